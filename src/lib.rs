@@ -1,0 +1,30 @@
+//! relit: from one turn of a relighting turntable to 1500 masked frames in training shards.
+//!
+//! Camera and object ride together on a black electric turntable. One turn of 360 degrees in
+//! 50 s, filmed at 30 frames/s, is 1500 frames in which the object stands still while light and
+//! background change (Yi, Zhu and Xu, *Weakly-supervised Single-view Image Relighting*,
+//! CVPR 2023). This crate is the part of the toolkit that turns such a recording into data:
+//!
+//! ```text
+//! session folder or video file -> mask.png -> 1500 masked frames with statistics -> shard -> verify
+//! ```
+//!
+//! # The map
+//!
+//! | room | what it is for | knows |
+//! | --- | --- | --- |
+//! | [`session`] | what a capture leaves on disk: manifest and frame index | nobody |
+//! | [`geometry`] | pixel rectangles | nobody |
+//! | [`video`] | FFmpeg: a video file to frames with numbers and time stamps | `geometry` |
+//! | [`shard`] | the data set on disk: samples, records, tables; write, read, verify | `geometry` |
+//! | [`report`] | the HTML page that shows one extracted session | `shard` |
+//! | [`mask`] | seeds, GrabCut, clean-up of the mask | `session`, `video`, `geometry` |
+//! | [`extract`] | select, crop, measure, scale, write: the pipeline | all of the above |
+//!
+//! Data flows one way, and nothing knows what stands below it in this table. The programs in
+//! `src/bin` parse arguments, call one function here and report. The library itself never prints,
+//! never exits and never reads the environment; errors are typed, one `Error` a room.
+
+pub mod geometry;
+pub mod session;
+pub mod shard;

@@ -1,0 +1,2 @@
+//! The data set on disk.
+pub mod record;
