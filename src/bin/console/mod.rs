@@ -1,0 +1,111 @@
+//! The edge between the programs and a person or a machine: lines on the terminal, JSON lines,
+//! progress, exit codes. The one place that prints.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+use std::error::Error;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::Value;
+
+/// How a command that ran to its end came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// All was done: exit code 0.
+    Whole,
+    /// Finished, and what was asked to be checked is wrong: exit code 1.
+    Wrong,
+    /// Finished, but something was left out or lost: exit code 3.
+    Lossy,
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> Self {
+        match outcome {
+            Outcome::Whole => Self::SUCCESS,
+            Outcome::Wrong => Self::from(1),
+            Outcome::Lossy => Self::from(3),
+        }
+    }
+}
+
+/// Speaks for one program, to a person or, with `--json`, to a machine.
+#[derive(Debug, Clone, Copy)]
+pub struct Console {
+    json: bool,
+}
+
+impl Console {
+    /// A console that prints JSON lines (`json`) or text on standard output.
+    pub fn new(json: bool) -> Self {
+        Self { json }
+    }
+
+    /// A result: `text` for a person, `event` as one JSON line for a machine.
+    pub fn say(self, text: &str, event: &Value) {
+        if self.json {
+            println!("{event}");
+        } else {
+            println!("{text}");
+        }
+    }
+
+    /// A warning: standard error for a person, a JSON line for a machine.
+    pub fn warn(self, text: &str) {
+        if self.json {
+            println!("{}", serde_json::json!({ "event": "warning", "message": text }));
+        } else {
+            eprintln!("warning: {text}");
+        }
+    }
+
+    /// An error, with its causes, as one sentence.
+    pub fn error(self, error: &dyn Error) {
+        let text = sentence(error);
+        if self.json {
+            println!("{}", serde_json::json!({ "event": "error", "message": text }));
+        }
+        eprintln!("error: {text}");
+    }
+
+    /// The exit code of a command, after its error, if any, was told.
+    pub fn finish<E: Error>(self, result: Result<Outcome, E>) -> ExitCode {
+        match result {
+            Ok(outcome) => outcome.into(),
+            Err(error) => {
+                self.error(&error);
+                ExitCode::FAILURE
+            }
+        }
+    }
+
+    /// A progress bar over `length` steps; hidden with `--json` or where standard error is not a
+    /// terminal.
+    pub fn progress(self, length: u64, label: &str) -> ProgressBar {
+        if self.json {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(length).with_message(label.to_owned());
+        let template = "{msg:.bold} {wide_bar} {pos}/{len} {per_sec} {eta}";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(200));
+        bar
+    }
+}
+
+/// The error and its causes, each told once.
+fn sentence(error: &dyn Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(inner) = cause {
+        let inner_text = inner.to_string();
+        if !text.contains(&inner_text) {
+            text = format!("{text}: {inner_text}");
+        }
+        cause = inner.source();
+    }
+    text
+}
