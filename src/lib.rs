@@ -15,6 +15,7 @@
 //! | --- | --- | --- |
 //! | [`session`] | what a capture leaves on disk: manifest and frame index | nobody |
 //! | [`geometry`] | pixel rectangles | nobody |
+//! | [`durable`] | files that appear whole or not at all | nobody |
 //! | [`video`] | FFmpeg: a video file to frames with numbers and time stamps | `geometry` |
 //! | [`shard`] | the data set on disk: samples, records, tables; write, read, verify | `geometry` |
 //! | [`report`] | the HTML page that shows one extracted session | `shard` |
@@ -25,6 +26,7 @@
 //! `src/bin` parse arguments, call one function here and report. The library itself never prints,
 //! never exits and never reads the environment; errors are typed, one `Error` a room.
 
+pub mod durable;
 pub mod geometry;
 pub mod session;
 pub mod shard;

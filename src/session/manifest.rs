@@ -1,0 +1,303 @@
+//! The manifest: `session.json`, schema `relit.session/1`.
+
+use std::collections::BTreeMap;
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::is_session_name;
+
+/// The schema that this version reads and writes.
+pub const MANIFEST_SCHEMA: &str = "relit.session/1";
+
+/// What is known of a session as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Manifest {
+    /// The session's name: `<UTC date>T<time>Z-<object>`.
+    pub id: String,
+    /// When the capture began, UTC.
+    pub created: Timestamp,
+    /// Whether the capture came to its end.
+    pub status: Status,
+    /// The camera and its settings.
+    pub camera: CameraFacts,
+    /// The turntable; `None` where the camera recorded without one.
+    pub turntable: Option<TurntableFacts>,
+    /// The video file.
+    pub video: VideoFacts,
+    /// What went wrong on the way, in order of time.
+    pub faults: Vec<Fault>,
+    /// The program that recorded.
+    pub software: SoftwareFacts,
+}
+
+/// How far a capture has come.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Status {
+    /// Not ended: running, or its recorder died and nothing was salvaged yet.
+    Recording,
+    /// Whole.
+    Complete,
+    /// Ended early or salvaged, for this reason.
+    Aborted(String),
+}
+
+/// The camera and its settings, as read back from the device.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraFacts {
+    /// `v4l2`, `nokhwa` or `replay`.
+    pub backend: String,
+    /// The device's path or number.
+    pub device: String,
+    /// The device's own name.
+    pub name: String,
+    /// The pixel format's four characters, such as `MJPG`.
+    pub fourcc: String,
+    /// Frame width, pixels.
+    pub width: u32,
+    /// Frame height, pixels.
+    pub height: u32,
+    /// Nominal frames per second.
+    pub fps: f64,
+    /// Every control's value, by name.
+    pub controls: BTreeMap<String, Value>,
+}
+
+/// The turntable's facts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TurntableFacts {
+    /// The serial port.
+    pub port: String,
+    /// What the controller says it runs.
+    pub firmware: String,
+    /// Speed of the constant part, degrees a second.
+    pub degrees_per_second: f64,
+    /// Motor steps a degree.
+    pub steps_per_degree: f64,
+}
+
+/// The video file. The last three are `None` only while the capture is not complete.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct VideoFacts {
+    /// Its name in the session folder.
+    pub file: String,
+    /// `mjpeg`, `h264` or `ffv1`.
+    pub codec: String,
+    /// Frames in it.
+    #[serde(default)]
+    pub frames: Option<u64>,
+    /// Its size, bytes.
+    #[serde(default)]
+    pub bytes: Option<u64>,
+    /// Its BLAKE3 hash, 64 hexadecimal digits.
+    #[serde(default)]
+    pub blake3: Option<String>,
+}
+
+/// Something that went wrong during a capture.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fault {
+    /// When, microseconds of the driver's monotonic clock.
+    pub t_us: i64,
+    /// What, for a person.
+    pub what: String,
+}
+
+/// The program that recorded.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SoftwareFacts {
+    /// Its version.
+    pub version: String,
+    /// The commit it was built from, or empty.
+    pub commit: String,
+}
+
+/// What is wrong in a manifest.
+#[derive(Debug, thiserror::Error)]
+pub enum ManifestFault {
+    /// Not JSON, or a field is missing or of another type.
+    #[error("{0}")]
+    Json(#[from] serde_json::Error),
+    /// Another schema, probably of a newer version.
+    #[error("its schema is {found:?}, and this version reads {MANIFEST_SCHEMA:?}")]
+    Schema {
+        /// What stands there.
+        found: String,
+    },
+    /// The id cannot be a session's name.
+    #[error("its id {0:?} cannot be a session's name")]
+    Id(String),
+    /// `status` is none of the three.
+    #[error("its status {0:?} is none of \"recording\", \"complete\", \"aborted\"")]
+    Status(String),
+    /// Aborted without a reason.
+    #[error("its status is \"aborted\" and no reason stands there")]
+    NoReason,
+    /// A complete session lacks a fact about its video.
+    #[error("its status is \"complete\" and video.{0} is missing")]
+    Incomplete(&'static str),
+    /// The video's name leads out of the session folder.
+    #[error("its video.file {0:?} is not a plain file name")]
+    VideoName(String),
+    /// The hash is not one.
+    #[error("its video.blake3 {0:?} is not a hash of 64 hexadecimal digits")]
+    Hash(String),
+    /// A number that must be positive and finite is not.
+    #[error("its {field} is {value}, which cannot be")]
+    Number {
+        /// The field.
+        field: &'static str,
+        /// What stands there.
+        value: f64,
+    },
+}
+
+impl Manifest {
+    /// Reads a manifest from the bytes of its file.
+    ///
+    /// # Errors
+    /// [`ManifestFault`] names the first thing that is wrong.
+    pub fn from_json(bytes: &[u8]) -> Result<Self, ManifestFault> {
+        // The schema first: of another version, no other field's complaint would be of use.
+        let schema: SchemaOnly = serde_json::from_slice(bytes)?;
+        if schema.schema != MANIFEST_SCHEMA {
+            return Err(ManifestFault::Schema {
+                found: schema.schema,
+            });
+        }
+        let wire: Wire = serde_json::from_slice(bytes)?;
+        let status = match (wire.status.as_str(), wire.reason) {
+            ("recording", _) => Status::Recording,
+            ("complete", _) => Status::Complete,
+            ("aborted", Some(reason)) => Status::Aborted(reason),
+            ("aborted", None) => return Err(ManifestFault::NoReason),
+            _ => return Err(ManifestFault::Status(wire.status)),
+        };
+        let manifest = Self {
+            id: wire.id,
+            created: wire.created,
+            status,
+            camera: wire.camera,
+            turntable: wire.turntable,
+            video: wire.video,
+            faults: wire.faults,
+            software: wire.software,
+        };
+        manifest.check()?;
+        Ok(manifest)
+    }
+
+    /// The manifest as the bytes of its file: indented JSON with a final line feed.
+    ///
+    /// # Errors
+    /// As [`Self::from_json`] would give for it: nothing is written that cannot be read back.
+    pub fn to_json(&self) -> Result<Vec<u8>, ManifestFault> {
+        self.check()?;
+        let (status, reason) = match &self.status {
+            Status::Recording => ("recording", None),
+            Status::Complete => ("complete", None),
+            Status::Aborted(reason) => ("aborted", Some(reason.clone())),
+        };
+        let wire = Wire {
+            schema: MANIFEST_SCHEMA.to_owned(),
+            id: self.id.clone(),
+            created: self.created,
+            status: status.to_owned(),
+            reason,
+            camera: self.camera.clone(),
+            turntable: self.turntable.clone(),
+            video: self.video.clone(),
+            faults: self.faults.clone(),
+            software: self.software.clone(),
+        };
+        let mut bytes = serde_json::to_vec_pretty(&wire)?;
+        bytes.push(b'\n');
+        Ok(bytes)
+    }
+
+    fn check(&self) -> Result<(), ManifestFault> {
+        if !is_session_name(&self.id) {
+            return Err(ManifestFault::Id(self.id.clone()));
+        }
+        let file = &self.video.file;
+        if file.is_empty() || file == "." || file == ".." || file.contains(['/', '\\', '\0']) {
+            return Err(ManifestFault::VideoName(file.clone()));
+        }
+        if let Some(hash) = &self.video.blake3
+            && (hash.len() != 64 || !hash.bytes().all(|b| b.is_ascii_hexdigit()))
+        {
+            return Err(ManifestFault::Hash(hash.clone()));
+        }
+        positive("camera.fps", self.camera.fps)?;
+        if let Some(table) = &self.turntable {
+            positive("turntable.degrees_per_second", table.degrees_per_second)?;
+            positive("turntable.steps_per_degree", table.steps_per_degree)?;
+        }
+        if self.status == Status::Complete {
+            let video = &self.video;
+            video.frames.ok_or(ManifestFault::Incomplete("frames"))?;
+            video.bytes.ok_or(ManifestFault::Incomplete("bytes"))?;
+            video
+                .blake3
+                .as_ref()
+                .ok_or(ManifestFault::Incomplete("blake3"))?;
+        }
+        Ok(())
+    }
+
+    /// The object's name: what follows the time in the id.
+    #[must_use]
+    pub fn object(&self) -> &str {
+        object_of(&self.id)
+    }
+}
+
+/// The object's name in a session's id: what follows `<UTC date>T<time>Z-`, or all of it where the
+/// id is not of that form.
+#[must_use]
+pub fn object_of(id: &str) -> &str {
+    let Some((stamp, object)) = id.split_once("Z-") else {
+        return id;
+    };
+    let is_stamp = stamp.len() == 15
+        && stamp.bytes().enumerate().all(|(at, byte)| match at {
+            8 => byte == b'T',
+            _ => byte.is_ascii_digit(),
+        });
+    if is_stamp && !object.is_empty() {
+        object
+    } else {
+        id
+    }
+}
+
+fn positive(field: &'static str, value: f64) -> Result<(), ManifestFault> {
+    if value.is_finite() && value > 0.0 {
+        Ok(())
+    } else {
+        Err(ManifestFault::Number { field, value })
+    }
+}
+
+#[derive(Deserialize)]
+struct SchemaOnly {
+    schema: String,
+}
+
+/// The manifest as it stands in the file, where `status` and `reason` are two fields.
+#[derive(Serialize, Deserialize)]
+struct Wire {
+    schema: String,
+    id: String,
+    created: Timestamp,
+    status: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reason: Option<String>,
+    camera: CameraFacts,
+    turntable: Option<TurntableFacts>,
+    video: VideoFacts,
+    #[serde(default)]
+    faults: Vec<Fault>,
+    software: SoftwareFacts,
+}

@@ -1,0 +1,279 @@
+//! A recording as a program is given it: a session folder, or a bare video.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::{
+    Error, FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, Status, is_session_name, object_of,
+};
+
+/// File name endings that are taken for videos in a folder without manifest.
+const VIDEO_ENDINGS: [&str; 7] = ["mkv", "mp4", "mov", "avi", "webm", "m4v", "nut"];
+
+/// Something about a recording that its user has to know.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Notice {
+    /// Worth a look; nothing is lost.
+    Warning(String),
+    /// Something that was recorded, or should have been, is not there.
+    Loss(String),
+}
+
+impl Notice {
+    /// The sentence.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        match self {
+            Self::Warning(text) | Self::Loss(text) => text,
+        }
+    }
+
+    /// True where something is lost.
+    #[must_use]
+    pub fn is_loss(&self) -> bool {
+        matches!(self, Self::Loss(_))
+    }
+}
+
+/// One recorded turn: the video and what is known of it.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    /// The session's name.
+    pub id: String,
+    /// The object's name.
+    pub object: String,
+    /// The session folder; `None` for a bare video file.
+    pub folder: Option<PathBuf>,
+    /// The video file.
+    pub video: PathBuf,
+    /// The manifest; `None` for a bare video.
+    pub manifest: Option<Manifest>,
+    /// The frame index, where there is one.
+    pub frames: Option<FrameIndex>,
+    /// What the user has to know.
+    pub notices: Vec<Notice>,
+}
+
+impl Recording {
+    /// Opens a session folder or a bare video file. The video itself is not looked into, except
+    /// for its size.
+    ///
+    /// # Errors
+    /// [`Error`] where manifest or index are not usable, the session has not ended, or there is no
+    /// video. What is short but usable becomes a [`Notice`].
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        if path.is_dir() {
+            if path.join(MANIFEST_FILE).exists() {
+                return Self::open_session(path);
+            }
+            return Self::open_plain_folder(path);
+        }
+        if !path.is_file() {
+            return Err(Error::NotThere(path.to_owned()));
+        }
+        Ok(Self::bare(path, path.file_stem(), None))
+    }
+
+    fn open_session(folder: &Path) -> Result<Self, Error> {
+        let manifest_path = folder.join(MANIFEST_FILE);
+        let bytes = fs::read(&manifest_path).map_err(Error::io(&manifest_path, "read"))?;
+        let manifest = Manifest::from_json(&bytes).map_err(|fault| Error::Manifest {
+            path: manifest_path,
+            fault,
+        })?;
+        let mut notices = Vec::new();
+        match &manifest.status {
+            Status::Complete => {}
+            Status::Recording => return Err(Error::StillRecording(folder.to_owned())),
+            Status::Aborted(reason) => {
+                notices.push(Notice::Loss(format!("the capture was aborted: {reason}")));
+            }
+        }
+        let video = folder.join(&manifest.video.file);
+        let found = match fs::metadata(&video) {
+            Ok(data) if data.is_file() => data.len(),
+            _ => return Err(Error::VideoMissing(video)),
+        };
+        if let Some(said) = manifest.video.bytes
+            && said != found
+        {
+            let file = &manifest.video.file;
+            notices.push(Notice::Loss(format!(
+                "{file} has {found} bytes where the manifest says {said}: it was cut or changed"
+            )));
+        }
+        for fault in &manifest.faults {
+            notices.push(Notice::Warning(format!(
+                "during the capture: {}",
+                fault.what
+            )));
+        }
+        let frames = read_index(folder, &manifest, &mut notices)?;
+        Ok(Self {
+            id: manifest.id.clone(),
+            object: manifest.object().to_owned(),
+            folder: Some(folder.to_owned()),
+            video,
+            manifest: Some(manifest),
+            frames,
+            notices,
+        })
+    }
+
+    fn open_plain_folder(folder: &Path) -> Result<Self, Error> {
+        let mut videos = videos_in(folder)?;
+        match (videos.pop(), videos.len()) {
+            (None, _) => Err(Error::NoSession(folder.to_owned())),
+            (Some(video), 0) => {
+                // A name such as "." tells nothing; the real one does.
+                let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+                let mut recording = Self::bare(&video, real.file_name(), Some(folder));
+                recording.notices.push(Notice::Warning(format!(
+                    "{} has no session.json: its video is taken without angles and driver's time stamps",
+                    folder.display()
+                )));
+                Ok(recording)
+            }
+            (Some(_), more) => Err(Error::SeveralVideos {
+                folder: folder.to_owned(),
+                count: more + 1,
+            }),
+        }
+    }
+
+    fn bare(video: &Path, name: Option<&OsStr>, folder: Option<&Path>) -> Self {
+        let id = name_from(name);
+        Self {
+            object: object_of(&id).to_owned(),
+            id,
+            folder: folder.map(Path::to_owned),
+            video: video.to_owned(),
+            manifest: None,
+            frames: None,
+            notices: Vec::new(),
+        }
+    }
+}
+
+/// The recordings that a path stands for: a session folder or a video file is one, a folder of
+/// sessions is each of them, sorted by name.
+///
+/// # Errors
+/// [`Error::NotThere`], [`Error::NoSession`], or what the file system answers.
+pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, Error> {
+    if !path.exists() {
+        return Err(Error::NotThere(path.to_owned()));
+    }
+    if path.is_file() || holds_recording(path)? {
+        return Ok(vec![path.to_owned()]);
+    }
+    let mut found = Vec::new();
+    for entry in fs::read_dir(path).map_err(Error::io(path, "listed"))? {
+        let inner = entry.map_err(Error::io(path, "listed"))?.path();
+        if inner.is_dir() && holds_recording(&inner)? {
+            found.push(inner);
+        }
+    }
+    if found.is_empty() {
+        return Err(Error::NoSession(path.to_owned()));
+    }
+    found.sort();
+    Ok(found)
+}
+
+fn holds_recording(folder: &Path) -> Result<bool, Error> {
+    Ok(folder.join(MANIFEST_FILE).exists() || !videos_in(folder)?.is_empty())
+}
+
+fn videos_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let mut videos = Vec::new();
+    for entry in fs::read_dir(folder).map_err(Error::io(folder, "listed"))? {
+        let path = entry.map_err(Error::io(folder, "listed"))?.path();
+        let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default();
+        if VIDEO_ENDINGS.contains(&ending.to_ascii_lowercase().as_str()) && path.is_file() {
+            videos.push(path);
+        }
+    }
+    videos.sort();
+    Ok(videos)
+}
+
+/// A session's name made from a file's: what cannot stand in one becomes '_'.
+fn name_from(name: Option<&OsStr>) -> String {
+    let name = name.unwrap_or_default().to_string_lossy();
+    let mut id: String = name
+        .chars()
+        .map(|c| {
+            if is_session_name(c.encode_utf8(&mut [0; 4])) || c == '.' {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect();
+    while id.len() > 120 {
+        id.pop();
+    }
+    if is_session_name(&id) {
+        id
+    } else {
+        format!("_{}", id.trim_start_matches('.'))
+    }
+}
+
+fn read_index(
+    folder: &Path,
+    manifest: &Manifest,
+    notices: &mut Vec<Notice>,
+) -> Result<Option<FrameIndex>, Error> {
+    let path = folder.join(INDEX_FILE);
+    if !path.exists() {
+        notices.push(Notice::Loss(format!(
+            "{INDEX_FILE} is missing: angles and the driver's time stamps are lost"
+        )));
+        return Ok(None);
+    }
+    let bytes = fs::read(&path).map_err(Error::io(&path, "read"))?;
+    let index = FrameIndex::parse(&bytes).map_err(|fault| Error::Index {
+        path: path.clone(),
+        fault,
+    })?;
+    if index.is_torn() {
+        notices.push(Notice::Loss(format!(
+            "the last line of {INDEX_FILE} was cut and is lost"
+        )));
+    }
+    let counted = index.entries().len() as u64;
+    if let Some(said) = manifest.video.frames
+        && said != counted
+    {
+        notices.push(Notice::Loss(format!(
+            "{INDEX_FILE} has {counted} frames where the manifest says {said}"
+        )));
+    }
+    for gap in index.gaps() {
+        notices.push(Notice::Warning(format!(
+            "the camera dropped {} frame{} before frame {}",
+            gap.missing,
+            if gap.missing == 1 { "" } else { "s" },
+            gap.before
+        )));
+    }
+    Ok(Some(index))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_name_becomes_a_session_name() {
+        let name = |text: &str| name_from(Some(OsStr::new(text)));
+        assert_eq!(name("mug 2 (blue)"), "mug_2__blue_");
+        assert_eq!(name("20261120T093015Z-mug"), "20261120T093015Z-mug");
+        assert_eq!(name(".hidden"), "_hidden");
+        assert_eq!(name(""), "_");
+        assert!(is_session_name(&name(&"ä".repeat(200))));
+    }
+}
