@@ -30,3 +30,4 @@ pub mod durable;
 pub mod geometry;
 pub mod session;
 pub mod shard;
+pub mod video;

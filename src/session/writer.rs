@@ -130,7 +130,9 @@ impl SessionWriter {
             let file = File::open(&path).map_err(Error::io(&path, "read"))?;
             file.sync_all().map_err(Error::io(&path, "synced"))?;
             let mut hasher = blake3::Hasher::new();
-            let hashed = hasher.update_reader(file).map_err(Error::io(&path, "read"))?;
+            let hashed = hasher
+                .update_reader(file)
+                .map_err(Error::io(&path, "read"))?;
             self.manifest.video.bytes = Some(hashed.count());
             self.manifest.video.blake3 = Some(hashed.finalize().to_hex().to_string());
         } else if status == Status::Complete {

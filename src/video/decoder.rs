@@ -1,0 +1,90 @@
+//! Opening FFmpeg's decoders.
+
+use std::sync::{Mutex, PoisonError};
+
+use ffmpeg_next::codec::decoder::Check;
+use ffmpeg_next::codec::threading;
+use ffmpeg_next::codec::{self, Parameters, decoder};
+use ffmpeg_next::{Packet, frame};
+
+use super::FrameFault;
+
+/// True where every packet is a whole picture that needs no other.
+pub(super) fn frames_stand_alone(codec: codec::Id) -> bool {
+    matches!(codec, codec::Id::MJPEG | codec::Id::RAWVIDEO)
+}
+
+/// Opens a decoder with this many threads of its own (1: none).
+pub(super) fn open(
+    parameters: Parameters,
+    threads: usize,
+) -> Result<decoder::Video, ffmpeg_next::Error> {
+    let mut context = codec::Context::from_parameters(parameters)?;
+    let codec = context.id();
+    if threads > 1 {
+        context.set_threading(threading::Config {
+            kind: threading::Type::Frame,
+            count: threads,
+            ..Default::default()
+        });
+    }
+    let mut decoder = context.decoder();
+    if frames_stand_alone(codec) {
+        // Half a JPEG is then an error, not a picture whose lower part is grey.
+        decoder.check(Check::EXPLODE | Check::CRC);
+    } else {
+        decoder.check(Check::CRC);
+    }
+    decoder.video()
+}
+
+/// Decoders for frames that stand alone: each thread takes one and brings it back.
+pub(super) struct Pool {
+    parameters: Mutex<Parameters>,
+    idle: Mutex<Vec<decoder::Video>>,
+}
+
+impl Pool {
+    pub(super) fn new(parameters: Parameters) -> Self {
+        Self {
+            parameters: Mutex::new(parameters),
+            idle: Mutex::new(Vec::new()),
+        }
+    }
+
+    /// Decodes one packet that is a whole picture.
+    pub(super) fn decode(&self, packet: &Packet) -> Result<frame::Video, FrameFault> {
+        let idle = self
+            .idle
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .pop();
+        let mut decoder = match idle {
+            Some(decoder) => decoder,
+            None => self.open().map_err(FrameFault::Damaged)?,
+        };
+        let mut picture = frame::Video::empty();
+        decoder.send_packet(packet).map_err(FrameFault::Damaged)?;
+        // A decoder that failed is not brought back: it may hold on to what broke it.
+        decoder
+            .receive_frame(&mut picture)
+            .map_err(FrameFault::Damaged)?;
+        self.idle
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(decoder);
+        if picture.is_corrupt() || picture.has_decode_errors() {
+            return Err(FrameFault::Concealed);
+        }
+        Ok(picture)
+    }
+
+    fn open(&self) -> Result<decoder::Video, ffmpeg_next::Error> {
+        let parameters = self
+            .parameters
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone();
+        open(parameters, 1)
+    }
+}

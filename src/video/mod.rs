@@ -1,0 +1,120 @@
+//! Videos by way of FFmpeg: a file becomes frames with numbers and time stamps, and frames become
+//! RGB pictures.
+//!
+//! A [`Video`] is opened by reading through the file once without decoding: which frames it has,
+//! in order of presentation, when each is due, and whether the file is whole. A [`Reader`] then
+//! hands out the wanted frames. Where each frame stands alone (Motion JPEG, raw video) it hands out
+//! compressed frames that any number of threads decode side by side; elsewhere FFmpeg's own threads
+//! decode ahead. Memory does not grow with the length of the video, but for some 30 bytes a frame.
+//!
+//! Colour range (limited, full) and matrix are honoured, a display rotation is applied, variable
+//! frame rate and gaps in the time stamps are kept as they are. This room knows nothing of
+//! sessions, masks or angles.
+
+mod decoder;
+mod matroska;
+mod orientation;
+mod picture;
+mod reader;
+mod scan;
+
+use std::path::PathBuf;
+use std::sync::Once;
+
+pub use matroska::{Cut, find_cut};
+pub use picture::Picture;
+pub use reader::{Pending, Reader};
+pub use scan::{Damage, Facts, FrameInfo, Video};
+
+/// Why a video could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// FFmpeg cannot make anything of the file.
+    #[error(
+        "{path} cannot be opened as a video ({why}): is it whole, and is it a video? `ffprobe` on it tells more"
+    )]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// FFmpeg's word.
+        why: ffmpeg_next::Error,
+    },
+    /// No picture track.
+    #[error("{0} has no video stream")]
+    NoVideo(PathBuf),
+    /// A picture track without a single frame.
+    #[error("{0} has not one whole frame")]
+    NoFrames(PathBuf),
+    /// The codec is not supported by this FFmpeg, or refuses the stream.
+    #[error("{path}: no decoder for its codec {codec} can be opened ({why})")]
+    Decoder {
+        /// The file.
+        path: PathBuf,
+        /// The codec's name.
+        codec: String,
+        /// FFmpeg's word.
+        why: ffmpeg_next::Error,
+    },
+    /// A frame beyond the end.
+    #[error("{path} has no frame {number}: its frames are 0 to {last}")]
+    NoSuchFrame {
+        /// The file.
+        path: PathBuf,
+        /// The frame that was asked for.
+        number: u64,
+        /// The last one.
+        last: u64,
+    },
+    /// A frame that is there and cannot be decoded.
+    #[error("frame {number} of {path} cannot be decoded: {fault}")]
+    Frame {
+        /// The file.
+        path: PathBuf,
+        /// The frame.
+        number: u64,
+        /// What is wrong with it.
+        fault: FrameFault,
+    },
+}
+
+/// Why one frame yields no picture.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum FrameFault {
+    /// The decoder refused its data.
+    #[error("its data are damaged ({0})")]
+    Damaged(ffmpeg_next::Error),
+    /// The decoder covered up missing parts.
+    #[error("parts of it are missing and were covered up by the decoder")]
+    Concealed,
+    /// It is predicted from a frame that is damaged.
+    #[error("it builds on the damaged frame {0}")]
+    BuildsOnDamaged(u64),
+    /// The decoder gave nothing for it.
+    #[error("the decoder gave no picture for it")]
+    NoPicture,
+    /// The picture's size changes in the middle of the video.
+    #[error("it is {found_w} x {found_h} pixels in a video of {wanted_w} x {wanted_h}")]
+    Size {
+        /// Width found.
+        found_w: u32,
+        /// Height found.
+        found_h: u32,
+        /// The video's width.
+        wanted_w: u32,
+        /// The video's height.
+        wanted_h: u32,
+    },
+    /// The pixel format cannot be converted to RGB.
+    #[error("its pixel format {0} cannot be converted to RGB")]
+    PixelFormat(String),
+}
+
+/// FFmpeg's one-time set-up. It would print its own messages to standard error otherwise.
+fn initialise() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        // Registers nothing in any FFmpeg of these years; a failure shows when a file is opened.
+        let _ = ffmpeg_next::init();
+        ffmpeg_next::log::set_level(ffmpeg_next::log::Level::Quiet);
+    });
+}

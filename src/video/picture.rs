@@ -1,0 +1,302 @@
+//! A decoded frame, and its way to RGB.
+
+use ffmpeg_next::color;
+use ffmpeg_next::format::Pixel;
+use ffmpeg_next::frame;
+use ffmpeg_next::software::scaling;
+use image::{GenericImage, RgbImage};
+use yuv::{YuvGrayImage, YuvPlanarImage, YuvRange, YuvStandardMatrix};
+
+use super::FrameFault;
+use super::orientation::Orientation;
+use crate::geometry::Rect;
+
+/// How luma and colour differences become RGB: range and matrix (ITU-T H.273).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Colour {
+    pub(super) full_range: bool,
+    pub(super) matrix: YuvStandardMatrix,
+    /// True where the file does not state the matrix and it was chosen by the picture's size.
+    pub(super) matrix_assumed: bool,
+}
+
+impl Colour {
+    /// What a stream or frame states. JPEG's own colours are full-range BT.601 (JFIF); of other
+    /// video that states no matrix, up to 576 rows are BT.601 and more are BT.709, as players do.
+    pub(super) fn stated(
+        format: Pixel,
+        range: color::Range,
+        space: color::Space,
+        height: u32,
+    ) -> Self {
+        let jpeg = is_jpeg_format(format);
+        let stated = match space {
+            color::Space::BT709 => Some(YuvStandardMatrix::Bt709),
+            color::Space::BT470BG | color::Space::SMPTE170M => Some(YuvStandardMatrix::Bt601),
+            color::Space::BT2020NCL | color::Space::BT2020CL => Some(YuvStandardMatrix::Bt2020),
+            color::Space::SMPTE240M => Some(YuvStandardMatrix::Smpte240),
+            color::Space::FCC => Some(YuvStandardMatrix::Fcc),
+            _ if jpeg => Some(YuvStandardMatrix::Bt601),
+            _ => None,
+        };
+        let by_size = if height > 576 {
+            YuvStandardMatrix::Bt709
+        } else {
+            YuvStandardMatrix::Bt601
+        };
+        Self {
+            full_range: jpeg || range == color::Range::JPEG,
+            matrix: stated.unwrap_or(by_size),
+            matrix_assumed: stated.is_none() && !is_rgb(format) && !is_grey(format),
+        }
+    }
+}
+
+fn is_jpeg_format(format: Pixel) -> bool {
+    use Pixel::{YUVJ411P, YUVJ420P, YUVJ422P, YUVJ440P, YUVJ444P};
+    matches!(format, YUVJ411P | YUVJ420P | YUVJ422P | YUVJ440P | YUVJ444P)
+}
+
+fn name_of(format: Pixel) -> &'static str {
+    format
+        .descriptor()
+        .map_or("unknown", |descriptor| descriptor.name())
+}
+
+fn is_rgb(format: Pixel) -> bool {
+    let name = name_of(format);
+    ["rgb", "bgr", "gbr", "bayer", "pal8", "mono"]
+        .iter()
+        .any(|part| name.contains(part))
+}
+
+fn is_grey(format: Pixel) -> bool {
+    let name = name_of(format);
+    name.starts_with("gray") || name.starts_with("ya8") || name.starts_with("ya16")
+}
+
+/// One decoded frame.
+pub struct Picture {
+    number: u64,
+    frame: frame::Video,
+    colour: Colour,
+    orientation: Orientation,
+}
+
+impl std::fmt::Debug for Picture {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let format = self.frame.format();
+        write!(
+            f,
+            "Picture {{ number: {}, format: {format:?} }}",
+            self.number
+        )
+    }
+}
+
+impl Picture {
+    pub(super) fn new(
+        number: u64,
+        frame: frame::Video,
+        colour: Colour,
+        orientation: Orientation,
+    ) -> Self {
+        Self {
+            number,
+            frame,
+            colour,
+            orientation,
+        }
+    }
+
+    /// The frame's position in the video, 0-based, in order of presentation.
+    #[must_use]
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Width and height as displayed, pixels.
+    #[must_use]
+    pub fn size(&self) -> (u32, u32) {
+        self.orientation
+            .displayed(self.frame.width(), self.frame.height())
+    }
+
+    /// The part of the displayed picture under `region` as 8-bit RGB, `region.w` x `region.h`
+    /// pixels; 0 where the region reaches beyond the picture.
+    ///
+    /// # Errors
+    /// [`FrameFault::PixelFormat`] where the format cannot be converted.
+    pub fn rgb(&self, region: Rect) -> Result<RgbImage, FrameFault> {
+        let (width, height) = self.size();
+        let Some(inside) = region.clipped_to(width, height) else {
+            return Ok(RgbImage::new(region.w, region.h));
+        };
+        let coded = self
+            .orientation
+            .to_coded(inside, self.frame.width(), self.frame.height());
+        let piece = self.orientation.apply(self.coded_rgb(coded)?);
+        if inside == region {
+            return Ok(piece);
+        }
+        let mut whole = RgbImage::new(region.w, region.h);
+        let (left, top) = (inside.x - region.x, inside.y - region.y);
+        // The piece fits by how `inside` was made.
+        let _ = whole.copy_from(&piece, left as u32, top as u32);
+        Ok(whole)
+    }
+
+    /// The RGB of a rectangle that lies inside the coded picture.
+    fn coded_rgb(&self, rect: Rect) -> Result<RgbImage, FrameFault> {
+        let format = self.frame.format();
+        if is_direct(format) && strides_are_forward(&self.frame) {
+            return planes_to_rgb(&self.frame, format, self.colour, rect)
+                .ok_or_else(|| unconvertible(format));
+        }
+        let plain = plain_format(format, self.colour.full_range);
+        let converted = convert(&self.frame, plain).map_err(|_| unconvertible(format))?;
+        planes_to_rgb(&converted, plain, self.colour, rect).ok_or_else(|| unconvertible(format))
+    }
+}
+
+fn unconvertible(format: Pixel) -> FrameFault {
+    FrameFault::PixelFormat(name_of(format).to_owned())
+}
+
+/// Formats that go to RGB without a step between.
+fn is_direct(format: Pixel) -> bool {
+    use Pixel::{GRAY8, RGB24, YUV420P, YUV422P, YUV444P, YUVJ420P, YUVJ422P, YUVJ444P};
+    matches!(
+        format,
+        GRAY8 | RGB24 | YUV420P | YUV422P | YUV444P | YUVJ420P | YUVJ422P | YUVJ444P
+    )
+}
+
+/// The direct format that keeps all of what `format` holds in 8 bits: chroma is only ever
+/// upsampled, and the range stays what it is.
+fn plain_format(format: Pixel, full_range: bool) -> Pixel {
+    if is_rgb(format) {
+        return Pixel::RGB24;
+    }
+    if is_grey(format) {
+        return Pixel::GRAY8;
+    }
+    let halved = format
+        .descriptor()
+        .map(|d| (d.log2_chroma_w(), d.log2_chroma_h()));
+    // swscale takes the range from the name of the format; the same one on both sides keeps it.
+    match (halved, is_jpeg_format(format) && full_range) {
+        (Some((1, 1)), false) => Pixel::YUV420P,
+        (Some((1, 1)), true) => Pixel::YUVJ420P,
+        (Some((1, 0)), false) => Pixel::YUV422P,
+        (Some((1, 0)), true) => Pixel::YUVJ422P,
+        (_, false) => Pixel::YUV444P,
+        (_, true) => Pixel::YUVJ444P,
+    }
+}
+
+fn convert(source: &frame::Video, plain: Pixel) -> Result<frame::Video, ffmpeg_next::Error> {
+    use scaling::Flags;
+    let (width, height) = (source.width(), source.height());
+    let flags = Flags::BILINEAR | Flags::ACCURATE_RND | Flags::BITEXACT | Flags::FULL_CHR_H_INP;
+    let mut scaler =
+        scaling::Context::get(source.format(), width, height, plain, width, height, flags)?;
+    let mut target = frame::Video::empty();
+    scaler.run(source, &mut target)?;
+    Ok(target)
+}
+
+/// False for pictures that are stored from the bottom up: their strides are negative.
+#[allow(unsafe_code)]
+fn strides_are_forward(frame: &frame::Video) -> bool {
+    // SAFETY: the pointer is that of a live frame, and `linesize` is a plain array in it.
+    unsafe { (*frame.as_ptr()).linesize.iter().all(|&stride| stride >= 0) }
+}
+
+/// One plane of samples, from the sample (x, y) on.
+fn plane(frame: &frame::Video, index: usize, x: usize, y: usize) -> Option<(&[u8], u32)> {
+    if index >= frame.planes() {
+        return None;
+    }
+    let stride = frame.stride(index);
+    let samples = frame.data(index).get(y * stride + x..)?;
+    Some((samples, u32::try_from(stride).ok()?))
+}
+
+/// RGB of `rect`, which lies inside the frame. `None` where the frame's planes are not what the
+/// format says.
+fn planes_to_rgb(
+    frame: &frame::Video,
+    format: Pixel,
+    colour: Colour,
+    rect: Rect,
+) -> Option<RgbImage> {
+    use Pixel::{GRAY8, RGB24, YUV420P, YUV422P, YUVJ420P, YUVJ422P};
+    let (shift_x, shift_y) = match format {
+        YUV420P | YUVJ420P => (1, 1),
+        YUV422P | YUVJ422P => (1, 0),
+        _ => (0, 0),
+    };
+    // A piece has to begin on a chroma sample: it is taken larger, and the surplus is cut off.
+    let (x, y) = (usize::try_from(rect.x).ok()?, usize::try_from(rect.y).ok()?);
+    let (surplus_x, surplus_y) = (x & shift_x, y & shift_y);
+    let (x, y) = (x - surplus_x, y - surplus_y);
+    let width = rect.w + surplus_x as u32;
+    let height = rect.h + surplus_y as u32;
+    if format == RGB24 {
+        return copy_rgb(frame, x, y, width, height);
+    }
+    let mut rgb = RgbImage::new(width, height);
+    let range = if colour.full_range {
+        YuvRange::Full
+    } else {
+        YuvRange::Limited
+    };
+    let (y_plane, y_stride) = plane(frame, 0, x, y)?;
+    let stride = width * 3;
+    let converted = if format == GRAY8 {
+        let grey = YuvGrayImage {
+            y_plane,
+            y_stride,
+            width,
+            height,
+        };
+        yuv::yuv400_to_rgb(&grey, &mut rgb, stride, range, colour.matrix)
+    } else {
+        let (u_plane, u_stride) = plane(frame, 1, x >> shift_x, y >> shift_y)?;
+        let (v_plane, v_stride) = plane(frame, 2, x >> shift_x, y >> shift_y)?;
+        let planes = YuvPlanarImage {
+            y_plane,
+            y_stride,
+            u_plane,
+            u_stride,
+            v_plane,
+            v_stride,
+            width,
+            height,
+        };
+        let to_rgb = match (shift_x, shift_y) {
+            (1, 1) => yuv::yuv420_to_rgb,
+            (1, 0) => yuv::yuv422_to_rgb,
+            _ => yuv::yuv444_to_rgb,
+        };
+        to_rgb(&planes, &mut rgb, stride, range, colour.matrix)
+    };
+    converted.ok()?;
+    if (surplus_x, surplus_y) == (0, 0) {
+        return Some(rgb);
+    }
+    let (left, top) = (surplus_x as u32, surplus_y as u32);
+    Some(image::imageops::crop_imm(&rgb, left, top, rect.w, rect.h).to_image())
+}
+
+fn copy_rgb(frame: &frame::Video, x: usize, y: usize, width: u32, height: u32) -> Option<RgbImage> {
+    let (samples, stride) = plane(frame, 0, 3 * x, y)?;
+    let row = 3 * width as usize;
+    let mut pixels = Vec::with_capacity(row * height as usize);
+    for line in 0..height as usize {
+        let start = line * stride as usize;
+        pixels.extend_from_slice(samples.get(start..start + row)?);
+    }
+    RgbImage::from_raw(width, height, pixels)
+}

@@ -1,0 +1,336 @@
+//! Handing out the wanted frames of a video, in order, with as little work as the codec allows.
+
+use std::collections::VecDeque;
+
+use ffmpeg_next::codec::{Parameters, decoder};
+use ffmpeg_next::format::context::Input;
+use ffmpeg_next::{Packet, format, frame};
+
+use super::decoder::{self as opening, Pool};
+use super::picture::Picture;
+use super::scan::{Track, Video};
+use super::{Error, FrameFault};
+
+/// A wanted frame on its way to a picture: still compressed, decoded, or lost.
+/// [`Video::picture`] makes the picture of it, on any thread.
+#[derive(Debug)]
+pub struct Pending {
+    number: u64,
+    state: State,
+}
+
+#[derive(Debug)]
+enum State {
+    Coded(PacketBox),
+    Decoded(Picture),
+    Lost(FrameFault),
+}
+
+/// A packet, which has no `Debug` of its own.
+struct PacketBox(Packet);
+
+impl std::fmt::Debug for PacketBox {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Packet({} bytes)", self.0.size())
+    }
+}
+
+impl Pending {
+    /// The frame's position in the video.
+    #[must_use]
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    pub(super) fn decode(self, track: &Track, pool: &Pool) -> Result<Picture, FrameFault> {
+        match self.state {
+            State::Coded(packet) => track.picture(self.number, pool.decode(&packet.0)?),
+            State::Decoded(picture) => Ok(picture),
+            State::Lost(fault) => Err(fault),
+        }
+    }
+}
+
+impl Track {
+    /// A decoded frame as a picture of this track.
+    fn picture(&self, number: u64, frame: frame::Video) -> Result<Picture, FrameFault> {
+        let (wanted_w, wanted_h) = self.coded;
+        let (found_w, found_h) = (frame.width(), frame.height());
+        if (found_w, found_h) != self.coded {
+            return Err(FrameFault::Size {
+                found_w,
+                found_h,
+                wanted_w,
+                wanted_h,
+            });
+        }
+        Ok(Picture::new(number, frame, self.colour, self.orientation))
+    }
+
+    fn number_at(&self, pts: i64) -> Option<u64> {
+        let at = self
+            .number_at
+            .binary_search_by_key(&pts, |&(pts, _)| pts)
+            .ok()?;
+        Some(self.number_at[at].1)
+    }
+}
+
+/// Hands out the wanted frames of a [`Video`]. Every wanted frame comes exactly once, in order of
+/// presentation but for lost ones, which may come last.
+pub struct Reader<'a> {
+    video: &'a Video,
+    input: Input,
+    packet: Packet,
+    /// Packets of the track read so far.
+    packets: usize,
+    wanted: Wanted,
+    /// The decoder, where frames do not stand alone.
+    chain: Option<Chain>,
+    ready: VecDeque<Pending>,
+    ended: bool,
+}
+
+impl<'a> Reader<'a> {
+    pub(super) fn open(video: &'a Video, wanted: &[u64], threads: usize) -> Result<Self, Error> {
+        let path = || video.path().to_owned();
+        let input = format::input(video.path()).map_err(|why| Error::Open { path: path(), why })?;
+        let stream = input
+            .stream(video.track.stream)
+            .ok_or_else(|| Error::NoVideo(path()))?;
+        let chain = if opening::frames_stand_alone(video.track.codec) {
+            None
+        } else {
+            let chain = Chain::open(stream.parameters(), threads);
+            Some(chain.map_err(|why| Error::Decoder {
+                path: path(),
+                codec: video.facts().codec.clone(),
+                why,
+            })?)
+        };
+        Ok(Self {
+            video,
+            input,
+            packet: Packet::empty(),
+            packets: 0,
+            wanted: Wanted::new(wanted),
+            chain,
+            ready: VecDeque::new(),
+            ended: false,
+        })
+    }
+
+    /// Reads on until something is ready or the file ends.
+    fn advance(&mut self) {
+        match self.packet.read(&mut self.input) {
+            Ok(())
+                if self.packet.stream() != self.video.track.stream || self.packet.size() == 0 => {}
+            Ok(()) => self.take_packet(),
+            Err(_) => self.end(),
+        }
+    }
+
+    fn take_packet(&mut self) {
+        let packet = std::mem::replace(&mut self.packet, Packet::empty());
+        let number = self.video.track.number_of_packet.get(self.packets).copied();
+        self.packets += 1;
+        let track = &self.video.track;
+        match &mut self.chain {
+            Some(chain) => chain.feed(&packet, number, track, &mut self.wanted, &mut self.ready),
+            None => {
+                if let Some(number) = number.filter(|&number| self.wanted.take(number)) {
+                    self.ready.push_back(Pending {
+                        number,
+                        state: State::Coded(PacketBox(packet)),
+                    });
+                }
+            }
+        }
+    }
+
+    fn end(&mut self) {
+        self.ended = true;
+        if let Some(chain) = &mut self.chain {
+            chain.flush(&self.video.track, &mut self.wanted, &mut self.ready);
+        }
+        for number in self.wanted.rest() {
+            self.ready.push_back(Pending {
+                number,
+                state: State::Lost(FrameFault::NoPicture),
+            });
+        }
+    }
+}
+
+impl Iterator for Reader<'_> {
+    type Item = Pending;
+
+    fn next(&mut self) -> Option<Pending> {
+        loop {
+            if let Some(pending) = self.ready.pop_front() {
+                return Some(pending);
+            }
+            if self.ended {
+                return None;
+            }
+            self.advance();
+            // Nothing more is wanted: the rest of the file need not be read.
+            if self.wanted.is_empty() && !self.ended {
+                self.ended = true;
+            }
+        }
+    }
+}
+
+/// The numbers still to be handed out.
+struct Wanted {
+    sorted: Vec<u64>,
+    taken: Vec<bool>,
+    left: usize,
+}
+
+impl Wanted {
+    fn new(numbers: &[u64]) -> Self {
+        let mut sorted = numbers.to_vec();
+        sorted.sort_unstable();
+        sorted.dedup();
+        Self {
+            taken: vec![false; sorted.len()],
+            left: sorted.len(),
+            sorted,
+        }
+    }
+
+    /// True the first time that a wanted number comes.
+    fn take(&mut self, number: u64) -> bool {
+        match self.sorted.binary_search(&number) {
+            Ok(at) if !self.taken[at] => {
+                self.taken[at] = true;
+                self.left -= 1;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.left == 0
+    }
+
+    fn rest(&mut self) -> Vec<u64> {
+        let open = self
+            .sorted
+            .iter()
+            .zip(&self.taken)
+            .filter(|(_, taken)| !**taken);
+        let rest = open.map(|(&number, _)| number).collect();
+        self.taken.fill(true);
+        self.left = 0;
+        rest
+    }
+}
+
+/// A decoder of frames that build on each other.
+struct Chain {
+    decoder: decoder::Video,
+    /// Frames that the decoder has given.
+    given: u64,
+    /// The damaged frame on which those up to the next key frame may build.
+    broken_by: Option<u64>,
+}
+
+impl Chain {
+    fn open(parameters: Parameters, threads: usize) -> Result<Self, ffmpeg_next::Error> {
+        let decoder = opening::open(parameters, threads)?;
+        Ok(Self {
+            decoder,
+            given: 0,
+            broken_by: None,
+        })
+    }
+
+    fn feed(
+        &mut self,
+        packet: &Packet,
+        number: Option<u64>,
+        track: &Track,
+        wanted: &mut Wanted,
+        ready: &mut VecDeque<Pending>,
+    ) {
+        if let Err(why) = self.decoder.send_packet(packet)
+            && let Some(number) = number
+        {
+            self.lose(number, FrameFault::Damaged(why), wanted, ready);
+        }
+        self.drain(track, wanted, ready);
+    }
+
+    fn flush(&mut self, track: &Track, wanted: &mut Wanted, ready: &mut VecDeque<Pending>) {
+        if self.decoder.send_eof().is_ok() {
+            self.drain(track, wanted, ready);
+        }
+    }
+
+    fn drain(&mut self, track: &Track, wanted: &mut Wanted, ready: &mut VecDeque<Pending>) {
+        let mut errors = 0;
+        loop {
+            let mut picture = frame::Video::empty();
+            match self.decoder.receive_frame(&mut picture) {
+                Ok(()) => self.accept(picture, track, wanted, ready),
+                // Decoding with threads tells of a damaged packet here; the frames after it come.
+                // No decoder holds back more packets than this, so it cannot go on for ever.
+                Err(ffmpeg_next::Error::InvalidData) if errors < 64 => {
+                    errors += 1;
+                    self.broken_by = self.broken_by.or(Some(self.given));
+                }
+                Err(_) => return,
+            }
+        }
+    }
+
+    fn accept(
+        &mut self,
+        picture: frame::Video,
+        track: &Track,
+        wanted: &mut Wanted,
+        ready: &mut VecDeque<Pending>,
+    ) {
+        let stamped = picture.timestamp().or_else(|| picture.pts());
+        let number = stamped
+            .and_then(|pts| track.number_at(pts))
+            .unwrap_or(self.given);
+        self.given = number + 1;
+        if picture.is_key() {
+            self.broken_by = None;
+        }
+        if picture.is_corrupt() || picture.has_decode_errors() {
+            return self.lose(number, FrameFault::Concealed, wanted, ready);
+        }
+        if let Some(damaged) = self.broken_by {
+            return self.lose(number, FrameFault::BuildsOnDamaged(damaged), wanted, ready);
+        }
+        if wanted.take(number) {
+            let state = match track.picture(number, picture) {
+                Ok(picture) => State::Decoded(picture),
+                Err(fault) => State::Lost(fault),
+            };
+            ready.push_back(Pending { number, state });
+        }
+    }
+
+    fn lose(
+        &mut self,
+        number: u64,
+        fault: FrameFault,
+        wanted: &mut Wanted,
+        ready: &mut VecDeque<Pending>,
+    ) {
+        self.broken_by = self.broken_by.or(Some(number));
+        if wanted.take(number) {
+            ready.push_back(Pending {
+                number,
+                state: State::Lost(fault),
+            });
+        }
+    }
+}
