@@ -1,13 +1,12 @@
 //! `dataset.json`: what a data set holds and vouches for.
 
-use std::fmt;
 use std::io;
 use std::path::Path;
-use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::digest::{Digest, FolderHasher};
+use super::digest::Digest;
+use super::settings::Settings;
 use super::{Error, names, output};
 use crate::geometry::Rect;
 
@@ -15,107 +14,6 @@ use crate::geometry::Rect;
 const SCHEMA: &str = "relit.dataset/1";
 /// Largest description that is read, bytes.
 const MOST_BYTES: u64 = 1 << 30;
-
-/// How samples lie on disk.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Layout {
-    /// One tar a session: `<session>.tar`, with members `<session>/<kkkk>.{png,mask.png,json}`.
-    Webdataset,
-    /// Folders: `imgs/<session>/<k>.png`, `masks/<session>.png`, `mean_img/<session>.png`.
-    Relit,
-}
-
-impl Layout {
-    /// All layouts.
-    pub const ALL: [Self; 2] = [Self::Webdataset, Self::Relit];
-
-    /// The name on the command line and in `dataset.json`.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Webdataset => "webdataset",
-            Self::Relit => "relit",
-        }
-    }
-
-    /// The shard of a session, relative to the data set: a tar or a folder.
-    pub(super) fn shard_file(self, session: &str) -> String {
-        match self {
-            Self::Webdataset => names::tar_file(session),
-            Self::Relit => names::image_folder(session),
-        }
-    }
-}
-
-impl fmt::Display for Layout {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Layout {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self, Error> {
-        let found = Self::ALL.into_iter().find(|layout| layout.name() == text);
-        found.ok_or_else(|| Error::UnknownLayout {
-            name: text.to_owned(),
-        })
-    }
-}
-
-/// The size of images and masks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum Size {
-    /// Scaled to a square of this side, pixels.
-    Pixels(u32),
-    /// The source's own pixels: `"native"`.
-    Native(Native),
-}
-
-/// The word `"native"`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Native {
-    /// Not scaled.
-    #[serde(rename = "native")]
-    Native,
-}
-
-impl Size {
-    /// The source's own pixels.
-    pub const NATIVE: Self = Self::Native(Native::Native);
-}
-
-/// What is done about a shift of the object.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Align {
-    /// Neither measured nor corrected.
-    Off,
-}
-
-/// How the sessions of a data set were extracted; the same for all of them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
-    /// Samples a session.
-    pub frames: u32,
-    /// Size of images and masks.
-    pub size: Size,
-    /// Margin around the mask's bounding box, as a fraction of its longer side, 0 and above.
-    pub margin: f64,
-    /// The 8-bit value from which a channel is saturated, 0..=255.
-    pub saturation_level: u8,
-    /// The fraction of saturated pixels above which `spec_net` is set, 0..=1.
-    pub gate: f64,
-    /// What is done about shifts.
-    pub align: Align,
-    /// How samples lie on disk.
-    pub layout: Layout,
-    /// The name of the method by which images were scaled.
-    pub scaling: String,
-}
 
 /// What wrote the data set.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -335,30 +233,6 @@ impl Dataset {
         self.shards.retain(|shard| shard.session != id);
     }
 
-    /// Whether the data set vouches for a session: it is entered, and each of its files is there
-    /// with its size and BLAKE3. The files are read once. Settings, input and mask are for the
-    /// caller to compare.
-    ///
-    /// # Errors
-    /// The reason why it does not: [`Error::NoSession`], [`Error::NoShard`], [`Error::Changed`]
-    /// or [`Error::Io`].
-    pub fn vouches_for(&self, out: &Path, id: &str) -> Result<(), Error> {
-        let unknown = || Error::NoSession {
-            session: id.to_owned(),
-        };
-        let session = self.session(id).ok_or_else(unknown)?;
-        for entry in std::iter::once(&session.table).chain(&session.report) {
-            check_file(out, entry)?;
-        }
-        if self.shards_of(id).next().is_none() {
-            return Err(Error::NoShard {
-                session: id.to_owned(),
-            });
-        }
-        self.shards_of(id)
-            .try_for_each(|shard| check_shard(out, shard, self.settings.layout))
-    }
-
     /// All files that the description names, of all sessions. Folders of images stand for
     /// themselves.
     pub(super) fn files(&self) -> impl Iterator<Item = &str> {
@@ -405,74 +279,10 @@ fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
     std::fs::read(path)
 }
 
-/// Whether a file is there and is the one of its entry.
-pub(super) fn check_file(out: &Path, entry: &FileEntry) -> Result<(), Error> {
-    names::check_path(&entry.file)?;
-    let path = out.join(&entry.file);
-    let (bytes, blake3) = Digest::of_file(&path).map_err(Error::io("read", &path))?;
-    compare(&entry.file, (entry.bytes, entry.blake3), (bytes, blake3))
-}
-
-/// Compares length and digest, as they should be and as they are.
-pub(super) fn compare(
-    file: &str,
-    expected: (u64, Digest),
-    found: (u64, Digest),
-) -> Result<(), Error> {
-    let changed = |what| {
-        Err(Error::Changed {
-            file: file.to_owned(),
-            what,
-        })
-    };
-    if found.0 != expected.0 {
-        return changed(format!("it has {} bytes, not {}", found.0, expected.0));
-    }
-    if found.1 != expected.1 {
-        return changed(format!("its BLAKE3 is {}, not {}", found.1, expected.1));
-    }
-    Ok(())
-}
-
-fn check_shard(out: &Path, shard: &ShardEntry, layout: Layout) -> Result<(), Error> {
-    for beside in shard.mask.iter().chain(&shard.mean_img) {
-        check_file(out, beside)?;
-    }
-    if layout == Layout::Webdataset {
-        let ShardEntry {
-            file,
-            bytes,
-            blake3,
-            ..
-        } = shard.clone();
-        return check_file(
-            out,
-            &FileEntry {
-                file,
-                bytes,
-                blake3,
-            },
-        );
-    }
-    names::check_path(&shard.file)?;
-    let mut hasher = FolderHasher::default();
-    let mut total = 0;
-    for index in 0..shard.samples {
-        let path = out.join(&shard.file).join(format!("{index}.png"));
-        let (bytes, digest) = Digest::of_file(&path).map_err(Error::io("read", &path))?;
-        hasher.add(&digest);
-        total += bytes;
-    }
-    compare(
-        &shard.file,
-        (shard.bytes, shard.blake3),
-        (total, hasher.finish()),
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shard::{Align, Layout, Size};
 
     fn settings() -> Settings {
         Settings {
@@ -541,23 +351,6 @@ mod tests {
             .map(|s| (s.id.as_str(), s.spec_net))
             .collect();
         assert_eq!(ids, [("a", 3), ("b", 4)]);
-    }
-
-    #[test]
-    fn the_size_is_a_number_or_the_word_native() {
-        for (size, json) in [(Size::Pixels(256), "256"), (Size::NATIVE, "\"native\"")] {
-            assert_eq!(serde_json::to_string(&size).unwrap(), json);
-            assert_eq!(serde_json::from_str::<Size>(json).unwrap(), size);
-        }
-        assert!(serde_json::from_str::<Size>("\"large\"").is_err());
-    }
-
-    #[test]
-    fn a_layout_is_read_by_its_name() {
-        for layout in Layout::ALL {
-            assert_eq!(layout.to_string().parse::<Layout>().unwrap(), layout);
-        }
-        assert!("tar".parse::<Layout>().is_err());
     }
 
     #[test]

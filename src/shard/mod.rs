@@ -14,7 +14,7 @@
 //! | `digest`, `names` | BLAKE3; which names are used and which are safe |
 //! | [`OutputFolder`] | one writer a folder; files that appear whole or not at all |
 //! | [`SessionWriter`] | samples in any order in, files out; `spool` and `folder` are its layouts |
-//! | [`Dataset`] | `dataset.json` |
+//! | [`Dataset`], [`Settings`] | `dataset.json`; `vouch` compares files with it |
 //! | [`ShardReader`] | any WebDataset shard as a stream of samples; `tarball` is the tar below it |
 //! | [`verify`](verify()) | reads everything back and names what is wrong |
 //!
@@ -32,16 +32,17 @@ mod order;
 mod output;
 mod reader;
 pub mod record;
+mod settings;
 mod spool;
 mod table;
 mod tarball;
 mod verify;
+mod vouch;
 mod writer;
 
 pub use codec::{decode_mask, decode_rgb, encode_mask, encode_rgb};
 pub use dataset::{
-    Align, Dataset, FileEntry, Input, Layout, MaskInfo, Native, Selection, SessionEntry, Settings,
-    ShardEntry, Size, Software,
+    Dataset, FileEntry, Input, MaskInfo, Selection, SessionEntry, ShardEntry, Software,
 };
 pub use digest::{Digest, NotADigest};
 pub use error::Error;
@@ -51,6 +52,7 @@ pub use order::order;
 pub use output::OutputFolder;
 pub use reader::{ShardReader, ShardSample};
 pub use record::FrameRecord;
+pub use settings::{Align, Layout, Native, Settings, Size};
 pub use table::{Row, read_table};
 pub use verify::{Problem, Verdict, verify};
 pub use writer::{Sample, SessionFiles, SessionWriter};

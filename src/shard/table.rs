@@ -19,9 +19,10 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::record::Field;
 use parquet::schema::parser::parse_message_type;
 
-use super::dataset::{FileEntry, compare};
+use super::dataset::FileEntry;
 use super::digest::{Digest, HashingReader};
 use super::record::FrameRecord;
+use super::vouch::compare;
 use super::{Error, MAX_SAMPLES, names};
 use crate::geometry::Rect;
 

@@ -5,11 +5,12 @@ use std::path::Path;
 use image::{GrayImage, RgbImage};
 
 use super::codec::{check_mask, encode_mask, encode_rgb};
-use super::dataset::{FileEntry, Layout, ShardEntry};
+use super::dataset::{FileEntry, ShardEntry};
 use super::digest::Digest;
 use super::folder::FolderStore;
 use super::output::{PartialFile, SealedFile};
 use super::record::FrameRecord;
+use super::settings::Layout;
 use super::spool::SpoolStore;
 use super::table::{Row, write_rows};
 use super::{Error, MAX_SAMPLES, names};

@@ -10,11 +10,12 @@ use rayon::prelude::*;
 use super::sample::{SessionMask, check_image};
 use super::{Found, SessionCheck};
 use crate::shard::codec::decode_rgb;
-use crate::shard::dataset::{FileEntry, check_file, compare};
+use crate::shard::dataset::FileEntry;
 use crate::shard::digest::{Digest, FolderHasher};
 use crate::shard::error::sentence;
 use crate::shard::folder::MeanImage;
 use crate::shard::measure::MaskSpans;
+use crate::shard::vouch::{check_file, compare};
 use crate::shard::{Error, names, output};
 
 /// Largest file that is read, bytes.

@@ -5,8 +5,9 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use super::Problem;
-use crate::shard::dataset::{Dataset, SessionEntry, ShardEntry, check_file};
+use crate::shard::dataset::{Dataset, SessionEntry, ShardEntry};
 use crate::shard::error::sentence;
+use crate::shard::vouch::check_file;
 use crate::shard::{Error, MAX_SAMPLES, names, output};
 
 /// What is wrong with the list of sessions and shards, with pages, and with stray files.

@@ -11,9 +11,10 @@ use std::fmt;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::dataset::{Dataset, Layout, SessionEntry, Settings, ShardEntry};
+use super::dataset::{Dataset, SessionEntry, ShardEntry};
 use super::error::sentence;
 use super::record::FrameRecord;
+use super::settings::{Layout, Settings};
 use super::table::{Row, read_table};
 use super::{Error, sample_key};
 

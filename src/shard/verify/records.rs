@@ -2,9 +2,10 @@
 
 use std::collections::HashSet;
 
-use crate::shard::dataset::{SessionEntry, Settings, Size};
+use crate::shard::dataset::SessionEntry;
 use crate::shard::measure::fraction;
 use crate::shard::record::FrameRecord;
+use crate::shard::settings::{Settings, Size};
 
 /// What is wrong with the records of a session, which stand by index; `None` where a record could
 /// not be read. Each problem with its index, or without one where it is the session's.

@@ -6,11 +6,11 @@ use image::RgbImage;
 
 use super::records::difference;
 use crate::shard::codec::{check_mask, decode_mask, decode_rgb};
-use crate::shard::dataset::{Settings, Size};
 use crate::shard::digest::Digest;
 use crate::shard::error::sentence;
 use crate::shard::measure::{MaskSpans, Measures};
 use crate::shard::record::FrameRecord;
+use crate::shard::settings::{Settings, Size};
 use crate::shard::table::Row;
 
 /// The mask of a session, which all its samples share: decoded once.

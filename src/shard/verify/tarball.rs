@@ -9,7 +9,6 @@ use rayon::prelude::*;
 use super::sample::{SessionMask, check_image, check_record};
 use super::{Found, SessionCheck};
 use crate::shard::Error;
-use crate::shard::dataset::compare;
 use crate::shard::digest::{Digest, HashingReader};
 use crate::shard::error::sentence;
 use crate::shard::measure::MaskSpans;
@@ -17,6 +16,7 @@ use crate::shard::names::{Part, parse_member};
 use crate::shard::order::order;
 use crate::shard::record::FrameRecord;
 use crate::shard::tarball::{Member, TarReader};
+use crate::shard::vouch::compare;
 
 /// Largest member that is read, bytes.
 const MOST_BYTES: u64 = 256 << 20;
