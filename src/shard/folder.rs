@@ -1,0 +1,177 @@
+//! The layout `relit`: images in a folder that takes its name when it is whole.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use image::RgbImage;
+use rayon::prelude::*;
+
+use super::codec::encode_rgb;
+use super::dataset::ShardEntry;
+use super::digest::FolderHasher;
+use super::output::{self, PartialFile, SealedFile};
+use super::table::Row;
+use super::{Error, names};
+
+/// The images of a session on their way into a folder.
+pub(super) struct FolderStore {
+    out: PathBuf,
+    session: String,
+    samples: u32,
+    partial: PartialFolder,
+    mean: MeanImage,
+    bytes: u64,
+}
+
+/// A folder under its temporary name; removed when dropped.
+struct PartialFolder {
+    path: PathBuf,
+}
+
+impl Drop for PartialFolder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.path);
+    }
+}
+
+impl FolderStore {
+    pub(super) fn create(
+        out: &Path,
+        session: &str,
+        samples: u32,
+        size: [u32; 2],
+    ) -> Result<Self, Error> {
+        for folder in [names::IMAGES, names::MASKS, names::MEANS] {
+            let path = out.join(folder);
+            fs::create_dir_all(&path).map_err(Error::io("make the folder", &path))?;
+        }
+        let path = out.join(names::IMAGES).join(names::partial(session));
+        fs::create_dir(&path).map_err(|source| match source.kind() {
+            io::ErrorKind::AlreadyExists => Error::Busy { path: path.clone() },
+            _ => Error::Io {
+                doing: "make the folder",
+                path: path.clone(),
+                source,
+            },
+        })?;
+        Ok(Self {
+            out: out.to_owned(),
+            session: session.to_owned(),
+            samples,
+            partial: PartialFolder { path },
+            mean: MeanImage::new(size),
+            bytes: 0,
+        })
+    }
+
+    pub(super) fn out(&self) -> &Path {
+        &self.out
+    }
+
+    pub(super) fn push(&mut self, index: u32, png: &[u8], image: &RgbImage) -> Result<(), Error> {
+        let path = self.image_path(index);
+        fs::write(&path, png).map_err(Error::io("write", &path))?;
+        self.mean.add(image);
+        self.bytes += png.len() as u64;
+        Ok(())
+    }
+
+    /// Gives folder, mask and mean image their names, in place of older ones.
+    pub(super) fn publish(self, rows: &[Row], mask_png: &[u8]) -> Result<ShardEntry, Error> {
+        // Side by side, because each waits for the disk.
+        (0..self.samples)
+            .into_par_iter()
+            .try_for_each(|index| output::sync(&self.image_path(index)))?;
+        output::sync(&self.partial.path)?;
+        let mask = self.seal(&names::mask_file(&self.session), mask_png)?;
+        let mean_png = encode_rgb(&self.mean.image()?)?;
+        let mean_img = self.seal(&names::mean_file(&self.session), &mean_png)?;
+        self.take_name()?;
+        let mut hasher = FolderHasher::default();
+        rows.iter().for_each(|row| hasher.add(&row.png_blake3));
+        Ok(ShardEntry {
+            file: names::image_folder(&self.session),
+            session: self.session.clone(),
+            samples: self.samples,
+            bytes: self.bytes,
+            blake3: hasher.finish(),
+            mask: Some(mask.publish()?),
+            mean_img: Some(mean_img.publish()?),
+        })
+    }
+
+    /// Puts the folder in the place of an older one, which stays whole until then.
+    fn take_name(&self) -> Result<(), Error> {
+        let images = self.out.join(names::IMAGES);
+        let place = images.join(&self.session);
+        let aside = images.join(names::outgoing(&self.session));
+        output::remove_folder(&aside)?;
+        if place.exists() {
+            fs::rename(&place, &aside).map_err(Error::io("set aside", &place))?;
+        }
+        if let Err(source) = fs::rename(&self.partial.path, &place) {
+            // The older one comes back; where that fails too, the next locked run does it.
+            let _ = fs::rename(&aside, &place);
+            return Err(Error::Io {
+                doing: "rename a finished folder to",
+                path: place,
+                source,
+            });
+        }
+        output::sync(&images)?;
+        output::remove_folder(&aside)
+    }
+
+    fn seal(&self, file: &str, bytes: &[u8]) -> Result<SealedFile, Error> {
+        let mut partial = PartialFile::create(&self.out, file)?;
+        partial
+            .write_all(bytes)
+            .map_err(Error::io("write", &self.out.join(file)))?;
+        partial.seal()
+    }
+
+    fn image_path(&self, index: u32) -> PathBuf {
+        self.partial.path.join(format!("{index}.png"))
+    }
+}
+
+/// The mean of images, channel by channel, rounded to the nearest value (half up).
+pub(super) struct MeanImage {
+    size: [u32; 2],
+    sums: Vec<u64>,
+    count: u64,
+}
+
+impl MeanImage {
+    pub(super) fn new([width, height]: [u32; 2]) -> Self {
+        let sums = vec![0; width as usize * height as usize * 3];
+        Self {
+            size: [width, height],
+            sums,
+            count: 0,
+        }
+    }
+
+    /// Adds an image of this size.
+    pub(super) fn add(&mut self, image: &RgbImage) {
+        for (sum, &value) in self.sums.iter_mut().zip(image.as_raw()) {
+            *sum += u64::from(value);
+        }
+        self.count += 1;
+    }
+
+    pub(super) fn image(&self) -> Result<RgbImage, Error> {
+        let [width, height] = self.size;
+        let round = |sum: &u64| (2 * sum + self.count) / (2 * self.count).max(1);
+        let pixels = self
+            .sums
+            .iter()
+            .map(|sum| u8::try_from(round(sum)).unwrap_or(u8::MAX));
+        RgbImage::from_raw(width, height, pixels.collect()).ok_or(Error::SizeMismatch {
+            what: "the mean image",
+            size: self.size,
+            expected: self.size,
+        })
+    }
+}

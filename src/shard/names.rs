@@ -1,0 +1,238 @@
+//! Names: of sessions, samples, members and files, and which of them are safe.
+
+use super::Error;
+
+/// Longest id of a session, bytes: the folder part of a tar member's name has room for 155, and
+/// a hidden name with two extensions must fit into a file name of 255.
+const LONGEST: usize = 150;
+
+/// Whether `name` can name a session: one plain part of a path.
+///
+/// # Errors
+/// [`Error::SessionName`] with the reason.
+pub fn check_session(name: &str) -> Result<(), Error> {
+    let wrong = |why| {
+        Err(Error::SessionName {
+            name: name.to_owned(),
+            why,
+        })
+    };
+    if name.is_empty() {
+        return wrong("it is empty");
+    }
+    if name.len() > LONGEST {
+        return wrong("it is longer than 150 bytes");
+    }
+    if name.starts_with('.') {
+        return wrong("it starts with a dot");
+    }
+    if name
+        .chars()
+        .any(|c| c == '/' || c == '\\' || c.is_control())
+    {
+        return wrong("it contains a slash, a backslash or a control character");
+    }
+    Ok(())
+}
+
+/// Whether `path` stays inside the data set: relative, parts separated by `/`, none of them
+/// empty, `.` or `..`.
+pub(super) fn check_path(path: &str) -> Result<(), Error> {
+    let plain = |part: &str| !matches!(part, "" | "." | "..");
+    let odd = |c: char| c == '\\' || c == ':' || c.is_control();
+    if path.split('/').all(plain) && !path.contains(odd) {
+        Ok(())
+    } else {
+        Err(Error::UnsafePath {
+            path: path.to_owned(),
+        })
+    }
+}
+
+/// The parts of a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Part {
+    Image,
+    Mask,
+    Record,
+}
+
+impl Part {
+    /// In the order in which they stand in a shard.
+    pub(super) const ALL: [Self; 3] = [Self::Image, Self::Mask, Self::Record];
+
+    /// What follows the key and a dot in the member's name.
+    pub(super) const fn suffix(self) -> &'static str {
+        match self {
+            Self::Image => "png",
+            Self::Mask => "mask.png",
+            Self::Record => "json",
+        }
+    }
+
+    fn of_suffix(suffix: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|part| part.suffix() == suffix)
+    }
+}
+
+/// The key of a sample: `<session>/<kkkk>`, the index with at least four digits.
+#[must_use]
+pub fn sample_key(session: &str, index: u32) -> String {
+    format!("{session}/{index:04}")
+}
+
+/// The name of a member of a shard.
+pub(super) fn member(session: &str, index: u32, part: Part) -> String {
+    format!("{}.{}", sample_key(session, index), part.suffix())
+}
+
+/// The sample and the part that a member's name stands for, if it is one of this session.
+pub(super) fn parse_member(session: &str, path: &str) -> Option<(u32, Part)> {
+    let (number, suffix) = path
+        .strip_prefix(session)?
+        .strip_prefix('/')?
+        .split_once('.')?;
+    let index: u32 = number.parse().ok()?;
+    let part = Part::of_suffix(suffix)?;
+    // Only the one spelling that the writer uses: no sign, no other number of zeros.
+    (member(session, index, part) == path).then_some((index, part))
+}
+
+/// The file of a session's shard, table, image folder, mask and mean image.
+pub(super) fn tar_file(session: &str) -> String {
+    format!("{session}.tar")
+}
+
+pub(super) fn table_file(session: &str) -> String {
+    format!("{session}.parquet")
+}
+
+pub(super) fn image_folder(session: &str) -> String {
+    format!("{IMAGES}/{session}")
+}
+
+pub(super) fn mask_file(session: &str) -> String {
+    format!("{MASKS}/{session}.png")
+}
+
+pub(super) fn mean_file(session: &str) -> String {
+    format!("{MEANS}/{session}.png")
+}
+
+/// The folders of the layout `relit`.
+pub(super) const IMAGES: &str = "imgs";
+pub(super) const MASKS: &str = "masks";
+pub(super) const MEANS: &str = "mean_img";
+
+/// The name under which `name` is written before it is whole.
+pub(super) fn partial(name: &str) -> String {
+    format!(".{name}.partial")
+}
+
+/// The name of the file in which a session's images wait for their place in the tar.
+pub(super) fn spool(session: &str) -> String {
+    format!(".{session}.spool")
+}
+
+/// The name to which a folder of images steps aside while its successor takes its place.
+pub(super) fn outgoing(session: &str) -> String {
+    format!(".{session}.outgoing")
+}
+
+/// The session whose folder of images stepped aside to `name`, if it is such a name.
+pub(super) fn session_of_outgoing(name: &str) -> Option<&str> {
+    name.strip_prefix('.')?.strip_suffix(".outgoing")
+}
+
+/// Whether a file of this name directly in the data set is a leftover of an interrupted writer.
+pub(super) fn is_leftover(name: &str) -> bool {
+    let Some(rest) = name.strip_prefix('.') else {
+        return false;
+    };
+    let finished = |file: &str| {
+        [".tar", ".parquet", ".html", ".json", ".png"]
+            .iter()
+            .any(|end| file.ends_with(end))
+    };
+    rest.ends_with(".spool") || rest.strip_suffix(".partial").is_some_and(finished)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_member_is_known_by_its_only_spelling() {
+        assert_eq!(member("s.1", 7, Part::Mask), "s.1/0007.mask.png");
+        assert_eq!(
+            parse_member("s.1", "s.1/0007.mask.png"),
+            Some((7, Part::Mask))
+        );
+        assert_eq!(
+            parse_member("s", "s/12345.json"),
+            Some((12345, Part::Record))
+        );
+        for path in [
+            "s/7.png",
+            "s/+007.png",
+            "t/0007.png",
+            "s/0007.jpg",
+            "s0007.png",
+            "s/0007",
+        ] {
+            assert_eq!(parse_member("s", path), None, "{path}");
+        }
+    }
+
+    #[test]
+    fn names_that_are_no_plain_part_of_a_path_are_refused() {
+        assert!(check_session("20261120T093015Z-mug").is_ok());
+        assert!(check_session("Öl kanne.v2").is_ok());
+        for name in [
+            "",
+            ".",
+            "..",
+            ".hidden",
+            "a/b",
+            "a\\b",
+            "a\nb",
+            &"x".repeat(151),
+        ] {
+            assert!(check_session(name).is_err(), "{name}");
+        }
+    }
+
+    #[test]
+    fn paths_that_lead_out_of_the_folder_are_refused() {
+        assert!(check_path("imgs/a/0.png").is_ok());
+        for path in [
+            "",
+            "/etc/passwd",
+            "../a",
+            "a/../b",
+            "a//b",
+            "a/",
+            "C:/a",
+            "a\\b",
+            "./a",
+        ] {
+            assert!(check_path(path).is_err(), "{path}");
+        }
+    }
+
+    #[test]
+    fn only_names_of_our_own_pattern_are_leftovers() {
+        for name in [".a.tar.partial", ".dataset.json.partial", ".a.spool"] {
+            assert!(is_leftover(name), "{name}");
+        }
+        for name in [
+            "a.tar.partial",
+            ".a.partial",
+            ".bashrc",
+            "a.spool",
+            ".partial",
+        ] {
+            assert!(!is_leftover(name), "{name}");
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! Reading a shard as a stream of samples, whoever wrote it. Knows nothing of sessions and
+//! records: a sample is a key and the members that share it.
+
+use std::io::Read;
+
+use super::Error;
+use super::tarball::{Member, TarReader};
+
+/// Largest sum of the members of a sample, bytes.
+const MOST_BYTES: u64 = 256 << 20;
+/// Largest number of members of a sample.
+const MOST_MEMBERS: usize = 64;
+
+/// One sample of a shard.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ShardSample {
+    /// The members' common name up to the first dot of its last part, with folders:
+    /// `20261120T093015Z-mug/0007`. Only a label: it may be absolute or lead anywhere.
+    pub key: String,
+    /// What follows the key and the dot (`png`, `mask.png`, `json`), and the bytes, in the order
+    /// of the tar.
+    pub members: Vec<(String, Vec<u8>)>,
+}
+
+impl ShardSample {
+    /// The bytes of the member with this suffix.
+    #[must_use]
+    pub fn member(&self, suffix: &str) -> Option<&[u8]> {
+        self.members
+            .iter()
+            .find(|(name, _)| name == suffix)
+            .map(|(_, data)| data.as_slice())
+    }
+}
+
+/// An iterator over the samples of a shard, by the rule of WebDataset: neighbouring members with
+/// the same key are one sample. Names without a dot are passed over. At most one sample is in
+/// memory, of at most 256 MiB and 64 members.
+///
+/// A shard that is damaged or cut off gives an error ([`Error::ShardTruncated`],
+/// [`Error::ShardHeader`], [`Error::ShardTooLarge`], [`Error::ShardName`],
+/// [`Error::ShardSample`], [`Error::ShardRead`]) and then ends; the sample in which it happens is
+/// not given.
+pub struct ShardReader<R> {
+    tar: TarReader<R>,
+    /// The first member of the next sample.
+    ahead: Option<(String, String, Vec<u8>)>,
+    ended: bool,
+}
+
+impl<R: Read> ShardReader<R> {
+    /// Reads a tar from `source`, which is best buffered.
+    pub fn new(source: R) -> Self {
+        Self {
+            tar: TarReader::new(source, MOST_BYTES),
+            ahead: None,
+            ended: false,
+        }
+    }
+
+    fn next_sample(&mut self) -> Result<Option<ShardSample>, Error> {
+        let first = match self.ahead.take() {
+            Some(first) => Some(first),
+            None => self.next_member()?,
+        };
+        let Some((key, suffix, data)) = first else {
+            return Ok(None);
+        };
+        let mut bytes = data.len() as u64;
+        let mut sample = ShardSample {
+            key,
+            members: vec![(suffix, data)],
+        };
+        while let Some((key, suffix, data)) = self.next_member()? {
+            if key != sample.key {
+                self.ahead = Some((key, suffix, data));
+                break;
+            }
+            bytes += data.len() as u64;
+            sample.take(suffix, data, bytes)?;
+        }
+        Ok(Some(sample))
+    }
+
+    fn next_member(&mut self) -> Result<Option<(String, String, Vec<u8>)>, Error> {
+        while let Some(Member { path, data, .. }) = self.tar.next()? {
+            if let Some((key, suffix)) = split(&path) {
+                return Ok(Some((key, suffix, data)));
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl ShardSample {
+    fn take(&mut self, suffix: String, data: Vec<u8>, bytes: u64) -> Result<(), Error> {
+        let path = || format!("{}.{suffix}", self.key);
+        if bytes > MOST_BYTES {
+            return Err(Error::ShardTooLarge {
+                path: path(),
+                offset: bytes,
+                limit: MOST_BYTES,
+            });
+        }
+        if self.member(&suffix).is_some() || self.members.len() == MOST_MEMBERS {
+            let (key, path) = (self.key.clone(), path());
+            return Err(Error::ShardSample {
+                key,
+                path,
+                most: MOST_MEMBERS,
+            });
+        }
+        self.members.push((suffix, data));
+        Ok(())
+    }
+}
+
+impl<R: Read> Iterator for ShardReader<R> {
+    type Item = Result<ShardSample, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ended {
+            return None;
+        }
+        let sample = self.next_sample().transpose();
+        self.ended = !matches!(sample, Some(Ok(_)));
+        sample
+    }
+}
+
+/// Key and suffix of a member's name; none where its last part has no dot, or starts with it.
+fn split(path: &str) -> Option<(String, String)> {
+    let base = path.rfind('/').map_or(0, |slash| slash + 1);
+    let dot = base + path.get(base..)?.find('.')?;
+    if dot == base {
+        return None;
+    }
+    Some((path.get(..dot)?.to_owned(), path.get(dot + 1..)?.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shard::tarball::header;
+    use proptest::prelude::*;
+
+    fn tar_of(members: &[(&str, &[u8])]) -> Vec<u8> {
+        let mut builder = tar::Builder::new(Vec::new());
+        for (path, data) in members {
+            builder
+                .append(&header(path, data.len() as u64).unwrap(), *data)
+                .unwrap();
+        }
+        builder.into_inner().unwrap()
+    }
+
+    fn read(bytes: &[u8]) -> Vec<Result<ShardSample, Error>> {
+        ShardReader::new(bytes).collect()
+    }
+
+    #[test]
+    fn neighbours_with_one_key_are_one_sample() {
+        let tar = tar_of(&[
+            ("README", b"no sample"),
+            ("a.b/0001.png", b"1"),
+            ("a.b/0001.mask.png", b"2"),
+            (".hidden", b"no sample"),
+            ("a.b/0002.png", b"3"),
+        ]);
+        let samples: Vec<_> = read(&tar).into_iter().map(Result::unwrap).collect();
+        assert_eq!(samples.len(), 2);
+        assert_eq!(samples[0].key, "a.b/0001");
+        assert_eq!(samples[0].member("mask.png"), Some(b"2".as_slice()));
+        assert_eq!(samples[1].members, [("png".to_owned(), b"3".to_vec())]);
+    }
+
+    #[test]
+    fn a_doubled_member_is_an_error_and_ends_the_shard() {
+        let results = read(&tar_of(&[
+            ("a.png", b"1"),
+            ("a.png", b"2"),
+            ("b.png", b"3"),
+        ]));
+        assert_eq!(results.len(), 1);
+        assert!(matches!(results[0], Err(Error::ShardSample { .. })));
+    }
+
+    #[test]
+    fn the_samples_before_a_cut_are_given() {
+        let tar = tar_of(&[("a.png", b"1"), ("b.png", b"2"), ("c.png", b"3")]);
+        let results = read(&tar[..tar.len() - 1500]);
+        let keys: Vec<_> = results
+            .iter()
+            .map(|r| r.as_ref().map(|s| s.key.clone()).ok())
+            .collect();
+        assert_eq!(keys, [Some("a".to_owned()), None]);
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_never_panics(bytes in prop::collection::vec(any::<u8>(), 0..3000)) {
+            let _ = read(&bytes);
+        }
+
+        #[test]
+        fn a_damaged_shard_never_panics(
+            flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+        ) {
+            let mut tar = tar_of(&[("s/0.png", &[1; 700]), ("s/0.json", b"{}"), ("t.png", b"")]);
+            for (at, value) in flips {
+                let at = at.index(tar.len());
+                tar[at] = value;
+            }
+            let _ = read(&tar);
+        }
+    }
+}

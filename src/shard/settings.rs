@@ -1,0 +1,131 @@
+//! How the sessions of a data set are extracted and laid out: what `dataset.json` holds of it.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Error, names};
+
+/// How samples lie on disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Layout {
+    /// One tar a session: `<session>.tar`, with members `<session>/<kkkk>.{png,mask.png,json}`.
+    Webdataset,
+    /// Folders: `imgs/<session>/<k>.png`, `masks/<session>.png`, `mean_img/<session>.png`.
+    Relit,
+}
+
+impl Layout {
+    /// All layouts.
+    pub const ALL: [Self; 2] = [Self::Webdataset, Self::Relit];
+
+    /// The name on the command line and in `dataset.json`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Webdataset => "webdataset",
+            Self::Relit => "relit",
+        }
+    }
+
+    /// The shard of a session, relative to the data set: a tar or a folder.
+    pub(super) fn shard_file(self, session: &str) -> String {
+        match self {
+            Self::Webdataset => names::tar_file(session),
+            Self::Relit => names::image_folder(session),
+        }
+    }
+}
+
+impl fmt::Display for Layout {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Layout {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let found = Self::ALL.into_iter().find(|layout| layout.name() == text);
+        found.ok_or_else(|| Error::UnknownLayout {
+            name: text.to_owned(),
+        })
+    }
+}
+
+/// The size of images and masks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Size {
+    /// Scaled to a square of this side, pixels.
+    Pixels(u32),
+    /// The source's own pixels: `"native"`.
+    Native(Native),
+}
+
+/// The word `"native"`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Native {
+    /// Not scaled.
+    #[serde(rename = "native")]
+    Native,
+}
+
+impl Size {
+    /// The source's own pixels.
+    pub const NATIVE: Self = Self::Native(Native::Native);
+}
+
+/// What is done about a shift of the object.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Align {
+    /// Neither measured nor corrected.
+    Off,
+}
+
+/// How the sessions of a data set were extracted; the same for all of them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Samples a session.
+    pub frames: u32,
+    /// Size of images and masks.
+    pub size: Size,
+    /// Margin around the mask's bounding box, as a fraction of its longer side, 0 and above.
+    pub margin: f64,
+    /// The 8-bit value from which a channel is saturated, 0..=255.
+    pub saturation_level: u8,
+    /// The fraction of saturated pixels above which `spec_net` is set, 0..=1.
+    pub gate: f64,
+    /// What is done about shifts.
+    pub align: Align,
+    /// How samples lie on disk.
+    pub layout: Layout,
+    /// The name of the method by which images were scaled.
+    pub scaling: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_size_is_a_number_or_the_word_native() {
+        for (size, json) in [(Size::Pixels(256), "256"), (Size::NATIVE, "\"native\"")] {
+            assert_eq!(serde_json::to_string(&size).unwrap(), json);
+            assert_eq!(serde_json::from_str::<Size>(json).unwrap(), size);
+        }
+        assert!(serde_json::from_str::<Size>("\"large\"").is_err());
+    }
+
+    #[test]
+    fn a_layout_is_read_by_its_name() {
+        for layout in Layout::ALL {
+            assert_eq!(layout.to_string().parse::<Layout>().unwrap(), layout);
+        }
+        assert!("tar".parse::<Layout>().is_err());
+    }
+}

@@ -1,0 +1,151 @@
+//! The layout `webdataset`: images wait in a spool file for their place in the tar.
+
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use super::dataset::ShardEntry;
+use super::names::{self, Part};
+use super::order::order;
+use super::output::{PartialFile, ScratchFile, SealedFile};
+use super::table::Row;
+use super::{Error, tarball};
+
+/// Where an image lies in the spool.
+#[derive(Debug, Clone, Copy, Default)]
+struct Place {
+    offset: u64,
+    bytes: u64,
+}
+
+/// The images of a session on their way into a tar.
+pub(super) struct SpoolStore {
+    out: PathBuf,
+    session: String,
+    scratch: ScratchFile,
+    places: Vec<Place>,
+    bytes: u64,
+}
+
+/// A tar that is whole, still under its temporary name.
+pub(super) struct SealedShard {
+    file: SealedFile,
+    session: String,
+    samples: u32,
+}
+
+impl SpoolStore {
+    pub(super) fn create(out: &Path, session: &str, samples: u32) -> Result<Self, Error> {
+        Ok(Self {
+            out: out.to_owned(),
+            session: session.to_owned(),
+            scratch: ScratchFile::create(out.join(names::spool(session)))?,
+            places: vec![Place::default(); samples as usize],
+            bytes: 0,
+        })
+    }
+
+    pub(super) fn out(&self) -> &Path {
+        &self.out
+    }
+
+    pub(super) fn push(&mut self, index: u32, png: &[u8]) -> Result<(), Error> {
+        let place = Place {
+            offset: self.bytes,
+            bytes: png.len() as u64,
+        };
+        let file = &mut self.scratch.file;
+        // A push that failed half-way may have left bytes: each starts at its own offset.
+        file.seek(SeekFrom::Start(place.offset))
+            .and_then(|_| file.write_all(png))
+            .map_err(Error::io("write", &self.scratch.path))?;
+        self.bytes += place.bytes;
+        if let Some(slot) = self.places.get_mut(index as usize) {
+            *slot = place;
+        }
+        Ok(())
+    }
+
+    /// Writes the tar under its temporary name; the spool stays until it is dropped.
+    pub(super) fn seal(&self, rows: &[Row], mask_png: &[u8]) -> Result<SealedShard, Error> {
+        let partial = PartialFile::create(&self.out, &names::tar_file(&self.session))?;
+        let samples = u32::try_from(rows.len()).unwrap_or(u32::MAX);
+        let mut tar = tar::Builder::new(partial);
+        let mut png = Vec::new();
+        for index in order(samples) {
+            let slot = index as usize;
+            let (Some(row), Some(&place)) = (rows.get(slot), self.places.get(slot)) else {
+                continue;
+            };
+            self.read(place, &mut png)?;
+            let json = serde_json::to_vec(&row.record).map_err(|source| Error::Json {
+                what: format!("the record of {}", names::sample_key(&self.session, index)),
+                source,
+            })?;
+            for (part, data) in [
+                (Part::Image, png.as_slice()),
+                (Part::Mask, mask_png),
+                (Part::Record, json.as_slice()),
+            ] {
+                self.append(&mut tar, &names::member(&self.session, index, part), data)?;
+            }
+        }
+        let file = tar.into_inner().map_err(self.failed_to_write())?.seal()?;
+        Ok(SealedShard {
+            file,
+            session: self.session.clone(),
+            samples,
+        })
+    }
+
+    fn append(
+        &self,
+        tar: &mut tar::Builder<PartialFile>,
+        path: &str,
+        data: &[u8],
+    ) -> Result<(), Error> {
+        tarball::header(path, data.len() as u64)
+            .and_then(|header| tar.append(&header, data))
+            .map_err(self.failed_to_write())
+    }
+
+    fn failed_to_write(&self) -> impl FnOnce(io::Error) -> Error {
+        move |source| {
+            let path = self.out.join(names::tar_file(&self.session));
+            Error::Io {
+                doing: "write",
+                path,
+                source,
+            }
+        }
+    }
+
+    fn read(&self, place: Place, png: &mut Vec<u8>) -> Result<(), Error> {
+        png.clear();
+        let mut file = &self.scratch.file;
+        file.seek(SeekFrom::Start(place.offset))
+            .and_then(|_| file.take(place.bytes).read_to_end(png))
+            .and_then(|read| {
+                let whole = read as u64 == place.bytes;
+                whole
+                    .then_some(())
+                    .ok_or_else(|| io::ErrorKind::UnexpectedEof.into())
+            })
+            .map_err(Error::io("read back", &self.scratch.path))
+    }
+}
+
+impl SealedShard {
+    /// Gives the tar its name, in place of an older one.
+    pub(super) fn publish(self) -> Result<ShardEntry, Error> {
+        let entry = self.file.publish()?;
+        Ok(ShardEntry {
+            file: entry.file,
+            session: self.session,
+            samples: self.samples,
+            bytes: entry.bytes,
+            blake3: entry.blake3,
+            mask: None,
+            mean_img: None,
+        })
+    }
+}

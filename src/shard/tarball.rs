@@ -1,0 +1,426 @@
+//! A tar as this room writes it, and any tar as it is read: member by member, with bounded
+//! memory and without trust in a single byte.
+
+use std::io::{self, Read};
+
+use tar::{EntryType, Header};
+
+use super::Error;
+
+/// The unit of a tar, bytes.
+pub(super) const BLOCK: usize = 512;
+/// Largest extension header (long names) that is read, bytes.
+const MOST_EXTENSION: u64 = 1 << 20;
+
+type Block = [u8; BLOCK];
+
+/// The header of a member as it is written: nothing of the time, the user or the machine.
+pub(super) fn header(path: &str, bytes: u64) -> io::Result<Header> {
+    let mut header = Header::new_ustar();
+    header.set_path(path)?;
+    header.set_size(bytes);
+    header.set_mode(0o644);
+    header.set_uid(0);
+    header.set_gid(0);
+    header.set_mtime(0);
+    header.set_entry_type(EntryType::Regular);
+    header.set_cksum();
+    Ok(header)
+}
+
+/// One file in a tar.
+pub(super) struct Member {
+    /// Where its header starts.
+    pub(super) offset: u64,
+    /// Its name. Only a label: it may be absolute or lead anywhere.
+    pub(super) path: String,
+    pub(super) data: Vec<u8>,
+    /// True where the header is, byte for byte, the one that is written here, and the padding
+    /// after the data is zero.
+    pub(super) canonical: bool,
+}
+
+/// Reads a tar as a stream of its regular files. Folders, links and the like are passed over;
+/// long names of GNU tar and of pax are understood.
+pub(super) struct TarReader<R> {
+    source: R,
+    /// Bytes taken from the source.
+    offset: u64,
+    /// A header that was found while looking for one.
+    found: Option<Block>,
+    limit: u64,
+    ended: bool,
+}
+
+impl<R: Read> TarReader<R> {
+    /// Reads `source`; a member of more than `limit` bytes is an error.
+    pub(super) fn new(source: R, limit: u64) -> Self {
+        Self {
+            source,
+            offset: 0,
+            found: None,
+            limit,
+            ended: false,
+        }
+    }
+
+    /// The source, after what was read of it.
+    pub(super) fn into_inner(self) -> R {
+        self.source
+    }
+
+    /// The next file; `None` after the two empty blocks that end a tar.
+    pub(super) fn next(&mut self) -> Result<Option<Member>, Error> {
+        let mut named = Extensions::default();
+        while !self.ended {
+            let start = self.offset
+                - if self.found.is_some() {
+                    BLOCK as u64
+                } else {
+                    0
+                };
+            let block = self.header_block()?;
+            if is_zero(&block) {
+                return self.end(start);
+            }
+            let header = valid_header(&block).ok_or(Error::ShardHeader { offset: start })?;
+            let claimed = header
+                .entry_size()
+                .map_err(|_| Error::ShardHeader { offset: start })?;
+            let bytes = named.size.unwrap_or(claimed);
+            match header.entry_type() {
+                EntryType::Regular | EntryType::Continuous => {
+                    return self.member(start, header, bytes, named).map(Some);
+                }
+                EntryType::GNULongName | EntryType::XHeader => {
+                    let path = String::from("an extension header");
+                    let data = self.data(start, &path, claimed, MOST_EXTENSION)?.0;
+                    named.add(header.entry_type(), &data);
+                }
+                EntryType::GNUSparse => return Err(Error::ShardHeader { offset: start }),
+                EntryType::GNULongLink | EntryType::XGlobalHeader => self.skip(claimed)?,
+                _ => {
+                    self.skip(bytes)?;
+                    named = Extensions::default();
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// After an error in the middle of a tar: looks, block by block, for the next header. False
+    /// where there is none.
+    pub(super) fn resume(&mut self) -> Result<bool, Error> {
+        self.skip_padding()?;
+        loop {
+            let block = match self.header_block() {
+                Ok(block) => block,
+                Err(Error::ShardTruncated { .. }) => return Ok(false),
+                Err(error) => return Err(error),
+            };
+            if valid_header(&block).is_some() {
+                self.found = Some(block);
+                return Ok(true);
+            }
+        }
+    }
+
+    fn end(&mut self, start: u64) -> Result<Option<Member>, Error> {
+        if is_zero(&self.header_block()?) {
+            self.ended = true;
+            Ok(None)
+        } else {
+            Err(Error::ShardHeader { offset: start })
+        }
+    }
+
+    fn member(
+        &mut self,
+        offset: u64,
+        own: &Header,
+        bytes: u64,
+        named: Extensions,
+    ) -> Result<Member, Error> {
+        let extended = named.path.is_some() || named.size.is_some();
+        let name = named.path.unwrap_or_else(|| own.path_bytes().into_owned());
+        let path = String::from_utf8(name).map_err(|_| Error::ShardName { offset });
+        let label = path.as_deref().unwrap_or("a member without a name");
+        let (data, padding_is_zero) = self.data(offset, label, bytes, self.limit)?;
+        let path = path?;
+        let as_written =
+            header(&path, bytes).is_ok_and(|written| written.as_bytes() == own.as_bytes());
+        let canonical = padding_is_zero && as_written && !extended;
+        Ok(Member {
+            offset,
+            path,
+            data,
+            canonical,
+        })
+    }
+
+    /// The data of a member and whether the padding after it is zero. Memory grows with what is
+    /// really there, not with what the header claims.
+    fn data(
+        &mut self,
+        start: u64,
+        path: &str,
+        bytes: u64,
+        limit: u64,
+    ) -> Result<(Vec<u8>, bool), Error> {
+        if bytes > limit {
+            return Err(Error::ShardTooLarge {
+                path: path.to_owned(),
+                offset: start,
+                limit,
+            });
+        }
+        let mut data = Vec::new();
+        let read = (&mut self.source).take(bytes).read_to_end(&mut data);
+        self.offset += data.len() as u64;
+        read.map_err(|source| Error::ShardRead {
+            offset: self.offset,
+            source,
+        })?;
+        if (data.len() as u64) < bytes {
+            return Err(Error::ShardTruncated {
+                offset: self.offset,
+            });
+        }
+        Ok((data, self.skip_padding()?))
+    }
+
+    /// Goes to the next multiple of a block; whether all that was passed over is zero.
+    fn skip_padding(&mut self) -> Result<bool, Error> {
+        let over = usize::try_from(self.offset % BLOCK as u64).unwrap_or(0);
+        if over == 0 {
+            return Ok(true);
+        }
+        let mut padding = [0; BLOCK];
+        let padding = padding.get_mut(over..).unwrap_or_default();
+        let read = fill(&mut self.source, padding);
+        self.count(read, padding.len())?;
+        Ok(is_zero(padding))
+    }
+
+    fn skip(&mut self, bytes: u64) -> Result<(), Error> {
+        let skipped =
+            io::copy(&mut (&mut self.source).take(bytes), &mut io::sink()).map_err(|source| {
+                Error::ShardRead {
+                    offset: self.offset,
+                    source,
+                }
+            })?;
+        self.offset += skipped;
+        if skipped < bytes {
+            return Err(Error::ShardTruncated {
+                offset: self.offset,
+            });
+        }
+        self.skip_padding().map(|_| ())
+    }
+
+    fn header_block(&mut self) -> Result<Block, Error> {
+        if let Some(block) = self.found.take() {
+            return Ok(block);
+        }
+        let mut block = [0; BLOCK];
+        let read = fill(&mut self.source, &mut block);
+        self.count(read, BLOCK)?;
+        Ok(block)
+    }
+
+    fn count(&mut self, read: io::Result<usize>, wanted: usize) -> Result<(), Error> {
+        let read = read.map_err(|source| Error::ShardRead {
+            offset: self.offset,
+            source,
+        })?;
+        self.offset += read as u64;
+        if read < wanted {
+            return Err(Error::ShardTruncated {
+                offset: self.offset,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// What extension headers say of the member that follows them.
+#[derive(Default)]
+struct Extensions {
+    path: Option<Vec<u8>>,
+    size: Option<u64>,
+}
+
+impl Extensions {
+    fn add(&mut self, kind: EntryType, data: &[u8]) {
+        if kind == EntryType::GNULongName {
+            let end = data
+                .iter()
+                .position(|&byte| byte == 0)
+                .unwrap_or(data.len());
+            self.path = data.get(..end).map(<[u8]>::to_vec);
+            return;
+        }
+        for (key, value) in pax_records(data) {
+            match key {
+                b"path" => self.path = Some(value.to_vec()),
+                b"size" => {
+                    self.size = std::str::from_utf8(value)
+                        .ok()
+                        .and_then(|text| text.parse().ok());
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// The records `LENGTH KEY=VALUE\n` of a pax header, up to the first that is malformed.
+fn pax_records(mut data: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
+    std::iter::from_fn(move || {
+        let space = data.iter().position(|&byte| byte == b' ')?;
+        let length: usize = std::str::from_utf8(data.get(..space)?).ok()?.parse().ok()?;
+        let record = data.get(space + 1..length)?.strip_suffix(b"\n")?;
+        data = data.get(length..)?;
+        let equals = record.iter().position(|&byte| byte == b'=')?;
+        Some((record.get(..equals)?, record.get(equals + 1..)?))
+    })
+}
+
+/// The block as a header, if its checksum is right.
+fn valid_header(block: &Block) -> Option<&Header> {
+    if is_zero(block) {
+        return None;
+    }
+    let header = Header::from_byte_slice(block);
+    let checksum = 148..156;
+    let sum: u32 = block
+        .iter()
+        .enumerate()
+        .map(|(at, &byte)| u32::from(if checksum.contains(&at) { b' ' } else { byte }))
+        .sum();
+    (header.cksum().ok()? == sum).then_some(header)
+}
+
+fn is_zero(bytes: &[u8]) -> bool {
+    bytes.iter().all(|&byte| byte == 0)
+}
+
+/// Reads until the buffer is full or the source ends.
+fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
+    let mut filled = 0;
+    while let Some(rest) = buffer.get_mut(filled..).filter(|rest| !rest.is_empty()) {
+        match source.read(rest) {
+            Ok(0) => break,
+            Ok(read) => filled += read,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(filled)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_all(bytes: &[u8]) -> Result<Vec<(String, Vec<u8>, bool)>, Error> {
+        let mut reader = TarReader::new(bytes, 1 << 20);
+        let mut members = Vec::new();
+        while let Some(member) = reader.next()? {
+            members.push((member.path, member.data, member.canonical));
+        }
+        Ok(members)
+    }
+
+    fn tar_of(members: &[(&str, &[u8])]) -> Vec<u8> {
+        let mut builder = tar::Builder::new(Vec::new());
+        for (path, data) in members {
+            builder
+                .append(&header(path, data.len() as u64).unwrap(), *data)
+                .unwrap();
+        }
+        builder.into_inner().unwrap()
+    }
+
+    #[test]
+    fn what_is_written_here_is_read_back_and_known_as_ours() {
+        let long = format!("{}/0000.mask.png", "x".repeat(150));
+        let members: [(&str, &[u8]); 3] = [("s/0000.png", b"abc"), (&long, b""), ("b", &[9; 512])];
+        let read = read_all(&tar_of(&members)).unwrap();
+        for ((path, data, canonical), expected) in read.iter().zip(members) {
+            assert_eq!(
+                (path.as_str(), data.as_slice(), *canonical),
+                (expected.0, expected.1, true)
+            );
+        }
+        assert_eq!(read.len(), 3);
+    }
+
+    #[test]
+    fn long_names_of_gnu_tar_are_read() {
+        let long = format!("{}.png", "y".repeat(300));
+        let mut builder = tar::Builder::new(Vec::new());
+        let mut header = Header::new_gnu();
+        header.set_size(2);
+        header.set_mode(0o600);
+        builder
+            .append_data(&mut header, &long, b"hi".as_slice())
+            .unwrap();
+        let read = read_all(&builder.into_inner().unwrap()).unwrap();
+        assert_eq!(read, [(long, b"hi".to_vec(), false)]);
+    }
+
+    #[test]
+    fn names_in_pax_headers_are_read() {
+        let long = format!("{}.png", "z".repeat(200));
+        let mut builder = tar::Builder::new(Vec::new());
+        let records = [("mtime", b"1.5".as_slice()), ("path", long.as_bytes())];
+        builder.append_pax_extensions(records).unwrap();
+        builder
+            .append(&super::header("short", 2).unwrap(), b"hi".as_slice())
+            .unwrap();
+        let read = read_all(&builder.into_inner().unwrap()).unwrap();
+        assert_eq!(read, [(long, b"hi".to_vec(), false)]);
+    }
+
+    #[test]
+    fn a_tar_cut_off_anywhere_is_an_error() {
+        let tar = tar_of(&[("a.png", b"abc"), ("b.png", b"def")]);
+        for end in 0..tar.len() {
+            let error = read_all(&tar[..end]).unwrap_err();
+            assert!(
+                matches!(error, Error::ShardTruncated { .. }),
+                "{end}: {error}"
+            );
+        }
+    }
+
+    #[test]
+    fn after_a_damaged_header_the_next_member_is_found() {
+        let mut tar = tar_of(&[("a.png", b"abc"), ("b.png", b"def"), ("c.png", b"ghi")]);
+        tar[1024] ^= 1;
+        let mut reader = TarReader::new(tar.as_slice(), 100);
+        assert_eq!(reader.next().unwrap().unwrap().path, "a.png");
+        assert!(matches!(
+            reader.next(),
+            Err(Error::ShardHeader { offset: 1024 })
+        ));
+        assert!(reader.resume().unwrap());
+        let member = reader.next().unwrap().unwrap();
+        assert_eq!((member.path.as_str(), member.offset), ("c.png", 2048));
+        assert!(reader.next().unwrap().is_none());
+    }
+
+    #[test]
+    fn a_claim_of_more_than_the_limit_takes_no_memory() {
+        let block = header("a.png", u64::MAX >> 3).unwrap();
+        let read = read_all(block.as_bytes());
+        assert!(matches!(read, Err(Error::ShardTooLarge { .. })));
+        let block = header("a.png", 1 << 20).unwrap();
+        assert!(matches!(
+            read_all(block.as_bytes()),
+            Err(Error::ShardTruncated { .. })
+        ));
+    }
+}

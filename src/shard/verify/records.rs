@@ -1,0 +1,145 @@
+//! Whether records are consistent, in themselves and with one another. Knows no files.
+
+use std::collections::HashSet;
+
+use crate::shard::dataset::SessionEntry;
+use crate::shard::measure::fraction;
+use crate::shard::record::FrameRecord;
+use crate::shard::settings::{Settings, Size};
+
+/// What is wrong with the records of a session, which stand by index; `None` where a record could
+/// not be read. Each problem with its index, or without one where it is the session's.
+pub(super) fn check(
+    settings: &Settings,
+    session: &SessionEntry,
+    records: &[Option<&FrameRecord>],
+) -> Vec<(Option<u32>, String)> {
+    let mut problems = Vec::new();
+    let mut sources = HashSet::new();
+    for (index, record) in (0..).zip(records) {
+        let Some(record) = record else { continue };
+        let mut wrong = |what| problems.push((Some(index), what));
+        own(settings, session, index, record)
+            .into_iter()
+            .for_each(&mut wrong);
+        let seen = !sources.insert(record.source_frame);
+        if seen != record.duplicate {
+            let is = if seen { "stands" } else { "does not stand" };
+            wrong(format!(
+                "duplicate is {}, but source frame {} {is} in a sample with a smaller index",
+                record.duplicate, record.source_frame
+            ));
+        }
+    }
+    if records.iter().all(Option::is_some) && !records.is_empty() {
+        problems.extend(
+            totals(session, records)
+                .into_iter()
+                .map(|what| (None, what)),
+        );
+    }
+    problems
+}
+
+/// What is wrong with one record in itself.
+fn own(settings: &Settings, session: &SessionEntry, index: u32, r: &FrameRecord) -> Vec<String> {
+    let expected_fraction = fraction(r.saturated_px, r.mask_px);
+    let size = match settings.size {
+        Size::Native(_) => [r.crop.w, r.crop.h],
+        Size::Pixels(side) => [side, side],
+    };
+    let checks = [
+        (
+            r.session == session.id,
+            format!("session is {:?}, not {:?}", r.session, session.id),
+        ),
+        (
+            r.object == session.object,
+            format!("object is {:?}, not {:?}", r.object, session.object),
+        ),
+        (
+            r.index == index,
+            format!("index is {}, not {index}", r.index),
+        ),
+        (
+            r.size == size,
+            format!("size is {:?}, not {size:?} as the settings say", r.size),
+        ),
+        (
+            r.saturated_px <= r.mask_px && r.saturated_any_px <= r.mask_px,
+            format!(
+                "more pixels are saturated than the {} under the mask",
+                r.mask_px
+            ),
+        ),
+        (
+            r.saturated_any_px >= r.saturated_px,
+            format!(
+                "saturated_any_px is {}, below saturated_px, {}",
+                r.saturated_any_px, r.saturated_px
+            ),
+        ),
+        (
+            r.saturated_fraction == expected_fraction,
+            format!(
+                "saturated_fraction is {}, not {expected_fraction}",
+                r.saturated_fraction
+            ),
+        ),
+        (
+            r.spec_net == (r.saturated_fraction > settings.gate),
+            format!(
+                "spec_net is {} at a fraction of {} and a gate of {}",
+                r.spec_net, r.saturated_fraction, settings.gate
+            ),
+        ),
+    ];
+    checks
+        .into_iter()
+        .filter(|(right, _)| !right)
+        .map(|(_, what)| what)
+        .collect()
+}
+
+/// What is wrong with the counts that the session's entry tells.
+fn totals(session: &SessionEntry, records: &[Option<&FrameRecord>]) -> Vec<String> {
+    let count = |flag: fn(&FrameRecord) -> bool| {
+        records
+            .iter()
+            .flatten()
+            .filter(|record| flag(record))
+            .count() as u64
+    };
+    let counts = [
+        (
+            "duplicates",
+            u64::from(session.duplicates),
+            count(|r| r.duplicate),
+        ),
+        (
+            "spec_net",
+            u64::from(session.spec_net),
+            count(|r| r.spec_net),
+        ),
+    ];
+    counts
+        .into_iter()
+        .filter(|(_, listed, found)| listed != found)
+        .map(|(what, listed, found)| {
+            format!("dataset.json tells {listed} samples with {what}, the records {found}")
+        })
+        .collect()
+}
+
+/// The fields in which two records differ.
+pub(super) fn difference(a: &FrameRecord, b: &FrameRecord) -> Vec<String> {
+    let fields = |record| match serde_json::to_value(record) {
+        Ok(serde_json::Value::Object(fields)) => fields,
+        _ => serde_json::Map::new(),
+    };
+    let (a, b) = (fields(a), fields(b));
+    a.iter()
+        .filter(|(name, value)| b.get(*name) != Some(value))
+        .map(|(n, _)| n.clone())
+        .collect()
+}

@@ -1,0 +1,253 @@
+//! Writing one session: samples in any order in, files in their places out.
+
+use std::path::Path;
+
+use image::{GrayImage, RgbImage};
+
+use super::codec::{check_mask, encode_mask, encode_rgb};
+use super::dataset::{FileEntry, ShardEntry};
+use super::digest::Digest;
+use super::folder::FolderStore;
+use super::output::{PartialFile, SealedFile};
+use super::record::FrameRecord;
+use super::settings::Layout;
+use super::spool::SpoolStore;
+use super::table::{Row, write_rows};
+use super::{Error, MAX_SAMPLES, names};
+
+/// One sample, ready to be written.
+#[derive(Debug, Clone)]
+pub struct Sample {
+    /// What is known of it.
+    pub record: FrameRecord,
+    /// The image, 0 outside the mask.
+    pub image: RgbImage,
+    /// The image as PNG, as [`encode_rgb`] gives it.
+    pub png: Vec<u8>,
+}
+
+impl Sample {
+    /// A sample of this record and image; encodes the image, which is the part worth doing on
+    /// many threads.
+    ///
+    /// # Errors
+    /// [`Error::Encode`] where the image has no pixels.
+    pub fn encode(record: FrameRecord, image: RgbImage) -> Result<Self, Error> {
+        let png = encode_rgb(&image)?;
+        Ok(Self { record, image, png })
+    }
+}
+
+/// The files of a session that was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SessionFiles {
+    /// The shards: one.
+    pub shards: Vec<ShardEntry>,
+    /// The table.
+    pub table: FileEntry,
+}
+
+/// Where images wait until the session is whole.
+enum Store {
+    Spool(SpoolStore),
+    Folder(FolderStore),
+}
+
+/// Writes one session. Its files appear under their names in [`finish`](Self::finish) and not
+/// before; a writer that is dropped leaves nothing behind. Memory does not grow with the images:
+/// they wait on the disk for their place. The bytes of all files are the same whatever the order
+/// in which samples come.
+///
+/// The folder should be held by an [`OutputFolder`](super::OutputFolder). Several sessions may be
+/// written into it at a time.
+pub struct SessionWriter {
+    session: String,
+    size: [u32; 2],
+    mask_png: Vec<u8>,
+    mask_blake3: Digest,
+    rows: Vec<Option<Row>>,
+    store: Store,
+}
+
+impl SessionWriter {
+    /// Starts the session `session` of `samples` samples (1 to [`MAX_SAMPLES`]) in the folder
+    /// `out`, which must exist. `mask` holds 0 and 255 only and has the size of the images.
+    ///
+    /// # Errors
+    /// [`Error::SessionName`], [`Error::SampleCount`], [`Error::MaskValue`], [`Error::Encode`]
+    /// where the mask is empty, [`Error::Busy`] where the session is being written already,
+    /// [`Error::Io`].
+    pub fn create(
+        out: &Path,
+        layout: Layout,
+        session: &str,
+        samples: u32,
+        mask: &GrayImage,
+    ) -> Result<Self, Error> {
+        names::check_session(session)?;
+        if samples == 0 || samples > MAX_SAMPLES {
+            return Err(Error::SampleCount { samples });
+        }
+        check_mask(mask)?;
+        let mask_png = encode_mask(mask)?;
+        let size = [mask.width(), mask.height()];
+        let store = match layout {
+            Layout::Webdataset => Store::Spool(SpoolStore::create(out, session, samples)?),
+            Layout::Relit => Store::Folder(FolderStore::create(out, session, samples, size)?),
+        };
+        Ok(Self {
+            session: session.to_owned(),
+            size,
+            mask_blake3: Digest::of(&mask_png),
+            mask_png,
+            rows: vec![None; samples as usize],
+            store,
+        })
+    }
+
+    /// Takes a sample. Each index must come exactly once; the order is free.
+    ///
+    /// # Errors
+    /// [`Error::WrongSession`], [`Error::OutOfRange`], [`Error::DoubledSample`],
+    /// [`Error::SizeMismatch`] where image, record and mask differ in size,
+    /// [`Error::NotFinite`], [`Error::Io`]. The sample is then not taken.
+    pub fn push(&mut self, sample: Sample) -> Result<(), Error> {
+        let Sample { record, image, png } = sample;
+        self.check(&record, &image)?;
+        let index = record.index;
+        let out_of_range = || Error::OutOfRange {
+            session: self.session.clone(),
+            index,
+            last: u32::try_from(self.rows.len()).unwrap_or(MAX_SAMPLES) - 1,
+        };
+        let slot = index as usize;
+        if self.rows.get(slot).ok_or_else(out_of_range)?.is_some() {
+            return Err(Error::DoubledSample {
+                session: self.session.clone(),
+                index,
+            });
+        }
+        match &mut self.store {
+            Store::Spool(spool) => spool.push(index, &png)?,
+            Store::Folder(folder) => folder.push(index, &png, &image)?,
+        }
+        if let Some(row) = self.rows.get_mut(slot) {
+            *row = Some(Row {
+                png_blake3: Digest::of(&png),
+                record,
+                mask_blake3: self.mask_blake3,
+            });
+        }
+        Ok(())
+    }
+
+    /// Gives the session's files their names, in place of older ones.
+    ///
+    /// # Errors
+    /// [`Error::MissingSample`] with the first index that did not come; [`Error::Io`],
+    /// [`Error::Table`] or [`Error::Json`] where a file could not be written. Nothing of the
+    /// session is then left, except that files may have been given their names before the error:
+    /// `dataset.json` does not vouch for those.
+    pub fn finish(self) -> Result<SessionFiles, Error> {
+        let Self {
+            session,
+            mask_png,
+            rows,
+            store,
+            ..
+        } = self;
+        let rows = complete(&session, rows)?;
+        match store {
+            Store::Spool(spool) => {
+                let shard = spool.seal(&rows, &mask_png)?;
+                let table = seal_table(spool.out(), &session, &rows)?;
+                Ok(SessionFiles {
+                    shards: vec![shard.publish()?],
+                    table: table.publish()?,
+                })
+            }
+            Store::Folder(folder) => {
+                let table = seal_table(folder.out(), &session, &rows)?;
+                let shard = folder.publish(&rows, &mask_png)?;
+                Ok(SessionFiles {
+                    shards: vec![shard],
+                    table: table.publish()?,
+                })
+            }
+        }
+    }
+
+    fn check(&self, record: &FrameRecord, image: &RgbImage) -> Result<(), Error> {
+        let index = record.index;
+        if record.session != self.session {
+            let (found, expected) = (record.session.clone(), self.session.clone());
+            return Err(Error::WrongSession {
+                index,
+                found,
+                expected,
+            });
+        }
+        let sizes = [
+            ("the image", [image.width(), image.height()]),
+            ("the record's size", record.size),
+        ];
+        for (what, size) in sizes {
+            if size != self.size {
+                return Err(Error::SizeMismatch {
+                    what,
+                    size,
+                    expected: self.size,
+                });
+            }
+        }
+        match first_not_finite(record) {
+            Some(field) => Err(Error::NotFinite {
+                session: self.session.clone(),
+                index,
+                field,
+            }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// All rows, or the first index that is missing.
+fn complete(session: &str, rows: Vec<Option<Row>>) -> Result<Vec<Row>, Error> {
+    let missing = rows.iter().filter(|row| row.is_none()).count();
+    if let Some(index) = rows.iter().position(Option::is_none) {
+        let index = u32::try_from(index).unwrap_or(MAX_SAMPLES);
+        return Err(Error::MissingSample {
+            session: session.to_owned(),
+            index,
+            missing,
+        });
+    }
+    Ok(rows.into_iter().flatten().collect())
+}
+
+fn first_not_finite(record: &FrameRecord) -> Option<&'static str> {
+    let [dx, dy] = record.shift_px.unwrap_or_default();
+    let [r, g, b] = record.mean_rgb;
+    let fields = [
+        ("angle_deg", record.angle_deg.unwrap_or_default()),
+        ("shift_px", dx + dy),
+        ("saturated_fraction", record.saturated_fraction),
+        ("mean_rgb", r + g + b),
+        ("sharpness", record.sharpness),
+    ];
+    fields
+        .into_iter()
+        .find(|(_, value)| !value.is_finite())
+        .map(|(field, _)| field)
+}
+
+fn seal_table(out: &Path, session: &str, rows: &[Row]) -> Result<SealedFile, Error> {
+    let file = names::table_file(session);
+    let mut partial = PartialFile::create(out, &file)?;
+    write_rows(&mut partial, rows).map_err(|source| Error::Table {
+        path: out.join(&file),
+        doing: "written",
+        source,
+    })?;
+    partial.seal()
+}
