@@ -119,7 +119,15 @@ mod tests {
 
     #[test]
     fn a_text_that_is_no_rectangle_is_refused() {
-        for text in ["", "1,2,3", "1,2,3,4,5", "a,2,3,4", "1,2,-3,4", "1,2,0,4", "1,2,3,99999999999"] {
+        for text in [
+            "",
+            "1,2,3",
+            "1,2,3,4,5",
+            "a,2,3,4",
+            "1,2,-3,4",
+            "1,2,0,4",
+            "1,2,3,99999999999",
+        ] {
             assert!(text.parse::<Rect>().is_err(), "{text}");
         }
     }
@@ -127,9 +135,18 @@ mod tests {
     #[test]
     fn clipping_keeps_what_lies_inside() {
         let image = |r: Rect| r.clipped_to(100, 50);
-        assert_eq!(image(Rect::new(-5, -5, 10, 10)), Some(Rect::new(0, 0, 5, 5)));
-        assert_eq!(image(Rect::new(90, 40, 100, 100)), Some(Rect::new(90, 40, 10, 10)));
+        assert_eq!(
+            image(Rect::new(-5, -5, 10, 10)),
+            Some(Rect::new(0, 0, 5, 5))
+        );
+        assert_eq!(
+            image(Rect::new(90, 40, 100, 100)),
+            Some(Rect::new(90, 40, 10, 10))
+        );
         assert_eq!(image(Rect::new(100, 0, 5, 5)), None);
-        assert_eq!(image(Rect::new(i32::MIN, 0, u32::MAX, 1)), Some(Rect::new(0, 0, 100, 1)));
+        assert_eq!(
+            image(Rect::new(i32::MIN, 0, u32::MAX, 1)),
+            Some(Rect::new(0, 0, 100, 1))
+        );
     }
 }

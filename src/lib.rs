@@ -26,5 +26,6 @@
 //! never exits and never reads the environment; errors are typed, one `Error` a room.
 
 pub mod geometry;
+pub mod report;
 pub mod session;
 pub mod shard;
