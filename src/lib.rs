@@ -28,6 +28,7 @@
 
 pub mod durable;
 pub mod geometry;
+pub mod report;
 pub mod session;
 pub mod shard;
 pub mod video;

@@ -1,0 +1,271 @@
+//! The page's parts, from the title to the tables.
+
+use super::axis::{degrees, number, percent};
+use super::html::{escape, table};
+use super::plot::{Level, Plot, Series};
+use super::turn::Turn;
+use super::{Page, any_fraction};
+use crate::shard::record::FrameRecord;
+
+/// Heights of the plotting areas, in units of which the width has 500.
+const TALL: f64 = 240.0;
+const LOW: f64 = 120.0;
+
+const STYLE: &str = include_str!("style.css");
+
+/// The whole document around the figures of the contact sheet.
+pub(super) fn document(page: &Page<'_>, turn: &Turn, contact: &str) -> String {
+    let session = page
+        .records
+        .first()
+        .map(|r| escape(&r.session))
+        .unwrap_or_default();
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
+         img-src data:; style-src 'unsafe-inline'\">\n\
+         <title>{session} \u{2013} relit</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
+         {header}{warnings}{contact}{plots}<div class=\"tables\">\n{settings}{facts}</div>\n\
+         </body>\n</html>\n",
+        header = header(page),
+        warnings = warnings(page.warnings),
+        contact = contact_sheet(contact),
+        plots = plots(page, turn),
+        settings = table("Settings", page.settings),
+        facts = table("Facts", page.facts),
+    )
+}
+
+fn header(page: &Page<'_>) -> String {
+    let Some(first) = page.records.first() else {
+        return String::new();
+    };
+    format!(
+        "<header>\n<p class=\"kind\">Extracted session</p>\n<h1><bdi>{session}</bdi></h1>\n\
+         <p>Object: <bdi>{object}</bdi></p>\n<p class=\"verdict\">{verdict}</p>\n</header>\n",
+        session = escape(&first.session),
+        object = escape(&first.object),
+        verdict = verdict(page),
+    )
+}
+
+fn verdict(page: &Page<'_>) -> String {
+    let total = page.records.len();
+    let duplicates = page.records.iter().filter(|r| r.duplicate).count();
+    let on = page.records.iter().filter(|r| r.spec_net).count();
+    let gate = percent(page.gate);
+    let spec_net = if on == 0 {
+        format!("Spec-Net is on in none: nowhere is more than {gate} of the object saturated")
+    } else {
+        let share = percent(share(on, total));
+        format!(
+            "Spec-Net is on in <b>{on}</b> ({share}): more than {gate} of the object is saturated \
+             there"
+        )
+    };
+    format!(
+        "<b>{total}</b> {samples}, {duplicates}. {spec_net}. {warnings}.",
+        samples = if total == 1 { "sample" } else { "samples" },
+        duplicates = counted(duplicates, "duplicate"),
+        warnings = capitalised(&counted(page.warnings.len(), "warning")),
+    )
+}
+
+fn counted(count: usize, noun: &str) -> String {
+    match count {
+        0 => format!("no {noun}s"),
+        1 => format!("<b>1</b> {noun}"),
+        _ => format!("<b>{count}</b> {noun}s"),
+    }
+}
+
+fn capitalised(text: &str) -> String {
+    match text.strip_prefix("no ") {
+        Some(rest) => format!("No {rest}"),
+        None => text.to_owned(),
+    }
+}
+
+#[expect(
+    clippy::cast_precision_loss,
+    reason = "counts of samples stay far below 2^52"
+)]
+fn share(part: usize, whole: usize) -> f64 {
+    part as f64 / whole.max(1) as f64
+}
+
+fn warnings(warnings: &[String]) -> String {
+    if warnings.is_empty() {
+        return String::new();
+    }
+    let items: String = warnings
+        .iter()
+        .map(|text| format!("<li><bdi>{}</bdi></li>\n", escape(text)))
+        .collect();
+    format!("<section class=\"warnings\">\n<h2>Warnings</h2>\n<ul>\n{items}</ul>\n</section>\n")
+}
+
+fn contact_sheet(figures: &str) -> String {
+    if figures.is_empty() {
+        return String::new();
+    }
+    format!(
+        "<section>\n<h2>Frames over the turn</h2>\n<div class=\"contact\">\n{figures}</div>\n\
+         <p class=\"note\">Angle, sample, and a mark where Spec-Net is on.</p>\n</section>\n"
+    )
+}
+
+fn plots(page: &Page<'_>, turn: &Turn) -> String {
+    format!(
+        "<section>\n<h2>Measured under the mask</h2>\n<p class=\"note\">{origin}</p>\n\
+         <div class=\"plots\">\n{saturated}{any}{colour}{sharpness}</div>\n</section>\n",
+        origin = turn.origin(),
+        saturated = saturated(page, turn),
+        any = saturated_any(page, turn),
+        colour = colour(page, turn),
+        sharpness = sharpness(page, turn),
+    )
+}
+
+fn saturated(page: &Page<'_>, turn: &Turn) -> String {
+    let extremes = Extremes::of(page.records, turn, |r| r.saturated_fraction);
+    let caption = format!(
+        "Pixels with all three channels at {level} or above. Above the dashed line, {gate}, \
+         Spec-Net is on. {extremes}",
+        level = page.saturation_level,
+        gate = percent(page.gate),
+        extremes = extremes.sentence(percent),
+    );
+    let plot = Plot {
+        alternative: &caption,
+        quantity: "saturated, all channels (% of the mask)",
+        abscissa: turn.label(),
+        height: TALL,
+        series: vec![Series {
+            class: "all",
+            label: "",
+            points: turn.points(page.records, |r| 100.0 * r.saturated_fraction),
+        }],
+        level: Some(Level {
+            at: 100.0 * page.gate,
+            fraction: page.gate,
+        }),
+    };
+    figure(&plot, &caption)
+}
+
+/// Apart from the gated fraction, which it exceeds tenfold on a coloured object: on one axis the
+/// gate could not be read.
+fn saturated_any(page: &Page<'_>, turn: &Turn) -> String {
+    let extremes = Extremes::of(page.records, turn, any_fraction);
+    let caption = format!(
+        "Pixels with at least one channel at {level} or above; not gated. {extremes}",
+        level = page.saturation_level,
+        extremes = extremes.sentence(percent),
+    );
+    let plot = Plot {
+        alternative: &caption,
+        quantity: "saturated, any channel (% of the mask)",
+        abscissa: turn.label(),
+        height: LOW,
+        series: vec![Series {
+            class: "any",
+            label: "",
+            points: turn.points(page.records, |r| 100.0 * any_fraction(r)),
+        }],
+        level: None,
+    };
+    figure(&plot, &caption)
+}
+
+fn colour(page: &Page<'_>, turn: &Turn) -> String {
+    let channel = |class, label, index: usize| Series {
+        class,
+        label,
+        points: turn.points(page.records, |r| {
+            r.mean_rgb.get(index).copied().unwrap_or(0.0)
+        }),
+    };
+    let caption = "Mean red (R), green (G) and blue (B) of the source pixels.";
+    let plot = Plot {
+        alternative: caption,
+        quantity: "mean colour (8-bit sRGB value)",
+        abscissa: turn.label(),
+        height: TALL,
+        series: vec![
+            channel("r", "R", 0),
+            channel("g", "G", 1),
+            channel("b", "B", 2),
+        ],
+        level: None,
+    };
+    figure(&plot, caption)
+}
+
+fn sharpness(page: &Page<'_>, turn: &Turn) -> String {
+    let extremes = Extremes::of(page.records, turn, |r| r.sharpness);
+    let caption = format!(
+        "Variance of the Laplacian; larger is sharper. {}",
+        extremes.sentence(|value| number(value, 1))
+    );
+    let plot = Plot {
+        alternative: &caption,
+        quantity: "sharpness (squared luma steps)",
+        abscissa: turn.label(),
+        height: LOW,
+        series: vec![Series {
+            class: "sharp",
+            label: "",
+            points: turn.points(page.records, |r| r.sharpness),
+        }],
+        level: None,
+    };
+    figure(&plot, &caption)
+}
+
+fn figure(plot: &Plot<'_>, caption: &str) -> String {
+    format!(
+        "<figure class=\"plot\">\n{}<figcaption>{caption}</figcaption>\n</figure>\n",
+        plot.svg()
+    )
+}
+
+/// Least, mean and largest value of a quantity, and where the extremes lie.
+struct Extremes {
+    least: (f64, f64),
+    mean: f64,
+    largest: (f64, f64),
+}
+
+impl Extremes {
+    fn of(records: &[FrameRecord], turn: &Turn, value: impl Fn(&FrameRecord) -> f64) -> Self {
+        let points = turn.points(records, value);
+        let by_value = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let nowhere = (0.0, 0.0);
+        Self {
+            least: points.iter().min_by(by_value).copied().unwrap_or(nowhere),
+            mean: points.iter().map(|p| p.1).sum::<f64>() * share(1, points.len()),
+            largest: points
+                .iter()
+                .rev()
+                .max_by(by_value)
+                .copied()
+                .unwrap_or(nowhere),
+        }
+    }
+
+    fn sentence(&self, written: impl Fn(f64) -> String) -> String {
+        let (least, largest) = (written(self.least.1), written(self.largest.1));
+        if least == largest {
+            return format!("{least} throughout.");
+        }
+        format!(
+            "Mean {mean}, least {least} at {low}, largest {largest} at {high}.",
+            mean = written(self.mean),
+            low = degrees(self.least.0),
+            high = degrees(self.largest.0),
+        )
+    }
+}

@@ -1,0 +1,235 @@
+"""Speed and memory of relit-extract against other ways to do the same work.
+
+All programs read the same video and may use the same processors. The runs are interleaved, so
+that a change of the machine's load meets all of them; the table gives medians.
+"""
+
+import argparse
+import dataclasses
+import os
+import pathlib
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+
+SIZE = 256
+MARGIN = 0.05
+HERE = pathlib.Path(__file__).parent
+
+# The bars of this comparison: times as fast as the peer.
+BARS = {"ffmpeg, PNG default": 1.5, "OpenCV + webdataset, PNG default": 2.0}
+PROGRAM = "relit-extract"
+
+
+@dataclasses.dataclass
+class Run:
+    """What one run cost."""
+
+    wall: float
+    cpu: float
+    peak_mb: float
+
+
+def fail(text):
+    sys.exit(f"bench: {text}")
+
+
+def output(*command):
+    try:
+        return subprocess.run(command, check=True, capture_output=True).stdout
+    except FileNotFoundError:
+        fail(f"there is no {command[0]}: run `make setup`")
+    except subprocess.CalledProcessError as error:
+        fail(f"{command[0]} failed: {error.stderr.decode(errors='replace').strip()}")
+
+
+def probe(path, entries, *options):
+    text = output(
+        "ffprobe", "-v", "error", "-select_streams", "v:0", *options,
+        "-show_entries", f"stream={entries}", "-of", "csv=p=0", str(path),
+    )
+    return [int(number) for number in text.decode().split(",") if number.strip()]
+
+
+def square_crop(mask):
+    """The mask's bounding box with its margin, made square, inside the frame."""
+    width, height = probe(mask, "width,height")
+    grey = output(
+        "ffmpeg", "-v", "error", "-i", str(mask),
+        "-f", "rawvideo", "-pix_fmt", "gray", "-",
+    )
+    rows = [grey[y * width : (y + 1) * width] for y in range(height)]
+    ys = [y for y, row in enumerate(rows) if any(row)]
+    xs = [x for x in range(width) if any(row[x] for row in rows)]
+    if not ys:
+        fail(f"the mask {mask} is empty")
+    w, h = xs[-1] + 1 - xs[0], ys[-1] + 1 - ys[0]
+    side = min(round(max(w, h) * (1 + 2 * MARGIN)), width, height)
+
+    def corner(low, extent, limit):
+        return min(max(low + (extent - side) // 2, 0), limit - side)
+
+    return corner(xs[0], w, width), corner(ys[0], h, height), side, side
+
+
+def run(command, threads, log):
+    """Runs a command on the first `threads` processors and waits for it."""
+    cpus = sorted(os.sched_getaffinity(0))[:threads]
+    with open(log, "wb") as sink:
+        start = time.monotonic()
+        child = subprocess.Popen(
+            [str(part) for part in command], stdin=subprocess.DEVNULL, stdout=sink, stderr=sink,
+            preexec_fn=lambda: os.sched_setaffinity(0, cpus),
+        )
+        _, status, usage = os.wait4(child.pid, 0)
+        wall = time.monotonic() - start
+    code = child.returncode = os.waitstatus_to_exitcode(status)
+    if code != 0:
+        tail = log.read_text(errors="replace")[-2000:]
+        fail(f"{command[0]} ended with {code}:\n{tail}")
+    return Run(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
+
+
+def ffmpeg_png(args, crop, out, *png):
+    x, y, w, h = crop
+    window = f"crop={w}:{h}:{x}:{y}:exact=1,format=gbrp"
+    graph = (
+        f"[1:v]{window}[mask];[0:v]{window}[frame];[frame][mask]blend=all_mode=multiply,"
+        f"scale={SIZE}:{SIZE}:flags=area,format=rgb24"
+    )
+    return [
+        "ffmpeg", "-v", "error", "-y", "-filter_complex_threads", args.threads,
+        "-threads", args.threads, "-i", args.video, "-i", args.mask,
+        "-filter_complex", graph, "-vsync", "passthrough",
+        "-threads", args.threads, *png, out / "%04d.png",
+    ]
+
+
+def opencv(args, crop, out, *png):
+    return [
+        sys.executable, HERE / "opencv_job.py", "--video", args.video, "--mask", args.mask,
+        "--crop", ",".join(map(str, crop)), "--size", SIZE, "--threads", args.threads,
+        "--out", out, *png,
+    ]
+
+
+def relit(args, frames, video, out):
+    return [
+        args.program, video, "--mask", args.mask, "--frames", frames, "--size", SIZE, "-o", out,
+    ]
+
+
+def contestants(args, crop, frames):
+    """Name -> the command that fills a folder."""
+    decode = ["ffmpeg", "-v", "error", "-threads", args.threads, "-i", args.video]
+    table = {
+        "ffmpeg, decoding only": lambda out: [*decode, "-f", "null", "-"],
+        "ffmpeg, PNG default": lambda out: ffmpeg_png(args, crop, out),
+        "ffmpeg, PNG level 1, up": lambda out: ffmpeg_png(
+            args, crop, out, "-compression_level", 1, "-pred", "up"
+        ),
+        "OpenCV + webdataset, PNG default": lambda out: opencv(args, crop, out),
+        "OpenCV + webdataset, PNG level 1": lambda out: opencv(args, crop, out, "--png-level", 1),
+    }
+    if args.program is not None:
+        table = {PROGRAM: lambda out: relit(args, frames, args.video, out), **table}
+    return table
+
+
+def fresh(folder):
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return folder
+
+
+def check_output(name, out, frames):
+    """A program that did less than its work must not look fast."""
+    if name.startswith("ffmpeg, PNG"):
+        found = len(list(out.glob("*.png")))
+    elif name.startswith(("OpenCV", PROGRAM)):
+        names = output("tar", "tf", str(next(out.glob("*.tar")))).decode().splitlines()
+        found = sum(member.endswith(".json") for member in names)
+    else:
+        return
+    if found != frames:
+        fail(f"{name} wrote {found} of {frames} frames")
+
+
+def compare(args, crop, frames):
+    runs = {}
+    for repetition in range(args.runs):
+        for name, command in contestants(args, crop, frames).items():
+            out = fresh(args.work / "out")
+            runs.setdefault(name, []).append(run(command(out), args.threads, args.work / "log"))
+            check_output(name, out, frames)
+            print(f"  {repetition + 1}/{args.runs} {name}: {runs[name][-1].wall:.2f} s", flush=True)
+    shutil.rmtree(args.work / "out")
+    return {
+        name: Run(*(statistics.median(column) for column in zip(*map(dataclasses.astuple, each))))
+        for name, each in runs.items()
+    }
+
+
+def print_comparison(medians, frames):
+    base = medians.get(PROGRAM)
+    print(f"\n{'':34}{'frames/s':>9}{'CPU-ms/frame':>14}{'peak MB':>9}{'relit is':>12}")
+    for name, median in medians.items():
+        ratio = f"{median.wall / base.wall:10.2f} x" if base and name != PROGRAM else ""
+        print(
+            f"{name:34}{frames / median.wall:9.1f}{1000 * median.cpu / frames:14.2f}"
+            f"{median.peak_mb:9.0f}{ratio:>12}"
+        )
+    for name, bar in BARS.items():
+        if base:
+            ratio = medians[name].wall / base.wall
+            verdict = "reached" if ratio >= bar else "MISSED"
+            print(f"bar: {bar} x as fast as {name}: {ratio:.2f} x, {verdict}")
+
+
+def memory(args, frames):
+    """Peak memory of relit-extract on the video and on the video four times over."""
+    long = (args.work / "long").with_suffix(args.video.suffix)
+    parts = args.work / "parts.txt"
+    quoted = str(args.video.resolve()).replace("'", "'\\''")
+    parts.write_text(f"file '{quoted}'\n" * 4)
+    output(
+        "ffmpeg", "-v", "error", "-y", "-f", "concat", "-safe", "0", "-i", str(parts),
+        "-c", "copy", str(long),
+    )
+    peaks = []
+    for video, count in ((args.video, frames), (long, 4 * frames)):
+        out = fresh(args.work / "out")
+        peaks.append(run(relit(args, count, video, out), args.threads, args.work / "log").peak_mb)
+        check_output(PROGRAM, out, count)
+        print(f"peak memory, {count} frames: {peaks[-1]:.0f} MB")
+    print(f"bar: the same within 10 %: {peaks[1] / peaks[0]:.2f} x")
+    shutil.rmtree(args.work / "out")
+    long.unlink()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--program", type=pathlib.Path, help="relit-extract; without it, the peers")
+    parser.add_argument("--video", type=pathlib.Path, required=True)
+    parser.add_argument("--mask", type=pathlib.Path, required=True)
+    parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)))
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--work", type=pathlib.Path, required=True, help="folder for what is written")
+    args = parser.parse_args()
+    for path in (args.video, args.mask):
+        if not path.is_file():
+            parser.error(f"there is no file {path}")
+    args.work.mkdir(parents=True, exist_ok=True)
+
+    frames = probe(args.video, "nb_read_packets", "-count_packets")[0]
+    crop = square_crop(args.mask)
+    print(f"{args.video}: {frames} frames, {args.threads} threads, crop {crop}, to {SIZE} pixels")
+    print_comparison(compare(args, crop, frames), frames)
+    if args.program is not None:
+        memory(args, frames)
+
+
+if __name__ == "__main__":
+    main()
