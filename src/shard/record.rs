@@ -21,7 +21,8 @@ pub struct FrameRecord {
     pub t_us: i64,
     /// Angle of the table, degrees; null where there is no table.
     pub angle_deg: Option<f64>,
-    /// True where the same source frame already stands in a sample with a smaller index.
+    /// True where another sample of the session shows the same source frame and is not flagged: of
+    /// all samples of one source frame, exactly one is not a duplicate.
     pub duplicate: bool,
     /// The part of the source frame that the image shows, source pixels. May reach beyond the
     /// frame, where the image is 0.

@@ -15,22 +15,16 @@ pub(super) fn check(
     records: &[Option<&FrameRecord>],
 ) -> Vec<(Option<u32>, String)> {
     let mut problems = Vec::new();
-    let mut sources = HashSet::new();
     for (index, record) in (0..).zip(records) {
         let Some(record) = record else { continue };
-        let mut wrong = |what| problems.push((Some(index), what));
-        own(settings, session, index, record)
-            .into_iter()
-            .for_each(&mut wrong);
-        let seen = !sources.insert(record.source_frame);
-        if seen != record.duplicate {
-            let is = if seen { "stands" } else { "does not stand" };
-            wrong(format!(
-                "duplicate is {}, but source frame {} {is} in a sample with a smaller index",
-                record.duplicate, record.source_frame
-            ));
-        }
+        let wrong = own(settings, session, index, record);
+        problems.extend(wrong.into_iter().map(|what| (Some(index), what)));
     }
+    problems.extend(
+        repeats(records)
+            .into_iter()
+            .map(|(index, what)| (Some(index), what)),
+    );
     if records.iter().all(Option::is_some) && !records.is_empty() {
         problems.extend(
             totals(session, records)
@@ -39,6 +33,37 @@ pub(super) fn check(
         );
     }
     problems
+}
+
+/// Where the flag `duplicate` does not fit: of the samples of one source frame exactly one is not
+/// flagged.
+fn repeats(records: &[Option<&FrameRecord>]) -> Vec<(u32, String)> {
+    let known = || records.iter().flatten();
+    let mut originals = HashSet::new();
+    let mut wrong = Vec::new();
+    for record in known().filter(|record| !record.duplicate) {
+        if !originals.insert(record.source_frame) {
+            let what = format!(
+                "duplicate is false, as in another sample of source frame {}",
+                record.source_frame
+            );
+            wrong.push((record.index, what));
+        }
+    }
+    if records.iter().any(Option::is_none) {
+        // The one that is not flagged may be the one that could not be read.
+        return wrong;
+    }
+    for record in known().filter(|record| record.duplicate) {
+        if !originals.contains(&record.source_frame) {
+            let what = format!(
+                "duplicate is true, and so it is in every sample of source frame {}",
+                record.source_frame
+            );
+            wrong.push((record.index, what));
+        }
+    }
+    wrong
 }
 
 /// What is wrong with one record in itself.
