@@ -250,8 +250,8 @@ fn inputs_are_sessions_folders_of_them_or_videos() {
     let (root, folder) = whole();
     let bare = root.path().join("clip one.mp4");
     fs::write(&bare, b"").unwrap();
-    assert_eq!(recordings(&folder).unwrap(), [folder.clone()]);
-    assert_eq!(recordings(&bare).unwrap(), [bare.clone()]);
+    assert_eq!(recordings(&folder).unwrap(), std::slice::from_ref(&folder));
+    assert_eq!(recordings(&bare).unwrap(), std::slice::from_ref(&bare));
     assert_eq!(Recording::open(&bare).unwrap().id, "clip_one");
     fs::remove_file(&bare).unwrap();
     assert_eq!(recordings(root.path()).unwrap(), [folder]);

@@ -129,10 +129,9 @@ impl Recording {
                 // A name such as "." tells nothing; the real one does.
                 let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
                 let mut recording = Self::bare(&video, real.file_name(), Some(folder));
-                recording.notices.push(Notice::Warning(format!(
-                    "{} has no session.json: its video is taken without angles and driver's time stamps",
-                    folder.display()
-                )));
+                recording.notices.push(Notice::Warning(
+                    "the folder has no session.json: its video is taken without angles and driver's time stamps".to_owned(),
+                ));
                 Ok(recording)
             }
             (Some(_), more) => Err(Error::SeveralVideos {
