@@ -1,8 +1,14 @@
 //! The edge between the programs and a person or a machine: lines on the terminal, JSON lines,
 //! progress, exit codes. The one place that prints.
-#![allow(clippy::print_stdout, clippy::print_stderr)]
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "this is where printing belongs"
+)]
+#![allow(dead_code, reason = "not every program says all of it")]
 
 use std::error::Error;
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -11,7 +17,7 @@ use serde_json::Value;
 
 /// How a command that ran to its end came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
+pub(crate) enum Outcome {
     /// All was done: exit code 0.
     Whole,
     /// Finished, and what was asked to be checked is wrong: exit code 1.
@@ -32,18 +38,18 @@ impl From<Outcome> for ExitCode {
 
 /// Speaks for one program, to a person or, with `--json`, to a machine.
 #[derive(Debug, Clone, Copy)]
-pub struct Console {
+pub(crate) struct Console {
     json: bool,
 }
 
 impl Console {
     /// A console that prints JSON lines (`json`) or text on standard output.
-    pub fn new(json: bool) -> Self {
+    pub(crate) fn new(json: bool) -> Self {
         Self { json }
     }
 
     /// A result: `text` for a person, `event` as one JSON line for a machine.
-    pub fn say(self, text: &str, event: &Value) {
+    pub(crate) fn say(self, text: &str, event: &Value) {
         if self.json {
             println!("{event}");
         } else {
@@ -52,25 +58,42 @@ impl Console {
     }
 
     /// A warning: standard error for a person, a JSON line for a machine.
-    pub fn warn(self, text: &str) {
+    pub(crate) fn warn(self, text: &str) {
         if self.json {
-            println!("{}", serde_json::json!({ "event": "warning", "message": text }));
+            println!(
+                "{}",
+                serde_json::json!({ "event": "warning", "message": text })
+            );
         } else {
             eprintln!("warning: {text}");
         }
     }
 
     /// An error, with its causes, as one sentence.
-    pub fn error(self, error: &dyn Error) {
-        let text = sentence(error);
+    pub(crate) fn error(self, error: &dyn Error) {
+        self.tell(&sentence(error), None);
+    }
+
+    /// An error with one of several inputs.
+    pub(crate) fn error_in(self, input: &Path, error: &dyn Error) {
+        self.tell(&sentence(error), Some(input));
+    }
+
+    fn tell(self, text: &str, input: Option<&Path>) {
         if self.json {
-            println!("{}", serde_json::json!({ "event": "error", "message": text }));
+            let event = serde_json::json!({ "event": "error", "message": text, "input": input });
+            println!("{event}");
         }
-        eprintln!("error: {text}");
+        match input {
+            Some(input) if !text.contains(&*input.to_string_lossy()) => {
+                eprintln!("error: {}: {text}", input.display());
+            }
+            _ => eprintln!("error: {text}"),
+        }
     }
 
     /// The exit code of a command, after its error, if any, was told.
-    pub fn finish<E: Error>(self, result: Result<Outcome, E>) -> ExitCode {
+    pub(crate) fn finish<E: Error>(self, result: Result<Outcome, E>) -> ExitCode {
         match result {
             Ok(outcome) => outcome.into(),
             Err(error) => {
@@ -82,7 +105,7 @@ impl Console {
 
     /// A progress bar over `length` steps; hidden with `--json` or where standard error is not a
     /// terminal.
-    pub fn progress(self, length: u64, label: &str) -> ProgressBar {
+    pub(crate) fn progress(self, length: u64, label: &str) -> ProgressBar {
         if self.json {
             return ProgressBar::hidden();
         }
