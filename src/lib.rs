@@ -28,6 +28,7 @@
 
 pub mod durable;
 pub mod geometry;
+pub mod mask;
 pub mod report;
 pub mod session;
 pub mod shard;

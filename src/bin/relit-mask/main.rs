@@ -1,0 +1,55 @@
+//! relit-mask: which pixels of a recording are the object.
+
+mod arguments;
+#[path = "../console/mod.rs"]
+mod console;
+mod report;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use relit::mask::Error;
+use relit::mask::files::make;
+use relit::session::recordings;
+
+use arguments::Arguments;
+use console::{Console, Outcome};
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let console = Console::new(arguments.json);
+    let paths = match recordings(&arguments.input) {
+        Ok(paths) => paths,
+        Err(error) => return console.finish(Err(error)),
+    };
+    if let Err(usage) = arguments.check_output(paths.len()) {
+        // Where standard error is closed there is nobody to tell.
+        let _ = usage.print();
+        return ExitCode::from(2);
+    }
+    console.finish(run(&paths, &arguments, console))
+}
+
+fn run(paths: &[PathBuf], arguments: &Arguments, console: Console) -> Result<Outcome, Error> {
+    let request = arguments.request()?;
+    let bar = console.progress(paths.len() as u64, "masks");
+    let mut failed = 0;
+    for path in paths {
+        match make(path, arguments.output.clone(), &request) {
+            Ok(made) => bar.suspend(|| report::tell(&made, console)),
+            Err(error) if paths.len() == 1 => return Err(error),
+            Err(error) => {
+                failed += 1;
+                bar.suspend(|| console.error(&error));
+            }
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(match failed {
+        0 => Outcome::Whole,
+        all if all == paths.len() => Outcome::Wrong,
+        _ => Outcome::Lossy,
+    })
+}

@@ -1,0 +1,37 @@
+//! What relit-mask says of a mask that it made.
+
+use relit::mask::files::Made;
+use serde_json::json;
+
+use super::console::Console;
+
+/// Tells of one mask: its warnings, then where it is and how large.
+pub(crate) fn tell(made: &Made, console: Console) {
+    let id = &made.recording;
+    for warning in &made.record.warnings {
+        console.warn(&format!("{id}: {warning}"));
+    }
+    let (source, result) = (&made.record.source, &made.record.result);
+    let frame_px = f64::from(source.width) * f64::from(source.height);
+    let text = format!(
+        "{id}: {} with {} pixels ({:.1} % of the frame) at {}, {} of {} parts; look at {}",
+        made.files.mask.display(),
+        result.area_px,
+        100.0 * result.area_px as f64 / frame_px,
+        result.bounding_box,
+        result.components_kept,
+        result.components,
+        made.files.preview.display(),
+    );
+    let event = json!({
+        "event": "mask",
+        "recording": id,
+        "mask": made.files.mask,
+        "record": made.files.record,
+        "preview": made.files.preview,
+        "source": source,
+        "result": result,
+        "warnings": made.record.warnings,
+    });
+    console.say(&text, &event);
+}

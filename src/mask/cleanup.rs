@@ -1,0 +1,218 @@
+//! From the raw cut to a mask: stray parts dropped, holes filled, the edge softened.
+
+use image::GrayImage;
+use opencv::core::{self, Mat, Size};
+use opencv::imgproc;
+
+use super::bitmap::{Bitmap, Connectivity, Part};
+use super::{Error, Feather, Mark, Seeds};
+
+/// Rise from 10 % to 90 % of a Gaussian edge, in standard deviations.
+const RISE: f64 = 2.563;
+
+/// A cut after its clean-up, and what was done to it.
+#[derive(Debug)]
+pub(super) struct Cleaned {
+    pub(super) mask: Bitmap,
+    /// Parts of the raw cut, 8-connected.
+    pub(super) components: usize,
+    pub(super) kept: usize,
+    /// The parts that were dropped, in the order of their first pixels.
+    pub(super) dropped: Vec<Part>,
+    /// Pixels that the seeds mark as object and that were dropped all the same.
+    pub(super) dropped_marks_px: u64,
+    /// The holes that were filled, in the order of their first pixels.
+    pub(super) holes: Vec<Part>,
+}
+
+/// Keeps the largest part, or with `keep_all` every part, and fills holes, except those in which
+/// the seeds mark background.
+pub(super) fn clean(raw: &Bitmap, seeds: Option<&Seeds>, keep_all: bool) -> Cleaned {
+    let parts = raw.parts(Connectivity::Eight);
+    let largest = parts.largest();
+    let is_kept = |part: usize| keep_all || Some(part) == largest;
+    let kept = raw.map(|at, _| parts.at(at).is_some_and(is_kept));
+    let (mask, holes) = fill_holes(&kept, seeds);
+    let parts_list = || parts.list.iter().enumerate();
+    Cleaned {
+        components: parts.list.len(),
+        kept: parts_list().filter(|&(part, _)| is_kept(part)).count(),
+        dropped: parts_list()
+            .filter(|&(part, _)| !is_kept(part))
+            .map(|(_, part)| *part)
+            .collect(),
+        dropped_marks_px: marked(seeds, Mark::Object)
+            .filter(|&at| !mask.bits().get(at).copied().unwrap_or(true))
+            .count() as u64,
+        mask,
+        holes,
+    }
+}
+
+/// Holes are what the border does not reach through 4-connected background: the counterpart of
+/// an 8-connected object.
+fn fill_holes(object: &Bitmap, seeds: Option<&Seeds>) -> (Bitmap, Vec<Part>) {
+    let ground = object.inverted();
+    let parts = ground.parts(Connectivity::Four);
+    let all = object.inverted().map(|_, _| true).bounds();
+    let mut is_hole: Vec<bool> = parts
+        .list
+        .iter()
+        .map(|part| {
+            let bounds = part.bounds;
+            bounds.x > 0
+                && bounds.y > 0
+                && bounds.right() < all.right()
+                && bounds.bottom() < all.bottom()
+        })
+        .collect();
+    for part in marked(seeds, Mark::Background).filter_map(|at| parts.at(at)) {
+        is_hole[part] = false;
+    }
+    let filled = object.map(|at, bit| bit || parts.at(at).is_some_and(|part| is_hole[part]));
+    let holes = parts.list.iter().zip(is_hole).filter(|&(_, hole)| hole);
+    (filled, holes.map(|(part, _)| *part).collect())
+}
+
+/// The pixels that the seeds mark so.
+fn marked(seeds: Option<&Seeds>, wanted: Mark) -> impl Iterator<Item = usize> {
+    let marks = seeds.map_or(&[][..], Seeds::marks).iter().enumerate();
+    marks
+        .filter(move |&(_, &mark)| mark == wanted)
+        .map(|(at, _)| at)
+}
+
+/// The mask as a picture: 0 and 255, with a Gaussian edge between them where `feather` asks for
+/// one. Set pixels are at least 128 and the others less, so that a threshold gives the mask back.
+pub(super) fn soften(
+    mask: &Bitmap,
+    size: (u32, u32),
+    feather: Feather,
+) -> Result<GrayImage, Error> {
+    let hard: Vec<u8> = mask
+        .bits()
+        .iter()
+        .map(|&bit| if bit { 255 } else { 0 })
+        .collect();
+    let levels = if feather.px() == 0 {
+        hard
+    } else {
+        let soft = blur(&hard, size, f64::from(feather.px()) / RISE)?;
+        let sided = soft.iter().zip(mask.bits());
+        sided
+            .map(|(&level, &bit)| if bit { level.max(128) } else { level.min(127) })
+            .collect()
+    };
+    Ok(GrayImage::from_raw(size.0, size.1, levels).unwrap_or_default())
+}
+
+fn blur(levels: &[u8], (width, height): (u32, u32), sigma: f64) -> Result<Vec<u8>, Error> {
+    let doing = "softening the mask's edge";
+    let mut soft = vec![0; levels.len()];
+    let from = Mat::new_rows_cols_with_data(height as i32, width as i32, levels)
+        .map_err(Error::opencv(doing))?;
+    let mut to = Mat::new_rows_cols_with_data_mut(height as i32, width as i32, &mut soft)
+        .map_err(Error::opencv(doing))?;
+    let by_sigma = Size::new(0, 0);
+    // The frame's border is no edge of the object.
+    imgproc::gaussian_blur(
+        &from,
+        &mut to,
+        by_sigma,
+        sigma,
+        sigma,
+        core::BORDER_REPLICATE,
+    )
+    .map_err(Error::opencv(doing))?;
+    drop(to);
+    Ok(soft)
+}
+
+#[cfg(test)]
+mod tests {
+    use image::{DynamicImage, Luma};
+
+    use super::*;
+
+    const RING: [&str; 6] = [
+        "#......", //
+        ".####..", //
+        ".#..#..", //
+        ".####.#", //
+        "......#", //
+        ".......",
+    ];
+
+    fn seeds(size: (u32, u32), marks: &[(u32, u32, u8)]) -> Seeds {
+        let mut image = GrayImage::from_pixel(size.0, size.1, Luma([128]));
+        for &(x, y, level) in marks {
+            image.put_pixel(x, y, Luma([level]));
+        }
+        Seeds::from_image(&DynamicImage::from(image)).unwrap()
+    }
+
+    #[test]
+    fn the_largest_part_stays_and_its_hole_is_filled() {
+        let cleaned = clean(&Bitmap::drawn(&RING), None, false);
+        let wanted = [
+            "#......", ".####..", ".####..", ".####..", ".......", ".......",
+        ];
+        assert_eq!(cleaned.mask, Bitmap::drawn(&wanted));
+        assert_eq!((cleaned.components, cleaned.kept), (2, 1));
+        assert_eq!(cleaned.dropped[0].area, 2);
+        assert_eq!(cleaned.holes[0].area, 2);
+    }
+
+    #[test]
+    fn every_part_stays_where_all_are_to_be_kept() {
+        let cleaned = clean(&Bitmap::drawn(&RING), None, true);
+        assert_eq!((cleaned.components, cleaned.kept), (2, 2));
+        assert!(cleaned.dropped.is_empty());
+        assert_eq!(cleaned.mask.count(), 15);
+    }
+
+    #[test]
+    fn a_hole_marked_as_background_stays_open() {
+        let marks = seeds((7, 6), &[(1, 1, 255), (2, 2, 0)]);
+        let cleaned = clean(&Bitmap::drawn(&RING), Some(&marks), false);
+        assert!(cleaned.holes.is_empty());
+        assert_eq!(cleaned.mask.count(), 11);
+    }
+
+    #[test]
+    fn a_dropped_mark_is_counted() {
+        let marks = seeds((7, 6), &[(6, 4, 255), (1, 1, 255)]);
+        let cleaned = clean(&Bitmap::drawn(&RING), Some(&marks), false);
+        assert_eq!(cleaned.dropped_marks_px, 1);
+    }
+
+    #[test]
+    fn a_bay_that_opens_to_the_border_is_no_hole() {
+        let bay = Bitmap::drawn(&["###", "#.#", "#.#"]);
+        assert_eq!(clean(&bay, None, false).mask, bay);
+    }
+
+    #[test]
+    fn a_soft_edge_is_as_wide_as_asked_and_gives_the_mask_back() {
+        let size = (200, 3);
+        let mask = Bitmap::new(size, (0..600).map(|at| at % 200 < 100));
+        let soft = soften(&mask, size, Feather::new(20).unwrap()).unwrap();
+        let row = &soft.as_raw()[..200];
+        let rising = row.iter().filter(|&&v| (26..=229).contains(&v)).count();
+        assert!((18..=22).contains(&rising), "{rising}");
+        assert!(
+            row.iter()
+                .enumerate()
+                .all(|(x, &v)| (v >= 128) == (x < 100))
+        );
+        assert_eq!((row[0], row[199]), (255, 0));
+    }
+
+    #[test]
+    fn a_mask_finer_than_its_feather_survives_the_threshold() {
+        let mask = Bitmap::drawn(&[".......", "...#...", "......."]);
+        let soft = soften(&mask, (7, 3), Feather::new(100).unwrap()).unwrap();
+        let back: Vec<bool> = soft.as_raw().iter().map(|&v| v >= 128).collect();
+        assert_eq!(back, mask.bits());
+    }
+}

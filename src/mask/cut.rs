@@ -1,0 +1,190 @@
+//! The door to OpenCV's GrabCut: hints to labels, labels to a cut.
+
+use image::RgbImage;
+use opencv::core::{self, Mat, Vec3b};
+use opencv::imgproc;
+
+use super::bitmap::Bitmap;
+use super::{Error, Hints, Iterations, Mark};
+use crate::geometry::Rect;
+
+/// Any fixed number: GrabCut's first clusters are drawn at random.
+const SEED: i32 = 1;
+
+/// GrabCut's labels; the numbers are OpenCV's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+enum Label {
+    Background = imgproc::GC_BGD as u8,
+    Object = imgproc::GC_FGD as u8,
+    ProbablyBackground = imgproc::GC_PR_BGD as u8,
+    ProbablyObject = imgproc::GC_PR_FGD as u8,
+}
+
+impl Label {
+    const OBJECT: [u8; 2] = [Self::Object as u8, Self::ProbablyObject as u8];
+}
+
+/// What GrabCut starts from.
+#[derive(Debug)]
+pub(super) struct Start {
+    size: (u32, u32),
+    labels: Vec<u8>,
+    /// Learn the first colour models from the marks alone.
+    marks_teach: bool,
+    /// The part of the hinted rectangle that lies in the frame.
+    pub(super) rect: Option<Rect>,
+}
+
+impl Start {
+    /// Lays the hints over a frame of `size`.
+    pub(super) fn new(hints: &Hints, size: (u32, u32)) -> Result<Self, Error> {
+        let rect = hints.rect().map(|rect| clip(rect, size)).transpose()?;
+        let seeds = hints.seeds();
+        if let Some(seeds) = seeds.filter(|seeds| seeds.size() != size) {
+            return Err(Error::SeedsSize {
+                seeds: seeds.size(),
+                frame: size,
+            });
+        }
+        let marks = seeds.map_or(&[][..], |seeds| seeds.marks());
+        let unmarked = |at: usize| match rect {
+            None => Label::ProbablyBackground,
+            Some(rect) if holds(rect, at, size.0) => Label::ProbablyObject,
+            Some(_) => Label::Background,
+        };
+        let label = |at: usize| match marks.get(at) {
+            Some(Mark::Object) => Label::Object,
+            Some(Mark::Background) => Label::Background,
+            Some(Mark::Unknown) | None => unmarked(at),
+        };
+        let pixels = size.0 as usize * size.1 as usize;
+        let start = Self {
+            size,
+            labels: (0..pixels).map(|at| label(at) as u8).collect(),
+            marks_teach: rect.is_none() && marks.contains(&Mark::Background),
+            rect,
+        };
+        start.check(hints)?;
+        Ok(start)
+    }
+
+    fn check(&self, hints: &Hints) -> Result<(), Error> {
+        let object = self.labels.iter().filter(|at| Label::OBJECT.contains(at));
+        let object = object.count();
+        if object == self.labels.len() {
+            let (width, height) = self.size;
+            return Err(Error::NoBackground { width, height });
+        }
+        match hints.rect() {
+            Some(rect) if object == 0 => Err(Error::NoObject { rect }),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn clip(rect: Rect, (width, height): (u32, u32)) -> Result<Rect, Error> {
+    let outside = Error::RectOutside {
+        rect,
+        width,
+        height,
+    };
+    rect.clipped_to(width, height).ok_or(outside)
+}
+
+fn holds(rect: Rect, at: usize, width: u32) -> bool {
+    let (x, y) = ((at % width as usize) as i64, (at / width as usize) as i64);
+    (i64::from(rect.x)..rect.right()).contains(&x)
+        && (i64::from(rect.y)..rect.bottom()).contains(&y)
+}
+
+/// Separates object from background in `frame`, which has the size that `start` was made for.
+/// The same input gives the same bits.
+pub(super) fn cut(frame: &RgbImage, start: Start, iterations: Iterations) -> Result<Bitmap, Error> {
+    let Start {
+        size, mut labels, ..
+    } = start;
+    // OpenCV's order of channels, so that its other users get the same mask.
+    let pixels: Vec<Vec3b> = frame
+        .pixels()
+        .map(|pixel| Vec3b::from([pixel.0[2], pixel.0[1], pixel.0[0]]))
+        .collect();
+    run(&pixels, size, &mut labels, start.marks_teach, iterations)
+        .map_err(Error::opencv("cutting the object out"))??;
+    let is_object = labels.iter().map(|label| Label::OBJECT.contains(label));
+    Ok(Bitmap::new(size, is_object))
+}
+
+/// The outer result is OpenCV's, the inner one says whether there is a cut.
+fn run(
+    pixels: &[Vec3b],
+    size: (u32, u32),
+    labels: &mut [u8],
+    marks_teach: bool,
+    iterations: Iterations,
+) -> opencv::Result<Result<(), Error>> {
+    core::set_rng_seed(SEED)?;
+    let mut models = Models::default();
+    let mut mode = imgproc::GC_INIT_WITH_MASK;
+    if marks_teach {
+        models.learn_from_marks(pixels, labels)?;
+        models.step(pixels, size, labels, imgproc::GC_EVAL_FREEZE_MODEL)?;
+        mode = imgproc::GC_EVAL;
+    }
+    // Round by round, because OpenCV goes on with models of nothing once a side has run empty.
+    for _ in 0..iterations.get() {
+        models.step(pixels, size, labels, mode)?;
+        mode = imgproc::GC_EVAL;
+        if let Err(one_sided) = both_sides(labels) {
+            return Ok(Err(one_sided));
+        }
+    }
+    Ok(Ok(()))
+}
+
+/// The colours of the two sides, as GrabCut keeps them between its rounds.
+#[derive(Default)]
+struct Models {
+    background: Mat,
+    object: Mat,
+}
+
+impl Models {
+    /// Learns from the marked pixels only. Unmarked ones would teach the background the object's
+    /// colours, or the object the background's: a few strokes leave nearly all pixels unmarked.
+    fn learn_from_marks(&mut self, pixels: &[Vec3b], labels: &[u8]) -> opencv::Result<()> {
+        let sure = [Label::Background as u8, Label::Object as u8];
+        let marked = pixels.iter().copied().zip(labels.iter().copied());
+        let (row, mut marks): (Vec<Vec3b>, Vec<u8>) =
+            marked.filter(|(_, label)| sure.contains(label)).unzip();
+        let size = (row.len() as u32, 1);
+        self.step(&row, size, &mut marks, imgproc::GC_INIT_WITH_MASK)
+    }
+
+    /// One round over a picture of `size`.
+    fn step(
+        &mut self,
+        pixels: &[Vec3b],
+        (width, height): (u32, u32),
+        labels: &mut [u8],
+        mode: i32,
+    ) -> opencv::Result<()> {
+        let (rows, columns) = (height as i32, width as i32);
+        let picture = Mat::new_rows_cols_with_data(rows, columns, pixels)?;
+        let mut map = Mat::new_rows_cols_with_data_mut(rows, columns, labels)?;
+        let (background, object) = (&mut self.background, &mut self.object);
+        let nowhere = core::Rect::default();
+        imgproc::grab_cut(&picture, &mut map, nowhere, background, object, 1, mode)
+    }
+}
+
+fn both_sides(labels: &[u8]) -> Result<(), Error> {
+    let is_object = |label: &u8| Label::OBJECT.contains(label);
+    if !labels.iter().any(is_object) {
+        return Err(Error::Empty);
+    }
+    if labels.iter().all(is_object) {
+        return Err(Error::Everything);
+    }
+    Ok(())
+}

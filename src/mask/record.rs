@@ -1,0 +1,273 @@
+//! `mask.json`: how a mask was made, enough to make it again.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::error::SeedsFault;
+use super::{Error, Figures, Hints, Seeds, Settings};
+use crate::geometry::Rect;
+
+/// The schema that is written and read.
+pub const MASK_SCHEMA: &str = "relit.mask/1";
+
+/// What `mask.json` holds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaskRecord {
+    /// [`MASK_SCHEMA`].
+    pub schema: String,
+    /// What made the mask.
+    pub software: Software,
+    /// The frame it was made on.
+    pub source: Source,
+    /// What a person said of the object.
+    pub hints: RecordedHints,
+    /// How it was made.
+    pub settings: Settings,
+    /// What came out.
+    pub result: RecordedResult,
+    /// The warnings, as sentences.
+    pub warnings: Vec<String>,
+}
+
+/// The versions on which a mask's bytes depend.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Software {
+    /// Version of relit.
+    pub version: String,
+    /// Version of OpenCV.
+    pub opencv: String,
+}
+
+/// The frame that a mask was made on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    /// File name of the video, without folders.
+    pub video: String,
+    /// The frame's number, 0-based.
+    pub frame: u64,
+    /// Its time stamp in the video, microseconds.
+    pub t_us: i64,
+    /// Its width, pixels.
+    pub width: u32,
+    /// Its height, pixels.
+    pub height: u32,
+    /// BLAKE3 of its 8-bit RGB values, row by row, in hexadecimal.
+    pub frame_blake3: String,
+}
+
+/// [`Hints`] as they are recorded.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordedHints {
+    /// The rectangle as given, null where there was none.
+    pub rect: Option<Rect>,
+    /// The seeds as a grey PNG in base64 (255 object, 0 background, 128 unknown), null where
+    /// there were none.
+    pub seeds: Option<String>,
+    /// Coloured pixels of the painted seeds, which count as unknown.
+    pub seeds_coloured_px: u64,
+}
+
+/// A mask's numbers as they are recorded.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordedResult {
+    /// BLAKE3 of the mask's file, in hexadecimal.
+    pub mask_blake3: String,
+    /// Pixels of the object.
+    pub area_px: u64,
+    /// The smallest rectangle around them.
+    pub bounding_box: Rect,
+    /// Parts of the cut before the clean-up.
+    pub components: u64,
+    /// Parts that were kept.
+    pub components_kept: u64,
+    /// Pixels of the holes that were filled.
+    pub holes_filled_px: u64,
+}
+
+/// Why a file is not a mask's record, or not one that can be followed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordFault {
+    /// No JSON, or not the fields of a record.
+    #[error("{0}")]
+    Json(#[from] serde_json::Error),
+    /// Another schema.
+    #[error("its schema is {found}, not {MASK_SCHEMA:?}")]
+    Schema {
+        /// The field `schema`, as JSON.
+        found: Value,
+    },
+    /// Neither rectangle nor seeds.
+    #[error("it records no hints")]
+    NoHints,
+    /// Seeds that are not base64.
+    #[error("its seeds are not base64 ({0})")]
+    Base64(#[from] base64::DecodeError),
+    /// Seeds that are not the image that is recorded.
+    #[error("of its seeds: {0}")]
+    Seeds(#[from] SeedsFault),
+}
+
+impl MaskRecord {
+    /// Reads the content of a `mask.json`.
+    ///
+    /// # Errors
+    /// [`RecordFault::Json`] or [`RecordFault::Schema`].
+    pub fn from_json(bytes: &[u8]) -> Result<Self, RecordFault> {
+        let value: Value = serde_json::from_slice(bytes)?;
+        let schema = value.get("schema").unwrap_or(&Value::Null);
+        if schema != MASK_SCHEMA {
+            return Err(RecordFault::Schema {
+                found: schema.clone(),
+            });
+        }
+        Ok(serde_json::from_value(value)?)
+    }
+
+    /// The content of a `mask.json`.
+    ///
+    /// # Errors
+    /// What `serde_json` answers; it has no reason to.
+    pub fn to_json(&self) -> serde_json::Result<Vec<u8>> {
+        let mut bytes = serde_json::to_vec_pretty(self)?;
+        bytes.push(b'\n');
+        Ok(bytes)
+    }
+}
+
+impl Software {
+    /// What runs here.
+    #[must_use]
+    pub fn here() -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            opencv: opencv::core::get_version_string().unwrap_or_else(|_| "unknown".to_owned()),
+        }
+    }
+}
+
+impl std::fmt::Display for Software {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "relit {} with OpenCV {}", self.version, self.opencv)
+    }
+}
+
+impl RecordedHints {
+    /// The hints, ready to be recorded.
+    ///
+    /// # Errors
+    /// [`Error::Encode`].
+    pub fn new(hints: &Hints) -> Result<Self, Error> {
+        let seeds = hints.seeds().map(Seeds::to_record).transpose()?;
+        Ok(Self {
+            rect: hints.rect(),
+            seeds: seeds.map(|png| STANDARD.encode(png)),
+            seeds_coloured_px: hints.seeds().map_or(0, Seeds::coloured_px),
+        })
+    }
+
+    /// The hints that were recorded.
+    ///
+    /// # Errors
+    /// [`RecordFault::NoHints`], [`RecordFault::Base64`] or [`RecordFault::Seeds`].
+    pub fn hints(&self) -> Result<Hints, RecordFault> {
+        let seeds = match &self.seeds {
+            None => None,
+            Some(text) => {
+                let png = STANDARD.decode(text)?;
+                Some(Seeds::from_record(&png, self.seeds_coloured_px)?)
+            }
+        };
+        Hints::from_parts(self.rect, seeds).map_err(|_| RecordFault::NoHints)
+    }
+}
+
+impl RecordedResult {
+    /// The numbers of a mask whose file is `png`.
+    #[must_use]
+    pub fn new(figures: Figures, png: &[u8]) -> Self {
+        Self {
+            mask_blake3: blake3::hash(png).to_hex().to_string(),
+            area_px: figures.area_px,
+            bounding_box: figures.bounding_box,
+            components: figures.components as u64,
+            components_kept: figures.components_kept as u64,
+            holes_filled_px: figures.holes_filled_px,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record() -> MaskRecord {
+        let figures = Figures {
+            area_px: 12,
+            bounding_box: Rect::new(1, 2, 3, 4),
+            components: 2,
+            components_kept: 1,
+            holes_filled_px: 0,
+        };
+        MaskRecord {
+            schema: MASK_SCHEMA.to_owned(),
+            software: Software::here(),
+            source: Source {
+                video: "video.mkv".to_owned(),
+                frame: 3,
+                t_us: 100_000,
+                width: 64,
+                height: 48,
+                frame_blake3: "00".to_owned(),
+            },
+            hints: RecordedHints::new(&Hints::Rect(Rect::new(-1, 2, 30, 40))).unwrap(),
+            settings: Settings::default(),
+            result: RecordedResult::new(figures, b"png"),
+            warnings: vec!["look".to_owned()],
+        }
+    }
+
+    #[test]
+    fn a_record_is_read_back_as_it_was_written() {
+        let bytes = record().to_json().unwrap();
+        assert_eq!(MaskRecord::from_json(&bytes).unwrap(), record());
+    }
+
+    #[test]
+    fn another_schema_is_refused_by_name() {
+        let error = MaskRecord::from_json(br#"{"schema": "relit.session/1"}"#).unwrap_err();
+        assert!(error.to_string().contains("relit.session/1"), "{error}");
+        assert!(MaskRecord::from_json(b"[]").is_err());
+        assert!(MaskRecord::from_json(b"").is_err());
+    }
+
+    #[test]
+    fn a_recipe_with_impossible_settings_is_refused() {
+        let text = String::from_utf8(record().to_json().unwrap()).unwrap();
+        let text = text.replace("\"iterations\": 5", "\"iterations\": 0");
+        let error = MaskRecord::from_json(text.as_bytes()).unwrap_err();
+        assert!(error.to_string().contains("0 iterations"), "{error}");
+    }
+
+    #[test]
+    fn hints_that_cannot_be_followed_are_refused() {
+        let of = |rect, seeds: Option<&str>| RecordedHints {
+            rect,
+            seeds: seeds.map(str::to_owned),
+            seeds_coloured_px: 0,
+        };
+        let no_hints = of(None, None).hints();
+        assert!(matches!(no_hints, Err(RecordFault::NoHints)));
+        let no_base64 = of(None, Some("%")).hints();
+        assert!(matches!(no_base64, Err(RecordFault::Base64(_))));
+        let no_png = of(None, Some("aaaa")).hints();
+        assert!(matches!(no_png, Err(RecordFault::Seeds(_))));
+    }
+}

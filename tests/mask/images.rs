@@ -1,0 +1,231 @@
+//! The library on images alone.
+
+use image::{GrayImage, Luma, Rgb, RgbImage};
+use proptest::prelude::*;
+use relit::geometry::Rect;
+use relit::mask::{Error, Feather, Hints, Iterations, Seeds, Settings, Warning, segment};
+
+use super::scene::{AROUND, HEIGHT, WIDTH, around, disc, disc_share, seeds, strokes};
+
+#[test]
+fn a_rectangle_finds_the_object_in_it() {
+    let mask = segment(&disc(), &around(), &Settings::default()).unwrap();
+    assert!(disc_share(mask.image()) > 0.98);
+    assert!(mask.image().pixels().all(|p| p.0[0] == 0 || p.0[0] == 255));
+    assert_eq!(mask.warnings(), []);
+    let figures = mask.figures();
+    let set = mask.image().pixels().filter(|p| p.0[0] == 255).count();
+    assert_eq!(figures.area_px, set as u64);
+    assert_eq!(figures.components_kept, 1);
+}
+
+#[test]
+fn strokes_alone_find_the_object() {
+    let hints = Hints::Seeds(seeds(strokes));
+    let mask = segment(&disc(), &hints, &Settings::default()).unwrap();
+    assert!(disc_share(mask.image()) > 0.98);
+}
+
+#[test]
+fn a_stroke_on_the_object_alone_is_enough_for_a_plain_ground() {
+    let hints = Hints::Seeds(seeds(|x, y| strokes(x, y).max(128)));
+    let mask = segment(&disc(), &hints, &Settings::default()).unwrap();
+    assert!(disc_share(mask.image()) > 0.9);
+}
+
+#[test]
+fn seeds_overrule_the_rectangle() {
+    let rect = AROUND.parse().unwrap();
+    let marks = |x, y| {
+        if (30..36).contains(&x) && (20..44).contains(&y) {
+            0
+        } else {
+            strokes(x, y)
+        }
+    };
+    let hints = Hints::Both {
+        rect,
+        seeds: seeds(marks),
+    };
+    let mask = segment(&disc(), &hints, &Settings::default()).unwrap();
+    assert!((20..44).all(|y| mask.image().get_pixel(33, y).0[0] == 0));
+    assert_eq!(mask.image().get_pixel(48, 31).0[0], 255);
+}
+
+#[test]
+fn the_same_input_gives_the_same_mask_with_any_number_of_threads() {
+    let make = |threads| {
+        opencv::core::set_num_threads(threads).unwrap();
+        let hints = [around(), Hints::Seeds(seeds(strokes))];
+        hints.map(|hints| {
+            segment(&noisy(), &hints, &Settings::default())
+                .unwrap()
+                .image()
+                .clone()
+        })
+    };
+    let one = make(1);
+    for threads in [2, 4, 7, 1] {
+        assert_eq!(make(threads), one, "{threads} threads");
+    }
+}
+
+/// The disc with noise that makes GrabCut's clusters a matter of chance.
+fn noisy() -> RgbImage {
+    let mut state = 1u32;
+    let mut image = disc();
+    for channel in image.iter_mut() {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        *channel = channel.saturating_add((state >> 26) as u8);
+    }
+    image
+}
+
+#[test]
+fn a_feathered_mask_gives_the_hard_one_back_at_half() {
+    let feathered = Settings {
+        feather: Feather::new(8).unwrap(),
+        ..Settings::default()
+    };
+    let hard = segment(&disc(), &around(), &Settings::default()).unwrap();
+    let soft = segment(&disc(), &around(), &feathered).unwrap();
+    assert!(soft.image().pixels().any(|p| (1..255).contains(&p.0[0])));
+    for (soft, hard) in soft.image().pixels().zip(hard.image().pixels()) {
+        assert_eq!(soft.0[0] >= 128, hard.0[0] == 255);
+    }
+    assert_eq!(soft.figures(), hard.figures());
+}
+
+#[test]
+fn hints_that_do_not_fit_the_frame_are_refused_with_a_sentence() {
+    let refused = |hints: Hints| {
+        let error = segment(&disc(), &hints, &Settings::default()).unwrap_err();
+        assert!(error.to_string().contains(": "), "{error}");
+        error
+    };
+    let rect = |x, y, w, h| Hints::Rect(Rect::new(x, y, w, h));
+    assert!(matches!(
+        refused(rect(96, 0, 5, 5)),
+        Error::RectOutside { .. }
+    ));
+    assert!(matches!(
+        refused(rect(-9, -9, 9, 9)),
+        Error::RectOutside { .. }
+    ));
+    assert!(matches!(
+        refused(rect(5, 5, 0, 9)),
+        Error::RectOutside { .. }
+    ));
+    assert!(matches!(
+        refused(rect(0, 0, 96, 64)),
+        Error::NoBackground { .. }
+    ));
+    assert!(matches!(
+        refused(rect(-1, -1, 999, 999)),
+        Error::NoBackground { .. }
+    ));
+    assert!(matches!(
+        refused(Hints::Seeds(seeds(|_, _| 255))),
+        Error::NoBackground { .. }
+    ));
+    let other = GrayImage::from_pixel(9, 7, Luma([255]));
+    let other = Seeds::from_image(&other.into()).unwrap();
+    let error = refused(Hints::Seeds(other));
+    assert!(error.to_string().contains("9 x 7") && error.to_string().contains("96 x 64"));
+}
+
+#[test]
+fn frames_that_cannot_be_segmented_are_refused() {
+    let tiny = RgbImage::new(15, 400);
+    let result = segment(&tiny, &around(), &Settings::default());
+    assert!(matches!(
+        result,
+        Err(Error::FrameTooSmall { width: 15, .. })
+    ));
+}
+
+#[test]
+fn a_frame_of_one_colour_yields_a_mask_with_a_warning_or_a_refusal() {
+    for level in [0, 128, 255] {
+        let plain = RgbImage::from_pixel(WIDTH, HEIGHT, Rgb([level; 3]));
+        match segment(&plain, &around(), &Settings::default()) {
+            Ok(mask) => assert!(!mask.warnings().is_empty()),
+            Err(error) => assert!(matches!(error, Error::Empty), "{error}"),
+        }
+    }
+}
+
+#[test]
+fn an_object_at_the_border_is_told() {
+    let frame = RgbImage::from_fn(64, 64, |x, y| {
+        let object = x < 30 && (20..40).contains(&y);
+        Rgb(if object {
+            [220, 180, 40]
+        } else {
+            [20, (x % 5) as u8, 60]
+        })
+    });
+    let hints = Hints::Rect(Rect::new(-10, 15, 50, 30));
+    let mask = segment(&frame, &hints, &Settings::default()).unwrap();
+    let is_border = |w: &Warning| matches!(w, Warning::TouchesBorder { .. });
+    let is_clipped = |w: &Warning| matches!(w, Warning::RectClipped { .. });
+    assert!(mask.warnings().iter().any(is_border));
+    assert!(mask.warnings().iter().any(is_clipped));
+}
+
+prop_compose! {
+    fn any_frame()(width in 1u32..40, height in 1u32..40)
+        (pixels in any_pixels(width * height), width in Just(width), height in Just(height))
+        -> RgbImage {
+        RgbImage::from_raw(width, height, pixels).unwrap()
+    }
+}
+
+/// Noise, or few colours, which make models without spread.
+fn any_pixels(count: u32) -> impl Strategy<Value = Vec<u8>> {
+    let bytes = count as usize * 3;
+    prop_oneof![
+        prop::collection::vec(any::<u8>(), bytes),
+        prop::collection::vec(prop_oneof![Just(0u8), Just(255u8)], bytes),
+        any::<u8>().prop_map(move |level| vec![level; bytes]),
+    ]
+}
+
+fn any_hints(width: u32, height: u32) -> impl Strategy<Value = Option<Hints>> {
+    let rect = (-10i32..50, -10i32..50, 0u32..60, 0u32..60);
+    let rect = prop::option::of(rect.prop_map(Rect::from));
+    let mark = prop_oneof![8 => Just(128u8), 1 => Just(0u8), 1 => Just(255u8)];
+    let marks = prop::collection::vec(mark, (width * height) as usize);
+    (rect, prop::option::of(marks)).prop_map(move |(rect, marks)| {
+        let image = marks.and_then(|marks| GrayImage::from_raw(width, height, marks));
+        let seeds = image.and_then(|image| Seeds::from_image(&image.into()).ok());
+        Hints::from_parts(rect, seeds).ok()
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn no_frame_and_no_hint_make_it_panic(
+        (frame, hints) in any_frame().prop_flat_map(|frame| {
+            let hints = any_hints(frame.width(), frame.height());
+            (Just(frame), hints)
+        }),
+        count in 1u32..4,
+        feather in 0u32..20,
+        keep_all in any::<bool>(),
+    ) {
+        let settings = Settings {
+            iterations: Iterations::new(count).unwrap(),
+            feather: Feather::new(feather).unwrap(),
+            keep_all,
+        };
+        if let Some(hints) = hints {
+            match segment(&frame, &hints, &settings) {
+                Ok(mask) => prop_assert!(mask.figures().area_px > 0),
+                Err(error) => prop_assert!(!matches!(error, Error::OpenCv { .. }), "{error}"),
+            }
+        }
+    }
+}
