@@ -27,6 +27,7 @@
 //! never exits and never reads the environment; errors are typed, one `Error` a room.
 
 pub mod durable;
+pub mod extract;
 pub mod geometry;
 pub mod mask;
 pub mod report;

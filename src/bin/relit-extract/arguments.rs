@@ -1,0 +1,211 @@
+//! The command line, and what it asks for.
+
+use std::path::PathBuf;
+use std::thread::available_parallelism;
+
+use clap::builder::RangedU64ValueParser;
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use relit::extract::{MAX_MARGIN, MAX_SIDE, Options};
+use relit::shard::{Layout, Size};
+
+const EXAMPLES: &str = "\
+Examples:
+  relit-extract sessions/20261120T093015Z-mug -o dataset
+      one recorded session with the mask.png in its folder
+  relit-extract sessions -o dataset --resume
+      every session in a folder; what is there already is skipped
+  relit-extract clip.mp4 --mask mask.png -o dataset --size native
+      a bare video, in its own pixels
+  relit-extract verify dataset
+      read everything back
+
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost.";
+
+/// What the command line asks for.
+pub(crate) struct Arguments {
+    pub(crate) json: bool,
+    pub(crate) command: Command,
+}
+
+/// The two things that the program does.
+pub(crate) enum Command {
+    Extract {
+        inputs: Vec<PathBuf>,
+        out: PathBuf,
+        options: Options,
+    },
+    Verify {
+        out: PathBuf,
+    },
+}
+
+/// Turn recorded turns into masked frames with saturation statistics, in training shards.
+#[derive(Parser)]
+#[command(
+    name = "relit-extract",
+    version,
+    after_help = EXAMPLES,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true
+)]
+struct CommandLine {
+    #[command(subcommand)]
+    verb: Option<Verb>,
+    #[command(flatten)]
+    extract: Option<ExtractArguments>,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Read a data set back and check all of it.
+    #[command(after_help = "Example:\n  relit-extract verify dataset")]
+    Verify {
+        /// The data set's folder.
+        #[arg(value_name = "OUT")]
+        out: PathBuf,
+        /// Print one JSON line an event on standard output.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+#[derive(Args)]
+struct ExtractArguments {
+    /// A session folder, a folder of sessions, or a video file.
+    #[arg(value_name = "INPUT", required = true)]
+    inputs: Vec<PathBuf>,
+    /// The data set's folder; made where it is missing.
+    #[arg(short, long, value_name = "OUT")]
+    out: PathBuf,
+    /// The mask for all inputs [default: each session folder's mask.png].
+    #[arg(long, value_name = "PNG")]
+    mask: Option<PathBuf>,
+    /// Samples a session, evenly spread over one turn.
+    #[arg(long, value_name = "N", default_value_t = 1500, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    frames: u32,
+    /// Side of images and masks in pixels, or "native" for the source's own pixels.
+    #[arg(long, value_name = "PIXELS", default_value = "256", value_parser = size)]
+    size: Size,
+    /// Margin around the object, as a fraction of its longer side.
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.05, value_parser = margin)]
+    margin: f64,
+    /// A channel is saturated from this 8-bit value on.
+    #[arg(long, value_name = "0-255", default_value_t = 250)]
+    saturation_level: u8,
+    /// Spec-Net is to run above this fraction of saturated pixels.
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.05, value_parser = fraction)]
+    gate: f64,
+    /// How the data set lies on disk.
+    #[arg(long, value_enum, default_value_t = LayoutName::Webdataset)]
+    layout: LayoutName,
+    /// What is done about shifts of the object in the picture.
+    #[arg(long, value_enum, default_value_t = AlignName::Off)]
+    align: AlignName,
+    /// Refuse recordings of which a frame would be used twice or something is lost.
+    #[arg(long)]
+    strict: bool,
+    /// Skip sessions that the data set already holds, whole and from the same video and mask.
+    #[arg(long)]
+    resume: bool,
+    /// Threads that work side by side [default: as many as there are cores].
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
+    threads: Option<usize>,
+    /// Print one JSON line an event on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum LayoutName {
+    /// One tar a session, as WebDataset reads it.
+    Webdataset,
+    /// Folders of images, as the released data set is read.
+    Relit,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum AlignName {
+    /// Shifts are neither measured nor corrected.
+    Off,
+}
+
+impl From<LayoutName> for Layout {
+    fn from(name: LayoutName) -> Self {
+        match name {
+            LayoutName::Webdataset => Self::Webdataset,
+            LayoutName::Relit => Self::Relit,
+        }
+    }
+}
+
+/// Reads the command line; ends the program with exit code 2 where it is wrong.
+pub(crate) fn parse() -> Arguments {
+    let line = CommandLine::parse();
+    match (line.verb, line.extract) {
+        (Some(Verb::Verify { out, json }), _) => Arguments {
+            json,
+            command: Command::Verify { out },
+        },
+        (None, Some(extract)) => extract.into(),
+        (None, None) => CommandLine::command()
+            .error(
+                ErrorKind::MissingRequiredArgument,
+                "INPUT and --out are needed",
+            )
+            .exit(),
+    }
+}
+
+impl From<ExtractArguments> for Arguments {
+    fn from(line: ExtractArguments) -> Self {
+        let AlignName::Off = line.align;
+        let cores = || available_parallelism().map_or(1, std::num::NonZero::get);
+        let options = Options {
+            frames: line.frames,
+            size: line.size,
+            margin: line.margin,
+            saturation_level: line.saturation_level,
+            gate: line.gate,
+            layout: line.layout.into(),
+            mask: line.mask,
+            strict: line.strict,
+            resume: line.resume,
+            threads: line.threads.unwrap_or_else(cores),
+        };
+        let command = Command::Extract {
+            inputs: line.inputs,
+            out: line.out,
+            options,
+        };
+        Self {
+            json: line.json,
+            command,
+        }
+    }
+}
+
+fn size(text: &str) -> Result<Size, String> {
+    if text == "native" {
+        return Ok(Size::NATIVE);
+    }
+    match text.parse() {
+        Ok(side) if (1..=MAX_SIDE).contains(&side) => Ok(Size::Pixels(side)),
+        _ => Err(format!("give 1 to {MAX_SIDE} pixels, or native")),
+    }
+}
+
+fn within(text: &str, most: f64) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if (0.0..=most).contains(&value) => Ok(value),
+        _ => Err(format!("give a fraction from 0 to {most}, such as 0.05")),
+    }
+}
+
+fn margin(text: &str) -> Result<f64, String> {
+    within(text, MAX_MARGIN)
+}
+
+fn fraction(text: &str) -> Result<f64, String> {
+    within(text, 1.0)
+}

@@ -1,0 +1,26 @@
+//! `relit-extract`: recorded turns become masked frames in training shards; `verify` reads a data
+//! set back.
+
+mod arguments;
+#[path = "../console/mod.rs"]
+mod console;
+mod extracting;
+mod verifying;
+
+use std::process::ExitCode;
+
+use arguments::Command;
+use console::Console;
+
+fn main() -> ExitCode {
+    let arguments = arguments::parse();
+    let console = Console::new(arguments.json);
+    match arguments.command {
+        Command::Extract {
+            inputs,
+            out,
+            options,
+        } => console.finish(extracting::run(console, &inputs, &out, &options)),
+        Command::Verify { out } => console.finish(verifying::run(console, &out)),
+    }
+}

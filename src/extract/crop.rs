@@ -1,0 +1,114 @@
+//! The one crop of a video: the mask's bounding box with a margin, made square.
+
+use image::GrayImage;
+
+use crate::geometry::Rect;
+
+/// The mask's level from which on a pixel is the object's.
+const OBJECT: u8 = 128;
+
+/// A mask whose pixels are either the object's (255) or not (0).
+#[must_use]
+pub fn binary(mask: &GrayImage) -> GrayImage {
+    let mut binary = mask.clone();
+    for pixel in &mut *binary {
+        *pixel = if *pixel >= OBJECT { 255 } else { 0 };
+    }
+    binary
+}
+
+/// The smallest rectangle that holds all non-zero pixels; `None` where there are none.
+#[must_use]
+pub fn bounding_box(mask: &GrayImage) -> Option<Rect> {
+    let mut corners: Option<(u32, u32, u32, u32)> = None;
+    for (x, y, pixel) in mask.enumerate_pixels() {
+        if pixel.0[0] != 0 {
+            let (x0, y0, x1, y1) = corners.unwrap_or((x, y, x, y));
+            corners = Some((x0.min(x), y0.min(y), x1.max(x), y1.max(y)));
+        }
+    }
+    let (x0, y0, x1, y1) = corners?;
+    Some(Rect::new(x0 as i32, y0 as i32, x1 - x0 + 1, y1 - y0 + 1))
+}
+
+/// The square around `object` whose side is the object's longer side plus `margin` (a fraction of
+/// that side) on both sides, centred on the object, moved into the frame where it fits. Where it
+/// does not fit, it reaches beyond the frame; there the image is 0.
+#[must_use]
+pub fn square_around(object: Rect, margin: f64, frame: (u32, u32)) -> Rect {
+    let longer = object.w.max(object.h);
+    let side = longer + 2 * (f64::from(longer) * margin).round() as u32;
+    let x = placed(object.x, object.w, side, frame.0);
+    let y = placed(object.y, object.h, side, frame.1);
+    Rect::new(x, y, side, side)
+}
+
+/// Where `side` pixels begin that are centred on `start..start + extent`, inside `0..whole` where
+/// they fit.
+fn placed(start: i32, extent: u32, side: u32, whole: u32) -> i32 {
+    let centred = i64::from(start) - (i64::from(side) - i64::from(extent)).div_euclid(2);
+    let room = i64::from(whole) - i64::from(side);
+    let moved = if room >= 0 {
+        centred.clamp(0, room)
+    } else {
+        centred.clamp(room, 0)
+    };
+    moved as i32
+}
+
+/// The part of the mask under `crop`; 0 where the crop reaches beyond it.
+#[must_use]
+pub fn cut(mask: &GrayImage, crop: Rect) -> GrayImage {
+    GrayImage::from_fn(crop.w, crop.h, |x, y| {
+        let x = i64::from(crop.x) + i64::from(x);
+        let y = i64::from(crop.y) + i64::from(y);
+        let inside = u32::try_from(x).ok().zip(u32::try_from(y).ok());
+        inside
+            .and_then(|(x, y)| mask.get_pixel_checked(x, y))
+            .copied()
+            .unwrap_or(image::Luma([0]))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn the_crop_is_square_and_centred_with_its_margin() {
+        let crop = square_around(Rect::new(200, 100, 100, 60), 0.05, (640, 480));
+        assert_eq!(crop, Rect::new(195, 75, 110, 110));
+    }
+
+    #[test]
+    fn a_crop_at_the_edge_is_moved_inside() {
+        let crop = square_around(Rect::new(0, 440, 100, 40), 0.05, (640, 480));
+        assert_eq!(crop, Rect::new(0, 370, 110, 110));
+    }
+
+    #[test]
+    fn an_object_wider_than_the_frame_is_high_is_padded() {
+        let crop = square_around(Rect::new(20, 100, 600, 200), 0.05, (640, 480));
+        assert_eq!((crop.w, crop.h), (660, 660));
+        assert!(crop.y <= 0 && crop.bottom() >= 480);
+        let mask = GrayImage::from_pixel(640, 480, image::Luma([255]));
+        let cut = cut(&mask, crop);
+        assert_eq!(cut.get_pixel(330, 0).0, [0]);
+        assert_eq!(cut.get_pixel(330, 330).0, [255]);
+    }
+
+    proptest! {
+        #[test]
+        fn the_crop_always_holds_the_object(
+            x in 0_i32..600, y in 0_i32..400, w in 1_u32..600, h in 1_u32..400, margin in 0.0..0.5,
+        ) {
+            let object = Rect::new(x, y, w.min(640 - x as u32), h.min(480 - y as u32));
+            let crop = square_around(object, margin, (640, 480));
+            prop_assert_eq!(crop.w, crop.h);
+            prop_assert!(crop.x <= object.x && crop.y <= object.y);
+            prop_assert!(crop.right() >= object.right() && crop.bottom() >= object.bottom());
+        }
+    }
+}

@@ -1,0 +1,287 @@
+//! Scaling a masked image to the output size without bleeding background into the object.
+//!
+//! Light adds up linearly, sRGB values do not: the image is scaled in linear light. It is masked
+//! before that, so that outside the mask there is 0, and what the filter gathered is divided by
+//! the share of the mask that it gathered (its weights renormalised), so that the object's edge
+//! does not darken. The filter is never negative, so that nothing rings: Hamming where pixels are
+//! merged, bilinear where they are spread.
+
+use fast_image_resize::images::{TypedImage, TypedImageRef};
+use fast_image_resize::pixels::{U16, U16x3};
+use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions, Resizer};
+use image::{GrayImage, RgbImage};
+
+use super::Error;
+
+/// What `dataset.json` says of the scaling.
+pub(super) const METHOD: &str = "linear light, masked before, Hamming down, bilinear up";
+/// What it says where nothing is scaled.
+pub(super) const NO_METHOD: &str = "none";
+
+/// Scales crops of one video, whose mask does not change.
+#[derive(Debug)]
+pub struct Scaler {
+    crop_mask: GrayImage,
+    /// `None` where the source pixels are kept.
+    to: Option<Target>,
+}
+
+#[derive(Debug)]
+struct Target {
+    side: u32,
+    options: ResizeOptions,
+    mask: GrayImage,
+    /// 1 / the mask's share in each output pixel; 0 outside the output's mask.
+    gain: Vec<f32>,
+    to_linear: [u16; 256],
+    to_srgb: Vec<u8>,
+}
+
+impl Scaler {
+    /// For crops under this mask (0 or 255), to `side` x `side` pixels, or as they are.
+    ///
+    /// # Errors
+    /// [`Error::ObjectTooSmall`] where no output pixel would be the object's by half or more.
+    pub fn new(crop_mask: GrayImage, side: Option<u32>) -> Result<Self, Error> {
+        let to = match side {
+            None => None,
+            Some(side) => Some(Target::new(&crop_mask, side)?),
+        };
+        Ok(Self { crop_mask, to })
+    }
+
+    /// The mask of the scaled images, 0 or 255: the object's where the source mask covers at least
+    /// half of the pixel.
+    #[must_use]
+    pub fn mask(&self) -> &GrayImage {
+        self.to
+            .as_ref()
+            .map_or(&self.crop_mask, |target| &target.mask)
+    }
+
+    /// Masks and scales one crop, which is as large as the mask.
+    ///
+    /// # Errors
+    /// [`Error::Scaling`] where the crop has another size.
+    pub fn scale(&self, crop: &RgbImage, resizer: &mut Resizer) -> Result<RgbImage, Error> {
+        if crop.dimensions() != self.crop_mask.dimensions() {
+            return Err(Error::Scaling(
+                "the crop and its mask differ in size".to_owned(),
+            ));
+        }
+        match &self.to {
+            None => Ok(masked(crop, &self.crop_mask)),
+            Some(target) => target.scale(crop, &self.crop_mask, resizer),
+        }
+    }
+}
+
+fn masked(crop: &RgbImage, mask: &GrayImage) -> RgbImage {
+    let mut kept = crop.clone();
+    for (pixel, mask) in kept.pixels_mut().zip(mask.as_raw()) {
+        if *mask == 0 {
+            pixel.0 = [0; 3];
+        }
+    }
+    kept
+}
+
+impl Target {
+    fn new(crop_mask: &GrayImage, side: u32) -> Result<Self, Error> {
+        let (width, height) = crop_mask.dimensions();
+        let filter = if width.max(height) > side {
+            FilterType::Hamming
+        } else {
+            FilterType::Bilinear
+        };
+        let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(filter));
+        let full: Vec<U16> = crop_mask
+            .as_raw()
+            .iter()
+            .map(|&m| U16::new(u16::from(m) * 257))
+            .collect();
+        let source = TypedImageRef::new(width, height, &full).map_err(scaling)?;
+        let mut share = TypedImage::new(side, side);
+        Resizer::new()
+            .resize_typed(&source, &mut share, &options)
+            .map_err(scaling)?;
+        let mut mask = GrayImage::new(side, side);
+        let mut gain = vec![0.0; side as usize * side as usize];
+        for ((share, mask), gain) in share.pixels().iter().zip(mask.iter_mut()).zip(&mut gain) {
+            if share.0 >= 0x8000 {
+                *mask = 255;
+                *gain = 65535.0 / f32::from(share.0);
+            }
+        }
+        if mask.as_raw().iter().all(|&m| m == 0) {
+            return Err(Error::ObjectTooSmall { side });
+        }
+        let to_linear = std::array::from_fn(|value| {
+            (65535.0 * linear_from_srgb(value as f64 / 255.0)).round() as u16
+        });
+        let to_srgb = (0..=u16::MAX)
+            .map(|value| (255.0 * srgb_from_linear(f64::from(value) / 65535.0)).round() as u8)
+            .collect();
+        Ok(Self {
+            side,
+            options,
+            mask,
+            gain,
+            to_linear,
+            to_srgb,
+        })
+    }
+
+    fn scale(
+        &self,
+        crop: &RgbImage,
+        crop_mask: &GrayImage,
+        resizer: &mut Resizer,
+    ) -> Result<RgbImage, Error> {
+        let linear: Vec<U16x3> = crop
+            .pixels()
+            .zip(crop_mask.as_raw())
+            .map(|(pixel, &mask)| match mask {
+                0 => U16x3::new([0; 3]),
+                _ => U16x3::new(pixel.0.map(|value| self.to_linear[usize::from(value)])),
+            })
+            .collect();
+        let source = TypedImageRef::new(crop.width(), crop.height(), &linear).map_err(scaling)?;
+        let mut gathered = TypedImage::new(self.side, self.side);
+        resizer
+            .resize_typed(&source, &mut gathered, &self.options)
+            .map_err(scaling)?;
+        let mut scaled = RgbImage::new(self.side, self.side);
+        let pixels = gathered
+            .pixels()
+            .iter()
+            .zip(scaled.pixels_mut())
+            .zip(&self.gain);
+        for ((gathered, pixel), &gain) in pixels {
+            if gain > 0.0 {
+                // The cast saturates at the brightest value.
+                pixel.0 = gathered
+                    .0
+                    .map(|sum| self.to_srgb[usize::from((f32::from(sum) * gain + 0.5) as u16)]);
+            }
+        }
+        Ok(scaled)
+    }
+}
+
+fn scaling(error: impl std::fmt::Display) -> Error {
+    Error::Scaling(error.to_string())
+}
+
+/// IEC 61966-2-1, from a value in 0..=1 to light in 0..=1.
+fn linear_from_srgb(value: f64) -> f64 {
+    if value <= 0.04045 {
+        value / 12.92
+    } else {
+        ((value + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+/// IEC 61966-2-1, from light in 0..=1 to a value in 0..=1.
+fn srgb_from_linear(light: f64) -> f64 {
+    if light <= 0.003_130_8 {
+        12.92 * light
+    } else {
+        1.055 * light.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use image::{Luma, Rgb};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn disc(side: u32) -> GrayImage {
+        let centre = f64::from(side) / 2.0;
+        GrayImage::from_fn(side, side, |x, y| {
+            let (dx, dy) = (f64::from(x) + 0.5 - centre, f64::from(y) + 0.5 - centre);
+            Luma([if dx.hypot(dy) < 0.4 * f64::from(side) {
+                255
+            } else {
+                0
+            }])
+        })
+    }
+
+    fn scaled(crop: &RgbImage, mask: &GrayImage, side: Option<u32>) -> (RgbImage, GrayImage) {
+        let scaler = Scaler::new(mask.clone(), side).unwrap();
+        (
+            scaler.scale(crop, &mut Resizer::new()).unwrap(),
+            scaler.mask().clone(),
+        )
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn an_even_object_stays_even_to_its_edge_and_0_outside(
+            colour in any::<[u8; 3]>(), background in any::<[u8; 3]>(),
+            from in 20_u32..200, to in 8_u32..120,
+        ) {
+            let mask = disc(from);
+            let crop = RgbImage::from_fn(from, from, |x, y| {
+                Rgb(if mask.get_pixel(x, y).0[0] != 0 { colour } else { background })
+            });
+            let (image, mask) = scaled(&crop, &mask, Some(to));
+            for (pixel, mask) in image.pixels().zip(mask.as_raw()) {
+                let wanted = if *mask != 0 { colour } else { [0; 3] };
+                for (found, wanted) in pixel.0.into_iter().zip(wanted) {
+                    prop_assert!(found.abs_diff(wanted) <= 1, "{found} for {wanted}");
+                }
+            }
+        }
+
+        #[test]
+        fn the_background_changes_nothing(seed in any::<u8>(), to in 8_u32..64) {
+            let mask = disc(50);
+            let object = |x: u32, y: u32| [(x * 5) as u8, (y * 5) as u8, seed];
+            let image = |background: [u8; 3]| {
+                RgbImage::from_fn(50, 50, |x, y| {
+                    Rgb(if mask.get_pixel(x, y).0[0] != 0 { object(x, y) } else { background })
+                })
+            };
+            let (black, _) = scaled(&image([0; 3]), &mask, Some(to));
+            let (white, _) = scaled(&image([255; 3]), &mask, Some(to));
+            prop_assert_eq!(black, white);
+        }
+    }
+
+    #[test]
+    fn black_and_white_in_turn_become_half_the_light_and_not_half_the_value() {
+        let mask = GrayImage::from_pixel(64, 64, Luma([255]));
+        let board = RgbImage::from_fn(64, 64, |x, y| {
+            Rgb([if (x + y) % 2 == 0 { 255 } else { 0 }; 3])
+        });
+        let (image, _) = scaled(&board, &mask, Some(8));
+        let middle = image.get_pixel(4, 4).0[0];
+        assert!(middle.abs_diff(188) <= 1, "{middle}");
+    }
+
+    #[test]
+    fn native_size_keeps_every_pixel_under_the_mask() {
+        let mask = disc(31);
+        let crop = RgbImage::from_fn(31, 31, |x, y| Rgb([x as u8, y as u8, 200]));
+        let (image, kept) = scaled(&crop, &mask, None);
+        assert_eq!(kept, mask);
+        for ((found, source), mask) in image.pixels().zip(crop.pixels()).zip(mask.as_raw()) {
+            assert_eq!(found.0, if *mask != 0 { source.0 } else { [0; 3] });
+        }
+    }
+
+    #[test]
+    fn an_object_of_less_than_half_a_pixel_is_refused() {
+        let mut mask = GrayImage::new(100, 100);
+        mask.put_pixel(50, 50, Luma([255]));
+        assert!(matches!(
+            Scaler::new(mask, Some(8)),
+            Err(Error::ObjectTooSmall { side: 8 })
+        ));
+    }
+}

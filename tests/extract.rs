@@ -1,0 +1,375 @@
+//! `relit-extract` from outside: what a user types, what comes out, and how it fails.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod support;
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use relit::shard::{Dataset, FrameRecord, ShardReader};
+use support::ffmpeg;
+use tempfile::TempDir;
+
+/// Thirty frames in which the pattern moves; the object is a disc in the middle.
+const PATTERN: &str = "testsrc2=size=96x72:rate=30:duration=1";
+
+struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let bench = Self {
+            folder: tempfile::tempdir().unwrap(),
+        };
+        bench.video("clip.mkv", "-pix_fmt yuvj422p -c:v mjpeg -q:v 2");
+        let mask = image::GrayImage::from_fn(96, 72, |x, y| {
+            let far = (f64::from(x) - 50.0).hypot(f64::from(y) - 35.0);
+            image::Luma([if far < 22.0 { 255 } else { 0 }])
+        });
+        mask.save(bench.path("mask.png")).unwrap();
+        bench
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn video(&self, name: &str, encoding: &str) {
+        let mut arguments = vec!["-f", "lavfi", "-i", PATTERN];
+        arguments.extend(encoding.split_whitespace());
+        arguments.push(name);
+        ffmpeg(self.folder.path(), &arguments);
+    }
+
+    fn run(&self, line: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+            .args(line.split_whitespace())
+            .current_dir(self.folder.path())
+            .output()
+            .unwrap()
+    }
+
+    /// Runs, expects this exit code, and answers what was told on standard error.
+    fn told(&self, code: i32, line: &str) -> String {
+        let output = self.run(line);
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{line}: {told}");
+        told
+    }
+
+    /// What `verify` prints.
+    fn verified(&self, code: i32, out: &str) -> String {
+        let output = self.run(&format!("verify {out}"));
+        let told = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{told}");
+        told
+    }
+
+    fn records(&self, shard: &str) -> Vec<FrameRecord> {
+        let file = File::open(self.path(shard)).unwrap();
+        let mut records: Vec<FrameRecord> = ShardReader::new(file)
+            .map(|sample| serde_json::from_slice(sample.unwrap().member("json").unwrap()).unwrap())
+            .collect();
+        records.sort_by_key(|record| record.index);
+        records
+    }
+}
+
+#[test]
+fn the_shard_is_the_same_bytes_for_any_number_of_threads() {
+    for (name, encoding) in [
+        ("clip.mkv", "-pix_fmt yuvj422p -c:v mjpeg"),
+        ("film.mp4", "-pix_fmt yuv420p -c:v libx264"),
+    ] {
+        let bench = Bench::new();
+        bench.video(name, encoding);
+        let mut shards = Vec::new();
+        for threads in [1, 2, 5] {
+            let out = format!("out{threads}");
+            bench.told(
+                0,
+                &format!(
+                    "{name} --mask mask.png --frames 30 --size 40 -o {out} --threads {threads}"
+                ),
+            );
+            let stem = name.split('.').next().unwrap();
+            shards.push(fs::read(bench.path(&format!("{out}/{stem}.tar"))).unwrap());
+        }
+        assert!(shards.windows(2).all(|pair| pair[0] == pair[1]), "{name}");
+    }
+}
+
+#[test]
+fn native_size_keeps_source_pixels_and_its_statistics_are_recomputed_by_verify() {
+    let bench = Bench::new();
+    bench.told(
+        0,
+        "clip.mkv --mask mask.png --frames 30 --size native -o out",
+    );
+    assert!(
+        bench
+            .verified(0, "out")
+            .contains("30 samples read back: all is well")
+    );
+    let record = &bench.records("out/clip.tar")[7];
+    assert_eq!(record.size, [record.crop.w, record.crop.h]);
+    assert_eq!(record.crop.w, 43 + 2 * 2);
+}
+
+#[test]
+fn the_relit_layout_has_gap_free_names_and_is_verified() {
+    let bench = Bench::new();
+    bench.told(
+        0,
+        "clip.mkv --mask mask.png --frames 30 --size 32 --layout relit -o out",
+    );
+    bench.verified(0, "out");
+    for k in 0..30 {
+        assert!(bench.path(&format!("out/imgs/clip/{k}.png")).is_file());
+    }
+    assert!(bench.path("out/masks/clip.png").is_file());
+    assert!(bench.path("out/mean_img/clip.png").is_file());
+    fs::copy(
+        bench.path("out/imgs/clip/3.png"),
+        bench.path("out/imgs/clip/4.png"),
+    )
+    .unwrap();
+    let told = bench.verified(1, "out");
+    assert!(told.contains("clip/0004"), "{told}");
+}
+
+#[test]
+fn more_samples_than_frames_are_flagged_and_refused_by_strict() {
+    let bench = Bench::new();
+    let told = bench.told(0, "clip.mkv --mask mask.png --frames 45 --size 32 -o out");
+    assert!(
+        told.contains("15 of 45 samples repeat a source frame"),
+        "{told}"
+    );
+    let records = bench.records("out/clip.tar");
+    assert_eq!(records.iter().filter(|record| record.duplicate).count(), 15);
+    let told = bench.told(
+        1,
+        "clip.mkv --mask mask.png --frames 45 --size 32 -o strict --strict",
+    );
+    assert!(
+        told.contains("refused by --strict: 15 samples would repeat"),
+        "{told}"
+    );
+    assert!(!bench.path("strict/clip.tar").exists());
+}
+
+#[test]
+fn a_damaged_frame_is_replaced_by_a_neighbour_and_told() {
+    let bench = Bench::new();
+    bench.video("clip.avi", "-pix_fmt yuvj422p -c:v mjpeg -q:v 2");
+    let mut bytes = fs::read(bench.path("clip.avi")).unwrap();
+    let starts: Vec<usize> = (0..bytes.len() - 3)
+        .filter(|&at| bytes[at..].starts_with(&[0xFF, 0xD8, 0xFF]))
+        .collect();
+    let middle = (starts[4] + starts[5]) / 2;
+    for pair in bytes[middle..middle + 200].chunks_exact_mut(2) {
+        pair.copy_from_slice(&[0xFF, 0xD9]);
+    }
+    fs::write(bench.path("clip.avi"), bytes).unwrap();
+    let told = bench.told(3, "clip.avi --mask mask.png --frames 30 --size 32 -o out");
+    assert!(told.contains("frame 4 cannot be decoded"), "{told}");
+    let records = bench.records("out/clip.tar");
+    assert_eq!(records.len(), 30);
+    assert!(records[4].duplicate && [3, 5].contains(&records[4].source_frame));
+    assert!(
+        records
+            .iter()
+            .filter(|record| record.index != 4)
+            .all(|record| !record.duplicate)
+    );
+    bench.verified(0, "out");
+    let told = bench.told(
+        1,
+        "clip.avi --mask mask.png --frames 30 --size 32 -o strict --strict",
+    );
+    assert!(told.contains("refused by --strict: frame 4"), "{told}");
+}
+
+#[test]
+fn a_truncated_video_gives_what_it_has_and_exit_code_3() {
+    let bench = Bench::new();
+    let whole = fs::read(bench.path("clip.mkv")).unwrap();
+    fs::write(bench.path("cut.mkv"), &whole[..whole.len() / 2]).unwrap();
+    let told = bench.told(3, "cut.mkv --mask mask.png --frames 30 --size 32 -o out");
+    assert!(told.contains("the file is cut off"), "{told}");
+    assert_eq!(bench.records("out/cut.tar").len(), 30);
+    bench.verified(0, "out");
+}
+
+#[test]
+fn one_bad_input_does_not_stop_the_others() {
+    let bench = Bench::new();
+    fs::write(bench.path("bad.mkv"), "no video").unwrap();
+    fs::copy(bench.path("clip.mkv"), bench.path("other.mkv")).unwrap();
+    let told = bench.told(
+        3,
+        "clip.mkv bad.mkv other.mkv --mask mask.png --frames 30 --size 32 -o out",
+    );
+    assert!(told.contains("bad.mkv"), "{told}");
+    let dataset = Dataset::read(&bench.path("out")).unwrap();
+    let ids: Vec<&str> = dataset
+        .sessions
+        .iter()
+        .map(|session| session.id.as_str())
+        .collect();
+    assert_eq!(ids, ["clip", "other"]);
+    bench.verified(0, "out");
+    bench.told(1, "bad.mkv --mask mask.png -o none");
+}
+
+#[test]
+fn resume_skips_what_is_vouched_for_and_makes_again_what_is_not() {
+    let bench = Bench::new();
+    fs::copy(bench.path("clip.mkv"), bench.path("other.mkv")).unwrap();
+    let line = "clip.mkv other.mkv --mask mask.png --frames 30 --size 32 -o out --resume";
+    bench.told(0, line);
+    let shard = bench.path("out/clip.tar");
+    let good = fs::read(&shard).unwrap();
+    let mut damaged = good.clone();
+    damaged[5000] ^= 1;
+    fs::write(&shard, damaged).unwrap();
+    let output = bench.run(line);
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert!(printed.contains("other: there already"), "{printed}");
+    assert!(
+        printed.contains("1 extracted (0 with losses), 1 skipped"),
+        "{printed}"
+    );
+    assert_eq!(fs::read(&shard).unwrap(), good);
+}
+
+#[test]
+fn a_data_set_keeps_to_its_settings() {
+    let bench = Bench::new();
+    bench.told(0, "clip.mkv --mask mask.png --frames 30 --size 32 -o out");
+    let told = bench.told(1, "clip.mkv --mask mask.png --frames 30 --size 48 -o out");
+    assert!(
+        told.contains("other settings (size 32 there, 48 now)"),
+        "{told}"
+    );
+    bench.verified(0, "out");
+}
+
+#[test]
+fn what_is_missing_or_does_not_fit_is_told_in_a_sentence() {
+    let bench = Bench::new();
+    image::GrayImage::new(96, 72)
+        .save(bench.path("empty.png"))
+        .unwrap();
+    image::GrayImage::new(10, 10)
+        .save(bench.path("small.png"))
+        .unwrap();
+    fs::write(bench.path("text.png"), "text").unwrap();
+    for (line, part) in [
+        ("clip.mkv -o out", "has no mask: make one with relit-mask"),
+        ("clip.mkv --mask nowhere.png -o out", "mask"),
+        ("clip.mkv --mask empty.png -o out", "is empty"),
+        (
+            "clip.mkv --mask small.png -o out",
+            "10 x 10 pixels and the frames are 96 x 72",
+        ),
+        (
+            "clip.mkv --mask text.png -o out",
+            "cannot be read as an image",
+        ),
+        ("nowhere --mask mask.png -o out", "there is no nowhere"),
+        ("verify out/nothing", "out/nothing"),
+    ] {
+        let told = bench.told(1, line);
+        assert!(told.contains(part), "{line}: {told}");
+        assert_eq!(told.lines().count(), 1, "{told}");
+    }
+    for line in [
+        "",
+        "clip.mkv",
+        "clip.mkv -o out --size 0",
+        "clip.mkv -o out --align correct",
+    ] {
+        bench.told(2, line);
+    }
+}
+
+#[test]
+fn two_inputs_of_one_name_are_not_mixed_up() {
+    let bench = Bench::new();
+    fs::create_dir(bench.path("b")).unwrap();
+    fs::copy(bench.path("clip.mkv"), bench.path("b/clip.mkv")).unwrap();
+    let told = bench.told(
+        3,
+        "clip.mkv b/clip.mkv --mask mask.png --frames 30 --size 32 -o out",
+    );
+    assert!(
+        told.contains("another recording of this call is named clip"),
+        "{told}"
+    );
+}
+
+#[test]
+fn machines_are_told_in_json_lines() {
+    let bench = Bench::new();
+    let output = bench.run("clip.mkv --mask mask.png --frames 30 --size 32 -o out --json");
+    assert!(output.stderr.is_empty());
+    let events: Vec<serde_json::Value> = String::from_utf8(output.stdout)
+        .unwrap()
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(events[0]["event"], "extracted");
+    assert_eq!(events[0]["session"]["samples"], 30);
+    assert_eq!(events.last().unwrap()["event"], "done");
+}
+
+#[test]
+fn what_lies_outside_the_mask_never_reaches_the_shard() {
+    let bench = Bench::new();
+    bench.told(0, "clip.mkv --mask mask.png --frames 30 --size 40 -o out");
+    let shard = File::open(bench.path("out/clip.tar")).unwrap();
+    for sample in ShardReader::new(shard) {
+        let sample = sample.unwrap();
+        let image = read(sample.member("png").unwrap()).into_rgb8();
+        let mask = read(sample.member("mask.png").unwrap()).into_luma8();
+        for (pixel, mask) in image.pixels().zip(mask.pixels()) {
+            assert!(
+                mask.0[0] == 255 || (mask.0[0] == 0 && pixel.0 == [0; 3]),
+                "{}",
+                sample.key
+            );
+        }
+    }
+}
+
+fn read(png: &[u8]) -> image::DynamicImage {
+    image::load_from_memory(png).unwrap()
+}
+
+#[test]
+fn a_killed_run_leaves_nothing_that_looks_whole_and_the_next_one_clears_up() {
+    let bench = Bench::new();
+    fs::create_dir(bench.path("out")).unwrap();
+    for name in [".clip.tar.partial", ".clip.spool"] {
+        fs::write(bench.path("out").join(name), "half").unwrap();
+    }
+    bench.told(0, "clip.mkv --mask mask.png --frames 30 --size 32 -o out");
+    let names = names_in(&bench.path("out"));
+    assert_eq!(
+        names,
+        ["clip.html", "clip.parquet", "clip.tar", "dataset.json"]
+    );
+}
+
+fn names_in(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
