@@ -1,0 +1,157 @@
+//! Replay: every session folder in `fixtures/` goes through the programs as a user would send it,
+//! and comes out as its `expect.json` and `truth.json` say. A new folder there is a new test.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use relit::session::{FrameIndex, Recording};
+use relit::shard::{Dataset, FrameRecord, ShardReader};
+use serde::Deserialize;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Expect {
+    samples: u32,
+    duplicates: u32,
+    lossy: bool,
+    selection: String,
+    warnings: Vec<String>,
+    saturated_tolerance: f64,
+}
+
+#[derive(Deserialize)]
+struct Truth {
+    by_sequence: Vec<FrameTruth>,
+}
+
+#[derive(Deserialize)]
+struct FrameTruth {
+    angle_deg: f64,
+    saturated_fraction: f64,
+}
+
+fn fixtures() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
+    let mut found: Vec<PathBuf> = fs::read_dir(root)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.join("session.json").exists())
+        .collect();
+    found.sort();
+    assert!(found.len() >= 5);
+    found
+}
+
+fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> T {
+    let text = fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+fn run(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+fn records(out: &Path, dataset: &Dataset) -> Vec<FrameRecord> {
+    let shard = File::open(out.join(&dataset.shards[0].file)).unwrap();
+    let mut records: Vec<FrameRecord> = ShardReader::new(shard)
+        .map(|sample| serde_json::from_slice(sample.unwrap().member("json").unwrap()).unwrap())
+        .collect();
+    records.sort_by_key(|record| record.index);
+    records
+}
+
+#[test]
+fn every_fixture_comes_out_as_it_says() {
+    for session in fixtures() {
+        let name = session.file_name().unwrap().to_str().unwrap();
+        let expect: Expect = read_json(&session.join("expect.json"));
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let (from, to) = (session.to_str().unwrap(), out.to_str().unwrap());
+        let mask = session.join("mask_gt.png");
+        let samples = expect.samples.to_string();
+        let arguments = [
+            from,
+            "-o",
+            to,
+            "--mask",
+            mask.to_str().unwrap(),
+            "--frames",
+            &samples,
+            "--size",
+            "64",
+        ];
+        let output = run(&arguments);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(
+            output.status.code(),
+            Some(if expect.lossy { 3 } else { 0 }),
+            "{name}: {told}"
+        );
+        let verdict = run(&["verify", to]);
+        assert_eq!(verdict.status.code(), Some(0), "{name}: {verdict:?}");
+
+        let dataset = Dataset::read(&out).unwrap();
+        check_entry(name, &expect, &dataset);
+        let records = records(&out, &dataset);
+        assert_eq!(records.len(), expect.samples as usize, "{name}");
+        check_records(name, &session, &expect, &records);
+    }
+}
+
+fn check_entry(name: &str, expect: &Expect, dataset: &Dataset) {
+    let entry = dataset.session(name).unwrap();
+    assert_eq!(
+        (entry.samples, entry.duplicates),
+        (expect.samples, expect.duplicates),
+        "{name}"
+    );
+    assert_eq!(
+        serde_json::to_value(entry.selection).unwrap(),
+        expect.selection,
+        "{name}"
+    );
+    assert_eq!(entry.lossy, expect.lossy, "{name}");
+    assert_eq!(
+        entry.warnings.len(),
+        expect.warnings.len(),
+        "{name}: {:?}",
+        entry.warnings
+    );
+    for (found, part) in entry.warnings.iter().zip(&expect.warnings) {
+        assert!(
+            found.contains(part.as_str()),
+            "{name}: {found:?} lacks {part:?}"
+        );
+    }
+}
+
+fn check_records(name: &str, session: &Path, expect: &Expect, records: &[FrameRecord]) {
+    let truth: Truth = read_json(&session.join("truth.json"));
+    let index: FrameIndex = Recording::open(session).unwrap().frames.unwrap();
+    for record in records {
+        let entry = index.entries()[record.source_frame as usize];
+        let truth = &truth.by_sequence[entry.sequence as usize];
+        assert_eq!(record.t_us, entry.t_us, "{name} {}", record.index);
+        assert!(
+            (record.angle_deg.unwrap() - truth.angle_deg).abs() < 1e-6,
+            "{name}"
+        );
+        let off = (record.saturated_fraction - truth.saturated_fraction).abs();
+        assert!(
+            off <= expect.saturated_tolerance,
+            "{name} {}: off by {off}",
+            record.index
+        );
+        let far = (truth.saturated_fraction - 0.05).abs() > expect.saturated_tolerance;
+        assert!(
+            !far || record.spec_net == (truth.saturated_fraction > 0.05),
+            "{name}"
+        );
+    }
+}
