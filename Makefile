@@ -7,7 +7,8 @@ SHELL := /bin/bash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
-# The recorded session of a whole turn, and the rectangle around its object.
+# The recorded session of a whole turn, and the rectangle around its object; its folder holds
+# seeds that somebody painted.
 SESSION := 20261120T093015Z-cow
 RECT := 170,20,325,390
 DEMO := $(TARGET)/demo
@@ -39,7 +40,8 @@ demo: setup ## Make a shard of the recorded turn in fixtures/, verify it, and sa
 	rm -rf $(DEMO)
 	mkdir -p $(DEMO)
 	cp -r fixtures/$(SESSION) $(DEMO)/
-	$(TARGET)/release/relit-mask $(DEMO)/$(SESSION) --rect $(RECT)
+	$(TARGET)/release/relit-mask $(DEMO)/$(SESSION) --rect $(RECT) \
+	    --seeds fixtures/$(SESSION)/seeds.png
 	$(TARGET)/release/relit-extract $(DEMO)/$(SESSION) -o $(DEMO)/out
 	$(TARGET)/release/relit-extract verify $(DEMO)/out
 	@echo
