@@ -162,6 +162,28 @@ fn more_samples_than_frames_are_flagged_and_refused_by_strict() {
 }
 
 #[test]
+fn where_frames_were_dropped_the_stand_ins_are_flagged_and_not_the_frames_themselves() {
+    let bench = Bench::new();
+    let drop = r"noise=amount=0:drop=eq(n\,9)+eq(n\,10)+eq(n\,20)";
+    ffmpeg(
+        bench.folder.path(),
+        &["-i", "clip.mkv", "-c", "copy", "-bsf:v", drop, "gaps.mkv"],
+    );
+    let told = bench.told(0, "gaps.mkv --mask mask.png --frames 30 --size 32 -o out");
+    assert!(
+        told.contains("room for 2 more frames before frame 9"),
+        "{told}"
+    );
+    let records = bench.records("out/gaps.tar");
+    let flagged: Vec<u32> = records
+        .iter()
+        .filter(|r| r.duplicate)
+        .map(|r| r.index)
+        .collect();
+    assert_eq!(flagged, [9, 10, 20]);
+}
+
+#[test]
 fn a_damaged_frame_is_replaced_by_a_neighbour_and_told() {
     let bench = Bench::new();
     bench.video("clip.avi", "-pix_fmt yuvj422p -c:v mjpeg -q:v 2");

@@ -27,6 +27,13 @@ pub(super) struct Use {
     pub(super) duplicate: bool,
 }
 
+/// A sample and the frame that was chosen for it.
+struct Place {
+    index: u32,
+    frame: u64,
+    off_by: f64,
+}
+
 /// The samples that each source frame serves.
 pub(super) type Uses = BTreeMap<u64, Vec<Use>>;
 
@@ -105,7 +112,13 @@ impl Plan {
 
     /// The samples that each source frame serves.
     pub(super) fn uses(&mut self) -> Uses {
-        let chosen = (0..).zip(self.selection.frames.clone());
+        let Selection { frames, off_by, .. } = &self.selection;
+        let places = (0..).zip(frames.iter().zip(off_by));
+        let chosen = places.map(|(index, (&frame, &off_by))| Place {
+            index,
+            frame,
+            off_by,
+        });
         self.note(chosen.collect())
     }
 
@@ -121,19 +134,26 @@ impl Plan {
             .retain(|candidate| !lost.contains(&candidate.frame));
         let again = Selection::choose(&self.candidates, self.samples)?;
         let mut chosen = Vec::new();
-        for (index, (frame, other)) in (0..).zip(self.selection.frames.iter_mut().zip(again.frames))
-        {
-            if lost.contains(frame) {
-                *frame = other;
-                chosen.push((index, other));
+        for (index, (frame, &off_by)) in (0_u32..).zip(again.frames.iter().zip(&again.off_by)) {
+            let kept = &mut self.selection.frames[index as usize];
+            if lost.contains(kept) {
+                *kept = *frame;
+                chosen.push(Place {
+                    index,
+                    frame: *frame,
+                    off_by,
+                });
             }
         }
         Ok(self.note(chosen))
     }
 
-    fn note(&mut self, chosen: Vec<(u32, u64)>) -> Uses {
+    /// Of the samples of one source frame, the one whose place is nearest to the frame's own is
+    /// the original, and the others are duplicates.
+    fn note(&mut self, mut chosen: Vec<Place>) -> Uses {
+        chosen.sort_by(|a, b| a.off_by.total_cmp(&b.off_by).then(a.index.cmp(&b.index)));
         let mut uses = Uses::new();
-        for (index, frame) in chosen {
+        for Place { index, frame, .. } in chosen {
             let duplicate = !self.taken.insert(frame);
             uses.entry(frame)
                 .or_default()

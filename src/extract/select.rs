@@ -29,6 +29,9 @@ pub struct Selection {
     pub basis: Basis,
     /// The source frame of each sample, by index.
     pub frames: Vec<u64>,
+    /// How far each sample's frame lies from the place it stands for, by index: degrees or
+    /// microseconds.
+    pub off_by: Vec<f64>,
     /// How much of a turn the candidates cover, degrees; `None` where there are no angles.
     pub covered_deg: Option<f64>,
 }
@@ -77,10 +80,13 @@ impl Selection {
         } else {
             covered
         };
+        let (frames, off_by) = nearest(candidates, &turned, turn, samples);
+        let covered_deg = Some(covered.min(TURN_DEG));
         Ok(Self {
             basis: Basis::Angle,
-            frames: nearest(candidates, &turned, turn, samples),
-            covered_deg: Some(covered.min(TURN_DEG)),
+            frames,
+            off_by,
+            covered_deg,
         })
     }
 
@@ -91,10 +97,11 @@ impl Selection {
             .map(|c| c.t_us.saturating_sub(first) as f64)
             .collect();
         let whole = times[times.len() - 1] + median_step(&times);
-        let frames = nearest(candidates, &times, whole, samples);
+        let (frames, off_by) = nearest(candidates, &times, whole, samples);
         Self {
             basis: Basis::Time,
             frames,
+            off_by,
             covered_deg: None,
         }
     }
@@ -118,26 +125,27 @@ fn median_step(positions: &[f64]) -> f64 {
 }
 
 /// For each of `samples` places, evenly spread over `whole` from 0 on, the candidate nearest to
-/// it; the earlier one of two at the same distance.
-fn nearest(candidates: &[Candidate], positions: &[f64], whole: f64, samples: u32) -> Vec<u64> {
-    let mut sorted: Vec<(f64, u64)> = positions
-        .iter()
-        .copied()
-        .zip(candidates.iter().map(|c| c.frame))
-        .collect();
+/// it, the earlier one of two at the same distance; and the distances.
+fn nearest(
+    candidates: &[Candidate],
+    positions: &[f64],
+    whole: f64,
+    samples: u32,
+) -> (Vec<u64>, Vec<f64>) {
+    let numbers = candidates.iter().map(|candidate| candidate.frame);
+    let mut sorted: Vec<(f64, u64)> = positions.iter().copied().zip(numbers).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut at = 0;
     (0..samples)
         .map(|k| {
             let target = f64::from(k) * whole / f64::from(samples);
-            while at + 1 < sorted.len()
-                && (sorted[at + 1].0 - target).abs() < (sorted[at].0 - target).abs()
-            {
+            let off = |at: usize| (sorted[at].0 - target).abs();
+            while at + 1 < sorted.len() && off(at + 1) < off(at) {
                 at += 1;
             }
-            sorted[at].1
+            (sorted[at].1, off(at))
         })
-        .collect()
+        .unzip()
 }
 
 /// A place where frames seem to be missing.

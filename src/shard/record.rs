@@ -22,7 +22,8 @@ pub struct FrameRecord {
     /// Angle of the table, degrees; null where there is no table.
     pub angle_deg: Option<f64>,
     /// True where another sample of the session shows the same source frame and is not flagged: of
-    /// all samples of one source frame, exactly one is not a duplicate.
+    /// all samples of one source frame, exactly one is not a duplicate. Where frames were dropped, it
+    /// is the one whose place in the turn is the frame's own.
     pub duplicate: bool,
     /// The part of the source frame that the image shows, source pixels. May reach beyond the
     /// frame, where the image is 0.
