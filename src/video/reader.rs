@@ -81,7 +81,6 @@ impl Track {
 pub struct Reader<'a> {
     video: &'a Video,
     input: Input,
-    packet: Packet,
     /// Packets of the track read so far.
     packets: usize,
     wanted: Wanted,
@@ -111,7 +110,6 @@ impl<'a> Reader<'a> {
         Ok(Self {
             video,
             input,
-            packet: Packet::empty(),
             packets: 0,
             wanted: Wanted::new(wanted),
             chain,
@@ -120,18 +118,20 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Reads on until something is ready or the file ends.
+    /// Reads on by one packet, or notes the file's end.
     fn advance(&mut self) {
-        match self.packet.read(&mut self.input) {
-            Ok(())
-                if self.packet.stream() != self.video.track.stream || self.packet.size() == 0 => {}
-            Ok(()) => self.take_packet(),
+        // A packet that is read into again would keep the memory of what it held.
+        let mut packet = Packet::empty();
+        match packet.read(&mut self.input) {
+            Ok(()) if packet.stream() == self.video.track.stream && packet.size() > 0 => {
+                self.take_packet(packet);
+            }
+            Ok(()) => {}
             Err(_) => self.end(),
         }
     }
 
-    fn take_packet(&mut self) {
-        let packet = std::mem::replace(&mut self.packet, Packet::empty());
+    fn take_packet(&mut self, packet: Packet) {
         let number = self.video.track.number_of_packet.get(self.packets).copied();
         self.packets += 1;
         let track = &self.video.track;

@@ -312,8 +312,9 @@ struct Stamp {
 
 fn read_through(input: &mut Input, stream: usize) -> (Vec<Stamp>, Option<ffmpeg_next::Error>) {
     let mut stamps = Vec::new();
-    let mut packet = Packet::empty();
     loop {
+        // A packet that is read into again would keep the memory of what it held.
+        let mut packet = Packet::empty();
         match packet.read(input) {
             Ok(()) if packet.stream() == stream && packet.size() > 0 => {
                 let pts = packet.pts().or_else(|| packet.dts());
