@@ -57,6 +57,11 @@ impl Console {
         }
     }
 
+    /// How many lines of a long list to print: `for_people`, or all for a machine.
+    pub(crate) fn most_lines(self, for_people: usize) -> usize {
+        if self.json { usize::MAX } else { for_people }
+    }
+
     /// A warning: standard error for a person, a JSON line for a machine.
     pub(crate) fn warn(self, text: &str) {
         if self.json {

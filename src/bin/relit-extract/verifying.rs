@@ -7,6 +7,9 @@ use serde_json::json;
 
 use crate::console::{Console, Outcome};
 
+/// How many problems a person is told one by one.
+const TOLD: usize = 50;
+
 pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, Error> {
     let bar = console.progress(0, "verify");
     let verdict = verify(out, &|done, total| {
@@ -14,14 +17,20 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, Error> {
         bar.set_position(done);
     })?;
     bar.finish_and_clear();
-    for problem in &verdict.problems {
+    let wrong = verdict.problems.len();
+    for problem in &verdict.problems[..wrong.min(console.most_lines(TOLD))] {
         let (file, sample, what) = (&problem.file, &problem.sample, &problem.what);
         console.say(
             &problem.to_string(),
             &json!({ "event": "problem", "file": file, "sample": sample, "message": what }),
         );
     }
-    let wrong = verdict.problems.len();
+    if wrong > console.most_lines(TOLD) {
+        console.warn(&format!(
+            "{} more problems: --json lists them all",
+            wrong - TOLD
+        ));
+    }
     let judgement = match wrong {
         0 => "all is well".to_owned(),
         1 => "1 problem".to_owned(),
