@@ -60,7 +60,8 @@ docs: setup ## Build the library's reference
 
 fuzz: setup ## Run each fuzz target for FUZZ_SECONDS (60)
 	cargo fuzz --version >/dev/null 2>&1 || cargo install --locked cargo-fuzz
-	for target in $$(cargo fuzz list --fuzz-dir tests/fuzz); do \
+	targets=$$(cargo fuzz list --fuzz-dir tests/fuzz); \
+	for target in $$targets; do \
 	    echo "fuzz: $$target"; \
 	    RUSTC_BOOTSTRAP=1 cargo fuzz run --fuzz-dir tests/fuzz "$$target" -- \
 	        -max_total_time=$(FUZZ_SECONDS); \

@@ -248,6 +248,111 @@ fn one_bad_input_does_not_stop_the_others() {
 }
 
 #[test]
+fn an_input_that_is_not_there_does_not_stop_the_others() {
+    let bench = Bench::new();
+    let told = bench.told(
+        3,
+        "nowhere.mkv clip.mkv --mask mask.png --frames 30 --size 32 -o out",
+    );
+    assert!(told.contains("there is no nowhere.mkv"), "{told}");
+    bench.verified(0, "out");
+}
+
+#[test]
+fn strict_does_not_take_over_what_it_would_refuse() {
+    let bench = Bench::new();
+    let line = "clip.mkv --mask mask.png --frames 45 --size 32 -o out --resume";
+    bench.told(0, line);
+    bench.told(1, &format!("{line} --strict"));
+    let whole = fs::read(bench.path("clip.mkv")).unwrap();
+    fs::write(bench.path("cut.mkv"), &whole[..whole.len() / 2]).unwrap();
+    let line = "cut.mkv --mask mask.png --frames 30 --size 32 -o cut --resume";
+    bench.told(3, line);
+    bench.told(3, line);
+}
+
+#[test]
+fn a_transparent_pixel_of_the_mask_is_not_the_objects() {
+    let bench = Bench::new();
+    let mask = image::open(bench.path("mask.png")).unwrap().into_luma8();
+    image::RgbaImage::from_fn(96, 72, |x, y| {
+        image::Rgba([255, 255, 255, mask.get_pixel(x, y).0[0]])
+    })
+    .save(bench.path("layer.png"))
+    .unwrap();
+    for (mask, out) in [("mask.png", "a"), ("layer.png", "b")] {
+        bench.told(
+            0,
+            &format!("clip.mkv --mask {mask} --frames 30 --size 32 -o {out}"),
+        );
+    }
+    let shards = ["a", "b"].map(|out| fs::read(bench.path(&format!("{out}/clip.tar"))).unwrap());
+    assert!(shards[0] == shards[1]);
+}
+
+#[test]
+fn damaged_h264_gives_the_same_shard_for_any_number_of_threads() {
+    let bench = Bench::new();
+    bench.video(
+        "film.mkv",
+        "-pix_fmt yuv420p -c:v libx264 -g 6 -bf 2 -sc_threshold 0",
+    );
+    let mut bytes = fs::read(bench.path("film.mkv")).unwrap();
+    let packet = support::packets(bench.folder.path(), "film.mkv")[14];
+    bytes[packet.at + 8..packet.at + packet.size].fill(0);
+    fs::write(bench.path("film.mkv"), bytes).unwrap();
+    let mut shards = Vec::new();
+    for threads in [1, 2, 4, 8] {
+        let out = format!("out{threads}");
+        let told = bench.told(
+            3,
+            &format!("film.mkv --mask mask.png --frames 30 --size 40 -o {out} --threads {threads}"),
+        );
+        shards.push((
+            told,
+            fs::read(bench.path(&format!("{out}/film.tar"))).unwrap(),
+        ));
+    }
+    assert!(
+        shards.windows(2).all(|pair| pair[0] == pair[1]),
+        "{:?}",
+        shards.iter().map(|s| &s.0).collect::<Vec<_>>()
+    );
+}
+
+#[test]
+fn names_that_ffmpeg_would_take_for_addresses_are_files() {
+    let bench = Bench::new();
+    for name in ["09:30.mkv", "concat:clip.mkv", "ü.mkv"] {
+        fs::copy(bench.path("clip.mkv"), bench.path(name)).unwrap();
+        bench.told(
+            0,
+            &format!("{name} --mask mask.png --frames 30 --size 32 -o out"),
+        );
+    }
+}
+
+#[test]
+fn a_name_that_is_no_text_is_refused_and_the_others_come() {
+    use std::os::unix::ffi::OsStrExt;
+    let bench = Bench::new();
+    let odd = bench
+        .folder
+        .path()
+        .join(std::ffi::OsStr::from_bytes(b"od\xFFd.mkv"));
+    fs::copy(bench.path("clip.mkv"), &odd).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+        .arg(&odd)
+        .args("clip.mkv --mask mask.png --frames 30 --size 32 -o out".split(' '))
+        .current_dir(bench.folder.path())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("rename the file"));
+    bench.verified(0, "out");
+}
+
+#[test]
 fn resume_skips_what_is_vouched_for_and_makes_again_what_is_not() {
     let bench = Bench::new();
     fs::copy(bench.path("clip.mkv"), bench.path("other.mkv")).unwrap();
@@ -292,7 +397,10 @@ fn what_is_missing_or_does_not_fit_is_told_in_a_sentence() {
     fs::write(bench.path("text.png"), "text").unwrap();
     for (line, part) in [
         ("clip.mkv -o out", "has no mask: make one with relit-mask"),
-        ("clip.mkv --mask nowhere.png -o out", "mask"),
+        (
+            "clip.mkv --mask nowhere.png -o out",
+            "there is no mask nowhere.png",
+        ),
         ("clip.mkv --mask empty.png -o out", "is empty"),
         (
             "clip.mkv --mask small.png -o out",

@@ -18,6 +18,7 @@ const ID: &str = "20261120T093015Z-mug";
 fn manifest() -> Manifest {
     Manifest {
         id: ID.to_owned(),
+        object: "mug".to_owned(),
         created: "2026-11-20T09:30:15Z".parse().unwrap(),
         status: Status::Recording,
         camera: CameraFacts {
@@ -177,6 +178,7 @@ fn what_is_wrong_in_a_manifest_is_named() {
         ("\"video.mkv\"", "\"../video.mkv\"", "not a plain file name"),
         ("\"fps\": 30.0", "\"fps\": 0.0", "camera.fps"),
         (ID, "a/b", "cannot be a session's name"),
+        ("\"mug\"", "\" \"", "its object is empty"),
         ("{", "", "line"),
     ] {
         let (_root, folder) = whole();
@@ -258,6 +260,26 @@ fn inputs_are_sessions_folders_of_them_or_videos() {
     assert!(matches!(recordings(&bare), Err(Error::NotThere(_))));
     let empty = tempfile::tempdir().unwrap();
     assert!(matches!(recordings(empty.path()), Err(Error::NoSession(_))));
+}
+
+#[test]
+fn a_video_beside_sessions_does_not_hide_them() {
+    let (root, _folder) = whole();
+    fs::write(root.path().join("preview.mkv"), b"").unwrap();
+    assert!(matches!(
+        recordings(root.path()),
+        Err(Error::VideoAmongSessions { .. })
+    ));
+}
+
+#[test]
+fn a_session_that_lost_its_manifest_and_video_is_not_passed_over() {
+    let (root, folder) = whole();
+    let lost = root.path().join("lost");
+    fs::create_dir(&lost).unwrap();
+    fs::write(lost.join("frames.jsonl"), b"").unwrap();
+    assert_eq!(recordings(root.path()).unwrap(), [folder, lost.clone()]);
+    assert!(matches!(Recording::open(&lost), Err(Error::NoSession(_))));
 }
 
 #[test]

@@ -4,19 +4,6 @@ use image::GrayImage;
 
 use crate::geometry::Rect;
 
-/// The mask's level from which on a pixel is the object's.
-const OBJECT: u8 = 128;
-
-/// A mask whose pixels are either the object's (255) or not (0).
-#[must_use]
-pub fn binary(mask: &GrayImage) -> GrayImage {
-    let mut binary = mask.clone();
-    for pixel in &mut *binary {
-        *pixel = if *pixel >= OBJECT { 255 } else { 0 };
-    }
-    binary
-}
-
 /// The smallest rectangle that holds all non-zero pixels; `None` where there are none.
 #[must_use]
 pub fn bounding_box(mask: &GrayImage) -> Option<Rect> {

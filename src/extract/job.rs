@@ -2,27 +2,22 @@
 
 use std::path::Path;
 
-use image::imageops::thumbnail;
-use image::{GrayImage, RgbImage};
 use rayon::ThreadPool;
 
+use super::made::Made;
+use super::object::Object;
 use super::pipeline::{Lost, Processed, Stage};
 use super::plan::{Plan, Use};
-use super::{Basis, Error, Observer, Options, Scaler, binary, bounding_box, cut, square_around};
-use crate::geometry::Rect;
-use crate::report::{self, Page, Thumbnail};
-use crate::session::{MASK_FILE, Notice, Recording};
+use super::{Basis, Error, Observer, Options, Scaler, cut, square_around};
+use crate::report::{self, Page};
+use crate::session::{INDEX_FILE, Notice, Recording};
 use crate::shard::{
-    self, Dataset, Digest, FileEntry, FrameRecord, Input, MaskInfo, MaskSpans, OutputFolder,
-    Sample, SessionEntry, SessionWriter, ShardEntry, Size,
+    self, Dataset, Digest, FrameRecord, Input, MaskInfo, MaskSpans, OutputFolder, Sample,
+    SessionEntry, SessionWriter, ShardEntry, Size,
 };
 use crate::video::Video;
 
-/// Pictures on the report's contact sheet.
-const THUMBNAILS: u32 = 24;
-/// Their largest side, pixels.
-const THUMBNAIL_SIDE: u32 = 256;
-/// How many damaged frames are told one by one.
+/// How many places with damaged frames are told one by one.
 const TOLD: usize = 8;
 /// Most pixels of a crop: each thread works on a few pictures of this size.
 const MAX_CROP_PIXELS: u64 = 1 << 26;
@@ -33,43 +28,18 @@ pub(super) struct Job {
     recording: Recording,
     video: Video,
     input: Input,
-    mask: Mask,
+    object: Object,
     notices: Vec<Notice>,
-}
-
-/// The mask of a video.
-#[derive(Debug)]
-struct Mask {
-    /// 0 or 255, as large as the frames.
-    pixels: GrayImage,
-    bounding_box: Rect,
-    blake3: Digest,
 }
 
 impl Job {
     /// Opens recording, video and mask, and looks whether they belong together.
     pub(super) fn open(path: &Path, options: &Options) -> Result<Self, Error> {
         let recording = Recording::open(path)?;
-        let mask_path = match (&options.mask, &recording.folder) {
-            (Some(mask), _) => mask.clone(),
-            (None, Some(folder)) => folder.join(MASK_FILE),
-            (None, None) => return Err(Error::NoMask(path.to_owned())),
-        };
-        if !mask_path.is_file() {
-            return Err(Error::NoMask(path.to_owned()));
-        }
         let video = Video::open(&recording.video)?;
-        let mask = Mask::open(&mask_path, (video.facts().width, video.facts().height))?;
+        let size = (video.facts().width, video.facts().height);
+        let object = Object::open(&recording, options.mask.as_deref(), size)?;
         let (bytes, blake3) = digest(&recording.video)?;
-        let mut notices = recording.notices.clone();
-        compare_with_manifest(&recording, &video, blake3, &mut notices);
-        notices.extend(
-            video
-                .damage()
-                .iter()
-                .map(|damage| Notice::Loss(damage.to_string())),
-        );
-        notices.extend(video.notes().iter().cloned().map(Notice::Warning));
         let name = recording.video.file_name().unwrap_or_default();
         let input = Input {
             video: name.to_string_lossy().into_owned(),
@@ -78,11 +48,17 @@ impl Job {
             bytes,
             blake3,
         };
+        let mut notices = recording.notices.clone();
+        notices.extend(differences(&recording, &input));
+        notices.extend(contradictions(&recording, &video));
+        notices.extend(video.damage().iter().map(|d| Notice::Loss(d.to_string())));
+        notices.extend(video.notes().iter().cloned().map(Notice::Warning));
+        notices.extend(object.warning().map(Notice::Warning));
         Ok(Self {
             recording,
             video,
             input,
-            mask,
+            object,
             notices,
         })
     }
@@ -91,11 +67,25 @@ impl Job {
         &self.recording.id
     }
 
-    /// Whether the data set in `out` holds this recording, of the same video and mask, whole.
-    pub(super) fn is_vouched_for(&self, dataset: &Dataset, out: &Path) -> bool {
-        dataset.session(self.id()).is_some_and(|entry| {
-            entry.input.blake3 == self.input.blake3 && entry.mask.blake3 == self.mask.blake3
-        }) && dataset.vouches_for(out, self.id()).is_ok()
+    /// The entry of this recording in the data set in `out`, if it was made of the same video, index
+    /// and mask, is whole on the disk, and is what these options would accept.
+    pub(super) fn vouched<'a>(
+        &self,
+        dataset: &'a Dataset,
+        out: &Path,
+        options: &Options,
+    ) -> Option<&'a SessionEntry> {
+        let entry = dataset.session(self.id())?;
+        let same = entry.input == self.input && entry.mask.blake3 == self.object.blake3;
+        let accepted = !options.strict || (!entry.lossy && entry.duplicates == 0);
+        (same && accepted && dataset.vouches_for(out, self.id()).is_ok()).then_some(entry)
+    }
+
+    /// Whether the data set holds a session of this name that is of another video.
+    pub(super) fn would_replace_another(&self, dataset: &Dataset) -> bool {
+        dataset
+            .session(self.id())
+            .is_some_and(|entry| entry.input.blake3 != self.input.blake3)
     }
 
     /// Extracts the recording into `folder`.
@@ -127,7 +117,7 @@ impl Job {
             let now_lost = stage.run(&uses, pool, |frame| {
                 for &chosen in uses.get(&frame.number).into_iter().flatten() {
                     let record = self.record(&stage, &plan, &frame, chosen, options);
-                    made.keep(&record, &frame.image, options.frames);
+                    made.keep(&record, &frame.image);
                     let (image, png) = (frame.image.clone(), frame.png.clone());
                     writer.push(Sample { record, image, png })?;
                     observer.advanced();
@@ -136,39 +126,35 @@ impl Job {
             })?;
             uses = plan.replace(&now_lost)?;
             lost.extend(now_lost);
-            if options.strict
-                && let Some(frame) = lost.first()
-            {
-                return Err(Error::Strict(told(frame)));
+            if options.strict && !lost.is_empty() {
+                let first = notices_of_lost(&lost).swap_remove(0);
+                return Err(Error::Strict(first.text().to_owned()));
             }
         }
         notices.extend(notices_of_lost(&lost));
-        let warnings: Vec<String> = notices.iter().map(|n| n.text().to_owned()).collect();
+        let made = made.in_order();
+        // What can still fail comes before the shard of an earlier run is replaced.
+        let page = self.page(options, &made, &notices)?;
         let files = writer.finish()?;
-        let Made {
-            records,
-            thumbnails,
-        } = made.in_order();
-        let report = self.report(folder, options, &records, &thumbnails, &warnings)?;
-        let count = |is: fn(&FrameRecord) -> bool| records.iter().filter(|r| is(r)).count() as u32;
+        let report = folder.write(&format!("{}.html", self.id()), page.as_bytes())?;
         let entry = SessionEntry {
             id: self.recording.id.clone(),
             object: self.recording.object.clone(),
             input: self.input.clone(),
             mask: MaskInfo {
-                blake3: self.mask.blake3,
+                blake3: self.object.blake3,
                 px: stage.spans.pixels(),
-                bounding_box: self.mask.bounding_box,
+                bounding_box: self.object.bounding_box,
             },
-            selection: match plan.selection.basis {
+            selection: match plan.selection.basis() {
                 Basis::Angle => shard::Selection::Angle,
                 Basis::Time => shard::Selection::Time,
             },
             samples: options.frames,
-            duplicates: count(|r| r.duplicate),
-            spec_net: count(|r| r.spec_net),
+            duplicates: made.count(|r| r.duplicate),
+            spec_net: made.count(|r| r.spec_net),
             lossy: notices.iter().any(Notice::is_loss),
-            warnings,
+            warnings: texts(&notices),
             table: files.table,
             report: Some(report),
         };
@@ -178,14 +164,14 @@ impl Job {
     fn stage(&self, options: &Options) -> Result<Stage<'_>, Error> {
         let facts = self.video.facts();
         let crop = square_around(
-            self.mask.bounding_box,
+            self.object.bounding_box,
             options.margin,
             (facts.width, facts.height),
         );
         if u64::from(crop.w) * u64::from(crop.h) > MAX_CROP_PIXELS {
             return Err(Error::CropTooLarge(crop));
         }
-        let crop_mask = cut(&self.mask.pixels, crop);
+        let crop_mask = cut(&self.object.mask, crop);
         let side = match options.size {
             Size::Pixels(side) => Some(side),
             Size::Native(_) => None,
@@ -243,6 +229,11 @@ impl Job {
                 "{left_out} frames have no angle, where others have one, and are left out"
             )));
         }
+        if let Some(frame) = plan.runs_back_at() {
+            notices.push(Notice::Warning(format!(
+                "the table's angle runs back at frame {frame}: look at {INDEX_FILE} there"
+            )));
+        }
         let repeated = plan.repeated();
         if repeated > 0 {
             notices.push(Notice::Warning(format!(
@@ -251,7 +242,7 @@ impl Job {
                 plan.usable(),
             )));
         }
-        if let Some(covered) = plan.selection.covered_deg
+        if let Some(covered) = plan.selection.covered_deg()
             && plan.selection.is_partial()
         {
             notices.push(Notice::Loss(format!(
@@ -261,23 +252,17 @@ impl Job {
         notices
     }
 
-    /// Writes the session's page.
-    fn report(
-        &self,
-        folder: &OutputFolder,
-        options: &Options,
-        records: &[FrameRecord],
-        thumbnails: &[Thumbnail],
-        warnings: &[String],
-    ) -> Result<FileEntry, Error> {
+    /// The session's page.
+    fn page(&self, options: &Options, made: &Made, notices: &[Notice]) -> Result<String, Error> {
         let facts = self.video.facts();
         let pair = |name: &str, value: String| (name.to_owned(), value);
-        let crop = records
+        let crop = made
+            .records
             .first()
             .map_or_else(String::new, |record| record.crop.to_string());
-        let page = report::render(&Page {
-            records,
-            thumbnails,
+        Ok(report::render(&Page {
+            records: &made.records,
+            thumbnails: &made.thumbnails,
             settings: &setting_rows(options),
             facts: &[
                 pair("video", self.input.video.clone()),
@@ -287,17 +272,23 @@ impl Job {
                     format!("{} x {} pixels", facts.width, facts.height),
                 ),
                 pair("frames in the video", self.input.frames.to_string()),
-                pair("mask, bounding box", self.mask.bounding_box.to_string()),
+                pair("mask, bounding box", self.object.bounding_box.to_string()),
                 pair("crop", crop),
                 pair("video BLAKE3", self.input.blake3.to_string()),
-                pair("mask BLAKE3", self.mask.blake3.to_string()),
+                pair("mask BLAKE3", self.object.blake3.to_string()),
             ],
-            warnings,
+            warnings: &texts(notices),
             gate: options.gate,
             saturation_level: options.saturation_level,
-        })?;
-        Ok(folder.write(&format!("{}.html", self.id()), page.as_bytes())?)
+        })?)
     }
+}
+
+fn texts(notices: &[Notice]) -> Vec<String> {
+    notices
+        .iter()
+        .map(|notice| notice.text().to_owned())
+        .collect()
 }
 
 /// With `strict`: an error where something is lost or a frame is repeated.
@@ -313,22 +304,29 @@ fn refuse(plan: &Plan, notices: &[Notice]) -> Result<(), Error> {
     }
 }
 
+/// One loss for each run of neighbouring frames that were lost for one reason.
 fn notices_of_lost(lost: &[Lost]) -> Vec<Notice> {
-    let mut notices: Vec<Notice> = lost.iter().take(TOLD).map(told).map(Notice::Loss).collect();
-    if lost.len() > TOLD {
-        let more = lost.len() - TOLD;
-        notices.push(Notice::Loss(format!(
-            "{more} more frames cannot be decoded"
-        )));
+    let mut sorted: Vec<&Lost> = lost.iter().collect();
+    sorted.sort_by_key(|frame| frame.number);
+    let runs = sorted.chunk_by(|a, b| a.number + 1 == b.number && a.fault == b.fault);
+    let told = |run: &[&Lost]| {
+        let (first, last) = (run.first()?, run.last()?);
+        let frames = match (first.number, last.number) {
+            (first, last) if first == last => format!("frame {first}"),
+            (first, last) => format!("frames {first} to {last}"),
+        };
+        let fault = &first.fault;
+        Some(Notice::Loss(format!(
+            "{frames} cannot be decoded: {fault}; neighbours stand in"
+        )))
+    };
+    let mut notices: Vec<Notice> = runs.filter_map(told).collect();
+    if notices.len() > TOLD {
+        let more = notices.len() - TOLD;
+        notices.truncate(TOLD);
+        notices.push(Notice::Loss(format!("and at {more} more places")));
     }
     notices
-}
-
-fn told(lost: &Lost) -> String {
-    format!(
-        "frame {} cannot be decoded: {}; a neighbour stands in for it",
-        lost.number, lost.fault
-    )
 }
 
 fn setting_rows(options: &Options) -> Vec<(String, String)> {
@@ -343,86 +341,6 @@ fn setting_rows(options: &Options) -> Vec<(String, String)> {
     .collect()
 }
 
-/// What is kept of the samples for table and report.
-struct Made {
-    records: Vec<FrameRecord>,
-    thumbnails: Vec<Thumbnail>,
-}
-
-impl Made {
-    fn new(samples: u32) -> Self {
-        Self {
-            records: Vec::with_capacity(samples as usize),
-            thumbnails: Vec::new(),
-        }
-    }
-
-    fn keep(&mut self, record: &FrameRecord, image: &RgbImage, samples: u32) {
-        if is_thumbnail(record.index, samples) {
-            let image = small(image);
-            self.thumbnails.push(Thumbnail {
-                index: record.index,
-                image,
-            });
-        }
-        self.records.push(record.clone());
-    }
-
-    fn in_order(mut self) -> Self {
-        self.records.sort_by_key(|record| record.index);
-        self.thumbnails.sort_by_key(|thumbnail| thumbnail.index);
-        self
-    }
-}
-
-/// Whether a sample is one of the evenly spread ones on the contact sheet.
-fn is_thumbnail(index: u32, samples: u32) -> bool {
-    let place = |index: u32| u64::from(index) * u64::from(THUMBNAILS) / u64::from(samples);
-    index == 0 || place(index) != place(index - 1)
-}
-
-fn small(image: &RgbImage) -> RgbImage {
-    let (width, height) = image.dimensions();
-    if width.max(height) <= THUMBNAIL_SIDE {
-        return image.clone();
-    }
-    // Crops are square.
-    thumbnail(image, THUMBNAIL_SIDE, THUMBNAIL_SIDE)
-}
-
-impl Mask {
-    fn open(path: &Path, frame: (u32, u32)) -> Result<Self, Error> {
-        let broken = |source| Error::Mask {
-            path: path.to_owned(),
-            source,
-        };
-        let bytes = std::fs::read(path).map_err(|source| Error::Read {
-            path: path.to_owned(),
-            source,
-        })?;
-        let pixels = binary(
-            &image::load_from_memory(&bytes)
-                .map_err(broken)?
-                .into_luma8(),
-        );
-        if pixels.dimensions() != frame {
-            let mask = pixels.dimensions();
-            return Err(Error::MaskSize {
-                path: path.to_owned(),
-                mask,
-                frame,
-            });
-        }
-        let bounding_box =
-            bounding_box(&pixels).ok_or_else(|| Error::EmptyMask(path.to_owned()))?;
-        Ok(Self {
-            pixels,
-            bounding_box,
-            blake3: Digest::of(&bytes),
-        })
-    }
-}
-
 fn digest(path: &Path) -> Result<(u64, Digest), Error> {
     Digest::of_file(path).map_err(|source| Error::Read {
         path: path.to_owned(),
@@ -430,34 +348,69 @@ fn digest(path: &Path) -> Result<(u64, Digest), Error> {
     })
 }
 
-/// Notes where the video is not what the manifest says of it.
-fn compare_with_manifest(
-    recording: &Recording,
-    video: &Video,
-    blake3: Digest,
-    notices: &mut Vec<Notice>,
-) {
+/// Where the video is not what the manifest and the index say of it.
+fn differences(recording: &Recording, input: &Input) -> Vec<Notice> {
+    let file = &input.video;
+    let found = input.frames;
+    let mut notices = Vec::new();
+    let lines = recording
+        .frames
+        .as_ref()
+        .map(|index| index.entries().len() as u64);
+    if let Some(lines) = lines
+        && lines != found
+    {
+        notices.push(Notice::Loss(format!(
+            "{file} has {found} frames and {INDEX_FILE} has {lines}: they were matched by their time stamps"
+        )));
+    }
     let Some(manifest) = &recording.manifest else {
-        return;
+        return notices;
     };
-    let file = &manifest.video.file;
-    let found = video.frames().len() as u64;
     if let Some(said) = manifest.video.frames
         && said != found
+        && Some(said) != lines
     {
         notices.push(Notice::Loss(format!(
             "{file} has {found} frames where the manifest says {said}"
         )));
     }
-    let size_differs = notices
-        .iter()
-        .any(|notice| notice.is_loss() && notice.text().contains(file));
+    // A file of another size was told of when the recording was opened.
+    let same_size = manifest
+        .video
+        .bytes
+        .is_none_or(|bytes| bytes == input.bytes);
     if let Some(said) = &manifest.video.blake3
-        && !said.eq_ignore_ascii_case(&blake3.to_string())
-        && !size_differs
+        && !said.eq_ignore_ascii_case(&input.blake3.to_string())
+        && same_size
     {
         notices.push(Notice::Loss(format!(
             "{file} is not the file that was recorded: its BLAKE3 differs from the manifest's"
         )));
     }
+    notices
+}
+
+/// Where the video is of another kind than the manifest says.
+fn contradictions(recording: &Recording, video: &Video) -> Vec<Notice> {
+    let Some(manifest) = &recording.manifest else {
+        return Vec::new();
+    };
+    let facts = video.facts();
+    let mut notices = Vec::new();
+    let said = &manifest.video.codec;
+    if !said.eq_ignore_ascii_case(&facts.codec) {
+        let found = &facts.codec;
+        notices.push(Notice::Warning(format!(
+            "the video is {found} where the manifest says {said}"
+        )));
+    }
+    let said = (manifest.camera.width, manifest.camera.height);
+    if said != (facts.width, facts.height) && said != (facts.height, facts.width) {
+        notices.push(Notice::Warning(format!(
+            "the frames are {} x {} pixels where the manifest says {} x {}",
+            facts.width, facts.height, said.0, said.1
+        )));
+    }
+    notices
 }

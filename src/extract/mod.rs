@@ -10,19 +10,22 @@
 
 mod crop;
 mod job;
+mod made;
+mod object;
 mod pipeline;
 mod plan;
 mod scale;
 mod select;
+mod timeline;
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-pub use crop::{binary, bounding_box, cut, square_around};
+pub use crop::{bounding_box, cut, square_around};
 pub use scale::Scaler;
-pub use select::{Basis, Candidate, Selection, TimeGap, time_gaps};
+pub use select::{Basis, Candidate, Selection, TimeGap, Turn, runs_back_at, time_gaps};
 
 use crate::geometry::Rect;
 use crate::session::{self, recordings};
@@ -57,6 +60,8 @@ pub struct Options {
     pub strict: bool,
     /// Skip what the data set already vouches for.
     pub resume: bool,
+    /// Replace sessions of the same name that were made of another video.
+    pub replace: bool,
     /// Threads that work side by side, 1 and above.
     pub threads: usize,
 }
@@ -124,8 +129,8 @@ pub trait Observer: Sync {
 pub enum Outcome {
     /// It is in the data set; the entry's warnings tell what to know.
     Extracted(Box<SessionEntry>),
-    /// It was there already, whole and with the same settings, video and mask.
-    Skipped(String),
+    /// It was there already, whole and with the same settings, video, index and mask.
+    Skipped(Box<SessionEntry>),
     /// It is not in the data set.
     Failed(Error),
 }
@@ -135,7 +140,7 @@ pub enum Outcome {
 pub struct Tally {
     /// Recordings extracted.
     pub extracted: usize,
-    /// Of those, the ones of which something was lost.
+    /// Of those and the skipped ones, how many have lost something.
     pub lossy: usize,
     /// Recordings that were there already.
     pub skipped: usize,
@@ -147,9 +152,9 @@ pub struct Tally {
 /// files) into the data set in the folder `out`, which is made where it is missing.
 ///
 /// # Errors
-/// [`Error`] where nothing can be done at all: an option out of range, an input that is not there,
-/// a data set with other settings in `out`, or no room. What goes wrong with one recording is told
-/// to `observer` and counted.
+/// [`Error`] where nothing can be done at all: an option out of range, a data set with other
+/// settings in `out`, or no room. What goes wrong with one input or recording is told to
+/// `observer` and counted.
 pub fn extract(
     inputs: &[PathBuf],
     out: &Path,
@@ -157,62 +162,93 @@ pub fn extract(
     observer: &dyn Observer,
 ) -> Result<Tally, Error> {
     options.check()?;
-    let mut found = Vec::new();
-    for input in inputs {
-        found.extend(recordings(input)?);
+    if out.join(session::MANIFEST_FILE).exists() {
+        return Err(Error::IntoSession(out.to_owned()));
     }
     let folder = OutputFolder::lock(out)?;
-    let mut dataset = open_dataset(out, options.settings())?;
+    let dataset = open_dataset(out, options.settings())?;
     let pool = ThreadPoolBuilder::new()
         .num_threads(options.threads)
         .build()?;
+    let mut run = Run {
+        folder,
+        dataset,
+        options,
+        pool,
+        names: HashSet::new(),
+        observer,
+    };
     let mut tally = Tally::default();
-    let mut names = HashSet::new();
-    for recording in &found {
-        let outcome = one(
-            recording,
-            &folder,
-            &mut dataset,
-            options,
-            &pool,
-            &mut names,
-            observer,
-        )
-        .unwrap_or_else(Outcome::Failed);
+    for input in inputs {
+        match recordings(input) {
+            Ok(found) => found
+                .iter()
+                .for_each(|recording| run.extract(recording, &mut tally)),
+            Err(error) => run.end(input, Err(error.into()), &mut tally),
+        }
+    }
+    Ok(tally)
+}
+
+/// One call's work on one data set.
+struct Run<'a> {
+    folder: OutputFolder,
+    dataset: Dataset,
+    options: &'a Options,
+    pool: ThreadPool,
+    /// Of the recordings so far.
+    names: HashSet<String>,
+    observer: &'a dyn Observer,
+}
+
+impl Run<'_> {
+    fn extract(&mut self, recording: &Path, tally: &mut Tally) {
+        let outcome = self.one(recording);
+        self.end(recording, outcome, tally);
+    }
+
+    fn end(&self, recording: &Path, outcome: Result<Outcome, Error>, tally: &mut Tally) {
+        let outcome = outcome.unwrap_or_else(Outcome::Failed);
         match &outcome {
             Outcome::Extracted(entry) => {
                 tally.extracted += 1;
                 tally.lossy += usize::from(entry.lossy);
             }
-            Outcome::Skipped(_) => tally.skipped += 1,
+            Outcome::Skipped(entry) => {
+                tally.skipped += 1;
+                tally.lossy += usize::from(entry.lossy);
+            }
             Outcome::Failed(_) => tally.failed += 1,
         }
-        observer.ended(recording, &outcome);
+        self.observer.ended(recording, &outcome);
     }
-    Ok(tally)
-}
 
-fn one(
-    path: &Path,
-    folder: &OutputFolder,
-    dataset: &mut Dataset,
-    options: &Options,
-    pool: &ThreadPool,
-    names: &mut HashSet<String>,
-    observer: &dyn Observer,
-) -> Result<Outcome, Error> {
-    let job = job::Job::open(path, options)?;
-    if !names.insert(job.id().to_owned()) {
-        return Err(Error::SameName(job.id().to_owned()));
+    fn one(&mut self, path: &Path) -> Result<Outcome, Error> {
+        let Self {
+            folder, options, ..
+        } = self;
+        let job = job::Job::open(path, options)?;
+        if !self.names.insert(job.id().to_owned()) {
+            return Err(Error::SameName(job.id().to_owned()));
+        }
+        if options.resume
+            && let Some(entry) = job.vouched(&self.dataset, folder.path(), options)
+        {
+            return Ok(Outcome::Skipped(Box::new(entry.clone())));
+        }
+        if !options.replace && job.would_replace_another(&self.dataset) {
+            let (out, id) = (folder.path().to_owned(), job.id().to_owned());
+            return Err(Error::NameTaken { out, id });
+        }
+        self.observer.begun(path, options.frames);
+        let (entry, shards) = job.run(folder, options, &self.pool, self.observer)?;
+        // A data set that could not be written is not the one that goes on.
+        let mut dataset = self.dataset.clone();
+        dataset.replace(entry.clone(), shards);
+        dataset.write(folder.path())?;
+        self.dataset = dataset;
+        Ok(Outcome::Extracted(Box::new(entry)))
     }
-    if options.resume && job.is_vouched_for(dataset, folder.path()) {
-        return Ok(Outcome::Skipped(job.id().to_owned()));
-    }
-    observer.begun(path, options.frames);
-    let (entry, shards) = job.run(folder, options, pool, observer)?;
-    dataset.replace(entry.clone(), shards);
-    dataset.write(folder.path())?;
-    Ok(Outcome::Extracted(Box::new(entry)))
 }
 
 /// The data set in `out`, or a new one.
@@ -271,8 +307,21 @@ pub enum Error {
     /// No mask.
     #[error("{0} has no mask: make one with relit-mask, or name one with --mask")]
     NoMask(PathBuf),
+    /// The mask that was named is not there.
+    #[error("there is no mask {0}: make one with relit-mask, or correct the name given to --mask")]
+    MaskNotThere(PathBuf),
+    /// The frame index and the video do not belong together.
+    #[error(
+        "frames.jsonl has {lines} lines and the video has {frames} frames, and their time stamps do not match: give the video file itself to go on without angles"
+    )]
+    IndexMismatch {
+        /// Lines of the index.
+        lines: u64,
+        /// Frames of the video.
+        frames: u64,
+    },
     /// The mask cannot be read.
-    #[error("the mask {path} cannot be read as an image: {source}")]
+    #[error("the mask {path} cannot be read as an image ({source}): give a PNG")]
     Mask {
         /// The mask's path.
         path: PathBuf,
@@ -293,7 +342,9 @@ pub enum Error {
         frame: (u32, u32),
     },
     /// Nothing in the mask.
-    #[error("the mask {0} is empty: not one of its pixels is 128 or brighter")]
+    #[error(
+        "the mask {0} is empty: not one of its pixels is 128 or brighter and opaque; make it again with relit-mask, or paint the object white"
+    )]
     EmptyMask(PathBuf),
     /// The object vanishes when scaled.
     #[error(
@@ -304,14 +355,30 @@ pub enum Error {
         side: u32,
     },
     /// The crop does not fit into memory.
-    #[error("a crop of {} x {} pixels is larger than can be worked on", .0.w, .0.h)]
+    #[error("a crop of {} x {} pixels is larger than can be worked on: give a smaller --margin", .0.w, .0.h)]
     CropTooLarge(Rect),
     /// Scaling failed.
     #[error("a frame could not be scaled: {0}")]
     Scaling(String),
     /// No frame can be decoded.
-    #[error("no frame of the video can be decoded")]
+    #[error("no frame of the video can be decoded: record it again, or give another file")]
     NoFrameLeft,
+    /// One frame is no turn.
+    #[error("the video has one usable frame only: this is no turn; give a recording of one")]
+    OneFrame,
+    /// Another video of this name is in the data set.
+    #[error(
+        "{out} holds a session {id} of another video: extract into another folder, rename the input, or give --replace"
+    )]
+    NameTaken {
+        /// The output folder.
+        out: PathBuf,
+        /// The session's id.
+        id: String,
+    },
+    /// The output folder is a session's.
+    #[error("{0} is a session's folder: give another one for the data set")]
+    IntoSession(PathBuf),
     /// The table did not turn.
     #[error(
         "the table turned by {degrees:.2} degrees only: this is no turn; to spread the frames over time, give the video file itself"
@@ -330,7 +397,9 @@ pub enum Error {
     #[error(transparent)]
     Video(#[from] video::Error),
     /// A frame cannot be converted.
-    #[error("frame {number}: {fault}")]
+    #[error(
+        "frame {number}: {fault}; convert the video to another pixel format, for example with ffmpeg"
+    )]
     Frame {
         /// The frame.
         number: u64,

@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, HashSet};
 
 use super::pipeline::Lost;
 use super::select::{Candidate, Selection};
-use super::{Error, time_gaps};
+use super::timeline::timeline;
+use super::{Error, runs_back_at, time_gaps};
 use crate::session::FrameIndex;
 use crate::video::Video;
 
@@ -45,28 +46,7 @@ impl Plan {
         index: Option<&FrameIndex>,
         samples: u32,
     ) -> Result<Self, Error> {
-        let whole = video.frames().iter().filter(|frame| !frame.damaged);
-        let mut candidates: Vec<Candidate> = match index {
-            None => whole
-                .map(|frame| Candidate {
-                    frame: frame.number,
-                    t_us: frame.t_us,
-                    angle_deg: None,
-                })
-                .collect(),
-            // A frame beyond the index has no time stamp on the driver's clock: it is left out.
-            Some(index) => whole
-                .filter_map(|frame| {
-                    let entry = index.entries().get(usize::try_from(frame.number).ok()?)?;
-                    let (t_us, angle_deg) = (entry.t_us, entry.angle_deg);
-                    Some(Candidate {
-                        frame: frame.number,
-                        t_us,
-                        angle_deg,
-                    })
-                })
-                .collect(),
-        };
+        let mut candidates = timeline(video.frames(), index)?;
         let all = candidates.len();
         if candidates
             .iter()
@@ -110,6 +90,11 @@ impl Plan {
         (self.without_angle > 0).then_some(self.without_angle)
     }
 
+    /// The frame at which the angle runs back, if it does.
+    pub(super) fn runs_back_at(&self) -> Option<u64> {
+        runs_back_at(&self.candidates)
+    }
+
     /// The samples that each source frame serves.
     pub(super) fn uses(&mut self) -> Uses {
         let Selection { frames, off_by, .. } = &self.selection;
@@ -132,7 +117,7 @@ impl Plan {
         let lost: HashSet<u64> = lost.iter().map(|frame| frame.number).collect();
         self.candidates
             .retain(|candidate| !lost.contains(&candidate.frame));
-        let again = Selection::choose(&self.candidates, self.samples)?;
+        let again = Selection::among(&self.candidates, self.selection.turn(), self.samples)?;
         let mut chosen = Vec::new();
         for (index, (frame, &off_by)) in (0_u32..).zip(again.frames.iter().zip(&again.off_by)) {
             let kept = &mut self.selection.frames[index as usize];

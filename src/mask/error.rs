@@ -64,6 +64,11 @@ pub enum Error {
     /// Neither rectangle nor seeds.
     #[error("nothing says where the object is: give a rectangle, seeds, or both")]
     NoHints,
+    /// Seeds alone that mark no object.
+    #[error(
+        "the seeds mark no pixel as the object and there is no rectangle: paint white on the object, or give --rect too"
+    )]
+    NothingMarked,
     /// The seeds have another size than the frame.
     #[error(
         "the seeds are {} x {} pixels and the frame is {} x {}: paint them on an image of the frame's size", .seeds.0, .seeds.1, .frame.0, .frame.1
@@ -113,16 +118,6 @@ pub enum Error {
         what: &'static str,
         /// The encoder's word.
         source: image::ImageError,
-    },
-    /// A frame that the video does not have.
-    #[error("{video} has no frame {frame}: its frames are 0 to {last}")]
-    NoSuchFrame {
-        /// The video.
-        video: PathBuf,
-        /// The frame that was asked for.
-        frame: u64,
-        /// The last frame.
-        last: u64,
     },
     /// A name for the mask that does not end in `.png`.
     #[error("{0} cannot be the mask's name: give one that ends in .png")]
@@ -228,11 +223,11 @@ pub enum SeedsFault {
     /// A PNG that cannot be decoded.
     #[error("it cannot be decoded as PNG ({0}); save it again")]
     Damaged(image::ImageError),
-    /// No pixel marks the object.
+    /// No pixel marks anything.
     #[error(
-        "no pixel marks the object; paint some of the object white (all channels at least 250)"
+        "no pixel of it is white (object) or black (background): paint with a hard brush, nearly white is unknown"
     )]
-    WithoutObject,
+    WithoutMark,
     /// A recorded seeds image holds a level that stands for nothing.
     #[error("it holds grey level {0}, where only 0, 128 and 255 stand for something")]
     Level(u8),

@@ -14,7 +14,7 @@ use super::{
     Source, Warning, encode, preview, segment,
 };
 use crate::durable;
-use crate::session::{MASK_FILE, Recording};
+use crate::session::{MASK_FILE, Notice, Recording};
 use crate::video::Video;
 
 /// What is to be made.
@@ -43,6 +43,8 @@ pub struct Made {
     pub files: MaskFiles,
     /// What the record says.
     pub record: MaskRecord,
+    /// What the user has to know of the recording.
+    pub notices: Vec<Notice>,
 }
 
 /// The names of a mask's three files.
@@ -136,6 +138,7 @@ pub fn make(input: &Path, output: Option<MaskFiles>, request: &Request) -> Resul
             recording: recording.id,
             files,
             record,
+            notices: recording.notices,
         }),
         Err(source) => Err(Error::Recording {
             recording: recording.id,
@@ -184,19 +187,13 @@ fn cut_and_write(video: &Path, files: &MaskFiles, request: &Request) -> Result<M
 
 fn read_frame(path: &Path, number: u64) -> Result<(RgbImage, Source), Error> {
     let video = Video::open(path)?;
-    let frames = video.frames();
-    let info = usize::try_from(number).ok().and_then(|at| frames.get(at));
-    let info = info.ok_or_else(|| Error::NoSuchFrame {
-        video: path.to_owned(),
-        frame: number,
-        last: (frames.len() as u64).saturating_sub(1),
-    })?;
     let frame = video.frame(number)?;
+    let info = video.frames().iter().find(|info| info.number == number);
     let name = path.file_name().unwrap_or_default();
     let source = Source {
         video: name.to_string_lossy().into_owned(),
         frame: number,
-        t_us: info.t_us,
+        t_us: info.map_or(0, |info| info.t_us),
         width: frame.width(),
         height: frame.height(),
         frame_blake3: blake3::hash(frame.as_raw()).to_hex().to_string(),

@@ -62,7 +62,7 @@ impl Mark {
     }
 }
 
-/// A mark for each pixel of a frame, at least one of them [`Mark::Object`].
+/// A mark for each pixel of a frame, at least one of them not [`Mark::Unknown`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds {
     width: u32,
@@ -76,7 +76,7 @@ impl Seeds {
     /// <= 5) background, everything else and what is more than half transparent unknown.
     ///
     /// # Errors
-    /// [`SeedsFault::WithoutObject`].
+    /// [`SeedsFault::WithoutMark`].
     pub fn from_image(image: &DynamicImage) -> Result<Self, SeedsFault> {
         let painted = image.to_rgba8();
         let marks = painted.pixels().map(|pixel| Mark::of(pixel.0)).collect();
@@ -110,6 +110,12 @@ impl Seeds {
         (self.width, self.height)
     }
 
+    /// True where some pixel marks the object.
+    #[must_use]
+    pub fn mark_the_object(&self) -> bool {
+        self.marks.contains(&Mark::Object)
+    }
+
     /// The marks, row by row, `width * height` of them.
     #[must_use]
     pub fn marks(&self) -> &[Mark] {
@@ -138,8 +144,8 @@ impl Seeds {
     }
 
     fn new(size: (u32, u32), marks: Vec<Mark>, coloured_px: u64) -> Result<Self, SeedsFault> {
-        if !marks.contains(&Mark::Object) {
-            return Err(SeedsFault::WithoutObject);
+        if marks.iter().all(|&mark| mark == Mark::Unknown) {
+            return Err(SeedsFault::WithoutMark);
         }
         Ok(Self {
             width: size.0,
@@ -176,7 +182,7 @@ pub enum Hints {
     Rect(Rect),
     /// Some of the object and, better still, some of the background is marked.
     Seeds(Seeds),
-    /// A rectangle, and marks that overrule it.
+    /// A rectangle, and marks that overrule it; black ones alone will do.
     Both {
         /// The rectangle.
         rect: Rect,
@@ -189,11 +195,13 @@ impl Hints {
     /// The hints that are there.
     ///
     /// # Errors
-    /// [`Error::NoHints`] where there are none.
+    /// [`Error::NoHints`] where there are none, [`Error::NothingMarked`] where seeds alone mark no
+    /// object.
     pub fn from_parts(rect: Option<Rect>, seeds: Option<Seeds>) -> Result<Self, Error> {
         match (rect, seeds) {
             (None, None) => Err(Error::NoHints),
             (Some(rect), None) => Ok(Self::Rect(rect)),
+            (None, Some(seeds)) if !seeds.mark_the_object() => Err(Error::NothingMarked),
             (None, Some(seeds)) => Ok(Self::Seeds(seeds)),
             (Some(rect), Some(seeds)) => Ok(Self::Both { rect, seeds }),
         }
@@ -276,10 +284,15 @@ mod tests {
     }
 
     #[test]
-    fn seeds_without_object_are_refused() {
+    fn seeds_without_object_are_refused_but_with_a_rectangle() {
+        let grey = ImageBuffer::from_pixel(4, 4, Rgb([128u8, 128, 128]));
+        let unmarked = Seeds::from_png(&png(grey));
+        assert!(matches!(unmarked, Err(SeedsFault::WithoutMark)));
         let black = ImageBuffer::from_pixel(4, 4, Rgb([0u8, 0, 0]));
-        let result = Seeds::from_png(&png(black));
-        assert!(matches!(result, Err(SeedsFault::WithoutObject)));
+        let seeds = Seeds::from_png(&png(black)).unwrap();
+        let alone = Hints::from_parts(None, Some(seeds.clone()));
+        assert!(matches!(alone, Err(Error::NothingMarked)));
+        assert!(Hints::from_parts(Some(Rect::new(0, 0, 2, 2)), Some(seeds)).is_ok());
     }
 
     #[test]

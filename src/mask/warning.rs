@@ -186,7 +186,7 @@ impl fmt::Display for Warning {
                 write!(
                     f,
                     "the mask touches the {} border of the frame: the object is cut off there, or background was taken for it",
-                    sides.join(" and ")
+                    sides.join(", ")
                 )
             }
             Self::Small { fraction } => write!(

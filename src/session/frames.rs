@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Largest angle that is believed, degrees: some thousands of turns either way.
+const MOST_DEGREES: f64 = 1e6;
+
 /// One frame, as the recorder knew it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FrameEntry {
@@ -67,8 +70,8 @@ pub enum IndexFault {
         /// What stands there.
         found: i64,
     },
-    /// The angle is not a number.
-    #[error("line {line} has an angle that is not a finite number")]
+    /// The angle cannot be one.
+    #[error("line {line} has an angle that no table reaches")]
     Angle {
         /// 1-based line.
         line: u64,
@@ -127,7 +130,10 @@ impl FrameIndex {
                 found: entry.n,
             });
         }
-        if entry.angle_deg.is_some_and(|angle| !angle.is_finite()) {
+        if entry
+            .angle_deg
+            .is_some_and(|angle| !(-MOST_DEGREES..=MOST_DEGREES).contains(&angle))
+        {
             return Err(IndexFault::Angle { line });
         }
         if let Some(last) = self.entries.last() {

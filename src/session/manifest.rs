@@ -16,6 +16,8 @@ pub const MANIFEST_SCHEMA: &str = "relit.session/1";
 pub struct Manifest {
     /// The session's name: `<UTC date>T<time>Z-<object>`.
     pub id: String,
+    /// The object's name.
+    pub object: String,
     /// When the capture began, UTC.
     pub created: Timestamp,
     /// Whether the capture came to its end.
@@ -128,6 +130,9 @@ pub enum ManifestFault {
     /// The id cannot be a session's name.
     #[error("its id {0:?} cannot be a session's name")]
     Id(String),
+    /// The object has no name.
+    #[error("its object is empty")]
+    NoObject,
     /// `status` is none of the three.
     #[error("its status {0:?} is none of \"recording\", \"complete\", \"aborted\"")]
     Status(String),
@@ -176,6 +181,7 @@ impl Manifest {
         };
         let manifest = Self {
             id: wire.id,
+            object: wire.object,
             created: wire.created,
             status,
             camera: wire.camera,
@@ -202,6 +208,7 @@ impl Manifest {
         let wire = Wire {
             schema: MANIFEST_SCHEMA.to_owned(),
             id: self.id.clone(),
+            object: self.object.clone(),
             created: self.created,
             status: status.to_owned(),
             reason,
@@ -219,6 +226,9 @@ impl Manifest {
     fn check(&self) -> Result<(), ManifestFault> {
         if !is_session_name(&self.id) {
             return Err(ManifestFault::Id(self.id.clone()));
+        }
+        if self.object.trim().is_empty() {
+            return Err(ManifestFault::NoObject);
         }
         let file = &self.video.file;
         if file.is_empty() || file == "." || file == ".." || file.contains(['/', '\\', '\0']) {
@@ -245,15 +255,9 @@ impl Manifest {
         }
         Ok(())
     }
-
-    /// The object's name: what follows the time in the id.
-    #[must_use]
-    pub fn object(&self) -> &str {
-        object_of(&self.id)
-    }
 }
 
-/// The object's name in a session's id: what follows `<UTC date>T<time>Z-`, or all of it where the
+/// The object's name that a session's id holds: what follows `<UTC date>T<time>Z-`, or all of it where the
 /// id is not of that form.
 #[must_use]
 pub fn object_of(id: &str) -> &str {
@@ -290,6 +294,7 @@ struct SchemaOnly {
 struct Wire {
     schema: String,
     id: String,
+    object: String,
     created: Timestamp,
     status: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]

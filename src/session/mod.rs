@@ -36,7 +36,7 @@ pub enum Error {
     NotThere(PathBuf),
     /// A folder without manifest, video or sessions.
     #[error(
-        "{0} holds no session: neither a session.json, nor a video file, nor folders that have one"
+        "{0} holds no session, neither a session.json, nor a video file, nor folders that have one: give another folder"
     )]
     NoSession(PathBuf),
     /// A folder without manifest that holds several videos.
@@ -49,8 +49,20 @@ pub enum Error {
         /// How many videos it holds.
         count: usize,
     },
+    /// A folder of sessions with a video of its own.
+    #[error(
+        "{folder} holds sessions and the video {video} beside them: give the sessions by name, or move the video away"
+    )]
+    VideoAmongSessions {
+        /// The folder.
+        folder: PathBuf,
+        /// The first video in it.
+        video: PathBuf,
+    },
     /// The manifest is not what the format says.
-    #[error("{path} is not a usable manifest: {fault}")]
+    #[error(
+        "{path} is not a usable manifest: {fault}; mend it, or give the video file itself to go on without it"
+    )]
     Manifest {
         /// The manifest's path.
         path: PathBuf,
@@ -73,7 +85,7 @@ pub enum Error {
     )]
     StillRecording(PathBuf),
     /// The manifest names a video that is not there.
-    #[error("{0} is missing, though the session's manifest names it")]
+    #[error("{0} is missing, though the session's manifest names it: put it back")]
     VideoMissing(PathBuf),
     /// A session of this name stands there already.
     #[error("{0} is there already: a session is never written over another")]
@@ -94,7 +106,9 @@ pub enum Error {
         fault: IndexFault,
     },
     /// The file system refused.
-    #[error("{path} could not be {doing}")]
+    #[error(
+        "{path} could not be {doing}: check that it is there, that it may be read and written, and that the disk has room"
+    )]
     Io {
         /// What was worked on.
         path: PathBuf,

@@ -5,7 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{
-    Error, FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, Status, is_session_name, object_of,
+    Error, FrameIndex, INDEX_FILE, MANIFEST_FILE, MASK_FILE, Manifest, Status, is_session_name,
+    object_of,
 };
 
 /// File name endings that are taken for videos in a folder without manifest.
@@ -112,7 +113,7 @@ impl Recording {
         let frames = read_index(folder, &manifest, &mut notices)?;
         Ok(Self {
             id: manifest.id.clone(),
-            object: manifest.object().to_owned(),
+            object: manifest.object.clone(),
             folder: Some(folder.to_owned()),
             video,
             manifest: Some(manifest),
@@ -156,33 +157,45 @@ impl Recording {
 }
 
 /// The recordings that a path stands for: a session folder or a video file is one, a folder of
-/// sessions is each of them, sorted by name.
+/// sessions is each of them, sorted by name. A folder in it that has lost its manifest or its video
+/// counts too, so that opening it tells.
 ///
 /// # Errors
-/// [`Error::NotThere`], [`Error::NoSession`], or what the file system answers.
+/// [`Error::NotThere`], [`Error::NoSession`], [`Error::VideoAmongSessions`], or what the file
+/// system answers.
 pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, Error> {
     if !path.exists() {
         return Err(Error::NotThere(path.to_owned()));
     }
-    if path.is_file() || holds_recording(path)? {
+    if path.is_file() || path.join(MANIFEST_FILE).exists() {
         return Ok(vec![path.to_owned()]);
     }
-    let mut found = Vec::new();
-    for entry in fs::read_dir(path).map_err(Error::io(path, "listed"))? {
-        let inner = entry.map_err(Error::io(path, "listed"))?.path();
-        if inner.is_dir() && holds_recording(&inner)? {
-            found.push(inner);
-        }
-    }
-    if found.is_empty() {
+    if !path.is_dir() {
         return Err(Error::NoSession(path.to_owned()));
     }
-    found.sort();
-    Ok(found)
+    let mut inner = Vec::new();
+    for entry in fs::read_dir(path).map_err(Error::io(path, "listed"))? {
+        let folder = entry.map_err(Error::io(path, "listed"))?.path();
+        if folder.is_dir() && is_of_a_session(&folder)? {
+            inner.push(folder);
+        }
+    }
+    inner.sort();
+    match (videos_in(path)?.into_iter().next(), inner.is_empty()) {
+        (None, true) => Err(Error::NoSession(path.to_owned())),
+        (None, false) => Ok(inner),
+        (Some(_), true) => Ok(vec![path.to_owned()]),
+        (Some(video), false) => Err(Error::VideoAmongSessions {
+            folder: path.to_owned(),
+            video,
+        }),
+    }
 }
 
-fn holds_recording(folder: &Path) -> Result<bool, Error> {
-    Ok(folder.join(MANIFEST_FILE).exists() || !videos_in(folder)?.is_empty())
+/// Whether a folder is a session's, whole or not.
+fn is_of_a_session(folder: &Path) -> Result<bool, Error> {
+    let parts = [MANIFEST_FILE, INDEX_FILE, MASK_FILE];
+    Ok(parts.iter().any(|part| folder.join(part).exists()) || !videos_in(folder)?.is_empty())
 }
 
 fn videos_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
@@ -252,7 +265,7 @@ fn read_index(
         )));
     }
     for gap in index.gaps() {
-        notices.push(Notice::Warning(format!(
+        notices.push(Notice::Loss(format!(
             "the camera dropped {} frame{} before frame {}",
             gap.missing,
             if gap.missing == 1 { "" } else { "s" },

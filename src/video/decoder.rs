@@ -9,6 +9,8 @@ use ffmpeg_next::{Packet, frame};
 
 use super::FrameFault;
 
+pub(super) use ffmpeg_next::codec::decoder::Video as VideoDecoder;
+
 /// True where every packet is a whole picture that needs no other.
 pub(super) fn frames_stand_alone(codec: codec::Id) -> bool {
     matches!(codec, codec::Id::MJPEG | codec::Id::RAWVIDEO)

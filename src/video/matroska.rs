@@ -9,7 +9,7 @@ const EBML: u32 = 0x1A45_DFA3;
 const SEGMENT: u32 = 0x1853_8067;
 const CLUSTER: u32 = 0x1F43_B675;
 
-/// Where a file ends too early.
+/// Where a file ends too early, or an element does not fit where it stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cut {
     /// Where the element begins that is not whole, bytes from the file's start.
@@ -26,7 +26,14 @@ pub fn find_cut(file: &mut (impl Read + Seek)) -> io::Result<Option<Cut>> {
     let length = file.seek(SeekFrom::End(0))?;
     file.seek(SeekFrom::Start(0))?;
     let mut at = 0;
+    // Where the cluster ends in which the walk is.
+    let mut cluster_end = length;
+    // A segment or cluster that was to end after the file's end.
+    let mut open = None;
     while at < length {
+        if at >= cluster_end {
+            cluster_end = length;
+        }
         let Some(header) = Header::read(file, at)? else {
             return Ok((at > 0).then_some(Cut {
                 element_at: at,
@@ -36,32 +43,37 @@ pub fn find_cut(file: &mut (impl Read + Seek)) -> io::Result<Option<Cut>> {
         if at == 0 && header.id != EBML {
             return Ok(None);
         }
+        let broken = |missing| {
+            Ok(Some(Cut {
+                element_at: at,
+                missing,
+            }))
+        };
         // The segment and clusters of unknown size hold elements up to the next of their rank, so
         // going through their children in one row comes to the same.
-        let enters = header.id == SEGMENT || (header.id == CLUSTER && header.size.is_none());
-        at = match header.size {
-            Some(size) if header.body_at.saturating_add(size) > length => {
-                let missing = header.body_at.saturating_add(size) - length;
-                if !enters {
-                    return Ok(Some(Cut {
+        let enters = header.id == SEGMENT || header.id == CLUSTER;
+        at = match header.size.map(|size| header.body_at.saturating_add(size)) {
+            Some(end) if end > length && !enters => return broken(Some(end - length)),
+            Some(end) if end > cluster_end && !enters => return broken(None),
+            Some(end) if enters => {
+                if end > length {
+                    open = Some(Cut {
                         element_at: at,
-                        missing: Some(missing),
-                    }));
+                        missing: Some(end - length),
+                    });
+                }
+                if header.id == CLUSTER {
+                    cluster_end = end.min(length);
                 }
                 header.body_at
             }
-            Some(size) if !enters => header.body_at + size,
-            _ if enters => header.body_at,
-            _ => {
-                return Ok(Some(Cut {
-                    element_at: at,
-                    missing: None,
-                }));
-            }
+            Some(end) if !enters => end,
+            None if !enters => return broken(None),
+            _ => header.body_at,
         };
         file.seek(SeekFrom::Start(at))?;
     }
-    Ok(None)
+    Ok(open)
 }
 
 /// An element's id and size.
@@ -181,6 +193,25 @@ mod tests {
         for bytes in [&b""[..], b"\0\0\0\x18ftypmp42", b"\xFF\xD8\xFF"] {
             assert_eq!(find_cut(&mut Cursor::new(bytes)).unwrap(), None);
         }
+    }
+
+    #[test]
+    fn a_block_that_reaches_beyond_its_cluster_is_found() {
+        let mut damaged = file(true);
+        let second = damaged.len() - 9;
+        damaged.extend(element(
+            &CLUSTER.to_be_bytes(),
+            &element(&[BLOCK], b"frame 2"),
+        ));
+        damaged[second + 1] += 3;
+        let cut = find_cut(&mut Cursor::new(damaged)).unwrap();
+        assert_eq!(
+            cut,
+            Some(Cut {
+                element_at: second as u64,
+                missing: None
+            })
+        );
     }
 
     #[test]

@@ -12,14 +12,18 @@
 //! sessions, masks or angles.
 
 mod decoder;
+mod ffv1;
 mod matroska;
+mod order;
 mod orientation;
 mod picture;
 mod reader;
 mod scan;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Once;
+
+use ffmpeg_next::format::context::Input;
 
 pub use matroska::{Cut, find_cut};
 pub use picture::Picture;
@@ -39,11 +43,14 @@ pub enum Error {
         /// FFmpeg's word.
         why: ffmpeg_next::Error,
     },
+    /// A name that FFmpeg cannot take.
+    #[error("the name of {0} is not plain text: rename the file")]
+    Name(PathBuf),
     /// No picture track.
-    #[error("{0} has no video stream")]
+    #[error("{0} has no video stream: give a file with a picture")]
     NoVideo(PathBuf),
     /// A picture track without a single frame.
-    #[error("{0} has not one whole frame")]
+    #[error("{0} has not one whole frame: it was cut off too early; record it again")]
     NoFrames(PathBuf),
     /// The codec is not supported by this FFmpeg, or refuses the stream.
     #[error("{path}: no decoder for its codec {codec} can be opened ({why})")]
@@ -56,7 +63,7 @@ pub enum Error {
         why: ffmpeg_next::Error,
     },
     /// A frame beyond the end.
-    #[error("{path} has no frame {number}: its frames are 0 to {last}")]
+    #[error("{path} has no frame {number}: give one of 0 to {last}")]
     NoSuchFrame {
         /// The file.
         path: PathBuf,
@@ -66,7 +73,7 @@ pub enum Error {
         last: u64,
     },
     /// A frame that is there and cannot be decoded.
-    #[error("frame {number} of {path} cannot be decoded: {fault}")]
+    #[error("frame {number} of {path} cannot be decoded: {fault}; take another frame")]
     Frame {
         /// The file.
         path: PathBuf,
@@ -83,6 +90,9 @@ pub enum FrameFault {
     /// The decoder refused its data.
     #[error("its data are damaged ({0})")]
     Damaged(ffmpeg_next::Error),
+    /// The container or a checksum says that its data are not whole.
+    #[error("its data are not whole")]
+    NotWhole,
     /// The decoder covered up missing parts.
     #[error("parts of it are missing and were covered up by the decoder")]
     Concealed,
@@ -107,6 +117,18 @@ pub enum FrameFault {
     /// The pixel format cannot be converted to RGB.
     #[error("its pixel format {0} cannot be converted to RGB")]
     PixelFormat(String),
+}
+
+/// Opens a file, and nothing but a file: FFmpeg would take a name with a colon for an address.
+fn open_input(path: &Path) -> Result<Input, Error> {
+    initialise();
+    let name = path.to_str().filter(|name| !name.contains('\0'));
+    let name = name.ok_or_else(|| Error::Name(path.to_owned()))?;
+    let failed = |why| Error::Open {
+        path: path.to_owned(),
+        why,
+    };
+    ffmpeg_next::format::input(&format!("file:{name}")).map_err(failed)
 }
 
 /// FFmpeg's one-time set-up. It would print its own messages to standard error otherwise.

@@ -16,8 +16,18 @@ use crate::geometry::Rect;
 pub(super) struct Colour {
     pub(super) full_range: bool,
     pub(super) matrix: YuvStandardMatrix,
-    /// True where the file does not state the matrix and it was chosen by the picture's size.
-    pub(super) matrix_assumed: bool,
+    pub(super) matrix_from: MatrixFrom,
+}
+
+/// Where the matrix comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum MatrixFrom {
+    /// The file states it, or its format has none.
+    File,
+    /// The file does not state it: it was chosen by the picture's size.
+    Size,
+    /// The file states one that is not known here: it was chosen by the picture's size.
+    SizeForUnknown,
 }
 
 impl Colour {
@@ -44,11 +54,34 @@ impl Colour {
         } else {
             YuvStandardMatrix::Bt601
         };
+        let has_matrix = !is_rgb(format) && !is_grey(format);
+        let matrix_from = match space {
+            _ if stated.is_some() || !has_matrix => MatrixFrom::File,
+            color::Space::Unspecified | color::Space::Reserved => MatrixFrom::Size,
+            _ => MatrixFrom::SizeForUnknown,
+        };
+        // Grey pictures have no headroom unless somebody says so.
+        let full_grey = is_grey(format) && range != color::Range::MPEG;
         Self {
-            full_range: jpeg || range == color::Range::JPEG,
+            full_range: jpeg || full_grey || range == color::Range::JPEG,
             matrix: stated.unwrap_or(by_size),
-            matrix_assumed: stated.is_none() && !is_rgb(format) && !is_grey(format),
+            matrix_from,
         }
+    }
+}
+
+impl Colour {
+    /// What had to be assumed, for the user.
+    pub(super) fn note(self) -> Option<String> {
+        let why = match self.matrix_from {
+            MatrixFrom::File => return None,
+            MatrixFrom::Size => "the file does not state its colour matrix",
+            MatrixFrom::SizeForUnknown => "the file's colour matrix is not known here",
+        };
+        Some(format!(
+            "{why}; {:?} is assumed from the picture's size",
+            self.matrix
+        ))
     }
 }
 
@@ -213,6 +246,9 @@ fn strides_are_forward(frame: &frame::Video) -> bool {
     unsafe { (*frame.as_ptr()).linesize.iter().all(|&stride| stride >= 0) }
 }
 
+/// Columns that are converted at a time.
+const BLOCK: usize = 32;
+
 /// One plane of samples, from the sample (x, y) on.
 fn plane(frame: &frame::Video, index: usize, x: usize, y: usize) -> Option<(&[u8], u32)> {
     if index >= frame.planes() {
@@ -237,14 +273,18 @@ fn planes_to_rgb(
         YUV422P | YUVJ422P => (1, 0),
         _ => (0, 0),
     };
-    // A piece has to begin on a chroma sample: it is taken larger, and the surplus is cut off.
+    // The converter works in blocks and rounds what does not fill one in another way. Blocks are
+    // laid from the frame's edge on, so that a pixel's value does not depend on the piece; this
+    // also begins the piece on a chroma sample.
     let (x, y) = (usize::try_from(rect.x).ok()?, usize::try_from(rect.y).ok()?);
-    let (surplus_x, surplus_y) = (x & shift_x, y & shift_y);
+    let (surplus_x, surplus_y) = (x % BLOCK, y & shift_y);
     let (x, y) = (x - surplus_x, y - surplus_y);
-    let width = rect.w + surplus_x as u32;
+    let end = (usize::try_from(rect.right()).ok()?).next_multiple_of(BLOCK);
+    let width = u32::try_from(end.min(frame.width() as usize) - x).ok()?;
     let height = rect.h + surplus_y as u32;
     if format == RGB24 {
-        return copy_rgb(frame, x, y, width, height);
+        let left = 3 * (x + surplus_x);
+        return copy_rgb(frame, left, y, rect.w, rect.h);
     }
     let mut rgb = RgbImage::new(width, height);
     let range = if colour.full_range {
@@ -283,15 +323,21 @@ fn planes_to_rgb(
         to_rgb(&planes, &mut rgb, stride, range, colour.matrix)
     };
     converted.ok()?;
-    if (surplus_x, surplus_y) == (0, 0) {
+    if rgb.dimensions() == (rect.w, rect.h) {
         return Some(rgb);
     }
     let (left, top) = (surplus_x as u32, surplus_y as u32);
     Some(image::imageops::crop_imm(&rgb, left, top, rect.w, rect.h).to_image())
 }
 
-fn copy_rgb(frame: &frame::Video, x: usize, y: usize, width: u32, height: u32) -> Option<RgbImage> {
-    let (samples, stride) = plane(frame, 0, 3 * x, y)?;
+fn copy_rgb(
+    frame: &frame::Video,
+    left: usize,
+    y: usize,
+    width: u32,
+    height: u32,
+) -> Option<RgbImage> {
+    let (samples, stride) = plane(frame, 0, left, y)?;
     let row = 3 * width as usize;
     let mut pixels = Vec::with_capacity(row * height as usize);
     for line in 0..height as usize {

@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 
 use ffmpeg_next::codec::{Parameters, decoder};
 use ffmpeg_next::format::context::Input;
-use ffmpeg_next::{Packet, format, frame};
+use ffmpeg_next::{Packet, frame};
 
 use super::decoder::{self as opening, Pool};
 use super::picture::Picture;
 use super::scan::{Track, Video};
-use super::{Error, FrameFault};
+use super::{Error, FrameFault, open_input};
 
 /// A wanted frame on its way to a picture: still compressed, decoded, or lost.
 /// [`Video::picture`] makes the picture of it, on any thread.
@@ -93,7 +93,7 @@ pub struct Reader<'a> {
 impl<'a> Reader<'a> {
     pub(super) fn open(video: &'a Video, wanted: &[u64], threads: usize) -> Result<Self, Error> {
         let path = || video.path().to_owned();
-        let input = format::input(video.path()).map_err(|why| Error::Open { path: path(), why })?;
+        let input = open_input(video.path())?;
         let stream = input
             .stream(video.track.stream)
             .ok_or_else(|| Error::NoVideo(path()))?;
@@ -132,17 +132,15 @@ impl<'a> Reader<'a> {
     }
 
     fn take_packet(&mut self, packet: Packet) {
-        let number = self.video.track.number_of_packet.get(self.packets).copied();
-        self.packets += 1;
         let track = &self.video.track;
+        let number = track.number_of_packet.get(self.packets).copied().flatten();
+        self.packets += 1;
         match &mut self.chain {
-            Some(chain) => chain.feed(&packet, number, track, &mut self.wanted, &mut self.ready),
+            Some(chain) => chain.feed(&packet, track, &mut self.wanted, &mut self.ready),
             None => {
                 if let Some(number) = number.filter(|&number| self.wanted.take(number)) {
-                    self.ready.push_back(Pending {
-                        number,
-                        state: State::Coded(PacketBox(packet)),
-                    });
+                    let state = State::Coded(PacketBox(packet));
+                    self.ready.push_back(Pending { number, state });
                 }
             }
         }
@@ -233,7 +231,7 @@ impl Wanted {
 /// A decoder of frames that build on each other.
 struct Chain {
     decoder: decoder::Video,
-    /// Frames that the decoder has given.
+    /// The number after that of the frame that the decoder gave last.
     given: u64,
     /// The damaged frame on which those up to the next key frame may build.
     broken_by: Option<u64>,
@@ -249,19 +247,16 @@ impl Chain {
         })
     }
 
+    /// Whatever goes wrong with a packet shows in the frames that come, or do not come: an error
+    /// here may belong to a packet that another thread is still at.
     fn feed(
         &mut self,
         packet: &Packet,
-        number: Option<u64>,
         track: &Track,
         wanted: &mut Wanted,
         ready: &mut VecDeque<Pending>,
     ) {
-        if let Err(why) = self.decoder.send_packet(packet)
-            && let Some(number) = number
-        {
-            self.lose(number, FrameFault::Damaged(why), wanted, ready);
-        }
+        let _ = self.decoder.send_packet(packet);
         self.drain(track, wanted, ready);
     }
 
@@ -279,10 +274,7 @@ impl Chain {
                 Ok(()) => self.accept(picture, track, wanted, ready),
                 // Decoding with threads tells of a damaged packet here; the frames after it come.
                 // No decoder holds back more packets than this, so it cannot go on for ever.
-                Err(ffmpeg_next::Error::InvalidData) if errors < 64 => {
-                    errors += 1;
-                    self.broken_by = self.broken_by.or(Some(self.given));
-                }
+                Err(ffmpeg_next::Error::InvalidData) if errors < 64 => errors += 1,
                 Err(_) => return,
             }
         }
@@ -299,8 +291,13 @@ impl Chain {
         let number = stamped
             .and_then(|pts| track.number_at(pts))
             .unwrap_or(self.given);
+        // Frames come in order of presentation: what is passed over was lost.
+        if number > self.given {
+            self.broken_by = self.broken_by.or(Some(self.given));
+        }
         self.given = number + 1;
-        if picture.is_key() {
+        // Without time stamps the numbers after a lost frame would be a guess.
+        if picture.is_key() && !track.number_at.is_empty() {
             self.broken_by = None;
         }
         if picture.is_corrupt() || picture.has_decode_errors() {

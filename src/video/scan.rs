@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 
 use ffmpeg_next::codec::packet::side_data;
 use ffmpeg_next::format::context::Input;
-use ffmpeg_next::{Packet, Rational, codec, format, media};
+use ffmpeg_next::{Packet, codec, format, media};
 use image::RgbImage;
 
-use super::decoder::{self, Pool};
+use super::decoder::{self, Pool, VideoDecoder};
+use super::order::{Ordered, Stamp, mark_wrong_checksums};
 use super::orientation::Orientation;
 use super::picture::Colour;
-use super::{Cut, Error, FrameFault, Pending, Reader, find_cut, initialise};
+use super::{Cut, Error, FrameFault, Pending, Reader, find_cut, open_input};
 use crate::geometry::Rect;
 
 /// What is known of one frame before it is decoded.
@@ -44,12 +45,8 @@ pub struct Facts {
 /// A sign that a video is not whole.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Damage {
-    /// The file ends inside an element.
-    #[error(
-        "the file is cut off: what begins at byte {at} is not whole{missing}",
-        at = .0.element_at,
-        missing = .0.missing.map(|n| format!(", {n} bytes are missing")).unwrap_or_default()
-    )]
+    /// The file ends inside an element, or an element does not fit where it stands.
+    #[error("the file {what} at byte {at}", what = cut_words(.0), at = .0.element_at)]
     CutOff(Cut),
     /// The container promises more frames than there are.
     #[error("the file promises {promised} frames and holds {found}")]
@@ -88,6 +85,14 @@ pub enum Damage {
     },
 }
 
+fn cut_words(cut: &Cut) -> String {
+    match cut.missing {
+        Some(1) => "is cut off: 1 byte is missing of what begins".to_owned(),
+        Some(n) => format!("is cut off: {n} bytes are missing of what begins"),
+        None => "is damaged or cut off in what begins".to_owned(),
+    }
+}
+
 /// A video file that was read through once.
 pub struct Video {
     path: PathBuf,
@@ -117,10 +122,7 @@ pub(super) struct Track {
     pub(super) coded: (u32, u32),
     pub(super) colour: Colour,
     pub(super) orientation: Orientation,
-    /// The frame's number of each packet, in the order in which packets stand in the file.
-    pub(super) number_of_packet: Vec<u64>,
-    /// Time stamps and numbers, sorted; empty where frames have none or share them, and the order
-    /// in which the decoder gives frames is the only guide.
+    pub(super) number_of_packet: Vec<Option<u64>>,
     pub(super) number_at: Vec<(i64, u64)>,
 }
 
@@ -131,82 +133,56 @@ impl Video {
     /// [`Error::Open`], [`Error::NoVideo`], [`Error::NoFrames`] or [`Error::Decoder`]. A file that
     /// is damaged but has frames is opened; [`Self::damage`] tells.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        initialise();
-        let failed = |why| Error::Open {
-            path: path.to_owned(),
-            why,
-        };
-        let mut input = format::input(path).map_err(failed)?;
+        let mut input = open_input(path)?;
         let stream = input
             .streams()
             .best(media::Type::Video)
             .ok_or_else(|| Error::NoVideo(path.to_owned()))?;
         let index = stream.index();
-        let time_base = stream.time_base();
-        let promised_frames = u64::try_from(stream.frames()).unwrap_or(0);
+        let (time_base, rate) = (stream.time_base(), stream.avg_frame_rate());
+        let promised = Promised {
+            // AVI counts chunks, also empty ones.
+            frames: match input.format().name() {
+                "avi" => 0,
+                _ => u64::try_from(stream.frames()).unwrap_or(0),
+            },
+            duration_us: input.duration(),
+        };
         let parameters = stream.parameters();
-        let matrix = display_matrix(&stream);
-        let promised_us = input.duration();
+        let (orientation, mut notes) = orientation(&stream);
 
-        let (stamps, read_error) = read_through(&mut input, index);
-        if stamps.is_empty() {
+        let (mut stamps, read_error) = read_through(&mut input, index, parameters.id());
+        mark_wrong_checksums(&mut stamps);
+        let ordered = Ordered::from(&stamps, time_base, rate);
+        if ordered.frames.is_empty() {
             return Err(Error::NoFrames(path.to_owned()));
         }
-        let ordered = Ordered::from(&stamps, time_base);
-
-        let id = parameters.id();
-        let decoder = decoder::open(parameters.clone(), 1).map_err(|why| Error::Decoder {
-            path: path.to_owned(),
-            codec: format!("{id:?}"),
-            why,
+        let decoder = decoder::open(parameters.clone(), 1).map_err(|why| {
+            let codec = format!("{:?}", parameters.id());
+            Error::Decoder {
+                path: path.to_owned(),
+                codec,
+                why,
+            }
         })?;
-        let coded = (decoder.width(), decoder.height());
-        let pixel = decoder.format();
-        let colour = Colour::stated(pixel, decoder.color_range(), decoder.color_space(), coded.1);
-        let (orientation, mut notes) = match matrix {
-            None => (Orientation::default(), Vec::new()),
-            Some(bytes) => match Orientation::from_display_matrix(&bytes) {
-                Some(orientation) => (orientation, Vec::new()),
-                None => (
-                    Orientation::default(),
-                    vec!["the file asks for a rotation that is not a multiple of 90 degrees, which is left out".to_owned()],
-                ),
-            },
-        };
-        if colour.matrix_assumed {
-            notes.push(format!(
-                "the file does not state its colour matrix; {:?} is assumed from its size",
-                colour.matrix
-            ));
-        }
-        let (width, height) = orientation.displayed(coded.0, coded.1);
-        let damage = find_damage(
-            path,
-            &ordered.frames,
-            promised_frames,
-            promised_us,
-            read_error,
+        let colour = Colour::stated(
+            decoder.format(),
+            decoder.color_range(),
+            decoder.color_space(),
+            decoder.height(),
         );
+        notes.extend(ordered.note);
+        notes.extend(colour.note());
         Ok(Self {
             path: path.to_owned(),
-            facts: Facts {
-                codec: decoder
-                    .codec()
-                    .map_or_else(|| format!("{id:?}"), |codec| codec.name().to_owned()),
-                width,
-                height,
-                pixel_format: pixel
-                    .descriptor()
-                    .map_or_else(|| "unknown".to_owned(), |d| d.name().to_owned()),
-                full_range: colour.full_range,
-            },
+            facts: facts(&decoder, colour, orientation),
+            damage: find_damage(path, &ordered.frames, stamps.len(), &promised, read_error),
             frames: ordered.frames,
-            damage,
             notes,
             track: Track {
                 stream: index,
-                codec: id,
-                coded,
+                codec: decoder.id(),
+                coded: (decoder.width(), decoder.height()),
                 colour,
                 orientation,
                 number_of_packet: ordered.number_of_packet,
@@ -274,6 +250,13 @@ impl Video {
             fault,
         };
         let mut reader = self.read(&[number], 1)?;
+        if self
+            .frames
+            .iter()
+            .any(|frame| frame.number == number && frame.damaged)
+        {
+            return Err(wrong(FrameFault::NotWhole));
+        }
         let pending = reader.next().ok_or_else(|| wrong(FrameFault::NoPicture))?;
         let all = Rect::new(0, 0, self.facts.width, self.facts.height);
         self.picture(pending)
@@ -287,41 +270,52 @@ impl Video {
     /// # Errors
     /// [`FrameFault`] where the frame yields no picture.
     pub fn picture(&self, pending: Pending) -> Result<super::Picture, FrameFault> {
-        reader_picture(self, pending)
+        pending.decode(&self.track, &self.pool)
     }
 }
 
-fn reader_picture(video: &Video, pending: Pending) -> Result<super::Picture, FrameFault> {
-    pending.decode(&video.track, &video.pool)
+fn facts(decoder: &VideoDecoder, colour: Colour, orientation: Orientation) -> Facts {
+    let (width, height) = orientation.displayed(decoder.width(), decoder.height());
+    let codec = decoder.codec().map(|codec| codec.name().to_owned());
+    let format = decoder
+        .format()
+        .descriptor()
+        .map(|format| format.name().to_owned());
+    Facts {
+        codec: codec.unwrap_or_else(|| format!("{:?}", decoder.id())),
+        width,
+        height,
+        pixel_format: format.unwrap_or_else(|| "unknown".to_owned()),
+        full_range: colour.full_range,
+    }
 }
 
-fn display_matrix(stream: &format::stream::Stream<'_>) -> Option<Vec<u8>> {
-    let found = stream
-        .side_data()
-        .find(|data| data.kind() == side_data::Type::DisplayMatrix)?;
-    Some(found.data().to_vec())
+/// How the stream is to be turned, and what to say of it.
+fn orientation(stream: &format::stream::Stream<'_>) -> (Orientation, Vec<String>) {
+    let mut side_data = stream.side_data();
+    let matrix = side_data.find(|data| data.kind() == side_data::Type::DisplayMatrix);
+    match matrix.map(|matrix| Orientation::from_display_matrix(matrix.data())) {
+        None => (Orientation::default(), Vec::new()),
+        Some(Some(orientation)) => (orientation, Vec::new()),
+        Some(None) => {
+            let note = "the file asks for a rotation that is not a multiple of 90 degrees, which is left out";
+            (Orientation::default(), vec![note.to_owned()])
+        }
+    }
 }
 
-/// What a packet says of its frame.
-#[derive(Debug, Clone, Copy)]
-struct Stamp {
-    /// Time stamp in units of the stream's time base.
-    pts: Option<i64>,
-    damaged: bool,
-}
-
-fn read_through(input: &mut Input, stream: usize) -> (Vec<Stamp>, Option<ffmpeg_next::Error>) {
+fn read_through(
+    input: &mut Input,
+    stream: usize,
+    codec: codec::Id,
+) -> (Vec<Stamp>, Option<ffmpeg_next::Error>) {
     let mut stamps = Vec::new();
     loop {
         // A packet that is read into again would keep the memory of what it held.
         let mut packet = Packet::empty();
         match packet.read(input) {
             Ok(()) if packet.stream() == stream && packet.size() > 0 => {
-                let pts = packet.pts().or_else(|| packet.dts());
-                stamps.push(Stamp {
-                    pts,
-                    damaged: packet.is_corrupt(),
-                });
+                stamps.push(Stamp::of(&packet, codec));
             }
             Ok(()) => {}
             Err(ffmpeg_next::Error::Eof) => return (stamps, None),
@@ -330,57 +324,17 @@ fn read_through(input: &mut Input, stream: usize) -> (Vec<Stamp>, Option<ffmpeg_
     }
 }
 
-/// Packets brought into the order of presentation.
-struct Ordered {
-    frames: Vec<FrameInfo>,
-    number_of_packet: Vec<u64>,
-    number_at: Vec<(i64, u64)>,
-}
-
-impl Ordered {
-    fn from(stamps: &[Stamp], time_base: Rational) -> Self {
-        let stamped = stamps.iter().all(|stamp| stamp.pts.is_some());
-        let mut order: Vec<usize> = (0..stamps.len()).collect();
-        if stamped {
-            order.sort_by_key(|&packet| stamps[packet].pts);
-        }
-        let mut number_of_packet = vec![0; stamps.len()];
-        let mut frames = Vec::with_capacity(stamps.len());
-        let mut number_at = Vec::new();
-        for (number, &packet) in (0_u64..).zip(&order) {
-            number_of_packet[packet] = number;
-            let pts = stamps[packet].pts;
-            frames.push(FrameInfo {
-                number,
-                t_us: microseconds(pts.unwrap_or(0), time_base),
-                damaged: stamps[packet].damaged,
-            });
-            number_at.extend(pts.map(|pts| (pts, number)));
-        }
-        let unique = number_at.windows(2).all(|pair| pair[0].0 < pair[1].0);
-        if !stamped || !unique {
-            number_at.clear();
-        }
-        Self {
-            frames,
-            number_of_packet,
-            number_at,
-        }
-    }
-}
-
-fn microseconds(pts: i64, time_base: Rational) -> i64 {
-    let numerator = i128::from(pts) * i128::from(time_base.numerator()) * 1_000_000;
-    let denominator = i128::from(time_base.denominator()).max(1);
-    let rounded = (2 * numerator + denominator).div_euclid(2 * denominator);
-    i64::try_from(rounded).unwrap_or(i64::MAX)
+/// What the container says of its own length; 0 where it says nothing.
+struct Promised {
+    frames: u64,
+    duration_us: i64,
 }
 
 fn find_damage(
     path: &Path,
     frames: &[FrameInfo],
-    promised_frames: u64,
-    promised_us: i64,
+    packets: usize,
+    promised: &Promised,
     read_error: Option<ffmpeg_next::Error>,
 ) -> Vec<Damage> {
     let found = frames.len() as u64;
@@ -392,10 +346,12 @@ fn find_damage(
     if let Some(why) = read_error {
         damage.push(Damage::ReadError { found, why });
     }
-    if promised_frames > found {
+    // What a trimmed clip does not show counts for the container.
+    let packets = packets as u64;
+    if promised.frames > packets {
         damage.push(Damage::FewerFrames {
-            promised: promised_frames,
-            found,
+            promised: promised.frames,
+            found: packets,
         });
     }
     let mut damaged = frames.iter().filter(|frame| frame.damaged);
@@ -408,13 +364,14 @@ fn find_damage(
     if let [first, .., last] = frames
         && damage.is_empty()
     {
-        let step = (last.t_us - first.t_us) / (frames.len() as i64 - 1);
+        let step = last.t_us.saturating_sub(first.t_us) / (frames.len() as i64 - 1);
+        let promised_us = promised.duration_us;
         let found_us = last.t_us.saturating_add(step);
         // Sound that outlasts the picture, or a slow last frame, is no damage: a tenth is.
         if promised_us
             > found_us
                 .saturating_add(promised_us / 10)
-                .saturating_add(2 * step)
+                .saturating_add(step.saturating_mul(2))
         {
             damage.push(Damage::Shorter {
                 promised_us,

@@ -22,3 +22,38 @@ pub(crate) fn ffmpeg(folder: &Path, arguments: &[&str]) -> Vec<u8> {
     assert!(output.status.success(), "ffmpeg {arguments:?}: {errors}");
     output.stdout
 }
+
+/// Where a packet's data stand in a file.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    pub(crate) at: usize,
+    pub(crate) size: usize,
+}
+
+/// The packets of a file's first stream, as `ffprobe` finds them.
+pub(crate) fn packets(folder: &Path, name: &str) -> Vec<Place> {
+    let output = Command::new("ffprobe")
+        .args([
+            "-v",
+            "error",
+            "-show_entries",
+            "packet=pos,size",
+            "-of",
+            "csv=p=0",
+            name,
+        ])
+        .current_dir(folder)
+        .output()
+        .expect("ffprobe comes with the ffmpeg program: run `make setup`");
+    let text = String::from_utf8(output.stdout).unwrap();
+    let number = |field: Option<&str>| field.unwrap().parse().unwrap();
+    text.lines()
+        .map(|line| {
+            let mut fields = line.split(',');
+            Place {
+                size: number(fields.next()),
+                at: number(fields.next()),
+            }
+        })
+        .collect()
+}

@@ -8,6 +8,7 @@
 #![allow(dead_code, reason = "not every program says all of it")]
 
 use std::error::Error;
+use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -51,9 +52,9 @@ impl Console {
     /// A result: `text` for a person, `event` as one JSON line for a machine.
     pub(crate) fn say(self, text: &str, event: &Value) {
         if self.json {
-            println!("{event}");
+            print_line(&event.to_string());
         } else {
-            println!("{text}");
+            print_line(text);
         }
     }
 
@@ -65,12 +66,9 @@ impl Console {
     /// A warning: standard error for a person, a JSON line for a machine.
     pub(crate) fn warn(self, text: &str) {
         if self.json {
-            println!(
-                "{}",
-                serde_json::json!({ "event": "warning", "message": text })
-            );
+            print_line(&serde_json::json!({ "event": "warning", "message": text }).to_string());
         } else {
-            eprintln!("warning: {text}");
+            print_error_line(&format!("warning: {text}"));
         }
     }
 
@@ -86,14 +84,14 @@ impl Console {
 
     fn tell(self, text: &str, input: Option<&Path>) {
         if self.json {
-            let event = serde_json::json!({ "event": "error", "message": text, "input": input });
-            println!("{event}");
+            let event = serde_json::json!({ "event": "error", "message": text, "input": input.map(Path::to_string_lossy) });
+            print_line(&event.to_string());
         }
         match input {
             Some(input) if !text.contains(&*input.to_string_lossy()) => {
-                eprintln!("error: {}: {text}", input.display());
+                print_error_line(&format!("error: {}: {text}", input.display()));
             }
-            _ => eprintln!("error: {text}"),
+            _ => print_error_line(&format!("error: {text}")),
         }
     }
 
@@ -122,6 +120,15 @@ impl Console {
         bar.enable_steady_tick(Duration::from_millis(200));
         bar
     }
+}
+
+/// Where nobody reads any more, there is nobody to tell, and the work goes on.
+fn print_line(text: &str) {
+    let _ = writeln!(io::stdout(), "{text}");
+}
+
+fn print_error_line(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
 }
 
 /// The error and its causes, each told once.

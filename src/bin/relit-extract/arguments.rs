@@ -108,6 +108,9 @@ struct ExtractArguments {
     /// Skip sessions that the data set already holds, whole and from the same video and mask.
     #[arg(long)]
     resume: bool,
+    /// Replace sessions of the same name that were made of another video.
+    #[arg(long)]
+    replace: bool,
     /// Threads that work side by side [default: as many as there are cores].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
@@ -171,6 +174,7 @@ impl From<ExtractArguments> for Arguments {
             mask: line.mask,
             strict: line.strict,
             resume: line.resume,
+            replace: line.replace,
             threads: line.threads.unwrap_or_else(cores),
         };
         let command = Command::Extract {

@@ -34,7 +34,7 @@ pub(crate) fn run(
         ),
         &json!({
             "event": "done",
-            "out": out,
+            "out": out.to_string_lossy(),
             "extracted": tally.extracted,
             "lossy": tally.lossy,
             "skipped": tally.skipped,
@@ -59,6 +59,18 @@ struct Teller<'a> {
 impl Teller<'_> {
     fn bar(&self) -> std::sync::MutexGuard<'_, ProgressBar> {
         self.bar.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn skipped(&self, entry: &SessionEntry) {
+        let lossy = if entry.lossy {
+            "; something of it is lost, see its report"
+        } else {
+            ""
+        };
+        self.console.say(
+            &format!("{}: there already, skipped{lossy}", entry.id),
+            &json!({ "event": "skipped", "id": entry.id, "lossy": entry.lossy }),
+        );
     }
 
     fn extracted(&self, entry: &SessionEntry) {
@@ -97,10 +109,7 @@ impl Observer for Teller<'_> {
         self.bar().finish_and_clear();
         match outcome {
             Outcome::Extracted(entry) => self.extracted(entry),
-            Outcome::Skipped(id) => self.console.say(
-                &format!("{id}: there already, skipped"),
-                &json!({ "event": "skipped", "id": id }),
-            ),
+            Outcome::Skipped(entry) => self.skipped(entry),
             Outcome::Failed(error) => self.console.error_in(recording, error),
         }
     }

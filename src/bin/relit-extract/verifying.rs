@@ -46,7 +46,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, Error> {
         ),
         &json!({
             "event": "verified",
-            "out": out,
+            "out": out.to_string_lossy(),
             "sessions": verdict.sessions,
             "shards": verdict.shards,
             "samples": verdict.samples,

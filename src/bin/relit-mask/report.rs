@@ -8,6 +8,9 @@ use super::console::Console;
 /// Tells of one mask: its warnings, then where it is and how large.
 pub(crate) fn tell(made: &Made, console: Console) {
     let id = &made.recording;
+    for notice in &made.notices {
+        console.warn(&format!("{id}: {}", notice.text()));
+    }
     for warning in &made.record.warnings {
         console.warn(&format!("{id}: {warning}"));
     }
@@ -26,9 +29,9 @@ pub(crate) fn tell(made: &Made, console: Console) {
     let event = json!({
         "event": "mask",
         "recording": id,
-        "mask": made.files.mask,
-        "record": made.files.record,
-        "preview": made.files.preview,
+        "mask": made.files.mask.to_string_lossy(),
+        "record": made.files.record.to_string_lossy(),
+        "preview": made.files.preview.to_string_lossy(),
         "source": source,
         "result": result,
         "warnings": made.record.warnings,
