@@ -1,6 +1,7 @@
 //! Names: of sessions, samples, members and files, and which of them are safe.
 
 use super::Error;
+use crate::durable;
 
 /// Longest id of a session, bytes: the folder part of a tar member's name has room for 155, and
 /// a hidden name with two extensions must fit into a file name of 255.
@@ -124,9 +125,9 @@ pub(super) const IMAGES: &str = "imgs";
 pub(super) const MASKS: &str = "masks";
 pub(super) const MEANS: &str = "mean_img";
 
-/// The name under which `name` is written before it is whole.
-pub(super) fn partial(name: &str) -> String {
-    format!(".{name}.partial")
+/// The name under which a folder of images is written before it is whole.
+pub(super) fn partial(session: &str) -> String {
+    format!(".{session}.partial")
 }
 
 /// The name of the file in which a session's images wait for their place in the tar.
@@ -154,7 +155,7 @@ pub(super) fn is_leftover(name: &str) -> bool {
             .iter()
             .any(|end| file.ends_with(end))
     };
-    rest.ends_with(".spool") || rest.strip_suffix(".partial").is_some_and(finished)
+    rest.ends_with(".spool") || durable::target_of(name).is_some_and(finished)
 }
 
 #[cfg(test)]
@@ -222,12 +223,17 @@ mod tests {
 
     #[test]
     fn only_names_of_our_own_pattern_are_leftovers() {
-        for name in [".a.tar.partial", ".dataset.json.partial", ".a.spool"] {
+        for name in [
+            ".a.tar.7.0.partial",
+            ".dataset.json.12.34.partial",
+            ".a.spool",
+        ] {
             assert!(is_leftover(name), "{name}");
         }
         for name in [
-            "a.tar.partial",
-            ".a.partial",
+            "a.tar.7.0.partial",
+            ".a.tar.partial",
+            ".a.7.0.partial",
             ".bashrc",
             "a.spool",
             ".partial",
