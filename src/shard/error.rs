@@ -39,12 +39,12 @@ pub enum Error {
         path: PathBuf,
     },
     /// A session's id cannot be the name of a file.
-    #[error("{name:?} cannot name a session: {why}; rename it")]
+    #[error(
+        "{name:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most 120 bytes, not starting with '.'"
+    )]
     SessionName {
         /// The name.
         name: String,
-        /// What is wrong with it.
-        why: &'static str,
     },
     /// A path in `dataset.json` leads out of the data set.
     #[error(
