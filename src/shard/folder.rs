@@ -5,7 +5,6 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
-use rayon::prelude::*;
 
 use super::codec::encode_rgb;
 use super::dataset::ShardEntry;
@@ -79,10 +78,7 @@ impl FolderStore {
 
     /// Gives folder, mask and mean image their names, in place of older ones.
     pub(super) fn publish(self, rows: &[Row], mask_png: &[u8]) -> Result<ShardEntry, Error> {
-        // Side by side, because each waits for the disk.
-        (0..self.samples)
-            .into_par_iter()
-            .try_for_each(|index| output::sync(&self.image_path(index)))?;
+        (0..self.samples).try_for_each(|index| output::sync(&self.image_path(index)))?;
         output::sync(&self.partial.path)?;
         let mask = output::seal_whole(&self.out, &names::mask_file(&self.session), mask_png)?;
         let mean_png = encode_rgb(&self.mean.image()?)?;
