@@ -64,7 +64,7 @@ pub struct Input {
     pub video: String,
     /// The codec's name.
     pub codec: String,
-    /// Number of frames that were decoded.
+    /// Number of frames found in the file.
     pub frames: u64,
     /// Length of the file, bytes.
     pub bytes: u64,
@@ -108,7 +108,7 @@ pub struct SessionEntry {
     pub selection: Selection,
     /// Number of samples.
     pub samples: u32,
-    /// Samples whose source frame stands in a sample with a smaller index too.
+    /// Samples with `duplicate`.
     pub duplicates: u32,
     /// Samples with `spec_net`.
     pub spec_net: u32,
