@@ -77,6 +77,7 @@ impl Job {
             frames: video.frames().len() as u64,
             bytes,
             blake3,
+            index_blake3: None,
         };
         Ok(Self {
             recording,
