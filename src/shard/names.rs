@@ -137,7 +137,9 @@ pub(super) fn is_leftover(name: &str) -> bool {
             .iter()
             .any(|end| file.ends_with(end))
     };
-    rest.ends_with(".spool") || durable::target_of(name).is_some_and(finished)
+    // Earlier writers used no numbers in the name.
+    let written = |plain| finished(durable::target_of(name).unwrap_or(plain));
+    rest.ends_with(".spool") || rest.strip_suffix(".partial").is_some_and(written)
 }
 
 #[cfg(test)]
@@ -207,14 +209,15 @@ mod tests {
         for name in [
             ".a.tar.7.0.partial",
             ".dataset.json.12.34.partial",
+            ".a.tar.partial",
             ".a.spool",
         ] {
             assert!(is_leftover(name), "{name}");
         }
         for name in [
             "a.tar.7.0.partial",
-            ".a.tar.partial",
             ".a.7.0.partial",
+            ".a.tar.7.partial",
             ".bashrc",
             "a.spool",
             ".partial",
