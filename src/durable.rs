@@ -1,35 +1,116 @@
 //! Files that appear whole or not at all. Knows nothing of what is in them.
 
-use std::fs::{self, File};
-use std::io::{self, Write};
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::process;
+use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The name under which `path` is written until it is whole: `.NAME.partial` in the same folder.
-#[must_use]
-pub fn partial_name(path: &Path) -> PathBuf {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!(".{name}.partial"))
+/// Bytes that are gathered before they are handed to the system.
+const BUFFER: usize = 1 << 18;
+
+/// A file that is being written under a temporary name, `.NAME.<process>.<counter>.partial` in the
+/// folder of its last one. No two writers share such a name, nor is one taken that stands there
+/// already, be it as a link. Dropped, the file is removed.
+#[derive(Debug)]
+pub struct Partial {
+    writer: BufWriter<File>,
+    names: Names,
+}
+
+/// A file that is whole and on the disk, still under its temporary name. Dropped, it is removed.
+#[derive(Debug)]
+pub struct Sealed {
+    names: Names,
+}
+
+/// Where a file is written and where it is to appear; removes the first when dropped.
+#[derive(Debug)]
+struct Names {
+    temporary: PathBuf,
+    last: PathBuf,
+}
+
+impl Drop for Names {
+    fn drop(&mut self) {
+        // After publishing there is nothing under this name; an error has no one to go to.
+        let _ = fs::remove_file(&self.temporary);
+    }
+}
+
+impl Partial {
+    /// Starts the file that is to appear at `path`.
+    ///
+    /// # Errors
+    /// Where `path` ends in no file name; whatever the file system answers.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        loop {
+            let temporary = temporary_name(path)?;
+            let opened = OpenOptions::new()
+                .write(true)
+                .create_new(true)
+                .open(&temporary);
+            match opened {
+                // A killed process of the same number left it.
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+                Ok(file) => {
+                    return Ok(Self {
+                        writer: BufWriter::with_capacity(BUFFER, file),
+                        names: Names {
+                            temporary,
+                            last: path.to_owned(),
+                        },
+                    });
+                }
+            }
+        }
+    }
+
+    /// Brings all bytes to the disk.
+    ///
+    /// # Errors
+    /// Whatever the file system answers; the file is removed then.
+    pub fn seal(self) -> io::Result<Sealed> {
+        let Self { writer, names } = self;
+        let file = writer
+            .into_inner()
+            .map_err(io::IntoInnerError::into_error)?;
+        file.sync_all()?;
+        Ok(Sealed { names })
+    }
+}
+
+impl Write for Partial {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        self.writer.write(buffer)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+impl Sealed {
+    /// Gives the file its name, in place of an older one.
+    ///
+    /// # Errors
+    /// Whatever the file system answers; the file is removed then, if it has no name yet.
+    pub fn publish(self) -> io::Result<()> {
+        publish(&self.names.temporary, &self.names.last)
+    }
 }
 
 /// Writes `bytes` so that `path` holds either its old content or all of the new one, also after a
-/// power cut: temporary name, fsync, rename, fsync of the folder.
+/// power cut, and also where several write it at once: the last one wins.
 ///
 /// # Errors
 /// Whatever the file system answers; the temporary file is removed then.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let partial = partial_name(path);
-    let written = File::create(&partial).and_then(|mut file| {
-        file.write_all(bytes)?;
-        file.sync_all()
-    });
-    match written.and_then(|()| publish(&partial, path)) {
-        Ok(()) => Ok(()),
-        Err(error) => {
-            // The first error is the one to tell; a leftover is found by its name.
-            let _ = fs::remove_file(&partial);
-            Err(error)
-        }
-    }
+    let mut partial = Partial::create(path)?;
+    partial.write_all(bytes)?;
+    partial.seal()?.publish()
 }
 
 /// Gives a finished, synced file or folder its final name and makes the name durable.
@@ -38,27 +119,54 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// Whatever the file system answers.
 pub fn publish(partial: &Path, path: &Path) -> io::Result<()> {
     fs::rename(partial, path)?;
-    sync_folder(parent(path))
+    sync_folder(path.parent().unwrap_or(Path::new("")))
 }
 
-/// Makes the names in `folder` durable.
+/// Makes the names in `folder` durable. The empty path is the current folder.
 ///
 /// # Errors
 /// Whatever the file system answers.
 pub fn sync_folder(folder: &Path) -> io::Result<()> {
-    File::open(folder)?.sync_all()
+    let here = folder.as_os_str().is_empty();
+    File::open(if here { Path::new(".") } else { folder })?.sync_all()
 }
 
-fn parent(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    }
+/// The name of the file that was to appear, if `name` is one under which a [`Partial`] is written.
+#[must_use]
+pub fn target_of(name: &str) -> Option<&str> {
+    let (rest, counter) = name
+        .strip_prefix('.')?
+        .strip_suffix(".partial")?
+        .rsplit_once('.')?;
+    let (target, process) = rest.rsplit_once('.')?;
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    (is_number(counter) && is_number(process) && !target.is_empty()).then_some(target)
+}
+
+/// A name for `path` that this process has not used before.
+fn temporary_name(path: &Path) -> io::Result<PathBuf> {
+    static COUNTER: AtomicU64 = AtomicU64::new(0);
+    let target = path
+        .file_name()
+        .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"))?;
+    let mut name = OsString::from(".");
+    name.push(target);
+    let counter = COUNTER.fetch_add(1, Ordering::Relaxed);
+    name.push(format!(".{}.{counter}.partial", process::id()));
+    Ok(path.with_file_name(name))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::thread;
+
+    fn names_in(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect()
+    }
 
     #[test]
     fn a_file_is_replaced_whole_and_leaves_no_temporary_one() {
@@ -67,7 +175,7 @@ mod tests {
         write_whole(&path, b"one").unwrap();
         write_whole(&path, b"two").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"two");
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert_eq!(names_in(folder.path()), ["a.json"]);
     }
 
     #[test]
@@ -77,6 +185,83 @@ mod tests {
         fs::create_dir_all(path.join("inner")).unwrap();
         assert!(write_whole(&path, b"x").is_err());
         assert!(path.join("inner").is_dir());
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert_eq!(names_in(folder.path()), ["taken"]);
+    }
+
+    #[test]
+    fn a_file_that_is_not_published_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut partial = Partial::create(&folder.path().join("a.tar")).unwrap();
+        partial.write_all(b"half").unwrap();
+        let names = names_in(folder.path());
+        assert_eq!(target_of(&names[0]), Some("a.tar"), "{names:?}");
+        drop(partial.seal().unwrap());
+        assert!(names_in(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn writers_of_one_file_at_once_never_publish_a_torn_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        thread::scope(|scope| {
+            for value in 0..8 {
+                let path = &path;
+                scope.spawn(move || {
+                    for _ in 0..20 {
+                        write_whole(path, &[value; 5000]).unwrap();
+                        let read = fs::read(path).unwrap();
+                        assert_eq!(read, [read[0]; 5000]);
+                    }
+                });
+            }
+        });
+        assert_eq!(names_in(folder.path()), ["a.json"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_stands_under_temporary_names_is_neither_followed_nor_in_the_way() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, outside) = (folder.path().join("a"), folder.path().join("outside"));
+        // The counter is the process's: other tests may take some of these numbers.
+        let next = temporary_name(&path).unwrap();
+        let number = |name: &Path| -> u64 {
+            let name = name.file_name().unwrap().to_str().unwrap();
+            name.split('.').nth_back(1).unwrap().parse().unwrap()
+        };
+        for counter in 1..100 {
+            let name = format!(".a.{}.{}.partial", process::id(), number(&next) + counter);
+            std::os::unix::fs::symlink(&outside, folder.path().join(name)).unwrap();
+        }
+        write_whole(&path, b"x").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"x");
+        assert!(!outside.exists());
+    }
+
+    #[test]
+    fn a_path_without_a_file_name_is_refused() {
+        let error = write_whole(Path::new("/"), b"x").unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::InvalidInput);
+    }
+
+    #[test]
+    fn the_empty_path_is_the_current_folder() {
+        sync_folder(Path::new("")).unwrap();
+        assert!(sync_folder(Path::new("no such folder")).is_err());
+    }
+
+    #[test]
+    fn temporary_names_tell_their_file() {
+        assert_eq!(target_of(".a.tar.12.0.partial"), Some("a.tar"));
+        for name in [
+            ".a.tar.partial",
+            "a.tar.1.2.partial",
+            ".a.tar.1.x.partial",
+            ".a.tar.1..partial",
+            ".a.tar.1.2.parti",
+            "..1.2.partial",
+        ] {
+            assert_eq!(target_of(name), None, "{name}");
+        }
     }
 }

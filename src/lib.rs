@@ -13,14 +13,15 @@
 //!
 //! | room | what it is for | knows |
 //! | --- | --- | --- |
-//! | [`session`] | what a capture leaves on disk: manifest and frame index | nobody |
 //! | [`geometry`] | pixel rectangles | nobody |
 //! | [`durable`] | files that appear whole or not at all | nobody |
+//! | [`naming`] | which names a session may have | nobody |
+//! | [`session`] | what a capture leaves on disk: manifest and frame index | `naming`, `durable` |
 //! | [`video`] | FFmpeg: a video file to frames with numbers and time stamps | `geometry` |
-//! | [`shard`] | the data set on disk: samples, records, tables; write, read, verify | `geometry` |
+//! | [`shard`] | the data set on disk: samples, records, tables; write, read, verify | `geometry`, `durable`, `naming` |
 //! | [`report`] | the HTML page that shows one extracted session | `shard` |
-//! | [`mask`] | seeds, GrabCut, clean-up of the mask | `session`, `video`, `geometry` |
-//! | [`extract`] | select, crop, measure, scale, write: the pipeline | all of the above |
+//! | [`mask`] | seeds, GrabCut, clean-up of the mask | `session`, `video`, `geometry`, `durable` |
+//! | [`extract`] | select, crop, measure, scale, write: the pipeline | `session`, `video`, `shard`, `report`, `geometry` |
 //!
 //! Data flows one way, and nothing knows what stands below it in this table. The programs in
 //! `src/bin` parse arguments, call one function here and report. The library itself never prints,
@@ -30,6 +31,7 @@ pub mod durable;
 pub mod extract;
 pub mod geometry;
 pub mod mask;
+pub mod naming;
 pub mod report;
 pub mod session;
 pub mod shard;

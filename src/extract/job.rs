@@ -47,6 +47,7 @@ impl Job {
             frames: video.frames().len() as u64,
             bytes,
             blake3,
+            index_blake3: None,
         };
         let mut notices = recording.notices.clone();
         notices.extend(differences(&recording, &input));

@@ -13,6 +13,7 @@ mod writer;
 use std::io;
 use std::path::PathBuf;
 
+pub use crate::naming::is_session_name;
 pub use frames::{FrameEntry, FrameIndex, Gap, IndexFault};
 pub use manifest::{
     CameraFacts, Fault, MANIFEST_SCHEMA, Manifest, ManifestFault, SoftwareFacts, Status,
@@ -128,16 +129,4 @@ impl Error {
             source,
         }
     }
-}
-
-/// Whether `name` can be a session's: it becomes a folder's name, a file's stem and part of a
-/// sample's key.
-#[must_use]
-pub fn is_session_name(name: &str) -> bool {
-    !name.is_empty()
-        && name.len() <= 120
-        && !name.starts_with('.')
-        && name
-            .chars()
-            .all(|c| c.is_alphanumeric() || matches!(c, '-' | '_' | '.'))
 }

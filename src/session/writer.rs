@@ -18,6 +18,8 @@ pub struct SessionWriter {
     manifest: Manifest,
     index: FrameIndex,
     lines: File,
+    /// Bytes of the index file's whole lines.
+    length: u64,
 }
 
 impl SessionWriter {
@@ -50,11 +52,13 @@ impl SessionWriter {
             .append(true)
             .open(&path)
             .map_err(Error::io(path, "made"))?;
+        durable::sync_folder(&folder).map_err(Error::io(&folder, "synced"))?;
         Ok(Self {
             folder,
             manifest,
             index: FrameIndex::default(),
             lines,
+            length: 0,
         })
     }
 
@@ -79,20 +83,49 @@ impl SessionWriter {
     ///
     /// # Errors
     /// [`Error::BadEntry`] where it does not continue the index, or what the file system answers.
+    /// The index stays as it was, and the same entry may be pushed again.
     pub fn push(&mut self, entry: FrameEntry) -> Result<(), Error> {
-        let path = || self.folder.join(INDEX_FILE);
+        self.keep(entry)?;
+        let written = self.append(&entry);
+        if written.is_err() {
+            self.take_back()?;
+        }
+        written.map_err(Error::io(self.folder.join(INDEX_FILE), "written"))
+    }
+
+    fn keep(&mut self, entry: FrameEntry) -> Result<(), Error> {
         self.index.push(entry).map_err(|fault| Error::BadEntry {
-            path: path(),
+            path: self.folder.join(INDEX_FILE),
             n: entry.n,
             fault,
-        })?;
-        let mut line = serde_json::to_vec(&entry)
-            .map_err(io::Error::other)
-            .map_err(Error::io(path(), "written"))?;
+        })
+    }
+
+    /// Writes an entry's line behind the last whole one.
+    fn append(&mut self, entry: &FrameEntry) -> io::Result<()> {
+        let mut line = serde_json::to_vec(entry).map_err(io::Error::other)?;
         line.push(b'\n');
-        self.lines
-            .write_all(&line)
-            .map_err(Error::io(path(), "written"))
+        self.cut()?;
+        self.lines.write_all(&line)?;
+        self.length += line.len() as u64;
+        Ok(())
+    }
+
+    /// Cuts off what a line that could not be written whole left in the file.
+    fn cut(&self) -> io::Result<()> {
+        self.lines.set_len(self.length)
+    }
+
+    /// Forgets the last entry, whose line could not be written.
+    fn take_back(&mut self) -> Result<(), Error> {
+        // Where the file cannot be cut now, it is cut before the next line and before a sync.
+        let _ = self.cut();
+        let entries = std::mem::take(&mut self.index);
+        let whole = entries
+            .entries()
+            .split_last()
+            .map_or(&[][..], |(_, rest)| rest);
+        whole.iter().try_for_each(|&entry| self.keep(entry))
     }
 
     /// Makes the index durable up to the last frame pushed.
@@ -100,8 +133,8 @@ impl SessionWriter {
     /// # Errors
     /// What the file system answers.
     pub fn sync(&self) -> Result<(), Error> {
-        self.lines
-            .sync_data()
+        self.cut()
+            .and_then(|()| self.lines.sync_data())
             .map_err(Error::io(self.folder.join(INDEX_FILE), "synced"))
     }
 
@@ -152,4 +185,51 @@ fn write_manifest(folder: &Path, manifest: &Manifest) -> Result<(), Error> {
         fault,
     })?;
     durable::write_whole(&path, &bytes).map_err(Error::io(path, "written"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn writer(root: &Path) -> SessionWriter {
+        let json = br#"{
+            "schema": "relit.session/1", "id": "20261120T093015Z-mug", "object": "mug",
+            "created": "2026-11-20T09:30:15Z", "status": "recording",
+            "camera": {"backend": "replay", "device": "", "name": "", "fourcc": "MJPG",
+                       "width": 4, "height": 4, "fps": 30.0, "controls": {}},
+            "turntable": null,
+            "video": {"file": "video.mkv", "codec": "mjpeg"},
+            "faults": [],
+            "software": {"version": "1", "commit": ""}
+        }"#;
+        SessionWriter::create(root, Manifest::from_json(json).unwrap()).unwrap()
+    }
+
+    fn entry(n: u64) -> FrameEntry {
+        FrameEntry {
+            n,
+            sequence: n,
+            t_us: n as i64,
+            angle_deg: None,
+        }
+    }
+
+    #[test]
+    fn a_line_that_was_not_written_whole_is_taken_back_and_can_be_pushed_again() {
+        let root = tempfile::tempdir().unwrap();
+        let mut writer = writer(root.path());
+        writer.push(entry(0)).unwrap();
+        let path = writer.folder().join(INDEX_FILE);
+        let whole = std::mem::replace(&mut writer.lines, File::open(&path).unwrap());
+        assert!(matches!(writer.push(entry(1)), Err(Error::Io { .. })));
+        writer.lines = whole;
+        writer.lines.write_all(b"{\"n\":1,\"seq").unwrap();
+        writer.push(entry(1)).unwrap();
+        writer.lines.write_all(b"{\"n\":2,").unwrap();
+        writer.sync().unwrap();
+        let index = FrameIndex::parse(&fs::read(path).unwrap()).unwrap();
+        assert!(!index.is_torn());
+        assert_eq!(index.entries(), [entry(0), entry(1)]);
+        assert_eq!(writer.index, index);
+    }
 }

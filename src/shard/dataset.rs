@@ -64,12 +64,15 @@ pub struct Input {
     pub video: String,
     /// The codec's name.
     pub codec: String,
-    /// Number of frames that were decoded.
+    /// Number of frames found in the file.
     pub frames: u64,
     /// Length of the file, bytes.
     pub bytes: u64,
     /// BLAKE3 of the file.
     pub blake3: Digest,
+    /// BLAKE3 of the session's `frames.jsonl`; `None` where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub index_blake3: Option<Digest>,
 }
 
 /// The mask that a session was extracted with.
@@ -108,7 +111,7 @@ pub struct SessionEntry {
     pub selection: Selection,
     /// Number of samples.
     pub samples: u32,
-    /// Samples whose source frame stands in a sample with a smaller index too.
+    /// Samples with `duplicate`.
     pub duplicates: u32,
     /// Samples with `spec_net`.
     pub spec_net: u32,
@@ -277,113 +280,4 @@ fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
         )));
     }
     std::fs::read(path)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::shard::{Align, Layout, Size};
-
-    fn settings() -> Settings {
-        Settings {
-            frames: 1500,
-            size: Size::Pixels(256),
-            margin: 0.05,
-            saturation_level: 250,
-            gate: 0.05,
-            align: Align::Off,
-            layout: Layout::Webdataset,
-            scaling: "area".to_owned(),
-        }
-    }
-
-    fn entry(id: &str) -> SessionEntry {
-        let blake3 = Digest::of(b"");
-        SessionEntry {
-            id: id.to_owned(),
-            object: "mug".to_owned(),
-            input: Input {
-                video: "video.mkv".to_owned(),
-                codec: "mjpeg".to_owned(),
-                frames: 1500,
-                bytes: 1,
-                blake3,
-            },
-            mask: MaskInfo {
-                blake3,
-                px: 9,
-                bounding_box: Rect::new(1, 2, 3, 3),
-            },
-            selection: Selection::Angle,
-            samples: 1500,
-            duplicates: 0,
-            spec_net: 3,
-            lossy: false,
-            warnings: vec!["a warning".to_owned()],
-            table: FileEntry {
-                file: format!("{id}.parquet"),
-                bytes: 0,
-                blake3,
-            },
-            report: None,
-        }
-    }
-
-    #[test]
-    fn a_description_comes_back_as_it_was_written() {
-        let dir = tempfile::tempdir().unwrap();
-        let mut dataset = Dataset::new(settings());
-        dataset.replace(entry("b"), Vec::new());
-        dataset.replace(entry("a"), Vec::new());
-        dataset.replace(
-            SessionEntry {
-                spec_net: 4,
-                ..entry("b")
-            },
-            Vec::new(),
-        );
-        dataset.write(dir.path()).unwrap();
-        let back = Dataset::read(dir.path()).unwrap();
-        assert_eq!(back, dataset);
-        let ids: Vec<_> = back
-            .sessions
-            .iter()
-            .map(|s| (s.id.as_str(), s.spec_net))
-            .collect();
-        assert_eq!(ids, [("a", 3), ("b", 4)]);
-    }
-
-    #[test]
-    fn a_folder_without_a_description_and_one_of_another_version_are_told_apart() {
-        let dir = tempfile::tempdir().unwrap();
-        let read = || Dataset::read(dir.path()).unwrap_err();
-        assert!(matches!(read(), Error::NoDataset { .. }));
-        std::fs::write(
-            dir.path().join(Dataset::FILE),
-            br#"{"schema": "relit.dataset/2"}"#,
-        )
-        .unwrap();
-        assert!(matches!(read(), Error::Schema { .. }));
-        std::fs::write(dir.path().join(Dataset::FILE), b"{").unwrap();
-        assert!(matches!(read(), Error::Description { .. }));
-    }
-
-    #[test]
-    fn a_description_that_points_out_of_its_folder_is_refused() {
-        let dir = tempfile::tempdir().unwrap();
-        let mut dataset = Dataset::new(settings());
-        let mut bad = entry("a");
-        bad.table.file = "../a.parquet".to_owned();
-        dataset.replace(bad, Vec::new());
-        assert!(matches!(
-            dataset.write(dir.path()),
-            Err(Error::UnsafePath { .. })
-        ));
-        let json = serde_json::to_vec(&dataset).unwrap();
-        std::fs::write(dir.path().join(Dataset::FILE), json).unwrap();
-        assert!(matches!(
-            Dataset::read(dir.path()),
-            Err(Error::UnsafePath { .. })
-        ));
-    }
 }

@@ -39,16 +39,16 @@ pub enum Error {
         path: PathBuf,
     },
     /// A session's id cannot be the name of a file.
-    #[error("{name:?} cannot name a session: {why}; rename it")]
+    #[error(
+        "{name:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most 120 bytes, not starting with '.'"
+    )]
     SessionName {
         /// The name.
         name: String,
-        /// What is wrong with it.
-        why: &'static str,
     },
-    /// A path in `dataset.json` leads out of the data set.
+    /// A path, in `dataset.json` or asked for, that leads out of the data set or is spelled oddly.
     #[error(
-        "dataset.json names the file {path:?}: paths must be relative, with `/` and without `..`; the file is not to be trusted"
+        "{path:?} cannot be a file of a data set: use a relative path with `/`, without `..`, `\\` and `:`; do not trust a dataset.json that names it"
     )]
     UnsafePath {
         /// The path.
@@ -147,7 +147,7 @@ pub enum Error {
         source: png::EncodingError,
     },
     /// A PNG that cannot be decoded.
-    #[error("the PNG is damaged")]
+    #[error("the PNG is damaged: restore it, or extract the session anew")]
     Decode {
         /// The decoder's reason.
         #[from]
@@ -221,7 +221,10 @@ pub enum Error {
         source: serde_json::Error,
     },
     /// A folder without `dataset.json`.
-    #[error("{path} holds no data set: there is no dataset.json", path = .path.display())]
+    #[error(
+        "{path} holds no data set: there is no dataset.json; give the folder that relit-extract wrote",
+        path = .path.display()
+    )]
     NoDataset {
         /// The folder.
         path: PathBuf,
@@ -277,7 +280,9 @@ pub enum Error {
         offset: u64,
     },
     /// A sample with the same member twice, or with too many.
-    #[error("sample {key:?} has {path:?} twice, or has more than {most} members")]
+    #[error(
+        "sample {key:?} has {path:?} twice, or has more than {most} members: pack the shard anew, each member once"
+    )]
     ShardSample {
         /// The sample's key.
         key: String,
@@ -287,7 +292,9 @@ pub enum Error {
         most: usize,
     },
     /// A shard that could not be read.
-    #[error("could not read the shard at byte {offset}")]
+    #[error(
+        "could not read the shard at byte {offset}: check the disk or connection that it comes from, and read it again"
+    )]
     ShardRead {
         /// How many bytes were read.
         offset: u64,

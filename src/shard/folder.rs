@@ -1,16 +1,15 @@
 //! The layout `relit`: images in a folder that takes its name when it is whole.
 
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
-use rayon::prelude::*;
 
 use super::codec::encode_rgb;
 use super::dataset::ShardEntry;
 use super::digest::FolderHasher;
-use super::output::{self, PartialFile, SealedFile};
+use super::output;
 use super::table::Row;
 use super::{Error, names};
 
@@ -79,14 +78,11 @@ impl FolderStore {
 
     /// Gives folder, mask and mean image their names, in place of older ones.
     pub(super) fn publish(self, rows: &[Row], mask_png: &[u8]) -> Result<ShardEntry, Error> {
-        // Side by side, because each waits for the disk.
-        (0..self.samples)
-            .into_par_iter()
-            .try_for_each(|index| output::sync(&self.image_path(index)))?;
+        (0..self.samples).try_for_each(|index| output::sync(&self.image_path(index)))?;
         output::sync(&self.partial.path)?;
-        let mask = self.seal(&names::mask_file(&self.session), mask_png)?;
+        let mask = output::seal_whole(&self.out, &names::mask_file(&self.session), mask_png)?;
         let mean_png = encode_rgb(&self.mean.image()?)?;
-        let mean_img = self.seal(&names::mean_file(&self.session), &mean_png)?;
+        let mean_img = output::seal_whole(&self.out, &names::mean_file(&self.session), &mean_png)?;
         self.take_name()?;
         let mut hasher = FolderHasher::default();
         rows.iter().for_each(|row| hasher.add(&row.png_blake3));
@@ -121,14 +117,6 @@ impl FolderStore {
         }
         output::sync(&images)?;
         output::remove_folder(&aside)
-    }
-
-    fn seal(&self, file: &str, bytes: &[u8]) -> Result<SealedFile, Error> {
-        let mut partial = PartialFile::create(&self.out, file)?;
-        partial
-            .write_all(bytes)
-            .map_err(Error::io("write", &self.out.join(file)))?;
-        partial.seal()
     }
 
     fn image_path(&self, index: u32) -> PathBuf {

@@ -1,13 +1,14 @@
-//! Writing so that a file appears whole or not at all, and one writer a folder.
+//! Writing files that the data set can vouch for, and one writer a folder.
 
 use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::dataset::FileEntry;
 use super::digest::HashingWriter;
 use super::{Error, names};
+use crate::durable::{Partial, Sealed};
 
 /// The folder of a data set, held by this process alone until it is dropped.
 #[derive(Debug)]
@@ -63,74 +64,60 @@ impl OutputFolder {
 
 /// Writes `bytes` to `file`, a path relative to `out`, whole or not at all.
 pub(super) fn write_whole(out: &Path, file: &str, bytes: &[u8]) -> Result<FileEntry, Error> {
+    seal_whole(out, file, bytes)?.publish()
+}
+
+/// As [`write_whole`], up to the name.
+pub(super) fn seal_whole(out: &Path, file: &str, bytes: &[u8]) -> Result<SealedFile, Error> {
     let mut partial = PartialFile::create(out, file)?;
     partial
         .write_all(bytes)
-        .map_err(Error::io("write", &out.join(file)))?;
-    partial.seal()?.publish()
+        .map_err(Error::io("write", &partial.path))?;
+    partial.seal()
 }
 
-/// A file that is being written under a temporary name. Dropped, it is removed.
+/// A file of the data set that is being written, counted and hashed. Dropped, it is removed.
 pub(super) struct PartialFile {
-    writer: HashingWriter<BufWriter<File>>,
-    names: Names,
-}
-
-/// A file that is whole and on the disk, still under its temporary name. Dropped, it is removed.
-pub(super) struct SealedFile {
-    names: Names,
-    entry: FileEntry,
-}
-
-/// Where a file is written and where it is to appear; removes the first when dropped.
-struct Names {
-    temporary: PathBuf,
-    last: PathBuf,
+    writer: HashingWriter<Partial>,
+    path: PathBuf,
     file: String,
 }
 
-impl Drop for Names {
-    fn drop(&mut self) {
-        // After publishing there is nothing under this name; an error has no one to go to.
-        let _ = fs::remove_file(&self.temporary);
-    }
+/// A file that is whole and on the disk, without its name yet. Dropped, it is removed.
+pub(super) struct SealedFile {
+    sealed: Sealed,
+    path: PathBuf,
+    entry: FileEntry,
 }
 
 impl PartialFile {
-    /// Starts `file`, a path relative to `out`, under `.NAME.partial` in the same folder.
+    /// Starts `file`, a path relative to `out`.
     pub(super) fn create(out: &Path, file: &str) -> Result<Self, Error> {
         names::check_path(file)?;
-        let last = out.join(file);
-        let name = file.rsplit('/').next().unwrap_or(file);
-        let temporary = last.with_file_name(names::partial(name));
-        let handle = File::create(&temporary).map_err(Error::io("create", &temporary))?;
-        let writer = HashingWriter::new(BufWriter::with_capacity(1 << 18, handle));
+        let path = out.join(file);
+        let partial = Partial::create(&path).map_err(Error::io("create", &path))?;
         Ok(Self {
-            writer,
-            names: Names {
-                temporary,
-                last,
-                file: file.to_owned(),
-            },
+            writer: HashingWriter::new(partial),
+            path,
+            file: file.to_owned(),
         })
     }
 
     /// Brings all bytes to the disk.
     pub(super) fn seal(self) -> Result<SealedFile, Error> {
-        let Self { writer, names } = self;
-        let (buffered, bytes, blake3) = writer.finish();
-        let written = buffered
-            .into_inner()
-            .map_err(io::IntoInnerError::into_error);
-        written
-            .and_then(|file| file.sync_all())
-            .map_err(Error::io("write", &names.temporary))?;
+        let Self { writer, path, file } = self;
+        let (partial, bytes, blake3) = writer.finish();
+        let sealed = partial.seal().map_err(Error::io("write", &path))?;
         let entry = FileEntry {
-            file: names.file.clone(),
+            file,
             bytes,
             blake3,
         };
-        Ok(SealedFile { names, entry })
+        Ok(SealedFile {
+            sealed,
+            path,
+            entry,
+        })
     }
 }
 
@@ -147,12 +134,10 @@ impl Write for PartialFile {
 impl SealedFile {
     /// Gives the file its name, in place of an older one.
     pub(super) fn publish(self) -> Result<FileEntry, Error> {
-        let Names {
-            temporary, last, ..
-        } = &self.names;
-        fs::rename(temporary, last).map_err(Error::io("rename a finished file to", last))?;
-        sync_folder_of(last)?;
-        Ok(self.entry.clone())
+        self.sealed
+            .publish()
+            .map_err(Error::io("give its name to", &self.path))?;
+        Ok(self.entry)
     }
 }
 
@@ -185,12 +170,6 @@ impl Drop for ScratchFile {
     fn drop(&mut self) {
         let _ = fs::remove_file(&self.path);
     }
-}
-
-/// Makes a rename in the folder of `path` last.
-pub(super) fn sync_folder_of(path: &Path) -> Result<(), Error> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    sync(folder)
 }
 
 /// Brings a file or folder to the disk.
@@ -248,13 +227,19 @@ fn clear_leftovers(out: &Path) -> Result<(), Error> {
             .iter()
             .filter(|name| names::is_leftover(name))
         {
-            let path = folder.join(name);
-            if path.is_file() {
-                fs::remove_file(&path).map_err(Error::io("remove", &path))?;
-            }
+            remove_leftover(&folder.join(name))?;
         }
     }
     clear_image_leftovers(&out.join(names::IMAGES))
+}
+
+/// Removes what is not a folder: a link is removed itself, wherever it leads.
+fn remove_leftover(path: &Path) -> Result<(), Error> {
+    let found = fs::symlink_metadata(path).map_err(Error::io("look at", path))?;
+    if found.is_dir() {
+        return Ok(());
+    }
+    fs::remove_file(path).map_err(Error::io("remove", path))
 }
 
 fn clear_image_leftovers(images: &Path) -> Result<(), Error> {
@@ -284,16 +269,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_that_is_not_published_leaves_nothing() {
-        let dir = tempfile::tempdir().unwrap();
-        let mut partial = PartialFile::create(dir.path(), "a.tar").unwrap();
-        partial.write_all(b"half").unwrap();
-        assert_eq!(names_in(dir.path()).unwrap(), [".a.tar.partial"]);
-        drop(partial.seal().unwrap());
-        assert!(names_in(dir.path()).unwrap().is_empty());
-    }
-
-    #[test]
     fn a_second_writer_is_kept_out_until_the_first_is_done() {
         let dir = tempfile::tempdir().unwrap();
         let first = OutputFolder::lock(dir.path()).unwrap();
@@ -320,15 +295,17 @@ mod tests {
         }
         for file in [
             ".a.spool",
-            ".a.tar.partial",
+            ".a.tar.7.0.partial",
             ".bashrc",
             "a.tar",
-            "masks/.a.png.partial",
+            "masks/.a.png.7.1.partial",
             "masks/a.png",
         ] {
             fs::write(at(file), b"x").unwrap();
         }
         fs::write(at("imgs/.b.outgoing/0.png"), b"x").unwrap();
+        #[cfg(unix)]
+        std::os::unix::fs::symlink("nowhere", at(".b.tar.7.2.partial")).unwrap();
         OutputFolder::lock(dir.path()).unwrap();
         assert_eq!(
             names_in(dir.path()).unwrap(),

@@ -141,18 +141,8 @@ fn split(path: &str) -> Option<(String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shard::tarball::header;
+    use crate::shard::tarball::tests::tar_of;
     use proptest::prelude::*;
-
-    fn tar_of(members: &[(&str, &[u8])]) -> Vec<u8> {
-        let mut builder = tar::Builder::new(Vec::new());
-        for (path, data) in members {
-            builder
-                .append(&header(path, data.len() as u64).unwrap(), *data)
-                .unwrap();
-        }
-        builder.into_inner().unwrap()
-    }
 
     fn read(bytes: &[u8]) -> Vec<Result<ShardSample, Error>> {
         ShardReader::new(bytes).collect()

@@ -193,7 +193,8 @@ pub fn read_table(out: &Path, entry: &FileEntry) -> Result<Vec<Row>, Error> {
 }
 
 /// Parses a table. The parser panics on some files that are no tables; for a file that was
-/// vouched for this takes intent, but it shall not end the program.
+/// vouched for this takes intent, but it shall not end the program. The panic hook is called all
+/// the same: by default it prints a message to standard error.
 fn read_rows(file: File, path: &Path) -> Result<Vec<Row>, Error> {
     std::panic::catch_unwind(|| parse_rows(file, path)).unwrap_or_else(|_| {
         let source = ParquetError::General("the file is malformed".to_owned());

@@ -321,7 +321,7 @@ fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     fn read_all(bytes: &[u8]) -> Result<Vec<(String, Vec<u8>, bool)>, Error> {
@@ -333,7 +333,7 @@ mod tests {
         Ok(members)
     }
 
-    fn tar_of(members: &[(&str, &[u8])]) -> Vec<u8> {
+    pub(in crate::shard) fn tar_of(members: &[(&str, &[u8])]) -> Vec<u8> {
         let mut builder = tar::Builder::new(Vec::new());
         for (path, data) in members {
             builder

@@ -91,15 +91,32 @@ fn swapped_samples_are_named() {
 
 #[test]
 fn swapped_contents_are_named() {
+    let mut swapped = None;
     let dir = with_members(|parts| {
-        let (a, b) = (3 * 2 + 2, 3 * 6 + 2);
         // Records of equal length change places under their old names.
+        let record = |place: usize| 3 * place + 2;
+        let size = |place: usize| &parts[record(place)][124..136];
+        let places = SAMPLES as usize;
+        let (a, b) = (0..places)
+            .flat_map(|a| (a + 1..places).map(move |b| (a, b)))
+            .find(|&(a, b)| size(a) == size(b))
+            .unwrap();
+        swapped = Some((a, b));
+        let (a, b) = (record(a), record(b));
         let (first, second) = (parts[a].clone(), parts[b].clone());
         parts[a] = [&first[..512], &second[512..]].concat();
         parts[b] = [&second[..512], &first[512..]].concat();
     });
-    assert_names(dir.path(), TAR, at(2), "");
-    assert_names(dir.path(), TAR, at(6), "");
+    let (a, b) = swapped.unwrap();
+    for place in [a, b] {
+        assert_names(
+            dir.path(),
+            TAR,
+            at(place),
+            "the record differs from the table in",
+        );
+    }
+    assert_eq!(verdict(dir.path()).problems.len(), 3);
 }
 
 #[test]
@@ -219,12 +236,21 @@ fn a_damaged_table_is_found_and_does_not_hide_damage_in_the_shard() {
 fn missing_files_and_strays_are_named() {
     let dir = dataset(Layout::Webdataset);
     fs::create_dir(dir.path().join("imgs")).unwrap();
-    for stray in ["b.tar", "b.parquet", "x.png", ".b.spool", "imgs/y"] {
+    let unknown = "dataset.json does not vouch for it";
+    let left = "an interrupted writer left it behind";
+    for (stray, says) in [
+        ("b.tar", unknown),
+        ("b.parquet", unknown),
+        ("x.png", unknown),
+        ("imgs/y", unknown),
+        (".b.spool", left),
+        (".b.tar.7.0.partial", left),
+    ] {
         fs::write(dir.path().join(stray), b"").unwrap();
-        assert_names(dir.path(), stray, None, "");
+        assert_names(dir.path(), stray, None, says);
     }
     fs::write(dir.path().join("notes.txt"), b"").unwrap();
-    assert_eq!(verdict(dir.path()).problems.len(), 5);
+    assert_eq!(verdict(dir.path()).problems.len(), 6);
     fs::remove_file(tar_path(dir.path())).unwrap();
     assert_names(dir.path(), TAR, None, "could not open");
 }

@@ -98,6 +98,7 @@ pub(crate) fn entry(id: &str, files: &relit::shard::SessionFiles, all: &[Sample]
             frames: 50,
             bytes: 5,
             blake3,
+            index_blake3: Some(blake3),
         },
         mask: MaskInfo {
             blake3,
