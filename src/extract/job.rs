@@ -47,7 +47,7 @@ impl Job {
             frames: video.frames().len() as u64,
             bytes,
             blake3,
-            index_blake3: None,
+            index_blake3: index_digest(&recording)?,
         };
         let mut notices = recording.notices.clone();
         notices.extend(differences(&recording, &input));
@@ -340,6 +340,14 @@ fn setting_rows(options: &Options) -> Vec<(String, String)> {
         (name.replace('_', " "), text)
     })
     .collect()
+}
+
+/// Of the frame index, where it was used.
+fn index_digest(recording: &Recording) -> Result<Option<Digest>, Error> {
+    match (&recording.frames, &recording.folder) {
+        (Some(_), Some(folder)) => Ok(Some(digest(&folder.join(INDEX_FILE))?.1)),
+        _ => Ok(None),
+    }
 }
 
 fn digest(path: &Path) -> Result<(u64, Digest), Error> {

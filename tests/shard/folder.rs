@@ -112,3 +112,14 @@ fn strangers_in_the_folders_are_named() {
         assert_names(dir.path(), name, None, "does not vouch");
     }
 }
+
+#[test]
+fn a_link_that_leads_nowhere_is_no_image() {
+    let dir = dataset(Layout::Relit);
+    let image = dir.path().join(IMAGES).join("3.png");
+    fs::remove_file(&image).unwrap();
+    std::os::unix::fs::symlink("nowhere", &image).unwrap();
+    let verdict = verdict(dir.path());
+    assert_eq!(verdict.samples, u64::from(SAMPLES) - 1);
+    assert!(!verdict.problems.is_empty());
+}

@@ -102,7 +102,7 @@ pub(crate) fn entry(id: &str, files: &relit::shard::SessionFiles, all: &[Sample]
         },
         mask: MaskInfo {
             blake3,
-            px: 1,
+            px: mask().as_raw().iter().filter(|&&level| level != 0).count() as u64,
             bounding_box: Rect::new(0, 0, 1, 1),
         },
         selection: Selection::Angle,

@@ -169,6 +169,14 @@ impl<'a> SessionCheck<'a> {
             .map(|(index, what)| self.at(file, index, what));
         let problems: Vec<Problem> = problems.collect();
         self.problems.extend(problems);
+        let expected = u64::from(self.session.samples);
+        // Whatever the reason, a sample less is a problem.
+        if found.samples != expected && self.problems.is_empty() {
+            self.note(
+                None,
+                format!("{} of {expected} samples are whole", found.samples),
+            );
+        }
         found.samples
     }
 

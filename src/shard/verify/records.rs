@@ -98,6 +98,13 @@ fn own(settings: &Settings, session: &SessionEntry, index: u32, r: &FrameRecord)
             ),
         ),
         (
+            r.mask_px == session.mask.px,
+            format!(
+                "mask_px is {}, dataset.json tells {} pixels under the mask",
+                r.mask_px, session.mask.px
+            ),
+        ),
+        (
             r.saturated_any_px >= r.saturated_px,
             format!(
                 "saturated_any_px is {}, below saturated_px, {}",
