@@ -63,7 +63,9 @@ fuzz: setup ## Run each fuzz target for FUZZ_SECONDS (60)
 	targets=$$(cargo fuzz list --fuzz-dir tests/fuzz); \
 	for target in $$targets; do \
 	    echo "fuzz: $$target"; \
-	    RUSTC_BOOTSTRAP=1 cargo fuzz run --fuzz-dir tests/fuzz "$$target" -- \
+	    mkdir -p "tests/fuzz/corpus/$$target"; \
+	    RUSTC_BOOTSTRAP=1 cargo fuzz run --fuzz-dir tests/fuzz "$$target" \
+	        "tests/fuzz/corpus/$$target" "tests/fuzz/seeds/$$target" -- \
 	        -max_total_time=$(FUZZ_SECONDS); \
 	done
 

@@ -1,0 +1,56 @@
+//! `frames.jsonl`: in an index that is read positions count up from 0, sequence and time grow,
+//! angles are finite, and the gaps are what the sequence lacks. Pushed or written again it is the
+//! same index, and cut off anywhere it is the index of the lines before.
+
+#![no_main]
+#![allow(clippy::expect_used, reason = "a panic is how a target tells")]
+
+use libfuzzer_sys::fuzz_target;
+use relit::session::FrameIndex;
+
+fuzz_target!(|bytes: &[u8]| {
+    let Ok(index) = FrameIndex::parse(bytes) else {
+        return;
+    };
+    holds_what_it_promises(&index);
+    comes_back(&index);
+    if !index.is_torn() {
+        let sum: usize = bytes.iter().copied().map(usize::from).sum();
+        let cut = bytes.get(..sum % (bytes.len() + 1)).unwrap_or(bytes);
+        survives_a_cut(&index, cut);
+    }
+});
+
+fn holds_what_it_promises(index: &FrameIndex) {
+    let entries = index.entries();
+    assert!((0..).zip(entries).all(|(n, entry)| entry.n == n));
+    assert!(entries.is_sorted_by(|a, b| a.sequence < b.sequence && a.t_us < b.t_us));
+    let mut angles = entries.iter().filter_map(|entry| entry.angle_deg);
+    assert!(angles.all(f64::is_finite));
+
+    let missing: u64 = index.gaps().iter().map(|gap| gap.missing).sum();
+    if let (Some(first), Some(last)) = (entries.first(), entries.last()) {
+        assert_eq!(last.sequence - first.sequence, last.n + missing);
+    }
+}
+
+fn comes_back(index: &FrameIndex) {
+    let mut pushed = FrameIndex::default();
+    let mut text = Vec::new();
+    for entry in index.entries() {
+        pushed.push(*entry).expect("what was read can be pushed");
+        serde_json::to_writer(&mut text, entry).expect("what was read can be written");
+        text.push(b'\n');
+    }
+    assert_eq!(pushed.entries(), index.entries());
+    assert_eq!(FrameIndex::parse(&text), Ok(pushed));
+}
+
+/// What a power cut leaves of a whole index is an index, short by the lines that are gone.
+fn survives_a_cut(whole: &FrameIndex, bytes: &[u8]) {
+    let left = FrameIndex::parse(bytes).expect("a cut file can be read");
+    let ended = bytes.iter().filter(|&&byte| byte == b'\n').count();
+    let lines = left.entries().len();
+    assert!(lines == ended || lines == ended + 1);
+    assert_eq!(whole.entries().get(..lines), Some(left.entries()));
+}

@@ -1,0 +1,25 @@
+//! `mask.json`: a record that is read is read back equal after it was written. Where its hints can
+//! be followed, they are the same after they were recorded again.
+
+#![no_main]
+#![allow(clippy::expect_used, reason = "a panic is how a target tells")]
+
+use libfuzzer_sys::fuzz_target;
+use relit::mask::{MASK_SCHEMA, MaskRecord, RecordedHints};
+
+fuzz_target!(|bytes: &[u8]| {
+    let Ok(record) = MaskRecord::from_json(bytes) else {
+        return;
+    };
+    assert_eq!(record.schema, MASK_SCHEMA);
+    let written = record.to_json().expect("what was read can be written");
+    let read = MaskRecord::from_json(&written).expect("what was written can be read");
+    assert_eq!(read, record);
+
+    let Ok(hints) = record.hints.hints() else {
+        return;
+    };
+    assert_eq!(hints.rect(), record.hints.rect);
+    let again = RecordedHints::new(&hints).expect("hints that were read can be recorded");
+    assert_eq!(again.hints().ok(), Some(hints));
+});
