@@ -16,7 +16,7 @@ fuzz_target!(|bytes: &[u8]| {
     };
     assert!(is_session_name(&manifest.id));
     assert!(is_plain(&manifest.id) && is_plain(&manifest.video.file));
-    assert!(manifest.id.ends_with(manifest.object()) && !manifest.object().is_empty());
+    assert!(!manifest.object.trim().is_empty());
 
     let written = manifest.to_json().expect("what was read can be written");
     let read = Manifest::from_json(&written).expect("what was written can be read");
