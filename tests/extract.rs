@@ -443,6 +443,37 @@ fn two_inputs_of_one_name_are_not_mixed_up() {
 }
 
 #[test]
+fn another_video_of_the_same_name_is_not_replaced_unasked() {
+    let bench = Bench::new();
+    let line = "clip.mkv --mask mask.png --frames 30 --size 32 -o out";
+    bench.told(0, line);
+    let first = fs::read(bench.path("out/clip.tar")).unwrap();
+    bench.video("clip.mkv", "-vf hue=h=90 -pix_fmt yuvj422p -c:v mjpeg");
+    for more in ["", " --resume"] {
+        let told = bench.told(1, &format!("{line}{more}"));
+        assert!(
+            told.contains("holds a session clip of another video"),
+            "{told}"
+        );
+    }
+    assert!(fs::read(bench.path("out/clip.tar")).unwrap() == first);
+    bench.told(0, &format!("{line} --replace"));
+    assert!(fs::read(bench.path("out/clip.tar")).unwrap() != first);
+    bench.verified(0, "out");
+}
+
+#[test]
+fn a_photograph_is_no_turn_and_a_session_folder_no_data_set() {
+    let bench = Bench::new();
+    let told = bench.told(1, "mask.png --mask mask.png -o out");
+    assert!(told.contains("one usable frame only"), "{told}");
+    fs::create_dir(bench.path("session")).unwrap();
+    fs::write(bench.path("session/session.json"), "{}").unwrap();
+    let told = bench.told(1, "clip.mkv --mask mask.png -o session");
+    assert!(told.contains("is a session's folder"), "{told}");
+}
+
+#[test]
 fn machines_are_told_in_json_lines() {
     let bench = Bench::new();
     let output = bench.run("clip.mkv --mask mask.png --frames 30 --size 32 -o out --json");
