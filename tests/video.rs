@@ -73,6 +73,15 @@ fn largest_difference(a: &RgbImage, b: &RgbImage) -> u8 {
         .unwrap()
 }
 
+fn farthest_from(frame: &RgbImage, level: u8) -> u8 {
+    frame
+        .as_raw()
+        .iter()
+        .map(|value| value.abs_diff(level))
+        .max()
+        .unwrap()
+}
+
 #[test]
 fn white_stays_255_and_black_0_in_every_sampling_of_motion_jpeg() {
     for format in [
@@ -83,12 +92,7 @@ fn white_stays_255_and_black_0_in_every_sampling_of_motion_jpeg() {
             let encoding = format!("-pix_fmt {format} -c:v mjpeg -q:v 2");
             let (_folder, path) = made(&source, "a.avi", &encoding);
             let frame = Video::open(&path).unwrap().frame(1).unwrap();
-            let worst = frame
-                .as_raw()
-                .iter()
-                .map(|v| v.abs_diff(level))
-                .max()
-                .unwrap();
+            let worst = farthest_from(&frame, level);
             assert!(worst <= 1, "{format} {colour}: off by {worst}");
             assert!(level == 0 || frame.as_raw().iter().filter(|&&v| v == 255).count() > 0);
         }
@@ -103,12 +107,7 @@ fn limited_range_is_expanded() {
         let video = Video::open(&path).unwrap();
         assert!(!video.facts().full_range);
         let frame = video.frame(0).unwrap();
-        let worst = frame
-            .as_raw()
-            .iter()
-            .map(|v| v.abs_diff(level))
-            .max()
-            .unwrap();
+        let worst = farthest_from(&frame, level);
         assert!(worst <= 1, "{colour}: off by {worst}");
     }
 }
