@@ -5,12 +5,24 @@
 #![no_main]
 #![allow(clippy::expect_used, reason = "a panic is how a target tells")]
 
+mod completed;
+
 use std::path::{Component, Path};
 
 use libfuzzer_sys::fuzz_target;
 use relit::session::{Manifest, is_session_name};
 
+/// A whole manifest.
+const WHOLE: &[u8] = include_bytes!("../seeds/manifest/complete.json");
+
 fuzz_target!(|bytes: &[u8]| {
+    check(bytes);
+    if let Some(bytes) = completed::completed(bytes, WHOLE) {
+        check(&bytes);
+    }
+});
+
+fn check(bytes: &[u8]) {
     let Ok(manifest) = Manifest::from_json(bytes) else {
         return;
     };
@@ -22,7 +34,7 @@ fuzz_target!(|bytes: &[u8]| {
     let read = Manifest::from_json(&written).expect("what was written can be read");
     assert_eq!(read, manifest);
     assert_eq!(read.to_json().ok(), Some(written));
-});
+}
 
 fn is_plain(name: &str) -> bool {
     let mut parts = Path::new(name).components();

@@ -4,10 +4,22 @@
 #![no_main]
 #![allow(clippy::expect_used, reason = "a panic is how a target tells")]
 
+mod completed;
+
 use libfuzzer_sys::fuzz_target;
 use relit::mask::{MASK_SCHEMA, MaskRecord, RecordedHints};
 
+/// A whole record.
+const WHOLE: &[u8] = include_bytes!("../seeds/mask_record/both.json");
+
 fuzz_target!(|bytes: &[u8]| {
+    check(bytes);
+    if let Some(bytes) = completed::completed(bytes, WHOLE) {
+        check(&bytes);
+    }
+});
+
+fn check(bytes: &[u8]) {
     let Ok(record) = MaskRecord::from_json(bytes) else {
         return;
     };
@@ -22,4 +34,4 @@ fuzz_target!(|bytes: &[u8]| {
     assert_eq!(hints.rect(), record.hints.rect);
     let again = RecordedHints::new(&hints).expect("hints that were read can be recorded");
     assert_eq!(again.hints().ok(), Some(hints));
-});
+}
