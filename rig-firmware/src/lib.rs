@@ -1,0 +1,2 @@
+//! The core of the turntable's firmware.
+#![no_std]
