@@ -13,6 +13,7 @@
 //!
 //! | room | what it is for | knows |
 //! | --- | --- | --- |
+//! | [`clock`] | microseconds of the monotonic clock | nobody |
 //! | [`geometry`] | pixel rectangles | nobody |
 //! | [`durable`] | files that appear whole or not at all | nobody |
 //! | [`naming`] | which names a session may have | nobody |
@@ -27,6 +28,7 @@
 //! `src/bin` parse arguments, call one function here and report. The library itself never prints,
 //! never exits and never reads the environment; errors are typed, one `Error` a room.
 
+pub mod clock;
 pub mod durable;
 pub mod extract;
 pub mod geometry;
