@@ -1,0 +1,124 @@
+//! `relit-capture turntable`: one look at the table, or one motion.
+
+use std::path::{Path, PathBuf};
+
+use relit::turntable::{
+    Address, Homed, Options, Owner, Status, Table, TurntableError, find_serial,
+};
+use serde_json::json;
+
+use crate::arguments::{Action, TurntableArguments};
+use crate::console::{Console, Outcome};
+
+pub(crate) fn run(
+    console: Console,
+    asked: &TurntableArguments,
+) -> Result<Outcome, TurntableError> {
+    let port = match &asked.turntable {
+        Address::Serial(Some(path)) => path.clone(),
+        Address::Serial(None) => find_serial()?,
+        Address::Simulated(_) | Address::None => return Err(no_port(&asked.turntable)),
+    };
+    let options = Options {
+        runtime_folder: runtime_folder(),
+        ..Options::default()
+    };
+    match asked.action {
+        Action::Status => status(console, &port, &options),
+        Action::Stop => stop(console, &port, &options),
+        Action::Home => home(console, &Table::open_serial(&port, &options)?),
+        Action::Jog { degrees, speed } => {
+            let table = Table::open_serial(&port, &options)?;
+            tell(console, "jogged", &table.jog(degrees, speed)?);
+            Ok(Outcome::Whole)
+        }
+        Action::Unlock => {
+            let table = Table::open_serial(&port, &options)?;
+            tell(console, "unlocked", &table.unlock()?);
+            Ok(Outcome::Whole)
+        }
+    }
+}
+
+/// The folder in which every program of this machine looks for the owner of a port.
+pub(crate) fn runtime_folder() -> PathBuf {
+    let locks = Path::new("/run/lock");
+    if locks.is_dir() {
+        locks.to_owned()
+    } else {
+        std::env::temp_dir()
+    }
+}
+
+fn no_port(address: &Address) -> TurntableError {
+    TurntableError::Address {
+        text: address.to_string(),
+        why: "it has no port that outlives this command; for a simulated table start \
+              `relit-capture simulate` and name the port that it prints"
+            .to_owned(),
+    }
+}
+
+fn status(console: Console, port: &Path, options: &Options) -> Result<Outcome, TurntableError> {
+    let status = match Owner::find(port, &options.runtime_folder)? {
+        Some(owner) => owner.status()?,
+        None => Table::open_serial(port, options)?.status()?,
+    };
+    tell(console, "status", &status);
+    Ok(Outcome::Whole)
+}
+
+fn stop(console: Console, port: &Path, options: &Options) -> Result<Outcome, TurntableError> {
+    let status = match Owner::find(port, &options.runtime_folder)? {
+        Some(owner) => owner.stop()?,
+        None => Table::open_serial(port, options)?.stop()?,
+    };
+    tell(console, "stopped", &status);
+    Ok(Outcome::Whole)
+}
+
+fn home(console: Console, table: &Table) -> Result<Outcome, TurntableError> {
+    let homed = table.home()?;
+    let status = table.status()?;
+    if homed == Homed::WhereItStands {
+        console.warn(
+            "the controller looks for no index (homing is off, $22=0): zero is where the table \
+             stands, for as long as it is not switched off or reset",
+        );
+    }
+    tell(console, "homed", &status);
+    Ok(Outcome::Whole)
+}
+
+fn tell(console: Console, event: &str, status: &Status) {
+    let mut value = json!({ "event": event });
+    if let (Some(map), Ok(facts)) = (value.as_object_mut(), serde_json::to_value(status))
+        && let Some(facts) = facts.as_object()
+    {
+        map.extend(facts.clone());
+    }
+    console.say(&in_words(status), &value);
+}
+
+fn in_words(status: &Status) -> String {
+    let mut text = format!("{}, {:.3} degrees", status.state, status.angle_deg);
+    if !status.homed {
+        text += " (not homed: from where it was switched on)";
+    }
+    if status.degrees_per_second != 0.0 {
+        text += &format!(", {:.2} degrees/s", status.degrees_per_second);
+    }
+    if let Some(volts) = status.battery_v {
+        text += &format!(", battery {volts:.2} V");
+    }
+    if status.index {
+        text += ", at the index";
+    }
+    if status.emergency_stop {
+        text += ", emergency stop pressed";
+    }
+    if let Some(alarm) = &status.alarm {
+        text += &format!("; locked: {alarm}");
+    }
+    text
+}
