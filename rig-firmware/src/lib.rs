@@ -2,6 +2,14 @@
 #![no_std]
 
 pub mod board;
+pub mod checked;
 pub mod controller;
+pub mod crc;
+pub mod error;
+pub mod line;
+pub mod number;
+pub mod ramp;
 pub mod realtime;
+pub mod settings;
 pub mod stepper;
+pub mod store;
