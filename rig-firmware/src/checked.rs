@@ -62,7 +62,7 @@ impl Session {
             Checksum::Right => split(line.text),
             Checksum::Absent | Checksum::Wrong => None,
         };
-        if line.damaged {
+        if line.damaged && checked.is_none() {
             return refuse(None, Error::Damaged);
         }
         let Some((sequence, block)) = checked else {
