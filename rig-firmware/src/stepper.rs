@@ -359,6 +359,11 @@ impl Stepper {
         self.search = Search::For(level);
     }
 
+    /// Whether a search has found what it looked for.
+    pub fn has_found(&self) -> bool {
+        matches!(self.search, Search::Found(_))
+    }
+
     /// Ends a search: the position where the level came and stayed, if it did.
     pub fn end_search(&mut self) -> Option<i32> {
         match core::mem::replace(&mut self.search, Search::Off) {
