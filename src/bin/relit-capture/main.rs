@@ -3,6 +3,7 @@
 mod arguments;
 #[path = "../console/mod.rs"]
 mod console;
+mod simulate;
 mod turntable;
 
 use std::process::ExitCode;
@@ -17,5 +18,6 @@ fn main() -> ExitCode {
     let console = Console::new(arguments.json);
     match arguments.verb {
         Verb::Turntable(asked) => console.finish(turntable::run(console, &asked)),
+        Verb::Simulate(asked) => console.finish(simulate::run(console, &asked)),
     }
 }

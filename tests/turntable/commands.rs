@@ -1,0 +1,128 @@
+//! `relit-capture turntable` and `relit-capture simulate`, as a person types them.
+
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+
+use tempfile::TempDir;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_relit-capture");
+
+/// A simulator in a process of its own.
+struct Simulated {
+    process: Child,
+    folder: TempDir,
+}
+
+impl Simulated {
+    fn start(more: &[&str]) -> Simulated {
+        let folder = TempDir::new().unwrap();
+        let mut process = Command::new(PROGRAM)
+            .args(["--json", "simulate", "--for", "60", "--link"])
+            .arg(folder.path().join("table"))
+            .args(more)
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut ready = String::new();
+        BufReader::new(process.stdout.as_mut().unwrap())
+            .read_line(&mut ready)
+            .unwrap();
+        assert!(ready.contains("\"ready\""), "{ready}");
+        Simulated { process, folder }
+    }
+
+    fn port(&self) -> PathBuf {
+        self.folder.path().join("table")
+    }
+
+    fn ask(&self, words: &[&str]) -> Output {
+        Command::new(PROGRAM)
+            .args(["turntable", "--turntable"])
+            .arg(format!("serial:{}", self.port().display()))
+            .args(words)
+            .output()
+            .unwrap()
+    }
+}
+
+impl Drop for Simulated {
+    fn drop(&mut self) {
+        let _gone = self.process.kill();
+        let _gone = self.process.wait();
+    }
+}
+
+fn out(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn err(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn a_table_is_looked_at_moved_and_stopped_from_the_command_line() {
+    let table = Simulated::start(&["--no-reset"]);
+    let status = table.ask(&["status"]);
+    assert!(status.status.success(), "{}", err(&status));
+    assert!(out(&status).starts_with("Idle, 0.000 degrees"), "{}", out(&status));
+    assert!(out(&status).contains("battery 12.0"), "{}", out(&status));
+    let jogged = table.ask(&["jog", "-12.5", "--speed", "20"]);
+    assert!(jogged.status.success(), "{}", err(&jogged));
+    assert!(out(&jogged).contains("-12.5"), "{}", out(&jogged));
+    let home = table.ask(&["home"]);
+    assert!(home.status.success(), "{}", err(&home));
+    assert!(err(&home).contains("where the table stands"), "{}", err(&home));
+    let json = table.ask(&["status", "--json"]);
+    let value: serde_json::Value = serde_json::from_str(&out(&json)).unwrap();
+    assert_eq!(value["event"], "status");
+    assert_eq!(value["state"], "Idle");
+}
+
+#[test]
+fn a_second_program_reaches_a_moving_table_through_its_owner() {
+    let table = Simulated::start(&[]);
+    let mut jog = Command::new(PROGRAM)
+        .args(["turntable", "--turntable"])
+        .arg(format!("serial:{}", table.port().display()))
+        .args(["jog", "300", "--speed", "10"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let moving = (0..100).find_map(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        let text = out(&table.ask(&["status"]));
+        text.starts_with("Jog").then_some(text)
+    });
+    assert!(moving.is_some_and(|text| text.contains("degrees/s")));
+    let refused = table.ask(&["jog", "5"]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(err(&refused).contains(&format!("process {}", jog.id())), "{}", err(&refused));
+    let stopped = table.ask(&["stop"]);
+    assert!(stopped.status.success(), "{}", err(&stopped));
+    assert!(out(&stopped).starts_with("Idle"), "{}", out(&stopped));
+    assert_eq!(jog.wait().unwrap().code(), Some(1));
+}
+
+#[test]
+fn what_is_wrong_is_said_in_a_sentence() {
+    let nothing = Command::new(PROGRAM)
+        .args(["turntable", "--turntable", "serial:/dev/nothing-here", "status"])
+        .output()
+        .unwrap();
+    assert_eq!(nothing.status.code(), Some(1));
+    assert!(err(&nothing).contains("/dev/nothing-here"), "{}", err(&nothing));
+    let fault = Command::new(PROGRAM)
+        .args(["simulate", "--fault", "gremlins=1", "--for", "1"])
+        .output()
+        .unwrap();
+    assert_eq!(fault.status.code(), Some(1));
+    assert!(err(&fault).contains("gremlins"), "{}", err(&fault));
+    let address = Command::new(PROGRAM)
+        .args(["turntable", "--turntable", "usb:3", "status"])
+        .output()
+        .unwrap();
+    assert_eq!(address.status.code(), Some(2));
+}
