@@ -12,7 +12,8 @@
 //! | [`line`] | bytes to lines | `crc` |
 //! | [`checked`] | sequence numbers: what to do with a line | `line`, `error` |
 //! | [`ramp`] | speed as a number of steps from standstill | nobody |
-//! | [`stepper`] | moves to step intervals, in the interrupt | `ramp`, `realtime` |
+//! | [`search`] | the index, found to one step | nobody |
+//! | [`stepper`] | moves to step intervals, in the interrupt | `ramp`, `search`, `realtime` |
 //! | [`board`] | what the core needs of a chip | `stepper` |
 //! | [`settings`], [`store`] | the `$` settings; keeping them in the EEPROM | `board`, `ramp`, `number`, `crc` |
 //! | [`gcode`], [`dollar`] | text to typed commands | `number`, `settings`, `error` |
@@ -36,6 +37,7 @@ pub mod number;
 pub mod ramp;
 pub mod realtime;
 pub mod report;
+pub mod search;
 pub mod settings;
 pub mod stepper;
 pub mod store;
