@@ -22,6 +22,8 @@ pub(super) type Timed = (u64, u8);
 pub struct WireCounts {
     /// Bytes that were given to it.
     pub bytes: u64,
+    /// Lines that were given to it.
+    pub lines: u64,
     /// Bytes that were lost.
     pub dropped: u64,
     /// Bytes in which a bit changed.
@@ -65,6 +67,7 @@ impl Wire {
     /// Takes a byte at a tick, and puts onto `out` what arrives of it.
     pub(super) fn carry(&mut self, at: u64, byte: u8, out: &mut VecDeque<Timed>) {
         self.counts.bytes += 1;
+        self.counts.lines += u64::from(byte == b'\n');
         self.free_at = self.free_at.max(at.saturating_sub(BYTE_TICKS));
         if self.random.hits(self.faults.delay) {
             self.counts.delayed += 1;

@@ -66,14 +66,22 @@ fn a_table_is_looked_at_moved_and_stopped_from_the_command_line() {
     let table = Simulated::start(&["--no-reset"]);
     let status = table.ask(&["status"]);
     assert!(status.status.success(), "{}", err(&status));
-    assert!(out(&status).starts_with("Idle, 0.000 degrees"), "{}", out(&status));
+    assert!(
+        out(&status).starts_with("Idle, 0.000 degrees"),
+        "{}",
+        out(&status)
+    );
     assert!(out(&status).contains("battery 12.0"), "{}", out(&status));
     let jogged = table.ask(&["jog", "-12.5", "--speed", "20"]);
     assert!(jogged.status.success(), "{}", err(&jogged));
-    assert!(out(&jogged).contains("-12.5"), "{}", out(&jogged));
+    assert!(out(&jogged).contains("-12.499 degrees"), "{}", out(&jogged));
     let home = table.ask(&["home"]);
     assert!(home.status.success(), "{}", err(&home));
-    assert!(err(&home).contains("where the table stands"), "{}", err(&home));
+    assert!(
+        err(&home).contains("where the table stands"),
+        "{}",
+        err(&home)
+    );
     let json = table.ask(&["status", "--json"]);
     let value: serde_json::Value = serde_json::from_str(&out(&json)).unwrap();
     assert_eq!(value["event"], "status");
@@ -99,7 +107,11 @@ fn a_second_program_reaches_a_moving_table_through_its_owner() {
     assert!(moving.is_some_and(|text| text.contains("degrees/s")));
     let refused = table.ask(&["jog", "5"]);
     assert_eq!(refused.status.code(), Some(1));
-    assert!(err(&refused).contains(&format!("process {}", jog.id())), "{}", err(&refused));
+    assert!(
+        err(&refused).contains(&format!("process {}", jog.id())),
+        "{}",
+        err(&refused)
+    );
     let stopped = table.ask(&["stop"]);
     assert!(stopped.status.success(), "{}", err(&stopped));
     assert!(out(&stopped).starts_with("Idle"), "{}", out(&stopped));
@@ -109,11 +121,20 @@ fn a_second_program_reaches_a_moving_table_through_its_owner() {
 #[test]
 fn what_is_wrong_is_said_in_a_sentence() {
     let nothing = Command::new(PROGRAM)
-        .args(["turntable", "--turntable", "serial:/dev/nothing-here", "status"])
+        .args([
+            "turntable",
+            "--turntable",
+            "serial:/dev/nothing-here",
+            "status",
+        ])
         .output()
         .unwrap();
     assert_eq!(nothing.status.code(), Some(1));
-    assert!(err(&nothing).contains("/dev/nothing-here"), "{}", err(&nothing));
+    assert!(
+        err(&nothing).contains("/dev/nothing-here"),
+        "{}",
+        err(&nothing)
+    );
     let fault = Command::new(PROGRAM)
         .args(["simulate", "--fault", "gremlins=1", "--for", "1"])
         .output()

@@ -88,7 +88,11 @@ fn turn() -> (Track, Vec<(i64, f64)>) {
     let chip = Chip::start();
     let table = chip.open();
     table.home().unwrap();
-    let track = table.start_turn(paper_turn(&table)).unwrap().wait_end().unwrap();
+    let track = table
+        .start_turn(paper_turn(&table))
+        .unwrap()
+        .wait_end()
+        .unwrap();
     drop(table);
     (track, chip.end())
 }
@@ -122,7 +126,12 @@ fn angle_error_against_the_step_edges() {
     let (track, steps) = turn();
     let quiet = tell("quiet", &track, &steps);
     let load: Vec<Child> = (0..thread::available_parallelism().unwrap().get())
-        .map(|_| Command::new("sh").args(["-c", "while :; do :; done"]).spawn().unwrap())
+        .map(|_| {
+            Command::new("sh")
+                .args(["-c", "while :; do :; done"])
+                .spawn()
+                .unwrap()
+        })
         .collect();
     let (track, steps) = turn();
     for mut busy in load {

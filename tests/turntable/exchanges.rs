@@ -3,8 +3,8 @@
 //! The ordinary tests do a few hundred. The long run, with its figures:
 //! `cargo test --release --test turntable a_hundred_thousand -- --ignored --nocapture`
 
+use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
-use proptest::prelude::RngCore;
 use relit::simulator::SimulatorOptions;
 use relit::turntable::{State, Table, TurntableError};
 
@@ -32,14 +32,20 @@ fn run(rig: &Rig, exchanges: u64, seed: u8) -> Outcome {
     while outcome.exchanges < exchanges {
         let before = rig.truth();
         let degrees = f64::from(random.next_u32() % 400) / 1000.0 - 0.2;
-        let degrees = if before > 10.0 { -degrees.abs() } else { degrees };
+        let degrees = if before > 10.0 {
+            -degrees.abs()
+        } else {
+            degrees
+        };
         outcome.moves += 1;
         match table.jog(degrees, None) {
             Ok(_) => {
                 outcome.done += 1;
                 let off = rig.truth() - before - degrees;
                 if off.abs() > 1.5 * STEP_DEG {
-                    outcome.wrong.push(format!("{degrees} was done, off by {off}"));
+                    outcome
+                        .wrong
+                        .push(format!("{degrees} was done, off by {off}"));
                 }
             }
             Err(error) => {
@@ -64,19 +70,23 @@ fn note_stop(
     outcome: &mut Outcome,
 ) {
     let _stopped_or_told = table.stop();
-    rig.options.clock.sleep(std::time::Duration::from_millis(500));
+    rig.options
+        .clock
+        .sleep(std::time::Duration::from_millis(500));
     let moved = rig.truth() - before;
     let (low, high) = (degrees.min(0.0), degrees.max(0.0));
     if moved < low - 1.5 * STEP_DEG || moved > high + 1.5 * STEP_DEG {
-        outcome
-            .wrong
-            .push(format!("{degrees} failed ({error}), and it moved by {moved}"));
+        outcome.wrong.push(format!(
+            "{degrees} failed ({error}), and it moved by {moved}"
+        ));
     }
 }
 
 fn recover(rig: &Rig, table: Table, outcome: &mut Outcome) -> Table {
     let _unlocked = table.unlock();
-    let ready = table.status().is_ok_and(|status| status.state == State::Idle);
+    let ready = table
+        .status()
+        .is_ok_and(|status| status.state == State::Idle);
     let probe = table.jog(0.0, None);
     if ready && !matches!(probe, Err(TurntableError::Unsent { .. })) {
         return table;
@@ -85,7 +95,8 @@ fn recover(rig: &Rig, table: Table, outcome: &mut Outcome) -> Table {
     drop(table);
     outcome.reopened += 1;
     for _ in 0..20 {
-        if let Ok(table) = relit::turntable::Table::open_serial(rig.simulator.path(), &rig.options) {
+        if let Ok(table) = relit::turntable::Table::open_serial(rig.simulator.path(), &rig.options)
+        {
             let _unlocked = table.unlock();
             return table;
         }
@@ -99,7 +110,7 @@ fn add_counts(table: &Table, outcome: &mut Outcome) {
     outcome.noise += counts.noise;
 }
 
-/// Lines that came back from the table, by their bytes: about 40 each.
+/// Answers and reports that the table sent.
 fn exchanged(rig: &Rig) -> u64 {
     rig.simulator.counts().from_chip.lines
 }

@@ -6,7 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use relit::clock::Clock;
-use relit::simulator::{Error, Faults, Simulator, SimulatorCounts, SimulatorOptions};
+use relit::simulator::{Error, Faults, Simulator, SimulatorCounts, SimulatorOptions, WireCounts};
 use serde_json::json;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
@@ -34,7 +34,10 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
     })?;
     let port = asked.link.as_deref().unwrap_or(simulator.path());
     console.say(
-        &format!("a simulated turntable is at {}; end it with Ctrl-C", port.display()),
+        &format!(
+            "a simulated turntable is at {}; end it with Ctrl-C",
+            port.display()
+        ),
         &json!({ "event": "ready", "port": port, "speed": asked.speed }),
     );
     wait(console, asked.for_seconds);
@@ -65,8 +68,21 @@ fn tell(console: Console, counts: &SimulatorCounts) {
         counts.opened,
         counts.resets,
         if counts.stalled { ", stalled" } else { "" },
-        counts.to_chip,
-        counts.from_chip,
+        of_the_wire(&counts.to_chip),
+        of_the_wire(&counts.from_chip),
     );
     console.say(&text, &json!({ "event": "ended", "counts": counts }));
+}
+
+fn of_the_wire(counts: &WireCounts) -> String {
+    format!(
+        "{} lines, {} bytes, {} lost, {} flipped, {} late; {} lines doubled, {} merged",
+        counts.lines,
+        counts.bytes,
+        counts.dropped,
+        counts.flipped,
+        counts.delayed,
+        counts.duplicated,
+        counts.merged,
+    )
 }

@@ -10,10 +10,7 @@ use serde_json::json;
 use crate::arguments::{Action, TurntableArguments};
 use crate::console::{Console, Outcome};
 
-pub(crate) fn run(
-    console: Console,
-    asked: &TurntableArguments,
-) -> Result<Outcome, TurntableError> {
+pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcome, TurntableError> {
     let port = match &asked.turntable {
         Address::Serial(Some(path)) => path.clone(),
         Address::Serial(None) => find_serial()?,
