@@ -19,7 +19,7 @@ struct Desk {
 
 impl Desk {
     fn new() -> Desk {
-        let supervisor = Supervisor::new(HABITS);
+        let supervisor = Supervisor::new(HABITS, 0);
         let mut desk = Desk {
             supervisor,
             now_us: 0,
