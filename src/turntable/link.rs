@@ -22,8 +22,8 @@ const REPORT_WAIT: Duration = Duration::from_millis(1500);
 const STOP_WAIT: Duration = Duration::from_secs(16);
 /// How long a thread may have to wait for a processor, in real time.
 const PAUSE: Duration = Duration::from_millis(150);
-/// What is added in real time to every wait on a clock that runs faster: threads do not.
-const GRACE: Duration = Duration::from_millis(500);
+/// What is added in real time to every wait: a line's five tries may each meet such a pause.
+const GRACE: Duration = Duration::from_millis(1500);
 
 /// The wire to a table with its thread; copies share both.
 #[derive(Clone)]

@@ -56,10 +56,9 @@ impl Desk {
     }
 
     fn moving(&mut self, target_deg: f64) {
-        let until_us = self.now_us + 60_000_000;
         let course = Course::To {
             target_deg,
-            until_us,
+            within_us: 60_000_000,
         };
         self.supervisor.begin_motion(self.now_us, course);
         self.supervisor.motion_accepted(self.now_us);
