@@ -21,7 +21,7 @@ const REPORT_WAIT: Duration = Duration::from_millis(1500);
 /// How long a stop may take, with all its repetitions.
 const STOP_WAIT: Duration = Duration::from_secs(16);
 /// How long a thread may have to wait for a processor, in real time.
-const PAUSE: Duration = Duration::from_millis(150);
+const PAUSE: Duration = Duration::from_millis(300);
 /// What is added in real time to every wait: a line's five tries may each meet such a pause.
 const GRACE: Duration = Duration::from_millis(1500);
 

@@ -65,7 +65,7 @@ impl Table {
     ) -> Result<Table, TurntableError> {
         let resets = port.resets();
         let (link, carrier) = Link::start(port, options.clock, greeting::STRANGER);
-        let identity = greeting::greet(&link, resets, options.travel_deg)?;
+        let identity = greeting::greet(&link, resets, options)?;
         let server = claim.as_ref().map(|claim| claim.serve(link.clone()));
         Ok(Table {
             server: server.transpose()?,

@@ -362,7 +362,7 @@ impl Supervisor {
             state: report.state,
             machine_deg: units * self.habits.degrees_per_unit,
             speed: report.feed.unwrap_or(0.0) * self.habits.degrees_per_unit / 60.0,
-            chip_us: report.chip_us,
+            chip_us: report.chip_us.filter(|_| self.habits.stamps),
             battery_v: report.battery_v,
             pins: report.pins,
             asked_us: poll.asked_us,

@@ -7,6 +7,7 @@ use super::*;
 const HABITS: Habits = Habits {
     degrees_per_unit: 1.0,
     poll: Duration::from_millis(67),
+    stamps: true,
     reports_homing: true,
     step_deg: 1.0 / 88.889,
 };

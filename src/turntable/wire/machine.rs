@@ -247,6 +247,7 @@ impl Machine {
             Message::Error { code, seq } => self.on_answer(now_us, seq, Some(code)),
             Message::Alarm(code) => self.events.push_back(Event::Alarm(code)),
             Message::Status(report) => {
+                self.counts.reports += 1;
                 let poll = self.polling.answered(report, first_us);
                 self.events.push_back(Event::Status(poll));
             }
