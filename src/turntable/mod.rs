@@ -21,14 +21,20 @@ mod address;
 mod codes;
 mod error;
 mod greeting;
+mod homing;
 mod identity;
 mod link;
 mod owner;
+#[cfg(test)]
+mod peer;
 mod plan;
 mod port;
+mod status;
 mod supervisor;
 mod sync;
 mod table;
+#[cfg(test)]
+mod tests;
 mod turn;
 pub mod wire;
 
@@ -39,12 +45,14 @@ use crate::clock::Clock;
 pub use address::{Address, SimulatedAddress, find_serial};
 pub use codes::Alarm;
 pub use error::{Fault, TurntableError};
+pub use homing::Homed;
 pub use identity::{Extras, Identity, Limits};
 pub use owner::Owner;
 pub use plan::{Direction, TurnPlan, TurnRequest};
 pub use port::{Port, SerialPort};
+pub use status::Status;
 pub use sync::{Residuals, Track, TrackError};
-pub use table::{Homed, Status, Table};
+pub use table::Table;
 pub use turn::{ConstantPart, Phase, Turn};
 pub use wire::{Counts, LineFault, ResetCause, SendError, State};
 
@@ -63,6 +71,9 @@ pub struct Options {
     /// How far the table may turn either way from the angle 0 before its cable is wound up, where
     /// the controller itself watches no limit; degrees.
     pub travel_deg: f64,
+    /// Whether what the rig's firmware offers beyond Grbl is used; without, it is spoken to as
+    /// a stock board.
+    pub extras: bool,
 }
 
 impl Default for Options {
@@ -71,6 +82,7 @@ impl Default for Options {
             clock: Clock::monotonic(),
             runtime_folder: PathBuf::from("/tmp"),
             travel_deg: 400.0,
+            extras: true,
         }
     }
 }

@@ -5,19 +5,19 @@
 //! It knows nothing of turns.
 
 mod motion;
+mod seen;
 mod stop;
 #[cfg(test)]
 mod tests;
 
-use std::time::Duration;
-
 use super::Alarm;
 use super::error::Fault;
 use super::wire::{
-    Counts, Event, LineFault, Machine, Outcome, Patience, Pins, Poll, Position, ResetCause,
-    SendError, State,
+    Counts, Event, LineFault, Machine, Outcome, Patience, Poll, Position, ResetCause, SendError,
+    State,
 };
 pub(crate) use motion::{Course, Motion};
+pub(crate) use seen::{Habits, Seen};
 pub(crate) use stop::{Stop, StopOutcome};
 
 /// Between two reports while the table is being stopped, microseconds.
@@ -27,41 +27,12 @@ const WANTED_POLL_US: i64 = 100_000;
 /// Most reports recorded of one turn: an hour of them at 15 a second.
 const MOST_RECORDED: usize = 54_000;
 
-/// A report in degrees.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Seen {
-    pub(crate) state: State,
-    /// Degrees from machine zero.
-    pub(crate) machine_deg: f64,
-    /// Degrees a second.
-    pub(crate) speed: f64,
-    pub(crate) chip_us: Option<u32>,
-    pub(crate) battery_v: Option<f64>,
-    pub(crate) pins: Pins,
-    pub(crate) asked_us: Option<i64>,
-    pub(crate) came_us: i64,
-    /// Whether question and report certainly belong together.
-    pub(crate) certain: bool,
-}
-
-/// How the controller tells its position, and how often it is asked in motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Habits {
-    /// Degrees in one unit of its reports.
-    pub(crate) degrees_per_unit: f64,
-    /// Between two reports in motion.
-    pub(crate) poll: Duration,
-    /// Whether it answers `?` while it looks for the index.
-    pub(crate) reports_homing: bool,
-    /// Smallest distance it can stand off its target, degrees.
-    pub(crate) step_deg: f64,
-}
-
 /// Everything known of one table, and the wire to it.
 #[derive(Debug)]
 pub(crate) struct Supervisor {
     wire: Machine,
     habits: Habits,
+    slack_us: i64,
     answer: Option<(u64, Outcome)>,
     seen: Option<Seen>,
     work_zero: Option<f64>,
@@ -80,9 +51,12 @@ pub(crate) struct Supervisor {
 }
 
 impl Supervisor {
-    pub(crate) fn new(habits: Habits) -> Self {
+    /// `slack_us` is added to every wait for the controller: more than 0 only on a clock that runs
+    /// faster than the machines that follow it.
+    pub(crate) fn new(habits: Habits, slack_us: i64) -> Self {
         Self {
-            wire: Machine::new(),
+            wire: Machine::with_slack(slack_us),
+            slack_us,
             habits,
             answer: None,
             seen: None,
@@ -260,7 +234,12 @@ impl Supervisor {
         if !self.is_stopping() {
             self.settled = false;
             self.wire.give_up();
-            self.stop = Some(Stop::begin(now_us, unsettled, &mut self.wire));
+            self.stop = Some(Stop::begin(
+                now_us,
+                unsettled,
+                self.slack_us,
+                &mut self.wire,
+            ));
         }
     }
 
@@ -299,7 +278,7 @@ impl Supervisor {
             && let Some(fault) = self
                 .motion
                 .as_ref()
-                .and_then(|m| m.overdue(now_us, &self.habits))
+                .and_then(|m| m.overdue(now_us - self.slack_us, &self.habits))
         {
             self.fail(now_us, fault);
         }
@@ -383,7 +362,7 @@ impl Supervisor {
             state: report.state,
             machine_deg: units * self.habits.degrees_per_unit,
             speed: report.feed.unwrap_or(0.0) * self.habits.degrees_per_unit / 60.0,
-            chip_us: report.chip_us,
+            chip_us: report.chip_us.filter(|_| self.habits.stamps),
             battery_v: report.battery_v,
             pins: report.pins,
             asked_us: poll.asked_us,
@@ -397,9 +376,8 @@ impl Supervisor {
         self.alarm = None;
         self.work_zero = None;
         let asked_for = matches!(cause, None | Some(ResetCause::Host));
-        let kept = self.is_stopping()
-            && asked_for
-            && self.stop.as_mut().is_some_and(|stop| stop.on_reset(now_us));
+        let stop = self.stop.as_mut().filter(|stop| stop.outcome().is_none());
+        let kept = stop.is_some_and(|stop| stop.on_reset(now_us)) && asked_for;
         if !kept {
             self.zero_deg = None;
         }
