@@ -85,7 +85,7 @@ fn a_table_is_looked_at_moved_and_stopped_from_the_command_line() {
     let json = table.ask(&["status", "--json"]);
     let value: serde_json::Value = serde_json::from_str(&out(&json)).unwrap();
     assert_eq!(value["event"], "status");
-    assert_eq!(value["state"], "Idle");
+    assert_eq!(value["state"], "idle");
 }
 
 #[test]

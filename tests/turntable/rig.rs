@@ -46,6 +46,12 @@ impl Rig {
         }
     }
 
+    /// A table whose host uses nothing beyond Grbl: no checksums, no chip's time.
+    pub(crate) fn plain(mut self) -> Rig {
+        self.options.extras = false;
+        self
+    }
+
     /// Opens the port as a program would.
     pub(crate) fn open(&self) -> Table {
         Table::open_serial(self.simulator.path(), &self.options).unwrap()
