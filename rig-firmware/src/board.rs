@@ -94,6 +94,13 @@ impl Events {
         self.0 & other.0 != 0
     }
 
+    /// Takes the events of `other` out, and tells whether any was there.
+    pub fn remove(&mut self, other: Events) -> bool {
+        let there = self.contains(other);
+        self.0 &= !other.0;
+        there
+    }
+
     /// Takes all events out and leaves none.
     pub fn take(&mut self) -> Events {
         core::mem::take(self)
