@@ -9,6 +9,7 @@
 
 use crate::ramp::{Cruise, Ramp};
 use crate::realtime::Realtime;
+use crate::search::Search;
 
 /// Moves that the queue holds.
 pub const QUEUE: usize = 8;
@@ -51,22 +52,6 @@ pub struct StepperSettings {
     pub invert_emergency: bool,
     /// Ticks for which the index has to stay before it counts.
     pub debounce: u32,
-}
-
-/// What the stepper is looking for on its way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Search {
-    Off,
-    /// The level is not there yet.
-    For(bool),
-    /// The level came at this position, and has been there for so many ticks.
-    Seen {
-        level: bool,
-        position: i32,
-        ticks: u32,
-    },
-    /// The level came at this position and stayed.
-    Found(i32),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -145,7 +130,11 @@ impl Stepper {
 
     /// Makes one step, and says when the next is due. `index` is the raw level of the index pin.
     pub fn fire(&mut self, index: bool) -> Fire {
-        self.look(index != self.settings.invert_index);
+        let active = index != self.settings.invert_index;
+        let ticks = self.interval >> 8;
+        self.held |= self
+            .search
+            .look(active, self.position, ticks, self.settings.debounce);
         let pulse = core::mem::take(&mut self.due);
         if pulse {
             let step = if self.forward { 1 } else { -1 };
@@ -370,32 +359,6 @@ impl Stepper {
             Search::Found(position) => Some(position),
             _ => None,
         }
-    }
-
-    /// Follows the index, as it is at the present position: a level counts from where it first
-    /// came, if it stays as long as the debounce time asks.
-    fn look(&mut self, active: bool) {
-        let (level, position, ticks) = match self.search {
-            Search::Off | Search::Found(_) => return,
-            Search::For(level) => (level, self.position, 0),
-            Search::Seen {
-                level,
-                position,
-                ticks,
-            } => (level, position, ticks.saturating_add(self.interval >> 8)),
-        };
-        self.search = if active != level {
-            Search::For(level)
-        } else if ticks < self.settings.debounce {
-            Search::Seen {
-                level,
-                position,
-                ticks,
-            }
-        } else {
-            self.held = true;
-            Search::Found(position)
-        };
     }
 }
 
