@@ -18,6 +18,8 @@
 //! | [`durable`] | files that appear whole or not at all | nobody |
 //! | [`naming`] | which names a session may have | nobody |
 //! | [`session`] | what a capture leaves on disk: manifest and frame index | `naming`, `durable` |
+//! | [`turntable`] | the table: Grbl over a serial line, turns, angles over time | `clock` |
+//! | [`simulator`] | a table without hardware: the firmware's core on a pseudoterminal | `clock` |
 //! | [`video`] | FFmpeg: a video file to frames with numbers and time stamps | `geometry` |
 //! | [`shard`] | the data set on disk: samples, records, tables; write, read, verify | `geometry`, `durable`, `naming` |
 //! | [`report`] | the HTML page that shows one extracted session | `shard` |
@@ -37,4 +39,6 @@ pub mod naming;
 pub mod report;
 pub mod session;
 pub mod shard;
+pub mod simulator;
+pub mod turntable;
 pub mod video;
