@@ -4,7 +4,7 @@
 
 use crate::error::Error;
 use crate::gcode::{self, Jog, Modal};
-use crate::number;
+use crate::number::{self, Decimal};
 use crate::settings::Key;
 
 /// A `$` command.
@@ -14,8 +14,8 @@ pub enum Dollar {
     Help,
     /// `$$`: tell the settings.
     Settings,
-    /// `$n=v`: change a setting; the value in millionths.
-    Set(Key, i64),
+    /// `$n=v`: change a setting.
+    Set(Key, Decimal),
     /// `$I`: tell version and options.
     Version,
     /// `$H`: look for the index.
@@ -95,11 +95,12 @@ mod tests {
     fn commands_are_told_apart() {
         assert_eq!(read(""), Ok(Dollar::Help));
         assert_eq!(read("$"), Ok(Dollar::Settings));
+        let number = |text: &str| number::parse(text.as_bytes()).unwrap().0;
         assert_eq!(
             read("110=2000.5"),
-            Ok(Dollar::Set(Key::MaxFeed, 2_000_500_000))
+            Ok(Dollar::Set(Key::MaxFeed, number("2000.5")))
         );
-        assert_eq!(read("0=-1"), Ok(Dollar::Set(Key::StepPulse, -1_000_000)));
+        assert_eq!(read("0=-1"), Ok(Dollar::Set(Key::StepPulse, number("-1"))));
         let all = Dollar::Restore {
             settings: true,
             offsets: true,

@@ -6,6 +6,7 @@ use crate::checked::Verdict;
 use crate::dollar::{self, Dollar};
 use crate::error::Error;
 use crate::gcode::{self, Action, Block, Jog, Modal, Motion};
+use crate::number::Decimal;
 use crate::report::{self, Reply};
 use crate::settings::{Key, Settings};
 use crate::store::Stored;
@@ -213,7 +214,7 @@ impl Controller {
         }
     }
 
-    fn set<B: Board>(&mut self, board: &mut B, key: Key, value: i64) -> Result<(), Error> {
+    fn set<B: Board>(&mut self, board: &mut B, key: Key, value: Decimal) -> Result<(), Error> {
         self.require_rest(board)?;
         self.settings.set(key, value)?;
         self.apply_settings(board);

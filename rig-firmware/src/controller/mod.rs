@@ -79,7 +79,7 @@ enum Job {
     /// Waits for rest, then for so many microseconds; `since`: counted up to here.
     Dwell {
         since: Option<u32>,
-        left: i64,
+        left: u32,
     },
     Home(Phase),
     /// The alarm that refuses the line.

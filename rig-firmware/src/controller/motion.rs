@@ -94,15 +94,15 @@ impl Controller {
         })
     }
 
-    fn advance_dwell<B: Board>(&mut self, board: &mut B, since: Option<u32>, left: i64) {
+    fn advance_dwell<B: Board>(&mut self, board: &mut B, since: Option<u32>, left: u32) {
         let busy = board.with_stepper(|stepper, _| stepper.is_moving() || stepper.has_plan());
         let now = board.micros();
         let waiting = busy || self.hold;
         let left = match since {
-            Some(since) if !waiting => left - i64::from(now.wrapping_sub(since)),
+            Some(since) if !waiting => left.saturating_sub(now.wrapping_sub(since)),
             _ => left,
         };
-        if !waiting && left <= 0 {
+        if !waiting && left == 0 {
             self.finish(board, Ok(()));
         } else {
             let since = (!waiting).then_some(now);

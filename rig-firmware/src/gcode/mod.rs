@@ -5,9 +5,9 @@
 
 mod words;
 
-use self::words::{ONE, OneShot, Words};
+use self::words::{OneShot, Words};
 use crate::error::Error;
-use crate::number;
+use crate::number::Decimal;
 
 /// What one line leaves for the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,7 +68,7 @@ pub enum Action {
     /// `G0`, `G1`: go there.
     Move(Target),
     /// `G4`: wait so many microseconds at rest.
-    Dwell(i64),
+    Dwell(u32),
     /// `G10 L20`: the present place has this work position, kept in the EEPROM.
     SetOrigin(i32),
     /// `G28`: go to machine zero at full speed, over a place if one is named.
@@ -138,7 +138,7 @@ impl Words {
     }
 
     /// That no word is left over which only `G4` and `G10` use.
-    fn without(&self, words: &[Option<i64>]) -> Result<(), Error> {
+    fn without(&self, words: &[Option<Decimal>]) -> Result<(), Error> {
         match words.iter().any(Option::is_some) {
             true => Err(Error::UnusedWords),
             false => Ok(()),
@@ -150,7 +150,8 @@ impl Words {
         if self.x.is_some() {
             return Err(Error::UnusedAxisWords);
         }
-        self.p.map(Action::Dwell).ok_or(Error::ValueMissing)
+        let micros = self.p.ok_or(Error::ValueMissing)?.micros();
+        micros.map(Action::Dwell).ok_or(Error::BadNumber)
     }
 
     fn set_origin(&self, modal: &Modal) -> Result<Action, Error> {
@@ -158,10 +159,10 @@ impl Words {
         let (Some(l), Some(p)) = (self.l, self.p) else {
             return Err(Error::ValueMissing);
         };
-        if l != 20 * ONE {
+        if !l.is(20) {
             return Err(Error::Unsupported);
         }
-        if p != 0 && p != ONE {
+        if !p.is(0) && !p.is(1) {
             return Err(Error::CoordinateSystem);
         }
         Ok(Action::SetOrigin(x))
@@ -182,13 +183,13 @@ impl Words {
     }
 }
 
-/// Millionths of a millimetre or inch to thousandths of a degree.
-fn degrees(millionths: i64, inches: bool) -> Option<i32> {
+/// Millimetres or inches to thousandths of a degree.
+fn degrees(value: Decimal, inches: bool) -> Option<i32> {
     if inches {
-        let scaled = number::divide_rounded(millionths.checked_mul(254)?, 10);
-        return number::to_thousandths(scaled);
+        value.inches()
+    } else {
+        value.thousandths()
     }
-    number::to_thousandths(millionths)
 }
 
 /// Reads a line of G-code under the modal state before it.
@@ -284,6 +285,7 @@ mod tests {
             ("X1000000000", 2),
             ("F-1", 4),
             ("G4P-1", 4),
+            ("G4P5000", 2),
             ("G2X1", 20),
             ("M5", 20),
             ("Y1", 20),
