@@ -38,24 +38,26 @@ impl Decimal {
     ///
     /// `None` where the result is beyond an `i32`.
     pub fn thousandths(self) -> Option<i32> {
-        self.scaled(1000, (self.millionths + 500) / 1000)
+        self.scaled(1000, 2_147_483, (self.millionths + 500) / 1000)
     }
 
     /// Inches to thousandths of a millimetre, as [`Decimal::thousandths`].
     pub fn inches(self) -> Option<i32> {
-        self.scaled(25_400, (self.millionths * 254 + 5000) / 10_000)
+        self.scaled(25_400, 84_546, (self.millionths * 254 + 5000) / 10_000)
     }
 
     /// Seconds to microseconds; `None` for less than none or more than 4293 s.
     pub fn micros(self) -> Option<u32> {
-        let whole = self.whole.checked_mul(1_000_000)?;
-        let micros = whole.checked_add(self.millionths)?;
-        (!self.negative).then_some(micros)
+        let fits = !self.negative && self.whole < 4294;
+        fits.then(|| self.whole * 1_000_000 + self.millionths)
     }
 
-    fn scaled(self, scale: u32, fraction: u32) -> Option<i32> {
-        let magnitude = self.whole.checked_mul(scale)?.checked_add(fraction)?;
-        let magnitude = i32::try_from(magnitude).ok()?;
+    /// `most`: the largest whole number that fits after scaling.
+    fn scaled(self, scale: u32, most: u32, fraction: u32) -> Option<i32> {
+        if self.whole > most {
+            return None;
+        }
+        let magnitude = i32::try_from(self.whole * scale + fraction).ok()?;
         Some(if self.negative { -magnitude } else { magnitude })
     }
 }
@@ -101,16 +103,19 @@ pub fn parse(text: &[u8]) -> Option<(Decimal, &[u8])> {
     any.then_some((number, rest))
 }
 
-/// `dividend / divisor` to the nearest, halves away from zero. Divisors are positive; zero as
-/// divisor gives zero.
-pub fn divide_rounded(dividend: i64, divisor: i64) -> i64 {
-    let half = divisor / 2;
-    let shifted = if dividend < 0 {
-        dividend.saturating_sub(half)
-    } else {
-        dividend.saturating_add(half)
-    };
-    shifted.checked_div(divisor).unwrap_or(0)
+/// `value * times / divisor` to the nearest, halves away from zero.
+///
+/// `None` where the result is beyond an `i32`, and for zero as divisor.
+pub fn scaled(value: i32, times: u32, divisor: u32) -> Option<i32> {
+    let product = u64::from(value.unsigned_abs()) * u64::from(times) + u64::from(divisor / 2);
+    let magnitude = product.checked_div(u64::from(divisor))?;
+    let magnitude = i32::try_from(magnitude).ok()?;
+    Some(if value < 0 { -magnitude } else { magnitude })
+}
+
+/// The end of what an `i32` can tell, on the side of `value`.
+pub fn end_towards(value: i32) -> i32 {
+    if value < 0 { i32::MIN } else { i32::MAX }
 }
 
 #[cfg(test)]
@@ -156,13 +161,15 @@ mod tests {
     }
 
     #[test]
-    fn division_rounds_halves_away_from_zero() {
-        assert_eq!(divide_rounded(15, 10), 2);
-        assert_eq!(divide_rounded(14, 10), 1);
-        assert_eq!(divide_rounded(-15, 10), -2);
-        assert_eq!(divide_rounded(-14, 10), -1);
-        assert_eq!(divide_rounded(7, 0), 0);
-        assert_eq!(divide_rounded(i64::MAX, 1), i64::MAX);
+    fn scaling_rounds_halves_away_from_zero_and_tells_what_does_not_fit() {
+        assert_eq!(scaled(3, 5, 10), Some(2));
+        assert_eq!(scaled(14, 1, 10), Some(1));
+        assert_eq!(scaled(-15, 1, 10), Some(-2));
+        assert_eq!(scaled(-14, 1, 10), Some(-1));
+        assert_eq!(scaled(7, 1, 0), None);
+        assert_eq!(scaled(i32::MIN, u32::MAX, u32::MAX), None);
+        assert_eq!(scaled(i32::MAX, u32::MAX, u32::MAX), Some(i32::MAX));
+        assert_eq!(scaled(-2, u32::MAX, 1), None);
     }
 
     #[test]

@@ -138,15 +138,17 @@ impl Words {
     }
 
     /// That no word is left over which only `G4` and `G10` use.
-    fn without(&self, words: &[Option<Decimal>]) -> Result<(), Error> {
-        match words.iter().any(Option::is_some) {
+    fn without_values(&self) -> Result<(), Error> {
+        match self.l.is_some() || self.p.is_some() {
             true => Err(Error::UnusedWords),
             false => Ok(()),
         }
     }
 
     fn dwell(&self) -> Result<Action, Error> {
-        self.without(&[self.l])?;
+        if self.l.is_some() {
+            return Err(Error::UnusedWords);
+        }
         if self.x.is_some() {
             return Err(Error::UnusedAxisWords);
         }
@@ -169,7 +171,7 @@ impl Words {
     }
 
     fn go(&self, modal: &Modal) -> Result<Action, Error> {
-        self.without(&[self.l, self.p])?;
+        self.without_values()?;
         let Some(target) = self.target(modal)? else {
             return match self.one_shot {
                 Some(OneShot::Machine) => Err(Error::MachineMotion),
@@ -197,17 +199,18 @@ fn degrees(value: Decimal, inches: bool) -> Option<i32> {
 /// # Errors
 /// Grbl's number for what is wrong first.
 pub fn parse(text: &[u8], before: &Modal) -> Result<Block, Error> {
-    let words = Words::read(text)?;
+    let mut words = Words::default();
+    words.read(text)?;
     let modal = words.modal(before)?;
     let action = match words.one_shot {
         Some(OneShot::Dwell) => words.dwell()?,
         Some(OneShot::SetOrigin) => words.set_origin(&modal)?,
         Some(OneShot::GoHome) => {
-            words.without(&[words.l, words.p])?;
+            words.without_values()?;
             Action::GoHome(words.target(&modal)?)
         }
         Some(OneShot::SetOffset) => {
-            words.without(&[words.l, words.p])?;
+            words.without_values()?;
             Action::SetOffset(words.origin(&modal)?)
         }
         Some(OneShot::Machine) | None => words.go(&modal)?,
@@ -222,7 +225,8 @@ pub fn parse(text: &[u8], before: &Modal) -> Result<Block, Error> {
 /// [`Error::InvalidJog`] for commands and words that a jog has no use for, [`Error::NoAxisWords`],
 /// [`Error::UndefinedFeed`], and what reading words gives.
 pub fn parse_jog(text: &[u8], modal: &Modal) -> Result<Jog, Error> {
-    let words = Words::read(text)?;
+    let mut words = Words::default();
+    words.read(text)?;
     let allowed = matches!(words.one_shot, None | Some(OneShot::Machine));
     if !allowed || words.motion.is_some() || words.l.is_some() || words.p.is_some() {
         return Err(Error::InvalidJog);

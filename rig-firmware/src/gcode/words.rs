@@ -32,18 +32,17 @@ const MAX_LINE_NUMBER: u32 = 9_999_999;
 
 impl Words {
     /// Reads all words of a line.
-    pub(super) fn read(text: &[u8]) -> Result<Words, Error> {
-        let mut words = Words::default();
+    pub(super) fn read(&mut self, text: &[u8]) -> Result<(), Error> {
         let mut rest = text;
         while let Some((&letter, after)) = rest.split_first() {
             if !letter.is_ascii_uppercase() {
                 return Err(Error::ExpectedLetter);
             }
             let (value, after) = number::parse(after).ok_or(Error::BadNumber)?;
-            words.take(letter, value)?;
+            self.take(letter, value)?;
             rest = after;
         }
-        Ok(words)
+        Ok(())
     }
 
     fn take(&mut self, letter: u8, value: Decimal) -> Result<(), Error> {

@@ -9,25 +9,23 @@ use crate::serial::{self, EVENTS};
 use crate::{battery, eeprom, pins, watchdog};
 
 /// An Arduino Uno or Nano with the CNC shield.
+///
+/// It holds nothing: what the chip's peripherals need lies with them. So no register and no code
+/// is spent on handing it round.
 pub(crate) struct Uno {
     foreground: Foreground,
-    reset_cause: ResetCause,
 }
 
 impl Uno {
     /// Sets the chip up: driver released, watchdog running, interrupts on.
     pub(crate) fn start(mut foreground: Foreground) -> Uno {
         pins::start();
-        let reset_cause = watchdog::reset_cause();
         watchdog::start();
         clock::start();
         serial::start();
         battery::start();
         foreground.enable_interrupts();
-        Uno {
-            foreground,
-            reset_cause,
-        }
+        Uno { foreground }
     }
 }
 
@@ -96,6 +94,6 @@ impl Board for Uno {
     }
 
     fn reset_cause(&mut self) -> ResetCause {
-        self.reset_cause
+        watchdog::reset_cause()
     }
 }

@@ -54,9 +54,9 @@ unsafe extern "C" {
     static mut relit_failed: u16;
 }
 
-/// Tells why the chip started, and takes the mark away.
+/// Tells why the chip started, and takes the mark away: to be asked once.
 pub(crate) fn reset_cause() -> ResetCause {
-    // SAFETY: these variables are above; `main` has not let interrupts come yet.
+    // SAFETY: these variables are above; an interrupt touches the mark only to end the program.
     let (own, loader, failed) = unsafe {
         let failed = ptr::read_volatile(&raw const relit_failed);
         ptr::write_volatile(&raw mut relit_failed, 0);
