@@ -103,6 +103,22 @@ pub fn parse(text: &[u8]) -> Option<(Decimal, &[u8])> {
     any.then_some((number, rest))
 }
 
+/// Reads a number of at most `most` digits (nine at most) and nothing else, and tells the rest.
+///
+/// `None` where no digit stands, or more.
+pub fn digits(text: &[u8], most: u8) -> Option<(u32, &[u8])> {
+    let (mut value, mut count, mut rest) = (0, 0, text);
+    while let Some((&byte @ b'0'..=b'9', after)) = rest.split_first() {
+        if count == most {
+            return None;
+        }
+        count += 1;
+        value = value * 10 + u32::from(byte - b'0');
+        rest = after;
+    }
+    (count > 0).then_some((value, rest))
+}
+
 /// `value * times / divisor` to the nearest, halves away from zero.
 ///
 /// `None` where the result is beyond an `i32`, and for zero as divisor.
@@ -158,6 +174,15 @@ mod tests {
         for text in ["", "-", ".", "-.", "X1", "+-1", "1000000000", " 1"] {
             assert_eq!(parse(text.as_bytes()), None, "{text}");
         }
+    }
+
+    #[test]
+    fn digits_are_counted() {
+        assert_eq!(digits(b"110=5", 3), Some((110, &b"=5"[..])));
+        assert_eq!(digits(b"007", 3), Some((7, &b""[..])));
+        assert_eq!(digits(b"1234", 3), None);
+        assert_eq!(digits(b"x", 3), None);
+        assert_eq!(digits(b"999999999", 9), Some((999_999_999, &b""[..])));
     }
 
     #[test]

@@ -40,9 +40,22 @@ extern "C" fn main() -> ! {
     // SAFETY: the start-up code calls `main` once, and nothing else makes one.
     let foreground = unsafe { Foreground::new() };
     let mut board = Uno::start(foreground);
-    let mut controller = Controller::new(&mut board);
+    let mut controller = start(&mut board);
+    run(&mut controller, &mut board)
+}
+
+// Functions of their own: in the frame of `main`, which holds the controller, most variables lie
+// further off than one instruction reaches.
+
+#[inline(never)]
+fn start(board: &mut Uno) -> Controller {
+    Controller::new(board)
+}
+
+#[inline(never)]
+fn run(controller: &mut Controller, board: &mut Uno) -> ! {
     loop {
-        controller.poll(&mut board);
+        controller.poll(board);
     }
 }
 
