@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup test lint demo bench docs fuzz
+.PHONY: help setup test lint demo bench docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -19,6 +19,14 @@ BENCH_MASK ?= $(DEMO)/$(SESSION)/mask.png
 BENCH_RUNS ?= 5
 BENCH_VENV := $(TARGET)/bench-venv
 
+# The turntable's firmware, and the emulated chip that its tests run on.
+FIRMWARE := $(TARGET)/firmware
+EMULATOR := $(FIRMWARE)/rig-emulator
+EMULATOR_SOURCES := $(wildcard rig-firmware/emulator/*.c)
+PORT ?= /dev/ttyACM0
+# A Nano with the old boot loader has 57600.
+FLASH_BAUD ?= 115200
+
 FUZZ_SECONDS ?= 60
 # A shard can claim sizes that nothing bears out: reading one takes no piece of so many MiB.
 FUZZ_SHARD_PIECE := 16
@@ -30,12 +38,28 @@ setup: ## Install the system packages that are missing
 	@.ci/setup
 
 test: setup ## Run all tests
+	@if rig-firmware/build --can && [[ -e /usr/include/simavr/sim_avr.h ]]; then \
+	    $(MAKE) --no-print-directory firmware emulator; \
+	else \
+	    echo "the firmware's tests on the emulated chip are skipped: 'make setup' told why"; \
+	fi
 	cargo test --locked
 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check
 	cargo clippy --locked --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps
+	cargo fmt --manifest-path rig-firmware/uno/Cargo.toml --check
+	@if rig-firmware/build --can; then rig-firmware/build --clippy; fi
+
+firmware: ## Build the turntable's firmware for Arduino Uno and Nano
+	@rig-firmware/build $(FIRMWARE)
+
+emulator: $(EMULATOR) ## Build the emulated chip for the firmware's tests
+
+flash: firmware ## Flash the firmware to the Arduino at PORT (/dev/ttyACM0)
+	avrdude -p atmega328p -c arduino -P $(PORT) -b $(FLASH_BAUD) -D \
+	    -U flash:w:$(FIRMWARE)/rig-firmware-uno.hex:i
 
 demo: setup ## Make a shard of the recorded turn in fixtures/, verify it, and say where to look
 	cargo build --locked --release --bins
@@ -71,6 +95,10 @@ fuzz: setup ## Run each fuzz target for FUZZ_SECONDS (60)
 	        -max_total_time=$(FUZZ_SECONDS) \
 	        -malloc_limit_mb=$$([[ $$target == shard_reader ]] && echo $(FUZZ_SHARD_PIECE) || echo 2048); \
 	done
+
+$(EMULATOR): $(EMULATOR_SOURCES) $(wildcard rig-firmware/emulator/*.h)
+	@mkdir -p $(@D)
+	$(CC) -std=c11 -O2 -Wall -Wextra -o $@ $(EMULATOR_SOURCES) -lsimavr -lelf
 
 $(DEMO)/$(SESSION)/mask.png:
 	$(MAKE) demo

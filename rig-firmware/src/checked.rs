@@ -5,6 +5,7 @@
 
 use crate::error::Error;
 use crate::line::{Checksum, Line};
+use crate::number;
 
 /// The highest sequence number.
 pub const MAX_SEQUENCE: u32 = 9_999_999;
@@ -110,19 +111,10 @@ impl Session {
 
 /// `N<sequence>` and the block behind it.
 fn split(text: &[u8]) -> Option<(u32, &[u8])> {
-    let digits = text.strip_prefix(b"N")?;
-    let count = digits
-        .iter()
-        .take_while(|byte| byte.is_ascii_digit())
-        .count();
-    let (digits, block) = digits.split_at_checked(count)?;
-    if !(1..=7).contains(&count) {
-        return None;
+    match text {
+        [b'N', digits @ ..] => number::digits(digits, 7),
+        _ => None,
     }
-    let sequence = digits
-        .iter()
-        .fold(0, |value, digit| value * 10 + u32::from(digit - b'0'));
-    Some((sequence, block))
 }
 
 #[cfg(test)]

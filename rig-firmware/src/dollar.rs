@@ -4,7 +4,7 @@
 
 use crate::error::Error;
 use crate::gcode::{self, Jog, Modal};
-use crate::number;
+use crate::number::{self, Decimal};
 use crate::settings::Key;
 
 /// A `$` command.
@@ -14,8 +14,8 @@ pub enum Dollar {
     Help,
     /// `$$`: tell the settings.
     Settings,
-    /// `$n=v`: change a setting; the value in millionths.
-    Set(Key, i64),
+    /// `$n=v`: change a setting.
+    Set(Key, Decimal),
     /// `$I`: tell version and options.
     Version,
     /// `$H`: look for the index.
@@ -45,37 +45,44 @@ pub enum Dollar {
 /// [`Error::InvalidStatement`] for what is no command of this table, [`Error::InvalidJog`] for `$J`
 /// without `=`, [`Error::BadNumber`] for a value that is none, and what a jog gives.
 pub fn parse(text: &[u8], modal: &Modal) -> Result<Dollar, Error> {
-    let restore = |settings, offsets| Ok(Dollar::Restore { settings, offsets });
     match text {
-        b"" => Ok(Dollar::Help),
-        b"$" => Ok(Dollar::Settings),
-        b"I" => Ok(Dollar::Version),
-        b"H" => Ok(Dollar::Home),
-        b"X" => Ok(Dollar::Unlock),
-        b"C" => Ok(Dollar::Check),
-        b"G" => Ok(Dollar::Modal),
-        b"#" => Ok(Dollar::Offsets),
-        b"RST=$" => restore(true, false),
-        b"RST=#" => restore(false, true),
-        b"RST=*" => restore(true, true),
+        [] => Ok(Dollar::Help),
+        [b'J'] => Err(Error::InvalidJog),
+        [letter] => simple(*letter).ok_or(Error::InvalidStatement),
+        [b'R', b'S', b'T', b'=', what] => restore(*what).ok_or(Error::InvalidStatement),
         [b'J', b'=', jog @ ..] => gcode::parse_jog(jog, modal).map(Dollar::Jog),
         [b'J', ..] => Err(Error::InvalidJog),
         _ => set(text),
     }
 }
 
+fn simple(letter: u8) -> Option<Dollar> {
+    Some(match letter {
+        b'$' => Dollar::Settings,
+        b'I' => Dollar::Version,
+        b'H' => Dollar::Home,
+        b'X' => Dollar::Unlock,
+        b'C' => Dollar::Check,
+        b'G' => Dollar::Modal,
+        b'#' => Dollar::Offsets,
+        _ => return None,
+    })
+}
+
+fn restore(what: u8) -> Option<Dollar> {
+    let (settings, offsets) = match what {
+        b'$' => (true, false),
+        b'#' => (false, true),
+        b'*' => (true, true),
+        _ => return None,
+    };
+    Some(Dollar::Restore { settings, offsets })
+}
+
 fn set(text: &[u8]) -> Result<Dollar, Error> {
-    let count = text.iter().take_while(|byte| byte.is_ascii_digit()).count();
-    let (number, assignment) = text
-        .split_at_checked(count)
-        .filter(|_| (1..=3).contains(&count))
-        .ok_or(Error::InvalidStatement)?;
-    let number = number
-        .iter()
-        .fold(0, |value, digit| value * 10 + u32::from(digit - b'0'));
-    let value = assignment
-        .strip_prefix(b"=")
-        .ok_or(Error::InvalidStatement)?;
+    let Some((number, [b'=', value @ ..])) = number::digits(text, 3) else {
+        return Err(Error::InvalidStatement);
+    };
     let key = Key::of(number).ok_or(Error::InvalidStatement)?;
     match number::parse(value) {
         Some((value, [])) => Ok(Dollar::Set(key, value)),
@@ -95,11 +102,12 @@ mod tests {
     fn commands_are_told_apart() {
         assert_eq!(read(""), Ok(Dollar::Help));
         assert_eq!(read("$"), Ok(Dollar::Settings));
+        let number = |text: &str| number::parse(text.as_bytes()).unwrap().0;
         assert_eq!(
             read("110=2000.5"),
-            Ok(Dollar::Set(Key::MaxFeed, 2_000_500_000))
+            Ok(Dollar::Set(Key::MaxFeed, number("2000.5")))
         );
-        assert_eq!(read("0=-1"), Ok(Dollar::Set(Key::StepPulse, -1_000_000)));
+        assert_eq!(read("0=-1"), Ok(Dollar::Set(Key::StepPulse, number("-1"))));
         let all = Dollar::Restore {
             settings: true,
             offsets: true,

@@ -56,10 +56,10 @@ enum Loss {
     Here,
 }
 
-/// Gathers a line.
+/// Gathers a line. The text comes last: small fields are cheap to reach near the start.
 #[derive(Debug)]
+#[repr(C)]
 pub struct LineReader {
-    text: [u8; CAPACITY],
     length: u8,
     part: Part,
     crc: Crc,
@@ -67,6 +67,7 @@ pub struct LineReader {
     loss: Loss,
     after_return: bool,
     complete: bool,
+    text: [u8; CAPACITY],
 }
 
 impl LineReader {

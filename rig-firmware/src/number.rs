@@ -1,76 +1,167 @@
-//! Decimal numbers in fixed point: text to millionths, and division with rounding.
+//! Decimal numbers in fixed point: text to whole and fraction, and division with rounding.
 //!
-//! Floating point would cost the chip kilobytes. Knows nobody.
+//! Floating point would cost the chip kilobytes, and numbers of 64 bits more than half as much.
+//! Knows nobody.
 
-/// Reads a number such as `-12.5` from the start of `text`: its value in millionths, and the rest
-/// of the text. Digits after the sixth decimal are dropped.
+/// A decimal number of up to nine digits before the point and six behind it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Decimal {
+    negative: bool,
+    /// Up to 999 999 999.
+    whole: u32,
+    /// Below 1 000 000.
+    millionths: u32,
+}
+
+impl Decimal {
+    /// Below zero.
+    pub fn is_negative(self) -> bool {
+        self.negative
+    }
+
+    /// Nothing stands behind the point.
+    pub fn is_whole(self) -> bool {
+        self.millionths == 0
+    }
+
+    /// What stands before the point, without the sign.
+    pub fn whole(self) -> u32 {
+        self.whole
+    }
+
+    /// Whether it is this number.
+    pub fn is(self, number: u32) -> bool {
+        !self.negative && self.whole == number && self.is_whole()
+    }
+
+    /// Thousandths, to the nearest, halves away from zero.
+    ///
+    /// `None` where the result is beyond an `i32`.
+    pub fn thousandths(self) -> Option<i32> {
+        self.scaled(1000, 2_147_483, (self.millionths + 500) / 1000)
+    }
+
+    /// Inches to thousandths of a millimetre, as [`Decimal::thousandths`].
+    pub fn inches(self) -> Option<i32> {
+        self.scaled(25_400, 84_546, (self.millionths * 254 + 5000) / 10_000)
+    }
+
+    /// Seconds to microseconds; `None` for less than none or more than 4293 s.
+    pub fn micros(self) -> Option<u32> {
+        let fits = !self.negative && self.whole < 4294;
+        fits.then(|| self.whole * 1_000_000 + self.millionths)
+    }
+
+    /// `most`: the largest whole number that fits after scaling.
+    fn scaled(self, scale: u32, most: u32, fraction: u32) -> Option<i32> {
+        if self.whole > most {
+            return None;
+        }
+        let magnitude = i32::try_from(self.whole * scale + fraction).ok()?;
+        Some(if self.negative { -magnitude } else { magnitude })
+    }
+}
+
+/// Reads a number such as `-12.5` from the start of `text`, and tells the rest of the text. Digits
+/// after the sixth decimal are dropped.
 ///
 /// `None` where no digit stands, or with more than nine digits before the point.
-pub fn parse(text: &[u8]) -> Option<(i64, &[u8])> {
+pub fn parse(text: &[u8]) -> Option<(Decimal, &[u8])> {
     let (negative, mut rest) = match text.split_first() {
         Some((b'-', rest)) => (true, rest),
         Some((b'+', rest)) => (false, rest),
         _ => (false, text),
     };
-    let mut value = 0_i64;
+    let (mut whole, mut millionths) = (0_u32, 0_u32);
     let mut any = false;
-    let mut decimals = None;
+    // What the next decimal counts, once the point has come.
+    let mut unit = None;
     while let Some((&byte, after)) = rest.split_first() {
-        match (byte, decimals) {
-            (b'0'..=b'9', None | Some(0..6)) => {
-                value = value * 10 + i64::from(byte - b'0');
-                decimals = decimals.map(|count| count + 1);
+        match (byte, unit) {
+            (b'0'..=b'9', None) => {
                 any = true;
+                if whole > 99_999_999 {
+                    return None;
+                }
+                whole = whole * 10 + u32::from(byte - b'0');
             }
-            (b'0'..=b'9', Some(_)) => {}
-            (b'.', None) => decimals = Some(0),
+            (b'0'..=b'9', Some(counts)) => {
+                any = true;
+                millionths += u32::from(byte - b'0') * counts;
+                unit = Some(counts / 10);
+            }
+            (b'.', None) => unit = Some(100_000_u32),
             _ => break,
-        }
-        if decimals.is_none() && value > 999_999_999 {
-            return None;
         }
         rest = after;
     }
-    for _ in decimals.unwrap_or(0)..6 {
-        value *= 10;
-    }
-    any.then_some((if negative { -value } else { value }, rest))
-}
-
-/// `dividend / divisor` to the nearest, halves away from zero. Divisors are positive; zero as
-/// divisor gives zero.
-pub fn divide_rounded(dividend: i64, divisor: i64) -> i64 {
-    let half = divisor / 2;
-    let shifted = if dividend < 0 {
-        dividend.saturating_sub(half)
-    } else {
-        dividend.saturating_add(half)
+    let number = Decimal {
+        negative: negative && (whole, millionths) != (0, 0),
+        whole,
+        millionths,
     };
-    shifted.checked_div(divisor).unwrap_or(0)
+    any.then_some((number, rest))
 }
 
-/// Millionths to thousandths, to the nearest.
+/// Reads a number of at most `most` digits (nine at most) and nothing else, and tells the rest.
 ///
-/// `None` where the result is beyond an `i32`.
-pub fn to_thousandths(millionths: i64) -> Option<i32> {
-    i32::try_from(divide_rounded(millionths, 1000)).ok()
+/// `None` where no digit stands, or more.
+pub fn digits(text: &[u8], most: u8) -> Option<(u32, &[u8])> {
+    let (mut value, mut count, mut rest) = (0, 0, text);
+    while let Some((&byte @ b'0'..=b'9', after)) = rest.split_first() {
+        if count == most {
+            return None;
+        }
+        count += 1;
+        value = value * 10 + u32::from(byte - b'0');
+        rest = after;
+    }
+    (count > 0).then_some((value, rest))
+}
+
+/// `value * times / divisor` to the nearest, halves away from zero.
+///
+/// `None` where the result is beyond an `i32`, and for zero as divisor.
+pub fn scaled(value: i32, times: u32, divisor: u32) -> Option<i32> {
+    let product = u64::from(value.unsigned_abs()) * u64::from(times) + u64::from(divisor / 2);
+    let magnitude = product.checked_div(u64::from(divisor))?;
+    let magnitude = i32::try_from(magnitude).ok()?;
+    Some(if value < 0 { -magnitude } else { magnitude })
+}
+
+/// The end of what an `i32` can tell, on the side of `value`.
+pub fn end_towards(value: i32) -> i32 {
+    if value < 0 { i32::MIN } else { i32::MAX }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn number(negative: bool, whole: u32, millionths: u32) -> Decimal {
+        Decimal {
+            negative,
+            whole,
+            millionths,
+        }
+    }
+
+    fn read(text: &str) -> Decimal {
+        parse(text.as_bytes()).unwrap().0
+    }
+
     #[test]
     fn numbers_are_read_to_millionths_and_end_where_they_end() {
-        let cases: [(&str, i64, &str); 8] = [
-            ("12.5X", 12_500_000, "X"),
-            ("-0.001", -1000, ""),
-            ("+7", 7_000_000, ""),
-            (".25", 250_000, ""),
-            ("3.", 3_000_000, ""),
-            ("1.2.3", 1_200_000, ".3"),
-            ("0.12345678G", 123_456, "G"),
-            ("999999999", 999_999_999_000_000, ""),
+        let cases = [
+            ("12.5X", number(false, 12, 500_000), "X"),
+            ("-0.001", number(true, 0, 1000), ""),
+            ("+7", number(false, 7, 0), ""),
+            ("-0", number(false, 0, 0), ""),
+            (".25", number(false, 0, 250_000), ""),
+            ("3.", number(false, 3, 0), ""),
+            ("1.2.3", number(false, 1, 200_000), ".3"),
+            ("0.12345678G", number(false, 0, 123_456), "G"),
+            ("999999999", number(false, 999_999_999, 0), ""),
         ];
         for (text, value, rest) in cases {
             let got = parse(text.as_bytes());
@@ -86,19 +177,39 @@ mod tests {
     }
 
     #[test]
-    fn division_rounds_halves_away_from_zero() {
-        assert_eq!(divide_rounded(15, 10), 2);
-        assert_eq!(divide_rounded(14, 10), 1);
-        assert_eq!(divide_rounded(-15, 10), -2);
-        assert_eq!(divide_rounded(-14, 10), -1);
-        assert_eq!(divide_rounded(7, 0), 0);
-        assert_eq!(divide_rounded(i64::MAX, 1), i64::MAX);
+    fn digits_are_counted() {
+        assert_eq!(digits(b"110=5", 3), Some((110, &b"=5"[..])));
+        assert_eq!(digits(b"007", 3), Some((7, &b""[..])));
+        assert_eq!(digits(b"1234", 3), None);
+        assert_eq!(digits(b"x", 3), None);
+        assert_eq!(digits(b"999999999", 9), Some((999_999_999, &b""[..])));
     }
 
     #[test]
-    fn thousandths_that_do_not_fit_are_told() {
-        assert_eq!(to_thousandths(2_147_483_647_000), Some(i32::MAX));
-        assert_eq!(to_thousandths(2_147_483_648_000), None);
-        assert_eq!(to_thousandths(-1500), Some(-2));
+    fn scaling_rounds_halves_away_from_zero_and_tells_what_does_not_fit() {
+        assert_eq!(scaled(3, 5, 10), Some(2));
+        assert_eq!(scaled(14, 1, 10), Some(1));
+        assert_eq!(scaled(-15, 1, 10), Some(-2));
+        assert_eq!(scaled(-14, 1, 10), Some(-1));
+        assert_eq!(scaled(7, 1, 0), None);
+        assert_eq!(scaled(i32::MIN, u32::MAX, u32::MAX), None);
+        assert_eq!(scaled(i32::MAX, u32::MAX, u32::MAX), Some(i32::MAX));
+        assert_eq!(scaled(-2, u32::MAX, 1), None);
+    }
+
+    #[test]
+    fn scaled_numbers_round_halves_away_from_zero_and_have_to_fit() {
+        assert_eq!(read("-0.0015").thousandths(), Some(-2));
+        assert_eq!(read("0.0014").thousandths(), Some(1));
+        assert_eq!(read("2147483.647").thousandths(), Some(i32::MAX));
+        assert_eq!(read("2147483.648").thousandths(), None);
+        assert_eq!(read("-1.0001").inches(), Some(-25_403));
+        assert_eq!(read("84546.6").inches(), Some(2_147_483_640));
+        assert_eq!(read("84546.7").inches(), None);
+        assert_eq!(read("999999999").inches(), None);
+        assert_eq!(read("0.5").micros(), Some(500_000));
+        assert_eq!(read("4293.999999").micros(), Some(4_293_999_999));
+        assert_eq!(read("4295").micros(), None);
+        assert_eq!(read("-1").micros(), None);
     }
 }

@@ -15,12 +15,16 @@
 pub const TICKS_PER_SECOND: u32 = 2_000_000;
 /// Most steps a second.
 pub const MAX_STEP_RATE: u32 = 10_000;
-/// Parts of a tick in an interval.
-const PARTS: u64 = 256;
+/// Parts of a tick in a minute, times a million.
+const PARTS_PER_MINUTE: u64 = TICKS_PER_SECOND as u64 * 256 * 60 * 1_000_000;
+/// Above any speed, in thousandths of a step/s.
+const MAX_SPEED: u32 = 100_000_000;
+/// Above any ramp index, and four times it fits 32 bits.
+const MAX_INDEX: u32 = u32::MAX / 8;
 /// The longest interval: more, and the carried fraction would not fit.
-const MAX_INTERVAL: u64 = 0xFFFF_FF00;
+const MAX_INTERVAL: u32 = 0xFFFF_FF00;
 /// The longest first interval of a ramp: twice it, and a remainder, fit 32 bits.
-const MAX_FIRST: u64 = 1 << 30;
+const MAX_FIRST: u32 = 1 << 30;
 
 /// A steady speed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,7 +41,7 @@ pub struct Profile {
     /// Steps a degree, in thousandths.
     steps_per_degree: u32,
     /// Acceleration in thousandths of a step/s^2.
-    acceleration: u64,
+    acceleration: u32,
     /// c(0).
     first: u32,
 }
@@ -45,14 +49,17 @@ pub struct Profile {
 impl Profile {
     /// From thousandths of steps/degree and of degrees/s^2; both are positive.
     pub fn new(steps_per_degree: u32, acceleration: u32) -> Profile {
-        let acceleration = (u64::from(steps_per_degree) * u64::from(acceleration) / 1000).max(1);
+        let product = u64::from(steps_per_degree) * u64::from(acceleration);
+        let acceleration = u32::try_from(product / 1000).unwrap_or(u32::MAX).max(1);
         // (0.676 f)^2 * 2 in sixteenths of a tick, times 1000 for the thousandths.
         let squared = 1_352_000_u64.pow(2) * 2 * 256 * 1000;
-        let first = root(squared / acceleration) * 16;
+        let first = root(squared / u64::from(acceleration)) * 16;
         Profile {
             steps_per_degree,
             acceleration,
-            first: first.clamp(1, MAX_FIRST) as u32,
+            first: u32::try_from(first)
+                .unwrap_or(MAX_FIRST)
+                .clamp(1, MAX_FIRST),
         }
     }
 
@@ -60,12 +67,12 @@ impl Profile {
     /// one step in 8 s counts as that.
     pub fn cruise(&self, feed: u32) -> Cruise {
         // Thousandths times thousandths: millionths of a step/min.
-        let rate = (u64::from(feed) * u64::from(self.steps_per_degree)).max(1);
-        let parts_per_minute = u64::from(TICKS_PER_SECOND) * PARTS * 60 * 1_000_000;
-        let interval = ((parts_per_minute + rate / 2) / rate).min(MAX_INTERVAL) as u32;
-        let millisteps = (rate / 60_000).min(100_000_000);
-        let index = millisteps * millisteps / (2000 * self.acceleration);
-        let mut index = index.min(u64::from(u32::MAX / 8)) as u32;
+        let rate = u64::from(feed.max(1)) * u64::from(self.steps_per_degree.max(1));
+        let interval = (PARTS_PER_MINUTE + rate / 2) / rate;
+        let interval = u32::try_from(interval).map_or(MAX_INTERVAL, |it| it.min(MAX_INTERVAL));
+        let millisteps = u32::try_from(rate / 60_000).map_or(MAX_SPEED, |it| it.min(MAX_SPEED));
+        let index = u64::from(millisteps).pow(2) / 2000 / u64::from(self.acceleration);
+        let mut index = u32::try_from(index).map_or(MAX_INDEX, |it| it.min(MAX_INDEX));
         if index == 0 && interval < self.first {
             // Not from rest to this speed within less than the first interval.
             index = 1;
@@ -76,8 +83,7 @@ impl Profile {
     /// The speed at which steps come at `interval`, in thousandths of a degree/min.
     pub fn feed(&self, interval: u32) -> u32 {
         let rate = u64::from(interval) * u64::from(self.steps_per_degree);
-        let parts_per_minute = u64::from(TICKS_PER_SECOND) * PARTS * 60 * 1_000_000;
-        u32::try_from(parts_per_minute.checked_div(rate).unwrap_or(0)).unwrap_or(u32::MAX)
+        u32::try_from(PARTS_PER_MINUTE.checked_div(rate).unwrap_or(0)).unwrap_or(u32::MAX)
     }
 
     /// The first interval from rest, in 256ths of a tick.

@@ -74,8 +74,8 @@ impl<'a, B: Board> Reply<'a, B> {
     /// Sends a position on three axes, of which the table has one; thousandths of a degree.
     pub fn position(&mut self, position: i32, inches: bool) -> &mut Self {
         if inches {
-            let tenths = number::divide_rounded(i64::from(position) * 100, 254);
-            self.decimal(tenths as i32, 4).text(",0.0000,0.0000")
+            let tenths = number::scaled(position, 100, 254).unwrap_or(0);
+            self.decimal(tenths, 4).text(",0.0000,0.0000")
         } else {
             self.decimal(position, 3).text(",0.000,0.000")
         }
@@ -84,7 +84,7 @@ impl<'a, B: Board> Reply<'a, B> {
     /// Sends a speed in thousandths of a degree/min, as whole units/min.
     pub fn speed(&mut self, feed: u32, inches: bool) -> &mut Self {
         let unit = if inches { 25_400 } else { 1000 };
-        self.whole(number::divide_rounded(i64::from(feed), unit) as u32)
+        self.whole(feed.saturating_add(unit / 2) / unit)
     }
 
     /// Ends the line.

@@ -5,7 +5,7 @@
 
 use crate::board::Outputs;
 use crate::error::Error;
-use crate::number;
+use crate::number::Decimal;
 use crate::ramp::{MAX_STEP_RATE, Profile, TICKS_PER_SECOND};
 use crate::stepper::StepperSettings;
 
@@ -221,22 +221,22 @@ impl Settings {
         self.get(key) != 0
     }
 
-    /// Sets a value, given in millionths.
+    /// Sets a value.
     ///
     /// # Errors
     /// [`Error::Negative`]; [`Error::StepPulse`] for pulses shorter than 3 us; [`Error::BadNumber`]
     /// for any other value out of bounds or a fraction where a whole number belongs;
     /// [`Error::StepRate`] where the highest speed would be more than 10 000 steps/s. Nothing
     /// changes then.
-    pub fn set(&mut self, key: Key, millionths: i64) -> Result<(), Error> {
+    pub fn set(&mut self, key: Key, value: Decimal) -> Result<(), Error> {
         let spec = key.spec();
-        if millionths < 0 {
+        if value.is_negative() {
             return Err(Error::Negative);
         }
         let value = match spec.kind {
-            Kind::Decimal => number::to_thousandths(millionths),
-            Kind::Whole if millionths % 1_000_000 != 0 => None,
-            Kind::Whole => i32::try_from(millionths / 1_000_000).ok(),
+            Kind::Decimal => value.thousandths(),
+            Kind::Whole if !value.is_whole() => None,
+            Kind::Whole => i32::try_from(value.whole()).ok(),
         };
         let value = value.ok_or(Error::BadNumber)?;
         if key == Key::StepPulse && value < spec.least {
@@ -318,18 +318,19 @@ mod tests {
     fn values_out_of_bounds_are_refused_and_change_nothing() {
         let mut settings = Settings::defaults();
         let cases = [
-            (Key::StepPulse, 2_000_000, Error::StepPulse),
-            (Key::StepPulse, 101_000_000, Error::BadNumber),
-            (Key::ReleaseDelay, -1_000_000, Error::Negative),
-            (Key::ReleaseDelay, 1_500_000, Error::BadNumber),
-            (Key::SoftLimits, 2_000_000, Error::BadNumber),
-            (Key::MaxFeed, 6_751_000_000, Error::StepRate),
-            (Key::StepsPerDegree, 300_000_000, Error::StepRate),
-            (Key::StepsPerDegree, i64::MAX, Error::BadNumber),
-            (Key::Acceleration, 10_000, Error::BadNumber),
-            (Key::Travel, 0, Error::BadNumber),
+            (Key::StepPulse, "2", Error::StepPulse),
+            (Key::StepPulse, "101", Error::BadNumber),
+            (Key::ReleaseDelay, "-1", Error::Negative),
+            (Key::ReleaseDelay, "1.5", Error::BadNumber),
+            (Key::SoftLimits, "2", Error::BadNumber),
+            (Key::MaxFeed, "6751", Error::StepRate),
+            (Key::StepsPerDegree, "300", Error::StepRate),
+            (Key::StepsPerDegree, "999999999", Error::BadNumber),
+            (Key::Acceleration, "0.01", Error::BadNumber),
+            (Key::Travel, "0", Error::BadNumber),
         ];
-        for (key, value, error) in cases {
+        for (key, text, error) in cases {
+            let (value, _) = crate::number::parse(text.as_bytes()).unwrap();
             assert_eq!(settings.set(key, value), Err(error), "{key:?}");
         }
         assert_eq!(settings, Settings::defaults());

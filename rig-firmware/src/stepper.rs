@@ -73,10 +73,10 @@ const EMPTY: Queued = Queued {
     exit: 0,
 };
 
-/// The step generator.
+/// The step generator. The queue comes last: small fields are cheap to reach near the start.
 #[derive(Debug)]
+#[repr(C)]
 pub struct Stepper {
-    queue: [Queued; QUEUE],
     head: u8,
     length: u8,
     ramp: Ramp,
@@ -93,6 +93,7 @@ pub struct Stepper {
     halted_in_motion: bool,
     search: Search,
     settings: StepperSettings,
+    queue: [Queued; QUEUE],
 }
 
 impl Stepper {

@@ -52,33 +52,58 @@ pub struct Store {
     generation: u8,
 }
 
+/// What a slot holds; its values are read only when they are wanted, for they take a good part of
+/// the chip's memory.
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum Slot {
     Blank,
     Damaged,
-    Whole { stored: Stored, generation: u8 },
+    Whole { generation: u8 },
 }
 
 impl Store {
     /// Reads what is stored. Damage is mended: the next call finds both slots good.
     pub fn open(board: &mut impl Board) -> (Store, Stored, Health) {
-        let (first, second) = (read(board, false), read(board, true));
-        let damaged = matches!(first, Slot::Damaged) || matches!(second, Slot::Damaged);
-        let first = whole(&first).map(|(stored, generation)| (stored, generation, false));
-        let second = whole(&second).map(|(stored, generation)| (stored, generation, true));
-        let newest = match (first, second) {
-            (Some(a), Some(b)) if (b.1.wrapping_sub(a.1) as i8) > 0 => Some(b),
-            (a, b) => a.or(b),
-        };
-        let (stored, generation, second) = newest.unwrap_or((Stored::defaults(), 0, true));
-        let mut store = Store { second, generation };
+        let slots = [examine(board, false), examine(board, true)];
+        let mut store = Store::newest(slots);
+        let mut found = store.and_then(|store| read(board, store.second));
+        let mut damaged = slots.contains(&Slot::Damaged);
+        if let (Some(refused), None) = (store, found) {
+            // The checksum is right and the values are not: as another version left them.
+            damaged = true;
+            store = Store::of(slots, !refused.second);
+            found = store.and_then(|store| read(board, store.second));
+        }
+        let none = found.is_none();
+        let stored = found.unwrap_or_else(Stored::defaults);
+        let mut store = store.unwrap_or(Store {
+            second: true,
+            generation: 0,
+        });
         if !damaged {
             return (store, stored, Health::Good);
         }
         store.write(board, &stored);
-        if newest.is_none() {
+        if none {
             store.write(board, &stored);
         }
         (store, stored, Health::Damaged)
+    }
+
+    /// The slot that was written last.
+    fn newest(slots: [Slot; 2]) -> Option<Store> {
+        match (Store::of(slots, false), Store::of(slots, true)) {
+            (Some(a), Some(b)) if (b.generation.wrapping_sub(a.generation) as i8) > 0 => Some(b),
+            (a, b) => a.or(b),
+        }
+    }
+
+    /// One slot, if it is whole.
+    fn of(slots: [Slot; 2], second: bool) -> Option<Store> {
+        match slots[usize::from(second)] {
+            Slot::Whole { generation } => Some(Store { second, generation }),
+            Slot::Blank | Slot::Damaged => None,
+        }
     }
 
     /// Writes what has changed. Takes 3.4 ms for every byte that differs from what stands there.
@@ -102,13 +127,6 @@ fn start(second: bool) -> u16 {
     if second { STRIDE } else { 0 }
 }
 
-fn whole(slot: &Slot) -> Option<(Stored, u8)> {
-    match slot {
-        Slot::Whole { stored, generation } => Some((*stored, *generation)),
-        Slot::Blank | Slot::Damaged => None,
-    }
-}
-
 /// The byte at a place of a slot's body.
 fn body(stored: &Stored, generation: u8, at: u16) -> u8 {
     let Some(at) = at.checked_sub(2) else {
@@ -128,25 +146,15 @@ fn put(board: &mut impl Board, address: u16, byte: u8) {
     }
 }
 
-fn read(board: &mut impl Board, second: bool) -> Slot {
+/// Whether a slot's checksum is right.
+fn examine(board: &mut impl Board, second: bool) -> Slot {
     let start = start(second);
     let mut crc = Crc::new();
     let mut blank = true;
-    let mut words = [0_u32; WORDS as usize];
-    let (mut version, mut generation) = (0, 0);
     for at in 0..BODY {
         let byte = board.eeprom_read(start + at);
         crc.update(byte);
         blank &= byte == BLANK;
-        match at {
-            0 => version = byte,
-            1 => generation = byte,
-            _ => {
-                if let Some(word) = words.get_mut(usize::from((at - 2) / 4)) {
-                    *word |= u32::from(byte) << (8 * ((at - 2) % 4));
-                }
-            }
-        }
     }
     let sum = [
         board.eeprom_read(start + BODY),
@@ -155,20 +163,27 @@ fn read(board: &mut impl Board, second: bool) -> Slot {
     if blank && sum == [BLANK; 2] {
         return Slot::Blank;
     }
-    let whole = u16::from_be_bytes(sum) == crc.value() && version == VERSION;
-    match whole.then(|| decode(words)).flatten() {
-        Some(stored) => Slot::Whole { stored, generation },
-        None => Slot::Damaged,
+    if u16::from_be_bytes(sum) != crc.value() || board.eeprom_read(start) != VERSION {
+        return Slot::Damaged;
+    }
+    Slot::Whole {
+        generation: board.eeprom_read(start + 1),
     }
 }
 
-fn decode(words: [u32; WORDS as usize]) -> Option<Stored> {
+/// The values of a slot; `None` where they are not allowed.
+fn read(board: &mut impl Board, second: bool) -> Option<Stored> {
+    let mut at = start(second) + 2;
+    let mut word = || {
+        let bytes = core::array::from_fn(|_| {
+            at += 1;
+            board.eeprom_read(at - 1)
+        });
+        i32::from_le_bytes(bytes)
+    };
     let mut values = [0; COUNT];
-    for (value, word) in values.iter_mut().zip(words) {
-        *value = word as i32;
-    }
-    Some(Stored {
-        settings: Settings::from_values(values)?,
-        offset: words.last().copied()? as i32,
-    })
+    values.iter_mut().for_each(|value| *value = word());
+    let offset = word();
+    let settings = Settings::from_values(values)?;
+    Some(Stored { settings, offset })
 }

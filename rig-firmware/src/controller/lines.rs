@@ -5,31 +5,14 @@ use crate::board::{Board, Events};
 use crate::checked::Verdict;
 use crate::dollar::{self, Dollar};
 use crate::error::Error;
-use crate::gcode::{self, Action, Block, Jog, Modal, Motion};
+use crate::gcode::{self, Action, Block, Jog, Motion};
+use crate::number::Decimal;
 use crate::report::{self, Reply};
 use crate::settings::{Key, Settings};
 use crate::store::Stored;
 
 /// Most bytes that one round of the main loop reads.
 const BYTES_A_ROUND: u8 = 128;
-
-/// What a line asks for.
-enum Request {
-    Nothing,
-    Block(Block),
-    Dollar(Dollar),
-}
-
-impl Request {
-    fn read(text: &[u8], modal: &Modal, locked: bool) -> Result<Request, Error> {
-        match text {
-            [] => Ok(Request::Nothing),
-            [b'$', rest @ ..] => dollar::parse(rest, modal).map(Request::Dollar),
-            _ if locked => Err(Error::Locked),
-            _ => gcode::parse(text, modal).map(Request::Block),
-        }
-    }
-}
 
 impl Controller {
     /// Reads up to the end of a line, if the line before is done, and does what it says.
@@ -64,9 +47,16 @@ impl Controller {
             }
             Verdict::Execute { sequence, block } => {
                 let locked = self.jogging || matches!(self.mode, Mode::Alarm(_));
-                let request = Request::read(block, &self.modal, locked);
                 self.sequence = sequence;
-                let done = request.and_then(|request| self.execute(board, request));
+                // What is read is a value of its own: the line's text is not needed any more.
+                let done = match block {
+                    [] => Ok(()),
+                    [b'$', rest @ ..] => dollar::parse(rest, &self.modal)
+                        .and_then(|command| self.execute_dollar(board, command)),
+                    _ if locked => Err(Error::Locked),
+                    _ => gcode::parse(block, &self.modal)
+                        .and_then(|block| self.execute_block(board, &block)),
+                };
                 if done.is_err() || (self.job == Job::None && self.stopping.is_none()) {
                     self.answer(board, done);
                 }
@@ -93,14 +83,6 @@ impl Controller {
     }
 
     /// Does what a line says, or leaves a job that will.
-    fn execute<B: Board>(&mut self, board: &mut B, request: Request) -> Result<(), Error> {
-        match request {
-            Request::Nothing => Ok(()),
-            Request::Block(block) => self.execute_block(board, &block),
-            Request::Dollar(command) => self.execute_dollar(board, command),
-        }
-    }
-
     fn execute_block<B: Board>(&mut self, board: &mut B, block: &Block) -> Result<(), Error> {
         let feed = match block.modal.motion {
             Motion::Feed => block.modal.feed,
@@ -139,8 +121,9 @@ impl Controller {
     /// The offset that, together with `other`, gives the place where the plan ends the work
     /// position `x`.
     fn zero_for(&self, x: i32, other: i32) -> Result<i32, Error> {
-        let zero = i64::from(self.planned.angle) - i64::from(other) - i64::from(x);
-        i32::try_from(zero).map_err(|_| Error::InvalidTarget)
+        let zero = self.planned.angle.checked_sub(other);
+        zero.and_then(|zero| zero.checked_sub(x))
+            .ok_or(Error::InvalidTarget)
     }
 
     fn go<B: Board>(&mut self, board: &mut B, target: i32, then: Option<i32>, feed: u32) {
@@ -213,7 +196,7 @@ impl Controller {
         }
     }
 
-    fn set<B: Board>(&mut self, board: &mut B, key: Key, value: i64) -> Result<(), Error> {
+    fn set<B: Board>(&mut self, board: &mut B, key: Key, value: Decimal) -> Result<(), Error> {
         self.require_rest(board)?;
         self.settings.set(key, value)?;
         self.apply_settings(board);

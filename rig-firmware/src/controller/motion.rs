@@ -5,7 +5,7 @@ use crate::board::Board;
 use crate::error::Error;
 use crate::gcode::Target;
 use crate::homing::{self, Leg, Outcome, Phase};
-use crate::number::divide_rounded;
+use crate::number::{end_towards, scaled};
 use crate::settings::Key;
 use crate::stepper::{Full, Move};
 
@@ -94,15 +94,15 @@ impl Controller {
         })
     }
 
-    fn advance_dwell<B: Board>(&mut self, board: &mut B, since: Option<u32>, left: i64) {
+    fn advance_dwell<B: Board>(&mut self, board: &mut B, since: Option<u32>, left: u32) {
         let busy = board.with_stepper(|stepper, _| stepper.is_moving() || stepper.has_plan());
         let now = board.micros();
         let waiting = busy || self.hold;
         let left = match since {
-            Some(since) if !waiting => left - i64::from(now.wrapping_sub(since)),
+            Some(since) if !waiting => left.saturating_sub(now.wrapping_sub(since)),
             _ => left,
         };
-        if !waiting && left <= 0 {
+        if !waiting && left == 0 {
             self.finish(board, Ok(()));
         } else {
             let since = (!waiting).then_some(now);
@@ -204,12 +204,14 @@ impl Controller {
     /// [`Error::InvalidTarget`] beyond what positions can tell.
     pub(super) fn resolve(&self, target: Target) -> Result<i32, Error> {
         let angle = match target {
-            Target::Machine(x) => i64::from(x),
-            Target::Work(x) => i64::from(x) + i64::from(self.offset) + i64::from(self.shift),
-            Target::Relative(x) => i64::from(x) + i64::from(self.planned.angle),
+            Target::Machine(x) => Some(x),
+            Target::Work(x) => x
+                .checked_add(self.offset)
+                .and_then(|x| x.checked_add(self.shift)),
+            Target::Relative(x) => x.checked_add(self.planned.angle),
         };
-        let angle = i32::try_from(angle).map_err(|_| Error::InvalidTarget)?;
-        i32::try_from(self.steps(angle)).map_err(|_| Error::InvalidTarget)?;
+        let angle = angle.ok_or(Error::InvalidTarget)?;
+        self.steps(angle).ok_or(Error::InvalidTarget)?;
         Ok(angle)
     }
 
@@ -220,21 +222,18 @@ impl Controller {
     }
 
     /// Thousandths of a degree to steps, always from zero: so relative moves do not drift.
-    fn steps(&self, angle: i32) -> i64 {
-        let steps_per_degree = i64::from(self.settings.get(Key::StepsPerDegree));
-        divide_rounded(i64::from(angle) * steps_per_degree, 1_000_000)
+    fn steps(&self, angle: i32) -> Option<i32> {
+        scaled(angle, self.settings.amount(Key::StepsPerDegree), 1_000_000)
     }
 
     fn saturated_steps(&self, angle: i32) -> i32 {
-        self.steps(angle)
-            .clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
+        self.steps(angle).unwrap_or(end_towards(angle))
     }
 
     /// Steps to thousandths of a degree.
     pub(super) fn angle(&self, steps: i32) -> i32 {
-        let steps_per_degree = i64::from(self.settings.get(Key::StepsPerDegree));
-        divide_rounded(i64::from(steps) * 1_000_000, steps_per_degree)
-            .clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
+        let angle = scaled(steps, 1_000_000, self.settings.amount(Key::StepsPerDegree));
+        angle.unwrap_or(end_towards(steps))
     }
 
     /// Plans from where the table stands; after whatever ended a plan early.

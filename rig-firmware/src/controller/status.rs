@@ -3,14 +3,14 @@
 use super::{Controller, Job, Mode};
 use crate::board::Board;
 use crate::gcode::Motion;
-use crate::number::divide_rounded;
+use crate::number::scaled;
 use crate::report::Reply;
 use crate::settings::Key;
 
 /// Every so many reports tell the work offset.
 const OFFSET_EVERY: u8 = 10;
 /// The battery input's full scale.
-const BATTERY_FULL: i64 = 1023;
+const BATTERY_FULL: u32 = 1023;
 
 /// What the stepper knows, at one moment.
 struct Snapshot {
@@ -85,8 +85,8 @@ impl Controller {
     }
 
     fn centivolts(&self, battery: u16) -> i32 {
-        let scale = i64::from(self.settings.get(Key::BatteryScale));
-        divide_rounded(i64::from(battery) * scale, BATTERY_FULL * 10) as i32
+        let scale = self.settings.amount(Key::BatteryScale);
+        scaled(i32::from(battery), scale, BATTERY_FULL * 10).unwrap_or(0)
     }
 
     /// `$G`.

@@ -5,9 +5,9 @@
 
 mod words;
 
-use self::words::{ONE, OneShot, Words};
+use self::words::{OneShot, Words};
 use crate::error::Error;
-use crate::number;
+use crate::number::Decimal;
 
 /// What one line leaves for the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,7 +68,7 @@ pub enum Action {
     /// `G0`, `G1`: go there.
     Move(Target),
     /// `G4`: wait so many microseconds at rest.
-    Dwell(i64),
+    Dwell(u32),
     /// `G10 L20`: the present place has this work position, kept in the EEPROM.
     SetOrigin(i32),
     /// `G28`: go to machine zero at full speed, over a place if one is named.
@@ -138,19 +138,22 @@ impl Words {
     }
 
     /// That no word is left over which only `G4` and `G10` use.
-    fn without(&self, words: &[Option<i64>]) -> Result<(), Error> {
-        match words.iter().any(Option::is_some) {
+    fn without_values(&self) -> Result<(), Error> {
+        match self.l.is_some() || self.p.is_some() {
             true => Err(Error::UnusedWords),
             false => Ok(()),
         }
     }
 
     fn dwell(&self) -> Result<Action, Error> {
-        self.without(&[self.l])?;
+        if self.l.is_some() {
+            return Err(Error::UnusedWords);
+        }
         if self.x.is_some() {
             return Err(Error::UnusedAxisWords);
         }
-        self.p.map(Action::Dwell).ok_or(Error::ValueMissing)
+        let micros = self.p.ok_or(Error::ValueMissing)?.micros();
+        micros.map(Action::Dwell).ok_or(Error::BadNumber)
     }
 
     fn set_origin(&self, modal: &Modal) -> Result<Action, Error> {
@@ -158,17 +161,17 @@ impl Words {
         let (Some(l), Some(p)) = (self.l, self.p) else {
             return Err(Error::ValueMissing);
         };
-        if l != 20 * ONE {
+        if !l.is(20) {
             return Err(Error::Unsupported);
         }
-        if p != 0 && p != ONE {
+        if !p.is(0) && !p.is(1) {
             return Err(Error::CoordinateSystem);
         }
         Ok(Action::SetOrigin(x))
     }
 
     fn go(&self, modal: &Modal) -> Result<Action, Error> {
-        self.without(&[self.l, self.p])?;
+        self.without_values()?;
         let Some(target) = self.target(modal)? else {
             return match self.one_shot {
                 Some(OneShot::Machine) => Err(Error::MachineMotion),
@@ -182,13 +185,13 @@ impl Words {
     }
 }
 
-/// Millionths of a millimetre or inch to thousandths of a degree.
-fn degrees(millionths: i64, inches: bool) -> Option<i32> {
+/// Millimetres or inches to thousandths of a degree.
+fn degrees(value: Decimal, inches: bool) -> Option<i32> {
     if inches {
-        let scaled = number::divide_rounded(millionths.checked_mul(254)?, 10);
-        return number::to_thousandths(scaled);
+        value.inches()
+    } else {
+        value.thousandths()
     }
-    number::to_thousandths(millionths)
 }
 
 /// Reads a line of G-code under the modal state before it.
@@ -196,17 +199,18 @@ fn degrees(millionths: i64, inches: bool) -> Option<i32> {
 /// # Errors
 /// Grbl's number for what is wrong first.
 pub fn parse(text: &[u8], before: &Modal) -> Result<Block, Error> {
-    let words = Words::read(text)?;
+    let mut words = Words::default();
+    words.read(text)?;
     let modal = words.modal(before)?;
     let action = match words.one_shot {
         Some(OneShot::Dwell) => words.dwell()?,
         Some(OneShot::SetOrigin) => words.set_origin(&modal)?,
         Some(OneShot::GoHome) => {
-            words.without(&[words.l, words.p])?;
+            words.without_values()?;
             Action::GoHome(words.target(&modal)?)
         }
         Some(OneShot::SetOffset) => {
-            words.without(&[words.l, words.p])?;
+            words.without_values()?;
             Action::SetOffset(words.origin(&modal)?)
         }
         Some(OneShot::Machine) | None => words.go(&modal)?,
@@ -221,7 +225,8 @@ pub fn parse(text: &[u8], before: &Modal) -> Result<Block, Error> {
 /// [`Error::InvalidJog`] for commands and words that a jog has no use for, [`Error::NoAxisWords`],
 /// [`Error::UndefinedFeed`], and what reading words gives.
 pub fn parse_jog(text: &[u8], modal: &Modal) -> Result<Jog, Error> {
-    let words = Words::read(text)?;
+    let mut words = Words::default();
+    words.read(text)?;
     let allowed = matches!(words.one_shot, None | Some(OneShot::Machine));
     if !allowed || words.motion.is_some() || words.l.is_some() || words.p.is_some() {
         return Err(Error::InvalidJog);
@@ -284,6 +289,7 @@ mod tests {
             ("X1000000000", 2),
             ("F-1", 4),
             ("G4P-1", 4),
+            ("G4P5000", 2),
             ("G2X1", 20),
             ("M5", 20),
             ("Y1", 20),

@@ -1,0 +1,427 @@
+//! The firmware that is flashed, on an emulated ATmega328P, timed in the chip's own cycles.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+mod chip;
+
+use chip::{CYCLES_PER_US, Chip, MS, STEPS_PER_DEGREE, Step};
+
+/// Cycles of one step at 432 degrees/min.
+const TURN_INTERVAL: f64 = 60.0 * 16e6 / (432.0 * STEPS_PER_DEGREE);
+
+/// A byte's time on the wire.
+const BYTE: u64 = 1360;
+
+/// The chip after power-on; ends the test where there is none.
+macro_rules! power_on {
+    () => {
+        match Chip::start() {
+            Some((chip, _)) => chip,
+            None => return,
+        }
+    };
+}
+
+fn intervals(steps: &[Step]) -> impl Iterator<Item = f64> + '_ {
+    steps
+        .windows(2)
+        .map(|pair| (pair[1].cycle - pair[0].cycle) as f64)
+}
+
+fn degrees(steps: f64) -> f64 {
+    steps / STEPS_PER_DEGREE
+}
+
+/// Moves at the speed of a turn, with more blocks behind, long enough to have ramped up.
+fn turn_with_full_buffer(chip: &mut Chip) {
+    chip.accept("G91");
+    for _ in 0..13 {
+        chip.write(b"G1X5F432\n");
+    }
+    chip.run(1000 * MS);
+    assert_eq!(chip.status().state(), "Run");
+}
+
+/// The first moment after `cycle` by which the table has visibly slowed down.
+fn slowed_at(chip: &Chip, cycle: u64) -> u64 {
+    chip.steps
+        .windows(2)
+        .filter(|pair| pair[1].cycle > cycle)
+        .find(|pair| (pair[1].cycle - pair[0].cycle) as f64 > TURN_INTERVAL * 1.005)
+        .map(|pair| pair[1].cycle)
+        .expect("the table slows down")
+}
+
+#[test]
+fn a_whole_turn_takes_50_s_at_constant_speed_while_the_host_polls() {
+    let mut chip = power_on!();
+    chip.accept("G91");
+    chip.accept("G1 X362 F432");
+    while chip.status().state() == "Run" {
+        chip.run(50 * MS);
+    }
+    assert_eq!(chip.net_steps(), (362.0 * STEPS_PER_DEGREE).round() as i64);
+
+    // One degree is left for each ramp, which takes 0.72.
+    let margin = STEPS_PER_DEGREE.ceil() as usize;
+    let turn = (360.0 * STEPS_PER_DEGREE).round() as usize;
+    let constant = &chip.steps[margin..=margin + turn];
+    let seconds = (constant[turn].cycle - constant[0].cycle) as f64 / 16e6;
+    assert!((seconds - 50.0).abs() <= 0.05, "{seconds} s");
+
+    let frame = (0.24 * STEPS_PER_DEGREE).floor() as usize;
+    let worst = constant
+        .windows(frame + 1)
+        .map(|steps| {
+            let interval = (steps[frame].cycle - steps[0].cycle) as f64 / frame as f64;
+            (TURN_INTERVAL / interval - 1.0).abs()
+        })
+        .fold(0.0, f64::max);
+    let shortest = intervals(constant).fold(f64::MAX, f64::min);
+    let longest = intervals(constant).fold(0.0, f64::max);
+    println!(
+        "a turn: {seconds:.5} s; worst speed error over 0.24 degrees {:.4} %; steps {:.1} to \
+         {:.1} us apart",
+        worst * 100.0,
+        shortest / 16.0,
+        longest / 16.0
+    );
+    assert!(worst <= 0.005, "{worst}");
+    assert_eq!(chip.overruns, 0);
+}
+
+#[test]
+fn speed_grows_and_falls_by_the_set_acceleration() {
+    let mut chip = power_on!();
+    chip.accept("G91");
+    chip.accept("G1 X20 F432");
+    chip.rest();
+    let fast = |steps: &[Step]| {
+        steps
+            .windows(2)
+            .position(|pair| ((pair[1].cycle - pair[0].cycle) as f64) < TURN_INTERVAL * 1.002)
+            .expect("the table reaches its speed") as f64
+    };
+    let up = degrees(fast(&chip.steps));
+    let mut backwards: Vec<Step> = chip.steps.clone();
+    let end = backwards.last().unwrap().cycle;
+    backwards.reverse();
+    for step in &mut backwards {
+        step.cycle = end - step.cycle;
+    }
+    let down = degrees(fast(&backwards));
+    println!("ramps: {up:.3} and {down:.3} degrees");
+    assert!((up - 0.72).abs() < 0.03, "{up}");
+    assert!((down - 0.72).abs() < 0.03, "{down}");
+}
+
+#[test]
+fn a_feed_hold_ramps_down_at_once_with_a_full_buffer_and_resumes_to_the_exact_target() {
+    let mut chip = power_on!();
+    turn_with_full_buffer(&mut chip);
+    let held = chip.cycle + BYTE;
+    chip.write(b"!");
+    chip.run(500 * MS);
+    let slowed = slowed_at(&chip, held);
+    println!("hold: slower {} us after the byte", (slowed - held) / 16);
+    assert!(slowed - held <= 10 * MS);
+
+    let stopped = chip.steps.last().unwrap().cycle;
+    assert!(stopped - held < 230 * MS, "the ramp of 0.2 s and a little");
+    assert_eq!(chip.status().state(), "Hold:0");
+    chip.write(b"~");
+    chip.rest();
+    assert_eq!(chip.net_steps(), (65.0 * STEPS_PER_DEGREE).round() as i64);
+}
+
+#[test]
+fn a_reset_stops_at_once_and_names_its_cause() {
+    let mut chip = power_on!();
+    turn_with_full_buffer(&mut chip);
+    let reset = chip.cycle + BYTE;
+    chip.write(&[0x18]);
+    chip.run(20 * MS);
+    let last = chip.steps.last().unwrap().cycle;
+    assert!(last < reset + 100 * CYCLES_PER_US, "{last} {reset}");
+
+    let mut lines = Vec::new();
+    while let Some(line) = chip.line(200 * MS) {
+        lines.push(line);
+    }
+    assert!(lines.contains(&"ALARM:3".to_string()), "{lines:?}");
+    assert!(
+        lines.contains(&"Grbl 1.1h ['$' for help] [reset: host]".to_string()),
+        "{lines:?}"
+    );
+    assert_eq!(chip.ask("G1 X1 F100").1, "error:9");
+    chip.accept("$X");
+}
+
+#[test]
+fn a_silent_host_loses_its_lease() {
+    let mut chip = power_on!();
+    chip.accept("$60=1");
+    chip.accept("G91");
+    chip.accept("G1 X100 F432");
+    chip.run(500 * MS);
+    let last_byte = chip.cycle + BYTE;
+    chip.status();
+    chip.run(1500 * MS);
+    let slowed = slowed_at(&chip, last_byte);
+    println!(
+        "lease of 1 s: slower after {} ms",
+        (slowed - last_byte) / MS
+    );
+    assert!(slowed > last_byte + 990 * MS, "not before its time");
+    assert!(slowed <= last_byte + 1100 * MS);
+    assert!(chip.steps.last().unwrap().cycle <= last_byte + 1310 * MS);
+    assert_eq!(chip.line(MS).as_deref(), Some("ALARM:20"));
+    assert_eq!(chip.status().state(), "Alarm");
+    let position = (chip.status().position() * STEPS_PER_DEGREE).round() as i64;
+    assert_eq!(position, chip.net_steps(), "the position is kept");
+    chip.accept("$X");
+}
+
+#[test]
+fn the_emergency_stop_ends_steps_and_current_within_a_millisecond_and_latches() {
+    let mut chip = power_on!();
+    turn_with_full_buffer(&mut chip);
+    // The main loop is busy for some 50 ms.
+    chip.write(b"$$\n");
+    chip.run(10 * MS);
+    let pressed = chip.cycle;
+    chip.command("pin estop 0");
+    chip.run(300 * MS);
+    let last = chip.steps.last().unwrap().cycle;
+    let released = chip.enables.last().unwrap();
+    println!(
+        "emergency stop: last step {} us after, driver released {} us after",
+        last.saturating_sub(pressed) / 16,
+        (released.cycle - pressed) / 16
+    );
+    assert!(last <= pressed + MS);
+    assert!(released.level && released.cycle <= pressed + MS);
+    assert!(released.cycle >= pressed);
+
+    while let Some(line) = chip.line(MS) {
+        if line == "ALARM:10" {
+            break;
+        }
+    }
+    assert_eq!(chip.status().field("Pn"), Some("R"));
+    assert_eq!(chip.ask("$X").1, "error:9");
+    chip.command("pin estop 1");
+    chip.run(10 * MS);
+    assert_eq!(chip.ask("$X").1, "error:9", "latched until a reset");
+    chip.write(&[0x18]);
+    chip.banner();
+    chip.accept("$X");
+}
+
+/// Homes from where the table stands; returns the step, counted since power-on, that is zero now.
+fn home(chip: &mut Chip) -> i64 {
+    chip.accept("$H");
+    let position = (chip.status().position() * STEPS_PER_DEGREE).round() as i64;
+    chip.net_steps() - position
+}
+
+#[test]
+fn homing_finds_the_same_step_from_everywhere_and_from_both_sides() {
+    let mut chip = power_on!();
+    chip.command("index 1000 1050 32000");
+    chip.accept("$22=1");
+    let first = home(&mut chip);
+    for start in [
+        "G1 X-5 F2160",
+        "G1 X-9.5 F2160",
+        "G1 X0.2 F2160",
+        "G1 X0 F2160",
+    ] {
+        chip.accept("G90");
+        chip.accept(start);
+        chip.rest();
+        assert_eq!(home(&mut chip), first, "after {start}");
+    }
+    assert_eq!(first, 1000, "the first step at which the index is active");
+
+    chip.accept("$23=1");
+    let other = home(&mut chip);
+    for start in ["G1 X6 F2160", "G1 X-0.3 F2160"] {
+        chip.accept("G90");
+        chip.accept(start);
+        chip.rest();
+        assert_eq!(home(&mut chip), other, "after {start}");
+    }
+    assert_eq!(
+        other, 1050,
+        "from the other side, the index begins at its other end"
+    );
+}
+
+#[test]
+fn a_table_without_an_index_gives_homing_up() {
+    let mut chip = power_on!();
+    chip.accept("$22=1");
+    chip.accept("$25=2160");
+    chip.write(b"$H\n");
+    let mut lines = Vec::new();
+    while !lines.iter().any(|line| line == "ALARM:9") {
+        lines.push(chip.line(30_000 * MS).expect("the search ends"));
+    }
+    let searched = degrees(chip.steps.len() as f64);
+    assert!((375.0..390.0).contains(&searched), "{searched} degrees");
+}
+
+#[test]
+fn settings_survive_a_reset_and_damage_is_told() {
+    let (mut chip, banner) = match Chip::start() {
+        Some(started) => started,
+        None => return,
+    };
+    assert!(banner.ends_with("[reset: power-on]"), "{banner}");
+    chip.accept("$120=40");
+    chip.accept("$1=255");
+    chip.command("reset external");
+    assert!(chip.banner().ends_with("[reset: external]"));
+    let (listing, _) = chip.ask("$$");
+    assert!(listing.contains(&"$120=40.000".to_string()), "{listing:?}");
+    assert!(listing.contains(&"$1=255".to_string()), "{listing:?}");
+
+    for address in 0..512 {
+        chip.command(&format!("eeprom {address} {}", (address * 7 + 3) % 256));
+    }
+    chip.command("reset power-on");
+    let told = chip.line(500 * MS);
+    assert_eq!(told.as_deref(), Some("error:7"));
+    chip.banner();
+    let (listing, _) = chip.ask("$$");
+    assert!(listing.contains(&"$120=36.000".to_string()), "{listing:?}");
+}
+
+#[test]
+fn a_hung_program_stops_the_motor_and_starts_anew_and_says_so() {
+    let mut chip = power_on!();
+    turn_with_full_buffer(&mut chip);
+    let hung = chip.cycle;
+    chip.command("hang");
+    let banner = chip.banner();
+    assert!(banner.ends_with("[reset: watchdog]"), "{banner}");
+    let last = chip.steps.last().unwrap().cycle;
+    assert!(last < hung + 600 * MS, "{last} {hung}");
+    assert!(chip.enables.last().unwrap().level, "the driver is released");
+    assert_eq!(chip.status().position(), 0.0);
+
+    chip.command("reset brown-out");
+    assert!(chip.banner().ends_with("[reset: brown-out]"));
+    chip.command("reset external");
+    assert!(chip.banner().ends_with("[reset: external]"));
+}
+
+#[test]
+fn the_battery_is_measured() {
+    let mut chip = power_on!();
+    for (millivolts, full_scale, volts) in [(3000_u32, "15.5", 9.3), (4000, "16", 12.8)] {
+        chip.accept(&format!("$61={full_scale}"));
+        chip.command(&format!("battery {millivolts}"));
+        chip.run(10 * MS);
+        let shown: f64 = chip.status().field("Bat").unwrap().parse().unwrap();
+        assert!((shown - volts).abs() <= 0.02, "{shown} for {volts}");
+    }
+}
+
+#[test]
+fn the_driver_is_fed_before_the_first_step_and_released_after_rest() {
+    let mut chip = power_on!();
+    let before = chip.enables.len();
+    chip.accept("G91");
+    chip.accept("G1 X2 F432");
+    chip.rest();
+    chip.run(400 * MS);
+    let [fed, released] = chip.enables[before..] else {
+        panic!("{:?}", &chip.enables[before..]);
+    };
+    assert!(!fed.level && released.level);
+    let lead = chip.steps[0].cycle - fed.cycle;
+    assert!((MS..50 * MS).contains(&lead), "{} us", lead / 16);
+    let rest = released.cycle - chip.steps.last().unwrap().cycle;
+    assert!((245 * MS..280 * MS).contains(&rest), "{} ms", rest / MS);
+}
+
+#[test]
+fn time_and_position_of_a_report_belong_together() {
+    let mut chip = power_on!();
+    chip.accept("G91");
+    chip.accept("G1 X30 F2160");
+    chip.run(300 * MS);
+    // Steps lag behind their interrupt's beginning; the clock starts some cycles after power-on.
+    let slack = 150 * CYCLES_PER_US;
+    for pause in [3, 7, 11, 13, 17, 19, 23, 29, 31, 37] {
+        chip.run(pause * MS + pause * 1237);
+        let status = chip.status();
+        let at = status.micros() * CYCLES_PER_US;
+        let steps =
+            |cycle: u64| chip.steps.iter().filter(|step| step.cycle <= cycle).count() as f64;
+        let told = (status.position() * STEPS_PER_DEGREE).round();
+        assert!(
+            (steps(at.saturating_sub(slack))..=steps(at + slack)).contains(&told),
+            "{told} steps at {at}, {} to {}",
+            steps(at - slack),
+            steps(at + slack)
+        );
+    }
+}
+
+/// CRC-16/CCITT-FALSE, bit by bit.
+fn crc(bytes: &[u8]) -> u16 {
+    bytes.iter().fold(0xFFFF, |crc, byte| {
+        (0..8).fold(crc ^ (u16::from(*byte) << 8), |crc, _| {
+            if crc & 0x8000 == 0 {
+                crc << 1
+            } else {
+                (crc << 1) ^ 0x1021
+            }
+        })
+    })
+}
+
+fn checked(text: &str) -> String {
+    format!("{text}*{:04X}", crc(text.as_bytes()))
+}
+
+#[test]
+fn ten_thousand_checked_lines_at_full_speed_lose_no_byte() {
+    let mut chip = power_on!();
+    chip.accept("$110=2160");
+    chip.accept("G90");
+    for target in [390, -390, 390, -390, 390] {
+        chip.accept(&format!("G1 X{target} F2160"));
+    }
+    let blocks = ["G90", "F2160", "", "(a comment that makes it long) G1 F432"];
+    let session = checked("N0 ");
+    chip.write(format!("{session}\n").as_bytes());
+    assert_eq!(chip.line(100 * MS), Some(checked("ok N0")));
+
+    // Four lines without a pause, as many as the buffer takes, and a report between them.
+    for burst in 0..2500 {
+        let numbers = burst * 4 + 1..=burst * 4 + 4;
+        let mut bytes = String::new();
+        for number in numbers.clone() {
+            bytes += &checked(&format!("N{number} {}", blocks[number % blocks.len()]));
+            bytes += "\n";
+        }
+        assert!(bytes.len() <= 128, "{}", bytes.len());
+        bytes.insert(bytes.len() / 2, '?');
+        chip.write(bytes.as_bytes());
+        for number in numbers {
+            let mut answer = chip.line(500 * MS).expect("an answer within 500 ms");
+            while answer.starts_with('<') {
+                assert!(answer.starts_with("<Run"), "{answer}");
+                answer = chip.line(500 * MS).expect("an answer within 500 ms");
+            }
+            assert_eq!(answer, checked(&format!("ok N{number}")));
+        }
+    }
+    assert_eq!(chip.overruns, 0);
+    let free = chip.stack_free();
+    println!("stack: {free} bytes were never used");
+    assert!(free >= 128, "{free}");
+}
