@@ -148,7 +148,8 @@ impl Link {
         }))
     }
 
-    /// The table's state by a report that was asked for just now.
+    /// The table's state by a report that was asked for just now, and by one more where they have
+    /// no checksum.
     pub(super) fn status(&self) -> Result<Status, TurntableError> {
         let asked_us = self.clock.now_us();
         let until_us = asked_us + REPORT_WAIT.as_micros() as i64;
@@ -159,7 +160,7 @@ impl Link {
             }
             let seen = supervisor.seen()?;
             let fresh = seen.asked_us.is_some_and(|us| us >= asked_us);
-            fresh.then(|| Ok(Status::of(seen, supervisor)))
+            (fresh && supervisor.is_confirmed()).then(|| Ok(Status::of(seen, supervisor)))
         });
         status.unwrap_or(Err(TurntableError::Silent {
             milliseconds: REPORT_WAIT.as_millis() as u64,

@@ -13,8 +13,7 @@ mod tests;
 use super::Alarm;
 use super::error::Fault;
 use super::wire::{
-    Counts, Event, LineFault, Machine, Outcome, Patience, Poll, Position, ResetCause, SendError,
-    State,
+    Counts, Event, LineFault, Machine, Outcome, Patience, Poll, ResetCause, SendError, State,
 };
 pub(crate) use motion::{Course, Motion};
 pub(crate) use seen::{Habits, Seen};
@@ -35,6 +34,7 @@ pub(crate) struct Supervisor {
     slack_us: i64,
     answer: Option<(u64, Outcome)>,
     seen: Option<Seen>,
+    confirmed: bool,
     work_zero: Option<f64>,
     /// The angle counted as zero, from machine zero; `None` while the position is not known.
     zero_deg: Option<f64>,
@@ -60,6 +60,7 @@ impl Supervisor {
             habits,
             answer: None,
             seen: None,
+            confirmed: false,
             work_zero: None,
             zero_deg: None,
             alarm: None,
@@ -88,6 +89,12 @@ impl Supervisor {
 
     pub(crate) fn seen(&self) -> Option<&Seen> {
         self.seen.as_ref()
+    }
+
+    /// Whether the last report can be relied on: it came with a checksum, or the one before says
+    /// the same. Without, a digit may be wrong.
+    pub(crate) fn is_confirmed(&self) -> bool {
+        self.is_checked() || self.confirmed
     }
 
     /// How often the controller has started since the port was opened.
@@ -157,7 +164,7 @@ impl Supervisor {
 
     /// Asks for reports for the next while.
     pub(crate) fn want_reports(&mut self, until_us: i64) {
-        self.wanted_until_us = self.wanted_until_us.max(until_us);
+        self.wanted_until_us = self.wanted_until_us.max(until_us + self.slack_us);
     }
 
     /// Starts watching a motion; faults from before are forgotten.
@@ -313,9 +320,11 @@ impl Supervisor {
     }
 
     fn on_report(&mut self, now_us: i64, poll: &Poll) {
-        let Some(seen) = self.read(poll) else {
+        self.work_zero = poll.report.work_zero.or(self.work_zero);
+        let Some(seen) = Seen::of(poll, self.work_zero, &self.habits) else {
             return;
         };
+        self.confirmed = self.seen.is_some_and(|before| before.confirms(&seen));
         self.seen = Some(seen);
         if seen.state != State::Alarm {
             self.alarm = None;
@@ -347,28 +356,6 @@ impl Supervisor {
             self.zero_deg = None;
         }
         self.settled = true;
-    }
-
-    fn read(&mut self, poll: &Poll) -> Option<Seen> {
-        let report = poll.report;
-        if report.work_zero.is_some() {
-            self.work_zero = report.work_zero;
-        }
-        let units = match report.position {
-            Position::Machine(at) => at,
-            Position::Work(at) => at + self.work_zero?,
-        };
-        Some(Seen {
-            state: report.state,
-            machine_deg: units * self.habits.degrees_per_unit,
-            speed: report.feed.unwrap_or(0.0) * self.habits.degrees_per_unit / 60.0,
-            chip_us: report.chip_us.filter(|_| self.habits.stamps),
-            battery_v: report.battery_v,
-            pins: report.pins,
-            asked_us: poll.asked_us,
-            came_us: poll.came_us,
-            certain: poll.certain,
-        })
     }
 
     fn on_reset(&mut self, now_us: i64, cause: Option<ResetCause>) {

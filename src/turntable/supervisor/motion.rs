@@ -72,8 +72,7 @@ impl Motion {
         let Course::To { target_deg, .. } = self.course else {
             return None;
         };
-        let since_us = self.standing_since(seen);
-        let stands_us = seen.came_us - since_us;
+        let stands_us = self.stands_for(seen);
         match seen.state {
             State::Run | State::Jog => (stands_us > STALL_US).then_some(Fault::Stalled {
                 machine_deg: seen.machine_deg,
@@ -112,13 +111,17 @@ impl Motion {
         })
     }
 
-    /// Since when the place of this report is reported.
-    fn standing_since(&mut self, seen: &Seen) -> i64 {
+    /// How long the table has certainly been at the place of this report, microseconds: from when
+    /// the first report of it came to when this one was asked for.
+    fn stands_for(&mut self, seen: &Seen) -> i64 {
         match self.place {
-            Some((place, since_us)) if place == seen.machine_deg => since_us,
+            Some((place, since_us)) if place == seen.machine_deg => {
+                let asked_us = seen.asked_us.filter(|_| seen.certain);
+                asked_us.map_or(0, |asked_us| asked_us - since_us)
+            }
             _ => {
                 self.place = Some((seen.machine_deg, seen.came_us));
-                seen.came_us
+                0
             }
         }
     }

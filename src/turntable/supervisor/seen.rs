@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::turntable::wire::{Pins, State};
+use crate::turntable::wire::{Pins, Poll, Position, State};
 
 /// A report in degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,6 +19,34 @@ pub(crate) struct Seen {
     pub(crate) came_us: i64,
     /// Whether question and report certainly belong together.
     pub(crate) certain: bool,
+}
+
+impl Seen {
+    /// A report in degrees; `None` while it tells its place from a zero that is not known yet.
+    pub(super) fn of(poll: &Poll, work_zero: Option<f64>, habits: &Habits) -> Option<Seen> {
+        let report = poll.report;
+        let units = match report.position {
+            Position::Machine(at) => at,
+            Position::Work(at) => at + work_zero?,
+        };
+        Some(Seen {
+            state: report.state,
+            machine_deg: units * habits.degrees_per_unit,
+            speed: report.feed.unwrap_or(0.0) * habits.degrees_per_unit / 60.0,
+            chip_us: report.chip_us.filter(|_| habits.stamps),
+            battery_v: report.battery_v,
+            pins: report.pins,
+            asked_us: poll.asked_us,
+            came_us: poll.came_us,
+            certain: poll.certain,
+        })
+    }
+
+    /// Whether the report after this one says the same; where a table moves places differ.
+    pub(super) fn confirms(&self, next: &Seen) -> bool {
+        let same = self.machine_deg == next.machine_deg || next.state.may_move();
+        self.state == next.state && same
+    }
 }
 
 /// How the controller tells its position, and how often it is asked in motion.

@@ -208,6 +208,36 @@ fn work_positions_count_once_their_zero_is_told_and_inches_are_degrees_too() {
 }
 
 #[test]
+fn without_checksums_a_report_counts_when_the_one_before_says_the_same() {
+    let mut desk = Desk::new();
+    desk.report("Idle", 3.0, 2);
+    assert!(desk.supervisor.is_confirmed());
+    desk.report("Idle", 673.0, 1);
+    assert!(!desk.supervisor.is_confirmed());
+    desk.report("Idle", 3.0, 2);
+    assert!(desk.supervisor.is_confirmed());
+    desk.report("Run", 3.0, 1);
+    assert!(!desk.supervisor.is_confirmed());
+    desk.report("Run", 4.0, 1);
+    assert!(desk.supervisor.is_confirmed());
+}
+
+#[test]
+fn a_report_that_comes_twice_and_late_is_no_stall() {
+    let mut desk = Desk::new();
+    desk.moving(10.0);
+    desk.report("Run", 5.0, 1);
+    desk.now_us += 850_000;
+    desk.hear("<Run|MPos:5.000,0.000,0.000|FS:432,0>");
+    assert_eq!(desk.supervisor.fault(), None);
+    desk.report("Run", 5.0, 12);
+    assert!(matches!(
+        desk.supervisor.fault(),
+        Some(Fault::Stalled { .. })
+    ));
+}
+
+#[test]
 fn a_banner_at_rest_loses_the_position_without_stopping_anything() {
     let mut desk = Desk::new();
     desk.hear("Grbl 1.1h ['$' for help]");
