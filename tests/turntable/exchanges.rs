@@ -96,14 +96,17 @@ fn recover(rig: &Rig, table: Table, outcome: &mut Outcome) -> Table {
     add_counts(&table, outcome);
     drop(table);
     outcome.reopened += 1;
+    let mut last = None;
     for _ in 0..20 {
-        if let Ok(table) = relit::turntable::Table::open_serial(rig.simulator.path(), &rig.options)
-        {
-            let _unlocked = table.unlock();
-            return table;
+        match Table::open_serial(rig.simulator.path(), &rig.options) {
+            Ok(table) => {
+                let _unlocked = table.unlock();
+                return table;
+            }
+            Err(error) => last = Some(error),
         }
     }
-    panic!("the table could not be opened again");
+    panic!("the table could not be opened again: {last:?}");
 }
 
 fn add_counts(table: &Table, outcome: &mut Outcome) {
