@@ -23,11 +23,13 @@
 //! | [`report`] | the HTML page that shows one extracted session | `shard` |
 //! | [`mask`] | seeds, GrabCut, clean-up of the mask | `session`, `video`, `geometry`, `durable` |
 //! | [`extract`] | select, crop, measure, scale, write: the pipeline | `session`, `video`, `shard`, `report`, `geometry` |
+//! | [`capture`] | drives table and camera through a turn and leaves a session | all above but `mask`, `extract`, `report`, `shard` |
 //!
 //! Data flows one way, and nothing knows what stands below it in this table. The programs in
 //! `src/bin` parse arguments, call one function here and report. The library itself never prints,
 //! never exits and never reads the environment; errors are typed, one `Error` a room.
 
+pub mod capture;
 pub mod clock;
 pub mod durable;
 pub mod extract;
