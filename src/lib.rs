@@ -28,6 +28,7 @@
 //! `src/bin` parse arguments, call one function here and report. The library itself never prints,
 //! never exits and never reads the environment; errors are typed, one `Error` a room.
 
+pub mod capture;
 pub mod clock;
 pub mod durable;
 pub mod extract;

@@ -1,0 +1,3 @@
+//! A turn as a session on disk.
+
+pub mod trace;
