@@ -19,6 +19,7 @@
 //! | [`naming`] | which names a session may have | nobody |
 //! | [`session`] | what a capture leaves on disk: manifest and frame index | `naming`, `durable` |
 //! | [`video`] | FFmpeg: a video file to frames with numbers and time stamps | `geometry` |
+//! | [`camera`] | cameras: V4L2, nokhwa, and recordings replayed as one | `clock`, `session`, `video` |
 //! | [`shard`] | the data set on disk: samples, records, tables; write, read, verify | `geometry`, `durable`, `naming` |
 //! | [`report`] | the HTML page that shows one extracted session | `shard` |
 //! | [`mask`] | seeds, GrabCut, clean-up of the mask | `session`, `video`, `geometry`, `durable` |
@@ -28,6 +29,7 @@
 //! `src/bin` parse arguments, call one function here and report. The library itself never prints,
 //! never exits and never reads the environment; errors are typed, one `Error` a room.
 
+pub mod camera;
 pub mod capture;
 pub mod clock;
 pub mod durable;

@@ -1,0 +1,415 @@
+//! What a camera offers: pixel formats, sizes, rates, and what of them was asked for and granted.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::{AddressFault, CameraError};
+
+/// A pixel format's four characters, as V4L2 writes them.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Fourcc(pub [u8; 4]);
+
+impl Fourcc {
+    /// Motion JPEG.
+    pub const MJPG: Self = Self(*b"MJPG");
+    /// H.264 with start codes.
+    pub const H264: Self = Self(*b"H264");
+    /// Packed 4:2:2.
+    pub const YUYV: Self = Self(*b"YUYV");
+    /// 4:2:0, luma plane, then interleaved colour differences.
+    pub const NV12: Self = Self(*b"NV12");
+    /// Packed red, green, blue.
+    pub const RGB3: Self = Self(*b"RGB3");
+    /// Luma alone.
+    pub const GREY: Self = Self(*b"GREY");
+
+    /// The format of the kernel's 32-bit code.
+    pub fn from_code(code: u32) -> Self {
+        Self(code.to_le_bytes())
+    }
+
+    /// The kernel's 32-bit code.
+    pub fn code(self) -> u32 {
+        u32::from_le_bytes(self.0)
+    }
+
+    /// How its frames are to be understood; `None` for a format that is not taken here.
+    pub fn encoding(self) -> Option<Encoding> {
+        Some(match &self.0 {
+            b"MJPG" | b"JPEG" => Encoding::Mjpeg,
+            b"H264" => Encoding::H264,
+            b"YUYV" => Encoding::Yuyv,
+            b"NV12" => Encoding::Nv12,
+            b"RGB3" => Encoding::Rgb24,
+            b"GREY" => Encoding::Grey,
+            b"BA81" => Encoding::Bayer(Bayer::Bggr),
+            b"GBRG" => Encoding::Bayer(Bayer::Gbrg),
+            b"GRBG" => Encoding::Bayer(Bayer::Grbg),
+            b"RGGB" => Encoding::Bayer(Bayer::Rggb),
+            _ => return None,
+        })
+    }
+}
+
+impl fmt::Display for Fourcc {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for byte in self.0 {
+            match byte {
+                b' '..=b'~' => write!(f, "{}", char::from(byte))?,
+                _ => f.write_str(".")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Debug for Fourcc {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Fourcc({self})")
+    }
+}
+
+/// The kinds of frames that are taken here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    /// Every frame a JPEG of its own.
+    Mjpeg,
+    /// H.264 as a byte stream with start codes.
+    H264,
+    /// Packed 4:2:2, two bytes a pixel.
+    Yuyv,
+    /// 4:2:0 in two planes, one and a half bytes a pixel.
+    Nv12,
+    /// Packed red, green, blue.
+    Rgb24,
+    /// Luma alone, one byte a pixel.
+    Grey,
+    /// The sensor's mosaic, one byte a pixel.
+    Bayer(Bayer),
+}
+
+/// The colours of a Bayer mosaic's first two rows, in reading order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bayer {
+    /// Blue, green / green, red.
+    Bggr,
+    /// Green, blue / red, green.
+    Gbrg,
+    /// Green, red / blue, green.
+    Grbg,
+    /// Red, green / green, blue.
+    Rggb,
+}
+
+impl Encoding {
+    /// Bytes of a row and number of rows of a raw frame without padding, all planes counted;
+    /// `None` for compressed ones and for sizes that no memory holds.
+    pub fn rows(self, width: u32, height: u32) -> Option<(usize, usize)> {
+        let (width, height) = (usize::try_from(width).ok()?, usize::try_from(height).ok()?);
+        Some(match self {
+            Self::Mjpeg | Self::H264 => return None,
+            Self::Yuyv => (width.div_ceil(2).checked_mul(4)?, height),
+            Self::Nv12 => (
+                width.div_ceil(2).checked_mul(2)?,
+                height.checked_add(height.div_ceil(2))?,
+            ),
+            Self::Rgb24 => (width.checked_mul(3)?, height),
+            Self::Grey | Self::Bayer(_) => (width, height),
+        })
+    }
+
+    /// Bytes of a raw frame; `None` as for [`Self::rows`].
+    pub fn frame_bytes(self, width: u32, height: u32) -> Option<usize> {
+        let (row, rows) = self.rows(width, height)?;
+        row.checked_mul(rows)
+    }
+}
+
+/// Frames per second, as a fraction of positive numbers.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Rate {
+    numerator: u32,
+    denominator: u32,
+}
+
+impl Rate {
+    /// `numerator / denominator` frames a second; `None` where either is 0.
+    pub fn new(numerator: u32, denominator: u32) -> Option<Self> {
+        (numerator > 0 && denominator > 0).then_some(Self {
+            numerator,
+            denominator,
+        })
+    }
+
+    /// The upper number.
+    pub fn numerator(self) -> u32 {
+        self.numerator
+    }
+
+    /// The lower number.
+    pub fn denominator(self) -> u32 {
+        self.denominator
+    }
+
+    /// Frames per second.
+    pub fn per_second(self) -> f64 {
+        f64::from(self.numerator) / f64::from(self.denominator)
+    }
+
+    /// The time from one frame to the next, microseconds, rounded.
+    pub fn period_us(self) -> i64 {
+        let (above, below) = (u64::from(self.denominator), u64::from(self.numerator));
+        let rounded = (above * 2_000_000 + below) / (2 * below);
+        i64::try_from(rounded).unwrap_or(i64::MAX)
+    }
+
+    /// True where both mean the same number.
+    pub fn equals(self, other: Self) -> bool {
+        u64::from(self.numerator) * u64::from(other.denominator)
+            == u64::from(other.numerator) * u64::from(self.denominator)
+    }
+
+    /// The nearest fraction in thousandths of a frame a second, whole where it is whole;
+    /// `None` for what is no rate between a thousandth and a million a second.
+    pub fn from_per_second(per_second: f64) -> Option<Self> {
+        if !(0.001..=1e6).contains(&per_second) {
+            return None;
+        }
+        let thousandths = (per_second * 1000.0).round() as u32;
+        if thousandths.is_multiple_of(1000) {
+            return Self::new(thousandths / 1000, 1);
+        }
+        // 29.97 and its kin are meant as n * 1000 / 1001.
+        let whole = per_second.ceil();
+        if (whole * 1000.0 / 1001.0 - per_second).abs() < 0.001 {
+            return Self::new(whole as u32 * 1000, 1001);
+        }
+        Self::new(thousandths, 1000)
+    }
+}
+
+impl fmt::Display for Rate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.numerator.is_multiple_of(self.denominator) {
+            return write!(f, "{}", self.numerator / self.denominator);
+        }
+        write!(f, "{:.3}", self.per_second())
+    }
+}
+
+impl fmt::Debug for Rate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Rate({}/{})", self.numerator, self.denominator)
+    }
+}
+
+/// The frame sizes of a mode, pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sizes {
+    /// This one.
+    One(u32, u32),
+    /// Any between two, in steps.
+    Range {
+        /// Smallest width and height.
+        min: (u32, u32),
+        /// Largest width and height.
+        max: (u32, u32),
+        /// Steps of width and height, at least 1.
+        step: (u32, u32),
+    },
+}
+
+impl Sizes {
+    /// True where this size is among them.
+    pub fn contains(self, width: u32, height: u32) -> bool {
+        let within = |value: u32, min: u32, max: u32, step: u32| {
+            (min..=max).contains(&value) && (value - min).is_multiple_of(step.max(1))
+        };
+        match self {
+            Self::One(w, h) => (w, h) == (width, height),
+            Self::Range { min, max, step } => {
+                within(width, min.0, max.0, step.0) && within(height, min.1, max.1, step.1)
+            }
+        }
+    }
+
+    /// The largest size.
+    pub fn largest(self) -> (u32, u32) {
+        match self {
+            Self::One(width, height) => (width, height),
+            Self::Range { max, .. } => max,
+        }
+    }
+}
+
+impl fmt::Display for Sizes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::One(width, height) => write!(f, "{width}x{height}"),
+            Self::Range { min, max, step } => write!(
+                f,
+                "{}x{} to {}x{} in steps of {}x{}",
+                min.0, min.1, max.0, max.1, step.0, step.1
+            ),
+        }
+    }
+}
+
+/// The frame rates of a mode.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Rates {
+    /// These.
+    List(Vec<Rate>),
+    /// Any between two.
+    Range {
+        /// The lowest.
+        slowest: Rate,
+        /// The highest.
+        fastest: Rate,
+    },
+    /// The camera does not say.
+    Unknown,
+}
+
+impl Rates {
+    /// The highest rate, where the camera says.
+    pub fn fastest(&self) -> Option<Rate> {
+        match self {
+            Self::List(rates) => rates
+                .iter()
+                .copied()
+                .max_by(|a, b| a.per_second().total_cmp(&b.per_second())),
+            Self::Range { fastest, .. } => Some(*fastest),
+            Self::Unknown => None,
+        }
+    }
+}
+
+impl fmt::Display for Rates {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::List(rates) => {
+                let rates: Vec<String> = rates.iter().map(Rate::to_string).collect();
+                write!(f, "{} frames/s", rates.join(", "))
+            }
+            Self::Range { slowest, fastest } => write!(f, "{slowest} to {fastest} frames/s"),
+            Self::Unknown => f.write_str("unknown rates"),
+        }
+    }
+}
+
+/// One thing that a camera offers: a pixel format with sizes and rates.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mode {
+    /// The pixel format.
+    pub fourcc: Fourcc,
+    /// Its sizes.
+    pub sizes: Sizes,
+    /// The rates at these sizes; at the largest where sizes are a range.
+    pub rates: Rates,
+}
+
+impl fmt::Display for Mode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}, {}", self.fourcc, self.sizes, self.rates)
+    }
+}
+
+/// What is asked of a camera, written `MJPG:1920x1080@30`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ModeRequest {
+    /// The pixel format.
+    pub fourcc: Fourcc,
+    /// Frame width, pixels.
+    pub width: u32,
+    /// Frame height, pixels.
+    pub height: u32,
+    /// Frames per second.
+    pub rate: Rate,
+}
+
+impl fmt::Display for ModeRequest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            fourcc,
+            width,
+            height,
+            rate,
+        } = self;
+        write!(f, "{fourcc}:{width}x{height}@{rate}")
+    }
+}
+
+impl FromStr for ModeRequest {
+    type Err = CameraError;
+
+    fn from_str(text: &str) -> Result<Self, CameraError> {
+        parse_request(text).ok_or_else(|| CameraError::Address {
+            text: text.to_owned(),
+            fault: AddressFault::Mode,
+        })
+    }
+}
+
+fn parse_request(text: &str) -> Option<ModeRequest> {
+    let (fourcc, rest) = text.split_once(':')?;
+    let (size, rate) = rest.split_once('@')?;
+    let (width, height) = size.split_once('x')?;
+    let size = |text: &str| text.parse().ok().filter(|&pixels: &u32| pixels > 0);
+    Some(ModeRequest {
+        fourcc: Fourcc(fourcc.as_bytes().try_into().ok()?),
+        width: size(width)?,
+        height: size(height)?,
+        rate: Rate::from_per_second(rate.parse().ok()?)?,
+    })
+}
+
+/// What a camera agreed to deliver. Drivers put the nearest they have in place of what was asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GrantedMode {
+    /// The pixel format.
+    pub fourcc: Fourcc,
+    /// Frame width, pixels.
+    pub width: u32,
+    /// Frame height, pixels.
+    pub height: u32,
+    /// Frames per second; `None` where the camera does not say.
+    pub rate: Option<Rate>,
+}
+
+impl GrantedMode {
+    /// In what this differs from what was asked, in words; empty where it is the same.
+    pub fn differences(&self, asked: &ModeRequest) -> Vec<String> {
+        let mut found = Vec::new();
+        if self.fourcc != asked.fourcc {
+            found.push(format!("{} instead of {}", self.fourcc, asked.fourcc));
+        }
+        if (self.width, self.height) != (asked.width, asked.height) {
+            found.push(format!(
+                "{} x {} instead of {} x {} pixels",
+                self.width, self.height, asked.width, asked.height
+            ));
+        }
+        match self.rate {
+            Some(rate) if !rate.equals(asked.rate) => {
+                found.push(format!("{rate} instead of {} frames/s", asked.rate));
+            }
+            Some(_) => {}
+            None => found.push(format!(
+                "an unknown rate instead of {} frames/s",
+                asked.rate
+            )),
+        }
+        found
+    }
+}
+
+impl fmt::Display for GrantedMode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}x{}", self.fourcc, self.width, self.height)?;
+        match self.rate {
+            Some(rate) => write!(f, ", {rate} frames/s"),
+            None => f.write_str(", unknown rate"),
+        }
+    }
+}
