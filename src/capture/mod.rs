@@ -2,3 +2,4 @@
 
 pub mod rig;
 pub mod state;
+pub mod trace;
