@@ -14,6 +14,7 @@
 mod annexb;
 mod decoder;
 mod ffv1;
+mod live;
 mod matroska;
 mod mux;
 mod order;
@@ -29,6 +30,7 @@ use std::sync::Once;
 
 use ffmpeg_next::format::context::Input;
 
+pub use live::LiveDecoder;
 pub use matroska::{Cut, find_cut};
 pub use mux::{Coding, Muxer, StreamFormat, Written};
 pub use picture::Picture;
