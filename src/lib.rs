@@ -18,6 +18,7 @@
 //! | [`durable`] | files that appear whole or not at all | nobody |
 //! | [`naming`] | which names a session may have | nobody |
 //! | [`session`] | what a capture leaves on disk: manifest and frame index | `naming`, `durable` |
+//! | [`turntable`] | the table: Grbl over a serial line, turns, angles over time | `clock` |
 //! | [`video`] | FFmpeg: a video file to frames with numbers and time stamps | `geometry` |
 //! | [`camera`] | cameras: V4L2, nokhwa, and recordings replayed as one | `clock`, `session`, `video` |
 //! | [`shard`] | the data set on disk: samples, records, tables; write, read, verify | `geometry`, `durable`, `naming` |
@@ -41,4 +42,5 @@ pub mod naming;
 pub mod report;
 pub mod session;
 pub mod shard;
+pub mod turntable;
 pub mod video;

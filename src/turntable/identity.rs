@@ -1,0 +1,223 @@
+//! What a controller is and can do, by what it says of itself.
+
+use std::collections::BTreeMap;
+
+use super::error::TurntableError;
+use super::wire::Message;
+
+/// Millimetres, here degrees, in the inch that a stock board can be set to report in.
+const INCH: f64 = 25.4;
+
+/// What the rig's own firmware offers beyond Grbl.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Extras {
+    /// Status reports carry the chip's time of the position.
+    pub stamps: bool,
+    /// Lines can be numbered and checksummed.
+    pub checked_lines: bool,
+    /// The table stops by itself when the host falls silent.
+    pub lease: bool,
+}
+
+impl Extras {
+    /// What the letters of `[OPT:..]` say; Grbl's own are capitals.
+    pub(super) fn of(letters: &str) -> Extras {
+        Extras {
+            stamps: letters.contains('t'),
+            checked_lines: letters.contains('c'),
+            lease: letters.contains('l'),
+        }
+    }
+}
+
+/// How far the table may turn, degrees from machine zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Lower end.
+    pub low_deg: f64,
+    /// Upper end.
+    pub high_deg: f64,
+}
+
+/// A controller, as it describes itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identity {
+    /// The firmware's version and note, such as `1.1h.20190830` or `1.1h.20261121 (relit)`.
+    pub firmware: String,
+    /// What it offers beyond Grbl: nothing on a stock board.
+    pub extras: Extras,
+    /// Steps in a degree.
+    pub steps_per_degree: f64,
+    /// Fastest turn, degrees a second.
+    pub max_degrees_per_second: f64,
+    /// Acceleration, degrees/s^2.
+    pub acceleration: f64,
+    /// How far it may turn.
+    pub limits: Limits,
+    /// Whether it can look for the index (`$22`).
+    pub homing: bool,
+    /// Its lease, seconds; 0 when it is off, `None` where there is none.
+    pub lease_s: Option<f64>,
+    /// Degrees in a unit of its reports.
+    pub(super) degrees_per_unit: f64,
+}
+
+impl Identity {
+    /// Whether this is a Grbl board without the rig's extras.
+    #[must_use]
+    pub fn is_stock(&self) -> bool {
+        self.extras == Extras::default()
+    }
+
+    /// One step, degrees.
+    #[must_use]
+    pub fn step_deg(&self) -> f64 {
+        self.steps_per_degree.recip()
+    }
+
+    /// Reads what `$I` and `$$` gave. `travel_deg`: how far the table may turn either way where
+    /// the controller itself watches no limit.
+    pub(super) fn read(
+        about: &[Message],
+        settings: &Settings,
+        travel_deg: f64,
+    ) -> Result<Identity, TurntableError> {
+        let mut firmware = None;
+        let mut extras = None;
+        for message in about {
+            match message {
+                Message::Version { version, note } if note.is_empty() => {
+                    firmware = Some(version.clone());
+                }
+                Message::Version { version, note } => {
+                    firmware = Some(format!("{version} ({note})"))
+                }
+                Message::Build { letters, .. } => {
+                    extras = Some(Extras::of(letters));
+                }
+                _ => {}
+            }
+        }
+        let firmware = firmware.ok_or(TurntableError::Untold("its version ([VER:..])"))?;
+        let extras = extras.ok_or(TurntableError::Untold("its options ([OPT:..])"))?;
+        let positive = |number, what| {
+            settings
+                .positive(number)
+                .ok_or(TurntableError::Untold(what))
+        };
+        Ok(Identity {
+            firmware,
+            extras,
+            steps_per_degree: positive(100, "its steps per degree ($100)")?,
+            max_degrees_per_second: positive(110, "its fastest speed ($110)")? / 60.0,
+            acceleration: positive(120, "its acceleration ($120)")?,
+            limits: settings.limits(extras, travel_deg)?,
+            homing: settings.is_on(22),
+            lease_s: extras.lease.then(|| settings.get(60)).flatten(),
+            degrees_per_unit: if settings.is_on(13) { INCH } else { 1.0 },
+        })
+    }
+}
+
+/// What `$$` gave.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Settings(BTreeMap<u16, f64>);
+
+impl Settings {
+    /// The settings among `messages`.
+    pub(super) fn of(messages: &[Message]) -> Settings {
+        let setting = |message: &Message| match message {
+            Message::Setting { number, value } => Some((*number, *value)),
+            _ => None,
+        };
+        Settings(messages.iter().filter_map(setting).collect())
+    }
+
+    /// Whether everything is there that a table is driven by.
+    pub(super) fn is_whole(&self, extras: Extras) -> bool {
+        let mut needed = [13, 20, 22, 100, 110, 120, 130].iter();
+        needed.all(|number| self.0.contains_key(number))
+            && (!extras.lease || self.0.contains_key(&60))
+    }
+
+    fn get(&self, number: u16) -> Option<f64> {
+        self.0.get(&number).copied()
+    }
+
+    fn positive(&self, number: u16) -> Option<f64> {
+        self.get(number).filter(|value| *value > 0.0)
+    }
+
+    fn is_on(&self, number: u16) -> bool {
+        self.get(number).is_some_and(|value| value != 0.0)
+    }
+
+    fn limits(&self, extras: Extras, travel_deg: f64) -> Result<Limits, TurntableError> {
+        let reach_deg = match self.is_on(20) {
+            true => self
+                .positive(130)
+                .ok_or(TurntableError::Untold("its soft limit ($130)"))?,
+            false => travel_deg,
+        };
+        // Stock Grbl's soft limits reach from the far end of the axis to machine zero.
+        let stock = self.is_on(20) && extras == Extras::default();
+        Ok(Limits {
+            low_deg: -reach_deg,
+            high_deg: if stock { 0.0 } else { reach_deg },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::turntable::wire::parse;
+
+    fn identity(about: &[&str], changed: &[(u16, f64)]) -> Result<Identity, TurntableError> {
+        let usual = [
+            (13, 0.0),
+            (20, 1.0),
+            (22, 0.0),
+            (60, 0.0),
+            (100, 88.889),
+            (110, 2160.0),
+            (120, 36.0),
+            (130, 400.0),
+        ];
+        let settings = Settings(usual.iter().chain(changed).copied().collect());
+        let about: Vec<_> = about.iter().filter_map(|line| parse(line)).collect();
+        Identity::read(&about, &settings, 400.0)
+    }
+
+    const RIG: [&str; 2] = ["[VER:1.1h.20261121:relit]", "[OPT:NHtcl,8,128]"];
+    const STOCK: [&str; 2] = ["[VER:1.1h.20190830:]", "[OPT:V,15,128]"];
+
+    #[test]
+    fn the_rigs_firmware_is_known_by_its_option_letters() {
+        let rig = identity(&RIG, &[]).unwrap();
+        assert!(rig.extras.stamps && rig.extras.checked_lines && rig.extras.lease);
+        assert_eq!(rig.firmware, "1.1h.20261121 (relit)");
+        assert_eq!(rig.lease_s, Some(0.0));
+        assert_eq!((rig.limits.low_deg, rig.limits.high_deg), (-400.0, 400.0));
+        assert!((rig.max_degrees_per_second - 36.0).abs() < 1e-9);
+        let stock = identity(&STOCK, &[]).unwrap();
+        assert!(stock.is_stock());
+        assert_eq!(stock.lease_s, None);
+    }
+
+    #[test]
+    fn a_stock_boards_soft_limits_lie_below_zero_and_without_them_the_given_travel_counts() {
+        let limits = |settings: &[(u16, f64)]| identity(&STOCK, settings).unwrap().limits;
+        assert_eq!((limits(&[]).low_deg, limits(&[]).high_deg), (-400.0, 0.0));
+        let free = limits(&[(20, 0.0), (130, 200.0)]);
+        assert_eq!((free.low_deg, free.high_deg), (-400.0, 400.0));
+    }
+
+    #[test]
+    fn what_is_not_told_is_named() {
+        let error = identity(&RIG[..1], &[]).unwrap_err();
+        assert!(error.to_string().contains("[OPT:..]"), "{error}");
+        let error = identity(&RIG, &[(100, 0.0)]).unwrap_err();
+        assert!(error.to_string().contains("$100"), "{error}");
+    }
+}

@@ -1,0 +1,107 @@
+//! The other side: asking a port's owner.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use super::claim::{Files, owner_pid, try_lock};
+use super::{Answer, Question};
+use crate::turntable::error::TurntableError;
+use crate::turntable::table::Status;
+
+/// How long an owner that is just opening the port may take until it answers.
+const OPENING: Duration = Duration::from_secs(15);
+const PAUSE: Duration = Duration::from_millis(100);
+/// How long an answer may take: a stop takes its time.
+const ANSWER: Duration = Duration::from_secs(25);
+/// Longest answer, bytes.
+const LONGEST: u64 = 65_536;
+
+/// The process that owns a port.
+#[derive(Debug, Clone)]
+pub struct Owner {
+    files: Files,
+    pid: u32,
+}
+
+impl Owner {
+    /// The owner of `port`, where it has one. Looks at the lock only, never at the port.
+    ///
+    /// # Errors
+    /// [`TurntableError::Open`] where there is no such port, [`TurntableError::Claim`] where the
+    /// lock cannot be looked at.
+    pub fn find(port: &Path, runtime_folder: &Path) -> Result<Option<Owner>, TurntableError> {
+        let files = Files::of(port, runtime_folder)?;
+        if try_lock(&files)?.is_some() {
+            return Ok(None);
+        }
+        let pid = owner_pid(&files.lock);
+        Ok(Some(Owner { files, pid }))
+    }
+
+    /// Its process number.
+    #[must_use]
+    pub fn pid(&self) -> u32 {
+        self.pid
+    }
+
+    /// Asks it what the table is doing.
+    ///
+    /// # Errors
+    /// [`TurntableError::Owner`] where it does not answer, [`TurntableError::OwnerSays`].
+    pub fn status(&self) -> Result<Status, TurntableError> {
+        self.ask(Question::Status)
+    }
+
+    /// Asks it to stop the table, and waits until it stands.
+    ///
+    /// # Errors
+    /// As [`Owner::status`].
+    pub fn stop(&self) -> Result<Status, TurntableError> {
+        self.ask(Question::Stop)
+    }
+
+    fn ask(&self, question: Question) -> Result<Status, TurntableError> {
+        let failed = |why: String| TurntableError::Owner {
+            path: self.files.port.clone(),
+            pid: self.pid,
+            why,
+        };
+        let line = self
+            .exchange(question)
+            .map_err(|error| failed(error.to_string()))?;
+        match serde_json::from_str(&line) {
+            Ok(Answer::Status(status)) => Ok(status),
+            Ok(Answer::Error(message)) => Err(TurntableError::OwnerSays {
+                pid: self.pid,
+                message,
+            }),
+            Err(_) => Err(failed("its answer is no answer".to_owned())),
+        }
+    }
+
+    fn exchange(&self, question: Question) -> std::io::Result<String> {
+        let mut stream = self.connect()?;
+        stream.set_read_timeout(Some(ANSWER))?;
+        stream.set_write_timeout(Some(ANSWER))?;
+        let mut asked = serde_json::to_vec(&question)?;
+        asked.push(b'\n');
+        stream.write_all(&asked)?;
+        let mut line = String::new();
+        BufReader::new(stream.take(LONGEST)).read_line(&mut line)?;
+        Ok(line)
+    }
+
+    /// An owner that is still opening its port has no socket yet.
+    fn connect(&self) -> std::io::Result<UnixStream> {
+        let until = Instant::now() + OPENING;
+        loop {
+            match UnixStream::connect(&self.files.socket) {
+                Err(_) if Instant::now() < until => thread::sleep(PAUSE),
+                connected => return connected,
+            }
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! The owner's side: answers at the socket.
+
+use std::fs;
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use super::claim::claim_error;
+use super::{Answer, Question};
+use crate::turntable::error::TurntableError;
+use crate::turntable::link::Link;
+
+/// How long somebody who has connected may take to ask, or to take the answer.
+const WAIT: Duration = Duration::from_millis(300);
+/// Longest question, bytes.
+const LONGEST: u64 = 64;
+/// How long is waited after the system has refused a connection.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// Answers other processes until it is dropped.
+pub(in crate::turntable) struct Server {
+    socket: PathBuf,
+    quit: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Server {
+    /// Binds the socket; one that lies there is a dead process's, since this one has the lock.
+    pub(super) fn start(socket: &Path, link: Link) -> Result<Server, TurntableError> {
+        match fs::remove_file(socket) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+            _ => UnixListener::bind(socket),
+        }
+        .map(|listener| {
+            let quit = Arc::new(AtomicBool::new(false));
+            let told = Arc::clone(&quit);
+            Server {
+                socket: socket.to_owned(),
+                quit,
+                thread: Some(thread::spawn(move || serve(&listener, &link, &told))),
+            }
+        })
+        .map_err(claim_error(socket, "bound"))
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.quit.store(true, Ordering::Release);
+        // The thread sleeps until somebody connects.
+        let woken = UnixStream::connect(&self.socket).is_ok();
+        if let Some(thread) = self.thread.take().filter(|_| woken) {
+            let _ = thread.join();
+        }
+        // The next owner removes what cannot be removed now.
+        let _ = fs::remove_file(&self.socket);
+    }
+}
+
+fn serve(listener: &UnixListener, link: &Link, quit: &AtomicBool) {
+    for stream in listener.incoming() {
+        if quit.load(Ordering::Acquire) {
+            return;
+        }
+        match stream {
+            // Somebody who asks badly or goes away harms nobody else.
+            Ok(stream) => drop(answer(&stream, link)),
+            Err(_) => thread::sleep(PAUSE),
+        }
+    }
+}
+
+fn answer(stream: &UnixStream, link: &Link) -> io::Result<()> {
+    stream.set_read_timeout(Some(WAIT))?;
+    stream.set_write_timeout(Some(WAIT))?;
+    let mut line = String::new();
+    BufReader::new(stream.take(LONGEST)).read_line(&mut line)?;
+    let done = match serde_json::from_str(&line) {
+        Ok(Question::Status) => link.status().map_err(|error| error.to_string()),
+        Ok(Question::Stop) => link.stop().map_err(|error| error.to_string()),
+        Err(_) => Err("the owner is asked for \"status\" or \"stop\"".to_owned()),
+    };
+    let answer = match done {
+        Ok(status) => Answer::Status(status),
+        Err(message) => Answer::Error(message),
+    };
+    let mut text = serde_json::to_vec(&answer).map_err(io::Error::other)?;
+    text.push(b'\n');
+    let mut stream = stream;
+    stream.write_all(&text)
+}

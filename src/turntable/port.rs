@@ -1,0 +1,103 @@
+//! The serial port: bytes in and out, each wait bounded.
+
+use std::io::{self, Read, Write};
+use std::path::Path;
+use std::time::Duration;
+
+use serialport::{SerialPort as _, TTYPort};
+
+use super::error::TurntableError;
+
+/// Grbl's speed, bits a second.
+const BAUD: u32 = 115_200;
+/// How long one write may take before the port counts as lost.
+const WRITE_WAIT: Duration = Duration::from_millis(500);
+
+/// A byte stream to a controller. Reads and writes come back within their time.
+pub trait Port: Send + 'static {
+    /// Reads what is there, waiting at most `wait` for the first byte; 0 when nothing came.
+    ///
+    /// # Errors
+    /// The port is gone.
+    fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize>;
+
+    /// Writes all of `bytes`, or fails within a second.
+    ///
+    /// # Errors
+    /// The port is gone, or takes nothing.
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// What a person knows it by.
+    fn name(&self) -> String;
+
+    /// Whether opening it may have reset the controller, as an Arduino's USB side does.
+    fn resets(&self) -> bool;
+}
+
+/// A serial port that nobody else can open.
+#[derive(Debug)]
+pub struct SerialPort {
+    port: TTYPort,
+    name: String,
+    resets: bool,
+}
+
+impl SerialPort {
+    /// Opens a port at Grbl's speed, for this process alone.
+    ///
+    /// # Errors
+    /// [`TurntableError::Open`].
+    pub fn open(path: &Path) -> Result<SerialPort, TurntableError> {
+        let name = path.display().to_string();
+        let settings = serialport::new(name.clone(), BAUD).timeout(WRITE_WAIT);
+        let open = |source: serialport::Error| TurntableError::Open {
+            path: path.to_owned(),
+            source: source.into(),
+        };
+        let mut port = TTYPort::open(&settings).map_err(open)?;
+        // A port without modem lines, such as a pseudo terminal, has none that could reset.
+        let resets = port.read_clear_to_send().is_ok();
+        Ok(SerialPort { port, name, resets })
+    }
+}
+
+impl Port for SerialPort {
+    fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
+        self.port.set_timeout(wait)?;
+        match self.port.read(buffer) {
+            Ok(0) => Err(io::Error::from(io::ErrorKind::UnexpectedEof)),
+            Err(error) if is_nothing(&error) => Ok(0),
+            read => read,
+        }
+    }
+
+    fn write(&mut self, mut bytes: &[u8]) -> io::Result<()> {
+        self.port.set_timeout(WRITE_WAIT)?;
+        while !bytes.is_empty() {
+            match self.port.write(bytes) {
+                Ok(0) => return Err(io::Error::from(io::ErrorKind::WriteZero)),
+                Ok(written) => bytes = bytes.get(written..).unwrap_or_default(),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+
+    fn name(&self) -> String {
+        self.name.clone()
+    }
+
+    fn resets(&self) -> bool {
+        self.resets
+    }
+}
+
+fn is_nothing(error: &io::Error) -> bool {
+    let kinds = [
+        io::ErrorKind::TimedOut,
+        io::ErrorKind::Interrupted,
+        io::ErrorKind::WouldBlock,
+    ];
+    kinds.contains(&error.kind())
+}

@@ -1,0 +1,139 @@
+//! Watching a motion: whether it goes on, and where it ends.
+
+use super::{Habits, Seen};
+use crate::turntable::Alarm;
+use crate::turntable::error::Fault;
+use crate::turntable::wire::State;
+
+/// Silence after which a table in motion counts as lost, microseconds.
+const SILENCE_US: i64 = 900_000;
+/// How long a table may report the same place in motion, microseconds.
+const STALL_US: i64 = 800_000;
+/// How long a table may stand elsewhere than at its target before that counts, microseconds:
+/// between accepting a line and starting, a controller is idle for a moment.
+const ASTRAY_US: i64 = 600_000;
+/// What the printing of a position loses, degrees.
+const PRINTED_DEG: f64 = 0.002;
+
+/// Where a motion goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Course {
+    /// To a place, degrees from machine zero.
+    To {
+        /// The place.
+        target_deg: f64,
+        /// When it has to be there, microseconds.
+        until_us: i64,
+    },
+    /// Looking for the index.
+    Homing,
+}
+
+/// A motion under way.
+#[derive(Debug)]
+pub(crate) struct Motion {
+    course: Course,
+    accepted_us: Option<i64>,
+    last_report_us: i64,
+    /// The last place, and since when it is reported.
+    place: Option<(f64, i64)>,
+    at_target: bool,
+}
+
+impl Motion {
+    pub(super) fn new(now_us: i64, course: Course) -> Self {
+        Self {
+            course,
+            accepted_us: None,
+            last_report_us: now_us,
+            place: None,
+            at_target: false,
+        }
+    }
+
+    pub(super) fn accepted(&mut self, now_us: i64) {
+        self.accepted_us = Some(now_us);
+        self.place = None;
+    }
+
+    /// Whether the table has come to rest at its target.
+    pub(crate) fn is_at_target(&self) -> bool {
+        self.at_target
+    }
+
+    /// A report has come: what it says against the motion.
+    pub(super) fn on_report(
+        &mut self,
+        seen: &Seen,
+        alarm: Option<u8>,
+        habits: &Habits,
+    ) -> Option<Fault> {
+        self.last_report_us = seen.came_us;
+        let Course::To { target_deg, .. } = self.course else {
+            return None;
+        };
+        let since_us = self.standing_since(seen);
+        let stands_us = seen.came_us - since_us;
+        match seen.state {
+            State::Run | State::Jog => (stands_us > STALL_US).then_some(Fault::Stalled {
+                machine_deg: seen.machine_deg,
+            }),
+            State::Idle => self.on_idle(seen, target_deg, stands_us, habits),
+            State::Held | State::Holding | State::Door | State::Sleep => Some(Fault::Held),
+            State::Alarm => Some(Fault::Alarm(Alarm(alarm))),
+            state @ (State::Home | State::Check) => Some(Fault::Astray {
+                state,
+                machine_deg: seen.machine_deg,
+                target_deg,
+            }),
+        }
+    }
+
+    fn on_idle(
+        &mut self,
+        seen: &Seen,
+        target_deg: f64,
+        stands_us: i64,
+        habits: &Habits,
+    ) -> Option<Fault> {
+        let accepted_us = self.accepted_us?;
+        let after = seen
+            .asked_us
+            .is_some_and(|asked_us| asked_us >= accepted_us);
+        let off = (seen.machine_deg - target_deg).abs();
+        if after && off <= habits.step_deg + PRINTED_DEG {
+            self.at_target = true;
+            return None;
+        }
+        (after && !self.at_target && stands_us > ASTRAY_US).then_some(Fault::Astray {
+            state: State::Idle,
+            machine_deg: seen.machine_deg,
+            target_deg,
+        })
+    }
+
+    /// Since when the place of this report is reported.
+    fn standing_since(&mut self, seen: &Seen) -> i64 {
+        match self.place {
+            Some((place, since_us)) if place == seen.machine_deg => since_us,
+            _ => {
+                self.place = Some((seen.machine_deg, seen.came_us));
+                seen.came_us
+            }
+        }
+    }
+
+    /// What the passing of time says against the motion.
+    pub(super) fn overdue(&self, now_us: i64, habits: &Habits) -> Option<Fault> {
+        let silent_us = now_us - self.last_report_us;
+        match self.course {
+            Course::Homing if !habits.reports_homing => None,
+            Course::To { until_us, .. } if now_us > until_us && !self.at_target => {
+                Some(Fault::Late)
+            }
+            _ => (silent_us > SILENCE_US).then_some(Fault::Silent {
+                milliseconds: silent_us / 1000,
+            }),
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Straight lines through points some of which are wrong.
+//!
+//! The first guess takes medians, which a quarter of wrong points does not move (slopes of pairs
+//! half the data apart, after Theil 1950 and Sen 1968); least squares over the points near it,
+//! thrice, makes it exact.
+
+/// Rounds of leaving out and fitting again.
+const ROUNDS: usize = 3;
+/// A point further off than so many standard deviations is an outlier.
+const SIGMAS: f64 = 4.0;
+/// A normal distribution's standard deviation over its median absolute deviation.
+const SIGMA_OF_MAD: f64 = 1.4826;
+
+/// A straight line, told from a point near the data so that large coordinates cost no digits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Line {
+    pub(super) x0: f64,
+    pub(super) y0: f64,
+    pub(super) slope: f64,
+}
+
+impl Line {
+    pub(super) fn at(&self, x: f64) -> f64 {
+        self.y0 + (x - self.x0) * self.slope
+    }
+
+    pub(super) fn inverse(&self, y: f64) -> Option<f64> {
+        let x = self.x0 + (y - self.y0) / self.slope;
+        x.is_finite().then_some(x)
+    }
+
+    /// This line over what `other` gives: where `other` maps x to z, z to y.
+    pub(super) fn over(&self, other: &Line) -> Line {
+        Line {
+            x0: other.at(self.x0),
+            y0: self.y0,
+            slope: self.slope / other.slope,
+        }
+    }
+}
+
+/// A line and the points it goes through.
+#[derive(Debug)]
+pub(super) struct Fit {
+    pub(super) line: Line,
+    /// For each point, whether it is no outlier.
+    pub(super) kept: Vec<bool>,
+}
+
+/// The line through `points`, in the order of x, most of which are right. Points off by less than
+/// `floor` are never outliers.
+pub(super) fn robust(points: &[(f64, f64)], floor: f64) -> Fit {
+    let mut line = guess(points);
+    let mut kept = vec![true; points.len()];
+    for _ in 0..ROUNDS {
+        let off = |&(x, y): &(f64, f64)| (y - line.at(x)).abs();
+        let offs: Vec<f64> = points.iter().map(off).collect();
+        let limit = (median(offs.clone()) * SIGMA_OF_MAD * SIGMAS).max(floor);
+        kept = offs.iter().map(|off| *off <= limit).collect();
+        let near = points.iter().zip(&kept).filter(|(_, kept)| **kept);
+        line = least_squares(near.map(|(point, _)| *point)).unwrap_or(line);
+    }
+    Fit { line, kept }
+}
+
+fn guess(points: &[(f64, f64)]) -> Line {
+    let half = points.len() / 2;
+    let far = points.iter().skip(half);
+    let slopes = points
+        .iter()
+        .zip(far)
+        .map(|((x, y), (xx, yy))| (yy - y) / (xx - x));
+    let slope = median(slopes.filter(|slope| slope.is_finite()).collect());
+    let x0 = median(points.iter().map(|point| point.0).collect());
+    let levels = points.iter().map(|(x, y)| y - (x - x0) * slope);
+    let y0 = median(levels.collect());
+    Line { x0, y0, slope }
+}
+
+fn least_squares(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Line> {
+    let count = points.clone().count() as f64;
+    let (sum_x, sum_y) = points
+        .clone()
+        .fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
+    let (x0, y0) = (sum_x / count, sum_y / count);
+    let sums = points.fold((0.0, 0.0), |(xx, xy), (x, y)| {
+        let (dx, dy) = (x - x0, y - y0);
+        (xx + dx * dx, xy + dx * dy)
+    });
+    let slope = sums.1 / sums.0;
+    slope.is_finite().then_some(Line { x0, y0, slope })
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    quantile(&values, 0.5)
+}
+
+/// The value below which `part` of the sorted values lie, 0 where there are none.
+pub(super) fn quantile(sorted: &[f64], part: f64) -> f64 {
+    let last = sorted.len().saturating_sub(1);
+    let place = (part * last as f64).round() as usize;
+    sorted.get(place).copied().unwrap_or_default()
+}

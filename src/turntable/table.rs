@@ -1,0 +1,460 @@
+//! The table: what a program does with it.
+
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use super::codes::Alarm;
+use super::error::TurntableError;
+use super::greeting;
+use super::identity::Identity;
+use super::link::{Carrier, Link};
+use super::owner::{Claim, Server};
+use super::plan::TurnPlan;
+use super::port::{Port, SerialPort};
+use super::supervisor::{Course, Seen, Supervisor};
+use super::turn::Turn;
+use super::wire::{Counts, Message, Outcome, Patience, State};
+use super::{LEASE_S, Options};
+use crate::clock::Clock;
+
+/// How long the search for the index may take.
+const HOMING: Patience = Patience::Long(120_000_000);
+/// What is added to the time a motion should take.
+const MOTION_SLACK: Duration = Duration::from_secs(4);
+/// Fastest jog and unwinding that is not asked for otherwise, degrees a second.
+const BRISK: f64 = 30.0;
+/// Grbl's refusal of `$H` where homing is switched off.
+const HOMING_OFF: u8 = 5;
+
+/// What the table is doing, by a report of just now.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Status {
+    /// The controller's state.
+    pub state: State,
+    /// Degrees from the angle counted as zero, or from machine zero while that is not known.
+    pub angle_deg: f64,
+    /// Degrees as the controller counts them.
+    pub machine_deg: f64,
+    /// Speed, degrees a second.
+    pub degrees_per_second: f64,
+    /// Battery, volts, where the controller measures it.
+    pub battery_v: Option<f64>,
+    /// Whether the index sensor is active.
+    pub index: bool,
+    /// Whether the emergency stop is pressed.
+    pub emergency_stop: bool,
+    /// Whether the position can be trusted.
+    pub homed: bool,
+    /// What locked the table.
+    pub alarm: Option<Alarm>,
+}
+
+impl Status {
+    pub(super) fn of(seen: &Seen, supervisor: &Supervisor) -> Status {
+        let zero = supervisor.zero_deg();
+        Status {
+            state: seen.state,
+            angle_deg: seen.machine_deg - zero.unwrap_or(0.0),
+            machine_deg: seen.machine_deg,
+            degrees_per_second: seen.speed,
+            battery_v: seen.battery_v,
+            index: seen.pins.index,
+            emergency_stop: seen.pins.emergency_stop,
+            homed: zero.is_some(),
+            alarm: supervisor.alarm(),
+        }
+    }
+}
+
+/// What homing did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Homed {
+    /// The index was found: the angle 0 is there.
+    Index,
+    /// There is no index sensor: the angle 0 is where the table stood.
+    WhereItStands,
+}
+
+/// A table, owned by this process. It is stopped when this is dropped.
+pub struct Table {
+    // Fields are dropped in this order: nobody asks any more, the port is closed, and then
+    // another process may have it.
+    server: Option<Server>,
+    link: Link,
+    _carrier: Carrier,
+    _claim: Option<Claim>,
+    identity: Identity,
+    /// Held while a line waits for its answer.
+    line: Mutex<()>,
+}
+
+impl Table {
+    /// Takes over the controller behind `port`: waits until it has started, stops it if it moves,
+    /// and reads what it is.
+    ///
+    /// # Errors
+    /// [`TurntableError::NoController`], or what else went wrong on the way.
+    pub fn open(port: impl Port, options: &Options) -> Result<Table, TurntableError> {
+        Self::greet(Box::new(port), None, options)
+    }
+
+    /// Opens a serial port for this process alone, and lets other processes ask it for `status`
+    /// and `stop` through [`super::Owner`].
+    ///
+    /// # Errors
+    /// [`TurntableError::Owned`] where another process has it, and what [`Table::open`] says.
+    pub fn open_serial(path: &Path, options: &Options) -> Result<Table, TurntableError> {
+        // Opening the port resets an Arduino: nobody may own it by then.
+        let claim = Claim::take(path, &options.runtime_folder)?;
+        let port = SerialPort::open(path)?;
+        Self::greet(Box::new(port), Some(claim), options)
+    }
+
+    fn greet(
+        port: Box<dyn Port>,
+        claim: Option<Claim>,
+        options: &Options,
+    ) -> Result<Table, TurntableError> {
+        let resets = port.resets();
+        let (link, carrier) = Link::start(port, options.clock, greeting::STRANGER);
+        let identity = greeting::greet(&link, resets, options.travel_deg)?;
+        let server = claim.as_ref().map(|claim| claim.serve(link.clone()));
+        Ok(Table {
+            server: server.transpose()?,
+            link,
+            _carrier: carrier,
+            _claim: claim,
+            identity,
+            line: Mutex::new(()),
+        })
+    }
+
+    /// What the controller is.
+    #[must_use]
+    pub fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
+    /// What went wrong on the wire so far and was put right or noticed.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        self.link.supervisor().counts()
+    }
+
+    pub(super) fn clock(&self) -> Clock {
+        self.link.clock()
+    }
+
+    pub(super) fn link(&self) -> &Link {
+        &self.link
+    }
+
+    /// What the table is doing just now.
+    ///
+    /// # Errors
+    /// [`TurntableError::Silent`].
+    pub fn status(&self) -> Result<Status, TurntableError> {
+        self.link.status()
+    }
+
+    /// Looks for the index, or, where the controller has no index sensor, counts the angle 0 from
+    /// where the table stands.
+    ///
+    /// # Errors
+    /// [`TurntableError::Homing`] where no index was found; what stops a motion.
+    pub fn home(&self) -> Result<Homed, TurntableError> {
+        if !self.identity.homing {
+            return self.home_where_it_stands();
+        }
+        self.begin(Course::Homing)?;
+        let searched = self.search_index();
+        self.link.supervisor().end_motion();
+        searched
+    }
+
+    fn search_index(&self) -> Result<Homed, TurntableError> {
+        match self.outcome("$H", HOMING)? {
+            Outcome::Refused(HOMING_OFF) => return self.home_where_it_stands(),
+            Outcome::Refused(code) => return Err(refused("$H", code)),
+            Outcome::Failed(fault) => return Err(self.lost("$H", fault)),
+            Outcome::Done(_) => {}
+        }
+        if let Some(fault) = self.end_by_fault()? {
+            return Err(fault);
+        }
+        // A controller that has not found its index accepts `$H` all the same.
+        let status = self.status()?;
+        if status.state != State::Idle {
+            return Err(TurntableError::Homing(status.alarm.unwrap_or(Alarm(None))));
+        }
+        self.link.supervisor().set_zero_deg(0.0);
+        Ok(Homed::Index)
+    }
+
+    fn home_where_it_stands(&self) -> Result<Homed, TurntableError> {
+        let status = self.ready()?;
+        self.link.supervisor().set_zero_deg(status.machine_deg);
+        Ok(Homed::WhereItStands)
+    }
+
+    /// Turns by `degrees` and waits until the table is there. Speed in degrees a second; brisk
+    /// where it is not given.
+    ///
+    /// # Errors
+    /// [`TurntableError::BeyondLimit`], [`TurntableError::NotReady`], or what ended the motion.
+    pub fn jog(&self, degrees: f64, speed: Option<f64>) -> Result<Status, TurntableError> {
+        let speed = speed.unwrap_or_else(|| self.brisk());
+        self.identity.check_speed(speed)?;
+        if !degrees.is_finite() {
+            return Err(TurntableError::Figure {
+                what: "the angle in degrees",
+                value: degrees,
+                range: "it has to be a number".to_owned(),
+            });
+        }
+        let status = self.ready()?;
+        let (low_deg, high_deg) = self.identity.limits_from(&status);
+        let target_deg = status.angle_deg + degrees;
+        if !(low_deg..=high_deg).contains(&target_deg) {
+            return Err(TurntableError::BeyondLimit {
+                target_deg,
+                low_deg,
+                high_deg,
+            });
+        }
+        let machine_deg = status.machine_deg + degrees;
+        // To a place instead of by an angle: sent twice it would still move once.
+        let block = format!("$J=G21G90G53X{machine_deg:.3}F{:.3}", speed * 60.0);
+        self.travel(&block, &status, machine_deg, speed)?;
+        self.status()
+    }
+
+    pub(super) fn brisk(&self) -> f64 {
+        self.identity.max_degrees_per_second.min(BRISK)
+    }
+
+    /// Moves straight to a place, degrees from machine zero, and waits until the table is there.
+    pub(super) fn go(&self, machine_deg: f64, speed: f64) -> Result<(), TurntableError> {
+        let status = self.ready()?;
+        let block = straight(machine_deg, speed);
+        self.travel(&block, &status, machine_deg, speed)
+    }
+
+    fn travel(
+        &self,
+        block: &str,
+        from: &Status,
+        machine_deg: f64,
+        speed: f64,
+    ) -> Result<(), TurntableError> {
+        let distance = (machine_deg - from.machine_deg).abs();
+        self.launch(block, machine_deg, distance, speed)?;
+        let arrived = self.wait_arrival(self.travel_time(distance, speed));
+        self.link.supervisor().end_motion();
+        arrived
+    }
+
+    /// Longest time that a motion may take.
+    pub(super) fn travel_time(&self, distance_deg: f64, speed: f64) -> Duration {
+        let ramps = speed / self.identity.acceleration;
+        Duration::try_from_secs_f64((distance_deg / speed + ramps) * 1.05)
+            .unwrap_or(Duration::MAX / 4)
+            .saturating_add(MOTION_SLACK)
+    }
+
+    /// Sends the line that moves the table, and watches it from then on.
+    pub(super) fn launch(
+        &self,
+        block: &str,
+        target_deg: f64,
+        distance: f64,
+        speed: f64,
+    ) -> Result<(), TurntableError> {
+        let time = self.travel_time(distance, speed);
+        let until_us = i64::try_from(time.as_micros()).unwrap_or(i64::MAX);
+        self.begin(Course::To {
+            target_deg,
+            until_us: self.clock().now_us().saturating_add(until_us),
+        })?;
+        let sent = self.command(block);
+        let mut supervisor = self.link.supervisor();
+        match sent {
+            Ok(_) => supervisor.motion_accepted(self.clock().now_us()),
+            Err(_) => supervisor.end_motion(),
+        }
+        sent.map(|_| ())
+    }
+
+    /// Waits until the table is at its target, or has been stopped by a fault.
+    pub(super) fn wait_arrival(&self, limit: Duration) -> Result<(), TurntableError> {
+        let ended = self.link.wait(limit + MOTION_SLACK, |supervisor| {
+            let arrived = supervisor
+                .motion()
+                .is_some_and(|motion| motion.is_at_target());
+            (arrived || supervisor.fault().is_some()).then_some(())
+        });
+        match self.end_by_fault()? {
+            Some(fault) => Err(fault),
+            None if ended.is_none() => {
+                self.stop()?;
+                Err(super::error::Fault::Late.into())
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The fault that has ended a motion, once the table has been stopped because of it.
+    pub(super) fn end_by_fault(&self) -> Result<Option<TurntableError>, TurntableError> {
+        let fault = self.link.supervisor().fault().cloned();
+        if let Some(fault) = fault {
+            let gone = self.link.supervisor().closed().is_some();
+            if !gone {
+                self.link.wait_stopped()?;
+            }
+            return Ok(Some(fault.into()));
+        }
+        Ok(None)
+    }
+
+    /// Starts watching a motion, unless one is under way.
+    fn begin(&self, course: Course) -> Result<(), TurntableError> {
+        self.secure()?;
+        let mut supervisor = self.link.supervisor();
+        if supervisor.is_stopping() || supervisor.motion().is_some() {
+            return Err(TurntableError::Busy);
+        }
+        supervisor.begin_motion(self.clock().now_us(), course);
+        Ok(())
+    }
+
+    /// The status of a table that can take a motion.
+    pub(super) fn ready(&self) -> Result<Status, TurntableError> {
+        let status = self.status()?;
+        let supervisor = self.link.supervisor();
+        if supervisor.is_stopping() || supervisor.motion().is_some() {
+            return Err(TurntableError::Busy);
+        }
+        match status.state {
+            State::Idle => Ok(status),
+            state => Err(TurntableError::NotReady {
+                state,
+                alarm: status.alarm,
+            }),
+        }
+    }
+
+    /// Ramps the table down, drops what it was still to do, and makes sure that it stands.
+    ///
+    /// # Errors
+    /// [`TurntableError::NotStopped`] where it was not seen at rest.
+    pub fn stop(&self) -> Result<Status, TurntableError> {
+        self.link.stop()
+    }
+
+    /// Unlocks the table after an alarm.
+    ///
+    /// # Errors
+    /// [`TurntableError::Refused`] while the emergency stop is pressed.
+    pub fn unlock(&self) -> Result<Status, TurntableError> {
+        self.command("$X")?;
+        self.status()
+    }
+
+    /// Moves back by the ramp, and starts the turn; it goes on by itself from then on, and is
+    /// watched until [`Turn`] ends or is dropped.
+    ///
+    /// Where the controller offers a lease (`$60`) and it is off, it is set to 3 s first, so that
+    /// the table stops when this computer fails; that is stored in the controller and so done
+    /// once in its life.
+    ///
+    /// # Errors
+    /// [`TurntableError::NotHomed`], [`TurntableError::Moved`], or what stops a motion.
+    pub fn start_turn(&self, plan: TurnPlan) -> Result<Turn<'_>, TurntableError> {
+        self.secure()?;
+        let status = self.ready()?;
+        if !status.homed {
+            return Err(TurntableError::NotHomed);
+        }
+        let planned_deg = plan.start_deg();
+        if (status.angle_deg - planned_deg).abs() > 2.0 * self.identity.step_deg() {
+            return Err(TurntableError::Moved {
+                planned_deg,
+                at_deg: status.angle_deg,
+            });
+        }
+        if self.identity.lease_s == Some(0.0) {
+            self.set_lease()?;
+        }
+        Turn::start(self, plan, status.machine_deg - status.angle_deg)
+    }
+
+    fn set_lease(&self) -> Result<(), TurntableError> {
+        let set = |messages: &[Message]| {
+            let lease = |message: &Message| matches!(message, Message::Setting { number: 60, value } if *value > 0.0);
+            messages.iter().any(lease)
+        };
+        if !set(&self.command("$$")?) {
+            self.command(&format!("$60={LEASE_S}"))?;
+        }
+        Ok(())
+    }
+
+    /// Opens a checked session where the controller offers one and none is open.
+    fn secure(&self) -> Result<(), TurntableError> {
+        let _line = self.line.lock().unwrap_or_else(PoisonError::into_inner);
+        greeting::secure(&self.link, &self.identity.extras)
+    }
+
+    fn outcome(&self, block: &str, patience: Patience) -> Result<Outcome, TurntableError> {
+        self.secure()?;
+        let _line = self.line.lock().unwrap_or_else(PoisonError::into_inner);
+        self.link.line(block, patience)
+    }
+
+    /// Sends a line and waits for its `ok`; gives what stood in front of it.
+    fn command(&self, block: &str) -> Result<Vec<Message>, TurntableError> {
+        match self.outcome(block, Patience::Short)? {
+            Outcome::Done(messages) => Ok(messages),
+            Outcome::Refused(code) => Err(refused(block, code)),
+            Outcome::Failed(fault) => Err(self.lost(block, fault)),
+        }
+    }
+
+    /// A line without answer: the table is being stopped for it, and that is waited for.
+    fn lost(&self, block: &str, fault: super::wire::LineFault) -> TurntableError {
+        match self.end_by_fault() {
+            Err(error) => error,
+            Ok(Some(TurntableError::Motion(fault @ super::error::Fault::PortLost(_)))) => {
+                fault.into()
+            }
+            Ok(_) => TurntableError::Lost {
+                block: block.to_owned(),
+                fault,
+            },
+        }
+    }
+}
+
+impl Drop for Table {
+    fn drop(&mut self) {
+        self.server = None;
+        self.link.supervisor().release(self.clock().now_us());
+        if self.link.supervisor().is_stopping() {
+            // There is nobody left to tell; the lease, where there is one, stops the table too.
+            let _ = self.link.wait_stopped();
+        }
+    }
+}
+
+fn refused(block: &str, code: u8) -> TurntableError {
+    TurntableError::Refused {
+        block: block.to_owned(),
+        code,
+    }
+}
+
+/// The line that moves straight to a place, degrees from machine zero.
+pub(super) fn straight(machine_deg: f64, speed: f64) -> String {
+    format!("G21G90G53G1X{machine_deg:.3}F{:.3}", speed * 60.0)
+}

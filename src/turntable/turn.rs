@@ -1,0 +1,212 @@
+//! One turn under way.
+
+use std::time::Duration;
+
+use super::error::TurntableError;
+use super::plan::TurnPlan;
+use super::supervisor::Seen;
+use super::sync::{self, Track};
+use super::table::{Status, Table, straight};
+use super::wire::State;
+
+/// How long the table rests before it starts, so that it has stopped swinging.
+const SETTLE: Duration = Duration::from_millis(300);
+/// What is added to the time the ramp should take.
+const RAMP_SLACK: Duration = Duration::from_secs(3);
+
+/// When the table is at constant speed, as expected by its first reports there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ConstantPart {
+    /// Start, microseconds of the host's clock.
+    pub from_us: i64,
+    /// End, microseconds of the host's clock.
+    pub to_us: i64,
+}
+
+/// How far a turn is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// Getting up to speed.
+    Starting,
+    /// At constant speed.
+    Constant,
+    /// Slowing down.
+    Ending,
+    /// At rest at its end.
+    AtEnd,
+}
+
+/// A turn under way. Dropped before its end, it stops the table.
+pub struct Turn<'table> {
+    table: &'table Table,
+    plan: TurnPlan,
+    zero_deg: f64,
+    over: bool,
+}
+
+impl<'table> Turn<'table> {
+    pub(super) fn start(
+        table: &'table Table,
+        plan: TurnPlan,
+        zero_deg: f64,
+    ) -> Result<Self, TurntableError> {
+        let speed = plan.degrees_per_second();
+        table.go(zero_deg + plan.back_deg(), speed)?;
+        table.clock().sleep(SETTLE);
+        let end_deg = zero_deg + plan.end_deg();
+        let distance = (plan.end_deg() - plan.back_deg()).abs();
+        table.link().supervisor().record();
+        table.launch(&straight(end_deg, speed), end_deg, distance, speed)?;
+        Ok(Self {
+            table,
+            plan,
+            zero_deg,
+            over: false,
+        })
+    }
+
+    /// The plan it follows.
+    #[must_use]
+    pub fn plan(&self) -> &TurnPlan {
+        &self.plan
+    }
+
+    /// How far it is.
+    ///
+    /// # Errors
+    /// What has ended it; the table has been stopped then.
+    pub fn state(&mut self) -> Result<Phase, TurntableError> {
+        self.check()?;
+        let supervisor = self.table.link().supervisor();
+        if supervisor
+            .motion()
+            .is_some_and(|motion| motion.is_at_target())
+        {
+            return Ok(Phase::AtEnd);
+        }
+        let gone = supervisor.recorded().last().map(|seen| self.gone(seen));
+        Ok(match gone {
+            Some(gone) if gone > self.plan.constant_deg() => Phase::Ending,
+            Some(gone) if gone >= 0.0 => Phase::Constant,
+            _ => Phase::Starting,
+        })
+    }
+
+    /// The table's angle by the last report, degrees, and when that was, microseconds of the
+    /// host's clock.
+    #[must_use]
+    pub fn last_angle(&self) -> Option<(f64, i64)> {
+        let supervisor = self.table.link().supervisor();
+        let seen = supervisor.recorded().last()?;
+        Some((seen.machine_deg - self.zero_deg, seen.came_us))
+    }
+
+    /// Degrees since the speed became constant; negative before.
+    fn gone(&self, seen: &Seen) -> f64 {
+        let angle = seen.machine_deg - self.zero_deg - self.plan.constant_from_deg();
+        angle * self.plan.direction().sign()
+    }
+
+    /// Waits until the speed is constant.
+    ///
+    /// # Errors
+    /// What has ended the turn; the table has been stopped then.
+    pub fn wait_constant(&mut self) -> Result<ConstantPart, TurntableError> {
+        let speed = self.plan.degrees_per_second();
+        let ramp = self.table.travel_time(0.0, speed) + RAMP_SLACK;
+        let found = self.table.link().wait(ramp, |supervisor| {
+            if supervisor.fault().is_some() {
+                return Some(None);
+            }
+            let constant = |seen: &&Seen| seen.state == State::Run && self.gone(seen) >= 0.0;
+            let seen = supervisor.recorded().iter().rev().find(constant)?;
+            Some(Some((*seen, self.gone(seen))))
+        });
+        self.check()?;
+        let Some(Some((seen, gone))) = found else {
+            self.stop()?;
+            return Err(super::error::Fault::Late.into());
+        };
+        let at_us = seen.asked_us.map_or(seen.came_us, |asked_us| {
+            i64::midpoint(asked_us, seen.came_us)
+        });
+        let micros = |degrees: f64| (degrees / speed * 1e6).round() as i64;
+        Ok(ConstantPart {
+            from_us: at_us - micros(gone),
+            to_us: at_us + micros(self.plan.constant_deg() - gone),
+        })
+    }
+
+    /// Waits until the table has come to rest at the turn's end, turns it back where the plan says
+    /// so, and tells its angles.
+    ///
+    /// # Errors
+    /// What has ended the turn; the table has been stopped then. [`TurntableError::Track`] where
+    /// the turn is whole and its angles cannot be told.
+    pub fn wait_end(mut self) -> Result<Track, TurntableError> {
+        let plan = &self.plan;
+        let distance = (plan.end_deg() - plan.back_deg()).abs();
+        let limit = self.table.travel_time(distance, plan.degrees_per_second());
+        let arrived = self.table.wait_arrival(limit);
+        let seen = self.leave();
+        arrived?;
+        let track = sync::fit(&seen, &self.course());
+        if self.plan.unwind() {
+            let start_deg = self.zero_deg + self.plan.start_deg();
+            self.table.go(start_deg, self.table.brisk())?;
+        }
+        Ok(track?)
+    }
+
+    fn course(&self) -> sync::Course {
+        sync::Course {
+            from_deg: self.zero_deg + self.plan.constant_from_deg(),
+            to_deg: self.zero_deg + self.plan.constant_to_deg(),
+            degrees_per_second: self.plan.degrees_per_second(),
+            zero_deg: self.zero_deg,
+            step_deg: self.table.identity().step_deg(),
+        }
+    }
+
+    /// Stops the table in the middle of the turn.
+    ///
+    /// # Errors
+    /// [`TurntableError::NotStopped`].
+    pub fn abort(mut self) -> Result<Status, TurntableError> {
+        self.stop()
+    }
+
+    fn stop(&mut self) -> Result<Status, TurntableError> {
+        let stopped = self.table.stop();
+        self.leave();
+        stopped
+    }
+
+    /// Ends the turn where a fault has.
+    fn check(&mut self) -> Result<(), TurntableError> {
+        match self.table.end_by_fault() {
+            Ok(None) => Ok(()),
+            Ok(Some(error)) | Err(error) => {
+                self.leave();
+                Err(error)
+            }
+        }
+    }
+
+    /// Stops watching; gives the reports.
+    fn leave(&mut self) -> Vec<Seen> {
+        self.over = true;
+        let mut supervisor = self.table.link().supervisor();
+        supervisor.end_motion();
+        supervisor.take_recorded()
+    }
+}
+
+impl Drop for Turn<'_> {
+    fn drop(&mut self) {
+        if !self.over {
+            // Whoever drops a turn is told nothing; the table's own end looks again.
+            let _ = self.stop();
+        }
+    }
+}

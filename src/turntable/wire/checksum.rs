@@ -1,0 +1,72 @@
+//! Checked lines: `<text>*<crc>`, where `<crc>` is CRC-16/CCITT-FALSE of the text (in the
+//! catalogues CRC-16/IBM-3740) as four upper-case hexadecimal digits.
+
+use crc::{CRC_16_IBM_3740, Crc};
+
+const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
+
+/// What a line says of its own wholeness.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sealed<'a> {
+    /// The text in front of a checksum that fits.
+    Good(&'a str),
+    /// There is a checksum, and it does not fit.
+    Bad,
+    /// There is no checksum.
+    Open,
+}
+
+/// `text` with its checksum.
+pub(super) fn seal(text: &str) -> String {
+    format!("{text}*{:04X}", CRC.checksum(text.as_bytes()))
+}
+
+/// Takes the checksum off a line.
+pub(super) fn unseal(line: &str) -> Sealed<'_> {
+    let Some((text, digits)) = line.rsplit_once('*') else {
+        return Sealed::Open;
+    };
+    let told = (digits.len() == 4 && digits.bytes().all(is_digit))
+        .then(|| u16::from_str_radix(digits, 16).ok())
+        .flatten();
+    if told == Some(CRC.checksum(text.as_bytes())) {
+        Sealed::Good(text)
+    } else {
+        Sealed::Bad
+    }
+}
+
+fn is_digit(byte: u8) -> bool {
+    byte.is_ascii_digit() || (b'A'..=b'F').contains(&byte)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_checksum_is_the_published_one() {
+        assert_eq!(seal("123456789"), "123456789*29B1");
+        assert_eq!(unseal("123456789*29B1"), Sealed::Good("123456789"));
+    }
+
+    #[test]
+    fn any_flipped_bit_is_told() {
+        let sealed = seal("ok N17");
+        for bit in 0..sealed.len() * 8 {
+            let mut bytes = sealed.clone().into_bytes();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            let damaged = String::from_utf8_lossy(&bytes);
+            assert!(!matches!(unseal(&damaged), Sealed::Good(_)), "{damaged}");
+        }
+    }
+
+    #[test]
+    fn a_line_without_head_or_tail_is_not_taken_for_whole() {
+        let sealed = seal("<Run|MPos:12.345,0.000,0.000|FS:432,0|T:1>");
+        for cut in 1..sealed.len() {
+            assert!(!matches!(unseal(&sealed[cut..]), Sealed::Good(_)));
+            assert!(!matches!(unseal(&sealed[..cut]), Sealed::Good(_)));
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Bytes to lines, each with the time its first byte came.
+
+/// Longest line taken, bytes; Grbl's longest answers stay well below it.
+const LONGEST: usize = 160;
+
+/// What the bytes gave.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Piece {
+    /// A line without its end.
+    Line {
+        /// Its text.
+        text: String,
+        /// When its first byte came, microseconds.
+        first_us: i64,
+    },
+    /// Something that is no line: bytes outside printable ASCII, or far too many without an end.
+    Noise,
+}
+
+/// Puts lines together.
+#[derive(Debug, Default)]
+pub(super) struct LineReader {
+    bytes: Vec<u8>,
+    first_us: i64,
+    spoilt: bool,
+}
+
+impl LineReader {
+    /// Takes one byte that came at `now_us`; a line end gives what stood before it.
+    pub(super) fn push(&mut self, now_us: i64, byte: u8) -> Option<Piece> {
+        if byte == b'\r' || byte == b'\n' {
+            return self.end();
+        }
+        if self.bytes.is_empty() && !self.spoilt {
+            self.first_us = now_us;
+        }
+        if !(b' '..=b'~').contains(&byte) || self.bytes.len() == LONGEST {
+            self.spoilt = true;
+        } else {
+            self.bytes.push(byte);
+        }
+        None
+    }
+
+    fn end(&mut self) -> Option<Piece> {
+        let bytes = std::mem::take(&mut self.bytes);
+        if std::mem::take(&mut self.spoilt) {
+            return Some(Piece::Noise);
+        }
+        if bytes.is_empty() {
+            return None;
+        }
+        Some(match String::from_utf8(bytes) {
+            Ok(text) => Piece::Line {
+                text,
+                first_us: self.first_us,
+            },
+            Err(_) => Piece::Noise,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(reader: &mut LineReader, now_us: i64, bytes: &[u8]) -> Vec<Piece> {
+        let pieces = bytes.iter().filter_map(|&byte| reader.push(now_us, byte));
+        pieces.collect()
+    }
+
+    #[test]
+    fn a_line_has_the_time_of_its_first_byte() {
+        let mut reader = LineReader::default();
+        assert_eq!(read(&mut reader, 5, b"\r\no"), []);
+        let text = "ok".to_owned();
+        let line = Piece::Line { text, first_us: 5 };
+        assert_eq!(read(&mut reader, 9, b"k\r\n"), [line]);
+    }
+
+    #[test]
+    fn a_line_with_foreign_bytes_or_without_end_is_noise_as_a_whole() {
+        let mut reader = LineReader::default();
+        assert_eq!(read(&mut reader, 0, b"o\xffk\r\n"), [Piece::Noise]);
+        assert_eq!(read(&mut reader, 0, &[b'x'; LONGEST + 1]), []);
+        assert_eq!(read(&mut reader, 0, b"\n\n"), [Piece::Noise]);
+    }
+}

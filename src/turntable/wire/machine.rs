@@ -1,0 +1,412 @@
+//! The state machine: one line in flight, checked or plain, and what comes back.
+
+use std::collections::VecDeque;
+
+use super::checksum::{Sealed, seal, unseal};
+use super::lines::{LineReader, Piece};
+use super::message::{Message, ResetCause, parse};
+use super::pending::{Due, Pending};
+use super::polling::{Poll, Polling};
+use super::realtime;
+
+pub use super::pending::Patience;
+
+/// Longest block sent, bytes: with number and checksum it fits Grbl's line buffer of 80.
+const LONGEST_BLOCK: usize = 60;
+/// Largest number of a checked line.
+const LAST_SEQ: u32 = 9_999_999;
+/// So many well-formed lines without checksum in a row mean that the controller has left the
+/// checked session, that is, has restarted.
+const UNCHECKED: u32 = 3;
+/// The controller's complaint of a number out of order.
+const OUT_OF_ORDER: u8 = 71;
+/// The controller's complaint of a checked line outside of a session.
+const NO_SESSION: u8 = 72;
+
+/// Something the controller did.
+#[derive(Debug, PartialEq)]
+pub enum Event {
+    /// The line `id` has its answer, or will never have one.
+    Answered {
+        /// What [`Machine::send`] gave.
+        id: u64,
+        /// What became of it.
+        outcome: Outcome,
+    },
+    /// A status report.
+    Status(Poll),
+    /// The controller has restarted.
+    Reset(Option<ResetCause>),
+    /// An alarm, by its number.
+    Alarm(u8),
+}
+
+/// What became of a line.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// Accepted; with the lines that stood in front of the answer.
+    Done(Vec<Message>),
+    /// Refused with Grbl's number: it did nothing.
+    Refused(u8),
+    /// It has no answer and will have none: it may or may not have been executed.
+    Failed(LineFault),
+}
+
+/// Why a line has no answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum LineFault {
+    /// Nothing that answers it came.
+    #[error("no answer came to {tries} of it")]
+    NoAnswer {
+        /// How often it was sent.
+        tries: u32,
+    },
+    /// The controller counts differently.
+    #[error("the controller counts its lines differently")]
+    OutOfOrder,
+    /// The controller restarted.
+    #[error("the controller restarted")]
+    Restarted,
+    /// It was given up, because the table is being stopped.
+    #[error("it was given up to stop the table")]
+    GivenUp,
+}
+
+/// Why a line was not sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum SendError {
+    /// Another line waits for its answer.
+    #[error("another line waits for its answer")]
+    Busy,
+    /// It is not known which answers are still to come; only a reset makes that certain again.
+    #[error("answers are outstanding that cannot be told apart: stop the table first")]
+    Unsure,
+    /// The line cannot be sent as one.
+    #[error("it is longer than 60 bytes or holds bytes that are no part of a line")]
+    Unsendable,
+}
+
+/// What went wrong on the wire so far and was put right or noticed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Lines sent, without repetitions.
+    pub lines: u64,
+    /// Lines sent again.
+    pub repeats: u64,
+    /// Lines that came damaged or were nothing a controller says.
+    pub noise: u64,
+    /// Answers that nothing waited for.
+    pub strays: u64,
+}
+
+/// How lines are sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Session {
+    Plain,
+    /// The line that opens a checked session is under way.
+    Opening,
+    /// Checked; the next line has this number.
+    Checked {
+        next: u32,
+    },
+}
+
+/// The byte state machine. Takes bytes and time, gives bytes and events.
+#[derive(Debug)]
+pub struct Machine {
+    reader: LineReader,
+    session: Session,
+    pending: Option<Pending>,
+    /// A line was given up whose answer may still come.
+    unsure: bool,
+    unchecked: u32,
+    polling: Polling,
+    realtime: Vec<u8>,
+    lines: Vec<u8>,
+    events: VecDeque<Event>,
+    next_id: u64,
+    counts: Counts,
+}
+
+impl Machine {
+    /// A machine that sends plain lines and asks for nothing.
+    pub fn new() -> Self {
+        Self {
+            reader: LineReader::default(),
+            session: Session::Plain,
+            pending: None,
+            unsure: false,
+            unchecked: 0,
+            polling: Polling::default(),
+            realtime: Vec::new(),
+            lines: Vec::new(),
+            events: VecDeque::new(),
+            next_id: 0,
+            counts: Counts::default(),
+        }
+    }
+
+    /// What went wrong so far.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// Whether a checked session is open.
+    pub fn is_checked(&self) -> bool {
+        matches!(self.session, Session::Checked { .. })
+    }
+
+    /// Whether a line waits for its answer, or one was given up whose answer may still come.
+    pub fn is_open(&self) -> bool {
+        self.pending.is_some() || self.unsure
+    }
+
+    /// Asks for a report every so many microseconds from now on, or no more.
+    pub fn poll_every(&mut self, every_us: Option<i64>) {
+        self.polling.set_every(every_us);
+    }
+
+    /// Sends a line, checked where a session is open.
+    ///
+    /// # Errors
+    /// [`SendError`]; then nothing was sent.
+    pub fn send(&mut self, now_us: i64, block: &str, patience: Patience) -> Result<u64, SendError> {
+        let plain = |b: u8| (b' '..=b'~').contains(&b) && !matches!(b, b'?' | b'!' | b'~' | b'*');
+        if block.len() > LONGEST_BLOCK || !block.bytes().all(plain) {
+            return Err(SendError::Unsendable);
+        }
+        match self.session {
+            Session::Checked { next } => {
+                let text = seal(&format!("N{next} {block}"));
+                self.launch(now_us, &text, Some(next), patience)
+            }
+            Session::Plain | Session::Opening => self.launch(now_us, block, None, patience),
+        }
+    }
+
+    /// Opens a checked session, or starts it anew.
+    ///
+    /// # Errors
+    /// [`SendError`]; then nothing was sent.
+    pub fn open_session(&mut self, now_us: i64) -> Result<u64, SendError> {
+        let id = self.launch(now_us, &seal("N0"), Some(0), Patience::Short)?;
+        self.session = Session::Opening;
+        Ok(id)
+    }
+
+    fn launch(
+        &mut self,
+        now_us: i64,
+        text: &str,
+        seq: Option<u32>,
+        patience: Patience,
+    ) -> Result<u64, SendError> {
+        if self.pending.is_some() {
+            return Err(SendError::Busy);
+        }
+        if self.unsure {
+            return Err(SendError::Unsure);
+        }
+        let id = self.next_id;
+        self.next_id += 1;
+        let pending = Pending::new(id, text, seq, patience, now_us);
+        self.lines.extend_from_slice(&pending.bytes);
+        self.pending = Some(pending);
+        self.counts.lines += 1;
+        Ok(id)
+    }
+
+    /// Sends a real-time byte, ahead of what waits to be sent.
+    pub fn realtime(&mut self, byte: u8) {
+        self.realtime.push(byte);
+    }
+
+    /// Gives up the line in flight. What is left of it is not sent, but it may have been executed.
+    pub fn give_up(&mut self) {
+        self.lines.clear();
+        self.fail(LineFault::GivenUp);
+    }
+
+    /// What is to be sent now. Call it right before writing: it notes the time of questions.
+    pub fn take_output(&mut self, now_us: i64) -> Vec<u8> {
+        let mut output = std::mem::take(&mut self.realtime);
+        if self.polling.is_due(now_us) {
+            self.polling.asked(now_us);
+            output.push(realtime::STATUS);
+        }
+        output.append(&mut self.lines);
+        output
+    }
+
+    /// The next event.
+    pub fn next_event(&mut self) -> Option<Event> {
+        self.events.pop_front()
+    }
+
+    /// Time has passed: lines without answer are sent again or given up.
+    pub fn on_time(&mut self, now_us: i64) {
+        let due = self
+            .pending
+            .as_ref()
+            .map_or(Due::Wait, |line| line.due(now_us));
+        self.follow(due, now_us);
+    }
+
+    fn follow(&mut self, due: Due, now_us: i64) {
+        let Some(pending) = &mut self.pending else {
+            return;
+        };
+        match due {
+            Due::Wait => {}
+            Due::Again => {
+                pending.sent_again(now_us);
+                self.lines.extend_from_slice(&pending.bytes);
+                self.counts.repeats += 1;
+            }
+            Due::Lost => {
+                let tries = pending.tries;
+                self.fail(LineFault::NoAnswer { tries });
+            }
+        }
+    }
+
+    /// Bytes have come.
+    pub fn on_bytes(&mut self, now_us: i64, bytes: &[u8]) {
+        for &byte in bytes {
+            match self.reader.push(now_us, byte) {
+                None => {}
+                Some(Piece::Noise) => self.counts.noise += 1,
+                Some(Piece::Line { text, first_us }) => self.on_line(now_us, &text, first_us),
+            }
+        }
+    }
+
+    fn on_line(&mut self, now_us: i64, line: &str, first_us: i64) {
+        match (unseal(line), self.session) {
+            (Sealed::Good(text), _) => {
+                self.unchecked = 0;
+                match parse(text) {
+                    Some(message) => self.on_message(now_us, message, first_us),
+                    None => self.counts.noise += 1,
+                }
+            }
+            (Sealed::Bad, _) => self.counts.noise += 1,
+            (Sealed::Open, Session::Plain | Session::Opening) => match parse(line) {
+                Some(message) => self.on_message(now_us, message, first_us),
+                None => self.counts.noise += 1,
+            },
+            (Sealed::Open, Session::Checked { .. }) => self.on_unchecked(line),
+        }
+    }
+
+    /// A line without checksum where each should have one: its tail was lost, or the controller
+    /// has restarted and left the session.
+    fn on_unchecked(&mut self, line: &str) {
+        self.counts.noise += 1;
+        let awaited = self.pending.as_ref().and_then(|line| line.seq);
+        match parse(line) {
+            Some(Message::Banner(banner)) => self.reset(banner.cause),
+            Some(Message::Error { code, seq }) if code == NO_SESSION && seq == awaited => {
+                self.reset(None);
+            }
+            Some(_) => {
+                self.unchecked += 1;
+                if self.unchecked >= UNCHECKED {
+                    self.reset(None);
+                }
+            }
+            None => {}
+        }
+    }
+
+    fn on_message(&mut self, now_us: i64, message: Message, first_us: i64) {
+        match message {
+            Message::Ok { seq } => self.on_answer(now_us, seq, None),
+            Message::Error { code, seq } => self.on_answer(now_us, seq, Some(code)),
+            Message::Alarm(code) => self.events.push_back(Event::Alarm(code)),
+            Message::Status(report) => {
+                let poll = self.polling.answered(report, first_us);
+                self.events.push_back(Event::Status(poll));
+            }
+            Message::Banner(banner) => self.reset(banner.cause),
+            other => {
+                if let Some(pending) = &mut self.pending {
+                    pending.keep(other);
+                }
+            }
+        }
+    }
+
+    fn on_answer(&mut self, now_us: i64, seq: Option<u32>, code: Option<u8>) {
+        let Some(awaited) = self.pending.as_ref().map(|line| line.seq) else {
+            self.counts.strays += 1;
+            return;
+        };
+        if awaited != seq {
+            // In a session an answer without number is a complaint of damage, and one with
+            // another number a repetition.
+            match (awaited, seq) {
+                (Some(_), None) => self.on_damaged(now_us),
+                _ => self.counts.strays += 1,
+            }
+            return;
+        }
+        match code {
+            None => self.accept(),
+            Some(NO_SESSION) if seq.is_some() => self.reset(None),
+            Some(OUT_OF_ORDER) if seq.is_some() => self.fail(LineFault::OutOfOrder),
+            Some(code) => self.answer(Outcome::Refused(code)),
+        }
+    }
+
+    fn on_damaged(&mut self, now_us: i64) {
+        let damaged = |line: &Pending| line.damaged(now_us);
+        let due = self.pending.as_ref().map_or(Due::Wait, damaged);
+        self.follow(due, now_us);
+    }
+
+    fn accept(&mut self) {
+        let info = self
+            .pending
+            .as_mut()
+            .map(|line| std::mem::take(&mut line.info));
+        self.answer(Outcome::Done(info.unwrap_or_default()));
+    }
+
+    /// The controller has dealt with the line: the next one has the next number.
+    fn answer(&mut self, outcome: Outcome) {
+        let Some(pending) = self.pending.take() else {
+            return;
+        };
+        self.lines.clear();
+        let opened = matches!(outcome, Outcome::Done(_));
+        self.session = match (self.session, pending.seq) {
+            (Session::Checked { .. }, Some(LAST_SEQ)) => Session::Plain,
+            (Session::Checked { .. }, Some(seq)) => Session::Checked { next: seq + 1 },
+            (Session::Opening, _) if opened => Session::Checked { next: 1 },
+            (Session::Opening, _) => Session::Plain,
+            (session, _) => session,
+        };
+        let id = pending.id;
+        self.events.push_back(Event::Answered { id, outcome });
+    }
+
+    fn fail(&mut self, fault: LineFault) {
+        if let Some(Pending { id, .. }) = self.pending.take() {
+            self.unsure = true;
+            let outcome = Outcome::Failed(fault);
+            self.events.push_back(Event::Answered { id, outcome });
+        }
+    }
+
+    /// The controller has restarted: nothing from before is answered, and it takes plain lines.
+    fn reset(&mut self, cause: Option<ResetCause>) {
+        self.fail(LineFault::Restarted);
+        self.lines.clear();
+        self.session = Session::Plain;
+        self.unsure = false;
+        self.unchecked = 0;
+        self.polling.forget();
+        self.events.push_back(Event::Reset(cause));
+    }
+}

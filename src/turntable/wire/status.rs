@@ -1,0 +1,213 @@
+//! Status reports: `<Run|MPos:12.345,0.000,0.000|FS:432,0|T:123456789|Bat:11.84|Pn:X>`.
+
+use std::fmt;
+
+use super::number::{decimal, whole};
+
+/// What the controller is doing, in Grbl's words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// At rest, ready.
+    Idle,
+    /// Moving by G-code, or waiting within it.
+    Run,
+    /// Held, and at rest.
+    Held,
+    /// Held, and still ramping down.
+    Holding,
+    /// Jogging.
+    Jog,
+    /// Looking for the index.
+    Home,
+    /// Locked after an alarm or at start-up.
+    Alarm,
+    /// Reads G-code without moving.
+    Check,
+    /// The safety door is open, which tables have none of; stock boards can report it.
+    Door,
+    /// Asleep until a reset.
+    Sleep,
+}
+
+impl State {
+    /// Whether the table may be moving, or will move on without being told.
+    #[must_use]
+    pub fn may_move(self) -> bool {
+        matches!(
+            self,
+            State::Run | State::Holding | State::Jog | State::Home | State::Door
+        )
+    }
+
+    fn parse(text: &str) -> Option<State> {
+        let (name, sub) = match text.split_once(':') {
+            Some((name, sub)) => (name, Some(whole(sub)?)),
+            None => (text, None),
+        };
+        Some(match (name, sub) {
+            ("Idle", None) => State::Idle,
+            ("Run", None) => State::Run,
+            ("Hold", Some(0)) => State::Held,
+            ("Hold", Some(1)) => State::Holding,
+            ("Jog", None) => State::Jog,
+            ("Home", None) => State::Home,
+            ("Alarm", None) => State::Alarm,
+            ("Check", None) => State::Check,
+            ("Door", Some(0..=3)) => State::Door,
+            ("Sleep", None) => State::Sleep,
+            _ => return None,
+        })
+    }
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            State::Idle => "Idle",
+            State::Run => "Run",
+            State::Held => "Hold:0",
+            State::Holding => "Hold:1",
+            State::Jog => "Jog",
+            State::Home => "Home",
+            State::Alarm => "Alarm",
+            State::Check => "Check",
+            State::Door => "Door:0",
+            State::Sleep => "Sleep",
+        })
+    }
+}
+
+/// Where the table is, in the controller's unit, by either of Grbl's two ways to say it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Position {
+    /// From machine zero.
+    Machine(f64),
+    /// From the zero of the work coordinates.
+    Work(f64),
+}
+
+/// Input pins that are active.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Pins {
+    /// The index sensor (Grbl's limit switch of X).
+    pub index: bool,
+    /// The emergency stop (Grbl's reset pin).
+    pub emergency_stop: bool,
+}
+
+/// A status report. Fields that are not known are skipped, as Grbl asks of its readers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StatusReport {
+    /// What the controller is doing.
+    pub state: State,
+    /// Where the table is.
+    pub position: Position,
+    /// Speed, the controller's unit a minute.
+    pub feed: Option<f64>,
+    /// Microseconds of the chip's clock at the moment of the position; wraps.
+    pub chip_us: Option<u32>,
+    /// Battery, volts.
+    pub battery_v: Option<f64>,
+    /// Active pins.
+    pub pins: Pins,
+    /// Machine position of the work coordinates' zero.
+    pub work_zero: Option<f64>,
+}
+
+impl StatusReport {
+    pub(super) fn parse(line: &str) -> Option<StatusReport> {
+        let inside = line.strip_prefix('<')?.strip_suffix('>')?;
+        if inside.contains(['<', '>']) {
+            return None;
+        }
+        let mut fields = inside.split('|');
+        let state = State::parse(fields.next()?)?;
+        let mut read = Fields::default();
+        for field in fields {
+            let (name, value) = field.split_once(':')?;
+            read.take(name, value)?;
+        }
+        Some(StatusReport {
+            state,
+            position: read.position?,
+            feed: read.feed,
+            chip_us: read.chip_us,
+            battery_v: read.battery_v,
+            pins: read.pins,
+            work_zero: read.work_zero,
+        })
+    }
+}
+
+#[derive(Default)]
+struct Fields {
+    position: Option<Position>,
+    feed: Option<f64>,
+    chip_us: Option<u32>,
+    battery_v: Option<f64>,
+    pins: Pins,
+    work_zero: Option<f64>,
+}
+
+impl Fields {
+    /// Takes a field; `None` where a known one is damaged or comes twice.
+    fn take(&mut self, name: &str, value: &str) -> Option<()> {
+        match name {
+            "MPos" => once(&mut self.position, Position::Machine(first(value)?)),
+            "WPos" => once(&mut self.position, Position::Work(first(value)?)),
+            "FS" | "F" => once(&mut self.feed, first(value)?),
+            "T" => once(&mut self.chip_us, whole(value)?),
+            "Bat" => once(&mut self.battery_v, decimal(value)?),
+            "WCO" => once(&mut self.work_zero, first(value)?),
+            "Pn" => {
+                self.pins = Pins {
+                    index: value.contains('X'),
+                    emergency_stop: value.contains('R'),
+                };
+                value.bytes().all(|b| b.is_ascii_uppercase()).then_some(())
+            }
+            _ => Some(()),
+        }
+    }
+}
+
+fn once<T>(place: &mut Option<T>, value: T) -> Option<()> {
+    place.replace(value).is_none().then_some(())
+}
+
+/// The first of a list of numbers, all of which have to be numbers.
+fn first(list: &str) -> Option<f64> {
+    let mut numbers = list.split(',').map(decimal);
+    let first = numbers.next()??;
+    numbers.all(|number| number.is_some()).then_some(first)
+}
+
+impl fmt::Display for StatusReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "<{}", self.state)?;
+        match self.position {
+            Position::Machine(at) => write!(f, "|MPos:{at:.3},0.000,0.000")?,
+            Position::Work(at) => write!(f, "|WPos:{at:.3},0.000,0.000")?,
+        }
+        if let Some(feed) = self.feed {
+            write!(f, "|FS:{feed},0")?;
+        }
+        if let Some(us) = self.chip_us {
+            write!(f, "|T:{us}")?;
+        }
+        if let Some(volts) = self.battery_v {
+            write!(f, "|Bat:{volts:.2}")?;
+        }
+        match (self.pins.index, self.pins.emergency_stop) {
+            (false, false) => {}
+            (true, false) => f.write_str("|Pn:X")?,
+            (false, true) => f.write_str("|Pn:R")?,
+            (true, true) => f.write_str("|Pn:XR")?,
+        }
+        if let Some(zero) = self.work_zero {
+            write!(f, "|WCO:{zero:.3},0.000,0.000")?;
+        }
+        f.write_str(">")
+    }
+}
