@@ -11,12 +11,15 @@
 //! frame rate and gaps in the time stamps are kept as they are. This room knows nothing of
 //! sessions, masks or angles.
 
+mod annexb;
 mod decoder;
 mod ffv1;
 mod matroska;
 mod order;
 mod orientation;
+mod packets;
 mod picture;
+mod raw;
 mod reader;
 mod scan;
 
@@ -26,7 +29,9 @@ use std::sync::Once;
 use ffmpeg_next::format::context::Input;
 
 pub use matroska::{Cut, find_cut};
+pub use packets::{CodedFrame, Packets};
 pub use picture::Picture;
+pub use raw::RawLayout;
 pub use reader::{Pending, Reader};
 pub use scan::{Damage, Facts, FrameInfo, Video};
 
