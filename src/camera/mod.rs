@@ -17,6 +17,8 @@ mod error;
 mod format;
 mod frame;
 pub mod lock;
+#[cfg(target_os = "linux")]
+mod v4l2;
 
 use std::time::Duration;
 

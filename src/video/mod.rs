@@ -15,10 +15,13 @@ mod annexb;
 mod decoder;
 mod ffv1;
 mod live;
+mod lossless;
 mod matroska;
 mod mux;
+mod nal;
 mod order;
 mod orientation;
+mod packets;
 mod picture;
 mod raw;
 mod reader;
@@ -31,10 +34,13 @@ use std::sync::Once;
 use ffmpeg_next::format::context::Input;
 
 pub use live::LiveDecoder;
+pub use lossless::RawFormat;
 pub use matroska::{Cut, find_cut};
 pub use mux::{Coding, Muxer, StreamFormat, Written};
+pub use nal::is_key;
+pub use packets::{CodedFrame, Packets};
 pub use picture::Picture;
-pub use raw::RawFormat;
+pub use raw::RawLayout;
 pub use reader::{Pending, Reader};
 pub use scan::{Damage, Facts, FrameInfo, Video};
 

@@ -15,8 +15,8 @@ use ffmpeg_next::codec::{self, Parameters, encoder};
 use ffmpeg_next::format::context::{Output, StreamIo};
 use ffmpeg_next::{Dictionary, Packet, Rational, ffi, format, media, packet};
 
-use super::annexb::{self, ParameterSets};
-use super::raw::RawFormat;
+use super::lossless::RawFormat;
+use super::nal::{self, ParameterSets};
 use super::{Error, initialise};
 
 /// Longest stretch of video that is held back for one cluster, milliseconds.
@@ -182,11 +182,11 @@ impl Muxer {
     pub fn write(&mut self, data: &[u8], t_us: i64) -> Result<Written, Error> {
         let key = match self.stream.coding {
             Coding::H264 => {
-                if !annexb::is_annex_b(data) {
+                if !nal::is_annex_b(data) {
                     return Err(Error::NotAnnexB(self.path.clone()));
                 }
                 self.sets.gather(data);
-                annexb::is_key(data)
+                nal::is_key(data)
             }
             Coding::Mjpeg | Coding::Raw(_) => true,
         };

@@ -1,0 +1,548 @@
+//! The kernel's V4L2 calls as safe functions: the one file of this room with unsafe code.
+//!
+//! The crate `v4l` gives the structures and call numbers. Its devices and streams are not used:
+//! dropping a stream panics on every error but one, frames come without the number of bytes used,
+//! waiting does not tell a broken stream from a frame, and reading controls panics on unknown kinds.
+#![allow(unsafe_code)]
+
+use std::ffi::c_void;
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::marker::PhantomData;
+use std::mem::{self, size_of};
+use std::os::fd::{AsFd, AsRawFd};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::Path;
+use std::ptr;
+use std::slice;
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::OFlags;
+use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
+use v4l::v4l_sys as sys;
+use v4l::v4l2;
+use v4l::v4l2::vidioc;
+
+/// The single-planar capture queue.
+const CAPTURE: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE;
+const MMAP: u32 = sys::v4l2_memory_V4L2_MEMORY_MMAP;
+
+/// A call's number, tied to the structure that it reads and writes.
+struct Request<T> {
+    code: vidioc::_IOC_TYPE,
+    argument: PhantomData<T>,
+}
+
+impl<T> Request<T> {
+    /// Does not compile where the number was made for a structure of another size.
+    const fn new(code: vidioc::_IOC_TYPE) -> Self {
+        assert!((code as usize >> 16) & 0x3fff == size_of::<T>());
+        Self {
+            code,
+            argument: PhantomData,
+        }
+    }
+}
+
+const QUERYCAP: Request<sys::v4l2_capability> = Request::new(vidioc::VIDIOC_QUERYCAP);
+const ENUM_FMT: Request<sys::v4l2_fmtdesc> = Request::new(vidioc::VIDIOC_ENUM_FMT);
+const ENUM_FRAMESIZES: Request<sys::v4l2_frmsizeenum> =
+    Request::new(vidioc::VIDIOC_ENUM_FRAMESIZES);
+const ENUM_FRAMEINTERVALS: Request<sys::v4l2_frmivalenum> =
+    Request::new(vidioc::VIDIOC_ENUM_FRAMEINTERVALS);
+const S_FMT: Request<sys::v4l2_format> = Request::new(vidioc::VIDIOC_S_FMT);
+const G_PARM: Request<sys::v4l2_streamparm> = Request::new(vidioc::VIDIOC_G_PARM);
+const S_PARM: Request<sys::v4l2_streamparm> = Request::new(vidioc::VIDIOC_S_PARM);
+const QUERY_EXT_CTRL: Request<sys::v4l2_query_ext_ctrl> =
+    Request::new(vidioc::VIDIOC_QUERY_EXT_CTRL);
+const QUERYMENU: Request<sys::v4l2_querymenu> = Request::new(vidioc::VIDIOC_QUERYMENU);
+const G_EXT_CTRLS: Request<sys::v4l2_ext_controls> = Request::new(vidioc::VIDIOC_G_EXT_CTRLS);
+const S_EXT_CTRLS: Request<sys::v4l2_ext_controls> = Request::new(vidioc::VIDIOC_S_EXT_CTRLS);
+const REQBUFS: Request<sys::v4l2_requestbuffers> = Request::new(vidioc::VIDIOC_REQBUFS);
+const QUERYBUF: Request<sys::v4l2_buffer> = Request::new(vidioc::VIDIOC_QUERYBUF);
+const QBUF: Request<sys::v4l2_buffer> = Request::new(vidioc::VIDIOC_QBUF);
+const DQBUF: Request<sys::v4l2_buffer> = Request::new(vidioc::VIDIOC_DQBUF);
+const STREAMON: Request<i32> = Request::new(vidioc::VIDIOC_STREAMON);
+const STREAMOFF: Request<i32> = Request::new(vidioc::VIDIOC_STREAMOFF);
+
+/// Structures of the kernel's interface for which all zeros is a value.
+///
+/// # Safety
+/// The type must be made of numbers, pointers, and arrays and unions of them.
+unsafe trait Plain {}
+
+macro_rules! plain {
+    ($($name:ident),*) => { $(
+        // SAFETY: a structure of the kernel's C interface, of numbers, pointers and their unions.
+        unsafe impl Plain for sys::$name {}
+    )* };
+}
+
+plain!(
+    v4l2_capability,
+    v4l2_fmtdesc,
+    v4l2_frmsizeenum,
+    v4l2_frmivalenum,
+    v4l2_format,
+    v4l2_streamparm,
+    v4l2_query_ext_ctrl,
+    v4l2_querymenu,
+    v4l2_ext_control,
+    v4l2_ext_controls,
+    v4l2_requestbuffers,
+    v4l2_buffer
+);
+
+fn zeroed<T: Plain>() -> T {
+    // SAFETY: `Plain` promises that all zeros is a value.
+    unsafe { mem::zeroed() }
+}
+
+/// An opened device node.
+#[derive(Debug)]
+pub(super) struct Node(File);
+
+/// What a node can do.
+#[derive(Debug, Clone)]
+pub(super) struct Identity {
+    pub(super) driver: String,
+    pub(super) card: String,
+    pub(super) bus: String,
+    /// `V4L2_CAP_*` of this node.
+    pub(super) capabilities: u32,
+}
+
+/// Sizes or intervals as the kernel lists them.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Listed<T> {
+    One(T),
+    Range { min: T, max: T, step: T },
+}
+
+/// What S_FMT granted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PixelLayout {
+    pub(super) fourcc: u32,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    /// Bytes from one row to the next; 0 for compressed formats.
+    pub(super) stride: u32,
+}
+
+/// A filled buffer that the driver handed over.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Filled {
+    pub(super) index: u32,
+    pub(super) bytes_used: u32,
+    /// `V4L2_BUF_FLAG_*`.
+    pub(super) flags: u32,
+    pub(super) sequence: u32,
+    pub(super) t_us: i64,
+}
+
+/// How waiting for a frame ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ready {
+    /// A frame, or an error that dequeuing will tell.
+    Yes,
+    /// The time ran out.
+    No,
+    /// The device reports an error, or that it went away.
+    Broken,
+}
+
+impl Node {
+    pub(super) fn open(path: &Path) -> io::Result<Self> {
+        // Non-blocking, so that dequeuing never waits longer than poll did.
+        let flags = OFlags::NONBLOCK.bits().cast_signed();
+        let mut options = OpenOptions::new();
+        options.read(true).write(true).custom_flags(flags);
+        options.open(path).map(Self)
+    }
+
+    /// One call, repeated where a signal interrupts it.
+    fn call<T>(&self, request: &Request<T>, argument: &mut T) -> io::Result<()> {
+        loop {
+            let pointer = ptr::from_mut(argument).cast::<c_void>();
+            // SAFETY: the request's number was made for a structure of T's size, so that the
+            // kernel reads and writes inside `argument`, which is borrowed for the call. Of the
+            // calls whose structures hold pointers, the callers set the pointers.
+            match unsafe { v4l2::ioctl(self.0.as_raw_fd(), request.code, pointer) } {
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                answer => return answer,
+            }
+        }
+    }
+
+    pub(super) fn identity(&self) -> io::Result<Identity> {
+        let mut found: sys::v4l2_capability = zeroed();
+        self.call(&QUERYCAP, &mut found)?;
+        // The node's own capabilities, where the driver tells them apart from the device's.
+        let own = found.capabilities & sys::V4L2_CAP_DEVICE_CAPS != 0;
+        Ok(Identity {
+            driver: text(&found.driver),
+            card: text(&found.card),
+            bus: text(&found.bus_info),
+            capabilities: if own {
+                found.device_caps
+            } else {
+                found.capabilities
+            },
+        })
+    }
+
+    /// The pixel format with this index; `None` after the last.
+    pub(super) fn pixel_format(&self, index: u32) -> io::Result<Option<u32>> {
+        let mut found = sys::v4l2_fmtdesc {
+            index,
+            type_: CAPTURE,
+            ..zeroed()
+        };
+        Ok(listed(self.call(&ENUM_FMT, &mut found))?.map(|()| found.pixelformat))
+    }
+
+    /// The frame size with this index; `None` after the last.
+    pub(super) fn frame_size(
+        &self,
+        fourcc: u32,
+        index: u32,
+    ) -> io::Result<Option<Listed<(u32, u32)>>> {
+        let mut found = sys::v4l2_frmsizeenum {
+            index,
+            pixel_format: fourcc,
+            ..zeroed()
+        };
+        if listed(self.call(&ENUM_FRAMESIZES, &mut found))?.is_none() {
+            return Ok(None);
+        }
+        // SAFETY: all fields of the union are plain numbers, and the call filled or zeroed them.
+        let (one, range) = unsafe {
+            let sizes = found.__bindgen_anon_1;
+            (sizes.discrete, sizes.stepwise)
+        };
+        Ok(Some(
+            if found.type_ == sys::v4l2_frmsizetypes_V4L2_FRMSIZE_TYPE_DISCRETE {
+                Listed::One((one.width, one.height))
+            } else {
+                Listed::Range {
+                    min: (range.min_width, range.min_height),
+                    max: (range.max_width, range.max_height),
+                    step: (range.step_width, range.step_height),
+                }
+            },
+        ))
+    }
+
+    /// The frame interval with this index, seconds as numerator and denominator; `None` after the
+    /// last.
+    pub(super) fn frame_interval(
+        &self,
+        fourcc: u32,
+        (width, height): (u32, u32),
+        index: u32,
+    ) -> io::Result<Option<Listed<(u32, u32)>>> {
+        let mut found = sys::v4l2_frmivalenum {
+            index,
+            pixel_format: fourcc,
+            width,
+            height,
+            ..zeroed()
+        };
+        if listed(self.call(&ENUM_FRAMEINTERVALS, &mut found))?.is_none() {
+            return Ok(None);
+        }
+        let pair = |of: sys::v4l2_fract| (of.numerator, of.denominator);
+        // SAFETY: all fields of the union are plain numbers, and the call filled or zeroed them.
+        let (one, range) = unsafe {
+            let intervals = found.__bindgen_anon_1;
+            (intervals.discrete, intervals.stepwise)
+        };
+        Ok(Some(
+            if found.type_ == sys::v4l2_frmivaltypes_V4L2_FRMIVAL_TYPE_DISCRETE {
+                Listed::One(pair(one))
+            } else {
+                Listed::Range {
+                    min: pair(range.min),
+                    max: pair(range.max),
+                    step: pair(range.step),
+                }
+            },
+        ))
+    }
+
+    /// Asks for a format; the driver puts the nearest that it has in its place.
+    pub(super) fn set_format(
+        &self,
+        fourcc: u32,
+        width: u32,
+        height: u32,
+    ) -> io::Result<PixelLayout> {
+        let mut format: sys::v4l2_format = zeroed();
+        format.type_ = CAPTURE;
+        format.fmt.pix = sys::v4l2_pix_format {
+            width,
+            height,
+            pixelformat: fourcc,
+            field: sys::v4l2_field_V4L2_FIELD_NONE,
+            // SAFETY: plain numbers and a union of them.
+            ..unsafe { mem::zeroed() }
+        };
+        self.call(&S_FMT, &mut format)?;
+        // SAFETY: the field for this type of queue, which the call filled; plain numbers.
+        let pix = unsafe { format.fmt.pix };
+        Ok(PixelLayout {
+            fourcc: pix.pixelformat,
+            width: pix.width,
+            height: pix.height,
+            stride: pix.bytesperline,
+        })
+    }
+
+    /// Asks for a frame interval, seconds as numerator and denominator, and answers the granted
+    /// one; `None` where the driver has no notion of it.
+    pub(super) fn set_interval(
+        &self,
+        numerator: u32,
+        denominator: u32,
+    ) -> io::Result<Option<(u32, u32)>> {
+        let mut parameters: sys::v4l2_streamparm = zeroed();
+        parameters.type_ = CAPTURE;
+        if listed(self.call(&G_PARM, &mut parameters))?.is_none() {
+            return Ok(None);
+        }
+        // SAFETY: the field for this type of queue; plain numbers.
+        if unsafe { parameters.parm.capture.capability } & sys::V4L2_CAP_TIMEPERFRAME != 0 {
+            parameters.parm.capture.timeperframe = sys::v4l2_fract {
+                numerator,
+                denominator,
+            };
+            self.call(&S_PARM, &mut parameters)?;
+        }
+        // SAFETY: as above.
+        let granted = unsafe { parameters.parm.capture.timeperframe };
+        Ok(Some((granted.numerator, granted.denominator)))
+    }
+
+    /// The first control after this number; `None` after the last. Controls of more than one
+    /// number are passed over by the kernel.
+    pub(super) fn control_after(&self, id: u32) -> io::Result<Option<sys::v4l2_query_ext_ctrl>> {
+        let mut found = sys::v4l2_query_ext_ctrl {
+            id: id | sys::V4L2_CTRL_FLAG_NEXT_CTRL,
+            ..zeroed()
+        };
+        Ok(listed(self.call(&QUERY_EXT_CTRL, &mut found))?.map(|()| found))
+    }
+
+    /// The control with this number; `None` where there is none.
+    pub(super) fn control(&self, id: u32) -> io::Result<Option<sys::v4l2_query_ext_ctrl>> {
+        let mut found = sys::v4l2_query_ext_ctrl { id, ..zeroed() };
+        Ok(listed(self.call(&QUERY_EXT_CTRL, &mut found))?.map(|()| found))
+    }
+
+    /// The words of a menu's item, or the number of an integer menu's; `None` where there is no
+    /// such item.
+    pub(super) fn menu_item(
+        &self,
+        id: u32,
+        index: u32,
+        numbers: bool,
+    ) -> io::Result<Option<String>> {
+        let mut found = sys::v4l2_querymenu {
+            id,
+            index,
+            ..zeroed()
+        };
+        if listed(self.call(&QUERYMENU, &mut found))?.is_none() {
+            return Ok(None);
+        }
+        let item = found.__bindgen_anon_1;
+        // SAFETY: bytes and a number share the place; the call filled it, and either can be read.
+        Ok(Some(unsafe {
+            if numbers {
+                item.value.to_string()
+            } else {
+                text(&item.name)
+            }
+        }))
+    }
+
+    /// Reads a control of one number. `wide`: of 64 bits.
+    pub(super) fn value(&self, id: u32, wide: bool) -> io::Result<i64> {
+        let mut control = sys::v4l2_ext_control { id, ..zeroed() };
+        self.with_control(&G_EXT_CTRLS, &mut control)?;
+        let value = control.__bindgen_anon_1;
+        // SAFETY: numbers share the place; it was zeroed, and the call filled the one of its kind.
+        Ok(unsafe {
+            if wide {
+                value.value64
+            } else {
+                i64::from(value.value)
+            }
+        })
+    }
+
+    /// Sets a control of one number. `wide`: of 64 bits; otherwise the value must fit into 32.
+    pub(super) fn set_value(&self, id: u32, wide: bool, value: i64) -> io::Result<()> {
+        let mut control = sys::v4l2_ext_control { id, ..zeroed() };
+        if wide {
+            control.__bindgen_anon_1.value64 = value;
+        } else {
+            let value = i32::try_from(value).map_err(|_| io::ErrorKind::InvalidInput)?;
+            control.__bindgen_anon_1.value = value;
+        }
+        self.with_control(&S_EXT_CTRLS, &mut control)
+    }
+
+    /// A call about one control without payload: `size` is 0, so that the kernel follows no pointer
+    /// in it.
+    fn with_control(
+        &self,
+        request: &Request<sys::v4l2_ext_controls>,
+        control: &mut sys::v4l2_ext_control,
+    ) -> io::Result<()> {
+        let mut controls = sys::v4l2_ext_controls {
+            count: 1,
+            controls: control,
+            ..zeroed()
+        };
+        self.call(request, &mut controls)
+    }
+
+    /// Asks for this many buffers, 0 to give all back; answers how many there are.
+    pub(super) fn request_buffers(&self, count: u32) -> io::Result<u32> {
+        let mut buffers = sys::v4l2_requestbuffers {
+            count,
+            type_: CAPTURE,
+            memory: MMAP,
+            ..zeroed()
+        };
+        self.call(&REQBUFS, &mut buffers)?;
+        Ok(buffers.count)
+    }
+
+    /// Maps a buffer into memory.
+    pub(super) fn map(&self, index: u32) -> io::Result<Mapping> {
+        let mut buffer = buffer(index);
+        self.call(&QUERYBUF, &mut buffer)?;
+        // SAFETY: of a buffer in mapped memory, the call filled the offset.
+        let offset = unsafe { buffer.m.offset };
+        Mapping::new(&self.0, u64::from(offset), buffer.length as usize)
+    }
+
+    /// Gives a buffer to the driver to be filled.
+    pub(super) fn queue(&self, index: u32) -> io::Result<()> {
+        self.call(&QBUF, &mut buffer(index))
+    }
+
+    /// Takes the next filled buffer; [`io::ErrorKind::WouldBlock`] where there is none.
+    pub(super) fn dequeue(&self) -> io::Result<Filled> {
+        let mut filled = buffer(0);
+        self.call(&DQBUF, &mut filled)?;
+        let time = filled.timestamp;
+        Ok(Filled {
+            index: filled.index,
+            bytes_used: filled.bytesused,
+            flags: filled.flags,
+            sequence: filled.sequence,
+            t_us: time
+                .tv_sec
+                .saturating_mul(1_000_000)
+                .saturating_add(time.tv_usec),
+        })
+    }
+
+    pub(super) fn stream_on(&self) -> io::Result<()> {
+        self.call(&STREAMON, &mut CAPTURE.cast_signed())
+    }
+
+    pub(super) fn stream_off(&self) -> io::Result<()> {
+        self.call(&STREAMOFF, &mut CAPTURE.cast_signed())
+    }
+
+    /// Waits until a frame can be taken.
+    pub(super) fn wait(&self, timeout: Duration) -> io::Result<Ready> {
+        let timeout = Timespec::try_from(timeout).map_err(|_| io::ErrorKind::InvalidInput)?;
+        let mut watched = [PollFd::from_borrowed_fd(self.0.as_fd(), PollFlags::IN)];
+        match poll(&mut watched, Some(&timeout)) {
+            Ok(0) | Err(rustix::io::Errno::INTR) => return Ok(Ready::No),
+            Ok(_) => {}
+            Err(error) => return Err(error.into()),
+        }
+        let broken = PollFlags::ERR | PollFlags::HUP | PollFlags::NVAL;
+        Ok(if watched[0].revents().intersects(broken) {
+            Ready::Broken
+        } else {
+            Ready::Yes
+        })
+    }
+}
+
+fn buffer(index: u32) -> sys::v4l2_buffer {
+    sys::v4l2_buffer {
+        index,
+        type_: CAPTURE,
+        memory: MMAP,
+        ..zeroed()
+    }
+}
+
+/// `None` for the answers with which drivers end a list, or say that they have none.
+fn listed(answer: io::Result<()>) -> io::Result<Option<()>> {
+    use rustix::io::Errno;
+    match answer {
+        Ok(()) => Ok(Some(())),
+        Err(error) => match Errno::from_io_error(&error) {
+            Some(Errno::INVAL | Errno::NOTTY | Errno::NODATA) => Ok(None),
+            _ => Err(error),
+        },
+    }
+}
+
+/// The text in a field that the kernel ends with a zero byte, or fills.
+pub(super) fn text(field: &[u8]) -> String {
+    let end = field
+        .iter()
+        .position(|&byte| byte == 0)
+        .unwrap_or(field.len());
+    String::from_utf8_lossy(&field[..end]).into_owned()
+}
+
+/// A driver's buffer in this program's memory, until it is dropped.
+#[derive(Debug)]
+pub(super) struct Mapping {
+    start: *mut c_void,
+    length: usize,
+}
+
+// SAFETY: the memory belongs to the process, not to a thread, and nobody else has the pointer.
+unsafe impl Send for Mapping {}
+
+impl Mapping {
+    fn new(file: &File, offset: u64, length: usize) -> io::Result<Self> {
+        if length == 0 {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        let (protection, flags) = (ProtFlags::READ | ProtFlags::WRITE, MapFlags::SHARED);
+        // SAFETY: the kernel chooses a place where nothing is mapped.
+        let start = unsafe { mmap(ptr::null_mut(), length, protection, flags, file, offset) }?;
+        Ok(Self { start, length })
+    }
+
+    /// A copy of the first `bytes`, or of all where there are fewer. To be called between taking
+    /// the buffer and giving it back, while the driver leaves it alone.
+    pub(super) fn copy(&self, bytes: usize) -> Vec<u8> {
+        let bytes = bytes.min(self.length);
+        // SAFETY: the mapping is `length` bytes, readable, and lives as long as `self`; a device
+        // that is unplugged leaves its memory mapped. Only bytes are read, of which any value goes.
+        unsafe { slice::from_raw_parts(self.start.cast::<u8>(), bytes) }.to_vec()
+    }
+}
+
+impl Drop for Mapping {
+    fn drop(&mut self) {
+        // SAFETY: the mapping was made with this start and length, and no slice of it outlives a
+        // call of `copy`. Failing, it stays mapped until the process ends.
+        let _ = unsafe { munmap(self.start, self.length) };
+    }
+}
