@@ -80,7 +80,9 @@ pub enum Refusal {
         Vec<String>,
     ),
     /// All that came first was damaged.
-    #[error("the camera's first {frames} frames were damaged ({why}): check its cable, or ask for another mode")]
+    #[error(
+        "the camera's first {frames} frames were damaged ({why}): check its cable, or ask for another mode"
+    )]
     Damaged {
         /// How many were looked at.
         frames: usize,
@@ -118,13 +120,17 @@ pub enum Refusal {
     #[error("the table does not tell its battery's voltage: leave --min-battery out")]
     NoBattery,
     /// The time of day cannot be right.
-    #[error("the system's clock says {now}, before this program was written: set it, or the session's name would be wrong")]
+    #[error(
+        "the system's clock says {now}, before this program was written: set it, or the session's name would be wrong"
+    )]
     Clock {
         /// What the clock says.
         now: String,
     },
     /// The object's name cannot be part of a session's.
-    #[error("{0:?} cannot be an object's name: use letters, digits, '-', '_' and '.', at most 80 bytes")]
+    #[error(
+        "{0:?} cannot be an object's name: use letters, digits, '-', '_' and '.', at most 80 bytes"
+    )]
     Object(String),
     /// Metering without a table.
     #[error("metering turns the table, and there is none: give --turntable, or set the exposure")]
@@ -148,7 +154,9 @@ pub enum MeterFault {
         allowed: f64,
     },
     /// The turns were over before all was seen.
-    #[error("{degrees} degrees of the turn were not seen at an exposure that holds: the light changes, or frames are missing; meter again, or set the exposure")]
+    #[error(
+        "{degrees} degrees of the turn were not seen at an exposure that holds: the light changes, or frames are missing; meter again, or set the exposure"
+    )]
     Unseen {
         /// Degrees not seen.
         degrees: usize,
@@ -170,7 +178,11 @@ pub enum MeterFault {
 }
 
 fn joined(moved: &[Moved]) -> String {
-    moved.iter().map(Moved::to_string).collect::<Vec<_>>().join(", ")
+    moved
+        .iter()
+        .map(Moved::to_string)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// The first of a long list.

@@ -177,7 +177,13 @@ mod tests {
 
     #[test]
     fn a_highlight_late_in_the_turn_darkens_it_and_only_its_part_is_seen_again() {
-        let light = |angle: f64| if (300.0..310.0).contains(&angle) { 0.01 } else { 0.001 };
+        let light = |angle: f64| {
+            if (300.0..310.0).contains(&angle) {
+                0.01
+            } else {
+                0.001
+            }
+        };
         let (exposure, angle) = meter(light, 0.48, 6).unwrap();
         assert!((85..=100).contains(&exposure), "{exposure}");
         assert!(angle < 672.0, "{angle}");
@@ -191,7 +197,10 @@ mod tests {
 
     #[test]
     fn a_camera_with_few_frames_does_not_see_every_degree_and_is_told_so() {
-        assert!(matches!(meter(|_| 0.001, 7.0, 0), Err(MeterFault::Unseen { degrees: 1.. })));
+        assert!(matches!(
+            meter(|_| 0.001, 7.0, 0),
+            Err(MeterFault::Unseen { degrees: 1.. })
+        ));
     }
 
     proptest! {

@@ -261,14 +261,23 @@ mod tests {
     use crate::camera::Sizes;
 
     fn settings(camera: &str, table: &str) -> Settings {
-        Settings::new("/root".into(), camera.parse().unwrap(), table.parse().unwrap())
+        Settings::new(
+            "/root".into(),
+            camera.parse().unwrap(),
+            table.parse().unwrap(),
+        )
     }
 
     fn mode(fourcc: Fourcc, width: u32, height: u32, rates: &[u32]) -> Mode {
         Mode {
             fourcc,
             sizes: Sizes::One(width, height),
-            rates: Rates::List(rates.iter().filter_map(|&rate| Rate::new(rate, 1)).collect()),
+            rates: Rates::List(
+                rates
+                    .iter()
+                    .filter_map(|&rate| Rate::new(rate, 1))
+                    .collect(),
+            ),
         }
     }
 
@@ -312,9 +321,15 @@ mod tests {
         ];
         let chosen = ModeWish::default().choose(&modes).unwrap();
         assert_eq!(chosen.to_string(), "MJPG:1920x1080@30");
-        let wish = ModeWish { fourcc: Some(Fourcc::YUYV), ..ModeWish::default() };
+        let wish = ModeWish {
+            fourcc: Some(Fourcc::YUYV),
+            ..ModeWish::default()
+        };
         assert_eq!(wish.choose(&modes).unwrap().fourcc, Fourcc::YUYV);
-        let wish = ModeWish { fps: 15.0, ..ModeWish::default() };
+        let wish = ModeWish {
+            fps: 15.0,
+            ..ModeWish::default()
+        };
         assert_eq!(wish.choose(&modes).unwrap().width, 3840);
     }
 
@@ -322,7 +337,10 @@ mod tests {
     fn a_wish_that_no_mode_fulfils_is_told_with_what_there_is() {
         let modes = [mode(Fourcc::MJPG, 640, 480, &[25])];
         let error = ModeWish::default().choose(&modes).unwrap_err().to_string();
-        assert!(error.contains("any format of any size at 30 frames/s"), "{error}");
+        assert!(
+            error.contains("any format of any size at 30 frames/s"),
+            "{error}"
+        );
         assert!(error.contains("MJPG 640x480, 25 frames/s"), "{error}");
     }
 
@@ -334,7 +352,13 @@ mod tests {
 
     #[test]
     fn sizes_are_written_with_an_x() {
-        assert_eq!("1920x1080".parse(), Ok(FrameSize { width: 1920, height: 1080 }));
+        assert_eq!(
+            "1920x1080".parse(),
+            Ok(FrameSize {
+                width: 1920,
+                height: 1080
+            })
+        );
         for text in ["", "1920", "0x5", "axb", "1920x1080x3"] {
             assert!(text.parse::<FrameSize>().is_err(), "{text}");
         }

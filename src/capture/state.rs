@@ -113,6 +113,36 @@ pub struct FaultLine {
     pub what: String,
 }
 
+/// Something that was looked at before the table turned.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Check {
+    /// What was looked at.
+    pub what: String,
+    /// False where it is not as it should be, and the capture goes on all the same.
+    pub good: bool,
+    /// What was found.
+    pub found: String,
+}
+
+impl Check {
+    /// A check that was passed.
+    pub fn passed(what: impl Into<String>, found: impl Into<String>) -> Self {
+        Self {
+            what: what.into(),
+            good: true,
+            found: found.into(),
+        }
+    }
+
+    /// Something that the person at the rig has to know, and that keeps nobody from going on.
+    pub fn noted(what: impl Into<String>, found: impl Into<String>) -> Self {
+        Self {
+            good: false,
+            ..Self::passed(what, found)
+        }
+    }
+}
+
 /// All that a viewer may know.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct RigState {
@@ -140,6 +170,8 @@ pub struct RigState {
     pub free_bytes: u64,
     /// Bytes that a take is expected to need.
     pub needed_bytes: u64,
+    /// What the last preflight found.
+    pub checks: Vec<Check>,
     /// Newest last.
     pub faults: VecDeque<FaultLine>,
     /// The last finished take.

@@ -82,10 +82,7 @@ fn open(id: codec::Id) -> Result<VideoDecoder, FrameFault> {
     decoder.video().map_err(FrameFault::Damaged)
 }
 
-fn compressed(
-    decoder: &mut VideoDecoder,
-    data: &[u8],
-) -> Result<Option<frame::Video>, FrameFault> {
+fn compressed(decoder: &mut VideoDecoder, data: &[u8]) -> Result<Option<frame::Video>, FrameFault> {
     decoder
         .send_packet(&Packet::copy(data))
         .map_err(FrameFault::Damaged)?;
