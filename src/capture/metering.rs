@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::error::{CaptureError, MeterFault};
+use super::failure::{CaptureError, MeterFault};
 use super::look::{clipped, middle};
 use super::meter::{Advice, Exposures, Meter};
 use super::preflight::Held;
@@ -58,7 +58,7 @@ pub(super) fn meter(
     held.controls = camera.controls()?;
     let moved = held.plan.check(&held.controls);
     if !moved.is_empty() {
-        return Err(super::error::Refusal::NotKept(moved).into());
+        return Err(super::failure::Refusal::NotKept(moved).into());
     }
     Ok(found)
 }

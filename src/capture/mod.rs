@@ -5,7 +5,7 @@
 //! ```
 
 mod coding;
-mod error;
+mod failure;
 pub mod look;
 pub mod meter;
 mod metering;
@@ -16,6 +16,6 @@ pub mod state;
 mod stop;
 pub mod trace;
 
-pub use error::{CaptureError, MeterFault, Refusal};
+pub use failure::{CaptureError, MeterFault, Refusal};
 pub use settings::{FrameSize, ModeWish, Settings};
 pub use stop::{StopRequest, Stopped};

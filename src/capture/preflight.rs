@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 
-use super::error::{CaptureError, Refusal};
+use super::failure::{CaptureError, Refusal};
 use super::settings::Settings;
 use super::state::Check;
 use super::stop::StopRequest;

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use super::error::{CaptureError, Refusal};
+use super::failure::{CaptureError, Refusal};
 use crate::camera::lock::Wanted;
 use crate::camera::{self, Fourcc, Mode, ModeRequest, Rate, Rates};
 use crate::clock::Clock;
