@@ -1,0 +1,306 @@
+//! Lines: taking one in, doing what it says, answering it.
+
+use super::{Alarm, Controller, Job, Mode, Stop, Way};
+use crate::board::{Board, Events};
+use crate::checked::Verdict;
+use crate::dollar::{self, Dollar};
+use crate::error::Error;
+use crate::gcode::{self, Action, Block, Jog, Modal, Motion};
+use crate::report::{self, Reply};
+use crate::settings::{Key, Settings};
+use crate::store::Stored;
+
+/// Most bytes that one round of the main loop reads.
+const BYTES_A_ROUND: u8 = 128;
+
+/// What a line asks for.
+enum Request {
+    Nothing,
+    Block(Block),
+    Dollar(Dollar),
+}
+
+impl Request {
+    fn read(text: &[u8], modal: &Modal, locked: bool) -> Result<Request, Error> {
+        match text {
+            [] => Ok(Request::Nothing),
+            [b'$', rest @ ..] => dollar::parse(rest, modal).map(Request::Dollar),
+            _ if locked => Err(Error::Locked),
+            _ => gcode::parse(text, modal).map(Request::Block),
+        }
+    }
+}
+
+impl Controller {
+    /// Reads up to the end of a line, if the line before is done, and does what it says.
+    pub(super) fn take_line<B: Board>(&mut self, board: &mut B) {
+        if self.job != Job::None || self.stopping.is_some() {
+            return;
+        }
+        for _ in 0..BYTES_A_ROUND {
+            let Some(byte) = board.receive() else {
+                self.reader.drained();
+                return;
+            };
+            if self.reader.push(byte) {
+                self.take_whole_line(board);
+                return;
+            }
+        }
+    }
+
+    fn take_whole_line<B: Board>(&mut self, board: &mut B) {
+        // Only now is it known whether a byte of this line was lost, or a reset came behind it.
+        self.pending.insert(board.take_events());
+        if self.pending.contains(Events::RESET) {
+            return;
+        }
+        if self.pending.remove(Events::LOST_INPUT) {
+            self.reader.lose();
+        }
+        match self.session.judge(&self.reader.line()) {
+            Verdict::Answer { sequence, answer } => {
+                report::answer(board, self.session.is_open(), sequence, answer);
+            }
+            Verdict::Execute { sequence, block } => {
+                let locked = self.jogging || matches!(self.mode, Mode::Alarm(_));
+                let request = Request::read(block, &self.modal, locked);
+                self.sequence = sequence;
+                let done = request.and_then(|request| self.execute(board, request));
+                if done.is_err() || (self.job == Job::None && self.stopping.is_none()) {
+                    self.answer(board, done);
+                }
+            }
+        }
+    }
+
+    /// Ends the job of the line under way, if there is one, and answers the line.
+    pub(super) fn finish<B: Board>(&mut self, board: &mut B, done: Result<(), Error>) {
+        if core::mem::replace(&mut self.job, Job::None) != Job::None {
+            self.answer(board, done);
+        }
+    }
+
+    fn answer<B: Board>(&mut self, board: &mut B, done: Result<(), Error>) {
+        let answer = done.map_or_else(Error::code, |()| 0);
+        let sequence = self.sequence.take();
+        self.session.remember(sequence, answer);
+        report::answer(board, self.session.is_open(), sequence, answer);
+        if self.restart_due {
+            self.restart_due = false;
+            self.restart(board);
+        }
+    }
+
+    /// Does what a line says, or leaves a job that will.
+    fn execute<B: Board>(&mut self, board: &mut B, request: Request) -> Result<(), Error> {
+        match request {
+            Request::Nothing => Ok(()),
+            Request::Block(block) => self.execute_block(board, &block),
+            Request::Dollar(command) => self.execute_dollar(board, command),
+        }
+    }
+
+    fn execute_block<B: Board>(&mut self, board: &mut B, block: &Block) -> Result<(), Error> {
+        let feed = match block.modal.motion {
+            Motion::Feed => block.modal.feed,
+            Motion::Rapid => u32::MAX,
+        };
+        let moving = match block.action {
+            Action::Move(target) => Some((self.resolve(target)?, None, feed)),
+            Action::GoHome(None) => Some((0, None, u32::MAX)),
+            Action::GoHome(Some(via)) => Some((self.resolve(via)?, Some(0), u32::MAX)),
+            _ => None,
+        };
+        self.modal = block.modal;
+        if self.mode == Mode::Check {
+            return Ok(());
+        }
+        if let Some((target, then, feed)) = moving {
+            self.go(board, target, then, feed);
+            return Ok(());
+        }
+        match block.action {
+            Action::Dwell(left) => self.job = Job::Dwell { since: None, left },
+            Action::SetOrigin(x) => {
+                self.offset = self.zero_for(x, self.shift)?;
+                self.reports_to_offset = 0;
+                self.save(board);
+            }
+            Action::SetOffset(x) => {
+                self.shift = self.zero_for(x, self.offset)?;
+                self.reports_to_offset = 0;
+            }
+            Action::Nothing | Action::Move(_) | Action::GoHome(_) => {}
+        }
+        Ok(())
+    }
+
+    /// The offset that, together with `other`, gives the place where the plan ends the work
+    /// position `x`.
+    fn zero_for(&self, x: i32, other: i32) -> Result<i32, Error> {
+        let zero = i64::from(self.planned.angle) - i64::from(other) - i64::from(x);
+        i32::try_from(zero).map_err(|_| Error::InvalidTarget)
+    }
+
+    fn go<B: Board>(&mut self, board: &mut B, target: i32, then: Option<i32>, feed: u32) {
+        if self.is_beyond(target) {
+            self.job = Job::Refusal;
+            self.stop(board, Stop::Alarm(Alarm::SoftLimit));
+            return;
+        }
+        self.job = Job::Move(Way {
+            target,
+            then,
+            feed,
+            jog: false,
+        });
+    }
+
+    fn save<B: Board>(&mut self, board: &mut B) {
+        let stored = Stored {
+            settings: self.settings,
+            offset: self.offset,
+        };
+        self.store.write(board, &stored);
+    }
+
+    fn execute_dollar<B: Board>(&mut self, board: &mut B, command: Dollar) -> Result<(), Error> {
+        match command {
+            Dollar::Help | Dollar::Settings | Dollar::Version => self.tell(board, command),
+            Dollar::Modal => self.tell_modal(board),
+            Dollar::Offsets => self.tell_offsets(board),
+            Dollar::Set(key, value) => return self.set(board, key, value),
+            Dollar::Restore { settings, offsets } => {
+                return self.restore(board, settings, offsets);
+            }
+            Dollar::Home => return self.home(board),
+            Dollar::Unlock => return self.unlock(board),
+            Dollar::Check => return self.toggle_check(board),
+            Dollar::Jog(jog) => return self.jog(board, jog),
+        }
+        Ok(())
+    }
+
+    fn tell<B: Board>(&self, board: &mut B, command: Dollar) {
+        let checked = self.session.is_open();
+        match command {
+            Dollar::Settings => {
+                for key in Key::ALL {
+                    report::setting(board, checked, &self.settings, key);
+                }
+            }
+            Dollar::Version => {
+                let mut reply = Reply::new(board, checked);
+                reply.text("[VER:1.1h.20261121:relit]").end();
+                let mut reply = Reply::new(board, checked);
+                reply.text("[OPT:NHtcl,8,128]").end();
+            }
+            _ => {
+                let mut reply = Reply::new(board, checked);
+                reply.text("[HLP:$$ $n=v $I $H $X $C $G $# $J= $RST= ? ! ~ ctrl-x]");
+                reply.end();
+            }
+        }
+    }
+
+    /// Settings change only at rest or locked, for they change what a step is.
+    fn require_rest<B: Board>(&self, board: &mut B) -> Result<(), Error> {
+        match self.mode {
+            Mode::Alarm(_) => Ok(()),
+            _ if self.is_idle(board) => Ok(()),
+            _ => Err(Error::NotIdle),
+        }
+    }
+
+    fn set<B: Board>(&mut self, board: &mut B, key: Key, value: i64) -> Result<(), Error> {
+        self.require_rest(board)?;
+        self.settings.set(key, value)?;
+        self.apply_settings(board);
+        self.save(board);
+        Ok(())
+    }
+
+    fn restore<B: Board>(
+        &mut self,
+        board: &mut B,
+        settings: bool,
+        offsets: bool,
+    ) -> Result<(), Error> {
+        self.require_rest(board)?;
+        if settings {
+            self.settings = Settings::defaults();
+            self.apply_settings(board);
+        }
+        if offsets {
+            self.offset = 0;
+            self.shift = 0;
+            self.reports_to_offset = 0;
+        }
+        self.save(board);
+        self.message(board, "Restoring defaults");
+        Ok(())
+    }
+
+    fn message<B: Board>(&self, board: &mut B, text: &str) {
+        let mut reply = Reply::new(board, self.session.is_open());
+        reply.text("[MSG:").text(text).text("]").end();
+    }
+
+    fn home<B: Board>(&mut self, board: &mut B) -> Result<(), Error> {
+        if !self.settings.flag(Key::Homing) {
+            return Err(Error::HomingDisabled);
+        }
+        if self.emergency {
+            return Err(Error::Locked);
+        }
+        self.require_rest(board)?;
+        self.start_homing(board);
+        Ok(())
+    }
+
+    fn unlock<B: Board>(&mut self, board: &mut B) -> Result<(), Error> {
+        if self.emergency {
+            return Err(Error::Locked);
+        }
+        if let Mode::Alarm(_) = self.mode {
+            self.mode = Mode::Ready;
+            self.message(board, "Caution: Unlocked");
+        }
+        Ok(())
+    }
+
+    /// `$C`. Its end is a reset, so that nothing that lines said while checked stays.
+    fn toggle_check<B: Board>(&mut self, board: &mut B) -> Result<(), Error> {
+        if self.mode == Mode::Check {
+            self.message(board, "Disabled");
+            self.restart_due = true;
+            return Ok(());
+        }
+        if !self.is_idle(board) {
+            return Err(Error::NotIdle);
+        }
+        self.mode = Mode::Check;
+        self.message(board, "Enabled");
+        Ok(())
+    }
+
+    fn jog<B: Board>(&mut self, board: &mut B, jog: Jog) -> Result<(), Error> {
+        match self.mode {
+            Mode::Alarm(_) => return Err(Error::Locked),
+            _ if self.jogging || self.is_idle(board) => {}
+            _ => return Err(Error::NotIdle),
+        }
+        let target = self.resolve(jog.target)?;
+        if self.is_beyond(target) {
+            return Err(Error::JogTravel);
+        }
+        self.job = Job::Move(Way {
+            target,
+            then: None,
+            feed: jog.feed,
+            jog: true,
+        });
+        Ok(())
+    }
+}

@@ -1,0 +1,117 @@
+//! Status reports, and what `$G` and `$#` tell.
+
+use super::{Controller, Job, Mode};
+use crate::board::Board;
+use crate::gcode::Motion;
+use crate::number::divide_rounded;
+use crate::report::Reply;
+use crate::settings::Key;
+
+/// Every so many reports tell the work offset.
+const OFFSET_EVERY: u8 = 10;
+/// The battery input's full scale.
+const BATTERY_FULL: i64 = 1023;
+
+/// What the stepper knows, at one moment.
+struct Snapshot {
+    micros: u32,
+    position: i32,
+    interval: Option<u32>,
+    free: u8,
+    planned: bool,
+}
+
+impl Controller {
+    /// Answers `?`.
+    pub(super) fn report_status<B: Board>(&mut self, board: &mut B) {
+        let now = board.with_stepper(|stepper, micros| Snapshot {
+            micros,
+            position: stepper.position(),
+            interval: stepper.interval(),
+            free: stepper.free(),
+            planned: stepper.has_plan(),
+        });
+        let (room, battery, inputs) = (board.receive_room(), board.battery(), board.inputs());
+        let index = inputs.index != self.settings.flag(Key::InvertIndex);
+        let emergency = inputs.emergency_stop != self.settings.flag(Key::InvertEmergency);
+        let inches = self.settings.flag(Key::ReportInches);
+
+        let mut reply = Reply::new(board, self.session.is_open());
+        reply.text("<").text(self.state(&now));
+        let machine = self.angle(now.position);
+        if self.settings.get(Key::Report) & 1 != 0 {
+            reply.text("|MPos:").position(machine, inches);
+        } else {
+            let work = machine.saturating_sub(self.work_zero());
+            reply.text("|WPos:").position(work, inches);
+        }
+        let buffers = reply.text("|Bf:").whole(u32::from(now.free)).text(",");
+        buffers.whole(u32::from(room));
+        let feed = now
+            .interval
+            .map_or(0, |interval| self.profile.feed(interval));
+        reply.text("|FS:").speed(feed, inches).text(",0");
+        reply.text("|T:").whole(now.micros);
+        reply.text("|Bat:").decimal(self.centivolts(battery), 2);
+        if index || emergency {
+            reply.text("|Pn:");
+            reply.text(if index { "X" } else { "" });
+            reply.text(if emergency { "R" } else { "" });
+        }
+        if self.reports_to_offset == 0 {
+            self.reports_to_offset = OFFSET_EVERY;
+            reply.text("|WCO:").position(self.work_zero(), inches);
+        }
+        self.reports_to_offset -= 1;
+        reply.text(">").end();
+    }
+
+    fn state(&self, now: &Snapshot) -> &'static str {
+        let moving = now.interval.is_some();
+        match (self.mode, self.job) {
+            (Mode::Alarm(_), _) => "Alarm",
+            (Mode::Check, _) => "Check",
+            _ if self.hold && moving => "Hold:1",
+            _ if self.hold => "Hold:0",
+            (_, Job::Home(_)) => "Home",
+            _ if self.jogging => "Jog",
+            (_, Job::None) if !moving && !now.planned => "Idle",
+            _ => "Run",
+        }
+    }
+
+    fn work_zero(&self) -> i32 {
+        self.offset.saturating_add(self.shift)
+    }
+
+    fn centivolts(&self, battery: u16) -> i32 {
+        let scale = i64::from(self.settings.get(Key::BatteryScale));
+        divide_rounded(i64::from(battery) * scale, BATTERY_FULL * 10) as i32
+    }
+
+    /// `$G`.
+    pub(super) fn tell_modal<B: Board>(&self, board: &mut B) {
+        let mut reply = Reply::new(board, self.session.is_open());
+        reply.text("[GC:G");
+        reply.text(match self.modal.motion {
+            Motion::Rapid => "0",
+            Motion::Feed => "1",
+        });
+        reply.text(" G54 G17 G2");
+        reply.text(if self.modal.inches { "0" } else { "1" });
+        reply.text(" G9");
+        reply.text(if self.modal.relative { "1" } else { "0" });
+        reply.text(" G94 M5 M9 T0 F");
+        let inches = self.settings.flag(Key::ReportInches);
+        reply.speed(self.modal.feed, inches).text(" S0]").end();
+    }
+
+    /// `$#`.
+    pub(super) fn tell_offsets<B: Board>(&self, board: &mut B) {
+        let inches = self.settings.flag(Key::ReportInches);
+        for (name, value) in [("[G54:", self.offset), ("[G28:", 0), ("[G92:", self.shift)] {
+            let mut reply = Reply::new(board, self.session.is_open());
+            reply.text(name).position(value, inches).text("]").end();
+        }
+    }
+}

@@ -1,0 +1,375 @@
+//! The G-code subset, as pure functions: text to a typed block.
+//!
+//! Which error a line gets follows Grbl 1.1. Distances leave here as thousandths of a degree, one
+//! millimetre of G-code being one degree. Knows nothing of positions, limits or states.
+
+mod words;
+
+use self::words::{ONE, OneShot, Words};
+use crate::error::Error;
+use crate::number;
+
+/// What one line leaves for the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Modal {
+    /// `G0` or `G1`.
+    pub motion: Motion,
+    /// `G20` instead of `G21`.
+    pub inches: bool,
+    /// `G91` instead of `G90`.
+    pub relative: bool,
+    /// `F`, thousandths of a degree/min; 0: none given yet.
+    pub feed: u32,
+}
+
+impl Modal {
+    /// As after a reset.
+    pub const fn new() -> Modal {
+        Modal {
+            motion: Motion::Rapid,
+            inches: false,
+            relative: false,
+            feed: 0,
+        }
+    }
+}
+
+impl Default for Modal {
+    fn default() -> Self {
+        Modal::new()
+    }
+}
+
+/// At which speed to move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motion {
+    /// `G0`: as fast as the table goes.
+    Rapid,
+    /// `G1`: at the feed.
+    Feed,
+}
+
+/// A place to go to, thousandths of a degree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// From machine zero.
+    Machine(i32),
+    /// From work zero.
+    Work(i32),
+    /// From where the moves before end.
+    Relative(i32),
+}
+
+/// What a line asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Nothing beyond the modal state.
+    Nothing,
+    /// `G0`, `G1`: go there.
+    Move(Target),
+    /// `G4`: wait so many microseconds at rest.
+    Dwell(i64),
+    /// `G10 L20`: the present place has this work position, kept in the EEPROM.
+    SetOrigin(i32),
+    /// `G28`: go to machine zero at full speed, over a place if one is named.
+    GoHome(Option<Target>),
+    /// `G92`: the present place has this work position, until the next reset.
+    SetOffset(i32),
+}
+
+/// A line of G-code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Block {
+    /// The modal state from this line on.
+    pub modal: Modal,
+    /// What to do under it.
+    pub action: Action,
+}
+
+/// A jog.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Jog {
+    /// Where to.
+    pub target: Target,
+    /// Thousandths of a degree/min.
+    pub feed: u32,
+}
+
+impl Words {
+    /// The modal state under this line.
+    fn modal(&self, before: &Modal) -> Result<Modal, Error> {
+        let inches = self.inches.unwrap_or(before.inches);
+        let feed = match self.f {
+            Some(feed) => {
+                let feed = degrees(feed, inches).ok_or(Error::InvalidTarget)?;
+                feed.unsigned_abs()
+            }
+            None => before.feed,
+        };
+        Ok(Modal {
+            motion: self.motion.unwrap_or(before.motion),
+            inches,
+            relative: self.relative.unwrap_or(before.relative),
+            feed,
+        })
+    }
+
+    /// The axis word in thousandths of a degree.
+    fn axis(&self, inches: bool) -> Result<Option<i32>, Error> {
+        match self.x {
+            Some(value) => degrees(value, inches).map(Some).ok_or(Error::InvalidTarget),
+            None => Ok(None),
+        }
+    }
+
+    /// Where the axis word points to.
+    fn target(&self, modal: &Modal) -> Result<Option<Target>, Error> {
+        let machine = self.one_shot == Some(OneShot::Machine);
+        Ok(self.axis(modal.inches)?.map(|x| match modal.relative {
+            _ if machine => Target::Machine(x),
+            true => Target::Relative(x),
+            false => Target::Work(x),
+        }))
+    }
+
+    /// The one-shot commands that set work zero.
+    fn origin(&self, modal: &Modal) -> Result<i32, Error> {
+        self.axis(modal.inches)?.ok_or(Error::NoAxisWords)
+    }
+
+    /// That no word is left over which only `G4` and `G10` use.
+    fn without(&self, words: &[Option<i64>]) -> Result<(), Error> {
+        match words.iter().any(Option::is_some) {
+            true => Err(Error::UnusedWords),
+            false => Ok(()),
+        }
+    }
+
+    fn dwell(&self) -> Result<Action, Error> {
+        self.without(&[self.l])?;
+        if self.x.is_some() {
+            return Err(Error::UnusedAxisWords);
+        }
+        self.p.map(Action::Dwell).ok_or(Error::ValueMissing)
+    }
+
+    fn set_origin(&self, modal: &Modal) -> Result<Action, Error> {
+        let x = self.origin(modal)?;
+        let (Some(l), Some(p)) = (self.l, self.p) else {
+            return Err(Error::ValueMissing);
+        };
+        if l != 20 * ONE {
+            return Err(Error::Unsupported);
+        }
+        if p != 0 && p != ONE {
+            return Err(Error::CoordinateSystem);
+        }
+        Ok(Action::SetOrigin(x))
+    }
+
+    fn go(&self, modal: &Modal) -> Result<Action, Error> {
+        self.without(&[self.l, self.p])?;
+        let Some(target) = self.target(modal)? else {
+            return match self.one_shot {
+                Some(OneShot::Machine) => Err(Error::MachineMotion),
+                _ => Ok(Action::Nothing),
+            };
+        };
+        if modal.motion == Motion::Feed && modal.feed == 0 {
+            return Err(Error::UndefinedFeed);
+        }
+        Ok(Action::Move(target))
+    }
+}
+
+/// Millionths of a millimetre or inch to thousandths of a degree.
+fn degrees(millionths: i64, inches: bool) -> Option<i32> {
+    if inches {
+        let scaled = number::divide_rounded(millionths.checked_mul(254)?, 10);
+        return number::to_thousandths(scaled);
+    }
+    number::to_thousandths(millionths)
+}
+
+/// Reads a line of G-code under the modal state before it.
+///
+/// # Errors
+/// Grbl's number for what is wrong first.
+pub fn parse(text: &[u8], before: &Modal) -> Result<Block, Error> {
+    let words = Words::read(text)?;
+    let modal = words.modal(before)?;
+    let action = match words.one_shot {
+        Some(OneShot::Dwell) => words.dwell()?,
+        Some(OneShot::SetOrigin) => words.set_origin(&modal)?,
+        Some(OneShot::GoHome) => {
+            words.without(&[words.l, words.p])?;
+            Action::GoHome(words.target(&modal)?)
+        }
+        Some(OneShot::SetOffset) => {
+            words.without(&[words.l, words.p])?;
+            Action::SetOffset(words.origin(&modal)?)
+        }
+        Some(OneShot::Machine) | None => words.go(&modal)?,
+    };
+    Ok(Block { modal, action })
+}
+
+/// Reads what stands behind `$J=`. A jog uses units and distance mode of the modal state, but
+/// changes nothing in it, and always names its own feed.
+///
+/// # Errors
+/// [`Error::InvalidJog`] for commands and words that a jog has no use for, [`Error::NoAxisWords`],
+/// [`Error::UndefinedFeed`], and what reading words gives.
+pub fn parse_jog(text: &[u8], modal: &Modal) -> Result<Jog, Error> {
+    let words = Words::read(text)?;
+    let allowed = matches!(words.one_shot, None | Some(OneShot::Machine));
+    if !allowed || words.motion.is_some() || words.l.is_some() || words.p.is_some() {
+        return Err(Error::InvalidJog);
+    }
+    let modal = words.modal(&Modal { feed: 0, ..*modal })?;
+    let target = words.target(&modal)?.ok_or(Error::NoAxisWords)?;
+    if modal.feed == 0 {
+        return Err(Error::UndefinedFeed);
+    }
+    Ok(Jog {
+        target,
+        feed: modal.feed,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn action(text: &str) -> Result<Action, Error> {
+        let before = Modal {
+            feed: 1000,
+            ..Modal::new()
+        };
+        parse(text.as_bytes(), &before).map(|block| block.action)
+    }
+
+    #[test]
+    fn lines_become_actions() {
+        let cases = [
+            ("", Action::Nothing),
+            ("G1", Action::Nothing),
+            ("N7F100", Action::Nothing),
+            ("G0X1.5", Action::Move(Target::Work(1500))),
+            ("X-2", Action::Move(Target::Work(-2000))),
+            ("G91G1X3", Action::Move(Target::Relative(3000))),
+            ("G91G53X3", Action::Move(Target::Machine(3000))),
+            ("G20X1", Action::Move(Target::Work(25_400))),
+            ("G4P0.5", Action::Dwell(500_000)),
+            ("G10L20P1X0", Action::SetOrigin(0)),
+            ("G10L20P0X9", Action::SetOrigin(9000)),
+            ("G28", Action::GoHome(None)),
+            ("G28X4", Action::GoHome(Some(Target::Work(4000)))),
+            ("G92X-1", Action::SetOffset(-1000)),
+            ("G00001X1", Action::Move(Target::Work(1000))),
+        ];
+        for (text, expected) in cases {
+            assert_eq!(action(text), Ok(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn wrong_lines_get_grbls_numbers() {
+        let cases = [
+            ("5", 1),
+            ("-X1", 1),
+            ("G", 2),
+            ("X1.2.3", 1),
+            ("X", 2),
+            ("X1000000000", 2),
+            ("F-1", 4),
+            ("G4P-1", 4),
+            ("G2X1", 20),
+            ("M5", 20),
+            ("Y1", 20),
+            ("G92.1", 20),
+            ("G28.1", 20),
+            ("G10L2P1X1", 20),
+            ("G54", 20),
+            ("G-5", 20),
+            ("G0G1X1", 21),
+            ("G20G21", 21),
+            ("G90G91", 21),
+            ("G4P1G53", 21),
+            ("G1.5X1", 23),
+            ("G90.1", 23),
+            ("G0G92X1", 24),
+            ("G28G1X1", 24),
+            ("X1X2", 25),
+            ("F1F2", 25),
+            ("G92", 26),
+            ("G10L20P1", 26),
+            ("N10000000", 27),
+            ("G4", 28),
+            ("G10X1", 28),
+            ("G10L20X1", 28),
+            ("G10L20P2X1", 29),
+            ("G53", 30),
+            ("G4P1X1", 31),
+            ("X3000000", 33),
+            ("G20X100000", 33),
+            ("F3000000", 33),
+            ("G1X1P1", 36),
+            ("G1X1L1", 36),
+            ("P1", 36),
+            ("G92X1P1", 36),
+        ];
+        for (text, code) in cases {
+            let got = action(text).map_err(Error::code);
+            assert_eq!(got, Err(code), "{text}");
+        }
+        let unfed = parse(b"G1X1", &Modal::new());
+        assert_eq!(unfed, Err(Error::UndefinedFeed));
+    }
+
+    #[test]
+    fn the_modal_state_goes_from_line_to_line() {
+        let block = parse(b"G20G91G1F10", &Modal::new()).unwrap();
+        let expected = Modal {
+            motion: Motion::Feed,
+            inches: true,
+            relative: true,
+            feed: 254_000,
+        };
+        assert_eq!(block.modal, expected);
+        let next = parse(b"X1", &block.modal).unwrap();
+        assert_eq!(next.action, Action::Move(Target::Relative(25_400)));
+        assert_eq!(next.modal, expected);
+    }
+
+    #[test]
+    fn a_jog_names_its_feed_and_only_what_a_jog_needs() {
+        let modal = Modal {
+            feed: 1000,
+            ..Modal::new()
+        };
+        let jog = |text: &str| parse_jog(text.as_bytes(), &modal).map_err(Error::code);
+        let expected = Jog {
+            target: Target::Relative(5000),
+            feed: 100_000,
+        };
+        assert_eq!(jog("G91X5F100"), Ok(expected));
+        assert_eq!(
+            jog("G53X5F1").map(|jog| jog.target),
+            Ok(Target::Machine(5000))
+        );
+        assert_eq!(jog("N5G20X1F1").map(|jog| jog.feed), Ok(25_400));
+        let wrong = [
+            ("X5", 22),
+            ("F5", 26),
+            ("G1X5F1", 16),
+            ("G92X5F1", 16),
+            ("X5F1P1", 16),
+            ("G4X5F1", 16),
+            ("X5FF", 2),
+        ];
+        for (text, code) in wrong {
+            assert_eq!(jog(text), Err(code), "{text}");
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Words of a line: which commands and values it names, each at most once.
+
+use super::Motion;
+use crate::error::Error;
+use crate::number;
+
+/// The commands that count for their line only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum OneShot {
+    Dwell,
+    SetOrigin,
+    GoHome,
+    Machine,
+    SetOffset,
+}
+
+/// The words of a line; values in millionths.
+#[derive(Debug, Default)]
+pub(super) struct Words {
+    pub(super) motion: Option<Motion>,
+    pub(super) one_shot: Option<OneShot>,
+    pub(super) inches: Option<bool>,
+    pub(super) relative: Option<bool>,
+    pub(super) f: Option<i64>,
+    pub(super) l: Option<i64>,
+    pub(super) n: Option<i64>,
+    pub(super) p: Option<i64>,
+    pub(super) x: Option<i64>,
+}
+
+/// One, in millionths.
+pub(super) const ONE: i64 = 1_000_000;
+const MAX_LINE_NUMBER: i64 = 9_999_999 * ONE;
+
+impl Words {
+    /// Reads all words of a line.
+    pub(super) fn read(text: &[u8]) -> Result<Words, Error> {
+        let mut words = Words::default();
+        let mut rest = text;
+        while let Some((&letter, after)) = rest.split_first() {
+            if !letter.is_ascii_uppercase() {
+                return Err(Error::ExpectedLetter);
+            }
+            let (value, after) = number::parse(after).ok_or(Error::BadNumber)?;
+            words.take(letter, value)?;
+            rest = after;
+        }
+        Ok(words)
+    }
+
+    fn take(&mut self, letter: u8, value: i64) -> Result<(), Error> {
+        let place = match letter {
+            b'G' => return self.command(value),
+            b'F' => &mut self.f,
+            b'L' => &mut self.l,
+            b'N' => &mut self.n,
+            b'P' => &mut self.p,
+            b'X' => &mut self.x,
+            _ => return Err(Error::Unsupported),
+        };
+        if place.replace(value).is_some() {
+            return Err(Error::RepeatedWord);
+        }
+        if value < 0 && letter != b'X' {
+            return Err(Error::Negative);
+        }
+        if letter == b'N' && value > MAX_LINE_NUMBER {
+            return Err(Error::LineNumber);
+        }
+        Ok(())
+    }
+
+    fn command(&mut self, value: i64) -> Result<(), Error> {
+        let group_taken = match value / ONE {
+            0 => self.motion.replace(Motion::Rapid).is_some(),
+            1 => self.motion.replace(Motion::Feed).is_some(),
+            4 => self.one_shot.replace(OneShot::Dwell).is_some(),
+            10 => self.one_shot.replace(OneShot::SetOrigin).is_some(),
+            // G28.1, G92.1 and their kin are commands of their own, and none of this table's.
+            28 | 92 if value % ONE != 0 => return Err(Error::Unsupported),
+            28 => self.one_shot.replace(OneShot::GoHome).is_some(),
+            53 => self.one_shot.replace(OneShot::Machine).is_some(),
+            92 => self.one_shot.replace(OneShot::SetOffset).is_some(),
+            20 => self.inches.replace(true).is_some(),
+            21 => self.inches.replace(false).is_some(),
+            90 => self.relative.replace(false).is_some(),
+            91 => self.relative.replace(true).is_some(),
+            _ => return Err(Error::Unsupported),
+        };
+        if value % ONE != 0 || value < 0 {
+            return Err(Error::NotInteger);
+        }
+        let wants_axis = matches!(
+            self.one_shot,
+            Some(OneShot::SetOrigin | OneShot::GoHome | OneShot::SetOffset)
+        );
+        if self.motion.is_some() && wants_axis {
+            return Err(Error::AxisConflict);
+        }
+        if group_taken {
+            return Err(Error::ModalGroup);
+        }
+        Ok(())
+    }
+}

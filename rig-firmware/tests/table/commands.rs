@@ -1,0 +1,243 @@
+//! What each command does and says.
+
+use crate::support::{FakeBoard, Table};
+use rig_firmware::board::ResetCause;
+
+#[test]
+fn the_banner_tells_why_the_chip_started() {
+    let causes = [
+        (ResetCause::PowerOn, "power-on"),
+        (ResetCause::External, "external"),
+        (ResetCause::BrownOut, "brown-out"),
+        (ResetCause::Watchdog, "watchdog"),
+    ];
+    for (cause, name) in causes {
+        let mut board = FakeBoard::new();
+        board.cause = cause;
+        let banner = format!("Grbl 1.1h ['$' for help] [reset: {name}]");
+        assert_eq!(Table::on(board).heard(), [banner]);
+    }
+    let host = Table::new().say(b"\x18");
+    assert_eq!(host, ["Grbl 1.1h ['$' for help] [reset: host]"]);
+}
+
+#[test]
+fn every_line_gets_one_answer_whatever_its_end() {
+    let mut table = Table::new();
+    let heard = table.say(b"G21\rG90\nG21\r\n\n\r\n(comment)\n");
+    assert_eq!(heard, ["ok"; 6]);
+}
+
+#[test]
+fn the_settings_are_listed_as_grbl_does() {
+    let heard = Table::new().ask("$$");
+    let expected = [
+        "$0=10",
+        "$1=250",
+        "$2=0",
+        "$3=0",
+        "$4=0",
+        "$5=0",
+        "$10=1",
+        "$13=0",
+        "$14=0",
+        "$20=1",
+        "$22=0",
+        "$23=0",
+        "$24=72.000",
+        "$25=720.000",
+        "$26=20",
+        "$27=2.000",
+        "$60=0",
+        "$61=15.500",
+        "$100=88.889",
+        "$110=2160.000",
+        "$120=36.000",
+        "$130=400.000",
+        "ok",
+    ];
+    assert_eq!(heard, expected);
+}
+
+#[test]
+fn version_help_and_modal_state_are_told() {
+    let mut table = Table::new();
+    let version = ["[VER:1.1h.20261121:relit]", "[OPT:NHtcl,8,128]", "ok"];
+    assert_eq!(table.ask("$I"), version);
+    assert!(table.ask("$")[0].starts_with("[HLP:$$ "));
+    let modal = "[GC:G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]";
+    assert_eq!(table.ask("$G"), [modal, "ok"]);
+    table.ok("G1 G20 G91 F10");
+    let modal = "[GC:G1 G54 G17 G20 G91 G94 M5 M9 T0 F254 S0]";
+    assert_eq!(table.ask("$g"), [modal, "ok"]);
+    table.say(b"\x18");
+    assert!(table.ask("$G")[0].contains("G0 G54 G17 G21 G90"));
+}
+
+#[test]
+fn offsets_follow_g10_and_g92() {
+    let mut table = Table::new();
+    table.ok("G0 X10");
+    table.wait("Idle");
+    table.ok("G10 L20 P1 X2");
+    table.ok("G92 X0.5");
+    let offsets = [
+        "[G54:8.000,0.000,0.000]",
+        "[G28:0.000,0.000,0.000]",
+        "[G92:1.500,0.000,0.000]",
+        "ok",
+    ];
+    assert_eq!(table.ask("$#"), offsets);
+    table.ok("G0 X1");
+    table.wait("Idle");
+    assert!((table.position("MPos") - 10.5).abs() < 0.007);
+    table.ok("$10=0");
+    assert!((table.position("WPos") - 1.0).abs() < 0.007);
+    table.ok("G53 G0 X3");
+    table.wait("Idle");
+    assert!((table.position("WPos") + 6.5).abs() < 0.007);
+    table.say(b"\x18");
+    assert!(
+        table
+            .ask("$#")
+            .contains(&"[G92:0.000,0.000,0.000]".to_owned())
+    );
+    assert!(
+        table
+            .ask("$#")
+            .contains(&"[G54:8.000,0.000,0.000]".to_owned())
+    );
+}
+
+#[test]
+fn a_status_report_has_all_its_fields() {
+    let mut table = Table::new();
+    table.board.battery = 781;
+    let status = table.status();
+    let (head, time) = status.split_once("|T:").unwrap();
+    assert_eq!(head, "<Idle|MPos:0.000,0.000,0.000|Bf:8,128|FS:0,0");
+    let (time, tail) = time.split_once('|').unwrap();
+    assert!(
+        (1..100_000).contains(&time.parse::<u32>().unwrap()),
+        "{time}"
+    );
+    assert_eq!(tail, "Bat:11.83|WCO:0.000,0.000,0.000>");
+    for _ in 0..9 {
+        assert!(!table.status().contains("WCO"));
+    }
+    assert!(table.status().contains("WCO"));
+    table.ok("G92 X1");
+    assert!(table.status().contains("|WCO:-1.000,0.000,0.000>"));
+}
+
+#[test]
+fn pins_show_only_while_active() {
+    let mut table = Table::new();
+    assert_eq!(table.field("Pn"), None);
+    table.board.index = (0, 1);
+    assert_eq!(table.field("Pn").as_deref(), Some("X"));
+    table.board.press_emergency(true);
+    table.run_ms(1);
+    assert_eq!(table.field("Pn").as_deref(), Some("XR"));
+}
+
+#[test]
+fn positions_in_inches_have_four_decimals() {
+    let mut table = Table::new();
+    table.ok("$13=1");
+    table.ok("G0 X25.4");
+    table.wait("Idle");
+    assert!((table.position("MPos") - 1.0).abs() < 0.0003);
+    let field = table.field("MPos").unwrap();
+    assert!(field.ends_with(",0.0000,0.0000"), "{field}");
+}
+
+#[test]
+fn time_and_position_of_a_report_belong_together() {
+    let mut table = Table::new();
+    table.ok("G1 X40 F432");
+    for _ in 0..40 {
+        table.run_ms(100);
+        let status = table.status();
+        let field = |name: &str| {
+            let field = status.split('|').find_map(|field| field.strip_prefix(name));
+            field.unwrap().split(',').next().unwrap().to_owned()
+        };
+        let at = field("T:").parse::<u64>().unwrap() * 2 + 1;
+        let truth = table.board.edges.iter().rfind(|edge| edge.at <= at);
+        let steps = field("MPos:").parse::<f64>().unwrap() * 88.889;
+        let truth = truth.map_or(0, |edge| edge.position);
+        assert!((steps - f64::from(truth)).abs() < 0.2, "{status} {truth}");
+    }
+}
+
+#[test]
+fn check_mode_answers_lines_and_moves_nothing() {
+    let mut table = Table::new();
+    assert_eq!(table.ask("$C"), ["[MSG:Enabled]", "ok"]);
+    assert!(table.status().starts_with("<Check|"));
+    table.ok("G1 X50 F100");
+    table.ok("G4 P100");
+    table.ok("G28");
+    assert_eq!(table.answer("G2 X1"), "error:20");
+    assert_eq!(table.answer("$J=X1F1"), "error:8");
+    table.say(b"!");
+    assert!(table.status().starts_with("<Check|"));
+    let banner = "Grbl 1.1h ['$' for help] [reset: host]";
+    assert_eq!(table.say(b"$C\n"), ["[MSG:Disabled]", "ok", banner]);
+    assert!(table.board.edges.is_empty());
+    assert!(table.ask("$G")[0].contains(" F0 "));
+}
+
+#[test]
+fn a_dwell_begins_at_rest_and_lasts() {
+    let mut table = Table::new();
+    table.ok("G1 X3 F432");
+    let start = table.board.now;
+    table.ok("G4 P0.5");
+    let rest = table.board.edges.last().unwrap().at;
+    assert!(rest > start);
+    let dwelt = (table.board.now - rest) as f64 / 2e6;
+    assert!((0.5..0.51).contains(&dwelt), "{dwelt}");
+    table.ok("G4 P0");
+}
+
+#[test]
+fn g28_goes_to_zero_over_a_place() {
+    let mut table = Table::new();
+    table.ok("G0 X5");
+    table.ok("G91 G28 X5");
+    table.wait("Idle");
+    assert_eq!(table.steps(), 0);
+    let farthest = table.board.edges.iter().map(|edge| edge.position).max();
+    assert_eq!(farthest, Some(889));
+    table.ok("G90 G0 X1");
+    table.ok("G28");
+    table.wait("Idle");
+    assert_eq!(table.steps(), 0);
+}
+
+#[test]
+fn bytes_that_grbl_takes_for_overrides_vanish() {
+    let mut table = Table::new();
+    let heard = table.say(b"G\x901\x84 \xA0X\xFF1 F\x80100\n");
+    assert_eq!(heard, ["ok"]);
+    table.wait("Idle");
+    assert_eq!(table.steps(), 89);
+}
+
+#[test]
+fn restoring_brings_back_what_it_names() {
+    let mut table = Table::new();
+    table.ok("$120=50");
+    table.ok("G10 L20 P0 X7");
+    assert_eq!(table.ask("$RST=#"), ["[MSG:Restoring defaults]", "ok"]);
+    assert!(table.ask("$#")[0].starts_with("[G54:0.000"));
+    assert!(table.ask("$$").contains(&"$120=50.000".to_owned()));
+    table.ok("G10 L20 P0 X7");
+    table.answer("$RST=$");
+    assert!(table.ask("$$").contains(&"$120=36.000".to_owned()));
+    assert!(table.ask("$#")[0].starts_with("[G54:-7.000"));
+    table.answer("$RST=*");
+    assert!(table.ask("$#")[0].starts_with("[G54:0.000"));
+}
