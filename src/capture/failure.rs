@@ -7,7 +7,7 @@ use super::settings::ModeWish;
 use super::stop::Stopped;
 use crate::camera::CameraError;
 use crate::camera::lock::Moved;
-use crate::session;
+use crate::{session, simulator};
 use crate::turntable::TurntableError;
 
 /// Why there is no capture.
@@ -31,6 +31,18 @@ pub enum CaptureError {
     /// Somebody asked for it.
     #[error("the capture was stopped: {0}")]
     Stopped(#[from] Stopped),
+    /// The recording.
+    #[error(transparent)]
+    Recording(#[from] super::Error),
+    /// The simulated table.
+    #[error(transparent)]
+    Simulator(#[from] simulator::Error),
+    /// The camera is away.
+    #[error("there is no camera at the moment: plug it in")]
+    NoCamera,
+    /// The recording was over before the turn was.
+    #[error("the recording ended before the turn did")]
+    EndedEarly,
     /// A part of the machine could not be had.
     #[error("{what} could not be {doing}: {source}")]
     System {

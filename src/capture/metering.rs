@@ -9,7 +9,7 @@ use super::preflight::Held;
 use super::settings::Settings;
 use super::stop::StopRequest;
 use crate::camera::lock::{Aspect, Step};
-use crate::camera::{Camera, CameraError, Control, Frame};
+use crate::camera::{Camera, Control, Frame};
 use crate::turntable::{Table, Turn, TurnPlan, TurnRequest};
 use crate::video::LiveDecoder;
 
@@ -87,8 +87,8 @@ fn exposures(controls: &[Control], step: &Step, fps: f64) -> Option<Exposures> {
 
 fn decoder_for(held: &Held) -> Result<LiveDecoder, CaptureError> {
     let none = |why: String| CaptureError::from(MeterFault::NoPicture(why));
-    let coding = super::coding::of(held.mode.fourcc);
-    let coding = coding.ok_or_else(|| none(held.mode.fourcc.to_string()))?;
+    let encoding = held.mode.fourcc.encoding();
+    let coding = super::recorder::coding(encoding.ok_or_else(|| none(held.mode.fourcc.to_string()))?);
     LiveDecoder::new(coding, held.mode.width, held.mode.height)
         .map_err(|fault| none(fault.to_string()))
 }
@@ -187,11 +187,7 @@ fn look_around(
     loop {
         stop.check()?;
         turn.state()?;
-        let frame = match camera.next_frame(NEXT_FRAME) {
-            Ok(frame) => frame,
-            Err(error @ CameraError::Timeout { .. }) => return Err(error.into()),
-            Err(error) => return Err(error.into()),
-        };
+        let frame = camera.next_frame(NEXT_FRAME)?;
         if frame.t_us >= part.to_us {
             let degrees = eye.meter.left();
             return Err(MeterFault::Unseen { degrees }.into());

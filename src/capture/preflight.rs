@@ -14,10 +14,10 @@ use super::settings::Settings;
 use super::state::Check;
 use super::stop::StopRequest;
 use crate::camera::lock::{Lack, ManualPlan};
-use crate::camera::{Camera, Control, Encoding, Frame, GrantedMode, ModeRequest};
+use crate::camera::{Camera, Control, GrantedMode, ModeRequest};
 use crate::clock::Clock;
 use crate::naming::is_session_name;
-use crate::turntable::{Direction, Homed, Table, TurnPlan, TurnRequest};
+use crate::turntable::{Homed, Table, TurnPlan, TurnRequest};
 
 /// How long the first frame may take, of real time.
 const FIRST_FRAME: Duration = Duration::from_secs(5);
@@ -33,9 +33,8 @@ const RESERVE: f64 = 0.2;
 const INDEX_LINE: f64 = 90.0;
 /// Bytes of manifest and of the video's own tables.
 const AROUND: f64 = 1e6;
-/// Degrees at constant speed on either side of the turn: time in which the table's first reports
-/// come and the recorder is told when the turn begins.
-const MARGIN_DEG: f64 = 4.0;
+/// Degrees at constant speed on either side of the turn.
+const MARGIN_DEG: f64 = 2.0;
 /// Longest object name, bytes: with date and time a session's name still has room.
 const LONGEST_OBJECT: usize = 80;
 /// 2025-01-01, seconds since 1970.
@@ -156,18 +155,17 @@ fn look_at_frames(camera: &mut dyn Camera, stop: &StopRequest) -> Result<f64, Ca
     }
 }
 
-/// Passes over frames, and gives the last one.
-pub(super) fn pass_over(
+/// Passes over frames.
+fn pass_over(
     camera: &mut dyn Camera,
     frames: usize,
     stop: &StopRequest,
-) -> Result<Option<Frame>, CaptureError> {
-    let mut last = None;
+) -> Result<(), CaptureError> {
     for _ in 0..frames {
         stop.check()?;
-        last = Some(camera.next_frame(NEXT_FRAME)?);
+        camera.next_frame(NEXT_FRAME)?;
     }
-    Ok(last)
+    Ok(())
 }
 
 fn settings_check(plan: &ManualPlan) -> Check {
@@ -300,24 +298,9 @@ pub fn margin_us(plan: &TurnPlan) -> i64 {
     (MARGIN_DEG / plan.degrees_per_second() * 1e6).round() as i64
 }
 
-/// 1 for a turn in which angles grow, -1 for the other way.
-#[must_use]
-pub fn sign(direction: Direction) -> f64 {
-    match direction {
-        Direction::Positive => 1.0,
-        Direction::Negative => -1.0,
-    }
-}
-
-/// How long frames are waited for before the camera counts as gone, of real time; a rehearsal that
-/// runs slower than real time waits longer.
+/// Without a frame for so long, of real time, a camera counts as failed; a rehearsal slower than
+/// real time has longer.
 #[must_use]
 pub fn frame_patience(clock: &Clock) -> Duration {
     NEXT_FRAME.max(clock.real(NEXT_FRAME))
-}
-
-/// Whether pictures of this coding stand alone.
-#[must_use]
-pub fn stands_alone(encoding: Encoding) -> bool {
-    encoding != Encoding::H264
 }

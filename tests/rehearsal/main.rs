@@ -1,0 +1,7 @@
+//! Whole captures without hardware: a replayed camera and a simulated table on one clock, twenty
+//! times as fast as real time.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod faults;
+mod support;
+mod turn;
