@@ -413,3 +413,96 @@ impl fmt::Display for GrantedMode {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn request(text: &str) -> ModeRequest {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn a_request_is_read_as_it_is_shown() {
+        for text in ["MJPG:1920x1080@30", "YUYV:640x480@29.970", "GREY:1x1@7.500"] {
+            assert_eq!(request(text).to_string(), text);
+        }
+        let ntsc = Rate::new(30_000, 1001).unwrap();
+        assert!(request("YUYV:640x480@29.97").rate.equals(ntsc));
+        for wrong in [
+            "",
+            "MJPG",
+            "MJPG:1920x1080",
+            "MJPEG:1x1@1",
+            "MJPG:0x1@1",
+            "MJPG:1x1@0",
+        ] {
+            assert!(wrong.parse::<ModeRequest>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_was_not_granted_is_told() {
+        let asked = request("MJPG:1280x720@30");
+        let granted = GrantedMode {
+            fourcc: Fourcc::MJPG,
+            width: 1280,
+            height: 720,
+            rate: Rate::new(60, 2),
+        };
+        assert_eq!(granted.differences(&asked), [] as [&str; 0]);
+        let other = GrantedMode {
+            fourcc: Fourcc::YUYV,
+            width: 640,
+            height: 480,
+            rate: Rate::new(25, 2),
+        };
+        assert_eq!(
+            other.differences(&asked),
+            [
+                "YUYV instead of MJPG",
+                "640 x 480 instead of 1280 x 720 pixels",
+                "12.500 instead of 30 frames/s"
+            ]
+        );
+    }
+
+    #[test]
+    fn sizes_in_steps_are_known() {
+        let range = Sizes::Range {
+            min: (2, 1),
+            max: (8, 4),
+            step: (2, 1),
+        };
+        assert!(range.contains(4, 3) && range.contains(8, 4));
+        assert!(!range.contains(5, 3) && !range.contains(10, 3) && !range.contains(0, 1));
+        assert_eq!(range.largest(), (8, 4));
+    }
+
+    #[test]
+    fn a_fourcc_is_shown_as_text() {
+        assert_eq!(Fourcc::from_code(0x5659_5559).to_string(), "YUYV");
+        assert_eq!(Fourcc(*b"Y1\0\xff").to_string(), "Y1..");
+        assert_eq!(Fourcc::from_code(Fourcc::NV12.code()), Fourcc::NV12);
+    }
+
+    proptest! {
+        #[test]
+        fn no_size_upsets_the_reckoning(width in any::<u32>(), height in any::<u32>()) {
+            for code in [Fourcc::YUYV, Fourcc::NV12, Fourcc::RGB3, Fourcc::GREY] {
+                let _ = code.encoding().unwrap().frame_bytes(width, height);
+            }
+            let text = format!("MJPG:{width}x{height}@{width}");
+            let _ = text.parse::<ModeRequest>();
+        }
+
+        #[test]
+        fn rates_have_a_period(numerator in 1_u32.., denominator in 1_u32..) {
+            let rate = Rate::new(numerator, denominator).unwrap();
+            let period = 1e6 / rate.per_second();
+            prop_assert!((rate.period_us() as f64 - period).abs() <= 0.5 + period * 1e-12);
+        }
+    }
+}

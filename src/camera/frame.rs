@@ -181,3 +181,155 @@ pub(super) fn without_padding(data: Vec<u8>, stride: usize, row: usize, rows: us
     }
     tight
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn unwrapped(raw: &[u32]) -> Vec<u64> {
+        let mut counter = SequenceUnwrapper::default();
+        raw.iter().map(|&raw| counter.next(raw).unwrapped).collect()
+    }
+
+    #[test]
+    fn a_wrapped_counter_goes_on_and_a_late_frame_goes_back() {
+        let wrap = [u32::MAX - 1, u32::MAX, 0, 1, 5];
+        let counted: Vec<u64> = vec![
+            0xffff_fffe,
+            0xffff_ffff,
+            1 << 32,
+            (1 << 32) + 1,
+            (1 << 32) + 5,
+        ];
+        assert_eq!(unwrapped(&wrap), counted);
+        assert_eq!(unwrapped(&[7, 7, 9, 8, 10]), [7, 7, 9, 8, 10]);
+        assert_eq!(unwrapped(&[3, 0, u32::MAX]), [3, 0, 0], "never below 0");
+    }
+
+    /// Start, quantisation table of 3 bytes, frame header of 2 x 3 pixels, scan, end.
+    const JPEG: [u8; 25] = [
+        0xff, 0xd8, 0xff, 0xdb, 0, 3, 9, 0xff, 0xff, 0xc0, 0, 9, 8, 0, 3, 0, 2, 1, 0, 0xff, 0xda,
+        0, 2, 0xff, 0xd9,
+    ];
+
+    fn jpeg(data: &[u8]) -> Frame {
+        Frame {
+            fourcc: Fourcc::MJPG,
+            width: 2,
+            height: 3,
+            data: data.to_vec(),
+            sequence: None,
+            t_us: 0,
+            stamp: StampSource::Arrival,
+            flagged: false,
+        }
+    }
+
+    #[test]
+    fn damage_of_a_jpeg_is_told() {
+        assert_eq!(jpeg(&JPEG).fault(), None);
+        assert_eq!(
+            jpeg(&[&JPEG[..], &[0; 40]].concat()).fault(),
+            None,
+            "padded"
+        );
+        assert_eq!(jpeg(&JPEG[..23]).fault(), Some(FrameFault::NoEnd));
+        assert_eq!(jpeg(&JPEG[1..]).fault(), Some(FrameFault::NoStart));
+        assert_eq!(jpeg(&[]).fault(), Some(FrameFault::Empty));
+        let other = Frame {
+            width: 3,
+            ..jpeg(&JPEG)
+        };
+        let size = FrameFault::OtherSize {
+            width: 2,
+            height: 3,
+        };
+        assert_eq!(other.fault(), Some(size));
+        let flagged = Frame {
+            flagged: true,
+            ..jpeg(&JPEG)
+        };
+        assert_eq!(flagged.fault(), Some(FrameFault::Flagged));
+    }
+
+    #[test]
+    fn a_raw_frame_has_the_bytes_of_its_size() {
+        for (fourcc, bytes) in [
+            (Fourcc::YUYV, 4 * 3),
+            (Fourcc::NV12, 2 * 5),
+            (Fourcc::RGB3, 6 * 3),
+            (Fourcc::GREY, 2 * 3),
+            (Fourcc(*b"RGGB"), 2 * 3),
+        ] {
+            let whole = Frame {
+                fourcc,
+                ..jpeg(&vec![0; bytes])
+            };
+            assert_eq!(whole.fault(), None, "{fourcc}");
+            let short = Frame {
+                fourcc,
+                ..jpeg(&vec![0; bytes - 1])
+            };
+            let (expected, found) = (bytes, bytes - 1);
+            assert_eq!(short.fault(), Some(FrameFault::Bytes { expected, found }));
+        }
+    }
+
+    #[test]
+    fn padding_is_taken_out_of_rows() {
+        let padded = vec![1, 2, 0, 3, 4, 0, 5, 6];
+        assert_eq!(without_padding(padded.clone(), 3, 2, 3), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(without_padding(padded.clone(), 2, 2, 4), padded);
+        assert_eq!(
+            without_padding(padded.clone(), 3, 2, 4),
+            padded,
+            "too short"
+        );
+        assert_eq!(
+            without_padding(padded.clone(), 0, 2, 3),
+            padded,
+            "stride not told"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_upset_the_look_at_a_jpeg(data in vec(any::<u8>(), 0..80), cut in 0..25_usize) {
+            let _ = jpeg(&data).fault();
+            let _ = jpeg(&[&JPEG[..cut], &data].concat()).fault();
+        }
+
+        #[test]
+        fn small_steps_are_counted_through_any_wrap(
+            start in any::<u32>(),
+            steps in vec(1_u32..1000, 1..50),
+        ) {
+            let mut raw = vec![start];
+            for step in &steps {
+                raw.push(raw[raw.len() - 1].wrapping_add(*step));
+            }
+            let counted = unwrapped(&raw);
+            for (pair, step) in counted.windows(2).zip(steps) {
+                prop_assert_eq!(pair[1] - pair[0], u64::from(step));
+            }
+        }
+
+        #[test]
+        fn rows_stay_what_they_are_whatever_the_padding(
+            row in 1_usize..9,
+            rows in 1_usize..9,
+            padding in 0_usize..5,
+        ) {
+            let tight: Vec<u8> = (0..row * rows).map(|at| at as u8 + 1).collect();
+            let mut padded = Vec::new();
+            for line in tight.chunks(row) {
+                padded.extend_from_slice(line);
+                padded.resize(padded.len() + padding, 0);
+            }
+            prop_assert_eq!(without_padding(padded, row + padding, row, rows), tight);
+        }
+    }
+}

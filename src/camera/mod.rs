@@ -17,9 +17,12 @@ mod error;
 mod format;
 mod frame;
 pub mod lock;
+mod nokhwa;
+mod replay;
 #[cfg(target_os = "linux")]
 mod v4l2;
 
+use std::path::Path;
 use std::time::Duration;
 
 pub use address::{Address, Faults, Speed};
@@ -27,6 +30,51 @@ pub use control::{Control, ControlFlags, ControlId, ControlKind, MenuItem, snake
 pub use error::{AddressFault, CameraError, ControlFault};
 pub use format::{Bayer, Encoding, Fourcc, GrantedMode, Mode, ModeRequest, Rate, Rates, Sizes};
 pub use frame::{Frame, FrameFault, Sequence, SequenceUnwrapper, StampSource, jpeg_size};
+
+use crate::clock::Clock;
+
+/// Opens a camera. A replay goes by the clock given; see [`Address::clock`].
+///
+/// # Errors
+/// [`CameraError::NotThere`], [`CameraError::NotPermitted`], [`CameraError::NotACamera`],
+/// [`CameraError::InUse`], what a recording's session or video answers, or what the device does.
+pub fn open(address: &Address, clock: Clock) -> Result<Box<dyn Camera>, CameraError> {
+    Ok(match address {
+        Address::V4l2(path) => open_v4l2(path)?,
+        Address::Nokhwa(number) => Box::new(nokhwa::NokhwaCamera::open(*number)?),
+        Address::Replay {
+            path,
+            speed,
+            repeat,
+            faults,
+        } => {
+            let replay = replay::ReplayCamera::open(path, *speed, *repeat, faults, clock)?;
+            Box::new(replay)
+        }
+    })
+}
+
+#[cfg(target_os = "linux")]
+fn open_v4l2(path: &Path) -> Result<Box<dyn Camera>, CameraError> {
+    Ok(Box::new(v4l2::V4l2Camera::open(path)?))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn open_v4l2(path: &Path) -> Result<Box<dyn Camera>, CameraError> {
+    Err(CameraError::Unsupported {
+        device: path.display().to_string(),
+        what: "V4L2 is Linux's; give the camera as nokhwa:0",
+    })
+}
+
+/// All cameras of this system, with what they offer and what of them could not be read: V4L2's
+/// under Linux, else those that nokhwa finds.
+pub fn list() -> Vec<DeviceInfo> {
+    #[cfg(target_os = "linux")]
+    return v4l2::list();
+    #[cfg(not(target_os = "linux"))]
+    return nokhwa::list();
+}
 
 /// A camera that may be started and stopped any number of times.
 pub trait Camera: Send {

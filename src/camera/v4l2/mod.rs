@@ -74,8 +74,9 @@ impl Camera for V4l2Camera {
     }
 
     fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
-        // The driver takes no new format while it has buffers.
-        self.stream = None;
+        // The driver takes no new format while it has buffers. What stopping answers shows again in
+        // the next call.
+        let _ = self.stop();
         let (stream, granted) = Stream::start(&self.device, want)?;
         self.stream = Some(stream);
         Ok(granted)

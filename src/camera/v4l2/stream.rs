@@ -19,6 +19,9 @@ const BUFFERS: u32 = 8;
 /// Fewest with which a driver can fill one while others wait.
 const FEWEST_BUFFERS: usize = 2;
 
+/// Longest wait in one call; a longer one is made of several.
+const LONGEST_WAIT: Duration = Duration::from_secs(60);
+
 #[derive(Debug)]
 pub(super) struct Stream {
     layout: PixelLayout,
@@ -102,7 +105,7 @@ impl Stream {
         let start = Instant::now();
         self.offer_idle(device)?;
         loop {
-            let left = timeout.saturating_sub(start.elapsed());
+            let left = timeout.saturating_sub(start.elapsed()).min(LONGEST_WAIT);
             let ready = device.node.wait(left);
             let ready = ready.map_err(|error| device.stream_error("waited for", error))?;
             match device.node.dequeue() {
