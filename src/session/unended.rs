@@ -58,10 +58,9 @@ impl Unended {
         self.folder.join(&self.manifest.video.file)
     }
 
-    /// The manifest as it was found.
-    #[must_use]
-    pub fn manifest(&self) -> &Manifest {
-        &self.manifest
+    /// The manifest, to note faults.
+    pub fn manifest_mut(&mut self) -> &mut Manifest {
+        &mut self.manifest
     }
 
     /// The index as far as it is whole.
