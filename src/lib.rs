@@ -19,6 +19,7 @@
 //! | [`naming`] | which names a session may have | nobody |
 //! | [`session`] | what a capture leaves on disk: manifest and frame index | `naming`, `durable` |
 //! | [`turntable`] | the table: Grbl over a serial line, turns, angles over time | `clock` |
+//! | [`simulator`] | a table without hardware: the firmware's core on a pseudoterminal | `clock` |
 //! | [`video`] | FFmpeg: a video file to frames with numbers and time stamps | `geometry` |
 //! | [`camera`] | cameras: V4L2, nokhwa, and recordings replayed as one | `clock`, `session`, `video` |
 //! | [`shard`] | the data set on disk: samples, records, tables; write, read, verify | `geometry`, `durable`, `naming` |
@@ -42,5 +43,6 @@ pub mod naming;
 pub mod report;
 pub mod session;
 pub mod shard;
+pub mod simulator;
 pub mod turntable;
 pub mod video;

@@ -1,0 +1,339 @@
+//! The chip: the firmware's core on pins, timers and memory of virtual time.
+//!
+//! Time is in ticks of the step timer, half a microsecond by the chip's own crystal.
+
+use std::collections::VecDeque;
+
+use rig_firmware::board::{Board, Events, Inputs, Outputs, ResetCause};
+use rig_firmware::controller::Controller;
+use rig_firmware::realtime::{Realtime, Received, classify};
+use rig_firmware::stepper::Stepper;
+
+use super::truth::STEPS_PER_TURN;
+use super::wire::{BYTE_TICKS, Timed};
+
+const RECEIVE_BUFFER: usize = 128;
+const SEND_BUFFER: usize = 64;
+const EEPROM_BYTES: usize = 1024;
+/// From a reset to the banner: the boot loader's time.
+const BOOT_TICKS: u64 = 600_000;
+/// Between two rounds of the main loop.
+const ROUND_TICKS: u64 = 400;
+/// From arming the step timer to its first call.
+const ARM_TICKS: u64 = 10;
+const EEPROM_WRITE_TICKS: u64 = 6800;
+
+/// Whether the index is as the angle says, or as somebody holds it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum IndexInput {
+    ByAngle,
+    Held(bool),
+}
+
+/// What is wired to the chip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Pins {
+    pub(super) index: IndexInput,
+    pub(super) emergency: bool,
+    pub(super) battery: u16,
+}
+
+/// Where the index is active: steps of the motor from where it was switched on, within a turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct IndexPlace {
+    pub(super) at: f64,
+    pub(super) width: f64,
+}
+
+enum State {
+    Booting { until: u64, cause: ResetCause },
+    Running(Controller),
+    Stalled,
+}
+
+/// The chip and what hangs on it.
+pub(super) struct Chip {
+    bench: Bench,
+    state: State,
+}
+
+impl Chip {
+    pub(super) fn new(pins: Pins, index: IndexPlace) -> Chip {
+        Chip {
+            bench: Bench::new(pins, index),
+            state: State::Booting {
+                until: BOOT_TICKS,
+                cause: ResetCause::PowerOn,
+            },
+        }
+    }
+
+    /// Starts the program anew; what the motor did and what the EEPROM holds stays.
+    pub(super) fn restart(&mut self, cause: ResetCause) {
+        self.bench.restart();
+        self.state = State::Booting {
+            until: self.bench.now + BOOT_TICKS,
+            cause,
+        };
+    }
+
+    /// Stops for good.
+    pub(super) fn stall(&mut self) {
+        self.bench.restart();
+        self.state = State::Stalled;
+    }
+
+    pub(super) fn set_pins(&mut self, pins: Pins) {
+        let pressed = pins.emergency != self.bench.pins.emergency;
+        self.bench.pins = pins;
+        if pressed && self.bench.stepper.emergency(pins.emergency) {
+            self.bench.events.insert(Events::EMERGENCY);
+        }
+    }
+
+    /// Bytes on their way to the chip.
+    pub(super) fn inbox(&mut self) -> &mut VecDeque<Timed> {
+        &mut self.bench.inbox
+    }
+
+    /// Bytes that the chip has sent whole.
+    pub(super) fn take_sent(&mut self) -> impl Iterator<Item = Timed> + '_ {
+        let now = self.bench.now;
+        let whole = self.bench.outbox.iter().take_while(|(at, _)| *at <= now);
+        let count = whole.count();
+        self.bench.outbox.drain(..count)
+    }
+
+    /// Steps since the last call: when, and where the motor stood then.
+    pub(super) fn take_edges(&mut self) -> impl Iterator<Item = (u64, i64)> + '_ {
+        self.bench.edges.drain(..)
+    }
+
+    /// Lets the chip work until a tick.
+    pub(super) fn run_until(&mut self, end: u64) {
+        while self.bench.now < end {
+            match &mut self.state {
+                State::Running(controller) => {
+                    controller.poll(&mut self.bench);
+                    self.bench.pass_until(self.bench.now + ROUND_TICKS);
+                }
+                State::Booting { until, cause } if *until <= self.bench.now => {
+                    self.bench.cause = *cause;
+                    self.state = State::Running(Controller::new(&mut self.bench));
+                }
+                State::Booting { until, .. } => {
+                    let until = (*until).min(end);
+                    self.bench.sleep_until(until);
+                }
+                State::Stalled => self.bench.sleep_until(end),
+            }
+        }
+    }
+}
+
+/// The board that the core runs on.
+struct Bench {
+    now: u64,
+    stepper: Stepper,
+    /// When the step timer fires.
+    next_step: Option<u64>,
+    forward: bool,
+    /// Where the motor stands, in steps from where it was switched on.
+    turned: i64,
+    edges: Vec<(u64, i64)>,
+    inbox: VecDeque<Timed>,
+    received: VecDeque<u8>,
+    outbox: VecDeque<Timed>,
+    events: Events,
+    pins: Pins,
+    index: IndexPlace,
+    eeprom: Vec<u8>,
+    cause: ResetCause,
+}
+
+impl Bench {
+    fn new(pins: Pins, index: IndexPlace) -> Bench {
+        Bench {
+            now: 0,
+            stepper: Stepper::new(),
+            next_step: None,
+            forward: true,
+            turned: 0,
+            edges: Vec::new(),
+            inbox: VecDeque::new(),
+            received: VecDeque::new(),
+            outbox: VecDeque::new(),
+            events: Events::NONE,
+            pins,
+            index,
+            eeprom: vec![0xFF; EEPROM_BYTES],
+            cause: ResetCause::PowerOn,
+        }
+    }
+
+    fn restart(&mut self) {
+        self.stepper = Stepper::new();
+        self.next_step = None;
+        self.received.clear();
+        self.events = Events::NONE;
+    }
+
+    fn index_level(&self) -> bool {
+        match self.pins.index {
+            IndexInput::Held(level) => level,
+            IndexInput::ByAngle => {
+                let past = (self.turned as f64 - self.index.at).rem_euclid(STEPS_PER_TURN);
+                past < self.index.width
+            }
+        }
+    }
+
+    /// Lets time go on while the program runs, with all that interrupts do in it.
+    fn pass_until(&mut self, end: u64) {
+        loop {
+            let step = self.next_step.filter(|at| *at <= end);
+            let byte = self
+                .inbox
+                .front()
+                .map(|(at, _)| *at)
+                .filter(|at| *at <= end);
+            match (step, byte) {
+                (Some(at), byte) if byte.is_none_or(|byte| at <= byte) => self.fire(at),
+                (_, Some(at)) => {
+                    self.now = self.now.max(at);
+                    if let Some((_, byte)) = self.inbox.pop_front() {
+                        self.hear(byte);
+                    }
+                }
+                _ => break,
+            }
+        }
+        self.now = self.now.max(end);
+    }
+
+    /// Lets time go on while no program runs: bytes go by unheard.
+    fn sleep_until(&mut self, end: u64) {
+        while self.inbox.front().is_some_and(|(at, _)| *at <= end) {
+            self.inbox.pop_front();
+        }
+        self.now = self.now.max(end);
+    }
+
+    fn fire(&mut self, at: u64) {
+        self.now = self.now.max(at);
+        let forward = self.forward;
+        let fire = self.stepper.fire(self.index_level());
+        if fire.pulse {
+            self.turned += if forward { 1 } else { -1 };
+            self.edges.push((at, self.turned));
+        }
+        self.forward = fire.forward;
+        self.next_step = fire.next.map(|ticks| at + u64::from(ticks));
+    }
+
+    fn hear(&mut self, byte: u8) {
+        self.events.insert(Events::RECEIVED);
+        match classify(byte) {
+            Received::Data(_) if self.received.len() >= RECEIVE_BUFFER => {
+                self.events.insert(Events::LOST_INPUT);
+            }
+            Received::Data(byte) => self.received.push_back(byte),
+            Received::Realtime(realtime) => {
+                self.stepper.obey(realtime);
+                self.stop_idle_timer();
+                self.events.insert(event_of(realtime));
+            }
+        }
+    }
+
+    /// A halt leaves the timer nothing to fire for.
+    fn stop_idle_timer(&mut self) {
+        if self.stepper.is_halted() {
+            self.next_step = None;
+        }
+    }
+}
+
+fn event_of(realtime: Realtime) -> Events {
+    match realtime {
+        Realtime::Status => Events::STATUS,
+        Realtime::Hold => Events::HOLD,
+        Realtime::Resume => Events::RESUME,
+        Realtime::Reset => Events::RESET,
+        Realtime::JogCancel => Events::JOG_CANCEL,
+        Realtime::Ignored => Events::NONE,
+    }
+}
+
+impl Board for Bench {
+    fn with_stepper<R>(&mut self, f: impl FnOnce(&mut Stepper, u32) -> R) -> R {
+        let micros = self.micros();
+        f(&mut self.stepper, micros)
+    }
+
+    fn start_steps(&mut self) {
+        if self.next_step.is_none() {
+            self.next_step = Some(self.now + ARM_TICKS);
+        }
+    }
+
+    fn micros(&mut self) -> u32 {
+        (self.now / 2) as u32
+    }
+
+    fn receive(&mut self) -> Option<u8> {
+        self.received.pop_front()
+    }
+
+    fn receive_room(&mut self) -> u8 {
+        RECEIVE_BUFFER.saturating_sub(self.received.len()) as u8
+    }
+
+    fn take_events(&mut self) -> Events {
+        self.events.take()
+    }
+
+    fn send(&mut self, byte: u8) {
+        let waiting = self.outbox.len().checked_sub(SEND_BUFFER);
+        if let Some((at, _)) = waiting.and_then(|place| self.outbox.get(place)).copied() {
+            self.pass_until(at);
+        }
+        let start = self.outbox.back().map_or(0, |(at, _)| *at).max(self.now);
+        self.outbox.push_back((start + BYTE_TICKS, byte));
+    }
+
+    fn enable_driver(&mut self, _enabled: bool) {}
+
+    fn configure_outputs(&mut self, _outputs: Outputs) {}
+
+    fn inputs(&mut self) -> Inputs {
+        Inputs {
+            index: self.index_level(),
+            emergency_stop: self.pins.emergency,
+        }
+    }
+
+    fn battery(&mut self) -> u16 {
+        self.pins.battery
+    }
+
+    fn eeprom_read(&mut self, address: u16) -> u8 {
+        self.eeprom
+            .get(usize::from(address))
+            .copied()
+            .unwrap_or(0xFF)
+    }
+
+    fn eeprom_write(&mut self, address: u16, byte: u8) {
+        if let Some(place) = self.eeprom.get_mut(usize::from(address)) {
+            *place = byte;
+        }
+        self.pass_until(self.now + EEPROM_WRITE_TICKS);
+    }
+
+    fn pet_watchdog(&mut self) {}
+
+    fn reset_cause(&mut self) -> ResetCause {
+        self.cause
+    }
+}

@@ -1,0 +1,185 @@
+//! What can go wrong, in words: `drop=0.01,flip=0.005,reset@12.5s`.
+
+use std::str::FromStr;
+use std::time::Duration;
+
+use super::Error;
+
+/// What goes wrong on the wire, and with the chip.
+///
+/// As text, parted by commas: `drop=0.01` loses that share of the bytes, `flip=` changes a bit in
+/// that share of the bytes, `duplicate=` sends that share of the lines twice, `merge=` loses the
+/// end of that share of the lines, `delay=0.02:30ms` lets that share of the bytes, and what follows
+/// them, come so much later. They hold for both directions; `to.drop=` is for bytes to the chip
+/// alone, `from.drop=` for those from it. `reset@12.5s` restarts the chip at that time, as a
+/// watchdog does; `stall@20s` makes it stop answering and moving. Times are by the simulator's
+/// clock, from its start.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Faults {
+    /// On the way to the chip.
+    pub to_chip: WireFaults,
+    /// On the way from the chip.
+    pub from_chip: WireFaults,
+    /// When the chip restarts.
+    pub resets: Vec<Duration>,
+    /// When the chip stops for good.
+    pub stall: Option<Duration>,
+}
+
+/// How often a wire fails, in one direction; shares are between 0 and 1.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct WireFaults {
+    /// Share of the bytes that are lost.
+    pub drop: f64,
+    /// Share of the bytes in which one bit changes.
+    pub flip: f64,
+    /// Share of the lines that come twice.
+    pub duplicate: f64,
+    /// Share of the lines that lose their end, and run into the next one.
+    pub merge: f64,
+    /// Share of the bytes that come late.
+    pub delay: f64,
+    /// How late they come.
+    pub delay_by: Duration,
+}
+
+impl FromStr for Faults {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Faults, Error> {
+        let mut faults = Faults::default();
+        for item in text
+            .split(',')
+            .map(str::trim)
+            .filter(|item| !item.is_empty())
+        {
+            faults.add(item).map_err(|why| Error::Fault {
+                item: item.to_owned(),
+                why,
+            })?;
+        }
+        Ok(faults)
+    }
+}
+
+impl Faults {
+    fn add(&mut self, item: &str) -> Result<(), &'static str> {
+        if let Some((what, at)) = item.split_once('@') {
+            let at = duration(at)?;
+            match what {
+                "reset" => self.resets.push(at),
+                "stall" => self.stall = Some(at),
+                _ => return Err("only reset and stall happen at a time"),
+            }
+            return Ok(());
+        }
+        let (what, how) = item
+            .split_once('=')
+            .ok_or("write it as drop=0.01 or reset@5s")?;
+        if let Some(what) = what.strip_prefix("to.") {
+            return self.to_chip.set(what, how);
+        }
+        if let Some(what) = what.strip_prefix("from.") {
+            return self.from_chip.set(what, how);
+        }
+        self.to_chip.set(what, how)?;
+        self.from_chip.set(what, how)
+    }
+}
+
+impl WireFaults {
+    fn set(&mut self, what: &str, how: &str) -> Result<(), &'static str> {
+        let place = match what {
+            "drop" => &mut self.drop,
+            "flip" => &mut self.flip,
+            "duplicate" => &mut self.duplicate,
+            "merge" => &mut self.merge,
+            "delay" => {
+                let (share_of, by) = how.split_once(':').ok_or("write it as delay=0.02:30ms")?;
+                self.delay = share(share_of)?;
+                self.delay_by = duration(by)?;
+                return Ok(());
+            }
+            _ => return Err("there are drop, flip, duplicate, merge, delay, reset and stall"),
+        };
+        *place = share(how)?;
+        Ok(())
+    }
+}
+
+fn share(text: &str) -> Result<f64, &'static str> {
+    let share = text
+        .parse()
+        .ok()
+        .filter(|share| (0.0..=1.0).contains(share));
+    share.ok_or("a share is a number from 0 to 1")
+}
+
+fn duration(text: &str) -> Result<Duration, &'static str> {
+    const WRONG: &str = "a time is a number with its unit, as in 12.5s or 30ms";
+    let (number, unit) = match text.strip_suffix("ms") {
+        Some(number) => (number, 1000.0),
+        None => (text.strip_suffix('s').ok_or(WRONG)?, 1.0),
+    };
+    let seconds = number.parse::<f64>().map_err(|_| WRONG)? / unit;
+    if !(0.0..=1e6).contains(&seconds) {
+        return Err(WRONG);
+    }
+    Ok(Duration::from_secs_f64(seconds))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_faults_are_read() {
+        let faults: Faults = "drop=0.01, to.flip=0.005,from.duplicate=1,merge=0,\
+                              delay=0.02:30ms,reset@12.5s,reset@20s,stall@30s"
+            .parse()
+            .unwrap();
+        let both = WireFaults {
+            drop: 0.01,
+            delay: 0.02,
+            delay_by: Duration::from_millis(30),
+            ..WireFaults::default()
+        };
+        let expected = Faults {
+            to_chip: WireFaults {
+                flip: 0.005,
+                ..both
+            },
+            from_chip: WireFaults {
+                duplicate: 1.0,
+                ..both
+            },
+            resets: vec![Duration::from_millis(12_500), Duration::from_secs(20)],
+            stall: Some(Duration::from_secs(30)),
+        };
+        assert_eq!(faults, expected);
+        assert_eq!("".parse::<Faults>().unwrap(), Faults::default());
+    }
+
+    #[test]
+    fn what_is_no_fault_is_told_with_its_words() {
+        for text in [
+            "drop",
+            "drop=",
+            "drop=2",
+            "drop=-0.1",
+            "drop=NaN",
+            "lose=0.1",
+            "delay=0.1",
+            "delay=0.1:3",
+            "reset@",
+            "reset@5",
+            "reset@-1s",
+            "stall@1e9s",
+            "flip@3s",
+            "to.reset=1",
+        ] {
+            let error = text.parse::<Faults>().unwrap_err().to_string();
+            assert!(error.contains(text), "{error}");
+        }
+    }
+}

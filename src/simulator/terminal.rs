@@ -1,0 +1,90 @@
+//! The pseudoterminal that stands for the serial port.
+
+use std::mem::MaybeUninit;
+use std::os::fd::OwnedFd;
+use std::os::unix::ffi::OsStringExt;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::inotify;
+use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
+use rustix::io::Errno;
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+
+use super::Error;
+
+/// The chip's end of the line.
+pub(super) struct Terminal {
+    line: OwnedFd,
+    /// Tells when somebody opens the port.
+    watch: OwnedFd,
+    path: PathBuf,
+    /// Nobody has the port open.
+    closed: bool,
+}
+
+impl Terminal {
+    pub(super) fn open() -> Result<Terminal, Error> {
+        let failed = |step| move |errno: Errno| Error::Terminal { step, errno };
+        let line = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)
+            .map_err(failed("open"))?;
+        grantpt(&line).map_err(failed("grant"))?;
+        unlockpt(&line).map_err(failed("unlock"))?;
+        let name = ptsname(&line, Vec::new()).map_err(failed("name"))?;
+        let path = PathBuf::from(std::ffi::OsString::from_vec(name.into_bytes()));
+        let flags = fcntl_getfl(&line).map_err(failed("set up"))?;
+        fcntl_setfl(&line, flags | OFlags::NONBLOCK).map_err(failed("set up"))?;
+        // Only a port that was closed once tells that nobody has it open.
+        let port = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
+        drop(open(&path, port, Mode::empty()).map_err(failed("try"))?);
+        let flags = inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC;
+        let watch = inotify::init(flags).map_err(failed("watch"))?;
+        inotify::add_watch(&watch, &path, inotify::WatchFlags::OPEN).map_err(failed("watch"))?;
+        Ok(Terminal {
+            line,
+            watch,
+            path,
+            closed: true,
+        })
+    }
+
+    /// The port that a host opens.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// How often the port was opened since the last call.
+    pub(super) fn opened(&self) -> u64 {
+        let mut buffer = [MaybeUninit::uninit(); 1024];
+        let mut reader = inotify::Reader::new(&self.watch, &mut buffer);
+        let mut times = 0;
+        while reader.next().is_ok() {
+            times += 1;
+        }
+        times
+    }
+
+    /// What the host has written, up to the size of the buffer.
+    pub(super) fn read<'a>(&mut self, buffer: &'a mut [u8]) -> &'a [u8] {
+        let count = match rustix::io::read(&self.line, &mut *buffer) {
+            Ok(count) => Some(count),
+            Err(Errno::AGAIN | Errno::INTR) => Some(0),
+            Err(_) => None,
+        };
+        self.closed = count.is_none();
+        buffer.get(..count.unwrap_or(0)).unwrap_or(&[])
+    }
+
+    /// Gives the host bytes. Those that nobody is there to take are lost, as on a wire: the number
+    /// of bytes that the host got.
+    pub(super) fn write(&self, mut bytes: &[u8]) -> usize {
+        let whole = bytes.len();
+        while !self.closed && !bytes.is_empty() {
+            match rustix::io::write(&self.line, bytes) {
+                Ok(count) if count > 0 => bytes = bytes.get(count..).unwrap_or(&[]),
+                Err(Errno::INTR) => {}
+                Ok(_) | Err(_) => break,
+            }
+        }
+        whole - bytes.len()
+    }
+}

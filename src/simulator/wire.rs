@@ -1,0 +1,214 @@
+//! One direction of the serial line: how long bytes take, and what happens to them on the way.
+
+use std::collections::VecDeque;
+
+use rig_firmware::realtime::{Received, classify};
+use serde::Serialize;
+
+use super::faults::WireFaults;
+
+/// Timer ticks of one byte: ten bits at 115 200 baud, in half microseconds.
+pub(super) const BYTE_TICKS: u64 = 174;
+/// Ticks a second.
+const TICKS_PER_SECOND: f64 = 2e6;
+/// The longest line that can come twice.
+const LONGEST_LINE: usize = 256;
+
+/// A byte, and the tick at which it is whole.
+pub(super) type Timed = (u64, u8);
+
+/// What happened on one direction of the wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct WireCounts {
+    /// Bytes that were given to it.
+    pub bytes: u64,
+    /// Bytes that were lost.
+    pub dropped: u64,
+    /// Bytes in which a bit changed.
+    pub flipped: u64,
+    /// Lines that came twice.
+    pub duplicated: u64,
+    /// Lines that lost their end.
+    pub merged: u64,
+    /// Bytes that came late, and others with them.
+    pub delayed: u64,
+}
+
+/// One direction of the wire.
+pub(super) struct Wire {
+    faults: WireFaults,
+    random: Random,
+    /// Commands of one byte are no part of a line in this direction.
+    to_chip: bool,
+    /// The line so far, for the case that it comes twice.
+    line: Vec<u8>,
+    /// The end of a line was lost at its first byte: the second goes too.
+    losing_end: bool,
+    /// When the last byte is through.
+    free_at: u64,
+    pub(super) counts: WireCounts,
+}
+
+impl Wire {
+    pub(super) fn new(faults: WireFaults, seed: u64, to_chip: bool) -> Wire {
+        Wire {
+            faults,
+            random: Random(seed ^ (u64::from(to_chip) << 63)),
+            to_chip,
+            line: Vec::new(),
+            losing_end: false,
+            free_at: 0,
+            counts: WireCounts::default(),
+        }
+    }
+
+    /// Takes a byte at a tick, and puts onto `out` what arrives of it.
+    pub(super) fn carry(&mut self, at: u64, byte: u8, out: &mut VecDeque<Timed>) {
+        self.counts.bytes += 1;
+        self.free_at = self.free_at.max(at.saturating_sub(BYTE_TICKS));
+        if self.random.hits(self.faults.delay) {
+            self.counts.delayed += 1;
+            let late = self.faults.delay_by.as_secs_f64() * TICKS_PER_SECOND;
+            self.free_at += late as u64;
+        }
+        if self.is_lost_end(byte) {
+            return;
+        }
+        if self.random.hits(self.faults.drop) {
+            self.counts.dropped += 1;
+            self.free_at += BYTE_TICKS;
+            return;
+        }
+        let mut arrived = byte;
+        if self.random.hits(self.faults.flip) {
+            self.counts.flipped += 1;
+            arrived ^= 1 << (self.random.next() % 8);
+        }
+        self.pass(arrived, out);
+        self.repeat_line(byte, arrived, out);
+    }
+
+    fn pass(&mut self, byte: u8, out: &mut VecDeque<Timed>) {
+        self.free_at += BYTE_TICKS;
+        out.push_back((self.free_at, byte));
+    }
+
+    /// Whether this byte belongs to the end of a line that is lost whole.
+    fn is_lost_end(&mut self, byte: u8) -> bool {
+        let losing = std::mem::take(&mut self.losing_end);
+        if losing && byte == b'\n' {
+            return true;
+        }
+        let lost = matches!(byte, b'\r' | b'\n') && self.random.hits(self.faults.merge);
+        if lost {
+            self.counts.merged += 1;
+            self.losing_end = byte == b'\r';
+        }
+        lost
+    }
+
+    /// Sends a line again, once it has come to its line feed.
+    fn repeat_line(&mut self, byte: u8, arrived: u8, out: &mut VecDeque<Timed>) {
+        if self.to_chip && matches!(classify(byte), Received::Realtime(_)) {
+            return;
+        }
+        self.line.push(arrived);
+        if byte == b'\n' {
+            let line = std::mem::take(&mut self.line);
+            if self.random.hits(self.faults.duplicate) {
+                self.counts.duplicated += 1;
+                line.iter().for_each(|&byte| self.pass(byte, out));
+            }
+        } else if self.line.len() >= LONGEST_LINE {
+            self.line.clear();
+        }
+    }
+}
+
+/// Random numbers that a seed makes repeatable: G. L. Steele's SplitMix64 (OOPSLA 2014).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut mixed = self.0;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        mixed ^ (mixed >> 31)
+    }
+
+    fn hits(&mut self, share: f64) -> bool {
+        share > 0.0 && (self.next() >> 11) as f64 / (1_u64 << 53) as f64 <= share
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    fn carry(faults: WireFaults, text: &[u8]) -> (Vec<u8>, WireCounts, VecDeque<Timed>) {
+        let mut wire = Wire::new(faults, 1, true);
+        let mut out = VecDeque::new();
+        text.iter()
+            .for_each(|&byte| wire.carry(1000, byte, &mut out));
+        (
+            out.iter().map(|(_, byte)| *byte).collect(),
+            wire.counts,
+            out,
+        )
+    }
+
+    #[test]
+    fn a_good_wire_carries_bytes_one_after_the_other() {
+        let (bytes, counts, timed) = carry(WireFaults::default(), b"G0\n");
+        assert_eq!(bytes, b"G0\n");
+        assert_eq!(counts.bytes, 3);
+        let times: Vec<u64> = timed.iter().map(|(at, _)| *at).collect();
+        assert_eq!(times, [1000, 1174, 1348]);
+    }
+
+    #[test]
+    fn certain_faults_happen_to_all() {
+        let none = WireFaults::default();
+        let (bytes, counts, _) = carry(WireFaults { drop: 1.0, ..none }, b"G0\nX");
+        assert_eq!((bytes.len(), counts.dropped), (0, 4));
+        let (bytes, _, _) = carry(WireFaults { merge: 1.0, ..none }, b"A\r\nB\nC\r");
+        assert_eq!(bytes, b"ABC");
+        let twice = WireFaults {
+            duplicate: 1.0,
+            ..none
+        };
+        let (bytes, counts, _) = carry(twice, b"A?B\nC\n");
+        assert_eq!(bytes, b"A?B\nAB\nC\nC\n");
+        assert_eq!(counts.duplicated, 2);
+        let (bytes, _, _) = carry(WireFaults { flip: 1.0, ..none }, b"AAAA");
+        assert!(bytes.iter().all(|byte| (byte ^ b'A').count_ones() == 1));
+    }
+
+    #[test]
+    fn a_late_byte_keeps_the_order() {
+        let late = WireFaults {
+            delay: 1.0,
+            delay_by: Duration::from_millis(1),
+            ..WireFaults::default()
+        };
+        let (bytes, counts, timed) = carry(late, b"AB");
+        assert_eq!(bytes, b"AB");
+        assert_eq!(counts.delayed, 2);
+        assert_eq!(timed[1].0 - timed[0].0, 2174);
+    }
+
+    #[test]
+    fn shares_come_out_about_as_asked_and_a_seed_repeats_them() {
+        let faults = WireFaults {
+            drop: 0.1,
+            ..WireFaults::default()
+        };
+        let text = vec![b'A'; 20_000];
+        let (first, counts, _) = carry(faults, &text);
+        assert!((1800..2200).contains(&counts.dropped), "{counts:?}");
+        assert_eq!(carry(faults, &text).0, first);
+    }
+}

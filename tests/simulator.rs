@@ -1,0 +1,274 @@
+//! The simulated table, as a program at its port sees it.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a panic is how a test tells"
+)]
+
+use std::io::{Read, Write};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use relit::clock::Clock;
+use relit::simulator::{STEPS_PER_TURN, Simulator, SimulatorOptions};
+use serialport::TTYPort;
+
+/// The longest that anything takes on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(30);
+const SPEED: f64 = 20.0;
+
+/// A simulated table and a host at its port.
+struct Bench {
+    table: Simulator,
+    clock: Clock,
+    port: TTYPort,
+    heard: String,
+}
+
+impl Bench {
+    fn new(options: SimulatorOptions) -> Bench {
+        let clock = options.clock;
+        let table = Simulator::start(options).unwrap();
+        let port = open(table.path());
+        let heard = String::new();
+        Bench {
+            table,
+            clock,
+            port,
+            heard,
+        }
+    }
+
+    fn ready() -> Bench {
+        let mut bench = Bench::new(fast());
+        bench.until("external]\r\n");
+        bench
+    }
+
+    fn say(&mut self, text: &str) {
+        self.port.write_all(text.as_bytes()).unwrap();
+    }
+
+    /// Listens until the table says this, and gives what it said up to there.
+    fn until(&mut self, text: &str) -> String {
+        let end = Instant::now() + PATIENCE;
+        while Instant::now() < end {
+            if let Some(at) = self.heard.find(text) {
+                let rest = self.heard.split_off(at + text.len());
+                return std::mem::replace(&mut self.heard, rest);
+            }
+            self.listen();
+        }
+        panic!("never {text:?}, but {:?}", self.heard);
+    }
+
+    fn listen(&mut self) {
+        let mut buffer = [0; 256];
+        if let Ok(count) = self.port.read(&mut buffer) {
+            self.heard += &String::from_utf8_lossy(&buffer[..count]);
+        }
+    }
+
+    fn ask(&mut self, line: &str) -> String {
+        self.say(&format!("{line}\n"));
+        self.until("ok\r\n")
+    }
+
+    /// Asks for status reports until one begins like this.
+    fn wait(&mut self, state: &str) -> String {
+        let end = Instant::now() + PATIENCE;
+        while Instant::now() < end {
+            self.say("?");
+            let report = self.until(">\r\n");
+            if report.starts_with(&format!("<{state}")) {
+                return report;
+            }
+            self.clock.sleep(Duration::from_millis(50));
+        }
+        panic!("never {state}");
+    }
+}
+
+fn fast() -> SimulatorOptions {
+    SimulatorOptions {
+        clock: Clock::scaled(SPEED),
+        ..SimulatorOptions::default()
+    }
+}
+
+fn open(path: &Path) -> TTYPort {
+    let port = serialport::new(path.to_string_lossy(), 115_200);
+    TTYPort::open(&port.timeout(Duration::from_millis(5))).unwrap()
+}
+
+#[test]
+fn whoever_opens_the_port_resets_the_chip() {
+    let mut bench = Bench::ready();
+    bench.ask("G0 X1");
+    bench.wait("Idle");
+    drop(bench.port);
+    bench.port = open(bench.table.path());
+    bench.until("[reset: external]\r\n");
+    assert!(bench.wait("Idle").contains("MPos:0.000"));
+    assert_eq!(bench.table.counts().opened, 2);
+}
+
+#[test]
+fn a_turn_is_told_step_by_step() {
+    let mut bench = Bench::ready();
+    bench.ask("G1 X360 F432");
+    bench.wait("Idle");
+    let edges = bench.table.edges();
+    assert_eq!(edges.last().unwrap().steps, STEPS_PER_TURN as i64);
+    let end = edges.last().unwrap().t_us;
+    assert!((bench.table.angle_at(end) - 360.0).abs() < 1e-9);
+    let (first, last) = (edges[100], edges[edges.len() - 100]);
+    let speed = (last.steps - first.steps) as f64 / (last.t_us - first.t_us) as f64 * 1e6;
+    assert!((speed - 640.0).abs() < 0.01, "{speed}");
+}
+
+#[test]
+fn a_report_and_the_truth_agree() {
+    let mut bench = Bench::ready();
+    let started = bench.clock.now_us();
+    bench.ask("G1 X180 F432");
+    bench.clock.sleep(Duration::from_secs(2));
+    for _ in 0..20 {
+        let before = bench.clock.now_us();
+        let report = bench.wait("Run");
+        let after = bench.clock.now_us();
+        let angle = report.split(['|', ':', ',']).nth(2).unwrap();
+        let angle: f64 = angle.parse().unwrap();
+        assert!(angle >= bench.table.angle_at(before) - 0.02);
+        assert!(angle <= bench.table.angle_at(after) + 0.02);
+        assert!(before > started);
+    }
+}
+
+#[test]
+fn homing_finds_the_index_at_its_angle() {
+    let mut bench = Bench::new(SimulatorOptions {
+        start_angle: 100.0,
+        index_at: 130.0,
+        ..fast()
+    });
+    bench.until("external]\r\n");
+    bench.ask("$22=1");
+    bench.ask("$H");
+    assert!(bench.wait("Idle").contains("MPos:0.000"));
+    let angle = bench.table.angle_at(bench.clock.now_us());
+    let step = 360.0 / STEPS_PER_TURN;
+    assert!((angle - 130.0).abs() <= step, "{angle}");
+}
+
+#[test]
+fn pins_can_be_driven() {
+    let mut bench = Bench::ready();
+    bench.table.hold_index(Some(true));
+    bench.table.set_battery(11.84);
+    bench.clock.sleep(Duration::from_millis(500));
+    let report = bench.wait("Idle");
+    assert!(report.contains("|Bat:11.8"), "{report}");
+    assert!(report.contains("|Pn:X"), "{report}");
+    bench.table.hold_index(None);
+    bench.ask("G1 X90 F432");
+    bench.table.press_emergency_stop(true);
+    bench.until("ALARM:10\r\n");
+    let edges = bench.table.edges().len();
+    bench.clock.sleep(Duration::from_secs(1));
+    assert_eq!(bench.table.edges().len(), edges);
+}
+
+#[test]
+fn a_reset_in_a_turn_shows_its_banner() {
+    let mut bench = Bench::new(SimulatorOptions {
+        faults: "reset@6s".parse().unwrap(),
+        ..fast()
+    });
+    bench.until("external]\r\n");
+    bench.ask("G1 X360 F432");
+    bench.until("[reset: watchdog]\r\n");
+    assert_eq!(bench.table.stop().resets, 1);
+}
+
+#[test]
+fn a_stalled_chip_neither_answers_nor_moves() {
+    let mut bench = Bench::new(SimulatorOptions {
+        faults: "stall@6s".parse().unwrap(),
+        ..fast()
+    });
+    bench.until("external]\r\n");
+    bench.ask("G1 X360 F432");
+    let end = Instant::now() + PATIENCE;
+    while !bench.table.counts().stalled && Instant::now() < end {
+        bench.listen();
+    }
+    bench.heard.clear();
+    let edges = bench.table.edges().len();
+    assert!(edges > 0);
+    bench.say("?\n");
+    bench.clock.sleep(Duration::from_secs(3));
+    bench.listen();
+    assert_eq!(bench.heard, "");
+    assert_eq!(bench.table.edges().len(), edges);
+}
+
+#[test]
+fn a_bad_wire_counts_what_it_does() {
+    let mut bench = Bench::new(SimulatorOptions {
+        faults: "to.drop=0.05,to.duplicate=0.2,to.merge=0.1,from.flip=0.02,from.delay=0.01:2ms"
+            .parse()
+            .unwrap(),
+        seed: 7,
+        ..fast()
+    });
+    bench.clock.sleep(Duration::from_secs(1));
+    for _ in 0..200 {
+        bench.say("$X\n");
+        bench.clock.sleep(Duration::from_millis(40));
+        bench.listen();
+    }
+    let counts = bench.table.stop();
+    assert_eq!(counts.to_chip.bytes, 600);
+    assert!(counts.to_chip.dropped > 10, "{counts:?}");
+    assert!(counts.to_chip.duplicated > 15, "{counts:?}");
+    assert!(counts.to_chip.merged > 5, "{counts:?}");
+    assert!(counts.from_chip.flipped > 5, "{counts:?}");
+    assert!(counts.from_chip.delayed > 2, "{counts:?}");
+}
+
+#[test]
+fn the_second_name_lives_as_long_as_the_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("table");
+    std::os::unix::fs::symlink("/nowhere", &link).unwrap();
+    let options = || SimulatorOptions {
+        link: Some(link.clone()),
+        ..fast()
+    };
+    let table = Simulator::start(options()).unwrap();
+    assert_eq!(std::fs::read_link(&link).unwrap(), table.path());
+    let mut port = open(&link);
+    port.write_all(b"\n").unwrap();
+    drop(table);
+    assert!(std::fs::read_link(&link).is_err());
+    std::fs::write(&link, "somebody's file").unwrap();
+    assert!(Simulator::start(options()).is_err());
+    assert_eq!(std::fs::read_to_string(&link).unwrap(), "somebody's file");
+}
+
+#[test]
+fn a_crystal_that_goes_wrong_shows_in_the_speed() {
+    let mut bench = Bench::new(SimulatorOptions {
+        drift_ppm: 5000.0,
+        ..fast()
+    });
+    bench.until("external]\r\n");
+    bench.ask("G1 X90 F432");
+    bench.wait("Idle");
+    let edges = bench.table.edges();
+    let (first, last) = (edges[100], edges[edges.len() - 100]);
+    let speed = (last.steps - first.steps) as f64 / (last.t_us - first.t_us) as f64 * 1e6;
+    assert!((speed - 640.0 * 1.005).abs() < 0.01, "{speed}");
+}
