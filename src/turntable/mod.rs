@@ -24,11 +24,15 @@ mod greeting;
 mod identity;
 mod link;
 mod owner;
+#[cfg(test)]
+mod peer;
 mod plan;
 mod port;
 mod supervisor;
 mod sync;
 mod table;
+#[cfg(test)]
+mod tests;
 mod turn;
 pub mod wire;
 

@@ -244,3 +244,142 @@ fn no_room(
         way_out,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::turntable::identity::{Extras, Limits};
+    use crate::turntable::wire::State;
+
+    fn identity(low_deg: f64, high_deg: f64) -> Identity {
+        Identity {
+            firmware: String::new(),
+            extras: Extras::default(),
+            steps_per_degree: 88.889,
+            max_degrees_per_second: 36.0,
+            acceleration: 36.0,
+            limits: Limits { low_deg, high_deg },
+            homing: false,
+            lease_s: None,
+            degrees_per_unit: 1.0,
+        }
+    }
+
+    fn status(angle_deg: f64, machine_deg: f64) -> Status {
+        Status {
+            state: State::Idle,
+            angle_deg,
+            machine_deg,
+            degrees_per_second: 0.0,
+            battery_v: None,
+            index: false,
+            emergency_stop: false,
+            homed: true,
+            alarm: None,
+        }
+    }
+
+    fn plan(angle_deg: f64) -> Result<TurnPlan, TurntableError> {
+        let request = TurnRequest::default();
+        TurnPlan::new(
+            &identity(-400.0, 400.0),
+            &status(angle_deg, angle_deg),
+            &request,
+        )
+    }
+
+    #[test]
+    fn a_turn_from_zero_has_its_ramps_outside_of_the_constant_part() {
+        let plan = plan(0.0).unwrap();
+        assert_eq!(plan.direction(), Direction::Positive);
+        // 7.2^2 / (2 * 36) = 0.72 degrees of ramp.
+        assert!((plan.back_deg() + 2.0 + 0.72 + RAMP_SLACK_DEG).abs() < 1e-9);
+        assert_eq!(plan.constant_from_deg(), -2.0);
+        assert_eq!(plan.constant_to_deg(), 362.0);
+        assert!((plan.end_deg() - 362.0 - 0.72 - RAMP_SLACK_DEG).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_table_that_is_wound_up_turns_the_other_way() {
+        let plan = plan(200.0).unwrap();
+        assert_eq!(plan.direction(), Direction::Negative);
+        assert!(plan.end_deg() > -163.0 && plan.back_deg() > 200.0);
+    }
+
+    #[test]
+    fn no_room_is_told_with_the_numbers_and_the_way_out() {
+        let request = TurnRequest {
+            direction: Some(Direction::Positive),
+            ..TurnRequest::default()
+        };
+        let here = status(100.0, 100.0);
+        let error = TurnPlan::new(&identity(-400.0, 400.0), &here, &request).unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.contains("from 100.000") && text.contains("400.000"),
+            "{text}"
+        );
+        assert!(text.contains("between -397.180 and 37.180"), "{text}");
+        let small = identity(-100.0, 100.0);
+        let error = TurnPlan::new(&small, &here, &request).unwrap_err();
+        assert!(error.to_string().contains("no place has room"), "{error}");
+    }
+
+    #[test]
+    fn speeds_and_angles_that_no_table_follows_are_refused() {
+        let refused = |request: TurnRequest| {
+            let planned = TurnPlan::new(&identity(-400.0, 400.0), &status(0.0, 0.0), &request);
+            assert!(
+                matches!(planned, Err(TurntableError::Figure { .. })),
+                "{planned:?}"
+            );
+        };
+        let usual = TurnRequest::default();
+        for degrees_per_second in [0.0, -1.0, 36.1, f64::NAN] {
+            refused(TurnRequest {
+                degrees_per_second,
+                ..usual
+            });
+        }
+        for turn_deg in [0.0, f64::INFINITY, f64::NAN] {
+            refused(TurnRequest { turn_deg, ..usual });
+        }
+        refused(TurnRequest {
+            margin_deg: -0.1,
+            ..usual
+        });
+    }
+
+    proptest! {
+        #[test]
+        fn a_plan_never_passes_a_limit_and_none_is_refused_that_has_room(
+            low in -800.0..0.0f64,
+            high in 0.0..800.0f64,
+            at in -800.0..800.0f64,
+            zero in -300.0..300.0f64,
+            speed in 0.1..36.0f64,
+            turn_deg in 1.0..800.0f64,
+            margin_deg in 0.0..20.0f64,
+        ) {
+            let identity = identity(low, high);
+            let status = status(at - zero, at);
+            let request = TurnRequest { degrees_per_second: speed, turn_deg, margin_deg, ..TurnRequest::default() };
+            let ramp = speed * speed / 72.0 + RAMP_SLACK_DEG;
+            let reach = high.max(-low);
+            let inside = |machine: f64| (low..=high).contains(&machine) && (machine - zero).abs() <= reach;
+            match TurnPlan::new(&identity, &status, &request) {
+                Ok(plan) => for angle in [plan.back_deg(), plan.end_deg()] {
+                    prop_assert!(inside(angle + zero));
+                    prop_assert!((plan.constant_to_deg() - plan.constant_from_deg()).abs() >= turn_deg);
+                },
+                Err(_) => for sign in [1.0, -1.0] {
+                    let (back, end) = (at - sign * (ramp + margin_deg), at + sign * (turn_deg + margin_deg + ramp));
+                    let room = |machine: f64| inside(machine - 0.002) && inside(machine + 0.002);
+                    prop_assert!(!(room(back) && room(end)));
+                },
+            }
+        }
+    }
+}

@@ -1,1 +1,170 @@
+#![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use serialport::{SerialPort as _, TTYPort};
+
+use super::claim::Files;
+use super::*;
+use crate::clock::Clock;
+use crate::turntable::peer::Peer;
+use crate::turntable::{Fault, Options, State, Table, TurntableError};
+
+/// A peer at a pseudo terminal.
+struct Terminal {
+    path: PathBuf,
+    quit: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+    runtime: tempfile::TempDir,
+    // Kept open, so that the other end is not told of a hang-up between two openings.
+    _slave: TTYPort,
+}
+
+impl Terminal {
+    fn new() -> Terminal {
+        let (mut master, slave) = TTYPort::pair().unwrap();
+        master.set_timeout(Duration::from_millis(1)).unwrap();
+        let path = PathBuf::from(slave.name().unwrap());
+        let quit = Arc::new(AtomicBool::new(false));
+        let told = Arc::clone(&quit);
+        let thread = thread::spawn(move || {
+            let (clock, mut peer) = (Clock::monotonic(), Peer::new(true));
+            let mut buffer = [0; 256];
+            while !told.load(Ordering::Acquire) {
+                let count = master.read(&mut buffer).unwrap_or(0);
+                peer.advance(clock.now_us());
+                peer.take(&buffer[..count]);
+                master.write_all(&peer.give()).unwrap();
+            }
+        });
+        Terminal {
+            path,
+            quit,
+            thread: Some(thread),
+            runtime: tempfile::tempdir().unwrap(),
+            _slave: slave,
+        }
+    }
+
+    fn open(&self) -> Result<Table, TurntableError> {
+        let options = Options {
+            runtime_folder: self.runtime.path().to_owned(),
+            ..Options::default()
+        };
+        Table::open_serial(&self.path, &options)
+    }
+
+    fn owner(&self) -> Option<Owner> {
+        Owner::find(&self.path, self.runtime.path()).unwrap()
+    }
+
+    fn files(&self) -> Files {
+        Files::of(&self.path, self.runtime.path()).unwrap()
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        self.quit.store(true, Ordering::Release);
+        self.thread.take().unwrap().join().unwrap();
+    }
+}
+
+#[test]
+fn a_port_has_one_owner_who_answers_for_it_until_it_is_closed() {
+    let terminal = Terminal::new();
+    assert!(terminal.owner().is_none());
+    let table = terminal.open().unwrap();
+    let owner = terminal.owner().unwrap();
+    assert_eq!(owner.pid(), std::process::id());
+    assert_eq!(owner.status().unwrap().state, State::Idle);
+    match terminal.open().map(|_| ()) {
+        Err(TurntableError::Owned { pid, .. }) => assert_eq!(pid, std::process::id()),
+        other => panic!("{other:?}"),
+    }
+    drop(table);
+    assert!(terminal.owner().is_none());
+    assert!(terminal.open().is_ok());
+}
+
+#[test]
+fn a_stop_asked_of_the_owner_stops_the_table_and_ends_its_motion() {
+    let terminal = Terminal::new();
+    let table = terminal.open().unwrap();
+    let owner = terminal.owner().unwrap();
+    let stopper = thread::spawn(move || {
+        for _ in 0..200 {
+            if owner.status().unwrap().state.may_move() {
+                break;
+            }
+        }
+        owner.stop().unwrap()
+    });
+    let error = table.jog(300.0, Some(5.0)).unwrap_err();
+    assert!(
+        matches!(error, TurntableError::Motion(Fault::Stopped)),
+        "{error}"
+    );
+    let stopped = stopper.join().unwrap();
+    assert!(!stopped.state.may_move() && stopped.angle_deg < 100.0);
+}
+
+#[test]
+fn what_a_killed_owner_left_behind_is_nobodys() {
+    let terminal = Terminal::new();
+    let files = terminal.files();
+    std::fs::write(&files.lock, "4194304").unwrap();
+    drop(std::os::unix::net::UnixListener::bind(&files.socket).unwrap());
+    assert!(files.socket.exists());
+    assert!(terminal.owner().is_none());
+    let _table = terminal.open().unwrap();
+    assert_eq!(
+        terminal.owner().unwrap().status().unwrap().state,
+        State::Idle
+    );
+}
+
+#[test]
+fn somebody_who_asks_badly_or_says_nothing_harms_nobody_else() {
+    let terminal = Terminal::new();
+    let _table = terminal.open().unwrap();
+    let socket = terminal.files().socket;
+    let silent = UnixStream::connect(&socket).unwrap();
+    let mut rude = UnixStream::connect(&socket).unwrap();
+    rude.write_all(b"\"home\"\n").unwrap();
+    let mut answer = String::new();
+    rude.read_to_string(&mut answer).unwrap();
+    assert!(answer.contains("error"), "{answer}");
+    assert!(terminal.owner().unwrap().status().is_ok());
+    drop(silent);
+}
+
+#[test]
+fn a_folder_that_others_can_write_in_is_not_used() {
+    use std::os::unix::fs::PermissionsExt;
+    let terminal = Terminal::new();
+    let files = terminal.files();
+    let folder = files.lock.parent().unwrap();
+    std::fs::set_permissions(folder, std::fs::Permissions::from_mode(0o777)).unwrap();
+    assert!(matches!(
+        terminal.open().map(|_| ()),
+        Err(TurntableError::Claim { .. })
+    ));
+}
+
+#[test]
+fn a_port_that_is_not_there_is_told_by_its_path() {
+    let options = Options::default();
+    let path = PathBuf::from("/dev/there-is-no-such-port");
+    let error = Table::open_serial(&path, &options).map(|_| ()).unwrap_err();
+    assert!(
+        error.to_string().contains("/dev/there-is-no-such-port"),
+        "{error}"
+    );
+}

@@ -397,9 +397,8 @@ impl Supervisor {
         self.alarm = None;
         self.work_zero = None;
         let asked_for = matches!(cause, None | Some(ResetCause::Host));
-        let kept = self.is_stopping()
-            && asked_for
-            && self.stop.as_mut().is_some_and(|stop| stop.on_reset(now_us));
+        let stop = self.stop.as_mut().filter(|stop| stop.outcome().is_none());
+        let kept = stop.is_some_and(|stop| stop.on_reset(now_us)) && asked_for;
         if !kept {
             self.zero_deg = None;
         }

@@ -1,1 +1,436 @@
+#![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+use super::*;
+use crate::turntable::peer::{Peer, seal};
+
+const HALF_SECOND: i64 = 500_000;
+
+fn events(machine: &mut Machine) -> Vec<Event> {
+    std::iter::from_fn(|| machine.next_event()).collect()
+}
+
+fn outcome(machine: &mut Machine) -> Option<Outcome> {
+    events(machine).into_iter().find_map(|event| match event {
+        Event::Answered { outcome, .. } => Some(outcome),
+        _ => None,
+    })
+}
+
+fn text(machine: &mut Machine, now_us: i64) -> String {
+    String::from_utf8(machine.take_output(now_us)).unwrap()
+}
+
+fn checked() -> Machine {
+    let mut machine = Machine::new();
+    machine.open_session(0).unwrap();
+    assert_eq!(text(&mut machine, 0), format!("{}\n", seal("N0")));
+    hear(&mut machine, 0, "ok N0");
+    assert!(machine.is_checked());
+    events(&mut machine);
+    machine
+}
+
+/// A whole line comes, with its checksum.
+fn hear(machine: &mut Machine, now_us: i64, line: &str) {
+    machine.on_bytes(now_us, format!("{}\r\n", seal(line)).as_bytes());
+}
+
+#[test]
+fn a_plain_line_is_done_by_its_ok_and_gives_what_stood_before_it() {
+    let mut machine = Machine::new();
+    machine.send(0, "$$", Patience::Short).unwrap();
+    assert_eq!(text(&mut machine, 0), "$$\n");
+    machine.on_bytes(
+        10,
+        b"$100=88.889\r\n<Idle|MPos:0.000,0.000,0.000>\r\nok\r\n",
+    );
+    let number = 100;
+    let setting = Message::Setting {
+        number,
+        value: 88.889,
+    };
+    assert_eq!(outcome(&mut machine), Some(Outcome::Done(vec![setting])));
+}
+
+#[test]
+fn a_plain_line_is_never_sent_twice_and_after_a_lost_answer_nothing_is_sent_until_a_reset() {
+    let mut machine = Machine::new();
+    machine.send(0, "G1X1F10", Patience::Short).unwrap();
+    text(&mut machine, 0);
+    machine.on_time(HALF_SECOND);
+    let lost = Outcome::Failed(LineFault::NoAnswer { tries: 1 });
+    assert_eq!(outcome(&mut machine), Some(lost));
+    assert_eq!(text(&mut machine, HALF_SECOND), "");
+    assert_eq!(
+        machine.send(HALF_SECOND, "$X", Patience::Short),
+        Err(SendError::Unsure)
+    );
+    machine.on_bytes(HALF_SECOND, b"ok\r\n");
+    assert_eq!(
+        machine.send(HALF_SECOND, "$X", Patience::Short),
+        Err(SendError::Unsure)
+    );
+    machine.on_bytes(HALF_SECOND, b"Grbl 1.1h ['$' for help]\r\n");
+    assert_eq!(events(&mut machine), [Event::Reset(None)]);
+    assert!(machine.send(HALF_SECOND, "$X", Patience::Short).is_ok());
+}
+
+#[test]
+fn only_one_line_is_in_flight() {
+    let mut machine = checked();
+    machine.send(0, "$X", Patience::Short).unwrap();
+    assert_eq!(machine.send(0, "$X", Patience::Short), Err(SendError::Busy));
+}
+
+#[test]
+fn what_would_not_be_one_line_is_not_sent() {
+    let mut machine = Machine::new();
+    for block in ["G1\nG1", "G1?", "!", "G1*3F", "\u{e4}", &"x".repeat(61)] {
+        let sent = machine.send(0, block, Patience::Short);
+        assert_eq!(sent, Err(SendError::Unsendable), "{block:?}");
+    }
+    assert_eq!(text(&mut machine, 0), "");
+}
+
+#[test]
+fn a_checked_line_is_repeated_with_its_number_until_the_fifth_time() {
+    let mut machine = checked();
+    machine.send(0, "G1X1F10", Patience::Short).unwrap();
+    let line = format!("{}\n", seal("N1 G1X1F10"));
+    assert_eq!(text(&mut machine, 0), line);
+    for again in 1..5 {
+        machine.on_time(again * HALF_SECOND - 1);
+        assert_eq!(text(&mut machine, 0), "");
+        machine.on_time(again * HALF_SECOND);
+        assert_eq!(text(&mut machine, 0), line);
+    }
+    machine.on_time(5 * HALF_SECOND);
+    let lost = Outcome::Failed(LineFault::NoAnswer { tries: 5 });
+    assert_eq!(outcome(&mut machine), Some(lost));
+}
+
+#[test]
+fn a_line_that_takes_long_is_asked_after_without_filling_the_controllers_buffer() {
+    let mut machine = checked();
+    let mut sent = 0;
+    machine.send(0, "$H", Patience::Long(60_000_000)).unwrap();
+    for now_us in (0..60_000_000).step_by(10_000) {
+        machine.on_time(now_us);
+        sent += machine.take_output(now_us).len();
+    }
+    assert!((2 * 11..100).contains(&sent), "{sent} bytes");
+    hear(&mut machine, 59_999_999, "ok N1");
+    assert_eq!(outcome(&mut machine), Some(Outcome::Done(Vec::new())));
+}
+
+#[test]
+fn a_line_that_came_damaged_is_repeated_at_once() {
+    let mut machine = checked();
+    machine.send(0, "$X", Patience::Short).unwrap();
+    let line = text(&mut machine, 0);
+    hear(&mut machine, 20_000, "error:70");
+    assert_eq!(text(&mut machine, 20_000), line);
+    hear(&mut machine, 40_000, "error:9 N1");
+    assert_eq!(outcome(&mut machine), Some(Outcome::Refused(9)));
+}
+
+#[test]
+fn a_repeated_answer_is_not_taken_for_the_next_lines() {
+    let mut machine = checked();
+    machine.send(0, "$X", Patience::Short).unwrap();
+    hear(&mut machine, 1, "ok N1");
+    hear(&mut machine, 2, "ok N1");
+    events(&mut machine);
+    machine.send(3, "$X", Patience::Short).unwrap();
+    hear(&mut machine, 4, "ok N1");
+    assert_eq!(outcome(&mut machine), None);
+    hear(&mut machine, 5, "ok N2");
+    assert_eq!(outcome(&mut machine), Some(Outcome::Done(Vec::new())));
+    assert_eq!(machine.counts().strays, 2);
+}
+
+#[test]
+fn in_a_session_an_answer_without_or_with_a_wrong_checksum_is_noise() {
+    let mut machine = checked();
+    machine.send(0, "$X", Patience::Short).unwrap();
+    machine.on_bytes(1, b"ok N1\r\nok N1*0000\r\nok N1okN1\r\n");
+    assert_eq!(outcome(&mut machine), None);
+    assert_eq!(machine.counts().noise, 3);
+}
+
+#[test]
+fn a_banner_in_the_middle_is_a_reset_and_fails_the_line() {
+    let mut machine = checked();
+    machine.send(0, "G1X1F10", Patience::Short).unwrap();
+    machine.on_bytes(1, b"\r\nGrbl 1.1h ['$' for help] [reset: brown-out]\r\n");
+    let found = events(&mut machine);
+    let failed = Outcome::Failed(LineFault::Restarted);
+    assert!(matches!(&found[0], Event::Answered { outcome, .. } if *outcome == failed));
+    assert_eq!(found[1], Event::Reset(Some(ResetCause::BrownOut)));
+    assert!(!machine.is_checked());
+}
+
+#[test]
+fn a_controller_that_has_left_the_session_unnoticed_has_restarted() {
+    let mut machine = checked();
+    machine.send(0, "$X", Patience::Short).unwrap();
+    machine.on_bytes(1, b"error:72 N1\r\n");
+    assert!(events(&mut machine).contains(&Event::Reset(None)));
+
+    let mut machine = checked();
+    let report = b"<Idle|MPos:0.000,0.000,0.000|FS:0,0>\r\n";
+    machine.on_bytes(1, report);
+    machine.on_bytes(2, report);
+    assert_eq!(events(&mut machine), []);
+    machine.on_bytes(3, report);
+    assert_eq!(events(&mut machine), [Event::Reset(None)]);
+}
+
+#[test]
+fn a_line_given_up_leaves_it_unsure_what_was_done() {
+    let mut machine = checked();
+    machine.send(0, "G1X1F10", Patience::Short).unwrap();
+    machine.give_up();
+    assert_eq!(text(&mut machine, 0), "");
+    assert_eq!(
+        outcome(&mut machine),
+        Some(Outcome::Failed(LineFault::GivenUp))
+    );
+    assert!(machine.is_open());
+}
+
+#[test]
+fn a_report_is_bracketed_by_its_question_and_its_first_byte() {
+    let mut machine = Machine::new();
+    machine.poll_every(Some(100_000));
+    assert_eq!(text(&mut machine, 1000), "?");
+    machine.on_bytes(3000, b"<Run|MPos:1.000,0");
+    machine.on_bytes(4000, b".000,0.000>\r\n");
+    let [Event::Status(poll)] = events(&mut machine)[..] else {
+        panic!("one report");
+    };
+    assert_eq!(
+        (poll.asked_us, poll.came_us, poll.certain),
+        (Some(1000), 3000, true)
+    );
+    machine.on_bytes(5000, b"<Run|MPos:1.000,0.000,0.000>\r\n");
+    let [Event::Status(poll)] = events(&mut machine)[..] else {
+        panic!("one report");
+    };
+    assert_eq!((poll.asked_us, poll.certain), (None, false));
+    assert_eq!(text(&mut machine, 100_999), "");
+    assert_eq!(text(&mut machine, 101_000), "?");
+}
+
+#[test]
+fn after_a_lost_report_the_next_ones_are_not_trusted_for_time() {
+    let mut machine = Machine::new();
+    machine.poll_every(Some(100_000));
+    text(&mut machine, 0);
+    assert_eq!(text(&mut machine, 249_999), "");
+    assert_eq!(text(&mut machine, 250_000), "?");
+    machine.on_bytes(252_000, b"<Run|MPos:1.000,0.000,0.000>\r\n");
+    let mut certain = |machine: &mut Machine| match events(machine)[..] {
+        [Event::Status(poll)] => poll.certain,
+        _ => panic!("one report"),
+    };
+    assert!(!certain(&mut machine));
+    assert_eq!(text(&mut machine, 1_300_000), "?");
+    machine.on_bytes(1_302_000, b"<Run|MPos:1.000,0.000,0.000>\r\n");
+    assert!(certain(&mut machine));
+}
+
+/// What the wire does to a line.
+#[derive(Debug, Clone, Copy)]
+enum Fault {
+    None,
+    Drop(usize),
+    Flip(usize),
+    Twice,
+    Merge,
+    Lose,
+}
+
+fn fault() -> impl Strategy<Value = Fault> {
+    prop_oneof![
+        6 => Just(Fault::None),
+        1 => any::<usize>().prop_map(Fault::Drop),
+        1 => any::<usize>().prop_map(Fault::Flip),
+        1 => Just(Fault::Twice),
+        1 => Just(Fault::Merge),
+        1 => Just(Fault::Lose),
+    ]
+}
+
+fn harm(bytes: &[u8], fault: Fault) -> Vec<u8> {
+    let mut harmed = bytes.to_vec();
+    match fault {
+        Fault::None => {}
+        Fault::Drop(at) => drop(harmed.remove(at % bytes.len())),
+        Fault::Flip(at) => harmed[at / 8 % bytes.len()] ^= 1 << (at % 8),
+        Fault::Twice => harmed.extend(bytes),
+        Fault::Merge => harmed.retain(|byte| !matches!(byte, b'\r' | b'\n')),
+        Fault::Lose => harmed.clear(),
+    }
+    harmed
+}
+
+/// Sends one line through a harmed wire until it is done or has failed.
+fn exchange(
+    machine: &mut Machine,
+    peer: &mut Peer,
+    now_us: &mut i64,
+    block: &str,
+    faults: &mut impl Iterator<Item = Fault>,
+) -> Outcome {
+    machine.send(*now_us, block, Patience::Short).unwrap();
+    for _ in 0..2000 {
+        *now_us += 5000;
+        machine.on_time(*now_us);
+        let output = machine.take_output(*now_us);
+        if !output.is_empty() {
+            peer.take(&harm(&output, faults.next().unwrap()));
+        }
+        peer.advance(*now_us);
+        for line in peer.give().split_inclusive(|byte| *byte == b'\n') {
+            machine.on_bytes(*now_us, &harm(line, faults.next().unwrap()));
+        }
+        if let Some(outcome) = outcome(machine) {
+            return outcome;
+        }
+    }
+    panic!("an exchange without end");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn on_a_harmed_wire_a_checked_line_is_done_once_or_fails(faults in vec(fault(), 50)) {
+        let (mut peer, mut machine, mut now_us) = (Peer::new(true), checked(), 1);
+        peer.advance(1);
+        peer.take(format!("{}\n", seal("N0")).as_bytes());
+        peer.advance(10_000);
+        peer.give();
+        let mut faults = faults.into_iter().cycle();
+        for number in 0..40 {
+            let block = format!("G4P{number}");
+            let before = peer.executed.len();
+            let outcome = exchange(&mut machine, &mut peer, &mut now_us, &block, &mut faults);
+            let done = peer.executed[before..].to_vec();
+            match outcome {
+                Outcome::Done(_) => prop_assert_eq!(done, [block]),
+                Outcome::Refused(code) => prop_assert!(false, "refused with {}", code),
+                Outcome::Failed(_) => {
+                    prop_assert!(done.is_empty() || done == [block.clone()], "{:?} for {}", done, block);
+                    break;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn any_bytes_are_taken_without_harm(pieces in vec(vec(any::<u8>(), 0..40), 0..30)) {
+        for mut machine in [Machine::new(), checked()] {
+            machine.send(0, "$X", Patience::Short).unwrap();
+            for (now_us, piece) in (0..).zip(&pieces) {
+                machine.on_bytes(now_us * 100_000, piece);
+                machine.on_time(now_us * 100_000);
+            }
+            let done = events(&mut machine).into_iter().any(|event| {
+                matches!(event, Event::Answered { outcome: Outcome::Done(_), .. })
+            });
+            prop_assert!(!done || !machine.is_checked());
+        }
+    }
+
+    #[test]
+    fn any_line_is_parsed_or_refused(line in "[ -~]{0,60}") {
+        if let Some(message) = parse(&line) {
+            let printed = message.to_string();
+            prop_assert_eq!(parse(&printed), Some(message));
+        }
+    }
+
+    #[test]
+    fn a_message_printed_is_the_same_read(message in message()) {
+        prop_assert_eq!(parse(&message.to_string()), Some(message));
+    }
+}
+
+fn thousandths() -> impl Strategy<Value = f64> {
+    (-9_999_999..9_999_999i32).prop_map(|n| f64::from(n) / 1000.0)
+}
+
+fn seq() -> impl Strategy<Value = Option<u32>> {
+    proptest::option::of(0..=9_999_999u32)
+}
+
+fn report() -> impl Strategy<Value = StatusReport> {
+    use State::*;
+    let state = [
+        Idle, Run, Held, Holding, Jog, Home, Alarm, Check, Door, Sleep,
+    ];
+    let position = prop_oneof![
+        thousandths().prop_map(Position::Machine),
+        thousandths().prop_map(Position::Work),
+    ];
+    let pins = (any::<bool>(), any::<bool>());
+    let pins = pins.prop_map(|(index, emergency_stop)| Pins {
+        index,
+        emergency_stop,
+    });
+    let whole = proptest::option::of((0..40_000u32).prop_map(f64::from));
+    let volts = proptest::option::of((0..2000u32).prop_map(|n| f64::from(n) / 100.0));
+    let stamp = proptest::option::of(any::<u32>());
+    let zero = proptest::option::of(thousandths());
+    let state = proptest::sample::select(state.to_vec());
+    (state, position, whole, stamp, volts, pins, zero).prop_map(
+        |(state, position, feed, chip_us, battery_v, pins, work_zero)| StatusReport {
+            state,
+            position,
+            feed,
+            chip_us,
+            battery_v,
+            pins,
+            work_zero,
+        },
+    )
+}
+
+fn message() -> impl Strategy<Value = Message> {
+    let cause = [
+        ResetCause::PowerOn,
+        ResetCause::External,
+        ResetCause::BrownOut,
+        ResetCause::Watchdog,
+        ResetCause::Host,
+    ];
+    let cause = proptest::option::of(proptest::sample::select(cause.to_vec()));
+    prop_oneof![
+        seq().prop_map(|seq| Message::Ok { seq }),
+        (any::<u8>(), seq()).prop_map(|(code, seq)| Message::Error { code, seq }),
+        any::<u8>().prop_map(Message::Alarm),
+        report().prop_map(Message::Status),
+        ("[0-9.a-z]{1,8}", cause)
+            .prop_map(|(version, cause)| Message::Banner(Banner { version, cause })),
+        ("[0-9.a-z]{0,12}", "[ a-z:]{0,12}")
+            .prop_map(|(version, note)| Message::Version { version, note }),
+        ("[A-Za-z]{0,8}", any::<u32>(), any::<u32>()).prop_map(|(letters, blocks, buffer)| {
+            Message::Build {
+                letters,
+                blocks,
+                buffer,
+            }
+        }),
+        "[ -~]{0,40}".prop_map(Message::Note),
+        ("G[0-9]{2}(\\.1)?|GC|HLP", "[ -~]{0,40}")
+            .prop_map(|(tag, text)| Message::Info { tag, text }),
+        (any::<u16>(), thousandths())
+            .prop_map(|(number, value)| Message::Setting { number, value }),
+        "[ -~]{0,40}".prop_map(Message::Startup),
+    ]
+}
