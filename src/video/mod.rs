@@ -19,6 +19,7 @@ mod orientation;
 mod picture;
 mod reader;
 mod scan;
+mod seek;
 
 use std::path::{Path, PathBuf};
 use std::sync::Once;
@@ -29,6 +30,7 @@ pub use matroska::{Cut, find_cut};
 pub use picture::Picture;
 pub use reader::{Pending, Reader};
 pub use scan::{Damage, Facts, FrameInfo, Video};
+pub use seek::first_picture;
 
 /// Why a video could not be read.
 #[derive(Debug, thiserror::Error)]
