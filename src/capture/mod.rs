@@ -26,6 +26,7 @@ mod preview;
 mod recorder;
 pub mod rig;
 mod salvage;
+pub mod serve;
 mod settings;
 mod shoot;
 mod sink;

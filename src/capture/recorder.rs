@@ -246,6 +246,14 @@ impl Ended {
         &self.end
     }
 
+    /// Says that something else than the recorder ended the take, which is bad then, for this
+    /// reason.
+    #[must_use]
+    pub fn because_of(mut self, reason: String) -> Self {
+        self.end = End::Elsewhere(reason);
+        self
+    }
+
     /// Closes the session: gives each frame the angle that `angle` (degrees) answers for its time
     /// stamp (microseconds), judges the take, and writes the manifest. `moved`: what changed on the
     /// camera since the start, a sentence each.
@@ -282,7 +290,8 @@ fn spawn(
     Ok((camera, writer))
 }
 
-fn coding(encoding: Encoding) -> Coding {
+/// How frames are kept in a video.
+pub(super) fn coding(encoding: Encoding) -> Coding {
     Coding::Raw(match encoding {
         Encoding::Mjpeg => return Coding::Mjpeg,
         Encoding::H264 => return Coding::H264,

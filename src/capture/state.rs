@@ -8,12 +8,13 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use serde::Serialize;
+use utoipa::ToSchema;
 
 /// Faults kept for display; older ones are in the sessions' manifests.
 const FAULTS_KEPT: usize = 50;
 
 /// Where a capture stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Default, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
     /// Nothing is under way.
@@ -38,7 +39,7 @@ pub enum Phase {
 }
 
 /// How a take came out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// All frames of the turn, nothing moved.
@@ -50,7 +51,7 @@ pub enum Verdict {
 }
 
 /// The last take, or the one before the present one.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct TakeSummary {
     /// The session's name.
     pub session: String,
@@ -65,7 +66,7 @@ pub struct TakeSummary {
 }
 
 /// The turntable as last heard.
-#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
 pub struct TableState {
     /// Whether there is a table at all.
     pub present: bool,
@@ -84,7 +85,7 @@ pub struct TableState {
 }
 
 /// The camera as last seen.
-#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
 pub struct CameraState {
     /// Whether it can be reached.
     pub present: bool,
@@ -105,7 +106,7 @@ pub struct CameraState {
 }
 
 /// Something that went wrong, in plain words.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct FaultLine {
     /// Microseconds of the capture's clock.
     pub t_us: i64,
@@ -114,7 +115,7 @@ pub struct FaultLine {
 }
 
 /// Something that was looked at before the table turned.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Check {
     /// What was looked at.
     pub what: String,
@@ -144,7 +145,7 @@ impl Check {
 }
 
 /// All that a viewer may know.
-#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
 pub struct RigState {
     /// Counts changes: a viewer that has seen this number has seen this state.
     pub version: u64,
@@ -173,6 +174,7 @@ pub struct RigState {
     /// What the last preflight found.
     pub checks: Vec<Check>,
     /// Newest last.
+    #[schema(value_type = Vec<FaultLine>)]
     pub faults: VecDeque<FaultLine>,
     /// The last finished take.
     pub last_take: Option<TakeSummary>,

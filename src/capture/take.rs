@@ -44,6 +44,9 @@ pub enum End {
     /// A replayed recording is over.
     #[error("the recording that plays the camera is over")]
     SourceOver,
+    /// Something that is not the recorder's ended the take: the table, or somebody's wish.
+    #[error("{0}")]
+    Elsewhere(String),
 }
 
 /// A frame that came damaged.
@@ -181,7 +184,8 @@ impl Verdict {
                 .missing
                 .last()
                 .is_none_or(|last| last.exposure + last.count < self.count.expected);
-        if !matches!(why.end, End::Over) && !whole {
+        let elsewhere = matches!(why.end, End::Elsewhere(_));
+        if elsewhere || !(matches!(why.end, End::Over) || whole) {
             let (has, all) = (why.recorded, self.count.expected);
             return bad(match all {
                 0 => format!("{}; the turn had not begun", why.end),

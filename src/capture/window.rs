@@ -32,6 +32,16 @@ impl Window {
         (from_us < to_us).then_some(Self { from_us, to_us })
     }
 
+    /// The time of so many microseconds from `from_us` on; of one at least.
+    #[must_use]
+    pub fn lasting(from_us: i64, us: i64) -> Self {
+        let from_us = from_us.min(i64::MAX - 1);
+        Self {
+            from_us,
+            to_us: from_us.saturating_add(us.max(1)),
+        }
+    }
+
     /// When it begins, microseconds.
     #[must_use]
     pub fn from_us(self) -> i64 {
@@ -167,11 +177,21 @@ impl Cutter {
         self.ring_bytes += frame.data.len();
         self.ring.push_back(frame);
         while let Some(oldest) = self.ring.front()
-            && (newest.saturating_sub(oldest.t_us) > RING_US || self.ring_bytes > RING_BYTES)
+            && (self.ring_bytes > RING_BYTES
+                || newest.saturating_sub(oldest.t_us) > RING_US && !self.carries_the_rest())
         {
             self.ring_bytes -= oldest.data.len();
             self.ring.pop_front();
         }
+    }
+
+    /// Whether the oldest frame that waits is the one on which all later ones build: some cameras
+    /// send a key frame every ten seconds only.
+    fn carries_the_rest(&self) -> bool {
+        self.begins_chain.is_some_and(|begins| {
+            let keys = self.ring.iter().filter(|frame| begins(&frame.data));
+            self.ring.front().is_some_and(|oldest| begins(&oldest.data)) && keys.count() == 1
+        })
     }
 
     /// What a decoder needs before the turn's first frame.

@@ -26,6 +26,7 @@ mod picture;
 mod raw;
 mod reader;
 mod scan;
+mod seek;
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -43,6 +44,7 @@ pub use picture::Picture;
 pub use raw::RawLayout;
 pub use reader::{Pending, Reader};
 pub use scan::{Damage, Facts, FrameInfo, Video};
+pub use seek::first_picture;
 
 /// Why a video could not be read or written.
 #[derive(Debug, thiserror::Error)]
