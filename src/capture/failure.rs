@@ -7,8 +7,8 @@ use super::settings::ModeWish;
 use super::stop::Stopped;
 use crate::camera::CameraError;
 use crate::camera::lock::Moved;
-use crate::{session, simulator};
 use crate::turntable::TurntableError;
+use crate::{session, simulator};
 
 /// Why there is no capture.
 #[derive(Debug, thiserror::Error)]
@@ -40,6 +40,20 @@ pub enum CaptureError {
     /// The camera is away.
     #[error("there is no camera at the moment: plug it in")]
     NoCamera,
+    /// The table is away.
+    #[error("there is no turntable at the moment: plug it in, or look at its fault")]
+    NoTable,
+    /// The camera lacks a control.
+    #[error("the camera has no control {0:?}: `relit-capture devices` lists those that it has")]
+    NoControl(String),
+    /// Another process has what only one can have.
+    #[error("{what} is in use by {}: end that one first", .pid.map_or("another process".to_owned(), |pid| format!("process {pid}")))]
+    Taken {
+        /// The folder or device.
+        what: String,
+        /// Who has it, where it said so.
+        pid: Option<u32>,
+    },
     /// The recording was over before the turn was.
     #[error("the recording ended before the turn did")]
     EndedEarly,

@@ -88,7 +88,8 @@ fn exposures(controls: &[Control], step: &Step, fps: f64) -> Option<Exposures> {
 fn decoder_for(held: &Held) -> Result<LiveDecoder, CaptureError> {
     let none = |why: String| CaptureError::from(MeterFault::NoPicture(why));
     let encoding = held.mode.fourcc.encoding();
-    let coding = super::recorder::coding(encoding.ok_or_else(|| none(held.mode.fourcc.to_string()))?);
+    let coding =
+        super::recorder::coding(encoding.ok_or_else(|| none(held.mode.fourcc.to_string()))?);
     LiveDecoder::new(coding, held.mode.width, held.mode.height)
         .map_err(|fault| none(fault.to_string()))
 }

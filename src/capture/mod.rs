@@ -14,10 +14,13 @@
 //! recorder knows cameras, videos and sessions, and nothing of turntables: the time of a turn and
 //! the angle at a time are given to it.
 
+mod daemon;
 mod equipment;
 mod error;
 mod failure;
 mod film;
+mod idle;
+mod lock;
 pub mod look;
 pub mod meter;
 mod metering;
@@ -38,9 +41,11 @@ mod tracking;
 mod viewer;
 mod window;
 
+pub use daemon::Daemon;
 pub use equipment::Equipment;
 pub use error::Error;
 pub use failure::{CaptureError, MeterFault, Refusal};
+pub use lock::Exclusive;
 pub use preview::Preview;
 pub use recorder::{Ended, Plan, Progress, Recorder, Stage};
 pub use salvage::{Salvaged, Saved, salvage, salvage_session};

@@ -21,9 +21,7 @@ use super::viewer::Viewer;
 use super::{End, Ended, Plan, Recorder, Report, Take, metering};
 use crate::camera::lock::moved_between;
 use crate::camera::{Camera, Control, ControlKind};
-use crate::session::{
-    CameraFacts, Manifest, SoftwareFacts, Status, TurntableFacts, VideoFacts,
-};
+use crate::session::{CameraFacts, Manifest, SoftwareFacts, Status, TurntableFacts, VideoFacts};
 use crate::turntable::{Table, TurnPlan};
 
 /// Longest wait of a second session name's turn: names have whole seconds.
@@ -64,7 +62,8 @@ pub fn capture(
     let mut left = equipment.settings().retries;
     loop {
         let (summary, worth_another) = one_take(equipment, &order.object, meter, on)?;
-        on.monitor.update(|state| state.last_take = Some(summary.clone()));
+        on.monitor
+            .update(|state| state.last_take = Some(summary.clone()));
         let Some(reason) = summary.reason.clone().filter(|_| worth_another && left > 0) else {
             return Ok(summary);
         };
@@ -72,7 +71,8 @@ pub fn capture(
         // The exposure that was found stays set.
         meter = false;
         let now_us = equipment.clock().now_us();
-        on.monitor.fault(now_us, format!("the take is repeated: {reason}"));
+        on.monitor
+            .fault(now_us, format!("the take is repeated: {reason}"));
         std::thread::sleep(NAME_WAIT);
     }
 }
@@ -164,12 +164,19 @@ fn get_ready(
     note(on, [preflight::check_disk(&settings.root, needed)?]);
     let turn = match table {
         Some(table) => {
-            note(on, on.stop.over(table, || preflight::ready_table(table, &settings))?);
+            note(
+                on,
+                on.stop
+                    .over(table, || preflight::ready_table(table, &settings))?,
+            );
             on.stop.check()?;
             if meter {
                 on.monitor.update(|state| state.phase = Phase::Metering);
                 let exposure = metering::meter(camera, table, &mut held, &settings, on.stop)?;
-                note(on, [Check::passed("exposure", format!("metered: {exposure}"))]);
+                note(
+                    on,
+                    [Check::passed("exposure", format!("metered: {exposure}"))],
+                );
             }
             let (turn, check) = preflight::plan_turn(table, &settings)?;
             note(on, [check]);
@@ -202,7 +209,10 @@ fn note(on: Onlookers<'_>, checks: impl IntoIterator<Item = Check>) {
 fn manifest(equipment: &Equipment, object: &str, now: Timestamp, held: &Held) -> Manifest {
     let settings = equipment.settings();
     let camera = settings.camera.clone();
-    let name = equipment.camera.as_ref().map(|camera| camera.info().name.clone());
+    let name = equipment
+        .camera
+        .as_ref()
+        .map(|camera| camera.info().name.clone());
     Manifest {
         id: format!("{}-{object}", now.strftime("%Y%m%dT%H%M%SZ")),
         object: object.to_owned(),
@@ -280,7 +290,11 @@ fn moved_since(held: &Held, camera: &mut dyn Camera) -> Vec<String> {
 
 fn summary_of(report: &Report) -> TakeSummary {
     use super::state::Verdict;
-    let lost = report.missing.iter().map(|missing| missing.count).sum::<u64>()
+    let lost = report
+        .missing
+        .iter()
+        .map(|missing| missing.count)
+        .sum::<u64>()
         + (report.overrun.len() + report.left_out.len()) as u64;
     let (verdict, reason) = match &report.take {
         Take::Clean => (Verdict::Clean, None),
@@ -297,5 +311,9 @@ fn summary_of(report: &Report) -> TakeSummary {
 }
 
 fn first_fault(report: &Report) -> Option<String> {
-    report.manifest.faults.first().map(|fault| fault.what.clone())
+    report
+        .manifest
+        .faults
+        .first()
+        .map(|fault| fault.what.clone())
 }

@@ -123,7 +123,10 @@ impl Showing {
             if figure {
                 self.figure(&rgb);
             }
-            if show && !as_it_is && let Some(jpeg) = jpeg_of(&rgb) {
+            if show
+                && !as_it_is
+                && let Some(jpeg) = jpeg_of(&rgb)
+            {
                 self.show(frame, jpeg);
             }
         }

@@ -3,9 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use relit::capture::state::{Monitor, TakeSummary};
-use relit::capture::{
-    CaptureError, Equipment, Onlookers, Order, Settings, StopRequest, capture,
-};
+use relit::capture::{CaptureError, Equipment, Onlookers, Order, Settings, StopRequest, capture};
 use relit::session::Recording;
 
 /// A whole turn, H.264 with a key frame every 250 frames.
@@ -14,7 +12,9 @@ pub(crate) const TURN: &str = "20261120T093015Z-cow";
 pub(crate) const SHORT: &str = "20261120T101500Z-cow-short";
 
 pub(crate) fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("fixtures")
+        .join(name)
 }
 
 /// A rig whose sessions go into a folder of its own.

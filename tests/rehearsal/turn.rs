@@ -21,8 +21,15 @@ fn check_whole(rig: &mut Rehearsal, lead: bool) {
         .map(|entry| (entry.angle_deg.unwrap() - simulator.angle_at(entry.t_us)).abs())
         .collect();
     errors.sort_by(f64::total_cmp);
-    eprintln!("angle errors: median {:.4}, p99 {:.4}, most {:.4}", errors[750], errors[1484], errors[1499]);
-    assert!(errors[1484] <= 0.05, "p99 of the angles' errors: {}", errors[1484]);
+    eprintln!(
+        "angle errors: median {:.4}, p99 {:.4}, most {:.4}",
+        errors[750], errors[1484], errors[1499]
+    );
+    assert!(
+        errors[1484] <= 0.05,
+        "p99 of the angles' errors: {}",
+        errors[1484]
+    );
     let turned = of_turn[1499].angle_deg.unwrap() - of_turn[0].angle_deg.unwrap();
     assert!((turned.abs() - 359.76).abs() < 0.05, "{turned}");
     assert!(rig.table_stands());

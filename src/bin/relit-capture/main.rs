@@ -1,0 +1,24 @@
+//! `relit-capture`: lists cameras and turntables, records a turn, and serves the rig.
+
+mod arguments;
+#[path = "../console/mod.rs"]
+mod console;
+mod devices;
+mod environment;
+mod recording;
+mod serving;
+
+use std::process::ExitCode;
+
+use arguments::Command;
+use console::Console;
+
+fn main() -> ExitCode {
+    let arguments = arguments::parse();
+    let console = Console::new(arguments.json);
+    match arguments.command {
+        Command::Devices => devices::run(console),
+        Command::Record(record) => console.finish(recording::run(console, *record)),
+        Command::Serve(serve) => console.finish(serving::run(console, *serve)),
+    }
+}
