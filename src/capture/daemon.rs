@@ -6,24 +6,21 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use super::equipment::Equipment;
 use super::failure::CaptureError;
-use super::idle::{Idle, show_table};
 use super::lock::Exclusive;
+use super::owner::{Job, Owner, rest};
 use super::rig::{Command, Refused, Rig};
 use super::settings::Settings;
-use super::shoot::{Onlookers, Order, capture};
+use super::shoot::Order;
 use super::state::{Monitor, Phase, RigState};
 use super::stop::{StopRequest, Stopped};
 use super::viewer::Viewer;
 use super::{preflight, salvage};
-use crate::camera::Camera;
-use crate::camera::lock::{ManualPlan, Wanted};
-use crate::turntable::{Table, TurntableError};
 
 /// Commands that wait for the owner.
 const WAITING: usize = 8;
@@ -43,17 +40,6 @@ pub struct Daemon {
     wants_table: bool,
     owner: Mutex<Option<JoinHandle<()>>>,
     _locks: (Exclusive, Option<Exclusive>),
-}
-
-/// What the owner does.
-#[derive(Debug, Clone, PartialEq)]
-enum Job {
-    Capture(Order),
-    StopTable,
-    Home,
-    Jog(f64),
-    Unlock,
-    SetControl(String, i64),
 }
 
 impl Daemon {
@@ -77,14 +63,8 @@ impl Daemon {
         let viewer = Viewer::start(monitor.clone()).map_err(thread)?;
         let (commands, queue) = sync_channel(WAITING);
         let (busy, stop) = (Arc::new(AtomicBool::new(false)), StopRequest::default());
-        let mut owner = Owner {
-            idle: Idle::new(monitor.clone()),
-            monitor: monitor.clone(),
-            equipment,
-            viewer,
-            busy: Arc::clone(&busy),
-            stop: stop.clone(),
-        };
+        let (shown, freed) = (monitor.clone(), Arc::clone(&busy));
+        let mut owner = Owner::new(equipment, shown, viewer, freed, stop.clone());
         let owner = std::thread::Builder::new()
             .name("relit-rig".to_owned())
             .spawn(move || owner.run(&queue))
@@ -264,17 +244,6 @@ fn busy_with(state: &RigState) -> String {
     }
 }
 
-/// The phase of a rig on which nothing is under way.
-fn rest(state: &mut RigState, busy: &AtomicBool) {
-    if busy.load(Ordering::Acquire) {
-        return;
-    }
-    state.phase = match state.queue.is_empty() {
-        true => Phase::Idle,
-        false => Phase::WaitingForObject,
-    };
-}
-
 /// Salvages what an earlier run left, and says so.
 fn tell_salvaged(root: &Path, monitor: &Monitor) -> Result<(), CaptureError> {
     for found in salvage(root)? {
@@ -289,123 +258,5 @@ fn tell_salvaged(root: &Path, monitor: &Monitor) -> Result<(), CaptureError> {
         };
         monitor.fault(0, told);
     }
-    Ok(())
-}
-
-/// The thread that owns camera and table.
-struct Owner {
-    // The table is stopped with the equipment, before anything else ends.
-    equipment: Equipment,
-    monitor: Monitor,
-    viewer: Viewer,
-    idle: Idle,
-    busy: Arc<AtomicBool>,
-    stop: StopRequest,
-}
-
-impl Owner {
-    fn run(&mut self, jobs: &Receiver<Job>) {
-        while self.stop.asked() != Some(Stopped::Shutdown) {
-            match jobs.try_recv() {
-                Ok(job) => self.work(job),
-                Err(TryRecvError::Empty) => self.idle.glance(&mut self.equipment, &self.viewer),
-                Err(TryRecvError::Disconnected) => return,
-            }
-        }
-    }
-
-    fn work(&mut self, job: Job) {
-        if let Err(error) = self.do_job(job) {
-            let now_us = self.equipment.clock().now_us();
-            self.monitor.fault(now_us, error.to_string());
-        }
-        self.stop.forget();
-        self.idle.begin_again();
-        self.busy.store(false, Ordering::Release);
-        self.monitor.update(|state| rest(state, &self.busy));
-    }
-
-    fn do_job(&mut self, job: Job) -> Result<(), CaptureError> {
-        match job {
-            Job::Capture(order) => self.capture(&order),
-            Job::StopTable => self.with_table(|table| table.stop().map(|_| ())),
-            Job::Home => self.with_table(|table| table.home().map(|_| ())),
-            Job::Jog(degrees) => self.with_table(|table| table.jog(degrees, None).map(|_| ())),
-            Job::Unlock => self.with_table(|table| table.unlock().map(|_| ())),
-            Job::SetControl(name, value) => self.set_control(&name, value),
-        }
-    }
-
-    fn capture(&mut self, order: &Order) -> Result<(), CaptureError> {
-        let on = Onlookers {
-            monitor: &self.monitor,
-            viewer: Some(&self.viewer),
-            stop: &self.stop,
-        };
-        let taken = capture(&mut self.equipment, order, on);
-        self.monitor.update(|state| state.session = None);
-        let summary = taken?;
-        if let Some(reason) = summary.reason {
-            let now_us = self.equipment.clock().now_us();
-            self.monitor
-                .fault(now_us, format!("{}: {reason}", summary.session));
-        }
-        Ok(())
-    }
-
-    /// Lets the table do something, while pictures and its angle go on being shown.
-    fn with_table(
-        &mut self,
-        motion: impl FnOnce(&Table) -> Result<(), TurntableError> + Send,
-    ) -> Result<(), CaptureError> {
-        let Some(table) = self.equipment.table.as_ref() else {
-            return Err(CaptureError::NoTable);
-        };
-        let (camera, viewer, idle) = (&mut self.equipment.camera, &self.viewer, &mut self.idle);
-        let moved = self.stop.over(table, || {
-            std::thread::scope(|scope| {
-                let moving = scope.spawn(|| motion(table));
-                while !moving.is_finished() {
-                    // What is wrong with either is seen and told when the motion is over.
-                    let _ = show_table(&self.monitor, table);
-                    if let Some(camera) = camera.as_mut() {
-                        let _ = idle.take_frame(camera.as_mut(), viewer);
-                    }
-                    std::thread::sleep(std::time::Duration::from_millis(20));
-                }
-                moving.join()
-            })
-        });
-        // A motion that broke down was stopped by what it left behind, and nobody saw it.
-        Ok(moved.unwrap_or(Err(TurntableError::NotStopped))?)
-    }
-
-    fn set_control(&mut self, name: &str, value: i64) -> Result<(), CaptureError> {
-        let camera = self
-            .equipment
-            .camera
-            .as_mut()
-            .ok_or(CaptureError::NoCamera)?;
-        let camera = camera.as_mut();
-        let set = set_by_name(camera, name, value);
-        let set = match set {
-            // An automatic may rule it: that is switched off, as it is for every capture.
-            Err(CaptureError::Camera(_)) => {
-                let controls = camera.controls()?;
-                ManualPlan::new(&controls, &Wanted::default()).apply(camera)?;
-                set_by_name(camera, name, value)
-            }
-            set => set,
-        };
-        self.idle.show_controls(camera);
-        set
-    }
-}
-
-fn set_by_name(camera: &mut dyn Camera, name: &str, value: i64) -> Result<(), CaptureError> {
-    let controls = camera.controls()?;
-    let found = controls.iter().find(|control| control.name == name);
-    let control = found.ok_or_else(|| CaptureError::NoControl(name.to_owned()))?;
-    camera.set_control(control.id, value)?;
     Ok(())
 }

@@ -17,10 +17,12 @@
 mod daemon;
 mod equipment;
 mod error;
+mod facts;
 mod failure;
 mod film;
 mod idle;
 mod lock;
+mod owner;
 pub mod look;
 pub mod meter;
 mod metering;

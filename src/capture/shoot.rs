@@ -5,23 +5,22 @@
 //! [`StopRequest`] reaches it while something waits for it, and the [`Table`] itself stops when the
 //! program ends.
 
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 use jiff::Timestamp;
-use serde_json::Value;
 
 use super::equipment::Equipment;
+use super::facts::manifest;
 use super::failure::CaptureError;
 use super::preflight::{self, Held};
+use super::settings::Settings;
 use super::state::{Check, Monitor, Phase, TakeSummary};
 use super::stop::StopRequest;
 use super::tracking::Course;
 use super::viewer::Viewer;
-use super::{End, Ended, Plan, Recorder, Report, Take, metering};
+use super::{End, Ended, Plan, Recorder, Refusal, Report, Take, metering};
 use crate::camera::lock::moved_between;
-use crate::camera::{Camera, Control, ControlKind};
-use crate::session::{CameraFacts, Manifest, SoftwareFacts, Status, TurntableFacts, VideoFacts};
+use crate::camera::Camera;
 use crate::turntable::{Table, TurnPlan};
 
 /// Longest wait of a second session name's turn: names have whole seconds.
@@ -162,29 +161,7 @@ fn get_ready(
     let needed = held.bytes_for(frames);
     on.monitor.update(|state| state.needed_bytes = needed);
     note(on, [preflight::check_disk(&settings.root, needed)?]);
-    let turn = match table {
-        Some(table) => {
-            note(
-                on,
-                on.stop
-                    .over(table, || preflight::ready_table(table, &settings))?,
-            );
-            on.stop.check()?;
-            if meter {
-                on.monitor.update(|state| state.phase = Phase::Metering);
-                let exposure = metering::meter(camera, table, &mut held, &settings, on.stop)?;
-                note(
-                    on,
-                    [Check::passed("exposure", format!("metered: {exposure}"))],
-                );
-            }
-            let (turn, check) = preflight::plan_turn(table, &settings)?;
-            note(on, [check]);
-            Some(turn)
-        }
-        None if meter => return Err(super::Refusal::MeterWithoutTable.into()),
-        None => None,
-    };
+    let turn = ready_to_turn(camera, table, &mut held, &settings, meter, on)?;
     let manifest = manifest(equipment, object, now, &held);
     let record = Plan {
         root: settings.root.clone(),
@@ -202,75 +179,38 @@ fn get_ready(
     })
 }
 
+/// Makes the table ready, meters where it is asked for, and plans the turn.
+fn ready_to_turn(
+    camera: &mut dyn Camera,
+    table: Option<&Table>,
+    held: &mut Held,
+    settings: &Settings,
+    meter: bool,
+    on: Onlookers<'_>,
+) -> Result<Option<TurnPlan>, CaptureError> {
+    let Some(table) = table else {
+        return match meter {
+            true => Err(Refusal::MeterWithoutTable.into()),
+            false => Ok(None),
+        };
+    };
+    let ready = on.stop.over(table, || preflight::ready_table(table, settings));
+    on.stop.check()?;
+    note(on, ready?);
+    if meter {
+        on.monitor.update(|state| state.phase = Phase::Metering);
+        let metered = metering::meter(camera, table, held, settings, on.stop);
+        // A wish to stop explains better why the table did not go on.
+        on.stop.check()?;
+        note(on, [Check::passed("exposure", format!("metered: {}", metered?))]);
+    }
+    let (turn, check) = preflight::plan_turn(table, settings)?;
+    note(on, [check]);
+    Ok(Some(turn))
+}
+
 fn note(on: Onlookers<'_>, checks: impl IntoIterator<Item = Check>) {
     on.monitor.update(|state| state.checks.extend(checks));
-}
-
-fn manifest(equipment: &Equipment, object: &str, now: Timestamp, held: &Held) -> Manifest {
-    let settings = equipment.settings();
-    let camera = settings.camera.clone();
-    let name = equipment
-        .camera
-        .as_ref()
-        .map(|camera| camera.info().name.clone());
-    Manifest {
-        id: format!("{}-{object}", now.strftime("%Y%m%dT%H%M%SZ")),
-        object: object.to_owned(),
-        created: now,
-        status: Status::Recording,
-        camera: CameraFacts {
-            backend: camera.backend().to_owned(),
-            device: camera.device(),
-            name: name.unwrap_or_default(),
-            fourcc: held.mode.fourcc.to_string(),
-            width: held.mode.width,
-            height: held.mode.height,
-            fps: held.fps(),
-            controls: controls_by_name(&held.controls),
-        },
-        turntable: equipment
-            .table
-            .as_ref()
-            .map(|table| facts_of(table, settings)),
-        video: VideoFacts {
-            file: String::new(),
-            codec: String::new(),
-            frames: None,
-            bytes: None,
-            blake3: None,
-        },
-        faults: Vec::new(),
-        software: SoftwareFacts {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            commit: settings.commit.clone(),
-        },
-    }
-}
-
-fn facts_of(table: &Table, settings: &super::Settings) -> TurntableFacts {
-    TurntableFacts {
-        port: settings.turntable.to_string(),
-        firmware: format!("Grbl {}", table.identity().firmware),
-        degrees_per_second: settings.degrees_per_second,
-        steps_per_degree: table.identity().steps_per_degree,
-    }
-}
-
-/// Values as the manifest keeps them: a menu's as its words, a switch's as true or false.
-fn controls_by_name(controls: &[Control]) -> BTreeMap<String, Value> {
-    let named = controls.iter().filter_map(|control| {
-        let value = control.value?;
-        let kept = match &control.kind {
-            ControlKind::Boolean => Value::from(value != 0),
-            ControlKind::Menu(items) => items
-                .iter()
-                .find(|item| item.index == value)
-                .map_or(Value::from(value), |item| Value::from(item.label.clone())),
-            _ => Value::from(value),
-        };
-        Some((control.name.clone(), kept))
-    });
-    named.collect()
 }
 
 /// What is no longer as it was when the take began, a sentence each. A camera that does not answer
