@@ -13,7 +13,12 @@ use crate::session::{CameraFacts, Manifest, SoftwareFacts, Status, TurntableFact
 use crate::turntable::Table;
 
 /// The manifest of a take that is to begin `now`.
-pub(super) fn manifest(equipment: &Equipment, object: &str, now: Timestamp, held: &Held) -> Manifest {
+pub(super) fn manifest(
+    equipment: &Equipment,
+    object: &str,
+    now: Timestamp,
+    held: &Held,
+) -> Manifest {
     let settings = equipment.settings();
     let camera = settings.camera.clone();
     let name = equipment

@@ -19,8 +19,8 @@ use super::stop::StopRequest;
 use super::tracking::Course;
 use super::viewer::Viewer;
 use super::{End, Ended, Plan, Recorder, Refusal, Report, Take, metering};
-use crate::camera::lock::moved_between;
 use crate::camera::Camera;
+use crate::camera::lock::moved_between;
 use crate::turntable::{Table, TurnPlan};
 
 /// Longest wait of a second session name's turn: names have whole seconds.
@@ -194,7 +194,9 @@ fn ready_to_turn(
             false => Ok(None),
         };
     };
-    let ready = on.stop.over(table, || preflight::ready_table(table, settings));
+    let ready = on
+        .stop
+        .over(table, || preflight::ready_table(table, settings));
     on.stop.check()?;
     note(on, ready?);
     if meter {
@@ -202,7 +204,10 @@ fn ready_to_turn(
         let metered = metering::meter(camera, table, held, settings, on.stop);
         // A wish to stop explains better why the table did not go on.
         on.stop.check()?;
-        note(on, [Check::passed("exposure", format!("metered: {}", metered?))]);
+        note(
+            on,
+            [Check::passed("exposure", format!("metered: {}", metered?))],
+        );
     }
     let (turn, check) = preflight::plan_turn(table, settings)?;
     note(on, [check]);

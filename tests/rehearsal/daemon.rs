@@ -9,7 +9,7 @@ use relit::capture::state::{Phase, RigState, Verdict};
 use relit::capture::{CaptureError, Daemon, Settings};
 use relit::session::{Manifest, SessionWriter};
 
-use crate::support::{SHORT, fixture};
+use crate::support::{SHORT, alone, fixture};
 
 fn settings(root: &Path, camera: &str, table: &str) -> Settings {
     let camera = format!("replay:{}?loop=1{camera}", fixture(SHORT).display());
@@ -43,6 +43,7 @@ fn is_ready(state: &RigState) -> bool {
 
 #[test]
 fn a_queue_is_captured_object_by_object_and_a_second_start_is_refused() {
+    let _alone = alone();
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=5")).unwrap();
     once(&daemon, is_ready);
@@ -72,6 +73,7 @@ fn a_queue_is_captured_object_by_object_and_a_second_start_is_refused() {
 
 #[test]
 fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
+    let _alone = alone();
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=5")).unwrap();
     once(&daemon, is_ready);
@@ -105,6 +107,7 @@ fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
 
 #[test]
 fn a_camera_that_was_unplugged_comes_back_without_a_restart() {
+    let _alone = alone();
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "&unplug=60", "sim:?speed=5")).unwrap();
     once(&daemon, |state| state.camera.present);

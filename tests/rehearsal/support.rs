@@ -1,6 +1,7 @@
 //! A rig of a replayed camera and a simulated table, and what it leaves.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use relit::capture::state::{Monitor, TakeSummary};
 use relit::capture::{CaptureError, Equipment, Onlookers, Order, Settings, StopRequest, capture};
@@ -17,12 +18,19 @@ pub(crate) fn fixture(name: &str) -> PathBuf {
         .join(name)
 }
 
+/// Rigs that run faster than real time need the machine for themselves: one test at a time.
+pub(crate) fn alone() -> MutexGuard<'static, ()> {
+    static ONE: Mutex<()> = Mutex::new(());
+    ONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// A rig whose sessions go into a folder of its own.
 pub(crate) struct Rehearsal {
     pub(crate) root: tempfile::TempDir,
     pub(crate) equipment: Equipment,
     pub(crate) monitor: Monitor,
     pub(crate) stop: StopRequest,
+    _alone: MutexGuard<'static, ()>,
 }
 
 impl Rehearsal {
@@ -37,6 +45,7 @@ impl Rehearsal {
         table: &str,
         change: impl FnOnce(&mut Settings),
     ) -> Self {
+        let alone = alone();
         let root = tempfile::tempdir().unwrap();
         let camera = format!("replay:{}?loop=1{camera}", fixture(fixture_name).display());
         let mut settings = Settings::new(
@@ -52,6 +61,7 @@ impl Rehearsal {
             equipment: Equipment::new(settings).unwrap(),
             monitor: Monitor::default(),
             stop: StopRequest::default(),
+            _alone: alone,
         }
     }
 

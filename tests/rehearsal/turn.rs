@@ -72,28 +72,6 @@ fn a_turn_whose_frames_build_on_each_other_is_whole_and_can_be_extracted() {
 }
 
 #[test]
-fn metering_finds_an_exposure_before_the_turn_and_brings_the_table_back() {
-    let mut rig = Rehearsal::with(SHORT, "", "sim:?speed=5", |settings| {
-        settings.degrees_per_second = 36.0;
-        // A replay's pictures do not follow its exposure: all of them may saturate.
-        settings.meter_clip = 1.0;
-    });
-    let take = rig.capture(true).unwrap();
-    assert_eq!(
-        (take.verdict, take.frames),
-        (Verdict::Clean, 300),
-        "{take:?}"
-    );
-    let checks = rig.monitor.state().checks;
-    assert!(
-        checks
-            .iter()
-            .any(|check| check.found.starts_with("metered: "))
-    );
-    assert!(rig.table_stands());
-}
-
-#[test]
 fn a_camera_without_a_table_is_recorded_as_long_as_a_turn_takes() {
     let mut rig = Rehearsal::with(SHORT, "&speed=5", "none", |settings| {
         settings.degrees_per_second = 36.0;

@@ -207,3 +207,6 @@ fn look_around(
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
