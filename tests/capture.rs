@@ -216,6 +216,7 @@ fn plan(root: &Path, max_dropped: u64) -> Plan {
             rate: Rate::new(30, 1),
         },
         fps: 30.0,
+        window: None,
         max_dropped,
         stall: Duration::from_millis(400),
     }
@@ -236,9 +237,9 @@ fn record_with(
     steps: impl Iterator<Item = Step> + Send + 'static,
     moved: &[String],
 ) -> Report {
-    let window = turn(120, 0);
-    let recorder = Recorder::start(Scripted::new(steps), plan(root, max_dropped)).unwrap();
-    recorder.announce(window);
+    let mut plan = plan(root, max_dropped);
+    plan.window = Some(turn(120, 0));
+    let recorder = Recorder::start(Scripted::new(steps), plan).unwrap();
     let (_camera, ended) = recorder.wait().unwrap();
     let angle = |t_us: i64| Some((t_us - 10 * PERIOD_US) as f64 / PERIOD_US as f64 * 3.0);
     ended.finish(&angle, moved).unwrap()
@@ -521,8 +522,9 @@ fn a_camera_at_half_the_agreed_rate_fails_the_take() {
 #[test]
 fn viewers_that_never_come_back_cost_no_frame() {
     let root = tempfile::tempdir().unwrap();
-    let recorder =
-        Recorder::start(Scripted::new(steps(stream(200, 0))), plan(root.path(), 0)).unwrap();
+    let mut plan = plan(root.path(), 0);
+    plan.window = Some(turn(120, 0));
+    let recorder = Recorder::start(Scripted::new(steps(stream(200, 0))), plan).unwrap();
     thread::scope(|scope| {
         let viewers: Vec<_> = (0..50)
             .map(|_| {
@@ -538,7 +540,6 @@ fn viewers_that_never_come_back_cost_no_frame() {
                 })
             })
             .collect();
-        recorder.announce(turn(120, 0));
         for viewer in viewers {
             viewer.join().unwrap();
         }
@@ -758,9 +759,9 @@ fn a_recording_killed_before_its_first_frame_is_salvaged_as_such() {
 #[test]
 fn frames_whose_content_a_power_cut_took_are_cut_from_the_index() {
     let root = tempfile::tempdir().unwrap();
-    let recorder =
-        Recorder::start(Scripted::new(steps(stream(200, 0))), plan(root.path(), 0)).unwrap();
-    recorder.announce(turn(120, 0));
+    let mut plan = plan(root.path(), 0);
+    plan.window = Some(turn(120, 0));
+    let recorder = Recorder::start(Scripted::new(steps(stream(200, 0))), plan).unwrap();
     let folder = recorder.folder().to_owned();
     drop(recorder.wait().unwrap());
     // The last bytes never reached the disk: the file has its length, and zeros there.

@@ -81,7 +81,9 @@ impl Film {
             if shared.stop_asked() {
                 return End::Stopped;
             }
-            if let Some(window) = shared.take_window() {
+            if !self.cutter.knows_window()
+                && let Some(window) = shared.window()
+            {
                 let chosen = self.cutter.announce(window);
                 if let Some(end) = self.queue_all(chosen, queue, shared) {
                     return end;

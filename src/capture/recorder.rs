@@ -34,6 +34,8 @@ pub struct Plan {
     pub mode: GrantedMode,
     /// Frames a second; where the camera said none, as asked for.
     pub fps: f64,
+    /// When the turn is, where that is known before: see [`Recorder::announce`].
+    pub window: Option<Window>,
     /// Dropped or damaged frames up to which a take counts.
     pub max_dropped: u64,
     /// Without a frame for so long the camera counts as failed.
@@ -94,12 +96,12 @@ impl Shared {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// The window, once after it was announced.
-    pub(super) fn take_window(&self) -> Option<Window> {
-        self.announced
+    /// The window, once it is announced.
+    pub(super) fn window(&self) -> Option<Window> {
+        *self
+            .announced
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
-            .take()
     }
 }
 
@@ -138,7 +140,10 @@ impl Recorder {
         let session = SessionWriter::create(&plan.root, manifest)?;
         let folder = session.folder().to_owned();
         let sink = Sink::new(stream, session)?;
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(Shared {
+            announced: Mutex::new(plan.window),
+            ..Shared::default()
+        });
         let (sender, queue) = sync_channel(queue_places(&stream));
         let film = Film::new(camera, &stream, plan.stall);
         let threads = spawn(film, sink, sender, queue, &shared)?;
@@ -150,7 +155,8 @@ impl Recorder {
         })
     }
 
-    /// Says when the turn is. It may have begun up to some seconds ago; only the first call counts.
+    /// Says when the turn is. It may have begun up to four seconds ago: so long frames are kept. Only
+    /// the first window counts.
     pub fn announce(&self, window: Window) {
         let announced = &self.shared.announced;
         let mut announced = announced.lock().unwrap_or_else(PoisonError::into_inner);
@@ -168,7 +174,7 @@ impl Recorder {
         &self.folder
     }
 
-    /// Calls `look` with the newest frames' slot, for a viewer.
+    /// The newest frame, for viewers.
     #[must_use]
     pub fn preview(&self) -> &Preview {
         &self.shared.preview
