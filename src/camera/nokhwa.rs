@@ -24,6 +24,8 @@ use crate::clock::Clock;
 
 /// Longest wait for the library to open a camera or start its stream.
 const OPENING: Duration = Duration::from_secs(10);
+/// Longest wait for the library to let go of a camera.
+const CLOSING: Duration = Duration::from_secs(2);
 /// Frames that may wait to be fetched.
 const WAITING: usize = 2;
 
@@ -37,7 +39,14 @@ const CAPABILITIES: Capabilities = Capabilities {
 pub(super) struct NokhwaCamera {
     number: u32,
     info: DeviceInfo,
-    stream: Option<Receiver<Result<Frame, NokhwaError>>>,
+    stream: Option<Stream>,
+}
+
+/// The receiving ends of a stream's thread.
+struct Stream {
+    frames: Receiver<Result<Frame, NokhwaError>>,
+    /// Is closed when the thread has let go of the camera.
+    ended: Receiver<()>,
 }
 
 /// Cameras that the library finds; what one of them offers shows when it is opened.
@@ -109,18 +118,21 @@ impl Camera for NokhwaCamera {
     }
 
     fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
-        self.stream = None;
+        self.stop()?;
         let format = library_format(want.fourcc).ok_or_else(|| CameraError::Format {
             device: device(self.number),
             fourcc: want.fourcc,
         })?;
         let rate = want.rate.per_second().round() as u32;
         let format = CameraFormat::new(Resolution::new(want.width, want.height), format, rate);
-        let (number, (frames, stream)) = (self.number, sync_channel(WAITING));
+        let number = self.number;
+        let (sender, frames) = sync_channel(WAITING);
+        let (running, ended) = sync_channel(0);
         let granted = on_thread(number, "its stream was started", move |answer| {
-            run(number, format, &answer, &frames);
+            run(number, format, &answer, &sender);
+            drop::<SyncSender<()>>(running);
         })?;
-        self.stream = Some(stream);
+        self.stream = Some(Stream { frames, ended });
         Ok(granted)
     }
 
@@ -130,7 +142,7 @@ impl Camera for NokhwaCamera {
             return Err(CameraError::NotStarted { device });
         };
         let doing = "a frame was read";
-        match stream.recv_timeout(timeout) {
+        match stream.frames.recv_timeout(timeout) {
             Ok(frame) => frame.map_err(|error| failed(self.number, doing, &error)),
             Err(RecvTimeoutError::Timeout) => Err(CameraError::Timeout {
                 device,
@@ -141,9 +153,20 @@ impl Camera for NokhwaCamera {
     }
 
     fn stop(&mut self) -> Result<(), CameraError> {
-        // The stream's thread ends when nobody fetches its next frame.
-        self.stream = None;
+        if let Some(Stream { frames, ended }) = self.stream.take() {
+            // The stream's thread ends when nobody fetches its next frame. One that hangs in the
+            // library is left behind.
+            drop(frames);
+            let _ = ended.recv_timeout(CLOSING);
+        }
         Ok(())
+    }
+}
+
+impl Drop for NokhwaCamera {
+    fn drop(&mut self) {
+        // Never fails.
+        let _ = self.stop();
     }
 }
 
@@ -329,8 +352,8 @@ mod tests {
     }
 
     #[test]
-    fn work_that_dies_or_never_answers_is_an_error() {
-        let died = on_thread::<()>(7, "it was opened", |answer| drop(answer));
+    fn work_that_dies_is_an_error() {
+        let died = on_thread::<()>(7, "it was opened", drop);
         assert!(matches!(died, Err(CameraError::Backend { .. })), "{died:?}");
     }
 

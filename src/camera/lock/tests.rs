@@ -246,8 +246,8 @@ fn a_value_that_moved_is_found_by_plan_and_by_comparison() {
         should: 64,
         is: Some(70),
     };
-    assert_eq!(plan.check(&after), [moved.clone()]);
-    assert_eq!(moved_between(&set, &after), [moved.clone()]);
+    assert_eq!(plan.check(&after), moved_between(&set, &after));
+    assert_eq!(plan.check(&after), std::slice::from_ref(&moved));
     assert_eq!(moved.to_string(), "gain is 70 where 64 was set");
 }
 

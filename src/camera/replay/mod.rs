@@ -11,6 +11,7 @@
 //! are as much closer together. As fast as it is read, time stamps run ahead of the clock. No frame
 //! is lost where the reader is slow: a replay waits.
 
+mod description;
 mod faults;
 mod source;
 mod timeline;
@@ -19,18 +20,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use serde_json::Value;
-
+use self::description::{controls, describe, rate};
 use self::faults::Spoiler;
 use self::source::{Delivery, Source, Taken};
 use self::timeline::{Moment, Timeline};
 use super::{
-    Address, Camera, CameraError, Capabilities, Control, ControlFlags, ControlId, ControlKind,
-    DeviceInfo, Faults, Frame, GrantedMode, MenuItem, Mode, ModeRequest, Rate, Rates, Sequence,
-    Sizes, Speed, StampSource,
+    Address, Camera, CameraError, Control, ControlId, DeviceInfo, Faults, Frame, GrantedMode, Mode,
+    ModeRequest, Sequence, Speed, StampSource,
 };
 use crate::clock::Clock;
-use crate::session::{Manifest, Recording};
+use crate::session::Recording;
 use crate::video::Video;
 
 /// A recording that behaves as the camera it was recorded with.
@@ -101,8 +100,14 @@ impl ReplayCamera {
             rate: rate(manifest, &timeline),
         };
         let spoiler = Spoiler::new(path, faults, &mode)?;
+        let address = Address::Replay {
+            path: path.to_owned(),
+            speed,
+            repeat,
+            faults: faults.clone(),
+        };
         Ok(Self {
-            info: describe(path, speed, repeat, faults, &recording, &video, &mode),
+            info: describe(address, &recording, &video, &mode),
             path: path.to_owned(),
             video,
             delivery,
@@ -329,87 +334,6 @@ impl Pace {
             }
         }
     }
-}
-
-fn rate(manifest: Option<&Manifest>, timeline: &Timeline) -> Option<Rate> {
-    let stated = manifest.and_then(|manifest| Rate::from_per_second(manifest.camera.fps));
-    stated.or_else(|| Rate::from_per_second(1e6 / timeline.period_us() as f64))
-}
-
-fn describe(
-    path: &Path,
-    speed: Speed,
-    repeat: bool,
-    faults: &Faults,
-    recording: &Recording,
-    video: &Video,
-    mode: &GrantedMode,
-) -> DeviceInfo {
-    let camera = recording.manifest.as_ref().map(|manifest| &manifest.camera);
-    let notices = recording
-        .notices
-        .iter()
-        .map(|notice| notice.text().to_owned());
-    let damage = video.damage().iter().map(ToString::to_string);
-    DeviceInfo {
-        address: Address::Replay {
-            path: path.to_owned(),
-            speed,
-            repeat,
-            faults: faults.clone(),
-        },
-        name: camera.map_or_else(|| recording.id.clone(), |camera| camera.name.clone()),
-        driver: "replay".to_owned(),
-        bus: camera
-            .map(|camera| camera.device.clone())
-            .unwrap_or_default(),
-        modes: vec![Mode {
-            fourcc: mode.fourcc,
-            sizes: Sizes::One(mode.width, mode.height),
-            rates: mode
-                .rate
-                .map_or(Rates::Unknown, |rate| Rates::List(vec![rate])),
-        }],
-        other_formats: Vec::new(),
-        capabilities: Capabilities {
-            sequence: true,
-            driver_time: true,
-            controls: false,
-        },
-        problems: notices.chain(damage).collect(),
-    }
-}
-
-/// The controls as they were recorded; they cannot be set.
-fn controls(manifest: &Manifest) -> Vec<Control> {
-    let recorded = manifest.camera.controls.iter().zip(1..);
-    recorded
-        .filter_map(|((name, value), id)| {
-            let (kind, value) = match value {
-                Value::Bool(value) => (ControlKind::Boolean, i64::from(*value)),
-                Value::Number(number) => (ControlKind::Integer, number.as_i64()?),
-                Value::String(label) => {
-                    let label = label.clone();
-                    (ControlKind::Menu(vec![MenuItem { index: 0, label }]), 0)
-                }
-                _ => return None,
-            };
-            Some(Control {
-                id: ControlId(id),
-                name: name.clone(),
-                kind,
-                minimum: value,
-                maximum: value,
-                step: 1,
-                default: value,
-                value: Some(value),
-                flags: ControlFlags {
-                    read_only: true,
-                    ..ControlFlags::default()
-                },
-            })
-        })
-        .collect()
 }
 
 #[cfg(test)]

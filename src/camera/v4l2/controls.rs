@@ -107,54 +107,55 @@ impl Device {
     }
 
     pub(super) fn set_control(&self, id: ControlId, value: i64) -> Result<i64, CameraError> {
-        let failed = |error| self.control_error(id, format!("set to {value}"), None, error);
-        let raw = self.node.control(id.0).map_err(failed)?;
-        let Some((raw, kind)) = raw
-            .map(|raw| self.kind_of(&raw).map(|kind| kind.map(|kind| (raw, kind))))
-            .transpose()
-            .map_err(failed)?
-            .flatten()
-        else {
-            return Err(self.no_control(id, value));
+        let setting = || format!("set to {value}");
+        let failed = |error| self.control_error(id, setting(), None, error);
+        let Some((raw, kind)) = self.look_up(id).map_err(failed)? else {
+            return Err(CameraError::Control {
+                device: self.name(),
+                control: id,
+                doing: setting(),
+                fault: ControlFault::Unknown,
+            });
         };
-        let range = Some((raw.minimum, raw.maximum));
         let wide = kind == ControlKind::Integer64;
-        self.node
-            .set_value(id.0, wide, value)
-            .map_err(|error| self.control_error(id, format!("set to {value}"), range, error))?;
-        if kind == ControlKind::Button || raw.flags & sys::V4L2_CTRL_FLAG_WRITE_ONLY != 0 {
+        let write_only = raw.flags & sys::V4L2_CTRL_FLAG_WRITE_ONLY != 0;
+        let has_value = kind != ControlKind::Button && !write_only;
+        let taken = Some(taken_values(&raw, kind));
+        let set = self.node.set_value(id.0, wide, value);
+        set.map_err(|error| self.control_error(id, setting(), taken, error))?;
+        if !has_value {
             return Ok(value);
         }
-        self.node
-            .value(id.0, wide)
-            .map_err(|error| self.control_error(id, "read back".to_owned(), range, error))
+        let read = self.node.value(id.0, wide);
+        read.map_err(|error| self.control_error(id, "read back".to_owned(), None, error))
     }
 
-    fn no_control(&self, control: ControlId, value: i64) -> CameraError {
-        CameraError::Control {
-            device: self.name(),
-            control,
-            doing: format!("set to {value}"),
-            fault: ControlFault::Unknown,
-        }
+    /// A control of one number, whatever its flags; `None` where there is none.
+    fn look_up(
+        &self,
+        id: ControlId,
+    ) -> io::Result<Option<(sys::v4l2_query_ext_ctrl, ControlKind)>> {
+        let Some(raw) = self.node.control(id.0)? else {
+            return Ok(None);
+        };
+        Ok(self.kind_of(&raw)?.map(|kind| (raw, kind)))
     }
 
+    /// `taken`: the fault where the value itself is what the driver minds.
     fn control_error(
         &self,
         control: ControlId,
         doing: String,
-        range: Option<(i64, i64)>,
+        taken: Option<ControlFault>,
         error: io::Error,
     ) -> CameraError {
         let device = self.name();
-        let fault = match (Errno::from_io_error(&error), range) {
+        let fault = match (Errno::from_io_error(&error), taken) {
             (Some(Errno::NODEV), _) => return CameraError::Unplugged { device },
             (Some(Errno::ACCESS | Errno::PERM), _) => ControlFault::Locked,
             (Some(Errno::BUSY), _) => ControlFault::Busy,
             // A value that does not fit into 32 bits never reaches the driver.
-            (Some(Errno::RANGE | Errno::INVAL) | None, Some((minimum, maximum))) => {
-                ControlFault::Range { minimum, maximum }
-            }
+            (Some(Errno::RANGE | Errno::INVAL) | None, Some(taken)) => taken,
             _ => ControlFault::Driver(error),
         };
         CameraError::Control {
@@ -163,6 +164,19 @@ impl Device {
             doing,
             fault,
         }
+    }
+}
+
+/// The fault that names the values which a control takes.
+fn taken_values(raw: &sys::v4l2_query_ext_ctrl, kind: ControlKind) -> ControlFault {
+    match kind {
+        ControlKind::Menu(items) => {
+            ControlFault::NoItem(items.iter().map(|item| item.index).collect())
+        }
+        _ => ControlFault::Range {
+            minimum: raw.minimum,
+            maximum: raw.maximum,
+        },
     }
 }
 
@@ -180,8 +194,8 @@ mod tests {
             path: "/dev/video9".into(),
         };
         let error = |error: io::Error| {
-            let range = Some((0, 9));
-            device.control_error(ControlId(7), "set to 10".to_owned(), range, error)
+            let taken = Some(ControlFault::NoItem(vec![0, 9]));
+            device.control_error(ControlId(7), "set to 10".to_owned(), taken, error)
         };
         let fault = |errno: Errno| match error(errno.into()) {
             CameraError::Control { fault, .. } => fault,
@@ -189,16 +203,12 @@ mod tests {
         };
         assert!(matches!(fault(Errno::ACCESS), ControlFault::Locked));
         assert!(matches!(fault(Errno::BUSY), ControlFault::Busy));
-        assert!(matches!(
-            fault(Errno::RANGE),
-            ControlFault::Range { maximum: 9, .. }
-        ));
+        assert!(matches!(fault(Errno::RANGE), ControlFault::NoItem(_)));
         assert!(matches!(fault(Errno::IO), ControlFault::Driver(_)));
         let unplugged = error(Errno::NODEV.into());
         assert!(matches!(unplugged, CameraError::Unplugged { .. }));
         let too_wide = error(io::ErrorKind::InvalidInput.into());
-        let words =
-            "control 0x00000007 of /dev/video9 cannot be set to 10: it takes values from 0 to 9";
+        let words = "control 0x00000007 of /dev/video9 cannot be set to 10: it takes one of 0, 9";
         assert_eq!(too_wide.to_string(), words);
         let unknown = device.set_control(ControlId(7), 1).unwrap_err();
         let fault = ControlFault::Unknown;

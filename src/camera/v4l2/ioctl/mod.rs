@@ -1,32 +1,31 @@
-//! The kernel's V4L2 calls as safe functions: the one file of this room with unsafe code.
+//! The kernel's V4L2 calls as safe functions: the one place of this room with unsafe code.
 //!
 //! The crate `v4l` gives the structures and call numbers. Its devices and streams are not used:
 //! dropping a stream panics on every error but one, frames come without the number of bytes used,
 //! waiting does not tell a broken stream from a frame, and reading controls panics on unknown kinds.
 #![allow(unsafe_code)]
 
+mod buffers;
+
 use std::ffi::c_void;
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::marker::PhantomData;
 use std::mem::{self, size_of};
-use std::os::fd::{AsFd, AsRawFd};
+use std::os::fd::AsRawFd;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 use std::ptr;
-use std::slice;
-use std::time::Duration;
 
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::OFlags;
-use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 use v4l::v4l_sys as sys;
 use v4l::v4l2;
 use v4l::v4l2::vidioc;
 
+pub(super) use buffers::{Filled, Mapping, Ready};
+
 /// The single-planar capture queue.
 const CAPTURE: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE;
-const MMAP: u32 = sys::v4l2_memory_V4L2_MEMORY_MMAP;
 
 /// A call's number, tied to the structure that it reads and writes.
 struct Request<T> {
@@ -59,13 +58,6 @@ const QUERY_EXT_CTRL: Request<sys::v4l2_query_ext_ctrl> =
 const QUERYMENU: Request<sys::v4l2_querymenu> = Request::new(vidioc::VIDIOC_QUERYMENU);
 const G_EXT_CTRLS: Request<sys::v4l2_ext_controls> = Request::new(vidioc::VIDIOC_G_EXT_CTRLS);
 const S_EXT_CTRLS: Request<sys::v4l2_ext_controls> = Request::new(vidioc::VIDIOC_S_EXT_CTRLS);
-const REQBUFS: Request<sys::v4l2_requestbuffers> = Request::new(vidioc::VIDIOC_REQBUFS);
-const QUERYBUF: Request<sys::v4l2_buffer> = Request::new(vidioc::VIDIOC_QUERYBUF);
-const QBUF: Request<sys::v4l2_buffer> = Request::new(vidioc::VIDIOC_QBUF);
-const DQBUF: Request<sys::v4l2_buffer> = Request::new(vidioc::VIDIOC_DQBUF);
-const STREAMON: Request<i32> = Request::new(vidioc::VIDIOC_STREAMON);
-const STREAMOFF: Request<i32> = Request::new(vidioc::VIDIOC_STREAMOFF);
-
 /// Structures of the kernel's interface for which all zeros is a value.
 ///
 /// # Safety
@@ -128,28 +120,6 @@ pub(super) struct PixelLayout {
     pub(super) height: u32,
     /// Bytes from one row to the next; 0 for compressed formats.
     pub(super) stride: u32,
-}
-
-/// A filled buffer that the driver handed over.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Filled {
-    pub(super) index: u32,
-    pub(super) bytes_used: u32,
-    /// `V4L2_BUF_FLAG_*`.
-    pub(super) flags: u32,
-    pub(super) sequence: u32,
-    pub(super) t_us: i64,
-}
-
-/// How waiting for a frame ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Ready {
-    /// A frame, or an error that dequeuing will tell.
-    Yes,
-    /// The time ran out.
-    No,
-    /// The device reports an error, or that it went away.
-    Broken,
 }
 
 impl Node {
@@ -408,83 +378,6 @@ impl Node {
         };
         self.call(request, &mut controls)
     }
-
-    /// Asks for this many buffers, 0 to give all back; answers how many there are.
-    pub(super) fn request_buffers(&self, count: u32) -> io::Result<u32> {
-        let mut buffers = sys::v4l2_requestbuffers {
-            count,
-            type_: CAPTURE,
-            memory: MMAP,
-            ..zeroed()
-        };
-        self.call(&REQBUFS, &mut buffers)?;
-        Ok(buffers.count)
-    }
-
-    /// Maps a buffer into memory.
-    pub(super) fn map(&self, index: u32) -> io::Result<Mapping> {
-        let mut buffer = buffer(index);
-        self.call(&QUERYBUF, &mut buffer)?;
-        // SAFETY: of a buffer in mapped memory, the call filled the offset.
-        let offset = unsafe { buffer.m.offset };
-        Mapping::new(&self.0, u64::from(offset), buffer.length as usize)
-    }
-
-    /// Gives a buffer to the driver to be filled.
-    pub(super) fn queue(&self, index: u32) -> io::Result<()> {
-        self.call(&QBUF, &mut buffer(index))
-    }
-
-    /// Takes the next filled buffer; [`io::ErrorKind::WouldBlock`] where there is none.
-    pub(super) fn dequeue(&self) -> io::Result<Filled> {
-        let mut filled = buffer(0);
-        self.call(&DQBUF, &mut filled)?;
-        let time = filled.timestamp;
-        Ok(Filled {
-            index: filled.index,
-            bytes_used: filled.bytesused,
-            flags: filled.flags,
-            sequence: filled.sequence,
-            t_us: time
-                .tv_sec
-                .saturating_mul(1_000_000)
-                .saturating_add(time.tv_usec),
-        })
-    }
-
-    pub(super) fn stream_on(&self) -> io::Result<()> {
-        self.call(&STREAMON, &mut CAPTURE.cast_signed())
-    }
-
-    pub(super) fn stream_off(&self) -> io::Result<()> {
-        self.call(&STREAMOFF, &mut CAPTURE.cast_signed())
-    }
-
-    /// Waits until a frame can be taken.
-    pub(super) fn wait(&self, timeout: Duration) -> io::Result<Ready> {
-        let timeout = Timespec::try_from(timeout).map_err(|_| io::ErrorKind::InvalidInput)?;
-        let mut watched = [PollFd::from_borrowed_fd(self.0.as_fd(), PollFlags::IN)];
-        match poll(&mut watched, Some(&timeout)) {
-            Ok(0) | Err(rustix::io::Errno::INTR) => return Ok(Ready::No),
-            Ok(_) => {}
-            Err(error) => return Err(error.into()),
-        }
-        let broken = PollFlags::ERR | PollFlags::HUP | PollFlags::NVAL;
-        Ok(if watched[0].revents().intersects(broken) {
-            Ready::Broken
-        } else {
-            Ready::Yes
-        })
-    }
-}
-
-fn buffer(index: u32) -> sys::v4l2_buffer {
-    sys::v4l2_buffer {
-        index,
-        type_: CAPTURE,
-        memory: MMAP,
-        ..zeroed()
-    }
 }
 
 /// `None` for the answers with which drivers end a list, or say that they have none.
@@ -506,43 +399,4 @@ pub(super) fn text(field: &[u8]) -> String {
         .position(|&byte| byte == 0)
         .unwrap_or(field.len());
     String::from_utf8_lossy(&field[..end]).into_owned()
-}
-
-/// A driver's buffer in this program's memory, until it is dropped.
-#[derive(Debug)]
-pub(super) struct Mapping {
-    start: *mut c_void,
-    length: usize,
-}
-
-// SAFETY: the memory belongs to the process, not to a thread, and nobody else has the pointer.
-unsafe impl Send for Mapping {}
-
-impl Mapping {
-    fn new(file: &File, offset: u64, length: usize) -> io::Result<Self> {
-        if length == 0 {
-            return Err(io::ErrorKind::InvalidData.into());
-        }
-        let (protection, flags) = (ProtFlags::READ | ProtFlags::WRITE, MapFlags::SHARED);
-        // SAFETY: the kernel chooses a place where nothing is mapped.
-        let start = unsafe { mmap(ptr::null_mut(), length, protection, flags, file, offset) }?;
-        Ok(Self { start, length })
-    }
-
-    /// A copy of the first `bytes`, or of all where there are fewer. To be called between taking
-    /// the buffer and giving it back, while the driver leaves it alone.
-    pub(super) fn copy(&self, bytes: usize) -> Vec<u8> {
-        let bytes = bytes.min(self.length);
-        // SAFETY: the mapping is `length` bytes, readable, and lives as long as `self`; a device
-        // that is unplugged leaves its memory mapped. Only bytes are read, of which any value goes.
-        unsafe { slice::from_raw_parts(self.start.cast::<u8>(), bytes) }.to_vec()
-    }
-}
-
-impl Drop for Mapping {
-    fn drop(&mut self) {
-        // SAFETY: the mapping was made with this start and length, and no slice of it outlives a
-        // call of `copy`. Failing, it stays mapped until the process ends.
-        let _ = unsafe { munmap(self.start, self.length) };
-    }
 }
