@@ -18,8 +18,9 @@
 //! | [`durable`] | files that appear whole or not at all | nobody |
 //! | [`naming`] | which names a session may have | nobody |
 //! | [`session`] | what a capture leaves on disk: manifest and frame index | `naming`, `durable` |
-//! | [`video`] | FFmpeg: a video file to frames with numbers and time stamps | `geometry` |
+//! | [`video`] | FFmpeg: a video file to frames with numbers and time stamps, and a camera's stream to a file | `geometry` |
 //! | [`camera`] | cameras: V4L2, nokhwa, and recordings replayed as one | `clock`, `session`, `video` |
+//! | [`capture`] | a turn as a session on disk: which frames, what is missing, salvage | `camera`, `session`, `video` |
 //! | [`shard`] | the data set on disk: samples, records, tables; write, read, verify | `geometry`, `durable`, `naming` |
 //! | [`report`] | the HTML page that shows one extracted session | `shard` |
 //! | [`mask`] | seeds, GrabCut, clean-up of the mask | `session`, `video`, `geometry`, `durable` |

@@ -21,7 +21,7 @@ mod window;
 
 pub use error::Error;
 pub use preview::Preview;
-pub use recorder::{Ended, Plan, Progress, Recorder, Stage};
+pub use recorder::{Ended, Plan, Progress, Recorder, Stage, WhenFull};
 pub use salvage::{Salvaged, Saved, salvage, salvage_session};
 pub use take::{Damaged, End, Report, Take};
 pub use window::{Count, Window};

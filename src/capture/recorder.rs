@@ -38,8 +38,19 @@ pub struct Plan {
     pub window: Option<Window>,
     /// Dropped or damaged frames up to which a take counts.
     pub max_dropped: u64,
+    /// What to do with a frame for which the disk has no time.
+    pub when_full: WhenFull,
     /// Without a frame for so long the camera counts as failed.
     pub stall: Duration,
+}
+
+/// What to do with a frame for which the disk has no time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WhenFull {
+    /// Drop it and say so: a camera does not wait.
+    Drop,
+    /// Let the camera wait, for a minute at most: a replay as fast as it is read does.
+    Wait,
 }
 
 /// How far a recording has come.
@@ -145,7 +156,7 @@ impl Recorder {
             ..Shared::default()
         });
         let (sender, queue) = sync_channel(queue_places(&stream));
-        let film = Film::new(camera, &stream, plan.stall);
+        let film = Film::new(camera, &stream, plan.stall, plan.when_full);
         let threads = spawn(film, sink, sender, queue, &shared)?;
         Ok(Self {
             shared,
