@@ -20,7 +20,7 @@
 //! | [`session`] | what a capture leaves on disk: manifest and frame index | `naming`, `durable` |
 //! | [`turntable`] | the table: Grbl over a serial line, turns, angles over time | `clock` |
 //! | [`simulator`] | a table without hardware: the firmware's core on a pseudoterminal | `clock` |
-//! | [`video`] | FFmpeg: a video file to frames with numbers and time stamps | `geometry` |
+//! | [`video`] | FFmpeg: a video file to frames with numbers and time stamps, and a camera's stream to a file | `geometry` |
 //! | [`camera`] | cameras: V4L2, nokhwa, and recordings replayed as one | `clock`, `session`, `video` |
 //! | [`shard`] | the data set on disk: samples, records, tables; write, read, verify | `geometry`, `durable`, `naming` |
 //! | [`report`] | the HTML page that shows one extracted session | `shard` |

@@ -12,10 +12,12 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use relit::camera::{
-    Camera, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
-    Mode, ModeRequest, Rate, Sequence, StampSource,
+    Address, Camera, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc, Frame,
+    GrantedMode, Mode, ModeRequest, Rate, Sequence, StampSource, open,
 };
-use relit::capture::{End, Plan, Recorder, Report, Stage, Take, Window, salvage, salvage_session};
+use relit::capture::{
+    End, Plan, Recorder, Report, Stage, Take, WhenFull, Window, salvage, salvage_session,
+};
 use relit::clock::Clock;
 use relit::extract::{self, Observer, Options, Outcome};
 use relit::session::{
@@ -216,7 +218,9 @@ fn plan(root: &Path, max_dropped: u64) -> Plan {
             rate: Rate::new(30, 1),
         },
         fps: 30.0,
+        window: None,
         max_dropped,
+        when_full: WhenFull::Drop,
         stall: Duration::from_millis(400),
     }
 }
@@ -236,9 +240,9 @@ fn record_with(
     steps: impl Iterator<Item = Step> + Send + 'static,
     moved: &[String],
 ) -> Report {
-    let window = turn(120, 0);
-    let recorder = Recorder::start(Scripted::new(steps), plan(root, max_dropped)).unwrap();
-    recorder.announce(window);
+    let mut plan = plan(root, max_dropped);
+    plan.window = Some(turn(120, 0));
+    let recorder = Recorder::start(Scripted::new(steps), plan).unwrap();
     let (_camera, ended) = recorder.wait().unwrap();
     let angle = |t_us: i64| Some((t_us - 10 * PERIOD_US) as f64 / PERIOD_US as f64 * 3.0);
     ended.finish(&angle, moved).unwrap()
@@ -521,8 +525,9 @@ fn a_camera_at_half_the_agreed_rate_fails_the_take() {
 #[test]
 fn viewers_that_never_come_back_cost_no_frame() {
     let root = tempfile::tempdir().unwrap();
-    let recorder =
-        Recorder::start(Scripted::new(steps(stream(200, 0))), plan(root.path(), 0)).unwrap();
+    let mut plan = plan(root.path(), 0);
+    plan.window = Some(turn(120, 0));
+    let recorder = Recorder::start(Scripted::new(steps(stream(200, 0))), plan).unwrap();
     thread::scope(|scope| {
         let viewers: Vec<_> = (0..50)
             .map(|_| {
@@ -538,7 +543,6 @@ fn viewers_that_never_come_back_cost_no_frame() {
                 })
             })
             .collect();
-        recorder.announce(turn(120, 0));
         for viewer in viewers {
             viewer.join().unwrap();
         }
@@ -546,6 +550,84 @@ fn viewers_that_never_come_back_cost_no_frame() {
     let (_camera, ended) = recorder.wait().unwrap();
     let report = ended.finish(&|_| None, &[]).unwrap();
     assert_eq!((report.take, report.recorded), (Take::Clean, 120));
+}
+
+/// Replays a recording as fast as it is read, and records the time from `from` to `to`, in frames
+/// of `period_us`, again.
+fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -> Report {
+    let address: Address = format!("replay:{}?speed=0", path.display())
+        .parse()
+        .unwrap();
+    let clock = address.clock();
+    let mut camera = open(&address, clock).unwrap();
+    let mode = camera.modes().unwrap().remove(0);
+    let (width, height) = mode.sizes.largest();
+    let rate = mode.rates.fastest().unwrap();
+    let request = ModeRequest {
+        fourcc: mode.fourcc,
+        width,
+        height,
+        rate,
+    };
+    let mut plan = plan(root, 0);
+    plan.fps = rate.per_second();
+    plan.when_full = WhenFull::Wait;
+    // A frame's way from the start of the replay to its time stamp is less than half a period.
+    let begun = clock.now_us() as f64;
+    plan.mode = camera.start(&request).unwrap();
+    let at = |frames: f64| (begun + frames * period_us) as i64;
+    plan.window = Window::new(at(from), at(to));
+    let recorder = Recorder::start(camera, plan).unwrap();
+    let (_camera, ended) = recorder.wait().unwrap();
+    ended.finish(&|_| None, &[]).unwrap()
+}
+
+#[test]
+fn a_replayed_session_is_recorded_again_packet_for_packet() {
+    let root = tempfile::tempdir().unwrap();
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/20261120T101500Z-cow-short");
+    let report = record_replay(root.path(), &fixture, 33_333.3, 0.0, 150.0);
+    assert_eq!((report.take.clone(), report.recorded), (Take::Clean, 150));
+    let hash = |folder: &Path| {
+        let arguments = ["-i", "video.mkv", "-c", "copy", "-f", "md5", "-"];
+        support::ffmpeg(folder, &arguments)
+    };
+    assert_eq!(hash(&report.folder), hash(&fixture));
+}
+
+#[test]
+fn a_turn_of_h264_keeps_the_frames_that_its_first_ones_build_on() {
+    let root = tempfile::tempdir().unwrap();
+    let encode = [
+        "-c:v",
+        "libx264",
+        "-bf",
+        "0",
+        "-g",
+        "12",
+        "-sc_threshold",
+        "0",
+        "a.mkv",
+    ];
+    let source = ["-f", "lavfi", "-i", "testsrc2=s=160x120:r=30:d=4"];
+    support::ffmpeg(root.path(), &[&source[..], &encode].concat());
+    let path = root.path().join("a.mkv");
+    // The turn begins with frame 31, and decoding with frame 24.
+    let report = record_replay(root.path(), &path, 33_333.3, 30.5, 90.5);
+    assert_eq!((report.expected, report.recorded), (60, 60));
+    assert_eq!(report.take, Take::Clean);
+    let (recording, video) = read_back(&report);
+    assert_eq!(
+        (video.facts().codec.as_str(), video.frames().len()),
+        ("h264", 67)
+    );
+    assert_eq!(recording.frames.unwrap().entries().len(), 67);
+    assert!(
+        recording.notices[0]
+            .text()
+            .contains("7 frames before the turn")
+    );
+    assert!(video.frame(66).is_ok() && video.damage().is_empty());
 }
 
 /// Runs this test binary again, with only the (ignored) test `name`, by way of `sh`.
@@ -758,9 +840,9 @@ fn a_recording_killed_before_its_first_frame_is_salvaged_as_such() {
 #[test]
 fn frames_whose_content_a_power_cut_took_are_cut_from_the_index() {
     let root = tempfile::tempdir().unwrap();
-    let recorder =
-        Recorder::start(Scripted::new(steps(stream(200, 0))), plan(root.path(), 0)).unwrap();
-    recorder.announce(turn(120, 0));
+    let mut plan = plan(root.path(), 0);
+    plan.window = Some(turn(120, 0));
+    let recorder = Recorder::start(Scripted::new(steps(stream(200, 0))), plan).unwrap();
     let folder = recorder.folder().to_owned();
     drop(recorder.wait().unwrap());
     // The last bytes never reached the disk: the file has its length, and zeros there.
@@ -773,4 +855,42 @@ fn frames_whose_content_a_power_cut_took_are_cut_from_the_index() {
     assert_eq!((saved.frames, saved.lines_cut), (110, 10));
     assert!(folder.join("frames.interrupted.jsonl").exists());
     extracts(&folder, &root.path().join("out"));
+}
+
+/// What `/proc/self` says: CPU time of this process in seconds, and its largest memory in MiB.
+fn used() -> (f64, u64) {
+    let stat = fs::read_to_string("/proc/self/stat").unwrap();
+    let fields: Vec<&str> = stat
+        .rsplit(')')
+        .next()
+        .unwrap()
+        .split_whitespace()
+        .collect();
+    let ticks: u64 = fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap();
+    let status = fs::read_to_string("/proc/self/status").unwrap();
+    let peak = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmHWM:"))
+        .unwrap();
+    let kib: u64 = peak.trim().trim_end_matches(" kB").parse().unwrap();
+    (ticks as f64 / 100.0, kib >> 10)
+}
+
+/// `RELIT_VIDEO=... cargo test --release --test capture -- --ignored --nocapture cost`
+#[test]
+#[ignore = "measures with a video that is given"]
+fn cost_of_recording_a_video_as_fast_as_it_goes() {
+    let path = PathBuf::from(std::env::var("RELIT_VIDEO").expect("RELIT_VIDEO names a video"));
+    let root = tempfile::tempdir_in(path.parent().unwrap()).unwrap();
+    let frames = Video::open(&path).unwrap().frames().len() as f64;
+    let (cpu, begun) = (used().0, Instant::now());
+    let report = record_replay(root.path(), &path, 33_333.3, 0.0, frames);
+    let (after, peak) = used();
+    println!(
+        "{:?}: {} frames, {:.2} CPU-s, {:.2} s, at most {peak} MiB",
+        report.take,
+        report.recorded,
+        after - cpu,
+        begun.elapsed().as_secs_f64()
+    );
 }

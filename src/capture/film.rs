@@ -5,7 +5,7 @@ use std::sync::mpsc::{SyncSender, TrySendError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use super::recorder::{Shared, Stage};
+use super::recorder::{Shared, Stage, WhenFull};
 use super::take::{Damaged, End};
 use super::window::{Chosen, Count, Cutter};
 use crate::camera::{Camera, CameraError, Frame, FrameFault};
@@ -15,11 +15,14 @@ use crate::video::{Coding, StreamFormat, is_key};
 const GLANCE: Duration = Duration::from_millis(100);
 /// How long the last frames of a turn may wait for a place in the queue.
 const LAST_WAIT: Duration = Duration::from_secs(4);
+/// How long a camera that can wait does so.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A camera being filmed with.
 pub(super) struct Film {
     camera: Box<dyn Camera>,
     stall: Duration,
+    when_full: WhenFull,
     cutter: Cutter,
     damaged: Vec<Damaged>,
     overrun: Vec<usize>,
@@ -40,11 +43,17 @@ pub(super) struct Filmed {
 }
 
 impl Film {
-    pub(super) fn new(camera: Box<dyn Camera>, stream: &StreamFormat, stall: Duration) -> Self {
+    pub(super) fn new(
+        camera: Box<dyn Camera>,
+        stream: &StreamFormat,
+        stall: Duration,
+        when_full: WhenFull,
+    ) -> Self {
         let chain = (stream.coding == Coding::H264).then_some(is_key as fn(&[u8]) -> bool);
         Self {
             camera,
             stall,
+            when_full,
             cutter: Cutter::new(stream.fps, chain),
             damaged: Vec::new(),
             overrun: Vec::new(),
@@ -60,7 +69,7 @@ impl Film {
         let until = Instant::now() + LAST_WAIT;
         for chosen in rest {
             let place = chosen.delivered;
-            if self.judge(&chosen) && !offer_until(queue, chosen, until) {
+            if self.judge(&chosen) && offer(queue, chosen, until) != Offered::Taken {
                 self.overrun.extend(place);
             }
         }
@@ -81,7 +90,9 @@ impl Film {
             if shared.stop_asked() {
                 return End::Stopped;
             }
-            if let Some(window) = shared.take_window() {
+            if !self.cutter.knows_window()
+                && let Some(window) = shared.window()
+            {
                 let chosen = self.cutter.announce(window);
                 if let Some(end) = self.queue_all(chosen, queue, shared) {
                     return end;
@@ -141,28 +152,42 @@ impl Film {
             if !self.judge(&chosen) {
                 continue;
             }
-            match queue.try_send(chosen) {
-                Ok(()) => {}
-                Err(TrySendError::Full(_)) => {
+            let until = match self.when_full {
+                WhenFull::Drop => Instant::now(),
+                WhenFull::Wait => Instant::now() + PATIENCE,
+            };
+            match offer(queue, chosen, until) {
+                Offered::Taken => {}
+                Offered::NoPlace => {
                     self.overrun.extend(place);
                     shared.overran();
                 }
-                Err(TrySendError::Disconnected(_)) => return Some(End::Disk),
+                Offered::Closed => return Some(End::Disk),
             }
         }
         self.cutter.is_done().then_some(End::Over)
     }
 }
 
-/// Puts a frame into the queue as soon as there is a place; false where none came in time.
-fn offer_until(queue: &SyncSender<Chosen>, mut chosen: Chosen, until: Instant) -> bool {
+/// What became of a frame for the queue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Offered {
+    Taken,
+    NoPlace,
+    /// The disk refused, and nothing is taken any more.
+    Closed,
+}
+
+/// Puts a frame into the queue, as soon as there is a place before `until`.
+fn offer(queue: &SyncSender<Chosen>, mut chosen: Chosen, until: Instant) -> Offered {
     loop {
         chosen = match queue.try_send(chosen) {
-            Ok(()) => return true,
+            Ok(()) => return Offered::Taken,
             Err(TrySendError::Full(chosen)) if Instant::now() < until => chosen,
-            Err(_) => return false,
+            Err(TrySendError::Full(_)) => return Offered::NoPlace,
+            Err(TrySendError::Disconnected(_)) => return Offered::Closed,
         };
-        thread::sleep(Duration::from_millis(5));
+        thread::sleep(Duration::from_millis(2));
     }
 }
 

@@ -49,7 +49,7 @@ pub use error::Error;
 pub use failure::{CaptureError, MeterFault, Refusal};
 pub use lock::Exclusive;
 pub use preview::Preview;
-pub use recorder::{Ended, Plan, Progress, Recorder, Stage};
+pub use recorder::{Ended, Plan, Progress, Recorder, Stage, WhenFull};
 pub use salvage::{Salvaged, Saved, salvage, salvage_session};
 pub use settings::{FrameSize, ModeWish, Settings};
 pub use shoot::{Onlookers, Order, capture};

@@ -34,10 +34,23 @@ pub struct Plan {
     pub mode: GrantedMode,
     /// Frames a second; where the camera said none, as asked for.
     pub fps: f64,
+    /// When the turn is, where that is known before: see [`Recorder::announce`].
+    pub window: Option<Window>,
     /// Dropped or damaged frames up to which a take counts.
     pub max_dropped: u64,
+    /// What to do with a frame for which the disk has no time.
+    pub when_full: WhenFull,
     /// Without a frame for so long the camera counts as failed.
     pub stall: Duration,
+}
+
+/// What to do with a frame for which the disk has no time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WhenFull {
+    /// Drop it and say so: a camera does not wait.
+    Drop,
+    /// Let the camera wait, for a minute at most: a replay as fast as it is read does.
+    Wait,
 }
 
 /// How far a recording has come.
@@ -94,12 +107,12 @@ impl Shared {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// The window, once after it was announced.
-    pub(super) fn take_window(&self) -> Option<Window> {
-        self.announced
+    /// The window, once it is announced.
+    pub(super) fn window(&self) -> Option<Window> {
+        *self
+            .announced
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
-            .take()
     }
 }
 
@@ -138,9 +151,12 @@ impl Recorder {
         let session = SessionWriter::create(&plan.root, manifest)?;
         let folder = session.folder().to_owned();
         let sink = Sink::new(stream, session)?;
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(Shared {
+            announced: Mutex::new(plan.window),
+            ..Shared::default()
+        });
         let (sender, queue) = sync_channel(queue_places(&stream));
-        let film = Film::new(camera, &stream, plan.stall);
+        let film = Film::new(camera, &stream, plan.stall, plan.when_full);
         let threads = spawn(film, sink, sender, queue, &shared)?;
         Ok(Self {
             shared,
@@ -150,7 +166,8 @@ impl Recorder {
         })
     }
 
-    /// Says when the turn is. It may have begun up to some seconds ago; only the first call counts.
+    /// Says when the turn is. It may have begun up to four seconds ago: so long frames are kept. Only
+    /// the first window counts.
     pub fn announce(&self, window: Window) {
         let announced = &self.shared.announced;
         let mut announced = announced.lock().unwrap_or_else(PoisonError::into_inner);
@@ -168,7 +185,7 @@ impl Recorder {
         &self.folder
     }
 
-    /// Calls `look` with the newest frames' slot, for a viewer.
+    /// The newest frame, for viewers.
     #[must_use]
     pub fn preview(&self) -> &Preview {
         &self.shared.preview

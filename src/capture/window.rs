@@ -95,8 +95,10 @@ pub(super) struct Cutter {
     window: Option<Window>,
     ring: VecDeque<Arc<Frame>>,
     ring_bytes: usize,
-    /// The last frame before the turn.
+    /// The last frame before those of the turn that are recorded.
     before: Option<Stamp>,
+    /// The last frame for which there was no place in the ring.
+    dropped: Option<Stamp>,
     stamps: Vec<Stamp>,
     held: VecDeque<Chosen>,
     done: bool,
@@ -111,6 +113,7 @@ impl Cutter {
             ring: VecDeque::new(),
             ring_bytes: 0,
             before: None,
+            dropped: None,
             stamps: Vec::new(),
             held: VecDeque::new(),
             done: false,
@@ -124,11 +127,17 @@ impl Cutter {
         }
         self.window = Some(window);
         self.ring_bytes = 0;
+        self.before = self.dropped;
         let waiting = std::mem::take(&mut self.ring);
         waiting
             .into_iter()
             .flat_map(|frame| self.push(frame))
             .collect()
+    }
+
+    /// True once the window was announced.
+    pub(super) fn knows_window(&self) -> bool {
+        self.window.is_some()
     }
 
     /// True once a frame came after the turn.
@@ -181,6 +190,7 @@ impl Cutter {
                 || newest.saturating_sub(oldest.t_us) > RING_US && !self.carries_the_rest())
         {
             self.ring_bytes -= oldest.data.len();
+            self.dropped = Some(stamp_of(oldest));
             self.ring.pop_front();
         }
     }
@@ -241,16 +251,17 @@ impl Cutter {
                 ..Count::of_nothing()
             };
         };
-        // Exposures of the turn before its first delivered frame. With the one before the turn at
-        // hand, only those between both can be missing.
+        // Exposures of the turn before its first frame.
         let due = trace.start_us + period * first as f64;
-        let late = ((due - window.from_us as f64) / period - 0.45)
-            .floor()
-            .max(0.0) as u64;
-        let lead = if lead_in == 1 {
-            late.min(first.saturating_sub(1))
-        } else {
-            late
+        let late = (due - window.from_us as f64) / period;
+        let lead = match self.before {
+            // Only those between both can be missing.
+            Some(before) if before.t_us < window.from_us => {
+                (late as u64).min(first.saturating_sub(1))
+            }
+            Some(_) => late as u64,
+            // The stream began with this frame: one period late is not yet one frame too few.
+            None => (late - 0.45).max(0.0) as u64,
         };
         let exposures: Vec<u64> = trace.exposures[lead_in..]
             .iter()

@@ -224,7 +224,7 @@ impl Line {
             square += off * off;
         }
         let period = product / square;
-        (period.is_finite() && period > 0.0).then(|| Self {
+        (period.is_finite() && period > 0.0).then_some(Self {
             start: mean_time - period * middle,
             period,
         })
