@@ -71,7 +71,8 @@ function showTake() {
   const { phase, object, frames, frames_wanted: wanted, dropped, table } = state;
   const part = wanted > 0 ? Math.min(frames / wanted, 1) : 0;
   const busy = !resting();
-  $("phase").textContent = PHASES[phase] ?? phase;
+  const ready = phase === "idle" && !state.camera.present ? "No camera" : PHASES[phase];
+  $("phase").textContent = ready ?? phase;
   $("what").textContent = object && busy ? object : "";
   $("progress").hidden = !busy;
   $("progress").value = part;
@@ -79,7 +80,7 @@ function showTake() {
   const angle = table.angle_deg;
   $("hand").setAttribute("transform", `rotate(${angle ?? 0} 50 50)`);
   $("ring-text").textContent = phase === "recording" ? `${Math.floor(part * 100)} %` : angle === null ? "" : `${angle.toFixed(0)}°`;
-  const counts = busy ? [make("span", { text: `${frames} of ${wanted} frames · ` }), make("span", { text: `${dropped} dropped`, className: dropped > 0 ? "bad" : "" })] : [];
+  const counts = busy ? [make("span", { text: `${frames} / ${wanted} · ` }), make("span", { text: `${dropped} dropped`, className: dropped > 0 ? "bad" : "" })] : [];
   $("counts").replaceChildren(...counts);
   const take = state.last_take;
   $("last").hidden = !take;
@@ -95,7 +96,7 @@ function action() {
   if (!state) return { text: "Start" };
   if (state.phase === "waiting-for-object") return { text: `Capture ${state.queue[0] ?? "the next object"}`, command: { command: "next" } };
   if (state.phase !== "idle") return { text: "Stop", stop: true, command: { command: "stop" } };
-  if (!object) return { text: "Name the object to start" };
+  if (!object) return { text: "Name the object" };
   return { text: `Start ${object}`, command: { command: "start", object, meter: $("meter").checked } };
 }
 
@@ -152,6 +153,7 @@ function showCamera() {
   $("clipped").className = clipped > 0.005 ? "bad" : "";
   $("fps").textContent = fps === null ? "" : `${fps.toFixed(1)} frames/s`;
   warn("camera-fault", fault);
+  $("preview").classList.toggle("stale", !present);
   const key = JSON.stringify([controls, resting()]);
   if ($("controls").dataset.key === key || $("controls").contains(document.activeElement) && document.activeElement.tagName === "INPUT") return;
   $("controls").dataset.key = key;
@@ -162,7 +164,7 @@ function showCamera() {
 
 /** A control's line: with buttons where a step is known. */
 function line(control, value) {
-  const name = control.replaceAll("_", " ");
+  const name = control.replace(/_(absolute|automatic)$/, "").replaceAll("_", " ");
   const step = STEPS.find(([pattern]) => pattern.test(control))?.[1]?.(value);
   if (!step) return make("p", { className: "fixed" }, make("span", { text: name }), make("span", { text: value }));
   const set = (to) => order({ command: "set-control", name: control, value: to });
@@ -188,7 +190,8 @@ function showDisk() {
   const short = needed > 0 && free < needed * RESERVE;
   const takes = needed > 0 ? `, a take needs ${size(needed)}` : "";
   $("disk").textContent = `${size(free)} free${takes}${short ? ": too little room for a take" : ""}`;
-  $("disk").className = short ? "bad" : "";
+  $("disk").className = short ? "bad" : "quiet";
+  $("disk").hidden = !resting() && !short;
 }
 
 function warn(id, fault) {
@@ -248,6 +251,7 @@ $("unlock-page").addEventListener("submit", (event) => {
 startPreview();
 follow({
   state: (next) => {
+    if (document.body.className === "lost") say("");
     link("connected", "");
     show(next);
   },

@@ -19,8 +19,8 @@ let number = 0;
 function piece() {
   const { width, height } = picture;
   if (!view.zoom) return [0, 0, width, height];
-  const part = Math.min(canvas.width / 2, width / 3);
-  const w = Math.max(16, part);
+  // Two pixels of the screen for one of the picture; of a small picture no less than half.
+  const w = Math.min(canvas.width / 2, width / 2);
   const h = (w * height) / width;
   const inside = (at, size, whole) => Math.min(Math.max(at * whole - size / 2, 0), whole - size);
   return [inside(view.x, w, width), inside(view.y, h, height), w, h];

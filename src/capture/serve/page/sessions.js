@@ -72,7 +72,8 @@ let shown = null;
 let timer = null;
 
 async function play(session) {
-  $("player-title").textContent = `${session.object}, ${when(session)}`;
+  $("player-title").textContent = session.object;
+  $("player-when").textContent = when(session);
   $("player-video").href = `${path(session.id)}/video`;
   const [words, className] = verdict(session);
   Object.assign($("player-verdict"), { textContent: `${words} · ${facts(session)}`, className });

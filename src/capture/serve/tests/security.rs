@@ -254,8 +254,14 @@ fn connections_beyond_the_limit_wait_until_others_end() {
         options.limits.connections = 3;
         options.limits.head = Duration::from_millis(800);
     });
+    let began = Instant::now();
     let idle: Vec<_> = (0..6).map(|_| serving.connect()).collect();
     assert_eq!(serving.get("/api/v1/state").status, 200);
+    assert!(
+        began.elapsed() > Duration::from_millis(700),
+        "{:?}",
+        began.elapsed()
+    );
     drop(idle);
 }
 
