@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use super::error::TurntableError;
 use super::port::Port;
+use super::status::Status;
 use super::supervisor::{Habits, StopOutcome, Supervisor};
-use super::table::Status;
 use super::wire::{Outcome, Patience, SendError};
 use crate::clock::Clock;
 

@@ -11,7 +11,7 @@
 
 use super::error::TurntableError;
 use super::identity::Identity;
-use super::table::Status;
+use super::status::Status;
 
 /// Degrees added to a ramp for the rounding of its steps.
 const RAMP_SLACK_DEG: f64 = 0.1;

@@ -4,7 +4,6 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use super::codes::Alarm;
 use super::error::TurntableError;
 use super::greeting;
 use super::identity::Identity;
@@ -12,69 +11,17 @@ use super::link::{Carrier, Link};
 use super::owner::{Claim, Server};
 use super::plan::TurnPlan;
 use super::port::{Port, SerialPort};
-use super::supervisor::{Course, Seen, Supervisor};
+use super::status::Status;
+use super::supervisor::Course;
 use super::turn::Turn;
 use super::wire::{Counts, Message, Outcome, Patience, State};
 use super::{LEASE_S, Options};
 use crate::clock::Clock;
 
-/// How long the search for the index may take.
-const HOMING: Patience = Patience::Long(120_000_000);
 /// What is added to the time a motion should take.
 const MOTION_SLACK: Duration = Duration::from_secs(4);
 /// Fastest jog and unwinding that is not asked for otherwise, degrees a second.
 const BRISK: f64 = 30.0;
-/// Grbl's refusal of `$H` where homing is switched off.
-const HOMING_OFF: u8 = 5;
-
-/// What the table is doing, by a report of just now.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Status {
-    /// The controller's state.
-    pub state: State,
-    /// Degrees from the angle counted as zero, or from machine zero while that is not known.
-    pub angle_deg: f64,
-    /// Degrees as the controller counts them.
-    pub machine_deg: f64,
-    /// Speed, degrees a second.
-    pub degrees_per_second: f64,
-    /// Battery, volts, where the controller measures it.
-    pub battery_v: Option<f64>,
-    /// Whether the index sensor is active.
-    pub index: bool,
-    /// Whether the emergency stop is pressed.
-    pub emergency_stop: bool,
-    /// Whether the position can be trusted.
-    pub homed: bool,
-    /// What locked the table.
-    pub alarm: Option<Alarm>,
-}
-
-impl Status {
-    pub(super) fn of(seen: &Seen, supervisor: &Supervisor) -> Status {
-        let zero = supervisor.zero_deg();
-        Status {
-            state: seen.state,
-            angle_deg: seen.machine_deg - zero.unwrap_or(0.0),
-            machine_deg: seen.machine_deg,
-            degrees_per_second: seen.speed,
-            battery_v: seen.battery_v,
-            index: seen.pins.index,
-            emergency_stop: seen.pins.emergency_stop,
-            homed: zero.is_some(),
-            alarm: supervisor.alarm(),
-        }
-    }
-}
-
-/// What homing did.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Homed {
-    /// The index was found: the angle 0 is there.
-    Index,
-    /// There is no index sensor: the angle 0 is where the table stood.
-    WhereItStands,
-}
 
 /// A table, owned by this process. It is stopped when this is dropped.
 pub struct Table {
@@ -156,46 +103,6 @@ impl Table {
     /// [`TurntableError::Silent`].
     pub fn status(&self) -> Result<Status, TurntableError> {
         self.link.status()
-    }
-
-    /// Looks for the index, or, where the controller has no index sensor, counts the angle 0 from
-    /// where the table stands.
-    ///
-    /// # Errors
-    /// [`TurntableError::Homing`] where no index was found; what stops a motion.
-    pub fn home(&self) -> Result<Homed, TurntableError> {
-        if !self.identity.homing {
-            return self.home_where_it_stands();
-        }
-        self.begin(Course::Homing)?;
-        let searched = self.search_index();
-        self.link.supervisor().end_motion();
-        searched
-    }
-
-    fn search_index(&self) -> Result<Homed, TurntableError> {
-        match self.outcome("$H", HOMING)? {
-            Outcome::Refused(HOMING_OFF) => return self.home_where_it_stands(),
-            Outcome::Refused(code) => return Err(refused("$H", code)),
-            Outcome::Failed(fault) => return Err(self.lost("$H", fault)),
-            Outcome::Done(_) => {}
-        }
-        if let Some(fault) = self.end_by_fault()? {
-            return Err(fault);
-        }
-        // A controller that has not found its index accepts `$H` all the same.
-        let status = self.status()?;
-        if status.state != State::Idle {
-            return Err(TurntableError::Homing(status.alarm.unwrap_or(Alarm(None))));
-        }
-        self.link.supervisor().set_zero_deg(0.0);
-        Ok(Homed::Index)
-    }
-
-    fn home_where_it_stands(&self) -> Result<Homed, TurntableError> {
-        let status = self.ready()?;
-        self.link.supervisor().set_zero_deg(status.machine_deg);
-        Ok(Homed::WhereItStands)
     }
 
     /// Turns by `degrees` and waits until the table is there. Speed in degrees a second; brisk
@@ -318,7 +225,7 @@ impl Table {
     }
 
     /// Starts watching a motion, unless one is under way.
-    fn begin(&self, course: Course) -> Result<(), TurntableError> {
+    pub(super) fn begin(&self, course: Course) -> Result<(), TurntableError> {
         self.secure()?;
         let mut supervisor = self.link.supervisor();
         if supervisor.is_stopping() || supervisor.motion().is_some() {
@@ -406,7 +313,11 @@ impl Table {
         greeting::secure(&self.link, &self.identity.extras)
     }
 
-    fn outcome(&self, block: &str, patience: Patience) -> Result<Outcome, TurntableError> {
+    pub(super) fn outcome(
+        &self,
+        block: &str,
+        patience: Patience,
+    ) -> Result<Outcome, TurntableError> {
         self.secure()?;
         let _line = self.line.lock().unwrap_or_else(PoisonError::into_inner);
         self.link.line(block, patience)
@@ -422,7 +333,7 @@ impl Table {
     }
 
     /// A line without answer: the table is being stopped for it, and that is waited for.
-    fn lost(&self, block: &str, fault: super::wire::LineFault) -> TurntableError {
+    pub(super) fn lost(&self, block: &str, fault: super::wire::LineFault) -> TurntableError {
         match self.end_by_fault() {
             Err(error) => error,
             Ok(Some(TurntableError::Motion(fault @ super::error::Fault::PortLost(_)))) => {
@@ -447,7 +358,7 @@ impl Drop for Table {
     }
 }
 
-fn refused(block: &str, code: u8) -> TurntableError {
+pub(super) fn refused(block: &str, code: u8) -> TurntableError {
     TurntableError::Refused {
         block: block.to_owned(),
         code,

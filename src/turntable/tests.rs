@@ -288,7 +288,7 @@ fn a_controller_that_falls_silent_ends_the_turn_within_a_second() {
     // Nobody can tell whether it stands.
     assert!(matches!(turn.state(), Err(TurntableError::NotStopped)));
     drop(turn);
-    assert!(!rig.table.link().supervisor().zero_deg().is_some());
+    assert!(rig.table.link().supervisor().zero_deg().is_none());
 }
 
 #[test]

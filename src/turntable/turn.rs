@@ -4,9 +4,10 @@ use std::time::Duration;
 
 use super::error::TurntableError;
 use super::plan::TurnPlan;
+use super::status::Status;
 use super::supervisor::Seen;
 use super::sync::{self, Track};
-use super::table::{Status, Table, straight};
+use super::table::{Table, straight};
 use super::wire::State;
 
 /// How long the table rests before it starts, so that it has stopped swinging.

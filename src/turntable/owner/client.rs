@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use super::claim::{Files, owner_pid, try_lock};
 use super::{Answer, Question};
 use crate::turntable::error::TurntableError;
-use crate::turntable::table::Status;
+use crate::turntable::status::Status;
 
 /// How long an owner that is just opening the port may take until it answers.
 const OPENING: Duration = Duration::from_secs(15);

@@ -16,7 +16,7 @@ pub(super) use claim::Claim;
 pub use client::Owner;
 pub(super) use server::Server;
 
-use super::table::Status;
+use super::status::Status;
 
 /// What can be asked of an owner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

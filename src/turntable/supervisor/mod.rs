@@ -5,19 +5,19 @@
 //! It knows nothing of turns.
 
 mod motion;
+mod seen;
 mod stop;
 #[cfg(test)]
 mod tests;
 
-use std::time::Duration;
-
 use super::Alarm;
 use super::error::Fault;
 use super::wire::{
-    Counts, Event, LineFault, Machine, Outcome, Patience, Pins, Poll, Position, ResetCause,
-    SendError, State,
+    Counts, Event, LineFault, Machine, Outcome, Patience, Poll, Position, ResetCause, SendError,
+    State,
 };
 pub(crate) use motion::{Course, Motion};
+pub(crate) use seen::{Habits, Seen};
 pub(crate) use stop::{Stop, StopOutcome};
 
 /// Between two reports while the table is being stopped, microseconds.
@@ -26,36 +26,6 @@ const STOPPING_POLL_US: i64 = 50_000;
 const WANTED_POLL_US: i64 = 100_000;
 /// Most reports recorded of one turn: an hour of them at 15 a second.
 const MOST_RECORDED: usize = 54_000;
-
-/// A report in degrees.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Seen {
-    pub(crate) state: State,
-    /// Degrees from machine zero.
-    pub(crate) machine_deg: f64,
-    /// Degrees a second.
-    pub(crate) speed: f64,
-    pub(crate) chip_us: Option<u32>,
-    pub(crate) battery_v: Option<f64>,
-    pub(crate) pins: Pins,
-    pub(crate) asked_us: Option<i64>,
-    pub(crate) came_us: i64,
-    /// Whether question and report certainly belong together.
-    pub(crate) certain: bool,
-}
-
-/// How the controller tells its position, and how often it is asked in motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Habits {
-    /// Degrees in one unit of its reports.
-    pub(crate) degrees_per_unit: f64,
-    /// Between two reports in motion.
-    pub(crate) poll: Duration,
-    /// Whether it answers `?` while it looks for the index.
-    pub(crate) reports_homing: bool,
-    /// Smallest distance it can stand off its target, degrees.
-    pub(crate) step_deg: f64,
-}
 
 /// Everything known of one table, and the wire to it.
 #[derive(Debug)]

@@ -1,5 +1,7 @@
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
+use std::time::Duration;
+
 use super::*;
 
 const HABITS: Habits = Habits {

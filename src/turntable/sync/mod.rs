@@ -318,7 +318,7 @@ fn by_the_chip(points: &[Point], course: &Course) -> Result<Fitted, TrackError> 
         .collect();
     let clocks = line::robust(&host, CLOCK_FLOOR_US);
     let factor = clocks.line.slope.recip();
-    if !((factor - 1.0).abs() <= MOST_OFF) {
+    if !(1.0 - MOST_OFF..=1.0 + MOST_OFF).contains(&factor) {
         return Err(TrackError::Clock { factor });
     }
     Ok(Fitted {

@@ -10,6 +10,7 @@
 //! It knows nothing of what the lines mean for the table.
 
 mod checksum;
+mod event;
 mod lines;
 mod machine;
 mod message;
@@ -19,10 +20,14 @@ mod polling;
 mod status;
 
 #[cfg(test)]
+mod properties;
+#[cfg(test)]
 mod tests;
 
-pub use machine::{Counts, Event, LineFault, Machine, Outcome, Patience, SendError};
+pub use event::{Counts, Event, LineFault, Outcome, SendError};
+pub use machine::Machine;
 pub use message::{Banner, Message, ResetCause, parse};
+pub use pending::Patience;
 pub use polling::Poll;
 pub use status::{Pins, Position, State, StatusReport};
 

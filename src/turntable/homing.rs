@@ -1,0 +1,63 @@
+//! Where the angle 0 is: at the index, or where the table stands.
+
+use super::codes::Alarm;
+use super::error::TurntableError;
+use super::supervisor::Course;
+use super::table::{Table, refused};
+use super::wire::{Outcome, Patience, State};
+
+/// How long the search for the index may take.
+const HOMING: Patience = Patience::Long(120_000_000);
+/// Grbl's refusal of `$H` where homing is switched off.
+const HOMING_OFF: u8 = 5;
+
+/// What homing did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Homed {
+    /// The index was found: the angle 0 is there.
+    Index,
+    /// There is no index sensor: the angle 0 is where the table stood.
+    WhereItStands,
+}
+
+impl Table {
+    /// Looks for the index, or, where the controller has no index sensor, counts the angle 0 from
+    /// where the table stands.
+    ///
+    /// # Errors
+    /// [`TurntableError::Homing`] where no index was found; what stops a motion.
+    pub fn home(&self) -> Result<Homed, TurntableError> {
+        if !self.identity().homing {
+            return self.home_where_it_stands();
+        }
+        self.begin(Course::Homing)?;
+        let searched = self.search_index();
+        self.link().supervisor().end_motion();
+        searched
+    }
+
+    fn search_index(&self) -> Result<Homed, TurntableError> {
+        match self.outcome("$H", HOMING)? {
+            Outcome::Refused(HOMING_OFF) => return self.home_where_it_stands(),
+            Outcome::Refused(code) => return Err(refused("$H", code)),
+            Outcome::Failed(fault) => return Err(self.lost("$H", fault)),
+            Outcome::Done(_) => {}
+        }
+        if let Some(fault) = self.end_by_fault()? {
+            return Err(fault);
+        }
+        // A controller that has not found its index accepts `$H` all the same.
+        let status = self.status()?;
+        if status.state != State::Idle {
+            return Err(TurntableError::Homing(status.alarm.unwrap_or(Alarm(None))));
+        }
+        self.link().supervisor().set_zero_deg(0.0);
+        Ok(Homed::Index)
+    }
+
+    fn home_where_it_stands(&self) -> Result<Homed, TurntableError> {
+        let status = self.ready()?;
+        self.link().supervisor().set_zero_deg(status.machine_deg);
+        Ok(Homed::WhereItStands)
+    }
+}

@@ -1,0 +1,45 @@
+//! What a table is doing.
+
+use super::codes::Alarm;
+use super::supervisor::{Seen, Supervisor};
+use super::wire::State;
+
+/// What the table is doing, by a report of just now.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Status {
+    /// The controller's state.
+    pub state: State,
+    /// Degrees from the angle counted as zero, or from machine zero while that is not known.
+    pub angle_deg: f64,
+    /// Degrees as the controller counts them.
+    pub machine_deg: f64,
+    /// Speed, degrees a second.
+    pub degrees_per_second: f64,
+    /// Battery, volts, where the controller measures it.
+    pub battery_v: Option<f64>,
+    /// Whether the index sensor is active.
+    pub index: bool,
+    /// Whether the emergency stop is pressed.
+    pub emergency_stop: bool,
+    /// Whether the position can be trusted.
+    pub homed: bool,
+    /// What locked the table.
+    pub alarm: Option<Alarm>,
+}
+
+impl Status {
+    pub(super) fn of(seen: &Seen, supervisor: &Supervisor) -> Status {
+        let zero = supervisor.zero_deg();
+        Status {
+            state: seen.state,
+            angle_deg: seen.machine_deg - zero.unwrap_or(0.0),
+            machine_deg: seen.machine_deg,
+            degrees_per_second: seen.speed,
+            battery_v: seen.battery_v,
+            index: seen.pins.index,
+            emergency_stop: seen.pins.emergency_stop,
+            homed: zero.is_some(),
+            alarm: supervisor.alarm(),
+        }
+    }
+}
