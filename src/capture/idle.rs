@@ -114,10 +114,11 @@ impl Idle {
                 Err(error) => self.no_camera(&error.to_string()),
             }
         }
-        if equipment.wants_table() && equipment.table.is_none() {
-            if let Err(error) = equipment.open_table() {
-                self.no_table(&error.to_string());
-            }
+        if equipment.wants_table()
+            && equipment.table.is_none()
+            && let Err(error) = equipment.open_table()
+        {
+            self.no_table(&error.to_string());
         }
     }
 

@@ -18,9 +18,9 @@ use super::state::{Check, Monitor, Phase, TakeSummary};
 use super::stop::StopRequest;
 use super::tracking::Course;
 use super::viewer::Viewer;
-use super::{End, Ended, Plan, Recorder, Refusal, Report, Take, metering};
-use crate::camera::Camera;
+use super::{End, Ended, Plan, Recorder, Refusal, Report, Take, WhenFull, metering};
 use crate::camera::lock::moved_between;
+use crate::camera::{Address, Camera};
 use crate::turntable::{Table, TurnPlan};
 
 /// Longest wait of a second session name's turn: names have whole seconds.
@@ -168,7 +168,9 @@ fn get_ready(
         manifest,
         mode: held.mode,
         fps: held.fps(),
+        window: None,
         max_dropped: settings.max_dropped,
+        when_full: when_full(&settings),
         stall: preflight::frame_patience(&equipment.clock()),
     };
     Ok(Ready {
@@ -212,6 +214,14 @@ fn ready_to_turn(
     let (turn, check) = preflight::plan_turn(table, settings)?;
     note(on, [check]);
     Ok(Some(turn))
+}
+
+/// A replayed camera can wait for the disk, and a rehearsal on a slow disk loses nothing.
+fn when_full(settings: &Settings) -> WhenFull {
+    match settings.camera {
+        Address::Replay { .. } => WhenFull::Wait,
+        _ => WhenFull::Drop,
+    }
 }
 
 fn note(on: Onlookers<'_>, checks: impl IntoIterator<Item = Check>) {

@@ -157,7 +157,7 @@ fn plan(table: &Table, fps: f64, home_deg: f64) -> Result<TurnPlan, CaptureError
     let ramp_deg = speed * speed / (2.0 * identity.acceleration) + MARGIN_DEG + 1.0;
     let limits = identity.limits;
     let room = limits.high_deg - limits.low_deg - 2.0 * ramp_deg;
-    let turn_deg = room.min(MOST_TURN).max(360.0);
+    let turn_deg = room.clamp(360.0, MOST_TURN);
     let status = table.status()?;
     let zero = status.machine_deg - status.angle_deg;
     // The limits are the controller's; the way begins as close to where the table stands as it can.
