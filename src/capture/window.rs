@@ -95,6 +95,8 @@ pub(super) struct Cutter {
     window: Option<Window>,
     ring: VecDeque<Arc<Frame>>,
     ring_bytes: usize,
+    /// Frames in the ring with which a chain begins.
+    keys: usize,
     /// The last frame before those of the turn that are recorded.
     before: Option<Stamp>,
     /// The last frame for which there was no place in the ring.
@@ -112,6 +114,7 @@ impl Cutter {
             window: None,
             ring: VecDeque::new(),
             ring_bytes: 0,
+            keys: 0,
             before: None,
             dropped: None,
             stamps: Vec::new(),
@@ -126,7 +129,7 @@ impl Cutter {
             return Vec::new();
         }
         self.window = Some(window);
-        self.ring_bytes = 0;
+        (self.ring_bytes, self.keys) = (0, 0);
         self.before = self.dropped;
         let waiting = std::mem::take(&mut self.ring);
         waiting
@@ -184,12 +187,14 @@ impl Cutter {
         self.before = Some(stamp_of(&frame));
         let newest = frame.t_us;
         self.ring_bytes += frame.data.len();
+        self.keys += usize::from(self.is_key(&frame));
         self.ring.push_back(frame);
         while let Some(oldest) = self.ring.front()
             && (self.ring_bytes > RING_BYTES
                 || newest.saturating_sub(oldest.t_us) > RING_US && !self.carries_the_rest())
         {
             self.ring_bytes -= oldest.data.len();
+            self.keys -= usize::from(self.is_key(oldest));
             self.dropped = Some(stamp_of(oldest));
             self.ring.pop_front();
         }
@@ -198,10 +203,12 @@ impl Cutter {
     /// Whether the oldest frame that waits is the one on which all later ones build: some cameras
     /// send a key frame every ten seconds only.
     fn carries_the_rest(&self) -> bool {
-        self.begins_chain.is_some_and(|begins| {
-            let keys = self.ring.iter().filter(|frame| begins(&frame.data));
-            self.ring.front().is_some_and(|oldest| begins(&oldest.data)) && keys.count() == 1
-        })
+        self.keys == 1 && self.ring.front().is_some_and(|oldest| self.is_key(oldest))
+    }
+
+    /// Whether a chain of frames begins with this one.
+    fn is_key(&self, frame: &Frame) -> bool {
+        self.begins_chain.is_some_and(|begins| begins(&frame.data))
     }
 
     /// What a decoder needs before the turn's first frame.
@@ -467,6 +474,25 @@ mod tests {
             .count();
         assert_eq!((lead, chosen.len() - lead, count.expected), (7, 30, 30));
         assert_eq!(chosen[0].frame.data, [1]);
+    }
+
+    #[test]
+    fn a_chain_is_kept_from_its_key_frame_on_however_long_ago_that_was() {
+        let mut cutter = Cutter::new(30.0, Some(|data| data == [1]));
+        let mut chosen = Vec::new();
+        for (n, mut frame) in frames(0..600).enumerate() {
+            frame.data = vec![u8::from(n % 250 == 0)];
+            chosen.extend(cutter.push(Arc::new(frame)));
+            if n == 480 {
+                chosen.extend(cutter.announce(seconds(15.01, 17.01)));
+            }
+        }
+        let (rest, count) = cutter.end();
+        chosen.extend(rest);
+        assert_eq!((count.expected, count.missing_count()), (60, 0));
+        assert_eq!(chosen[0].frame.data, [1]);
+        // From frame 250 on, before frame 451.
+        assert_eq!(chosen.len(), 201 + 60);
     }
 
     proptest! {
