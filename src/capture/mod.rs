@@ -10,6 +10,7 @@
 //! and the angle at a time are given to it.
 
 mod error;
+mod faults;
 mod film;
 mod preview;
 mod recorder;
