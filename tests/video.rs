@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use image::RgbImage;
 use relit::geometry::Rect;
-use relit::video::{Damage, Error, FrameFault, Video};
+use relit::video::{CodedFrame, Damage, Error, FrameFault, RawLayout, Video};
 use support::{ffmpeg, packets};
 use tempfile::TempDir;
 
@@ -538,4 +538,99 @@ fn a_frame_beyond_the_end_is_refused() {
             ..
         })
     ));
+}
+
+#[test]
+fn coded_frames_are_the_bytes_of_the_file() {
+    let (folder, path) = made(PATTERN, "clip.avi", "-c:v mjpeg");
+    let video = Video::open(&path).unwrap();
+    let coded: Vec<_> = video.packets().unwrap().collect();
+    let sizes: Vec<usize> = packets(folder.path(), "clip.avi")
+        .iter()
+        .map(|place| place.size)
+        .collect();
+    let found: Vec<usize> = coded.iter().map(|frame| frame.data.len()).collect();
+    assert_eq!(found, sizes);
+    assert!(coded.iter().all(|frame| frame.key && !frame.damaged));
+    assert!(coded.iter().map(|frame| frame.number).eq(0..10));
+    assert!(video.is_in_order());
+    let arguments = "-i clip.avi -c copy -f mjpeg -";
+    let stream = ffmpeg(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    assert!(all_data(&coded) == stream);
+}
+
+fn all_data(frames: &[CodedFrame]) -> Vec<u8> {
+    frames.iter().flat_map(|frame| frame.data.clone()).collect()
+}
+
+/// The units of an H.264 byte stream, without start codes.
+fn units(stream: &[u8]) -> Vec<Vec<u8>> {
+    let mut units = vec![Vec::new()];
+    for &byte in stream {
+        let unit = units.last_mut().unwrap();
+        unit.push(byte);
+        if unit.ends_with(&[0, 0, 1]) {
+            let end = unit
+                .iter()
+                .rposition(|&byte| byte > 1)
+                .map_or(0, |at| at + 1);
+            unit.truncate(end);
+            units.push(Vec::new());
+        }
+    }
+    units.split_off(1)
+}
+
+#[test]
+fn coded_h264_is_the_byte_stream_of_a_camera() {
+    const PARAMETER_SETS: [u8; 2] = [7, 8];
+    let kind = |unit: &[u8]| unit[0] & 0x1f;
+    let (folder, path) = made(PATTERN, "clip.mp4", "-c:v libx264 -bf 0 -g 4");
+    let video = Video::open(&path).unwrap();
+    assert!(video.is_in_order());
+    let coded: Vec<_> = video.packets().unwrap().collect();
+    for frame in &coded {
+        let kinds: Vec<u8> = units(&frame.data).iter().map(|unit| kind(unit)).collect();
+        assert_eq!(kinds.starts_with(&PARAMETER_SETS), frame.key, "{kinds:?}");
+    }
+    assert_eq!(coded.iter().filter(|frame| frame.key).count(), 3);
+    let arguments = "-i clip.mp4 -c copy -bsf:v h264_mp4toannexb -f h264 -";
+    let stream = ffmpeg(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    // FFmpeg puts the parameter sets behind other headers of the frame.
+    let others = |stream: &[u8]| -> Vec<Vec<u8>> {
+        let mut units = units(stream);
+        units.retain(|unit| !PARAMETER_SETS.contains(&kind(unit)));
+        units
+    };
+    assert!(others(&all_data(&coded)) == others(&stream));
+}
+
+#[test]
+fn frames_that_stand_out_of_order_are_told() {
+    let (_folder, path) = made(PATTERN, "clip.mp4", "-c:v libx264 -bf 2");
+    assert!(!Video::open(&path).unwrap().is_in_order());
+}
+
+#[test]
+fn raw_pictures_hold_the_samples_of_the_video() {
+    for (pixels, layout, raw) in [
+        ("yuv420p", RawLayout::Nv12, "nv12"),
+        ("yuv422p", RawLayout::Yuyv, "yuyv422"),
+        ("gray", RawLayout::Grey, "gray"),
+        ("bgr0", RawLayout::Rgb24, "rgb24"),
+    ] {
+        let encoding = format!("-c:v ffv1 -pix_fmt {pixels}");
+        let (folder, path) = made(PATTERN, "clip.mkv", &encoding);
+        let video = Video::open(&path).unwrap();
+        let wanted: Vec<u64> = (0..video.frames().len() as u64).collect();
+        let mut found = Vec::new();
+        for pending in video.read(&wanted, 1).unwrap() {
+            let (is, data) = video.picture(pending).unwrap().raw().unwrap();
+            assert_eq!(is, layout, "{pixels}");
+            found.extend(data);
+        }
+        let arguments = format!("-i clip.mkv -pix_fmt {raw} -f rawvideo -");
+        let reference = ffmpeg(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+        assert!(found == reference, "{pixels}");
+    }
 }

@@ -113,6 +113,45 @@ impl FrameIndex {
         Ok(index)
     }
 
+    /// Reads an index as far as it is whole, and says what is wrong from there on: what a power cut
+    /// leaves need not be a line.
+    #[must_use]
+    pub fn parse_as_far_as_whole(bytes: &[u8]) -> (Self, Option<IndexFault>) {
+        let mut index = Self::default();
+        for (text, line) in bytes.split_inclusive(|&byte| byte == b'\n').zip(1_u64..) {
+            let read = match serde_json::from_slice::<FrameEntry>(text) {
+                Ok(entry) => index.push_as(entry, line),
+                Err(error) => Err(IndexFault::Line {
+                    line,
+                    what: error.to_string(),
+                }),
+            };
+            if let Err(fault) = read {
+                index.torn = true;
+                return (index, Some(fault));
+            }
+        }
+        (index, None)
+    }
+
+    /// The index as the bytes of its file.
+    ///
+    /// # Errors
+    /// Where an entry is not JSON, which no checked one is.
+    pub fn to_jsonl(&self) -> Result<Vec<u8>, serde_json::Error> {
+        let mut bytes = Vec::with_capacity(self.entries.len() * 72);
+        for entry in &self.entries {
+            serde_json::to_writer(&mut bytes, entry)?;
+            bytes.push(b'\n');
+        }
+        Ok(bytes)
+    }
+
+    /// Forgets all frames from position `frames` on.
+    pub fn truncate(&mut self, frames: usize) {
+        self.entries.truncate(frames);
+    }
+
     /// Adds the next frame.
     ///
     /// # Errors
@@ -236,6 +275,18 @@ mod tests {
         let index = FrameIndex::parse(&whole.as_bytes()[..whole.len() - 9]).unwrap();
         assert_eq!(index.entries().len(), 1);
         assert!(index.is_torn());
+    }
+
+    #[test]
+    fn an_index_is_read_as_far_as_it_is_whole() {
+        let whole = text(&[entry(0), entry(1)]);
+        let (index, fault) = FrameIndex::parse_as_far_as_whole(whole.as_bytes());
+        assert_eq!((index.entries().len(), fault), (2, None));
+        assert_eq!(index.to_jsonl().unwrap(), whole.as_bytes());
+        let zeros = [whole.as_bytes(), &[0; 100]].concat();
+        let (index, fault) = FrameIndex::parse_as_far_as_whole(&zeros);
+        assert_eq!(index.entries().len(), 2);
+        assert!(matches!(fault, Some(IndexFault::Line { line: 3, .. })));
     }
 
     #[test]

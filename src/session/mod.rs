@@ -5,21 +5,25 @@
 //! nothing of cameras, masks or shards. A video file without a session folder is taken too: it is
 //! a [`Recording`] without manifest and frame index.
 
+mod claim;
 mod frames;
 mod manifest;
 mod recording;
+mod unended;
 mod writer;
 
 use std::io;
 use std::path::PathBuf;
 
 pub use crate::naming::is_session_name;
+pub use claim::Claim;
 pub use frames::{FrameEntry, FrameIndex, Gap, IndexFault};
 pub use manifest::{
     CameraFacts, Fault, MANIFEST_SCHEMA, Manifest, ManifestFault, SoftwareFacts, Status,
     TurntableFacts, VideoFacts, object_of,
 };
 pub use recording::{Notice, Recording, recordings};
+pub use unended::Unended;
 pub use writer::SessionWriter;
 
 /// Name of the manifest in a session folder.
@@ -91,6 +95,12 @@ pub enum Error {
     /// A session of this name stands there already.
     #[error("{0} is there already: a session is never written over another")]
     Exists(PathBuf),
+    /// Another process records there, or works on it.
+    #[error("{0} is being recorded by another process: wait for it to end")]
+    InUse(PathBuf),
+    /// The session has ended already.
+    #[error("{0} is not marked as still recording: there is nothing to bring to an end")]
+    Ended(PathBuf),
     /// The name cannot be a session's.
     #[error(
         "{0:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most 120 bytes, not starting with '.'"

@@ -5,13 +5,14 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::{
-    Error, FrameEntry, FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, Status, is_session_name,
+    Claim, Error, FrameEntry, FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, Status,
+    is_session_name,
 };
 use crate::durable;
 
 /// A session folder under way. The manifest says "recording" until [`Self::finish`] or
 /// [`Self::abort`]; a writer that is dropped leaves it so, which is what the next start of a
-/// capture looks for.
+/// capture looks for. While it lives, the folder is claimed: see [`Claim`].
 #[derive(Debug)]
 pub struct SessionWriter {
     folder: PathBuf,
@@ -20,6 +21,9 @@ pub struct SessionWriter {
     lines: File,
     /// Bytes of the index file's whole lines.
     length: u64,
+    /// True where the index in memory says more than its file, or less.
+    rewrite: bool,
+    claim: Claim,
 }
 
 impl SessionWriter {
@@ -41,6 +45,9 @@ impl SessionWriter {
             made => made.map_err(Error::io(&folder, "made"))?,
         }
         durable::sync_folder(root).map_err(Error::io(root, "synced"))?;
+        // Claimed before there is a manifest: never does it stand there as if interrupted.
+        let mut claim = Claim::take(&folder)?;
+        claim.reserve()?;
         manifest.status = Status::Recording;
         manifest.video.frames = None;
         manifest.video.bytes = None;
@@ -59,6 +66,8 @@ impl SessionWriter {
             index: FrameIndex::default(),
             lines,
             length: 0,
+            rewrite: false,
+            claim,
         })
     }
 
@@ -88,7 +97,7 @@ impl SessionWriter {
         self.keep(entry)?;
         let written = self.append(&entry);
         if written.is_err() {
-            self.take_back()?;
+            self.take_back();
         }
         written.map_err(Error::io(self.folder.join(INDEX_FILE), "written"))
     }
@@ -117,15 +126,37 @@ impl SessionWriter {
     }
 
     /// Forgets the last entry, whose line could not be written.
-    fn take_back(&mut self) -> Result<(), Error> {
+    fn take_back(&mut self) {
         // Where the file cannot be cut now, it is cut before the next line and before a sync.
         let _ = self.cut();
-        let entries = std::mem::take(&mut self.index);
-        let whole = entries
-            .entries()
-            .split_last()
-            .map_or(&[][..], |(_, rest)| rest);
-        whole.iter().try_for_each(|&entry| self.keep(entry))
+        self.index
+            .truncate(self.index.entries().len().saturating_sub(1));
+    }
+
+    /// The index so far.
+    #[must_use]
+    pub fn index(&self) -> &FrameIndex {
+        &self.index
+    }
+
+    /// Gives each frame what became known of it since its line was written, such as its angle. The
+    /// file is rewritten, whole or not at all, when the session ends.
+    ///
+    /// # Errors
+    /// [`Error::BadEntry`] for the first entry that does not fit; none is changed then.
+    pub fn amend(&mut self, amended: impl Fn(&FrameEntry) -> FrameEntry) -> Result<(), Error> {
+        let mut index = FrameIndex::default();
+        for entry in self.index.entries() {
+            let entry = amended(entry);
+            index.push(entry).map_err(|fault| Error::BadEntry {
+                path: self.folder.join(INDEX_FILE),
+                n: entry.n,
+                fault,
+            })?;
+        }
+        self.rewrite |= index != self.index;
+        self.index = index;
+        Ok(())
     }
 
     /// Makes the index durable up to the last frame pushed.
@@ -155,27 +186,53 @@ impl SessionWriter {
         self.end(Status::Aborted(reason.to_owned()))
     }
 
-    fn end(mut self, status: Status) -> Result<Manifest, Error> {
+    fn end(self, status: Status) -> Result<Manifest, Error> {
+        // On a full disk this is the room for what follows.
+        self.claim.release_reserve()?;
         self.sync()?;
-        let path = self.video_path();
-        // A capture can fail before its first frame: it is aborted without a video.
-        if path.is_file() {
-            let file = File::open(&path).map_err(Error::io(&path, "read"))?;
-            file.sync_all().map_err(Error::io(&path, "synced"))?;
-            let mut hasher = blake3::Hasher::new();
-            let hashed = hasher
-                .update_reader(file)
-                .map_err(Error::io(&path, "read"))?;
-            self.manifest.video.bytes = Some(hashed.count());
-            self.manifest.video.blake3 = Some(hashed.finalize().to_hex().to_string());
-        } else if status == Status::Complete {
-            return Err(Error::VideoMissing(path));
+        if self.rewrite {
+            write_index(&self.folder, &self.index)?;
         }
-        self.manifest.status = status;
-        self.manifest.video.frames = Some(self.index.entries().len() as u64);
-        write_manifest(&self.folder, &self.manifest)?;
-        Ok(self.manifest)
+        let frames = self.index.entries().len() as u64;
+        let manifest = close(&self.folder, self.manifest, frames, status)?;
+        self.claim.end()?;
+        Ok(manifest)
     }
+}
+
+/// Takes the video's size and hash into the manifest and writes it with its last status.
+pub(super) fn close(
+    folder: &Path,
+    mut manifest: Manifest,
+    frames: u64,
+    status: Status,
+) -> Result<Manifest, Error> {
+    let path = folder.join(&manifest.video.file);
+    // A capture can fail before its first frame: it is aborted without a video.
+    if path.is_file() {
+        let file = File::open(&path).map_err(Error::io(&path, "read"))?;
+        file.sync_all().map_err(Error::io(&path, "synced"))?;
+        let mut hasher = blake3::Hasher::new();
+        let hashed = hasher
+            .update_reader(file)
+            .map_err(Error::io(&path, "read"))?;
+        manifest.video.bytes = Some(hashed.count());
+        manifest.video.blake3 = Some(hashed.finalize().to_hex().to_string());
+    } else if status == Status::Complete {
+        return Err(Error::VideoMissing(path));
+    }
+    manifest.status = status;
+    manifest.video.frames = Some(frames);
+    write_manifest(folder, &manifest)?;
+    Ok(manifest)
+}
+
+pub(super) fn write_index(folder: &Path, index: &FrameIndex) -> Result<(), Error> {
+    let path = folder.join(INDEX_FILE);
+    let bytes = index.to_jsonl().map_err(io::Error::other);
+    bytes
+        .and_then(|bytes| durable::write_whole(&path, &bytes))
+        .map_err(Error::io(&path, "written"))
 }
 
 fn write_manifest(folder: &Path, manifest: &Manifest) -> Result<(), Error> {
@@ -188,10 +245,10 @@ fn write_manifest(folder: &Path, manifest: &Manifest) -> Result<(), Error> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn writer(root: &Path) -> SessionWriter {
+    pub(in crate::session) fn writer(root: &Path) -> SessionWriter {
         let json = br#"{
             "schema": "relit.session/1", "id": "20261120T093015Z-mug", "object": "mug",
             "created": "2026-11-20T09:30:15Z", "status": "recording",
@@ -205,7 +262,7 @@ mod tests {
         SessionWriter::create(root, Manifest::from_json(json).unwrap()).unwrap()
     }
 
-    fn entry(n: u64) -> FrameEntry {
+    pub(in crate::session) fn entry(n: u64) -> FrameEntry {
         FrameEntry {
             n,
             sequence: n,
@@ -231,5 +288,31 @@ mod tests {
         assert!(!index.is_torn());
         assert_eq!(index.entries(), [entry(0), entry(1)]);
         assert_eq!(writer.index, index);
+    }
+
+    fn with_angle(entry: &FrameEntry) -> FrameEntry {
+        FrameEntry {
+            angle_deg: Some(entry.n as f64),
+            ..*entry
+        }
+    }
+
+    #[test]
+    fn amended_entries_are_in_the_index_once_the_session_ends() {
+        let root = tempfile::tempdir().unwrap();
+        let mut writer = writer(root.path());
+        writer.push(entry(0)).unwrap();
+        writer.push(entry(1)).unwrap();
+        fs::write(writer.video_path(), b"two frames").unwrap();
+        let path = writer.folder().join(INDEX_FILE);
+        let wrong = |entry: &FrameEntry| FrameEntry { n: 7, ..*entry };
+        assert!(matches!(writer.amend(wrong), Err(Error::BadEntry { .. })));
+        writer.amend(with_angle).unwrap();
+        writer.finish().unwrap();
+        let index = FrameIndex::parse(&fs::read(path).unwrap()).unwrap();
+        assert_eq!(
+            index.entries(),
+            [entry(0), entry(1)].map(|e| with_angle(&e))
+        );
     }
 }

@@ -1,5 +1,5 @@
 //! Videos by way of FFmpeg: a file becomes frames with numbers and time stamps, and frames become
-//! RGB pictures.
+//! RGB pictures; and back: a [`Muxer`] writes what a camera delivers to a file.
 //!
 //! A [`Video`] is opened by reading through the file once without decoding: which frames it has,
 //! in order of presentation, when each is due, and whether the file is whole. A [`Reader`] then
@@ -11,26 +11,42 @@
 //! frame rate and gaps in the time stamps are kept as they are. This room knows nothing of
 //! sessions, masks or angles.
 
+mod annexb;
 mod decoder;
 mod ffv1;
+mod live;
+mod lossless;
 mod matroska;
+mod mux;
+mod nal;
 mod order;
 mod orientation;
+mod packets;
 mod picture;
+mod raw;
 mod reader;
 mod scan;
+mod seek;
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 
 use ffmpeg_next::format::context::Input;
 
+pub use live::LiveDecoder;
+pub use lossless::RawFormat;
 pub use matroska::{Cut, find_cut};
+pub use mux::{Coding, Muxer, StreamFormat, Written};
+pub use nal::is_key;
+pub use packets::{CodedFrame, Packets};
 pub use picture::Picture;
+pub use raw::RawLayout;
 pub use reader::{Pending, Reader};
 pub use scan::{Damage, Facts, FrameInfo, Video};
+pub use seek::first_picture;
 
-/// Why a video could not be read.
+/// Why a video could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// FFmpeg cannot make anything of the file.
@@ -82,6 +98,70 @@ pub enum Error {
         /// What is wrong with it.
         fault: FrameFault,
     },
+    /// The disk is full.
+    #[error(
+        "no room to write {path}: {missing} bytes of what was recorded are missing there; make room in {folder}, or record elsewhere",
+        folder = folder_of(path).display()
+    )]
+    NoRoom {
+        /// The file.
+        path: PathBuf,
+        /// Bytes that were taken and did not fit.
+        missing: u64,
+    },
+    /// The file system refused otherwise.
+    #[error(
+        "{path} could not be written ({source}): check the folder's rights and that the disk is in order"
+    )]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// FFmpeg refused to make the file.
+    #[error("{path} could not be made ({why}): does this FFmpeg write Matroska and FFV1?")]
+    Mux {
+        /// The file.
+        path: PathBuf,
+        /// FFmpeg's word.
+        why: ffmpeg_next::Error,
+    },
+    /// An uncompressed format that cannot have this size.
+    #[error(
+        "a picture of {width} x {height} pixels cannot be kept in this pixel format: choose another mode"
+    )]
+    PictureSize {
+        /// Width, pixels.
+        width: u32,
+        /// Height, pixels.
+        height: u32,
+    },
+    /// An uncompressed picture that is not one.
+    #[error(
+        "a picture of {width} x {height} pixels came with {found} bytes instead of {wanted}: the camera sends another size than agreed, or half a picture"
+    )]
+    PictureBytes {
+        /// Bytes that came.
+        found: usize,
+        /// Bytes of a whole picture.
+        wanted: usize,
+        /// Width, pixels.
+        width: u32,
+        /// Height, pixels.
+        height: u32,
+    },
+    /// H.264 in another form than cameras give it.
+    #[error("the stream for {0} is no H.264 with start codes: choose another mode of the camera")]
+    NotAnnexB(PathBuf),
+}
+
+/// The folder in which a file stands.
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    }
 }
 
 /// Why one frame yields no picture.

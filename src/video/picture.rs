@@ -111,9 +111,9 @@ fn is_grey(format: Pixel) -> bool {
 /// One decoded frame.
 pub struct Picture {
     number: u64,
-    frame: frame::Video,
-    colour: Colour,
-    orientation: Orientation,
+    pub(super) frame: frame::Video,
+    pub(super) colour: Colour,
+    pub(super) orientation: Orientation,
 }
 
 impl std::fmt::Debug for Picture {
@@ -250,7 +250,12 @@ fn strides_are_forward(frame: &frame::Video) -> bool {
 const BLOCK: usize = 32;
 
 /// One plane of samples, from the sample (x, y) on.
-fn plane(frame: &frame::Video, index: usize, x: usize, y: usize) -> Option<(&[u8], u32)> {
+pub(super) fn plane(
+    frame: &frame::Video,
+    index: usize,
+    x: usize,
+    y: usize,
+) -> Option<(&[u8], u32)> {
     if index >= frame.planes() {
         return None;
     }

@@ -53,7 +53,7 @@ impl Pending {
 
 impl Track {
     /// A decoded frame as a picture of this track.
-    fn picture(&self, number: u64, frame: frame::Video) -> Result<Picture, FrameFault> {
+    pub(super) fn picture(&self, number: u64, frame: frame::Video) -> Result<Picture, FrameFault> {
         let (wanted_w, wanted_h) = self.coded;
         let (found_w, found_h) = (frame.width(), frame.height());
         if (found_w, found_h) != self.coded {

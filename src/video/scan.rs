@@ -257,8 +257,11 @@ impl Video {
         {
             return Err(wrong(FrameFault::NotWhole));
         }
-        let pending = reader.next().ok_or_else(|| wrong(FrameFault::NoPicture))?;
         let all = Rect::new(0, 0, self.facts.width, self.facts.height);
+        if let Some(picture) = self.sought(number) {
+            return picture.rgb(all).map_err(wrong);
+        }
+        let pending = reader.next().ok_or_else(|| wrong(FrameFault::NoPicture))?;
         self.picture(pending)
             .and_then(|picture| picture.rgb(all))
             .map_err(wrong)
@@ -291,7 +294,7 @@ fn facts(decoder: &VideoDecoder, colour: Colour, orientation: Orientation) -> Fa
 }
 
 /// How the stream is to be turned, and what to say of it.
-fn orientation(stream: &format::stream::Stream<'_>) -> (Orientation, Vec<String>) {
+pub(super) fn orientation(stream: &format::stream::Stream<'_>) -> (Orientation, Vec<String>) {
     let mut side_data = stream.side_data();
     let matrix = side_data.find(|data| data.kind() == side_data::Type::DisplayMatrix);
     match matrix.map(|matrix| Orientation::from_display_matrix(matrix.data())) {

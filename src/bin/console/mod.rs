@@ -58,6 +58,21 @@ impl Console {
         }
     }
 
+    /// What is being done now: standard error for a person, a JSON line for a machine.
+    pub(crate) fn say_phase(self, text: &str, event: &Value) {
+        if self.json {
+            print_line(&event.to_string());
+        } else {
+            print_error_line(text);
+        }
+    }
+
+    /// A question for a person at the terminal, on standard error.
+    pub(crate) fn ask(self, question: &str) {
+        let _ = write!(io::stderr(), "{question}");
+        let _ = io::stderr().flush();
+    }
+
     /// How many lines of a long list to print: `for_people`, or all for a machine.
     pub(crate) fn most_lines(self, for_people: usize) -> usize {
         if self.json { usize::MAX } else { for_people }

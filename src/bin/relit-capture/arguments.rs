@@ -1,48 +1,96 @@
 //! The command line, and what it asks for.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use relit::turntable::Address;
+use relit::camera::lock::Wanted;
+use relit::camera::{self, Fourcc};
+use relit::capture::serve::Token;
+use relit::capture::{FrameSize, ModeWish, Settings};
+use relit::turntable;
+
+use crate::environment::runtime_folder;
+use crate::table_arguments::{
+    SIMULATE_EXAMPLES, SimulateArguments, TURNTABLE_EXAMPLES, TurntableArguments,
+};
 
 const EXAMPLES: &str = "\
 Examples:
+  relit-capture devices
+      cameras with their modes and controls, and the turntable's port
+  relit-capture record --object mug --camera v4l2:/dev/video0 --turntable serial:
+      one turn of the object on the table, as a session folder in ./sessions
+  relit-capture record --object mug --camera 'replay:fixtures/20261120T093015Z-cow?loop=1' --turntable sim:
+      a rehearsal without hardware
+  relit-capture serve --camera v4l2:/dev/video0 --turntable serial:
+      the rig as a page for a browser
   relit-capture turntable status
       what the table at the only controller plugged in is doing
-  relit-capture turntable --turntable serial:/dev/ttyUSB0 home
-      find the index, or make zero of where the table stands
-  relit-capture turntable jog -90
-      turn by 90 degrees, back
-  relit-capture turntable stop
-      stop it, also from beside a capture that runs
+
+Addresses: --camera v4l2:/dev/video0 | nokhwa:0 | replay:PATH, --turntable serial:/dev/ttyUSB0 | serial: | sim: | none.
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost.";
 
-const SIMULATE_EXAMPLES: &str = "\
-Examples:
-  relit-capture simulate --link /tmp/table
-      then, beside it: relit-capture turntable --turntable serial:/tmp/table status
-  relit-capture simulate --fault drop=0.01,flip=0.005 --fault reset@12.5s
-      a bad line, and a controller that restarts
+/// What the command line asks for.
+pub(crate) struct Arguments {
+    pub(crate) json: bool,
+    pub(crate) command: Command,
+}
 
-Faults: drop=SHARE flip=SHARE duplicate=SHARE merge=SHARE delay=SHARE:TIME of bytes or lines, with
-`to.` or `from.` before them for one direction; reset@TIME and stall@TIME.";
+/// What the program does.
+pub(crate) enum Command {
+    Devices,
+    Record(Box<Record>),
+    Serve(Box<Serve>),
+    Turntable(TurntableArguments),
+    Simulate(SimulateArguments),
+}
 
-/// Drive the turntable and record its turns.
+/// One capture.
+pub(crate) struct Record {
+    pub(crate) settings: Settings,
+    pub(crate) object: String,
+    pub(crate) meter: bool,
+    pub(crate) yes: bool,
+}
+
+/// The daemon.
+pub(crate) struct Serve {
+    pub(crate) settings: Settings,
+    pub(crate) address: SocketAddr,
+    pub(crate) token: Option<Token>,
+    pub(crate) names: Vec<String>,
+}
+
+/// Record turns of objects on a turntable as session folders.
 #[derive(Parser)]
 #[command(name = "relit-capture", version, after_help = EXAMPLES)]
-pub(crate) struct Arguments {
+struct CommandLine {
     #[command(subcommand)]
-    pub(crate) verb: Verb,
-    /// Print JSON lines, for machines.
+    verb: Verb,
+    /// Print JSON lines on standard output, for machines.
     #[arg(long, global = true)]
-    pub(crate) json: bool,
+    json: bool,
 }
 
 #[derive(Subcommand)]
-pub(crate) enum Verb {
+enum Verb {
+    /// List cameras with their modes and controls, and the turntable's port.
+    #[command(after_help = "Example:\n  relit-capture devices --json")]
+    Devices,
+    /// Capture one turn of the object on the table.
+    #[command(
+        after_help = "Example:\n  relit-capture record --object mug --turntable serial: --meter"
+    )]
+    Record(RecordArguments),
+    /// Serve the rig: a page for a phone or a browser, and an interface for scripts.
+    #[command(
+        after_help = "Example:\n  relit-capture serve --turntable serial: --listen 0.0.0.0:8420"
+    )]
+    Serve(ServeArguments),
     /// Look at the turntable, or move it.
-    #[command(after_help = EXAMPLES)]
+    #[command(after_help = TURNTABLE_EXAMPLES)]
     Turntable(TurntableArguments),
     /// Run a turntable without hardware: the firmware on a pseudoterminal.
     #[command(after_help = SIMULATE_EXAMPLES)]
@@ -50,87 +98,164 @@ pub(crate) enum Verb {
 }
 
 #[derive(Args)]
-pub(crate) struct TurntableArguments {
-    /// The table: serial:/dev/ttyUSB0, serial: (the only controller plugged in) or sim:.
-    #[arg(long, value_name = "ADDRESS", default_value = "serial:", global = true)]
-    pub(crate) turntable: Address,
-    #[command(subcommand)]
-    pub(crate) action: Action,
-}
-
-#[derive(Subcommand)]
-pub(crate) enum Action {
-    /// Tell what the table is doing.
-    Status,
-    /// Find the index; without an index sensor, count from where the table stands.
-    Home,
-    /// Turn by so many degrees, negative for back, and wait until it is done.
-    Jog {
-        /// Degrees from here.
-        #[arg(value_name = "DEGREES", allow_negative_numbers = true)]
-        degrees: f64,
-        /// Degrees a second; by default as fast as is gentle.
-        #[arg(long, value_name = "DEGREES_PER_SECOND")]
-        speed: Option<f64>,
-    },
-    /// Slow the table down to a stop and drop what it had to do.
-    Stop,
-    /// Release the lock after an alarm.
-    Unlock,
+struct RecordArguments {
+    /// The object's name, as it goes into the session's: letters, digits, '-', '_', '.'.
+    #[arg(long, value_name = "NAME")]
+    object: String,
+    /// Find the exposure on a slow metering turn first.
+    #[arg(long)]
+    meter: bool,
+    /// Do not ask before the table turns.
+    #[arg(long)]
+    yes: bool,
+    #[command(flatten)]
+    rig: RigArguments,
 }
 
 #[derive(Args)]
-pub(crate) struct SimulateArguments {
-    /// Make PATH a second name of the port.
-    #[arg(long, value_name = "PATH")]
-    pub(crate) link: Option<PathBuf>,
-    /// How many times faster than real time it runs.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
-    pub(crate) speed: f64,
-    /// What goes wrong, such as drop=0.01 or reset@12.5s; may be given again.
-    #[arg(long, value_name = "FAULT")]
-    pub(crate) fault: Vec<String>,
-    /// Seed of the random faults.
-    #[arg(long, default_value_t = 0)]
-    pub(crate) seed: u64,
-    /// Angle at which the table stands when it is switched on, degrees.
-    #[arg(
-        long,
-        value_name = "DEGREES",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
-    pub(crate) start_angle: f64,
-    /// Angle of the index sensor, degrees.
-    #[arg(
-        long,
-        value_name = "DEGREES",
-        default_value_t = 30.0,
-        allow_negative_numbers = true
-    )]
-    pub(crate) index_at: f64,
-    /// Volts of its battery.
-    #[arg(long, value_name = "VOLTS", default_value_t = 12.0)]
-    pub(crate) battery: f64,
-    /// How much faster than the host's clock its own goes, parts in a million.
-    #[arg(
-        long,
-        value_name = "PPM",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
-    pub(crate) drift_ppm: f64,
-    /// Opening the port does not reset the controller, as an Arduino's does.
-    #[arg(long)]
-    pub(crate) no_reset: bool,
-    /// End by itself after so many seconds.
-    #[arg(long = "for", value_name = "SECONDS")]
-    pub(crate) for_seconds: Option<f64>,
+struct ServeArguments {
+    /// Address and port to listen on.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8420")]
+    listen: SocketAddr,
+    /// What a client has to know [default: random where other machines can reach the address].
+    #[arg(long, value_name = "TOKEN")]
+    token: Option<Token>,
+    /// A name under which clients reach this machine, such as rig.local; may be given several times.
+    #[arg(long = "name", value_name = "NAME")]
+    names: Vec<String>,
+    #[command(flatten)]
+    rig: RigArguments,
+}
+
+#[derive(Args)]
+struct RigArguments {
+    /// The folder in which session folders are made.
+    #[arg(long, value_name = "DIR", default_value = "sessions")]
+    root: PathBuf,
+    /// The camera's address.
+    #[arg(long, value_name = "ADDRESS", default_value = "v4l2:/dev/video0")]
+    camera: camera::Address,
+    /// The turntable's address.
+    #[arg(long, value_name = "ADDRESS", default_value = "serial:")]
+    turntable: turntable::Address,
+    /// Speed of the turn, degrees a second.
+    #[arg(long, value_name = "SPEED", default_value_t = 7.2, value_parser = speed)]
+    degrees_per_second: f64,
+    /// Frames a second.
+    #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
+    fps: f64,
+    /// Frame size, such as 1920x1080 [default: the largest at that rate].
+    #[arg(long, value_name = "WIDTHxHEIGHT")]
+    size: Option<FrameSize>,
+    /// Pixel format: MJPG, H264, YUYV, NV12, RGB3, GREY or 8-bit Bayer [default: compressed before raw].
+    #[arg(long, value_name = "FORMAT", value_parser = fourcc)]
+    fourcc: Option<Fourcc>,
+    /// Exposure to hold, in the camera's own units [default: as it is].
+    #[arg(long, value_name = "VALUE")]
+    exposure: Option<i64>,
+    /// Gain to hold [default: as it is].
+    #[arg(long, value_name = "VALUE")]
+    gain: Option<i64>,
+    /// White balance to hold, kelvin [default: as it is].
+    #[arg(long, value_name = "KELVIN")]
+    white_balance: Option<i64>,
+    /// Focus to hold [default: as it is].
+    #[arg(long, value_name = "VALUE")]
+    focus: Option<i64>,
+    /// Part of the pixels in the middle, per cent, that metering lets saturate.
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.5, value_parser = percent)]
+    meter_clip: f64,
+    /// Least voltage of the table's battery [default: not looked at].
+    #[arg(long, value_name = "VOLTS", value_parser = volts)]
+    min_battery: Option<f64>,
+    /// Frames that may be missing or damaged in a take.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    max_dropped: u64,
+    /// How often a take that came out bad is repeated; the bad ones are kept.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(0..=100))]
+    retries: u32,
+}
+
+/// Reads the command line; ends the program with exit code 2 where it is wrong.
+pub(crate) fn parse() -> Arguments {
+    let line = CommandLine::parse();
+    let command = match line.verb {
+        Verb::Devices => Command::Devices,
+        Verb::Record(line) => Command::Record(Box::new(Record {
+            settings: line.rig.into(),
+            object: line.object,
+            meter: line.meter,
+            yes: line.yes,
+        })),
+        Verb::Serve(line) => Command::Serve(Box::new(Serve {
+            settings: line.rig.into(),
+            address: line.listen,
+            token: line.token,
+            names: line.names,
+        })),
+        Verb::Turntable(line) => Command::Turntable(line),
+        Verb::Simulate(line) => Command::Simulate(line),
+    };
+    Arguments {
+        json: line.json,
+        command,
+    }
+}
+
+impl From<RigArguments> for Settings {
+    fn from(line: RigArguments) -> Self {
+        let mut settings = Self::new(line.root, line.camera, line.turntable);
+        settings.mode = ModeWish {
+            fourcc: line.fourcc,
+            size: line.size,
+            fps: line.fps,
+        };
+        settings.wanted = Wanted {
+            exposure: line.exposure,
+            gain: line.gain,
+            white_balance: line.white_balance,
+            focus: line.focus,
+            power_line: None,
+        };
+        settings.degrees_per_second = line.degrees_per_second;
+        settings.min_battery_v = line.min_battery;
+        settings.max_dropped = line.max_dropped;
+        settings.retries = line.retries;
+        settings.meter_clip = line.meter_clip / 100.0;
+        settings.runtime_folder = runtime_folder();
+        settings.commit = option_env!("RELIT_COMMIT").unwrap_or_default().to_owned();
+        settings
+    }
+}
+
+fn fourcc(text: &str) -> Result<Fourcc, String> {
+    let known = || "give four characters such as MJPG, H264 or YUYV".to_owned();
+    let fourcc = Fourcc(text.as_bytes().try_into().map_err(|_| known())?);
+    match fourcc.encoding() {
+        Some(_) => Ok(fourcc),
+        None => Err(format!("{text} frames cannot be recorded: {}", known())),
+    }
+}
+
+fn figure(text: &str, low: f64, high: f64, what: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if (low..=high).contains(&value) => Ok(value),
+        _ => Err(format!("give {what} from {low} to {high}")),
+    }
 }
 
 fn speed(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|factor: &f64| factor.is_finite() && (0.01..=100.0).contains(factor))
-        .ok_or_else(|| "a speed is a number from 0.01 to 100".to_owned())
+    figure(text, 0.1, 360.0, "degrees a second")
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    figure(text, 1.0, 1000.0, "frames a second")
+}
+
+fn percent(text: &str) -> Result<f64, String> {
+    figure(text, 0.0, 100.0, "per cent")
+}
+
+fn volts(text: &str) -> Result<f64, String> {
+    figure(text, 0.0, 100.0, "volts")
 }

@@ -1,23 +1,30 @@
-//! `relit-capture`: drives the turntable, and records its turns.
+//! `relit-capture`: lists cameras and turntables, records a turn, serves the rig, and looks after the
+//! turntable.
 
 mod arguments;
 #[path = "../console/mod.rs"]
 mod console;
+mod devices;
+mod environment;
+mod recording;
+mod serving;
 mod simulate;
+mod table_arguments;
 mod turntable;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
-use arguments::{Arguments, Verb};
+use arguments::Command;
 use console::Console;
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = arguments::parse();
     let console = Console::new(arguments.json);
-    match arguments.verb {
-        Verb::Turntable(asked) => console.finish(turntable::run(console, &asked)),
-        Verb::Simulate(asked) => console.finish(simulate::run(console, &asked)),
+    match arguments.command {
+        Command::Devices => devices::run(console),
+        Command::Record(record) => console.finish(recording::run(console, *record)),
+        Command::Serve(serve) => console.finish(serving::run(console, *serve)),
+        Command::Turntable(asked) => console.finish(turntable::run(console, &asked)),
+        Command::Simulate(asked) => console.finish(simulate::run(console, &asked)),
     }
 }

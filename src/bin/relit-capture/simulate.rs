@@ -10,8 +10,8 @@ use relit::simulator::{Error, Faults, Simulator, SimulatorCounts, SimulatorOptio
 use serde_json::json;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use crate::arguments::SimulateArguments;
 use crate::console::{Console, Outcome};
+use crate::table_arguments::SimulateArguments;
 
 /// How often a look is taken at whether to end.
 const LOOK: Duration = Duration::from_millis(50);

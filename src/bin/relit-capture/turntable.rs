@@ -1,14 +1,15 @@
 //! `relit-capture turntable`: one look at the table, or one motion.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use relit::turntable::{
     Address, Homed, Options, Owner, Status, Table, TurntableError, find_serial,
 };
 use serde_json::json;
 
-use crate::arguments::{Action, TurntableArguments};
 use crate::console::{Console, Outcome};
+use crate::environment::runtime_folder;
+use crate::table_arguments::{Action, TurntableArguments};
 
 pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcome, TurntableError> {
     let port = match &asked.turntable {
@@ -34,16 +35,6 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
             tell(console, "unlocked", &table.unlock()?);
             Ok(Outcome::Whole)
         }
-    }
-}
-
-/// The folder in which every program of this machine looks for the owner of a port.
-pub(crate) fn runtime_folder() -> PathBuf {
-    let locks = Path::new("/run/lock");
-    if locks.is_dir() {
-        locks.to_owned()
-    } else {
-        std::env::temp_dir()
     }
 }
 

@@ -1,0 +1,115 @@
+//! The command line of the verbs that need no camera: `turntable` and `simulate`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use relit::turntable::Address;
+
+pub(crate) const TURNTABLE_EXAMPLES: &str = "\
+Examples:
+  relit-capture turntable status
+      what the table at the only controller plugged in is doing
+  relit-capture turntable --turntable serial:/dev/ttyUSB0 home
+      find the index, or make zero of where the table stands
+  relit-capture turntable jog -90
+      turn by 90 degrees, back
+  relit-capture turntable stop
+      stop it, also from beside a capture that runs
+
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost.";
+
+pub(crate) const SIMULATE_EXAMPLES: &str = "\
+Examples:
+  relit-capture simulate --link /tmp/table
+      then, beside it: relit-capture turntable --turntable serial:/tmp/table status
+  relit-capture simulate --fault drop=0.01,flip=0.005 --fault reset@12.5s
+      a bad line, and a controller that restarts
+
+Faults: drop=SHARE flip=SHARE duplicate=SHARE merge=SHARE delay=SHARE:TIME of bytes or lines, with
+`to.` or `from.` before them for one direction; reset@TIME and stall@TIME.";
+
+#[derive(Args)]
+pub(crate) struct TurntableArguments {
+    /// The table: serial:/dev/ttyUSB0, serial: (the only controller plugged in) or sim:.
+    #[arg(long, value_name = "ADDRESS", default_value = "serial:", global = true)]
+    pub(crate) turntable: Address,
+    #[command(subcommand)]
+    pub(crate) action: Action,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Action {
+    /// Tell what the table is doing.
+    Status,
+    /// Find the index; without an index sensor, count from where the table stands.
+    Home,
+    /// Turn by so many degrees, negative for back, and wait until it is done.
+    Jog {
+        /// Degrees from here.
+        #[arg(value_name = "DEGREES", allow_negative_numbers = true)]
+        degrees: f64,
+        /// Degrees a second; by default as fast as is gentle.
+        #[arg(long, value_name = "DEGREES_PER_SECOND")]
+        speed: Option<f64>,
+    },
+    /// Slow the table down to a stop and drop what it had to do.
+    Stop,
+    /// Release the lock after an alarm.
+    Unlock,
+}
+
+#[derive(Args)]
+pub(crate) struct SimulateArguments {
+    /// Make PATH a second name of the port.
+    #[arg(long, value_name = "PATH")]
+    pub(crate) link: Option<PathBuf>,
+    /// How many times faster than real time it runs.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
+    pub(crate) speed: f64,
+    /// What goes wrong, such as drop=0.01 or reset@12.5s; may be given again.
+    #[arg(long, value_name = "FAULT")]
+    pub(crate) fault: Vec<String>,
+    /// Seed of the random faults.
+    #[arg(long, default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Angle at which the table stands when it is switched on, degrees.
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub(crate) start_angle: f64,
+    /// Angle of the index sensor, degrees.
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value_t = 30.0,
+        allow_negative_numbers = true
+    )]
+    pub(crate) index_at: f64,
+    /// Volts of its battery.
+    #[arg(long, value_name = "VOLTS", default_value_t = 12.0)]
+    pub(crate) battery: f64,
+    /// How much faster than the host's clock its own goes, parts in a million.
+    #[arg(
+        long,
+        value_name = "PPM",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub(crate) drift_ppm: f64,
+    /// Opening the port does not reset the controller, as an Arduino's does.
+    #[arg(long)]
+    pub(crate) no_reset: bool,
+    /// End by itself after so many seconds.
+    #[arg(long = "for", value_name = "SECONDS")]
+    pub(crate) for_seconds: Option<f64>,
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|factor: &f64| factor.is_finite() && (0.01..=100.0).contains(factor))
+        .ok_or_else(|| "a speed is a number from 0.01 to 100".to_owned())
+}

@@ -1,0 +1,392 @@
+//! A camera's address as a person types it.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use super::{AddressFault, CameraError};
+use crate::clock::Clock;
+
+/// Fastest replay that may be asked for, times real time.
+const FASTEST: f64 = 1000.0;
+/// Most frames that one fault may name.
+const MOST_FRAMES: usize = 10_000;
+
+/// Which camera is meant: `v4l2:/dev/video0`, `nokhwa:0`, or `replay:PATH` with options as
+/// `replay:PATH?speed=0&drop=7,8`. Options begin at the last question mark.
+///
+/// Options of a replay:
+///
+/// | option | meaning |
+/// | --- | --- |
+/// | `speed=1` | real time (the default); `K` is K times as fast, `0` as fast as it is read |
+/// | `loop=1` | begins again at its end, counter and time stamps going on |
+/// | `drop=7,8` | these frames are dropped: a gap in the counter |
+/// | `damage=5` | the data of these frames are cut in half, unmarked |
+/// | `flag=6` | the driver marks these frames as damaged |
+/// | `unplug=100` | the camera is unplugged in place of this frame |
+/// | `stall=20` | from this frame on, no frame comes |
+/// | `resize=9` | from this frame on, frames have half the width and height (not for H.264) |
+///
+/// Frames are named by their position in the recording, 0-based, counted on where it loops.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Address {
+    /// A V4L2 device node.
+    V4l2(PathBuf),
+    /// The portable library's number of a camera.
+    Nokhwa(u32),
+    /// A recording.
+    Replay {
+        /// A session folder or a video file.
+        path: PathBuf,
+        /// How fast.
+        speed: Speed,
+        /// Whether it begins again at its end.
+        repeat: bool,
+        /// What is to go wrong.
+        faults: Faults,
+    },
+}
+
+/// How fast a recording is replayed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Speed {
+    /// As fast as it is read.
+    AsRead,
+    /// This many times real time; positive, at most 1000.
+    Times(f64),
+}
+
+/// What is to go wrong in a replay, for tests and rehearsals; positions in the recording.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Faults {
+    /// Frames that are dropped.
+    pub drop: BTreeSet<u64>,
+    /// Frames whose data are cut in half.
+    pub damage: BTreeSet<u64>,
+    /// Frames that the driver marks as damaged.
+    pub flag: BTreeSet<u64>,
+    /// The frame in whose place the camera is unplugged.
+    pub unplug: Option<u64>,
+    /// The frame from which on none comes.
+    pub stall: Option<u64>,
+    /// The frame from which on frames have half the width and height.
+    pub resize: Option<u64>,
+}
+
+impl Address {
+    /// A replay in real time without faults.
+    pub fn replay(path: impl Into<PathBuf>) -> Self {
+        Self::Replay {
+            path: path.into(),
+            speed: Speed::Times(1.0),
+            repeat: false,
+            faults: Faults::default(),
+        }
+    }
+
+    /// The clock on which frames of this camera come as they were taken: the system's own, or a
+    /// faster one for a replay that runs faster. Everything of a capture goes by one such clock.
+    pub fn clock(&self) -> Clock {
+        match self {
+            Self::Replay {
+                speed: Speed::Times(times),
+                ..
+            } if *times != 1.0 => Clock::scaled(*times),
+            _ => Clock::monotonic(),
+        }
+    }
+
+    /// `v4l2`, `nokhwa` or `replay`.
+    pub fn backend(&self) -> &'static str {
+        match self {
+            Self::V4l2(_) => "v4l2",
+            Self::Nokhwa(_) => "nokhwa",
+            Self::Replay { .. } => "replay",
+        }
+    }
+
+    /// The device's path or number, or the recording's path, without options.
+    pub fn device(&self) -> String {
+        match self {
+            Self::V4l2(path) | Self::Replay { path, .. } => path.display().to_string(),
+            Self::Nokhwa(number) => number.to_string(),
+        }
+    }
+}
+
+impl FromStr for Address {
+    type Err = CameraError;
+
+    fn from_str(text: &str) -> Result<Self, CameraError> {
+        parse(text).map_err(|fault| CameraError::Address {
+            text: text.to_owned(),
+            fault,
+        })
+    }
+}
+
+fn parse(text: &str) -> Result<Address, AddressFault> {
+    let (scheme, rest) = text.split_once(':').ok_or(AddressFault::Scheme)?;
+    match scheme {
+        "v4l2" | "nokhwa" | "replay" if rest.is_empty() => Err(AddressFault::Empty),
+        "v4l2" if rest.contains('\0') => Err(AddressFault::Path),
+        "v4l2" => Ok(Address::V4l2(rest.into())),
+        "nokhwa" => rest
+            .parse()
+            .map(Address::Nokhwa)
+            .map_err(|_| AddressFault::Number),
+        "replay" => parse_replay(rest),
+        _ => Err(AddressFault::Scheme),
+    }
+}
+
+fn parse_replay(text: &str) -> Result<Address, AddressFault> {
+    let (path, options) = text.rsplit_once('?').unwrap_or((text, ""));
+    if path.is_empty() {
+        return Err(AddressFault::Empty);
+    }
+    if path.contains('\0') {
+        return Err(AddressFault::Path);
+    }
+    let (mut speed, mut repeat, mut faults) = (Speed::Times(1.0), false, Faults::default());
+    let mut seen = BTreeSet::new();
+    for option in options.split('&').filter(|option| !option.is_empty()) {
+        let (name, value) = option.split_once('=').unwrap_or((option, ""));
+        if !seen.insert(name) {
+            return Err(AddressFault::Twice(name.to_owned()));
+        }
+        let wrong = || AddressFault::Value {
+            option: name.to_owned(),
+            value: value.to_owned(),
+        };
+        let number = || value.parse().map(Some).map_err(|_| wrong());
+        match name {
+            "speed" => speed = parse_speed(value).ok_or_else(wrong)?,
+            "loop" => repeat = parse_switch(value).ok_or_else(wrong)?,
+            "drop" => faults.drop = parse_frames(value).ok_or_else(wrong)?,
+            "damage" => faults.damage = parse_frames(value).ok_or_else(wrong)?,
+            "flag" => faults.flag = parse_frames(value).ok_or_else(wrong)?,
+            "unplug" => faults.unplug = number()?,
+            "stall" => faults.stall = number()?,
+            "resize" => faults.resize = number()?,
+            _ => return Err(AddressFault::Option(name.to_owned())),
+        }
+    }
+    Ok(Address::Replay {
+        path: path.into(),
+        speed,
+        repeat,
+        faults,
+    })
+}
+
+fn parse_speed(text: &str) -> Option<Speed> {
+    match text.parse::<f64>().ok()? {
+        0.0 => Some(Speed::AsRead),
+        times if times.is_normal() && times > 0.0 && times <= FASTEST => Some(Speed::Times(times)),
+        _ => None,
+    }
+}
+
+fn parse_switch(text: &str) -> Option<bool> {
+    match text {
+        "0" => Some(false),
+        "1" => Some(true),
+        _ => None,
+    }
+}
+
+fn parse_frames(text: &str) -> Option<BTreeSet<u64>> {
+    let frames: BTreeSet<u64> = text
+        .split(',')
+        .take(MOST_FRAMES + 1)
+        .map(|number| number.parse().ok())
+        .collect::<Option<_>>()?;
+    (frames.len() <= MOST_FRAMES).then_some(frames)
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self::Replay {
+            speed,
+            repeat,
+            faults,
+            ..
+        } = self
+        else {
+            return write!(f, "{}:{}", self.backend(), self.device());
+        };
+        let device = self.device();
+        let mut options = faults.options();
+        if *repeat {
+            options.insert(0, "loop=1".to_owned());
+        }
+        match speed {
+            Speed::AsRead => options.insert(0, "speed=0".to_owned()),
+            // A question mark in the path would otherwise begin the options.
+            Speed::Times(times) if *times != 1.0 || device.contains('?') => {
+                options.insert(0, format!("speed={times}"));
+            }
+            Speed::Times(_) => {}
+        }
+        write!(f, "replay:{device}")?;
+        if !options.is_empty() {
+            write!(f, "?{}", options.join("&"))?;
+        }
+        Ok(())
+    }
+}
+
+impl Faults {
+    fn options(&self) -> Vec<String> {
+        let sets = [
+            ("drop", &self.drop),
+            ("damage", &self.damage),
+            ("flag", &self.flag),
+        ];
+        let numbers = [
+            ("unplug", self.unplug),
+            ("stall", self.stall),
+            ("resize", self.resize),
+        ];
+        let sets = sets.into_iter().filter(|(_, frames)| !frames.is_empty());
+        let sets = sets.map(|(name, frames)| {
+            let frames: Vec<String> = frames.iter().map(u64::to_string).collect();
+            format!("{name}={}", frames.join(","))
+        });
+        let numbers = numbers.into_iter();
+        let numbers = numbers.filter_map(|(name, at)| Some(format!("{name}={}", at?)));
+        sets.chain(numbers).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::collection::btree_set;
+    use proptest::option;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn faults() -> impl Strategy<Value = Faults> {
+        let frames = || btree_set(any::<u64>(), 0..4);
+        let at = || option::of(any::<u64>());
+        (frames(), frames(), frames(), at(), at(), at()).prop_map(
+            |(drop, damage, flag, unplug, stall, resize)| Faults {
+                drop,
+                damage,
+                flag,
+                unplug,
+                stall,
+                resize,
+            },
+        )
+    }
+
+    fn address() -> impl Strategy<Value = Address> {
+        let path = || "[ -~]{1,20}".prop_map(PathBuf::from);
+        let speed = prop_oneof![
+            Just(Speed::AsRead),
+            (0.01..FASTEST).prop_map(Speed::Times),
+            Just(Speed::Times(1.0))
+        ];
+        prop_oneof![
+            path().prop_map(Address::V4l2),
+            any::<u32>().prop_map(Address::Nokhwa),
+            (path(), speed, any::<bool>(), faults()).prop_map(|(path, speed, repeat, faults)| {
+                Address::Replay {
+                    path,
+                    speed,
+                    repeat,
+                    faults,
+                }
+            }),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn an_address_is_read_as_it_is_shown(address in address()) {
+            prop_assert_eq!(address.to_string().parse::<Address>().unwrap(), address);
+        }
+
+        #[test]
+        fn no_text_upsets_the_parser(text in ".{0,60}", options in "[a-z0-9=&,?.-]{0,40}") {
+            let _ = text.parse::<Address>();
+            let _ = format!("replay:{text}?{options}").parse::<Address>();
+        }
+    }
+
+    #[test]
+    fn addresses_are_those_of_the_manual() {
+        let read = |text: &str| text.parse::<Address>().unwrap();
+        assert_eq!(
+            read("v4l2:/dev/video0"),
+            Address::V4l2("/dev/video0".into())
+        );
+        assert_eq!(read("nokhwa:3"), Address::Nokhwa(3));
+        assert_eq!(read("replay:clip.mp4"), Address::replay("clip.mp4"));
+        let all = "replay:a b?speed=0&loop=1&drop=7,8&damage=5&flag=6&unplug=100&stall=20&resize=9";
+        let Address::Replay {
+            path,
+            speed,
+            repeat,
+            faults,
+        } = read(all)
+        else {
+            panic!("{all} is a replay");
+        };
+        assert_eq!((path, speed, repeat), ("a b".into(), Speed::AsRead, true));
+        assert_eq!(faults.drop, BTreeSet::from([7, 8]));
+        assert_eq!(
+            (faults.unplug, faults.stall, faults.resize),
+            (Some(100), Some(20), Some(9))
+        );
+        assert_eq!(read(all).to_string(), all);
+    }
+
+    #[test]
+    fn a_wrong_address_says_what_is_wrong() {
+        for (text, fault) in [
+            ("/dev/video0", AddressFault::Scheme),
+            ("usb:0", AddressFault::Scheme),
+            ("v4l2:", AddressFault::Empty),
+            ("replay:?speed=1", AddressFault::Empty),
+            ("v4l2:a\0b", AddressFault::Path),
+            ("nokhwa:-1", AddressFault::Number),
+            ("replay:a?fast=1", AddressFault::Option("fast".into())),
+            ("replay:a?loop=1&loop=1", AddressFault::Twice("loop".into())),
+        ] {
+            assert_eq!(parse(text), Err(fault), "{text}");
+        }
+        for option in [
+            "speed=-1",
+            "speed=NaN",
+            "speed=1e9",
+            "speed",
+            "loop=yes",
+            "drop=",
+            "drop=1,,2",
+            "unplug=x",
+        ] {
+            let found = parse(&format!("replay:a?{option}"));
+            assert!(matches!(found, Err(AddressFault::Value { .. })), "{option}");
+        }
+    }
+
+    #[test]
+    fn a_faster_replay_goes_by_a_faster_clock() {
+        let factor = |text: &str| text.parse::<Address>().unwrap().clock().factor();
+        assert_eq!(factor("replay:a?speed=8"), 8.0);
+        for text in [
+            "replay:a",
+            "replay:a?speed=0",
+            "nokhwa:0",
+            "v4l2:/dev/video0",
+        ] {
+            assert_eq!(factor(text), 1.0, "{text}");
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! What a camera offers: pixel formats, sizes and rates.
+
+use std::fmt;
+
+use super::Rate;
+
+/// A pixel format's four characters, as V4L2 writes them.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Fourcc(pub [u8; 4]);
+
+impl Fourcc {
+    /// Motion JPEG.
+    pub const MJPG: Self = Self(*b"MJPG");
+    /// H.264 with start codes.
+    pub const H264: Self = Self(*b"H264");
+    /// Packed 4:2:2.
+    pub const YUYV: Self = Self(*b"YUYV");
+    /// 4:2:0, luma plane, then interleaved colour differences.
+    pub const NV12: Self = Self(*b"NV12");
+    /// Packed red, green, blue.
+    pub const RGB3: Self = Self(*b"RGB3");
+    /// Luma alone.
+    pub const GREY: Self = Self(*b"GREY");
+
+    /// The format of the kernel's 32-bit code.
+    pub fn from_code(code: u32) -> Self {
+        Self(code.to_le_bytes())
+    }
+
+    /// The kernel's 32-bit code.
+    pub fn code(self) -> u32 {
+        u32::from_le_bytes(self.0)
+    }
+
+    /// How its frames are to be understood; `None` for a format that is not taken here.
+    pub fn encoding(self) -> Option<Encoding> {
+        Some(match &self.0 {
+            b"MJPG" | b"JPEG" => Encoding::Mjpeg,
+            b"H264" => Encoding::H264,
+            b"YUYV" => Encoding::Yuyv,
+            b"NV12" => Encoding::Nv12,
+            b"RGB3" => Encoding::Rgb24,
+            b"GREY" => Encoding::Grey,
+            b"BA81" => Encoding::Bayer(Bayer::Bggr),
+            b"GBRG" => Encoding::Bayer(Bayer::Gbrg),
+            b"GRBG" => Encoding::Bayer(Bayer::Grbg),
+            b"RGGB" => Encoding::Bayer(Bayer::Rggb),
+            _ => return None,
+        })
+    }
+}
+
+impl fmt::Display for Fourcc {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for byte in self.0 {
+            match byte {
+                b' '..=b'~' => write!(f, "{}", char::from(byte))?,
+                _ => f.write_str(".")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Debug for Fourcc {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Fourcc({self})")
+    }
+}
+
+/// The kinds of frames that are taken here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    /// Every frame a JPEG of its own.
+    Mjpeg,
+    /// H.264 as a byte stream with start codes.
+    H264,
+    /// Packed 4:2:2, two bytes a pixel.
+    Yuyv,
+    /// 4:2:0 in two planes, one and a half bytes a pixel.
+    Nv12,
+    /// Packed red, green, blue.
+    Rgb24,
+    /// Luma alone, one byte a pixel.
+    Grey,
+    /// The sensor's mosaic, one byte a pixel.
+    Bayer(Bayer),
+}
+
+/// The colours of a Bayer mosaic's first two rows, in reading order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bayer {
+    /// Blue, green / green, red.
+    Bggr,
+    /// Green, blue / red, green.
+    Gbrg,
+    /// Green, red / blue, green.
+    Grbg,
+    /// Red, green / green, blue.
+    Rggb,
+}
+
+impl Encoding {
+    /// Bytes of a row and number of rows of a raw frame without padding, all planes counted;
+    /// `None` for compressed ones and for sizes that no memory holds.
+    pub fn rows(self, width: u32, height: u32) -> Option<(usize, usize)> {
+        let (width, height) = (usize::try_from(width).ok()?, usize::try_from(height).ok()?);
+        Some(match self {
+            Self::Mjpeg | Self::H264 => return None,
+            Self::Yuyv => (width.div_ceil(2).checked_mul(4)?, height),
+            Self::Nv12 => (
+                width.div_ceil(2).checked_mul(2)?,
+                height.checked_add(height.div_ceil(2))?,
+            ),
+            Self::Rgb24 => (width.checked_mul(3)?, height),
+            Self::Grey | Self::Bayer(_) => (width, height),
+        })
+    }
+
+    /// Bytes of a raw frame; `None` as for [`Self::rows`].
+    pub fn frame_bytes(self, width: u32, height: u32) -> Option<usize> {
+        let (row, rows) = self.rows(width, height)?;
+        row.checked_mul(rows)
+    }
+}
+
+/// The frame sizes of a mode, pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sizes {
+    /// This one.
+    One(u32, u32),
+    /// Any between two, in steps.
+    Range {
+        /// Smallest width and height.
+        min: (u32, u32),
+        /// Largest width and height.
+        max: (u32, u32),
+        /// Steps of width and height, at least 1.
+        step: (u32, u32),
+    },
+}
+
+impl Sizes {
+    /// True where this size is among them.
+    pub fn contains(self, width: u32, height: u32) -> bool {
+        let within = |value: u32, min: u32, max: u32, step: u32| {
+            (min..=max).contains(&value) && (value - min).is_multiple_of(step.max(1))
+        };
+        match self {
+            Self::One(w, h) => (w, h) == (width, height),
+            Self::Range { min, max, step } => {
+                within(width, min.0, max.0, step.0) && within(height, min.1, max.1, step.1)
+            }
+        }
+    }
+
+    /// The largest size.
+    pub fn largest(self) -> (u32, u32) {
+        match self {
+            Self::One(width, height) => (width, height),
+            Self::Range { max, .. } => max,
+        }
+    }
+}
+
+impl fmt::Display for Sizes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::One(width, height) => write!(f, "{width}x{height}"),
+            Self::Range { min, max, step } => write!(
+                f,
+                "{}x{} to {}x{} in steps of {}x{}",
+                min.0, min.1, max.0, max.1, step.0, step.1
+            ),
+        }
+    }
+}
+
+/// The frame rates of a mode.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Rates {
+    /// These.
+    List(Vec<Rate>),
+    /// Any between two.
+    Range {
+        /// The lowest.
+        slowest: Rate,
+        /// The highest.
+        fastest: Rate,
+    },
+    /// The camera does not say.
+    Unknown,
+}
+
+impl Rates {
+    /// The highest rate, where the camera says.
+    pub fn fastest(&self) -> Option<Rate> {
+        match self {
+            Self::List(rates) => rates
+                .iter()
+                .copied()
+                .max_by(|a, b| a.per_second().total_cmp(&b.per_second())),
+            Self::Range { fastest, .. } => Some(*fastest),
+            Self::Unknown => None,
+        }
+    }
+}
+
+impl fmt::Display for Rates {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::List(rates) => {
+                let rates: Vec<String> = rates.iter().map(Rate::to_string).collect();
+                write!(f, "{} frames/s", rates.join(", "))
+            }
+            Self::Range { slowest, fastest } => write!(f, "{slowest} to {fastest} frames/s"),
+            Self::Unknown => f.write_str("unknown rates"),
+        }
+    }
+}
+
+/// One thing that a camera offers: a pixel format with sizes and rates.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mode {
+    /// The pixel format.
+    pub fourcc: Fourcc,
+    /// Its sizes.
+    pub sizes: Sizes,
+    /// The rates at these sizes; at the largest where sizes are a range.
+    pub rates: Rates,
+}
+
+impl fmt::Display for Mode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}, {}", self.fourcc, self.sizes, self.rates)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn sizes_in_steps_are_known() {
+        let range = Sizes::Range {
+            min: (2, 1),
+            max: (8, 4),
+            step: (2, 1),
+        };
+        assert!(range.contains(4, 3) && range.contains(8, 4));
+        assert!(!range.contains(5, 3) && !range.contains(10, 3) && !range.contains(0, 1));
+        assert_eq!(range.largest(), (8, 4));
+    }
+
+    #[test]
+    fn a_fourcc_is_shown_as_text() {
+        assert_eq!(Fourcc::from_code(0x5659_5559).to_string(), "YUYV");
+        assert_eq!(Fourcc(*b"Y1\0\xff").to_string(), "Y1..");
+        assert_eq!(Fourcc::from_code(Fourcc::NV12.code()), Fourcc::NV12);
+    }
+
+    proptest! {
+        #[test]
+        fn no_size_upsets_the_reckoning(width in any::<u32>(), height in any::<u32>()) {
+            for code in [Fourcc::YUYV, Fourcc::NV12, Fourcc::RGB3, Fourcc::GREY] {
+                let _ = code.encoding().unwrap().frame_bytes(width, height);
+            }
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! One frame as a camera delivered it, and what can be wrong with it.
+
+use super::format::{Encoding, Fourcc};
+
+/// One frame as the camera delivered it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// The pixel format that was agreed.
+    pub fourcc: Fourcc,
+    /// The width that was agreed, pixels.
+    pub width: u32,
+    /// The height that was agreed, pixels.
+    pub height: u32,
+    /// The bytes that the driver says are used; raw rows without padding.
+    pub data: Vec<u8>,
+    /// The driver's counter; `None` where the camera has none.
+    pub sequence: Option<Sequence>,
+    /// When the frame was taken, microseconds of the monotonic clock (of the clock given, for a
+    /// replay).
+    pub t_us: i64,
+    /// What the time stamp stands for.
+    pub stamp: StampSource,
+    /// True where the driver marked the frame's data as damaged.
+    pub flagged: bool,
+}
+
+/// The driver's frame counter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sequence {
+    /// As delivered.
+    pub raw: u32,
+    /// Without the wrap at 2^32, counted from the stream's first frame on.
+    pub unwrapped: u64,
+}
+
+/// What a frame's time stamp stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StampSource {
+    /// The driver's, when the frame's last data came.
+    EndOfFrame,
+    /// The driver's, when the exposure began.
+    StartOfExposure,
+    /// The driver has no monotonic time stamps: when this program got the frame.
+    Arrival,
+}
+
+/// Takes the wraps out of a driver's 32-bit frame counter.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SequenceUnwrapper {
+    last: Option<Sequence>,
+}
+
+impl SequenceUnwrapper {
+    /// The next counter. Less than half the range ahead is forward, all else is back: some drivers
+    /// repeat a number, or deliver one late.
+    pub fn next(&mut self, raw: u32) -> Sequence {
+        let unwrapped = match self.last {
+            None => u64::from(raw),
+            Some(last) => {
+                let step = raw.wrapping_sub(last.raw).cast_signed();
+                last.unwrapped.saturating_add_signed(i64::from(step))
+            }
+        };
+        let sequence = Sequence { raw, unwrapped };
+        self.last = Some(sequence);
+        sequence
+    }
+}
+
+/// What is wrong with a frame's data, as far as can be told without decoding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum FrameFault {
+    /// The driver says so.
+    #[error("the driver marked it as damaged")]
+    Flagged,
+    /// No data at all.
+    #[error("it is empty")]
+    Empty,
+    /// A JPEG that does not begin as one.
+    #[error("it does not begin as a JPEG")]
+    NoStart,
+    /// A JPEG without its end.
+    #[error("it is a JPEG without an end")]
+    NoEnd,
+    /// A JPEG of another size than was agreed.
+    #[error("it is {width} x {height} pixels, which was not agreed")]
+    OtherSize {
+        /// Its width, pixels.
+        width: u32,
+        /// Its height, pixels.
+        height: u32,
+    },
+    /// A raw frame with the wrong number of bytes.
+    #[error("it has {found} bytes where its size needs {expected}")]
+    Bytes {
+        /// Bytes it needs.
+        expected: usize,
+        /// Bytes it has.
+        found: usize,
+    },
+}
+
+impl Frame {
+    /// The first sign of damage, or of a size other than agreed.
+    pub fn fault(&self) -> Option<FrameFault> {
+        if self.flagged {
+            return Some(FrameFault::Flagged);
+        }
+        if self.data.is_empty() {
+            return Some(FrameFault::Empty);
+        }
+        match self.fourcc.encoding()? {
+            Encoding::Mjpeg => jpeg_fault(&self.data, self.width, self.height),
+            Encoding::H264 => None,
+            raw => {
+                let expected = raw.frame_bytes(self.width, self.height)?;
+                let found = self.data.len();
+                (expected != found).then_some(FrameFault::Bytes { expected, found })
+            }
+        }
+    }
+}
+
+fn jpeg_fault(data: &[u8], width: u32, height: u32) -> Option<FrameFault> {
+    if !data.starts_with(&[0xff, 0xd8]) {
+        return Some(FrameFault::NoStart);
+    }
+    // Cameras pad behind the end. Compressed data cannot hold these two bytes: 0xff is stuffed.
+    if !data.windows(2).rev().any(|pair| pair == [0xff, 0xd9]) {
+        return Some(FrameFault::NoEnd);
+    }
+    match jpeg_size(data) {
+        Some(found) if found == (width, height) => None,
+        Some((width, height)) => Some(FrameFault::OtherSize { width, height }),
+        None => Some(FrameFault::NoStart),
+    }
+}
+
+/// Width and height that a JPEG's frame header states (ITU-T T.81, B.2.2); `None` where there is
+/// no frame header before the first scan.
+pub fn jpeg_size(data: &[u8]) -> Option<(u32, u32)> {
+    let mut at = 2;
+    loop {
+        let &[marker, code] = data.get(at..)?.first_chunk()?;
+        if marker != 0xff {
+            return None;
+        }
+        match code {
+            // Fill bytes before a marker.
+            0xff => at += 1,
+            // Markers that stand alone.
+            0x01 | 0xd0..=0xd8 => at += 2,
+            // Frame headers; 0xc4, 0xc8 and 0xcc in this range are none.
+            0xc0..=0xcf if !matches!(code, 0xc4 | 0xc8 | 0xcc) => {
+                let header: &[u8; 9] = data.get(at..)?.first_chunk()?;
+                let number =
+                    |high: usize| u32::from(header[high]) << 8 | u32::from(header[high + 1]);
+                return Some((number(7), number(5)));
+            }
+            0xda | 0xd9 | 0x00 => return None,
+            _ => {
+                let &[_, _, high, low] = data.get(at..)?.first_chunk()?;
+                at += 2 + usize::from(u16::from_be_bytes([high, low]));
+            }
+        }
+    }
+}
+
+/// Takes the padding out of a raw frame's rows: `stride` bytes apart, `row` bytes used. The data
+/// stay as they are where nothing is padded, or where they do not hold all rows.
+pub(super) fn without_padding(data: Vec<u8>, stride: usize, row: usize, rows: usize) -> Vec<u8> {
+    let needed = rows
+        .checked_sub(1)
+        .and_then(|full| full.checked_mul(stride)?.checked_add(row));
+    if stride <= row || needed.is_none_or(|needed| data.len() < needed) {
+        return data;
+    }
+    let mut tight = Vec::with_capacity(row * rows);
+    for line in data.chunks(stride).take(rows) {
+        tight.extend_from_slice(&line[..row]);
+    }
+    tight
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn unwrapped(raw: &[u32]) -> Vec<u64> {
+        let mut counter = SequenceUnwrapper::default();
+        raw.iter().map(|&raw| counter.next(raw).unwrapped).collect()
+    }
+
+    #[test]
+    fn a_wrapped_counter_goes_on_and_a_late_frame_goes_back() {
+        let wrap = [u32::MAX - 1, u32::MAX, 0, 1, 5];
+        let counted: Vec<u64> = vec![
+            0xffff_fffe,
+            0xffff_ffff,
+            1 << 32,
+            (1 << 32) + 1,
+            (1 << 32) + 5,
+        ];
+        assert_eq!(unwrapped(&wrap), counted);
+        assert_eq!(unwrapped(&[7, 7, 9, 8, 10]), [7, 7, 9, 8, 10]);
+        assert_eq!(unwrapped(&[3, 0, u32::MAX]), [3, 0, 0], "never below 0");
+    }
+
+    /// Start, quantisation table of 3 bytes, frame header of 2 x 3 pixels, scan, end.
+    const JPEG: [u8; 25] = [
+        0xff, 0xd8, 0xff, 0xdb, 0, 3, 9, 0xff, 0xff, 0xc0, 0, 9, 8, 0, 3, 0, 2, 1, 0, 0xff, 0xda,
+        0, 2, 0xff, 0xd9,
+    ];
+
+    fn jpeg(data: &[u8]) -> Frame {
+        Frame {
+            fourcc: Fourcc::MJPG,
+            width: 2,
+            height: 3,
+            data: data.to_vec(),
+            sequence: None,
+            t_us: 0,
+            stamp: StampSource::Arrival,
+            flagged: false,
+        }
+    }
+
+    #[test]
+    fn damage_of_a_jpeg_is_told() {
+        assert_eq!(jpeg(&JPEG).fault(), None);
+        assert_eq!(
+            jpeg(&[&JPEG[..], &[0; 40]].concat()).fault(),
+            None,
+            "padded"
+        );
+        assert_eq!(jpeg(&JPEG[..23]).fault(), Some(FrameFault::NoEnd));
+        assert_eq!(jpeg(&JPEG[1..]).fault(), Some(FrameFault::NoStart));
+        assert_eq!(jpeg(&[]).fault(), Some(FrameFault::Empty));
+        let other = Frame {
+            width: 3,
+            ..jpeg(&JPEG)
+        };
+        let size = FrameFault::OtherSize {
+            width: 2,
+            height: 3,
+        };
+        assert_eq!(other.fault(), Some(size));
+        let flagged = Frame {
+            flagged: true,
+            ..jpeg(&JPEG)
+        };
+        assert_eq!(flagged.fault(), Some(FrameFault::Flagged));
+    }
+
+    #[test]
+    fn a_raw_frame_has_the_bytes_of_its_size() {
+        for (fourcc, bytes) in [
+            (Fourcc::YUYV, 4 * 3),
+            (Fourcc::NV12, 2 * 5),
+            (Fourcc::RGB3, 6 * 3),
+            (Fourcc::GREY, 2 * 3),
+            (Fourcc(*b"RGGB"), 2 * 3),
+        ] {
+            let whole = Frame {
+                fourcc,
+                ..jpeg(&vec![0; bytes])
+            };
+            assert_eq!(whole.fault(), None, "{fourcc}");
+            let short = Frame {
+                fourcc,
+                ..jpeg(&vec![0; bytes - 1])
+            };
+            let (expected, found) = (bytes, bytes - 1);
+            assert_eq!(short.fault(), Some(FrameFault::Bytes { expected, found }));
+        }
+    }
+
+    #[test]
+    fn padding_is_taken_out_of_rows() {
+        let padded = vec![1, 2, 0, 3, 4, 0, 5, 6];
+        assert_eq!(without_padding(padded.clone(), 3, 2, 3), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(without_padding(padded.clone(), 2, 2, 4), padded);
+        assert_eq!(
+            without_padding(padded.clone(), 3, 2, 4),
+            padded,
+            "too short"
+        );
+        assert_eq!(
+            without_padding(padded.clone(), 0, 2, 3),
+            padded,
+            "stride not told"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_upset_the_look_at_a_jpeg(data in vec(any::<u8>(), 0..80), cut in 0..25_usize) {
+            let _ = jpeg(&data).fault();
+            let _ = jpeg(&[&JPEG[..cut], &data].concat()).fault();
+        }
+
+        #[test]
+        fn small_steps_are_counted_through_any_wrap(
+            start in any::<u32>(),
+            steps in vec(1_u32..1000, 1..50),
+        ) {
+            let mut raw = vec![start];
+            for step in &steps {
+                raw.push(raw[raw.len() - 1].wrapping_add(*step));
+            }
+            let counted = unwrapped(&raw);
+            for (pair, step) in counted.windows(2).zip(steps) {
+                prop_assert_eq!(pair[1] - pair[0], u64::from(step));
+            }
+        }
+
+        #[test]
+        fn rows_stay_what_they_are_whatever_the_padding(
+            row in 1_usize..9,
+            rows in 1_usize..9,
+            padding in 0_usize..5,
+        ) {
+            let tight: Vec<u8> = (0..row * rows).map(|at| at as u8 + 1).collect();
+            let mut padded = Vec::new();
+            for line in tight.chunks(row) {
+                padded.extend_from_slice(line);
+                padded.resize(padded.len() + padding, 0);
+            }
+            prop_assert_eq!(without_padding(padded, row + padding, row, rows), tight);
+        }
+    }
+}

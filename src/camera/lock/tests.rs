@@ -1,0 +1,262 @@
+//! Plans for the control lists of real cameras, as `v4l2-ctl --list-ctrls-menus` prints them.
+
+use super::*;
+use crate::camera::{ControlFlags, MenuItem};
+
+fn control(name: &str, kind: ControlKind, range: (i64, i64), value: i64) -> Control {
+    // Any number will do, as long as each name has its own.
+    let id = name.bytes().fold(7_u32, |id, byte| {
+        id.wrapping_mul(31).wrapping_add(byte.into())
+    });
+    Control {
+        id: ControlId(id),
+        name: name.to_owned(),
+        kind,
+        minimum: range.0,
+        maximum: range.1,
+        step: 1,
+        default: range.0,
+        value: Some(value),
+        flags: ControlFlags::default(),
+    }
+}
+
+fn number(name: &str, range: (i64, i64), value: i64) -> Control {
+    control(name, ControlKind::Integer, range, value)
+}
+
+fn inactive(mut control: Control) -> Control {
+    control.flags.inactive = true;
+    control
+}
+
+fn switch(name: &str, value: i64) -> Control {
+    control(name, ControlKind::Boolean, (0, 1), value)
+}
+
+fn menu(name: &str, items: &[(i64, &str)], value: i64) -> Control {
+    let items: Vec<MenuItem> = items
+        .iter()
+        .map(|&(index, label)| MenuItem {
+            index,
+            label: label.to_owned(),
+        })
+        .collect();
+    let range = (items[0].index, items[items.len() - 1].index);
+    control(name, ControlKind::Menu(items), range, value)
+}
+
+const UVC_EXPOSURE: [(i64, &str); 2] = [(1, "Manual Mode"), (3, "Aperture Priority Mode")];
+const POWER_LINE: [(i64, &str); 3] = [(0, "Disabled"), (1, "50 Hz"), (2, "60 Hz")];
+
+/// Logitech C920 under Linux 5.10.
+fn c920_old() -> Vec<Control> {
+    vec![
+        number("brightness", (0, 255), 128),
+        switch("white_balance_temperature_auto", 1),
+        number("gain", (0, 255), 64),
+        menu("power_line_frequency", &POWER_LINE, 2),
+        inactive(number("white_balance_temperature", (2000, 6500), 4120)),
+        number("backlight_compensation", (0, 1), 1),
+        menu("exposure_auto", &UVC_EXPOSURE, 3),
+        inactive(number("exposure_absolute", (3, 2047), 250)),
+        switch("exposure_auto_priority", 1),
+        inactive(number("focus_absolute", (0, 250), 30)),
+        switch("focus_auto", 1),
+    ]
+}
+
+/// Logitech C920 under Linux 6.1.
+fn c920_new() -> Vec<Control> {
+    vec![
+        switch("white_balance_automatic", 1),
+        number("gain", (0, 255), 64),
+        menu("power_line_frequency", &POWER_LINE, 2),
+        inactive(number("white_balance_temperature", (2000, 6500), 4120)),
+        number("backlight_compensation", (0, 1), 0),
+        menu("auto_exposure", &UVC_EXPOSURE, 3),
+        inactive(number("exposure_time_absolute", (3, 2047), 250)),
+        switch("exposure_dynamic_framerate", 1),
+        inactive(number("focus_absolute", (0, 250), 30)),
+        switch("focus_automatic_continuous", 1),
+    ]
+}
+
+/// A laptop's built-in camera: fixed focus, no gain.
+fn laptop() -> Vec<Control> {
+    vec![
+        switch("white_balance_automatic", 1),
+        number("gamma", (72, 500), 100),
+        menu("power_line_frequency", &POWER_LINE[..2], 1),
+        inactive(number("white_balance_temperature", (2800, 6500), 4600)),
+        menu("auto_exposure", &UVC_EXPOSURE, 3),
+        inactive(number("exposure_time_absolute", (1, 5000), 157)),
+        switch("exposure_dynamic_framerate", 1),
+    ]
+}
+
+fn steps(plan: &ManualPlan) -> Vec<(&str, i64)> {
+    plan.steps
+        .iter()
+        .map(|step| (step.name.as_str(), step.value))
+        .collect()
+}
+
+#[test]
+fn automatics_go_off_before_values_are_held() {
+    let plan = ManualPlan::new(&c920_new(), &Wanted::default());
+    assert_eq!(
+        steps(&plan),
+        [
+            ("exposure_dynamic_framerate", 0),
+            ("auto_exposure", 1),
+            ("white_balance_automatic", 0),
+            ("focus_automatic_continuous", 0),
+            ("exposure_time_absolute", 250),
+            ("gain", 64),
+            ("white_balance_temperature", 4120),
+            ("focus_absolute", 30),
+            ("power_line_frequency", 0),
+            ("backlight_compensation", 0),
+        ]
+    );
+    assert_eq!(plan.lacks, []);
+}
+
+#[test]
+fn names_from_before_linux_5_17_are_known_too() {
+    let plan = ManualPlan::new(&c920_old(), &Wanted::default());
+    let found = steps(&plan);
+    for wanted in [
+        ("exposure_auto_priority", 0),
+        ("exposure_auto", 1),
+        ("white_balance_temperature_auto", 0),
+        ("focus_auto", 0),
+        ("exposure_absolute", 250),
+        ("backlight_compensation", 0),
+    ] {
+        assert!(found.contains(&wanted), "{wanted:?} in {found:?}");
+    }
+    assert_eq!(plan.lacks, []);
+}
+
+#[test]
+fn what_a_camera_lacks_is_named() {
+    let plan = ManualPlan::new(&laptop(), &Wanted::default());
+    assert_eq!(
+        plan.lacks,
+        [
+            Lack::NoControl(Aspect::Gain),
+            Lack::NoControl(Aspect::Focus)
+        ]
+    );
+    let none = ManualPlan::new(&[], &Wanted::default());
+    assert_eq!(none.steps, []);
+    assert_eq!(
+        none.lacks.len(),
+        5,
+        "frame rate and backlight lack nothing: {:?}",
+        none.lacks
+    );
+}
+
+#[test]
+fn wanted_values_go_into_the_range_and_onto_the_steps() {
+    let mut controls = c920_new();
+    let coarse = controls
+        .iter_mut()
+        .find(|control| control.name == "focus_absolute")
+        .unwrap();
+    coarse.step = 5;
+    let wanted = Wanted {
+        exposure: Some(1_000_000),
+        gain: Some(-4),
+        white_balance: Some(5000),
+        focus: Some(33),
+        power_line: Some(1),
+    };
+    let plan = ManualPlan::new(&controls, &wanted);
+    let found = steps(&plan);
+    for wanted in [
+        ("exposure_time_absolute", 2047),
+        ("gain", 0),
+        ("white_balance_temperature", 5000),
+        ("focus_absolute", 35),
+        ("power_line_frequency", 1),
+    ] {
+        assert!(found.contains(&wanted), "{wanted:?} in {found:?}");
+    }
+}
+
+#[test]
+fn an_exposure_without_a_manual_mode_is_named() {
+    let mut controls = laptop();
+    controls.retain(|control| control.name != "auto_exposure");
+    controls.push(menu("auto_exposure", &[(3, "Aperture Priority Mode")], 3));
+    let plan = ManualPlan::new(&controls, &Wanted::default());
+    assert!(plan.lacks.contains(&Lack::NoManual {
+        aspect: Aspect::Exposure,
+        control: "auto_exposure".to_owned()
+    }));
+    assert!(
+        steps(&plan)
+            .iter()
+            .all(|&(name, _)| name != "auto_exposure")
+    );
+}
+
+#[test]
+fn a_read_only_value_is_named_and_an_automatic_without_value_too() {
+    let mut controls = c920_new();
+    for control in &mut controls {
+        control.flags.read_only = control.name == "gain";
+    }
+    controls.retain(|control| control.name != "white_balance_temperature");
+    let plan = ManualPlan::new(&controls, &Wanted::default());
+    assert_eq!(
+        plan.lacks,
+        [
+            Lack::NotSettable {
+                aspect: Aspect::Gain,
+                control: "gain".to_owned()
+            },
+            Lack::NoValue(Aspect::WhiteBalance)
+        ]
+    );
+}
+
+#[test]
+fn a_value_that_moved_is_found_by_plan_and_by_comparison() {
+    let before = c920_new();
+    let plan = ManualPlan::new(&before, &Wanted::default());
+    let mut after = before.clone();
+    for control in &mut after {
+        for step in &plan.steps {
+            if step.id == control.id {
+                control.value = Some(step.value);
+            }
+        }
+    }
+    assert_eq!(plan.check(&after), []);
+    let set = after.clone();
+    let gain = after.iter_mut().find(|control| control.name == "gain");
+    gain.unwrap().value = Some(70);
+    let moved = Moved {
+        name: "gain".to_owned(),
+        should: 64,
+        is: Some(70),
+    };
+    assert_eq!(plan.check(&after), moved_between(&set, &after));
+    assert_eq!(plan.check(&after), std::slice::from_ref(&moved));
+    assert_eq!(moved.to_string(), "gain is 70 where 64 was set");
+}
+
+#[test]
+fn odd_ranges_upset_nothing() {
+    for (minimum, maximum, step) in [(5, 5, 0), (9, 2, 3), (i64::MIN, i64::MAX, u64::MAX)] {
+        let mut odd = number("gain", (minimum, maximum), 7);
+        odd.step = step;
+        let plan = ManualPlan::new(&[odd], &Wanted::default());
+        assert_eq!(plan.steps.len(), 1);
+    }
+}

@@ -1,0 +1,314 @@
+//! The kernel's V4L2 calls as safe functions: the one place of this room with unsafe code.
+//!
+//! The crate `v4l` gives the structures and call numbers. Its devices and streams are not used:
+//! dropping a stream panics on every error but one, frames come without the number of bytes used,
+//! waiting does not tell a broken stream from a frame, and reading controls panics on unknown kinds.
+#![allow(unsafe_code)]
+
+mod buffers;
+mod controls;
+
+use std::ffi::c_void;
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::marker::PhantomData;
+use std::mem::{self, size_of};
+use std::os::fd::AsRawFd;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::Path;
+use std::ptr;
+
+use rustix::fs::OFlags;
+use v4l::v4l_sys as sys;
+use v4l::v4l2;
+use v4l::v4l2::vidioc;
+
+pub(super) use buffers::{Filled, Mapping, Ready};
+
+/// The single-planar capture queue.
+const CAPTURE: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE;
+
+/// A call's number, tied to the structure that it reads and writes.
+struct Request<T> {
+    code: vidioc::_IOC_TYPE,
+    argument: PhantomData<T>,
+}
+
+impl<T> Request<T> {
+    /// Does not compile where the number was made for a structure of another size.
+    const fn new(code: vidioc::_IOC_TYPE) -> Self {
+        assert!((code as usize >> 16) & 0x3fff == size_of::<T>());
+        Self {
+            code,
+            argument: PhantomData,
+        }
+    }
+}
+
+const QUERYCAP: Request<sys::v4l2_capability> = Request::new(vidioc::VIDIOC_QUERYCAP);
+const ENUM_FMT: Request<sys::v4l2_fmtdesc> = Request::new(vidioc::VIDIOC_ENUM_FMT);
+const ENUM_FRAMESIZES: Request<sys::v4l2_frmsizeenum> =
+    Request::new(vidioc::VIDIOC_ENUM_FRAMESIZES);
+const ENUM_FRAMEINTERVALS: Request<sys::v4l2_frmivalenum> =
+    Request::new(vidioc::VIDIOC_ENUM_FRAMEINTERVALS);
+const S_FMT: Request<sys::v4l2_format> = Request::new(vidioc::VIDIOC_S_FMT);
+const G_PARM: Request<sys::v4l2_streamparm> = Request::new(vidioc::VIDIOC_G_PARM);
+const S_PARM: Request<sys::v4l2_streamparm> = Request::new(vidioc::VIDIOC_S_PARM);
+
+/// Structures of the kernel's interface for which all zeros is a value.
+///
+/// # Safety
+/// The type must be made of numbers, pointers, and arrays and unions of them.
+unsafe trait Plain {}
+
+macro_rules! plain {
+    ($($name:ident),*) => { $(
+        // SAFETY: a structure of the kernel's C interface, of numbers, pointers and their unions.
+        unsafe impl Plain for sys::$name {}
+    )* };
+}
+
+plain!(
+    v4l2_capability,
+    v4l2_fmtdesc,
+    v4l2_frmsizeenum,
+    v4l2_frmivalenum,
+    v4l2_format,
+    v4l2_streamparm,
+    v4l2_query_ext_ctrl,
+    v4l2_querymenu,
+    v4l2_ext_control,
+    v4l2_ext_controls,
+    v4l2_requestbuffers,
+    v4l2_buffer
+);
+
+fn zeroed<T: Plain>() -> T {
+    // SAFETY: `Plain` promises that all zeros is a value.
+    unsafe { mem::zeroed() }
+}
+
+/// An opened device node.
+#[derive(Debug)]
+pub(super) struct Node(File);
+
+/// What a node can do.
+#[derive(Debug, Clone)]
+pub(super) struct Identity {
+    pub(super) driver: String,
+    pub(super) card: String,
+    pub(super) bus: String,
+    /// `V4L2_CAP_*` of this node.
+    pub(super) capabilities: u32,
+}
+
+/// Sizes or intervals as the kernel lists them.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Listed<T> {
+    One(T),
+    Range { min: T, max: T, step: T },
+}
+
+/// What S_FMT granted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PixelLayout {
+    pub(super) fourcc: u32,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    /// Bytes from one row to the next; 0 for compressed formats.
+    pub(super) stride: u32,
+}
+
+impl Node {
+    pub(super) fn open(path: &Path) -> io::Result<Self> {
+        // Non-blocking, so that dequeuing never waits longer than poll did.
+        let flags = OFlags::NONBLOCK.bits().cast_signed();
+        let mut options = OpenOptions::new();
+        options.read(true).write(true).custom_flags(flags);
+        options.open(path).map(Self)
+    }
+
+    /// One call, repeated where a signal interrupts it.
+    fn call<T>(&self, request: &Request<T>, argument: &mut T) -> io::Result<()> {
+        loop {
+            let pointer = ptr::from_mut(argument).cast::<c_void>();
+            // SAFETY: the request's number was made for a structure of T's size, so that the
+            // kernel reads and writes inside `argument`, which is borrowed for the call. Of the
+            // calls whose structures hold pointers, the callers set the pointers.
+            match unsafe { v4l2::ioctl(self.0.as_raw_fd(), request.code, pointer) } {
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                answer => return answer,
+            }
+        }
+    }
+
+    pub(super) fn identity(&self) -> io::Result<Identity> {
+        let mut found: sys::v4l2_capability = zeroed();
+        self.call(&QUERYCAP, &mut found)?;
+        // The node's own capabilities, where the driver tells them apart from the device's.
+        let own = found.capabilities & sys::V4L2_CAP_DEVICE_CAPS != 0;
+        Ok(Identity {
+            driver: text(&found.driver),
+            card: text(&found.card),
+            bus: text(&found.bus_info),
+            capabilities: if own {
+                found.device_caps
+            } else {
+                found.capabilities
+            },
+        })
+    }
+
+    /// The pixel format with this index; `None` after the last.
+    pub(super) fn pixel_format(&self, index: u32) -> io::Result<Option<u32>> {
+        let mut found = sys::v4l2_fmtdesc {
+            index,
+            type_: CAPTURE,
+            ..zeroed()
+        };
+        Ok(listed(self.call(&ENUM_FMT, &mut found))?.map(|()| found.pixelformat))
+    }
+
+    /// The frame size with this index; `None` after the last.
+    pub(super) fn frame_size(
+        &self,
+        fourcc: u32,
+        index: u32,
+    ) -> io::Result<Option<Listed<(u32, u32)>>> {
+        let mut found = sys::v4l2_frmsizeenum {
+            index,
+            pixel_format: fourcc,
+            ..zeroed()
+        };
+        if listed(self.call(&ENUM_FRAMESIZES, &mut found))?.is_none() {
+            return Ok(None);
+        }
+        // SAFETY: all fields of the union are plain numbers, and the call filled or zeroed them.
+        let (one, range) = unsafe {
+            let sizes = found.__bindgen_anon_1;
+            (sizes.discrete, sizes.stepwise)
+        };
+        Ok(Some(
+            if found.type_ == sys::v4l2_frmsizetypes_V4L2_FRMSIZE_TYPE_DISCRETE {
+                Listed::One((one.width, one.height))
+            } else {
+                Listed::Range {
+                    min: (range.min_width, range.min_height),
+                    max: (range.max_width, range.max_height),
+                    step: (range.step_width, range.step_height),
+                }
+            },
+        ))
+    }
+
+    /// The frame interval with this index, seconds as numerator and denominator; `None` after the
+    /// last.
+    pub(super) fn frame_interval(
+        &self,
+        fourcc: u32,
+        (width, height): (u32, u32),
+        index: u32,
+    ) -> io::Result<Option<Listed<(u32, u32)>>> {
+        let mut found = sys::v4l2_frmivalenum {
+            index,
+            pixel_format: fourcc,
+            width,
+            height,
+            ..zeroed()
+        };
+        if listed(self.call(&ENUM_FRAMEINTERVALS, &mut found))?.is_none() {
+            return Ok(None);
+        }
+        let pair = |of: sys::v4l2_fract| (of.numerator, of.denominator);
+        // SAFETY: all fields of the union are plain numbers, and the call filled or zeroed them.
+        let (one, range) = unsafe {
+            let intervals = found.__bindgen_anon_1;
+            (intervals.discrete, intervals.stepwise)
+        };
+        Ok(Some(
+            if found.type_ == sys::v4l2_frmivaltypes_V4L2_FRMIVAL_TYPE_DISCRETE {
+                Listed::One(pair(one))
+            } else {
+                Listed::Range {
+                    min: pair(range.min),
+                    max: pair(range.max),
+                    step: pair(range.step),
+                }
+            },
+        ))
+    }
+
+    /// Asks for a format; the driver puts the nearest that it has in its place.
+    pub(super) fn set_format(
+        &self,
+        fourcc: u32,
+        width: u32,
+        height: u32,
+    ) -> io::Result<PixelLayout> {
+        let mut format: sys::v4l2_format = zeroed();
+        format.type_ = CAPTURE;
+        format.fmt.pix = sys::v4l2_pix_format {
+            width,
+            height,
+            pixelformat: fourcc,
+            field: sys::v4l2_field_V4L2_FIELD_NONE,
+            // SAFETY: plain numbers and a union of them.
+            ..unsafe { mem::zeroed() }
+        };
+        self.call(&S_FMT, &mut format)?;
+        // SAFETY: the field for this type of queue, which the call filled; plain numbers.
+        let pix = unsafe { format.fmt.pix };
+        Ok(PixelLayout {
+            fourcc: pix.pixelformat,
+            width: pix.width,
+            height: pix.height,
+            stride: pix.bytesperline,
+        })
+    }
+
+    /// Asks for a frame interval, seconds as numerator and denominator, and answers the granted
+    /// one; `None` where the driver has no notion of it.
+    pub(super) fn set_interval(
+        &self,
+        numerator: u32,
+        denominator: u32,
+    ) -> io::Result<Option<(u32, u32)>> {
+        let mut parameters: sys::v4l2_streamparm = zeroed();
+        parameters.type_ = CAPTURE;
+        if listed(self.call(&G_PARM, &mut parameters))?.is_none() {
+            return Ok(None);
+        }
+        // SAFETY: the field for this type of queue; plain numbers.
+        if unsafe { parameters.parm.capture.capability } & sys::V4L2_CAP_TIMEPERFRAME != 0 {
+            parameters.parm.capture.timeperframe = sys::v4l2_fract {
+                numerator,
+                denominator,
+            };
+            self.call(&S_PARM, &mut parameters)?;
+        }
+        // SAFETY: as above.
+        let granted = unsafe { parameters.parm.capture.timeperframe };
+        Ok(Some((granted.numerator, granted.denominator)))
+    }
+}
+
+/// `None` for the answers with which drivers end a list, or say that they have none.
+fn listed(answer: io::Result<()>) -> io::Result<Option<()>> {
+    use rustix::io::Errno;
+    match answer {
+        Ok(()) => Ok(Some(())),
+        Err(error) => match Errno::from_io_error(&error) {
+            Some(Errno::INVAL | Errno::NOTTY | Errno::NODATA) => Ok(None),
+            _ => Err(error),
+        },
+    }
+}
+
+/// The text in a field that the kernel ends with a zero byte, or fills.
+pub(super) fn text(field: &[u8]) -> String {
+    let end = field
+        .iter()
+        .position(|&byte| byte == 0)
+        .unwrap_or(field.len());
+    String::from_utf8_lossy(&field[..end]).into_owned()
+}

@@ -1,0 +1,170 @@
+//! Which devices there are, and what they offer.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::ioctl::{Listed, Node};
+use super::{Camera as _, CameraError, V4l2Camera};
+use crate::camera::{Address, Capabilities, DeviceInfo, Fourcc, Mode, Rate, Rates, Sizes};
+
+/// Most entries that are read of a driver's list: a faulty driver must not list for ever.
+const MOST_ENTRIES: u32 = 256;
+
+/// All video devices that deliver pictures, by number. A device that cannot be looked at is listed
+/// with the reason; nodes of other kinds, such as those for metadata, are not listed.
+pub(in crate::camera) fn list() -> Vec<DeviceInfo> {
+    let mut nodes = nodes(Path::new("/dev"));
+    nodes.sort_unstable();
+    let devices = nodes.into_iter();
+    devices
+        .filter_map(|(_, path)| match V4l2Camera::open(&path) {
+            Ok(camera) => Some(camera.info().clone()),
+            Err(CameraError::NotACamera { .. }) => None,
+            Err(error) => Some(unreadable(path, &error)),
+        })
+        .collect()
+}
+
+/// Numbers and paths of a folder's video nodes.
+fn nodes(folder: &Path) -> Vec<(u32, PathBuf)> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries
+        .filter_map(|entry| {
+            let name = entry.file_name();
+            let number = name.to_str()?.strip_prefix("video")?.parse().ok()?;
+            Some((number, entry.path()))
+        })
+        .collect()
+}
+
+fn unreadable(path: PathBuf, error: &CameraError) -> DeviceInfo {
+    DeviceInfo {
+        address: Address::V4l2(path),
+        name: String::new(),
+        driver: String::new(),
+        bus: String::new(),
+        modes: Vec::new(),
+        other_formats: Vec::new(),
+        capabilities: Capabilities {
+            sequence: false,
+            driver_time: false,
+            controls: false,
+        },
+        problems: vec![error.to_string()],
+    }
+}
+
+/// Formats that are taken here, with sizes and rates, and the others.
+pub(super) fn modes(node: &Node) -> io::Result<(Vec<Mode>, Vec<Fourcc>)> {
+    let (mut modes, mut others) = (Vec::new(), Vec::new());
+    for code in entries(|index| node.pixel_format(index))? {
+        let fourcc = Fourcc::from_code(code);
+        if fourcc.encoding().is_none() {
+            others.push(fourcc);
+            continue;
+        }
+        for size in entries(|index| node.frame_size(code, index))? {
+            let sizes = sizes(size);
+            let largest = sizes.largest();
+            let intervals = entries(|index| node.frame_interval(code, largest, index))?;
+            modes.push(Mode {
+                fourcc,
+                sizes,
+                rates: rates(&intervals),
+            });
+        }
+    }
+    Ok((modes, others))
+}
+
+/// A driver's list from index 0 to its end.
+fn entries<T>(entry: impl Fn(u32) -> io::Result<Option<T>>) -> io::Result<Vec<T>> {
+    let mut found = Vec::new();
+    for index in 0..MOST_ENTRIES {
+        match entry(index)? {
+            Some(entry) => found.push(entry),
+            None => break,
+        }
+    }
+    Ok(found)
+}
+
+fn sizes(size: Listed<(u32, u32)>) -> Sizes {
+    match size {
+        Listed::One((width, height)) => Sizes::One(width, height),
+        Listed::Range { min, max, step } => Sizes::Range {
+            min,
+            max,
+            step: (step.0.max(1), step.1.max(1)),
+        },
+    }
+}
+
+/// Intervals are seconds; the shortest is the fastest rate.
+fn rates(intervals: &[Listed<(u32, u32)>]) -> Rates {
+    let rate = |(numerator, denominator): (u32, u32)| Rate::new(denominator, numerator);
+    let mut list = Vec::new();
+    for interval in intervals {
+        match *interval {
+            Listed::One(seconds) => list.extend(rate(seconds)),
+            Listed::Range { min, max, .. } => {
+                if let (Some(fastest), Some(slowest)) = (rate(min), rate(max)) {
+                    return Rates::Range { slowest, fastest };
+                }
+            }
+        }
+    }
+    if list.is_empty() {
+        return Rates::Unknown;
+    }
+    Rates::List(list)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_become_rates() {
+        let one = |pair| Listed::One(pair);
+        let list = rates(&[one((1, 30)), one((1001, 30000)), one((0, 5))]);
+        let wanted = [Rate::new(30, 1), Rate::new(30000, 1001)];
+        assert_eq!(list, Rates::List(wanted.into_iter().flatten().collect()));
+        let range = Listed::Range {
+            min: (1, 60),
+            max: (1, 5),
+            step: (1, 1),
+        };
+        let (slowest, fastest) = (Rate::new(5, 1).unwrap(), Rate::new(60, 1).unwrap());
+        assert_eq!(rates(&[range]), Rates::Range { slowest, fastest });
+        assert_eq!(rates(&[]), Rates::Unknown);
+    }
+
+    #[test]
+    fn a_list_without_end_is_cut() {
+        let endless = entries(|index| Ok(Some(index))).unwrap();
+        assert_eq!(endless.len(), MOST_ENTRIES as usize);
+    }
+
+    #[test]
+    fn only_numbered_video_nodes_count() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["video10", "video2", "video", "vbi0", "videox"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let mut found = nodes(folder.path());
+        found.sort_unstable();
+        let numbers: Vec<u32> = found.iter().map(|&(number, _)| number).collect();
+        assert_eq!(numbers, [2, 10]);
+    }
+
+    #[test]
+    fn a_device_that_cannot_be_looked_at_is_listed_with_the_reason() {
+        let error = CameraError::NotPermitted {
+            device: "/dev/video3".to_owned(),
+        };
+        let info = unreadable("/dev/video3".into(), &error);
+        assert_eq!(info.address.to_string(), "v4l2:/dev/video3");
+        assert!(info.problems[0].contains("group `video`"), "{info:?}");
+    }
+}

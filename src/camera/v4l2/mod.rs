@@ -1,0 +1,282 @@
+//! Cameras under Linux, by the kernel's Video4Linux2 interface: the recording path.
+
+mod controls;
+mod ioctl;
+mod listing;
+mod stream;
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rustix::io::Errno;
+use v4l::v4l_sys as sys;
+
+use self::ioctl::{Identity, Node};
+use self::stream::Stream;
+use super::{
+    Address, Camera, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc, Frame,
+    GrantedMode, Mode, ModeRequest,
+};
+
+pub(super) use listing::list;
+
+/// A V4L2 device.
+#[derive(Debug)]
+pub(super) struct V4l2Camera {
+    device: Device,
+    info: DeviceInfo,
+    stream: Option<Stream>,
+}
+
+/// A node and its name, for errors.
+#[derive(Debug)]
+struct Device {
+    node: Node,
+    path: PathBuf,
+}
+
+impl V4l2Camera {
+    pub(super) fn open(path: &Path) -> Result<Self, CameraError> {
+        let node = Node::open(path).map_err(|error| open_error(path, error))?;
+        let device = Device {
+            node,
+            path: path.to_owned(),
+        };
+        let identity = device.node.identity();
+        let identity = identity.map_err(|error| device.no_camera(error))?;
+        device.check_capabilities(identity.capabilities)?;
+        let info = device.describe(identity)?;
+        Ok(Self {
+            device,
+            info,
+            stream: None,
+        })
+    }
+}
+
+impl Camera for V4l2Camera {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn modes(&mut self) -> Result<Vec<Mode>, CameraError> {
+        let (modes, _) = self.device.modes()?;
+        Ok(modes)
+    }
+
+    fn controls(&mut self) -> Result<Vec<Control>, CameraError> {
+        self.device.controls()
+    }
+
+    fn set_control(&mut self, id: ControlId, value: i64) -> Result<i64, CameraError> {
+        self.device.set_control(id, value)
+    }
+
+    fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
+        // The driver takes no new format while it has buffers. What stopping answers shows again in
+        // the next call.
+        let _ = self.stop();
+        let (stream, granted) = Stream::start(&self.device, want)?;
+        self.stream = Some(stream);
+        Ok(granted)
+    }
+
+    fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError> {
+        match &mut self.stream {
+            Some(stream) => stream.next(&self.device, timeout),
+            None => Err(CameraError::NotStarted {
+                device: self.device.name(),
+            }),
+        }
+    }
+
+    fn stop(&mut self) -> Result<(), CameraError> {
+        match self.stream.take() {
+            Some(stream) => stream.stop(&self.device),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Drop for V4l2Camera {
+    fn drop(&mut self) {
+        // Whatever the driver answers: closing the node stops the stream as well.
+        let _ = self.stop();
+    }
+}
+
+impl Device {
+    fn name(&self) -> String {
+        self.path.display().to_string()
+    }
+
+    fn describe(&self, identity: Identity) -> Result<DeviceInfo, CameraError> {
+        let mut problems = Vec::new();
+        let (modes, other_formats) = match self.modes() {
+            Err(error @ CameraError::Refused { .. }) => {
+                problems.push(error.to_string());
+                Default::default()
+            }
+            answer => answer?,
+        };
+        Ok(DeviceInfo {
+            address: Address::V4l2(self.path.clone()),
+            name: identity.card,
+            driver: identity.driver,
+            bus: identity.bus,
+            modes,
+            other_formats,
+            capabilities: Capabilities {
+                sequence: true,
+                driver_time: true,
+                controls: true,
+            },
+            problems,
+        })
+    }
+
+    fn check_capabilities(&self, capabilities: u32) -> Result<(), CameraError> {
+        let why = if capabilities & sys::V4L2_CAP_VIDEO_CAPTURE == 0 {
+            if capabilities & sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE != 0 {
+                "it delivers frames in several planes only"
+            } else {
+                "it delivers no pictures"
+            }
+        } else if capabilities & sys::V4L2_CAP_STREAMING == 0 {
+            "it cannot stream"
+        } else {
+            return Ok(());
+        };
+        Err(CameraError::NotACamera {
+            device: self.name(),
+            why: why.to_owned(),
+        })
+    }
+
+    /// What an error of a call means that is not about a control or a running stream.
+    fn error(&self, doing: &'static str, source: io::Error) -> CameraError {
+        let device = self.name();
+        match Errno::from_io_error(&source) {
+            Some(Errno::NODEV) => CameraError::Unplugged { device },
+            Some(Errno::BUSY) => CameraError::InUse { device },
+            _ => CameraError::Refused {
+                device,
+                doing,
+                source,
+            },
+        }
+    }
+
+    /// What an error of a running stream means. An unplugged device can answer with any error, and
+    /// only then with its absence.
+    fn stream_error(&self, doing: &'static str, source: io::Error) -> CameraError {
+        let device = self.name();
+        if Errno::from_io_error(&source) == Some(Errno::NODEV) || self.is_gone() {
+            return CameraError::Unplugged { device };
+        }
+        CameraError::Stream {
+            device,
+            doing,
+            source,
+        }
+    }
+
+    fn is_gone(&self) -> bool {
+        let answer = self.node.identity();
+        answer.is_err_and(|error| Errno::from_io_error(&error) == Some(Errno::NODEV))
+    }
+
+    /// An error of the first call: a node of another kind does not know it.
+    fn no_camera(&self, error: io::Error) -> CameraError {
+        match Errno::from_io_error(&error) {
+            Some(Errno::NOTTY | Errno::INVAL) => CameraError::NotACamera {
+                device: self.name(),
+                why: "it does not answer as a camera".to_owned(),
+            },
+            _ => self.error("it was asked what it is", error),
+        }
+    }
+
+    /// What it offers: formats that are taken here, with sizes and rates, and the others.
+    fn modes(&self) -> Result<(Vec<Mode>, Vec<Fourcc>), CameraError> {
+        listing::modes(&self.node).map_err(|error| self.error("its modes were read", error))
+    }
+}
+
+fn open_error(path: &Path, error: io::Error) -> CameraError {
+    let device = path.display().to_string();
+    match Errno::from_io_error(&error) {
+        Some(Errno::NOENT | Errno::NODEV | Errno::NXIO | Errno::NOTDIR) => {
+            CameraError::NotThere { device }
+        }
+        Some(Errno::ACCESS | Errno::PERM) => CameraError::NotPermitted { device },
+        Some(Errno::BUSY) => CameraError::InUse { device },
+        _ => CameraError::Refused {
+            device,
+            doing: "it was opened",
+            source: error,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn device(node: Node) -> Device {
+        Device {
+            node,
+            path: "/dev/video9".into(),
+        }
+    }
+
+    /// A node that is no camera: every call is refused.
+    fn null() -> Device {
+        device(Node::open(Path::new("/dev/null")).unwrap())
+    }
+
+    #[test]
+    fn what_opening_answers_is_told_apart() {
+        let open = |path: &str| V4l2Camera::open(Path::new(path)).unwrap_err();
+        let missing = open("/dev/there-is-no-such-camera");
+        assert!(matches!(missing, CameraError::NotThere { .. }), "{missing}");
+        let other = open("/dev/null");
+        assert!(matches!(other, CameraError::NotACamera { .. }), "{other}");
+        let errno = |errno: Errno| open_error(Path::new("/dev/video9"), errno.into());
+        assert!(matches!(
+            errno(Errno::ACCESS),
+            CameraError::NotPermitted { .. }
+        ));
+        assert!(matches!(errno(Errno::NODEV), CameraError::NotThere { .. }));
+        assert!(matches!(errno(Errno::BUSY), CameraError::InUse { .. }));
+        assert!(matches!(errno(Errno::IO), CameraError::Refused { .. }));
+    }
+
+    #[test]
+    fn errors_of_calls_are_told_apart() {
+        let error = |errno: Errno| null().error("its modes were read", errno.into());
+        assert!(matches!(error(Errno::NODEV), CameraError::Unplugged { .. }));
+        assert!(matches!(error(Errno::BUSY), CameraError::InUse { .. }));
+        assert!(matches!(error(Errno::INVAL), CameraError::Refused { .. }));
+        let stream = |errno: Errno| null().stream_error("read", errno.into());
+        assert!(matches!(
+            stream(Errno::NODEV),
+            CameraError::Unplugged { .. }
+        ));
+        assert!(matches!(stream(Errno::IO), CameraError::Stream { .. }));
+    }
+
+    #[test]
+    fn nodes_that_give_no_pictures_are_refused_with_the_reason() {
+        let why = |capabilities| match null().check_capabilities(capabilities) {
+            Err(CameraError::NotACamera { why, .. }) => why,
+            answer => panic!("{answer:?}"),
+        };
+        assert!(why(sys::V4L2_CAP_META_CAPTURE).contains("no pictures"));
+        assert!(why(sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE).contains("several planes"));
+        assert!(why(sys::V4L2_CAP_VIDEO_CAPTURE).contains("stream"));
+        let camera = sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_STREAMING;
+        assert!(null().check_capabilities(camera).is_ok());
+    }
+}

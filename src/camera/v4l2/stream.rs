@@ -1,0 +1,229 @@
+//! A running stream: buffers in mapped memory, frames out.
+
+use std::io;
+use std::time::{Duration, Instant};
+
+use v4l::v4l_sys as sys;
+
+use super::ioctl::{Filled, Mapping, PixelLayout, Ready};
+use super::{CameraError, Device};
+use crate::camera::frame::without_padding;
+use crate::camera::{
+    Encoding, Fourcc, Frame, GrantedMode, ModeRequest, Rate, SequenceUnwrapper, StampSource,
+};
+use crate::clock::Clock;
+
+/// Buffers asked of the driver: at 30 frames/s, a quarter of a second in which nobody has to fetch
+/// a frame.
+const BUFFERS: u32 = 8;
+/// Fewest with which a driver can fill one while others wait.
+const FEWEST_BUFFERS: usize = 2;
+
+/// Longest wait in one call; a longer one is made of several.
+const LONGEST_WAIT: Duration = Duration::from_secs(60);
+
+#[derive(Debug)]
+pub(super) struct Stream {
+    layout: PixelLayout,
+    encoding: Encoding,
+    buffers: Vec<Mapping>,
+    /// Buffers that the driver did not take back; they are offered again.
+    idle: Vec<u32>,
+    counter: SequenceUnwrapper,
+}
+
+impl Stream {
+    pub(super) fn start(
+        device: &Device,
+        want: &ModeRequest,
+    ) -> Result<(Self, GrantedMode), CameraError> {
+        let layout = device
+            .node
+            .set_format(want.fourcc.code(), want.width, want.height)
+            .map_err(|error| device.error("its format was set", error))?;
+        let fourcc = Fourcc::from_code(layout.fourcc);
+        let encoding = fourcc.encoding().ok_or_else(|| CameraError::Format {
+            device: device.name(),
+            fourcc,
+        })?;
+        let interval = device
+            .node
+            .set_interval(want.rate.denominator(), want.rate.numerator())
+            .map_err(|error| device.error("its frame rate was set", error))?;
+        let rate = interval.and_then(|(numerator, denominator)| Rate::new(denominator, numerator));
+        let mut stream = Self {
+            layout,
+            encoding,
+            buffers: Vec::new(),
+            idle: Vec::new(),
+            counter: SequenceUnwrapper::default(),
+        };
+        if let Err(error) = stream.run(device) {
+            stream.release(device);
+            return Err(device.error("its stream was started", error));
+        }
+        let granted = GrantedMode {
+            fourcc,
+            width: layout.width,
+            height: layout.height,
+            rate,
+        };
+        Ok((stream, granted))
+    }
+
+    /// Gets buffers, gives them to the driver, and lets it run.
+    fn run(&mut self, device: &Device) -> io::Result<()> {
+        let count = device.node.request_buffers(BUFFERS)?;
+        for index in 0..count {
+            self.buffers.push(device.node.map(index)?);
+            device.node.queue(index)?;
+        }
+        if self.buffers.len() < FEWEST_BUFFERS {
+            return Err(io::Error::other(format!("it has only {count} buffers")));
+        }
+        device.node.stream_on()
+    }
+
+    /// Stops and gives back what can be given back, whatever the driver answers.
+    fn release(&mut self, device: &Device) {
+        let _ = device.node.stream_off();
+        self.buffers.clear();
+        let _ = device.node.request_buffers(0);
+    }
+
+    pub(super) fn stop(mut self, device: &Device) -> Result<(), CameraError> {
+        let stopped = device.node.stream_off();
+        self.release(device);
+        stopped.map_err(|error| device.stream_error("stopped", error))
+    }
+
+    pub(super) fn next(
+        &mut self,
+        device: &Device,
+        timeout: Duration,
+    ) -> Result<Frame, CameraError> {
+        let start = Instant::now();
+        self.offer_idle(device)?;
+        loop {
+            let left = timeout.saturating_sub(start.elapsed()).min(LONGEST_WAIT);
+            let ready = device.node.wait(left);
+            let ready = ready.map_err(|error| device.stream_error("waited for", error))?;
+            match device.node.dequeue() {
+                Ok(filled) => return Ok(self.take(device, filled)),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                    if ready == Ready::Broken {
+                        return Err(device.stream_error("waited for", error));
+                    }
+                }
+                Err(error) => return Err(device.stream_error("read", error)),
+            }
+            if start.elapsed() >= timeout {
+                return Err(self.too_late(device, timeout));
+            }
+        }
+    }
+
+    fn too_late(&self, device: &Device, waited: Duration) -> CameraError {
+        let device_name = device.name();
+        if device.is_gone() {
+            return CameraError::Unplugged {
+                device: device_name,
+            };
+        }
+        CameraError::Timeout {
+            device: device_name,
+            waited,
+        }
+    }
+
+    /// Copies a filled buffer's frame out and gives the buffer back at once.
+    fn take(&mut self, device: &Device, filled: Filled) -> Frame {
+        let arrived_us = Clock::monotonic().now_us();
+        // An index that was never given out would be a driver's fault; the frame is then empty.
+        let data = usize::try_from(filled.index)
+            .ok()
+            .and_then(|index| self.buffers.get(index))
+            .map(|buffer| buffer.copy(filled.bytes_used as usize))
+            .unwrap_or_default();
+        // A frame in hand is delivered even if its buffer is not taken back now.
+        if device.node.queue(filled.index).is_err() {
+            self.idle.push(filled.index);
+        }
+        let (t_us, stamp) = stamp(filled, arrived_us);
+        let PixelLayout {
+            fourcc,
+            width,
+            height,
+            stride,
+        } = self.layout;
+        let data = match self.encoding.rows(width, height) {
+            Some((row, rows)) => without_padding(data, stride as usize, row, rows),
+            None => data,
+        };
+        Frame {
+            fourcc: Fourcc::from_code(fourcc),
+            width,
+            height,
+            data,
+            sequence: Some(self.counter.next(filled.sequence)),
+            t_us,
+            stamp,
+            flagged: filled.flags & sys::V4L2_BUF_FLAG_ERROR != 0,
+        }
+    }
+
+    /// Gives the driver the buffers that it did not take before.
+    fn offer_idle(&mut self, device: &Device) -> Result<(), CameraError> {
+        let mut last = None;
+        self.idle.retain(|&index| {
+            device
+                .node
+                .queue(index)
+                .map_err(|error| last = Some(error))
+                .is_err()
+        });
+        match last {
+            // With none left to fill, no frame would ever come.
+            Some(error) if self.idle.len() >= self.buffers.len() => {
+                Err(device.stream_error("given its buffers", error))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A frame's time stamp: the driver's where it goes by the monotonic clock, else the arrival.
+fn stamp(filled: Filled, arrived_us: i64) -> (i64, StampSource) {
+    if filled.flags & sys::V4L2_BUF_FLAG_TIMESTAMP_MASK != sys::V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC {
+        return (arrived_us, StampSource::Arrival);
+    }
+    let source = match filled.flags & sys::V4L2_BUF_FLAG_TSTAMP_SRC_MASK {
+        sys::V4L2_BUF_FLAG_TSTAMP_SRC_SOE => StampSource::StartOfExposure,
+        _ => StampSource::EndOfFrame,
+    };
+    (filled.t_us, source)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_stamp_of_another_clock_is_replaced_and_told() {
+        let filled = |flags| Filled {
+            index: 0,
+            bytes_used: 0,
+            flags,
+            sequence: 0,
+            t_us: 5,
+        };
+        let monotonic = sys::V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+        let at = |flags| stamp(filled(flags), 9);
+        assert_eq!(at(monotonic), (5, StampSource::EndOfFrame));
+        let exposure = monotonic | sys::V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
+        assert_eq!(at(exposure), (5, StampSource::StartOfExposure));
+        for other in [0, sys::V4L2_BUF_FLAG_TIMESTAMP_COPY] {
+            assert_eq!(at(other), (9, StampSource::Arrival));
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Camera and table, opened on one clock, and opened again after they were gone.
+
+use crate::camera::{self, Camera};
+use crate::clock::Clock;
+use crate::simulator::{self, Simulator, SimulatorOptions};
+use crate::turntable::{Address, Options, Table, find_serial};
+
+use super::failure::CaptureError;
+use super::settings::Settings;
+
+/// Camera and table of a rig.
+pub struct Equipment {
+    // Dropped in this order: the table is stopped before its simulator is switched off.
+    /// The camera; `None` while it is gone.
+    pub camera: Option<Box<dyn Camera>>,
+    /// The table; `None` while it is gone, and where there is none.
+    pub table: Option<Table>,
+    simulator: Option<Simulator>,
+    settings: Settings,
+    clock: Clock,
+}
+
+impl Equipment {
+    /// Nothing opened yet. Brings camera and table onto one clock.
+    ///
+    /// # Errors
+    /// [`super::Refusal::Pace`].
+    pub fn new(settings: Settings) -> Result<Self, CaptureError> {
+        let (settings, clock) = settings.on_one_clock()?;
+        Ok(Self {
+            camera: None,
+            table: None,
+            simulator: None,
+            settings,
+            clock,
+        })
+    }
+
+    /// The settings, with the addresses as they are opened.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The clock that everything goes by.
+    #[must_use]
+    pub fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    /// The simulated table, where the table is one and was opened.
+    #[must_use]
+    pub fn simulator(&self) -> Option<&Simulator> {
+        self.simulator.as_ref()
+    }
+
+    /// Whether a table is to be there.
+    #[must_use]
+    pub fn wants_table(&self) -> bool {
+        self.settings.turntable != Address::None
+    }
+
+    /// Opens the camera where it is not.
+    ///
+    /// # Errors
+    /// What opening it answers.
+    pub fn open_camera(&mut self) -> Result<&mut dyn Camera, CaptureError> {
+        let opened = match self.camera.take() {
+            Some(camera) => camera,
+            None => camera::open(&self.settings.camera, self.clock)?,
+        };
+        Ok(self.camera.insert(opened).as_mut())
+    }
+
+    /// Opens the table where it is not and there is one.
+    ///
+    /// # Errors
+    /// What opening it answers.
+    pub fn open_table(&mut self) -> Result<Option<&Table>, CaptureError> {
+        if self.table.is_none() {
+            self.table = self.connect()?;
+        }
+        Ok(self.table.as_ref())
+    }
+
+    fn connect(&mut self) -> Result<Option<Table>, CaptureError> {
+        let options = Options {
+            clock: self.clock,
+            runtime_folder: self.settings.runtime_folder.clone(),
+            ..Options::default()
+        };
+        let path = match &self.settings.turntable {
+            Address::None => return Ok(None),
+            Address::Serial(Some(path)) => path.clone(),
+            Address::Serial(None) => find_serial()?,
+            Address::Simulated(address) => {
+                let fault = address.fault.clone();
+                self.simulated(fault.as_deref())?.path().to_owned()
+            }
+        };
+        Ok(Some(Table::open_serial(&path, &options)?))
+    }
+
+    /// The simulated table, switched on the first time.
+    fn simulated(&mut self, fault: Option<&str>) -> Result<&Simulator, simulator::Error> {
+        let simulator = match self.simulator.take() {
+            Some(simulator) => simulator,
+            None => Simulator::start(SimulatorOptions {
+                clock: self.clock,
+                faults: fault.unwrap_or_default().parse()?,
+                ..SimulatorOptions::default()
+            })?,
+        };
+        Ok(self.simulator.insert(simulator))
+    }
+
+    /// Forgets the camera, so that it is opened again.
+    pub fn drop_camera(&mut self) {
+        self.camera = None;
+    }
+
+    /// Forgets the table, so that it is opened again.
+    pub fn drop_table(&mut self) {
+        self.table = None;
+    }
+}

@@ -1,0 +1,91 @@
+//! The page for a phone beside the rig: a few files that are part of the program.
+
+use std::sync::Arc;
+
+use axum::extract::State;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Redirect, Response};
+use serde::Deserialize;
+
+use super::body::Asked;
+use super::server::Server;
+
+const INDEX: &str = include_str!("page/index.html");
+
+/// A file of the page.
+#[derive(Debug)]
+pub(super) struct Asset {
+    pub(super) path: &'static str,
+    pub(super) kind: &'static str,
+    pub(super) text: &'static str,
+}
+
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+
+/// All files but the page itself.
+pub(super) const ASSETS: [Asset; 6] = [
+    Asset {
+        path: "/page.css",
+        kind: "text/css; charset=utf-8",
+        text: include_str!("page/page.css"),
+    },
+    Asset {
+        path: "/page.js",
+        kind: SCRIPT,
+        text: include_str!("page/page.js"),
+    },
+    Asset {
+        path: "/link.js",
+        kind: SCRIPT,
+        text: include_str!("page/link.js"),
+    },
+    Asset {
+        path: "/preview.js",
+        kind: SCRIPT,
+        text: include_str!("page/preview.js"),
+    },
+    Asset {
+        path: "/sessions.js",
+        kind: SCRIPT,
+        text: include_str!("page/sessions.js"),
+    },
+    Asset {
+        path: "/icon.svg",
+        kind: "image/svg+xml",
+        text: include_str!("page/icon.svg"),
+    },
+];
+
+impl Asset {
+    pub(super) fn answer(&self) -> Response {
+        ([(header::CONTENT_TYPE, self.kind)], self.text).into_response()
+    }
+}
+
+/// Whether a path is one of the page's files, which hold nothing of the rig and need no token.
+pub(super) fn is_open(path: &str) -> bool {
+    path == "/" || ASSETS.iter().any(|asset| asset.path == path)
+}
+
+/// The token, as it stands in the address that is printed at the start.
+#[derive(Debug, Deserialize)]
+pub(super) struct Entry {
+    token: Option<String>,
+}
+
+/// The page. With a token in the URL, the browser gets it as a cookie and goes on to the URL without it, so
+/// that it stays out of history and bookmarks.
+pub(super) async fn index(
+    State(server): State<Arc<Server>>,
+    Asked(Entry { token }): Asked<Entry>,
+) -> Response {
+    let page = [(header::CONTENT_TYPE, "text/html; charset=utf-8")];
+    match token {
+        None => (page, INDEX).into_response(),
+        Some(given) => match server.door.cookie_for(&given) {
+            Some(cookie) => ([(header::SET_COOKIE, cookie)], Redirect::to("/")).into_response(),
+            None if server.door.is_open() => Redirect::to("/").into_response(),
+            None => (StatusCode::UNAUTHORIZED, page, INDEX).into_response(),
+        },
+    }
+}

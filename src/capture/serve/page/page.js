@@ -1,0 +1,269 @@
+// The page beside the rig: shows the state as it comes and gives the rig its commands. All text from the
+// rig goes in as text, never as markup.
+import { ask, follow, give } from "./link.js";
+import { startPreview } from "./preview.js";
+import { listSessions, make } from "./sessions.js";
+
+const $ = (id) => document.getElementById(id);
+
+const PHASES = {
+  "idle": "Ready",
+  "preflight": "Checking camera, table and disk",
+  "metering": "Finding the exposure",
+  "moving-back": "Moving back for the run-up",
+  "starting": "Gathering speed",
+  "recording": "Recording",
+  "unwinding": "Turning back",
+  "checking": "Checking the take",
+  "waiting-for-object": "Put the next object on the table",
+};
+const VERDICTS = { clean: "clean", tolerated: "kept, with dropped frames", aborted: "aborted" };
+/** Controls that can be set here, and by how much a step moves them. */
+const STEPS = [
+  [/auto|dynamic|priority/, null],
+  [/exposure/, (value) => Math.max(1, Math.round(Math.abs(value) * 0.1))],
+  [/focus/, () => 5],
+  [/gain/, () => 1],
+  [/white_balance_temperature/, () => 100],
+];
+/** A take needs its predicted size and a fifth more. */
+const RESERVE = 1.2;
+
+let state = null;
+let seenFault = -Infinity;
+
+/** Gives a command; what the rig has against it is shown. */
+async function order(command) {
+  try {
+    show(await give(command));
+    say("");
+    return true;
+  } catch (problem) {
+    say(problem.message);
+    return false;
+  }
+}
+
+function say(sentence) {
+  $("message").textContent = sentence;
+  $("message").hidden = !sentence;
+}
+
+const resting = () => state.phase === "idle" || state.phase === "waiting-for-object";
+
+function show(next) {
+  // Events and answers to commands come by two ways: an old state must not replace a newer one.
+  if (state && next.version < state.version && state.version - next.version < 1e6) return;
+  const before = state;
+  state = next;
+  showTake();
+  showGo();
+  showFaults();
+  showQueue();
+  showTable();
+  showCamera();
+  showDisk();
+  const finished = before && JSON.stringify(before.last_take) !== JSON.stringify(state.last_take);
+  if (!before || finished || before.session !== state.session) refresh();
+}
+
+function showTake() {
+  const { phase, object, frames, frames_wanted: wanted, dropped, table } = state;
+  const part = wanted > 0 ? Math.min(frames / wanted, 1) : 0;
+  const busy = !resting();
+  const ready = phase === "idle" && !state.camera.present ? "No camera" : PHASES[phase];
+  $("phase").textContent = ready ?? phase;
+  $("what").textContent = object && busy ? object : "";
+  $("progress").hidden = !busy;
+  $("progress").value = part;
+  $("arc").setAttribute("stroke-dasharray", `${busy ? part * 100 : 0} 100`);
+  const angle = table.angle_deg;
+  $("hand").setAttribute("transform", `rotate(${angle ?? 0} 50 50)`);
+  $("ring-text").textContent = phase === "recording" ? `${Math.floor(part * 100)} %` : angle === null ? "" : `${angle.toFixed(0)}°`;
+  const counts = busy ? [make("span", { text: `${frames} / ${wanted} · ` }), make("span", { text: `${dropped} dropped`, className: dropped > 0 ? "bad" : "" })] : [];
+  $("counts").replaceChildren(...counts);
+  const take = state.last_take;
+  $("last").hidden = !take;
+  if (!take) return;
+  const words = make("b", { text: VERDICTS[take.verdict] ?? take.verdict, className: take.verdict === "clean" ? "good" : "bad" });
+  const rest = `: ${take.frames} frames, ${take.dropped} dropped, ${take.session}.${take.reason ? ` ${take.reason}` : ""}`;
+  $("last-text").replaceChildren(words, rest);
+}
+
+/** What the big button does now. */
+function action() {
+  const object = $("object").value.trim();
+  if (!state) return { text: "Start" };
+  if (state.phase === "waiting-for-object") return { text: `Capture ${state.queue[0] ?? "the next object"}`, command: { command: "next" } };
+  if (state.phase !== "idle") return { text: "Stop", stop: true, command: { command: "stop" } };
+  if (!object) return { text: "Name the object" };
+  return { text: `Start ${object}`, command: { command: "start", object, meter: $("meter").checked } };
+}
+
+function showGo() {
+  const { text, stop, command } = action();
+  $("go").textContent = text;
+  $("go").disabled = !command;
+  $("go").classList.toggle("stop", Boolean(stop));
+}
+
+function showFaults() {
+  const faults = state.faults.filter(({ t_us }) => t_us > seenFault).reverse();
+  $("faults").hidden = faults.length === 0;
+  const lines = faults.slice(0, 10).map(({ what }) => what);
+  const same = [...$("fault-list").children].map((line) => line.textContent);
+  if (lines.join("\n") !== same.join("\n")) $("fault-list").replaceChildren(...lines.map((text) => make("li", { text })));
+}
+
+function showQueue() {
+  const waiting = state.phase === "waiting-for-object";
+  $("queue").hidden = state.queue.length === 0;
+  $("next").hidden = state.phase !== "idle";
+  $("next").textContent = `${state.queue[0]} stands on the table: capture`;
+  const key = JSON.stringify([state.queue, waiting]);
+  if ($("queue").dataset.key === key) return;
+  $("queue").dataset.key = key;
+  const lines = state.queue.map((object, place) => {
+    const remove = make("button", { type: "button", text: "Remove", ariaLabel: `Take ${object} out of the queue` });
+    remove.addEventListener("click", () => order({ command: "dequeue", place }));
+    return make("li", {}, make("span", { text: object }), remove);
+  });
+  $("queue-list").replaceChildren(...lines);
+}
+
+function showTable() {
+  const { present, state: word, angle_deg: angle, degrees_per_second: speed, homed, battery_v: battery, fault } = state.table;
+  const facts = [["State", present ? word || "unknown" : "none"]];
+  if (present) {
+    facts.push(["Angle", angle === null ? "unknown" : `${angle.toFixed(1)}°`], ["Zero", homed ? "known" : "unknown"]);
+    if (speed) facts.push(["Speed", `${speed.toFixed(1)}°/s`]);
+    if (battery !== null) facts.push(["Battery", `${battery.toFixed(1)} V`]);
+  }
+  $("table").replaceChildren(...facts.map(([name, value]) => make("div", {}, make("dd", { text: value }), make("dt", { text: name }))));
+  warn("table-fault", fault);
+  for (const button of document.querySelectorAll("[data-jog], #home")) button.disabled = !present || !resting();
+  $("unlock").hidden = !word.startsWith("Alarm");
+}
+
+function showCamera() {
+  const { present, name, mode, fps, controls, clipped, focus, fault } = state.camera;
+  $("camera").textContent = present ? [name, mode].filter(Boolean).join(" · ") : "No camera";
+  $("focus").textContent = focus === null ? "" : `focus ${focus.toFixed(0)}`;
+  $("clipped").textContent = clipped === null ? "" : `clipped ${(clipped * 100).toFixed(clipped < 0.1 ? 2 : 0)} %`;
+  $("clipped").className = clipped > 0.005 ? "bad" : "";
+  $("fps").textContent = fps === null ? "" : `${fps.toFixed(1)} frames/s`;
+  warn("camera-fault", fault);
+  $("preview").classList.toggle("stale", !present);
+  const key = JSON.stringify([controls, resting()]);
+  if ($("controls").dataset.key === key || $("controls").contains(document.activeElement) && document.activeElement.tagName === "INPUT") return;
+  $("controls").dataset.key = key;
+  const focused = document.activeElement?.dataset?.control;
+  $("controls").replaceChildren(...controls.map(([control, value]) => line(control, value)));
+  if (focused) document.querySelector(`[data-control="${CSS.escape(focused)}"]`)?.focus();
+}
+
+/** A control's line: with buttons where a step is known. */
+function line(control, value) {
+  const name = control.replace(/_(absolute|automatic)$/, "").replaceAll("_", " ");
+  const step = STEPS.find(([pattern]) => pattern.test(control))?.[1]?.(value);
+  if (!step) return make("p", { className: "fixed" }, make("span", { text: name }), make("span", { text: value }));
+  const set = (to) => order({ command: "set-control", name: control, value: to });
+  const disabled = !resting();
+  const less = make("button", { type: "button", text: "−", ariaLabel: `Less ${name}`, disabled });
+  const more = make("button", { type: "button", text: "+", ariaLabel: `More ${name}`, disabled });
+  less.dataset.control = `${control} less`;
+  more.dataset.control = `${control} more`;
+  const input = make("input", { type: "number", step: 1, value, ariaLabel: name, inputMode: "numeric", disabled });
+  less.addEventListener("click", () => set(value - step));
+  more.addEventListener("click", () => set(value + step));
+  input.addEventListener("change", () => {
+    const to = input.valueAsNumber;
+    input.blur();
+    if (Number.isSafeInteger(to)) set(to);
+  });
+  return make("div", { className: "stepper" }, make("span", { text: name }), less, input, more);
+}
+
+function showDisk() {
+  const { free_bytes: free, needed_bytes: needed } = state;
+  const size = (bytes) => (bytes < 1e9 ? `${(bytes / 1e6).toFixed(0)} MB` : `${(bytes / 1e9).toFixed(1)} GB`);
+  const short = needed > 0 && free < needed * RESERVE;
+  const takes = needed > 0 ? `, a take needs ${size(needed)}` : "";
+  $("disk").textContent = `${size(free)} free${takes}${short ? ": too little room for a take" : ""}`;
+  $("disk").className = short ? "bad" : "quiet";
+  $("disk").hidden = !resting() && !short;
+}
+
+function warn(id, fault) {
+  $(id).textContent = fault ?? "";
+  $(id).hidden = !fault;
+}
+
+/** Fetches what is on the disk: the list, and the names to suggest. */
+async function refresh() {
+  try {
+    await listSessions();
+    const names = await ask("/api/v1/objects");
+    $("objects").replaceChildren(...names.map((value) => make("option", { value })));
+  } catch (problem) {
+    if (problem.status !== 0) say(problem.message);
+  }
+}
+
+function link(word, className) {
+  if ($("link").textContent !== word) $("link").textContent = word;
+  document.body.className = className;
+}
+
+$("object").addEventListener("input", showGo);
+$("object-form").addEventListener("submit", (event) => {
+  event.preventDefault();
+  $("object").blur();
+});
+$("meter").addEventListener("change", showGo);
+$("go").addEventListener("click", () => {
+  const { command } = action();
+  if (command) order(command);
+});
+$("enqueue").addEventListener("click", async () => {
+  const object = $("object").value.trim();
+  if (!object) return $("object").focus();
+  if (await order({ command: "enqueue", object })) {
+    $("object").value = "";
+    showGo();
+  }
+});
+$("next").addEventListener("click", () => order({ command: "next" }));
+$("home").addEventListener("click", () => order({ command: "home" }));
+$("unlock").addEventListener("click", () => order({ command: "unlock" }));
+for (const button of document.querySelectorAll("[data-jog]")) {
+  button.addEventListener("click", () => order({ command: "jog", degrees: Number(button.dataset.jog) }));
+}
+$("faults-seen").addEventListener("click", () => {
+  seenFault = Math.max(...state.faults.map(({ t_us }) => t_us));
+  showFaults();
+});
+$("unlock-page").addEventListener("submit", (event) => {
+  event.preventDefault();
+  location.assign(`/?token=${encodeURIComponent($("token").value.trim())}`);
+});
+
+startPreview();
+follow({
+  state: (next) => {
+    if (document.body.className === "lost") say("");
+    link("connected", "");
+    show(next);
+  },
+  lost: () => {
+    // A rig that was started anew counts its states from the beginning.
+    if (state) state.version = -1;
+    link("connection lost", "lost");
+  },
+  locked: () => {
+    link("locked", "locked");
+    $("locked").hidden = false;
+    $("rig").hidden = true;
+    $("bar").hidden = true;
+  },
+});

@@ -1,0 +1,149 @@
+//! What was recorded: the list of sessions, one of them, and pictures out of it.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
+use utoipa::IntoParams;
+
+use super::answer::{Failure, Problem};
+use super::body::Asked;
+use super::library::{SessionDetail, SessionSummary};
+use super::server::{Server, Work};
+
+/// Sessions in one answer, unless asked otherwise, and at most.
+const SESSIONS: usize = 100;
+const MOST_SESSIONS: usize = 1000;
+/// Names that are suggested.
+const OBJECTS: usize = 20;
+/// Width of a frame in the player, unless asked otherwise, and what can be asked for; pixels.
+const WIDTH: u32 = 960;
+const WIDTHS: std::ops::RangeInclusive<u32> = 64..=1920;
+/// Recorded pictures do not change.
+const KEEP: &str = "private, max-age=86400";
+
+/// Which part of the list.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct Part {
+    /// Only sessions whose name comes before this one: the last of the part before.
+    before: Option<String>,
+    /// How many, up to 1000; 100 if left out.
+    limit: Option<usize>,
+}
+
+/// The sessions, newest first
+#[utoipa::path(
+    get, path = "/api/v1/sessions", tag = "sessions", params(Part),
+    responses((status = 200, body = [SessionSummary]), (status = 401, body = Problem))
+)]
+pub(super) async fn list(
+    State(server): State<Arc<Server>>,
+    Asked(Part { before, limit }): Asked<Part>,
+) -> Result<Json<Vec<SessionSummary>>, Failure> {
+    let most = limit.unwrap_or(SESSIONS).min(MOST_SESSIONS);
+    let list = server.block_on(Work::Listing, move |server| {
+        server.library.list(before.as_deref(), most)
+    });
+    Ok(Json(list.await?))
+}
+
+/// One session, with each frame's time and angle
+#[utoipa::path(
+    get, path = "/api/v1/sessions/{id}", tag = "sessions",
+    params(("id" = String, Path, description = "The session's name")),
+    responses(
+        (status = 200, body = SessionDetail), (status = 401, body = Problem),
+        (status = 404, description = "No such session", body = Problem),
+    )
+)]
+pub(super) async fn detail(
+    State(server): State<Arc<Server>>,
+    Path(id): Path<String>,
+) -> Result<Json<SessionDetail>, Failure> {
+    let detail = server.block_on(Work::Listing, move |server| server.library.detail(&id));
+    Ok(Json(detail.await?))
+}
+
+/// The first frame, small
+#[utoipa::path(
+    get, path = "/api/v1/sessions/{id}/thumbnail.jpg", tag = "sessions",
+    params(("id" = String, Path, description = "The session's name")),
+    responses(
+        (status = 200, description = "A JPEG file", content_type = "image/jpeg"),
+        (status = 401, body = Problem),
+        (status = 404, description = "No such session", body = Problem),
+        (status = 409, description = "Still being recorded", body = Problem),
+    )
+)]
+pub(super) async fn thumbnail(
+    State(server): State<Arc<Server>>,
+    Path(id): Path<String>,
+) -> Result<Response, Failure> {
+    let jpeg = server.block_on(Work::Decoding, move |server| {
+        server.pictures.thumbnail(server.library.footage(&id)?)
+    });
+    Ok(picture(jpeg.await?))
+}
+
+/// How large.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct Size {
+    /// Greatest width, 64 to 1920 pixels; 960 if left out.
+    width: Option<u32>,
+}
+
+/// One frame
+#[utoipa::path(
+    get, path = "/api/v1/sessions/{id}/frames/{frame}", tag = "sessions",
+    params(
+        ("id" = String, Path, description = "The session's name"),
+        ("frame" = String, Path, description = "The frame's number, 0-based, and `.jpg`", example = "0.jpg"),
+        Size,
+    ),
+    responses(
+        (status = 200, description = "A JPEG file", content_type = "image/jpeg"),
+        (status = 401, body = Problem),
+        (status = 404, description = "No such session or frame", body = Problem),
+        (status = 409, description = "Still being recorded", body = Problem),
+    )
+)]
+pub(super) async fn frame(
+    State(server): State<Arc<Server>>,
+    Path((id, frame)): Path<(String, String)>,
+    Asked(Size { width }): Asked<Size>,
+) -> Result<Response, Failure> {
+    let number = frame.strip_suffix(".jpg").and_then(|n| n.parse().ok());
+    let unknown = || Failure::not_found("there is no such frame: ask for a number and \".jpg\"");
+    let number: u64 = number.ok_or_else(unknown)?;
+    let width = width.unwrap_or(WIDTH).clamp(*WIDTHS.start(), *WIDTHS.end());
+    let jpeg = server.block_on(Work::Decoding, move |server| {
+        let footage = server.library.footage(&id)?;
+        server.pictures.frame(footage, number, width)
+    });
+    Ok(picture(jpeg.await?))
+}
+
+fn picture(jpeg: axum::body::Bytes) -> Response {
+    let headers = [
+        (header::CONTENT_TYPE, "image/jpeg"),
+        (header::CACHE_CONTROL, KEEP),
+    ];
+    (headers, jpeg).into_response()
+}
+
+/// Names of objects captured last, newest first
+#[utoipa::path(
+    get, path = "/api/v1/objects", tag = "sessions",
+    responses((status = 200, body = [String]), (status = 401, body = Problem))
+)]
+pub(super) async fn objects(
+    State(server): State<Arc<Server>>,
+) -> Result<Json<Vec<String>>, Failure> {
+    let objects = server.block_on(Work::Listing, |server| server.library.objects(OBJECTS));
+    Ok(Json(objects.await?))
+}

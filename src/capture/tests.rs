@@ -1,0 +1,20 @@
+//! What the tests of this room share.
+
+use crate::camera::{Fourcc, Frame, Sequence, StampSource};
+
+/// Frame `n` of a camera of 30 frames/s.
+pub(super) fn frame(n: u64) -> Frame {
+    Frame {
+        fourcc: Fourcc::GREY,
+        width: 2,
+        height: 2,
+        data: vec![n as u8; 4],
+        sequence: Some(Sequence {
+            raw: n as u32,
+            unwrapped: n,
+        }),
+        t_us: 33_333 * n as i64,
+        stamp: StampSource::EndOfFrame,
+        flagged: false,
+    }
+}

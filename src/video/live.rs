@@ -1,0 +1,125 @@
+//! Decoding a camera's frames as they come, for people and exposure meters: nothing is kept.
+
+use ffmpeg_next::codec::{self, decoder};
+use ffmpeg_next::{Packet, frame};
+
+use super::decoder::VideoDecoder;
+use super::mux::Coding;
+use super::orientation::Orientation;
+use super::picture::{Colour, Picture};
+use super::{FrameFault, initialise};
+
+/// Decodes one frame after the other, in the order in which the camera delivers them.
+pub struct LiveDecoder {
+    coding: Coding,
+    width: u32,
+    height: u32,
+    decoder: Option<VideoDecoder>,
+    number: u64,
+}
+
+impl std::fmt::Debug for LiveDecoder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "LiveDecoder({:?}, {} x {})",
+            self.coding, self.width, self.height
+        )
+    }
+}
+
+impl LiveDecoder {
+    /// For frames of this coding and size.
+    ///
+    /// # Errors
+    /// [`FrameFault::Damaged`] where this FFmpeg lacks the codec.
+    pub fn new(coding: Coding, width: u32, height: u32) -> Result<Self, FrameFault> {
+        initialise();
+        let decoder = match coding {
+            Coding::Mjpeg => Some(open(codec::Id::MJPEG)?),
+            Coding::H264 => Some(open(codec::Id::H264)?),
+            Coding::Raw(_) => None,
+        };
+        Ok(Self {
+            coding,
+            width,
+            height,
+            decoder,
+            number: 0,
+        })
+    }
+
+    /// Decodes the next frame. `None` where its codec shows nothing yet: H.264 begins with a key
+    /// frame.
+    ///
+    /// # Errors
+    /// [`FrameFault`] where the data are damaged; the next frame may be whole again.
+    pub fn decode(&mut self, data: &[u8]) -> Result<Option<Picture>, FrameFault> {
+        let frame = match (&mut self.decoder, self.coding) {
+            (Some(decoder), _) => match compressed(decoder, data)? {
+                Some(frame) => frame,
+                None => return Ok(None),
+            },
+            (None, Coding::Raw(raw)) => raw
+                .frame(data, self.width, self.height)
+                .ok_or(FrameFault::Concealed)?,
+            (None, _) => return Ok(None),
+        };
+        let (range, space) = (frame.color_range(), frame.color_space());
+        let colour = Colour::stated(frame.format(), range, space, frame.height());
+        self.number += 1;
+        let upright = Orientation::default();
+        Ok(Some(Picture::new(self.number - 1, frame, colour, upright)))
+    }
+}
+
+fn open(id: codec::Id) -> Result<VideoDecoder, FrameFault> {
+    let found = decoder::find(id).ok_or(ffmpeg_next::Error::DecoderNotFound);
+    let context = codec::Context::new_with_codec(found.map_err(FrameFault::Damaged)?);
+    let mut decoder = context.decoder();
+    // A picture is wanted for each frame, without waiting for those that follow.
+    decoder.set_flags(codec::Flags::LOW_DELAY);
+    decoder.video().map_err(FrameFault::Damaged)
+}
+
+fn compressed(decoder: &mut VideoDecoder, data: &[u8]) -> Result<Option<frame::Video>, FrameFault> {
+    decoder
+        .send_packet(&Packet::copy(data))
+        .map_err(FrameFault::Damaged)?;
+    let mut newest = None;
+    loop {
+        let mut picture = frame::Video::empty();
+        match decoder.receive_frame(&mut picture) {
+            Ok(()) if picture.is_corrupt() || picture.has_decode_errors() => {
+                return Err(FrameFault::Concealed);
+            }
+            Ok(()) => newest = Some(picture),
+            Err(_) => return Ok(newest),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Rect;
+    use crate::video::RawFormat;
+
+    #[test]
+    fn a_raw_picture_is_shown_as_the_camera_sent_it() {
+        let mut live = LiveDecoder::new(Coding::Raw(RawFormat::Rgb24), 2, 2).unwrap();
+        let bytes = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
+        let picture = live.decode(&bytes).unwrap().unwrap();
+        let rgb = picture.rgb(Rect::new(0, 0, 2, 2)).unwrap();
+        assert_eq!(rgb.as_raw().as_slice(), &bytes);
+    }
+
+    #[test]
+    fn data_that_are_no_picture_are_a_fault_and_the_next_one_is_shown() {
+        let mut live = LiveDecoder::new(Coding::Raw(RawFormat::Grey), 2, 2).unwrap();
+        assert!(live.decode(&[1, 2]).is_err());
+        assert!(live.decode(&[1, 2, 3, 4]).unwrap().is_some());
+        let mut live = LiveDecoder::new(Coding::Mjpeg, 2, 2).unwrap();
+        assert!(live.decode(b"no jpeg").is_err());
+    }
+}

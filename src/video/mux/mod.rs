@@ -1,0 +1,336 @@
+//! Writing a camera's stream to a Matroska file, so that what is on the disk is readable at any
+//! moment: clusters are short, [`Muxer::sync`] brings all that was taken to the disk, and no reader
+//! needs the index that [`Muxer::finish`] adds.
+//!
+//! Motion JPEG and H.264 are kept as they come. Uncompressed pictures are coded as FFV1, without
+//! loss. Matroska as FFmpeg writes it counts in milliseconds: each frame's time is rounded to the
+//! nearest one, relative to the first frame. The exact time stamps belong into a frame index.
+
+mod container;
+mod file;
+
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use ffmpeg_next::codec::encoder;
+use ffmpeg_next::format::context::{Output, StreamIo};
+use ffmpeg_next::{Packet, packet};
+
+use self::container::{end_cluster, open};
+use self::file::{Refusal, Sink};
+
+use super::lossless::RawFormat;
+use super::nal::{self, ParameterSets};
+use super::{Error, initialise};
+
+/// Bytes that are gathered before they are handed to the system.
+const BUFFER: usize = 1 << 15;
+
+/// How a camera's frames are coded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coding {
+    /// Each frame a JPEG.
+    Mjpeg,
+    /// H.264 with start codes, a frame a packet, in the order in which they are shown.
+    H264,
+    /// Uncompressed pictures without padding.
+    Raw(RawFormat),
+}
+
+impl Coding {
+    /// The name of the codec that the file gets: `mjpeg`, `h264` or `ffv1`.
+    #[must_use]
+    pub fn codec(self) -> &'static str {
+        match self {
+            Self::Mjpeg => "mjpeg",
+            Self::H264 => "h264",
+            Self::Raw(_) => "ffv1",
+        }
+    }
+}
+
+/// What a camera was set to deliver.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StreamFormat {
+    /// How its frames are coded.
+    pub coding: Coding,
+    /// Frame width, pixels.
+    pub width: u32,
+    /// Frame height, pixels.
+    pub height: u32,
+    /// Nominal frames a second.
+    pub fps: f64,
+}
+
+/// What became of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Written {
+    /// It is in the file, or on its way there.
+    Kept,
+    /// It was left out: it builds on frames before the recording, and no key frame came yet.
+    BeforeKeyFrame,
+}
+
+/// A video file that is being written.
+pub struct Muxer {
+    path: PathBuf,
+    stream: StreamFormat,
+    file: File,
+    refusal: Refusal,
+    state: State,
+    encoder: Option<encoder::video::Encoder>,
+    sets: ParameterSets,
+    first_us: Option<i64>,
+    last_ms: i64,
+    frames: u64,
+    /// Bytes of the packets that were handed to FFmpeg.
+    taken: u64,
+}
+
+/// How far the file has come.
+enum State {
+    /// The header is not written: H.264 has to tell its parameters first.
+    Waiting(StreamIo),
+    Running(Output),
+    /// Something failed, and nothing more can be written.
+    Broken,
+}
+
+impl std::fmt::Debug for Muxer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Muxer({}, {} frames)", self.path.display(), self.frames)
+    }
+}
+
+impl Muxer {
+    /// Makes a new file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::PictureSize`] where the format cannot have this size, [`Error::Write`] where the
+    /// file cannot be made or is there already, [`Error::Mux`] where this FFmpeg lacks the codec.
+    pub fn create(path: &Path, stream: StreamFormat) -> Result<Self, Error> {
+        initialise();
+        let refused = |source| Error::Write {
+            path: path.to_owned(),
+            source,
+        };
+        let failed = |why| Error::Mux {
+            path: path.to_owned(),
+            why,
+        };
+        let encoder = match stream.coding {
+            Coding::Raw(raw) => {
+                let (width, height) = (stream.width, stream.height);
+                raw.picture_bytes(width, height)
+                    .ok_or(Error::PictureSize { width, height })?;
+                Some(raw.encoder(width, height).map_err(failed)?)
+            }
+            Coding::Mjpeg | Coding::H264 => None,
+        };
+        let mut options = OpenOptions::new();
+        let file = options.write(true).create_new(true).open(path);
+        let file = file.map_err(refused)?;
+        let refusal = Refusal::default();
+        let sink = Sink {
+            file: file.try_clone().map_err(refused)?,
+            refusal: refusal.clone(),
+        };
+        let io = StreamIo::from_write_seek_with_capacity(sink, BUFFER).map_err(failed)?;
+        Ok(Self {
+            path: path.to_owned(),
+            stream,
+            file,
+            refusal,
+            state: State::Waiting(io),
+            encoder,
+            sets: ParameterSets::default(),
+            first_us: None,
+            last_ms: 0,
+            frames: 0,
+            taken: 0,
+        })
+    }
+
+    /// Frames in the file.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Bytes taken so far, after coding.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.taken
+    }
+
+    /// Adds a frame that was taken at `t_us` microseconds of the camera's clock.
+    ///
+    /// # Errors
+    /// [`Error::NoRoom`] where the disk is full, [`Error::Write`] where it fails otherwise,
+    /// [`Error::PictureBytes`] where an uncompressed picture has not the bytes of one (nothing was
+    /// written then, and the next may follow), [`Error::NotAnnexB`], or [`Error::Mux`].
+    pub fn write(&mut self, data: &[u8], t_us: i64) -> Result<Written, Error> {
+        let key = match self.stream.coding {
+            Coding::H264 => {
+                if !nal::is_annex_b(data) {
+                    return Err(Error::NotAnnexB(self.path.clone()));
+                }
+                self.sets.gather(data);
+                nal::is_key(data)
+            }
+            Coding::Mjpeg | Coding::Raw(_) => true,
+        };
+        if matches!(self.state, State::Waiting(_)) {
+            if !key || (self.stream.coding == Coding::H264 && self.sets.extradata().is_none()) {
+                return Ok(Written::BeforeKeyFrame);
+            }
+            self.begin()?;
+        }
+        let first = *self.first_us.get_or_insert(t_us);
+        // Matroska's reader puts frames in order of time: one that does not grow would swap them.
+        let ms = (t_us.saturating_sub(first).saturating_add(500)) / 1000;
+        let ms = if self.frames == 0 {
+            0
+        } else {
+            ms.max(self.last_ms)
+        };
+        let mut packet = match self.stream.coding {
+            Coding::Raw(raw) => self.encode(raw, data, ms)?,
+            Coding::Mjpeg | Coding::H264 => Packet::copy(data),
+        };
+        packet.set_stream(0);
+        packet.set_pts(Some(ms));
+        packet.set_dts(Some(ms));
+        if key {
+            packet.set_flags(packet::Flags::KEY);
+        }
+        self.taken += packet.size() as u64;
+        self.run(|output| packet.write(output).map(|_| ()))?;
+        self.last_ms = ms;
+        self.frames += 1;
+        Ok(Written::Kept)
+    }
+
+    /// Hands everything that was taken to the system: after this, a killed process loses none of
+    /// it.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn flush(&mut self) -> Result<(), Error> {
+        if self.frames == 0 {
+            return Ok(());
+        }
+        self.run(end_cluster)
+    }
+
+    /// [`Self::flush`], and brings it to the disk: after this, a power cut loses none of it.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn sync(&mut self) -> Result<(), Error> {
+        self.flush()?;
+        let synced = self.file.sync_data();
+        synced.map_err(|source| self.refused(source))
+    }
+
+    /// Ends the file: adds the index by which players jump, and brings all to the disk. The file is
+    /// readable also where this fails.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn finish(mut self) -> Result<(), Error> {
+        if matches!(self.state, State::Running(_)) {
+            self.run(|output| output.write_trailer())?;
+            // What FFmpeg still holds is written when its side is closed.
+            self.state = State::Broken;
+            self.check()?;
+        }
+        let synced = self.file.sync_all();
+        synced.map_err(|source| self.refused(source))
+    }
+
+    /// Writes the header.
+    fn begin(&mut self) -> Result<(), Error> {
+        let State::Waiting(io) = std::mem::replace(&mut self.state, State::Broken) else {
+            return Ok(());
+        };
+        let extradata = self.sets.extradata();
+        let begun = open(
+            io,
+            &self.stream,
+            self.encoder.as_ref(),
+            extradata.as_deref(),
+        );
+        let output = begun.map_err(|why| self.failed(why))?;
+        self.state = State::Running(output);
+        self.check()
+    }
+
+    fn encode(&mut self, raw: RawFormat, data: &[u8], ms: i64) -> Result<Packet, Error> {
+        let (width, height) = (self.stream.width, self.stream.height);
+        let mut frame = raw
+            .frame(data, width, height)
+            .ok_or_else(|| Error::PictureBytes {
+                found: data.len(),
+                wanted: raw.picture_bytes(width, height).unwrap_or(0),
+                width,
+                height,
+            })?;
+        frame.set_pts(Some(ms));
+        let mut packet = Packet::empty();
+        let coded = match &mut self.encoder {
+            Some(encoder) => encoder
+                .send_frame(&frame)
+                .and_then(|()| encoder.receive_packet(&mut packet)),
+            None => Err(ffmpeg_next::Error::EncoderNotFound),
+        };
+        coded.map_err(|why| self.failed(why))?;
+        Ok(packet)
+    }
+
+    /// Does something with the output, and finds out whether the system took it.
+    fn run(
+        &mut self,
+        work: impl FnOnce(&mut Output) -> Result<(), ffmpeg_next::Error>,
+    ) -> Result<(), Error> {
+        let done = match &mut self.state {
+            State::Running(output) => work(output),
+            State::Waiting(_) | State::Broken => Err(ffmpeg_next::Error::Exit),
+        };
+        self.check()?;
+        done.map_err(|why| self.failed(why))
+    }
+
+    fn check(&mut self) -> Result<(), Error> {
+        match self.refusal.take() {
+            None => Ok(()),
+            Some(source) => {
+                self.state = State::Broken;
+                Err(self.refused(source))
+            }
+        }
+    }
+
+    fn failed(&self, why: ffmpeg_next::Error) -> Error {
+        let path = self.path.clone();
+        Error::Mux { path, why }
+    }
+
+    /// What the system's refusal to write is called.
+    fn refused(&self, source: io::Error) -> Error {
+        let path = self.path.clone();
+        if is_no_room(&source) {
+            let kept = self.file.metadata().map_or(0, |data| data.len());
+            let missing = self.taken.saturating_sub(kept).max(1);
+            return Error::NoRoom { path, missing };
+        }
+        Error::Write { path, source }
+    }
+}
+
+/// True where a write failed because the disk, a quota or a limit on file sizes is exhausted.
+fn is_no_room(error: &io::Error) -> bool {
+    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
+}

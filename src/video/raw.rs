@@ -1,0 +1,81 @@
+//! A decoded frame as the raw picture of a camera.
+
+use ffmpeg_next::format::Pixel;
+
+use super::FrameFault;
+use super::orientation::Orientation;
+use super::picture::{Picture, plane};
+use crate::geometry::Rect;
+
+/// How a raw picture's bytes are laid out, without padding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RawLayout {
+    /// Luma alone, one byte a pixel.
+    Grey,
+    /// Red, green, blue.
+    Rgb24,
+    /// 4:2:0: luma, then interleaved Cb and Cr.
+    Nv12,
+    /// 4:2:2: Y, Cb, Y, Cr.
+    Yuyv,
+}
+
+impl Picture {
+    /// The picture in the raw layout that holds the same samples, where there is one; else, and
+    /// where the picture is to be turned or its YUV is full-range, as RGB. Its size is
+    /// [`Self::size`].
+    ///
+    /// # Errors
+    /// [`FrameFault::PixelFormat`] where the format cannot be converted.
+    pub fn raw(&self) -> Result<(RawLayout, Vec<u8>), FrameFault> {
+        if self.orientation == Orientation::default()
+            && let Some(raw) = self.same_samples()
+        {
+            return Ok(raw);
+        }
+        let (width, height) = self.size();
+        let rgb = self.rgb(Rect::new(0, 0, width, height))?;
+        Ok((RawLayout::Rgb24, rgb.into_raw()))
+    }
+
+    fn same_samples(&self) -> Option<(RawLayout, Vec<u8>)> {
+        let (width, height) = (self.frame.width() as usize, self.frame.height() as usize);
+        let even = width.is_multiple_of(2);
+        match self.frame.format() {
+            Pixel::GRAY8 => Some((RawLayout::Grey, self.rows(0, width, height)?)),
+            Pixel::YUYV422 if even => Some((RawLayout::Yuyv, self.rows(0, 2 * width, height)?)),
+            _ if self.colour.full_range || !even => None,
+            Pixel::YUV420P => Some((RawLayout::Nv12, self.nv12(width, height)?)),
+            Pixel::YUV422P => Some((RawLayout::Yuyv, self.yuyv(width, height)?)),
+            _ => None,
+        }
+    }
+
+    /// The rows of a plane without padding.
+    fn rows(&self, index: usize, row: usize, rows: usize) -> Option<Vec<u8>> {
+        let mut tight = Vec::with_capacity(row * rows);
+        for y in 0..rows {
+            let (samples, _) = plane(&self.frame, index, 0, y)?;
+            tight.extend_from_slice(samples.get(..row)?);
+        }
+        Some(tight)
+    }
+
+    fn nv12(&self, width: usize, height: usize) -> Option<Vec<u8>> {
+        let mut picture = self.rows(0, width, height)?;
+        let (half_width, half_height) = (width / 2, height.div_ceil(2));
+        let blue = self.rows(1, half_width, half_height)?;
+        let red = self.rows(2, half_width, half_height)?;
+        picture.extend(blue.iter().zip(&red).flat_map(|(&blue, &red)| [blue, red]));
+        Some(picture)
+    }
+
+    fn yuyv(&self, width: usize, height: usize) -> Option<Vec<u8>> {
+        let luma = self.rows(0, width, height)?;
+        let blue = self.rows(1, width / 2, height)?;
+        let red = self.rows(2, width / 2, height)?;
+        let pairs = luma.chunks_exact(2).zip(blue.iter().zip(&red));
+        let packed = pairs.flat_map(|(luma, (&blue, &red))| [luma[0], blue, luma[1], red]);
+        Some(packed.collect())
+    }
+}

@@ -1,0 +1,175 @@
+//! One frame out of a video without reading all that comes before it.
+
+use std::cmp::Ordering;
+use std::path::Path;
+
+use ffmpeg_next::codec::Parameters;
+use ffmpeg_next::format::context::Input;
+use ffmpeg_next::{Packet, frame, media};
+use image::RgbImage;
+
+use super::decoder::{self as opening, VideoDecoder};
+use super::picture::{Colour, Picture};
+use super::scan::{Video, orientation};
+use super::{Error, FrameFault, open_input};
+use crate::geometry::Rect;
+
+/// Packets that are read in search of one frame: more than lie between two key frames.
+const MOST_PACKETS: usize = 600;
+
+/// The first picture of a video that can be decoded. Unlike [`Video::open`] it reads no further, so
+/// that the time it takes does not grow with the file.
+///
+/// # Errors
+/// As [`Video::open`]; [`Error::NoFrames`] where nothing at the file's beginning can be decoded.
+pub fn first_picture(path: &Path) -> Result<RgbImage, Error> {
+    let mut input = open_input(path)?;
+    let stream = input
+        .streams()
+        .best(media::Type::Video)
+        .ok_or_else(|| Error::NoVideo(path.to_owned()))?;
+    let (index, parameters) = (stream.index(), stream.parameters());
+    let (orientation, _) = orientation(&stream);
+    let codec = format!("{:?}", parameters.id());
+    let mut decoder = opening::open(parameters, 1).map_err(|why| Error::Decoder {
+        path: path.to_owned(),
+        codec,
+        why,
+    })?;
+    let colour = Colour::stated(
+        decoder.format(),
+        decoder.color_range(),
+        decoder.color_space(),
+        decoder.height(),
+    );
+    let frame = search(&mut input, index, &mut decoder, |frame| {
+        match is_whole(frame) {
+            true => Found::This,
+            false => Found::Earlier,
+        }
+    });
+    let frame = frame.ok_or_else(|| Error::NoFrames(path.to_owned()))?;
+    let picture = Picture::new(0, frame, colour, orientation);
+    let (width, height) = picture.size();
+    let wrong = |fault: FrameFault| Error::Frame {
+        path: path.to_owned(),
+        number: 0,
+        fault,
+    };
+    picture.rgb(Rect::new(0, 0, width, height)).map_err(wrong)
+}
+
+impl Video {
+    /// The picture of a frame, by way of the container's own index. `None` where it is not found so, or
+    /// where anything about it is doubtful: reading from the start tells then.
+    pub(super) fn sought(&self, number: u64) -> Option<Picture> {
+        let info = *self.frames().get(usize::try_from(number).ok()?)?;
+        let mut stamps = self.track.number_at.iter();
+        let &(wanted, _) = stamps.find(|&&(_, at)| at == number)?;
+        let mut input = open_input(self.path()).ok()?;
+        input.seek(info.t_us, ..info.t_us.saturating_add(1)).ok()?;
+        let parameters: Parameters = input.stream(self.track.stream)?.parameters();
+        let mut decoder = opening::open(parameters, 1).ok()?;
+        let frame = search(&mut input, self.track.stream, &mut decoder, |frame| {
+            let stamp = frame.timestamp().or_else(|| frame.pts());
+            match stamp.map(|stamp| stamp.cmp(&wanted)) {
+                // What builds on a damaged frame is not taken.
+                _ if !is_whole(frame) => Found::Nothing,
+                Some(Ordering::Equal) => Found::This,
+                Some(Ordering::Less) => Found::Earlier,
+                Some(Ordering::Greater) | None => Found::Nothing,
+            }
+        })?;
+        self.track.picture(number, frame).ok()
+    }
+}
+
+fn is_whole(frame: &frame::Video) -> bool {
+    !frame.is_corrupt() && !frame.has_decode_errors()
+}
+
+/// What a decoded frame is to a search.
+enum Found {
+    This,
+    Earlier,
+    Nothing,
+}
+
+/// Decodes on from where the input stands, up to the frame that `judge` takes by its time stamp.
+fn search(
+    input: &mut Input,
+    stream: usize,
+    decoder: &mut VideoDecoder,
+    judge: impl Fn(&frame::Video) -> Found,
+) -> Option<frame::Video> {
+    let mut ended = false;
+    for _ in 0..MOST_PACKETS {
+        // A packet that is read into again would keep the memory of what it held.
+        let mut packet = Packet::empty();
+        match packet.read(input) {
+            Ok(()) if packet.stream() != stream || packet.size() == 0 => continue,
+            // A damaged packet gives no frame; the next ones may.
+            Ok(()) => drop(decoder.send_packet(&packet)),
+            Err(_) => {
+                decoder.send_eof().ok()?;
+                ended = true;
+            }
+        }
+        let mut picture = frame::Video::empty();
+        while decoder.receive_frame(&mut picture).is_ok() {
+            match judge(&picture) {
+                Found::This => return Some(picture),
+                Found::Earlier => {}
+                Found::Nothing => return None,
+            }
+        }
+        if ended {
+            return None;
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fixture(name: &str) -> std::path::PathBuf {
+        let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
+        fixtures.join(name).join("video.mkv")
+    }
+
+    #[test]
+    fn a_frame_that_is_sought_is_the_one_that_reading_from_the_start_gives() {
+        for name in ["20261120T093015Z-cow", "20261120T103000Z-cow-dropped"] {
+            let video = Video::open(&fixture(name)).unwrap();
+            let last = video.frames().len() as u64 - 1;
+            let numbers = [0, 1, 29, 30, 31, last / 2, last - 1, last];
+            for (pending, number) in video.read(&numbers, 1).unwrap().zip(numbers) {
+                let read = video.picture(pending).unwrap();
+                let sought = video.sought(number).unwrap();
+                let (w, h) = read.size();
+                let all = Rect::new(0, 0, w, h);
+                assert_eq!(sought.number(), number);
+                assert!(
+                    sought.rgb(all).unwrap() == read.rgb(all).unwrap(),
+                    "{name} {number}"
+                );
+            }
+            assert!(video.sought(last + 1).is_none());
+        }
+    }
+
+    #[test]
+    fn the_first_picture_is_that_of_frame_0_also_of_a_file_that_was_cut() {
+        for name in ["20261120T101500Z-cow-short", "20261120T104500Z-cow-cut"] {
+            let first = first_picture(&fixture(name)).unwrap();
+            let video = Video::open(&fixture(name)).unwrap();
+            assert!(first == video.frame(0).unwrap(), "{name}");
+        }
+        assert!(matches!(
+            first_picture(&fixture("no such session")),
+            Err(Error::Open { .. })
+        ));
+    }
+}

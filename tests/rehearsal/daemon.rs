@@ -1,0 +1,175 @@
+//! The rig as a daemon: commands, the queue, and what comes back by itself.
+
+use std::path::Path;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use relit::capture::rig::{Command, Refused, Rig};
+use relit::capture::state::{Phase, RigState, Verdict};
+use relit::capture::{CaptureError, Daemon, Settings};
+use relit::session::{Manifest, SessionWriter};
+
+use crate::support::{SHORT, alone, fixture};
+
+fn settings(root: &Path, camera: &str, table: &str) -> Settings {
+    let camera = format!("replay:{}?loop=1{camera}", fixture(SHORT).display());
+    let mut settings = Settings::new(
+        root.to_owned(),
+        camera.parse().unwrap(),
+        table.parse().unwrap(),
+    );
+    settings.runtime_folder = root.to_owned();
+    settings.degrees_per_second = 36.0;
+    settings.retries = 0;
+    settings
+}
+
+/// The state once it is as wished; fails after a minute.
+fn once(daemon: &Daemon, wished: impl Fn(&RigState) -> bool) -> RigState {
+    let until = Instant::now() + Duration::from_secs(60);
+    loop {
+        let state = daemon.monitor().state();
+        if wished(&state) {
+            return state;
+        }
+        assert!(Instant::now() < until, "{state:#?}");
+        thread::sleep(Duration::from_millis(10));
+    }
+}
+
+fn is_ready(state: &RigState) -> bool {
+    state.camera.present && state.table.present
+}
+
+#[test]
+fn a_queue_is_captured_object_by_object_and_a_second_start_is_refused() {
+    let _alone = alone();
+    let root = tempfile::tempdir().unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=5")).unwrap();
+    once(&daemon, is_ready);
+    once(&daemon, |state| state.camera.focus.is_some());
+    assert!(daemon.monitor().preview().is_some());
+    for object in ["mug", "cow"] {
+        let object = object.to_owned();
+        daemon.command(Command::Enqueue { object }).unwrap();
+    }
+    once(&daemon, |state| state.phase == Phase::WaitingForObject);
+    daemon.command(Command::Next).unwrap();
+    let again = daemon.command(Command::Next).unwrap_err();
+    assert!(matches!(again, Refused::Busy(_)), "{again}");
+    let state = once(&daemon, |state| {
+        state.last_take.is_some() && state.session.is_none()
+    });
+    let take = state.last_take.unwrap();
+    assert_eq!(take.verdict, Verdict::Clean, "{take:?}");
+    assert!(take.session.ends_with("-mug"));
+    assert_eq!(
+        once(&daemon, |state| state.phase == Phase::WaitingForObject).queue,
+        ["cow"]
+    );
+    daemon.command(Command::Dequeue { place: 0 }).unwrap();
+    assert_eq!(daemon.monitor().state().phase, Phase::Idle);
+}
+
+#[test]
+fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
+    let _alone = alone();
+    let root = tempfile::tempdir().unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=5")).unwrap();
+    once(&daemon, is_ready);
+    daemon.command(Command::Jog { degrees: 300.0 }).unwrap();
+    once(&daemon, |state| state.table.state == "Jog");
+    daemon.command(Command::Stop).unwrap();
+    once(&daemon, |state| state.table.state == "Idle");
+    let state = once(&daemon, |state| !state.faults.is_empty());
+    assert!(state.faults[0].what.contains("stop"), "{:?}", state.faults);
+    assert!(state.table.angle_deg.unwrap() < 299.0);
+
+    let object = "mug".to_owned();
+    let start = Command::Start {
+        object,
+        meter: false,
+    };
+    let until = Instant::now() + Duration::from_secs(10);
+    while daemon.command(start.clone()).is_err() {
+        assert!(Instant::now() < until);
+        thread::sleep(Duration::from_millis(10));
+    }
+    once(&daemon, |state| state.frames > 20);
+    let asked = Instant::now();
+    daemon.end();
+    assert!(asked.elapsed() < Duration::from_secs(5));
+    let take = daemon.monitor().state().last_take.unwrap();
+    assert_eq!(take.verdict, Verdict::Aborted);
+    assert!(take.reason.unwrap().contains("told to end"));
+    assert!(daemon.command(start).is_err());
+}
+
+#[test]
+fn a_camera_that_was_unplugged_comes_back_without_a_restart() {
+    let _alone = alone();
+    let root = tempfile::tempdir().unwrap();
+    let daemon = Daemon::start(settings(root.path(), "&unplug=60", "sim:?speed=5")).unwrap();
+    once(&daemon, |state| state.camera.present);
+    let state = once(&daemon, |state| !state.camera.present);
+    assert!(state.camera.fault.unwrap().contains("was unplugged"));
+    once(&daemon, |state| {
+        state.camera.present && state.camera.fault.is_none()
+    });
+}
+
+#[test]
+fn a_second_daemon_is_refused_with_the_process_that_has_the_folder() {
+    let root = tempfile::tempdir().unwrap();
+    let _first = Daemon::start(settings(root.path(), "", "none")).unwrap();
+    let error = Daemon::start(settings(root.path(), "", "none")).unwrap_err();
+    assert!(matches!(error, CaptureError::Taken { pid: Some(_), .. }));
+    let pid = std::process::id();
+    assert!(
+        error.to_string().contains(&format!("process {pid}")),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_session_whose_recorder_died_is_salvaged_at_the_start_and_told() {
+    let root = tempfile::tempdir().unwrap();
+    let json = std::fs::read(fixture(SHORT).join("session.json")).unwrap();
+    let manifest = Manifest::from_json(&json).unwrap();
+    drop(SessionWriter::create(root.path(), manifest).unwrap());
+    let daemon = Daemon::start(settings(root.path(), "", "none")).unwrap();
+    let told = daemon.monitor().state().faults;
+    assert!(
+        told[0].what.contains(SHORT) && told[0].what.contains("was interrupted"),
+        "{told:?}"
+    );
+}
+
+#[test]
+fn commands_that_make_no_sense_are_refused_where_they_are_given() {
+    let root = tempfile::tempdir().unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "none")).unwrap();
+    let refused = |command: Command| daemon.command(command).unwrap_err();
+    let object = || "a/b".to_owned();
+    assert!(matches!(
+        refused(Command::Start {
+            object: object(),
+            meter: false
+        }),
+        Refused::Invalid(_)
+    ));
+    assert!(matches!(
+        refused(Command::Enqueue { object: object() }),
+        Refused::Invalid(_)
+    ));
+    assert!(matches!(
+        refused(Command::Dequeue { place: 0 }),
+        Refused::Invalid(_)
+    ));
+    assert!(matches!(refused(Command::Next), Refused::Invalid(_)));
+    assert!(matches!(refused(Command::Home), Refused::Unavailable(_)));
+    assert!(matches!(
+        refused(Command::Jog { degrees: f64::NAN }),
+        Refused::Invalid(_)
+    ));
+}

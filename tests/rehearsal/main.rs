@@ -1,0 +1,8 @@
+//! Whole captures without hardware: a replayed camera and a simulated table on one clock that
+//! runs faster than real time.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod daemon;
+mod faults;
+mod support;
+mod turn;

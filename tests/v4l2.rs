@@ -1,0 +1,516 @@
+//! The V4L2 cameras against the kernel's own test drivers, faults included.
+//!
+//! These tests need root and the driver `vivid` as `/dev/video0`, best in a virtual machine; those
+//! on Motion JPEG need `v4l2loopback` as `/dev/video10`, fed with 320 x 240 pixels. They change the
+//! driver's controls and take it away, so that they run one by one and only when asked:
+//!
+//! ```text
+//! modprobe vivid n_devs=1 node_types=0x1 num_inputs=1 input_types=0 vid_cap_nr=0
+//! cargo test --test v4l2 -- --ignored --test-threads=1
+//! ```
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![cfg(target_os = "linux")]
+
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use relit::camera::lock::{Aspect, Lack, ManualPlan, Wanted};
+use relit::camera::{
+    self, Address, Camera, CameraError, ControlFault, ControlId, ControlKind, Frame, GrantedMode,
+    StampSource,
+};
+use relit::clock::Clock;
+
+const VIVID: &str = "v4l2:/dev/video0";
+const LOOPBACK: &str = "v4l2:/dev/video10";
+const DRIVER: &str = "/sys/bus/platform/drivers/vivid";
+/// Long enough for an emulated machine.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+fn open(address: &str) -> Result<Box<dyn Camera>, CameraError> {
+    camera::open(&address.parse().unwrap(), Clock::monotonic())
+}
+
+/// The driver with all its faults off.
+fn vivid() -> Box<dyn Camera> {
+    let mut camera = open(VIVID).unwrap();
+    for name in [
+        "percentage_of_dropped_buffers",
+        "wrap_sequence_number",
+        "timestamp_source",
+    ] {
+        set(&mut *camera, name, 0);
+    }
+    camera
+}
+
+fn id(camera: &mut dyn Camera, name: &str) -> ControlId {
+    let controls = camera.controls().unwrap();
+    let control = controls.iter().find(|control| control.name == name);
+    control.unwrap_or_else(|| panic!("no control {name}")).id
+}
+
+fn set(camera: &mut dyn Camera, name: &str, value: i64) {
+    let id = id(camera, name);
+    assert_eq!(camera.set_control(id, value).unwrap(), value, "{name}");
+}
+
+fn start(camera: &mut dyn Camera, mode: &str) -> GrantedMode {
+    camera.start(&mode.parse().unwrap()).unwrap()
+}
+
+fn frames(camera: &mut dyn Camera, count: usize) -> Vec<Frame> {
+    (0..count)
+        .map(|_| camera.next_frame(PATIENCE).unwrap())
+        .collect()
+}
+
+fn counted(frames: &[Frame]) -> Vec<u64> {
+    frames
+        .iter()
+        .map(|frame| frame.sequence.unwrap().unwrapped)
+        .collect()
+}
+
+/// Frames until the first error, and that with the time that it took to come.
+fn until_error(camera: &mut dyn Camera) -> (usize, CameraError, Duration) {
+    for count in 0.. {
+        let asked = Instant::now();
+        if let Err(error) = camera.next_frame(PATIENCE) {
+            return (count, error, asked.elapsed());
+        }
+        assert!(count < 500, "the fault never came");
+    }
+    unreachable!()
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn the_driver_is_listed_with_its_modes() {
+    let listed = camera::list();
+    let vivid = listed
+        .iter()
+        .find(|info| info.address.to_string() == VIVID)
+        .unwrap();
+    println!("{} {} {}", vivid.name, vivid.driver, vivid.bus);
+    for mode in vivid
+        .modes
+        .iter()
+        .filter(|mode| mode.fourcc.to_string() == "YUYV")
+    {
+        println!("  {mode}");
+    }
+    println!(
+        "  {} other formats, e.g. {}",
+        vivid.other_formats.len(),
+        vivid.other_formats[0]
+    );
+    assert_eq!(
+        (vivid.name.as_str(), vivid.driver.as_str()),
+        ("vivid", "vivid")
+    );
+    for wanted in ["YUYV", "NV12", "RGB3", "GREY", "RGGB"] {
+        let found = |mode: &&camera::Mode| {
+            mode.fourcc.to_string() == wanted && mode.sizes.contains(640, 480)
+        };
+        let mode = vivid.modes.iter().find(found).unwrap();
+        assert!(mode.rates.fastest().unwrap().per_second() >= 25.0, "{mode}");
+    }
+    assert!(!vivid.other_formats.is_empty());
+    assert_eq!(vivid.problems, [] as [&str; 0]);
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn fifty_frames_come_whole_counted_and_stamped() {
+    let mut camera = vivid();
+    let granted = start(&mut *camera, "YUYV:640x480@25");
+    assert_eq!(
+        granted.differences(&"YUYV:640x480@25".parse().unwrap()),
+        [] as [&str; 0]
+    );
+    let before = Clock::monotonic().now_us();
+    let frames = frames(&mut *camera, 50);
+    let after = Clock::monotonic().now_us();
+    let counted = counted(&frames);
+    println!(
+        "counted {} to {} in {} us",
+        counted[0],
+        counted[49],
+        frames[49].t_us - frames[0].t_us
+    );
+    for frame in &frames {
+        assert_eq!((frame.fault(), frame.data.len()), (None, 640 * 480 * 2));
+        assert_eq!(frame.stamp, StampSource::EndOfFrame);
+        // The driver stamps the end of a frame ahead of time.
+        let around = before - 1_000_000..after + 1_000_000;
+        assert!(around.contains(&frame.t_us), "{} in {around:?}", frame.t_us);
+    }
+    assert!(frames.is_sorted_by(|a, b| a.t_us < b.t_us));
+    assert!(counted.is_sorted(), "{counted:?}");
+    camera.stop().unwrap();
+    camera.stop().unwrap();
+    let error = camera.next_frame(PATIENCE).unwrap_err();
+    assert!(matches!(error, CameraError::NotStarted { .. }), "{error}");
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn every_raw_format_comes_with_the_bytes_of_its_size() {
+    let mut camera = vivid();
+    for mode in [
+        "YUYV", "NV12", "RGB3", "GREY", "RGGB", "BA81", "GBRG", "GRBG",
+    ] {
+        let granted = start(&mut *camera, &format!("{mode}:320x180@30"));
+        assert_eq!(
+            (granted.fourcc.to_string().as_str(), granted.width),
+            (mode, 320)
+        );
+        for frame in frames(&mut *camera, 3) {
+            assert_eq!(frame.fault(), None, "{mode}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn what_was_not_granted_is_told() {
+    let mut camera = vivid();
+    let asked = "MJPG:1000x700@60";
+    let granted = start(&mut *camera, asked);
+    let differences = granted.differences(&asked.parse().unwrap());
+    println!("{differences:?}");
+    assert_eq!(differences.len(), 3);
+    assert_eq!(frames(&mut *camera, 1)[0].fault(), None);
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn controls_are_set_and_read_back() {
+    let mut camera = vivid();
+    let controls = camera.controls().unwrap();
+    println!("{} controls", controls.len());
+    for (name, values) in [
+        ("brightness", [0, 200]),
+        ("boolean", [0, 1]),
+        ("integer_64_bits", [i64::MIN, 5_000_000_000]),
+        ("menu", [1, 4]),
+        ("integer_menu", [2, 8]),
+        ("bitmask", [0, 0x0040_2010]),
+    ] {
+        for value in values {
+            set(&mut *camera, name, value);
+        }
+    }
+    let control = |name: &str| {
+        controls
+            .iter()
+            .find(|control| control.name == name)
+            .unwrap()
+    };
+    let ControlKind::Menu(items) = &control("menu").kind else {
+        panic!("{:?}", control("menu"));
+    };
+    assert_eq!(items[0].label, "Menu Item 1");
+    assert_eq!(control("button").value, None);
+    assert!(control("read_only_integer_32_bits").flags.read_only);
+    assert!(
+        controls
+            .iter()
+            .all(|control| !control.name.contains("array"))
+    );
+    let clamped = camera
+        .set_control(control("brightness").id, 70_000)
+        .unwrap();
+    assert_eq!(clamped, 255);
+    let mut fault =
+        |name: &str, value: i64| match camera.set_control(control(name).id, value).unwrap_err() {
+            CameraError::Control { fault, .. } => fault,
+            other => panic!("{other}"),
+        };
+    let locked = fault("read_only_integer_32_bits", 1);
+    assert!(matches!(locked, ControlFault::Locked), "{locked}");
+    let hole = fault("menu", 9);
+    assert!(matches!(hole, ControlFault::NoItem(_)), "{hole}");
+    let too_wide = fault("brightness", 1 << 40);
+    assert!(matches!(too_wide, ControlFault::Range { .. }), "{too_wide}");
+    let unknown = camera.set_control(ControlId(0x0098_09ff), 1).unwrap_err();
+    assert!(unknown.to_string().contains("no such control"), "{unknown}");
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn a_camera_is_made_to_hold_still() {
+    let mut camera = vivid();
+    set(&mut *camera, "gain_automatic", 1);
+    let wanted = Wanted {
+        gain: Some(33),
+        ..Wanted::default()
+    };
+    let plan = ManualPlan::new(&camera.controls().unwrap(), &wanted);
+    assert_eq!(plan.apply(&mut *camera).unwrap(), []);
+    let lacks = [
+        Aspect::Exposure,
+        Aspect::WhiteBalance,
+        Aspect::Focus,
+        Aspect::PowerLine,
+    ];
+    assert_eq!(plan.lacks, lacks.map(Lack::NoControl));
+    set(&mut *camera, "gain", 34);
+    let moved = plan.check(&camera.controls().unwrap());
+    assert_eq!(moved[0].to_string(), "gain is 34 where 33 was set");
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn a_frame_marked_as_damaged_is_delivered_and_told() {
+    let mut camera = vivid();
+    start(&mut *camera, "YUYV:320x180@30");
+    frames(&mut *camera, 3);
+    set(&mut *camera, "inject_v4l2_buf_flag_error", 1);
+    let flagged = frames(&mut *camera, 15)
+        .iter()
+        .filter(|frame| frame.flagged)
+        .count();
+    assert_eq!(flagged, 1);
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn a_broken_stream_is_told_and_starts_again() {
+    let mut camera = vivid();
+    start(&mut *camera, "YUYV:320x180@30");
+    frames(&mut *camera, 3);
+    set(&mut *camera, "inject_fatal_streaming_error", 1);
+    let (count, error, took) = until_error(&mut *camera);
+    println!("after {count} frames and {took:?}: {error}");
+    assert!(matches!(error, CameraError::Stream { .. }), "{error}");
+    let again = camera.next_frame(PATIENCE).unwrap_err();
+    assert!(matches!(again, CameraError::Stream { .. }), "{again}");
+    start(&mut *camera, "YUYV:320x180@30");
+    frames(&mut *camera, 3);
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn a_disconnected_camera_is_told_at_once_and_comes_back() {
+    let mut camera = vivid();
+    start(&mut *camera, "YUYV:320x180@30");
+    frames(&mut *camera, 3);
+    set_and_forget(&mut *camera, "disconnect");
+    let (count, error, took) = until_error(&mut *camera);
+    println!("after {count} frames and {took:?}: {error}");
+    assert!(matches!(error, CameraError::Unplugged { .. }), "{error}");
+    assert!(took < Duration::from_secs(2), "{took:?}");
+    let stopped = camera.stop();
+    assert!(
+        matches!(stopped, Err(CameraError::Unplugged { .. })),
+        "{stopped:?}"
+    );
+    let controls = camera.controls();
+    assert!(
+        matches!(controls, Err(CameraError::Unplugged { .. })),
+        "{controls:?}"
+    );
+    drop(camera);
+    let mut camera = vivid();
+    start(&mut *camera, "YUYV:320x180@30");
+    frames(&mut *camera, 3);
+}
+
+/// Presses a button whose device may not answer any more.
+fn set_and_forget(camera: &mut dyn Camera, name: &str) {
+    let id = id(camera, name);
+    let _ = camera.set_control(id, 1);
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn a_camera_whose_node_goes_is_unplugged_and_comes_back() {
+    let mut camera = vivid();
+    start(&mut *camera, "YUYV:320x180@30");
+    frames(&mut *camera, 3);
+    let unbind = std::thread::spawn(|| fs::write(format!("{DRIVER}/unbind"), "vivid.0").unwrap());
+    let start_of_wait = Instant::now();
+    let (count, error, took) = until_error(&mut *camera);
+    println!(
+        "after {count} frames, {took:?} of {:?}: {error}",
+        start_of_wait.elapsed()
+    );
+    assert!(matches!(error, CameraError::Unplugged { .. }), "{error}");
+    assert!(took < Duration::from_secs(2), "{took:?}");
+    drop(camera);
+    unbind.join().unwrap();
+    let gone = open(VIVID).err().unwrap();
+    assert!(matches!(gone, CameraError::NotThere { .. }), "{gone}");
+    fs::write(format!("{DRIVER}/bind"), "vivid.0").unwrap();
+    let mut camera = vivid();
+    start(&mut *camera, "YUYV:320x180@30");
+    frames(&mut *camera, 3);
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn dropped_buffers_are_gaps_in_the_counter() {
+    let mut camera = vivid();
+    set(&mut *camera, "percentage_of_dropped_buffers", 50);
+    start(&mut *camera, "YUYV:320x180@30");
+    let counted = counted(&frames(&mut *camera, 40));
+    set(&mut *camera, "percentage_of_dropped_buffers", 0);
+    let missing = counted[39] - counted[0] - 39;
+    println!("{missing} frames missing among 40");
+    assert!((8..200).contains(&missing), "{counted:?}");
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn a_second_program_is_refused_and_the_first_goes_on() {
+    let mut first = vivid();
+    start(&mut *first, "YUYV:320x180@30");
+    let mut second = open(VIVID).unwrap();
+    let refused = second
+        .start(&"YUYV:640x480@25".parse().unwrap())
+        .unwrap_err();
+    println!("{refused}");
+    assert!(matches!(refused, CameraError::InUse { .. }), "{refused}");
+    drop(second);
+    for frame in frames(&mut *first, 10) {
+        assert_eq!((frame.fault(), frame.width), (None, 320));
+    }
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn an_error_at_the_start_leaves_a_camera_that_starts() {
+    let mut camera = vivid();
+    for fault in [
+        "inject_vidioc_reqbufs_error",
+        "inject_vidioc_qbuf_error",
+        "inject_vidioc_streamon_error",
+    ] {
+        set(&mut *camera, fault, 1);
+        let error = camera
+            .start(&"YUYV:320x180@30".parse().unwrap())
+            .unwrap_err();
+        println!("{fault}: {error}");
+        assert!(matches!(error, CameraError::Refused { .. }), "{error}");
+        let error = camera.next_frame(PATIENCE).unwrap_err();
+        assert!(matches!(error, CameraError::NotStarted { .. }), "{error}");
+        start(&mut *camera, "YUYV:320x180@30");
+        frames(&mut *camera, 3);
+    }
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn a_buffer_that_is_not_taken_back_costs_no_frame() {
+    let mut camera = vivid();
+    start(&mut *camera, "YUYV:320x180@30");
+    frames(&mut *camera, 3);
+    for _ in 0..12 {
+        set(&mut *camera, "inject_vidioc_qbuf_error", 1);
+        assert_eq!(frames(&mut *camera, 2)[0].fault(), None);
+    }
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn a_counter_that_wraps_goes_on() {
+    let mut camera = vivid();
+    set(&mut *camera, "wrap_sequence_number", 1);
+    start(&mut *camera, "YUYV:320x180@60");
+    let frames = frames(&mut *camera, 150);
+    set(&mut *camera, "wrap_sequence_number", 0);
+    let raw: Vec<u32> = frames
+        .iter()
+        .map(|frame| frame.sequence.unwrap().raw)
+        .collect();
+    assert!(raw[0] > raw[149], "{} to {}", raw[0], raw[149]);
+    let counted = counted(&frames);
+    println!("{} to {}", counted[0], counted[149]);
+    assert!(counted.is_sorted() && counted[149] > 1 << 32, "{counted:?}");
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn stamps_at_the_start_of_exposure_are_told() {
+    let mut camera = vivid();
+    set(&mut *camera, "timestamp_source", 1);
+    start(&mut *camera, "YUYV:320x180@30");
+    let frame = frames(&mut *camera, 1).remove(0);
+    set(&mut *camera, "timestamp_source", 0);
+    assert_eq!(frame.stamp, StampSource::StartOfExposure);
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn a_timeout_is_bounded_and_costs_no_frame() {
+    let mut camera = vivid();
+    start(&mut *camera, "YUYV:1920x1080@5");
+    let mut timeouts = 0;
+    let mut counted = Vec::new();
+    while counted.len() < 3 {
+        let asked = Instant::now();
+        match camera.next_frame(Duration::from_millis(20)) {
+            Ok(frame) => counted.push(frame.sequence.unwrap().unwrapped),
+            Err(CameraError::Timeout { .. }) => timeouts += 1,
+            Err(other) => panic!("{other}"),
+        }
+        assert!(asked.elapsed() < PATIENCE);
+    }
+    println!("{timeouts} timeouts, counted {counted:?}");
+    assert!(timeouts > 0);
+    assert!(counted.is_sorted());
+}
+
+#[test]
+#[ignore = "needs the driver vivid"]
+fn the_portable_library_shows_the_same_camera() {
+    let address = Address::Nokhwa(0).to_string();
+    let mut camera = open(&address).unwrap();
+    println!(
+        "{}: {} modes",
+        camera.info().name,
+        camera.info().modes.len()
+    );
+    let granted = start(&mut *camera, "YUYV:640x480@25");
+    println!("{granted}");
+    for frame in frames(&mut *camera, 5) {
+        assert_eq!((frame.sequence, frame.stamp), (None, StampSource::Arrival));
+        assert_eq!(frame.fault(), None);
+    }
+    camera.stop().unwrap();
+}
+
+#[test]
+#[ignore = "needs the driver v4l2loopback"]
+fn motion_jpeg_comes_with_the_bytes_used_alone() {
+    assert!(
+        Path::new("/dev/video10").exists(),
+        "needs v4l2loopback as /dev/video10"
+    );
+    let mut camera = open(LOOPBACK).unwrap();
+    for mode in &camera.info().modes {
+        println!("{mode}");
+    }
+    let offered = camera.info().modes[0].sizes.largest();
+    let granted = start(
+        &mut *camera,
+        &format!("MJPG:{}x{}@30", offered.0, offered.1),
+    );
+    println!("{granted}");
+    let frames = frames(&mut *camera, 50);
+    let sizes: Vec<usize> = frames.iter().map(|frame| frame.data.len()).collect();
+    println!("{sizes:?} {:?} {:?}", counted(&frames), frames[1].stamp);
+    // The driver's first buffer may be one from before.
+    for frame in &frames[1..] {
+        assert_eq!(frame.fault(), None);
+        assert!(
+            frame.data.ends_with(&[0xff, 0xd9]),
+            "{} bytes",
+            frame.data.len()
+        );
+    }
+    assert!(sizes[1..].iter().any(|&size| size != sizes[1]));
+}
