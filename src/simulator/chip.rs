@@ -47,7 +47,7 @@ pub(super) struct IndexPlace {
 
 enum State {
     Booting { until: u64, cause: ResetCause },
-    Running(Controller),
+    Running(Box<Controller>),
     Stalled,
 }
 
@@ -119,7 +119,7 @@ impl Chip {
                 }
                 State::Booting { until, cause } if *until <= self.bench.now => {
                     self.bench.cause = *cause;
-                    self.state = State::Running(Controller::new(&mut self.bench));
+                    self.state = State::Running(Box::new(Controller::new(&mut self.bench)));
                 }
                 State::Booting { until, .. } => {
                     let until = (*until).min(end);

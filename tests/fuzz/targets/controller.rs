@@ -1,0 +1,39 @@
+//! The turntable's firmware: whatever comes over the line, it answers, and nothing moves before a
+//! line was accepted.
+
+#![no_main]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a panic is how a target tells"
+)]
+
+#[allow(dead_code, reason = "the firmware's own tests use the rest")]
+#[path = "../../../rig-firmware/tests/support/mod.rs"]
+mod support;
+
+use libfuzzer_sys::fuzz_target;
+use support::Table;
+
+/// More would only take longer.
+const LONGEST: usize = 1024;
+
+fuzz_target!(|bytes: &[u8]| {
+    let mut table = Table::new();
+    let mut accepted = false;
+    for piece in bytes.chunks(16).take(LONGEST / 16) {
+        let before = table.board.turned;
+        let heard = table.say(piece);
+        accepted |= heard.iter().any(|line| line.starts_with("ok"));
+        accepted |= table.status().starts_with("<Home");
+        assert!(accepted || table.board.turned == before, "moved unasked");
+    }
+    table.board.press_emergency(true);
+    let stood = table.board.turned;
+    table.run_ms(20);
+    assert_eq!(
+        table.board.turned, stood,
+        "moved with the emergency stop pressed"
+    );
+    assert!(table.status().starts_with("<Alarm"));
+});
