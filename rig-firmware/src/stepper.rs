@@ -46,9 +46,9 @@ pub struct Full;
 pub struct StepperSettings {
     /// The first interval of a ramp, in 256ths of a tick.
     pub first_interval: u32,
-    /// The index pin is low when active.
+    /// The index input is active when open.
     pub invert_index: bool,
-    /// The emergency-stop pin is low when active.
+    /// The emergency-stop input is active when open.
     pub invert_emergency: bool,
     /// Ticks for which the index has to stay before it counts.
     pub debounce: u32,
@@ -129,7 +129,8 @@ impl Stepper {
         self.ramp = Ramp::at_rest(settings.first_interval);
     }
 
-    /// Makes one step, and says when the next is due. `index` is the raw level of the index pin.
+    /// Makes one step, and says when the next is due. `index`: its input is
+    /// closed (see [`Inputs`](crate::board::Inputs)).
     pub fn fire(&mut self, index: bool) -> Fire {
         let active = index != self.settings.invert_index;
         let ticks = self.interval >> 8;
@@ -253,11 +254,11 @@ impl Stepper {
         }
     }
 
-    /// Tells the raw level of the emergency-stop input; for the interrupt of that pin. Steps stop
+    /// Tells whether the emergency-stop input is closed; for the interrupt of that pin. Steps stop
     /// at once if it is active. Returns whether it is active: then note
     /// [`Events::EMERGENCY`](crate::board::Events::EMERGENCY).
-    pub fn emergency(&mut self, level: bool) -> bool {
-        let active = level != self.settings.invert_emergency;
+    pub fn emergency(&mut self, closed: bool) -> bool {
+        let active = closed != self.settings.invert_emergency;
         if active {
             self.halt();
         }
