@@ -41,16 +41,10 @@ fn turn_with_full_buffer(chip: &mut Chip) {
     assert_eq!(chip.status().state(), "Run");
 }
 
-/// When the ramp to the last step began: from there on each step takes longer than the one before.
+/// The first step of the ramp to the last one, which is 7.2^2 / (2 * 36) degrees long.
 fn ramp_down_began(chip: &Chip) -> u64 {
-    let steps = &chip.steps;
-    let mut at = steps.len() - 1;
-    let interval = |at: usize| steps[at].cycle - steps[at - 1].cycle;
-    while interval(at - 1) < interval(at) {
-        at -= 1;
-    }
-    assert!(steps.len() - at > 50, "a ramp of 64 steps");
-    steps[at].cycle
+    let ramp = (0.72 * STEPS_PER_DEGREE - 0.5) as usize;
+    chip.steps[chip.steps.len() - ramp].cycle
 }
 
 #[test]
