@@ -64,7 +64,7 @@ struct Queued {
 const EMPTY: Queued = Queued {
     plan: Move {
         steps: 0,
-        forward: true,
+        forward: false,
         cruise: Cruise {
             interval: 0,
             index: 0,
@@ -97,15 +97,16 @@ pub struct Stepper {
 }
 
 impl Stepper {
-    /// A generator at rest at position zero.
+    /// A generator at rest at position zero, which waits for [`Stepper::configure`]. All of it is
+    /// zero, so that it takes no flash.
     pub const fn new() -> Stepper {
         Stepper {
             queue: [EMPTY; QUEUE],
             head: 0,
             length: 0,
-            ramp: Ramp::at_rest(1),
+            ramp: Ramp::at_rest(0),
             position: 0,
-            forward: true,
+            forward: false,
             due: false,
             interval: 0,
             fraction: 0,
@@ -115,7 +116,7 @@ impl Stepper {
             halted_in_motion: false,
             search: Search::Off,
             settings: StepperSettings {
-                first_interval: 1,
+                first_interval: 0,
                 invert_index: false,
                 invert_emergency: false,
                 debounce: 0,

@@ -23,10 +23,10 @@ const ENABLE: u8 = bit(0);
 const INDEX: u8 = bit(1);
 const EMERGENCY_STOP: u8 = bit(0);
 
-/// How the output pins are wired, and whether the driver is fed.
+/// How the output pins are wired, and whether the driver is fed; zero until the settings are read.
 static DRIVER: Shared<Driver> = Shared::new(Driver {
     outputs: Outputs {
-        pulse_us: 10,
+        pulse_us: 0,
         invert_step: false,
         invert_direction: false,
         invert_enable: false,
