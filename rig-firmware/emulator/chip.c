@@ -271,12 +271,14 @@ struct chip *chip_new(const char *elf, chip_listener listener, void *context)
 	avr_global_logger_set(log_to_stderr);
 	chip->listener = listener;
 	chip->context = context;
-	chip->level[CHIP_INDEX] = true;
+	chip->level[CHIP_INDEX] = chip->level[CHIP_EMERGENCY_STOP] = true;
 	chip->random = 1;
 	if (!load(chip, elf)) {
 		free(chip);
 		return NULL;
 	}
+	uint32_t quiet = 0;
+	avr_ioctl(chip->avr, AVR_IOCTL_UART_SET_FLAGS('0'), &quiet);
 	wire(chip);
 	chip_reset(chip, CHIP_POWER_ON);
 	return chip;
@@ -352,6 +354,10 @@ void chip_reset(struct chip *chip, enum chip_reset cause)
 
 void chip_hang(struct chip *chip)
 {
+	/* Not within an interrupt: the emulated watchdog, unlike a real one, waits for ever for its
+	 * own to be served. */
+	for (unsigned tries = 0; tries < 100000 && !chip->avr->sreg[S_I]; tries++)
+		chip_run(chip);
 	chip->avr->pc = chip->avr->flashend - 1;
 }
 

@@ -41,7 +41,7 @@ pub trait Board {
     /// How pulses and levels leave the chip: called at the start and when a setting changes.
     fn configure_outputs(&mut self, outputs: Outputs);
 
-    /// The levels of the input pins as they are: true is high.
+    /// The input pins as they are: true is closed, whatever the settings call active.
     fn inputs(&mut self) -> Inputs;
 
     /// The last conversion at the battery pin, 0..=1023.
@@ -107,7 +107,8 @@ impl Events {
     }
 }
 
-/// The levels of the input pins: true is high.
+/// The input pins, each with a pull-up: true is closed, that is pulled to ground by a switch or a
+/// sensor; false is open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Inputs {
     /// The index sensor.

@@ -17,6 +17,8 @@ pub const TICKS_PER_SECOND: u32 = 2_000_000;
 pub const MAX_STEP_RATE: u32 = 10_000;
 /// Parts of a tick in a minute, times a million.
 const PARTS_PER_MINUTE: u64 = TICKS_PER_SECOND as u64 * 256 * 60 * 1_000_000;
+/// 0.676 f sqrt(2 / a) in 256ths of a tick, where a is a thousandth of a step/s^2.
+const FIRST: u64 = 15_478_600_000;
 /// Above any speed, in thousandths of a step/s.
 const MAX_SPEED: u32 = 100_000_000;
 /// Above any ramp index, and four times it fits 32 bits.
@@ -51,9 +53,13 @@ impl Profile {
     pub fn new(steps_per_degree: u32, acceleration: u32) -> Profile {
         let product = u64::from(steps_per_degree) * u64::from(acceleration);
         let acceleration = u32::try_from(product / 1000).unwrap_or(u32::MAX).max(1);
-        // (0.676 f)^2 * 2 in sixteenths of a tick, times 1000 for the thousandths.
-        let squared = 1_352_000_u64.pow(2) * 2 * 256 * 1000;
-        let first = root(squared / u64::from(acceleration)) * 16;
+        // Scaled by fours, so that its root has sixteen digits in base two.
+        let (mut scaled, mut twos) = (acceleration, 1_u64);
+        while scaled < 1 << 30 {
+            scaled <<= 2;
+            twos *= 2;
+        }
+        let first = FIRST * twos / u64::from(root(scaled).max(1));
         Profile {
             steps_per_degree,
             acceleration,
@@ -93,10 +99,10 @@ impl Profile {
 }
 
 /// The integer square root, digit by digit in base two.
-fn root(square: u64) -> u64 {
+fn root(square: u32) -> u32 {
     let mut rest = square;
-    let mut root = 0_u64;
-    let mut bit = 1_u64 << 62;
+    let mut root = 0_u32;
+    let mut bit = 1_u32 << 30;
     while bit != 0 {
         if rest >= root + bit {
             rest -= root + bit;
@@ -119,7 +125,7 @@ pub struct Ramp {
     /// What the last division left, so that long ramps stay true where a step changes the interval
     /// by less than a 256th of a tick.
     remainder: u32,
-    rising: bool,
+    falling: bool,
 }
 
 impl Ramp {
@@ -130,7 +136,7 @@ impl Ramp {
             index: 0,
             interval: first,
             remainder: 0,
-            rising: true,
+            falling: false,
         }
     }
 
@@ -153,7 +159,7 @@ impl Ramp {
     pub fn up(&mut self) -> u32 {
         let interval = self.interval;
         self.index = self.index.saturating_add(1);
-        let change = self.change(true, self.index.saturating_mul(4).saturating_add(1));
+        let change = self.change(false, self.index.saturating_mul(4).saturating_add(1));
         self.interval = interval.saturating_sub(change).max(1);
         interval
     }
@@ -165,16 +171,16 @@ impl Ramp {
         if self.index == 0 {
             self.rest();
         } else {
-            let change = self.change(false, divisor);
+            let change = self.change(true, divisor);
             self.interval = self.interval.saturating_add(change).min(self.first);
         }
         self.interval
     }
 
     /// 2 c / divisor, with the remainder of the step before where that went the same way.
-    fn change(&mut self, rising: bool, divisor: u32) -> u32 {
-        if self.rising != rising {
-            self.rising = rising;
+    fn change(&mut self, falling: bool, divisor: u32) -> u32 {
+        if self.falling != falling {
+            self.falling = falling;
             self.remainder = divisor / 2;
         }
         let dividend = (self.interval * 2).saturating_add(self.remainder);

@@ -4,6 +4,7 @@
 
 /// What is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Search {
     /// Nothing.
     Off,

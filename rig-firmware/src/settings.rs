@@ -26,13 +26,13 @@ pub enum Key {
     InvertDirection,
     /// `$4`: the enable pin is inverted.
     InvertEnable,
-    /// `$5`: the index input is low when active.
+    /// `$5`: the index input is active when open (high) instead of closed (low).
     InvertIndex,
     /// `$10`: bit 0 asks for machine positions in status reports instead of work positions.
     Report,
     /// `$13`: positions are reported in inches.
     ReportInches,
-    /// `$14`: the emergency-stop input is low when active.
+    /// `$14`: the emergency-stop input is active when open (high) instead of closed (low).
     InvertEmergency,
     /// `$20`: soft limits are on.
     SoftLimits,

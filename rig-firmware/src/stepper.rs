@@ -46,9 +46,9 @@ pub struct Full;
 pub struct StepperSettings {
     /// The first interval of a ramp, in 256ths of a tick.
     pub first_interval: u32,
-    /// The index pin is low when active.
+    /// The index input is active when open.
     pub invert_index: bool,
-    /// The emergency-stop pin is low when active.
+    /// The emergency-stop input is active when open.
     pub invert_emergency: bool,
     /// Ticks for which the index has to stay before it counts.
     pub debounce: u32,
@@ -64,7 +64,7 @@ struct Queued {
 const EMPTY: Queued = Queued {
     plan: Move {
         steps: 0,
-        forward: true,
+        forward: false,
         cruise: Cruise {
             interval: 0,
             index: 0,
@@ -97,15 +97,16 @@ pub struct Stepper {
 }
 
 impl Stepper {
-    /// A generator at rest at position zero.
+    /// A generator at rest at position zero, which waits for [`Stepper::configure`]. All of it is
+    /// zero, so that it takes no flash.
     pub const fn new() -> Stepper {
         Stepper {
             queue: [EMPTY; QUEUE],
             head: 0,
             length: 0,
-            ramp: Ramp::at_rest(1),
+            ramp: Ramp::at_rest(0),
             position: 0,
-            forward: true,
+            forward: false,
             due: false,
             interval: 0,
             fraction: 0,
@@ -115,7 +116,7 @@ impl Stepper {
             halted_in_motion: false,
             search: Search::Off,
             settings: StepperSettings {
-                first_interval: 1,
+                first_interval: 0,
                 invert_index: false,
                 invert_emergency: false,
                 debounce: 0,
@@ -129,7 +130,8 @@ impl Stepper {
         self.ramp = Ramp::at_rest(settings.first_interval);
     }
 
-    /// Makes one step, and says when the next is due. `index` is the raw level of the index pin.
+    /// Makes one step, and says when the next is due. `index`: its input is
+    /// closed (see [`Inputs`](crate::board::Inputs)).
     pub fn fire(&mut self, index: bool) -> Fire {
         let active = index != self.settings.invert_index;
         let ticks = self.interval >> 8;
@@ -253,11 +255,11 @@ impl Stepper {
         }
     }
 
-    /// Tells the raw level of the emergency-stop input; for the interrupt of that pin. Steps stop
+    /// Tells whether the emergency-stop input is closed; for the interrupt of that pin. Steps stop
     /// at once if it is active. Returns whether it is active: then note
     /// [`Events::EMERGENCY`](crate::board::Events::EMERGENCY).
-    pub fn emergency(&mut self, level: bool) -> bool {
-        let active = level != self.settings.invert_emergency;
+    pub fn emergency(&mut self, closed: bool) -> bool {
+        let active = closed != self.settings.invert_emergency;
         if active {
             self.halt();
         }

@@ -203,7 +203,7 @@ impl Simulator {
         *lock(&self.shared.counts)
     }
 
-    /// Holds the index input at a level, or (`None`) lets the angle decide.
+    /// Holds the index input closed or open, or (`None`) lets the angle decide.
     pub fn hold_index(&self, level: Option<bool>) {
         lock(&self.shared.pins).index = match level {
             Some(level) => IndexInput::Held(level),

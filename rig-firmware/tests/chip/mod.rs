@@ -8,86 +8,86 @@ use std::sync::Once;
 use std::time::SystemTime;
 
 /// Cycles in a microsecond of the chip's clock.
-pub const CYCLES_PER_US: u64 = 16;
+pub(crate) const CYCLES_PER_US: u64 = 16;
 /// Cycles in a millisecond.
-pub const MS: u64 = 16_000;
+pub(crate) const MS: u64 = 16_000;
 /// Steps in a degree, as `$100` has it by default.
-pub const STEPS_PER_DEGREE: f64 = 88.889;
+pub(crate) const STEPS_PER_DEGREE: f64 = 88.889;
 
 /// A rising edge at STEP.
 #[derive(Debug, Clone, Copy)]
-pub struct Step {
+pub(crate) struct Step {
     /// When.
-    pub cycle: u64,
+    pub(crate) cycle: u64,
     /// Whether DIR was high.
-    pub forward: bool,
+    pub(crate) forward: bool,
 }
 
 /// A change at ENABLE.
 #[derive(Debug, Clone, Copy)]
-pub struct Enable {
+pub(crate) struct Enable {
     /// When.
-    pub cycle: u64,
+    pub(crate) cycle: u64,
     /// The level; low feeds the driver.
-    pub level: bool,
+    pub(crate) level: bool,
 }
 
 /// A status report.
 #[derive(Debug, Clone)]
-pub struct Status {
+pub(crate) struct Status {
     text: String,
 }
 
 impl Status {
     /// The state, such as `Run`.
-    pub fn state(&self) -> &str {
+    pub(crate) fn state(&self) -> &str {
         self.text.split('|').next().unwrap_or_default()
     }
 
     /// What follows `name:`.
-    pub fn field(&self, name: &str) -> Option<&str> {
+    pub(crate) fn field(&self, name: &str) -> Option<&str> {
         self.text
             .split('|')
             .find_map(|field| field.strip_prefix(name)?.strip_prefix(':'))
     }
 
     /// Degrees from machine zero.
-    pub fn position(&self) -> f64 {
+    pub(crate) fn position(&self) -> f64 {
         let axes = self.field("MPos").expect("the report has MPos");
         axes.split(',').next().unwrap().parse().unwrap()
     }
 
     /// Microseconds of the chip's clock.
-    pub fn micros(&self) -> u64 {
+    pub(crate) fn micros(&self) -> u64 {
         self.field("T").expect("the report has T").parse().unwrap()
     }
 }
 
 /// The firmware on an emulated chip.
-pub struct Chip {
+pub(crate) struct Chip {
     process: Child,
     commands: ChildStdin,
     answers: BufReader<ChildStdout>,
     partial: Vec<u8>,
     lines: VecDeque<String>,
     /// The chip's clock.
-    pub cycle: u64,
+    pub(crate) cycle: u64,
     /// When the last byte left the chip.
-    pub sent_at: u64,
+    pub(crate) sent_at: u64,
     /// Every step so far.
-    pub steps: Vec<Step>,
+    pub(crate) steps: Vec<Step>,
     /// Every change at ENABLE so far.
-    pub enables: Vec<Enable>,
+    pub(crate) enables: Vec<Enable>,
     /// Bytes that the receiver lost because the program was late.
-    pub overruns: usize,
+    pub(crate) overruns: usize,
     /// Bytes of stack that were never used, as of the last question.
-    pub stack_free: Option<u32>,
+    pub(crate) stack_free: Option<u32>,
 }
 
 impl Chip {
     /// Power on, up to the banner; `None`, with the reason on stderr, where firmware or emulator
     /// have not been built.
-    pub fn start() -> Option<(Chip, String)> {
+    pub(crate) fn start() -> Option<(Chip, String)> {
         let (elf, emulator) = match find() {
             Ok(found) => found,
             Err(reason) => {
@@ -120,7 +120,7 @@ impl Chip {
     }
 
     /// The next banner.
-    pub fn banner(&mut self) -> String {
+    pub(crate) fn banner(&mut self) -> String {
         loop {
             let line = self.line(1000 * MS).expect("a banner comes within 1 s");
             if line.starts_with("Grbl") {
@@ -130,7 +130,7 @@ impl Chip {
     }
 
     /// Gives a command to the emulator, and takes in what happened.
-    pub fn command(&mut self, command: &str) {
+    pub(crate) fn command(&mut self, command: &str) {
         writeln!(self.commands, "{command}").expect("the emulator listens");
         self.commands.flush().unwrap();
         loop {
@@ -180,18 +180,18 @@ impl Chip {
     }
 
     /// Lets time pass.
-    pub fn run(&mut self, cycles: u64) {
+    pub(crate) fn run(&mut self, cycles: u64) {
         self.command(&format!("run {cycles}"));
     }
 
     /// Puts bytes on the wire to the chip.
-    pub fn write(&mut self, bytes: &[u8]) {
+    pub(crate) fn write(&mut self, bytes: &[u8]) {
         let hex: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
         self.command(&format!("rx {hex}"));
     }
 
     /// The next line from the chip, within `cycles`.
-    pub fn line(&mut self, cycles: u64) -> Option<String> {
+    pub(crate) fn line(&mut self, cycles: u64) -> Option<String> {
         if self.lines.is_empty() {
             self.command(&format!("line {cycles}"));
         }
@@ -199,13 +199,13 @@ impl Chip {
     }
 
     /// Sends a line, and returns its answer (`ok` or `error:N`) with what came before it.
-    pub fn ask(&mut self, line: &str) -> (Vec<String>, String) {
+    pub(crate) fn ask(&mut self, line: &str) -> (Vec<String>, String) {
         self.write(format!("{line}\n").as_bytes());
         self.answer(line)
     }
 
     /// Waits for the answer to a line.
-    pub fn answer(&mut self, line: &str) -> (Vec<String>, String) {
+    pub(crate) fn answer(&mut self, line: &str) -> (Vec<String>, String) {
         let mut before = Vec::new();
         loop {
             let got = self
@@ -219,13 +219,13 @@ impl Chip {
     }
 
     /// Sends a line that has to be accepted.
-    pub fn accept(&mut self, line: &str) {
+    pub(crate) fn accept(&mut self, line: &str) {
         let (before, answer) = self.ask(line);
         assert_eq!(answer, "ok", "to `{line}`, after {before:?}");
     }
 
     /// Asks for a status report.
-    pub fn status(&mut self) -> Status {
+    pub(crate) fn status(&mut self) -> Status {
         self.write(b"?");
         loop {
             let line = self.line(100 * MS).expect("a report within 100 ms");
@@ -238,14 +238,14 @@ impl Chip {
     }
 
     /// Lets time pass until the table rests.
-    pub fn rest(&mut self) {
+    pub(crate) fn rest(&mut self) {
         while self.status().state() != "Idle" {
             self.run(20 * MS);
         }
     }
 
     /// Steps since power-on, forward ones less backward ones.
-    pub fn net_steps(&self) -> i64 {
+    pub(crate) fn net_steps(&self) -> i64 {
         self.steps
             .iter()
             .map(|step| if step.forward { 1 } else { -1 })
@@ -253,7 +253,7 @@ impl Chip {
     }
 
     /// Bytes of stack that were never used.
-    pub fn stack_free(&mut self) -> u32 {
+    pub(crate) fn stack_free(&mut self) -> u32 {
         self.command("stack");
         self.stack_free.expect("the emulator knows the stack")
     }

@@ -107,7 +107,7 @@ fn an_emergency_stop_answers_the_line_that_waits() {
 }
 
 #[test]
-fn an_inverted_emergency_stop_is_active_when_low() {
+fn an_inverted_emergency_stop_is_active_when_open() {
     let mut table = Table::new();
     table.board.emergency = true;
     table.run_ms(5);

@@ -23,10 +23,10 @@ const ENABLE: u8 = bit(0);
 const INDEX: u8 = bit(1);
 const EMERGENCY_STOP: u8 = bit(0);
 
-/// How the output pins are wired, and whether the driver is fed.
+/// How the output pins are wired, and whether the driver is fed; zero until the settings are read.
 static DRIVER: Shared<Driver> = Shared::new(Driver {
     outputs: Outputs {
-        pulse_us: 10,
+        pulse_us: 0,
         invert_step: false,
         invert_direction: false,
         invert_enable: false,
@@ -87,17 +87,21 @@ pub(crate) fn set_direction(forward: bool, outputs: Outputs) {
     PORTD.change(DIRECTION, forward != outputs.invert_direction);
 }
 
-/// The level of the index pin.
+/// Whether the index input is closed.
 pub(crate) fn index() -> bool {
-    PINB.has(INDEX)
+    !PINB.has(INDEX)
 }
 
-/// The levels of both inputs.
+/// Both inputs.
 pub(crate) fn inputs() -> Inputs {
     Inputs {
         index: index(),
-        emergency_stop: PINC.has(EMERGENCY_STOP),
+        emergency_stop: emergency_stop(),
     }
+}
+
+fn emergency_stop() -> bool {
+    !PINC.has(EMERGENCY_STOP)
 }
 
 /// Pin change of A0: the emergency stop. Steps end and the driver is released here; the main
@@ -106,10 +110,7 @@ pub(crate) fn inputs() -> Inputs {
 extern "avr-interrupt" fn __vector_4() {
     // SAFETY: the one proof of this handler, and interrupts never nest.
     let mut masked = unsafe { Masked::in_interrupt() };
-    if STEPPER
-        .lend(&mut masked)
-        .emergency(PINC.has(EMERGENCY_STOP))
-    {
+    if STEPPER.lend(&mut masked).emergency(emergency_stop()) {
         feed_driver(false, &mut masked);
         EVENTS.lend(&mut masked).insert(Events::EMERGENCY);
     }

@@ -79,11 +79,12 @@ pub(crate) fn reset_cause() -> ResetCause {
     }
 }
 
+/// Sets the watchdog up; its new time begins here.
 fn set(control: u8) {
     // SAFETY: the timed sequence that the data sheet demands, on a register that only this
     // function writes.
     unsafe {
-        asm!("wdr", "sts 0x60, {unlock}", "sts 0x60, {control}",
+        asm!("wdr", "sts 0x60, {unlock}", "sts 0x60, {control}", "wdr",
             unlock = in(reg_upper) WDCE | WDE, control = in(reg_upper) control);
     }
 }
