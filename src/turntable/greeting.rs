@@ -16,7 +16,7 @@ const SHORT_WAIT: Duration = Duration::from_millis(300);
 /// How long a controller may take to answer its first `?`.
 const PROBE_WAIT: Duration = Duration::from_secs(5);
 /// How often the settings are read until they are whole, and, unchecked, the same twice.
-const READINGS: usize = 6;
+const READINGS: usize = 20;
 /// The complaint of a line without checksum in a checked session.
 const SESSION_OPEN: u8 = 70;
 /// Between two reports in motion, with the chip's stamp and without.
