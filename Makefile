@@ -7,15 +7,15 @@ SHELL := /bin/bash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
-# The recorded session of a whole turn, and the rectangle around its object; its folder holds
-# seeds that somebody painted.
+# The recorded session of a whole turn, which the demonstration plays to the camera's side, and the
+# rectangle around its object; its folder holds seeds that somebody painted.
 SESSION := 20261120T093015Z-cow
 RECT := 170,20,325,390
 DEMO := $(TARGET)/demo
 
 # The input of the benchmark, and how often each program runs.
 BENCH_VIDEO ?= fixtures/$(SESSION)/video.mkv
-BENCH_MASK ?= $(DEMO)/$(SESSION)/mask.png
+BENCH_MASK ?= $(DEMO)/mask.png
 BENCH_RUNS ?= 5
 BENCH_VENV := $(TARGET)/bench-venv
 
@@ -61,19 +61,21 @@ flash: firmware ## Flash the firmware to the Arduino at PORT (/dev/ttyACM0)
 	avrdude -p atmega328p -c arduino -P $(PORT) -b $(FLASH_BAUD) -D \
 	    -U flash:w:$(FIRMWARE)/rig-firmware-uno.hex:i
 
-demo: setup ## Make a shard of the recorded turn in fixtures/, verify it, and say where to look
+demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of it, say where to look
 	cargo build --locked --release --bins
 	rm -rf $(DEMO)
-	mkdir -p $(DEMO)
-	cp -r fixtures/$(SESSION) $(DEMO)/
-	$(TARGET)/release/relit-mask $(DEMO)/$(SESSION) --rect $(RECT) \
-	    --seeds fixtures/$(SESSION)/seeds.png
-	$(TARGET)/release/relit-extract $(DEMO)/$(SESSION) -o $(DEMO)/out
-	$(TARGET)/release/relit-extract verify $(DEMO)/out
-	@echo
-	@echo "The mask, drawn over the frame:   $(DEMO)/$(SESSION)/mask-preview.png"
-	@echo "The report, for a browser:        $(DEMO)/out/$(SESSION).html"
-	@echo "The shard of 1500 samples:        $(DEMO)/out/$(SESSION).tar"
+	$(TARGET)/release/relit-capture record --yes --object cow --root $(DEMO)/sessions \
+	    --camera 'replay:fixtures/$(SESSION)?loop=1' --turntable sim:
+	session=$$(echo $(DEMO)/sessions/*-cow); \
+	$(TARGET)/release/relit-mask "$$session" --rect $(RECT) --seeds fixtures/$(SESSION)/seeds.png; \
+	$(TARGET)/release/relit-extract "$$session" -o $(DEMO)/out; \
+	$(TARGET)/release/relit-extract verify $(DEMO)/out; \
+	cp "$$session/mask.png" $(DEMO)/mask.png; \
+	echo; \
+	echo "The recorded session:             $$session"; \
+	echo "The mask, drawn over the frame:   $$session/mask-preview.png"; \
+	echo "The report, for a browser:        $$(echo $(DEMO)/out/*-cow.html)"; \
+	echo "The shard of 1500 samples:        $$(echo $(DEMO)/out/*-cow.tar)"
 
 bench: setup $(BENCH_MASK) $(BENCH_VENV)/ready ## Measure relit-extract against ffmpeg and Python OpenCV
 	cargo build --locked --release --bins
@@ -100,7 +102,7 @@ $(EMULATOR): $(EMULATOR_SOURCES) $(wildcard rig-firmware/emulator/*.h)
 	@mkdir -p $(@D)
 	$(CC) -std=c11 -O2 -Wall -Wextra -o $@ $(EMULATOR_SOURCES) -lsimavr -lelf
 
-$(DEMO)/$(SESSION)/mask.png:
+$(DEMO)/mask.png:
 	$(MAKE) demo
 
 $(BENCH_VENV)/ready: tests/bench/requirements.txt
