@@ -6,7 +6,7 @@ use crate::turntable::error::Fault;
 use crate::turntable::wire::State;
 
 /// Silence after which a table in motion counts as lost, microseconds.
-const SILENCE_US: i64 = 900_000;
+const SILENCE_US: i64 = 2_000_000;
 /// How long a table may report the same place in motion, microseconds.
 const STALL_US: i64 = 800_000;
 /// How long a table may stand elsewhere than at its target before that counts, microseconds:
