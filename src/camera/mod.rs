@@ -20,6 +20,7 @@ pub mod lock;
 mod nokhwa;
 mod rate;
 mod replay;
+mod request;
 #[cfg(target_os = "linux")]
 mod v4l2;
 
@@ -29,9 +30,10 @@ use std::time::Duration;
 pub use address::{Address, Faults, Speed};
 pub use control::{Control, ControlFlags, ControlId, ControlKind, MenuItem, snake_case};
 pub use error::{AddressFault, CameraError, ControlFault};
-pub use format::{Bayer, Encoding, Fourcc, GrantedMode, Mode, ModeRequest, Rates, Sizes};
+pub use format::{Bayer, Encoding, Fourcc, Mode, Rates, Sizes};
 pub use frame::{Frame, FrameFault, Sequence, SequenceUnwrapper, StampSource, jpeg_size};
 pub use rate::Rate;
+pub use request::{GrantedMode, ModeRequest};
 
 use crate::clock::Clock;
 

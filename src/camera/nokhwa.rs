@@ -1,4 +1,5 @@
-//! Cameras by the portable library nokhwa: for lists and previews on systems without V4L2.
+//! Cameras by the portable library nokhwa: for lists and previews on systems without V4L2. It is
+//! tried out under Linux only, where the library uses V4L2 itself.
 //!
 //! The library waits for a frame without limit, and some of its parts panic where a device goes
 //! away. So each stream has a thread of its own, which owns the library's camera; whoever wants a
@@ -50,7 +51,7 @@ struct Stream {
 }
 
 /// Cameras that the library finds; what one of them offers shows when it is opened.
-#[cfg(not(target_os = "linux"))]
+#[cfg(any(test, not(target_os = "linux")))]
 pub(super) fn list() -> Vec<DeviceInfo> {
     let found = query(ApiBackend::Auto).unwrap_or_default();
     let numbered = found.iter().filter_map(|camera| {
@@ -355,6 +356,14 @@ mod tests {
     fn work_that_dies_is_an_error() {
         let died = on_thread::<()>(7, "it was opened", drop);
         assert!(matches!(died, Err(CameraError::Backend { .. })), "{died:?}");
+    }
+
+    #[test]
+    fn what_is_listed_names_the_address_to_open() {
+        for info in list() {
+            assert!(matches!(info.address, Address::Nokhwa(_)), "{info:?}");
+            assert_eq!(info.capabilities, CAPABILITIES);
+        }
     }
 
     #[test]

@@ -1,0 +1,169 @@
+//! What is asked of a camera, and what it grants.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::{AddressFault, CameraError, Fourcc, Rate};
+
+/// What is asked of a camera, written `MJPG:1920x1080@30`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ModeRequest {
+    /// The pixel format.
+    pub fourcc: Fourcc,
+    /// Frame width, pixels.
+    pub width: u32,
+    /// Frame height, pixels.
+    pub height: u32,
+    /// Frames per second.
+    pub rate: Rate,
+}
+
+impl fmt::Display for ModeRequest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            fourcc,
+            width,
+            height,
+            rate,
+        } = self;
+        write!(f, "{fourcc}:{width}x{height}@{rate}")
+    }
+}
+
+impl FromStr for ModeRequest {
+    type Err = CameraError;
+
+    fn from_str(text: &str) -> Result<Self, CameraError> {
+        parse_request(text).ok_or_else(|| CameraError::Address {
+            text: text.to_owned(),
+            fault: AddressFault::Mode,
+        })
+    }
+}
+
+fn parse_request(text: &str) -> Option<ModeRequest> {
+    let (fourcc, rest) = text.split_once(':')?;
+    let (size, rate) = rest.split_once('@')?;
+    let (width, height) = size.split_once('x')?;
+    let size = |text: &str| text.parse().ok().filter(|&pixels: &u32| pixels > 0);
+    Some(ModeRequest {
+        fourcc: Fourcc(fourcc.as_bytes().try_into().ok()?),
+        width: size(width)?,
+        height: size(height)?,
+        rate: Rate::from_per_second(rate.parse().ok()?)?,
+    })
+}
+
+/// What a camera agreed to deliver. Drivers put the nearest they have in place of what was asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GrantedMode {
+    /// The pixel format.
+    pub fourcc: Fourcc,
+    /// Frame width, pixels.
+    pub width: u32,
+    /// Frame height, pixels.
+    pub height: u32,
+    /// Frames per second; `None` where the camera does not say.
+    pub rate: Option<Rate>,
+}
+
+impl GrantedMode {
+    /// In what this differs from what was asked, in words; empty where it is the same.
+    pub fn differences(&self, asked: &ModeRequest) -> Vec<String> {
+        let mut found = Vec::new();
+        if self.fourcc != asked.fourcc {
+            found.push(format!("{} instead of {}", self.fourcc, asked.fourcc));
+        }
+        if (self.width, self.height) != (asked.width, asked.height) {
+            found.push(format!(
+                "{} x {} instead of {} x {} pixels",
+                self.width, self.height, asked.width, asked.height
+            ));
+        }
+        match self.rate {
+            Some(rate) if !rate.equals(asked.rate) => {
+                found.push(format!("{rate} instead of {} frames/s", asked.rate));
+            }
+            Some(_) => {}
+            None => found.push(format!(
+                "an unknown rate instead of {} frames/s",
+                asked.rate
+            )),
+        }
+        found
+    }
+}
+
+impl fmt::Display for GrantedMode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}x{}", self.fourcc, self.width, self.height)?;
+        match self.rate {
+            Some(rate) => write!(f, ", {rate} frames/s"),
+            None => f.write_str(", unknown rate"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn request(text: &str) -> ModeRequest {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn a_request_is_read_as_it_is_shown() {
+        for text in ["MJPG:1920x1080@30", "YUYV:640x480@29.970", "GREY:1x1@7.500"] {
+            assert_eq!(request(text).to_string(), text);
+        }
+        let ntsc = Rate::new(30_000, 1001).unwrap();
+        assert!(request("YUYV:640x480@29.97").rate.equals(ntsc));
+        for wrong in [
+            "",
+            "MJPG",
+            "MJPG:1920x1080",
+            "MJPEG:1x1@1",
+            "MJPG:0x1@1",
+            "MJPG:1x1@0",
+        ] {
+            assert!(wrong.parse::<ModeRequest>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_was_not_granted_is_told() {
+        let asked = request("MJPG:1280x720@30");
+        let granted = GrantedMode {
+            fourcc: Fourcc::MJPG,
+            width: 1280,
+            height: 720,
+            rate: Rate::new(60, 2),
+        };
+        assert_eq!(granted.differences(&asked), [] as [&str; 0]);
+        let other = GrantedMode {
+            fourcc: Fourcc::YUYV,
+            width: 640,
+            height: 480,
+            rate: Rate::new(25, 2),
+        };
+        assert_eq!(
+            other.differences(&asked),
+            [
+                "YUYV instead of MJPG",
+                "640 x 480 instead of 1280 x 720 pixels",
+                "12.500 instead of 30 frames/s"
+            ]
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_upsets_the_parser(text in "[A-Z0-9:x@.-]{0,30}", size in any::<u64>()) {
+            let _ = text.parse::<ModeRequest>();
+            let _ = format!("MJPG:{size}x{size}@{size}").parse::<ModeRequest>();
+        }
+    }
+}
