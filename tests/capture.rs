@@ -684,7 +684,14 @@ fn a_full_disk_ends_the_recording_and_says_how_much_is_missing() {
     // The turn has 120 frames of 11.6 kB, of which 0.6 MB fitted.
     assert!((600_000..1_000_000).contains(&missing), "{told}");
     let recording = Recording::open(&folder).unwrap();
-    let lines = recording.frames.unwrap().entries().len();
+    let index = recording.frames.unwrap();
+    assert!(
+        index
+            .entries()
+            .iter()
+            .all(|entry| entry.angle_deg.is_some())
+    );
+    let lines = index.entries().len();
     let frames = Video::open(&recording.video).unwrap().frames().len();
     assert!(
         lines > 20 && lines == frames,

@@ -88,19 +88,6 @@ pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, Error> {
 /// "recording" then, but for [`Error::NotMended`].
 pub fn salvage_session(folder: &Path) -> Result<Saved, Error> {
     let unended = Unended::open(folder)?;
-    let (_, saved) = close(unended, |saved| match saved.frames {
-        0 => "recording was interrupted before its first frame was on the disk".to_owned(),
-        _ => format!("recording was interrupted: {saved}"),
-    })?;
-    verify(folder, saved.frames)?;
-    Ok(saved)
-}
-
-/// Cuts the index to what the video holds and marks the session as aborted.
-pub(super) fn close(
-    unended: Unended,
-    reason: impl FnOnce(&Saved) -> String,
-) -> Result<(Manifest, Saved), Error> {
     let entries = unended.index().entries();
     let frames = whole_frames(&unended.video_path()).min(entries.len());
     let seconds = match entries.get(..frames) {
@@ -112,12 +99,17 @@ pub(super) fn close(
         seconds,
         lines_cut: entries.len() - frames,
     };
-    let manifest = unended.abort(frames, &reason(&saved))?;
-    Ok((manifest, saved))
+    let reason = match frames {
+        0 => "recording was interrupted before its first frame was on the disk".to_owned(),
+        _ => format!("recording was interrupted: {saved}"),
+    };
+    unended.abort(frames, &reason)?;
+    verify(folder, frames)?;
+    Ok(saved)
 }
 
 /// How many frames from the first on can be had; 0 where there is no video yet.
-fn whole_frames(path: &Path) -> usize {
+pub(super) fn whole_frames(path: &Path) -> usize {
     let Ok(video) = Video::open(path) else {
         return 0;
     };

@@ -4,12 +4,12 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use super::salvage::{self, Saved};
+use super::salvage::whole_frames;
 use super::sink::Sunk;
 use super::trace::{Doubt, Missing};
 use super::{Count, Error};
 use crate::camera::{CameraError, FrameFault};
-use crate::session::{Fault, FrameEntry, Manifest, SessionWriter, Unended};
+use crate::session::{Fault, FrameEntry, Manifest, SessionWriter};
 use crate::video;
 
 /// Largest angle that is believed, degrees.
@@ -115,12 +115,17 @@ impl Verdict {
     ) -> Result<Report, Error> {
         self.keep_to_the_turn();
         let Sunk {
-            session,
-            places,
+            mut session,
+            mut places,
             left_out,
             bytes,
             failure,
         } = sunk;
+        if failure.is_some() {
+            // The video could not be ended: what the disk has of it decides.
+            session.truncate(whole_frames(&session.video_path()));
+            places.truncate(session.index().entries().len());
+        }
         let recorded = places.iter().flatten().count() as u64;
         let mut left_out = [&self.empty[..], &left_out].concat();
         left_out.sort_unstable();
@@ -137,13 +142,8 @@ impl Verdict {
         let take = self.judge(&why);
         let faults = self.faults(&session, &places, &left_out, moved);
         let folder = session.folder().to_owned();
-        let manifest = if failure.is_none() {
-            close_whole(session, &take, faults, |entry| {
-                self.amended(&places, entry, angle)
-            })?
-        } else {
-            close_broken(session, &take, faults)?.0
-        };
+        let amended = |entry: &FrameEntry| self.amended(&places, entry, angle);
+        let manifest = close_session(session, &take, faults, amended)?;
         let exposure = |places: &[usize]| -> Vec<u64> {
             let exposures = places.iter().filter_map(|&at| self.count.exposures.get(at));
             exposures.copied().collect()
@@ -300,8 +300,8 @@ impl Why<'_> {
     }
 }
 
-/// Closes a session whose video is whole up to where it ends.
-fn close_whole(
+/// Closes the session by what the take is worth.
+fn close_session(
     mut session: SessionWriter,
     take: &Take,
     faults: Vec<Fault>,
@@ -313,23 +313,6 @@ fn close_whole(
         Take::Clean | Take::Tolerated => session.finish()?,
         Take::Bad { reason } => session.abort(reason)?,
     })
-}
-
-/// Closes a session whose video could not be ended: what is on the disk decides.
-fn close_broken(
-    session: SessionWriter,
-    take: &Take,
-    faults: Vec<Fault>,
-) -> Result<(Manifest, Saved), Error> {
-    let folder = session.folder().to_owned();
-    drop(session);
-    let mut unended = Unended::open(&folder)?;
-    unended.manifest_mut().faults.extend(faults);
-    let reason = match take {
-        Take::Bad { reason } => reason.as_str(),
-        Take::Clean | Take::Tolerated => "the video could not be ended",
-    };
-    salvage::close(unended, |saved| format!("{reason}; {saved}"))
 }
 
 pub(super) fn frames(count: u64) -> String {

@@ -4,11 +4,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::writer::{close, write_index};
+use super::writer::{close, keep_as_found, write_index};
 use super::{Claim, Error, FrameIndex, INDEX_FILE, IndexFault, MANIFEST_FILE, Manifest, Status};
-
-/// Name under which the index is kept as it was found, where lines of it had to go.
-const INDEX_AS_FOUND: &str = "frames.interrupted.jsonl";
 
 /// A session whose recorder died: marked as recording, and claimed by nobody else.
 #[derive(Debug)]
@@ -58,11 +55,6 @@ impl Unended {
         self.folder.join(&self.manifest.video.file)
     }
 
-    /// The manifest, to note faults.
-    pub fn manifest_mut(&mut self) -> &mut Manifest {
-        &mut self.manifest
-    }
-
     /// The index as far as it is whole.
     #[must_use]
     pub fn index(&self) -> &FrameIndex {
@@ -94,21 +86,11 @@ impl Unended {
     }
 }
 
-/// Gives the index as it is a second name, unless an earlier try did.
-fn keep_as_found(folder: &Path) -> Result<(), Error> {
-    let (path, kept) = (folder.join(INDEX_FILE), folder.join(INDEX_AS_FOUND));
-    if kept.exists() || !path.exists() {
-        return Ok(());
-    }
-    // Not every file system has links.
-    let linked = fs::hard_link(&path, &kept).or_else(|_| fs::copy(&path, &kept).map(|_| ()));
-    linked.map_err(Error::io(kept, "written"))
-}
-
 #[cfg(test)]
 mod tests {
     use std::io::Write;
 
+    use super::super::writer::INDEX_AS_FOUND;
     use super::super::writer::tests::{entry, writer};
     use super::*;
 

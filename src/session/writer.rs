@@ -10,6 +10,9 @@ use super::{
 };
 use crate::durable;
 
+/// Name under which the index is kept as it was found, where lines of it had to go.
+pub(super) const INDEX_AS_FOUND: &str = "frames.interrupted.jsonl";
+
 /// A session folder under way. The manifest says "recording" until [`Self::finish`] or
 /// [`Self::abort`]; a writer that is dropped leaves it so, which is what the next start of a
 /// capture looks for. While it lives, the folder is claimed: see [`Claim`].
@@ -23,6 +26,8 @@ pub struct SessionWriter {
     length: u64,
     /// True where the index in memory says more than its file, or less.
     rewrite: bool,
+    /// True where lines of the file have to go.
+    truncated: bool,
     claim: Claim,
 }
 
@@ -67,6 +72,7 @@ impl SessionWriter {
             lines,
             length: 0,
             rewrite: false,
+            truncated: false,
             claim,
         })
     }
@@ -159,6 +165,15 @@ impl SessionWriter {
         Ok(())
     }
 
+    /// Forgets all frames from position `frames` on, as the video lacks them. The index as it was
+    /// stays beside the one that is written when the session ends, `frames.interrupted.jsonl`.
+    pub fn truncate(&mut self, frames: usize) {
+        if frames < self.index.entries().len() {
+            self.index.truncate(frames);
+            self.truncated = true;
+        }
+    }
+
     /// Makes the index durable up to the last frame pushed.
     ///
     /// # Errors
@@ -190,7 +205,10 @@ impl SessionWriter {
         // On a full disk this is the room for what follows.
         self.claim.release_reserve()?;
         self.sync()?;
-        if self.rewrite {
+        if self.truncated {
+            keep_as_found(&self.folder)?;
+        }
+        if self.rewrite || self.truncated {
             write_index(&self.folder, &self.index)?;
         }
         let frames = self.index.entries().len() as u64;
@@ -198,6 +216,17 @@ impl SessionWriter {
         self.claim.end()?;
         Ok(manifest)
     }
+}
+
+/// Gives the index as it is a second name, unless an earlier try did.
+pub(super) fn keep_as_found(folder: &Path) -> Result<(), Error> {
+    let (path, kept) = (folder.join(INDEX_FILE), folder.join(INDEX_AS_FOUND));
+    if kept.exists() || !path.exists() {
+        return Ok(());
+    }
+    // Not every file system has links.
+    let linked = fs::hard_link(&path, &kept).or_else(|_| fs::copy(&path, &kept).map(|_| ()));
+    linked.map_err(Error::io(kept, "written"))
 }
 
 /// Takes the video's size and hash into the manifest and writes it with its last status.
