@@ -32,7 +32,7 @@ FUZZ_SECONDS ?= 60
 FUZZ_SHARD_PIECE := 16
 
 help: ## List the targets
-	@sed -n 's/^\([a-z]*\):.*## /  \1\t/p' Makefile | expand -t 10
+	@sed -n 's/^\([a-z]*\):.*## /  \1\t/p' Makefile | expand -t 12
 
 setup: ## Install the system packages that are missing
 	@.ci/setup
