@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup test lint demo bench docs fuzz firmware emulator flash
+.PHONY: help setup test test-rig lint demo bench docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -32,7 +32,7 @@ FUZZ_SECONDS ?= 60
 FUZZ_SHARD_PIECE := 16
 
 help: ## List the targets
-	@sed -n 's/^\([a-z]*\):.*## /  \1\t/p' Makefile | expand -t 12
+	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 12
 
 setup: ## Install the system packages that are missing
 	@.ci/setup
@@ -44,6 +44,9 @@ test: setup ## Run all tests
 	    echo "the firmware's tests on the emulated chip are skipped: 'make setup' told why"; \
 	fi
 	cargo test --locked
+
+test-rig: setup ## Capture with the kernel's camera drivers and a real tty, in a virtual machine
+	@tests/rig-vm/run
 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check

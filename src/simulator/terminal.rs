@@ -9,6 +9,7 @@ use rustix::fs::inotify;
 use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
 use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use super::Error;
 
@@ -35,7 +36,12 @@ impl Terminal {
         fcntl_setfl(&line, flags | OFlags::NONBLOCK).map_err(failed("set up"))?;
         // Only a port that was closed once tells that nobody has it open.
         let port = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
-        drop(open(&path, port, Mode::empty()).map_err(failed("try"))?);
+        let port = open(&path, port, Mode::empty()).map_err(failed("try"))?;
+        // What the chip says before a host has set the line up must not come back to it as an echo.
+        let mut modes = tcgetattr(&port).map_err(failed("set up"))?;
+        modes.make_raw();
+        tcsetattr(&port, OptionalActions::Now, &modes).map_err(failed("set up"))?;
+        drop(port);
         let flags = inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC;
         let watch = inotify::init(flags).map_err(failed("watch"))?;
         inotify::add_watch(&watch, &path, inotify::WatchFlags::OPEN).map_err(failed("watch"))?;

@@ -304,9 +304,11 @@ impl ManualPlan {
 }
 
 /// Controls whose values differ between two readings, by name. Those that the hardware changes by
-/// itself count only where they had been set: [`ManualPlan::check`].
+/// itself count only where they had been set: [`ManualPlan::check`]. Those that nobody can set are
+/// readings, not settings: they do not count.
 pub fn moved_between(before: &[Control], after: &[Control]) -> Vec<Moved> {
-    let held = before.iter().filter(|control| !control.flags.volatile);
+    let settings = |control: &&Control| !control.flags.volatile && !control.flags.read_only;
+    let held = before.iter().filter(settings);
     held.filter_map(|control| moved(&control.name, control.id, control.value?, after))
         .collect()
 }

@@ -252,6 +252,20 @@ fn a_value_that_moved_is_found_by_plan_and_by_comparison() {
 }
 
 #[test]
+fn a_reading_that_nobody_can_set_may_move() {
+    let mut before = c920_new();
+    let mut temperature = number("sensor_temperature", (-40, 125), 31);
+    temperature.flags.read_only = true;
+    before.push(temperature);
+    let mut after = before.clone();
+    after.last_mut().unwrap().value = Some(38);
+    assert_eq!(moved_between(&before, &after), []);
+    let gain = after.iter_mut().find(|control| control.name == "gain");
+    gain.unwrap().value = Some(70);
+    assert_eq!(moved_between(&before, &after).len(), 1);
+}
+
+#[test]
 fn odd_ranges_upset_nothing() {
     for (minimum, maximum, step) in [(5, 5, 0), (9, 2, 3), (i64::MIN, i64::MAX, u64::MAX)] {
         let mut odd = number("gain", (minimum, maximum), 7);
