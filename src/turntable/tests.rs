@@ -274,7 +274,7 @@ fn whatever_breaks_a_turn_ends_it_with_its_reason_and_stops_the_table() {
 }
 
 #[test]
-fn a_controller_that_falls_silent_ends_the_turn_within_a_second() {
+fn a_controller_that_falls_silent_for_two_seconds_ends_the_turn() {
     let rig = open_at(Clock::monotonic(), Peer::new(true)).unwrap();
     rig.table.home().unwrap();
     let mut turn = rig.turn(90.0);
@@ -287,7 +287,7 @@ fn a_controller_that_falls_silent_ends_the_turn_within_a_second() {
     });
     let took_us = rig.table.clock().now_us() - start_us;
     assert!(matches!(found, Some(Fault::Silent { .. })), "{found:?}");
-    assert!(took_us < 2_000_000, "{took_us} us");
+    assert!((1_900_000..4_000_000).contains(&took_us), "{took_us} us");
     // Nobody can tell whether it stands.
     assert!(matches!(turn.state(), Err(TurntableError::NotStopped)));
     drop(turn);
