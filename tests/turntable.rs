@@ -8,6 +8,10 @@ use relit::clock::Clock;
 use relit::simulator::{Simulator, SimulatorOptions};
 use relit::turntable::{Fault, Options, State, Table, TurnPlan, TurnRequest, TurntableError};
 
+/// How much faster than real time whole turns run: not so fast that a pause of a busy machine is
+/// longer than the lease.
+const TURN_SPEED: f64 = 4.0;
+
 /// A simulated table and its driver.
 struct Rig {
     table: Table,
@@ -84,7 +88,7 @@ fn turn_errors(rig: &Rig) -> Vec<f64> {
 #[test]
 fn a_whole_turn_tells_the_angle_at_any_time() {
     for extras in [true, false] {
-        let rig = open_with(10.0, "", extras).unwrap();
+        let rig = open_with(TURN_SPEED, "", extras).unwrap();
         let off = turn_errors(&rig);
         assert!(off.len() > 1500);
         assert!(off[off.len() * 99 / 100] <= 0.05);
@@ -169,7 +173,7 @@ fn recover(rig: &Rig) {
 
 #[test]
 fn a_chip_that_restarts_in_a_turn_ends_it_with_that_reason() {
-    let rig = open(10.0, "reset@20s").unwrap();
+    let rig = open(TURN_SPEED, "reset@20s").unwrap();
     rig.table.home().unwrap();
     let turn = rig.table.start_turn(rig.plan()).unwrap();
     let error = turn.wait_end().unwrap_err();
