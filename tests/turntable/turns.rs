@@ -5,7 +5,7 @@ use relit::turntable::{Fault, Homed, State, TurntableError};
 
 use crate::rig::{Rig, STEP_DEG, paper_turn, spread};
 
-const SPEED: f64 = 20.0;
+const SPEED: f64 = 10.0;
 const FRAME_US: i64 = 33_333;
 
 #[test]
@@ -17,7 +17,7 @@ fn every_frame_of_a_turn_gets_its_angle() {
 
 #[test]
 fn without_the_chips_time_every_frame_of_a_turn_gets_its_angle_too() {
-    let rig = drifting(SPEED / 2.0).plain();
+    let rig = drifting(SPEED).plain();
     let p99 = turn_and_compare(&rig);
     assert!(p99 <= 0.05, "p99 {p99}");
 }
