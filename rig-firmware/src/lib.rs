@@ -9,7 +9,7 @@
 //! | room | what it is for | knows |
 //! | --- | --- | --- |
 //! | [`crc`], [`number`], [`error`], [`realtime`] | checksum, decimals, error numbers, commands of one byte | nobody |
-//! | [`line`] | bytes to lines | `crc` |
+//! | [`mod@line`] | bytes to lines | `crc` |
 //! | [`checked`] | sequence numbers: what to do with a line | `line`, `error` |
 //! | [`ramp`] | speed as a number of steps from standstill | nobody |
 //! | [`search`] | the index, found to one step | nobody |

@@ -3,7 +3,7 @@
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
 use std::{env, fs};
@@ -71,7 +71,7 @@ impl Running {
             .spawn()
             .unwrap();
         let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-        let (tell, events) = channel();
+        let (tell, events) = sync_channel(1024);
         thread::spawn(move || {
             for line in lines.map_while(Result::ok) {
                 // Nobody listens any more when the test is over.

@@ -1,6 +1,6 @@
 //! The main loop's part of the firmware: protocol, states and plans.
 //!
-//! One line is under way at a time. What it has to wait for is its [`Job`]; until that is done,
+//! One line is under way at a time. What it has to wait for is its `Job`; until that is done,
 //! further lines stay in the board's receive buffer, while real-time bytes, alarms, the lease and
 //! the driver go on.
 

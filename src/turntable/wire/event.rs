@@ -8,7 +8,7 @@ use super::polling::Poll;
 pub enum Event {
     /// The line `id` has its answer, or will never have one.
     Answered {
-        /// What [`Machine::send`] gave.
+        /// What [`Machine::send`](super::Machine::send) gave.
         id: u64,
         /// What became of it.
         outcome: Outcome,
