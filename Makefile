@@ -69,7 +69,7 @@ demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of 
 	rm -rf $(DEMO)
 	$(TARGET)/release/relit-capture record --yes --object cow --root $(DEMO)/sessions \
 	    --camera 'replay:fixtures/$(SESSION)?loop=1' --turntable sim:
-	session=$$(echo $(DEMO)/sessions/*-cow); \
+	@session=$$(echo $(DEMO)/sessions/*-cow); \
 	$(TARGET)/release/relit-mask "$$session" --rect $(RECT) --seeds fixtures/$(SESSION)/seeds.png; \
 	$(TARGET)/release/relit-extract "$$session" -o $(DEMO)/out; \
 	$(TARGET)/release/relit-extract verify $(DEMO)/out; \
