@@ -19,6 +19,7 @@ mod equipment;
 mod error;
 mod facts;
 mod failure;
+mod faults;
 mod film;
 mod idle;
 mod lock;

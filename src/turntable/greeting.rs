@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::Options;
 use super::error::TurntableError;
 use super::identity::{Extras, Identity, Settings};
 use super::link::Link;
@@ -26,6 +27,7 @@ const POLL_STOCK: Duration = Duration::from_millis(200);
 pub(super) const STRANGER: Habits = Habits {
     degrees_per_unit: 1.0,
     poll: POLL_STOCK,
+    stamps: false,
     reports_homing: false,
     step_deg: 0.0,
 };
@@ -35,7 +37,7 @@ pub(super) const STRANGER: Habits = Habits {
 pub(super) fn greet(
     link: &Link,
     resets: bool,
-    travel_deg: f64,
+    options: &Options,
 ) -> Result<Identity, TurntableError> {
     rouse(link, resets)?;
     let about = about(link)?;
@@ -43,10 +45,13 @@ pub(super) fn greet(
         Message::Build { letters, .. } => Some(Extras::of(letters)),
         _ => None,
     };
-    let extras = about.iter().find_map(build).unwrap_or_default();
+    let offered = about.iter().find_map(build).filter(|_| options.extras);
+    let extras = offered.unwrap_or_default();
     secure(link, &extras)?;
     let settings = settings(link, extras)?;
-    let identity = Identity::read(&about, &settings, travel_deg)?;
+    let mut identity = Identity::read(&about, &settings, options.travel_deg)?;
+    identity.extras = extras;
+    identity.lease_s = identity.lease_s.filter(|_| extras.lease);
     link.supervisor().set_habits(Habits {
         degrees_per_unit: identity.degrees_per_unit,
         poll: if extras.stamps {
@@ -54,6 +59,7 @@ pub(super) fn greet(
         } else {
             POLL_STOCK
         },
+        stamps: extras.stamps,
         reports_homing: !identity.is_stock(),
         step_deg: identity.step_deg(),
     });

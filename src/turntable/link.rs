@@ -20,8 +20,10 @@ const LEAST_WAIT: Duration = Duration::from_micros(200);
 const REPORT_WAIT: Duration = Duration::from_millis(1500);
 /// How long a stop may take, with all its repetitions.
 const STOP_WAIT: Duration = Duration::from_secs(16);
-/// What is added in real time to every wait on a clock that runs faster: threads do not.
-const GRACE: Duration = Duration::from_millis(500);
+/// How long a thread may have to wait for a processor, in real time.
+const PAUSE: Duration = Duration::from_millis(300);
+/// What is added in real time to every wait: a line's five tries may each meet such a pause.
+const GRACE: Duration = Duration::from_millis(1500);
 
 /// The wire to a table with its thread; copies share both.
 #[derive(Clone)]
@@ -57,7 +59,7 @@ impl Link {
     /// Starts the thread.
     pub(super) fn start(port: Box<dyn Port>, clock: Clock, habits: Habits) -> (Link, Carrier) {
         let shared = Arc::new(Shared {
-            supervisor: Mutex::new(Supervisor::new(habits)),
+            supervisor: Mutex::new(Supervisor::new(habits, slack_us(&clock))),
             changed: Condvar::new(),
             quit: AtomicBool::new(false),
             name: port.name(),
@@ -197,22 +199,27 @@ impl Shared {
     }
 }
 
+/// What a wait of a fast clock has to allow for: threads run no faster for it. Microseconds.
+fn slack_us(clock: &Clock) -> i64 {
+    ((clock.factor() - 1.0).max(0.0) * PAUSE.as_micros() as f64) as i64
+}
+
 /// The thread: what is due goes out, what comes is taken, until the link is dropped or the port
 /// is gone.
 fn carry(mut port: Box<dyn Port>, shared: &Shared, clock: Clock) {
     let wait = clock.real(READ_WAIT).clamp(LEAST_WAIT, READ_WAIT);
     let mut buffer = [0; 512];
     while !shared.quit.load(Ordering::Acquire) {
-        let output = {
-            let mut supervisor = shared.lock();
-            supervisor.on_time(clock.now_us());
-            supervisor.take_output(clock.now_us())
-        };
+        let output = shared.lock().take_output(clock.now_us());
         let written = port.write(&output);
+        let asked_us = clock.now_us();
         let read = written.and_then(|()| port.read(&mut buffer, wait));
         let now_us = clock.now_us();
         let mut supervisor = shared.lock();
         match read {
+            // Nothing had come by the time the port was asked. What came later, while this thread
+            // perhaps had to wait for a processor, is no silence.
+            Ok(0) => supervisor.on_time(asked_us),
             Ok(count) => supervisor.on_bytes(now_us, buffer.get(..count).unwrap_or_default()),
             Err(error) => supervisor.close(error.to_string()),
         }

@@ -71,6 +71,9 @@ pub struct Options {
     /// How far the table may turn either way from the angle 0 before its cable is wound up, where
     /// the controller itself watches no limit; degrees.
     pub travel_deg: f64,
+    /// Whether what the rig's firmware offers beyond Grbl is used; without, it is spoken to as
+    /// a stock board.
+    pub extras: bool,
 }
 
 impl Default for Options {
@@ -79,6 +82,7 @@ impl Default for Options {
             clock: Clock::monotonic(),
             runtime_folder: PathBuf::from("/tmp"),
             travel_deg: 400.0,
+            extras: true,
         }
     }
 }

@@ -65,7 +65,7 @@ impl Table {
     ) -> Result<Table, TurntableError> {
         let resets = port.resets();
         let (link, carrier) = Link::start(port, options.clock, greeting::STRANGER);
-        let identity = greeting::greet(&link, resets, options.travel_deg)?;
+        let identity = greeting::greet(&link, resets, options)?;
         let server = claim.as_ref().map(|claim| claim.serve(link.clone()));
         Ok(Table {
             server: server.transpose()?,
@@ -179,10 +179,9 @@ impl Table {
         speed: f64,
     ) -> Result<(), TurntableError> {
         let time = self.travel_time(distance, speed);
-        let until_us = i64::try_from(time.as_micros()).unwrap_or(i64::MAX);
         self.begin(Course::To {
             target_deg,
-            until_us: self.clock().now_us().saturating_add(until_us),
+            within_us: i64::try_from(time.as_micros()).unwrap_or(i64::MAX),
         })?;
         let sent = self.command(block);
         let mut supervisor = self.link.supervisor();

@@ -21,7 +21,10 @@ fn open(peer: Peer) -> Rig {
 }
 
 fn try_open(peer: Peer) -> Result<Rig, TurntableError> {
-    let clock = Clock::scaled(SPEED);
+    open_at(Clock::scaled(SPEED), peer)
+}
+
+fn open_at(clock: Clock, peer: Peer) -> Result<Rig, TurntableError> {
     let peer = Arc::new(Mutex::new(peer));
     let port = PeerPort {
         peer: Arc::clone(&peer),
@@ -272,7 +275,7 @@ fn whatever_breaks_a_turn_ends_it_with_its_reason_and_stops_the_table() {
 
 #[test]
 fn a_controller_that_falls_silent_ends_the_turn_within_a_second() {
-    let rig = open(Peer::new(true));
+    let rig = open_at(Clock::monotonic(), Peer::new(true)).unwrap();
     rig.table.home().unwrap();
     let mut turn = rig.turn(90.0);
     turn.wait_constant().unwrap();

@@ -1,5 +1,5 @@
-//! Whole captures without hardware: a replayed camera and a simulated table on one clock, five
-//! times as fast as real time.
+//! Whole captures without hardware: a replayed camera and a simulated table on one clock that
+//! runs faster than real time.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod daemon;

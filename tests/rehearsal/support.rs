@@ -7,7 +7,7 @@ use relit::capture::state::{Monitor, TakeSummary};
 use relit::capture::{CaptureError, Equipment, Onlookers, Order, Settings, StopRequest, capture};
 use relit::session::Recording;
 
-/// A whole turn, H.264 with a key frame every 250 frames.
+/// A whole turn, H.264 out of order, which a replay delivers as raw pictures.
 pub(crate) const TURN: &str = "20261120T093015Z-cow";
 /// Motion JPEG, 150 frames.
 pub(crate) const SHORT: &str = "20261120T101500Z-cow-short";

@@ -7,7 +7,7 @@ use std::time::UNIX_EPOCH;
 
 use axum::body::{Body, Bytes};
 use axum::extract::{Path, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream;
 use tokio::sync::OwnedSemaphorePermit;
@@ -51,47 +51,15 @@ pub(super) async fn video(
         Ok((file, footage.stamp))
     });
     let (file, stamp) = opened.await?;
-    let (size, tag) = (stamp.0, entity_tag(stamp));
-    let fresh = headers
-        .get(header::IF_RANGE)
-        .is_none_or(|of| of.as_bytes() == tag.as_bytes());
-    let asked = headers.get(header::RANGE).filter(|_| fresh);
-    let asked = asked.and_then(|range| range.to_str().ok());
-    let range = asked.map_or(Range::All, |range| Range::read(range, size));
+    let tag = entity_tag(stamp);
+    let range = Range::asked(&headers, stamp.0, &tag);
     let common = [
         (header::CONTENT_TYPE, "video/x-matroska".to_owned()),
         (header::ACCEPT_RANGES, "bytes".to_owned()),
         (header::ETAG, tag),
         (header::CONTENT_DISPOSITION, attachment(&name)),
     ];
-    let (status, first, length) = match range {
-        Range::All => (StatusCode::OK, 0, size),
-        Range::Part { first, length } => (StatusCode::PARTIAL_CONTENT, first, length),
-        Range::Beyond => {
-            let error = format!("the range lies beyond the end: the file has {size} bytes");
-            let failure = Failure::new(StatusCode::RANGE_NOT_SATISFIABLE, error);
-            let told = [(header::CONTENT_RANGE, format!("bytes */{size}"))];
-            return Ok((told, failure).into_response());
-        }
-    };
-    let body = Body::from_stream(stream::try_unfold(
-        Download {
-            file: Arc::new(file),
-            at: first,
-            left: length,
-            _place: place,
-        },
-        Download::piece,
-    ));
-    let mut response = (status, common, body).into_response();
-    let headers = response.headers_mut();
-    headers.insert(header::CONTENT_LENGTH, length.into());
-    if status == StatusCode::PARTIAL_CONTENT {
-        let last = first + length - 1;
-        let told = format!("bytes {first}-{last}/{size}").parse();
-        headers.extend(told.ok().map(|told| (header::CONTENT_RANGE, told)));
-    }
-    Ok(response)
+    Ok(range.answer(file, stamp.0, common, place))
 }
 
 /// Which bytes of a file are asked for.
@@ -107,6 +75,57 @@ enum Range {
 }
 
 impl Range {
+    /// What a request wants of a file of `size` bytes whose entity tag is `tag`.
+    fn asked(headers: &HeaderMap, size: u64, tag: &str) -> Self {
+        let mut conditions = headers.get_all(header::IF_RANGE).iter();
+        let range = headers
+            .get(header::RANGE)
+            .and_then(|range| range.to_str().ok());
+        match range {
+            Some(range) if conditions.all(|of| of.as_bytes() == tag.as_bytes()) => {
+                Self::read(range, size)
+            }
+            _ => Self::All,
+        }
+    }
+
+    /// The bytes, with the headers that tell which they are.
+    fn answer(
+        self,
+        file: File,
+        size: u64,
+        common: [(HeaderName, String); 4],
+        place: OwnedSemaphorePermit,
+    ) -> Response {
+        let (first, length) = match self {
+            Self::All => (0, size),
+            Self::Part { first, length } => (first, length),
+            Self::Beyond => {
+                let error = format!("the range lies beyond the end: the file has {size} bytes");
+                let failure = Failure::new(StatusCode::RANGE_NOT_SATISFIABLE, error);
+                let told = [(header::CONTENT_RANGE, format!("bytes */{size}"))];
+                return (told, failure).into_response();
+            }
+        };
+        let download = Download {
+            file: Arc::new(file),
+            at: first,
+            left: length,
+            _place: place,
+        };
+        let body = Body::from_stream(stream::try_unfold(download, Download::piece));
+        let sized = [(header::CONTENT_LENGTH, length.to_string())];
+        if self == Self::All {
+            return (common, sized, body).into_response();
+        }
+        let last = first + length - 1;
+        let told = [(
+            header::CONTENT_RANGE,
+            format!("bytes {first}-{last}/{size}"),
+        )];
+        (StatusCode::PARTIAL_CONTENT, common, sized, told, body).into_response()
+    }
+
     /// Of a `Range` header, for a file of `size` bytes. What is no single range of bytes is passed over,
     /// as the standard has it.
     fn read(text: &str, size: u64) -> Self {

@@ -10,7 +10,7 @@ use axum::response::{IntoResponse, Response};
 
 use super::answer::Problem;
 use super::server::Server;
-use crate::capture::state::{Phase, RigState};
+use crate::capture::state::{CameraState, Phase, RigState, TableState};
 
 const PHASES: [Phase; 9] = [
     Phase::Idle,
@@ -70,123 +70,115 @@ pub(super) async fn metrics(State(server): State<Arc<Server>>) -> Response {
 }
 
 fn rig(page: &mut Page, state: &RigState) {
-    page.head(
-        "relit_phase",
-        "gauge",
-        "1 for the phase that the capture is in",
-    );
+    let help = "1 for the phase that the capture is in";
+    page.head("relit_phase", "gauge", help);
     for phase in PHASES {
         let name = serde_json::to_string(&phase).unwrap_or_default();
         let here = f64::from(u8::from(phase == state.phase));
         page.line("relit_phase", &format!("{{phase={name}}}"), here);
     }
-    let yes = |is: bool| Some(f64::from(u8::from(is)));
-    let (table, camera) = (&state.table, &state.camera);
-    let last = state.last_take.as_ref();
-    for (name, help, value) in [
-        (
-            "take_frames",
-            "Frames written of the present take",
-            Some(state.frames as f64),
-        ),
-        (
-            "take_frames_wanted",
-            "Frames that the present take shall have",
-            Some(state.frames_wanted as f64),
-        ),
-        (
-            "take_frames_dropped",
-            "Frames missing of the present take so far",
-            Some(state.dropped as f64),
-        ),
-        (
-            "last_take_frames",
-            "Frames of the last take",
-            last.map(|take| take.frames as f64),
-        ),
-        (
-            "last_take_frames_dropped",
-            "Frames missing of the last take",
-            last.map(|take| take.dropped as f64),
-        ),
-        (
-            "queue_objects",
-            "Objects that wait",
-            Some(state.queue.len() as f64),
-        ),
-        (
-            "faults_shown",
-            "Faults in the list on the page",
-            Some(state.faults.len() as f64),
-        ),
-        (
-            "disk_free_bytes",
-            "Bytes free where sessions are written",
-            Some(state.free_bytes as f64),
-        ),
-        (
-            "disk_needed_bytes",
-            "Bytes that a take is expected to need",
-            Some(state.needed_bytes as f64),
-        ),
-        (
-            "table_present",
-            "1 where there is a table",
-            yes(table.present),
-        ),
-        (
-            "table_homed",
-            "1 where the table's zero is known",
-            yes(table.homed),
-        ),
-        (
-            "table_faulty",
-            "1 where something is wrong with the table",
-            yes(table.fault.is_some()),
-        ),
-        (
-            "table_angle_degrees",
-            "Angle from machine zero",
-            table.angle_deg,
-        ),
-        (
-            "table_degrees_per_second",
-            "Speed of the table",
-            table.degrees_per_second,
-        ),
-        (
-            "table_battery_volts",
-            "Battery of the table",
-            table.battery_v,
-        ),
-        (
-            "camera_present",
-            "1 where the camera can be reached",
-            yes(camera.present),
-        ),
-        (
-            "camera_faulty",
-            "1 where something is wrong with the camera",
-            yes(camera.fault.is_some()),
-        ),
-        (
-            "camera_frames_per_second",
-            "Frames over the last second",
-            camera.fps,
-        ),
-        (
-            "camera_clipped_ratio",
-            "Pixels of the newest frame that are clipped, 0 to 1",
-            camera.clipped,
-        ),
-        (
-            "camera_focus",
-            "Variance of the Laplacian in the middle of the newest frame",
-            camera.focus,
-        ),
-    ] {
-        page.gauge(&format!("relit_{name}"), help, value);
+    take(page, state);
+    table(page, &state.table);
+    camera(page, &state.camera);
+}
+
+fn take(page: &mut Page, state: &RigState) {
+    let mut count = |name, help, value| page.gauge(name, help, Some(value as f64));
+    let (frames, dropped) = ("Frames written", "Frames missing");
+    count("relit_take_frames", frames, state.frames);
+    count(
+        "relit_take_frames_wanted",
+        "Frames of a whole take",
+        state.frames_wanted,
+    );
+    count("relit_take_frames_dropped", dropped, state.dropped);
+    if let Some(last) = &state.last_take {
+        count("relit_last_take_frames", frames, last.frames);
+        count("relit_last_take_frames_dropped", dropped, last.dropped);
     }
+    count(
+        "relit_queue_objects",
+        "Objects that wait",
+        state.queue.len() as u64,
+    );
+    count(
+        "relit_faults_shown",
+        "Faults in the list",
+        state.faults.len() as u64,
+    );
+    count(
+        "relit_disk_free_bytes",
+        "Room for sessions",
+        state.free_bytes,
+    );
+    count(
+        "relit_disk_needed_bytes",
+        "Expected size of a take",
+        state.needed_bytes,
+    );
+}
+
+fn table(page: &mut Page, table: &TableState) {
+    let mut gauge = |name, help, value| page.gauge(name, help, value);
+    gauge(
+        "relit_table_present",
+        "1 where there is a table",
+        yes(table.present),
+    );
+    gauge(
+        "relit_table_homed",
+        "1 where its zero is known",
+        yes(table.homed),
+    );
+    gauge(
+        "relit_table_faulty",
+        "1 where something is wrong",
+        yes(table.fault.is_some()),
+    );
+    gauge(
+        "relit_table_angle_degrees",
+        "From machine zero",
+        table.angle_deg,
+    );
+    gauge(
+        "relit_table_degrees_per_second",
+        "Speed",
+        table.degrees_per_second,
+    );
+    gauge("relit_table_battery_volts", "Battery", table.battery_v);
+}
+
+fn camera(page: &mut Page, camera: &CameraState) {
+    let mut gauge = |name, help, value| page.gauge(name, help, value);
+    gauge(
+        "relit_camera_present",
+        "1 where it can be reached",
+        yes(camera.present),
+    );
+    gauge(
+        "relit_camera_faulty",
+        "1 where something is wrong",
+        yes(camera.fault.is_some()),
+    );
+    gauge(
+        "relit_camera_frames_per_second",
+        "Over the last second",
+        camera.fps,
+    );
+    gauge(
+        "relit_camera_clipped_ratio",
+        "Clipped pixels, 0 to 1",
+        camera.clipped,
+    );
+    gauge(
+        "relit_camera_focus",
+        "Variance of the Laplacian",
+        camera.focus,
+    );
+}
+
+fn yes(is: bool) -> Option<f64> {
+    Some(f64::from(u8::from(is)))
 }
 
 fn load(count: &AtomicU64) -> f64 {

@@ -32,6 +32,7 @@ const MOST_RECORDED: usize = 54_000;
 pub(crate) struct Supervisor {
     wire: Machine,
     habits: Habits,
+    slack_us: i64,
     answer: Option<(u64, Outcome)>,
     seen: Option<Seen>,
     work_zero: Option<f64>,
@@ -50,9 +51,12 @@ pub(crate) struct Supervisor {
 }
 
 impl Supervisor {
-    pub(crate) fn new(habits: Habits) -> Self {
+    /// `slack_us` is added to every wait for the controller: more than 0 only on a clock that runs
+    /// faster than the machines that follow it.
+    pub(crate) fn new(habits: Habits, slack_us: i64) -> Self {
         Self {
-            wire: Machine::new(),
+            wire: Machine::with_slack(slack_us),
+            slack_us,
             habits,
             answer: None,
             seen: None,
@@ -230,7 +234,12 @@ impl Supervisor {
         if !self.is_stopping() {
             self.settled = false;
             self.wire.give_up();
-            self.stop = Some(Stop::begin(now_us, unsettled, &mut self.wire));
+            self.stop = Some(Stop::begin(
+                now_us,
+                unsettled,
+                self.slack_us,
+                &mut self.wire,
+            ));
         }
     }
 
@@ -269,7 +278,7 @@ impl Supervisor {
             && let Some(fault) = self
                 .motion
                 .as_ref()
-                .and_then(|m| m.overdue(now_us, &self.habits))
+                .and_then(|m| m.overdue(now_us - self.slack_us, &self.habits))
         {
             self.fail(now_us, fault);
         }
@@ -353,7 +362,7 @@ impl Supervisor {
             state: report.state,
             machine_deg: units * self.habits.degrees_per_unit,
             speed: report.feed.unwrap_or(0.0) * self.habits.degrees_per_unit / 60.0,
-            chip_us: report.chip_us,
+            chip_us: report.chip_us.filter(|_| self.habits.stamps),
             battery_v: report.battery_v,
             pins: report.pins,
             asked_us: poll.asked_us,

@@ -22,8 +22,8 @@ pub(crate) enum Course {
     To {
         /// The place.
         target_deg: f64,
-        /// When it has to be there, microseconds.
-        until_us: i64,
+        /// How long after the controller has taken the line it has to be there, microseconds.
+        within_us: i64,
     },
     /// Looking for the index.
     Homing,
@@ -123,12 +123,20 @@ impl Motion {
         }
     }
 
+    /// How long ago the controller took the line, microseconds.
+    fn runs_for(&self, now_us: i64) -> i64 {
+        self.accepted_us
+            .map_or(0, |accepted_us| now_us - accepted_us)
+    }
+
     /// What the passing of time says against the motion.
     pub(super) fn overdue(&self, now_us: i64, habits: &Habits) -> Option<Fault> {
         let silent_us = now_us - self.last_report_us;
         match self.course {
             Course::Homing if !habits.reports_homing => None,
-            Course::To { until_us, .. } if now_us > until_us && !self.at_target => {
+            Course::To { within_us, .. }
+                if !self.at_target && self.runs_for(now_us) > within_us =>
+            {
                 Some(Fault::Late)
             }
             _ => (silent_us > SILENCE_US).then_some(Fault::Silent {

@@ -28,6 +28,8 @@ pub(crate) struct Habits {
     pub(crate) degrees_per_unit: f64,
     /// Between two reports in motion.
     pub(crate) poll: Duration,
+    /// Whether its reports carry the chip's time.
+    pub(crate) stamps: bool,
     /// Whether it answers `?` while it looks for the index.
     pub(crate) reports_homing: bool,
     /// Smallest distance it can stand off its target, degrees.

@@ -7,6 +7,7 @@ use super::*;
 const HABITS: Habits = Habits {
     degrees_per_unit: 1.0,
     poll: Duration::from_millis(67),
+    stamps: true,
     reports_homing: true,
     step_deg: 1.0 / 88.889,
 };
@@ -19,7 +20,7 @@ struct Desk {
 
 impl Desk {
     fn new() -> Desk {
-        let supervisor = Supervisor::new(HABITS);
+        let supervisor = Supervisor::new(HABITS, 0);
         let mut desk = Desk {
             supervisor,
             now_us: 0,
@@ -56,10 +57,9 @@ impl Desk {
     }
 
     fn moving(&mut self, target_deg: f64) {
-        let until_us = self.now_us + 60_000_000;
         let course = Course::To {
             target_deg,
-            until_us,
+            within_us: 60_000_000,
         };
         self.supervisor.begin_motion(self.now_us, course);
         self.supervisor.motion_accepted(self.now_us);

@@ -71,6 +71,8 @@ pub enum SendError {
 pub struct Counts {
     /// Lines sent, without repetitions.
     pub lines: u64,
+    /// Status reports that came.
+    pub reports: u64,
     /// Lines sent again.
     pub repeats: u64,
     /// Lines that came damaged or were nothing a controller says.

@@ -3,9 +3,9 @@
 use super::status::StatusReport;
 
 /// How long a question may stay without a report before it counts as lost, microseconds.
-const LOST_US: i64 = 250_000;
+const LOST_US: i64 = 120_000;
 /// How long after a lost question a report may still be its answer, microseconds.
-const DOUBT_US: i64 = 1_000_000;
+const DOUBT_US: i64 = 500_000;
 
 /// A status report with its place in time.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -227,15 +227,15 @@ fn after_a_lost_report_the_next_ones_are_not_trusted_for_time() {
     let mut machine = Machine::new();
     machine.poll_every(Some(100_000));
     text(&mut machine, 0);
-    assert_eq!(text(&mut machine, 249_999), "");
-    assert_eq!(text(&mut machine, 250_000), "?");
-    machine.on_bytes(252_000, b"<Run|MPos:1.000,0.000,0.000>\r\n");
+    assert_eq!(text(&mut machine, 119_999), "");
+    assert_eq!(text(&mut machine, 120_000), "?");
+    machine.on_bytes(122_000, b"<Run|MPos:1.000,0.000,0.000>\r\n");
     let certain = |machine: &mut Machine| match events(machine)[..] {
         [Event::Status(poll)] => poll.certain,
         _ => panic!("one report"),
     };
     assert!(!certain(&mut machine));
-    assert_eq!(text(&mut machine, 1_300_000), "?");
-    machine.on_bytes(1_302_000, b"<Run|MPos:1.000,0.000,0.000>\r\n");
+    assert_eq!(text(&mut machine, 630_000), "?");
+    machine.on_bytes(632_000, b"<Run|MPos:1.000,0.000,0.000>\r\n");
     assert!(certain(&mut machine));
 }

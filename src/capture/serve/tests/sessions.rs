@@ -167,6 +167,7 @@ fn the_video_is_served_whole_and_in_parts() {
     assert_eq!(part(&["Range: bytes=-7"]).body, bytes[size - 7..]);
     let beyond = part(&[&format!("Range: bytes={size}-")]);
     assert_eq!(beyond.status, 416);
+    assert_eq!(beyond.header("content-type"), Some("application/json"));
     assert_eq!(
         beyond.header("content-range"),
         Some(format!("bytes */{size}").as_str())

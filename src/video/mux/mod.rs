@@ -6,27 +6,26 @@
 //! loss. Matroska as FFmpeg writes it counts in milliseconds: each frame's time is rounded to the
 //! nearest one, relative to the first frame. The exact time stamps belong into a frame index.
 
-use std::fs::{File, OpenOptions};
-use std::io::{self, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+mod container;
+mod file;
 
-use ffmpeg_next::codec::{self, Parameters, encoder};
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use ffmpeg_next::codec::encoder;
 use ffmpeg_next::format::context::{Output, StreamIo};
-use ffmpeg_next::{Dictionary, Packet, Rational, ffi, format, media, packet};
+use ffmpeg_next::{Packet, packet};
+
+use self::container::{end_cluster, open};
+use self::file::{Refusal, Sink};
 
 use super::lossless::RawFormat;
 use super::nal::{self, ParameterSets};
 use super::{Error, initialise};
 
-/// Longest stretch of video that is held back for one cluster, milliseconds.
-const CLUSTER_MS: &str = "400";
-/// Most bytes of a cluster: a fast camera's are not gathered for long.
-const CLUSTER_BYTES: &str = "16000000";
 /// Bytes that are gathered before they are handed to the system.
 const BUFFER: usize = 1 << 15;
-/// The muxer's unit of time, a second's parts.
-const MILLISECONDS: i64 = 1000;
 
 /// How a camera's frames are coded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,14 +46,6 @@ impl Coding {
             Self::Mjpeg => "mjpeg",
             Self::H264 => "h264",
             Self::Raw(_) => "ffv1",
-        }
-    }
-
-    fn codec_id(self) -> codec::Id {
-        match self {
-            Self::Mjpeg => codec::Id::MJPEG,
-            Self::H264 => codec::Id::H264,
-            Self::Raw(_) => codec::Id::FFV1,
         }
     }
 }
@@ -342,132 +333,4 @@ impl Muxer {
 fn is_no_room(error: &io::Error) -> bool {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
-}
-
-/// Starts a Matroska file with one track.
-fn open(
-    io: StreamIo,
-    stream: &StreamFormat,
-    encoder: Option<&encoder::video::Encoder>,
-    extradata: Option<&[u8]>,
-) -> Result<Output, ffmpeg_next::Error> {
-    let mut output = format::output_to_stream(io, None, Some("matroska"))?;
-    let rate = Rational::new((stream.fps * 1000.0).round() as i32, 1000);
-    let mut parameters = match encoder {
-        Some(encoder) => Parameters::from(encoder),
-        None => copied(stream)?,
-    };
-    if let Some(extradata) = extradata {
-        set_extradata(&mut parameters, extradata)?;
-    }
-    let mut track = output.add_stream(codec::Id::None)?;
-    track.set_parameters(parameters);
-    track.set_time_base(Rational::new(1, MILLISECONDS as i32));
-    if rate.numerator() > 0 {
-        track.set_avg_frame_rate(rate);
-    }
-    let mut options = Dictionary::new();
-    options.set("cluster_time_limit", CLUSTER_MS);
-    options.set("cluster_size_limit", CLUSTER_BYTES);
-    drop(output.write_header_with(options)?);
-    Ok(output)
-}
-
-/// The track of a stream that is kept as it comes.
-fn copied(stream: &StreamFormat) -> Result<Parameters, ffmpeg_next::Error> {
-    let mut parameters = Parameters::new();
-    parameters.set_medium(media::Type::Video);
-    parameters.set_id(stream.coding.codec_id());
-    let context = codec::Context::from_parameters(parameters)?;
-    let mut video = context.encoder().video()?;
-    video.set_width(stream.width);
-    video.set_height(stream.height);
-    Ok(Parameters::from(&video))
-}
-
-#[allow(unsafe_code)]
-fn set_extradata(parameters: &mut Parameters, bytes: &[u8]) -> Result<(), ffmpeg_next::Error> {
-    let no_memory = ffmpeg_next::Error::Other {
-        errno: ffmpeg_next::error::ENOMEM,
-    };
-    let padding = ffi::AV_INPUT_BUFFER_PADDING_SIZE as usize;
-    let length = i32::try_from(bytes.len()).map_err(|_| no_memory)?;
-    // SAFETY: the buffer is FFmpeg's own allocation with the padding that it asks for, zeroed; the
-    // parameters own it from here on and free it. They were made by this module and have none yet.
-    unsafe {
-        let buffer = ffi::av_mallocz(bytes.len() + padding).cast::<u8>();
-        if buffer.is_null() {
-            return Err(no_memory);
-        }
-        std::ptr::copy_nonoverlapping(bytes.as_ptr(), buffer, bytes.len());
-        let target = parameters.as_mut_ptr();
-        (*target).extradata = buffer;
-        (*target).extradata_size = length;
-    }
-    Ok(())
-}
-
-/// Ends the cluster under way and hands all to the sink.
-#[allow(unsafe_code)]
-fn end_cluster(output: &mut Output) -> Result<(), ffmpeg_next::Error> {
-    // SAFETY: the context is alive and its header was written; a null packet asks the muxer to
-    // flush, which Matroska's supports (AVFMT_ALLOW_FLUSH). `pb` is the sink's, open until the
-    // context is dropped.
-    let answer = unsafe {
-        let answer = ffi::av_write_frame(output.as_mut_ptr(), std::ptr::null_mut());
-        ffi::avio_flush((*output.as_mut_ptr()).pb);
-        answer
-    };
-    if answer < 0 {
-        return Err(ffmpeg_next::Error::from(answer));
-    }
-    Ok(())
-}
-
-/// Where FFmpeg writes to. FFmpeg keeps of an error at most its number: the first one is kept aside.
-struct Sink {
-    file: File,
-    refusal: Refusal,
-}
-
-/// The first error that the system answered to a sink.
-#[derive(Debug, Clone, Default)]
-struct Refusal(Arc<Mutex<Option<io::Error>>>);
-
-impl Refusal {
-    fn take(&self) -> Option<io::Error> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
-    }
-
-    /// Keeps the error and answers one of the same number for FFmpeg.
-    fn keep(&self, error: io::Error) -> io::Error {
-        let told = match error.raw_os_error() {
-            Some(number) => io::Error::from_raw_os_error(number),
-            None => io::Error::from(error.kind()),
-        };
-        let mut first = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        first.get_or_insert(error);
-        told
-    }
-}
-
-impl Write for Sink {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self.file.write(bytes) {
-            Err(error) if error.kind() != io::ErrorKind::Interrupted => {
-                Err(self.refusal.keep(error))
-            }
-            other => other,
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Seek for Sink {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file.seek(to).map_err(|error| self.refusal.keep(error))
-    }
 }
