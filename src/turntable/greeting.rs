@@ -15,6 +15,8 @@ const START_WAIT: Duration = Duration::from_secs(4);
 const SHORT_WAIT: Duration = Duration::from_millis(300);
 /// How long a controller may take to answer its first `?`.
 const PROBE_WAIT: Duration = Duration::from_secs(5);
+/// How long answers to an echo may be under way.
+const ECHO_WAIT: Duration = Duration::from_millis(250);
 /// How often the settings are read until they are whole, and, unchecked, the same twice.
 const READINGS: usize = 20;
 /// The complaint of a line without checksum in a checked session.
@@ -89,10 +91,14 @@ fn rouse(link: &Link, resets: bool) -> Result<(), TurntableError> {
         supervisor.seen().map(|seen| Some(seen.state))
     });
     match state {
-        Some(Some(State::Idle | State::Alarm | State::Check)) => Ok(()),
-        Some(Some(_)) => link.stop().map(|_| ()),
-        Some(None) | None => Err(stranger(link)),
+        Some(Some(State::Idle | State::Alarm | State::Check)) => {}
+        Some(Some(_)) => link.stop().map(|_| ())?,
+        Some(None) | None => return Err(stranger(link)),
     }
+    // Until a port is set up, the system echoes what the controller says, which answers that with
+    // errors: let them come while no line waits for an answer.
+    link.clock().sleep(ECHO_WAIT);
+    Ok(())
 }
 
 fn stranger(link: &Link) -> TurntableError {

@@ -82,6 +82,16 @@ fn a_session_that_a_killed_owner_left_open_is_taken_over() {
 }
 
 #[test]
+fn answers_to_an_echo_of_the_banner_are_passed_over() {
+    for rig in [true, false] {
+        let mut peer = Peer::new(rig);
+        peer.trouble.echo = true;
+        let rig = open(peer);
+        assert!(rig.table.jog(1.0, None).is_ok());
+    }
+}
+
+#[test]
 fn nothing_behind_the_port_is_no_controller() {
     let mut peer = Peer::new(false);
     peer.trouble.silent_from_us = Some(0);

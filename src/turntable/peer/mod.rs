@@ -35,6 +35,8 @@ pub(super) struct Trouble {
     pub(super) lose_answers: u32,
     /// The first so many lines with a motion lose the digit after X.
     pub(super) wrong_digits: u32,
+    /// It answers its own banner, which was echoed, soon after its first report.
+    pub(super) echo: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,6 +136,15 @@ impl Peer {
             let due = self.now_us + self.delay_us;
             self.out
                 .push_back((due, format!("{text}\r\n").into_bytes()));
+        }
+    }
+
+    fn answer_echo(&mut self) {
+        if std::mem::take(&mut self.trouble.echo) {
+            let due = self.now_us + self.delay_us + 5000;
+            for answer in ["error:2\r\n", "ok\r\n"] {
+                self.out.push_back((due, answer.as_bytes().to_vec()));
+            }
         }
     }
 
@@ -247,7 +258,10 @@ impl Peer {
         for &byte in bytes {
             match byte {
                 _ if self.silent() => {}
-                b'?' => self.report(),
+                b'?' => {
+                    self.report();
+                    self.answer_echo();
+                }
                 b'!' => self.hold(),
                 0x18 => self.restart("host"),
                 b'\n' | b'\r' => {
