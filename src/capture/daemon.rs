@@ -21,6 +21,7 @@ use super::state::{Monitor, Phase, RigState};
 use super::stop::{StopRequest, Stopped};
 use super::viewer::Viewer;
 use super::{preflight, salvage};
+use crate::clock::Clock;
 
 /// Commands that wait for the owner.
 const WAITING: usize = 8;
@@ -256,7 +257,7 @@ fn tell_salvaged(root: &Path, monitor: &Monitor) -> Result<(), CaptureError> {
             Ok(saved) => format!("{session} was interrupted, and is kept as aborted: {saved}"),
             Err(error) => format!("{session} was interrupted and could not be salvaged: {error}"),
         };
-        monitor.fault(0, told);
+        monitor.fault(Clock::monotonic().now_us(), told);
     }
     Ok(())
 }

@@ -11,6 +11,7 @@ use super::state::{CameraState, Monitor, TableState};
 use super::viewer::Viewer;
 use crate::camera::lock::ManualPlan;
 use crate::camera::{Camera, CameraError, GrantedMode};
+use crate::clock::Clock;
 use crate::turntable::Table;
 
 /// Longest wait for a frame in one go.
@@ -167,7 +168,7 @@ impl Idle {
             state.camera.fault = Some(why.to_owned());
         });
         if told.as_deref() != Some(why) {
-            self.monitor.fault(0, why);
+            self.monitor.fault(Clock::monotonic().now_us(), why);
         }
     }
 
@@ -180,7 +181,7 @@ impl Idle {
             };
         });
         if told.as_deref() != Some(why) {
-            self.monitor.fault(0, why);
+            self.monitor.fault(Clock::monotonic().now_us(), why);
         }
     }
 
