@@ -1,8 +1,9 @@
 //! The V4L2 cameras against the kernel's own test drivers, faults included.
 //!
-//! These tests need root and the driver `vivid` as `/dev/video0`, best in a virtual machine; those
-//! on Motion JPEG need `v4l2loopback` as `/dev/video10`, fed with 320 x 240 pixels. They change the
-//! driver's controls and take it away, so that they run one by one and only when asked:
+//! These tests need root and the driver `vivid` as `/dev/video0`; those on Motion JPEG need
+//! `v4l2loopback` as `/dev/video10`, fed with Motion JPEG. They change the driver's controls and take
+//! it away, so that they run one by one and only when asked. `make test-rig` runs them in a virtual
+//! machine of its own; by hand:
 //!
 //! ```text
 //! modprobe vivid n_devs=1 node_types=0x1 num_inputs=1 input_types=0 vid_cap_nr=0
@@ -502,7 +503,13 @@ fn motion_jpeg_comes_with_the_bytes_used_alone() {
     println!("{granted}");
     let frames = frames(&mut *camera, 50);
     let sizes: Vec<usize> = frames.iter().map(|frame| frame.data.len()).collect();
-    println!("{sizes:?} {:?} {:?}", counted(&frames), frames[1].stamp);
+    println!(
+        "the first frame has {} bytes, the others {:?} to {:?}; stamps {:?}",
+        sizes[0],
+        sizes[1..].iter().min(),
+        sizes[1..].iter().max(),
+        frames[1].stamp
+    );
     // The driver's first buffer may be one from before.
     for frame in &frames[1..] {
         assert_eq!(frame.fault(), None);

@@ -71,8 +71,7 @@ fn an_unplugged_camera_ends_the_take_and_is_recorded_again_when_it_is_back() {
     check_ends("unplug", "unplugged", || unplugged = Some(Unplugged::now()));
     let root = sessions("unplugged");
     let refused = Running::start(&root, &turn(SMALL, &[])).end();
-    assert_eq!((refused.code, refused.folders().len()), (Some(1), 0));
-    let reason = refused.reason().to_owned();
+    let reason = refused.refusal().to_owned();
     assert!(reason.contains("/dev/video0"), "{reason}");
     drop(unplugged);
     let again = Running::start(&root, &turn(SMALL, &TOLERANT)).end();
@@ -149,13 +148,7 @@ fn a_camera_that_does_not_start_is_told_before_the_table_turns() {
     let before = table::stands();
     vivid.press("inject_vidioc_streamon_error", 1).unwrap();
     let ended = Running::start(&sessions("start"), &turn(SMALL, &[])).end();
-    assert_eq!(
-        (ended.code, ended.folders().len()),
-        (Some(1), 0),
-        "{ended:#?}"
-    );
-    assert!(!ended.moved(), "{ended:#?}");
-    println!("exit 1, no session, table {before}: {}", ended.reason());
+    println!("exit 1, no session, table {before}: {}", ended.refusal());
 }
 
 #[test]
@@ -166,12 +159,7 @@ fn a_second_recorder_is_refused_and_the_first_goes_on() {
     let mut first = Running::start(&root, &turn(SMALL, &TOLERANT));
     first.until_recording();
     let second = Running::start(&sessions("second"), &turn(SMALL, &[])).end();
-    assert_eq!(
-        (second.code, second.folders().len()),
-        (Some(1), 0),
-        "{second:#?}"
-    );
-    assert!(second.reason().contains("in use"), "{}", second.reason());
+    assert!(second.refusal().contains("in use"), "{second:#?}");
     let first = first.end();
     assert_eq!(first.manifest().status, Status::Complete, "{first:#?}");
     println!(

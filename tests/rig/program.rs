@@ -1,5 +1,6 @@
 //! `relit-capture record`, watched while it runs.
 
+use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -13,6 +14,10 @@ use serde_json::Value;
 
 /// Long enough for an emulated machine whose host is busy.
 const PATIENCE: Duration = Duration::from_secs(240);
+/// Where a capture's standard error goes, among its sessions.
+const STDERR: &str = "stderr.txt";
+/// More lines than a capture prints.
+const MOST_LINES: usize = 4096;
 /// What any capture here is asked for.
 const ALWAYS: [&str; 7] = [
     "record",
@@ -68,10 +73,11 @@ impl Running {
             .env("XDG_RUNTIME_DIR", "/run")
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
+            .stderr(File::create(root.join(STDERR)).unwrap())
             .spawn()
             .unwrap();
         let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-        let (tell, events) = sync_channel(1024);
+        let (tell, events) = sync_channel(MOST_LINES);
         thread::spawn(move || {
             for line in lines.map_while(Result::ok) {
                 // Nobody listens any more when the test is over.
@@ -151,6 +157,18 @@ impl Ended {
         told.unwrap_or("")
     }
 
+    /// Checks that it was refused: told on standard error, with no session left, and before the
+    /// table was told to move. Gives the reason.
+    pub(crate) fn refusal(&self) -> &str {
+        assert_eq!(self.code, Some(1), "{self:#?}");
+        assert_eq!(self.folders().len(), 0, "{self:#?}");
+        let moved = |event: &Event| event.what["phase"] == "moving-back";
+        assert!(!self.events.iter().any(moved), "{self:#?}");
+        let told = fs::read_to_string(self.root.join(STDERR)).unwrap();
+        assert!(told.contains(self.reason()), "{told}");
+        self.reason()
+    }
+
     /// When it entered a phase.
     pub(crate) fn time_of(&self, phase: &str) -> Instant {
         let entered = self
@@ -162,15 +180,8 @@ impl Ended {
             .at
     }
 
-    /// Whether the table was told to move.
-    pub(crate) fn moved(&self) -> bool {
-        self.events
-            .iter()
-            .any(|event| event.what["phase"] == "moving-back")
-    }
-
     /// The folders of its sessions.
-    pub(crate) fn folders(&self) -> Vec<PathBuf> {
+    fn folders(&self) -> Vec<PathBuf> {
         let entries = fs::read_dir(&self.root).unwrap();
         entries
             .map(|entry| entry.unwrap().path())

@@ -1,5 +1,8 @@
 //! Turns that come out well.
 
+use std::path::Path;
+
+use image::{GrayImage, Luma};
 use relit::session::{FrameEntry, Status};
 
 use crate::camera::{Handed, Trace, VIVID, Vivid};
@@ -79,11 +82,20 @@ fn check_angles(entries: &[FrameEntry]) -> f64 {
     turned
 }
 
-/// `relit-extract` reads the session, with the whole frame as the object.
-fn check_extracted(session: &std::path::Path) -> String {
+/// `relit-extract` reads the session, with the picture's middle as the object.
+fn check_extracted(session: &Path) -> String {
+    let mask = session.with_file_name("mask.png");
+    let is_object = |x: u32, y: u32| (220..420).contains(&x) && (140..340).contains(&y);
+    let paint = |x, y| Luma([if is_object(x, y) { 255_u8 } else { 0 }]);
+    GrayImage::from_fn(640, 480, paint).save(&mask).unwrap();
     let out = session.with_file_name("samples");
-    let out = out.to_str().unwrap();
-    let (code, told) = extract(session, &["-o", out]);
+    let arguments = [
+        "-o",
+        out.to_str().unwrap(),
+        "--mask",
+        mask.to_str().unwrap(),
+    ];
+    let (code, told) = extract(session, &arguments);
     assert!(matches!(code, Some(0 | 3)), "{told}");
     format!("relit-extract ends with {}", code.unwrap())
 }
