@@ -121,6 +121,12 @@ pub enum Refusal {
         /// Which.
         Vec<Moved>,
     ),
+    /// Values that were asked for, and which the camera has no control to hold.
+    #[error("the camera cannot be set to {}: leave that out, or set it at the camera", .0.join(", "))]
+    NotHeld(
+        /// Aspect and value of each.
+        Vec<String>,
+    ),
     /// Too little room.
     #[error(
         "{folder} has {} MB free and the take needs {} MB (a fifth in reserve): make room, or give another --root",

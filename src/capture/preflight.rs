@@ -87,6 +87,10 @@ pub fn hold_camera(
     let mut checks = vec![mode_check(&request, &mode)?];
     let frame_bytes = look_at_frames(camera, stop)?;
     let plan = ManualPlan::new(&camera.controls()?, &settings.wanted);
+    let not_held = plan.without(&settings.wanted);
+    if !not_held.is_empty() {
+        return Err(Refusal::NotHeld(not_held).into());
+    }
     let moved = plan.apply(camera)?;
     if !moved.is_empty() {
         return Err(Refusal::NotKept(moved).into());

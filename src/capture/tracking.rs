@@ -4,12 +4,13 @@
 use std::time::{Duration, Instant};
 
 use super::failure::CaptureError;
+use super::idle::show_table;
 use super::preflight;
 use super::shoot::Onlookers;
 use super::state::Phase;
 use super::{Recorder, Stage, Window};
 use crate::clock::Clock;
-use crate::turntable::{self, ConstantPart, Table, Track, Turn, TurnPlan};
+use crate::turntable::{self, ConstantPart, State, Table, Track, Turn, TurnPlan};
 
 /// How long the newest frame is waited for in one go: how often everything is looked at.
 const GLANCE: Duration = Duration::from_millis(20);
@@ -38,6 +39,7 @@ impl Course<'_> {
 
     fn turn(&self, table: &Table, plan: TurnPlan) -> Result<Track, CaptureError> {
         self.enter(Phase::MovingBack);
+        self.show_unwatched_motion();
         let margin_us = preflight::margin_us(&plan);
         let mut turn = self.or_stopped(table.start_turn(plan))?;
         self.enter(Phase::Starting);
@@ -45,11 +47,12 @@ impl Course<'_> {
         let window = self.window(part, margin_us);
         self.recorder.announce(window);
         self.enter(Phase::Recording);
-        if !self.watch(window, &mut turn)? {
+        if !self.watch(window, &mut turn, table)? {
             turn.abort()?;
             return Err(CaptureError::EndedEarly);
         }
         self.enter(Phase::Unwinding);
+        self.show_unwatched_motion();
         self.or_stopped(turn.wait_end())
     }
 
@@ -60,7 +63,12 @@ impl Course<'_> {
 
     /// Looks at recorder and table until the recording has ended; false where that was before the
     /// turn's end.
-    fn watch(&self, window: Window, turn: &mut Turn<'_>) -> Result<bool, CaptureError> {
+    fn watch(
+        &self,
+        window: Window,
+        turn: &mut Turn<'_>,
+        table: &Table,
+    ) -> Result<bool, CaptureError> {
         let mut look = Look::default();
         loop {
             self.on.stop.check()?;
@@ -72,7 +80,7 @@ impl Course<'_> {
             if self.clock.real(micros(late)) > END_PATIENCE {
                 return Ok(false);
             }
-            self.look(&mut look, turn.last_angle().map(|(angle_deg, _)| angle_deg));
+            self.look(&mut look, Some(table));
         }
     }
 
@@ -95,7 +103,7 @@ impl Course<'_> {
     }
 
     /// Shows the newest frame, and tells how far it is.
-    fn look(&self, look: &mut Look, angle_deg: Option<f64>) {
+    fn look(&self, look: &mut Look, table: Option<&Table>) {
         let newest = self.recorder.preview().newer_than(look.seen, GLANCE);
         if let Some((number, frame)) = newest {
             look.seen = number;
@@ -111,9 +119,19 @@ impl Course<'_> {
         self.on.monitor.update(|state| {
             state.frames = progress.frames;
             state.dropped = progress.overrun;
-            if angle_deg.is_some() {
-                state.table.angle_deg = angle_deg;
-            }
+        });
+        if let Some(table) = table {
+            // A table that does not answer ends the turn, which is watched elsewhere.
+            let _shown = show_table(self.on.monitor, table);
+        }
+    }
+
+    /// The table moves, and nobody looks at its reports until it is there.
+    fn show_unwatched_motion(&self) {
+        self.on.monitor.update(|state| {
+            state.table.state = State::Run.to_string();
+            state.table.angle_deg = None;
+            state.table.degrees_per_second = None;
         });
     }
 

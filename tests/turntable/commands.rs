@@ -147,3 +147,31 @@ fn what_is_wrong_is_said_in_a_sentence() {
         .unwrap();
     assert_eq!(address.status.code(), Some(2));
 }
+
+#[test]
+fn a_jog_that_is_interrupted_stops_the_table() {
+    let table = Simulated::start(&["--no-reset"]);
+    let mut jog = Command::new(PROGRAM)
+        .args(["turntable", "--turntable"])
+        .arg(format!("serial:{}", table.port().display()))
+        .args(["jog", "300", "--speed", "10"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let moving = (0..100).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        out(&table.ask(&["status"])).starts_with("Jog")
+    });
+    assert!(moving);
+    let interrupted = Command::new("kill")
+        .args(["-INT", &jog.id().to_string()])
+        .status()
+        .unwrap();
+    assert!(interrupted.success());
+    assert_eq!(jog.wait().unwrap().code(), Some(1));
+    let first = out(&table.ask(&["status"]));
+    let second = out(&table.ask(&["status"]));
+    assert!(first.starts_with("Idle"), "{first}");
+    assert_eq!(first, second);
+}

@@ -2,16 +2,16 @@
 
 use std::env;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use relit::capture::serve::ServiceManager;
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+use signal_hook::low_level::emulate_default_handler;
 
-/// How late a signal is seen.
-const GLANCE: Duration = Duration::from_millis(50);
+/// Signals within this time are one wish to end: `timeout` and a closing terminal send several.
+const TOGETHER: Duration = Duration::from_secs(1);
 
 /// The folder for locks and sockets: one for the whole machine, so that a service and a person who
 /// logs in find each other.
@@ -36,20 +36,24 @@ pub(crate) fn service_manager() -> Option<ServiceManager> {
     })
 }
 
-/// Calls `end` when the program is told to end. A second signal of the kind ends it at once.
+/// Calls `end` when the program is told to end, also by a terminal that is closed. Another signal
+/// a second or more later ends it at once; those that come together count as one.
 pub(crate) fn at_end(end: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
-    let told = Arc::new(AtomicBool::new(false));
-    for signal in [SIGTERM, SIGINT] {
-        signal_hook::flag::register_conditional_shutdown(signal, 1, Arc::clone(&told))?;
-        signal_hook::flag::register(signal, Arc::clone(&told))?;
-    }
+    let mut signals = Signals::new([SIGTERM, SIGINT, SIGHUP])?;
     thread::Builder::new()
         .name("relit-signals".to_owned())
         .spawn(move || {
-            while !told.load(Ordering::Relaxed) {
-                thread::sleep(GLANCE);
+            let mut end = Some(end);
+            let mut told: Option<Instant> = None;
+            for signal in signals.forever() {
+                if let Some(end) = end.take() {
+                    told = Some(Instant::now());
+                    thread::spawn(end);
+                } else if told.is_some_and(|told| told.elapsed() >= TOGETHER) {
+                    // What cannot be done by the signal's default is left to the end under way.
+                    let _ended = emulate_default_handler(signal);
+                }
             }
-            end();
         })?;
     Ok(())
 }

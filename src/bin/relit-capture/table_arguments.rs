@@ -30,7 +30,7 @@ Faults: drop=SHARE flip=SHARE duplicate=SHARE merge=SHARE delay=SHARE:TIME of by
 
 #[derive(Args)]
 pub(crate) struct TurntableArguments {
-    /// The table: serial:/dev/ttyUSB0, serial: (the only controller plugged in) or sim:.
+    /// The table: serial:/dev/ttyUSB0, or serial: (the only controller plugged in).
     #[arg(long, value_name = "ADDRESS", default_value = "serial:", global = true)]
     pub(crate) turntable: Address,
     #[command(subcommand)]
@@ -103,7 +103,7 @@ pub(crate) struct SimulateArguments {
     #[arg(long)]
     pub(crate) no_reset: bool,
     /// End by itself after so many seconds.
-    #[arg(long = "for", value_name = "SECONDS")]
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
     pub(crate) for_seconds: Option<f64>,
 }
 
@@ -112,4 +112,11 @@ fn speed(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|factor: &f64| factor.is_finite() && (0.01..=100.0).contains(factor))
         .ok_or_else(|| "a speed is a number from 0.01 to 100".to_owned())
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|seconds: &f64| (0.0..=1e9).contains(seconds))
+        .ok_or_else(|| "give seconds, from 0 on".to_owned())
 }

@@ -1,6 +1,7 @@
 //! `relit-capture turntable`: one look at the table, or one motion.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use relit::turntable::{
     Address, Homed, Options, Owner, Status, Table, TurntableError, find_serial,
@@ -8,7 +9,7 @@ use relit::turntable::{
 use serde_json::json;
 
 use crate::console::{Console, Outcome};
-use crate::environment::runtime_folder;
+use crate::environment::{at_end, runtime_folder};
 use crate::table_arguments::{Action, TurntableArguments};
 
 pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcome, TurntableError> {
@@ -24,9 +25,9 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
     match asked.action {
         Action::Status => status(console, &port, &options),
         Action::Stop => stop(console, &port, &options),
-        Action::Home => home(console, &Table::open_serial(&port, &options)?),
+        Action::Home => home(console, open_to_move(console, &port, &options)?.as_ref()),
         Action::Jog { degrees, speed } => {
-            let table = Table::open_serial(&port, &options)?;
+            let table = open_to_move(console, &port, &options)?;
             tell(console, "jogged", &table.jog(degrees, speed)?);
             Ok(Outcome::Whole)
         }
@@ -36,6 +37,29 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
             Ok(Outcome::Whole)
         }
     }
+}
+
+/// A table that is stopped when the program is told to end.
+fn open_to_move(
+    console: Console,
+    port: &Path,
+    options: &Options,
+) -> Result<Arc<Table>, TurntableError> {
+    let table = Arc::new(Table::open_serial(port, options)?);
+    // Held weakly, so that the table is let go, and its port, when the motion has ended.
+    let moving = Arc::downgrade(&table);
+    let listening = at_end(move || {
+        if let Some(table) = moving.upgrade() {
+            // Its answer comes to the motion, which ends with it.
+            let _told_there = table.stop();
+        }
+    });
+    if let Err(error) = listening {
+        console.warn(&format!(
+            "a signal ends this program without stopping the table first: {error}"
+        ));
+    }
+    Ok(table)
 }
 
 fn no_port(address: &Address) -> TurntableError {

@@ -230,6 +230,28 @@ impl ManualPlan {
         plan
     }
 
+    /// What was asked for and is not planned, because the camera has no control for it: aspect and
+    /// value of each, in words.
+    pub fn without(&self, wanted: &Wanted) -> Vec<String> {
+        let asked = [
+            (Aspect::Exposure, wanted.exposure),
+            (Aspect::Gain, wanted.gain),
+            (Aspect::WhiteBalance, wanted.white_balance),
+            (Aspect::Focus, wanted.focus),
+            (Aspect::PowerLine, wanted.power_line),
+        ];
+        let planned = |aspect, value| {
+            let mut steps = self.steps.iter();
+            steps.any(|step| step.aspect == aspect && step.value == value)
+        };
+        asked
+            .into_iter()
+            .filter_map(|(aspect, value)| Some((aspect, value?)))
+            .filter(|(aspect, value)| !planned(*aspect, *value))
+            .map(|(aspect, value)| format!("{aspect} {value}"))
+            .collect()
+    }
+
     /// Plans the switches of an aspect; true where there is one that can be set.
     fn switch_off(&mut self, controls: &[Control], aspect: Aspect) -> bool {
         let mut switched = false;
