@@ -95,10 +95,18 @@ fn rouse(link: &Link, resets: bool) -> Result<(), TurntableError> {
         Some(Some(_)) => link.stop().map(|_| ())?,
         Some(None) | None => return Err(stranger(link)),
     }
-    // Until a port is set up, the system echoes what the controller says, which answers that with
-    // errors: let them come while no line waits for an answer.
+    forget_echo(link)
+}
+
+/// Until a port is set up, the system echoes what the controller says. The controller answers such
+/// lines with errors, which come here while no line waits for an answer; a part of one it keeps as
+/// the head of the next line, which is an empty one here, whatever the answer.
+fn forget_echo(link: &Link) -> Result<(), TurntableError> {
     link.clock().sleep(ECHO_WAIT);
-    Ok(())
+    match link.line("", Patience::Short)? {
+        Outcome::Failed(_) => link.wait_stopped(),
+        Outcome::Done(_) | Outcome::Refused(_) => Ok(()),
+    }
 }
 
 fn stranger(link: &Link) -> TurntableError {

@@ -35,7 +35,8 @@ pub(super) struct Trouble {
     pub(super) lose_answers: u32,
     /// The first so many lines with a motion lose the digit after X.
     pub(super) wrong_digits: u32,
-    /// It answers its own banner, which was echoed, soon after its first report.
+    /// Its banner was echoed: soon after its first report it answers a part of that, and takes the
+    /// rest for the beginning of a line.
     pub(super) echo: bool,
 }
 
@@ -141,6 +142,7 @@ impl Peer {
 
     fn answer_echo(&mut self) {
         if std::mem::take(&mut self.trouble.echo) {
+            self.line.extend_from_slice(b"Grbl 1.1h ['$' f");
             let due = self.now_us + self.delay_us + 5000;
             for answer in ["error:2\r\n", "ok\r\n"] {
                 self.out.push_back((due, answer.as_bytes().to_vec()));
