@@ -45,7 +45,7 @@ fn is_ready(state: &RigState) -> bool {
 fn a_queue_is_captured_object_by_object_and_a_second_start_is_refused() {
     let _alone = alone();
     let root = tempfile::tempdir().unwrap();
-    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=5")).unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3")).unwrap();
     once(&daemon, is_ready);
     once(&daemon, |state| state.camera.focus.is_some());
     assert!(daemon.monitor().preview().is_some());
@@ -75,7 +75,7 @@ fn a_queue_is_captured_object_by_object_and_a_second_start_is_refused() {
 fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
     let _alone = alone();
     let root = tempfile::tempdir().unwrap();
-    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=5")).unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3")).unwrap();
     once(&daemon, is_ready);
     daemon.command(Command::Jog { degrees: 300.0 }).unwrap();
     once(&daemon, |state| state.table.state == "Jog");
@@ -109,7 +109,7 @@ fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
 fn a_camera_that_was_unplugged_comes_back_without_a_restart() {
     let _alone = alone();
     let root = tempfile::tempdir().unwrap();
-    let daemon = Daemon::start(settings(root.path(), "&unplug=60", "sim:?speed=5")).unwrap();
+    let daemon = Daemon::start(settings(root.path(), "&unplug=60", "sim:?speed=3")).unwrap();
     once(&daemon, |state| state.camera.present);
     let state = once(&daemon, |state| !state.camera.present);
     assert!(state.camera.fault.unwrap().contains("was unplugged"));

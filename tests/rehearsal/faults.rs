@@ -14,7 +14,7 @@ use crate::support::{Rehearsal, SHORT};
 
 /// A quick turn of ten seconds, 300 frames, five times as fast.
 fn quick(camera: &str) -> Rehearsal {
-    Rehearsal::with(SHORT, camera, "sim:?speed=5", |settings| {
+    Rehearsal::with(SHORT, camera, "sim:?speed=3", |settings| {
         settings.degrees_per_second = 36.0;
     })
 }
@@ -54,7 +54,7 @@ fn a_camera_that_changes_its_size_ends_the_take() {
 
 #[test]
 fn a_take_with_a_dropped_frame_is_repeated_and_both_are_kept() {
-    let mut rig = Rehearsal::with(SHORT, "&drop=220", "sim:?speed=5", |settings| {
+    let mut rig = Rehearsal::with(SHORT, "&drop=220", "sim:?speed=3", |settings| {
         settings.degrees_per_second = 36.0;
         settings.retries = 1;
     });
@@ -73,7 +73,7 @@ fn a_take_with_a_dropped_frame_is_repeated_and_both_are_kept() {
 
 #[test]
 fn dropped_and_damaged_frames_within_the_limit_are_told_and_kept() {
-    let mut rig = Rehearsal::with(SHORT, "&drop=220&damage=240", "sim:?speed=5", |settings| {
+    let mut rig = Rehearsal::with(SHORT, "&drop=220&damage=240", "sim:?speed=3", |settings| {
         settings.degrees_per_second = 36.0;
         settings.max_dropped = 2;
     });
@@ -102,7 +102,7 @@ fn dropped_and_damaged_frames_within_the_limit_are_told_and_kept() {
 
 #[test]
 fn a_controller_that_restarts_in_the_turn_ends_the_take() {
-    let mut rig = Rehearsal::new(SHORT, "", "sim:?speed=5&fault=reset@35s");
+    let mut rig = Rehearsal::new(SHORT, "", "sim:?speed=3&fault=reset@35s");
     let take = rig.capture(false).unwrap();
     check_aborted(&rig, &take, "restarted");
     // Its position is lost: the next take looks for zero again, and comes out well.
@@ -114,7 +114,7 @@ fn a_controller_that_restarts_in_the_turn_ends_the_take() {
 
 #[test]
 fn a_table_that_stalls_ends_the_take() {
-    let mut rig = Rehearsal::new(SHORT, "", "sim:?speed=5&fault=stall@35s");
+    let mut rig = Rehearsal::new(SHORT, "", "sim:?speed=3&fault=stall@35s");
     let take = rig.capture(false).unwrap();
     check_aborted(&rig, &take, "could not be seen at rest");
 }
@@ -136,7 +136,7 @@ fn meddle_in_the_turn(rig: &mut Rehearsal, meddle: impl FnOnce() + Send) -> Take
 
 #[test]
 fn a_stop_ends_the_take_within_seconds_and_stops_the_table() {
-    let mut rig = Rehearsal::new(SHORT, "", "sim:?speed=5");
+    let mut rig = Rehearsal::new(SHORT, "", "sim:?speed=3");
     let stop = rig.stop.clone();
     let asked = std::sync::Mutex::new(None);
     let take = meddle_in_the_turn(&mut rig, || {
@@ -200,7 +200,7 @@ fn what_preflight_refuses_is_said_with_its_numbers_and_nothing_turns() {
     ));
     assert!(error.to_string().contains("1383505805529 MB"), "{error}");
 
-    let mut rig = Rehearsal::with(SHORT, "", "sim:?speed=5", |settings| {
+    let mut rig = Rehearsal::with(SHORT, "", "sim:?speed=3", |settings| {
         settings.min_battery_v = Some(13.0);
     });
     let error = rig.capture(false).unwrap_err().to_string();
@@ -209,7 +209,7 @@ fn what_preflight_refuses_is_said_with_its_numbers_and_nothing_turns() {
     assert_eq!(simulator.angle_at(rig.equipment.clock().now_us()), 0.0);
     drop(rig);
 
-    let mut rig = Rehearsal::with(SHORT, "", "sim:?speed=5", |settings| {
+    let mut rig = Rehearsal::with(SHORT, "", "sim:?speed=3", |settings| {
         settings.mode.fps = 60.0;
     });
     let error = rig.capture(false).unwrap_err().to_string();

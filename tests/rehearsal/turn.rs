@@ -36,7 +36,7 @@ fn check_whole(rig: &mut Rehearsal) -> std::path::PathBuf {
 
 #[test]
 fn a_turn_is_1500_frames_with_the_angles_that_the_table_had() {
-    check_whole(&mut Rehearsal::new(SHORT, "", "sim:?speed=5"));
+    check_whole(&mut Rehearsal::new(SHORT, "", "sim:?speed=3"));
 }
 
 struct Quiet;
