@@ -5,8 +5,8 @@ mod support;
 
 use std::time::Duration;
 
-use relit::camera::{self, Camera, CameraError, Frame};
-use relit::clock::Clock;
+use relit_rig::camera::{self, Camera, CameraError, Frame};
+use relit_rig::clock::Clock;
 use support::ffmpeg;
 use tempfile::TempDir;
 

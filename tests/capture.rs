@@ -17,20 +17,20 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use relit::camera::{
+use relit::extract::{self, Observer, Options, Outcome};
+use relit_data::session::{
+    CameraFacts, Manifest, Recording, SoftwareFacts, Status, TurntableFacts, VideoFacts,
+};
+use relit_data::shard::{Layout, Size};
+use relit_rig::camera::{
     Address, Camera, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc, Frame,
     GrantedMode, Mode, ModeRequest, Rate, Sequence, StampSource, open,
 };
-use relit::capture::{
+use relit_rig::capture::{
     End, Plan, Recorder, Report, Stage, Take, WhenFull, Window, salvage, salvage_session,
 };
-use relit::clock::Clock;
-use relit::extract::{self, Observer, Options, Outcome};
-use relit::session::{
-    CameraFacts, Manifest, Recording, SoftwareFacts, Status, TurntableFacts, VideoFacts,
-};
-use relit::shard::{Layout, Size};
-use relit::video::Video;
+use relit_rig::clock::Clock;
+use relit_video::Video;
 
 /// What the camera of a test does next.
 enum Step {

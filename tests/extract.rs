@@ -7,7 +7,7 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use relit::shard::{Dataset, FrameRecord, ShardReader};
+use relit_data::shard::{Dataset, FrameRecord, ShardReader};
 use support::ffmpeg;
 use tempfile::TempDir;
 

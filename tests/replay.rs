@@ -6,8 +6,8 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use relit::session::{FrameIndex, Recording};
-use relit::shard::{Dataset, FrameRecord, ShardReader};
+use relit_data::session::{FrameIndex, Recording};
+use relit_data::shard::{Dataset, FrameRecord, ShardReader};
 use serde::Deserialize;
 
 #[derive(Deserialize)]

@@ -10,8 +10,8 @@ use std::io::{Read, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use relit::clock::Clock;
-use relit::simulator::{STEPS_PER_TURN, Simulator, SimulatorOptions};
+use relit_rig::clock::Clock;
+use relit_rig::simulator::{STEPS_PER_TURN, Simulator, SimulatorOptions};
 use serialport::TTYPort;
 
 /// The longest that anything takes on a busy machine.

@@ -16,12 +16,12 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use relit::camera::lock::{Aspect, Lack, ManualPlan, Wanted};
-use relit::camera::{
+use relit_rig::camera::lock::{Aspect, Lack, ManualPlan, Wanted};
+use relit_rig::camera::{
     self, Address, Camera, CameraError, ControlFault, ControlId, ControlKind, Frame, GrantedMode,
     StampSource,
 };
-use relit::clock::Clock;
+use relit_rig::clock::Clock;
 
 const VIVID: &str = "v4l2:/dev/video0";
 const LOOPBACK: &str = "v4l2:/dev/video10";

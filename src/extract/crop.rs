@@ -2,7 +2,7 @@
 
 use image::GrayImage;
 
-use crate::geometry::Rect;
+use relit_data::geometry::Rect;
 
 /// The smallest rectangle that holds all non-zero pixels; `None` where there are none.
 #[must_use]

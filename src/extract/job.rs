@@ -9,13 +9,13 @@ use super::object::Object;
 use super::pipeline::{Lost, Processed, Stage};
 use super::plan::{Plan, Use};
 use super::{Basis, Error, Observer, Options, Scaler, cut, square_around};
-use crate::report::{self, Page};
-use crate::session::{INDEX_FILE, Notice, Recording};
-use crate::shard::{
+use relit_data::report::{self, Page};
+use relit_data::session::{INDEX_FILE, Notice, Recording};
+use relit_data::shard::{
     self, Dataset, Digest, FrameRecord, Input, MaskInfo, MaskSpans, OutputFolder, Sample,
     SessionEntry, SessionWriter, ShardEntry, Size,
 };
-use crate::video::Video;
+use relit_video::Video;
 
 /// How many places with damaged frames are told one by one.
 const TOLD: usize = 8;

@@ -3,8 +3,8 @@
 use image::RgbImage;
 use image::imageops::thumbnail;
 
-use crate::report::{THUMBNAIL_SIDE, Thumbnail};
-use crate::shard::FrameRecord;
+use relit_data::report::{THUMBNAIL_SIDE, Thumbnail};
+use relit_data::shard::FrameRecord;
 
 /// Pictures on the report's contact sheet.
 const THUMBNAILS: u32 = 24;

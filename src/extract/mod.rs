@@ -27,10 +27,11 @@ pub use crop::{bounding_box, cut, square_around};
 pub use scale::Scaler;
 pub use select::{Basis, Candidate, Selection, TimeGap, Turn, runs_back_at, time_gaps};
 
-use crate::geometry::Rect;
-use crate::session::{self, recordings};
-use crate::shard::{self, Align, Dataset, Layout, OutputFolder, SessionEntry, Settings, Size};
-use crate::{report, video};
+use relit_data::geometry::Rect;
+use relit_data::report;
+use relit_data::session::{self, recordings};
+use relit_data::shard::{self, Align, Dataset, Layout, OutputFolder, SessionEntry, Settings, Size};
+use relit_video as video;
 
 /// Largest side of a scaled image, pixels.
 pub const MAX_SIDE: u32 = 8192;

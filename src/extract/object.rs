@@ -5,9 +5,9 @@ use std::path::Path;
 use image::{GrayImage, Luma};
 
 use super::{Error, bounding_box};
-use crate::geometry::Rect;
-use crate::session::{MASK_FILE, Recording};
-use crate::shard::Digest;
+use relit_data::geometry::Rect;
+use relit_data::session::{MASK_FILE, Recording};
+use relit_data::shard::Digest;
 
 /// A pixel of the mask file is the object's from this level on, where it is not transparent.
 const OBJECT: u8 = 128;

@@ -11,9 +11,9 @@ use rayon::iter::{ParallelBridge, ParallelIterator};
 
 use super::plan::Uses;
 use super::{Error, Scaler};
-use crate::geometry::Rect;
-use crate::shard::{self, MaskSpans, Measures};
-use crate::video::{FrameFault, Pending, Reader, Video};
+use relit_data::geometry::Rect;
+use relit_data::shard::{self, MaskSpans, Measures};
+use relit_video::{FrameFault, Pending, Reader, Video};
 
 /// What is done with every frame of one video.
 pub(super) struct Stage<'a> {

@@ -6,8 +6,8 @@ use super::pipeline::Lost;
 use super::select::{Candidate, Selection};
 use super::timeline::timeline;
 use super::{Error, runs_back_at, time_gaps};
-use crate::session::FrameIndex;
-use crate::video::Video;
+use relit_data::session::FrameIndex;
+use relit_video::Video;
 
 /// The frames of a video that may be chosen, and what was chosen among them.
 #[derive(Debug)]

@@ -2,8 +2,8 @@
 
 use super::Error;
 use super::select::Candidate;
-use crate::session::{FrameEntry, FrameIndex};
-use crate::video::FrameInfo;
+use relit_data::session::{FrameEntry, FrameIndex};
+use relit_video::FrameInfo;
 
 /// The frames that are whole as far as the container knows, with the driver's time stamps and
 /// angles where the session has them.

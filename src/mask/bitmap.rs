@@ -1,6 +1,6 @@
 //! Bits in rows and columns: parts that hang together, growing, counting.
 
-use crate::geometry::Rect;
+use relit_data::geometry::Rect;
 
 /// A bit for each pixel of an image. At least one pixel, sides under 2^31.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use opencv::imgproc;
 
 use super::bitmap::Bitmap;
 use super::{Error, Hints, Iterations, Mark};
-use crate::geometry::Rect;
+use relit_data::geometry::Rect;
 
 /// Any fixed number: GrabCut's first clusters are drawn at random.
 const SEED: i32 = 1;

@@ -6,7 +6,7 @@ use image::{GrayImage, RgbImage};
 use super::Error;
 
 /// A grey PNG of few levels: unfiltered, as suits flat areas.
-pub(super) fn grey_png(image: &GrayImage, what: &'static str) -> Result<Vec<u8>, Error> {
+pub fn grey_png(image: &GrayImage, what: &'static str) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     let encoder =
         PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::NoFilter);
@@ -17,7 +17,7 @@ pub(super) fn grey_png(image: &GrayImage, what: &'static str) -> Result<Vec<u8>,
 }
 
 /// A colour PNG, quickly.
-pub(super) fn rgb_png(image: &RgbImage, what: &'static str) -> Result<Vec<u8>, Error> {
+pub fn rgb_png(image: &RgbImage, what: &'static str) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     let encoder =
         PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);

@@ -1,11 +1,10 @@
-//! What can go wrong between a recording and its mask.
+//! What can go wrong between an image with hints and its mask.
 
 use std::io;
 use std::path::PathBuf;
 
 use super::{Feather, Iterations, MAX_PIXELS, MIN_SIDE};
-use crate::geometry::Rect;
-use crate::{session, video};
+use relit_data::geometry::Rect;
 
 /// Why there is no mask.
 #[derive(Debug, thiserror::Error)]
@@ -119,62 +118,6 @@ pub enum Error {
         /// The encoder's word.
         source: image::ImageError,
     },
-    /// A name for the mask that does not end in `.png`.
-    #[error("{0} cannot be the mask's name: give one that ends in .png")]
-    OutputName(PathBuf),
-    /// A mask for which no record vouches.
-    #[error(
-        "{0} was not made by this program, or was changed since: it may be somebody's handwork and is kept; give --force to replace it, or another name with -o"
-    )]
-    Handmade(PathBuf),
-    /// Where the record would be written stands another file.
-    #[error(
-        "{path} would be overwritten, but is not a mask's record ({why}): move it away, or give another name with -o"
-    )]
-    ForeignFile {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        why: String,
-    },
-    /// A recipe that cannot be followed.
-    #[error("{path} cannot be used as a recipe: {why}")]
-    Recipe {
-        /// The record.
-        path: PathBuf,
-        /// What is wrong with it.
-        why: String,
-    },
-    /// The frame is not the one that the recipe was recorded on.
-    #[error(
-        "frame {frame} of {video} is not the frame that {recipe} was recorded on: give hints of its own, or --force to use the recorded ones"
-    )]
-    OtherFrame {
-        /// The frame's number.
-        frame: u64,
-        /// The video.
-        video: PathBuf,
-        /// The record.
-        recipe: PathBuf,
-    },
-    /// The recipe was followed on the same frame and gave another mask.
-    #[error(
-        "the mask made after {recipe} differs from the recorded one, though the frame is the same (made by {made_by}, now {now}): nothing was written; give --force to take the new mask"
-    )]
-    NotReproduced {
-        /// The record.
-        recipe: PathBuf,
-        /// The software that made the recorded mask.
-        made_by: String,
-        /// This software.
-        now: String,
-    },
-    /// The recording cannot be opened.
-    #[error(transparent)]
-    Session(#[from] session::Error),
-    /// The video cannot be read.
-    #[error(transparent)]
-    Video(#[from] video::Error),
     /// The file system refused.
     #[error("{path} could not be {doing}")]
     Io {
@@ -184,14 +127,6 @@ pub enum Error {
         doing: &'static str,
         /// The system's answer.
         source: io::Error,
-    },
-    /// Any of the others, with the recording that it befell.
-    #[error("no mask for {recording}: {source}")]
-    Recording {
-        /// The recording's id.
-        recording: String,
-        /// What went wrong.
-        source: Box<Self>,
     },
 }
 

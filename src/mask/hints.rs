@@ -8,7 +8,7 @@ use image::{DynamicImage, GrayImage, ImageFormat, ImageReader, RgbaImage};
 
 use super::error::SeedsFault;
 use super::{Error, encode};
-use crate::geometry::Rect;
+use relit_data::geometry::Rect;
 
 /// Every channel at or above this marks the object.
 const OBJECT_FROM: u8 = 250;

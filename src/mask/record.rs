@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::error::SeedsFault;
 use super::{Error, Figures, Hints, Seeds, Settings};
-use crate::geometry::Rect;
+use relit_data::geometry::Rect;
 
 /// The schema that is written and read.
 pub const MASK_SCHEMA: &str = "relit.mask/1";

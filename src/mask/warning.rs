@@ -5,7 +5,7 @@ use std::fmt;
 use super::bitmap::{Bitmap, Part};
 use super::cleanup::Cleaned;
 use super::{Hints, Seeds};
-use crate::geometry::Rect;
+use relit_data::geometry::Rect;
 
 /// Under this part of the frame a mask is small.
 const SMALL: f64 = 0.005;

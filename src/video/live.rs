@@ -102,8 +102,8 @@ fn compressed(decoder: &mut VideoDecoder, data: &[u8]) -> Result<Option<frame::V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Rect;
-    use crate::video::RawFormat;
+    use crate::RawFormat;
+    use relit_data::geometry::Rect;
 
     #[test]
     fn a_raw_picture_is_shown_as_the_camera_sent_it() {

@@ -3,7 +3,7 @@
 use image::RgbImage;
 use image::imageops::{flip_horizontal_in_place, flip_vertical_in_place};
 
-use crate::geometry::Rect;
+use relit_data::geometry::Rect;
 
 /// One of the eight ways to lay a picture: first transposed, then flipped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

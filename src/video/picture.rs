@@ -9,7 +9,7 @@ use yuv::{YuvGrayImage, YuvPlanarImage, YuvRange, YuvStandardMatrix};
 
 use super::FrameFault;
 use super::orientation::Orientation;
-use crate::geometry::Rect;
+use relit_data::geometry::Rect;
 
 /// How luma and colour differences become RGB: range and matrix (ITU-T H.273).
 #[derive(Debug, Clone, Copy, PartialEq)]

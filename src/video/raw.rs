@@ -5,7 +5,7 @@ use ffmpeg_next::format::Pixel;
 use super::FrameFault;
 use super::orientation::Orientation;
 use super::picture::{Picture, plane};
-use crate::geometry::Rect;
+use relit_data::geometry::Rect;
 
 /// How a raw picture's bytes are laid out, without padding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -14,7 +14,7 @@ use super::order::{Ordered, Stamp, mark_wrong_checksums};
 use super::orientation::Orientation;
 use super::picture::Colour;
 use super::{Cut, Error, FrameFault, Pending, Reader, find_cut, open_input};
-use crate::geometry::Rect;
+use relit_data::geometry::Rect;
 
 /// What is known of one frame before it is decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

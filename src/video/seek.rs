@@ -12,7 +12,7 @@ use super::decoder::{self as opening, VideoDecoder};
 use super::picture::{Colour, Picture};
 use super::scan::{Video, orientation};
 use super::{Error, FrameFault, open_input};
-use crate::geometry::Rect;
+use relit_data::geometry::Rect;
 
 /// Packets that are read in search of one frame: more than lie between two key frames.
 const MOST_PACKETS: usize = 600;
@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     fn fixture(name: &str) -> std::path::PathBuf {
-        let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
+        let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures");
         fixtures.join(name).join("video.mkv")
     }
 

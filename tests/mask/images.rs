@@ -1,11 +1,19 @@
-//! The library on images alone.
+//! Masks on images alone.
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly, and the scene serves the program's tests too"
+)]
+
+mod scene;
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use proptest::prelude::*;
-use relit::geometry::Rect;
-use relit::mask::{Error, Feather, Hints, Iterations, Seeds, Settings, Warning, segment};
+use relit_data::geometry::Rect;
+use relit_mask::{Error, Feather, Hints, Iterations, Seeds, Settings, Warning, segment};
 
-use super::scene::{AROUND, HEIGHT, WIDTH, around, disc, disc_share, seeds, strokes};
+use scene::{AROUND, HEIGHT, WIDTH, around, disc, disc_share, seeds, strokes};
 
 #[test]
 fn a_rectangle_finds_the_object_in_it() {

@@ -1,7 +1,7 @@
 //! The scene that the tests cut: a bright disc on a dark ground, and hints for it.
 
 use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage};
-use relit::mask::{Hints, Seeds};
+use relit_mask::{Hints, Seeds};
 
 pub(crate) const WIDTH: u32 = 96;
 pub(crate) const HEIGHT: u32 = 64;

@@ -4,10 +4,11 @@ use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use relit::capture::rig::{Command, Refused, Rig};
-use relit::capture::state::{Phase, RigState, Verdict};
-use relit::capture::{CaptureError, Daemon, Settings};
-use relit::session::{Manifest, SessionWriter};
+use relit_data::session::{Manifest, SessionWriter};
+use relit_rig::capture::{CaptureError, Settings};
+use relit_rig::daemon::Daemon;
+use relit_rig::serve::rig::{Command, Refused, Rig};
+use relit_rig::state::{Phase, RigState, Verdict};
 
 use crate::support::{SHORT, alone, fixture};
 

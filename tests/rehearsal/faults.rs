@@ -4,11 +4,11 @@
 use std::thread;
 use std::time::{Duration, Instant};
 
-use relit::capture::preflight::check_disk;
-use relit::capture::state::{TakeSummary, Verdict};
-use relit::capture::{CaptureError, MeterFault, Refusal, Stopped};
-use relit::session::{Status, recordings};
-use relit::simulator::{Simulator, SimulatorOptions};
+use relit_data::session::{Status, recordings};
+use relit_rig::capture::preflight::check_disk;
+use relit_rig::capture::{CaptureError, MeterFault, Refusal, Stopped};
+use relit_rig::simulator::{Simulator, SimulatorOptions};
+use relit_rig::state::{TakeSummary, Verdict};
 
 use crate::support::{Rehearsal, SHORT};
 

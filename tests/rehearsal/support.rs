@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use relit::capture::state::{Monitor, TakeSummary};
-use relit::capture::{CaptureError, Equipment, Onlookers, Order, Settings, StopRequest, capture};
-use relit::session::Recording;
+use relit_data::session::Recording;
+use relit_rig::capture::{
+    CaptureError, Equipment, Onlookers, Order, Settings, StopRequest, capture,
+};
+use relit_rig::state::{Monitor, TakeSummary};
 
 /// A whole turn, H.264 out of order, which a replay delivers as raw pictures.
 pub(crate) const TURN: &str = "20261120T093015Z-cow";

@@ -1,9 +1,9 @@
 //! Takes that come out well.
 
-use relit::capture::state::Verdict;
 use relit::extract::{Observer, Options, Outcome, extract};
-use relit::session::Status;
-use relit::shard::{Layout, Size};
+use relit_data::session::Status;
+use relit_data::shard::{Layout, Size};
+use relit_rig::state::Verdict;
 
 use crate::support::{Rehearsal, SHORT, TURN, fixture};
 

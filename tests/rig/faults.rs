@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use relit::session::Status;
+use relit_data::session::Status;
 
 use crate::camera::{Unplugged, Vivid};
 use crate::program::{Ended, Running, sessions};

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use relit::session::Status;
-use relit::video::Video;
+use relit_data::session::Status;
+use relit_video::Video;
 
 use crate::program::{Running, sessions};
 

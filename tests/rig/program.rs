@@ -9,7 +9,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 use std::{env, fs};
 
-use relit::session::{Manifest, Recording};
+use relit_data::session::{Manifest, Recording};
 use serde_json::Value;
 
 /// Long enough for an emulated machine whose host is busy.

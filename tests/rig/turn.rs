@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use image::{GrayImage, Luma};
-use relit::session::{FrameEntry, Status};
+use relit_data::session::{FrameEntry, Status};
 
 use crate::camera::{Handed, Trace, VIVID, Vivid};
 use crate::program::{Running, extract, sessions};

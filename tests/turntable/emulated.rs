@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread;
 
-use relit::turntable::{Options, Table, Track};
+use relit_rig::turntable::{Options, Table, Track};
 use tempfile::TempDir;
 
 use crate::rig::{STEP_DEG, paper_turn, spread};

@@ -5,8 +5,8 @@
 
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
-use relit::simulator::SimulatorOptions;
-use relit::turntable::{State, Table, TurntableError};
+use relit_rig::simulator::SimulatorOptions;
+use relit_rig::turntable::{State, Table, TurntableError};
 
 use crate::rig::{Rig, STEP_DEG};
 

@@ -1,8 +1,8 @@
 //! A simulated table, and a host that has its port.
 
-use relit::clock::Clock;
-use relit::simulator::{Simulator, SimulatorOptions};
-use relit::turntable::{Options, Table, TurnPlan, TurnRequest};
+use relit_rig::clock::Clock;
+use relit_rig::simulator::{Simulator, SimulatorOptions};
+use relit_rig::turntable::{Options, Table, TurnPlan, TurnRequest};
 use tempfile::TempDir;
 
 /// Degrees in one step, at the firmware's default of 88.889 steps a degree.

@@ -1,7 +1,7 @@
 //! Whole turns against the simulated table, whose true angle is known at any moment.
 
-use relit::simulator::SimulatorOptions;
-use relit::turntable::{Fault, Homed, State, TurntableError};
+use relit_rig::simulator::SimulatorOptions;
+use relit_rig::turntable::{Fault, Homed, State, TurntableError};
 
 use crate::rig::{Rig, STEP_DEG, paper_turn, spread};
 

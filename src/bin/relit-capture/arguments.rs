@@ -4,11 +4,11 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use relit::camera::lock::Wanted;
-use relit::camera::{self, Fourcc};
-use relit::capture::serve::Token;
-use relit::capture::{FrameSize, ModeWish, Settings};
-use relit::turntable;
+use relit_rig::camera::lock::Wanted;
+use relit_rig::camera::{self, Fourcc};
+use relit_rig::capture::{FrameSize, ModeWish, Settings};
+use relit_rig::serve::Token;
+use relit_rig::turntable;
 
 use crate::environment::runtime_folder;
 use crate::table_arguments::{

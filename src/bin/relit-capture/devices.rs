@@ -2,12 +2,12 @@
 
 use std::process::ExitCode;
 
-use relit::camera::{self, Control, ControlKind, DeviceInfo};
-use relit::clock::Clock;
-use relit::turntable::{TurntableError, find_serial};
+use relit_rig::camera::{self, Control, ControlKind, DeviceInfo};
+use relit_rig::clock::Clock;
+use relit_rig::turntable::{TurntableError, find_serial};
 use serde_json::{Value, json};
 
-use crate::console::{Console, Outcome};
+use relit::console::{Console, Outcome};
 
 pub(crate) fn run(console: Console) -> ExitCode {
     let cameras = camera::list();

@@ -2,8 +2,6 @@
 //! turntable.
 
 mod arguments;
-#[path = "../console/mod.rs"]
-mod console;
 mod devices;
 mod environment;
 mod recording;
@@ -15,7 +13,7 @@ mod turntable;
 use std::process::ExitCode;
 
 use arguments::Command;
-use console::Console;
+use relit::console::Console;
 
 fn main() -> ExitCode {
     let arguments = arguments::parse();

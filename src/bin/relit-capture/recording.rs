@@ -6,17 +6,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use relit::capture::state::{Monitor, Phase, RigState, TakeSummary, Verdict};
-use relit::capture::{
+use relit_rig::capture::{
     CaptureError, Equipment, Exclusive, Onlookers, Order, Settings, StopRequest, Stopped, capture,
     salvage,
 };
-use relit::turntable::Address;
+use relit_rig::state::{Monitor, Phase, RigState, TakeSummary, Verdict};
+use relit_rig::turntable::Address;
 use serde_json::json;
 
 use crate::arguments::Record;
-use crate::console::{Console, Outcome};
 use crate::environment::at_end;
+use relit::console::{Console, Outcome};
 
 /// How often progress is looked at.
 const GLANCE: Duration = Duration::from_millis(100);

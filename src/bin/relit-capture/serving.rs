@@ -3,13 +3,14 @@
 use std::fs;
 use std::sync::Arc;
 
-use relit::capture::serve::{Announcement, ServeError, ServeOptions, Shutdown, serve};
-use relit::capture::{CaptureError, Daemon};
+use relit_rig::capture::CaptureError;
+use relit_rig::daemon::Daemon;
+use relit_rig::serve::{Announcement, ServeError, ServeOptions, Shutdown, serve};
 use serde_json::json;
 
 use crate::arguments::Serve;
-use crate::console::{Console, Outcome};
 use crate::environment::{at_end, service_manager};
+use relit::console::{Console, Outcome};
 
 /// Why the rig is not served.
 #[derive(Debug, thiserror::Error)]

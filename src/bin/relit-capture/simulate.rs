@@ -5,13 +5,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use relit::clock::Clock;
-use relit::simulator::{Error, Faults, Simulator, SimulatorCounts, SimulatorOptions, WireCounts};
+use relit_rig::clock::Clock;
+use relit_rig::simulator::{
+    Error, Faults, Simulator, SimulatorCounts, SimulatorOptions, WireCounts,
+};
 use serde_json::json;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use crate::console::{Console, Outcome};
 use crate::table_arguments::SimulateArguments;
+use relit::console::{Console, Outcome};
 
 /// How often a look is taken at whether to end.
 const LOOK: Duration = Duration::from_millis(50);

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use relit::turntable::Address;
+use relit_rig::turntable::Address;
 
 pub(crate) const TURNTABLE_EXAMPLES: &str = "\
 Examples:

@@ -3,14 +3,14 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use relit::turntable::{
+use relit_rig::turntable::{
     Address, Homed, Options, Owner, Status, Table, TurntableError, find_serial,
 };
 use serde_json::json;
 
-use crate::console::{Console, Outcome};
 use crate::environment::{at_end, runtime_folder};
 use crate::table_arguments::{Action, TurntableArguments};
+use relit::console::{Console, Outcome};
 
 pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcome, TurntableError> {
     let port = match &asked.turntable {

@@ -7,7 +7,7 @@ use clap::builder::RangedU64ValueParser;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use relit::extract::{MAX_MARGIN, MAX_SIDE, Options};
-use relit::shard::{Layout, Size};
+use relit_data::shard::{Layout, Size};
 
 const EXAMPLES: &str = "\
 Examples:

@@ -6,10 +6,10 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::ProgressBar;
 use relit::extract::{Error, Observer, Options, Outcome, extract};
-use relit::shard::SessionEntry;
+use relit_data::shard::SessionEntry;
 use serde_json::json;
 
-use crate::console::{self, Console};
+use relit::console::{self, Console};
 
 pub(crate) fn run(
     console: Console,

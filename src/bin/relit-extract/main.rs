@@ -2,15 +2,13 @@
 //! set back.
 
 mod arguments;
-#[path = "../console/mod.rs"]
-mod console;
 mod extracting;
 mod verifying;
 
 use std::process::ExitCode;
 
 use arguments::Command;
-use console::Console;
+use relit::console::Console;
 
 fn main() -> ExitCode {
     let arguments = arguments::parse();

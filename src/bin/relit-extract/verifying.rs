@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use relit::shard::{Error, verify};
+use relit_data::shard::{Error, verify};
 use serde_json::json;
 
-use crate::console::{Console, Outcome};
+use relit::console::{Console, Outcome};
 
 /// How many problems a person is told one by one.
 const TOLD: usize = 50;

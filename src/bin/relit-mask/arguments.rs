@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::error::ErrorKind;
 use clap::{ArgGroup, CommandFactory, Parser};
-use relit::geometry::Rect;
-use relit::mask::files::{MaskFiles, Request};
-use relit::mask::{Error, Feather, Hints, Iterations, Seeds, Settings};
+use relit::masking::{Error, MaskFiles, Request};
+use relit_data::geometry::Rect;
+use relit_mask::{Feather, Hints, Iterations, Seeds, Settings};
 
 const EXAMPLES: &str = "\
 Examples:

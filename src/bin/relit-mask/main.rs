@@ -1,20 +1,18 @@
 //! relit-mask: which pixels of a recording are the object.
 
 mod arguments;
-#[path = "../console/mod.rs"]
-mod console;
 mod report;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use relit::mask::Error;
-use relit::mask::files::make;
-use relit::session::recordings;
+use relit::masking::Error;
+use relit::masking::make;
+use relit_data::session::recordings;
 
 use arguments::Arguments;
-use console::{Console, Outcome};
+use relit::console::{Console, Outcome};
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();

@@ -1,9 +1,9 @@
 //! What relit-mask says of a mask that it made.
 
-use relit::mask::files::Made;
+use relit::masking::Made;
 use serde_json::json;
 
-use super::console::Console;
+use relit::console::Console;
 
 /// Tells of one mask: its warnings, then where it is and how large.
 pub(crate) fn tell(made: &Made, console: Console) {

@@ -6,7 +6,7 @@
 #![allow(clippy::expect_used, reason = "a panic is how a target tells")]
 
 use libfuzzer_sys::fuzz_target;
-use relit::session::FrameIndex;
+use relit_data::session::FrameIndex;
 
 fuzz_target!(|bytes: &[u8]| {
     let Ok(index) = FrameIndex::parse(bytes) else {

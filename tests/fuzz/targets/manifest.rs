@@ -10,7 +10,7 @@ mod completed;
 use std::path::{Component, Path};
 
 use libfuzzer_sys::fuzz_target;
-use relit::session::{Manifest, is_session_name};
+use relit_data::session::{Manifest, is_session_name};
 
 /// A whole manifest.
 const WHOLE: &[u8] = include_bytes!("../seeds/manifest/complete.json");

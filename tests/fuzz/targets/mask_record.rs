@@ -7,7 +7,7 @@
 mod completed;
 
 use libfuzzer_sys::fuzz_target;
-use relit::mask::{MASK_SCHEMA, MaskRecord, RecordedHints};
+use relit_mask::{MASK_SCHEMA, MaskRecord, RecordedHints};
 
 /// A whole record.
 const WHOLE: &[u8] = include_bytes!("../seeds/mask_record/both.json");

@@ -8,7 +8,7 @@
 use std::io::{self, Cursor, Read, Seek, SeekFrom};
 
 use libfuzzer_sys::fuzz_target;
-use relit::video::{Cut, find_cut};
+use relit_video::{Cut, find_cut};
 
 /// The id of the element that a Matroska file begins with.
 const EBML: [u8; 4] = [0x1A, 0x45, 0xDF, 0xA3];

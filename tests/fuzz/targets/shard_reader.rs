@@ -11,7 +11,7 @@ use std::collections::HashSet;
 use std::io::{self, Read};
 
 use libfuzzer_sys::fuzz_target;
-use relit::shard::{ShardReader, ShardSample};
+use relit_data::shard::{ShardReader, ShardSample};
 
 const BLOCK: usize = 512;
 /// Where a header has its checksum.

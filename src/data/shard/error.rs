@@ -1,0 +1,315 @@
+//! What can go wrong in this room.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a data set could not be written, read or vouched for.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused.
+    #[error(
+        "could not {doing} {path}: check that it exists, may be read and written, and that the disk has room",
+        path = .path.display()
+    )]
+    Io {
+        /// What was tried, as a verb.
+        doing: &'static str,
+        /// With what.
+        path: PathBuf,
+        /// The operating system's reason.
+        source: io::Error,
+    },
+    /// Another process writes into the folder.
+    #[error(
+        "{path} is being written by another process: wait for it to end, or give another folder",
+        path = .path.display()
+    )]
+    Locked {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The session is being written already, or a killed run left its spool behind.
+    #[error(
+        "{path} exists: either the session is being written already, or a killed run left it (the next locked run removes it)",
+        path = .path.display()
+    )]
+    Busy {
+        /// The file or folder in the way.
+        path: PathBuf,
+    },
+    /// A session's id cannot be the name of a file.
+    #[error(
+        "{name:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most 120 bytes, not starting with '.'"
+    )]
+    SessionName {
+        /// The name.
+        name: String,
+    },
+    /// A path, in `dataset.json` or asked for, that leads out of the data set or is spelled oddly.
+    #[error(
+        "{path:?} cannot be a file of a data set: use a relative path with `/`, without `..`, `\\` and `:`; do not trust a dataset.json that names it"
+    )]
+    UnsafePath {
+        /// The path.
+        path: String,
+    },
+    /// A layout of an unknown name.
+    #[error("{name:?} is not a layout: give webdataset or relit")]
+    UnknownLayout {
+        /// The name.
+        name: String,
+    },
+    /// A session of no samples, or of too many.
+    #[error("a session of {samples} samples cannot be written: give 1 to {most}", most = super::MAX_SAMPLES)]
+    SampleCount {
+        /// The number asked for.
+        samples: u32,
+    },
+    /// A sample of another session was pushed.
+    #[error("sample {index} belongs to session {found:?}, but {expected:?} is being written")]
+    WrongSession {
+        /// The sample's index.
+        index: u32,
+        /// The session of the sample.
+        found: String,
+        /// The session of the writer.
+        expected: String,
+    },
+    /// A sample with an index that the session does not have.
+    #[error("session {session:?} has samples 0 to {last}, and sample {index} was given")]
+    OutOfRange {
+        /// The session.
+        session: String,
+        /// The sample's index.
+        index: u32,
+        /// The largest index there is.
+        last: u32,
+    },
+    /// A sample was pushed twice.
+    #[error("sample {index} of session {session:?} was given twice")]
+    DoubledSample {
+        /// The session.
+        session: String,
+        /// The sample's index.
+        index: u32,
+    },
+    /// Samples were not pushed.
+    #[error(
+        "session {session:?} is not whole: sample {index} is the first of {missing} that were not given"
+    )]
+    MissingSample {
+        /// The session.
+        session: String,
+        /// The smallest missing index.
+        index: u32,
+        /// How many are missing.
+        missing: usize,
+    },
+    /// A record with a number that JSON cannot hold.
+    #[error("{field} of sample {index} of session {session:?} is not a finite number")]
+    NotFinite {
+        /// The session.
+        session: String,
+        /// The sample's index.
+        index: u32,
+        /// The record's field.
+        field: &'static str,
+    },
+    /// Two sizes that must be equal are not.
+    #[error("{what} is {}x{} pixels where {}x{} were expected", size[0], size[1], expected[0], expected[1])]
+    SizeMismatch {
+        /// What has the wrong size.
+        what: &'static str,
+        /// Its width and height, pixels.
+        size: [u32; 2],
+        /// Width and height that it should have, pixels.
+        expected: [u32; 2],
+    },
+    /// A mask with a value between object and background.
+    #[error("the mask has the value {value} at pixel ({x}, {y}): only 0 and 255 are allowed")]
+    MaskValue {
+        /// The value.
+        value: u8,
+        /// Column, pixels.
+        x: u32,
+        /// Row, pixels.
+        y: u32,
+    },
+    /// An image that PNG cannot hold.
+    #[error("could not encode an image of {width}x{height} pixels as PNG")]
+    Encode {
+        /// Width, pixels.
+        width: u32,
+        /// Height, pixels.
+        height: u32,
+        /// The encoder's reason.
+        source: png::EncodingError,
+    },
+    /// A PNG that cannot be decoded.
+    #[error("the PNG is damaged: restore it, or extract the session anew")]
+    Decode {
+        /// The decoder's reason.
+        #[from]
+        source: png::DecodingError,
+    },
+    /// A PNG of another kind than the data set has.
+    #[error("the PNG is {found} where {expected} was expected")]
+    PixelFormat {
+        /// Its pixel format.
+        found: String,
+        /// The expected one.
+        expected: &'static str,
+    },
+    /// A PNG that is too large to be decoded.
+    #[error("the PNG claims {width}x{height} pixels: more than {most} are not decoded")]
+    TooManyPixels {
+        /// Width, pixels.
+        width: u32,
+        /// Height, pixels.
+        height: u32,
+        /// The limit, pixels.
+        most: u64,
+    },
+    /// A table that could not be written or read.
+    #[error("the table {path} could not be {doing}", path = .path.display())]
+    Table {
+        /// The table.
+        path: PathBuf,
+        /// Written or read.
+        doing: &'static str,
+        /// The Parquet library's reason.
+        source: parquet::errors::ParquetError,
+    },
+    /// A table without a column, or with a value that its column cannot have.
+    #[error("the table {path} is not one of this data set: row {row} has no valid {column}", path = .path.display())]
+    TableValue {
+        /// The table.
+        path: PathBuf,
+        /// The row, 0-based.
+        row: usize,
+        /// The column.
+        column: &'static str,
+    },
+    /// `dataset.json` is not what it should be.
+    #[error("{path} is not a valid description of a data set: restore it, or write the data set anew", path = .path.display())]
+    Description {
+        /// The file.
+        path: PathBuf,
+        /// Where and why.
+        source: serde_json::Error,
+    },
+    /// `dataset.json` of another version.
+    #[error(
+        "{path} has the schema {found:?}, but {expected:?} is read here: use the version of relit that wrote it",
+        path = .path.display()
+    )]
+    Schema {
+        /// The file.
+        path: PathBuf,
+        /// Its schema.
+        found: String,
+        /// The schema that is read here.
+        expected: &'static str,
+    },
+    /// A record could not be turned to JSON.
+    #[error("could not write {what} as JSON")]
+    Json {
+        /// What was to be written.
+        what: String,
+        /// The reason.
+        source: serde_json::Error,
+    },
+    /// A folder without `dataset.json`.
+    #[error(
+        "{path} holds no data set: there is no dataset.json; give the folder that relit-extract wrote",
+        path = .path.display()
+    )]
+    NoDataset {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A session that the data set does not have.
+    #[error("the data set has no session {session:?}")]
+    NoSession {
+        /// The session's id.
+        session: String,
+    },
+    /// A session without a shard.
+    #[error("session {session:?} has no shard in dataset.json")]
+    NoShard {
+        /// The session's id.
+        session: String,
+    },
+    /// A file of the data set is not the one that was written.
+    #[error("{file} is not the file that dataset.json vouches for: {what}")]
+    Changed {
+        /// The file, relative to the data set.
+        file: String,
+        /// How it differs.
+        what: String,
+    },
+    /// A tar that ends too early.
+    #[error("the shard ends at byte {offset}, in the middle: it was cut off, copy it again")]
+    ShardTruncated {
+        /// How many bytes there are.
+        offset: u64,
+    },
+    /// A block of a tar that should be a header and is none.
+    #[error("the block at byte {offset} of the shard is not a tar header: the shard is damaged")]
+    ShardHeader {
+        /// Where the block starts.
+        offset: u64,
+    },
+    /// A member, or a sample, that is too large to be held in memory.
+    #[error(
+        "{path:?} at byte {offset} of the shard claims more than {limit} bytes: it is not read"
+    )]
+    ShardTooLarge {
+        /// The member.
+        path: String,
+        /// Where its header starts.
+        offset: u64,
+        /// The limit, bytes.
+        limit: u64,
+    },
+    /// A member whose name is not text.
+    #[error("the name of the member at byte {offset} of the shard is not UTF-8")]
+    ShardName {
+        /// Where its header starts.
+        offset: u64,
+    },
+    /// A sample with the same member twice, or with too many.
+    #[error(
+        "sample {key:?} has {path:?} twice, or has more than {most} members: pack the shard anew, each member once"
+    )]
+    ShardSample {
+        /// The sample's key.
+        key: String,
+        /// The member.
+        path: String,
+        /// The largest number of members.
+        most: usize,
+    },
+    /// A shard that could not be read.
+    #[error(
+        "could not read the shard at byte {offset}: check the disk or connection that it comes from, and read it again"
+    )]
+    ShardRead {
+        /// How many bytes were read.
+        offset: u64,
+        /// The operating system's reason.
+        source: io::Error,
+    },
+}
+
+impl Error {
+    /// For `map_err`: an I/O error with what was tried and with what.
+    pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io {
+            doing,
+            path: path.to_owned(),
+            source,
+        }
+    }
+}

@@ -1,0 +1,350 @@
+//! Whether a tar holds the samples of its session, each once, whole and in its place.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::sample::{SessionMask, check_image, check_record};
+use super::{Found, SessionCheck};
+use crate::causes::with_causes;
+use crate::shard::Error;
+use crate::shard::digest::{Digest, HashingReader};
+use crate::shard::measure::MaskSpans;
+use crate::shard::names::{Part, parse_member};
+use crate::shard::order::order;
+use crate::shard::record::FrameRecord;
+use crate::shard::tarball::{Member, TarReader};
+use crate::shard::vouch::compare;
+
+/// Largest member that is read, bytes.
+const MOST_BYTES: u64 = 256 << 20;
+/// Samples that are checked side by side, and the bytes after which no more are gathered.
+const BATCH_SAMPLES: usize = 64;
+const BATCH_BYTES: usize = 64 << 20;
+
+type Source = HashingReader<BufReader<File>>;
+
+pub(super) fn check(check: &mut SessionCheck<'_>) -> Found {
+    let path = check.out.join(&check.shard.file);
+    let samples = check.session.samples as usize;
+    match File::open(&path).map_err(Error::io("open", &path)) {
+        Ok(file) => {
+            let source = HashingReader::new(BufReader::with_capacity(1 << 18, file));
+            Walk::new(check, TarReader::new(source, MOST_BYTES)).run()
+        }
+        Err(error) => {
+            check.note(None, with_causes(&error));
+            Found {
+                samples: 0,
+                records: vec![None; samples],
+            }
+        }
+    }
+}
+
+/// Neighbouring members of one sample.
+struct Gathered {
+    index: u32,
+    image: Option<Vec<u8>>,
+    json: Option<Vec<u8>>,
+    mask: Option<Arc<MaskSpans>>,
+}
+
+/// What was found in gathered members.
+struct Checked {
+    index: u32,
+    problems: Vec<String>,
+    record: Option<FrameRecord>,
+}
+
+/// A walk through a tar.
+struct Walk<'a, 'b> {
+    check: &'a mut SessionCheck<'b>,
+    tar: TarReader<Source>,
+    order: Vec<u32>,
+    /// Place of each sample in the order, by index.
+    rank: Vec<u32>,
+    /// Which parts were seen, by index.
+    seen: Vec<[bool; 3]>,
+    /// The places that the members seen should have, in the order in which they stand.
+    places: Vec<u32>,
+    mask: SessionMask,
+    batch: Vec<Gathered>,
+    batch_bytes: usize,
+    records: Vec<Option<FrameRecord>>,
+}
+
+impl<'a, 'b> Walk<'a, 'b> {
+    fn new(check: &'a mut SessionCheck<'b>, tar: TarReader<Source>) -> Self {
+        let samples = check.session.samples;
+        let order = order(samples);
+        let mut rank = vec![0; samples as usize];
+        for (place, &index) in (0..).zip(&order) {
+            if let Some(slot) = rank.get_mut(index as usize) {
+                *slot = place;
+            }
+        }
+        Self {
+            check,
+            tar,
+            order,
+            rank,
+            seen: vec![[false; 3]; samples as usize],
+            places: Vec::new(),
+            mask: SessionMask::default(),
+            batch: Vec::new(),
+            batch_bytes: 0,
+            records: vec![None; samples as usize],
+        }
+    }
+
+    fn run(mut self) -> Found {
+        loop {
+            match self.tar.next() {
+                Ok(Some(member)) => self.take(member),
+                Ok(None) => break,
+                Err(error) => {
+                    let index = self.expected();
+                    self.check.note(index, with_causes(&error));
+                    let over = matches!(
+                        error,
+                        Error::ShardRead { .. } | Error::ShardTruncated { .. }
+                    );
+                    if over || !self.resume() {
+                        break;
+                    }
+                }
+            }
+        }
+        self.check_batch();
+        self.note_missing();
+        self.note_displaced();
+        self.finish()
+    }
+
+    /// Goes on behind damage; false where nothing follows.
+    fn resume(&mut self) -> bool {
+        self.tar.resume().unwrap_or_else(|error| {
+            self.check.note(None, with_causes(&error));
+            false
+        })
+    }
+
+    /// The sample of which the next member should be; none behind the last.
+    fn expected(&self) -> Option<u32> {
+        let next = self.places.last().map_or(0, |place| place + 1);
+        self.order.get(next as usize / Part::ALL.len()).copied()
+    }
+
+    fn take(&mut self, member: Member) {
+        let Some((index, part)) = parse_member(&self.check.session.id, &member.path)
+            .filter(|(index, _)| *index < self.check.session.samples)
+        else {
+            let what = format!(
+                "{:?} at byte {} does not belong here",
+                member.path, member.offset
+            );
+            return self.check.note(None, what);
+        };
+        let slot = index as usize;
+        if !member.canonical {
+            let what = format!("header or padding of its {} are damaged", part.suffix());
+            self.check.note(Some(index), what);
+        }
+        let seen = self
+            .seen
+            .get_mut(slot)
+            .and_then(|parts| parts.get_mut(part as usize));
+        if seen.is_none_or(|seen| std::mem::replace(seen, true)) {
+            let what = format!("its {} stands in the shard twice", part.suffix());
+            return self.check.note(Some(index), what);
+        }
+        let rank = self.rank.get(slot).copied().unwrap_or_default();
+        self.places
+            .push(rank * Part::ALL.len() as u32 + part as u32);
+        self.gather(index, part, member.data);
+    }
+
+    fn gather(&mut self, index: u32, part: Part, data: Vec<u8>) {
+        if self.batch.last().is_none_or(|last| last.index != index) {
+            if self.batch.len() >= BATCH_SAMPLES || self.batch_bytes >= BATCH_BYTES {
+                self.check_batch();
+            }
+            self.batch.push(Gathered {
+                index,
+                image: None,
+                json: None,
+                mask: None,
+            });
+        }
+        if part == Part::Mask {
+            let expected = self.check.row(index).map(|row| row.mask_blake3);
+            for what in self.mask.look(&data, expected.as_ref()) {
+                self.check.note(Some(index), what);
+            }
+        }
+        let mask = self.mask.get();
+        let Some(gathered) = self.batch.last_mut() else {
+            return;
+        };
+        gathered.mask = mask;
+        if part != Part::Mask {
+            self.batch_bytes += data.len();
+        }
+        match part {
+            Part::Image => gathered.image = Some(data),
+            Part::Record => gathered.json = Some(data),
+            Part::Mask => {}
+        }
+    }
+
+    fn check_batch(&mut self) {
+        let check = &*self.check;
+        let checked: Vec<Checked> = self
+            .batch
+            .par_iter()
+            .map(|gathered| check_gathered(check, gathered))
+            .collect();
+        for Checked {
+            index,
+            problems,
+            record,
+        } in checked
+        {
+            for what in problems {
+                self.check.note(Some(index), what);
+            }
+            if let (Some(slot), Some(record)) = (self.records.get_mut(index as usize), record) {
+                *slot = Some(record);
+            }
+        }
+        self.check.progress.add(self.batch.len());
+        self.batch.clear();
+        self.batch_bytes = 0;
+    }
+
+    fn note_missing(&mut self) {
+        for (index, parts) in (0..).zip(&self.seen) {
+            if parts.iter().all(|&seen| !seen) {
+                self.check
+                    .note(Some(index), "the sample is missing".to_owned());
+                continue;
+            }
+            for (part, _) in Part::ALL.iter().zip(parts).filter(|(_, seen)| !**seen) {
+                self.check
+                    .note(Some(index), format!("its {} is missing", part.suffix()));
+            }
+        }
+    }
+
+    fn note_displaced(&mut self) {
+        let mut samples: Vec<u32> = displaced(&self.places)
+            .into_iter()
+            .filter_map(|place| self.order.get(place as usize / Part::ALL.len()).copied())
+            .collect();
+        samples.sort_unstable();
+        samples.dedup();
+        for index in samples {
+            let what = "it, or a member of it, stands in another place than it was written to";
+            self.check.note(Some(index), what.to_owned());
+        }
+    }
+
+    /// Reads what is left, and compares the file as a whole.
+    fn finish(self) -> Found {
+        let Self {
+            check,
+            tar,
+            seen,
+            records,
+            ..
+        } = self;
+        let mut source = tar.into_inner();
+        match source.drain() {
+            Ok(0) => {}
+            Ok(bytes) => check.note(None, format!("{bytes} bytes follow the end of the tar")),
+            Err(error) => check.note(None, format!("could not be read to its end: {error}")),
+        }
+        let shard = check.shard;
+        if let Err(error) = compare(&shard.file, (shard.bytes, shard.blake3), source.finish()) {
+            check.note(None, with_causes(&error));
+        }
+        let whole = seen
+            .iter()
+            .filter(|parts| parts.iter().all(|&seen| seen))
+            .count();
+        Found {
+            samples: whole as u64,
+            records,
+        }
+    }
+}
+
+fn check_gathered(check: &SessionCheck<'_>, gathered: &Gathered) -> Checked {
+    let row = check.row(gathered.index);
+    let (mut problems, record) = match &gathered.json {
+        Some(json) => check_record(json, row),
+        None => (Vec::new(), None),
+    };
+    if let Some(png) = &gathered.image {
+        let known = row.map(|row| &row.record).or(record.as_ref());
+        let digest = Digest::of(png);
+        let mask = gathered.mask.as_deref();
+        problems.extend(check_image(check.settings, png, &digest, row, known, mask).0);
+    }
+    Checked {
+        index: gathered.index,
+        problems,
+        record,
+    }
+}
+
+/// The fewest values that have to be taken out so that the rest ascends: those outside one
+/// longest ascending subsequence.
+fn displaced(values: &[u32]) -> Vec<u32> {
+    // `tails[k]` is the position of the smallest value that ends an ascent of k + 1 values.
+    let mut tails: Vec<usize> = Vec::new();
+    let mut before: Vec<Option<usize>> = Vec::with_capacity(values.len());
+    let at = |position: usize| values.get(position).copied().unwrap_or_default();
+    for (position, &value) in values.iter().enumerate() {
+        let length = tails.partition_point(|&tail| at(tail) < value);
+        before.push(
+            length
+                .checked_sub(1)
+                .and_then(|last| tails.get(last).copied()),
+        );
+        match tails.get_mut(length) {
+            Some(tail) => *tail = position,
+            None => tails.push(position),
+        }
+    }
+    let mut ascending = vec![false; values.len()];
+    let mut position = tails.last().copied();
+    while let Some(here) = position {
+        if let Some(slot) = ascending.get_mut(here) {
+            *slot = true;
+        }
+        position = before.get(here).copied().flatten();
+    }
+    values
+        .iter()
+        .zip(ascending)
+        .filter(|(_, kept)| !kept)
+        .map(|(&value, _)| value)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_was_moved_is_displaced() {
+        assert!(displaced(&[]).is_empty());
+        assert!(displaced(&[0, 1, 2, 5, 6]).is_empty());
+        assert_eq!(displaced(&[0, 4, 2, 3, 1, 5]), [4, 1]);
+        assert_eq!(displaced(&[3, 0, 1, 2]), [3]);
+    }
+}

@@ -1,0 +1,227 @@
+//! What can go wrong with a camera.
+
+use std::io;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::control::ControlId;
+use super::format::Fourcc;
+use relit_data::session;
+use relit_video as video;
+
+/// Why a camera could not be found, set, or read.
+#[derive(Debug, thiserror::Error)]
+pub enum CameraError {
+    /// A text that is no address or mode.
+    #[error("{text:?} is no camera's address: {fault}")]
+    Address {
+        /// The text.
+        text: String,
+        /// What is wrong in it.
+        fault: AddressFault,
+    },
+    /// No such device.
+    #[error("there is no camera at {device}: plug it in, or look at the list of devices")]
+    NotThere {
+        /// The device.
+        device: String,
+    },
+    /// The device may not be opened.
+    #[error(
+        "{device} may not be opened by this user: add the user to the group `video` and log in again"
+    )]
+    NotPermitted {
+        /// The device.
+        device: String,
+    },
+    /// A device that gives no frames, or not in a way that can be used here.
+    #[error("{device} cannot be used as a camera ({why}): give another device")]
+    NotACamera {
+        /// The device.
+        device: String,
+        /// What it lacks.
+        why: String,
+    },
+    /// Another program streams from the device.
+    #[error("{device} is in use by another program: close that one (`fuser {device}` names it)")]
+    InUse {
+        /// The device.
+        device: String,
+    },
+    /// The device went away.
+    #[error("{device} was unplugged: plug it in again and start anew")]
+    Unplugged {
+        /// The device.
+        device: String,
+    },
+    /// No frame came in time.
+    #[error(
+        "{device} gave no frame for {:.1} s: check its cable, and that its mode fits the bus",
+        .waited.as_secs_f64()
+    )]
+    Timeout {
+        /// The device.
+        device: String,
+        /// How long was waited.
+        waited: Duration,
+    },
+    /// The driver reports an error of the running stream.
+    #[error("the stream of {device} broke while it was {doing}: stop and start it again")]
+    Stream {
+        /// The device.
+        device: String,
+        /// What was done, as a participle: "read".
+        doing: &'static str,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// A frame was asked for before the start.
+    #[error("{device} is not started: start it before asking for frames")]
+    NotStarted {
+        /// The device.
+        device: String,
+    },
+    /// The device refused a request.
+    #[error("{device} refused when {doing}: unplug it and plug it in again if this stays")]
+    Refused {
+        /// The device.
+        device: String,
+        /// What was done: "its formats were read".
+        doing: &'static str,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// A pixel format that is not taken here.
+    #[error(
+        "{fourcc} frames cannot be recorded: ask {device} for MJPG, H264, YUYV, NV12, RGB3, GREY or 8-bit Bayer"
+    )]
+    Format {
+        /// The device.
+        device: String,
+        /// The format.
+        fourcc: Fourcc,
+    },
+    /// A control could not be read or set.
+    #[error("control {control} of {device} cannot be {doing}: {fault}")]
+    Control {
+        /// The device.
+        device: String,
+        /// The control's number.
+        control: ControlId,
+        /// What was done, as a participle: "set to 5".
+        doing: String,
+        /// Why not.
+        fault: ControlFault,
+    },
+    /// Something that this kind of camera does not have.
+    #[error("{device} cannot do this: {what}")]
+    Unsupported {
+        /// The device.
+        device: String,
+        /// What it cannot do, and what can.
+        what: &'static str,
+    },
+    /// The portable camera library failed.
+    #[error("{device} failed when {doing} ({why}): check that no other program uses it")]
+    Backend {
+        /// The device.
+        device: String,
+        /// What was done: "it was opened".
+        doing: &'static str,
+        /// The library's words.
+        why: String,
+    },
+    /// A replay has come to its end.
+    #[error(
+        "the recording {path} ends after {frames} frames: add `loop=1` to play it again and again"
+    )]
+    EndOfRecording {
+        /// The recording.
+        path: PathBuf,
+        /// Frames delivered.
+        frames: u64,
+    },
+    /// A recording that cannot be replayed.
+    #[error("{path} cannot be replayed: {why}")]
+    Replay {
+        /// The recording.
+        path: PathBuf,
+        /// Why, and what to do.
+        why: String,
+    },
+    /// The session of a replay cannot be read.
+    #[error(transparent)]
+    Session(#[from] session::Error),
+    /// The video of a replay cannot be read.
+    #[error(transparent)]
+    Video(#[from] video::Error),
+}
+
+/// What is wrong in an address or mode.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum AddressFault {
+    /// None of the known beginnings.
+    #[error("write v4l2:/dev/video0, nokhwa:0 or replay:PATH")]
+    Scheme,
+    /// Nothing behind the colon.
+    #[error("nothing stands behind the colon")]
+    Empty,
+    /// A device name that cannot be one.
+    #[error("a device is named by its path, such as /dev/video0")]
+    Path,
+    /// Not a camera's number.
+    #[error("a number from 0 stands behind nokhwa:")]
+    Number,
+    /// An option that is not known.
+    #[error(
+        "the option {0:?} is not known; there are speed, loop, drop, damage, flag, unplug, resize and stall"
+    )]
+    Option(String),
+    /// An option that stands there twice.
+    #[error("the option {0:?} stands there twice")]
+    Twice(String),
+    /// An option's value that cannot be one.
+    #[error("{value:?} cannot be the value of {option}")]
+    Value {
+        /// The option.
+        option: String,
+        /// What stands there.
+        value: String,
+    },
+    /// Not a mode.
+    #[error("a mode is written as format:widthxheight@rate, such as MJPG:1920x1080@30")]
+    Mode,
+}
+
+/// Why a control could not be read or set.
+#[derive(Debug, thiserror::Error)]
+pub enum ControlFault {
+    /// The camera has no such control.
+    #[error("the camera has no such control")]
+    Unknown,
+    /// A menu has no such item.
+    #[error("it takes one of {}", list_words(.0))]
+    NoItem(Vec<i64>),
+    /// The value is out of range.
+    #[error("it takes values from {minimum} to {maximum}")]
+    Range {
+        /// Smallest value.
+        minimum: i64,
+        /// Largest value.
+        maximum: i64,
+    },
+    /// An automatic rules it, or it is read-only.
+    #[error("it is read-only, or an automatic rules it: switch that off first")]
+    Locked,
+    /// The stream or another program holds it.
+    #[error("it is held while the camera streams, or by another program: stop that first")]
+    Busy,
+    /// Anything else.
+    #[error("the driver answers: {0}")]
+    Driver(io::Error),
+}
+
+fn list_words(values: &[i64]) -> String {
+    let words: Vec<String> = values.iter().map(i64::to_string).collect();
+    words.join(", ")
+}

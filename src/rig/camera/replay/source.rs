@@ -1,0 +1,155 @@
+//! Where a replay's frames come from: the file's own packets, or a thread that decodes.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
+
+use super::CameraError;
+use crate::camera::Fourcc;
+use relit_video::{FrameFault, Packets, Pending, RawLayout, Video};
+
+/// Decoded frames that may wait to be fetched.
+const AHEAD: usize = 4;
+/// Threads of a decoder that decodes ahead.
+const DECODING_THREADS: usize = 2;
+
+/// How a video's frames are delivered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Delivery {
+    pub(super) fourcc: Fourcc,
+    /// The layout to decode to; `None` where frames come as they are coded.
+    decoded: Option<RawLayout>,
+}
+
+/// A frame of the recording.
+#[derive(Debug)]
+pub(super) struct Taken {
+    /// Position in the recording.
+    pub(super) number: u64,
+    pub(super) data: Vec<u8>,
+    /// True where the container says that its data are not whole.
+    pub(super) damaged: bool,
+}
+
+#[derive(Debug)]
+pub(super) enum Source {
+    Coded(Packets),
+    Decoded(Receiver<Taken>),
+}
+
+impl Delivery {
+    /// As the file has the frames, where a camera could have sent them so; else decoded.
+    pub(super) fn of(video: &Video) -> Result<Self, CameraError> {
+        let facts = video.facts();
+        let coded = match (facts.codec.as_str(), facts.pixel_format.as_str()) {
+            ("mjpeg", _) => Some(Fourcc::MJPG),
+            ("h264", _) => Some(Fourcc::H264),
+            ("rawvideo", "yuyv422") => Some(Fourcc::YUYV),
+            ("rawvideo", "nv12") => Some(Fourcc::NV12),
+            ("rawvideo", "rgb24") => Some(Fourcc::RGB3),
+            ("rawvideo", "gray") => Some(Fourcc::GREY),
+            _ => None,
+        };
+        if let Some(fourcc) = coded.filter(|_| video.is_in_order()) {
+            return Ok(Self {
+                fourcc,
+                decoded: None,
+            });
+        }
+        let layout = first_layout(video)?;
+        Ok(Self {
+            fourcc: match layout {
+                RawLayout::Grey => Fourcc::GREY,
+                RawLayout::Rgb24 => Fourcc::RGB3,
+                RawLayout::Nv12 => Fourcc::NV12,
+                RawLayout::Yuyv => Fourcc::YUYV,
+            },
+            decoded: Some(layout),
+        })
+    }
+
+    /// Width and height of the frames delivered: a rotation is applied where they are decoded.
+    pub(super) fn size(self, video: &Video) -> (u32, u32) {
+        match self.decoded {
+            None => video.coded_size(),
+            Some(_) => (video.facts().width, video.facts().height),
+        }
+    }
+
+    /// Frames from the first on.
+    pub(super) fn open(self, video: &Arc<Video>) -> Result<Source, CameraError> {
+        let Some(layout) = self.decoded else {
+            return Ok(Source::Coded(video.packets()?));
+        };
+        let (sender, receiver) = sync_channel(AHEAD);
+        let owned = Arc::clone(video);
+        let decoder = thread::Builder::new().name("replay".to_owned());
+        // The thread ends by itself: at the end of the video, or when nobody receives any more.
+        let started = decoder.spawn(move || decode(&owned, layout, &sender));
+        started.map_err(|error| CameraError::Replay {
+            path: video.path().to_owned(),
+            why: format!("no thread could be started to decode it ({error}); close other programs"),
+        })?;
+        Ok(Source::Decoded(receiver))
+    }
+}
+
+impl Source {
+    /// The next frame; `None` at the end.
+    pub(super) fn next(&mut self) -> Option<Taken> {
+        match self {
+            Self::Coded(packets) => packets.next().map(|frame| Taken {
+                number: frame.number,
+                data: frame.data,
+                damaged: frame.damaged,
+            }),
+            Self::Decoded(frames) => frames.recv().ok(),
+        }
+    }
+}
+
+/// Decodes all frames in order. One that cannot be decoded is left out, as a camera that dropped it
+/// would: its counter is missing then.
+fn decode(video: &Video, layout: RawLayout, sender: &SyncSender<Taken>) {
+    let wanted: Vec<u64> = (0..video.frames().len() as u64).collect();
+    let Ok(reader) = video.read(&wanted, DECODING_THREADS) else {
+        return;
+    };
+    let mut due = 0;
+    for pending in reader {
+        let number = pending.number();
+        match raw(video, pending) {
+            // Lost frames may come late.
+            Ok((found, data)) if found == layout && number >= due => {
+                due = number + 1;
+                let damaged = false;
+                let taken = Taken {
+                    number,
+                    data,
+                    damaged,
+                };
+                if sender.send(taken).is_err() {
+                    return;
+                }
+            }
+            Ok(_) | Err(_) => {}
+        }
+    }
+}
+
+fn raw(video: &Video, pending: Pending) -> Result<(RawLayout, Vec<u8>), FrameFault> {
+    video.picture(pending)?.raw()
+}
+
+/// The raw layout of the first frame that can be decoded.
+fn first_layout(video: &Video) -> Result<RawLayout, CameraError> {
+    let wanted: Vec<u64> = (0..video.frames().len() as u64).collect();
+    let mut reader = video.read(&wanted, 1)?;
+    let layout = reader.find_map(|pending| raw(video, pending).ok());
+    layout
+        .map(|(layout, _)| layout)
+        .ok_or_else(|| CameraError::Replay {
+            path: video.path().to_owned(),
+            why: "not one of its frames can be decoded; give another recording".to_owned(),
+        })
+}

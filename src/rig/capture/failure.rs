@@ -1,0 +1,229 @@
+//! What keeps a turn from being captured, each with the way out.
+
+use std::io;
+use std::path::PathBuf;
+
+use super::settings::ModeWish;
+use super::stop::Stopped;
+use crate::camera::CameraError;
+use crate::camera::lock::Moved;
+use crate::simulator;
+use crate::turntable::TurntableError;
+use relit_data::session;
+
+/// Why there is no capture.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureError {
+    /// Something was not as it has to be before the table turns.
+    #[error("the capture was not begun: {0}")]
+    Refused(#[from] Refusal),
+    /// No exposure was found.
+    #[error("metering failed: {0}")]
+    Meter(#[from] MeterFault),
+    /// The camera.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The table.
+    #[error(transparent)]
+    Turntable(#[from] TurntableError),
+    /// The session on disk.
+    #[error(transparent)]
+    Session(#[from] session::Error),
+    /// Somebody asked for it.
+    #[error("the capture was stopped: {0}")]
+    Stopped(#[from] Stopped),
+    /// The recording.
+    #[error(transparent)]
+    Recording(#[from] super::Error),
+    /// The simulated table.
+    #[error(transparent)]
+    Simulator(#[from] simulator::Error),
+    /// The camera is away.
+    #[error("there is no camera at the moment: plug it in")]
+    NoCamera,
+    /// The table is away.
+    #[error("there is no turntable at the moment: plug it in, or look at its fault")]
+    NoTable,
+    /// The camera lacks a control.
+    #[error("the camera has no control {0:?}: `relit-capture devices` lists those that it has")]
+    NoControl(String),
+    /// Another process has what only one can have.
+    #[error("{what} is in use by {}: end that one first", .pid.map_or("another process".to_owned(), |pid| format!("process {pid}")))]
+    Taken {
+        /// The folder or device.
+        what: String,
+        /// Who has it, where it said so.
+        pid: Option<u32>,
+    },
+    /// The recording was over before the turn was.
+    #[error("the recording ended before the turn did")]
+    EndedEarly,
+    /// A part of the machine could not be had.
+    #[error("{what} could not be {doing}: {source}")]
+    System {
+        /// What was worked on.
+        what: String,
+        /// What was to be done, as a participle.
+        doing: &'static str,
+        /// The system's answer.
+        source: io::Error,
+    },
+}
+
+impl CaptureError {
+    pub(crate) fn system(
+        what: impl Into<String>,
+        doing: &'static str,
+    ) -> impl FnOnce(io::Error) -> Self {
+        let what = what.into();
+        move |source| Self::System {
+            what,
+            doing,
+            source,
+        }
+    }
+}
+
+/// What preflight found wrong; nothing has turned yet.
+#[derive(Debug, thiserror::Error)]
+pub enum Refusal {
+    /// A real camera or table beside a rehearsal that is to run faster.
+    #[error(
+        "a real camera or turntable goes by real time: leave speed= out of the other one's address"
+    )]
+    Pace,
+    /// No mode is as wished.
+    #[error("the camera does not offer {wish}; it offers {}", listed(.offered))]
+    NoMode {
+        /// What was wished.
+        wish: ModeWish,
+        /// What there is.
+        offered: Vec<String>,
+    },
+    /// The camera put another mode in place of the one asked for.
+    #[error("the camera grants {}: ask for a mode that `relit-capture devices` lists", .0.join(", "))]
+    OtherMode(
+        /// In what it differs.
+        Vec<String>,
+    ),
+    /// All that came first was damaged.
+    #[error(
+        "the camera's first {frames} frames were damaged ({why}): check its cable, or ask for another mode"
+    )]
+    Damaged {
+        /// How many were looked at.
+        frames: usize,
+        /// What was wrong with the last.
+        why: String,
+    },
+    /// Controls do not stay as they are set.
+    #[error("the camera does not keep its settings: {}; close other programs that use it, or give values that it takes", joined(.0))]
+    NotKept(
+        /// Which.
+        Vec<Moved>,
+    ),
+    /// Values that were asked for, and which the camera has no control to hold.
+    #[error("the camera cannot be set to {}: leave that out, or set it at the camera", .0.join(", "))]
+    NotHeld(
+        /// Aspect and value of each.
+        Vec<String>,
+    ),
+    /// Too little room.
+    #[error(
+        "{folder} has {} MB free and the take needs {} MB (a fifth in reserve): make room, or give another --root",
+        .free / 1_000_000, .needed.div_ceil(1_000_000)
+    )]
+    DiskFull {
+        /// The folder.
+        folder: PathBuf,
+        /// Bytes free.
+        free: u64,
+        /// Bytes needed, reserve included.
+        needed: u64,
+    },
+    /// The battery is low.
+    #[error("the table's battery has {volts:.2} V and {least:.2} V are demanded: charge it")]
+    Battery {
+        /// Volts it has.
+        volts: f64,
+        /// Volts it should have.
+        least: f64,
+    },
+    /// The battery is not measured.
+    #[error("the table does not tell its battery's voltage: leave --min-battery out")]
+    NoBattery,
+    /// The time of day cannot be right.
+    #[error(
+        "the system's clock says {now}, before this program was written: set it, or the session's name would be wrong"
+    )]
+    Clock {
+        /// What the clock says.
+        now: String,
+    },
+    /// The object's name cannot be part of a session's.
+    #[error(
+        "{0:?} cannot be an object's name: use letters, digits, '-', '_' and '.', at most 80 bytes"
+    )]
+    Object(String),
+    /// Metering without a table.
+    #[error("metering turns the table, and there is none: give --turntable, or set the exposure")]
+    MeterWithoutTable,
+}
+
+/// Why metering found no exposure.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MeterFault {
+    /// Too bright even at the darkest exposure.
+    #[error(
+        "{:.1} % of the middle saturate at the darkest exposure ({exposure}), and {:.1} % are allowed: less light, a smaller aperture or less gain",
+        100.0 * .clipped, 100.0 * .allowed
+    )]
+    TooBright {
+        /// The exposure, in the control's own units.
+        exposure: i64,
+        /// The part that saturates.
+        clipped: f64,
+        /// The part that may.
+        allowed: f64,
+    },
+    /// The turns were over before all was seen.
+    #[error(
+        "{degrees} degrees of the turn were not seen at an exposure that holds: the light changes, or frames are missing; meter again, or set the exposure"
+    )]
+    Unseen {
+        /// Degrees not seen.
+        degrees: usize,
+    },
+    /// The camera's exposure cannot be set.
+    #[error("the camera's exposure cannot be set: leave --meter out")]
+    NoExposure,
+    /// The camera gives another value than was set.
+    #[error("the exposure was set to {set} and reads {read}: leave --meter out")]
+    NotTaken {
+        /// As set.
+        set: i64,
+        /// As read back.
+        read: i64,
+    },
+    /// No picture could be decoded.
+    #[error("the camera's pictures cannot be decoded ({0}): ask for another format")]
+    NoPicture(String),
+}
+
+fn joined(moved: &[Moved]) -> String {
+    moved
+        .iter()
+        .map(Moved::to_string)
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// The first of a long list.
+fn listed(offered: &[String]) -> String {
+    const TOLD: usize = 12;
+    match offered.len() {
+        0 => "nothing that can be recorded".to_owned(),
+        n if n > TOLD => format!("{} and {} more", offered[..TOLD].join("; "), n - TOLD),
+        _ => offered.join("; "),
+    }
+}

@@ -1,0 +1,126 @@
+//! The rig itself: its state, once and as events, and commands to it.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::State;
+use axum::http::{StatusCode, header};
+use axum::response::sse::{Event, Sse};
+use axum::response::{IntoResponse, Response};
+use futures_util::{Stream, StreamExt, stream};
+use tokio::sync::{OwnedSemaphorePermit, watch};
+use tokio::time::{Instant, sleep_until, timeout};
+
+use super::answer::{Failure, Problem};
+use super::body::Payload;
+use super::server::{Server, Work, place};
+use super::watcher::{STATES, Seen};
+use crate::serve::rig::Command;
+use crate::state::RigState;
+
+/// A subscriber hears something at least so often: silence means a lost connection.
+const BEAT: Duration = Duration::from_secs(2);
+/// Time in which the rig has to take or refuse a command.
+const COMMAND: Duration = Duration::from_secs(15);
+
+/// The rig's state
+///
+/// Phase, progress, table, camera, room on the disk, queue, faults and the last take.
+#[utoipa::path(
+    get, path = "/api/v1/state", tag = "rig",
+    responses((status = 200, body = RigState), (status = 401, body = Problem))
+)]
+pub(super) async fn state(State(server): State<Arc<Server>>) -> Response {
+    let json = server.watcher.seen().json.clone();
+    ([(header::CONTENT_TYPE, "application/json")], json).into_response()
+}
+
+/// The rig's state on every change
+///
+/// Server-sent events. `state` holds the whole state as JSON and comes at once, then on change, at most
+/// ten times a second; who reads slowly gets fewer, never old ones. `beat` comes where nothing changed
+/// for two seconds.
+#[utoipa::path(
+    get, path = "/api/v1/events", tag = "rig",
+    responses(
+        (status = 200, body = String, content_type = "text/event-stream"),
+        (status = 401, body = Problem),
+        (status = 503, description = "Too many subscribers", body = Problem),
+    )
+)]
+pub(super) async fn events(
+    State(server): State<Arc<Server>>,
+) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Failure> {
+    let mut states = server.watcher.states();
+    states.mark_changed();
+    let subscription = Subscription {
+        states,
+        next: Instant::now(),
+        _place: place(&server.places.subscribers, "pages that watch the rig")?,
+    };
+    let events = stream::unfold(subscription, |mut subscription| async {
+        let event = subscription.event().await;
+        Some((Ok(event), subscription))
+    });
+    Ok(Sse::new(events.take_until(server.closing())))
+}
+
+struct Subscription {
+    states: watch::Receiver<Arc<Seen>>,
+    /// When the next state may be sent.
+    next: Instant,
+    _place: OwnedSemaphorePermit,
+}
+
+impl Subscription {
+    async fn event(&mut self) -> Event {
+        sleep_until(self.next).await;
+        // The sender outlives all requests: only the time can run out.
+        let changed = timeout(BEAT, self.states.changed()).await;
+        if changed.is_err() {
+            return Event::default().event("beat").data("");
+        }
+        self.next = Instant::now() + STATES;
+        let seen = self.states.borrow_and_update().clone();
+        Event::default().event("state").data(&seen.json)
+    }
+}
+
+/// Give the rig a command
+///
+/// Answers once the rig has taken or refused it; what comes of it shows in the state. Of several starts at
+/// once, one is taken.
+#[utoipa::path(
+    post, path = "/api/v1/command", tag = "rig", request_body = Command,
+    responses(
+        (status = 202, description = "Taken; the state after it", body = RigState),
+        (status = 400, description = "No such command", body = Problem),
+        (status = 401, body = Problem),
+        (status = 403, description = "Asked for by a page of another site", body = Problem),
+        (status = 408, description = "The body did not come in time", body = Problem),
+        (status = 409, description = "Something else is under way", body = Problem),
+        (status = 413, description = "More than 16 kB", body = Problem),
+        (status = 415, description = "Not JSON", body = Problem),
+        (status = 422, description = "The command makes no sense as given", body = Problem),
+        (status = 503, description = "Camera, table or disk is not there", body = Problem),
+        (status = 504, description = "The rig does not answer", body = Problem),
+    )
+)]
+pub(super) async fn command(
+    State(server): State<Arc<Server>>,
+    Payload(command): Payload<Command>,
+) -> Result<Response, Failure> {
+    let given = server.block_on(Work::Command, move |server| {
+        server.rig.command(command)?;
+        server.watcher.look();
+        Ok(())
+    });
+    let answered = timeout(COMMAND, given).await;
+    answered.map_err(|_| {
+        let error = "the rig did not answer: look at it, and see its state before you try again";
+        Failure::new(StatusCode::GATEWAY_TIMEOUT, error)
+    })??;
+    let state = state(State(server)).await;
+    Ok((StatusCode::ACCEPTED, state).into_response())
+}

@@ -1,0 +1,301 @@
+//! The sessions on disk, as a list and one by one. Reads manifests and frame indexes, no video.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::SystemTime;
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::answer::Failure;
+use relit_data::naming::is_session_name;
+use relit_data::session::{FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, Status, object_of};
+
+/// How far a session has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum SessionStatus {
+    /// Being written, or waiting to be salvaged.
+    Recording,
+    /// Whole.
+    Complete,
+    /// Ended early.
+    Aborted,
+    /// Its manifest cannot be read.
+    Unreadable,
+}
+
+/// A session in the list.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub(super) struct SessionSummary {
+    /// Its name.
+    #[schema(example = "20261120T093015Z-mug")]
+    pub(super) id: String,
+    /// The object's name.
+    pub(super) object: String,
+    /// When the capture began, RFC 3339.
+    pub(super) created: Option<String>,
+    pub(super) status: SessionStatus,
+    /// Why it is not whole.
+    pub(super) reason: Option<String>,
+    /// Frames in the video.
+    pub(super) frames: Option<u64>,
+    /// Frames that the camera counted and the video lacks.
+    pub(super) dropped: Option<u64>,
+    /// From the first frame to the last, seconds.
+    pub(super) duration_s: Option<f64>,
+}
+
+/// All that is known of a session.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub(super) struct SessionDetail {
+    #[serde(flatten)]
+    pub(super) summary: SessionSummary,
+    /// The manifest, `session.json`.
+    #[schema(value_type = Object)]
+    pub(super) manifest: serde_json::Value,
+    /// Each frame's place in time, seconds from the first.
+    pub(super) times_s: Vec<f64>,
+    /// Each frame's angle, degrees; `null` where there was no table.
+    pub(super) angles_deg: Vec<Option<f64>>,
+    /// Where frames are missing.
+    pub(super) gaps: Vec<DroppedFrames>,
+}
+
+/// Frames that are missing.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub(super) struct DroppedFrames {
+    /// Number of the frame after the gap.
+    pub(super) before: u64,
+    /// How many are missing.
+    pub(super) missing: u64,
+}
+
+/// A video that can be looked at.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Footage {
+    pub(super) path: PathBuf,
+    /// Tells one state of the file from another: its size, and when it was changed.
+    pub(super) stamp: Stamp,
+}
+
+/// A file's size, bytes, and the time of its last change.
+pub(super) type Stamp = (u64, Option<SystemTime>);
+
+/// The sessions under one folder.
+#[derive(Debug)]
+pub(super) struct Library {
+    root: PathBuf,
+    /// Summaries by name, each with the stamp of the manifest that it was made from.
+    known: Mutex<HashMap<String, (Stamp, SessionSummary)>>,
+}
+
+impl Library {
+    pub(super) fn new(root: PathBuf) -> Self {
+        Self {
+            root,
+            known: Mutex::new(HashMap::new()),
+        }
+    }
+
+    /// Up to `most` sessions, newest first, from those whose names come before `before`.
+    pub(super) fn list(
+        &self,
+        before: Option<&str>,
+        most: usize,
+    ) -> Result<Vec<SessionSummary>, Failure> {
+        let mut names = self.names()?;
+        names.retain(|name| before.is_none_or(|before| name.as_str() < before));
+        names.truncate(most);
+        Ok(names.iter().filter_map(|name| self.summary(name)).collect())
+    }
+
+    /// The objects of the newest sessions, each once.
+    pub(super) fn objects(&self, most: usize) -> Result<Vec<String>, Failure> {
+        let mut objects: Vec<String> = Vec::new();
+        for name in self.names()? {
+            let object = object_of(&name);
+            if !objects.iter().any(|known| known == object) {
+                objects.push(object.to_owned());
+            }
+            if objects.len() == most {
+                break;
+            }
+        }
+        Ok(objects)
+    }
+
+    /// Names of all session folders, newest first: they begin with the date.
+    fn names(&self) -> Result<Vec<String>, Failure> {
+        let failed = |error| {
+            let root = self.root.display();
+            Failure::broken(format!(
+                "the folder of sessions {root} cannot be read: {error}"
+            ))
+        };
+        let mut names = Vec::new();
+        for entry in fs::read_dir(&self.root).map_err(failed)? {
+            let entry = entry.map_err(failed)?;
+            if let Ok(name) = entry.file_name().into_string()
+                && is_session_name(&name)
+                && entry.path().join(MANIFEST_FILE).is_file()
+            {
+                names.push(name);
+            }
+        }
+        names.sort_unstable_by(|one, other| other.cmp(one));
+        self.forget_all_but(&names);
+        Ok(names)
+    }
+
+    fn forget_all_but(&self, names: &[String]) {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        known.retain(|name, _| {
+            names
+                .binary_search_by(|other| name.as_str().cmp(other))
+                .is_ok()
+        });
+    }
+
+    /// The summary of a session. `None` where it has gone meanwhile.
+    fn summary(&self, name: &str) -> Option<SessionSummary> {
+        let folder = self.root.join(name);
+        let stamp = stamp(&folder.join(MANIFEST_FILE))?;
+        {
+            let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some((of, summary)) = known.get(name)
+                && *of == stamp
+            {
+                return Some(summary.clone());
+            }
+        }
+        let summary = match read_manifest(&folder) {
+            Ok(manifest) => {
+                let index = read_index(&folder, &manifest);
+                summarise(name, &manifest, index.as_ref())
+            }
+            Err(reason) => unreadable(name, reason),
+        };
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        known.insert(name.to_owned(), (stamp, summary.clone()));
+        Some(summary)
+    }
+
+    /// All about one session.
+    pub(super) fn detail(&self, id: &str) -> Result<SessionDetail, Failure> {
+        let folder = self.folder(id)?;
+        let manifest = read_manifest(&folder).map_err(Failure::broken)?;
+        let index = read_index(&folder, &manifest);
+        let summary = summarise(id, &manifest, index.as_ref());
+        let json = manifest.to_json().map_err(|fault| fault.to_string());
+        let json = json
+            .and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string()));
+        let index = index.unwrap_or_default();
+        let entries = index.entries();
+        let first = entries.first().map_or(0, |entry| entry.t_us);
+        let gaps = index.gaps().into_iter().map(|gap| DroppedFrames {
+            before: gap.before,
+            missing: gap.missing,
+        });
+        Ok(SessionDetail {
+            summary,
+            manifest: json.map_err(Failure::broken)?,
+            times_s: entries
+                .iter()
+                .map(|entry| seconds(first, entry.t_us))
+                .collect(),
+            angles_deg: entries.iter().map(|entry| entry.angle_deg).collect(),
+            gaps: gaps.collect(),
+        })
+    }
+
+    /// The video of a session that is not being recorded.
+    pub(super) fn footage(&self, id: &str) -> Result<Footage, Failure> {
+        let folder = self.folder(id)?;
+        let manifest = read_manifest(&folder).map_err(Failure::broken)?;
+        if manifest.status == Status::Recording {
+            let error = format!("{id} is still being recorded: wait for its end");
+            return Err(Failure::new(axum::http::StatusCode::CONFLICT, error));
+        }
+        let path = folder.join(&manifest.video.file);
+        let missing = || Failure::not_found(format!("the video of {id} is missing"));
+        let stamp = stamp(&path).ok_or_else(missing)?;
+        Ok(Footage { path, stamp })
+    }
+
+    /// A session's folder. A name with which one could leave the root is nobody's.
+    fn folder(&self, id: &str) -> Result<PathBuf, Failure> {
+        let folder = self.root.join(id);
+        if is_session_name(id) && folder.join(MANIFEST_FILE).is_file() {
+            Ok(folder)
+        } else {
+            Err(Failure::not_found("there is no session of that name"))
+        }
+    }
+}
+
+/// `None` where there is no such file.
+fn stamp(path: &Path) -> Option<Stamp> {
+    let data = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
+    Some((data.len(), data.modified().ok()))
+}
+
+fn read_manifest(folder: &Path) -> Result<Manifest, String> {
+    let bytes = fs::read(folder.join(MANIFEST_FILE))
+        .map_err(|error| format!("its {MANIFEST_FILE} cannot be read: {error}"))?;
+    Manifest::from_json(&bytes)
+        .map_err(|fault| format!("its {MANIFEST_FILE} is not usable: {fault}"))
+}
+
+/// The frame index of a session that has ended. A damaged one counts as none: the programs that need it
+/// tell what is wrong with it.
+fn read_index(folder: &Path, manifest: &Manifest) -> Option<FrameIndex> {
+    if manifest.status == Status::Recording {
+        return None;
+    }
+    let bytes = fs::read(folder.join(INDEX_FILE)).ok()?;
+    FrameIndex::parse(&bytes).ok()
+}
+
+fn summarise(id: &str, manifest: &Manifest, index: Option<&FrameIndex>) -> SessionSummary {
+    let (status, reason) = match &manifest.status {
+        Status::Recording => (SessionStatus::Recording, None),
+        Status::Complete => (SessionStatus::Complete, None),
+        Status::Aborted(reason) => (SessionStatus::Aborted, Some(reason.clone())),
+    };
+    let ends = index.and_then(|index| Some((index.entries().first()?, index.entries().last()?)));
+    let counted = index.map(|index| index.entries().len() as u64);
+    let missing = |index: &FrameIndex| {
+        let gaps = index.gaps().into_iter();
+        gaps.fold(0_u64, |sum, gap| sum.saturating_add(gap.missing))
+    };
+    SessionSummary {
+        id: id.to_owned(),
+        object: manifest.object.clone(),
+        created: Some(manifest.created.to_string()),
+        status,
+        reason,
+        frames: manifest.video.frames.or(counted),
+        dropped: index.map(missing),
+        duration_s: ends.map(|(first, last)| seconds(first.t_us, last.t_us)),
+    }
+}
+
+fn unreadable(id: &str, reason: String) -> SessionSummary {
+    SessionSummary {
+        id: id.to_owned(),
+        object: object_of(id).to_owned(),
+        created: None,
+        status: SessionStatus::Unreadable,
+        reason: Some(reason),
+        frames: None,
+        dropped: None,
+        duration_s: None,
+    }
+}
+
+fn seconds(from_us: i64, to_us: i64) -> f64 {
+    to_us.saturating_sub(from_us) as f64 / 1e6
+}

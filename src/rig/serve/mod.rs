@@ -1,0 +1,201 @@
+//! The rig over HTTP: a page for the phone beside the turntable, the same as JSON for scripts, and
+//! figures for Prometheus.
+//!
+//! It stands on [`Rig`]: it hands commands on, shows what the [`Monitor`](super::state::Monitor)
+//! holds and reads what lies in the session folder. It knows nothing of cameras, tables or how a
+//! capture goes. The capture is never held up by it: one task looks at the monitor ten times a
+//! second (thirty times for the picture) whatever the number of viewers, its threads give way to all
+//! others of the process, and whatever a client can ask for is bounded in number, size and time.
+//!
+//! Who may do what: without a token only programs on this machine get in, and no web page but this
+//! one. Everywhere else a token of 128 random bits is demanded; the page's own files alone go
+//! without, as they hold nothing of the rig.
+
+mod address;
+mod answer;
+mod api;
+mod body;
+mod files;
+mod gate;
+mod library;
+mod listen;
+mod metrics;
+mod openapi;
+mod page;
+mod pictures;
+mod preview;
+mod recent;
+mod routes;
+mod server;
+mod service;
+mod sessions;
+mod shutdown;
+mod stalling;
+mod token;
+mod watcher;
+
+#[cfg(test)]
+mod tests;
+
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::time::Duration;
+
+pub use self::address::Announcement;
+pub use self::service::ServiceManager;
+pub use self::shutdown::Shutdown;
+pub use self::token::{BadToken, Token};
+pub mod rig;
+
+use rig::Rig;
+
+/// Threads that carry requests; files and decoding have their own.
+const THREADS: usize = 2;
+/// Threads for files, decoding and commands: more than all that may use them at once, so that a
+/// command to stop never waits for a thread.
+const BLOCKING_THREADS: usize = 24;
+/// Time that running requests get when the daemon stops.
+const GRACE: Duration = Duration::from_secs(1);
+
+/// Where and for whom the rig is served.
+#[derive(Debug, Clone)]
+pub struct ServeOptions {
+    /// The address to listen on; port 0 takes any free one.
+    pub address: SocketAddr,
+    /// What a client has to know. Where it is `None`, an address that other machines can reach gets a
+    /// random one, and a loopback address none.
+    pub token: Option<Token>,
+    /// Names, without port, under which clients reach this machine besides its addresses, such as
+    /// `rig.local`. The first one stands in the announced URL.
+    pub names: Vec<String>,
+    /// The service manager that is told of the start, of being alive and of the end.
+    pub service: Option<ServiceManager>,
+    /// What clients may take up.
+    pub limits: Limits,
+}
+
+impl ServeOptions {
+    /// Options for an address, and nothing else asked for.
+    #[must_use]
+    pub fn at(address: SocketAddr) -> Self {
+        Self {
+            address,
+            token: None,
+            names: Vec::new(),
+            service: None,
+            limits: Limits::default(),
+        }
+    }
+}
+
+/// What all clients together may take up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Connections at once; further ones wait to be accepted.
+    pub connections: usize,
+    /// Requests for the preview at once.
+    pub viewers: usize,
+    /// Subscribers to the events at once.
+    pub subscribers: usize,
+    /// Time in which a request's head has to come, and how long a connection may lie idle.
+    pub head: Duration,
+    /// Time in which a request's body has to come.
+    pub body: Duration,
+    /// Longest time in which a client takes not a single byte of an answer.
+    pub stall: Duration,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            connections: 256,
+            viewers: 16,
+            subscribers: 32,
+            head: Duration::from_secs(10),
+            body: Duration::from_secs(10),
+            stall: Duration::from_secs(20),
+        }
+    }
+}
+
+/// Why the rig could not be served.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// The address is taken, not this machine's, or not allowed.
+    #[error(
+        "cannot listen on {address}: {source}; give another address or port, or end the program that has it"
+    )]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// No threads.
+    #[error("the threads of the HTTP server could not be started: {0}; close other programs")]
+    Threads(io::Error),
+    /// No random numbers for a token.
+    #[error("the system gave no random numbers for a token: {0}; give a token yourself")]
+    Random(io::Error),
+    /// The service manager cannot be told.
+    #[error("the service manager at {socket} could not be told of the start: {source}")]
+    Service {
+        /// Its socket.
+        socket: String,
+        /// The system's answer.
+        source: io::Error,
+    },
+}
+
+/// Serves the rig until `shutdown` is asked for. `announce` is called once, when clients can connect.
+///
+/// # Errors
+/// [`ServeError`] where it cannot begin; later troubles concern single clients only.
+pub fn serve(
+    rig: Arc<dyn Rig>,
+    options: ServeOptions,
+    shutdown: &Shutdown,
+    announce: impl FnOnce(&Announcement),
+) -> Result<(), ServeError> {
+    let asked = options.address;
+    let failed = |source| ServeError::Listen {
+        address: asked,
+        source,
+    };
+    let listener = TcpListener::bind(asked).map_err(failed)?;
+    listener.set_nonblocking(true).map_err(failed)?;
+    let address = listener.local_addr().map_err(failed)?;
+    let token = match options.token {
+        Some(token) => Some(token),
+        None if address.ip().is_loopback() => None,
+        None => Some(Token::random().map_err(ServeError::Random)?),
+    };
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(THREADS)
+        .max_blocking_threads(BLOCKING_THREADS)
+        .thread_name("relit-http")
+        .on_thread_start(give_way)
+        .enable_io()
+        .enable_time()
+        .build()
+        .map_err(ServeError::Threads)?;
+    let announcement = Announcement::new(address, &options.names, token.as_ref());
+    let door = gate::Door::new(address.port(), token, options.names);
+    let server = server::Server::new(rig, door, options.limits, shutdown.clone());
+    let served = runtime.block_on(async {
+        let listener = tokio::net::TcpListener::from_std(listener).map_err(failed)?;
+        service::tell_ready(options.service.as_ref(), &announcement)?;
+        announce(&announcement);
+        listen::run(listener, Arc::new(server), options.service).await;
+        Ok(())
+    });
+    runtime.shutdown_timeout(GRACE);
+    served
+}
+
+/// Lets every other thread of the process go first. Linux keeps this value for each thread; where the
+/// system refuses, the thread stays as it is.
+fn give_way() {
+    let _ = rustix::process::setpriority_process(None, 10);
+}

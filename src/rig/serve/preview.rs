@@ -1,0 +1,137 @@
+//! The newest picture: as a file, and as a stream in which each part replaces the one before.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::body::{Body, Bytes};
+use axum::extract::State;
+use axum::http::{HeaderName, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use futures_util::{StreamExt, stream};
+use serde::Deserialize;
+use tokio::sync::{OwnedSemaphorePermit, watch};
+use tokio::time::{Instant, sleep_until, timeout};
+use utoipa::IntoParams;
+
+use super::answer::{Failure, Problem};
+use super::body::Asked;
+use super::server::{Server, place};
+use crate::state::PreviewFrame;
+
+/// Shortest time between two pictures of a stream: 15 a second.
+const PERIOD: Duration = Duration::from_millis(66);
+/// Longest wait for a picture that is newer than the client's.
+const WAIT: Duration = Duration::from_secs(4);
+/// Carries a picture's number.
+const NUMBER: HeaderName = HeaderName::from_static("relit-frame");
+const VIEWERS: &str = "viewers of the preview";
+
+/// Which picture is wanted.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct After {
+    /// The number of the picture that the client has: the answer waits up to 4 s for another one.
+    after: Option<u64>,
+}
+
+/// The newest picture
+///
+/// Its number is in the header `relit-frame`. With `after`, the answer comes when there is another
+/// picture than that one: asking again and again gives a stream at the client's own pace.
+#[utoipa::path(
+    get, path = "/api/v1/preview.jpg", tag = "preview", params(After),
+    responses(
+        (status = 200, description = "A JPEG file", content_type = "image/jpeg"),
+        (status = 204, description = "No newer picture within 4 s"),
+        (status = 401, body = Problem),
+        (status = 503, description = "No picture yet, or too many viewers", body = Problem),
+    )
+)]
+pub(super) async fn picture(
+    State(server): State<Arc<Server>>,
+    Asked(After { after }): Asked<After>,
+) -> Result<Response, Failure> {
+    let Some(after) = after else {
+        let none = || Failure::busy("there is no picture yet: the camera has not delivered one");
+        return Ok(jpeg(server.watcher.picture().ok_or_else(none)?));
+    };
+    let _place = place(&server.places.viewers, VIEWERS)?;
+    let mut pictures = server.watcher.pictures();
+    let newer = pictures.wait_for(|picture| {
+        let number = picture.as_ref().map(|picture| picture.number);
+        number.is_some_and(|number| number != after)
+    });
+    let newer = tokio::select! {
+        newer = timeout(WAIT, newer) => newer.ok().and_then(Result::ok).and_then(|found| found.clone()),
+        () = server.closing() => None,
+    };
+    Ok(newer.map_or_else(|| StatusCode::NO_CONTENT.into_response(), jpeg))
+}
+
+fn jpeg(picture: PreviewFrame) -> Response {
+    let headers = [
+        (header::CONTENT_TYPE, "image/jpeg".to_owned()),
+        (NUMBER, picture.number.to_string()),
+    ];
+    (headers, Bytes::from_owner(picture.jpeg)).into_response()
+}
+
+/// The preview as Motion JPEG
+///
+/// `multipart/x-mixed-replace` of the newest picture, at most 15 a second. A viewer that reads slowly
+/// skips pictures.
+#[utoipa::path(
+    get, path = "/api/v1/preview.mjpg", tag = "preview",
+    responses(
+        (status = 200, description = "JPEG files without end", content_type = "multipart/x-mixed-replace"),
+        (status = 401, body = Problem),
+        (status = 503, description = "Too many viewers", body = Problem),
+    )
+)]
+pub(super) async fn stream(State(server): State<Arc<Server>>) -> Result<Response, Failure> {
+    let mut pictures = server.watcher.pictures();
+    pictures.mark_changed();
+    let viewer = Viewer {
+        pictures,
+        next: Instant::now(),
+        _place: place(&server.places.viewers, VIEWERS)?,
+    };
+    // The boundary that ends a part is sent with it, so that the browser shows it at once.
+    let opening = stream::iter([Ok::<_, axum::Error>(Bytes::from_static(b"--picture\r\n"))]);
+    let parts = stream::unfold(viewer, |mut viewer| async {
+        let part = viewer.part().await?;
+        Some((Ok(part), viewer))
+    });
+    let body = opening.chain(parts).take_until(server.closing());
+    let kind = "multipart/x-mixed-replace; boundary=picture";
+    Ok(([(header::CONTENT_TYPE, kind)], Body::from_stream(body)).into_response())
+}
+
+struct Viewer {
+    pictures: watch::Receiver<Option<PreviewFrame>>,
+    /// When the next picture may be sent.
+    next: Instant,
+    _place: OwnedSemaphorePermit,
+}
+
+impl Viewer {
+    /// The next part. It is asked for when the one before is on its way, and takes what is newest then.
+    async fn part(&mut self) -> Option<Bytes> {
+        loop {
+            sleep_until(self.next).await;
+            self.pictures.changed().await.ok()?;
+            self.next = Instant::now() + PERIOD;
+            if let Some(picture) = self.pictures.borrow_and_update().clone() {
+                let jpeg = &picture.jpeg;
+                let mut part = format!(
+                    "Content-Type: image/jpeg\r\nContent-Length: {}\r\n\r\n",
+                    jpeg.len()
+                )
+                .into_bytes();
+                part.extend_from_slice(jpeg);
+                part.extend_from_slice(b"\r\n--picture\r\n");
+                return Some(part.into());
+            }
+        }
+    }
+}

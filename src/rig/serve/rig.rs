@@ -1,0 +1,81 @@
+//! What a page, a terminal or a script may ask of a rig, whatever drives it.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::state::Monitor;
+
+/// Something a person at the rig asks for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "command", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Command {
+    /// Captures one turn of the object that stands on the table.
+    Start {
+        /// The object's name, as it goes into the session's.
+        object: String,
+        /// Whether a metering turn comes first.
+        #[serde(default)]
+        meter: bool,
+    },
+    /// Stops the table and ends the take that is under way; what was recorded stays, marked aborted.
+    Stop,
+    /// Appends an object to the queue.
+    Enqueue {
+        /// The object's name.
+        object: String,
+    },
+    /// Takes an object out of the queue.
+    Dequeue {
+        /// Its place, 0 is next.
+        place: usize,
+    },
+    /// The next object of the queue stands on the table: captures it.
+    Next,
+    /// Finds the table's zero.
+    Home,
+    /// Turns the table by so many degrees.
+    Jog {
+        /// Degrees, positive or negative.
+        degrees: f64,
+    },
+    /// Releases the table's lock after an alarm.
+    Unlock,
+    /// Sets one of the camera's controls by its name.
+    SetControl {
+        /// The control's name, such as `exposure_time_absolute`.
+        name: String,
+        /// The value, in the control's own units.
+        value: i64,
+    },
+}
+
+/// Why a command was not taken: a sentence for the person who gave it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Refused {
+    /// Something else is under way.
+    #[error("{0}")]
+    Busy(String),
+    /// The command makes no sense as given.
+    #[error("{0}")]
+    Invalid(String),
+    /// What is needed is not there: camera, table, disk.
+    #[error("{0}")]
+    Unavailable(String),
+}
+
+/// A rig that takes commands and tells its state.
+pub trait Rig: Send + Sync {
+    /// Takes a command; what comes of it shows in the monitor.
+    ///
+    /// # Errors
+    /// [`Refused`] where it cannot be begun.
+    fn command(&self, command: Command) -> Result<(), Refused>;
+
+    /// The state and the newest picture.
+    fn monitor(&self) -> &Monitor;
+
+    /// The folder in which sessions lie.
+    fn root(&self) -> &Path;
+}

@@ -1,0 +1,219 @@
+use std::sync::Barrier;
+use std::thread;
+
+use super::{Serving, begin};
+use crate::serve::rig::Command;
+use crate::state::Phase;
+
+#[test]
+fn the_state_is_what_the_monitor_holds() {
+    let serving = Serving::start();
+    serving.rig.monitor.update(|state| {
+        state.phase = Phase::MovingBack;
+        state.table.angle_deg = Some(12.5);
+        state.queue = vec!["mug".to_owned()];
+    });
+    serving.rig.monitor.fault(7, "the table does not answer");
+    let mut events = begin(&serving, "/api/v1/events");
+    events.until("the table does not answer");
+    let state = serving.get("/api/v1/state");
+    assert_eq!(state.status, 200);
+    assert_eq!(state.header("content-type"), Some("application/json"));
+    let state = state.json();
+    assert_eq!(state["phase"], "moving-back");
+    assert_eq!(state["table"]["angle_deg"], 12.5);
+    assert_eq!(state["queue"][0], "mug");
+    assert_eq!(state["faults"][0]["what"], "the table does not answer");
+}
+
+#[test]
+fn a_command_reaches_the_rig_and_its_answer_is_the_state_after_it() {
+    let serving = Serving::start();
+    let answer = serving.command(r#"{"command":"start","object":"mug","meter":true}"#);
+    assert_eq!(answer.status, 202);
+    assert_eq!(answer.json()["phase"], "recording");
+    assert_eq!(serving.get("/api/v1/state").json()["object"], "mug");
+    for body in [
+        r#"{"command":"enqueue","object":"bust"}"#,
+        r#"{"command":"dequeue","place":0}"#,
+        r#"{"command":"next"}"#,
+        r#"{"command":"unlock"}"#,
+        r#"{"command":"set-control","name":"gain","value":-3}"#,
+        r#"{"command":"stop"}"#,
+    ] {
+        assert_eq!(serving.command(body).status, 202, "{body}");
+    }
+    let told = serving.rig.told.lock().unwrap();
+    let object = || "mug".to_owned();
+    assert_eq!(
+        told[0],
+        Command::Start {
+            object: object(),
+            meter: true
+        }
+    );
+    assert_eq!(
+        told[5],
+        Command::SetControl {
+            name: "gain".to_owned(),
+            value: -3
+        }
+    );
+    assert_eq!(told.last(), Some(&Command::Stop));
+}
+
+#[test]
+fn what_the_rig_refuses_is_told_in_its_words() {
+    let serving = Serving::start();
+    let refused = serving.command(r#"{"command":"home"}"#);
+    assert_eq!(
+        (refused.status, refused.error().as_str()),
+        (503, "there is no table")
+    );
+    let refused = serving.command(r#"{"command":"jog","degrees":1e9}"#);
+    assert_eq!(
+        (refused.status, refused.error().as_str()),
+        (422, "no table turns so far")
+    );
+    let start = r#"{"command":"start","object":"mug"}"#;
+    assert_eq!(serving.command(start).status, 202);
+    let refused = serving.command(start);
+    assert_eq!(refused.status, 409);
+    assert!(refused.error().starts_with("a capture is under way"));
+}
+
+#[test]
+fn what_is_no_command_does_not_reach_the_rig() {
+    let serving = Serving::start();
+    for body in [
+        "",
+        "start",
+        "[]",
+        r#"{"command":"explode"}"#,
+        r#"{"command":"start"}"#,
+        r#"{"command":"start","object":"mug","speed":9}"#,
+        r#"{"command":"dequeue","place":-1}"#,
+        r#"{"command":"stop"} {"command":"stop"}"#,
+    ] {
+        let refused = serving.command(body);
+        assert_eq!(refused.status, 400, "{body}");
+        assert!(refused.error().contains("cannot be understood"), "{body}");
+    }
+    assert!(serving.rig.told.lock().unwrap().is_empty());
+}
+
+#[test]
+fn of_many_starts_at_once_exactly_one_is_taken() {
+    let serving = Serving::start();
+    let together = Barrier::new(12);
+    let statuses: Vec<u16> = thread::scope(|scope| {
+        let starts: Vec<_> = (0..12)
+            .map(|number| {
+                let (serving, together) = (&serving, &together);
+                scope.spawn(move || {
+                    together.wait();
+                    let start = format!(r#"{{"command":"start","object":"mug{number}"}}"#);
+                    serving.command(&start).status
+                })
+            })
+            .collect();
+        starts
+            .into_iter()
+            .map(|start| start.join().unwrap())
+            .collect()
+    });
+    let count = |wanted| statuses.iter().filter(|status| **status == wanted).count();
+    assert_eq!((count(202), count(409)), (1, 11), "{statuses:?}");
+}
+
+#[test]
+fn events_tell_the_state_at_once_then_its_changes_and_beat_between() {
+    let serving = Serving::start();
+    let mut events = begin(&serving, "/api/v1/events");
+    assert_eq!(events.header("content-type"), Some("text/event-stream"));
+    assert!(events.until("\n\n").contains(r#""phase":"idle""#));
+    serving
+        .rig
+        .monitor
+        .update(|state| state.phase = Phase::Metering);
+    assert!(events.until("\n\n").contains(r#""phase":"metering""#));
+    assert!(events.until("\n\n").contains("event: beat"));
+}
+
+#[test]
+fn a_state_that_changes_all_the_time_is_told_ten_times_a_second_at_most() {
+    let serving = Serving::start();
+    let mut events = begin(&serving, "/api/v1/events");
+    events.until("\n\n");
+    let began = std::time::Instant::now();
+    let done = std::sync::atomic::AtomicBool::new(false);
+    thread::scope(|scope| {
+        scope.spawn(|| {
+            while !done.load(std::sync::atomic::Ordering::Relaxed) {
+                serving.rig.monitor.update(|state| state.frames += 1);
+                thread::sleep(std::time::Duration::from_millis(1));
+            }
+        });
+        for _ in 0..10 {
+            events.until("\n\n");
+        }
+        done.store(true, std::sync::atomic::Ordering::Relaxed);
+    });
+    assert!(began.elapsed().as_millis() >= 900, "{:?}", began.elapsed());
+}
+
+#[test]
+fn one_subscriber_too_many_is_refused_and_a_place_comes_free_again() {
+    let serving = Serving::with(|options| options.limits.subscribers = 2);
+    let one = begin(&serving, "/api/v1/events");
+    let other = begin(&serving, "/api/v1/events");
+    let refused = serving.get("/api/v1/events");
+    assert_eq!(refused.status, 503);
+    assert!(refused.error().contains("close one"));
+    drop(one);
+    let taken = (0..300).any(|_| {
+        thread::sleep(std::time::Duration::from_millis(100));
+        begin(&serving, "/api/v1/events").status == 200
+    });
+    assert!(taken);
+    drop(other);
+}
+
+#[test]
+fn figures_for_prometheus_are_well_formed() {
+    let serving = Serving::start();
+    serving.rig.monitor.update(|state| {
+        state.phase = Phase::Recording;
+        state.frames = 512;
+        state.table.battery_v = Some(11.9);
+    });
+    let mut events = begin(&serving, "/api/v1/events");
+    events.until("11.9");
+    let metrics = serving.get("/metrics");
+    assert!(
+        metrics
+            .header("content-type")
+            .unwrap()
+            .starts_with("text/plain; version=0.0.4")
+    );
+    let text = String::from_utf8(metrics.body).unwrap();
+    for line in text.lines().filter(|line| !line.starts_with('#')) {
+        let (name, value) = line.rsplit_once(' ').unwrap();
+        let bare = name.split('{').next().unwrap();
+        assert!(value.parse::<f64>().is_ok(), "{line}");
+        assert!(text.contains(&format!("# TYPE {bare} ")), "{line}");
+    }
+    for line in [
+        "relit_phase{phase=\"recording\"} 1",
+        "relit_phase{phase=\"idle\"} 0",
+        "relit_take_frames 512",
+        "relit_table_battery_volts 11.9",
+        "relit_http_subscribers 1",
+    ] {
+        assert!(text.lines().any(|found| found == line), "{line} in\n{text}");
+    }
+    assert!(
+        !text.contains("relit_camera_focus"),
+        "not known, so left out"
+    );
+}

@@ -1,0 +1,137 @@
+use std::collections::BTreeSet;
+use std::os::unix::net::UnixDatagram;
+use std::time::Duration;
+
+use super::{LONG, Serving};
+use crate::serve::{ServiceManager, page, routes};
+
+#[test]
+fn the_page_and_its_files_are_served_and_need_nothing_else() {
+    let serving = Serving::start();
+    let index = serving.get("/");
+    assert_eq!(
+        index.header("content-type"),
+        Some("text/html; charset=utf-8")
+    );
+    let index = String::from_utf8(index.body).unwrap();
+    for asset in &page::ASSETS {
+        let answer = serving.get(asset.path);
+        assert_eq!(
+            answer.header("content-type"),
+            Some(asset.kind),
+            "{}",
+            asset.path
+        );
+        assert_eq!(answer.body, asset.text.as_bytes());
+    }
+    // The policy allows no script or style in the page itself, and nothing from elsewhere.
+    for forbidden in [
+        "<style", "style=", "onclick", "https://", "http://", "<script>",
+    ] {
+        assert!(!index.contains(forbidden), "{forbidden}");
+    }
+}
+
+#[test]
+fn scripts_set_text_never_markup_and_look_only_for_what_the_page_has() {
+    let index = include_str!("../page/index.html");
+    let scripts = page::ASSETS
+        .iter()
+        .filter(|asset| asset.path.ends_with(".js"));
+    for script in scripts {
+        for forbidden in [
+            "innerHTML",
+            "outerHTML",
+            "insertAdjacentHTML",
+            "document.write",
+            "eval(",
+        ] {
+            assert!(
+                !script.text.contains(forbidden),
+                "{forbidden} in {}",
+                script.path
+            );
+        }
+        for opening in ["$(\"", "getElementById(\""] {
+            for piece in script.text.split(opening).skip(1) {
+                let id = piece.split('"').next().unwrap();
+                assert!(
+                    index.contains(&format!("id=\"{id}\"")),
+                    "{id} in {}",
+                    script.path
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_description_names_every_route_and_no_other() {
+    let serving = Serving::start();
+    let document = serving.get("/api/v1/openapi.json").json();
+    assert_eq!(
+        document["openapi"].as_str().unwrap().split('.').next(),
+        Some("3")
+    );
+    let described: BTreeSet<&str> = document["paths"]
+        .as_object()
+        .unwrap()
+        .keys()
+        .map(String::as_str)
+        .collect();
+    let served: BTreeSet<&str> = routes::interface().iter().map(|(path, _)| *path).collect();
+    assert_eq!(described, served);
+    for (path, methods) in document["paths"].as_object().unwrap() {
+        for (method, operation) in methods.as_object().unwrap() {
+            assert!(
+                operation["responses"].get("401").is_some() || path.ends_with("openapi.json"),
+                "{path}"
+            );
+            let filled = path.replace("{id}", "x").replace("{frame}", "0.jpg");
+            if !filled.ends_with("events") && !filled.ends_with("mjpg") {
+                let status = serving
+                    .ask(&method.to_uppercase(), &filled, &[], b"")
+                    .status;
+                assert_ne!(status, 405, "{method} {path}");
+            }
+        }
+    }
+    let text = document.to_string();
+    for piece in text.split("\"$ref\":\"#/components/schemas/").skip(1) {
+        let name = piece.split('"').next().unwrap();
+        assert!(
+            document["components"]["schemas"].get(name).is_some(),
+            "{name}"
+        );
+    }
+    assert!(text.contains("set-control"));
+}
+
+#[test]
+fn the_service_manager_hears_of_start_life_and_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let socket = folder.path().join("notify");
+    let manager = UnixDatagram::bind(&socket).unwrap();
+    manager.set_read_timeout(Some(LONG)).unwrap();
+    let hear = || {
+        let mut buffer = [0; 512];
+        let count = manager.recv(&mut buffer).unwrap();
+        String::from_utf8(buffer[..count].to_vec()).unwrap()
+    };
+    let mut serving = Serving::with(|options| {
+        options.service = Some(ServiceManager {
+            socket: socket.to_str().unwrap().to_owned(),
+            watchdog: Some(Duration::from_millis(600)),
+        });
+    });
+    let ready = hear();
+    assert!(
+        ready.starts_with("READY=1\nSTATUS=Serving on 127.0.0.1:"),
+        "{ready}"
+    );
+    assert_eq!(hear(), "WATCHDOG=1\n");
+    assert_eq!(hear(), "WATCHDOG=1\n");
+    serving.stop();
+    let last = std::iter::repeat_with(hear).find(|line| !line.starts_with("WATCHDOG"));
+    assert_eq!(last.unwrap(), "STOPPING=1\n");
+}

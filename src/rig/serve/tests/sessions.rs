@@ -1,0 +1,237 @@
+use std::fs;
+
+use super::Serving;
+use relit_video::Video;
+
+const COW: &str = "20261120T101500Z-cow-short";
+const BUST: &str = "20261120T102000Z-bust-short";
+const DROPPED: &str = "20261120T103000Z-cow-dropped";
+const CUT: &str = "20261120T104500Z-cow-cut";
+
+fn path(session: &str, rest: &str) -> String {
+    format!("/api/v1/sessions/{session}{rest}")
+}
+
+#[test]
+fn sessions_are_listed_newest_first_with_their_verdicts() {
+    let serving = Serving::start();
+    assert_eq!(
+        serving.get("/api/v1/sessions").json(),
+        serde_json::json!([])
+    );
+    serving.hold(&[COW, BUST, DROPPED, CUT]);
+    fs::create_dir(serving.root.path().join("no-session")).unwrap();
+    let list = serving.get("/api/v1/sessions").json();
+    let ids: Vec<_> = list
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|s| s["id"].as_str().unwrap())
+        .collect();
+    assert_eq!(ids, [CUT, DROPPED, BUST, COW]);
+    assert_eq!(list[0]["status"], "aborted");
+    assert!(list[0]["reason"].as_str().unwrap().contains("salvaged"));
+    assert_eq!(list[1]["status"], "complete");
+    assert!(list[1]["dropped"].as_u64() > Some(0));
+    assert_eq!(
+        (&list[3]["object"], &list[3]["dropped"]),
+        (&"cow".into(), &0.into())
+    );
+    assert_eq!(list[3]["created"], "2026-11-20T10:15:00Z");
+    assert!(list[3]["frames"].as_u64() > Some(100));
+    assert!(list[3]["duration_s"].as_f64() > Some(4.0));
+    let part = serving
+        .get(&format!("/api/v1/sessions?limit=1&before={DROPPED}"))
+        .json();
+    assert_eq!(
+        (part.as_array().unwrap().len(), &part[0]["id"]),
+        (1, &BUST.into())
+    );
+}
+
+#[test]
+fn a_session_that_changes_is_listed_as_it_is_now() {
+    let serving = Serving::start();
+    serving.hold(&[COW]);
+    let manifest = serving.root.path().join(COW).join("session.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace("\"complete\"", "\"recording\"")).unwrap();
+    let list = serving.get("/api/v1/sessions").json();
+    assert_eq!(list[0]["status"], "recording");
+    for rest in ["/thumbnail.jpg", "/frames/0.jpg", "/video"] {
+        let refused = serving.get(&path(COW, rest));
+        assert_eq!(refused.status, 409, "{rest}");
+        assert!(refused.error().contains("still being recorded"));
+    }
+    fs::write(&manifest, &text).unwrap();
+    assert_eq!(
+        serving.get("/api/v1/sessions").json()[0]["status"],
+        "complete"
+    );
+    fs::write(&manifest, "{").unwrap();
+    let list = serving.get("/api/v1/sessions").json();
+    assert_eq!(
+        (&list[0]["status"], &list[0]["object"]),
+        (&"unreadable".into(), &"cow-short".into())
+    );
+    assert_eq!(serving.get(&path(COW, "")).status, 500);
+}
+
+#[test]
+fn one_session_is_told_with_each_frames_time_and_angle() {
+    let serving = Serving::start();
+    serving.hold(&[DROPPED]);
+    let detail = serving.get(&path(DROPPED, "")).json();
+    assert_eq!(detail["id"], DROPPED);
+    assert_eq!(detail["manifest"]["camera"]["fourcc"], "MJPG");
+    let frames = detail["frames"].as_u64().unwrap() as usize;
+    assert_eq!(detail["times_s"].as_array().unwrap().len(), frames);
+    assert_eq!(detail["angles_deg"].as_array().unwrap().len(), frames);
+    assert_eq!(detail["times_s"][0], 0.0);
+    let gaps = detail["gaps"].as_array().unwrap();
+    let missing: u64 = gaps
+        .iter()
+        .map(|gap| gap["missing"].as_u64().unwrap())
+        .sum();
+    assert_eq!(Some(missing), detail["dropped"].as_u64());
+    assert!(missing > 0);
+}
+
+#[test]
+fn any_frame_of_a_turn_is_served_as_a_picture() {
+    let serving = Serving::start();
+    serving.hold(&[COW]);
+    let video = Video::open(&serving.root.path().join(COW).join("video.mkv")).unwrap();
+    for number in [0, 77, video.frames().len() - 1] {
+        let answer = serving.get(&path(COW, &format!("/frames/{number}.jpg")));
+        assert_eq!(
+            answer.status,
+            200,
+            "{}",
+            String::from_utf8_lossy(&answer.body)
+        );
+        assert_eq!(answer.header("content-type"), Some("image/jpeg"));
+        let served = image::load_from_memory(&answer.body).unwrap().to_rgb8();
+        let truth = video.frame(number as u64).unwrap();
+        assert_eq!(served.dimensions(), truth.dimensions());
+        let pairs = served.as_raw().iter().zip(truth.as_raw());
+        let sum: u64 = pairs
+            .map(|(one, other)| u64::from(one.abs_diff(*other)))
+            .sum();
+        assert!(sum / (served.as_raw().len() as u64) < 3, "frame {number}");
+    }
+    let small = serving.get(&path(COW, "/frames/5.jpg?width=100"));
+    assert_eq!(image::load_from_memory(&small.body).unwrap().width(), 100);
+    let thumbnail = serving.get(&path(COW, "/thumbnail.jpg"));
+    assert_eq!(
+        image::load_from_memory(&thumbnail.body).unwrap().width(),
+        192
+    );
+    assert!(thumbnail.body.len() < 20_000);
+    for wrong in [
+        "/frames/99999.jpg",
+        "/frames/-1.jpg",
+        "/frames/0",
+        "/frames/x.jpg",
+    ] {
+        assert_eq!(serving.get(&path(COW, wrong)).status, 404, "{wrong}");
+    }
+}
+
+#[test]
+fn the_video_is_served_whole_and_in_parts() {
+    let serving = Serving::start();
+    serving.hold(&[COW]);
+    let bytes = fs::read(serving.root.path().join(COW).join("video.mkv")).unwrap();
+    let size = bytes.len();
+    let video = path(COW, "/video");
+    let whole = serving.get(&video);
+    assert_eq!(
+        (whole.status, whole.header("accept-ranges")),
+        (200, Some("bytes"))
+    );
+    assert_eq!(whole.body, bytes);
+    assert!(
+        whole
+            .header("content-disposition")
+            .unwrap()
+            .ends_with("cow-short.mkv")
+    );
+    let tag = whole.header("etag").unwrap().to_owned();
+    let part = |headers: &[&str]| serving.ask("GET", &video, headers, b"");
+    let middle = part(&["Range: bytes=1000-300999", &format!("If-Range: {tag}")]);
+    assert_eq!(middle.status, 206);
+    let told = format!("bytes 1000-300999/{size}");
+    assert_eq!(middle.header("content-range"), Some(told.as_str()));
+    assert_eq!(middle.body, bytes[1000..301_000]);
+    assert_eq!(part(&["Range: bytes=-7"]).body, bytes[size - 7..]);
+    let beyond = part(&[&format!("Range: bytes={size}-")]);
+    assert_eq!(beyond.status, 416);
+    assert_eq!(beyond.header("content-type"), Some("application/json"));
+    assert_eq!(
+        beyond.header("content-range"),
+        Some(format!("bytes */{size}").as_str())
+    );
+    let stale = part(&["Range: bytes=0-1", "If-Range: \"older\""]);
+    assert_eq!((stale.status, stale.body.len()), (200, size));
+}
+
+#[test]
+fn objects_are_suggested_newest_first_each_once() {
+    let serving = Serving::start();
+    serving.hold(&[COW, BUST]);
+    let again = serving.root.path().join("20261121T080000Z-cow-short");
+    fs::create_dir(&again).unwrap();
+    fs::copy(
+        serving.root.path().join(COW).join("session.json"),
+        again.join("session.json"),
+    )
+    .unwrap();
+    let objects = serving.get("/api/v1/objects").json();
+    assert_eq!(objects, serde_json::json!(["cow-short", "bust-short"]));
+}
+
+#[test]
+fn nothing_outside_the_folder_of_sessions_can_be_reached() {
+    let serving = Serving::start();
+    serving.hold(&[COW]);
+    let outside = tempfile::tempdir().unwrap();
+    let secret = outside.path().join("20261120T000000Z-secret");
+    fs::create_dir(&secret).unwrap();
+    for file in ["session.json", "video.mkv", "frames.jsonl"] {
+        fs::copy(serving.root.path().join(COW).join(file), secret.join(file)).unwrap();
+    }
+    let way = format!("{}", secret.display()).replace('/', "%2f");
+    let near = outside
+        .path()
+        .file_name()
+        .unwrap()
+        .to_str()
+        .unwrap()
+        .to_owned();
+    let up = format!("..%2f{near}%2f20261120T000000Z-secret");
+    for id in [
+        "..",
+        ".",
+        "%2e%2e",
+        "..%2f",
+        "%2e%2e%2f%2e%2e%2fetc",
+        "..%5c",
+        ".hidden",
+        "%00",
+        "",
+        "%ff",
+        way.as_str(),
+        up.as_str(),
+        "20261120T101500Z-cow-short%2f..%2f20261120T101500Z-cow-short",
+    ] {
+        for rest in ["", "/video", "/thumbnail.jpg", "/frames/0.jpg"] {
+            let status = serving.get(&path(id, rest)).status;
+            assert!(matches!(status, 400 | 404), "{id}{rest} gave {status}");
+        }
+    }
+    let manifest = serving.root.path().join(COW).join("session.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace("video.mkv", "../../etc/passwd")).unwrap();
+    assert_eq!(serving.get(&path(COW, "/video")).status, 500);
+}

@@ -1,0 +1,328 @@
+//! The session room from outside: folders written and read, and damaged in every way that was
+//! thought of.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use proptest::prelude::*;
+use relit_data::session::{
+    CameraFacts, Error, FrameEntry, FrameIndex, Manifest, Notice, Recording, SessionWriter,
+    SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of, recordings,
+};
+use tempfile::TempDir;
+
+const ID: &str = "20261120T093015Z-mug";
+
+fn manifest() -> Manifest {
+    Manifest {
+        id: ID.to_owned(),
+        object: "mug".to_owned(),
+        created: "2026-11-20T09:30:15Z".parse().unwrap(),
+        status: Status::Recording,
+        camera: CameraFacts {
+            backend: "v4l2".to_owned(),
+            device: "/dev/video0".to_owned(),
+            name: "Camera".to_owned(),
+            fourcc: "MJPG".to_owned(),
+            width: 640,
+            height: 480,
+            fps: 30.0,
+            controls: BTreeMap::from([("gain".to_owned(), 4.into())]),
+        },
+        turntable: Some(TurntableFacts {
+            port: "/dev/ttyUSB0".to_owned(),
+            firmware: "Grbl 1.1h".to_owned(),
+            degrees_per_second: 7.2,
+            steps_per_degree: 88.889,
+        }),
+        video: VideoFacts {
+            file: "video.mkv".to_owned(),
+            codec: "mjpeg".to_owned(),
+            frames: None,
+            bytes: None,
+            blake3: None,
+        },
+        faults: Vec::new(),
+        software: SoftwareFacts {
+            version: "1".to_owned(),
+            commit: String::new(),
+        },
+    }
+}
+
+fn entry(n: u64) -> FrameEntry {
+    FrameEntry {
+        n,
+        sequence: n,
+        t_us: 33_333 * n as i64,
+        angle_deg: Some(0.24 * n as f64),
+    }
+}
+
+/// A whole session of ten frames, whose video is not one: nothing here looks into it.
+fn whole() -> (TempDir, PathBuf) {
+    let root = tempfile::tempdir().unwrap();
+    let mut writer = SessionWriter::create(root.path(), manifest()).unwrap();
+    fs::write(writer.video_path(), b"ten frames").unwrap();
+    (0..10).for_each(|n| writer.push(entry(n)).unwrap());
+    let folder = writer.folder().to_owned();
+    writer.finish().unwrap();
+    (root, folder)
+}
+
+fn edit(folder: &Path, from: &str, to: &str) {
+    let path = folder.join("session.json");
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains(from), "{text}");
+    fs::write(path, text.replacen(from, to, 1)).unwrap();
+}
+
+fn losses(recording: &Recording) -> Vec<&str> {
+    recording
+        .notices
+        .iter()
+        .filter(|n| n.is_loss())
+        .map(Notice::text)
+        .collect()
+}
+
+#[test]
+fn a_session_is_read_as_it_was_written() {
+    let (_root, folder) = whole();
+    let recording = Recording::open(&folder).unwrap();
+    assert_eq!(
+        (recording.id.as_str(), recording.object.as_str()),
+        (ID, "mug")
+    );
+    assert!(recording.notices.is_empty(), "{:?}", recording.notices);
+    let read = recording.manifest.unwrap();
+    assert_eq!(read.status, Status::Complete);
+    assert_eq!((read.video.frames, read.video.bytes), (Some(10), Some(10)));
+    assert_eq!(read.camera, manifest().camera);
+    assert_eq!(
+        recording.frames.unwrap().entries(),
+        (0..10).map(entry).collect::<Vec<_>>()
+    );
+}
+
+#[test]
+fn a_session_under_way_says_so_until_it_is_ended() {
+    let root = tempfile::tempdir().unwrap();
+    let mut writer = SessionWriter::create(root.path(), manifest()).unwrap();
+    fs::write(writer.video_path(), b"some").unwrap();
+    writer.push(entry(0)).unwrap();
+    let folder = writer.folder().to_owned();
+    assert!(matches!(
+        Recording::open(&folder),
+        Err(Error::StillRecording(_))
+    ));
+    writer.abort("the camera was unplugged").unwrap();
+    let recording = Recording::open(&folder).unwrap();
+    assert_eq!(
+        losses(&recording),
+        ["the capture was aborted: the camera was unplugged"]
+    );
+}
+
+#[test]
+fn a_capture_that_failed_before_its_first_frame_can_be_aborted() {
+    let root = tempfile::tempdir().unwrap();
+    let writer = SessionWriter::create(root.path(), manifest()).unwrap();
+    let ended = writer.abort("no frame came").unwrap();
+    assert_eq!(ended.status, Status::Aborted("no frame came".to_owned()));
+}
+
+#[test]
+fn a_session_is_never_written_over_another() {
+    let (root, _folder) = whole();
+    assert!(matches!(
+        SessionWriter::create(root.path(), manifest()),
+        Err(Error::Exists(_))
+    ));
+    let mut outside = manifest();
+    outside.id = "../mug".to_owned();
+    assert!(matches!(
+        SessionWriter::create(root.path(), outside),
+        Err(Error::BadName(_))
+    ));
+}
+
+#[test]
+fn an_entry_that_does_not_follow_is_refused_and_leaves_the_index_whole() {
+    let root = tempfile::tempdir().unwrap();
+    let mut writer = SessionWriter::create(root.path(), manifest()).unwrap();
+    writer.push(entry(0)).unwrap();
+    assert!(matches!(
+        writer.push(entry(2)),
+        Err(Error::BadEntry { n: 2, .. })
+    ));
+    writer.push(entry(1)).unwrap();
+    let text = fs::read(writer.folder().join("frames.jsonl")).unwrap();
+    assert_eq!(FrameIndex::parse(&text).unwrap().entries().len(), 2);
+}
+
+#[test]
+fn what_is_wrong_in_a_manifest_is_named() {
+    for (from, to, named) in [
+        (
+            "relit.session/1",
+            "relit.session/2",
+            "its schema is \"relit.session/2\"",
+        ),
+        ("\"complete\"", "\"finished\"", "its status \"finished\""),
+        ("\"complete\"", "\"aborted\"", "no reason"),
+        ("\"width\": 640", "\"width\": \"wide\"", "line"),
+        ("\"bytes\": 10", "\"bytes\": null", "video.bytes is missing"),
+        ("\"video.mkv\"", "\"../video.mkv\"", "not a plain file name"),
+        ("\"fps\": 30.0", "\"fps\": 0.0", "camera.fps"),
+        (ID, "a/b", "cannot be a session's name"),
+        ("\"mug\"", "\" \"", "its object is empty"),
+        ("{", "", "line"),
+    ] {
+        let (_root, folder) = whole();
+        edit(&folder, from, to);
+        let message = Recording::open(&folder).unwrap_err().to_string();
+        assert!(
+            message.contains(named) && message.contains("session.json"),
+            "{to}: {message}"
+        );
+    }
+}
+
+#[test]
+fn a_video_that_was_cut_is_a_loss_and_a_missing_one_an_error() {
+    let (_root, folder) = whole();
+    fs::write(folder.join("video.mkv"), b"ten").unwrap();
+    let recording = Recording::open(&folder).unwrap();
+    let told = losses(&recording);
+    assert_eq!(
+        told,
+        ["video.mkv has 3 bytes where the manifest says 10: it was cut or changed"]
+    );
+    fs::remove_file(folder.join("video.mkv")).unwrap();
+    assert!(matches!(
+        Recording::open(&folder),
+        Err(Error::VideoMissing(_))
+    ));
+}
+
+#[test]
+fn damage_to_the_index_is_told_by_line_or_as_a_loss() {
+    let (_root, folder) = whole();
+    let path = folder.join("frames.jsonl");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replace("\"n\":4", "\"n\":5")).unwrap();
+    let message = Recording::open(&folder).unwrap_err().to_string();
+    assert!(
+        message.contains("line 5 says n = 5 where 4 is due"),
+        "{message}"
+    );
+    fs::write(&path, &text[..text.len() - 10]).unwrap();
+    assert_eq!(losses(&Recording::open(&folder).unwrap()).len(), 2);
+    fs::remove_file(&path).unwrap();
+    assert!(Recording::open(&folder).unwrap().frames.is_none());
+}
+
+#[test]
+fn dropped_frames_and_faults_are_warned_of() {
+    let (_root, folder) = whole();
+    let path = folder.join("frames.jsonl");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replace("\"sequence\":9", "\"sequence\":11")).unwrap();
+    edit(
+        &folder,
+        "\"faults\": []",
+        r#""faults": [{"t_us": 5, "what": "the table was slow"}]"#,
+    );
+    let recording = Recording::open(&folder).unwrap();
+    let told: Vec<_> = recording.notices.iter().map(Notice::text).collect();
+    assert_eq!(
+        told,
+        [
+            "during the capture: the table was slow",
+            "the camera dropped 2 frames before frame 9"
+        ]
+    );
+}
+
+#[test]
+fn inputs_are_sessions_folders_of_them_or_videos() {
+    let (root, folder) = whole();
+    let bare = root.path().join("clip one.mp4");
+    fs::write(&bare, b"").unwrap();
+    assert_eq!(recordings(&folder).unwrap(), std::slice::from_ref(&folder));
+    assert_eq!(recordings(&bare).unwrap(), std::slice::from_ref(&bare));
+    assert_eq!(Recording::open(&bare).unwrap().id, "clip_one");
+    fs::remove_file(&bare).unwrap();
+    assert_eq!(recordings(root.path()).unwrap(), [folder]);
+    assert!(matches!(recordings(&bare), Err(Error::NotThere(_))));
+    let empty = tempfile::tempdir().unwrap();
+    assert!(matches!(recordings(empty.path()), Err(Error::NoSession(_))));
+}
+
+#[test]
+fn a_video_beside_sessions_does_not_hide_them() {
+    let (root, _folder) = whole();
+    fs::write(root.path().join("preview.mkv"), b"").unwrap();
+    assert!(matches!(
+        recordings(root.path()),
+        Err(Error::VideoAmongSessions { .. })
+    ));
+}
+
+#[test]
+fn a_session_that_lost_its_manifest_and_video_is_not_passed_over() {
+    let (root, folder) = whole();
+    let lost = root.path().join("lost");
+    fs::create_dir(&lost).unwrap();
+    fs::write(lost.join("frames.jsonl"), b"").unwrap();
+    assert_eq!(recordings(root.path()).unwrap(), [folder, lost.clone()]);
+    assert!(matches!(Recording::open(&lost), Err(Error::NoSession(_))));
+}
+
+#[test]
+fn a_folder_with_one_video_and_no_manifest_is_taken_with_a_warning() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path().join("spot");
+    fs::create_dir(&folder).unwrap();
+    fs::write(folder.join("video.mkv"), b"").unwrap();
+    let recording = Recording::open(&folder).unwrap();
+    assert_eq!(recording.id, "spot");
+    assert!(recording.notices[0].text().contains("has no session.json"));
+    fs::write(folder.join("other.mp4"), b"").unwrap();
+    assert!(matches!(
+        Recording::open(&folder),
+        Err(Error::SeveralVideos { count: 2, .. })
+    ));
+}
+
+#[test]
+fn the_object_is_what_follows_the_time() {
+    assert_eq!(object_of("20261120T093015Z-blue-mug"), "blue-mug");
+    assert_eq!(object_of("mug"), "mug");
+    assert_eq!(object_of("jazZ-band"), "jazZ-band");
+}
+
+proptest! {
+    #[test]
+    fn no_bytes_make_the_readers_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        let _ = Manifest::from_json(&bytes);
+        let _ = FrameIndex::parse(&bytes);
+    }
+
+    #[test]
+    fn a_damaged_manifest_is_refused_or_reads_as_one_that_can_be_written(
+        at in 0_usize..900, byte in any::<u8>(),
+    ) {
+        let mut complete = manifest();
+        complete.status = Status::Aborted("why".to_owned());
+        let mut bytes = complete.to_json().unwrap();
+        let at = at % bytes.len();
+        bytes[at] = byte;
+        if let Ok(read) = Manifest::from_json(&bytes) {
+            prop_assert_eq!(Manifest::from_json(&read.to_json().unwrap()).unwrap(), read);
+        }
+    }
+}

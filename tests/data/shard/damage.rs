@@ -1,0 +1,358 @@
+//! Damage to shards, tables and descriptions is found and named.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use image::Rgb;
+use proptest::prelude::*;
+use relit_data::shard::{Dataset, Layout, Sample, encode_rgb, order};
+
+use crate::made::{
+    SAMPLES, SESSION, assert_names, assert_whole, dataset, settings, texts, verdict, write_with,
+};
+
+const TAR: &str = "20261120T093015Z-mug.tar";
+const TABLE: &str = "20261120T093015Z-mug.parquet";
+
+fn tar_path(out: &Path) -> PathBuf {
+    out.join(TAR)
+}
+
+/// The members of a tar as raw bytes (header, data, padding), and the end blocks.
+fn members(tar: &[u8]) -> (Vec<Vec<u8>>, Vec<u8>) {
+    let mut archive = tar::Archive::new(tar);
+    let mut starts = Vec::new();
+    let mut end = 0;
+    for entry in archive.entries().unwrap() {
+        let entry = entry.unwrap();
+        starts.push(entry.raw_header_position() as usize);
+        end = (entry.raw_file_position() + entry.size()).next_multiple_of(512) as usize;
+    }
+    starts.push(end);
+    let members = starts
+        .windows(2)
+        .map(|w| tar[w[0]..w[1]].to_vec())
+        .collect();
+    (members, tar[end..].to_vec())
+}
+
+/// Rewrites the tar of a fresh data set.
+fn with_members(change: impl FnOnce(&mut Vec<Vec<u8>>)) -> tempfile::TempDir {
+    let dir = dataset(Layout::Webdataset);
+    let (mut parts, end) = members(&fs::read(tar_path(dir.path())).unwrap());
+    assert_eq!(parts.len(), 3 * SAMPLES as usize);
+    change(&mut parts);
+    parts.push(end);
+    fs::write(tar_path(dir.path()), parts.concat()).unwrap();
+    dir
+}
+
+/// The sample that stands at a place of the tar.
+fn at(place: usize) -> Option<u32> {
+    Some(order(SAMPLES)[place])
+}
+
+#[test]
+fn the_same_members_in_the_same_places_are_whole() {
+    assert_whole(with_members(|_| {}).path());
+}
+
+#[test]
+fn a_missing_member_is_named() {
+    let dir = with_members(|parts| drop(parts.remove(3 * 4 + 1)));
+    assert_names(dir.path(), TAR, at(4), "its mask.png is missing");
+    assert_names(dir.path(), TAR, None, "bytes, not");
+}
+
+#[test]
+fn a_missing_sample_is_named() {
+    let dir = with_members(|parts| drop(parts.drain(6..9)));
+    assert_names(dir.path(), TAR, at(2), "the sample is missing");
+}
+
+#[test]
+fn a_doubled_member_is_named() {
+    let dir = with_members(|parts| parts.insert(10, parts[9].clone()));
+    assert_names(dir.path(), TAR, at(3), "its png stands in the shard twice");
+}
+
+#[test]
+fn swapped_samples_are_named() {
+    let dir = with_members(|parts| {
+        for part in 0..3 {
+            parts.swap(3 + part, 27 + part);
+        }
+    });
+    assert_names(dir.path(), TAR, at(1), "another place");
+    assert_names(dir.path(), TAR, at(9), "another place");
+    assert_names(dir.path(), TAR, None, "BLAKE3");
+    assert_eq!(verdict(dir.path()).problems.len(), 3);
+}
+
+#[test]
+fn swapped_contents_are_named() {
+    let mut swapped = None;
+    let dir = with_members(|parts| {
+        // Records of equal length change places under their old names.
+        let record = |place: usize| 3 * place + 2;
+        let size = |place: usize| &parts[record(place)][124..136];
+        let places = SAMPLES as usize;
+        let (a, b) = (0..places)
+            .flat_map(|a| (a + 1..places).map(move |b| (a, b)))
+            .find(|&(a, b)| size(a) == size(b))
+            .unwrap();
+        swapped = Some((a, b));
+        let (a, b) = (record(a), record(b));
+        let (first, second) = (parts[a].clone(), parts[b].clone());
+        parts[a] = [&first[..512], &second[512..]].concat();
+        parts[b] = [&second[..512], &first[512..]].concat();
+    });
+    let (a, b) = swapped.unwrap();
+    for place in [a, b] {
+        assert_names(
+            dir.path(),
+            TAR,
+            at(place),
+            "the record differs from the table in",
+        );
+    }
+    assert_eq!(verdict(dir.path()).problems.len(), 3);
+}
+
+#[test]
+fn a_stranger_in_the_tar_is_named() {
+    let dir = with_members(|parts| {
+        let mut header = tar::Header::new_ustar();
+        header.set_path("intruder.png").unwrap();
+        header.set_size(0);
+        header.set_cksum();
+        parts.insert(3, header.as_bytes().to_vec());
+    });
+    assert_names(dir.path(), TAR, None, "\"intruder.png\" at byte");
+}
+
+#[test]
+fn a_damaged_header_is_named_and_the_rest_is_read() {
+    let dir = with_members(|parts| parts[3 * 5][20] ^= 1);
+    assert_names(dir.path(), TAR, at(5), "not a tar header");
+    assert_names(dir.path(), TAR, at(5), "its png is missing");
+    assert_eq!(verdict(dir.path()).problems.len(), 3);
+}
+
+#[test]
+fn damaged_padding_is_named() {
+    let dir = with_members(|parts| *parts[3 * 5 + 2].last_mut().unwrap() = 1);
+    assert_names(dir.path(), TAR, at(5), "header or padding of its json");
+}
+
+#[test]
+fn a_damaged_image_mask_and_record_are_named() {
+    for (part, says) in [(0, "image"), (1, "mask"), (2, "record")] {
+        let dir = with_members(|parts| parts[3 * 7 + part][512 + 40] ^= 4);
+        assert_names(dir.path(), TAR, at(7), says);
+        assert_names(dir.path(), TAR, None, "BLAKE3");
+    }
+}
+
+#[test]
+fn a_tar_cut_off_anywhere_is_found() {
+    let dir = dataset(Layout::Webdataset);
+    let whole = fs::read(tar_path(dir.path())).unwrap();
+    for end in [
+        0,
+        1,
+        511,
+        512,
+        700,
+        whole.len() / 2,
+        whole.len() - 1024,
+        whole.len() - 1,
+    ] {
+        fs::write(tar_path(dir.path()), &whole[..end]).unwrap();
+        assert_names(dir.path(), TAR, None, "bytes, not");
+        let problems = texts(&verdict(dir.path()).problems);
+        assert!(
+            problems.iter().any(|p| p.contains("cut off")),
+            "{end}: {problems:#?}"
+        );
+    }
+    fs::write(tar_path(dir.path()), &whole[..whole.len() / 2]).unwrap();
+    assert_names(
+        dir.path(),
+        TAR,
+        at(SAMPLES as usize - 1),
+        "the sample is missing",
+    );
+}
+
+#[test]
+fn bytes_behind_the_end_are_found() {
+    let dir = dataset(Layout::Webdataset);
+    let mut tar = fs::read(tar_path(dir.path())).unwrap();
+    tar.push(0);
+    fs::write(tar_path(dir.path()), tar).unwrap();
+    assert_names(dir.path(), TAR, None, "1 bytes follow");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+    #[test]
+    fn a_flipped_byte_is_found_and_its_sample_named(
+        place in any::<prop::sample::Index>(),
+        flip in 1_u8..,
+    ) {
+        let dir = dataset(Layout::Webdataset);
+        let mut tar = fs::read(tar_path(dir.path())).unwrap();
+        let (parts, _) = members(&tar);
+        let place = place.index(tar.len());
+        tar[place] ^= flip;
+        fs::write(tar_path(dir.path()), &tar).unwrap();
+        let ends = parts.iter().scan(0, |end, part| { *end += part.len(); Some(*end) });
+        let member = ends.filter(|&end| end <= place).count();
+        let problems = verdict(dir.path()).problems;
+        prop_assert!(problems.iter().all(|p| p.file == TAR));
+        if member < parts.len() {
+            let key = at(member / 3).map(|index| relit_data::shard::sample_key(SESSION, index));
+            prop_assert!(problems.iter().any(|p| p.sample == key), "{:#?}", texts(&problems));
+        }
+        prop_assert!(problems.iter().any(|p| p.what.contains("BLAKE3")));
+    }
+}
+
+#[test]
+fn a_damaged_table_is_found_and_does_not_hide_damage_in_the_shard() {
+    let dir = with_members(|parts| parts[3 * 7][512 + 40] ^= 4);
+    let table = dir.path().join(TABLE);
+    let mut bytes = fs::read(&table).unwrap();
+    bytes[100] ^= 1;
+    fs::write(&table, bytes).unwrap();
+    assert_names(dir.path(), TABLE, None, "BLAKE3");
+    assert_names(dir.path(), TAR, at(7), "image: the PNG is damaged");
+    fs::remove_file(table).unwrap();
+    assert_names(dir.path(), TABLE, None, "could not open");
+}
+
+#[test]
+fn missing_files_and_strays_are_named() {
+    let dir = dataset(Layout::Webdataset);
+    fs::create_dir(dir.path().join("imgs")).unwrap();
+    let unknown = "dataset.json does not vouch for it";
+    let left = "an interrupted writer left it behind";
+    for (stray, says) in [
+        ("b.tar", unknown),
+        ("b.parquet", unknown),
+        ("x.png", unknown),
+        ("imgs/y", unknown),
+        (".b.spool", left),
+        (".b.tar.7.0.partial", left),
+    ] {
+        fs::write(dir.path().join(stray), b"").unwrap();
+        assert_names(dir.path(), stray, None, says);
+    }
+    fs::write(dir.path().join("notes.txt"), b"").unwrap();
+    assert_eq!(verdict(dir.path()).problems.len(), 6);
+    fs::remove_file(tar_path(dir.path())).unwrap();
+    assert_names(dir.path(), TAR, None, "could not open");
+}
+
+#[test]
+fn a_description_that_contradicts_itself_is_found() {
+    let dir = dataset(Layout::Webdataset);
+    let good = Dataset::read(dir.path()).unwrap();
+    let says = |change: fn(&mut Dataset), says: &str| {
+        let mut dataset = good.clone();
+        change(&mut dataset);
+        dataset.write(dir.path()).unwrap();
+        assert_names(dir.path(), Dataset::FILE, None, says);
+    };
+    says(|d| d.shards.clear(), "0 shards");
+    says(|d| d.sessions.clear(), "unknown session");
+    says(|d| d.shards[0].samples = 3, "its shard 3");
+    says(
+        |d| d.sessions[0].samples = u32::MAX,
+        "samples, the settings say 14",
+    );
+    says(|d| d.settings.frames = 15, "the settings say 15");
+    says(|d| d.shards.push(d.shards[0].clone()), "2 shards");
+    says(|d| d.sessions.push(d.sessions[0].clone()), "listed 2 times");
+    says(
+        |d| d.shards[0].file = "other.tar".into(),
+        "the shard \"other.tar\"",
+    );
+    good.write(dir.path()).unwrap();
+    assert_whole(dir.path());
+}
+
+/// A data set whose samples were wrong when they were written.
+fn written_wrong(change: impl Fn(&mut Sample)) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    let indices: Vec<u32> = (0..SAMPLES).collect();
+    write_with(
+        dir.path(),
+        Layout::Webdataset,
+        SESSION,
+        &indices,
+        |sample| {
+            if sample.record.index == 9 {
+                change(sample);
+            }
+        },
+    );
+    dir
+}
+
+#[test]
+fn a_record_that_does_not_agree_with_itself_is_named() {
+    let says = |change: fn(&mut Sample), says: &str| {
+        assert_names(written_wrong(change).path(), TABLE, Some(9), says);
+    };
+    says(|s| s.record.duplicate = true, "duplicate is true");
+    says(|s| s.record.source_frame = 3, "duplicate is false");
+    says(
+        |s| s.record.saturated_fraction += 1e-9,
+        "saturated_fraction is",
+    );
+    says(|s| s.record.spec_net = !s.record.spec_net, "spec_net is");
+    says(|s| s.record.saturated_any_px = 0, "below saturated_px");
+    says(|s| s.record.mask_px = 1, "more pixels are saturated");
+    says(|s| s.record.object = "cup".into(), "object is \"cup\"");
+    says(|s| s.record.crop.w += 1, "as the settings say");
+}
+
+#[test]
+fn figures_that_the_pixels_do_not_give_are_named() {
+    let says = |change: fn(&mut Sample), says: &str| {
+        assert_names(written_wrong(change).path(), TAR, Some(9), says);
+    };
+    says(|s| s.record.mask_px += 1, "mask_px is");
+    says(|s| s.record.saturated_px += 1, "saturated_px is");
+    says(|s| s.record.saturated_any_px += 1, "saturated_any_px is");
+    says(|s| s.record.mean_rgb[1] += 1e-9, "mean_rgb is");
+    says(|s| s.record.sharpness *= 2.0, "sharpness is");
+}
+
+#[test]
+fn light_outside_the_mask_is_named_with_its_pixel() {
+    let dir = written_wrong(|sample| {
+        sample.image.put_pixel(1, 3, Rgb([0, 1, 0]));
+        sample.png = encode_rgb(&sample.image).unwrap();
+    });
+    assert_names(dir.path(), TAR, Some(9), "pixel (1, 3) outside the mask");
+}
+
+#[test]
+fn settings_of_another_size_are_found() {
+    let dir = dataset(Layout::Webdataset);
+    let mut description = Dataset::read(dir.path()).unwrap();
+    description.settings = relit_data::shard::Settings {
+        size: relit_data::shard::Size::Pixels(256),
+        ..settings(Layout::Webdataset)
+    };
+    description.write(dir.path()).unwrap();
+    assert_names(
+        dir.path(),
+        TABLE,
+        Some(0),
+        "not [256, 256] as the settings say",
+    );
+}

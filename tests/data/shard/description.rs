@@ -1,0 +1,81 @@
+//! `dataset.json`: what is written is read back, and what cannot be trusted is refused.
+
+use std::fs;
+
+use relit_data::shard::{Dataset, Digest, Error, FileEntry, Layout, SessionEntry, SessionFiles};
+
+use crate::made::{self, settings};
+
+fn entry(id: &str) -> SessionEntry {
+    let files = SessionFiles {
+        shards: Vec::new(),
+        table: FileEntry {
+            file: format!("{id}.parquet"),
+            bytes: 0,
+            blake3: Digest::of(b""),
+        },
+    };
+    made::entry(id, &files, &[])
+}
+
+#[test]
+fn a_description_comes_back_as_it_was_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut dataset = Dataset::new(settings(Layout::Webdataset));
+    dataset.replace(entry("b"), Vec::new());
+    dataset.replace(entry("a"), Vec::new());
+    let changed = SessionEntry {
+        spec_net: 4,
+        warnings: vec!["a warning".to_owned()],
+        ..entry("b")
+    };
+    dataset.replace(changed.clone(), Vec::new());
+    dataset.write(dir.path()).unwrap();
+    let back = Dataset::read(dir.path()).unwrap();
+    assert_eq!(back, dataset);
+    assert_eq!(back.sessions, [entry("a"), changed]);
+}
+
+#[test]
+fn a_description_without_the_digest_of_an_index_is_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut dataset = Dataset::new(settings(Layout::Webdataset));
+    let mut bare = entry("a");
+    bare.input.index_blake3 = None;
+    dataset.replace(bare, Vec::new());
+    dataset.write(dir.path()).unwrap();
+    let text = fs::read_to_string(dir.path().join(Dataset::FILE)).unwrap();
+    assert!(!text.contains("index_blake3"), "{text}");
+    assert_eq!(Dataset::read(dir.path()).unwrap(), dataset);
+}
+
+#[test]
+fn a_folder_without_a_description_and_one_of_another_version_are_told_apart() {
+    let dir = tempfile::tempdir().unwrap();
+    let read = || Dataset::read(dir.path()).unwrap_err();
+    let write = |text: &str| fs::write(dir.path().join(Dataset::FILE), text).unwrap();
+    assert!(matches!(read(), Error::NoDataset { .. }));
+    write(r#"{"schema": "relit.dataset/2"}"#);
+    assert!(matches!(read(), Error::Schema { .. }));
+    write("{");
+    assert!(matches!(read(), Error::Description { .. }));
+}
+
+#[test]
+fn a_description_that_points_out_of_its_folder_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut dataset = Dataset::new(settings(Layout::Webdataset));
+    let mut bad = entry("a");
+    bad.table.file = "../a.parquet".to_owned();
+    dataset.replace(bad, Vec::new());
+    assert!(matches!(
+        dataset.write(dir.path()),
+        Err(Error::UnsafePath { .. })
+    ));
+    let json = serde_json::to_vec(&dataset).unwrap();
+    fs::write(dir.path().join(Dataset::FILE), json).unwrap();
+    assert!(matches!(
+        Dataset::read(dir.path()),
+        Err(Error::UnsafePath { .. })
+    ));
+}
