@@ -1,4 +1,4 @@
-//! The contact sheet: frames over the turn, inside the page.
+//! The contact sheet: thumbnails over the turn, embedded in the page.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -7,14 +7,15 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder as _, RgbImage};
 
 use super::axis::{degrees, percent};
+use super::error::Error;
+use super::page::{Page, THUMBNAIL_SIDE, Thumbnail};
 use super::turn::Turn;
-use super::{Error, Page, THUMBNAIL_SIDE, Thumbnail};
 use crate::shard::record::FrameRecord;
 
 /// Good enough to judge mask and light; a quarter of a PNG's size on a real frame.
 const JPEG_QUALITY: u8 = 85;
 
-/// The thumbnails as figures, in their order.
+/// The thumbnails as figures, in the given order.
 pub(super) fn sheet(page: &Page<'_>, turn: &Turn) -> Result<String, Error> {
     page.thumbnails
         .iter()
@@ -62,7 +63,7 @@ fn marks(record: &FrameRecord) -> String {
     format!("{spec_net}{duplicate}")
 }
 
-/// The image as JPEG or PNG, whichever is smaller: PNG wins on small and flat images.
+/// The image as JPEG or PNG, whichever is smaller: PNG is smaller for small and flat images.
 fn data_uri(thumbnail: &Thumbnail) -> Result<String, Error> {
     let (index, image) = (thumbnail.index, &thumbnail.image);
     let (width, height) = image.dimensions();

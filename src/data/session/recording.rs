@@ -1,4 +1,4 @@
-//! A recording as a program is given it: a session folder, or a bare video.
+//! The input of the programs: a session folder, or a bare video.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -9,20 +9,20 @@ use super::{
     object_of,
 };
 
-/// File name endings that are taken for videos in a folder without manifest.
+/// File extensions that count as videos in a folder without manifest.
 const VIDEO_ENDINGS: [&str; 7] = ["mkv", "mp4", "mov", "avi", "webm", "m4v", "nut"];
 
-/// Something about a recording that its user has to know.
+/// Something about a recording that its user should know.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Notice {
     /// Worth a look; nothing is lost.
     Warning(String),
-    /// Something that was recorded, or should have been, is not there.
+    /// Something that was recorded, or should have been, is missing.
     Loss(String),
 }
 
 impl Notice {
-    /// The sentence.
+    /// The text, one sentence.
     #[must_use]
     pub fn text(&self) -> &str {
         match self {
@@ -30,7 +30,7 @@ impl Notice {
         }
     }
 
-    /// True where something is lost.
+    /// True if something is lost.
     #[must_use]
     pub fn is_loss(&self) -> bool {
         matches!(self, Self::Loss(_))
@@ -50,19 +50,18 @@ pub struct Recording {
     pub video: PathBuf,
     /// The manifest; `None` for a bare video.
     pub manifest: Option<Manifest>,
-    /// The frame index, where there is one.
+    /// The frame index, if there is one.
     pub frames: Option<FrameIndex>,
-    /// What the user has to know.
+    /// What the user should know.
     pub notices: Vec<Notice>,
 }
 
 impl Recording {
-    /// Opens a session folder or a bare video file. The video itself is not looked into, except
-    /// for its size.
+    /// Opens a session folder or a bare video file. Of the video only the size is checked.
     ///
     /// # Errors
-    /// [`Error`] where manifest or index are not usable, the session has not ended, or there is no
-    /// video. What is short but usable becomes a [`Notice`].
+    /// [`Error`] if manifest or index are not usable, the session has not ended, or there is no video.
+    /// What is incomplete but usable becomes a [`Notice`].
     pub fn open(path: &Path) -> Result<Self, Error> {
         if path.is_dir() {
             if path.join(MANIFEST_FILE).exists() {
@@ -96,12 +95,12 @@ impl Recording {
             Ok(data) if data.is_file() => data.len(),
             _ => return Err(Error::VideoMissing(video)),
         };
-        if let Some(said) = manifest.video.bytes
-            && said != found
+        if let Some(recorded) = manifest.video.bytes
+            && recorded != found
         {
             let file = &manifest.video.file;
             notices.push(Notice::Loss(format!(
-                "{file} has {found} bytes where the manifest says {said}: it was cut or changed"
+                "{file} has {found} bytes, but the manifest says {recorded}: it was truncated or changed"
             )));
         }
         for fault in &manifest.faults {
@@ -127,11 +126,11 @@ impl Recording {
         match (videos.pop(), videos.len()) {
             (None, _) => Err(Error::NoSession(folder.to_owned())),
             (Some(video), 0) => {
-                // A name such as "." tells nothing; the real one does.
+                // A path such as "." has no usable name.
                 let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
                 let mut recording = Self::bare(&video, real.file_name(), Some(folder));
                 recording.notices.push(Notice::Warning(
-                    "the folder has no session.json: its video is taken without angles and driver's time stamps".to_owned(),
+                    "the folder has no session.json: its video is used without angles and without the driver's time stamps".to_owned(),
                 ));
                 Ok(recording)
             }
@@ -156,13 +155,12 @@ impl Recording {
     }
 }
 
-/// The recordings that a path stands for: a session folder or a video file is one, a folder of
-/// sessions is each of them, sorted by name. A folder in it that has lost its manifest or its video
-/// counts too, so that opening it tells.
+/// The recordings at a path: the path itself for a session folder or a video file; for a folder of
+/// sessions each of them, sorted by name. A session folder that has lost its manifest or its video is
+/// listed too, so that opening it reports the loss.
 ///
 /// # Errors
-/// [`Error::NotThere`], [`Error::NoSession`], [`Error::VideoAmongSessions`], or what the file
-/// system answers.
+/// [`Error::NotThere`], [`Error::NoSession`], [`Error::VideoAmongSessions`], or [`Error::Io`].
 pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, Error> {
     if !path.exists() {
         return Err(Error::NotThere(path.to_owned()));
@@ -176,7 +174,7 @@ pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut inner = Vec::new();
     for entry in fs::read_dir(path).map_err(Error::io(path, "listed"))? {
         let folder = entry.map_err(Error::io(path, "listed"))?.path();
-        if folder.is_dir() && is_of_a_session(&folder)? {
+        if folder.is_dir() && is_session_folder(&folder)? {
             inner.push(folder);
         }
     }
@@ -192,8 +190,8 @@ pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, Error> {
     }
 }
 
-/// Whether a folder is a session's, whole or not.
-fn is_of_a_session(folder: &Path) -> Result<bool, Error> {
+/// Whether a folder is a session, complete or not.
+fn is_session_folder(folder: &Path) -> Result<bool, Error> {
     let parts = [MANIFEST_FILE, INDEX_FILE, MASK_FILE];
     Ok(parts.iter().any(|part| folder.join(part).exists()) || !videos_in(folder)?.is_empty())
 }
@@ -211,7 +209,7 @@ fn videos_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(videos)
 }
 
-/// A session's name made from a file's: what cannot stand in one becomes '_'.
+/// A session's name made from a file name: invalid characters become '_'.
 fn name_from(name: Option<&OsStr>) -> String {
     let name = name.unwrap_or_default().to_string_lossy();
     let mut id: String = name
@@ -253,15 +251,15 @@ fn read_index(
     })?;
     if index.is_torn() {
         notices.push(Notice::Loss(format!(
-            "the last line of {INDEX_FILE} was cut and is lost"
+            "the last line of {INDEX_FILE} is incomplete and lost"
         )));
     }
     let counted = index.entries().len() as u64;
-    if let Some(said) = manifest.video.frames
-        && said != counted
+    if let Some(recorded) = manifest.video.frames
+        && recorded != counted
     {
         notices.push(Notice::Loss(format!(
-            "{INDEX_FILE} has {counted} frames where the manifest says {said}"
+            "{INDEX_FILE} has {counted} frames, but the manifest says {recorded}"
         )));
     }
     for gap in index.gaps() {

@@ -5,39 +5,40 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::{
-    Claim, Error, FrameEntry, FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, Status,
+    Error, FrameEntry, FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, SessionLock, Status,
     is_session_name,
 };
 use crate::durable;
 
-/// Name under which the index is kept as it was found, where lines of it had to go.
+/// Name under which the original index is kept if lines of it are removed.
 pub(super) const INDEX_AS_FOUND: &str = "frames.interrupted.jsonl";
 
-/// A session folder under way. The manifest says "recording" until [`Self::finish`] or
-/// [`Self::abort`]; a writer that is dropped leaves it so, which is what the next start of a
-/// capture looks for. While it lives, the folder is claimed: see [`Claim`].
+/// A session folder that is being recorded. The manifest says "recording" until [`Self::finish`] or
+/// [`Self::abort`]. A writer that is dropped leaves it so, for the next start of a capture to find
+/// ([`InterruptedSession`](super::InterruptedSession)). The folder is locked while the writer lives:
+/// see [`SessionLock`].
 #[derive(Debug)]
 pub struct SessionWriter {
     folder: PathBuf,
     manifest: Manifest,
     index: FrameIndex,
     lines: File,
-    /// Bytes of the index file's whole lines.
+    /// Bytes of the complete lines in the index file.
     length: u64,
-    /// True where the index in memory says more than its file, or less.
+    /// True if entries were amended since their lines were written.
     rewrite: bool,
-    /// True where lines of the file have to go.
+    /// True if frames were removed whose lines are in the file.
     truncated: bool,
-    claim: Claim,
+    lock: SessionLock,
 }
 
 impl SessionWriter {
-    /// Makes the folder `root/<id>` with a manifest whose status is "recording". The manifest's
-    /// own status and the video's figures are not looked at: they are known at the end.
+    /// Creates the folder `root/<id>` with a manifest whose status is "recording". The status and the
+    /// video's figures in `manifest` are ignored: they are set at the end.
     ///
     /// # Errors
-    /// [`Error::Exists`], [`Error::BadName`], a manifest that could not be read back, or what the
-    /// file system answers.
+    /// [`Error::Exists`], [`Error::BadName`], [`Error::Manifest`] if the manifest could not be read
+    /// back, or [`Error::Io`].
     pub fn create(root: &Path, mut manifest: Manifest) -> Result<Self, Error> {
         if !is_session_name(&manifest.id) {
             return Err(Error::BadName(manifest.id));
@@ -50,9 +51,9 @@ impl SessionWriter {
             made => made.map_err(Error::io(&folder, "made"))?,
         }
         durable::sync_folder(root).map_err(Error::io(root, "synced"))?;
-        // Claimed before there is a manifest: never does it stand there as if interrupted.
-        let mut claim = Claim::take(&folder)?;
-        claim.reserve()?;
+        // Locked before the manifest exists, so that the session never looks interrupted.
+        let mut lock = SessionLock::acquire(&folder)?;
+        lock.reserve()?;
         manifest.status = Status::Recording;
         manifest.video.frames = None;
         manifest.video.bytes = None;
@@ -73,7 +74,7 @@ impl SessionWriter {
             length: 0,
             rewrite: false,
             truncated: false,
-            claim,
+            lock,
         })
     }
 
@@ -83,13 +84,13 @@ impl SessionWriter {
         &self.folder
     }
 
-    /// Where the video belongs.
+    /// Path at which the video has to be written.
     #[must_use]
     pub fn video_path(&self) -> PathBuf {
         self.folder.join(&self.manifest.video.file)
     }
 
-    /// The manifest, to note faults and what became known after the start.
+    /// The manifest, to add faults and what became known after the start.
     pub fn manifest_mut(&mut self) -> &mut Manifest {
         &mut self.manifest
     }
@@ -97,18 +98,18 @@ impl SessionWriter {
     /// Appends a frame's line to the index.
     ///
     /// # Errors
-    /// [`Error::BadEntry`] where it does not continue the index, or what the file system answers.
-    /// The index stays as it was, and the same entry may be pushed again.
+    /// [`Error::BadEntry`] if it does not continue the index, or [`Error::Io`]. The index is then
+    /// unchanged, and the same entry may be pushed again.
     pub fn push(&mut self, entry: FrameEntry) -> Result<(), Error> {
-        self.keep(entry)?;
-        let written = self.append(&entry);
+        self.push_to_index(entry)?;
+        let written = self.append_line(&entry);
         if written.is_err() {
-            self.take_back();
+            self.remove_last();
         }
         written.map_err(Error::io(self.folder.join(INDEX_FILE), "written"))
     }
 
-    fn keep(&mut self, entry: FrameEntry) -> Result<(), Error> {
+    fn push_to_index(&mut self, entry: FrameEntry) -> Result<(), Error> {
         self.index.push(entry).map_err(|fault| Error::BadEntry {
             path: self.folder.join(INDEX_FILE),
             n: entry.n,
@@ -116,25 +117,25 @@ impl SessionWriter {
         })
     }
 
-    /// Writes an entry's line behind the last whole one.
-    fn append(&mut self, entry: &FrameEntry) -> io::Result<()> {
+    /// Writes an entry's line after the last complete one.
+    fn append_line(&mut self, entry: &FrameEntry) -> io::Result<()> {
         let mut line = serde_json::to_vec(entry).map_err(io::Error::other)?;
         line.push(b'\n');
-        self.cut()?;
+        self.drop_partial_line()?;
         self.lines.write_all(&line)?;
         self.length += line.len() as u64;
         Ok(())
     }
 
-    /// Cuts off what a line that could not be written whole left in the file.
-    fn cut(&self) -> io::Result<()> {
+    /// Truncates the file to its complete lines, in case the last write failed half-way.
+    fn drop_partial_line(&self) -> io::Result<()> {
         self.lines.set_len(self.length)
     }
 
-    /// Forgets the last entry, whose line could not be written.
-    fn take_back(&mut self) {
-        // Where the file cannot be cut now, it is cut before the next line and before a sync.
-        let _ = self.cut();
+    /// Removes the last entry, whose line could not be written.
+    fn remove_last(&mut self) {
+        // If truncating fails now, it is repeated before the next line and before a sync.
+        let _ = self.drop_partial_line();
         self.index
             .truncate(self.index.entries().len().saturating_sub(1));
     }
@@ -145,11 +146,11 @@ impl SessionWriter {
         &self.index
     }
 
-    /// Gives each frame what became known of it since its line was written, such as its angle. The
-    /// file is rewritten, whole or not at all, when the session ends.
+    /// Changes entries after their lines were written, for example to add the angle. The file is
+    /// rewritten, whole or not at all, when the session ends.
     ///
     /// # Errors
-    /// [`Error::BadEntry`] for the first entry that does not fit; none is changed then.
+    /// [`Error::BadEntry`] for the first invalid entry; then none is changed.
     pub fn amend(&mut self, amended: impl Fn(&FrameEntry) -> FrameEntry) -> Result<(), Error> {
         let mut index = FrameIndex::default();
         for entry in self.index.entries() {
@@ -165,8 +166,8 @@ impl SessionWriter {
         Ok(())
     }
 
-    /// Forgets all frames from position `frames` on, as the video lacks them. The index as it was
-    /// stays beside the one that is written when the session ends, `frames.interrupted.jsonl`.
+    /// Removes all frames from position `frames` on, which the video does not have. When the session
+    /// ends, the original index is kept as `frames.interrupted.jsonl`.
     pub fn truncate(&mut self, frames: usize) {
         if frames < self.index.entries().len() {
             self.index.truncate(frames);
@@ -174,26 +175,26 @@ impl SessionWriter {
         }
     }
 
-    /// Makes the index durable up to the last frame pushed.
+    /// Syncs the index to disk, up to the last frame pushed.
     ///
     /// # Errors
-    /// What the file system answers.
+    /// [`Error::Io`].
     pub fn sync(&self) -> Result<(), Error> {
-        self.cut()
+        self.drop_partial_line()
             .and_then(|()| self.lines.sync_data())
             .map_err(Error::io(self.folder.join(INDEX_FILE), "synced"))
     }
 
-    /// Ends a whole session: takes the video's size, hash and number of frames into the manifest
-    /// and marks it complete. The video must have been closed.
+    /// Ends a complete session: adds the video's size, hash and number of frames to the manifest and
+    /// marks it complete. The video must have been closed.
     ///
     /// # Errors
-    /// [`Error::VideoMissing`], or what the file system answers; the status stays "recording".
+    /// [`Error::VideoMissing`] or [`Error::Io`]; the status then stays "recording".
     pub fn finish(self) -> Result<Manifest, Error> {
         self.end(Status::Complete)
     }
 
-    /// Ends a session that is not whole, for this reason. What was recorded stays.
+    /// Marks an incomplete session as aborted, with this reason. What was recorded stays.
     ///
     /// # Errors
     /// As [`Self::finish`].
@@ -202,8 +203,8 @@ impl SessionWriter {
     }
 
     fn end(self, status: Status) -> Result<Manifest, Error> {
-        // On a full disk this is the room for what follows.
-        self.claim.release_reserve()?;
+        // On a full disk this frees the space for what follows.
+        self.lock.release_reserve()?;
         self.sync()?;
         if self.truncated {
             keep_as_found(&self.folder)?;
@@ -213,23 +214,23 @@ impl SessionWriter {
         }
         let frames = self.index.entries().len() as u64;
         let manifest = close(&self.folder, self.manifest, frames, status)?;
-        self.claim.end()?;
+        self.lock.remove()?;
         Ok(manifest)
     }
 }
 
-/// Gives the index as it is a second name, unless an earlier try did.
+/// Keeps the index as it is under a second name, unless an earlier attempt did so.
 pub(super) fn keep_as_found(folder: &Path) -> Result<(), Error> {
     let (path, kept) = (folder.join(INDEX_FILE), folder.join(INDEX_AS_FOUND));
     if kept.exists() || !path.exists() {
         return Ok(());
     }
-    // Not every file system has links.
+    // Not every file system has hard links.
     let linked = fs::hard_link(&path, &kept).or_else(|_| fs::copy(&path, &kept).map(|_| ()));
     linked.map_err(Error::io(kept, "written"))
 }
 
-/// Takes the video's size and hash into the manifest and writes it with its last status.
+/// Adds the video's size and hash to the manifest and writes it with its final status.
 pub(super) fn close(
     folder: &Path,
     mut manifest: Manifest,
@@ -237,7 +238,7 @@ pub(super) fn close(
     status: Status,
 ) -> Result<Manifest, Error> {
     let path = folder.join(&manifest.video.file);
-    // A capture can fail before its first frame: it is aborted without a video.
+    // A capture that failed before its first frame is aborted without a video.
     if path.is_file() {
         let file = File::open(&path).map_err(Error::io(&path, "read"))?;
         file.sync_all().map_err(Error::io(&path, "synced"))?;
@@ -301,7 +302,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_line_that_was_not_written_whole_is_taken_back_and_can_be_pushed_again() {
+    fn a_line_that_was_not_written_completely_is_removed_and_can_be_pushed_again() {
         let root = tempfile::tempdir().unwrap();
         let mut writer = writer(root.path());
         writer.push(entry(0)).unwrap();

@@ -8,12 +8,12 @@ use png::{BitDepth, ColorType, Compression};
 use super::Error;
 
 /// Largest image that is decoded, pixels: 64 Mi, 192 MiB of RGB.
-const MOST_PIXELS: u64 = 1 << 26;
+const MAX_PIXELS: u64 = 1 << 26;
 
 /// An image as PNG, 8-bit RGB.
 ///
 /// # Errors
-/// [`Error::Encode`] where the image has no pixels.
+/// [`Error::Encode`] if the image has no pixels.
 pub fn encode_rgb(image: &RgbImage) -> Result<Vec<u8>, Error> {
     encode(image.as_raw(), image.dimensions(), ColorType::Rgb)
 }
@@ -21,7 +21,7 @@ pub fn encode_rgb(image: &RgbImage) -> Result<Vec<u8>, Error> {
 /// A mask as PNG, 8-bit grey.
 ///
 /// # Errors
-/// [`Error::Encode`] where the mask has no pixels.
+/// [`Error::Encode`] if the mask has no pixels.
 pub fn encode_mask(mask: &GrayImage) -> Result<Vec<u8>, Error> {
     encode(mask.as_raw(), mask.dimensions(), ColorType::Grayscale)
 }
@@ -29,14 +29,14 @@ pub fn encode_mask(mask: &GrayImage) -> Result<Vec<u8>, Error> {
 /// The image in a PNG of 8-bit RGB.
 ///
 /// # Errors
-/// [`Error::Decode`] where the PNG is damaged, [`Error::PixelFormat`] where it has other pixels,
+/// [`Error::Decode`] if the PNG is damaged, [`Error::PixelFormat`] if it has another pixel format,
 /// [`Error::TooManyPixels`] above 64 Mi pixels.
 pub fn decode_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
     let (width, height, pixels) = decode(bytes, ColorType::Rgb, "8-bit RGB")?;
     RgbImage::from_raw(width, height, pixels).ok_or(Error::TooManyPixels {
         width,
         height,
-        most: MOST_PIXELS,
+        limit: MAX_PIXELS,
     })
 }
 
@@ -49,11 +49,11 @@ pub fn decode_mask(bytes: &[u8]) -> Result<GrayImage, Error> {
     GrayImage::from_raw(width, height, pixels).ok_or(Error::TooManyPixels {
         width,
         height,
-        most: MOST_PIXELS,
+        limit: MAX_PIXELS,
     })
 }
 
-/// Whether a mask holds 0 and 255 only.
+/// Checks that a mask holds 0 and 255 only.
 pub(super) fn check_mask(mask: &GrayImage) -> Result<(), Error> {
     match mask
         .enumerate_pixels()
@@ -102,9 +102,9 @@ fn decode(
     let too_many = Error::TooManyPixels {
         width,
         height,
-        most: MOST_PIXELS,
+        limit: MAX_PIXELS,
     };
-    if u64::from(width) * u64::from(height) > MOST_PIXELS {
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
         return Err(too_many);
     }
     let mut pixels = vec![0; reader.output_buffer_size().ok_or(too_many)?];
@@ -133,14 +133,14 @@ mod tests {
     }
 
     #[test]
-    fn pixels_of_another_kind_are_refused() {
+    fn another_pixel_format_is_refused() {
         let png = encode_rgb(&image()).unwrap();
         assert!(matches!(decode_mask(&png), Err(Error::PixelFormat { .. })));
         assert!(encode_rgb(&RgbImage::new(0, 3)).is_err());
     }
 
     #[test]
-    fn a_png_that_claims_a_huge_image_is_refused_before_memory_is_taken() {
+    fn a_png_that_claims_a_huge_image_is_refused_before_memory_is_allocated() {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 1 << 30, 1 << 30);
         encoder.set_color(ColorType::Rgb);

@@ -1,4 +1,4 @@
-//! The layout `relit`: images in a folder that takes its name when it is whole.
+//! The layout `relit`: images in a folder that gets its final name when it is complete.
 
 use std::fs;
 use std::io;
@@ -10,10 +10,10 @@ use super::codec::encode_rgb;
 use super::dataset::ShardEntry;
 use super::digest::FolderHasher;
 use super::output;
-use super::table::Row;
+use super::table::TableRow;
 use super::{Error, names};
 
-/// The images of a session on their way into a folder.
+/// The images of a session that are written into a folder.
 pub(super) struct FolderStore {
     out: PathBuf,
     session: String,
@@ -76,14 +76,14 @@ impl FolderStore {
         Ok(())
     }
 
-    /// Gives folder, mask and mean image their names, in place of older ones.
-    pub(super) fn publish(self, rows: &[Row], mask_png: &[u8]) -> Result<ShardEntry, Error> {
+    /// Renames folder, mask and mean image to their final names, replacing older ones.
+    pub(super) fn publish(self, rows: &[TableRow], mask_png: &[u8]) -> Result<ShardEntry, Error> {
         (0..self.samples).try_for_each(|index| output::sync(&self.image_path(index)))?;
         output::sync(&self.partial.path)?;
         let mask = output::seal_whole(&self.out, &names::mask_file(&self.session), mask_png)?;
         let mean_png = encode_rgb(&self.mean.image()?)?;
         let mean_img = output::seal_whole(&self.out, &names::mean_file(&self.session), &mean_png)?;
-        self.take_name()?;
+        self.replace_folder()?;
         let mut hasher = FolderHasher::default();
         rows.iter().for_each(|row| hasher.add(&row.png_blake3));
         Ok(ShardEntry {
@@ -97,26 +97,26 @@ impl FolderStore {
         })
     }
 
-    /// Puts the folder in the place of an older one, which stays whole until then.
-    fn take_name(&self) -> Result<(), Error> {
+    /// Renames the folder to its final name. An older folder stays complete until then.
+    fn replace_folder(&self) -> Result<(), Error> {
         let images = self.out.join(names::IMAGES);
-        let place = images.join(&self.session);
-        let aside = images.join(names::outgoing(&self.session));
-        output::remove_folder(&aside)?;
-        if place.exists() {
-            fs::rename(&place, &aside).map_err(Error::io("set aside", &place))?;
+        let path = images.join(&self.session);
+        let old = images.join(names::outgoing(&self.session));
+        output::remove_folder(&old)?;
+        if path.exists() {
+            fs::rename(&path, &old).map_err(Error::io("move away", &path))?;
         }
-        if let Err(source) = fs::rename(&self.partial.path, &place) {
-            // The older one comes back; where that fails too, the next locked run does it.
-            let _ = fs::rename(&aside, &place);
+        if let Err(source) = fs::rename(&self.partial.path, &path) {
+            // Restore the older one; if that fails too, the next run does it.
+            let _ = fs::rename(&old, &path);
             return Err(Error::Io {
                 doing: "rename a finished folder to",
-                path: place,
+                path,
                 source,
             });
         }
         output::sync(&images)?;
-        output::remove_folder(&aside)
+        output::remove_folder(&old)
     }
 
     fn image_path(&self, index: u32) -> PathBuf {

@@ -1,5 +1,5 @@
-//! A tar as this room writes it, and any tar as it is read: member by member, with bounded
-//! memory and without trust in a single byte.
+//! The tar that a shard is: headers as they are written, and a reader for any tar, member by member,
+//! with bounded memory and without trusting the input.
 
 use std::io::{self, Read};
 
@@ -7,14 +7,14 @@ use tar::{EntryType, Header};
 
 use super::Error;
 
-/// The unit of a tar, bytes.
+/// Size of a tar's blocks, bytes.
 pub(super) const BLOCK: usize = 512;
 /// Largest extension header (long names) that is read, bytes.
-const MOST_EXTENSION: u64 = 1 << 20;
+const MAX_EXTENSION: u64 = 1 << 20;
 
 type Block = [u8; BLOCK];
 
-/// The header of a member as it is written: nothing of the time, the user or the machine.
+/// The header of a member as it is written: without time, user or machine.
 pub(super) fn header(path: &str, bytes: u64) -> io::Result<Header> {
     let mut header = Header::new_ustar();
     header.set_path(path)?;
@@ -30,23 +30,23 @@ pub(super) fn header(path: &str, bytes: u64) -> io::Result<Header> {
 
 /// One file in a tar.
 pub(super) struct Member {
-    /// Where its header starts.
+    /// Offset of its header, bytes.
     pub(super) offset: u64,
-    /// Its name. Only a label: it may be absolute or lead anywhere.
+    /// Its name. A label only: it may be absolute or contain `..`.
     pub(super) path: String,
     pub(super) data: Vec<u8>,
-    /// True where the header is, byte for byte, the one that is written here, and the padding
-    /// after the data is zero.
+    /// True if the header is byte for byte what [`header`] gives, and the padding after the data is
+    /// zero.
     pub(super) canonical: bool,
 }
 
-/// Reads a tar as a stream of its regular files. Folders, links and the like are passed over;
-/// long names of GNU tar and of pax are understood.
+/// Reads the regular files of a tar as a stream. Folders, links and the like are skipped; long names
+/// of GNU tar and of pax are supported.
 pub(super) struct TarReader<R> {
     source: R,
-    /// Bytes taken from the source.
+    /// Bytes read from the source.
     offset: u64,
-    /// A header that was found while looking for one.
+    /// The header at which [`Self::resume`] stopped.
     found: Option<Block>,
     limit: u64,
     ended: bool,
@@ -64,7 +64,7 @@ impl<R: Read> TarReader<R> {
         }
     }
 
-    /// The source, after what was read of it.
+    /// The source, positioned after what was read.
     pub(super) fn into_inner(self) -> R {
         self.source
     }
@@ -94,7 +94,7 @@ impl<R: Read> TarReader<R> {
                 }
                 EntryType::GNULongName | EntryType::XHeader => {
                     let path = String::from("an extension header");
-                    let data = self.data(start, &path, claimed, MOST_EXTENSION)?.0;
+                    let data = self.data(start, &path, claimed, MAX_EXTENSION)?.0;
                     named.add(header.entry_type(), &data);
                 }
                 EntryType::GNUSparse => return Err(Error::ShardHeader { offset: start }),
@@ -108,8 +108,8 @@ impl<R: Read> TarReader<R> {
         Ok(None)
     }
 
-    /// After an error in the middle of a tar: looks, block by block, for the next header. False
-    /// where there is none.
+    /// After an error in the middle of a tar: searches block by block for the next header. False if
+    /// there is none.
     pub(super) fn resume(&mut self) -> Result<bool, Error> {
         self.skip_padding()?;
         loop {
@@ -158,8 +158,8 @@ impl<R: Read> TarReader<R> {
         })
     }
 
-    /// The data of a member and whether the padding after it is zero. Memory grows with what is
-    /// really there, not with what the header claims.
+    /// The data of a member, and whether the padding after it is zero. Memory grows with the data
+    /// that is there, not with the size that the header claims.
     fn data(
         &mut self,
         start: u64,
@@ -189,7 +189,7 @@ impl<R: Read> TarReader<R> {
         Ok((data, self.skip_padding()?))
     }
 
-    /// Goes to the next multiple of a block; whether all that was passed over is zero.
+    /// Skips to the next block; returns whether all skipped bytes are zero.
     fn skip_padding(&mut self) -> Result<bool, Error> {
         let over = usize::try_from(self.offset % BLOCK as u64).unwrap_or(0);
         if over == 0 {
@@ -244,7 +244,7 @@ impl<R: Read> TarReader<R> {
     }
 }
 
-/// What extension headers say of the member that follows them.
+/// Path and size that extension headers give for the member that follows them.
 #[derive(Default)]
 struct Extensions {
     path: Option<Vec<u8>>,
@@ -275,7 +275,7 @@ impl Extensions {
     }
 }
 
-/// The records `LENGTH KEY=VALUE\n` of a pax header, up to the first that is malformed.
+/// The records `LENGTH KEY=VALUE\n` of a pax header, up to the first malformed one.
 fn pax_records(mut data: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
     std::iter::from_fn(move || {
         let space = data.iter().position(|&byte| byte == b' ')?;
@@ -287,7 +287,7 @@ fn pax_records(mut data: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
     })
 }
 
-/// The block as a header, if its checksum is right.
+/// The block as a header, if its checksum is correct.
 fn valid_header(block: &Block) -> Option<&Header> {
     if is_zero(block) {
         return None;
@@ -344,7 +344,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_is_written_here_is_read_back_and_known_as_ours() {
+    fn written_members_are_read_back_as_canonical() {
         let long = format!("{}/0000.mask.png", "x".repeat(150));
         let members: [(&str, &[u8]); 3] = [("s/0000.png", b"abc"), (&long, b""), ("b", &[9; 512])];
         let read = read_all(&tar_of(&members)).unwrap();
@@ -385,7 +385,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_tar_cut_off_anywhere_is_an_error() {
+    fn a_tar_truncated_anywhere_is_an_error() {
         let tar = tar_of(&[("a.png", b"abc"), ("b.png", b"def")]);
         for end in 0..tar.len() {
             let error = read_all(&tar[..end]).unwrap_err();
@@ -413,7 +413,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_claim_of_more_than_the_limit_takes_no_memory() {
+    fn a_size_above_the_limit_allocates_no_memory() {
         let block = header("a.png", u64::MAX >> 3).unwrap();
         let read = read_all(block.as_bytes());
         assert!(matches!(read, Err(Error::ShardTooLarge { .. })));

@@ -1,13 +1,13 @@
-//! `dataset.json`: what is written is read back, and what cannot be trusted is refused.
+//! `dataset.json`: what is written is read back, and unsafe content is refused.
 
 use std::fs;
 
-use relit_data::shard::{Dataset, Digest, Error, FileEntry, Layout, SessionEntry, SessionFiles};
+use relit_data::shard::{Dataset, Digest, Error, FileEntry, Layout, SessionEntry, ShardFiles};
 
-use crate::made::{self, settings};
+use crate::sample_set::{self, settings};
 
 fn entry(id: &str) -> SessionEntry {
-    let files = SessionFiles {
+    let files = ShardFiles {
         shards: Vec::new(),
         table: FileEntry {
             file: format!("{id}.parquet"),
@@ -15,7 +15,7 @@ fn entry(id: &str) -> SessionEntry {
             blake3: Digest::of(b""),
         },
     };
-    made::entry(id, &files, &[])
+    sample_set::entry(id, &files, &[])
 }
 
 #[test]

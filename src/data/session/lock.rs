@@ -1,6 +1,5 @@
-//! Who records a session: a file in its folder that the recorder keeps locked. The system frees the
-//! lock of a process that dies, however it dies, so that a session that is marked as recording and
-//! whose claim is free was interrupted.
+//! The lock on a session folder: a file that the recorder keeps locked. The system releases the lock
+//! of a process that dies, so a session that is marked as recording and not locked was interrupted.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
@@ -9,25 +8,25 @@ use std::path::{Path, PathBuf};
 use super::Error;
 
 /// Name of the file that a recorder keeps locked.
-const CLAIM_FILE: &str = ".recording";
-/// Bytes kept in reserve: on a full disk, manifest and index can still be written.
+const LOCK_FILE: &str = ".recording";
+/// Bytes kept in reserve, so that manifest and index can still be written on a full disk.
 const RESERVE: usize = 512 << 10;
 
-/// The lock on a session folder, and some room on the disk kept for its end. Dropped, it is freed,
-/// and the file stays.
+/// The lock on a session folder, and some disk space reserved for the end of the session. Dropping it
+/// releases the lock and leaves the file.
 #[derive(Debug)]
-pub struct Claim {
+pub struct SessionLock {
     path: PathBuf,
     file: File,
 }
 
-impl Claim {
-    /// Claims a session folder.
+impl SessionLock {
+    /// Locks a session folder.
     ///
     /// # Errors
-    /// [`Error::InUse`] where another holds it, or what the file system answers.
-    pub fn take(folder: &Path) -> Result<Self, Error> {
-        let path = folder.join(CLAIM_FILE);
+    /// [`Error::InUse`] if another process holds the lock, or [`Error::Io`].
+    pub fn acquire(folder: &Path) -> Result<Self, Error> {
+        let path = folder.join(LOCK_FILE);
         let mut options = OpenOptions::new();
         let opened = options.create(true).truncate(false).write(true).open(&path);
         let file = opened.map_err(Error::io(&path, "made"))?;
@@ -38,7 +37,7 @@ impl Claim {
         }
     }
 
-    /// Takes room on the disk for what is written last.
+    /// Reserves disk space for what is written last.
     pub(super) fn reserve(&mut self) -> Result<(), Error> {
         let written = self.file.write_all(&vec![0; RESERVE]);
         written
@@ -46,14 +45,14 @@ impl Claim {
             .map_err(Error::io(&self.path, "written"))
     }
 
-    /// Gives the room back to the disk.
+    /// Frees the reserved disk space.
     pub(super) fn release_reserve(&self) -> Result<(), Error> {
         let cut = self.file.set_len(0);
         cut.map_err(Error::io(&self.path, "written"))
     }
 
-    /// Frees the folder and takes the file away: nobody records there any more.
-    pub(super) fn end(self) -> Result<(), Error> {
+    /// Releases the lock and removes its file: nobody records in this folder any more.
+    pub(super) fn remove(self) -> Result<(), Error> {
         match fs::remove_file(&self.path) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
                 Err(Error::io(&self.path, "removed")(error))
