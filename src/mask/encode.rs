@@ -1,11 +1,14 @@
-//! Pictures to PNG, in memory.
+//! Images to PNG, in memory.
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{GrayImage, RgbImage};
 
 use super::Error;
 
-/// A grey PNG of few levels: unfiltered, as suits flat areas.
+/// A grey image as PNG, without filters: best for flat areas. `what` names the image in the error.
+///
+/// # Errors
+/// [`Error::Encode`].
 pub fn grey_png(image: &GrayImage, what: &'static str) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     let encoder =
@@ -16,7 +19,10 @@ pub fn grey_png(image: &GrayImage, what: &'static str) -> Result<Vec<u8>, Error>
     Ok(bytes)
 }
 
-/// A colour PNG, quickly.
+/// A colour image as PNG, with fast compression. `what` names the image in the error.
+///
+/// # Errors
+/// [`Error::Encode`].
 pub fn rgb_png(image: &RgbImage, what: &'static str) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     let encoder =
