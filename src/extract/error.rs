@@ -8,7 +8,7 @@ use relit_video as video;
 
 /// Why a recording, or all of them, could not be extracted.
 #[derive(Debug, thiserror::Error)]
-pub enum Error {
+pub enum ExtractError {
     /// An option is out of range.
     #[error("{name} is {value}: give {allowed}")]
     Option {
@@ -122,7 +122,7 @@ pub enum Error {
     Strict(String),
     /// The recording cannot be used.
     #[error(transparent)]
-    Session(#[from] session::Error),
+    Session(#[from] session::SessionError),
     /// The video cannot be used.
     #[error(transparent)]
     Video(#[from] video::Error),
@@ -138,10 +138,10 @@ pub enum Error {
     },
     /// The data set cannot be written.
     #[error(transparent)]
-    Shard(#[from] shard::Error),
+    Shard(#[from] shard::ShardError),
     /// The report cannot be made.
     #[error(transparent)]
-    Report(#[from] report::Error),
+    Report(#[from] report::ReportError),
     /// The worker threads cannot be started.
     #[error("the worker threads could not be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),

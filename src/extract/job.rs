@@ -16,7 +16,7 @@ use super::collected::Collected;
 use super::object::ObjectMask;
 use super::pipeline::{LostFrame, ProcessedFrame, Stage};
 use super::plan::{Assignment, Plan};
-use super::{Error, ExtractOptions, Observer, Scaler, cut, square_around};
+use super::{ExtractError, ExtractOptions, Observer, Scaler, cut, square_around};
 
 /// Number of runs of damaged frames that are reported one by one.
 const MAX_REPORTED: usize = 8;
@@ -35,7 +35,7 @@ pub(super) struct Job {
 
 impl Job {
     /// Opens recording, video and mask, and checks that they belong together.
-    pub(super) fn open(path: &Path, options: &ExtractOptions) -> Result<Self, Error> {
+    pub(super) fn open(path: &Path, options: &ExtractOptions) -> Result<Self, ExtractError> {
         let recording = Recording::open(path)?;
         let video = Video::open(&recording.video)?;
         let size = (video.facts().width, video.facts().height);
@@ -97,7 +97,7 @@ impl Job {
         options: &ExtractOptions,
         pool: &ThreadPool,
         observer: &dyn Observer,
-    ) -> Result<(SessionEntry, Vec<ShardEntry>), Error> {
+    ) -> Result<(SessionEntry, Vec<ShardEntry>), ExtractError> {
         let mut plan = Plan::new(&self.video, self.recording.frames.as_ref(), options.frames)?;
         let mut notices = self.notices.clone();
         notices.extend(self.notices_of_plan(&plan));
@@ -130,7 +130,7 @@ impl Job {
             lost.extend(newly_lost);
             if options.strict && !lost.is_empty() {
                 let first = notices_of_lost(&lost).swap_remove(0);
-                return Err(Error::Strict(first.text().to_owned()));
+                return Err(ExtractError::Strict(first.text().to_owned()));
             }
         }
         notices.extend(notices_of_lost(&lost));
@@ -160,7 +160,7 @@ impl Job {
         Ok((entry, files.shards))
     }
 
-    fn stage(&self, options: &ExtractOptions) -> Result<Stage<'_>, Error> {
+    fn stage(&self, options: &ExtractOptions) -> Result<Stage<'_>, ExtractError> {
         let facts = self.video.facts();
         let crop = square_around(
             self.mask.bounding_box,
@@ -168,7 +168,7 @@ impl Job {
             (facts.width, facts.height),
         );
         if u64::from(crop.w) * u64::from(crop.h) > MAX_CROP_PIXELS {
-            return Err(Error::CropTooLarge(crop));
+            return Err(ExtractError::CropTooLarge(crop));
         }
         let crop_mask = cut(&self.mask.image, crop);
         let side = match options.size {
@@ -257,7 +257,7 @@ impl Job {
         options: &ExtractOptions,
         collected: &Collected,
         notices: &[Notice],
-    ) -> Result<String, Error> {
+    ) -> Result<String, ExtractError> {
         let facts = self.video.facts();
         let pair = |name: &str, value: String| (name.to_owned(), value);
         let crop = collected
@@ -296,13 +296,13 @@ fn texts(notices: &[Notice]) -> Vec<String> {
 }
 
 /// With `strict`: an error if something is lost or a frame is repeated.
-fn check_strict(plan: &Plan, notices: &[Notice]) -> Result<(), Error> {
+fn check_strict(plan: &Plan, notices: &[Notice]) -> Result<(), ExtractError> {
     if let Some(loss) = notices.iter().find(|notice| notice.is_loss()) {
-        return Err(Error::Strict(loss.text().to_owned()));
+        return Err(ExtractError::Strict(loss.text().to_owned()));
     }
     match plan.repeated() {
         0 => Ok(()),
-        n => Err(Error::Strict(format!(
+        n => Err(ExtractError::Strict(format!(
             "{n} samples would repeat a source frame"
         ))),
     }
@@ -348,15 +348,15 @@ fn setting_rows(options: &ExtractOptions) -> Vec<(String, String)> {
 }
 
 /// BLAKE3 of the frame index, if it was used.
-fn index_digest(recording: &Recording) -> Result<Option<Digest>, Error> {
+fn index_digest(recording: &Recording) -> Result<Option<Digest>, ExtractError> {
     match (&recording.frames, &recording.folder) {
         (Some(_), Some(folder)) => Ok(Some(digest(&folder.join(INDEX_FILE))?.1)),
         _ => Ok(None),
     }
 }
 
-fn digest(path: &Path) -> Result<(u64, Digest), Error> {
-    Digest::of_file(path).map_err(|source| Error::Read {
+fn digest(path: &Path) -> Result<(u64, Digest), ExtractError> {
+    Digest::of_file(path).map_err(|source| ExtractError::Read {
         path: path.to_owned(),
         source,
     })

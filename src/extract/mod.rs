@@ -30,7 +30,7 @@ use relit_data::session::{self, recordings};
 use relit_data::shard::{self, Dataset, ExtractionSettings, OutputFolder};
 
 pub use crop::{bounding_box, cut, square_around};
-pub use error::Error;
+pub use error::ExtractError;
 pub use observer::{Observer, RecordingOutcome};
 pub use options::{ExtractOptions, MAX_MARGIN, MAX_SIDE};
 pub use scale::Scaler;
@@ -53,7 +53,7 @@ pub struct Tally {
 /// data set in the folder `out`, which is created if it does not exist.
 ///
 /// # Errors
-/// [`Error`] if nothing can be extracted: an option is out of range, `out` holds a data set with other
+/// [`ExtractError`] if nothing can be extracted: an option is out of range, `out` holds a data set with other
 /// settings, or it cannot be written. A failure with one input or recording is reported to `observer`
 /// and counted.
 pub fn extract(
@@ -61,10 +61,10 @@ pub fn extract(
     out: &Path,
     options: &ExtractOptions,
     observer: &dyn Observer,
-) -> Result<Tally, Error> {
+) -> Result<Tally, ExtractError> {
     options.check()?;
     if out.join(session::MANIFEST_FILE).exists() {
-        return Err(Error::IntoSession(out.to_owned()));
+        return Err(ExtractError::IntoSession(out.to_owned()));
     }
     let folder = OutputFolder::lock(out)?;
     let dataset = open_dataset(out, options.settings())?;
@@ -108,7 +108,12 @@ impl Run<'_> {
         self.end(recording, outcome, tally);
     }
 
-    fn end(&self, recording: &Path, outcome: Result<RecordingOutcome, Error>, tally: &mut Tally) {
+    fn end(
+        &self,
+        recording: &Path,
+        outcome: Result<RecordingOutcome, ExtractError>,
+        tally: &mut Tally,
+    ) {
         let outcome = outcome.unwrap_or_else(RecordingOutcome::Failed);
         match &outcome {
             RecordingOutcome::Extracted(entry) => {
@@ -124,13 +129,13 @@ impl Run<'_> {
         self.observer.ended(recording, &outcome);
     }
 
-    fn extract_one(&mut self, path: &Path) -> Result<RecordingOutcome, Error> {
+    fn extract_one(&mut self, path: &Path) -> Result<RecordingOutcome, ExtractError> {
         let Self {
             folder, options, ..
         } = self;
         let job = job::Job::open(path, options)?;
         if !self.names.insert(job.id().to_owned()) {
-            return Err(Error::SameName(job.id().to_owned()));
+            return Err(ExtractError::SameName(job.id().to_owned()));
         }
         if options.resume
             && let Some(entry) = job.existing_entry(&self.dataset, folder.path(), options)
@@ -139,7 +144,7 @@ impl Run<'_> {
         }
         if !options.replace && job.would_replace_another(&self.dataset) {
             let (out, id) = (folder.path().to_owned(), job.id().to_owned());
-            return Err(Error::NameTaken { out, id });
+            return Err(ExtractError::NameTaken { out, id });
         }
         self.observer.started(path, options.frames);
         let (entry, shards) = job.run(folder, options, &self.pool, self.observer)?;
@@ -153,10 +158,10 @@ impl Run<'_> {
 }
 
 /// The data set in `out`, or a new one.
-fn open_dataset(out: &Path, settings: ExtractionSettings) -> Result<Dataset, Error> {
+fn open_dataset(out: &Path, settings: ExtractionSettings) -> Result<Dataset, ExtractError> {
     let existing = match Dataset::read(out) {
         Ok(existing) => existing,
-        Err(shard::Error::NoDataset { .. }) => return Ok(Dataset::new(settings)),
+        Err(shard::ShardError::NoDataset { .. }) => return Ok(Dataset::new(settings)),
         Err(error) => return Err(error.into()),
     };
     if existing.settings == settings {
@@ -172,7 +177,7 @@ fn open_dataset(out: &Path, settings: ExtractionSettings) -> Result<Dataset, Err
             let new = &new[name];
             (old != new).then(|| format!("{name} {old} there, {new} now"))
         });
-    Err(Error::OtherSettings {
+    Err(ExtractError::OtherSettings {
         out: out.to_owned(),
         differ: differ.collect::<Vec<_>>().join("; "),
     })

@@ -8,7 +8,7 @@ use relit_data::geometry::Rect;
 use relit_data::session::{MASK_FILE, Recording};
 use relit_data::shard::Digest;
 
-use super::{Error, bounding_box};
+use super::{ExtractError, bounding_box};
 
 /// Pixels of the mask file with at least this level and this alpha belong to the object.
 const OBJECT: u8 = 128;
@@ -33,27 +33,27 @@ impl ObjectMask {
         recording: &Recording,
         named: Option<&Path>,
         frame: (u32, u32),
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, ExtractError> {
         let path = match (named, &recording.folder) {
             (Some(named), _) if named.is_file() => named.to_owned(),
-            (Some(named), _) => return Err(Error::MaskNotThere(named.to_owned())),
+            (Some(named), _) => return Err(ExtractError::MaskNotThere(named.to_owned())),
             (None, Some(folder)) if folder.join(MASK_FILE).is_file() => folder.join(MASK_FILE),
-            (None, Some(folder)) => return Err(Error::NoMask(folder.clone())),
-            (None, None) => return Err(Error::NoMask(recording.video.clone())),
+            (None, Some(folder)) => return Err(ExtractError::NoMask(folder.clone())),
+            (None, None) => return Err(ExtractError::NoMask(recording.video.clone())),
         };
-        let bytes = std::fs::read(&path).map_err(|source| Error::Read {
+        let bytes = std::fs::read(&path).map_err(|source| ExtractError::Read {
             path: path.clone(),
             source,
         })?;
         let image = image::load_from_memory(&bytes)
-            .map_err(|source| Error::Mask {
+            .map_err(|source| ExtractError::Mask {
                 path: path.clone(),
                 source,
             })?
             .into_luma_alpha8();
         let size = image.dimensions();
         if size != frame {
-            return Err(Error::MaskSize {
+            return Err(ExtractError::MaskSize {
                 path,
                 mask: size,
                 frame,
@@ -67,7 +67,7 @@ impl ObjectMask {
                 0
             }])
         });
-        let bounding_box = bounding_box(&mask_image).ok_or(Error::EmptyMask(path))?;
+        let bounding_box = bounding_box(&mask_image).ok_or(ExtractError::EmptyMask(path))?;
         Ok(Self {
             image: mask_image,
             bounding_box,

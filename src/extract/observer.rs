@@ -4,7 +4,7 @@ use std::path::Path;
 
 use relit_data::shard::SessionEntry;
 
-use super::Error;
+use super::ExtractError;
 
 /// Receives the progress of an extraction, from several threads. `()` ignores it.
 pub trait Observer: Sync {
@@ -30,5 +30,5 @@ pub enum RecordingOutcome {
     /// It was in the data set already, intact and with the same settings, video, index and mask.
     Skipped(Box<SessionEntry>),
     /// It is not in the data set.
-    Failed(Error),
+    Failed(ExtractError),
 }

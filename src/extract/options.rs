@@ -5,7 +5,7 @@ use std::thread::available_parallelism;
 
 use relit_data::shard::{Align, ExtractionSettings, ImageSize, Layout};
 
-use super::{Error, scale};
+use super::{ExtractError, scale};
 
 /// Largest side of a scaled image, pixels.
 pub const MAX_SIDE: u32 = 8192;
@@ -78,9 +78,9 @@ impl ExtractOptions {
         }
     }
 
-    pub(super) fn check(&self) -> Result<(), Error> {
+    pub(super) fn check(&self) -> Result<(), ExtractError> {
         let wrong = |name, value: f64, allowed| {
-            Err(Error::Option {
+            Err(ExtractError::Option {
                 name,
                 value,
                 allowed,

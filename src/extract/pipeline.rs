@@ -14,7 +14,7 @@ use relit_data::shard::{self, MaskSpans, Measures};
 use relit_video::{FrameFault, Pending, Reader, Video};
 
 use super::plan::Assignments;
-use super::{Error, Scaler};
+use super::{ExtractError, Scaler};
 
 /// The processing of the frames of one video.
 pub(super) struct Stage<'a> {
@@ -42,7 +42,7 @@ pub(super) struct LostFrame {
 }
 
 /// The inner error is a frame that is lost, the outer one ends the extraction.
-type Finished = Result<Result<ProcessedFrame, LostFrame>, Error>;
+type Finished = Result<Result<ProcessedFrame, LostFrame>, ExtractError>;
 
 impl Stage<'_> {
     /// Reads the assigned frames and passes each to `accept`, in no particular order; returns the
@@ -51,8 +51,8 @@ impl Stage<'_> {
         &self,
         assignments: &Assignments,
         pool: &ThreadPool,
-        mut accept: impl FnMut(ProcessedFrame) -> Result<(), Error>,
-    ) -> Result<Vec<LostFrame>, Error> {
+        mut accept: impl FnMut(ProcessedFrame) -> Result<(), ExtractError>,
+    ) -> Result<Vec<LostFrame>, ExtractError> {
         let wanted: Vec<u64> = assignments.keys().copied().collect();
         let threads = pool.current_num_threads();
         let reader = self.video.read(&wanted, threads)?;
@@ -82,7 +82,9 @@ impl Stage<'_> {
         let crop = match crop {
             Ok(crop) => crop,
             // The other frames have the same pixel format.
-            Err(fault @ FrameFault::PixelFormat(_)) => return Err(Error::Frame { number, fault }),
+            Err(fault @ FrameFault::PixelFormat(_)) => {
+                return Err(ExtractError::Frame { number, fault });
+            }
             Err(fault) => return Ok(Err(LostFrame { number, fault })),
         };
         let measures = self.spans.measure(&crop, self.saturation_level)?;
@@ -99,8 +101,8 @@ impl Stage<'_> {
 
 fn collect(
     receiver: Receiver<Finished>,
-    accept: &mut impl FnMut(ProcessedFrame) -> Result<(), Error>,
-) -> Result<Vec<LostFrame>, Error> {
+    accept: &mut impl FnMut(ProcessedFrame) -> Result<(), ExtractError>,
+) -> Result<Vec<LostFrame>, ExtractError> {
     let mut lost = Vec::new();
     for finished in receiver {
         match finished? {

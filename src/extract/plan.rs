@@ -7,7 +7,7 @@ use relit_video::Video;
 
 use super::select::{Candidate, Selection};
 use super::timeline::timeline;
-use super::{Error, runs_back_at, time_gaps};
+use super::{ExtractError, runs_back_at, time_gaps};
 
 /// The frames of a video that may be chosen, and those that were chosen.
 #[derive(Debug)]
@@ -46,7 +46,7 @@ impl Plan {
         video: &Video,
         index: Option<&FrameIndex>,
         samples: u32,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, ExtractError> {
         let mut candidates = timeline(video.frames(), index)?;
         let all = candidates.len();
         if candidates
@@ -113,7 +113,7 @@ impl Plan {
 
     /// Chooses again, without the frames `lost`, for the samples to which these were assigned. The
     /// other samples keep their frames. Returns the new assignments; none if nothing is lost.
-    pub(super) fn replace(&mut self, lost: &HashSet<u64>) -> Result<Assignments, Error> {
+    pub(super) fn replace(&mut self, lost: &HashSet<u64>) -> Result<Assignments, ExtractError> {
         if lost.is_empty() {
             return Ok(Assignments::new());
         }

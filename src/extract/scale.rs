@@ -10,7 +10,7 @@ use fast_image_resize::pixels::{U16, U16x3};
 use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions, Resizer};
 use image::{GrayImage, RgbImage};
 
-use super::Error;
+use super::ExtractError;
 
 /// The name of the method in `dataset.json`.
 pub(super) const METHOD: &str = "linear light, masked before, Hamming down, bilinear up";
@@ -40,8 +40,8 @@ impl Scaler {
     /// A scaler for crops with this mask (0 or 255), to `side` x `side` pixels or without scaling.
     ///
     /// # Errors
-    /// [`Error::ObjectTooSmall`] if the object covers half of no output pixel.
-    pub fn new(crop_mask: GrayImage, side: Option<u32>) -> Result<Self, Error> {
+    /// [`ExtractError::ObjectTooSmall`] if the object covers half of no output pixel.
+    pub fn new(crop_mask: GrayImage, side: Option<u32>) -> Result<Self, ExtractError> {
         let to = match side {
             None => None,
             Some(side) => Some(Target::new(&crop_mask, side)?),
@@ -61,10 +61,10 @@ impl Scaler {
     /// Masks and scales one crop, which has the size of the mask.
     ///
     /// # Errors
-    /// [`Error::Scaling`] if the crop has another size.
-    pub fn scale(&self, crop: &RgbImage, resizer: &mut Resizer) -> Result<RgbImage, Error> {
+    /// [`ExtractError::Scaling`] if the crop has another size.
+    pub fn scale(&self, crop: &RgbImage, resizer: &mut Resizer) -> Result<RgbImage, ExtractError> {
         if crop.dimensions() != self.crop_mask.dimensions() {
-            return Err(Error::Scaling(
+            return Err(ExtractError::Scaling(
                 "the crop and its mask differ in size".to_owned(),
             ));
         }
@@ -86,7 +86,7 @@ fn masked(crop: &RgbImage, mask: &GrayImage) -> RgbImage {
 }
 
 impl Target {
-    fn new(crop_mask: &GrayImage, side: u32) -> Result<Self, Error> {
+    fn new(crop_mask: &GrayImage, side: u32) -> Result<Self, ExtractError> {
         let (width, height) = crop_mask.dimensions();
         let filter = if width.max(height) > side {
             FilterType::Hamming
@@ -113,7 +113,7 @@ impl Target {
             }
         }
         if mask.as_raw().iter().all(|&m| m == 0) {
-            return Err(Error::ObjectTooSmall { side });
+            return Err(ExtractError::ObjectTooSmall { side });
         }
         let to_linear = std::array::from_fn(|value| {
             (65535.0 * linear_from_srgb(value as f64 / 255.0)).round() as u16
@@ -136,7 +136,7 @@ impl Target {
         crop: &RgbImage,
         crop_mask: &GrayImage,
         resizer: &mut Resizer,
-    ) -> Result<RgbImage, Error> {
+    ) -> Result<RgbImage, ExtractError> {
         let linear: Vec<U16x3> = crop
             .pixels()
             .zip(crop_mask.as_raw())
@@ -168,8 +168,8 @@ impl Target {
     }
 }
 
-fn scaling(error: impl std::fmt::Display) -> Error {
-    Error::Scaling(error.to_string())
+fn scaling(error: impl std::fmt::Display) -> ExtractError {
+    ExtractError::Scaling(error.to_string())
 }
 
 /// IEC 61966-2-1, from a value in 0..=1 to light in 0..=1.
@@ -280,7 +280,7 @@ mod tests {
         mask.put_pixel(50, 50, Luma([255]));
         assert!(matches!(
             Scaler::new(mask, Some(8)),
-            Err(Error::ObjectTooSmall { side: 8 })
+            Err(ExtractError::ObjectTooSmall { side: 8 })
         ));
     }
 }

@@ -2,7 +2,7 @@
 
 use relit_data::shard::SamplingBasis;
 
-use super::Error;
+use super::ExtractError;
 
 /// A source frame that may be chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,12 +41,12 @@ impl TurnSpan {
     /// first frame to the end of the last.
     ///
     /// # Errors
-    /// [`Error::NoFrameLeft`] without candidates, [`Error::OneFrame`] with one,
-    /// [`Error::TableStands`] if the angle does not change.
-    pub fn of(candidates: &[Candidate]) -> Result<Self, Error> {
+    /// [`ExtractError::NoFrameLeft`] without candidates, [`ExtractError::OneFrame`] with one,
+    /// [`ExtractError::TableStands`] if the angle does not change.
+    pub fn of(candidates: &[Candidate]) -> Result<Self, ExtractError> {
         let (first, last) = match candidates {
-            [] => return Err(Error::NoFrameLeft),
-            [_] => return Err(Error::OneFrame),
+            [] => return Err(ExtractError::NoFrameLeft),
+            [_] => return Err(ExtractError::OneFrame),
             [first, .., last] => (first, last),
         };
         let all_have_angles = candidates
@@ -67,7 +67,7 @@ impl TurnSpan {
         span.extent = to_last + median_step(&positions);
         if span.basis == SamplingBasis::Angle {
             if to_last < TURN_TOLERANCE_DEG {
-                return Err(Error::TableStands { degrees: to_last });
+                return Err(ExtractError::TableStands { degrees: to_last });
             }
             span.covered_deg = Some(span.extent.min(TURN_DEG));
             if span.extent >= TURN_DEG - TURN_TOLERANCE_DEG {
@@ -141,17 +141,21 @@ impl Selection {
     ///
     /// # Errors
     /// As [`TurnSpan::of`].
-    pub fn choose(candidates: &[Candidate], samples: u32) -> Result<Self, Error> {
+    pub fn choose(candidates: &[Candidate], samples: u32) -> Result<Self, ExtractError> {
         Self::among(candidates, TurnSpan::of(candidates)?, samples)
     }
 
     /// Chooses `samples` frames, evenly spread over a given span.
     ///
     /// # Errors
-    /// [`Error::NoFrameLeft`] without candidates.
-    pub fn among(candidates: &[Candidate], span: TurnSpan, samples: u32) -> Result<Self, Error> {
+    /// [`ExtractError::NoFrameLeft`] without candidates.
+    pub fn among(
+        candidates: &[Candidate],
+        span: TurnSpan,
+        samples: u32,
+    ) -> Result<Self, ExtractError> {
         if candidates.is_empty() {
-            return Err(Error::NoFrameLeft);
+            return Err(ExtractError::NoFrameLeft);
         }
         let (frames, distances) = span.nearest(candidates, samples);
         Ok(Self {
@@ -354,7 +358,7 @@ mod tests {
     fn a_table_that_does_not_turn_is_refused() {
         let candidates = turned((0..100).map(|n| f64::from(n) * 1e-4));
         let error = Selection::choose(&candidates, 100).unwrap_err();
-        assert!(matches!(error, Error::TableStands { .. }), "{error}");
+        assert!(matches!(error, ExtractError::TableStands { .. }), "{error}");
     }
 
     #[test]

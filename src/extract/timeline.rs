@@ -3,7 +3,7 @@
 use relit_data::session::{FrameEntry, FrameIndex};
 use relit_video::FrameInfo;
 
-use super::Error;
+use super::ExtractError;
 use super::select::Candidate;
 
 /// The frames that are not damaged as far as the container shows, with the driver's time stamps and
@@ -14,11 +14,11 @@ use super::select::Candidate;
 /// and frames without a line are left out.
 ///
 /// # Errors
-/// [`Error::IndexMismatch`] if the time stamps do not match either.
+/// [`ExtractError::IndexMismatch`] if the time stamps do not match either.
 pub(super) fn timeline(
     frames: &[FrameInfo],
     index: Option<&FrameIndex>,
-) -> Result<Vec<Candidate>, Error> {
+) -> Result<Vec<Candidate>, ExtractError> {
     let intact = || frames.iter().filter(|frame| !frame.damaged);
     let Some(index) = index else {
         let without_entry = |frame: &FrameInfo| candidate(frame, frame.t_us, None);
@@ -28,7 +28,7 @@ pub(super) fn timeline(
     let entry_of: Vec<Option<&FrameEntry>> = if entries.len() == frames.len() {
         entries.iter().map(Some).collect()
     } else {
-        let mismatch = || Error::IndexMismatch {
+        let mismatch = || ExtractError::IndexMismatch {
             lines: entries.len() as u64,
             frames: frames.len() as u64,
         };
@@ -176,7 +176,7 @@ mod tests {
         let refused = timeline(&fast, Some(&index()));
         assert!(matches!(
             refused,
-            Err(Error::IndexMismatch {
+            Err(ExtractError::IndexMismatch {
                 lines: 10,
                 frames: 8
             })

@@ -5,7 +5,7 @@ use opencv::core::{self, Mat, Size};
 use opencv::imgproc;
 
 use super::bitmap::{Bitmap, Component, Connectivity};
-use super::{Error, Feather, Mark, Seeds};
+use super::{Feather, Mark, MaskError, Seeds};
 
 /// Width of the rise from 10 % to 90 % of a Gaussian edge, in standard deviations.
 const RISE: f64 = 2.563;
@@ -91,7 +91,7 @@ pub(super) fn soften(
     mask: &Bitmap,
     size: (u32, u32),
     feather: Feather,
-) -> Result<GrayImage, Error> {
+) -> Result<GrayImage, MaskError> {
     let hard: Vec<u8> = mask
         .bits()
         .iter()
@@ -109,13 +109,13 @@ pub(super) fn soften(
     Ok(GrayImage::from_raw(size.0, size.1, levels).unwrap_or_default())
 }
 
-fn blur(levels: &[u8], (width, height): (u32, u32), sigma: f64) -> Result<Vec<u8>, Error> {
+fn blur(levels: &[u8], (width, height): (u32, u32), sigma: f64) -> Result<Vec<u8>, MaskError> {
     let doing = "softening the mask's edge";
     let mut soft = vec![0; levels.len()];
     let from = Mat::new_rows_cols_with_data(height as i32, width as i32, levels)
-        .map_err(Error::opencv(doing))?;
+        .map_err(MaskError::opencv(doing))?;
     let mut to = Mat::new_rows_cols_with_data_mut(height as i32, width as i32, &mut soft)
-        .map_err(Error::opencv(doing))?;
+        .map_err(MaskError::opencv(doing))?;
     let by_sigma = Size::new(0, 0);
     // The frame's border is not an edge of the object.
     imgproc::gaussian_blur(
@@ -126,7 +126,7 @@ fn blur(levels: &[u8], (width, height): (u32, u32), sigma: f64) -> Result<Vec<u8
         sigma,
         core::BORDER_REPLICATE,
     )
-    .map_err(Error::opencv(doing))?;
+    .map_err(MaskError::opencv(doing))?;
     drop(to);
     Ok(soft)
 }

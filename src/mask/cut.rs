@@ -6,7 +6,7 @@ use opencv::imgproc;
 use relit_data::geometry::Rect;
 
 use super::bitmap::Bitmap;
-use super::{Error, Hints, Iterations, Mark};
+use super::{Hints, Iterations, Mark, MaskError};
 
 /// Seed of OpenCV's random numbers, from which GrabCut draws its first clusters; any fixed number.
 const RNG_SEED: i32 = 1;
@@ -38,11 +38,11 @@ pub(super) struct InitialLabels {
 
 impl InitialLabels {
     /// The labels that the hints give to a frame of `size`.
-    pub(super) fn new(hints: &Hints, size: (u32, u32)) -> Result<Self, Error> {
+    pub(super) fn new(hints: &Hints, size: (u32, u32)) -> Result<Self, MaskError> {
         let rect = hints.rect().map(|rect| clip(rect, size)).transpose()?;
         let seeds = hints.seeds();
         if let Some(seeds) = seeds.filter(|seeds| seeds.size() != size) {
-            return Err(Error::SeedsSize {
+            return Err(MaskError::SeedsSize {
                 seeds: seeds.size(),
                 frame: size,
             });
@@ -69,22 +69,22 @@ impl InitialLabels {
         Ok(initial)
     }
 
-    fn check(&self, hints: &Hints) -> Result<(), Error> {
+    fn check(&self, hints: &Hints) -> Result<(), MaskError> {
         let object = self.labels.iter().filter(|at| Label::OBJECT.contains(at));
         let object = object.count();
         if object == self.labels.len() {
             let (width, height) = self.size;
-            return Err(Error::NoBackground { width, height });
+            return Err(MaskError::NoBackground { width, height });
         }
         match hints.rect() {
-            Some(rect) if object == 0 => Err(Error::NoObject { rect }),
+            Some(rect) if object == 0 => Err(MaskError::NoObject { rect }),
             _ => Ok(()),
         }
     }
 }
 
-fn clip(rect: Rect, (width, height): (u32, u32)) -> Result<Rect, Error> {
-    let outside = Error::RectOutside {
+fn clip(rect: Rect, (width, height): (u32, u32)) -> Result<Rect, MaskError> {
+    let outside = MaskError::RectOutside {
         rect,
         width,
         height,
@@ -104,7 +104,7 @@ pub(super) fn cut(
     frame: &RgbImage,
     initial: InitialLabels,
     iterations: Iterations,
-) -> Result<Bitmap, Error> {
+) -> Result<Bitmap, MaskError> {
     let InitialLabels {
         size,
         mut labels,
@@ -117,7 +117,7 @@ pub(super) fn cut(
         .map(|pixel| Vec3b::from([pixel.0[2], pixel.0[1], pixel.0[0]]))
         .collect();
     grab_cut(&pixels, size, &mut labels, learn_from_marks, iterations)
-        .map_err(Error::opencv("cutting the object out"))??;
+        .map_err(MaskError::opencv("cutting the object out"))??;
     let is_object = labels.iter().map(|label| Label::OBJECT.contains(label));
     Ok(Bitmap::new(size, is_object))
 }
@@ -129,7 +129,7 @@ fn grab_cut(
     labels: &mut [u8],
     learn_from_marks: bool,
     iterations: Iterations,
-) -> opencv::Result<Result<(), Error>> {
+) -> opencv::Result<Result<(), MaskError>> {
     core::set_rng_seed(RNG_SEED)?;
     let mut models = ColourModels::default();
     let mut mode = imgproc::GC_INIT_WITH_MASK;
@@ -185,13 +185,13 @@ impl ColourModels {
     }
 }
 
-fn both_sides(labels: &[u8]) -> Result<(), Error> {
+fn both_sides(labels: &[u8]) -> Result<(), MaskError> {
     let is_object = |label: &u8| Label::OBJECT.contains(label);
     if !labels.iter().any(is_object) {
-        return Err(Error::Empty);
+        return Err(MaskError::Empty);
     }
     if labels.iter().all(is_object) {
-        return Err(Error::Everything);
+        return Err(MaskError::Everything);
     }
     Ok(())
 }

@@ -10,7 +10,7 @@ use super::settings::{MAX_PIXELS, MIN_SIDE};
 /// Why no mask could be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Error {
+pub enum MaskError {
     /// A side of the frame is shorter than [`MIN_SIDE`].
     #[error(
         "the frame is {width} x {height} pixels, too small to segment: at least {MIN_SIDE} a side are needed"
@@ -125,7 +125,7 @@ pub enum Error {
     },
 }
 
-impl Error {
+impl MaskError {
     pub(super) fn io(
         path: impl Into<PathBuf>,
         doing: &'static str,

@@ -9,7 +9,7 @@ use image::{DynamicImage, GrayImage, ImageFormat, ImageReader, RgbaImage};
 use relit_data::geometry::Rect;
 
 use super::error::SeedsFault;
-use super::{Error, encode};
+use super::{MaskError, encode};
 
 /// A pixel marks the object if all its channels are at least this.
 const OBJECT_FROM: u8 = 250;
@@ -96,10 +96,10 @@ impl Seeds {
     /// [`Self::from_png`] on a file.
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::Seeds`].
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let bytes = fs::read(path).map_err(Error::io(path, "read"))?;
-        Self::from_png(&bytes).map_err(|fault| Error::Seeds {
+    /// [`MaskError::Io`] or [`MaskError::Seeds`].
+    pub fn read(path: &Path) -> Result<Self, MaskError> {
+        let bytes = fs::read(path).map_err(MaskError::io(path, "read"))?;
+        Self::from_png(&bytes).map_err(|fault| MaskError::Seeds {
             path: path.to_owned(),
             fault,
         })
@@ -130,7 +130,7 @@ impl Seeds {
     }
 
     /// The marks as a grey PNG: 255 object, 0 background, 128 unknown.
-    pub(super) fn to_record(&self) -> Result<Vec<u8>, Error> {
+    pub(super) fn to_record(&self) -> Result<Vec<u8>, MaskError> {
         let levels = self.marks.iter().map(|mark| mark.level()).collect();
         let image = GrayImage::from_raw(self.width, self.height, levels).unwrap_or_default();
         encode::grey_png(&image, "the seeds")
@@ -196,13 +196,13 @@ impl Hints {
     /// The hints from a rectangle, seeds, or both.
     ///
     /// # Errors
-    /// [`Error::NoHints`] without either, [`Error::NothingMarked`] for seeds without rectangle that
+    /// [`MaskError::NoHints`] without either, [`MaskError::NothingMarked`] for seeds without rectangle that
     /// mark no object.
-    pub fn from_parts(rect: Option<Rect>, seeds: Option<Seeds>) -> Result<Self, Error> {
+    pub fn from_parts(rect: Option<Rect>, seeds: Option<Seeds>) -> Result<Self, MaskError> {
         match (rect, seeds) {
-            (None, None) => Err(Error::NoHints),
+            (None, None) => Err(MaskError::NoHints),
             (Some(rect), None) => Ok(Self::Rect(rect)),
-            (None, Some(seeds)) if !seeds.mark_the_object() => Err(Error::NothingMarked),
+            (None, Some(seeds)) if !seeds.mark_the_object() => Err(MaskError::NothingMarked),
             (None, Some(seeds)) => Ok(Self::Seeds(seeds)),
             (Some(rect), Some(seeds)) => Ok(Self::Both { rect, seeds }),
         }
@@ -292,7 +292,7 @@ mod tests {
         let black = ImageBuffer::from_pixel(4, 4, Rgb([0u8, 0, 0]));
         let seeds = Seeds::from_png(&png(black)).unwrap();
         let alone = Hints::from_parts(None, Some(seeds.clone()));
-        assert!(matches!(alone, Err(Error::NothingMarked)));
+        assert!(matches!(alone, Err(MaskError::NothingMarked)));
         assert!(Hints::from_parts(Some(Rect::new(0, 0, 2, 2)), Some(seeds)).is_ok());
     }
 

@@ -28,7 +28,7 @@
 //! assert_eq!(mask.image().get_pixel(10, 10).0, [0]);
 //! assert_eq!(mask.statistics().bounding_box, Rect::new(30, 14, 37, 37));
 //! assert!(mask.warnings().is_empty());
-//! # Ok::<(), relit_mask::Error>(())
+//! # Ok::<(), relit_mask::MaskError>(())
 //! ```
 //!
 //! # How it decides
@@ -52,7 +52,7 @@ mod settings;
 mod warning;
 
 pub use encode::{grey_png, rgb_png};
-pub use error::{Error, SeedsFault};
+pub use error::{MaskError, SeedsFault};
 pub use hints::{Hints, Mark, Seeds};
 pub use preview::preview;
 pub use record::{

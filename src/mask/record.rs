@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::error::SeedsFault;
-use super::{Error, Hints, MaskStatistics, Seeds, SegmentSettings};
+use super::{Hints, MaskError, MaskStatistics, Seeds, SegmentSettings};
 
 /// The schema that this version writes and reads.
 pub const MASK_SCHEMA: &str = "relit.mask/1";
@@ -163,8 +163,8 @@ impl RecordedHints {
     /// The hints in the form in which they are recorded.
     ///
     /// # Errors
-    /// [`Error::Encode`].
-    pub fn new(hints: &Hints) -> Result<Self, Error> {
+    /// [`MaskError::Encode`].
+    pub fn new(hints: &Hints) -> Result<Self, MaskError> {
         let seeds = hints.seeds().map(Seeds::to_record).transpose()?;
         Ok(Self {
             rect: hints.rect(),

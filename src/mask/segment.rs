@@ -4,7 +4,7 @@ use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
 
 use super::settings::{MAX_PIXELS, MIN_SIDE};
-use super::{Error, Hints, SegmentSettings, Warning, cleanup, cut, warning};
+use super::{Hints, MaskError, SegmentSettings, Warning, cleanup, cut, warning};
 
 /// An object's mask on one frame.
 #[derive(Debug, Clone)]
@@ -53,11 +53,15 @@ impl Mask {
 /// Finds the object in `frame`. The same input gives the same mask, with any number of threads.
 ///
 /// # Errors
-/// [`Error::FrameTooSmall`], [`Error::FrameTooLarge`]; hints that do not fit the frame
-/// ([`Error::RectOutside`], [`Error::NoBackground`], [`Error::NoObject`], [`Error::SeedsSize`]);
-/// a result without object or without background ([`Error::Empty`], [`Error::Everything`]);
-/// [`Error::OpenCv`].
-pub fn segment(frame: &RgbImage, hints: &Hints, settings: &SegmentSettings) -> Result<Mask, Error> {
+/// [`MaskError::FrameTooSmall`], [`MaskError::FrameTooLarge`]; hints that do not fit the frame
+/// ([`MaskError::RectOutside`], [`MaskError::NoBackground`], [`MaskError::NoObject`], [`MaskError::SeedsSize`]);
+/// a result without object or without background ([`MaskError::Empty`], [`MaskError::Everything`]);
+/// [`MaskError::OpenCv`].
+pub fn segment(
+    frame: &RgbImage,
+    hints: &Hints,
+    settings: &SegmentSettings,
+) -> Result<Mask, MaskError> {
     let size = frame.dimensions();
     check_size(size)?;
     let labels = cut::InitialLabels::new(hints, size)?;
@@ -77,12 +81,12 @@ pub fn segment(frame: &RgbImage, hints: &Hints, settings: &SegmentSettings) -> R
     })
 }
 
-fn check_size((width, height): (u32, u32)) -> Result<(), Error> {
+fn check_size((width, height): (u32, u32)) -> Result<(), MaskError> {
     if width.min(height) < MIN_SIDE {
-        return Err(Error::FrameTooSmall { width, height });
+        return Err(MaskError::FrameTooSmall { width, height });
     }
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        return Err(Error::FrameTooLarge { width, height });
+        return Err(MaskError::FrameTooLarge { width, height });
     }
     Ok(())
 }

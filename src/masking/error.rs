@@ -8,10 +8,10 @@ use relit_data::session;
 /// Why the mask of a recording could not be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Error {
+pub enum MaskingError {
     /// The frame cannot be segmented with these hints.
     #[error(transparent)]
-    Mask(#[from] relit_mask::Error),
+    Mask(#[from] relit_mask::MaskError),
     /// A name for the mask that does not end in `.png`.
     #[error("{0} cannot be the mask's name: give one that ends in .png")]
     OutputName(PathBuf),
@@ -64,7 +64,7 @@ pub enum Error {
     },
     /// The recording cannot be opened.
     #[error(transparent)]
-    Session(#[from] session::Error),
+    Session(#[from] session::SessionError),
     /// The video cannot be read.
     #[error(transparent)]
     Video(#[from] relit_video::Error),
@@ -88,7 +88,7 @@ pub enum Error {
     },
 }
 
-impl Error {
+impl MaskingError {
     pub(super) fn io(
         path: impl Into<PathBuf>,
         doing: &'static str,

@@ -21,7 +21,7 @@ use relit_mask::{
 };
 use relit_video::Video;
 
-pub use error::Error;
+pub use error::MaskingError;
 
 /// How to make a mask.
 #[derive(Debug, Clone)]
@@ -80,13 +80,13 @@ impl MaskRequest {
     /// The mask that the record `path` describes, to the same bytes.
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::Recipe`].
-    pub fn from_recipe(path: &Path) -> Result<Self, Error> {
-        let wrong = |fault: RecordFault| Error::Recipe {
+    /// [`MaskingError::Io`] or [`MaskingError::Recipe`].
+    pub fn from_recipe(path: &Path) -> Result<Self, MaskingError> {
+        let wrong = |fault: RecordFault| MaskingError::Recipe {
             path: path.to_owned(),
             why: fault.to_string(),
         };
-        let bytes = fs::read(path).map_err(Error::io(path, "read"))?;
+        let bytes = fs::read(path).map_err(MaskingError::io(path, "read"))?;
         let record = MaskRecord::from_json(&bytes).map_err(wrong)?;
         let hints = record.hints.hints().map_err(wrong)?;
         let path = path.to_owned();
@@ -111,8 +111,8 @@ impl MaskFiles {
     /// The files of the mask `mask`, whose name must end in `.png`.
     ///
     /// # Errors
-    /// [`Error::OutputName`].
-    pub fn of(mask: &Path) -> Result<Self, Error> {
+    /// [`MaskingError::OutputName`].
+    pub fn of(mask: &Path) -> Result<Self, MaskingError> {
         let is_png = mask
             .extension()
             .is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
@@ -126,7 +126,7 @@ impl MaskFiles {
                     preview: mask.with_file_name(preview),
                 })
             }
-            _ => Err(Error::OutputName(mask.to_owned())),
+            _ => Err(MaskingError::OutputName(mask.to_owned())),
         }
     }
 }
@@ -137,12 +137,12 @@ impl MaskFiles {
 /// anything before fails.
 ///
 /// # Errors
-/// [`Error::Session`] if there is no recording; otherwise [`Error::Recording`] around the cause.
+/// [`MaskingError::Session`] if there is no recording; otherwise [`MaskingError::Recording`] around the cause.
 pub fn make_mask(
     input: &Path,
     output: Option<MaskFiles>,
     request: &MaskRequest,
-) -> Result<MaskOutput, Error> {
+) -> Result<MaskOutput, MaskingError> {
     let recording = Recording::open(input)?;
     match mask_recording(&recording, output, request) {
         Ok((files, record)) => Ok(MaskOutput {
@@ -151,7 +151,7 @@ pub fn make_mask(
             record,
             notices: recording.notices,
         }),
-        Err(source) => Err(Error::Recording {
+        Err(source) => Err(MaskingError::Recording {
             recording: recording.id,
             source: Box::new(source),
         }),
@@ -162,7 +162,7 @@ fn mask_recording(
     recording: &Recording,
     output: Option<MaskFiles>,
     request: &MaskRequest,
-) -> Result<(MaskFiles, MaskRecord), Error> {
+) -> Result<(MaskFiles, MaskRecord), MaskingError> {
     let files = match output {
         Some(files) => files,
         None => MaskFiles::of(&recording.folder.clone().unwrap_or_default().join(MASK_FILE))?,
@@ -176,13 +176,13 @@ fn segment_and_write(
     video: &Path,
     files: &MaskFiles,
     request: &MaskRequest,
-) -> Result<MaskRecord, Error> {
+) -> Result<MaskRecord, MaskingError> {
     let (frame, source) = read_frame(video, request.frame)?;
     if let Some(recipe) = &request.recipe
         && !request.force
         && !same_image(&recipe.record.source, &source)
     {
-        return Err(Error::OtherFrame {
+        return Err(MaskingError::OtherFrame {
             frame: request.frame,
             video: video.to_owned(),
             recipe: recipe.path.clone(),
@@ -193,14 +193,14 @@ fn segment_and_write(
     let record = record_of(source, request, &mask, &png)?;
     let preview_png = rgb_png(&preview(&frame, mask.image()), "the preview")?;
     let json = record.to_json();
-    let json = json.map_err(|error| Error::io(&files.record, "written")(error.into()))?;
+    let json = json.map_err(|error| MaskingError::io(&files.record, "written")(error.into()))?;
     write(&files.preview, &preview_png)?;
     write(&files.record, &json)?;
     write(&files.mask, &png)?;
     Ok(record)
 }
 
-fn read_frame(path: &Path, number: u64) -> Result<(RgbImage, SourceFrame), Error> {
+fn read_frame(path: &Path, number: u64) -> Result<(RgbImage, SourceFrame), MaskingError> {
     let video = Video::open(path)?;
     let frame = video.frame(number)?;
     let info = video.frames().iter().find(|info| info.number == number);
@@ -225,7 +225,7 @@ fn record_of(
     request: &MaskRequest,
     mask: &Mask,
     png: &[u8],
-) -> Result<MaskRecord, Error> {
+) -> Result<MaskRecord, MaskingError> {
     let result = RecordedResult::new(mask.statistics(), png);
     let mut warnings: Vec<String> = mask.warnings().iter().map(Warning::to_string).collect();
     let software = MaskSoftware::current();
@@ -233,7 +233,7 @@ fn record_of(
         && record.result.mask_blake3 != result.mask_blake3
     {
         if !request.force {
-            return Err(Error::NotReproduced {
+            return Err(MaskingError::NotReproduced {
                 recipe: path.clone(),
                 made_by: record.software.to_string(),
                 now: software.to_string(),
@@ -253,14 +253,15 @@ fn record_of(
 }
 
 /// Checks that existing files may be replaced.
-fn check_replaceable(files: &MaskFiles, force: bool) -> Result<(), Error> {
+fn check_replaceable(files: &MaskFiles, force: bool) -> Result<(), MaskingError> {
     let record = match read_if_exists(&files.record)? {
         None => None,
         Some(bytes) => {
-            let record = MaskRecord::from_json(&bytes).map_err(|fault| Error::ForeignFile {
-                path: files.record.clone(),
-                why: fault.to_string(),
-            })?;
+            let record =
+                MaskRecord::from_json(&bytes).map_err(|fault| MaskingError::ForeignFile {
+                    path: files.record.clone(),
+                    why: fault.to_string(),
+                })?;
             Some(record)
         }
     };
@@ -273,20 +274,20 @@ fn check_replaceable(files: &MaskFiles, force: bool) -> Result<(), Error> {
     let found = blake3::hash(&mask).to_hex();
     match record {
         Some(record) if record.result.mask_blake3 == found.as_str() => Ok(()),
-        _ => Err(Error::Handmade(files.mask.clone())),
+        _ => Err(MaskingError::Handmade(files.mask.clone())),
     }
 }
 
-fn read_if_exists(path: &Path) -> Result<Option<Vec<u8>>, Error> {
+fn read_if_exists(path: &Path) -> Result<Option<Vec<u8>>, MaskingError> {
     match fs::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(Error::io(path, "read")(error)),
+        Err(error) => Err(MaskingError::io(path, "read")(error)),
     }
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    durable::write_whole(path, bytes).map_err(Error::io(path, "written"))
+fn write(path: &Path, bytes: &[u8]) -> Result<(), MaskingError> {
+    durable::write_whole(path, bytes).map_err(MaskingError::io(path, "written"))
 }
 
 #[cfg(test)]
@@ -304,7 +305,7 @@ mod tests {
     fn the_name_of_a_mask_must_end_in_png() {
         for name in ["mask", "mask.jpg", "session.json", ".png", ""] {
             let files = MaskFiles::of(Path::new(name));
-            assert!(matches!(files, Err(Error::OutputName(_))), "{name}");
+            assert!(matches!(files, Err(MaskingError::OutputName(_))), "{name}");
         }
     }
 
@@ -314,7 +315,7 @@ mod tests {
         let files = MaskFiles::of(&folder.path().join("session.png")).unwrap();
         fs::write(&files.record, r#"{"schema": "relit.session/1"}"#).unwrap();
         let result = check_replaceable(&files, true);
-        assert!(matches!(result, Err(Error::ForeignFile { .. })));
+        assert!(matches!(result, Err(MaskingError::ForeignFile { .. })));
     }
 
     #[test]
@@ -325,7 +326,7 @@ mod tests {
         fs::write(&files.mask, "painted").unwrap();
         assert!(matches!(
             check_replaceable(&files, false),
-            Err(Error::Handmade(_))
+            Err(MaskingError::Handmade(_))
         ));
         assert!(check_replaceable(&files, true).is_ok());
     }

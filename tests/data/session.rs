@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
 use relit_data::session::{
-    CameraFacts, Error, FrameEntry, FrameIndex, Manifest, Notice, Recording, SessionWriter,
+    CameraFacts, FrameEntry, FrameIndex, Manifest, Notice, Recording, SessionError, SessionWriter,
     SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of, recordings,
 };
 use tempfile::TempDir;
@@ -115,7 +115,7 @@ fn a_session_is_marked_as_recording_until_it_ends() {
     let folder = writer.folder().to_owned();
     assert!(matches!(
         Recording::open(&folder),
-        Err(Error::StillRecording(_))
+        Err(SessionError::StillRecording(_))
     ));
     writer.abort("the camera was unplugged").unwrap();
     let recording = Recording::open(&folder).unwrap();
@@ -138,13 +138,13 @@ fn a_session_never_replaces_another_one() {
     let (root, _folder) = whole();
     assert!(matches!(
         SessionWriter::create(root.path(), manifest()),
-        Err(Error::Exists(_))
+        Err(SessionError::Exists(_))
     ));
     let mut outside = manifest();
     outside.id = "../mug".to_owned();
     assert!(matches!(
         SessionWriter::create(root.path(), outside),
-        Err(Error::BadName(_))
+        Err(SessionError::BadName(_))
     ));
 }
 
@@ -155,7 +155,7 @@ fn an_entry_that_does_not_follow_is_refused_and_leaves_the_index_whole() {
     writer.push(entry(0)).unwrap();
     assert!(matches!(
         writer.push(entry(2)),
-        Err(Error::BadEntry { n: 2, .. })
+        Err(SessionError::BadEntry { n: 2, .. })
     ));
     writer.push(entry(1)).unwrap();
     let text = fs::read(writer.folder().join("frames.jsonl")).unwrap();
@@ -202,7 +202,7 @@ fn a_truncated_video_is_a_loss_and_a_missing_one_an_error() {
     fs::remove_file(folder.join("video.mkv")).unwrap();
     assert!(matches!(
         Recording::open(&folder),
-        Err(Error::VideoMissing(_))
+        Err(SessionError::VideoMissing(_))
     ));
 }
 
@@ -255,9 +255,12 @@ fn inputs_are_sessions_folders_of_them_or_videos() {
     assert_eq!(Recording::open(&bare).unwrap().id, "clip_one");
     fs::remove_file(&bare).unwrap();
     assert_eq!(recordings(root.path()).unwrap(), [folder]);
-    assert!(matches!(recordings(&bare), Err(Error::NotThere(_))));
+    assert!(matches!(recordings(&bare), Err(SessionError::NotThere(_))));
     let empty = tempfile::tempdir().unwrap();
-    assert!(matches!(recordings(empty.path()), Err(Error::NoSession(_))));
+    assert!(matches!(
+        recordings(empty.path()),
+        Err(SessionError::NoSession(_))
+    ));
 }
 
 #[test]
@@ -266,7 +269,7 @@ fn a_video_beside_sessions_does_not_hide_them() {
     fs::write(root.path().join("preview.mkv"), b"").unwrap();
     assert!(matches!(
         recordings(root.path()),
-        Err(Error::VideoAmongSessions { .. })
+        Err(SessionError::VideoAmongSessions { .. })
     ));
 }
 
@@ -277,7 +280,10 @@ fn a_session_that_lost_its_manifest_and_video_is_not_skipped() {
     fs::create_dir(&lost).unwrap();
     fs::write(lost.join("frames.jsonl"), b"").unwrap();
     assert_eq!(recordings(root.path()).unwrap(), [folder, lost.clone()]);
-    assert!(matches!(Recording::open(&lost), Err(Error::NoSession(_))));
+    assert!(matches!(
+        Recording::open(&lost),
+        Err(SessionError::NoSession(_))
+    ));
 }
 
 #[test]
@@ -292,7 +298,7 @@ fn a_folder_with_one_video_and_no_manifest_is_read_with_a_warning() {
     fs::write(folder.join("other.mp4"), b"").unwrap();
     assert!(matches!(
         Recording::open(&folder),
-        Err(Error::SeveralVideos { count: 2, .. })
+        Err(SessionError::SeveralVideos { count: 2, .. })
     ));
 }
 

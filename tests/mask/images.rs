@@ -11,7 +11,7 @@ mod scene;
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use proptest::prelude::*;
 use relit_data::geometry::Rect;
-use relit_mask::{Error, Feather, Hints, Iterations, Seeds, SegmentSettings, Warning, segment};
+use relit_mask::{Feather, Hints, Iterations, MaskError, Seeds, SegmentSettings, Warning, segment};
 
 use scene::{AROUND, HEIGHT, WIDTH, around, disc, disc_share, seeds, strokes};
 
@@ -114,27 +114,27 @@ fn hints_that_do_not_fit_the_frame_are_refused_with_a_sentence() {
     let rect = |x, y, w, h| Hints::Rect(Rect::new(x, y, w, h));
     assert!(matches!(
         refused(rect(96, 0, 5, 5)),
-        Error::RectOutside { .. }
+        MaskError::RectOutside { .. }
     ));
     assert!(matches!(
         refused(rect(-9, -9, 9, 9)),
-        Error::RectOutside { .. }
+        MaskError::RectOutside { .. }
     ));
     assert!(matches!(
         refused(rect(5, 5, 0, 9)),
-        Error::RectOutside { .. }
+        MaskError::RectOutside { .. }
     ));
     assert!(matches!(
         refused(rect(0, 0, 96, 64)),
-        Error::NoBackground { .. }
+        MaskError::NoBackground { .. }
     ));
     assert!(matches!(
         refused(rect(-1, -1, 999, 999)),
-        Error::NoBackground { .. }
+        MaskError::NoBackground { .. }
     ));
     assert!(matches!(
         refused(Hints::Seeds(seeds(|_, _| 255))),
-        Error::NoBackground { .. }
+        MaskError::NoBackground { .. }
     ));
     let other = GrayImage::from_pixel(9, 7, Luma([255]));
     let other = Seeds::from_image(&other.into()).unwrap();
@@ -148,7 +148,7 @@ fn frames_that_cannot_be_segmented_are_refused() {
     let result = segment(&tiny, &around(), &SegmentSettings::default());
     assert!(matches!(
         result,
-        Err(Error::FrameTooSmall { width: 15, .. })
+        Err(MaskError::FrameTooSmall { width: 15, .. })
     ));
 }
 
@@ -158,7 +158,7 @@ fn a_frame_of_one_colour_yields_a_mask_with_a_warning_or_a_refusal() {
         let plain = RgbImage::from_pixel(WIDTH, HEIGHT, Rgb([level; 3]));
         match segment(&plain, &around(), &SegmentSettings::default()) {
             Ok(mask) => assert!(!mask.warnings().is_empty()),
-            Err(error) => assert!(matches!(error, Error::Empty), "{error}"),
+            Err(error) => assert!(matches!(error, MaskError::Empty), "{error}"),
         }
     }
 }
@@ -232,7 +232,7 @@ proptest! {
         if let Some(hints) = hints {
             match segment(&frame, &hints, &settings) {
                 Ok(mask) => prop_assert!(mask.statistics().area_px > 0),
-                Err(error) => prop_assert!(!matches!(error, Error::OpenCv { .. }), "{error}"),
+                Err(error) => prop_assert!(!matches!(error, MaskError::OpenCv { .. }), "{error}"),
             }
         }
     }

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::ProgressBar;
 use relit::console::{Console, Outcome};
-use relit::extract::{Error, ExtractOptions, Observer, RecordingOutcome, extract};
+use relit::extract::{ExtractError, ExtractOptions, Observer, RecordingOutcome, extract};
 use relit_data::shard::SessionEntry;
 use serde_json::json;
 
@@ -14,7 +14,7 @@ pub(crate) fn run(
     inputs: &[PathBuf],
     out: &Path,
     options: &ExtractOptions,
-) -> Result<Outcome, Error> {
+) -> Result<Outcome, ExtractError> {
     let reporter = Reporter {
         console,
         out,

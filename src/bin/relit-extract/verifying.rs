@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use relit::console::{Console, Outcome};
-use relit_data::shard::{Error, verify};
+use relit_data::shard::{ShardError, verify};
 use serde_json::json;
 
 /// Number of problems that are printed for a person.
 const MAX_PRINTED: usize = 50;
 
-pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, Error> {
+pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ShardError> {
     let bar = console.progress(0, "verify");
     let report = verify(out, &|done, total| {
         bar.set_length(total);

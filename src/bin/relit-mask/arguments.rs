@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::error::ErrorKind;
 use clap::{ArgGroup, CommandFactory, Parser};
-use relit::masking::{Error, MaskFiles, MaskRequest};
+use relit::masking::{MaskFiles, MaskRequest, MaskingError};
 use relit_data::geometry::Rect;
 use relit_mask::{Feather, Hints, Iterations, Seeds, SegmentSettings};
 
@@ -73,7 +73,7 @@ impl Arguments {
     ///
     /// # Errors
     /// If seeds or recipe cannot be read.
-    pub(crate) fn request(&self) -> Result<MaskRequest, Error> {
+    pub(crate) fn request(&self) -> Result<MaskRequest, MaskingError> {
         let request = match &self.recipe {
             Some(path) => MaskRequest::from_recipe(path)?,
             None => {
@@ -119,6 +119,6 @@ fn feather(text: &str) -> Result<Feather, String> {
     Feather::new(px).map_err(|error| error.to_string())
 }
 
-fn output(text: &str) -> Result<MaskFiles, Error> {
+fn output(text: &str) -> Result<MaskFiles, MaskingError> {
     MaskFiles::of(text.as_ref())
 }

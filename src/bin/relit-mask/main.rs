@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use relit::console::{Console, Outcome};
-use relit::masking::{Error, make_mask};
+use relit::masking::{MaskingError, make_mask};
 use relit_data::session::recordings;
 
 use arguments::Arguments;
@@ -28,7 +28,11 @@ fn main() -> ExitCode {
     console.finish(run(&paths, &arguments, console))
 }
 
-fn run(paths: &[PathBuf], arguments: &Arguments, console: Console) -> Result<Outcome, Error> {
+fn run(
+    paths: &[PathBuf],
+    arguments: &Arguments,
+    console: Console,
+) -> Result<Outcome, MaskingError> {
     let request = arguments.request()?;
     let bar = console.progress(paths.len() as u64, "masks");
     let mut failed = 0;

@@ -7,7 +7,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder as _, RgbImage};
 
 use super::axis::{degrees, percent};
-use super::error::Error;
+use super::error::ReportError;
 use super::page::{Page, THUMBNAIL_SIDE, Thumbnail};
 use super::turn::Turn;
 use crate::shard::record::FrameRecord;
@@ -16,15 +16,19 @@ use crate::shard::record::FrameRecord;
 const JPEG_QUALITY: u8 = 85;
 
 /// The thumbnails as figures, in the given order.
-pub(super) fn sheet(page: &Page<'_>, turn: &Turn) -> Result<String, Error> {
+pub(super) fn sheet(page: &Page<'_>, turn: &Turn) -> Result<String, ReportError> {
     page.thumbnails
         .iter()
         .map(|thumbnail| figure(page.records, turn, thumbnail))
         .collect()
 }
 
-fn figure(records: &[FrameRecord], turn: &Turn, thumbnail: &Thumbnail) -> Result<String, Error> {
-    let stray = || Error::Stray(thumbnail.index);
+fn figure(
+    records: &[FrameRecord],
+    turn: &Turn,
+    thumbnail: &Thumbnail,
+) -> Result<String, ReportError> {
+    let stray = || ReportError::Stray(thumbnail.index);
     let position = records
         .binary_search_by_key(&thumbnail.index, |r| r.index)
         .map_err(|_| stray())?;
@@ -64,18 +68,18 @@ fn marks(record: &FrameRecord) -> String {
 }
 
 /// The image as JPEG or PNG, whichever is smaller: PNG is smaller for small and flat images.
-fn data_uri(thumbnail: &Thumbnail) -> Result<String, Error> {
+fn data_uri(thumbnail: &Thumbnail) -> Result<String, ReportError> {
     let (index, image) = (thumbnail.index, &thumbnail.image);
     let (width, height) = image.dimensions();
     let fits = |side| (1..=THUMBNAIL_SIDE).contains(&side);
     if !fits(width) || !fits(height) {
-        return Err(Error::Size {
+        return Err(ReportError::Size {
             index,
             width,
             height,
         });
     }
-    let failed = |source| Error::Encode { index, source };
+    let failed = |source| ReportError::Encode { index, source };
     let jpeg = jpeg(image).map_err(failed)?;
     let png = png(image).map_err(failed)?;
     Ok(if jpeg.len() < png.len() {

@@ -16,7 +16,7 @@ mod plot;
 mod sections;
 mod turn;
 
-pub use error::Error;
+pub use error::ReportError;
 pub use page::{Page, THUMBNAIL_SIDE, Thumbnail};
 
 use crate::shard::measure::fraction;
@@ -36,26 +36,26 @@ const MAX_ANGLE: f64 = 1e9;
 ///
 /// # Errors
 ///
-/// [`Error::Empty`], [`Error::Order`] and [`Error::Session`] if the records are not those of one
-/// session in order; [`Error::Value`] and [`Error::Gate`] if a number is not finite or out of range;
-/// [`Error::Stray`], [`Error::Size`] and [`Error::Encode`] if a thumbnail does not fit.
-pub fn render(page: &Page<'_>) -> Result<String, Error> {
+/// [`ReportError::Empty`], [`ReportError::Order`] and [`ReportError::Session`] if the records are not those of one
+/// session in order; [`ReportError::Value`] and [`ReportError::Gate`] if a number is not finite or out of range;
+/// [`ReportError::Stray`], [`ReportError::Size`] and [`ReportError::Encode`] if a thumbnail does not fit.
+pub fn render(page: &Page<'_>) -> Result<String, ReportError> {
     check(page)?;
     let turn = Turn::of(page.records);
     let contact = contact::sheet(page, &turn)?;
     Ok(sections::document(page, &turn, &contact))
 }
 
-fn check(page: &Page<'_>) -> Result<(), Error> {
-    let first = page.records.first().ok_or(Error::Empty)?;
+fn check(page: &Page<'_>) -> Result<(), ReportError> {
+    let first = page.records.first().ok_or(ReportError::Empty)?;
     if !(0.0..=1.0).contains(&page.gate) {
-        return Err(Error::Gate(page.gate));
+        return Err(ReportError::Gate(page.gate));
     }
     for pair in page.records.windows(2) {
         if let [before, record] = pair
             && record.index <= before.index
         {
-            return Err(Error::Order {
+            return Err(ReportError::Order {
                 index: record.index,
                 before: before.index,
             });
@@ -63,7 +63,7 @@ fn check(page: &Page<'_>) -> Result<(), Error> {
     }
     for record in page.records {
         if record.session != first.session {
-            return Err(Error::Session {
+            return Err(ReportError::Session {
                 index: record.index,
                 expected: first.session.clone(),
                 found: record.session.clone(),
@@ -74,13 +74,13 @@ fn check(page: &Page<'_>) -> Result<(), Error> {
     Ok(())
 }
 
-fn check_values(record: &FrameRecord) -> Result<(), Error> {
+fn check_values(record: &FrameRecord) -> Result<(), ReportError> {
     let within = |field, value: f64, low: f64, high: f64, range| {
         // False for NaN, which a comparison with < would accept.
         if (low..=high).contains(&value) {
             return Ok(());
         }
-        Err(Error::Value {
+        Err(ReportError::Value {
             index: record.index,
             field,
             value,

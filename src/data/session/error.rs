@@ -8,7 +8,7 @@ use super::manifest::ManifestFault;
 
 /// Why a session could not be read or written.
 #[derive(Debug, thiserror::Error)]
-pub enum Error {
+pub enum SessionError {
     /// The path does not exist.
     #[error("there is no {0}: give a session folder, a folder of sessions, or a video file")]
     NotThere(PathBuf),
@@ -103,7 +103,7 @@ pub enum Error {
     },
 }
 
-impl Error {
+impl SessionError {
     /// For `map_err`: an I/O error with the path and what was attempted.
     pub(super) fn io(
         path: impl Into<PathBuf>,

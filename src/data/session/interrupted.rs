@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::writer::{close, keep_as_found, write_index};
 use super::{
-    Error, FrameIndex, INDEX_FILE, IndexFault, MANIFEST_FILE, Manifest, SessionLock, Status,
+    FrameIndex, INDEX_FILE, IndexFault, MANIFEST_FILE, Manifest, SessionError, SessionLock, Status,
 };
 
 /// A session that is marked as recording although its recorder has died. It stays locked while this
@@ -24,23 +24,23 @@ impl InterruptedSession {
     /// Locks a session and reads it, the index up to its first fault.
     ///
     /// # Errors
-    /// [`Error::InUse`] if its recorder is still running, [`Error::Ended`] if it has ended,
-    /// [`Error::Manifest`], or [`Error::Io`].
-    pub fn open(folder: &Path) -> Result<Self, Error> {
+    /// [`SessionError::InUse`] if its recorder is still running, [`SessionError::Ended`] if it has ended,
+    /// [`SessionError::Manifest`], or [`SessionError::Io`].
+    pub fn open(folder: &Path) -> Result<Self, SessionError> {
         let lock = SessionLock::acquire(folder)?;
         let path = folder.join(MANIFEST_FILE);
-        let bytes = fs::read(&path).map_err(Error::io(&path, "read"))?;
+        let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
         let manifest =
-            Manifest::from_json(&bytes).map_err(|fault| Error::Manifest { path, fault })?;
+            Manifest::from_json(&bytes).map_err(|fault| SessionError::Manifest { path, fault })?;
         if manifest.status != Status::Recording {
             lock.remove()?;
-            return Err(Error::Ended(folder.to_owned()));
+            return Err(SessionError::Ended(folder.to_owned()));
         }
         lock.release_reserve()?;
         let path = folder.join(INDEX_FILE);
         let lines = match fs::read(&path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
-            read => read.map_err(Error::io(path, "read"))?,
+            read => read.map_err(SessionError::io(path, "read"))?,
         };
         let (index, fault) = FrameIndex::parse_until_fault(&lines);
         Ok(Self {
@@ -74,8 +74,8 @@ impl InterruptedSession {
     /// lines are removed, the index is kept as it was found in `frames.interrupted.jsonl`.
     ///
     /// # Errors
-    /// [`Error::Io`]; the status then stays "recording".
-    pub fn abort(mut self, frames: usize, reason: &str) -> Result<Manifest, Error> {
+    /// [`SessionError::Io`]; the status then stays "recording".
+    pub fn abort(mut self, frames: usize, reason: &str) -> Result<Manifest, SessionError> {
         if self.fault.is_some() || frames < self.index.entries().len() {
             keep_as_found(&self.folder)?;
             self.index.truncate(frames);
@@ -103,11 +103,11 @@ mod tests {
         let live = writer(root.path());
         let folder = live.folder().to_owned();
         let open = || InterruptedSession::open(&folder);
-        assert!(matches!(open(), Err(Error::InUse(_))));
+        assert!(matches!(open(), Err(SessionError::InUse(_))));
         drop(live);
         let manifest = open().unwrap().abort(0, "interrupted").unwrap();
         assert_eq!(manifest.status, Status::Aborted("interrupted".to_owned()));
-        assert!(matches!(open(), Err(Error::Ended(_))));
+        assert!(matches!(open(), Err(SessionError::Ended(_))));
         let names = fs::read_dir(&folder).unwrap();
         let mut names: Vec<_> = names.map(|entry| entry.unwrap().file_name()).collect();
         names.sort();

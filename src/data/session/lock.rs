@@ -5,7 +5,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use super::Error;
+use super::SessionError;
 
 /// Name of the file that a recorder keeps locked.
 const LOCK_FILE: &str = ".recording";
@@ -24,38 +24,38 @@ impl SessionLock {
     /// Locks a session folder.
     ///
     /// # Errors
-    /// [`Error::InUse`] if another process holds the lock, or [`Error::Io`].
-    pub fn acquire(folder: &Path) -> Result<Self, Error> {
+    /// [`SessionError::InUse`] if another process holds the lock, or [`SessionError::Io`].
+    pub fn acquire(folder: &Path) -> Result<Self, SessionError> {
         let path = folder.join(LOCK_FILE);
         let mut options = OpenOptions::new();
         let opened = options.create(true).truncate(false).write(true).open(&path);
-        let file = opened.map_err(Error::io(&path, "made"))?;
+        let file = opened.map_err(SessionError::io(&path, "made"))?;
         match file.try_lock() {
             Ok(()) => Ok(Self { path, file }),
-            Err(TryLockError::WouldBlock) => Err(Error::InUse(folder.to_owned())),
-            Err(TryLockError::Error(source)) => Err(Error::io(path, "locked")(source)),
+            Err(TryLockError::WouldBlock) => Err(SessionError::InUse(folder.to_owned())),
+            Err(TryLockError::Error(source)) => Err(SessionError::io(path, "locked")(source)),
         }
     }
 
     /// Reserves disk space for what is written last.
-    pub(super) fn reserve(&mut self) -> Result<(), Error> {
+    pub(super) fn reserve(&mut self) -> Result<(), SessionError> {
         let written = self.file.write_all(&vec![0; RESERVE]);
         written
             .and_then(|()| self.file.sync_all())
-            .map_err(Error::io(&self.path, "written"))
+            .map_err(SessionError::io(&self.path, "written"))
     }
 
     /// Frees the reserved disk space.
-    pub(super) fn release_reserve(&self) -> Result<(), Error> {
+    pub(super) fn release_reserve(&self) -> Result<(), SessionError> {
         let cut = self.file.set_len(0);
-        cut.map_err(Error::io(&self.path, "written"))
+        cut.map_err(SessionError::io(&self.path, "written"))
     }
 
     /// Releases the lock and removes its file: nobody records in this folder any more.
-    pub(super) fn remove(self) -> Result<(), Error> {
+    pub(super) fn remove(self) -> Result<(), SessionError> {
         match fs::remove_file(&self.path) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                Err(Error::io(&self.path, "removed")(error))
+                Err(SessionError::io(&self.path, "removed")(error))
             }
             _ => Ok(()),
         }

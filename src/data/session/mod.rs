@@ -19,7 +19,7 @@ mod recording;
 mod writer;
 
 pub use crate::naming::is_session_name;
-pub use error::Error;
+pub use error::SessionError;
 pub use frames::{FrameEntry, FrameIndex, Gap, IndexFault};
 pub use interrupted::InterruptedSession;
 pub use lock::SessionLock;

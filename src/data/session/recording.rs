@@ -5,8 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{
-    Error, FrameIndex, INDEX_FILE, MANIFEST_FILE, MASK_FILE, Manifest, Status, is_session_name,
-    object_of,
+    FrameIndex, INDEX_FILE, MANIFEST_FILE, MASK_FILE, Manifest, SessionError, Status,
+    is_session_name, object_of,
 };
 
 /// File extensions that count as videos in a folder without manifest.
@@ -60,9 +60,9 @@ impl Recording {
     /// Opens a session folder or a bare video file. Of the video only the size is checked.
     ///
     /// # Errors
-    /// [`Error`] if manifest or index are not usable, the session has not ended, or there is no video.
+    /// [`SessionError`] if manifest or index are not usable, the session has not ended, or there is no video.
     /// What is incomplete but usable becomes a [`Notice`].
-    pub fn open(path: &Path) -> Result<Self, Error> {
+    pub fn open(path: &Path) -> Result<Self, SessionError> {
         if path.is_dir() {
             if path.join(MANIFEST_FILE).exists() {
                 return Self::open_session(path);
@@ -70,22 +70,22 @@ impl Recording {
             return Self::open_plain_folder(path);
         }
         if !path.is_file() {
-            return Err(Error::NotThere(path.to_owned()));
+            return Err(SessionError::NotThere(path.to_owned()));
         }
         Ok(Self::bare(path, path.file_stem(), None))
     }
 
-    fn open_session(folder: &Path) -> Result<Self, Error> {
+    fn open_session(folder: &Path) -> Result<Self, SessionError> {
         let manifest_path = folder.join(MANIFEST_FILE);
-        let bytes = fs::read(&manifest_path).map_err(Error::io(&manifest_path, "read"))?;
-        let manifest = Manifest::from_json(&bytes).map_err(|fault| Error::Manifest {
+        let bytes = fs::read(&manifest_path).map_err(SessionError::io(&manifest_path, "read"))?;
+        let manifest = Manifest::from_json(&bytes).map_err(|fault| SessionError::Manifest {
             path: manifest_path,
             fault,
         })?;
         let mut notices = Vec::new();
         match &manifest.status {
             Status::Complete => {}
-            Status::Recording => return Err(Error::StillRecording(folder.to_owned())),
+            Status::Recording => return Err(SessionError::StillRecording(folder.to_owned())),
             Status::Aborted(reason) => {
                 notices.push(Notice::Loss(format!("the capture was aborted: {reason}")));
             }
@@ -93,7 +93,7 @@ impl Recording {
         let video = folder.join(&manifest.video.file);
         let found = match fs::metadata(&video) {
             Ok(data) if data.is_file() => data.len(),
-            _ => return Err(Error::VideoMissing(video)),
+            _ => return Err(SessionError::VideoMissing(video)),
         };
         if let Some(recorded) = manifest.video.bytes
             && recorded != found
@@ -121,10 +121,10 @@ impl Recording {
         })
     }
 
-    fn open_plain_folder(folder: &Path) -> Result<Self, Error> {
+    fn open_plain_folder(folder: &Path) -> Result<Self, SessionError> {
         let mut videos = videos_in(folder)?;
         match (videos.pop(), videos.len()) {
-            (None, _) => Err(Error::NoSession(folder.to_owned())),
+            (None, _) => Err(SessionError::NoSession(folder.to_owned())),
             (Some(video), 0) => {
                 // A path such as "." has no usable name.
                 let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
@@ -134,7 +134,7 @@ impl Recording {
                 ));
                 Ok(recording)
             }
-            (Some(_), more) => Err(Error::SeveralVideos {
+            (Some(_), more) => Err(SessionError::SeveralVideos {
                 folder: folder.to_owned(),
                 count: more + 1,
             }),
@@ -160,30 +160,30 @@ impl Recording {
 /// listed too, so that opening it reports the loss.
 ///
 /// # Errors
-/// [`Error::NotThere`], [`Error::NoSession`], [`Error::VideoAmongSessions`], or [`Error::Io`].
-pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, Error> {
+/// [`SessionError::NotThere`], [`SessionError::NoSession`], [`SessionError::VideoAmongSessions`], or [`SessionError::Io`].
+pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, SessionError> {
     if !path.exists() {
-        return Err(Error::NotThere(path.to_owned()));
+        return Err(SessionError::NotThere(path.to_owned()));
     }
     if path.is_file() || path.join(MANIFEST_FILE).exists() {
         return Ok(vec![path.to_owned()]);
     }
     if !path.is_dir() {
-        return Err(Error::NoSession(path.to_owned()));
+        return Err(SessionError::NoSession(path.to_owned()));
     }
     let mut inner = Vec::new();
-    for entry in fs::read_dir(path).map_err(Error::io(path, "listed"))? {
-        let folder = entry.map_err(Error::io(path, "listed"))?.path();
+    for entry in fs::read_dir(path).map_err(SessionError::io(path, "listed"))? {
+        let folder = entry.map_err(SessionError::io(path, "listed"))?.path();
         if folder.is_dir() && is_session_folder(&folder)? {
             inner.push(folder);
         }
     }
     inner.sort();
     match (videos_in(path)?.into_iter().next(), inner.is_empty()) {
-        (None, true) => Err(Error::NoSession(path.to_owned())),
+        (None, true) => Err(SessionError::NoSession(path.to_owned())),
         (None, false) => Ok(inner),
         (Some(_), true) => Ok(vec![path.to_owned()]),
-        (Some(video), false) => Err(Error::VideoAmongSessions {
+        (Some(video), false) => Err(SessionError::VideoAmongSessions {
             folder: path.to_owned(),
             video,
         }),
@@ -191,15 +191,15 @@ pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, Error> {
 }
 
 /// Whether a folder is a session, complete or not.
-fn is_session_folder(folder: &Path) -> Result<bool, Error> {
+fn is_session_folder(folder: &Path) -> Result<bool, SessionError> {
     let parts = [MANIFEST_FILE, INDEX_FILE, MASK_FILE];
     Ok(parts.iter().any(|part| folder.join(part).exists()) || !videos_in(folder)?.is_empty())
 }
 
-fn videos_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+fn videos_in(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
     let mut videos = Vec::new();
-    for entry in fs::read_dir(folder).map_err(Error::io(folder, "listed"))? {
-        let path = entry.map_err(Error::io(folder, "listed"))?.path();
+    for entry in fs::read_dir(folder).map_err(SessionError::io(folder, "listed"))? {
+        let path = entry.map_err(SessionError::io(folder, "listed"))?.path();
         let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default();
         if VIDEO_ENDINGS.contains(&ending.to_ascii_lowercase().as_str()) && path.is_file() {
             videos.push(path);
@@ -236,7 +236,7 @@ fn read_index(
     folder: &Path,
     manifest: &Manifest,
     notices: &mut Vec<Notice>,
-) -> Result<Option<FrameIndex>, Error> {
+) -> Result<Option<FrameIndex>, SessionError> {
     let path = folder.join(INDEX_FILE);
     if !path.exists() {
         notices.push(Notice::Loss(format!(
@@ -244,8 +244,8 @@ fn read_index(
         )));
         return Ok(None);
     }
-    let bytes = fs::read(&path).map_err(Error::io(&path, "read"))?;
-    let index = FrameIndex::parse(&bytes).map_err(|fault| Error::Index {
+    let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
+    let index = FrameIndex::parse(&bytes).map_err(|fault| SessionError::Index {
         path: path.clone(),
         fault,
     })?;

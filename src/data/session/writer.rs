@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::{
-    Error, FrameEntry, FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, SessionLock, Status,
+    FrameEntry, FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, SessionError, SessionLock, Status,
     is_session_name,
 };
 use crate::durable;
@@ -37,20 +37,20 @@ impl SessionWriter {
     /// video's figures in `manifest` are ignored: they are set at the end.
     ///
     /// # Errors
-    /// [`Error::Exists`], [`Error::BadName`], [`Error::Manifest`] if the manifest could not be read
-    /// back, or [`Error::Io`].
-    pub fn create(root: &Path, mut manifest: Manifest) -> Result<Self, Error> {
+    /// [`SessionError::Exists`], [`SessionError::BadName`], [`SessionError::Manifest`] if the manifest could not be read
+    /// back, or [`SessionError::Io`].
+    pub fn create(root: &Path, mut manifest: Manifest) -> Result<Self, SessionError> {
         if !is_session_name(&manifest.id) {
-            return Err(Error::BadName(manifest.id));
+            return Err(SessionError::BadName(manifest.id));
         }
         let folder = root.join(&manifest.id);
         match fs::create_dir(&folder) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-                return Err(Error::Exists(folder));
+                return Err(SessionError::Exists(folder));
             }
-            made => made.map_err(Error::io(&folder, "made"))?,
+            made => made.map_err(SessionError::io(&folder, "made"))?,
         }
-        durable::sync_folder(root).map_err(Error::io(root, "synced"))?;
+        durable::sync_folder(root).map_err(SessionError::io(root, "synced"))?;
         // Locked before the manifest exists, so that the session never looks interrupted.
         let mut lock = SessionLock::acquire(&folder)?;
         lock.reserve()?;
@@ -64,8 +64,8 @@ impl SessionWriter {
             .create_new(true)
             .append(true)
             .open(&path)
-            .map_err(Error::io(path, "made"))?;
-        durable::sync_folder(&folder).map_err(Error::io(&folder, "synced"))?;
+            .map_err(SessionError::io(path, "made"))?;
+        durable::sync_folder(&folder).map_err(SessionError::io(&folder, "synced"))?;
         Ok(Self {
             folder,
             manifest,
@@ -98,23 +98,25 @@ impl SessionWriter {
     /// Appends a frame's line to the index.
     ///
     /// # Errors
-    /// [`Error::BadEntry`] if it does not continue the index, or [`Error::Io`]. The index is then
+    /// [`SessionError::BadEntry`] if it does not continue the index, or [`SessionError::Io`]. The index is then
     /// unchanged, and the same entry may be pushed again.
-    pub fn push(&mut self, entry: FrameEntry) -> Result<(), Error> {
+    pub fn push(&mut self, entry: FrameEntry) -> Result<(), SessionError> {
         self.push_to_index(entry)?;
         let written = self.append_line(&entry);
         if written.is_err() {
             self.remove_last();
         }
-        written.map_err(Error::io(self.folder.join(INDEX_FILE), "written"))
+        written.map_err(SessionError::io(self.folder.join(INDEX_FILE), "written"))
     }
 
-    fn push_to_index(&mut self, entry: FrameEntry) -> Result<(), Error> {
-        self.index.push(entry).map_err(|fault| Error::BadEntry {
-            path: self.folder.join(INDEX_FILE),
-            n: entry.n,
-            fault,
-        })
+    fn push_to_index(&mut self, entry: FrameEntry) -> Result<(), SessionError> {
+        self.index
+            .push(entry)
+            .map_err(|fault| SessionError::BadEntry {
+                path: self.folder.join(INDEX_FILE),
+                n: entry.n,
+                fault,
+            })
     }
 
     /// Writes an entry's line after the last complete one.
@@ -150,12 +152,15 @@ impl SessionWriter {
     /// rewritten, whole or not at all, when the session ends.
     ///
     /// # Errors
-    /// [`Error::BadEntry`] for the first invalid entry; then none is changed.
-    pub fn amend(&mut self, amended: impl Fn(&FrameEntry) -> FrameEntry) -> Result<(), Error> {
+    /// [`SessionError::BadEntry`] for the first invalid entry; then none is changed.
+    pub fn amend(
+        &mut self,
+        amended: impl Fn(&FrameEntry) -> FrameEntry,
+    ) -> Result<(), SessionError> {
         let mut index = FrameIndex::default();
         for entry in self.index.entries() {
             let entry = amended(entry);
-            index.push(entry).map_err(|fault| Error::BadEntry {
+            index.push(entry).map_err(|fault| SessionError::BadEntry {
                 path: self.folder.join(INDEX_FILE),
                 n: entry.n,
                 fault,
@@ -178,19 +183,19 @@ impl SessionWriter {
     /// Syncs the index to disk, up to the last frame pushed.
     ///
     /// # Errors
-    /// [`Error::Io`].
-    pub fn sync(&self) -> Result<(), Error> {
+    /// [`SessionError::Io`].
+    pub fn sync(&self) -> Result<(), SessionError> {
         self.drop_partial_line()
             .and_then(|()| self.lines.sync_data())
-            .map_err(Error::io(self.folder.join(INDEX_FILE), "synced"))
+            .map_err(SessionError::io(self.folder.join(INDEX_FILE), "synced"))
     }
 
     /// Ends a complete session: adds the video's size, hash and number of frames to the manifest and
     /// marks it complete. The video must have been closed.
     ///
     /// # Errors
-    /// [`Error::VideoMissing`] or [`Error::Io`]; the status then stays "recording".
-    pub fn finish(self) -> Result<Manifest, Error> {
+    /// [`SessionError::VideoMissing`] or [`SessionError::Io`]; the status then stays "recording".
+    pub fn finish(self) -> Result<Manifest, SessionError> {
         self.end(Status::Complete)
     }
 
@@ -198,11 +203,11 @@ impl SessionWriter {
     ///
     /// # Errors
     /// As [`Self::finish`].
-    pub fn abort(self, reason: &str) -> Result<Manifest, Error> {
+    pub fn abort(self, reason: &str) -> Result<Manifest, SessionError> {
         self.end(Status::Aborted(reason.to_owned()))
     }
 
-    fn end(self, status: Status) -> Result<Manifest, Error> {
+    fn end(self, status: Status) -> Result<Manifest, SessionError> {
         // On a full disk this frees the space for what follows.
         self.lock.release_reserve()?;
         self.sync()?;
@@ -220,14 +225,14 @@ impl SessionWriter {
 }
 
 /// Keeps the index as it is under a second name, unless an earlier attempt did so.
-pub(super) fn keep_as_found(folder: &Path) -> Result<(), Error> {
+pub(super) fn keep_as_found(folder: &Path) -> Result<(), SessionError> {
     let (path, kept) = (folder.join(INDEX_FILE), folder.join(INDEX_AS_FOUND));
     if kept.exists() || !path.exists() {
         return Ok(());
     }
     // Not every file system has hard links.
     let linked = fs::hard_link(&path, &kept).or_else(|_| fs::copy(&path, &kept).map(|_| ()));
-    linked.map_err(Error::io(kept, "written"))
+    linked.map_err(SessionError::io(kept, "written"))
 }
 
 /// Adds the video's size and hash to the manifest and writes it with its final status.
@@ -236,20 +241,20 @@ pub(super) fn close(
     mut manifest: Manifest,
     frames: u64,
     status: Status,
-) -> Result<Manifest, Error> {
+) -> Result<Manifest, SessionError> {
     let path = folder.join(&manifest.video.file);
     // A capture that failed before its first frame is aborted without a video.
     if path.is_file() {
-        let file = File::open(&path).map_err(Error::io(&path, "read"))?;
-        file.sync_all().map_err(Error::io(&path, "synced"))?;
+        let file = File::open(&path).map_err(SessionError::io(&path, "read"))?;
+        file.sync_all().map_err(SessionError::io(&path, "synced"))?;
         let mut hasher = blake3::Hasher::new();
         let hashed = hasher
             .update_reader(file)
-            .map_err(Error::io(&path, "read"))?;
+            .map_err(SessionError::io(&path, "read"))?;
         manifest.video.bytes = Some(hashed.count());
         manifest.video.blake3 = Some(hashed.finalize().to_hex().to_string());
     } else if status == Status::Complete {
-        return Err(Error::VideoMissing(path));
+        return Err(SessionError::VideoMissing(path));
     }
     manifest.status = status;
     manifest.video.frames = Some(frames);
@@ -257,21 +262,21 @@ pub(super) fn close(
     Ok(manifest)
 }
 
-pub(super) fn write_index(folder: &Path, index: &FrameIndex) -> Result<(), Error> {
+pub(super) fn write_index(folder: &Path, index: &FrameIndex) -> Result<(), SessionError> {
     let path = folder.join(INDEX_FILE);
     let bytes = index.to_jsonl().map_err(io::Error::other);
     bytes
         .and_then(|bytes| durable::write_whole(&path, &bytes))
-        .map_err(Error::io(&path, "written"))
+        .map_err(SessionError::io(&path, "written"))
 }
 
-fn write_manifest(folder: &Path, manifest: &Manifest) -> Result<(), Error> {
+fn write_manifest(folder: &Path, manifest: &Manifest) -> Result<(), SessionError> {
     let path = folder.join(MANIFEST_FILE);
-    let bytes = manifest.to_json().map_err(|fault| Error::Manifest {
+    let bytes = manifest.to_json().map_err(|fault| SessionError::Manifest {
         path: path.clone(),
         fault,
     })?;
-    durable::write_whole(&path, &bytes).map_err(Error::io(path, "written"))
+    durable::write_whole(&path, &bytes).map_err(SessionError::io(path, "written"))
 }
 
 #[cfg(test)]
@@ -308,7 +313,10 @@ pub(super) mod tests {
         writer.push(entry(0)).unwrap();
         let path = writer.folder().join(INDEX_FILE);
         let whole = std::mem::replace(&mut writer.lines, File::open(&path).unwrap());
-        assert!(matches!(writer.push(entry(1)), Err(Error::Io { .. })));
+        assert!(matches!(
+            writer.push(entry(1)),
+            Err(SessionError::Io { .. })
+        ));
         writer.lines = whole;
         writer.lines.write_all(b"{\"n\":1,\"seq").unwrap();
         writer.push(entry(1)).unwrap();
@@ -336,7 +344,10 @@ pub(super) mod tests {
         fs::write(writer.video_path(), b"two frames").unwrap();
         let path = writer.folder().join(INDEX_FILE);
         let wrong = |entry: &FrameEntry| FrameEntry { n: 7, ..*entry };
-        assert!(matches!(writer.amend(wrong), Err(Error::BadEntry { .. })));
+        assert!(matches!(
+            writer.amend(wrong),
+            Err(SessionError::BadEntry { .. })
+        ));
         writer.amend(with_angle).unwrap();
         writer.finish().unwrap();
         let index = FrameIndex::parse(&fs::read(path).unwrap()).unwrap();

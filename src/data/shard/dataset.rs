@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::digest::Digest;
 use super::file::FileEntry;
 use super::settings::ExtractionSettings;
-use super::{Error, names, output};
+use super::{ShardError, names, output};
 use crate::geometry::Rect;
 
 /// The schema that this version writes and reads.
@@ -152,28 +152,28 @@ impl Dataset {
     /// Reads the description of the data set in the folder `out`.
     ///
     /// # Errors
-    /// [`Error::NoDataset`] if there is none, [`Error::Schema`] if it is from another version,
-    /// [`Error::Description`] if it is damaged, [`Error::UnsafePath`] or [`Error::SessionName`] if
-    /// it names a file outside the folder, [`Error::Io`].
-    pub fn read(out: &Path) -> Result<Self, Error> {
+    /// [`ShardError::NoDataset`] if there is none, [`ShardError::Schema`] if it is from another version,
+    /// [`ShardError::Description`] if it is damaged, [`ShardError::UnsafePath`] or [`ShardError::SessionName`] if
+    /// it names a file outside the folder, [`ShardError::Io`].
+    pub fn read(out: &Path) -> Result<Self, ShardError> {
         let path = out.join(Self::FILE);
         let bytes = read_limited(&path).map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound => Error::NoDataset {
+            io::ErrorKind::NotFound => ShardError::NoDataset {
                 path: out.to_owned(),
             },
-            _ => Error::Io {
+            _ => ShardError::Io {
                 doing: "read",
                 path: path.clone(),
                 source,
             },
         })?;
-        let damaged = |source| Error::Description {
+        let damaged = |source| ShardError::Description {
             path: path.clone(),
             source,
         };
         let Header { schema } = serde_json::from_slice(&bytes).map_err(damaged)?;
         if schema != SCHEMA {
-            return Err(Error::Schema {
+            return Err(ShardError::Schema {
                 path,
                 found: schema,
                 expected: SCHEMA,
@@ -187,11 +187,11 @@ impl Dataset {
     /// Writes the description into the folder `out`, whole or not at all.
     ///
     /// # Errors
-    /// [`Error::UnsafePath`] or [`Error::SessionName`] if an entry could not be read back,
-    /// [`Error::Json`] if a number is not finite, [`Error::Io`].
-    pub fn write(&self, out: &Path) -> Result<(), Error> {
+    /// [`ShardError::UnsafePath`] or [`ShardError::SessionName`] if an entry could not be read back,
+    /// [`ShardError::Json`] if a number is not finite, [`ShardError::Io`].
+    pub fn write(&self, out: &Path) -> Result<(), ShardError> {
         self.check_names()?;
-        let mut bytes = serde_json::to_vec_pretty(self).map_err(|source| Error::Json {
+        let mut bytes = serde_json::to_vec_pretty(self).map_err(|source| ShardError::Json {
             what: Self::FILE.to_owned(),
             source,
         })?;
@@ -240,7 +240,7 @@ impl Dataset {
         session_files.chain(shard_files).map(String::as_str)
     }
 
-    fn check_names(&self) -> Result<(), Error> {
+    fn check_names(&self) -> Result<(), ShardError> {
         self.sessions
             .iter()
             .try_for_each(|session| names::check_session(&session.id))?;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Why a data set could not be written, read or checked.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Error {
+pub enum ShardError {
     /// A file or folder could not be read or written.
     #[error(
         "could not {doing} {path}: check that it exists, may be read and written, and that the disk has space",
@@ -302,7 +302,7 @@ pub enum Error {
     },
 }
 
-impl Error {
+impl ShardError {
     /// For `map_err`: an I/O error with what was attempted and the path.
     pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Io {

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::digest::Digest;
-use super::{Error, names};
+use super::{ShardError, names};
 
 /// A file that `dataset.json` lists.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -22,11 +22,11 @@ impl FileEntry {
     /// Checks that the file exists in the data set `out` and has this length and digest.
     ///
     /// # Errors
-    /// [`Error::Changed`] if it differs, [`Error::UnsafePath`], or [`Error::Io`].
-    pub(super) fn check(&self, out: &Path) -> Result<(), Error> {
+    /// [`ShardError::Changed`] if it differs, [`ShardError::UnsafePath`], or [`ShardError::Io`].
+    pub(super) fn check(&self, out: &Path) -> Result<(), ShardError> {
         names::check_path(&self.file)?;
         let path = out.join(&self.file);
-        let found = Digest::of_file(&path).map_err(Error::io("read", &path))?;
+        let found = Digest::of_file(&path).map_err(ShardError::io("read", &path))?;
         compare(&self.file, (self.bytes, self.blake3), found)
     }
 }
@@ -34,14 +34,14 @@ impl FileEntry {
 /// Compares the expected length and digest of `file` with those that were found.
 ///
 /// # Errors
-/// [`Error::Changed`] if they differ.
+/// [`ShardError::Changed`] if they differ.
 pub(super) fn compare(
     file: &str,
     expected: (u64, Digest),
     found: (u64, Digest),
-) -> Result<(), Error> {
+) -> Result<(), ShardError> {
     let changed = |what| {
-        Err(Error::Changed {
+        Err(ShardError::Changed {
             file: file.to_owned(),
             what,
         })

@@ -6,7 +6,7 @@ use super::dataset::{Dataset, ShardEntry};
 use super::digest::{Digest, FolderHasher};
 use super::file::{FileEntry, compare};
 use super::settings::Layout;
-use super::{Error, names};
+use super::{ShardError, names};
 
 impl Dataset {
     /// Checks that the session `id` is listed and that each of its files in the data set `out` exists
@@ -14,11 +14,11 @@ impl Dataset {
     /// that. Settings, source and mask are for the caller to compare.
     ///
     /// # Errors
-    /// [`Error::NoSession`], [`Error::NoShard`], [`Error::Changed`] or [`Error::Io`].
+    /// [`ShardError::NoSession`], [`ShardError::NoShard`], [`ShardError::Changed`] or [`ShardError::Io`].
     ///
     /// [`verify`]: super::verify()
-    pub fn check_integrity(&self, out: &Path, id: &str) -> Result<(), Error> {
-        let unknown = || Error::NoSession {
+    pub fn check_integrity(&self, out: &Path, id: &str) -> Result<(), ShardError> {
+        let unknown = || ShardError::NoSession {
             session: id.to_owned(),
         };
         let session = self.session(id).ok_or_else(unknown)?;
@@ -26,7 +26,7 @@ impl Dataset {
             entry.check(out)?;
         }
         if self.shards_of(id).next().is_none() {
-            return Err(Error::NoShard {
+            return Err(ShardError::NoShard {
                 session: id.to_owned(),
             });
         }
@@ -35,7 +35,7 @@ impl Dataset {
     }
 }
 
-fn check_shard(out: &Path, shard: &ShardEntry, layout: Layout) -> Result<(), Error> {
+fn check_shard(out: &Path, shard: &ShardEntry, layout: Layout) -> Result<(), ShardError> {
     for entry in shard.mask.iter().chain(&shard.mean_img) {
         entry.check(out)?;
     }
@@ -54,13 +54,13 @@ fn check_shard(out: &Path, shard: &ShardEntry, layout: Layout) -> Result<(), Err
     }
 }
 
-fn check_folder(out: &Path, shard: &ShardEntry) -> Result<(), Error> {
+fn check_folder(out: &Path, shard: &ShardEntry) -> Result<(), ShardError> {
     names::check_path(&shard.file)?;
     let mut hasher = FolderHasher::default();
     let mut total = 0;
     for index in 0..shard.samples {
         let path = out.join(&shard.file).join(format!("{index}.png"));
-        let (bytes, digest) = Digest::of_file(&path).map_err(Error::io("read", &path))?;
+        let (bytes, digest) = Digest::of_file(&path).map_err(ShardError::io("read", &path))?;
         hasher.add(&digest);
         total += bytes;
     }

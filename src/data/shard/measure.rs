@@ -5,7 +5,7 @@
 
 use image::{GrayImage, RgbImage};
 
-use super::Error;
+use super::ShardError;
 
 /// Luma of a pixel in thousandths of a grey level, 0..=255 000.
 fn luma(r: u8, g: u8, b: u8) -> i32 {
@@ -109,8 +109,8 @@ impl MaskSpans {
     /// Pixels outside the mask have no influence.
     ///
     /// # Errors
-    /// [`Error::SizeMismatch`] if image and mask differ in size.
-    pub fn measure(&self, image: &RgbImage, level: u8) -> Result<Measures, Error> {
+    /// [`ShardError::SizeMismatch`] if image and mask differ in size.
+    pub fn measure(&self, image: &RgbImage, level: u8) -> Result<Measures, ShardError> {
         self.check_size(image)?;
         let row_bytes = self.width as usize * 3;
         let mut sums = [0_u64; 3];
@@ -143,8 +143,8 @@ impl MaskSpans {
     /// The first pixel (x, y) outside the mask that is not black, if there is one.
     ///
     /// # Errors
-    /// [`Error::SizeMismatch`] if image and mask differ in size.
-    pub fn first_lit_outside(&self, image: &RgbImage) -> Result<Option<(u32, u32)>, Error> {
+    /// [`ShardError::SizeMismatch`] if image and mask differ in size.
+    pub fn first_lit_outside(&self, image: &RgbImage) -> Result<Option<(u32, u32)>, ShardError> {
         self.check_size(image)?;
         let row_bytes = self.width as usize * 3;
         let rows = image.as_raw().chunks_exact(row_bytes.max(3));
@@ -165,12 +165,12 @@ impl MaskSpans {
         Ok(None)
     }
 
-    fn check_size(&self, image: &RgbImage) -> Result<(), Error> {
+    fn check_size(&self, image: &RgbImage) -> Result<(), ShardError> {
         let size = [image.width(), image.height()];
         if size == self.size() {
             Ok(())
         } else {
-            Err(Error::SizeMismatch {
+            Err(ShardError::SizeMismatch {
                 what: "the image",
                 size,
                 expected: self.size(),

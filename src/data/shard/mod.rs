@@ -45,7 +45,7 @@ pub use dataset::{
     Dataset, DatasetSoftware, MaskInfo, SamplingBasis, SessionEntry, ShardEntry, SourceVideo,
 };
 pub use digest::{Digest, NotADigest};
-pub use error::Error;
+pub use error::ShardError;
 pub use file::FileEntry;
 pub use measure::{MaskSpans, Measures};
 pub use names::{check_session, sample_key};

@@ -1,18 +1,18 @@
 //! Names of sessions, samples, members and files, and checks that they are safe.
 
-use super::Error;
+use super::ShardError;
 use crate::durable;
 use crate::naming::is_session_name;
 
 /// Checks that `name` can be a session's name, by the rule of [`is_session_name`].
 ///
 /// # Errors
-/// [`Error::SessionName`] if it cannot.
-pub fn check_session(name: &str) -> Result<(), Error> {
+/// [`ShardError::SessionName`] if it cannot.
+pub fn check_session(name: &str) -> Result<(), ShardError> {
     if is_session_name(name) {
         Ok(())
     } else {
-        Err(Error::SessionName {
+        Err(ShardError::SessionName {
             name: name.to_owned(),
         })
     }
@@ -20,13 +20,13 @@ pub fn check_session(name: &str) -> Result<(), Error> {
 
 /// Checks that `path` stays inside the data set: relative, parts separated by `/`, none of them
 /// empty, `.` or `..`.
-pub(super) fn check_path(path: &str) -> Result<(), Error> {
+pub(super) fn check_path(path: &str) -> Result<(), ShardError> {
     let plain = |part: &str| !matches!(part, "" | "." | "..");
     let forbidden = |c: char| c == '\\' || c == ':' || c.is_control();
     if path.split('/').all(plain) && !path.contains(forbidden) {
         Ok(())
     } else {
-        Err(Error::UnsafePath {
+        Err(ShardError::UnsafePath {
             path: path.to_owned(),
         })
     }
@@ -181,7 +181,7 @@ mod tests {
         for name in ["a:b", "../a", ""] {
             assert!(matches!(
                 check_session(name),
-                Err(Error::SessionName { .. })
+                Err(ShardError::SessionName { .. })
             ));
         }
     }

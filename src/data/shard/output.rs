@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::digest::HashingWriter;
 use super::file::FileEntry;
-use super::{Error, names};
+use super::{ShardError, names};
 use crate::durable::{Partial, Sealed};
 
 /// The folder of a data set, locked by this process until it is dropped.
@@ -22,16 +22,16 @@ impl OutputFolder {
     /// killed writer left behind. An image folder that was being replaced gets its name back.
     ///
     /// # Errors
-    /// [`Error::Locked`] if another process holds the lock; [`Error::Io`] if the folder cannot be
+    /// [`ShardError::Locked`] if another process holds the lock; [`ShardError::Io`] if the folder cannot be
     /// created, opened, locked or cleaned.
-    pub fn lock(out: &Path) -> Result<Self, Error> {
-        fs::create_dir_all(out).map_err(Error::io("make the folder", out))?;
-        let handle = File::open(out).map_err(Error::io("open the folder", out))?;
+    pub fn lock(out: &Path) -> Result<Self, ShardError> {
+        fs::create_dir_all(out).map_err(ShardError::io("make the folder", out))?;
+        let handle = File::open(out).map_err(ShardError::io("open the folder", out))?;
         handle.try_lock().map_err(|reason| match reason {
-            TryLockError::WouldBlock => Error::Locked {
+            TryLockError::WouldBlock => ShardError::Locked {
                 path: out.to_owned(),
             },
-            TryLockError::Error(source) => Error::Io {
+            TryLockError::Error(source) => ShardError::Io {
                 doing: "lock the folder",
                 path: out.to_owned(),
                 source,
@@ -54,23 +54,23 @@ impl OutputFolder {
     /// the page of a session, for example.
     ///
     /// # Errors
-    /// [`Error::UnsafePath`] if `name` is not a relative path inside the folder; [`Error::Io`].
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<FileEntry, Error> {
+    /// [`ShardError::UnsafePath`] if `name` is not a relative path inside the folder; [`ShardError::Io`].
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<FileEntry, ShardError> {
         write_whole(&self.path, name, bytes)
     }
 }
 
 /// Writes `bytes` to `file`, a path relative to `out`, whole or not at all.
-pub(super) fn write_whole(out: &Path, file: &str, bytes: &[u8]) -> Result<FileEntry, Error> {
+pub(super) fn write_whole(out: &Path, file: &str, bytes: &[u8]) -> Result<FileEntry, ShardError> {
     seal_whole(out, file, bytes)?.publish()
 }
 
 /// As [`write_whole`], without the final rename.
-pub(super) fn seal_whole(out: &Path, file: &str, bytes: &[u8]) -> Result<SealedFile, Error> {
+pub(super) fn seal_whole(out: &Path, file: &str, bytes: &[u8]) -> Result<SealedFile, ShardError> {
     let mut partial = PartialFile::create(out, file)?;
     partial
         .write_all(bytes)
-        .map_err(Error::io("write", &partial.path))?;
+        .map_err(ShardError::io("write", &partial.path))?;
     partial.seal()
 }
 
@@ -91,10 +91,10 @@ pub(super) struct SealedFile {
 
 impl PartialFile {
     /// Starts `file`, a path relative to `out`.
-    pub(super) fn create(out: &Path, file: &str) -> Result<Self, Error> {
+    pub(super) fn create(out: &Path, file: &str) -> Result<Self, ShardError> {
         names::check_path(file)?;
         let path = out.join(file);
-        let partial = Partial::create(&path).map_err(Error::io("create", &path))?;
+        let partial = Partial::create(&path).map_err(ShardError::io("create", &path))?;
         Ok(Self {
             writer: HashingWriter::new(partial),
             path,
@@ -103,10 +103,10 @@ impl PartialFile {
     }
 
     /// Writes and syncs all bytes to disk.
-    pub(super) fn seal(self) -> Result<SealedFile, Error> {
+    pub(super) fn seal(self) -> Result<SealedFile, ShardError> {
         let Self { writer, path, file } = self;
         let (partial, bytes, blake3) = writer.finish();
-        let sealed = partial.seal().map_err(Error::io("write", &path))?;
+        let sealed = partial.seal().map_err(ShardError::io("write", &path))?;
         let entry = FileEntry {
             file,
             bytes,
@@ -132,10 +132,10 @@ impl Write for PartialFile {
 
 impl SealedFile {
     /// Renames the file to its final name, replacing an older one.
-    pub(super) fn publish(self) -> Result<FileEntry, Error> {
+    pub(super) fn publish(self) -> Result<FileEntry, ShardError> {
         self.sealed
             .publish()
-            .map_err(Error::io("rename a finished file to", &self.path))?;
+            .map_err(ShardError::io("rename a finished file to", &self.path))?;
         Ok(self.entry)
     }
 }
@@ -147,7 +147,7 @@ pub(super) struct ScratchFile {
 }
 
 impl ScratchFile {
-    pub(super) fn create(path: PathBuf) -> Result<Self, Error> {
+    pub(super) fn create(path: PathBuf) -> Result<Self, ShardError> {
         let opened = OpenOptions::new()
             .read(true)
             .write(true)
@@ -155,8 +155,8 @@ impl ScratchFile {
             .open(&path);
         match opened {
             Ok(file) => Ok(Self { file, path }),
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Err(Error::Busy { path }),
-            Err(source) => Err(Error::Io {
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Err(ShardError::Busy { path }),
+            Err(source) => Err(ShardError::Io {
                 doing: "create",
                 path,
                 source,
@@ -172,16 +172,16 @@ impl Drop for ScratchFile {
 }
 
 /// Syncs a file or folder to disk.
-pub(super) fn sync(path: &Path) -> Result<(), Error> {
+pub(super) fn sync(path: &Path) -> Result<(), ShardError> {
     File::open(path)
         .and_then(|file| file.sync_all())
-        .map_err(Error::io("write", path))
+        .map_err(ShardError::io("write", path))
 }
 
 /// Removes a folder and its content, if it exists.
-pub(super) fn remove_folder(path: &Path) -> Result<(), Error> {
+pub(super) fn remove_folder(path: &Path) -> Result<(), ShardError> {
     match fs::remove_dir_all(path) {
-        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(Error::Io {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(ShardError::Io {
             doing: "remove",
             path: path.to_owned(),
             source: e,
@@ -192,12 +192,12 @@ pub(super) fn remove_folder(path: &Path) -> Result<(), Error> {
 
 /// The names in a folder, sorted; none if there is no such folder. In a name that is not UTF-8,
 /// invalid bytes are replaced: the writer uses no such names.
-pub(super) fn names_in(folder: &Path) -> Result<Vec<String>, Error> {
+pub(super) fn names_in(folder: &Path) -> Result<Vec<String>, ShardError> {
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
         Err(source) => {
-            return Err(Error::Io {
+            return Err(ShardError::Io {
                 doing: "list",
                 path: folder.to_owned(),
                 source,
@@ -207,12 +207,12 @@ pub(super) fn names_in(folder: &Path) -> Result<Vec<String>, Error> {
     let mut names = entries
         .map(|entry| entry.map(|e| e.file_name().to_string_lossy().into_owned()))
         .collect::<Result<Vec<_>, _>>()
-        .map_err(Error::io("list", folder))?;
+        .map_err(ShardError::io("list", folder))?;
     names.sort_unstable();
     Ok(names)
 }
 
-fn clear_leftovers(out: &Path) -> Result<(), Error> {
+fn clear_leftovers(out: &Path) -> Result<(), ShardError> {
     for folder in [
         out.to_owned(),
         out.join(names::MASKS),
@@ -229,15 +229,15 @@ fn clear_leftovers(out: &Path) -> Result<(), Error> {
 }
 
 /// Removes a file or a link (not its target), and leaves folders alone.
-fn remove_leftover(path: &Path) -> Result<(), Error> {
-    let found = fs::symlink_metadata(path).map_err(Error::io("look at", path))?;
+fn remove_leftover(path: &Path) -> Result<(), ShardError> {
+    let found = fs::symlink_metadata(path).map_err(ShardError::io("look at", path))?;
     if found.is_dir() {
         return Ok(());
     }
-    fs::remove_file(path).map_err(Error::io("remove", path))
+    fs::remove_file(path).map_err(ShardError::io("remove", path))
 }
 
-fn clear_image_leftovers(images: &Path) -> Result<(), Error> {
+fn clear_image_leftovers(images: &Path) -> Result<(), ShardError> {
     let found = names_in(images)?;
     for name in &found {
         // The writer was killed between moving the old folder away and renaming the new one: the old
@@ -247,7 +247,7 @@ fn clear_image_leftovers(images: &Path) -> Result<(), Error> {
             if path.exists() {
                 remove_folder(&old)?;
             } else {
-                fs::rename(&old, &path).map_err(Error::io("restore", &path))?;
+                fs::rename(&old, &path).map_err(ShardError::io("restore", &path))?;
             }
         }
     }
@@ -269,7 +269,7 @@ mod tests {
         let first = OutputFolder::lock(dir.path()).unwrap();
         assert!(matches!(
             OutputFolder::lock(dir.path()),
-            Err(Error::Locked { .. })
+            Err(ShardError::Locked { .. })
         ));
         drop(first);
         assert!(OutputFolder::lock(dir.path()).is_ok());
@@ -319,7 +319,7 @@ mod tests {
         assert_eq!((entry.file.as_str(), entry.bytes), ("a.html", 4));
         assert!(matches!(
             folder.write("../a.html", b""),
-            Err(Error::UnsafePath { .. })
+            Err(ShardError::UnsafePath { .. })
         ));
     }
 }

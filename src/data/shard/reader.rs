@@ -3,7 +3,7 @@
 
 use std::io::Read;
 
-use super::Error;
+use super::ShardError;
 use super::tarball::{Member, TarReader};
 
 /// Largest total size of the members of a sample, bytes.
@@ -37,9 +37,9 @@ impl ShardSample {
 /// same key are one sample. Names without a dot are skipped. At most one sample is in memory, of at
 /// most 256 MiB and 64 members.
 ///
-/// A shard that is damaged or truncated gives one error ([`Error::ShardTruncated`],
-/// [`Error::ShardHeader`], [`Error::ShardTooLarge`], [`Error::ShardName`], [`Error::ShardSample`],
-/// [`Error::ShardRead`]) and then ends; the sample that is affected is not returned.
+/// A shard that is damaged or truncated gives one error ([`ShardError::ShardTruncated`],
+/// [`ShardError::ShardHeader`], [`ShardError::ShardTooLarge`], [`ShardError::ShardName`], [`ShardError::ShardSample`],
+/// [`ShardError::ShardRead`]) and then ends; the sample that is affected is not returned.
 pub struct ShardReader<R> {
     tar: TarReader<R>,
     /// The first member of the next sample.
@@ -57,7 +57,7 @@ impl<R: Read> ShardReader<R> {
         }
     }
 
-    fn next_sample(&mut self) -> Result<Option<ShardSample>, Error> {
+    fn next_sample(&mut self) -> Result<Option<ShardSample>, ShardError> {
         let first = match self.ahead.take() {
             Some(first) => Some(first),
             None => self.next_member()?,
@@ -81,7 +81,7 @@ impl<R: Read> ShardReader<R> {
         Ok(Some(sample))
     }
 
-    fn next_member(&mut self) -> Result<Option<(String, String, Vec<u8>)>, Error> {
+    fn next_member(&mut self) -> Result<Option<(String, String, Vec<u8>)>, ShardError> {
         while let Some(Member { path, data, .. }) = self.tar.next()? {
             if let Some((key, suffix)) = split(&path) {
                 return Ok(Some((key, suffix, data)));
@@ -92,10 +92,10 @@ impl<R: Read> ShardReader<R> {
 }
 
 impl ShardSample {
-    fn add(&mut self, suffix: String, data: Vec<u8>, bytes: u64) -> Result<(), Error> {
+    fn add(&mut self, suffix: String, data: Vec<u8>, bytes: u64) -> Result<(), ShardError> {
         let path = || format!("{}.{suffix}", self.key);
         if bytes > MAX_BYTES {
-            return Err(Error::ShardTooLarge {
+            return Err(ShardError::ShardTooLarge {
                 path: path(),
                 offset: bytes,
                 limit: MAX_BYTES,
@@ -103,7 +103,7 @@ impl ShardSample {
         }
         if self.member(&suffix).is_some() || self.members.len() == MAX_MEMBERS {
             let (key, path) = (self.key.clone(), path());
-            return Err(Error::ShardSample {
+            return Err(ShardError::ShardSample {
                 key,
                 path,
                 limit: MAX_MEMBERS,
@@ -115,7 +115,7 @@ impl ShardSample {
 }
 
 impl<R: Read> Iterator for ShardReader<R> {
-    type Item = Result<ShardSample, Error>;
+    type Item = Result<ShardSample, ShardError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.ended {
@@ -143,7 +143,7 @@ mod tests {
     use crate::shard::tarball::tests::tar_of;
     use proptest::prelude::*;
 
-    fn read(bytes: &[u8]) -> Vec<Result<ShardSample, Error>> {
+    fn read(bytes: &[u8]) -> Vec<Result<ShardSample, ShardError>> {
         ShardReader::new(bytes).collect()
     }
 
@@ -171,7 +171,7 @@ mod tests {
             ("b.png", b"3"),
         ]));
         assert_eq!(results.len(), 1);
-        assert!(matches!(results[0], Err(Error::ShardSample { .. })));
+        assert!(matches!(results[0], Err(ShardError::ShardSample { .. })));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Error, names};
+use super::{ShardError, names};
 
 /// How samples are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -46,11 +46,11 @@ impl fmt::Display for Layout {
 }
 
 impl FromStr for Layout {
-    type Err = Error;
+    type Err = ShardError;
 
-    fn from_str(text: &str) -> Result<Self, Error> {
+    fn from_str(text: &str) -> Result<Self, ShardError> {
         let found = Self::ALL.into_iter().find(|layout| layout.name() == text);
-        found.ok_or_else(|| Error::UnknownLayout {
+        found.ok_or_else(|| ShardError::UnknownLayout {
             name: text.to_owned(),
         })
     }

@@ -9,7 +9,7 @@ use super::names::{self, Part};
 use super::order::order;
 use super::output::{PartialFile, ScratchFile, SealedFile};
 use super::table::TableRow;
-use super::{Error, tarball};
+use super::{ShardError, tarball};
 
 /// Part of the spool that holds an image.
 #[derive(Debug, Clone, Copy, Default)]
@@ -36,7 +36,7 @@ pub(super) struct SealedShard {
 }
 
 impl SpoolStore {
-    pub(super) fn create(out: &Path, session: &str, samples: u32) -> Result<Self, Error> {
+    pub(super) fn create(out: &Path, session: &str, samples: u32) -> Result<Self, ShardError> {
         Ok(Self {
             out: out.to_owned(),
             session: session.to_owned(),
@@ -50,7 +50,7 @@ impl SpoolStore {
         &self.out
     }
 
-    pub(super) fn push(&mut self, index: u32, png: &[u8]) -> Result<(), Error> {
+    pub(super) fn push(&mut self, index: u32, png: &[u8]) -> Result<(), ShardError> {
         let extent = Extent {
             offset: self.bytes,
             bytes: png.len() as u64,
@@ -59,7 +59,7 @@ impl SpoolStore {
         // A failed push may have left bytes behind: each image is written at its own offset.
         file.seek(SeekFrom::Start(extent.offset))
             .and_then(|_| file.write_all(png))
-            .map_err(Error::io("write", &self.scratch.path))?;
+            .map_err(ShardError::io("write", &self.scratch.path))?;
         self.bytes += extent.bytes;
         if let Some(slot) = self.extents.get_mut(index as usize) {
             *slot = extent;
@@ -68,7 +68,11 @@ impl SpoolStore {
     }
 
     /// Writes the tar under its temporary name. The spool is removed when `self` is dropped.
-    pub(super) fn seal(&self, rows: &[TableRow], mask_png: &[u8]) -> Result<SealedShard, Error> {
+    pub(super) fn seal(
+        &self,
+        rows: &[TableRow],
+        mask_png: &[u8],
+    ) -> Result<SealedShard, ShardError> {
         let partial = PartialFile::create(&self.out, &names::tar_file(&self.session))?;
         let samples = u32::try_from(rows.len()).unwrap_or(u32::MAX);
         let mut tar = tar::Builder::new(partial);
@@ -79,7 +83,7 @@ impl SpoolStore {
                 continue;
             };
             self.read(extent, &mut png)?;
-            let json = serde_json::to_vec(&row.record).map_err(|source| Error::Json {
+            let json = serde_json::to_vec(&row.record).map_err(|source| ShardError::Json {
                 what: format!("the record of {}", names::sample_key(&self.session, index)),
                 source,
             })?;
@@ -104,16 +108,16 @@ impl SpoolStore {
         tar: &mut tar::Builder<PartialFile>,
         path: &str,
         data: &[u8],
-    ) -> Result<(), Error> {
+    ) -> Result<(), ShardError> {
         tarball::header(path, data.len() as u64)
             .and_then(|header| tar.append(&header, data))
             .map_err(self.failed_to_write())
     }
 
-    fn failed_to_write(&self) -> impl FnOnce(io::Error) -> Error {
+    fn failed_to_write(&self) -> impl FnOnce(io::Error) -> ShardError {
         move |source| {
             let path = self.out.join(names::tar_file(&self.session));
-            Error::Io {
+            ShardError::Io {
                 doing: "write",
                 path,
                 source,
@@ -121,7 +125,7 @@ impl SpoolStore {
         }
     }
 
-    fn read(&self, extent: Extent, png: &mut Vec<u8>) -> Result<(), Error> {
+    fn read(&self, extent: Extent, png: &mut Vec<u8>) -> Result<(), ShardError> {
         png.clear();
         let mut file = &self.scratch.file;
         file.seek(SeekFrom::Start(extent.offset))
@@ -132,13 +136,13 @@ impl SpoolStore {
                     .then_some(())
                     .ok_or_else(|| io::ErrorKind::UnexpectedEof.into())
             })
-            .map_err(Error::io("read back", &self.scratch.path))
+            .map_err(ShardError::io("read back", &self.scratch.path))
     }
 }
 
 impl SealedShard {
     /// Renames the tar to its final name, replacing an older one.
-    pub(super) fn publish(self) -> Result<ShardEntry, Error> {
+    pub(super) fn publish(self) -> Result<ShardEntry, ShardError> {
         let entry = self.file.publish()?;
         Ok(ShardEntry {
             file: entry.file,

@@ -22,7 +22,7 @@ use parquet::schema::parser::parse_message_type;
 use super::digest::{Digest, HashingReader};
 use super::file::{FileEntry, compare};
 use super::record::FrameRecord;
-use super::{Error, MAX_SAMPLES, names};
+use super::{MAX_SAMPLES, ShardError, names};
 use crate::geometry::Rect;
 
 /// One row: the record of a sample and the digests of its files, which allow to attribute damage to
@@ -181,13 +181,13 @@ fn write_column(
 /// is refused before it is parsed, so that the parser never sees damaged data.
 ///
 /// # Errors
-/// [`Error::Changed`] if the file differs from its entry, [`Error::Table`] if it is not Parquet,
-/// [`Error::TableValue`] if a column is missing or a value is out of range, [`Error::Io`],
-/// [`Error::UnsafePath`].
-pub fn read_table(out: &Path, entry: &FileEntry) -> Result<Vec<TableRow>, Error> {
+/// [`ShardError::Changed`] if the file differs from its entry, [`ShardError::Table`] if it is not Parquet,
+/// [`ShardError::TableValue`] if a column is missing or a value is out of range, [`ShardError::Io`],
+/// [`ShardError::UnsafePath`].
+pub fn read_table(out: &Path, entry: &FileEntry) -> Result<Vec<TableRow>, ShardError> {
     names::check_path(&entry.file)?;
     let path = out.join(&entry.file);
-    let io = |doing| Error::io(doing, &path);
+    let io = |doing| ShardError::io(doing, &path);
     let file = File::open(&path).map_err(io("open"))?;
     let mut hashed = HashingReader::new(&file);
     hashed.drain().map_err(io("read"))?;
@@ -198,10 +198,10 @@ pub fn read_table(out: &Path, entry: &FileEntry) -> Result<Vec<TableRow>, Error>
 /// Parses a table. The parser panics on some files that are not tables. A file with the right digest
 /// is only such a file if somebody meant it, but it must not end the program. The panic hook still
 /// runs: by default it prints a message to standard error.
-fn read_rows(file: File, path: &Path) -> Result<Vec<TableRow>, Error> {
+fn read_rows(file: File, path: &Path) -> Result<Vec<TableRow>, ShardError> {
     std::panic::catch_unwind(|| parse_rows(file, path)).unwrap_or_else(|_| {
         let source = ParquetError::General("the file is malformed".to_owned());
-        Err(Error::Table {
+        Err(ShardError::Table {
             path: path.to_owned(),
             doing: "read",
             source,
@@ -209,8 +209,8 @@ fn read_rows(file: File, path: &Path) -> Result<Vec<TableRow>, Error> {
     })
 }
 
-fn parse_rows(file: File, path: &Path) -> Result<Vec<TableRow>, Error> {
-    let failed = |source| Error::Table {
+fn parse_rows(file: File, path: &Path) -> Result<Vec<TableRow>, ShardError> {
+    let failed = |source| ShardError::Table {
         path: path.to_owned(),
         doing: "read",
         source,
@@ -240,7 +240,7 @@ struct Fields<'a> {
 }
 
 impl Fields<'_> {
-    fn row(&self) -> Result<TableRow, Error> {
+    fn row(&self) -> Result<TableRow, ShardError> {
         let record = FrameRecord {
             session: self.text("session")?,
             object: self.text("object")?,
@@ -287,68 +287,68 @@ impl Fields<'_> {
         &self,
         column: &'static str,
         read: impl FnOnce(&Field) -> Option<T>,
-    ) -> Result<T, Error> {
+    ) -> Result<T, ShardError> {
         self.fields
             .get(column)
             .and_then(read)
             .ok_or_else(|| self.invalid(column))
     }
 
-    fn invalid(&self, column: &'static str) -> Error {
-        Error::TableValue {
+    fn invalid(&self, column: &'static str) -> ShardError {
+        ShardError::TableValue {
             path: self.path.to_owned(),
             row: self.number,
             column,
         }
     }
 
-    fn text(&self, column: &'static str) -> Result<String, Error> {
+    fn text(&self, column: &'static str) -> Result<String, ShardError> {
         self.get(column, |field| match field {
             Field::Str(text) => Some(text.clone()),
             _ => None,
         })
     }
 
-    fn digest(&self, column: &'static str) -> Result<Digest, Error> {
+    fn digest(&self, column: &'static str) -> Result<Digest, ShardError> {
         self.text(column)?.parse().map_err(|_| self.invalid(column))
     }
 
-    fn u32(&self, column: &'static str) -> Result<u32, Error> {
+    fn u32(&self, column: &'static str) -> Result<u32, ShardError> {
         self.get(column, |field| match field {
             Field::UInt(value) => Some(*value),
             _ => None,
         })
     }
 
-    fn i32(&self, column: &'static str) -> Result<i32, Error> {
+    fn i32(&self, column: &'static str) -> Result<i32, ShardError> {
         self.get(column, |field| match field {
             Field::Int(value) => Some(*value),
             _ => None,
         })
     }
 
-    fn u64(&self, column: &'static str) -> Result<u64, Error> {
+    fn u64(&self, column: &'static str) -> Result<u64, ShardError> {
         self.get(column, |field| match field {
             Field::ULong(value) => Some(*value),
             _ => None,
         })
     }
 
-    fn i64(&self, column: &'static str) -> Result<i64, Error> {
+    fn i64(&self, column: &'static str) -> Result<i64, ShardError> {
         self.get(column, |field| match field {
             Field::Long(value) => Some(*value),
             _ => None,
         })
     }
 
-    fn real(&self, column: &'static str) -> Result<f64, Error> {
+    fn real(&self, column: &'static str) -> Result<f64, ShardError> {
         self.get(column, |field| match field {
             Field::Double(value) => Some(*value),
             _ => None,
         })
     }
 
-    fn maybe_real(&self, column: &'static str) -> Result<Option<f64>, Error> {
+    fn maybe_real(&self, column: &'static str) -> Result<Option<f64>, ShardError> {
         self.get(column, |field| match field {
             Field::Double(value) => Some(Some(*value)),
             Field::Null => Some(None),
@@ -356,7 +356,7 @@ impl Fields<'_> {
         })
     }
 
-    fn flag(&self, column: &'static str) -> Result<bool, Error> {
+    fn flag(&self, column: &'static str) -> Result<bool, ShardError> {
         self.get(column, |field| match field {
             Field::Bool(value) => Some(*value),
             _ => None,
@@ -434,7 +434,7 @@ mod tests {
             damaged[at] ^= 0x10;
             std::fs::write(dir.path().join("s.parquet"), damaged).unwrap();
             let error = read_table(dir.path(), &entry).unwrap_err();
-            assert!(matches!(error, Error::Changed { .. }), "{at}: {error}");
+            assert!(matches!(error, ShardError::Changed { .. }), "{at}: {error}");
         }
     }
 
@@ -443,7 +443,7 @@ mod tests {
         let (dir, entry) = on_disk(b"PAR1 and nothing that belongs to it PAR1");
         assert!(matches!(
             read_table(dir.path(), &entry),
-            Err(Error::Table { .. })
+            Err(ShardError::Table { .. })
         ));
     }
 }

@@ -5,7 +5,7 @@ use std::io::{self, Read};
 
 use tar::{EntryType, Header};
 
-use super::Error;
+use super::ShardError;
 
 /// Size of a tar's blocks, bytes.
 pub(super) const BLOCK: usize = 512;
@@ -70,7 +70,7 @@ impl<R: Read> TarReader<R> {
     }
 
     /// The next file; `None` after the two empty blocks that end a tar.
-    pub(super) fn next(&mut self) -> Result<Option<Member>, Error> {
+    pub(super) fn next(&mut self) -> Result<Option<Member>, ShardError> {
         let mut named = Extensions::default();
         while !self.ended {
             let start = self.offset
@@ -83,10 +83,10 @@ impl<R: Read> TarReader<R> {
             if is_zero(&block) {
                 return self.end(start);
             }
-            let header = valid_header(&block).ok_or(Error::ShardHeader { offset: start })?;
+            let header = valid_header(&block).ok_or(ShardError::ShardHeader { offset: start })?;
             let claimed = header
                 .entry_size()
-                .map_err(|_| Error::ShardHeader { offset: start })?;
+                .map_err(|_| ShardError::ShardHeader { offset: start })?;
             let bytes = named.size.unwrap_or(claimed);
             match header.entry_type() {
                 EntryType::Regular | EntryType::Continuous => {
@@ -97,7 +97,7 @@ impl<R: Read> TarReader<R> {
                     let data = self.data(start, &path, claimed, MAX_EXTENSION)?.0;
                     named.add(header.entry_type(), &data);
                 }
-                EntryType::GNUSparse => return Err(Error::ShardHeader { offset: start }),
+                EntryType::GNUSparse => return Err(ShardError::ShardHeader { offset: start }),
                 EntryType::GNULongLink | EntryType::XGlobalHeader => self.skip(claimed)?,
                 _ => {
                     self.skip(bytes)?;
@@ -110,12 +110,12 @@ impl<R: Read> TarReader<R> {
 
     /// After an error in the middle of a tar: searches block by block for the next header. False if
     /// there is none.
-    pub(super) fn resume(&mut self) -> Result<bool, Error> {
+    pub(super) fn resume(&mut self) -> Result<bool, ShardError> {
         self.skip_padding()?;
         loop {
             let block = match self.header_block() {
                 Ok(block) => block,
-                Err(Error::ShardTruncated { .. }) => return Ok(false),
+                Err(ShardError::ShardTruncated { .. }) => return Ok(false),
                 Err(error) => return Err(error),
             };
             if valid_header(&block).is_some() {
@@ -125,12 +125,12 @@ impl<R: Read> TarReader<R> {
         }
     }
 
-    fn end(&mut self, start: u64) -> Result<Option<Member>, Error> {
+    fn end(&mut self, start: u64) -> Result<Option<Member>, ShardError> {
         if is_zero(&self.header_block()?) {
             self.ended = true;
             Ok(None)
         } else {
-            Err(Error::ShardHeader { offset: start })
+            Err(ShardError::ShardHeader { offset: start })
         }
     }
 
@@ -140,10 +140,10 @@ impl<R: Read> TarReader<R> {
         own: &Header,
         bytes: u64,
         named: Extensions,
-    ) -> Result<Member, Error> {
+    ) -> Result<Member, ShardError> {
         let extended = named.path.is_some() || named.size.is_some();
         let name = named.path.unwrap_or_else(|| own.path_bytes().into_owned());
-        let path = String::from_utf8(name).map_err(|_| Error::ShardName { offset });
+        let path = String::from_utf8(name).map_err(|_| ShardError::ShardName { offset });
         let label = path.as_deref().unwrap_or("a member without a name");
         let (data, padding_is_zero) = self.data(offset, label, bytes, self.limit)?;
         let path = path?;
@@ -166,9 +166,9 @@ impl<R: Read> TarReader<R> {
         path: &str,
         bytes: u64,
         limit: u64,
-    ) -> Result<(Vec<u8>, bool), Error> {
+    ) -> Result<(Vec<u8>, bool), ShardError> {
         if bytes > limit {
-            return Err(Error::ShardTooLarge {
+            return Err(ShardError::ShardTooLarge {
                 path: path.to_owned(),
                 offset: start,
                 limit,
@@ -177,12 +177,12 @@ impl<R: Read> TarReader<R> {
         let mut data = Vec::new();
         let read = (&mut self.source).take(bytes).read_to_end(&mut data);
         self.offset += data.len() as u64;
-        read.map_err(|source| Error::ShardRead {
+        read.map_err(|source| ShardError::ShardRead {
             offset: self.offset,
             source,
         })?;
         if (data.len() as u64) < bytes {
-            return Err(Error::ShardTruncated {
+            return Err(ShardError::ShardTruncated {
                 offset: self.offset,
             });
         }
@@ -190,7 +190,7 @@ impl<R: Read> TarReader<R> {
     }
 
     /// Skips to the next block; returns whether all skipped bytes are zero.
-    fn skip_padding(&mut self) -> Result<bool, Error> {
+    fn skip_padding(&mut self) -> Result<bool, ShardError> {
         let over = usize::try_from(self.offset % BLOCK as u64).unwrap_or(0);
         if over == 0 {
             return Ok(true);
@@ -202,24 +202,24 @@ impl<R: Read> TarReader<R> {
         Ok(is_zero(padding))
     }
 
-    fn skip(&mut self, bytes: u64) -> Result<(), Error> {
+    fn skip(&mut self, bytes: u64) -> Result<(), ShardError> {
         let skipped =
             io::copy(&mut (&mut self.source).take(bytes), &mut io::sink()).map_err(|source| {
-                Error::ShardRead {
+                ShardError::ShardRead {
                     offset: self.offset,
                     source,
                 }
             })?;
         self.offset += skipped;
         if skipped < bytes {
-            return Err(Error::ShardTruncated {
+            return Err(ShardError::ShardTruncated {
                 offset: self.offset,
             });
         }
         self.skip_padding().map(|_| ())
     }
 
-    fn header_block(&mut self) -> Result<Block, Error> {
+    fn header_block(&mut self) -> Result<Block, ShardError> {
         if let Some(block) = self.found.take() {
             return Ok(block);
         }
@@ -229,14 +229,14 @@ impl<R: Read> TarReader<R> {
         Ok(block)
     }
 
-    fn count(&mut self, read: io::Result<usize>, wanted: usize) -> Result<(), Error> {
-        let read = read.map_err(|source| Error::ShardRead {
+    fn count(&mut self, read: io::Result<usize>, wanted: usize) -> Result<(), ShardError> {
+        let read = read.map_err(|source| ShardError::ShardRead {
             offset: self.offset,
             source,
         })?;
         self.offset += read as u64;
         if read < wanted {
-            return Err(Error::ShardTruncated {
+            return Err(ShardError::ShardTruncated {
                 offset: self.offset,
             });
         }
@@ -324,7 +324,7 @@ fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
 pub(super) mod tests {
     use super::*;
 
-    fn read_all(bytes: &[u8]) -> Result<Vec<(String, Vec<u8>, bool)>, Error> {
+    fn read_all(bytes: &[u8]) -> Result<Vec<(String, Vec<u8>, bool)>, ShardError> {
         let mut reader = TarReader::new(bytes, 1 << 20);
         let mut members = Vec::new();
         while let Some(member) = reader.next()? {
@@ -390,7 +390,7 @@ pub(super) mod tests {
         for end in 0..tar.len() {
             let error = read_all(&tar[..end]).unwrap_err();
             assert!(
-                matches!(error, Error::ShardTruncated { .. }),
+                matches!(error, ShardError::ShardTruncated { .. }),
                 "{end}: {error}"
             );
         }
@@ -404,7 +404,7 @@ pub(super) mod tests {
         assert_eq!(reader.next().unwrap().unwrap().path, "a.png");
         assert!(matches!(
             reader.next(),
-            Err(Error::ShardHeader { offset: 1024 })
+            Err(ShardError::ShardHeader { offset: 1024 })
         ));
         assert!(reader.resume().unwrap());
         let member = reader.next().unwrap().unwrap();
@@ -416,11 +416,11 @@ pub(super) mod tests {
     fn a_size_above_the_limit_allocates_no_memory() {
         let block = header("a.png", u64::MAX >> 3).unwrap();
         let read = read_all(block.as_bytes());
-        assert!(matches!(read, Err(Error::ShardTooLarge { .. })));
+        assert!(matches!(read, Err(ShardError::ShardTooLarge { .. })));
         let block = header("a.png", 1 << 20).unwrap();
         assert!(matches!(
             read_all(block.as_bytes()),
-            Err(Error::ShardTruncated { .. })
+            Err(ShardError::ShardTruncated { .. })
         ));
     }
 }

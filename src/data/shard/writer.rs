@@ -14,7 +14,7 @@ use super::record::FrameRecord;
 use super::settings::Layout;
 use super::spool::SpoolStore;
 use super::table::{TableRow, write_rows};
-use super::{Error, MAX_SAMPLES, names};
+use super::{MAX_SAMPLES, ShardError, names};
 
 /// One sample, ready to be written.
 #[derive(Debug, Clone)]
@@ -32,8 +32,8 @@ impl Sample {
     /// many threads.
     ///
     /// # Errors
-    /// [`Error::Encode`] if the image has no pixels.
-    pub fn encode(record: FrameRecord, image: RgbImage) -> Result<Self, Error> {
+    /// [`ShardError::Encode`] if the image has no pixels.
+    pub fn encode(record: FrameRecord, image: RgbImage) -> Result<Self, ShardError> {
         let png = encode_rgb(&image)?;
         Ok(Self { record, image, png })
     }
@@ -75,18 +75,18 @@ impl ShardWriter {
     /// `out`, which must exist. `mask` holds 0 and 255 only and has the size of the images.
     ///
     /// # Errors
-    /// [`Error::SessionName`], [`Error::SampleCount`], [`Error::MaskValue`], [`Error::Encode`] if the
-    /// mask has no pixels, [`Error::Busy`] if the session is being written already, [`Error::Io`].
+    /// [`ShardError::SessionName`], [`ShardError::SampleCount`], [`ShardError::MaskValue`], [`ShardError::Encode`] if the
+    /// mask has no pixels, [`ShardError::Busy`] if the session is being written already, [`ShardError::Io`].
     pub fn create(
         out: &Path,
         layout: Layout,
         session: &str,
         samples: u32,
         mask: &GrayImage,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, ShardError> {
         names::check_session(session)?;
         if samples == 0 || samples > MAX_SAMPLES {
-            return Err(Error::SampleCount { samples });
+            return Err(ShardError::SampleCount { samples });
         }
         check_mask(mask)?;
         let mask_png = encode_mask(mask)?;
@@ -108,21 +108,21 @@ impl ShardWriter {
     /// Adds a sample. Each index must be given exactly once, in any order.
     ///
     /// # Errors
-    /// [`Error::WrongSession`], [`Error::OutOfRange`], [`Error::DoubledSample`],
-    /// [`Error::SizeMismatch`] if image, record and mask differ in size, [`Error::NotFinite`],
-    /// [`Error::Io`]. The sample is then not added.
-    pub fn push(&mut self, sample: Sample) -> Result<(), Error> {
+    /// [`ShardError::WrongSession`], [`ShardError::OutOfRange`], [`ShardError::DoubledSample`],
+    /// [`ShardError::SizeMismatch`] if image, record and mask differ in size, [`ShardError::NotFinite`],
+    /// [`ShardError::Io`]. The sample is then not added.
+    pub fn push(&mut self, sample: Sample) -> Result<(), ShardError> {
         let Sample { record, image, png } = sample;
         self.check(&record, &image)?;
         let index = record.index;
-        let out_of_range = || Error::OutOfRange {
+        let out_of_range = || ShardError::OutOfRange {
             session: self.session.clone(),
             index,
             last: u32::try_from(self.rows.len()).unwrap_or(MAX_SAMPLES) - 1,
         };
         let slot = index as usize;
         if self.rows.get(slot).ok_or_else(out_of_range)?.is_some() {
-            return Err(Error::DoubledSample {
+            return Err(ShardError::DoubledSample {
                 session: self.session.clone(),
                 index,
             });
@@ -144,10 +144,10 @@ impl ShardWriter {
     /// Writes the session's files under their final names, replacing older ones.
     ///
     /// # Errors
-    /// [`Error::MissingSample`] if samples were not given; [`Error::Io`], [`Error::Table`] or
-    /// [`Error::Json`] if a file could not be written. Then nothing of the session is left, except
+    /// [`ShardError::MissingSample`] if samples were not given; [`ShardError::Io`], [`ShardError::Table`] or
+    /// [`ShardError::Json`] if a file could not be written. Then nothing of the session is left, except
     /// files that got their names before the error, which `dataset.json` does not list.
-    pub fn finish(self) -> Result<ShardFiles, Error> {
+    pub fn finish(self) -> Result<ShardFiles, ShardError> {
         let Self {
             session,
             mask_png,
@@ -176,11 +176,11 @@ impl ShardWriter {
         }
     }
 
-    fn check(&self, record: &FrameRecord, image: &RgbImage) -> Result<(), Error> {
+    fn check(&self, record: &FrameRecord, image: &RgbImage) -> Result<(), ShardError> {
         let index = record.index;
         if record.session != self.session {
             let (found, expected) = (record.session.clone(), self.session.clone());
-            return Err(Error::WrongSession {
+            return Err(ShardError::WrongSession {
                 index,
                 found,
                 expected,
@@ -192,7 +192,7 @@ impl ShardWriter {
         ];
         for (what, size) in sizes {
             if size != self.size {
-                return Err(Error::SizeMismatch {
+                return Err(ShardError::SizeMismatch {
                     what,
                     size,
                     expected: self.size,
@@ -200,7 +200,7 @@ impl ShardWriter {
             }
         }
         match first_not_finite(record) {
-            Some(field) => Err(Error::NotFinite {
+            Some(field) => Err(ShardError::NotFinite {
                 session: self.session.clone(),
                 index,
                 field,
@@ -211,11 +211,11 @@ impl ShardWriter {
 }
 
 /// All rows, or an error with the first missing index.
-fn complete(session: &str, rows: Vec<Option<TableRow>>) -> Result<Vec<TableRow>, Error> {
+fn complete(session: &str, rows: Vec<Option<TableRow>>) -> Result<Vec<TableRow>, ShardError> {
     let missing = rows.iter().filter(|row| row.is_none()).count();
     if let Some(index) = rows.iter().position(Option::is_none) {
         let index = u32::try_from(index).unwrap_or(MAX_SAMPLES);
-        return Err(Error::MissingSample {
+        return Err(ShardError::MissingSample {
             session: session.to_owned(),
             index,
             missing,
@@ -240,10 +240,10 @@ fn first_not_finite(record: &FrameRecord) -> Option<&'static str> {
         .map(|(field, _)| field)
 }
 
-fn seal_table(out: &Path, session: &str, rows: &[TableRow]) -> Result<SealedFile, Error> {
+fn seal_table(out: &Path, session: &str, rows: &[TableRow]) -> Result<SealedFile, ShardError> {
     let file = names::table_file(session);
     let mut partial = PartialFile::create(out, &file)?;
-    write_rows(&mut partial, rows).map_err(|source| Error::Table {
+    write_rows(&mut partial, rows).map_err(|source| ShardError::Table {
         path: out.join(&file),
         doing: "written",
         source,

@@ -2,7 +2,9 @@
 
 use std::fs;
 
-use relit_data::shard::{Dataset, Error, Layout, decode_mask, decode_rgb, encode_mask, encode_rgb};
+use relit_data::shard::{
+    Dataset, Layout, ShardError, decode_mask, decode_rgb, encode_mask, encode_rgb,
+};
 
 use crate::sample_set::{SAMPLES, SESSION, assert_names, dataset, mask, sample, verified};
 
@@ -50,13 +52,13 @@ fn damage_to_an_image_is_named() {
     let dataset = Dataset::read(dir.path()).unwrap();
     assert!(matches!(
         dataset.check_integrity(dir.path(), SESSION),
-        Err(Error::Io { .. })
+        Err(ShardError::Io { .. })
     ));
     fs::write(&path, encode_rgb(&sample(SESSION, 7).image).unwrap()).unwrap();
     assert_names(dir.path(), IMAGES, Some(6), "differs from the table's");
     assert!(matches!(
         dataset.check_integrity(dir.path(), SESSION),
-        Err(Error::Changed { .. })
+        Err(ShardError::Changed { .. })
     ));
     fs::write(&path, good).unwrap();
     assert_eq!(verified(dir.path()).problems, []);

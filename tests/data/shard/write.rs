@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use image::{GrayImage, Luma};
 use proptest::prelude::*;
 use relit_data::shard::{
-    Dataset, Error, FrameRecord, Layout, OutputFolder, ShardReader, ShardWriter, decode_mask,
+    Dataset, FrameRecord, Layout, OutputFolder, ShardError, ShardReader, ShardWriter, decode_mask,
     decode_rgb, order, read_table, sample_key, verify,
 };
 
@@ -83,7 +83,7 @@ fn what_was_written_is_intact() {
         let dataset = Dataset::read(dir.path()).unwrap();
         dataset.check_integrity(dir.path(), SESSION).unwrap();
         let unknown = dataset.check_integrity(dir.path(), "another");
-        assert!(matches!(unknown, Err(Error::NoSession { .. })));
+        assert!(matches!(unknown, Err(ShardError::NoSession { .. })));
         let rows = read_table(dir.path(), &dataset.sessions[0].table).unwrap();
         let records: Vec<_> = (0..SAMPLES).map(|k| sample(SESSION, k).record).collect();
         assert_eq!(
@@ -131,7 +131,7 @@ fn an_incomplete_session_is_refused_with_the_first_missing_sample() {
         assert!(
             matches!(
                 error,
-                Error::MissingSample {
+                ShardError::MissingSample {
                     index: 2,
                     missing: 11,
                     ..
@@ -152,7 +152,7 @@ fn what_a_killed_writer_left_behind_is_removed_by_the_next() {
         killed.push(sample(SESSION, 3)).unwrap();
         std::mem::forget(killed);
         let busy = ShardWriter::create(dir.path(), layout, SESSION, SAMPLES, &mask());
-        assert!(matches!(busy, Err(Error::Busy { .. })));
+        assert!(matches!(busy, Err(ShardError::Busy { .. })));
         write(dir.path(), layout);
         assert_intact(dir.path());
     }
@@ -171,28 +171,28 @@ fn samples_that_do_not_fit_are_refused_and_do_no_harm() {
     };
     assert!(matches!(
         refused(|s| s.record.index = 0),
-        Error::DoubledSample { index: 0, .. }
+        ShardError::DoubledSample { index: 0, .. }
     ));
     assert!(matches!(
         refused(|s| s.record.index = 14),
-        Error::OutOfRange { last: 13, .. }
+        ShardError::OutOfRange { last: 13, .. }
     ));
     assert!(matches!(
         refused(|s| s.record.session = "b".into()),
-        Error::WrongSession { .. }
+        ShardError::WrongSession { .. }
     ));
     assert!(matches!(
         refused(|s| s.record.size = [1, 1]),
-        Error::SizeMismatch { .. }
+        ShardError::SizeMismatch { .. }
     ));
     assert!(matches!(
         refused(|s| s.image = image::RgbImage::new(3, 3)),
-        Error::SizeMismatch { .. }
+        ShardError::SizeMismatch { .. }
     ));
     let error = refused(|s| s.record.sharpness = f64::NAN);
     assert!(matches!(
         error,
-        Error::NotFinite {
+        ShardError::NotFinite {
             field: "sharpness",
             ..
         }
@@ -213,17 +213,20 @@ fn sessions_that_cannot_be_written_are_refused_at_the_start() {
     };
     assert!(matches!(
         create("../a", 1, &mask()),
-        Error::SessionName { .. }
+        ShardError::SessionName { .. }
     ));
-    assert!(matches!(create("a", 0, &mask()), Error::SampleCount { .. }));
+    assert!(matches!(
+        create("a", 0, &mask()),
+        ShardError::SampleCount { .. }
+    ));
     assert!(matches!(
         create("a", u32::MAX, &mask()),
-        Error::SampleCount { .. }
+        ShardError::SampleCount { .. }
     ));
     let grey = GrayImage::from_pixel(4, 4, Luma([7]));
     assert!(matches!(
         create("a", 1, &grey),
-        Error::MaskValue {
+        ShardError::MaskValue {
             value: 7,
             x: 0,
             y: 0
@@ -231,7 +234,7 @@ fn sessions_that_cannot_be_written_are_refused_at_the_start() {
     ));
     assert!(matches!(
         create("a", 1, &GrayImage::new(0, 0)),
-        Error::Encode { .. }
+        ShardError::Encode { .. }
     ));
 }
 
@@ -264,6 +267,6 @@ fn a_folder_can_be_locked_again_after_a_writer_is_done() {
     let held = OutputFolder::lock(dir.path()).unwrap();
     assert!(matches!(
         OutputFolder::lock(held.path()),
-        Err(Error::Locked { .. })
+        Err(ShardError::Locked { .. })
     ));
 }

@@ -15,7 +15,7 @@ use crate::shard::digest::{Digest, FolderHasher};
 use crate::shard::file::{FileEntry, compare};
 use crate::shard::folder::MeanImage;
 use crate::shard::measure::MaskSpans;
-use crate::shard::{Error, names, output};
+use crate::shard::{ShardError, names, output};
 
 /// Largest file that is read, bytes.
 const MAX_BYTES: u64 = 256 << 20;
@@ -179,7 +179,7 @@ fn check_one(check: &SessionCheck<'_>, index: u32, mask: Option<&MaskSpans>) -> 
     let png = match read(&folder.join(format!("{index}.png"))) {
         Ok(png) => png,
         // Missing images are reported by `check_names`.
-        Err(Error::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
+        Err(ShardError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
             return unread(Vec::new());
         }
         Err(error) => return unread(vec![with_causes(&error)]),
@@ -213,7 +213,7 @@ fn check_mean(check: &mut SessionCheck<'_>, mean: Option<&MeanImage>) {
 }
 
 /// The bytes of a file of limited size.
-fn read(path: &Path) -> Result<Vec<u8>, Error> {
+fn read(path: &Path) -> Result<Vec<u8>, ShardError> {
     let read_limited = |file: File| {
         let mut bytes = Vec::new();
         file.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
@@ -225,5 +225,5 @@ fn read(path: &Path) -> Result<Vec<u8>, Error> {
     };
     File::open(path)
         .and_then(read_limited)
-        .map_err(Error::io("read", path))
+        .map_err(ShardError::io("read", path))
 }

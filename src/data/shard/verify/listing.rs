@@ -7,12 +7,12 @@ use std::path::Path;
 use super::problem::Problem;
 use crate::causes::with_causes;
 use crate::shard::dataset::{Dataset, SessionEntry, ShardEntry};
-use crate::shard::{Error, MAX_SAMPLES, names, output};
+use crate::shard::{MAX_SAMPLES, ShardError, names, output};
 
 const UNLISTED: &str = "dataset.json does not list it";
 
 /// The problems with the list of sessions and shards, with reports, and with unlisted files.
-pub(super) fn check(out: &Path, dataset: &Dataset) -> Result<Vec<Problem>, Error> {
+pub(super) fn check(out: &Path, dataset: &Dataset) -> Result<Vec<Problem>, ShardError> {
     let mut problems = entries(dataset);
     for report in dataset
         .sessions
@@ -121,7 +121,7 @@ fn counted<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(&'a str, u32)> {
 }
 
 /// Shards, tables, images and temporary files in the folder that have no entry.
-fn unlisted(out: &Path, dataset: &Dataset) -> Result<Vec<Problem>, Error> {
+fn unlisted(out: &Path, dataset: &Dataset) -> Result<Vec<Problem>, ShardError> {
     let known: HashSet<&str> = dataset.files().collect();
     let mut problems = Vec::new();
     for name in output::names_in(out)? {

@@ -11,7 +11,7 @@ mod tarball;
 
 use std::path::Path;
 
-use super::Error;
+use super::ShardError;
 use super::dataset::Dataset;
 use super::record::FrameRecord;
 use super::settings::Layout;
@@ -29,10 +29,13 @@ pub use problem::{Problem, VerifyReport};
 /// rayon's threads, in batches of bounded size.
 ///
 /// # Errors
-/// Only if there is no data set to check: [`Error::NoDataset`], [`Error::Schema`],
-/// [`Error::Description`], [`Error::UnsafePath`], [`Error::SessionName`], or [`Error::Io`] on the
+/// Only if there is no data set to check: [`ShardError::NoDataset`], [`ShardError::Schema`],
+/// [`ShardError::Description`], [`ShardError::UnsafePath`], [`ShardError::SessionName`], or [`ShardError::Io`] on the
 /// folder. Everything else is a [`Problem`].
-pub fn verify(out: &Path, progress: &(dyn Fn(u64, u64) + Sync)) -> Result<VerifyReport, Error> {
+pub fn verify(
+    out: &Path,
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<VerifyReport, ShardError> {
     let dataset = Dataset::read(out)?;
     let mut problems = listing::check(out, &dataset)?;
     let samples_of = |session: &super::SessionEntry| u64::from(session.samples);

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::sample::{SessionMask, check_image, check_record};
 use super::session::{Found, SessionCheck};
 use crate::causes::with_causes;
-use crate::shard::Error;
+use crate::shard::ShardError;
 use crate::shard::digest::{Digest, HashingReader};
 use crate::shard::file::compare;
 use crate::shard::measure::MaskSpans;
@@ -30,7 +30,7 @@ type Source = HashingReader<BufReader<File>>;
 pub(super) fn check(check: &mut SessionCheck<'_>) -> Found {
     let path = check.out.join(&check.shard.file);
     let samples = check.session.samples as usize;
-    match File::open(&path).map_err(Error::io("open", &path)) {
+    match File::open(&path).map_err(ShardError::io("open", &path)) {
         Ok(file) => {
             let source = HashingReader::new(BufReader::with_capacity(1 << 18, file));
             TarCheck::new(check, TarReader::new(source, MAX_BYTES)).run()
@@ -111,7 +111,7 @@ impl<'a, 'b> TarCheck<'a, 'b> {
                     self.check.note(index, with_causes(&error));
                     let ended = matches!(
                         error,
-                        Error::ShardRead { .. } | Error::ShardTruncated { .. }
+                        ShardError::ShardRead { .. } | ShardError::ShardTruncated { .. }
                     );
                     if ended || !self.resume() {
                         break;
