@@ -17,11 +17,11 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use relit::extract::{self, Observer, Options, Outcome};
+use relit::extract::{ExtractOptions, extract};
 use relit_data::session::{
     CameraFacts, Manifest, Recording, SoftwareFacts, Status, TurntableFacts, VideoFacts,
 };
-use relit_data::shard::{Layout, Size};
+use relit_data::shard::{Dataset, ImageSize};
 use relit_rig::camera::{
     Address, Camera, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc, Frame,
     GrantedMode, Mode, ModeRequest, Rate, Sequence, StampSource, open,
@@ -718,44 +718,22 @@ fn child_that_records_until_it_is_killed() {
     recorder.wait().unwrap();
 }
 
-struct Silent;
-
-impl Observer for Silent {
-    fn begun(&self, _: &Path, _: u32) {}
-    fn advanced(&self) {}
-    fn ended(&self, recording: &Path, outcome: &Outcome) {
-        match outcome {
-            Outcome::Extracted(entry) => {
-                let told = entry
-                    .warnings
-                    .iter()
-                    .any(|w| w.contains("recording was interrupted"));
-                assert!(told, "{:?}", entry.warnings);
-            }
-            other => panic!("{}: {other:?}", recording.display()),
-        }
-    }
-}
-
 /// `relit-extract` takes the session, with the loss told.
 fn extracts(folder: &Path, out: &Path) {
     let mask = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("fixtures/20261120T101500Z-cow-short/mask_gt.png");
-    let options = Options {
+    let options = ExtractOptions {
         frames: 4,
-        size: Size::Pixels(32),
-        margin: 0.1,
-        saturation_level: 250,
-        gate: 0.05,
-        layout: Layout::Webdataset,
+        size: ImageSize::Pixels(32),
         mask: Some(mask),
-        strict: false,
-        resume: false,
-        replace: false,
         threads: 1,
+        ..ExtractOptions::default()
     };
-    let tally = extract::extract(&[folder.to_owned()], out, &options, &Silent).unwrap();
+    let tally = extract(&[folder.to_owned()], out, &options, &()).unwrap();
     assert_eq!((tally.extracted, tally.lossy), (1, 1));
+    let warnings = &Dataset::read(out).unwrap().sessions[0].warnings;
+    let interrupted = |warning: &String| warning.contains("recording was interrupted");
+    assert!(warnings.iter().any(interrupted), "{warnings:?}");
 }
 
 /// Kills a recorder `after` its start, salvages, and answers how much was lost, microseconds.

@@ -1,8 +1,8 @@
 //! Takes that come out well.
 
-use relit::extract::{Observer, Options, Outcome, extract};
+use relit::extract::{ExtractOptions, extract};
 use relit_data::session::Status;
-use relit_data::shard::{Layout, Size};
+use relit_data::shard::ImageSize;
 use relit_rig::state::Verdict;
 
 use crate::support::{Rehearsal, SHORT, TURN, fixture};
@@ -39,36 +39,20 @@ fn a_turn_is_1500_frames_with_the_angles_that_the_table_had() {
     check_whole(&mut Rehearsal::new(SHORT, "", "sim:?speed=3"));
 }
 
-struct Quiet;
-
-impl Observer for Quiet {
-    fn begun(&self, _: &std::path::Path, _: u32) {}
-    fn advanced(&self) {}
-    fn ended(&self, _: &std::path::Path, outcome: &Outcome) {
-        assert!(matches!(outcome, Outcome::Extracted(_)), "{outcome:?}");
-    }
-}
-
 #[test]
 fn a_turn_of_raw_pictures_is_whole_and_can_be_extracted() {
     // Coding every picture without loss takes a good part of a core even in real time.
     let mut rig = Rehearsal::new(TURN, "", "sim:?speed=2");
     let folder = check_whole(&mut rig);
-    let options = Options {
+    let options = ExtractOptions {
         frames: 60,
-        size: Size::Pixels(64),
-        margin: 0.05,
-        saturation_level: 250,
-        gate: 0.05,
-        layout: Layout::Webdataset,
+        size: ImageSize::Pixels(64),
         mask: Some(fixture(TURN).join("mask_gt.png")),
-        strict: false,
-        resume: false,
-        replace: false,
         threads: 2,
+        ..ExtractOptions::default()
     };
     let out = rig.root.path().join("out");
-    let tally = extract(&[folder], &out, &options, &Quiet).unwrap();
+    let tally = extract(&[folder], &out, &options, &()).unwrap();
     assert_eq!((tally.extracted, tally.failed), (1, 0));
 }
 

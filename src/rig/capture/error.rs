@@ -34,7 +34,7 @@ pub enum Error {
     Broken(&'static str),
     /// The session folder could not be made, written or read.
     #[error(transparent)]
-    Session(#[from] session::Error),
+    Session(#[from] session::SessionError),
     /// The video could not be made, written or read.
     #[error(transparent)]
     Video(#[from] video::Error),
@@ -67,7 +67,7 @@ impl Error {
         use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
         match self {
             Self::Video(video::Error::NoRoom { .. }) => true,
-            Self::Session(session::Error::Io { source, .. }) => {
+            Self::Session(session::SessionError::Io { source, .. }) => {
                 matches!(source.kind(), StorageFull | QuotaExceeded | FileTooLarge)
             }
             _ => false,

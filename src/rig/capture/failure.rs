@@ -28,7 +28,7 @@ pub enum CaptureError {
     Turntable(#[from] TurntableError),
     /// The session on disk.
     #[error(transparent)]
-    Session(#[from] session::Error),
+    Session(#[from] session::SessionError),
     /// Somebody asked for it.
     #[error("the capture was stopped: {0}")]
     Stopped(#[from] Stopped),

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::Error;
-use relit_data::session::{self, FrameIndex, MANIFEST_FILE, Manifest, Status, Unended};
+use relit_data::session::{self, FrameIndex, InterruptedSession, MANIFEST_FILE, Manifest, Status};
 use relit_video::Video;
 
 /// How many frames at the end are tried until one decodes. A power cut can leave blocks of the last
@@ -70,7 +70,9 @@ pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, Error> {
     folders.sort();
     let salvaged = folders.into_iter().filter_map(|folder| {
         let saved = match salvage_session(&folder) {
-            Err(Error::Session(session::Error::InUse(_) | session::Error::Ended(_))) => {
+            Err(Error::Session(
+                session::SessionError::InUse(_) | session::SessionError::Ended(_),
+            )) => {
                 return None;
             }
             saved => saved,
@@ -83,11 +85,11 @@ pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, Error> {
 /// Brings one interrupted session to its end.
 ///
 /// # Errors
-/// [`session::Error::InUse`] where its recorder lives, [`session::Error::Ended`] where there is
+/// [`session::SessionError::InUse`] where its recorder lives, [`session::SessionError::Ended`] where there is
 /// nothing to do, [`Error::NotMended`], or what the file system answers; its status stays
 /// "recording" then, but for [`Error::NotMended`].
 pub fn salvage_session(folder: &Path) -> Result<Saved, Error> {
-    let unended = Unended::open(folder)?;
+    let unended = InterruptedSession::open(folder)?;
     let entries = unended.index().entries();
     let frames = whole_frames(&unended.video_path()).min(entries.len());
     let seconds = match entries.get(..frames) {

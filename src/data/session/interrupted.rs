@@ -1,51 +1,54 @@
-//! A session whose recorder died, and its end.
+//! Salvaging a session whose recorder died.
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use super::writer::{close, keep_as_found, write_index};
-use super::{Claim, Error, FrameIndex, INDEX_FILE, IndexFault, MANIFEST_FILE, Manifest, Status};
+use super::{
+    FrameIndex, INDEX_FILE, IndexFault, MANIFEST_FILE, Manifest, SessionError, SessionLock, Status,
+};
 
-/// A session whose recorder died: marked as recording, and claimed by nobody else.
+/// A session that is marked as recording although its recorder has died. It stays locked while this
+/// value lives.
 #[derive(Debug)]
-pub struct Unended {
+pub struct InterruptedSession {
     folder: PathBuf,
     manifest: Manifest,
     index: FrameIndex,
     fault: Option<IndexFault>,
-    claim: Claim,
+    lock: SessionLock,
 }
 
-impl Unended {
-    /// Claims a session and reads what stands there, the index as far as it is whole.
+impl InterruptedSession {
+    /// Locks a session and reads it, the index up to its first fault.
     ///
     /// # Errors
-    /// [`Error::InUse`] where its recorder lives, [`Error::Ended`] where it has ended,
-    /// [`Error::Manifest`], or what the file system answers.
-    pub fn open(folder: &Path) -> Result<Self, Error> {
-        let claim = Claim::take(folder)?;
+    /// [`SessionError::InUse`] if its recorder is still running, [`SessionError::Ended`] if it has ended,
+    /// [`SessionError::Manifest`], or [`SessionError::Io`].
+    pub fn open(folder: &Path) -> Result<Self, SessionError> {
+        let lock = SessionLock::acquire(folder)?;
         let path = folder.join(MANIFEST_FILE);
-        let bytes = fs::read(&path).map_err(Error::io(&path, "read"))?;
+        let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
         let manifest =
-            Manifest::from_json(&bytes).map_err(|fault| Error::Manifest { path, fault })?;
+            Manifest::from_json(&bytes).map_err(|fault| SessionError::Manifest { path, fault })?;
         if manifest.status != Status::Recording {
-            claim.end()?;
-            return Err(Error::Ended(folder.to_owned()));
+            lock.remove()?;
+            return Err(SessionError::Ended(folder.to_owned()));
         }
-        claim.release_reserve()?;
+        lock.release_reserve()?;
         let path = folder.join(INDEX_FILE);
         let lines = match fs::read(&path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
-            read => read.map_err(Error::io(path, "read"))?,
+            read => read.map_err(SessionError::io(path, "read"))?,
         };
-        let (index, fault) = FrameIndex::parse_as_far_as_whole(&lines);
+        let (index, fault) = FrameIndex::parse_until_fault(&lines);
         Ok(Self {
             folder: folder.to_owned(),
             manifest,
             index,
             fault,
-            claim,
+            lock,
         })
     }
 
@@ -55,24 +58,24 @@ impl Unended {
         self.folder.join(&self.manifest.video.file)
     }
 
-    /// The index as far as it is whole.
+    /// The index up to its first fault.
     #[must_use]
     pub fn index(&self) -> &FrameIndex {
         &self.index
     }
 
-    /// What is wrong in the index behind that.
+    /// The first fault in the index, if there is one.
     #[must_use]
     pub fn index_fault(&self) -> Option<&IndexFault> {
         self.fault.as_ref()
     }
 
-    /// Marks the session as aborted for this reason, with the first `frames` lines of the index. Where
-    /// lines have to go for that, the index as found stays beside it, `frames.interrupted.jsonl`.
+    /// Marks the session as aborted for this reason, with the first `frames` lines of the index. If
+    /// lines are removed, the index is kept as it was found in `frames.interrupted.jsonl`.
     ///
     /// # Errors
-    /// What the file system answers; the status stays "recording" then.
-    pub fn abort(mut self, frames: usize, reason: &str) -> Result<Manifest, Error> {
+    /// [`SessionError::Io`]; the status then stays "recording".
+    pub fn abort(mut self, frames: usize, reason: &str) -> Result<Manifest, SessionError> {
         if self.fault.is_some() || frames < self.index.entries().len() {
             keep_as_found(&self.folder)?;
             self.index.truncate(frames);
@@ -81,7 +84,7 @@ impl Unended {
         let frames = self.index.entries().len() as u64;
         let status = Status::Aborted(reason.to_owned());
         let manifest = close(&self.folder, self.manifest, frames, status)?;
-        self.claim.end()?;
+        self.lock.remove()?;
         Ok(manifest)
     }
 }
@@ -95,18 +98,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_session_is_claimed_while_its_writer_lives_and_no_longer() {
+    fn a_session_is_locked_while_its_writer_lives_and_no_longer() {
         let root = tempfile::tempdir().unwrap();
         let live = writer(root.path());
         let folder = live.folder().to_owned();
-        assert!(matches!(Unended::open(&folder), Err(Error::InUse(_))));
+        let open = || InterruptedSession::open(&folder);
+        assert!(matches!(open(), Err(SessionError::InUse(_))));
         drop(live);
-        let manifest = Unended::open(&folder)
-            .unwrap()
-            .abort(0, "interrupted")
-            .unwrap();
+        let manifest = open().unwrap().abort(0, "interrupted").unwrap();
         assert_eq!(manifest.status, Status::Aborted("interrupted".to_owned()));
-        assert!(matches!(Unended::open(&folder), Err(Error::Ended(_))));
+        assert!(matches!(open(), Err(SessionError::Ended(_))));
         let names = fs::read_dir(&folder).unwrap();
         let mut names: Vec<_> = names.map(|entry| entry.unwrap().file_name()).collect();
         names.sort();
@@ -114,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn an_index_that_is_cut_stays_as_it_was_found_under_another_name() {
+    fn an_index_that_is_truncated_is_kept_as_it_was_found_under_another_name() {
         let root = tempfile::tempdir().unwrap();
         let mut live = writer(root.path());
         (0..5).for_each(|n| live.push(entry(n)).unwrap());
@@ -124,10 +125,10 @@ mod tests {
         lines.write_all(&[0; 30]).unwrap();
         drop(live);
         let found = fs::read(folder.join(INDEX_FILE)).unwrap();
-        let unended = Unended::open(&folder).unwrap();
-        assert_eq!(unended.index().entries().len(), 5);
-        assert!(unended.index_fault().is_some());
-        let manifest = unended.abort(3, "interrupted").unwrap();
+        let session = InterruptedSession::open(&folder).unwrap();
+        assert_eq!(session.index().entries().len(), 5);
+        assert!(session.index_fault().is_some());
+        let manifest = session.abort(3, "interrupted").unwrap();
         assert_eq!(manifest.video.frames, Some(3));
         let cut = FrameIndex::parse(&fs::read(folder.join(INDEX_FILE)).unwrap()).unwrap();
         assert_eq!(cut.entries(), [0, 1, 2].map(entry));

@@ -1,12 +1,13 @@
-//! A small data set, made in memory.
+//! A small data set for the tests.
 
 use std::path::Path;
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use relit_data::geometry::Rect;
 use relit_data::shard::{
-    Align, Dataset, Digest, FrameRecord, Input, Layout, MaskInfo, MaskSpans, OutputFolder, Problem,
-    Sample, Selection, SessionEntry, SessionWriter, Settings, Size, Verdict, verify,
+    Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
+    MaskSpans, OutputFolder, Problem, Sample, SamplingBasis, SessionEntry, ShardWriter,
+    SourceVideo, VerifyReport, verify,
 };
 
 pub(crate) const SESSION: &str = "20261120T093015Z-mug";
@@ -71,10 +72,10 @@ pub(crate) fn sample(session: &str, index: u32) -> Sample {
     Sample::encode(record(session, index, &image), image).unwrap()
 }
 
-pub(crate) fn settings(layout: Layout) -> Settings {
-    Settings {
+pub(crate) fn settings(layout: Layout) -> ExtractionSettings {
+    ExtractionSettings {
         frames: SAMPLES,
-        size: Size::NATIVE,
+        size: ImageSize::NATIVE,
         margin: 0.05,
         saturation_level: LEVEL,
         gate: GATE,
@@ -86,7 +87,7 @@ pub(crate) fn settings(layout: Layout) -> Settings {
 
 pub(crate) fn entry(
     id: &str,
-    files: &relit_data::shard::SessionFiles,
+    files: &relit_data::shard::ShardFiles,
     all: &[Sample],
 ) -> SessionEntry {
     let count = |flag: fn(&FrameRecord) -> bool| {
@@ -96,7 +97,7 @@ pub(crate) fn entry(
     SessionEntry {
         id: id.to_owned(),
         object: "mug".to_owned(),
-        input: Input {
+        input: SourceVideo {
             video: "video.mkv".to_owned(),
             codec: "mjpeg".to_owned(),
             frames: 50,
@@ -109,7 +110,7 @@ pub(crate) fn entry(
             px: mask().as_raw().iter().filter(|&&level| level != 0).count() as u64,
             bounding_box: Rect::new(0, 0, 1, 1),
         },
-        selection: Selection::Angle,
+        selection: SamplingBasis::Angle,
         samples: SAMPLES,
         duplicates: count(|r| r.duplicate),
         spec_net: count(|r| r.spec_net),
@@ -129,7 +130,7 @@ pub(crate) fn write_with(
     change: impl Fn(&mut Sample),
 ) {
     let _lock = OutputFolder::lock(out).unwrap();
-    let mut writer = SessionWriter::create(out, layout, id, SAMPLES, &mask()).unwrap();
+    let mut writer = ShardWriter::create(out, layout, id, SAMPLES, &mask()).unwrap();
     let mut all = Vec::new();
     for &index in indices {
         let mut sample = sample(id, index);
@@ -156,20 +157,20 @@ pub(crate) fn dataset(layout: Layout) -> tempfile::TempDir {
     dir
 }
 
-pub(crate) fn verdict(out: &Path) -> Verdict {
+pub(crate) fn verified(out: &Path) -> VerifyReport {
     verify(out, &|_, _| {}).unwrap()
 }
 
-/// The data set must be whole.
-pub(crate) fn assert_whole(out: &Path) {
-    let verdict = verdict(out);
-    assert_eq!(texts(&verdict.problems), Vec::<String>::new());
+/// Asserts that the data set has no problems.
+#[track_caller]
+pub(crate) fn assert_intact(out: &Path) {
+    assert_eq!(texts(&verified(out).problems), Vec::<String>::new());
 }
 
-/// Some problem must name this file and this sample, and say this.
+/// Asserts that a problem with this file and sample contains this text.
 #[track_caller]
 pub(crate) fn assert_names(out: &Path, file: &str, sample: Option<u32>, says: &str) {
-    let problems = verdict(out).problems;
+    let problems = verified(out).problems;
     let key = sample.map(|index| relit_data::shard::sample_key(SESSION, index));
     let named = problems
         .iter()

@@ -1,4 +1,4 @@
-//! What is kept of a session's samples for its table and its page.
+//! What is kept in memory of a session's samples, for its report.
 
 use image::RgbImage;
 use image::imageops::thumbnail;
@@ -6,17 +6,17 @@ use image::imageops::thumbnail;
 use relit_data::report::{THUMBNAIL_SIDE, Thumbnail};
 use relit_data::shard::FrameRecord;
 
-/// Pictures on the report's contact sheet.
+/// Images on the report's contact sheet.
 const THUMBNAILS: u32 = 24;
 
-/// The records of all samples, and the pictures of a few.
-pub(super) struct Made {
+/// The records of all samples, and small images of a few.
+pub(super) struct Collected {
     samples: u32,
     pub(super) records: Vec<FrameRecord>,
     pub(super) thumbnails: Vec<Thumbnail>,
 }
 
-impl Made {
+impl Collected {
     pub(super) fn new(samples: u32) -> Self {
         Self {
             samples,
@@ -25,8 +25,8 @@ impl Made {
         }
     }
 
-    /// Keeps what is needed of one sample; they come in no order.
-    pub(super) fn keep(&mut self, record: &FrameRecord, image: &RgbImage) {
+    /// Adds a sample; the order is free.
+    pub(super) fn add(&mut self, record: &FrameRecord, image: &RgbImage) {
         if self.is_thumbnail(record.index) {
             let image = small(image);
             self.thumbnails.push(Thumbnail {
@@ -37,22 +37,22 @@ impl Made {
         self.records.push(record.clone());
     }
 
-    /// Everything by index.
-    pub(super) fn in_order(mut self) -> Self {
+    /// Sorts everything by index.
+    pub(super) fn sorted(mut self) -> Self {
         self.records.sort_by_key(|record| record.index);
         self.thumbnails.sort_by_key(|thumbnail| thumbnail.index);
         self
     }
 
-    /// How many records are of this kind.
+    /// Number of records for which `is` is true.
     pub(super) fn count(&self, is: fn(&FrameRecord) -> bool) -> u32 {
         self.records.iter().filter(|record| is(record)).count() as u32
     }
 
-    /// Whether a sample is one of the evenly spread ones on the contact sheet.
+    /// Whether a sample is on the contact sheet, whose samples are evenly spread.
     fn is_thumbnail(&self, index: u32) -> bool {
-        let place = |index: u32| u64::from(index) * u64::from(THUMBNAILS) / u64::from(self.samples);
-        index == 0 || place(index) != place(index - 1)
+        let slot = |index: u32| u64::from(index) * u64::from(THUMBNAILS) / u64::from(self.samples);
+        index == 0 || slot(index) != slot(index - 1)
     }
 }
 
