@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use relit_rig::camera::lock::Wanted;
 use relit_rig::camera::{self, Fourcc};
-use relit_rig::capture::{FrameSize, ModeWish, Settings};
+use relit_rig::capture::{FrameSize, ModePreference, Settings};
 use relit_rig::serve::Token;
 use relit_rig::turntable;
 
@@ -205,7 +205,7 @@ pub(crate) fn parse() -> Arguments {
 impl From<RigArguments> for Settings {
     fn from(line: RigArguments) -> Self {
         let mut settings = Self::new(line.root, line.camera, line.turntable);
-        settings.mode = ModeWish {
+        settings.mode = ModePreference {
             fourcc: line.fourcc,
             size: line.size,
             fps: line.fps,

@@ -5,7 +5,7 @@ use crate::clock::Clock;
 use crate::simulator::{self, Simulator, SimulatorOptions};
 use crate::turntable::{Address, Options, Table, find_serial};
 
-use super::failure::CaptureError;
+use super::error::CaptureError;
 use super::settings::Settings;
 
 /// Camera and table of a rig.

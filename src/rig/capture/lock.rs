@@ -5,7 +5,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-use super::failure::CaptureError;
+use super::error::CaptureError;
 use super::settings::Settings;
 use crate::camera::Address;
 

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use super::failure::{CaptureError, Refusal};
+use super::error::{CaptureError, Refusal};
 use crate::camera::lock::Wanted;
 use crate::camera::{self, Fourcc, Mode, ModeRequest, Rate, Rates};
 use crate::clock::Clock;
@@ -33,7 +33,7 @@ pub struct Settings {
     /// The turntable.
     pub turntable: turntable::Address,
     /// The camera's mode.
-    pub mode: ModeWish,
+    pub mode: ModePreference,
     /// Values of its controls; what is not given stays as the camera has it.
     pub wanted: Wanted,
     /// Speed of the turn, degrees a second.
@@ -61,7 +61,7 @@ impl Settings {
             root,
             camera,
             turntable,
-            mode: ModeWish::default(),
+            mode: ModePreference::default(),
             wanted: Wanted::default(),
             degrees_per_second: 7.2,
             min_battery_v: None,
@@ -132,7 +132,7 @@ impl Settings {
 
 /// What is wished of a camera's mode; what is not given is chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ModeWish {
+pub struct ModePreference {
     /// Pixel format.
     pub fourcc: Option<Fourcc>,
     /// Frame size.
@@ -141,7 +141,7 @@ pub struct ModeWish {
     pub fps: f64,
 }
 
-impl Default for ModeWish {
+impl Default for ModePreference {
     fn default() -> Self {
         Self {
             fourcc: None,
@@ -151,7 +151,7 @@ impl Default for ModeWish {
     }
 }
 
-impl fmt::Display for ModeWish {
+impl fmt::Display for ModePreference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.fourcc {
             Some(fourcc) => write!(f, "{fourcc}")?,
@@ -197,7 +197,7 @@ impl FromStr for FrameSize {
     }
 }
 
-impl ModeWish {
+impl ModePreference {
     /// The mode to ask the camera for: of those that fulfil the wish the largest, and of those the
     /// one whose frames take least room.
     ///
@@ -319,16 +319,16 @@ mod tests {
             mode(Fourcc::MJPG, 1920, 1080, &[30, 60]),
             mode(Fourcc::MJPG, 3840, 2160, &[15]),
         ];
-        let chosen = ModeWish::default().choose(&modes).unwrap();
+        let chosen = ModePreference::default().choose(&modes).unwrap();
         assert_eq!(chosen.to_string(), "MJPG:1920x1080@30");
-        let wish = ModeWish {
+        let wish = ModePreference {
             fourcc: Some(Fourcc::YUYV),
-            ..ModeWish::default()
+            ..ModePreference::default()
         };
         assert_eq!(wish.choose(&modes).unwrap().fourcc, Fourcc::YUYV);
-        let wish = ModeWish {
+        let wish = ModePreference {
             fps: 15.0,
-            ..ModeWish::default()
+            ..ModePreference::default()
         };
         assert_eq!(wish.choose(&modes).unwrap().width, 3840);
     }
@@ -336,7 +336,10 @@ mod tests {
     #[test]
     fn a_wish_that_no_mode_fulfils_is_told_with_what_there_is() {
         let modes = [mode(Fourcc::MJPG, 640, 480, &[25])];
-        let error = ModeWish::default().choose(&modes).unwrap_err().to_string();
+        let error = ModePreference::default()
+            .choose(&modes)
+            .unwrap_err()
+            .to_string();
         assert!(
             error.contains("any format of any size at 30 frames/s"),
             "{error}"

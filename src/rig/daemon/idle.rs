@@ -10,9 +10,9 @@ use crate::camera::{Camera, CameraError, GrantedMode};
 use crate::capture::CaptureError;
 use crate::capture::Equipment;
 use crate::capture::preflight::free_bytes;
+use crate::capture::turn::show_table;
 use crate::clock::Clock;
 use crate::state::{CameraState, Monitor, TableState};
-use crate::turntable::Table;
 
 /// Longest wait for a frame in one go.
 const GLANCE: Duration = Duration::from_millis(50);
@@ -195,23 +195,6 @@ impl Idle {
             self.no_table(&error.to_string());
         }
     }
-}
-
-/// Asks the table and shows its answer.
-pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), CaptureError> {
-    let status = table.status()?;
-    monitor.update(|state| {
-        state.table = TableState {
-            present: true,
-            state: status.state.to_string(),
-            angle_deg: Some(status.angle_deg),
-            degrees_per_second: Some(status.degrees_per_second),
-            homed: status.homed,
-            battery_v: status.battery_v,
-            fault: status.alarm.map(|alarm| alarm.to_string()),
-        };
-    });
-    Ok(())
 }
 
 /// The settings that are held during a capture, as they are now.

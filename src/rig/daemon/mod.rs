@@ -15,9 +15,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use crate::capture::CaptureError;
+use crate::capture::CaptureRequest;
 use crate::capture::Equipment;
 use crate::capture::Exclusive;
-use crate::capture::Order;
 use crate::capture::Settings;
 use crate::capture::{StopRequest, Stopped};
 use crate::capture::{preflight, salvage};
@@ -127,7 +127,7 @@ impl Daemon {
                 .unwrap_or_else(|| "there is no camera yet".to_owned());
             return Err(Refused::Unavailable(why));
         }
-        self.begin(Job::Capture(Order { object, meter }))
+        self.begin(Job::Capture(CaptureRequest { object, meter }))
     }
 
     fn next(&self) -> Result<(), Refused> {

@@ -6,13 +6,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
-use super::idle::{Idle, show_table};
+use super::idle::Idle;
 use super::viewer::Viewer;
 use crate::camera::Camera;
 use crate::camera::lock::{ManualPlan, Wanted};
 use crate::capture::CaptureError;
 use crate::capture::Equipment;
-use crate::capture::{Onlookers, Order, capture};
+use crate::capture::turn::show_table;
+use crate::capture::{CaptureContext, CaptureRequest, capture};
 use crate::capture::{StopRequest, Stopped};
 use crate::state::{Monitor, Phase, RigState};
 use crate::turntable::{Table, TurntableError};
@@ -23,7 +24,7 @@ const LOOK: Duration = Duration::from_millis(20);
 /// What the owner does.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Job {
-    Capture(Order),
+    Capture(CaptureRequest),
     StopTable,
     Home,
     Jog(f64),
@@ -95,7 +96,7 @@ impl Owner {
 
     fn do_job(&mut self, job: Job) -> Result<(), CaptureError> {
         match job {
-            Job::Capture(order) => self.capture(&order),
+            Job::Capture(request) => self.capture(&request),
             Job::StopTable => self.with_table(|table| table.stop().map(|_| ())),
             Job::Home => self.with_table(|table| table.home().map(|_| ())),
             Job::Jog(degrees) => self.with_table(|table| table.jog(degrees, None).map(|_| ())),
@@ -104,15 +105,15 @@ impl Owner {
         }
     }
 
-    fn capture(&mut self, order: &Order) -> Result<(), CaptureError> {
-        let on = Onlookers {
+    fn capture(&mut self, request: &CaptureRequest) -> Result<(), CaptureError> {
+        let context = CaptureContext {
             monitor: &self.monitor,
             viewer: Some(&self.viewer),
             stop: &self.stop,
         };
-        let taken = capture(&mut self.equipment, order, on);
+        let captured = capture(&mut self.equipment, request, context);
         self.monitor.update(|state| state.session = None);
-        let summary = taken?;
+        let summary = captured?.take;
         if let Some(reason) = summary.reason {
             let now_us = self.equipment.clock().now_us();
             self.monitor

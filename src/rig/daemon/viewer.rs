@@ -15,7 +15,7 @@ use image::codecs::jpeg::JpegEncoder;
 
 use crate::camera::{Encoding, Frame};
 use crate::capture::look::{clipped, focus, middle};
-use crate::capture::recorder::coding;
+use crate::capture::recording::coding;
 use crate::state::Monitor;
 use relit_data::geometry::Rect;
 use relit_video::{LiveDecoder, Picture, is_key};

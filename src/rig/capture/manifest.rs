@@ -1,4 +1,4 @@
-//! What is known of a session at its start.
+//! The manifest of a session at its start.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use serde_json::Value;
 
 use super::equipment::Equipment;
-use super::preflight::Held;
+use super::locked_camera::LockedCamera;
 use super::settings::Settings;
 use crate::camera::{Control, ControlKind};
 use crate::turntable::Table;
@@ -19,7 +19,7 @@ pub(super) fn manifest(
     equipment: &Equipment,
     object: &str,
     now: Timestamp,
-    held: &Held,
+    locked: &LockedCamera,
 ) -> Manifest {
     let settings = equipment.settings();
     let camera = settings.camera.clone();
@@ -36,11 +36,11 @@ pub(super) fn manifest(
             backend: camera.backend().to_owned(),
             device: camera.device(),
             name: name.unwrap_or_default(),
-            fourcc: held.mode.fourcc.to_string(),
-            width: held.mode.width,
-            height: held.mode.height,
-            fps: held.fps(),
-            controls: controls_by_name(&held.controls),
+            fourcc: locked.mode.fourcc.to_string(),
+            width: locked.mode.width,
+            height: locked.mode.height,
+            fps: locked.fps(),
+            controls: controls_by_name(&locked.controls),
         },
         turntable: equipment
             .table
