@@ -28,7 +28,7 @@ struct Bench {
 
 impl Bench {
     fn new(options: SimulatorOptions) -> Bench {
-        let clock = options.clock;
+        let clock = options.clock.clone();
         let table = Simulator::start(options).unwrap();
         let port = open(table.path());
         let heard = String::new();

@@ -28,7 +28,7 @@ impl Rig {
             Clock::scaled(speed)
         };
         let simulator = Simulator::start(SimulatorOptions {
-            clock,
+            clock: clock.clone(),
             faults: faults.parse().unwrap(),
             ..options
         })

@@ -45,7 +45,7 @@ impl Equipment {
     /// The clock that everything goes by.
     #[must_use]
     pub fn clock(&self) -> Clock {
-        self.clock
+        self.clock.clone()
     }
 
     /// The simulated table, where the table is one and was opened.
@@ -67,7 +67,7 @@ impl Equipment {
     pub fn open_camera(&mut self) -> Result<&mut dyn Camera, CaptureError> {
         let opened = match self.camera.take() {
             Some(camera) => camera,
-            None => camera::open(&self.settings.camera, self.clock)?,
+            None => camera::open(&self.settings.camera, self.clock.clone())?,
         };
         Ok(self.camera.insert(opened).as_mut())
     }
@@ -85,7 +85,7 @@ impl Equipment {
 
     fn connect(&mut self) -> Result<Option<Table>, CaptureError> {
         let options = Options {
-            clock: self.clock,
+            clock: self.clock.clone(),
             runtime_folder: self.settings.runtime_folder.clone(),
             ..Options::default()
         };
@@ -106,7 +106,7 @@ impl Equipment {
         let simulator = match self.simulator.take() {
             Some(simulator) => simulator,
             None => Simulator::start(SimulatorOptions {
-                clock: self.clock,
+                clock: self.clock.clone(),
                 faults: fault.unwrap_or_default().parse()?,
                 ..SimulatorOptions::default()
             })?,

@@ -65,7 +65,8 @@ impl Link {
             name: port.name(),
         });
         let carried = Arc::clone(&shared);
-        let thread = thread::spawn(move || carry(port, &carried, clock));
+        let carries = clock.clone();
+        let thread = thread::spawn(move || carry(port, &carried, carries));
         let carrier = Carrier {
             shared: Arc::clone(&shared),
             thread: Some(thread),
@@ -74,7 +75,7 @@ impl Link {
     }
 
     pub(super) fn clock(&self) -> Clock {
-        self.clock
+        self.clock.clone()
     }
 
     pub(super) fn port_name(&self) -> &str {

@@ -64,7 +64,7 @@ impl Table {
         options: &Options,
     ) -> Result<Table, TurntableError> {
         let resets = port.resets();
-        let (link, carrier) = Link::start(port, options.clock, greeting::STRANGER);
+        let (link, carrier) = Link::start(port, options.clock.clone(), greeting::STRANGER);
         let identity = greeting::greet(&link, resets, options)?;
         let server = claim.as_ref().map(|claim| claim.serve(link.clone()));
         Ok(Table {

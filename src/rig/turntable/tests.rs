@@ -28,7 +28,7 @@ fn open_at(clock: Clock, peer: Peer) -> Result<Rig, TurntableError> {
     let peer = Arc::new(Mutex::new(peer));
     let port = PeerPort {
         peer: Arc::clone(&peer),
-        clock,
+        clock: clock.clone(),
     };
     let options = Options {
         clock,

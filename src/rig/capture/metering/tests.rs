@@ -47,13 +47,13 @@ impl<'a> Scene<'a> {
             problems: Vec::new(),
         };
         Self {
+            due_us: clock.now_us(),
             clock,
             table,
             light,
             exposure: 40,
             automatic: 3,
             frames: 0,
-            due_us: clock.now_us(),
             info,
         }
     }
@@ -163,13 +163,13 @@ impl Camera for Scene<'_> {
 fn metered(light: fn(f64) -> f64) -> (Result<i64, CaptureError>, f64, i64) {
     let clock = Clock::scaled(4.0);
     let simulator = Simulator::start(SimulatorOptions {
-        clock,
+        clock: clock.clone(),
         ..SimulatorOptions::default()
     });
     let simulator = simulator.unwrap();
     let locks = tempfile::tempdir().unwrap();
     let options = Options {
-        clock,
+        clock: clock.clone(),
         runtime_folder: locks.path().to_owned(),
         ..Options::default()
     };
