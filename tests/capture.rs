@@ -102,7 +102,7 @@ impl Camera for Scripted {
         let step = if self.silent { None } else { self.steps.next() };
         match step {
             Some(Step::Frame(frame)) => {
-                if let Some(clock) = self.clock {
+                if let Some(clock) = &self.clock {
                     let early = frame.t_us - clock.now_us();
                     thread::sleep(Duration::from_micros(early.max(0) as u64));
                 }
@@ -584,7 +584,7 @@ fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -
         .parse()
         .unwrap();
     let clock = address.clock();
-    let mut camera = open(&address, clock).unwrap();
+    let mut camera = open(&address, clock.clone()).unwrap();
     let mode = camera.modes().unwrap().remove(0);
     let (width, height) = mode.sizes.largest();
     let rate = mode.rates.fastest().unwrap();

@@ -237,14 +237,7 @@ fn a_stop_ends_the_take_within_seconds_and_stops_the_table() {
 fn a_serial_line_that_is_unplugged_ends_the_take_and_the_next_one_finds_it_again() {
     let ports = tempfile::tempdir().unwrap();
     let link = ports.path().join("table");
-    let table = || {
-        let link = Some(link.clone());
-        Simulator::start(SimulatorOptions {
-            link,
-            ..SimulatorOptions::default()
-        })
-        .unwrap()
-    };
+    let table = || Simulator::start(&SimulatorOptions::default(), Some(&link)).unwrap();
     let simulator = table();
     let address = format!("serial:{}", link.display());
     let mut rig = Rehearsal::with(SHORT, "", &address, |settings| {
