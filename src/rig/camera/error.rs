@@ -154,7 +154,7 @@ pub enum CameraError {
     Session(#[from] session::Error),
     /// The video of a replay cannot be read.
     #[error(transparent)]
-    Video(#[from] video::Error),
+    Video(#[from] video::VideoError),
 }
 
 /// What is wrong in an address or mode.

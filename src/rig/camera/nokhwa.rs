@@ -18,8 +18,8 @@ use ::nokhwa::utils::{
 use ::nokhwa::{Camera as Library, NokhwaError, query};
 
 use super::{
-    Address, Camera, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc, Frame,
-    GrantedMode, Mode, ModeRequest, Rate, Rates, Sizes, StampSource,
+    Camera, CameraAddress, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc,
+    Frame, GrantedMode, Mode, ModeRequest, Rate, Rates, Sizes, StampSource,
 };
 use crate::clock::Clock;
 
@@ -63,7 +63,7 @@ pub(super) fn list() -> Vec<DeviceInfo> {
 
 fn describe(number: u32, name: String, modes: Vec<Mode>) -> DeviceInfo {
     DeviceInfo {
-        address: Address::Nokhwa(number),
+        address: CameraAddress::Nokhwa(number),
         name,
         driver: "nokhwa".to_owned(),
         bus: String::new(),
@@ -172,7 +172,7 @@ impl Drop for NokhwaCamera {
 }
 
 fn device(number: u32) -> String {
-    Address::Nokhwa(number).to_string()
+    CameraAddress::Nokhwa(number).to_string()
 }
 
 fn failed(number: u32, doing: &'static str, error: &NokhwaError) -> CameraError {
@@ -361,7 +361,7 @@ mod tests {
     #[test]
     fn what_is_listed_names_the_address_to_open() {
         for info in list() {
-            assert!(matches!(info.address, Address::Nokhwa(_)), "{info:?}");
+            assert!(matches!(info.address, CameraAddress::Nokhwa(_)), "{info:?}");
             assert_eq!(info.capabilities, CAPABILITIES);
         }
     }

@@ -37,7 +37,7 @@ pub enum Error {
     Session(#[from] session::Error),
     /// The video could not be made, written or read.
     #[error(transparent)]
-    Video(#[from] video::Error),
+    Video(#[from] video::VideoError),
     /// A folder of sessions could not be looked through.
     #[error("{path} could not be listed ({source}): check that it is there and may be read")]
     List {
@@ -66,7 +66,7 @@ impl Error {
     pub fn is_no_room(&self) -> bool {
         use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
         match self {
-            Self::Video(video::Error::NoRoom { .. }) => true,
+            Self::Video(video::VideoError::NoRoom { .. }) => true,
             Self::Session(session::Error::Io { source, .. }) => {
                 matches!(source.kind(), StorageFull | QuotaExceeded | FileTooLarge)
             }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::settings::ModeWish;
 use super::stop::Stopped;
 use crate::camera::CameraError;
-use crate::camera::lock::Moved;
+use crate::camera::hold::ControlDrift;
 use crate::simulator;
 use crate::turntable::TurntableError;
 use relit_data::session;
@@ -120,7 +120,7 @@ pub enum Refusal {
     #[error("the camera does not keep its settings: {}; close other programs that use it, or give values that it takes", joined(.0))]
     NotKept(
         /// Which.
-        Vec<Moved>,
+        Vec<ControlDrift>,
     ),
     /// Values that were asked for, and which the camera has no control to hold.
     #[error("the camera cannot be set to {}: leave that out, or set it at the camera", .0.join(", "))]
@@ -210,10 +210,10 @@ pub enum MeterFault {
     NoPicture(String),
 }
 
-fn joined(moved: &[Moved]) -> String {
+fn joined(moved: &[ControlDrift]) -> String {
     moved
         .iter()
-        .map(Moved::to_string)
+        .map(ControlDrift::to_string)
         .collect::<Vec<_>>()
         .join(", ")
 }

@@ -90,7 +90,7 @@ impl Verdict {
             last,
             moved.iter().map(|moved| Fault {
                 t_us: last,
-                what: format!("changed during the turn: {moved}"),
+                what: moved.clone(),
             }),
         );
         faults

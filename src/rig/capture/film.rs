@@ -9,7 +9,7 @@ use super::recorder::{Shared, Stage, WhenFull};
 use super::take::{Damaged, End};
 use super::window::{Chosen, Count, Cutter};
 use crate::camera::{Camera, CameraError, Frame, FrameFault};
-use relit_video::{Coding, StreamFormat, is_key};
+use relit_video::{PixelFormat, StreamFormat, is_key};
 
 /// Longest wait for a frame in one go: how late a stop is seen.
 const GLANCE: Duration = Duration::from_millis(100);
@@ -49,7 +49,7 @@ impl Film {
         stall: Duration,
         when_full: WhenFull,
     ) -> Self {
-        let chain = (stream.coding == Coding::H264).then_some(is_key as fn(&[u8]) -> bool);
+        let chain = (stream.format == PixelFormat::H264).then_some(is_key as fn(&[u8]) -> bool);
         Self {
             camera,
             stall,

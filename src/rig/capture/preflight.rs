@@ -12,12 +12,13 @@ use jiff::Timestamp;
 use super::failure::{CaptureError, Refusal};
 use super::settings::Settings;
 use super::stop::StopRequest;
-use crate::camera::lock::{Lack, ManualPlan};
+use crate::camera::hold::{ManualPlan, MissingControl};
 use crate::camera::{Camera, Control, GrantedMode, ModeRequest};
 use crate::clock::Clock;
 use crate::state::Check;
 use crate::turntable::{Homed, Table, TurnPlan, TurnRequest};
 use relit_data::naming::is_session_name;
+use relit_data::session::FrameClock;
 
 /// How long the first frame may take, of real time.
 const FIRST_FRAME: Duration = Duration::from_secs(5);
@@ -51,6 +52,8 @@ pub struct Held {
     pub plan: ManualPlan,
     /// All controls, as read back.
     pub controls: Vec<Control>,
+    /// What stamps its frames.
+    pub clock: FrameClock,
     /// Mean size of a frame, bytes.
     pub frame_bytes: f64,
     /// What was found.
@@ -95,19 +98,20 @@ pub fn hold_camera(
     if !moved.is_empty() {
         return Err(Refusal::NotKept(moved).into());
     }
-    pass_over(camera, SETTLING, stop)?;
+    let clock = pass_over(camera, SETTLING, stop)?;
     let controls = camera.controls()?;
     let moved = plan.check(&controls);
     if !moved.is_empty() {
         return Err(Refusal::NotKept(moved).into());
     }
     checks.push(settings_check(&plan));
-    checks.extend(plan.lacks.iter().map(lack_check));
+    checks.extend(plan.missing.iter().map(missing_check));
     Ok(Held {
         request,
         mode,
         plan,
         controls,
+        clock,
         frame_bytes,
         checks,
     })
@@ -159,17 +163,18 @@ fn look_at_frames(camera: &mut dyn Camera, stop: &StopRequest) -> Result<f64, Ca
     }
 }
 
-/// Passes over frames.
+/// Passes over frames; gives what stamps them.
 fn pass_over(
     camera: &mut dyn Camera,
     frames: usize,
     stop: &StopRequest,
-) -> Result<(), CaptureError> {
+) -> Result<FrameClock, CaptureError> {
+    let mut clock = FrameClock::default();
     for _ in 0..frames {
         stop.check()?;
-        camera.next_frame(NEXT_FRAME)?;
+        clock = camera.next_frame(NEXT_FRAME)?.stamp.clock();
     }
-    Ok(())
+    Ok(clock)
 }
 
 fn settings_check(plan: &ManualPlan) -> Check {
@@ -185,7 +190,7 @@ fn settings_check(plan: &ManualPlan) -> Check {
     Check::passed("camera settings", held.join(", "))
 }
 
-fn lack_check(lack: &Lack) -> Check {
+fn missing_check(lack: &MissingControl) -> Check {
     Check::noted("camera settings", lack.to_string())
 }
 

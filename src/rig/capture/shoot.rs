@@ -17,8 +17,7 @@ use super::settings::Settings;
 use super::stop::StopRequest;
 use super::tracking::Course;
 use super::{End, Ended, Plan, Recorder, Refusal, Report, Take, WhenFull, metering};
-use crate::camera::lock::moved_between;
-use crate::camera::{Address, Camera};
+use crate::camera::{Camera, CameraAddress};
 use crate::daemon::Viewer;
 use crate::state::{Check, Monitor, Phase, TakeSummary};
 use crate::turntable::{Table, TurnPlan};
@@ -112,7 +111,8 @@ fn one_take(
     recorder.stop();
     on.monitor.update(|state| state.phase = Phase::Checking);
     let (mut camera, ended) = recorder.wait()?;
-    let moved = moved_since(&ready.held, camera.as_mut());
+    let held = &ready.held;
+    let moved = held.plan.read_back(&held.controls, camera.as_mut());
     equipment.camera = Some(camera);
     let (ended, track) = match turned {
         Ok(track) => (ended, track),
@@ -120,7 +120,7 @@ fn one_take(
     };
     let over = matches!(ended.end(), End::Over);
     let angle = |t_us| track.as_ref().and_then(|track| track.angle_at(t_us));
-    let report = ended.finish(&angle, &moved)?;
+    let report = ended.finish(&angle, &moved.faults())?;
     Ok((summary_of(&report), over))
 }
 
@@ -219,28 +219,13 @@ fn ready_to_turn(
 /// A replayed camera can wait for the disk, and a rehearsal on a slow disk loses nothing.
 fn when_full(settings: &Settings) -> WhenFull {
     match settings.camera {
-        Address::Replay { .. } => WhenFull::Wait,
+        CameraAddress::Replay { .. } => WhenFull::Wait,
         _ => WhenFull::Drop,
     }
 }
 
 fn note(on: Onlookers<'_>, checks: impl IntoIterator<Item = Check>) {
     on.monitor.update(|state| state.checks.extend(checks));
-}
-
-/// What is no longer as it was when the take began, a sentence each. A camera that does not answer
-/// any more has its own fault, and is not asked twice.
-fn moved_since(held: &Held, camera: &mut dyn Camera) -> Vec<String> {
-    let Ok(now) = camera.controls() else {
-        return Vec::new();
-    };
-    let mut moved = held.plan.check(&now);
-    for other in moved_between(&held.controls, &now) {
-        if moved.iter().all(|known| known.name != other.name) {
-            moved.push(other);
-        }
-    }
-    moved.iter().map(ToString::to_string).collect()
 }
 
 fn summary_of(report: &Report) -> TakeSummary {

@@ -8,7 +8,7 @@ use super::Error;
 use super::recorder::Shared;
 use super::window::Chosen;
 use relit_data::session::{FrameEntry, SessionWriter};
-use relit_video::{Coding, Muxer, StreamFormat, Written};
+use relit_video::{Muxer, StreamFormat, Written};
 
 /// How often all that was taken is brought to the disk: with the time that the disk needs for it,
 /// nothing there is older than a second.
@@ -107,10 +107,8 @@ impl Sink {
 
     /// Half a raw picture, filled up with zeros: what came of it is kept.
     fn whole_picture(&self, data: &[u8]) -> Option<Vec<u8>> {
-        let Coding::Raw(raw) = self.stream.coding else {
-            return None;
-        };
-        let wanted = raw.picture_bytes(self.stream.width, self.stream.height)?;
+        let stream = &self.stream;
+        let wanted = stream.format.frame_bytes(stream.width, stream.height)?;
         (data.len() < wanted).then(|| {
             let mut padded = data.to_vec();
             padded.resize(wanted, 0);

@@ -190,9 +190,7 @@ impl Verdict {
             });
         }
         if let Some(moved) = why.moved.first() {
-            return bad(format!(
-                "the camera's settings changed during the turn: {moved}"
-            ));
+            return bad(moved.clone());
         }
         let rate = self
             .count
@@ -286,7 +284,7 @@ impl Why<'_> {
             return failure.to_string();
         }
         let pending = match failure {
-            Error::Video(relit_video::Error::NoRoom { missing, .. }) => *missing,
+            Error::Video(relit_video::VideoError::NoRoom { missing, .. }) => *missing,
             _ => 0,
         };
         let left = expected.saturating_sub(self.recorded);

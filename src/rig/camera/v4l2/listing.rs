@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::ioctl::{Listed, Node};
 use super::{Camera as _, CameraError, V4l2Camera};
-use crate::camera::{Address, Capabilities, DeviceInfo, Fourcc, Mode, Rate, Rates, Sizes};
+use crate::camera::{CameraAddress, Capabilities, DeviceInfo, Fourcc, Mode, Rate, Rates, Sizes};
 
 /// Most entries that are read of a driver's list: a faulty driver must not list for ever.
 const MOST_ENTRIES: u32 = 256;
@@ -39,7 +39,7 @@ fn nodes(folder: &Path) -> Vec<(u32, PathBuf)> {
 
 fn unreadable(path: PathBuf, error: &CameraError) -> DeviceInfo {
     DeviceInfo {
-        address: Address::V4l2(path),
+        address: CameraAddress::V4l2(path),
         name: String::new(),
         driver: String::new(),
         bus: String::new(),
@@ -59,7 +59,7 @@ pub(super) fn modes(node: &Node) -> io::Result<(Vec<Mode>, Vec<Fourcc>)> {
     let (mut modes, mut others) = (Vec::new(), Vec::new());
     for code in entries(|index| node.pixel_format(index))? {
         let fourcc = Fourcc::from_code(code);
-        if fourcc.encoding().is_none() {
+        if fourcc.pixel_format().is_none() {
             others.push(fourcc);
             continue;
         }

@@ -15,8 +15,8 @@ use v4l::v4l_sys as sys;
 use self::ioctl::{Identity, Node};
 use self::stream::Stream;
 use super::{
-    Address, Camera, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc, Frame,
-    GrantedMode, Mode, ModeRequest,
+    Camera, CameraAddress, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc,
+    Frame, GrantedMode, Mode, ModeRequest,
 };
 
 pub(super) use listing::list;
@@ -121,7 +121,7 @@ impl Device {
             answer => answer?,
         };
         Ok(DeviceInfo {
-            address: Address::V4l2(self.path.clone()),
+            address: CameraAddress::V4l2(self.path.clone()),
             name: identity.card,
             driver: identity.driver,
             bus: identity.bus,

@@ -9,9 +9,10 @@ use super::ioctl::{Filled, Mapping, PixelLayout, Ready};
 use super::{CameraError, Device};
 use crate::camera::frame::without_padding;
 use crate::camera::{
-    Encoding, Fourcc, Frame, GrantedMode, ModeRequest, Rate, SequenceUnwrapper, StampSource,
+    Fourcc, Frame, GrantedMode, ModeRequest, Rate, SequenceUnwrapper, StampSource,
 };
 use crate::clock::Clock;
+use relit_video::PixelFormat;
 
 /// Buffers asked of the driver: at 30 frames/s, a quarter of a second in which nobody has to fetch
 /// a frame.
@@ -25,7 +26,7 @@ const LONGEST_WAIT: Duration = Duration::from_secs(60);
 #[derive(Debug)]
 pub(super) struct Stream {
     layout: PixelLayout,
-    encoding: Encoding,
+    format: PixelFormat,
     buffers: Vec<Mapping>,
     /// Buffers that the driver did not take back; they are offered again.
     idle: Vec<u32>,
@@ -42,7 +43,7 @@ impl Stream {
             .set_format(want.fourcc.code(), want.width, want.height)
             .map_err(|error| device.error("its format was set", error))?;
         let fourcc = Fourcc::from_code(layout.fourcc);
-        let encoding = fourcc.encoding().ok_or_else(|| CameraError::Format {
+        let format = fourcc.pixel_format().ok_or_else(|| CameraError::Format {
             device: device.name(),
             fourcc,
         })?;
@@ -53,7 +54,7 @@ impl Stream {
         let rate = interval.and_then(|(numerator, denominator)| Rate::new(denominator, numerator));
         let mut stream = Self {
             layout,
-            encoding,
+            format,
             buffers: Vec::new(),
             idle: Vec::new(),
             counter: SequenceUnwrapper::default(),
@@ -156,7 +157,7 @@ impl Stream {
             height,
             stride,
         } = self.layout;
-        let data = match self.encoding.rows(width, height) {
+        let data = match self.format.rows(width, height) {
             Some((row, rows)) => without_padding(data, stride as usize, row, rows),
             None => data,
         };

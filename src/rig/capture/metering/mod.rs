@@ -8,7 +8,7 @@ use super::meter::{Advice, Exposures, Meter};
 use super::preflight::Held;
 use super::settings::Settings;
 use super::stop::StopRequest;
-use crate::camera::lock::{Aspect, Step};
+use crate::camera::hold::{Aspect, ControlSetting};
 use crate::camera::{Camera, Control, Frame};
 use crate::turntable::{Table, Turn, TurnPlan, TurnRequest};
 use relit_video::LiveDecoder;
@@ -63,13 +63,13 @@ pub(super) fn meter(
     Ok(found)
 }
 
-fn is_exposure(step: &Step) -> bool {
+fn is_exposure(step: &ControlSetting) -> bool {
     step.aspect == Aspect::Exposure
         && (TIMED.contains(&step.name.as_str()) || step.name == "exposure")
 }
 
 /// The exposures of a control that fit into a frame's time, where its unit is known; else all.
-fn exposures(controls: &[Control], step: &Step, fps: f64) -> Option<Exposures> {
+fn exposures(controls: &[Control], step: &ControlSetting, fps: f64) -> Option<Exposures> {
     let control = controls.iter().find(|control| control.id == step.id)?;
     let spacing = i64::try_from(control.step.max(1)).ok()?;
     let darkest = control.minimum.max(1);
@@ -87,17 +87,16 @@ fn exposures(controls: &[Control], step: &Step, fps: f64) -> Option<Exposures> {
 
 fn decoder_for(held: &Held) -> Result<LiveDecoder, CaptureError> {
     let none = |why: String| CaptureError::from(MeterFault::NoPicture(why));
-    let encoding = held.mode.fourcc.encoding();
-    let coding =
-        super::recorder::coding(encoding.ok_or_else(|| none(held.mode.fourcc.to_string()))?);
-    LiveDecoder::new(coding, held.mode.width, held.mode.height)
+    let format = held.mode.fourcc.pixel_format();
+    let format = format.ok_or_else(|| none(held.mode.fourcc.to_string()))?;
+    LiveDecoder::new(format, held.mode.width, held.mode.height)
         .map_err(|fault| none(fault.to_string()))
 }
 
 /// What looks at the frames.
 struct Eye {
     meter: Meter,
-    step: Step,
+    step: ControlSetting,
     decoder: LiveDecoder,
     /// Frames that are still to be passed over.
     late: usize,
