@@ -435,6 +435,7 @@ fn an_unplugged_camera_leaves_what_was_recorded() {
     let root = tempfile::tempdir().unwrap();
     let unplugged: fn() -> CameraError = || CameraError::Unplugged {
         device: "/dev/video0".to_owned(),
+        source: None,
     };
     let script = steps(stream(55, 0)).chain([Step::Fail(unplugged)]);
     let report = record(root.path(), 5, script);

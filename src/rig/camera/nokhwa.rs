@@ -84,6 +84,7 @@ impl NokhwaCamera {
         let name = listed.map(|camera| camera.human_name());
         let name = name.ok_or_else(|| CameraError::NotThere {
             device: device(number),
+            source: None,
         })?;
         let modes = modes(number)?;
         Ok(Self {
@@ -149,7 +150,10 @@ impl Camera for NokhwaCamera {
                 device,
                 waited: timeout,
             }),
-            Err(RecvTimeoutError::Disconnected) => Err(CameraError::Unplugged { device }),
+            Err(RecvTimeoutError::Disconnected) => Err(CameraError::Unplugged {
+                device,
+                source: None,
+            }),
         }
     }
 
@@ -179,7 +183,7 @@ fn failed(number: u32, doing: &'static str, error: &NokhwaError) -> CameraError 
     CameraError::Backend {
         device: device(number),
         doing,
-        why: error.to_string(),
+        source: Box::new(error.clone()),
     }
 }
 
@@ -195,7 +199,7 @@ fn on_thread<T: Send + 'static>(
     let broken = |why: String| CameraError::Backend {
         device: device(number),
         doing,
-        why,
+        source: why.into(),
     };
     started.map_err(|error| broken(error.to_string()))?;
     match receiver.recv_timeout(OPENING) {

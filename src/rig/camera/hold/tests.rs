@@ -272,16 +272,17 @@ struct Answers(Vec<Control>, bool);
 
 impl Camera for Answers {
     fn info(&self) -> &DeviceInfo {
-        unimplemented!()
+        panic!("only the controls are asked")
     }
     fn modes(&mut self) -> Result<Vec<Mode>, CameraError> {
-        unimplemented!()
+        panic!("only the controls are asked")
     }
     fn controls(&mut self) -> Result<Vec<Control>, CameraError> {
         match self.1 {
             true => Ok(self.0.clone()),
             false => Err(CameraError::Unplugged {
                 device: "/dev/video9".to_owned(),
+                source: Some(std::io::Error::from_raw_os_error(19)),
             }),
         }
     }
@@ -289,13 +290,13 @@ impl Camera for Answers {
         Ok(value)
     }
     fn start(&mut self, _: &ModeRequest) -> Result<GrantedMode, CameraError> {
-        unimplemented!()
+        panic!("only the controls are asked")
     }
     fn next_frame(&mut self, _: Duration) -> Result<Frame, CameraError> {
-        unimplemented!()
+        panic!("only the controls are asked")
     }
     fn stop(&mut self) -> Result<(), CameraError> {
-        unimplemented!()
+        panic!("only the controls are asked")
     }
 }
 
@@ -336,6 +337,7 @@ fn reading_back_tells_unchanged_drifted_and_unreadable_apart() {
     let faults = unreadable.faults();
     assert!(faults[0].contains("could not be read back"), "{faults:?}");
     assert!(faults[0].contains("/dev/video9"), "{faults:?}");
+    assert!(faults[0].ends_with("(os error 19)"), "{faults:?}");
 }
 
 #[test]

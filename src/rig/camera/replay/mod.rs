@@ -129,7 +129,10 @@ impl ReplayCamera {
                 path: self.path.clone(),
                 frames: delivered,
             },
-            End::Unplugged => CameraError::Unplugged { device },
+            End::Unplugged => CameraError::Unplugged {
+                device,
+                source: None,
+            },
             End::Stalled => CameraError::Timeout { device, waited },
         }
     }

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use relit_data::causes::with_causes;
+
 use super::ioctl::{Listed, Node};
 use super::{Camera as _, CameraError, V4l2Camera};
 use crate::camera::{CameraAddress, Capabilities, DeviceInfo, Fourcc, Mode, Rate, Rates, Sizes};
@@ -50,7 +52,7 @@ fn unreadable(path: PathBuf, error: &CameraError) -> DeviceInfo {
             driver_time: false,
             controls: false,
         },
-        problems: vec![error.to_string()],
+        problems: vec![with_causes(error)],
     }
 }
 
@@ -162,9 +164,11 @@ mod tests {
     fn a_device_that_cannot_be_looked_at_is_listed_with_the_reason() {
         let error = CameraError::NotPermitted {
             device: "/dev/video3".to_owned(),
+            source: Some(io::ErrorKind::PermissionDenied.into()),
         };
         let info = unreadable("/dev/video3".into(), &error);
         assert_eq!(info.address.to_string(), "v4l2:/dev/video3");
         assert!(info.problems[0].contains("group `video`"), "{info:?}");
+        assert!(info.problems[0].contains("permission denied"), "{info:?}");
     }
 }

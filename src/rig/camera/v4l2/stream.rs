@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use v4l::v4l_sys as sys;
 
-use super::ioctl::{Filled, Mapping, PixelLayout, Ready};
-use super::{CameraError, Device};
+use super::ioctl::{FilledBuffer, Mapping, PixelLayout, Ready};
+use super::{CameraError, Device, unplugged};
 use crate::camera::frame::without_padding;
 use crate::camera::{
     Fourcc, Frame, GrantedMode, ModeRequest, Rate, SequenceUnwrapper, StampSource,
@@ -125,20 +125,17 @@ impl Stream {
     }
 
     fn too_late(&self, device: &Device, waited: Duration) -> CameraError {
-        let device_name = device.name();
-        if device.is_gone() {
-            return CameraError::Unplugged {
-                device: device_name,
-            };
-        }
-        CameraError::Timeout {
-            device: device_name,
-            waited,
+        match device.absence() {
+            Some(source) => unplugged(device.name(), source),
+            None => CameraError::Timeout {
+                device: device.name(),
+                waited,
+            },
         }
     }
 
     /// Copies a filled buffer's frame out and gives the buffer back at once.
-    fn take(&mut self, device: &Device, filled: Filled) -> Frame {
+    fn take(&mut self, device: &Device, filled: FilledBuffer) -> Frame {
         let arrived_us = Clock::monotonic().now_us();
         // An index that was never given out would be a driver's fault; the frame is then empty.
         let data = usize::try_from(filled.index)
@@ -194,7 +191,7 @@ impl Stream {
 }
 
 /// A frame's time stamp: the driver's where it goes by the monotonic clock, else the arrival.
-fn stamp(filled: Filled, arrived_us: i64) -> (i64, StampSource) {
+fn stamp(filled: FilledBuffer, arrived_us: i64) -> (i64, StampSource) {
     if filled.flags & sys::V4L2_BUF_FLAG_TIMESTAMP_MASK != sys::V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC {
         return (arrived_us, StampSource::Arrival);
     }
@@ -211,7 +208,7 @@ mod tests {
 
     #[test]
     fn a_time_stamp_of_another_clock_is_replaced_and_told() {
-        let filled = |flags| Filled {
+        let filled = |flags| FilledBuffer {
             index: 0,
             bytes_used: 0,
             flags,
