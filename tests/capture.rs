@@ -19,12 +19,13 @@ use std::time::{Duration, Instant};
 
 use relit::extract::{self, Observer, Options, Outcome};
 use relit_data::session::{
-    CameraFacts, FrameIndex, Manifest, Recording, SoftwareFacts, Status, TurntableFacts, VideoFacts,
+    CameraFacts, FrameClock, FrameIndex, Manifest, Recording, SoftwareFacts, Status,
+    TurntableFacts, VideoFacts,
 };
 use relit_data::shard::{Layout, Size};
 use relit_rig::camera::{
-    Address, Camera, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc, Frame,
-    GrantedMode, Mode, ModeRequest, Rate, Sequence, StampSource, open,
+    Camera, CameraAddress, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc,
+    Frame, GrantedMode, Mode, ModeRequest, Rate, Sequence, StampSource, open,
 };
 use relit_rig::capture::{End, Plan, Recorder, Window, salvage, salvage_session};
 use relit_rig::clock::Clock;
@@ -189,6 +190,7 @@ fn manifest(id: &str) -> Manifest {
             width: 0,
             height: 0,
             fps: 30.0,
+            clock: FrameClock::default(),
             controls: BTreeMap::new(),
         },
         turntable: Some(TurntableFacts {
@@ -460,6 +462,7 @@ fn an_unplugged_camera_leaves_what_was_recorded() {
     let root = tempfile::tempdir().unwrap();
     let unplugged: fn() -> CameraError = || CameraError::Unplugged {
         device: "/dev/video0".to_owned(),
+        source: None,
     };
     let script = steps(stream(55, 0)).chain([Step::Fail(unplugged)]);
     let take = record(root.path(), 5, script);
@@ -580,7 +583,7 @@ fn viewers_that_never_come_back_cost_no_frame() {
 /// Replays a recording as fast as it is read, and records the time from `from` to `to`, in frames
 /// of `period_us`, again.
 fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -> Take {
-    let address: Address = format!("replay:{}?speed=0", path.display())
+    let address: CameraAddress = format!("replay:{}?speed=0", path.display())
         .parse()
         .unwrap();
     let clock = address.clock();

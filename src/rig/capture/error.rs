@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::recording::RecordingError;
 use super::settings::ModePreference;
 use super::stop::Stopped;
-use crate::camera::lock::Moved;
+use crate::camera::hold::ControlDrift;
 use crate::camera::{CameraError, FrameFault};
 use crate::simulator;
 use crate::turntable::TurntableError;
@@ -122,7 +122,7 @@ pub enum Refusal {
     #[error("the camera does not keep its settings: {}; close other programs that use it, or give values that it takes", joined(.0))]
     NotKept(
         /// Which.
-        Vec<Moved>,
+        Vec<ControlDrift>,
     ),
     /// Values that were asked for, and which the camera has no control to hold.
     #[error("the camera cannot be set to {}: leave that out, or set it at the camera", .0.join(", "))]
@@ -209,13 +209,13 @@ pub enum MeterFault {
     },
     /// No picture could be decoded.
     #[error("the camera's pictures cannot be decoded: ask for another format")]
-    NoPicture(#[source] relit_video::FrameFault),
+    NoPicture(#[source] relit_video::DecodeFault),
 }
 
-fn joined(moved: &[Moved]) -> String {
+fn joined(moved: &[ControlDrift]) -> String {
     moved
         .iter()
-        .map(Moved::to_string)
+        .map(ControlDrift::to_string)
         .collect::<Vec<_>>()
         .join(", ")
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::CaptureError;
 use super::settings::Settings;
-use crate::camera::Address;
+use crate::camera::CameraAddress;
 
 /// Name of the lock in a folder of sessions.
 const ROOT_LOCK: &str = ".relit-capture.lock";
@@ -34,7 +34,7 @@ impl Exclusive {
     /// # Errors
     /// [`CaptureError::Taken`] with the holder's process number.
     pub fn camera(settings: &Settings) -> Result<Option<Self>, CaptureError> {
-        let Address::V4l2(path) = &settings.camera else {
+        let CameraAddress::V4l2(path) = &settings.camera else {
             return Ok(None);
         };
         // A camera has many names, one of which is the kernel's.

@@ -6,9 +6,10 @@ use std::time::Duration;
 use super::error::{CaptureError, Refusal};
 use super::settings::Settings;
 use super::stop::StopRequest;
-use crate::camera::lock::{ManualPlan, Moved};
+use crate::camera::hold::{ControlDrift, ManualPlan};
 use crate::camera::{Camera, Control, GrantedMode, ModeRequest};
 use crate::state::Check;
+use relit_data::session::FrameClock;
 
 /// How long the first frame may take.
 const FIRST_FRAME: Duration = Duration::from_secs(5);
@@ -34,6 +35,8 @@ pub struct LockedCamera {
     pub plan: ManualPlan,
     /// All controls, as read back.
     pub controls: Vec<Control>,
+    /// What stamps its frames.
+    pub clock: FrameClock,
     /// Mean size of a frame, bytes.
     pub frame_bytes: f64,
     /// What was found.
@@ -61,20 +64,23 @@ impl LockedCamera {
             return Err(Refusal::NotHeld(not_held).into());
         }
         require_kept(plan.apply(camera)?)?;
+        let mut clock = FrameClock::default();
         for _ in 0..SETTLING {
             stop.check()?;
-            camera.next_frame(NEXT_FRAME)?;
+            clock = camera.next_frame(NEXT_FRAME)?.stamp.clock();
         }
         let controls = camera.controls()?;
         require_kept(plan.check(&controls))?;
         checks.push(settings_check(&plan));
-        let lacks = plan.lacks.iter();
-        checks.extend(lacks.map(|lack| Check::noted("camera settings", lack.to_string())));
+        let missing = plan.missing.iter();
+        let noted = missing.map(|missing| Check::noted("camera settings", missing.to_string()));
+        checks.extend(noted);
         Ok(Self {
             request,
             mode,
             plan,
             controls,
+            clock,
             frame_bytes,
             checks,
         })
@@ -112,7 +118,7 @@ impl LockedCamera {
     }
 }
 
-fn require_kept(moved: Vec<Moved>) -> Result<(), Refusal> {
+fn require_kept(moved: Vec<ControlDrift>) -> Result<(), Refusal> {
     match moved.is_empty() {
         true => Ok(()),
         false => Err(Refusal::NotKept(moved)),

@@ -11,7 +11,7 @@ use super::settings::Settings;
 use crate::camera::{Control, ControlKind};
 use crate::turntable::Table;
 use relit_data::session::{
-    CameraFacts, Manifest, SoftwareFacts, Status, TurntableFacts, VideoFacts,
+    CameraFacts, Fault, FrameClock, Manifest, SoftwareFacts, Status, TurntableFacts, VideoFacts,
 };
 
 /// The manifest of a take that is to begin `now`.
@@ -40,6 +40,7 @@ pub(super) fn manifest(
             width: locked.mode.width,
             height: locked.mode.height,
             fps: locked.fps(),
+            clock: locked.clock,
             controls: controls_by_name(&locked.controls),
         },
         turntable: equipment
@@ -53,12 +54,27 @@ pub(super) fn manifest(
             bytes: None,
             blake3: None,
         },
-        faults: Vec::new(),
+        faults: not_held(locked),
         software: SoftwareFacts {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             commit: settings.commit.clone(),
         },
     }
+}
+
+/// What a camera changes as it likes where it is not the driver that is asked: nobody can see that in
+/// the recording afterwards.
+fn not_held(locked: &LockedCamera) -> Vec<Fault> {
+    if locked.clock == FrameClock::Driver {
+        return Vec::new();
+    }
+    let missing = locked.plan.missing.iter();
+    missing
+        .map(|missing| Fault {
+            t_us: 0,
+            what: format!("not held during the turn: {missing}"),
+        })
+        .collect()
 }
 
 fn facts_of(table: &Table, settings: &Settings) -> TurntableFacts {

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use super::error::{CaptureError, Refusal};
-use crate::camera::lock::Wanted;
-use crate::camera::{self, Fourcc, Mode, ModeRequest, Rate, Rates};
+use crate::camera::hold::ManualValues;
+use crate::camera::{CameraAddress, Fourcc, Mode, ModeRequest, Rate, Rates, ReplaySpeed};
 use crate::clock::Clock;
 use crate::turntable;
 
@@ -29,13 +29,13 @@ pub struct Settings {
     /// The folder in which sessions are made.
     pub root: PathBuf,
     /// The camera.
-    pub camera: camera::Address,
+    pub camera: CameraAddress,
     /// The turntable.
     pub turntable: turntable::Address,
     /// The camera's mode.
     pub mode: ModePreference,
     /// Values of its controls; what is not given stays as the camera has it.
-    pub wanted: Wanted,
+    pub wanted: ManualValues,
     /// Speed of the turn, degrees a second.
     pub degrees_per_second: f64,
     /// Least voltage of the table's battery.
@@ -56,13 +56,13 @@ impl Settings {
     /// Settings with the usual figures: 7.2 degrees/s at 30 frames/s, no frame may be missing, one
     /// more try.
     #[must_use]
-    pub fn new(root: PathBuf, camera: camera::Address, turntable: turntable::Address) -> Self {
+    pub fn new(root: PathBuf, camera: CameraAddress, turntable: turntable::Address) -> Self {
         Self {
             root,
             camera,
             turntable,
             mode: ModePreference::default(),
-            wanted: Wanted::default(),
+            wanted: ManualValues::default(),
             degrees_per_second: 7.2,
             min_battery_v: None,
             max_dropped: 0,
@@ -86,9 +86,9 @@ impl Settings {
             speed => speed,
         };
         let replayed = match &self.camera {
-            camera::Address::Replay { speed, .. } => Some(match speed {
-                camera::Speed::AsRead => FASTEST_REHEARSAL,
-                camera::Speed::Times(times) => *times,
+            CameraAddress::Replay { speed, .. } => Some(match speed {
+                ReplaySpeed::AsRead => FASTEST_REHEARSAL,
+                ReplaySpeed::Times(times) => *times,
             }),
             _ => None,
         };
@@ -104,8 +104,8 @@ impl Settings {
             (None, None, _) => 1.0,
             _ => return Err(Refusal::Pace.into()),
         };
-        if let camera::Address::Replay { speed, .. } = &mut self.camera {
-            *speed = camera::Speed::Times(times);
+        if let CameraAddress::Replay { speed, .. } = &mut self.camera {
+            *speed = ReplaySpeed::Times(times);
         }
         if let Table::Simulated(table) = &mut self.turntable {
             table.speed = times;
@@ -294,8 +294,8 @@ mod tests {
         ] {
             let (paced, clock) = settings(camera, table).on_one_clock().unwrap();
             assert_eq!(clock.factor(), factor, "{camera} {table}");
-            if let camera::Address::Replay { speed, .. } = paced.camera {
-                assert_eq!(speed, camera::Speed::Times(factor));
+            if let CameraAddress::Replay { speed, .. } = paced.camera {
+                assert_eq!(speed, ReplaySpeed::Times(factor));
             }
         }
     }

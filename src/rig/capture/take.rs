@@ -20,8 +20,7 @@ use super::recording::{End, Plan, Recorder};
 use super::settings::Settings;
 use super::stop::StopRequest;
 use super::turn::TurnRecording;
-use crate::camera::lock::moved_between;
-use crate::camera::{Address, Camera};
+use crate::camera::{Camera, CameraAddress};
 use crate::daemon::Viewer;
 use crate::state::{Check, Monitor, Phase, TakeSummary, Verdict};
 use crate::turntable::{Table, TurnPlan};
@@ -144,7 +143,8 @@ fn run_take(
     recorder.stop();
     context.enter(Phase::Checking);
     let (mut camera, mut recorded) = recorder.wait()?;
-    let control_faults = control_faults(&prepared.locked, camera.as_mut());
+    let locked = &prepared.locked;
+    let read_back = locked.plan.read_back(&locked.controls, camera.as_mut());
     equipment.camera = Some(camera);
     // A camera that failed by itself explains the take better than the table that was stopped for
     // it.
@@ -159,7 +159,7 @@ fn run_take(
     };
     let repeatable = matches!(recorded.end(), End::Over);
     let angle = |t_us| track.as_ref().and_then(|track| track.angle_at(t_us));
-    Ok((recorded.finish(&angle, &control_faults)?, repeatable))
+    Ok((recorded.finish(&angle, &read_back.faults())?, repeatable))
 }
 
 /// What a take needs before the table turns for it.
@@ -204,7 +204,7 @@ fn prepare(
         None => None,
     };
     let queue_wait = match settings.camera {
-        Address::Replay { .. } => REPLAY_WAIT,
+        CameraAddress::Replay { .. } => REPLAY_WAIT,
         _ => Duration::ZERO,
     };
     let plan = Plan {
@@ -249,27 +249,4 @@ fn prepare_table(
     let (turn, check) = preflight::plan_turn(table, settings)?;
     context.note([check]);
     Ok(turn)
-}
-
-/// What is no longer as it was set on the camera when the take began, a sentence each.
-fn control_faults(locked: &LockedCamera, camera: &mut dyn Camera) -> Vec<String> {
-    let now = match camera.controls() {
-        Ok(now) => now,
-        Err(error) => {
-            let why = with_causes(&error);
-            return vec![format!(
-                "the camera's settings could not be read after the turn: {why}"
-            )];
-        }
-    };
-    let mut changes = locked.plan.check(&now);
-    for other in moved_between(&locked.controls, &now) {
-        if changes.iter().all(|known| known.name != other.name) {
-            changes.push(other);
-        }
-    }
-    let changes = changes.iter();
-    changes
-        .map(|change| format!("the camera's settings changed during the turn: {change}"))
-        .collect()
 }

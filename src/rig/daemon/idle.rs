@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::viewer::Viewer;
-use crate::camera::lock::ManualPlan;
+use crate::camera::hold::ManualPlan;
 use crate::camera::{Camera, CameraError, GrantedMode};
 use crate::capture::CaptureError;
 use crate::capture::Equipment;
@@ -202,7 +202,7 @@ fn held_controls(camera: &mut dyn Camera) -> Vec<(String, i64)> {
     let Ok(controls) = camera.controls() else {
         return Vec::new();
     };
-    let plan = ManualPlan::new(&controls, &crate::camera::lock::Wanted::default());
+    let plan = ManualPlan::new(&controls, &crate::camera::hold::ManualValues::default());
     let value = |name: &str| controls.iter().find(|control| control.name == name)?.value;
     let held = plan.steps.iter();
     held.filter_map(|step| Some((step.name.clone(), value(&step.name)?)))

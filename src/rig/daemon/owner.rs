@@ -9,7 +9,7 @@ use std::time::Duration;
 use super::idle::Idle;
 use super::viewer::Viewer;
 use crate::camera::Camera;
-use crate::camera::lock::{ManualPlan, Wanted};
+use crate::camera::hold::{ManualPlan, ManualValues};
 use crate::capture::CaptureError;
 use crate::capture::Equipment;
 use crate::capture::turn::show_table;
@@ -161,7 +161,7 @@ impl Owner {
             // An automatic may rule it: that is switched off, as it is for every capture.
             Err(CaptureError::Camera(_)) => {
                 let controls = camera.controls()?;
-                ManualPlan::new(&controls, &Wanted::default()).apply(camera)?;
+                ManualPlan::new(&controls, &ManualValues::default()).apply(camera)?;
                 set_by_name(camera, name, value)
             }
             set => set,

@@ -7,10 +7,10 @@ mod tests;
 use super::error::{CaptureError, MeterFault};
 use super::locked_camera::{LockedCamera, NEXT_FRAME};
 use super::look::{clipped, middle};
-use super::recording::{RecordingError, coding};
+use super::recording::RecordingError;
 use super::settings::Settings;
 use super::stop::StopRequest;
-use crate::camera::lock::{Aspect, Step};
+use crate::camera::hold::{Aspect, ControlSetting};
 use crate::camera::{Camera, Control, Frame};
 use crate::turntable::{Table, Turn, TurnPlan, TurnRequest};
 use relit_video::LiveDecoder;
@@ -62,13 +62,13 @@ pub(super) fn meter(
     Ok(found)
 }
 
-fn is_exposure(step: &Step) -> bool {
+fn is_exposure(step: &ControlSetting) -> bool {
     let name = step.name.as_str();
     step.aspect == Aspect::Exposure && (TIMED.contains(&name) || name == "exposure")
 }
 
 /// The exposures of a control that fit into a frame's time, where its unit is known; else all.
-fn exposure_range(controls: &[Control], step: &Step, fps: f64) -> Option<ExposureRange> {
+fn exposure_range(controls: &[Control], step: &ControlSetting, fps: f64) -> Option<ExposureRange> {
     let control = controls.iter().find(|control| control.id == step.id)?;
     let spacing = i64::try_from(control.step.max(1)).ok()?;
     let darkest = control.minimum.max(1);
@@ -86,9 +86,9 @@ fn exposure_range(controls: &[Control], step: &Step, fps: f64) -> Option<Exposur
 
 fn decoder_for(locked: &LockedCamera) -> Result<LiveDecoder, CaptureError> {
     let mode = &locked.mode;
-    let encoding = mode.fourcc.encoding();
-    let coding = coding(encoding.ok_or(RecordingError::Format(mode.fourcc))?);
-    Ok(LiveDecoder::new(coding, mode.width, mode.height).map_err(MeterFault::NoPicture)?)
+    let format = mode.fourcc.pixel_format();
+    let format = format.ok_or(RecordingError::Format(mode.fourcc))?;
+    Ok(LiveDecoder::new(format, mode.width, mode.height).map_err(MeterFault::NoPicture)?)
 }
 
 /// Frames in, exposures out.
@@ -97,7 +97,7 @@ struct MeteringLoop<'a> {
     stop: &'a StopRequest,
     search: ExposureSearch,
     /// The control of the exposure.
-    step: Step,
+    step: ControlSetting,
     decoder: LiveDecoder,
     /// Frames until the present exposure has effect.
     late: usize,

@@ -9,7 +9,7 @@ use super::cutter::{Cutter, IsKey, TurnFrame};
 use super::outcome::{CameraOutcome, End, FrameIssue};
 use super::progress::Shared;
 use crate::camera::{Camera, CameraError, Frame, FrameFault};
-use relit_video::{Coding, StreamFormat, is_key};
+use relit_video::{PixelFormat, StreamFormat, is_key};
 
 /// Longest wait for a frame in one go: how late a stop is noticed.
 const FRAME_WAIT: Duration = Duration::from_millis(100);
@@ -38,7 +38,7 @@ impl CameraThread {
         queue: Sender<TurnFrame>,
         shared: Arc<Shared>,
     ) -> Self {
-        let is_key = (stream.coding == Coding::H264).then_some(is_key as IsKey);
+        let is_key = (stream.format == PixelFormat::H264).then_some(is_key as IsKey);
         Self {
             camera,
             stall,

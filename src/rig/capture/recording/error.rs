@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crate::camera::Fourcc;
 use relit_data::session;
-use relit_video as video;
+use relit_video::VideoError;
 
 /// Why a recording could not begin, be finished, or be salvaged. What ends a recording early is no
 /// such error: see [`super::End`].
@@ -37,7 +37,7 @@ pub enum RecordingError {
     Session(#[from] session::Error),
     /// The video could not be made, written or read.
     #[error(transparent)]
-    Video(#[from] video::Error),
+    Video(#[from] VideoError),
     /// A folder of sessions could not be listed.
     #[error("{path} could not be listed: check that it is there and may be read")]
     List {
@@ -66,7 +66,7 @@ impl RecordingError {
     pub fn is_out_of_space(&self) -> bool {
         use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
         match self {
-            Self::Video(video::Error::NoRoom { .. }) => true,
+            Self::Video(VideoError::NoRoom { .. }) => true,
             Self::Session(session::Error::Io { source, .. }) => {
                 matches!(source.kind(), StorageFull | QuotaExceeded | FileTooLarge)
             }

@@ -28,7 +28,6 @@ mod writer_thread;
 pub use error::RecordingError;
 pub use outcome::End;
 pub use progress::Progress;
-pub(crate) use recorder::coding;
 pub use recorder::{Plan, Recorder};
 pub use salvage::{Salvaged, Saved, salvage, salvage_session};
 pub use verdict::Recorded;

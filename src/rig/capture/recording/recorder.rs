@@ -12,10 +12,10 @@ use super::progress::{Progress, Shared};
 use super::verdict::Recorded;
 use super::window::Window;
 use super::writer_thread::WriterThread;
-use crate::camera::{Bayer, Camera, Encoding, GrantedMode};
+use crate::camera::{Camera, GrantedMode};
 use crate::capture::preview::Preview;
 use relit_data::session::{Fault, Manifest, SessionWriter};
-use relit_video::{Coding, RawFormat, StreamFormat};
+use relit_video::{PixelFormat, StreamFormat};
 
 /// Name of the video in a session folder.
 const VIDEO_FILE: &str = "video.mkv";
@@ -68,15 +68,15 @@ impl Recorder {
             return Err(RecordingError::Rate(plan.fps));
         }
         let fourcc = plan.mode.fourcc;
-        let encoding = fourcc.encoding().ok_or(RecordingError::Format(fourcc))?;
+        let format = fourcc.pixel_format();
         let stream = StreamFormat {
-            coding: coding(encoding),
+            format: format.ok_or(RecordingError::Format(fourcc))?,
             width: plan.mode.width,
             height: plan.mode.height,
             fps: plan.fps,
         };
         let mut manifest = plan.manifest;
-        fill_in(&mut manifest, &stream, &plan.mode, encoding);
+        fill_in(&mut manifest, &stream, &plan.mode);
         let session = SessionWriter::create(&plan.root, manifest)?;
         let folder = session.folder().to_owned();
         let shared = Arc::new(Shared::new(plan.window));
@@ -161,47 +161,23 @@ fn spawn<T: Send + 'static>(
     let refused = |source| RecordingError::Thread { what, source };
     thread.spawn(run).map_err(refused)
 }
-/// How frames are kept in a video.
-pub(crate) fn coding(encoding: Encoding) -> Coding {
-    Coding::Raw(match encoding {
-        Encoding::Mjpeg => return Coding::Mjpeg,
-        Encoding::H264 => return Coding::H264,
-        Encoding::Yuyv => RawFormat::Yuyv,
-        Encoding::Nv12 => RawFormat::Nv12,
-        Encoding::Rgb24 => RawFormat::Rgb24,
-        Encoding::Grey => RawFormat::Grey,
-        Encoding::Bayer(_) => RawFormat::Bayer,
-    })
-}
-
 /// How many frames may wait for the disk, by the largest that they can reasonably be.
 fn queue_places(stream: &StreamFormat) -> usize {
     let pixels = stream.width as usize * stream.height as usize;
-    let frame = match stream.coding {
-        Coding::Raw(raw) => raw
-            .picture_bytes(stream.width, stream.height)
-            .unwrap_or(pixels),
-        Coding::Mjpeg | Coding::H264 => pixels,
-    };
+    let uncompressed = stream.format.frame_bytes(stream.width, stream.height);
     let (fewest, most) = QUEUE_FRAMES;
-    (QUEUE_BYTES / frame.max(1)).clamp(fewest, most)
+    (QUEUE_BYTES / uncompressed.unwrap_or(pixels).max(1)).clamp(fewest, most)
 }
 
 /// What the stream makes known of the session.
-fn fill_in(manifest: &mut Manifest, stream: &StreamFormat, mode: &GrantedMode, encoding: Encoding) {
+fn fill_in(manifest: &mut Manifest, stream: &StreamFormat, mode: &GrantedMode) {
     manifest.camera.fourcc = mode.fourcc.to_string();
     manifest.camera.width = stream.width;
     manifest.camera.height = stream.height;
     manifest.camera.fps = stream.fps;
     manifest.video.file = VIDEO_FILE.to_owned();
-    manifest.video.codec = stream.coding.codec().to_owned();
-    if let Encoding::Bayer(pattern) = encoding {
-        let colours = match pattern {
-            Bayer::Bggr => "blue, green / green, red",
-            Bayer::Gbrg => "green, blue / red, green",
-            Bayer::Grbg => "green, red / blue, green",
-            Bayer::Rggb => "red, green / green, blue",
-        };
+    manifest.video.codec = stream.format.codec().to_owned();
+    if let PixelFormat::Bayer(colours) = stream.format {
         manifest.faults.push(Fault {
             t_us: 0,
             what: format!("the sensor's mosaic ({colours}) is kept as a grey picture"),

@@ -197,7 +197,7 @@ impl Recorded {
             return with_causes(failure);
         }
         let pending = match failure {
-            RecordingError::Video(relit_video::Error::NoRoom { missing, .. }) => *missing,
+            RecordingError::Video(relit_video::VideoError::NoRoom { missing, .. }) => *missing,
             _ => 0,
         };
         let recorded = self.recorded();

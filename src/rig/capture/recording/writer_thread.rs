@@ -11,7 +11,7 @@ use super::error::RecordingError;
 use super::outcome::WriterOutcome;
 use super::progress::Shared;
 use relit_data::session::{FrameEntry, SessionWriter};
-use relit_video::{Coding, Muxer, StreamFormat, Written};
+use relit_video::{Muxer, StreamFormat, Written};
 
 /// How often everything is synced to the disk: with the time that the disk needs for it, nothing
 /// there is older than a second.
@@ -105,10 +105,8 @@ impl WriterThread {
 
     /// Part of a raw picture, filled up with zeros: what came of it is kept.
     fn padded(&self, data: &[u8]) -> Option<Vec<u8>> {
-        let Coding::Raw(raw) = self.stream.coding else {
-            return None;
-        };
-        let whole = raw.picture_bytes(self.stream.width, self.stream.height)?;
+        let stream = &self.stream;
+        let whole = stream.format.frame_bytes(stream.width, stream.height)?;
         (data.len() < whole).then(|| {
             let mut padded = data.to_vec();
             padded.resize(whole, 0);
