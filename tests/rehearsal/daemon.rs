@@ -124,7 +124,7 @@ fn a_second_daemon_is_refused_with_the_process_that_has_the_folder() {
     let root = tempfile::tempdir().unwrap();
     let _first = Daemon::start(settings(root.path(), "", "none")).unwrap();
     let error = Daemon::start(settings(root.path(), "", "none")).unwrap_err();
-    assert!(matches!(error, CaptureError::Taken { pid: Some(_), .. }));
+    assert!(matches!(error, CaptureError::Lock(_)));
     let pid = std::process::id();
     assert!(
         error.to_string().contains(&format!("process {pid}")),

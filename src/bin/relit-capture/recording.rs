@@ -7,8 +7,7 @@ use std::thread;
 use std::time::Duration;
 
 use relit_rig::capture::{
-    CaptureError, Equipment, Exclusive, Onlookers, Order, Settings, StopRequest, Stopped, capture,
-    salvage,
+    CaptureError, Equipment, Onlookers, Order, Settings, StopRequest, Stopped, capture, salvage,
 };
 use relit_rig::state::{Monitor, Phase, RigState, TakeSummary, Verdict};
 use relit_rig::turntable::Address;
@@ -33,7 +32,7 @@ pub(crate) fn run(console: Console, record: Record) -> Result<Outcome, CaptureEr
         console.warn("the table was not turned: nobody agreed; --yes agrees beforehand");
         return Ok(Outcome::Wrong);
     }
-    let _camera = Exclusive::camera(&settings)?;
+    let _camera = settings.lock_camera()?;
     tell_salvaged(console, &settings)?;
     let stop = StopRequest::default();
     let asked = stop.clone();

@@ -7,6 +7,7 @@ use super::settings::ModeWish;
 use super::stop::Stopped;
 use crate::camera::CameraError;
 use crate::camera::lock::Moved;
+use crate::lockfile::LockError;
 use crate::simulator;
 use crate::turntable::TurntableError;
 use relit_data::session;
@@ -47,14 +48,9 @@ pub enum CaptureError {
     /// The camera lacks a control.
     #[error("the camera has no control {0:?}: `relit-capture devices` lists those that it has")]
     NoControl(String),
-    /// Another process has what only one can have.
-    #[error("{what} is in use by {}: end that one first", .pid.map_or("another process".to_owned(), |pid| format!("process {pid}")))]
-    Taken {
-        /// The folder or device.
-        what: String,
-        /// Who has it, where it said so.
-        pid: Option<u32>,
-    },
+    /// Another process has the camera or the folder, or that cannot be known.
+    #[error(transparent)]
+    Lock(#[from] LockError),
     /// The recording was over before the turn was.
     #[error("the recording ended before the turn did")]
     EndedEarly,

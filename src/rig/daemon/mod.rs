@@ -16,12 +16,12 @@ use std::thread::JoinHandle;
 
 use crate::capture::CaptureError;
 use crate::capture::Equipment;
-use crate::capture::Exclusive;
 use crate::capture::Order;
 use crate::capture::Settings;
 use crate::capture::{StopRequest, Stopped};
 use crate::capture::{preflight, salvage};
 use crate::clock::Clock;
+use crate::lockfile::LockFile;
 use crate::serve::rig::{Command, Refused, Rig};
 use crate::state::{Monitor, Phase, RigState};
 use owner::{Job, Owner, rest};
@@ -44,7 +44,7 @@ pub struct Daemon {
     stop: StopRequest,
     wants_table: bool,
     owner: Mutex<Option<JoinHandle<()>>>,
-    _locks: (Exclusive, Option<Exclusive>),
+    _locks: (LockFile, Option<LockFile>),
 }
 
 impl Daemon {
@@ -52,13 +52,10 @@ impl Daemon {
     /// the owner, which looks for camera and table, and keeps looking where they are not there.
     ///
     /// # Errors
-    /// [`CaptureError::Taken`] where another daemon has them, [`super::Refusal::Pace`], or what the
+    /// [`CaptureError::Lock`] where another daemon has them, [`super::Refusal::Pace`], or what the
     /// system answers.
     pub fn start(settings: Settings) -> Result<Self, CaptureError> {
-        let locks = (
-            Exclusive::root(&settings.root)?,
-            Exclusive::camera(&settings)?,
-        );
+        let locks = (LockFile::of_root(&settings.root)?, settings.lock_camera()?);
         let monitor = Monitor::default();
         tell_salvaged(&settings.root, &monitor)?;
         let root = settings.root.clone();
