@@ -10,7 +10,6 @@ use relit_rig::capture::{FrameSize, ModePreference, Settings};
 use relit_rig::serve::Token;
 use relit_rig::turntable;
 
-use crate::environment::runtime_folder;
 use crate::table_arguments::{
     SIMULATE_EXAMPLES, SimulateArguments, TURNTABLE_EXAMPLES, TurntableArguments,
 };
@@ -222,7 +221,6 @@ impl From<RigArguments> for Settings {
         settings.max_dropped = line.max_dropped;
         settings.retries = line.retries;
         settings.meter_clip = line.meter_clip / 100.0;
-        settings.runtime_folder = runtime_folder();
         settings.commit = option_env!("RELIT_COMMIT").unwrap_or_default().to_owned();
         settings
     }

@@ -7,8 +7,8 @@ use std::thread;
 use std::time::Duration;
 
 use relit_rig::capture::{
-    CaptureContext, CaptureError, CaptureRequest, Captured, Equipment, Exclusive, Settings,
-    StopRequest, Stopped, capture, salvage,
+    CaptureContext, CaptureError, CaptureRequest, Captured, Equipment, Settings, StopRequest,
+    Stopped, capture, salvage,
 };
 use relit_rig::state::{Monitor, Phase, RigState, Verdict};
 use relit_rig::turntable::Address;
@@ -33,7 +33,7 @@ pub(crate) fn run(console: Console, record: Record) -> Result<Outcome, CaptureEr
         console.warn("the table was not turned: nobody agreed; --yes agrees beforehand");
         return Ok(Outcome::Wrong);
     }
-    let _camera = Exclusive::camera(&settings)?;
+    let _camera = settings.lock_camera()?;
     report_salvaged(console, &settings)?;
     let stop = StopRequest::default();
     let asked = stop.clone();

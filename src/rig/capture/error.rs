@@ -8,6 +8,7 @@ use super::settings::ModePreference;
 use super::stop::Stopped;
 use crate::camera::hold::ControlDrift;
 use crate::camera::{CameraError, FrameFault};
+use crate::lockfile::LockError;
 use crate::simulator;
 use crate::turntable::TurntableError;
 use relit_data::session;
@@ -48,14 +49,9 @@ pub enum CaptureError {
     /// The camera lacks a control.
     #[error("the camera has no control {0:?}: `relit-capture devices` lists those that it has")]
     NoControl(String),
-    /// Another process has what only one can have.
-    #[error("{what} is in use by {}: end that one first", .pid.map_or("another process".to_owned(), |pid| format!("process {pid}")))]
-    Taken {
-        /// The folder or device.
-        what: String,
-        /// Who has it, where it said so.
-        pid: Option<u32>,
-    },
+    /// Another process has the camera or the folder, or that cannot be known.
+    #[error(transparent)]
+    Lock(#[from] LockError),
     /// The recording ended before the turn, or long after it.
     #[error("the recording did not end with the turn")]
     NotWithTheTurn,

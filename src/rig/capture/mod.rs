@@ -11,7 +11,6 @@
 
 mod equipment;
 mod error;
-mod lock;
 pub mod locked_camera;
 pub mod look;
 mod manifest;
@@ -26,7 +25,6 @@ pub(crate) mod turn;
 
 pub use equipment::Equipment;
 pub use error::{CaptureError, MeterFault, Refusal};
-pub use lock::Exclusive;
 pub use locked_camera::LockedCamera;
 pub use preview::Preview;
 pub use recording::{

@@ -8,6 +8,7 @@ use super::error::{CaptureError, Refusal};
 use crate::camera::hold::ManualValues;
 use crate::camera::{CameraAddress, Fourcc, Mode, ModeRequest, Rate, Rates, ReplaySpeed};
 use crate::clock::Clock;
+use crate::lockfile::{self, LockError, LockFile};
 use crate::turntable;
 
 /// How much faster than real time a rehearsal runs that is to be as fast as is sensible.
@@ -46,7 +47,7 @@ pub struct Settings {
     pub retries: u32,
     /// The part of the pixels in the middle that metering lets saturate, 0 to 1.
     pub meter_clip: f64,
-    /// Where owners of serial ports leave their locks.
+    /// Where those who use cameras and serial ports leave their locks.
     pub runtime_folder: PathBuf,
     /// The commit that the program was built from, or nothing.
     pub commit: String,
@@ -68,8 +69,19 @@ impl Settings {
             max_dropped: 0,
             retries: 1,
             meter_clip: 0.005,
-            runtime_folder: PathBuf::from("/tmp"),
+            runtime_folder: lockfile::standard_folder(),
             commit: String::new(),
+        }
+    }
+
+    /// Takes the camera for this process; `None` for one that any number of programs can have.
+    ///
+    /// # Errors
+    /// [`LockError::Held`] with the holder's process number, or what the file system answers.
+    pub fn lock_camera(&self) -> Result<Option<LockFile>, LockError> {
+        match &self.camera {
+            CameraAddress::V4l2(path) => LockFile::of_device(path, &self.runtime_folder).map(Some),
+            _ => Ok(None),
         }
     }
 
