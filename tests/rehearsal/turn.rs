@@ -36,7 +36,7 @@ fn check_whole(rig: &mut Rehearsal) -> std::path::PathBuf {
 
 #[test]
 fn a_turn_is_1500_frames_with_the_angles_that_the_table_had() {
-    check_whole(&mut Rehearsal::new(SHORT, "", "sim:?speed=3"));
+    check_whole(&mut Rehearsal::whole(SHORT, ""));
 }
 
 struct Quiet;
@@ -51,8 +51,7 @@ impl Observer for Quiet {
 
 #[test]
 fn a_turn_of_raw_pictures_is_whole_and_can_be_extracted() {
-    // Coding every picture without loss takes a good part of a core even in real time.
-    let mut rig = Rehearsal::new(TURN, "", "sim:?speed=2");
+    let mut rig = Rehearsal::whole(TURN, "");
     let folder = check_whole(&mut rig);
     let options = Options {
         frames: 60,
@@ -74,7 +73,7 @@ fn a_turn_of_raw_pictures_is_whole_and_can_be_extracted() {
 
 #[test]
 fn a_camera_without_a_table_is_recorded_as_long_as_a_turn_takes() {
-    let mut rig = Rehearsal::with(SHORT, "&speed=5", "none", |settings| {
+    let mut rig = Rehearsal::with(SHORT, "&speed=0", "none", |settings| {
         settings.degrees_per_second = 36.0;
     });
     let take = rig.capture(false).unwrap();

@@ -118,7 +118,7 @@ impl Worker {
         };
         let (camera, viewer, idle) = (&mut self.equipment.camera, &self.viewer, &mut self.idle);
         let monitor = &self.dispatcher.monitor;
-        let moved = stop.over(table, || {
+        stop.over(table, || {
             std::thread::scope(|scope| {
                 let moving = scope.spawn(|| motion(table));
                 while !moving.is_finished() {
@@ -129,11 +129,11 @@ impl Worker {
                     }
                     std::thread::sleep(PERIOD);
                 }
-                moving.join()
+                // A motion that panicked was stopped by what it left behind, and nobody saw it.
+                let moved = moving.join();
+                moved.unwrap_or(Err(TurntableError::NotStopped))
             })
-        });
-        // A motion that broke down was stopped by what it left behind, and nobody saw it.
-        Ok(moved.unwrap_or(Err(TurntableError::NotStopped))?)
+        })
     }
 
     fn set_control(&mut self, name: &str, value: i64) -> Result<(), CaptureError> {

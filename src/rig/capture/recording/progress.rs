@@ -1,9 +1,8 @@
 //! What a recording's owner and its two threads share: wishes one way, figures the other.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use super::window::Window;
 use crate::capture::preview::Preview;
+use crate::clock::{Clock, Waitable};
 
 /// How far a recording has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -27,21 +26,22 @@ pub(super) struct Control {
 }
 
 /// Shared by the owner and the threads.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Shared {
     pub(super) preview: Preview,
-    control: Mutex<Control>,
+    /// Locked for moments only: the camera's thread looks at it between two frames.
+    pub(super) control: Waitable<Control>,
 }
 
 impl Shared {
-    pub(super) fn new(window: Option<Window>) -> Self {
-        let shared = Self::default();
-        shared.control().window = window;
-        shared
-    }
-
-    /// For a moment only: the camera's thread looks at it between two frames.
-    pub(super) fn control(&self) -> MutexGuard<'_, Control> {
-        self.control.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(super) fn new(clock: &Clock, window: Option<Window>) -> Self {
+        let control = Control {
+            window,
+            ..Control::default()
+        };
+        Self {
+            preview: Preview::default(),
+            control: Waitable::new(clock, control),
+        }
     }
 }
