@@ -4,13 +4,12 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use relit_rig::camera::lock::Wanted;
-use relit_rig::camera::{self, Fourcc};
-use relit_rig::capture::{FrameSize, ModeWish, Settings};
+use relit_rig::camera::hold::ManualValues;
+use relit_rig::camera::{CameraAddress, Fourcc};
+use relit_rig::capture::{FrameSize, ModePreference, Settings};
 use relit_rig::serve::Token;
 use relit_rig::turntable;
 
-use crate::environment::runtime_folder;
 use crate::table_arguments::{
     SIMULATE_EXAMPLES, SimulateArguments, TURNTABLE_EXAMPLES, TurntableArguments,
 };
@@ -134,7 +133,7 @@ struct RigArguments {
     root: PathBuf,
     /// The camera's address.
     #[arg(long, value_name = "ADDRESS", default_value = "v4l2:/dev/video0")]
-    camera: camera::Address,
+    camera: CameraAddress,
     /// The turntable's address.
     #[arg(long, value_name = "ADDRESS", default_value = "serial:")]
     turntable: turntable::Address,
@@ -205,12 +204,12 @@ pub(crate) fn parse() -> Arguments {
 impl From<RigArguments> for Settings {
     fn from(line: RigArguments) -> Self {
         let mut settings = Self::new(line.root, line.camera, line.turntable);
-        settings.mode = ModeWish {
+        settings.mode = ModePreference {
             fourcc: line.fourcc,
             size: line.size,
             fps: line.fps,
         };
-        settings.wanted = Wanted {
+        settings.wanted = ManualValues {
             exposure: line.exposure,
             gain: line.gain,
             white_balance: line.white_balance,
@@ -222,7 +221,6 @@ impl From<RigArguments> for Settings {
         settings.max_dropped = line.max_dropped;
         settings.retries = line.retries;
         settings.meter_clip = line.meter_clip / 100.0;
-        settings.runtime_folder = runtime_folder();
         settings.commit = option_env!("RELIT_COMMIT").unwrap_or_default().to_owned();
         settings
     }
@@ -231,7 +229,7 @@ impl From<RigArguments> for Settings {
 fn fourcc(text: &str) -> Result<Fourcc, String> {
     let known = || "give four characters such as MJPG, H264 or YUYV".to_owned();
     let fourcc = Fourcc(text.as_bytes().try_into().map_err(|_| known())?);
-    match fourcc.encoding() {
+    match fourcc.pixel_format() {
         Some(_) => Ok(fourcc),
         None => Err(format!("{text} frames cannot be recorded: {}", known())),
     }

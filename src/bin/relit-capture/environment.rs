@@ -1,7 +1,6 @@
 //! What the program takes from its surroundings: signals and environment variables.
 
 use std::env;
-use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -12,17 +11,6 @@ use signal_hook::low_level::emulate_default_handler;
 
 /// Signals within this time are one wish to end: `timeout` and a closing terminal send several.
 const TOGETHER: Duration = Duration::from_secs(1);
-
-/// The folder for locks and sockets: one for the whole machine, so that a service and a person who
-/// logs in find each other.
-pub(crate) fn runtime_folder() -> PathBuf {
-    let locks = Path::new("/run/lock");
-    if locks.is_dir() {
-        locks.to_owned()
-    } else {
-        env::temp_dir()
-    }
-}
 
 /// The service manager that started the program, where one did and wants to be told.
 pub(crate) fn service_manager() -> Option<ServiceManager> {

@@ -8,7 +8,7 @@ use relit_rig::turntable::{
 };
 use serde_json::json;
 
-use crate::environment::{at_end, runtime_folder};
+use crate::environment::at_end;
 use crate::table_arguments::{Action, TurntableArguments};
 use relit::console::{Console, Outcome};
 
@@ -18,10 +18,7 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
         Address::Serial(None) => find_serial()?,
         Address::Simulated(_) | Address::None => return Err(no_port(&asked.turntable)),
     };
-    let options = Options {
-        runtime_folder: runtime_folder(),
-        ..Options::default()
-    };
+    let options = Options::default();
     match asked.action {
         Action::Status => status(console, &port, &options),
         Action::Stop => stop(console, &port, &options),

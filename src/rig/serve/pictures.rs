@@ -77,9 +77,9 @@ impl Pictures {
     }
 }
 
-fn failed(error: relit_video::Error) -> Failure {
+fn failed(error: relit_video::VideoError) -> Failure {
     match error {
-        relit_video::Error::NoSuchFrame { .. } => Failure::not_found(error.to_string()),
+        relit_video::VideoError::NoSuchFrame { .. } => Failure::not_found(error.to_string()),
         _ => Failure::broken(error.to_string()),
     }
 }

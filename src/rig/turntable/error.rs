@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::codes::{Alarm, meaning_of_error};
 use super::wire::{LineFault, ResetCause, SendError, State};
+use crate::lockfile::LockError;
 
 /// Why a turntable could not be reached, or did not do what it was told.
 #[derive(Debug, thiserror::Error)]
@@ -40,6 +41,9 @@ pub enum TurntableError {
         /// The owner.
         pid: u32,
     },
+    /// The system gave no thread for the port.
+    #[error("no thread could be started for the port: {0}; end other programs and try again")]
+    Thread(std::io::Error),
     /// The port could not be opened.
     #[error(
         "{path} could not be opened: {source}; check that the controller is plugged in, that no other program has the port, and that you may use it (group dialout)"
@@ -51,17 +55,8 @@ pub enum TurntableError {
         source: std::io::Error,
     },
     /// Lock, socket or folder of the port's owner could not be used.
-    #[error(
-        "{path} could not be {doing}, and without it two programs could move one table: check the folder and who owns it"
-    )]
-    Claim {
-        /// The file.
-        path: PathBuf,
-        /// What was to be done, as a participle.
-        doing: &'static str,
-        /// The system's answer.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Lock(#[from] LockError),
     /// The process that owns the port could not be asked.
     #[error("process {pid}, which has {path}, did not answer: {why}; ask again, or end it")]
     Owner {

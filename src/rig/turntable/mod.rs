@@ -41,6 +41,7 @@ pub mod wire;
 use std::path::PathBuf;
 
 use crate::clock::Clock;
+use crate::lockfile;
 
 pub use address::{Address, SimulatedAddress, find_serial};
 pub use codes::Alarm;
@@ -65,8 +66,8 @@ pub struct Options {
     /// The clock that the table's times are told by. A simulated table that runs faster than real
     /// time needs the same clock as its simulator.
     pub clock: Clock,
-    /// Where the owner of a port leaves its lock and its socket: `$XDG_RUNTIME_DIR`, or a folder
-    /// that every program on the machine agrees on.
+    /// Where the owner of a port leaves its lock and its socket: a folder that every program on the
+    /// machine agrees on, as [`lockfile::standard_folder`] does.
     pub runtime_folder: PathBuf,
     /// How far the table may turn either way from the angle 0 before its cable is wound up, where
     /// the controller itself watches no limit; degrees.
@@ -80,7 +81,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             clock: Clock::monotonic(),
-            runtime_folder: PathBuf::from("/tmp"),
+            runtime_folder: lockfile::standard_folder(),
             travel_deg: 400.0,
             extras: true,
         }

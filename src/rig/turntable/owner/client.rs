@@ -1,13 +1,16 @@
 //! The other side: asking a port's owner.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use super::claim::{Files, owner_pid, try_lock};
+use relit_data::causes::with_causes;
+
+use super::claim::Files;
 use super::{Answer, Question};
+use crate::lockfile::LockFile;
 use crate::turntable::error::TurntableError;
 use crate::turntable::status::Status;
 
@@ -27,18 +30,18 @@ pub struct Owner {
 }
 
 impl Owner {
-    /// The owner of `port`, where it has one. Looks at the lock only, never at the port.
+    /// The owner of `port`, where it has one. Reads the lock only; never opens the port.
     ///
     /// # Errors
-    /// [`TurntableError::Open`] where there is no such port, [`TurntableError::Claim`] where the
-    /// lock cannot be looked at.
+    /// [`TurntableError::Open`] where there is no such port, [`TurntableError::Lock`] where it cannot
+    /// be known whether it has an owner: then nobody may open it either.
     pub fn find(port: &Path, runtime_folder: &Path) -> Result<Option<Owner>, TurntableError> {
         let files = Files::of(port, runtime_folder)?;
-        if try_lock(&files)?.is_some() {
-            return Ok(None);
-        }
-        let pid = owner_pid(&files.lock);
-        Ok(Some(Owner { files, pid }))
+        let holder = LockFile::holder(&files.lock)?;
+        Ok(holder.map(|holder| Owner {
+            files,
+            pid: holder.pid.unwrap_or(0),
+        }))
     }
 
     /// Its process number.
@@ -71,7 +74,7 @@ impl Owner {
         };
         let line = self
             .exchange(question)
-            .map_err(|error| failed(error.to_string()))?;
+            .map_err(|error| failed(with_causes(&error)))?;
         match serde_json::from_str(&line) {
             Ok(Answer::Status(status)) => Ok(status),
             Ok(Answer::Error(message)) => Err(TurntableError::OwnerSays {
@@ -99,7 +102,11 @@ impl Owner {
         let until = Instant::now() + OPENING;
         loop {
             match UnixStream::connect(&self.files.socket) {
-                Err(_) if Instant::now() < until => thread::sleep(PAUSE),
+                Err(error)
+                    if error.kind() != ErrorKind::PermissionDenied && Instant::now() < until =>
+                {
+                    thread::sleep(PAUSE);
+                }
                 connected => return connected,
             }
         }

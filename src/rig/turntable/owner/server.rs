@@ -9,8 +9,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use super::claim::claim_error;
+use relit_data::causes::with_causes;
+
 use super::{Answer, Question};
+use crate::lockfile::LockError;
 use crate::turntable::error::TurntableError;
 use crate::turntable::link::Link;
 
@@ -44,7 +46,7 @@ impl Server {
                 thread: Some(thread::spawn(move || serve(&listener, &link, &told))),
             }
         })
-        .map_err(claim_error(socket, "bound"))
+        .map_err(|source| LockError::system(socket, "bound")(source).into())
     }
 }
 
@@ -80,8 +82,8 @@ fn answer(stream: &UnixStream, link: &Link) -> io::Result<()> {
     let mut line = String::new();
     BufReader::new(stream.take(LONGEST)).read_line(&mut line)?;
     let done = match serde_json::from_str(&line) {
-        Ok(Question::Status) => link.status().map_err(|error| error.to_string()),
-        Ok(Question::Stop) => link.stop().map_err(|error| error.to_string()),
+        Ok(Question::Status) => link.status().map_err(|error| with_causes(&error)),
+        Ok(Question::Stop) => link.stop().map_err(|error| with_causes(&error)),
         Err(_) => Err("the owner is asked for \"status\" or \"stop\"".to_owned()),
     };
     let answer = match done {
