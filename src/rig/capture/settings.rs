@@ -31,7 +31,7 @@ pub struct Settings {
     /// The camera.
     pub camera: camera::Address,
     /// The turntable.
-    pub turntable: turntable::Address,
+    pub turntable: turntable::TurntableAddress,
     /// The camera's mode.
     pub mode: ModeWish,
     /// Values of its controls; what is not given stays as the camera has it.
@@ -56,7 +56,11 @@ impl Settings {
     /// Settings with the usual figures: 7.2 degrees/s at 30 frames/s, no frame may be missing, one
     /// more try.
     #[must_use]
-    pub fn new(root: PathBuf, camera: camera::Address, turntable: turntable::Address) -> Self {
+    pub fn new(
+        root: PathBuf,
+        camera: camera::Address,
+        turntable: turntable::TurntableAddress,
+    ) -> Self {
         Self {
             root,
             camera,
@@ -80,7 +84,7 @@ impl Settings {
     /// # Errors
     /// [`Refusal::Pace`] where one side is real and the other is to run faster.
     pub fn on_one_clock(mut self) -> Result<(Self, Clock), CaptureError> {
-        use turntable::Address as Table;
+        use turntable::TurntableAddress as Table;
         let sensible = |speed: f64| match speed {
             0.0 => FASTEST_REHEARSAL,
             speed => speed,

@@ -10,7 +10,7 @@ use super::{Recorder, Stage, Window};
 use crate::clock::Clock;
 use crate::daemon::idle::show_table;
 use crate::state::Phase;
-use crate::turntable::{self, ConstantPart, State, Table, Track, Turn, TurnPlan};
+use crate::turntable::{self, ConstantPart, ControllerState, Table, Track, Turn, TurnPlan};
 
 /// How long the newest frame is waited for in one go: how often everything is looked at.
 const GLANCE: Duration = Duration::from_millis(20);
@@ -129,7 +129,7 @@ impl Course<'_> {
     /// The table moves, and nobody looks at its reports until it is there.
     fn show_unwatched_motion(&self) {
         self.on.monitor.update(|state| {
-            state.table.state = State::Run.to_string();
+            state.table.state = ControllerState::Run.to_string();
             state.table.angle_deg = None;
             state.table.degrees_per_second = None;
         });

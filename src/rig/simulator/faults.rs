@@ -3,7 +3,7 @@
 use std::str::FromStr;
 use std::time::Duration;
 
-use super::Error;
+use super::SimulatorError;
 
 /// What goes wrong on the wire, and with the chip.
 ///
@@ -15,7 +15,7 @@ use super::Error;
 /// watchdog does; `stall@20s` makes it stop answering and moving. Times are by the simulator's
 /// clock, from its start.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Faults {
+pub struct TableFaults {
     /// On the way to the chip.
     pub to_chip: WireFaults,
     /// On the way from the chip.
@@ -43,17 +43,17 @@ pub struct WireFaults {
     pub delay_by: Duration,
 }
 
-impl FromStr for Faults {
-    type Err = Error;
+impl FromStr for TableFaults {
+    type Err = SimulatorError;
 
-    fn from_str(text: &str) -> Result<Faults, Error> {
-        let mut faults = Faults::default();
+    fn from_str(text: &str) -> Result<TableFaults, SimulatorError> {
+        let mut faults = TableFaults::default();
         for item in text
             .split(',')
             .map(str::trim)
             .filter(|item| !item.is_empty())
         {
-            faults.add(item).map_err(|why| Error::Fault {
+            faults.add(item).map_err(|why| SimulatorError::Fault {
                 item: item.to_owned(),
                 why,
             })?;
@@ -62,7 +62,7 @@ impl FromStr for Faults {
     }
 }
 
-impl Faults {
+impl TableFaults {
     fn add(&mut self, item: &str) -> Result<(), &'static str> {
         if let Some((what, at)) = item.split_once('@') {
             let at = duration(at)?;
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn all_faults_are_read() {
-        let faults: Faults = "drop=0.01, to.flip=0.005,from.duplicate=1,merge=0,\
+        let faults: TableFaults = "drop=0.01, to.flip=0.005,from.duplicate=1,merge=0,\
                               delay=0.02:30ms,reset@12.5s,reset@20s,stall@30s"
             .parse()
             .unwrap();
@@ -144,7 +144,7 @@ mod tests {
             delay_by: Duration::from_millis(30),
             ..WireFaults::default()
         };
-        let expected = Faults {
+        let expected = TableFaults {
             to_chip: WireFaults {
                 flip: 0.005,
                 ..both
@@ -157,7 +157,7 @@ mod tests {
             stall: Some(Duration::from_secs(30)),
         };
         assert_eq!(faults, expected);
-        assert_eq!("".parse::<Faults>().unwrap(), Faults::default());
+        assert_eq!("".parse::<TableFaults>().unwrap(), TableFaults::default());
     }
 
     #[test]
@@ -178,7 +178,7 @@ mod tests {
             "flip@3s",
             "to.reset=1",
         ] {
-            let error = text.parse::<Faults>().unwrap_err().to_string();
+            let error = text.parse::<TableFaults>().unwrap_err().to_string();
             assert!(error.contains(text), "{error}");
         }
     }

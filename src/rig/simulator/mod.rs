@@ -3,13 +3,13 @@
 //! A [`SimulatedTable`] runs the very code that runs on the chip, up to whatever its [`Clock`] shows
 //! when somebody looks. Its port leads through memory; a [`Simulator`] puts it on a pseudoterminal, for
 //! other programs. Either looks like an Arduino's: whoever opens it resets the chip, bytes take the
-//! time of 115 200 baud, and the wire can be as bad as [`Faults`] asks. What no real table reports, this
+//! time of 115 200 baud, and the wire can be as bad as [`TableFaults`] asks. What no real table reports, this
 //! one does: where it stood at any moment.
 //!
 //! ```
 //! use relit_rig::clock::Clock;
 //! use relit_rig::simulator::{SimulatedTable, SimulatorOptions};
-//! use relit_rig::turntable::{Options, Table};
+//! use relit_rig::turntable::{TableOptions, Table};
 //!
 //! let clock = Clock::virtual_time();
 //! let _part = clock.take_part();
@@ -17,9 +17,9 @@
 //!     clock: clock.clone(),
 //!     ..SimulatorOptions::default()
 //! });
-//! let options = Options {
+//! let options = TableOptions {
 //!     clock: clock.clone(),
-//!     ..Options::default()
+//!     ..TableOptions::default()
 //! };
 //! let table = Table::open(simulated.open(), &options)?;
 //! table.jog(90.0, None)?;
@@ -48,7 +48,7 @@ use serde::Serialize;
 
 use crate::clock::{Clock, JoinHandle};
 
-pub use faults::{Faults, WireFaults};
+pub use faults::{TableFaults, WireFaults};
 pub use table::{SimulatedPort, SimulatedTable};
 pub use truth::{STEPS_PER_TURN, StepEdge};
 pub use wire::WireCounts;
@@ -58,7 +58,7 @@ use terminal::Terminal;
 
 /// Why there is no simulated table.
 #[derive(Debug, thiserror::Error)]
-pub enum Error {
+pub enum SimulatorError {
     /// A fault that nobody can make.
     #[error("the fault {item:?} is not understood: {why}")]
     Fault {
@@ -96,7 +96,7 @@ pub struct SimulatorOptions {
     /// The clock that its time follows; give the same one to whatever works with it.
     pub clock: Clock,
     /// What goes wrong.
-    pub faults: Faults,
+    pub faults: TableFaults,
     /// What makes random faults repeatable.
     pub seed: u64,
     /// The angle at which the table stands when it is switched on, degrees.
@@ -117,7 +117,7 @@ impl Default for SimulatorOptions {
     fn default() -> Self {
         SimulatorOptions {
             clock: Clock::monotonic(),
-            faults: Faults::default(),
+            faults: TableFaults::default(),
             seed: 0,
             start_angle: 0.0,
             index_at: 30.0,
@@ -161,7 +161,10 @@ impl Simulator {
     ///
     /// # Errors
     /// Where the system gives no pseudoterminal, link or thread.
-    pub fn start(options: &SimulatorOptions, link: Option<&Path>) -> Result<Simulator, Error> {
+    pub fn start(
+        options: &SimulatorOptions,
+        link: Option<&Path>,
+    ) -> Result<Simulator, SimulatorError> {
         let terminal = Terminal::open()?;
         let path = terminal.path().to_owned();
         if let Some(link) = link {
@@ -179,7 +182,7 @@ impl Simulator {
         let thread = options.clock.spawn("simulator", move || {
             carry(&clock, &table, terminal, &stop);
         });
-        simulator.thread = Some(thread.map_err(Error::Thread)?);
+        simulator.thread = Some(thread.map_err(SimulatorError::Thread)?);
         Ok(simulator)
     }
 
@@ -241,8 +244,8 @@ fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &A
 }
 
 /// Makes the link; one that was left behind is replaced, anything else is not.
-fn make_link(port: &Path, link: &Path) -> Result<(), Error> {
-    let failed = |source| Error::Link {
+fn make_link(port: &Path, link: &Path) -> Result<(), SimulatorError> {
+    let failed = |source| SimulatorError::Link {
         path: link.to_owned(),
         source,
     };

@@ -11,7 +11,7 @@ use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-use super::Error;
+use super::SimulatorError;
 
 /// The chip's end of the line.
 pub(super) struct Terminal {
@@ -24,8 +24,8 @@ pub(super) struct Terminal {
 }
 
 impl Terminal {
-    pub(super) fn open() -> Result<Terminal, Error> {
-        let failed = |step| move |errno: Errno| Error::Terminal { step, errno };
+    pub(super) fn open() -> Result<Terminal, SimulatorError> {
+        let failed = |step| move |errno: Errno| SimulatorError::Terminal { step, errno };
         let line = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)
             .map_err(failed("open"))?;
         grantpt(&line).map_err(failed("grant"))?;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::codes::{Alarm, meaning_of_error};
-use super::wire::{LineFault, ResetCause, SendError, State};
+use super::wire::{ControllerState, LineFault, RestartCause, SendError};
 
 /// Why a turntable could not be reached, or did not do what it was told.
 #[derive(Debug, thiserror::Error)]
@@ -137,7 +137,7 @@ pub enum TurntableError {
     #[error("the table is in state {state} and takes no motion: {}", advice(*.state, .alarm.as_ref()))]
     NotReady {
         /// Its state.
-        state: State,
+        state: ControllerState,
         /// The alarm that locked it.
         alarm: Option<Alarm>,
     },
@@ -191,7 +191,7 @@ pub enum TurntableError {
     #[error(
         "the turn was planned from {planned_deg:.3} degrees and the table stands at {at_deg:.3}: plan it anew"
     )]
-    Moved {
+    MovedSincePlan {
         /// Where it was planned from.
         planned_deg: f64,
         /// Where the table stands.
@@ -199,7 +199,7 @@ pub enum TurntableError {
     },
     /// A motion ended otherwise than it should have.
     #[error("the motion failed: {0}")]
-    Motion(#[from] Fault),
+    Motion(#[from] MotionFault),
     /// The table could not be seen at rest.
     #[error(
         "the table was told to stop and could not be seen at rest: cut its power, then check the cable"
@@ -212,10 +212,10 @@ pub enum TurntableError {
 
 /// Why a motion ended otherwise than it should have. The table is being stopped then, or has been.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Fault {
+pub enum MotionFault {
     /// The controller restarted.
     #[error("the controller restarted{}, and its position is lost; check its supply and cable, then home it", .0.map_or_else(String::new, |cause| format!(" ({cause})")))]
-    Restarted(Option<ResetCause>),
+    Restarted(Option<RestartCause>),
     /// An alarm.
     #[error("{0}")]
     Alarm(Alarm),
@@ -242,7 +242,7 @@ pub enum Fault {
     )]
     Astray {
         /// What it does.
-        state: State,
+        state: ControllerState,
         /// Where it is, from machine zero.
         machine_deg: f64,
         /// Where it was sent, from machine zero.
@@ -262,12 +262,16 @@ pub enum Fault {
     Stopped,
 }
 
-fn advice(state: State, alarm: Option<&Alarm>) -> String {
+fn advice(state: ControllerState, alarm: Option<&Alarm>) -> String {
     match state {
-        State::Alarm => alarm.map_or_else(|| "unlock or home it".to_owned(), Alarm::to_string),
-        State::Held | State::Holding | State::Door => "stop it first".to_owned(),
-        State::Check => "switch Grbl's check mode off with `$C`".to_owned(),
-        State::Sleep => "wake it with a reset".to_owned(),
+        ControllerState::Alarm => {
+            alarm.map_or_else(|| "unlock or home it".to_owned(), Alarm::to_string)
+        }
+        ControllerState::Held | ControllerState::Holding | ControllerState::Door => {
+            "stop it first".to_owned()
+        }
+        ControllerState::Check => "switch Grbl's check mode off with `$C`".to_owned(),
+        ControllerState::Sleep => "wake it with a reset".to_owned(),
         _ => "stop it, or wait until it is idle".to_owned(),
     }
 }

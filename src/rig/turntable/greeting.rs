@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use super::Options;
+use super::TableOptions;
 use super::error::TurntableError;
 use super::identity::{Extras, Identity, Settings};
 use super::link::Link;
-use super::supervisor::Habits;
-use super::wire::{Message, Outcome, Patience, State};
+use super::supervisor::ControllerTraits;
+use super::wire::{ControllerState, LineOutcome, Message, ReplyTimeout};
 
 /// How long an Arduino takes at most to start after its port was opened.
 const START_WAIT: Duration = Duration::from_secs(4);
@@ -26,7 +26,7 @@ const POLL_STAMPED: Duration = Duration::from_micros(66_667);
 const POLL_STOCK: Duration = Duration::from_millis(200);
 
 /// What is assumed of a controller before it is known.
-pub(super) const STRANGER: Habits = Habits {
+pub(super) const UNKNOWN_CONTROLLER: ControllerTraits = ControllerTraits {
     degrees_per_unit: 1.0,
     poll: POLL_STOCK,
     stamps: false,
@@ -39,9 +39,9 @@ pub(super) const STRANGER: Habits = Habits {
 pub(super) fn greet(
     link: &Link,
     resets: bool,
-    options: &Options,
+    options: &TableOptions,
 ) -> Result<Identity, TurntableError> {
-    rouse(link, resets)?;
+    wake(link, resets)?;
     let about = about(link)?;
     let build = |message: &Message| match message {
         Message::Build { letters, .. } => Some(Extras::of(letters)),
@@ -54,7 +54,7 @@ pub(super) fn greet(
     let mut identity = Identity::read(&about, &settings, options.travel_deg)?;
     identity.extras = extras;
     identity.lease_s = identity.lease_s.filter(|_| extras.lease);
-    link.supervisor().set_habits(Habits {
+    link.supervisor().set_traits(ControllerTraits {
         degrees_per_unit: identity.degrees_per_unit,
         poll: if extras.stamps {
             POLL_STAMPED
@@ -77,7 +77,7 @@ pub(super) fn secure(link: &Link, extras: &Extras) -> Result<(), TurntableError>
 }
 
 /// Waits for the banner, and for a first report; stops a table that moves or is held.
-fn rouse(link: &Link, resets: bool) -> Result<(), TurntableError> {
+fn wake(link: &Link, resets: bool) -> Result<(), TurntableError> {
     let limit = if resets { START_WAIT } else { SHORT_WAIT };
     link.wait(limit, |supervisor| {
         (supervisor.restarts() > 0).then_some(())
@@ -91,9 +91,9 @@ fn rouse(link: &Link, resets: bool) -> Result<(), TurntableError> {
         supervisor.seen().map(|seen| Some(seen.state))
     });
     match state {
-        Some(Some(State::Idle | State::Alarm | State::Check)) => {}
+        Some(Some(ControllerState::Idle | ControllerState::Alarm | ControllerState::Check)) => {}
         Some(Some(_)) => link.stop().map(|_| ())?,
-        Some(None) | None => return Err(stranger(link)),
+        Some(None) | None => return Err(no_controller(link)),
     }
     forget_echo(link)
 }
@@ -103,13 +103,13 @@ fn rouse(link: &Link, resets: bool) -> Result<(), TurntableError> {
 /// the head of the next line, which is an empty one here, whatever the answer.
 fn forget_echo(link: &Link) -> Result<(), TurntableError> {
     link.clock().sleep(ECHO_WAIT);
-    match link.line("", Patience::Short)? {
-        Outcome::Failed(_) => link.wait_stopped(),
-        Outcome::Done(_) | Outcome::Refused(_) => Ok(()),
+    match link.line("", ReplyTimeout::AtOnce)? {
+        LineOutcome::Failed(_) => link.wait_stopped(),
+        LineOutcome::Done(_) | LineOutcome::Refused(_) => Ok(()),
     }
 }
 
-fn stranger(link: &Link) -> TurntableError {
+fn no_controller(link: &Link) -> TurntableError {
     let supervisor = link.supervisor();
     let counts = supervisor.counts();
     let heard = match (supervisor.closed(), counts.noise) {
@@ -127,14 +127,14 @@ fn stranger(link: &Link) -> TurntableError {
 fn about(link: &Link) -> Result<Vec<Message>, TurntableError> {
     let mut told = Vec::new();
     for _ in 0..READINGS {
-        let outcome = link.line("$I", Patience::Short)?;
-        if outcome == Outcome::Refused(SESSION_OPEN) {
+        let outcome = link.line("$I", ReplyTimeout::AtOnce)?;
+        if outcome == LineOutcome::Refused(SESSION_OPEN) {
             // The last owner went away in the middle of a checked session: go on with it.
             done(link, "N0", link.open_session()?)?;
             continue;
         }
         let messages = match outcome {
-            Outcome::Failed(_) if link.wait_stopped().is_ok() => continue,
+            LineOutcome::Failed(_) if link.wait_stopped().is_ok() => continue,
             outcome => done(link, "$I", outcome)?,
         };
         let whole = |kind: fn(&Message) -> bool| messages.iter().any(kind);
@@ -154,8 +154,8 @@ fn about(link: &Link) -> Result<Vec<Message>, TurntableError> {
 fn settings(link: &Link, extras: Extras) -> Result<Settings, TurntableError> {
     let mut told = None;
     for _ in 0..READINGS {
-        let messages = match link.line("$$", Patience::Short)? {
-            Outcome::Failed(_) if link.wait_stopped().is_ok() => {
+        let messages = match link.line("$$", ReplyTimeout::AtOnce)? {
+            LineOutcome::Failed(_) if link.wait_stopped().is_ok() => {
                 secure(link, &extras)?;
                 continue;
             }
@@ -173,12 +173,12 @@ fn settings(link: &Link, extras: Extras) -> Result<Settings, TurntableError> {
     Err(TurntableError::Untold("its settings (`$$`) twice the same"))
 }
 
-fn done(link: &Link, block: &str, outcome: Outcome) -> Result<Vec<Message>, TurntableError> {
+fn done(link: &Link, block: &str, outcome: LineOutcome) -> Result<Vec<Message>, TurntableError> {
     let block = block.to_owned();
     match outcome {
-        Outcome::Done(messages) => Ok(messages),
-        Outcome::Refused(code) => Err(TurntableError::Refused { block, code }),
-        Outcome::Failed(fault) => {
+        LineOutcome::Done(messages) => Ok(messages),
+        LineOutcome::Refused(code) => Err(TurntableError::Refused { block, code }),
+        LineOutcome::Failed(fault) => {
             link.wait_stopped()?;
             Err(TurntableError::Lost { block, fault })
         }

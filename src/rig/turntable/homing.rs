@@ -4,10 +4,10 @@ use super::codes::Alarm;
 use super::error::TurntableError;
 use super::supervisor::Course;
 use super::table::{Table, refused};
-use super::wire::{Outcome, Patience, State};
+use super::wire::{ControllerState, LineOutcome, ReplyTimeout};
 
 /// How long the search for the index may take.
-const HOMING: Patience = Patience::Long(120_000_000);
+const HOMING: ReplyTimeout = ReplyTimeout::Within(120_000_000);
 /// Grbl's refusal of `$H` where homing is switched off.
 const HOMING_OFF: u8 = 5;
 
@@ -38,17 +38,17 @@ impl Table {
 
     fn search_index(&self) -> Result<Homed, TurntableError> {
         match self.outcome("$H", HOMING)? {
-            Outcome::Refused(HOMING_OFF) => return self.home_where_it_stands(),
-            Outcome::Refused(code) => return Err(refused("$H", code)),
-            Outcome::Failed(fault) => return Err(self.lost("$H", fault)),
-            Outcome::Done(_) => {}
+            LineOutcome::Refused(HOMING_OFF) => return self.home_where_it_stands(),
+            LineOutcome::Refused(code) => return Err(refused("$H", code)),
+            LineOutcome::Failed(fault) => return Err(self.lost("$H", fault)),
+            LineOutcome::Done(_) => {}
         }
         if let Some(fault) = self.end_by_fault()? {
             return Err(fault);
         }
         // A controller that has not found its index accepts `$H` all the same.
         let status = self.status()?;
-        if status.state != State::Idle {
+        if status.state != ControllerState::Idle {
             return Err(TurntableError::Homing(status.alarm.unwrap_or(Alarm(None))));
         }
         self.link().supervisor().set_zero_deg(0.0);

@@ -11,7 +11,7 @@ const INCH: f64 = 25.4;
 /// What the rig's own firmware offers beyond Grbl.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Extras {
-    /// Status reports carry the chip's time of the position.
+    /// TableStatus reports carry the chip's time of the position.
     pub stamps: bool,
     /// Lines can be numbered and checksummed.
     pub checked_lines: bool,
@@ -32,7 +32,7 @@ impl Extras {
 
 /// How far the table may turn, degrees from machine zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub struct TravelLimits {
     /// Lower end.
     pub low_deg: f64,
     /// Upper end.
@@ -53,7 +53,7 @@ pub struct Identity {
     /// Acceleration, degrees/s^2.
     pub acceleration: f64,
     /// How far it may turn.
-    pub limits: Limits,
+    pub limits: TravelLimits,
     /// Whether it can look for the index (`$22`).
     pub homing: bool,
     /// Its lease, seconds; 0 when it is off, `None` where there is none.
@@ -152,7 +152,7 @@ impl Settings {
         self.get(number).is_some_and(|value| value != 0.0)
     }
 
-    fn limits(&self, extras: Extras, travel_deg: f64) -> Result<Limits, TurntableError> {
+    fn limits(&self, extras: Extras, travel_deg: f64) -> Result<TravelLimits, TurntableError> {
         let reach_deg = match self.is_on(20) {
             true => self
                 .positive(130)
@@ -161,7 +161,7 @@ impl Settings {
         };
         // Stock Grbl's soft limits reach from the far end of the axis to machine zero.
         let stock = self.is_on(20) && extras == Extras::default();
-        Ok(Limits {
+        Ok(TravelLimits {
             low_deg: -reach_deg,
             high_deg: if stock { 0.0 } else { reach_deg },
         })

@@ -5,11 +5,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, MutexGuard};
 use std::time::Duration;
 
-use super::error::{Fault, TurntableError};
+use super::error::{MotionFault, TurntableError};
 use super::port::Port;
-use super::status::Status;
-use super::supervisor::{Habits, StopOutcome, Supervisor};
-use super::wire::{Outcome, Patience, SendError};
+use super::status::TableStatus;
+use super::supervisor::{ControllerTraits, StopOutcome, Supervisor};
+use super::wire::{LineOutcome, ReplyTimeout, SendError};
 use crate::clock::{Clock, JoinHandle, Waitable};
 
 /// Longest wait for bytes before time and output are looked at again.
@@ -51,11 +51,11 @@ impl Link {
     pub(super) fn start(
         port: Box<dyn Port>,
         clock: &Clock,
-        habits: Habits,
+        traits: ControllerTraits,
     ) -> Result<(Link, IoThread), TurntableError> {
         let link = Link {
             port_name: port.name().into(),
-            supervisor: Arc::new(Waitable::new(clock, Supervisor::new(habits))),
+            supervisor: Arc::new(Waitable::new(clock, Supervisor::new(traits))),
         };
         let quit = Arc::new(AtomicBool::new(false));
         let thread = clock.spawn("turntable", {
@@ -90,32 +90,36 @@ impl Link {
     }
 
     /// Sends a line and waits for its answer.
-    pub(super) fn line(&self, block: &str, patience: Patience) -> Result<Outcome, TurntableError> {
+    pub(super) fn line(
+        &self,
+        block: &str,
+        timeout: ReplyTimeout,
+    ) -> Result<LineOutcome, TurntableError> {
         let now_us = self.clock().now_us();
-        let sent = self.supervisor().send(now_us, block, patience);
-        self.answer(block, sent, patience)
+        let sent = self.supervisor().send(now_us, block, timeout);
+        self.answer(block, sent, timeout)
     }
 
     /// Opens a checked session.
-    pub(super) fn open_session(&self) -> Result<Outcome, TurntableError> {
+    pub(super) fn open_session(&self) -> Result<LineOutcome, TurntableError> {
         let now_us = self.clock().now_us();
         let sent = self.supervisor().open_session(now_us);
-        self.answer("N0", sent, Patience::Short)
+        self.answer("N0", sent, ReplyTimeout::AtOnce)
     }
 
     fn answer(
         &self,
         block: &str,
         sent: Result<u64, SendError>,
-        patience: Patience,
-    ) -> Result<Outcome, TurntableError> {
+        timeout: ReplyTimeout,
+    ) -> Result<LineOutcome, TurntableError> {
         let id = sent.map_err(|why| TurntableError::Unsent {
             block: block.to_owned(),
             why,
         })?;
-        let limit = match patience {
-            Patience::Short => ANSWER_WAIT,
-            Patience::Long(us) => Duration::from_micros(us.unsigned_abs()) + LATE_ANSWER,
+        let limit = match timeout {
+            ReplyTimeout::AtOnce => ANSWER_WAIT,
+            ReplyTimeout::Within(us) => Duration::from_micros(us.unsigned_abs()) + LATE_ANSWER,
         };
         let outcome = self.wait(limit, |supervisor| match port_lost(supervisor) {
             Some(error) => Some(Err(error)),
@@ -128,7 +132,7 @@ impl Link {
 
     /// The table's state by a report that was asked for just now, and by one more where they have
     /// no checksum.
-    pub(super) fn status(&self) -> Result<Status, TurntableError> {
+    pub(super) fn status(&self) -> Result<TableStatus, TurntableError> {
         let asked_us = self.clock().now_us();
         let until_us = self.clock().after(REPORT_WAIT);
         self.supervisor().want_reports(until_us);
@@ -138,7 +142,7 @@ impl Link {
             }
             let seen = supervisor.seen()?;
             let fresh = seen.asked_us.is_some_and(|us| us >= asked_us);
-            (fresh && supervisor.is_confirmed()).then(|| Ok(Status::of(seen, supervisor)))
+            (fresh && supervisor.is_confirmed()).then(|| Ok(TableStatus::of(seen, supervisor)))
         });
         status.unwrap_or(Err(TurntableError::Silent {
             milliseconds: REPORT_WAIT.as_millis() as u64,
@@ -146,7 +150,7 @@ impl Link {
     }
 
     /// Brings the table to a standstill, and drops what it was still to do.
-    pub(super) fn stop(&self) -> Result<Status, TurntableError> {
+    pub(super) fn stop(&self) -> Result<TableStatus, TurntableError> {
         let now_us = self.clock().now_us();
         self.supervisor().request_stop(now_us);
         self.wait_stopped()?;
@@ -168,7 +172,7 @@ impl Link {
 
 fn port_lost(supervisor: &Supervisor) -> Option<TurntableError> {
     let why = supervisor.closed()?;
-    Some(Fault::PortLost(why.to_owned()).into())
+    Some(MotionFault::PortLost(why.to_owned()).into())
 }
 
 /// The thread: what is due goes out, what comes is taken, until it is to end or the port is gone.

@@ -20,13 +20,13 @@
 mod address;
 mod codes;
 mod error;
+#[cfg(test)]
+mod fake_grbl;
 mod greeting;
 mod homing;
 mod identity;
 mod link;
 mod owner;
-#[cfg(test)]
-mod peer;
 mod plan;
 mod port;
 mod status;
@@ -42,26 +42,26 @@ use std::path::PathBuf;
 
 use crate::clock::Clock;
 
-pub use address::{Address, SimulatedAddress, find_serial};
+pub use address::{SimulatedAddress, TurntableAddress, find_serial};
 pub use codes::Alarm;
-pub use error::{Fault, TurntableError};
+pub use error::{MotionFault, TurntableError};
 pub use homing::Homed;
-pub use identity::{Extras, Identity, Limits};
+pub use identity::{Extras, Identity, TravelLimits};
 pub use owner::Owner;
 pub use plan::{Direction, TurnPlan, TurnRequest};
 pub use port::{Port, SerialPort};
-pub use status::Status;
+pub use status::TableStatus;
 pub use sync::{Residuals, Track, TrackError};
 pub use table::Table;
-pub use turn::{ConstantPart, Phase, Turn};
-pub use wire::{Counts, LineFault, ResetCause, SendError, State};
+pub use turn::{ConstantPart, Turn, TurnPhase};
+pub use wire::{ControllerState, Counts, LineFault, RestartCause, SendError};
 
 /// The lease that a turn sets where it is off, seconds.
 const LEASE_S: u32 = 3;
 
 /// How a table is opened.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Options {
+pub struct TableOptions {
     /// The clock that the table's times are told by. A simulated table that runs faster than real
     /// time needs the same clock as its simulator.
     pub clock: Clock,
@@ -76,7 +76,7 @@ pub struct Options {
     pub extras: bool,
 }
 
-impl Default for Options {
+impl Default for TableOptions {
     fn default() -> Self {
         Self {
             clock: Clock::monotonic(),

@@ -11,7 +11,7 @@
 
 use super::error::TurntableError;
 use super::identity::Identity;
-use super::status::Status;
+use super::status::TableStatus;
 
 /// Degrees added to a ramp for the rounding of its steps.
 const RAMP_SLACK_DEG: f64 = 0.1;
@@ -84,7 +84,7 @@ impl TurnPlan {
     /// table can follow.
     pub fn new(
         identity: &Identity,
-        status: &Status,
+        status: &TableStatus,
         request: &TurnRequest,
     ) -> Result<TurnPlan, TurntableError> {
         check(identity, request)?;
@@ -173,7 +173,7 @@ impl TurnPlan {
 impl Identity {
     /// The limits as angles of a table whose angle and machine position are known: those of the
     /// controller, and as far again either way from the angle 0, where the cable hangs free.
-    pub(super) fn limits_from(&self, status: &Status) -> (f64, f64) {
+    pub(super) fn limits_from(&self, status: &TableStatus) -> (f64, f64) {
         let zero = status.machine_deg - status.angle_deg;
         let reach = self.limits.high_deg.max(-self.limits.low_deg);
         let low = (self.limits.low_deg - zero).max(-reach);
@@ -218,7 +218,7 @@ fn check(identity: &Identity, request: &TurnRequest) -> Result<(), TurntableErro
 
 fn no_room(
     plan: Option<&TurnPlan>,
-    status: &Status,
+    status: &TableStatus,
     (low_deg, high_deg): (f64, f64),
     request: &TurnRequest,
 ) -> TurntableError {
@@ -250,8 +250,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::turntable::identity::{Extras, Limits};
-    use crate::turntable::wire::State;
+    use crate::turntable::identity::{Extras, TravelLimits};
+    use crate::turntable::wire::ControllerState;
 
     fn identity(low_deg: f64, high_deg: f64) -> Identity {
         Identity {
@@ -260,16 +260,16 @@ mod tests {
             steps_per_degree: 88.889,
             max_degrees_per_second: 36.0,
             acceleration: 36.0,
-            limits: Limits { low_deg, high_deg },
+            limits: TravelLimits { low_deg, high_deg },
             homing: false,
             lease_s: None,
             degrees_per_unit: 1.0,
         }
     }
 
-    fn status(angle_deg: f64, machine_deg: f64) -> Status {
-        Status {
-            state: State::Idle,
+    fn status(angle_deg: f64, machine_deg: f64) -> TableStatus {
+        TableStatus {
+            state: ControllerState::Idle,
             angle_deg,
             machine_deg,
             degrees_per_second: 0.0,

@@ -1,14 +1,14 @@
 //! What a table is doing.
 
 use super::codes::Alarm;
-use super::supervisor::{Seen, Supervisor};
-use super::wire::State;
+use super::supervisor::{PositionReport, Supervisor};
+use super::wire::ControllerState;
 
 /// What the table is doing, by a report of just now.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Status {
+pub struct TableStatus {
     /// The controller's state.
-    pub state: State,
+    pub state: ControllerState,
     /// Degrees from the angle counted as zero, or from machine zero while that is not known.
     pub angle_deg: f64,
     /// Degrees as the controller counts them.
@@ -27,10 +27,10 @@ pub struct Status {
     pub alarm: Option<Alarm>,
 }
 
-impl Status {
-    pub(super) fn of(seen: &Seen, supervisor: &Supervisor) -> Status {
+impl TableStatus {
+    pub(super) fn of(seen: &PositionReport, supervisor: &Supervisor) -> TableStatus {
         let zero = supervisor.zero_deg();
-        Status {
+        TableStatus {
             state: seen.state,
             angle_deg: seen.machine_deg - zero.unwrap_or(0.0),
             machine_deg: seen.machine_deg,

@@ -10,11 +10,11 @@ use super::link::{IoThread, Link};
 use super::owner::{Claim, Server};
 use super::plan::TurnPlan;
 use super::port::{Port, SerialPort};
-use super::status::Status;
+use super::status::TableStatus;
 use super::supervisor::Course;
 use super::turn::Turn;
-use super::wire::{Counts, Message, Outcome, Patience, State};
-use super::{LEASE_S, Options};
+use super::wire::{ControllerState, Counts, LineOutcome, Message, ReplyTimeout};
+use super::{LEASE_S, TableOptions};
 use crate::clock::{Clock, Waitable};
 
 /// What is added to the time a motion should take.
@@ -41,7 +41,7 @@ impl Table {
     ///
     /// # Errors
     /// [`TurntableError::NoController`], or what else went wrong on the way.
-    pub fn open(port: impl Port, options: &Options) -> Result<Table, TurntableError> {
+    pub fn open(port: impl Port, options: &TableOptions) -> Result<Table, TurntableError> {
         Self::greet(Box::new(port), None, options)
     }
 
@@ -50,7 +50,7 @@ impl Table {
     ///
     /// # Errors
     /// [`TurntableError::Owned`] where another process has it, and what [`Table::open`] says.
-    pub fn open_serial(path: &Path, options: &Options) -> Result<Table, TurntableError> {
+    pub fn open_serial(path: &Path, options: &TableOptions) -> Result<Table, TurntableError> {
         // Opening the port resets an Arduino: nobody may own it by then.
         let claim = Claim::take(path, &options.runtime_folder)?;
         let port = SerialPort::open(path)?;
@@ -60,10 +60,10 @@ impl Table {
     fn greet(
         port: Box<dyn Port>,
         claim: Option<Claim>,
-        options: &Options,
+        options: &TableOptions,
     ) -> Result<Table, TurntableError> {
         let resets = port.resets();
-        let (link, io_thread) = Link::start(port, &options.clock, greeting::STRANGER)?;
+        let (link, io_thread) = Link::start(port, &options.clock, greeting::UNKNOWN_CONTROLLER)?;
         let identity = greeting::greet(&link, resets, options)?;
         let server = claim.as_ref().map(|claim| claim.serve(link.clone()));
         Ok(Table {
@@ -100,7 +100,7 @@ impl Table {
     ///
     /// # Errors
     /// [`TurntableError::Silent`].
-    pub fn status(&self) -> Result<Status, TurntableError> {
+    pub fn status(&self) -> Result<TableStatus, TurntableError> {
         self.link.status()
     }
 
@@ -109,7 +109,7 @@ impl Table {
     ///
     /// # Errors
     /// [`TurntableError::BeyondLimit`], [`TurntableError::NotReady`], or what ended the motion.
-    pub fn jog(&self, degrees: f64, speed: Option<f64>) -> Result<Status, TurntableError> {
+    pub fn jog(&self, degrees: f64, speed: Option<f64>) -> Result<TableStatus, TurntableError> {
         let speed = speed.unwrap_or_else(|| self.brisk());
         self.identity.check_speed(speed)?;
         if !degrees.is_finite() {
@@ -150,7 +150,7 @@ impl Table {
     fn travel(
         &self,
         block: &str,
-        from: &Status,
+        from: &TableStatus,
         machine_deg: f64,
         speed: f64,
     ) -> Result<(), TurntableError> {
@@ -203,7 +203,7 @@ impl Table {
             Some(fault) => Err(fault),
             None if ended.is_none() => {
                 self.stop()?;
-                Err(super::error::Fault::Late.into())
+                Err(super::error::MotionFault::Late.into())
             }
             None => Ok(()),
         }
@@ -234,14 +234,14 @@ impl Table {
     }
 
     /// The status of a table that can take a motion.
-    pub(super) fn ready(&self) -> Result<Status, TurntableError> {
+    pub(super) fn ready(&self) -> Result<TableStatus, TurntableError> {
         let status = self.status()?;
         let supervisor = self.link.supervisor();
         if supervisor.is_stopping() || supervisor.motion().is_some() {
             return Err(TurntableError::Busy);
         }
         match status.state {
-            State::Idle => Ok(status),
+            ControllerState::Idle => Ok(status),
             state => Err(TurntableError::NotReady {
                 state,
                 alarm: status.alarm,
@@ -253,7 +253,7 @@ impl Table {
     ///
     /// # Errors
     /// [`TurntableError::NotStopped`] where it was not seen at rest.
-    pub fn stop(&self) -> Result<Status, TurntableError> {
+    pub fn stop(&self) -> Result<TableStatus, TurntableError> {
         self.link.stop()
     }
 
@@ -261,7 +261,7 @@ impl Table {
     ///
     /// # Errors
     /// [`TurntableError::Refused`] while the emergency stop is pressed.
-    pub fn unlock(&self) -> Result<Status, TurntableError> {
+    pub fn unlock(&self) -> Result<TableStatus, TurntableError> {
         self.command("$X")?;
         self.status()
     }
@@ -274,7 +274,7 @@ impl Table {
     /// once in its life.
     ///
     /// # Errors
-    /// [`TurntableError::NotHomed`], [`TurntableError::Moved`], or what stops a motion.
+    /// [`TurntableError::NotHomed`], [`TurntableError::MovedSincePlan`], or what stops a motion.
     pub fn start_turn(&self, plan: TurnPlan) -> Result<Turn<'_>, TurntableError> {
         self.secure()?;
         let status = self.ready()?;
@@ -283,7 +283,7 @@ impl Table {
         }
         let planned_deg = plan.start_deg();
         if (status.angle_deg - planned_deg).abs() > 2.0 * self.identity.step_deg() {
-            return Err(TurntableError::Moved {
+            return Err(TurntableError::MovedSincePlan {
                 planned_deg,
                 at_deg: status.angle_deg,
             });
@@ -314,19 +314,19 @@ impl Table {
     pub(super) fn outcome(
         &self,
         block: &str,
-        patience: Patience,
-    ) -> Result<Outcome, TurntableError> {
+        timeout: ReplyTimeout,
+    ) -> Result<LineOutcome, TurntableError> {
         self.secure()?;
         let _turn = LineTurn::take(&self.line_open);
-        self.link.line(block, patience)
+        self.link.line(block, timeout)
     }
 
     /// Sends a line and waits for its `ok`; gives what stood in front of it.
     fn command(&self, block: &str) -> Result<Vec<Message>, TurntableError> {
-        match self.outcome(block, Patience::Short)? {
-            Outcome::Done(messages) => Ok(messages),
-            Outcome::Refused(code) => Err(refused(block, code)),
-            Outcome::Failed(fault) => Err(self.lost(block, fault)),
+        match self.outcome(block, ReplyTimeout::AtOnce)? {
+            LineOutcome::Done(messages) => Ok(messages),
+            LineOutcome::Refused(code) => Err(refused(block, code)),
+            LineOutcome::Failed(fault) => Err(self.lost(block, fault)),
         }
     }
 
@@ -334,7 +334,7 @@ impl Table {
     pub(super) fn lost(&self, block: &str, fault: super::wire::LineFault) -> TurntableError {
         match self.end_by_fault() {
             Err(error) => error,
-            Ok(Some(TurntableError::Motion(fault @ super::error::Fault::PortLost(_)))) => {
+            Ok(Some(TurntableError::Motion(fault @ super::error::MotionFault::PortLost(_)))) => {
                 fault.into()
             }
             Ok(_) => TurntableError::Lost {

@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use super::error::TurntableError;
 use super::plan::TurnPlan;
-use super::status::Status;
-use super::supervisor::Seen;
+use super::status::TableStatus;
+use super::supervisor::PositionReport;
 use super::sync::{self, Track};
 use super::table::{Table, straight};
-use super::wire::State;
+use super::wire::ControllerState;
 
 /// How long the table rests before it starts, so that it has stopped swinging.
 const SETTLE: Duration = Duration::from_millis(300);
@@ -26,7 +26,7 @@ pub struct ConstantPart {
 
 /// How far a turn is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
+pub enum TurnPhase {
     /// Getting up to speed.
     Starting,
     /// At constant speed.
@@ -76,20 +76,20 @@ impl<'table> Turn<'table> {
     ///
     /// # Errors
     /// What has ended it; the table has been stopped then.
-    pub fn state(&mut self) -> Result<Phase, TurntableError> {
+    pub fn state(&mut self) -> Result<TurnPhase, TurntableError> {
         self.check()?;
         let supervisor = self.table.link().supervisor();
         if supervisor
             .motion()
             .is_some_and(|motion| motion.is_at_target())
         {
-            return Ok(Phase::AtEnd);
+            return Ok(TurnPhase::AtEnd);
         }
         let gone = supervisor.recorded().last().map(|seen| self.gone(seen));
         Ok(match gone {
-            Some(gone) if gone > self.plan.constant_deg() => Phase::Ending,
-            Some(gone) if gone >= 0.0 => Phase::Constant,
-            _ => Phase::Starting,
+            Some(gone) if gone > self.plan.constant_deg() => TurnPhase::Ending,
+            Some(gone) if gone >= 0.0 => TurnPhase::Constant,
+            _ => TurnPhase::Starting,
         })
     }
 
@@ -103,7 +103,7 @@ impl<'table> Turn<'table> {
     }
 
     /// Degrees since the speed became constant; negative before.
-    fn gone(&self, seen: &Seen) -> f64 {
+    fn gone(&self, seen: &PositionReport) -> f64 {
         let angle = seen.machine_deg - self.zero_deg - self.plan.constant_from_deg();
         angle * self.plan.direction().sign()
     }
@@ -119,14 +119,16 @@ impl<'table> Turn<'table> {
             if supervisor.fault().is_some() {
                 return Some(None);
             }
-            let constant = |seen: &&Seen| seen.state == State::Run && self.gone(seen) >= 0.0;
+            let constant = |seen: &&PositionReport| {
+                seen.state == ControllerState::Run && self.gone(seen) >= 0.0
+            };
             let seen = supervisor.recorded().iter().rev().find(constant)?;
             Some(Some((*seen, self.gone(seen))))
         });
         self.check()?;
         let Some(Some((seen, gone))) = found else {
             self.stop()?;
-            return Err(super::error::Fault::Late.into());
+            return Err(super::error::MotionFault::Late.into());
         };
         let at_us = seen.asked_us.map_or(seen.came_us, |asked_us| {
             i64::midpoint(asked_us, seen.came_us)
@@ -173,11 +175,11 @@ impl<'table> Turn<'table> {
     ///
     /// # Errors
     /// [`TurntableError::NotStopped`].
-    pub fn abort(mut self) -> Result<Status, TurntableError> {
+    pub fn abort(mut self) -> Result<TableStatus, TurntableError> {
         self.stop()
     }
 
-    fn stop(&mut self) -> Result<Status, TurntableError> {
+    fn stop(&mut self) -> Result<TableStatus, TurntableError> {
         let stopped = self.table.stop();
         self.leave();
         stopped
@@ -195,7 +197,7 @@ impl<'table> Turn<'table> {
     }
 
     /// Stops watching; gives the reports.
-    fn leave(&mut self) -> Vec<Seen> {
+    fn leave(&mut self) -> Vec<PositionReport> {
         self.over = true;
         let mut supervisor = self.table.link().supervisor();
         supervisor.end_motion();

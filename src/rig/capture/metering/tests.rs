@@ -10,7 +10,7 @@ use crate::camera::{
 };
 use crate::clock::Clock;
 use crate::simulator::{SimulatedTable, SimulatorOptions};
-use crate::turntable::Options;
+use crate::turntable::TableOptions;
 
 const EXPOSURE: ControlId = ControlId(1);
 const AUTOMATIC: ControlId = ControlId(2);
@@ -168,10 +168,10 @@ fn metered(light: fn(f64) -> f64) -> (Result<i64, CaptureError>, f64, i64) {
         ..SimulatorOptions::default()
     });
     let locks = tempfile::tempdir().unwrap();
-    let options = Options {
+    let options = TableOptions {
         clock: clock.clone(),
         runtime_folder: locks.path().to_owned(),
-        ..Options::default()
+        ..TableOptions::default()
     };
     let table = Table::open(simulator.open(), &options).unwrap();
     let mut settings = Settings::new(

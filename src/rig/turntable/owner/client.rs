@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use super::claim::{Files, owner_pid, try_lock};
 use super::{Answer, Question};
 use crate::turntable::error::TurntableError;
-use crate::turntable::status::Status;
+use crate::turntable::status::TableStatus;
 
 /// How long an owner that is just opening the port may take until it answers.
 const OPENING: Duration = Duration::from_secs(15);
@@ -51,7 +51,7 @@ impl Owner {
     ///
     /// # Errors
     /// [`TurntableError::Owner`] where it does not answer, [`TurntableError::OwnerSays`].
-    pub fn status(&self) -> Result<Status, TurntableError> {
+    pub fn status(&self) -> Result<TableStatus, TurntableError> {
         self.ask(Question::Status)
     }
 
@@ -59,11 +59,11 @@ impl Owner {
     ///
     /// # Errors
     /// As [`Owner::status`].
-    pub fn stop(&self) -> Result<Status, TurntableError> {
+    pub fn stop(&self) -> Result<TableStatus, TurntableError> {
         self.ask(Question::Stop)
     }
 
-    fn ask(&self, question: Question) -> Result<Status, TurntableError> {
+    fn ask(&self, question: Question) -> Result<TableStatus, TurntableError> {
         let failed = |why: String| TurntableError::Owner {
             path: self.files.port.clone(),
             pid: self.pid,

@@ -16,7 +16,7 @@ pub(super) use claim::Claim;
 pub use client::Owner;
 pub(super) use server::Server;
 
-use super::status::Status;
+use super::status::TableStatus;
 
 /// What can be asked of an owner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -30,6 +30,6 @@ enum Question {
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Answer {
-    Status(Status),
+    Status(TableStatus),
     Error(String),
 }

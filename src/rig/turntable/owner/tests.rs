@@ -13,10 +13,10 @@ use serialport::{SerialPort as _, TTYPort};
 use super::claim::Files;
 use super::*;
 use crate::clock::Clock;
-use crate::turntable::peer::Peer;
-use crate::turntable::{Fault, Options, State, Table, TurntableError};
+use crate::turntable::fake_grbl::FakeGrbl;
+use crate::turntable::{ControllerState, MotionFault, Table, TableOptions, TurntableError};
 
-/// A peer at a pseudo terminal.
+/// A fake_grbl at a pseudo terminal.
 struct Terminal {
     path: PathBuf,
     quit: Arc<AtomicBool>,
@@ -34,13 +34,13 @@ impl Terminal {
         let quit = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&quit);
         let thread = thread::spawn(move || {
-            let (clock, mut peer) = (Clock::monotonic(), Peer::new(true));
+            let (clock, mut fake_grbl) = (Clock::monotonic(), FakeGrbl::new(true));
             let mut buffer = [0; 256];
             while !told.load(Ordering::Acquire) {
                 let count = master.read(&mut buffer).unwrap_or(0);
-                peer.advance(clock.now_us());
-                peer.take(&buffer[..count]);
-                master.write_all(&peer.give()).unwrap();
+                fake_grbl.advance(clock.now_us());
+                fake_grbl.take(&buffer[..count]);
+                master.write_all(&fake_grbl.give()).unwrap();
             }
         });
         Terminal {
@@ -53,9 +53,9 @@ impl Terminal {
     }
 
     fn open(&self) -> Result<Table, TurntableError> {
-        let options = Options {
+        let options = TableOptions {
             runtime_folder: self.runtime.path().to_owned(),
-            ..Options::default()
+            ..TableOptions::default()
         };
         Table::open_serial(&self.path, &options)
     }
@@ -83,7 +83,7 @@ fn a_port_has_one_owner_who_answers_for_it_until_it_is_closed() {
     let table = terminal.open().unwrap();
     let owner = terminal.owner().unwrap();
     assert_eq!(owner.pid(), std::process::id());
-    assert_eq!(owner.status().unwrap().state, State::Idle);
+    assert_eq!(owner.status().unwrap().state, ControllerState::Idle);
     match terminal.open().map(|_| ()) {
         Err(TurntableError::Owned { pid, .. }) => assert_eq!(pid, std::process::id()),
         other => panic!("{other:?}"),
@@ -108,7 +108,7 @@ fn a_stop_asked_of_the_owner_stops_the_table_and_ends_its_motion() {
     });
     let error = table.jog(300.0, Some(5.0)).unwrap_err();
     assert!(
-        matches!(error, TurntableError::Motion(Fault::Stopped)),
+        matches!(error, TurntableError::Motion(MotionFault::Stopped)),
         "{error}"
     );
     let stopped = stopper.join().unwrap();
@@ -126,7 +126,7 @@ fn what_a_killed_owner_left_behind_is_nobodys() {
     let _table = terminal.open().unwrap();
     assert_eq!(
         terminal.owner().unwrap().status().unwrap().state,
-        State::Idle
+        ControllerState::Idle
     );
 }
 
@@ -160,7 +160,7 @@ fn a_folder_that_others_can_write_in_is_not_used() {
 
 #[test]
 fn a_port_that_is_not_there_is_told_by_its_path() {
-    let options = Options::default();
+    let options = TableOptions::default();
     let path = PathBuf::from("/dev/there-is-no-such-port");
     let error = Table::open_serial(&path, &options).map(|_| ()).unwrap_err();
     assert!(

@@ -5,18 +5,19 @@
 //! It knows nothing of turns.
 
 mod motion;
-mod seen;
+mod position_report;
 mod stop;
 #[cfg(test)]
 mod tests;
 
 use super::Alarm;
-use super::error::Fault;
+use super::error::MotionFault;
 use super::wire::{
-    Counts, Event, LineFault, Machine, Outcome, Patience, Poll, ResetCause, SendError, State,
+    ControllerState, Counts, LineFault, LineOutcome, Machine, Poll, ReplyTimeout, RestartCause,
+    SendError, WireEvent,
 };
 pub(crate) use motion::{Course, Motion};
-pub(crate) use seen::{Habits, Seen};
+pub(crate) use position_report::{ControllerTraits, PositionReport};
 pub(crate) use stop::{Stop, StopOutcome};
 
 /// Between two reports while the table is being stopped, microseconds.
@@ -30,9 +31,9 @@ const MOST_RECORDED: usize = 54_000;
 #[derive(Debug)]
 pub(crate) struct Supervisor {
     wire: Machine,
-    habits: Habits,
-    answer: Option<(u64, Outcome)>,
-    seen: Option<Seen>,
+    traits: ControllerTraits,
+    answer: Option<(u64, LineOutcome)>,
+    seen: Option<PositionReport>,
     confirmed: bool,
     work_zero: Option<f64>,
     /// The angle counted as zero, from machine zero; `None` while the position is not known.
@@ -40,11 +41,11 @@ pub(crate) struct Supervisor {
     alarm: Option<u8>,
     restarts: u64,
     motion: Option<Motion>,
-    fault: Option<Fault>,
+    fault: Option<MotionFault>,
     stop: Option<Stop>,
     /// What the last stop has done to the position is drawn.
     settled: bool,
-    recorded: Option<Vec<Seen>>,
+    recorded: Option<Vec<PositionReport>>,
     wanted_until_us: i64,
     closed: Option<String>,
     /// Something has happened that somebody may wait for.
@@ -52,10 +53,10 @@ pub(crate) struct Supervisor {
 }
 
 impl Supervisor {
-    pub(crate) fn new(habits: Habits) -> Self {
+    pub(crate) fn new(traits: ControllerTraits) -> Self {
         Self {
             wire: Machine::new(),
-            habits,
+            traits,
             answer: None,
             seen: None,
             confirmed: false,
@@ -74,8 +75,8 @@ impl Supervisor {
         }
     }
 
-    pub(crate) fn set_habits(&mut self, habits: Habits) {
-        self.habits = habits;
+    pub(crate) fn set_traits(&mut self, traits: ControllerTraits) {
+        self.traits = traits;
     }
 
     pub(crate) fn counts(&self) -> Counts {
@@ -86,7 +87,7 @@ impl Supervisor {
         self.wire.is_checked()
     }
 
-    pub(crate) fn seen(&self) -> Option<&Seen> {
+    pub(crate) fn seen(&self) -> Option<&PositionReport> {
         self.seen.as_ref()
     }
 
@@ -110,11 +111,13 @@ impl Supervisor {
     }
 
     pub(crate) fn alarm(&self) -> Option<Alarm> {
-        let locked = self.seen.is_some_and(|seen| seen.state == State::Alarm);
+        let locked = self
+            .seen
+            .is_some_and(|seen| seen.state == ControllerState::Alarm);
         locked.then_some(Alarm(self.alarm))
     }
 
-    pub(crate) fn fault(&self) -> Option<&Fault> {
+    pub(crate) fn fault(&self) -> Option<&MotionFault> {
         self.fault.as_ref()
     }
 
@@ -129,7 +132,7 @@ impl Supervisor {
 
     /// The port is gone.
     pub(crate) fn close(&mut self, why: String) {
-        self.raise(Fault::PortLost(why.clone()));
+        self.raise(MotionFault::PortLost(why.clone()));
         self.closed = Some(why);
         self.zero_deg = None;
     }
@@ -144,12 +147,12 @@ impl Supervisor {
         &mut self,
         now_us: i64,
         block: &str,
-        patience: Patience,
+        timeout: ReplyTimeout,
     ) -> Result<u64, SendError> {
         if self.is_stopping() {
             return Err(SendError::Busy);
         }
-        self.wire.send(now_us, block, patience)
+        self.wire.send(now_us, block, timeout)
     }
 
     /// Opens a checked session.
@@ -161,7 +164,7 @@ impl Supervisor {
     }
 
     /// The answer to line `id`, once.
-    pub(crate) fn take_answer(&mut self, id: u64) -> Option<Outcome> {
+    pub(crate) fn take_answer(&mut self, id: u64) -> Option<LineOutcome> {
         let (_, outcome) = self.answer.take_if(|(answered, _)| *answered == id)?;
         Some(outcome)
     }
@@ -194,12 +197,12 @@ impl Supervisor {
         self.recorded = Some(Vec::new());
     }
 
-    pub(crate) fn recorded(&self) -> &[Seen] {
+    pub(crate) fn recorded(&self) -> &[PositionReport] {
         self.recorded.as_deref().unwrap_or_default()
     }
 
     /// Ends keeping reports.
-    pub(crate) fn take_recorded(&mut self) -> Vec<Seen> {
+    pub(crate) fn take_recorded(&mut self) -> Vec<PositionReport> {
         self.recorded.take().unwrap_or_default()
     }
 
@@ -218,7 +221,7 @@ impl Supervisor {
     /// Brings the table to a standstill and drops what it was still to do, because somebody asked.
     pub(crate) fn request_stop(&mut self, now_us: i64) {
         if self.motion.is_some() {
-            self.raise(Fault::Stopped);
+            self.raise(MotionFault::Stopped);
         }
         self.begin_stop(now_us);
     }
@@ -250,12 +253,12 @@ impl Supervisor {
     }
 
     /// Notes the first fault of a motion and stops the table.
-    fn fail(&mut self, now_us: i64, fault: Fault) {
+    fn fail(&mut self, now_us: i64, fault: MotionFault) {
         self.raise(fault);
         self.begin_stop(now_us);
     }
 
-    fn raise(&mut self, fault: Fault) {
+    fn raise(&mut self, fault: MotionFault) {
         self.changed = true;
         self.fault.get_or_insert(fault);
     }
@@ -265,7 +268,7 @@ impl Supervisor {
         let every_us = if self.is_stopping() {
             Some(STOPPING_POLL_US)
         } else if self.motion.is_some() {
-            Some(i64::try_from(self.habits.poll.as_micros()).unwrap_or(WANTED_POLL_US))
+            Some(i64::try_from(self.traits.poll.as_micros()).unwrap_or(WANTED_POLL_US))
         } else {
             (now_us < self.wanted_until_us).then_some(WANTED_POLL_US)
         };
@@ -285,7 +288,7 @@ impl Supervisor {
             && let Some(fault) = self
                 .motion
                 .as_ref()
-                .and_then(|m| m.overdue(now_us, &self.habits))
+                .and_then(|m| m.overdue(now_us, &self.traits))
         {
             self.fail(now_us, fault);
         }
@@ -301,33 +304,33 @@ impl Supervisor {
         while let Some(event) = self.wire.next_event() {
             self.changed = true;
             match event {
-                Event::Answered { id, outcome } => self.on_answer(now_us, id, outcome),
-                Event::Status(poll) => self.on_report(now_us, &poll),
-                Event::Reset(cause) => self.on_reset(now_us, cause),
-                Event::Alarm(code) => self.on_alarm(now_us, code),
+                WireEvent::Answered { id, outcome } => self.on_answer(now_us, id, outcome),
+                WireEvent::Status(poll) => self.on_report(now_us, &poll),
+                WireEvent::Reset(cause) => self.on_reset(now_us, cause),
+                WireEvent::Alarm(code) => self.on_alarm(now_us, code),
             }
         }
     }
 
-    fn on_answer(&mut self, now_us: i64, id: u64, outcome: Outcome) {
+    fn on_answer(&mut self, now_us: i64, id: u64, outcome: LineOutcome) {
         // A line without answer may have been executed, and its answer may still come: only a
         // table at rest after a reset is certain again.
-        if let Outcome::Failed(fault @ (LineFault::NoAnswer { .. } | LineFault::OutOfOrder)) =
+        if let LineOutcome::Failed(fault @ (LineFault::NoAnswer { .. } | LineFault::OutOfOrder)) =
             outcome
         {
-            self.fail(now_us, Fault::Line(fault));
+            self.fail(now_us, MotionFault::Line(fault));
         }
         self.answer = Some((id, outcome));
     }
 
     fn on_report(&mut self, now_us: i64, poll: &Poll) {
         self.work_zero = poll.report.work_zero.or(self.work_zero);
-        let Some(seen) = Seen::of(poll, self.work_zero, &self.habits) else {
+        let Some(seen) = PositionReport::of(poll, self.work_zero, &self.traits) else {
             return;
         };
         self.confirmed = self.seen.is_some_and(|before| before.confirms(&seen));
         self.seen = Some(seen);
-        if seen.state != State::Alarm {
+        if seen.state != ControllerState::Alarm {
             self.alarm = None;
         }
         if let Some(recorded) = &mut self.recorded
@@ -342,7 +345,7 @@ impl Supervisor {
             self.settle();
         } else if self.fault.is_none()
             && let Some(motion) = &mut self.motion
-            && let Some(fault) = motion.on_report(&seen, self.alarm, &self.habits)
+            && let Some(fault) = motion.on_report(&seen, self.alarm, &self.traits)
         {
             self.fail(now_us, fault);
         }
@@ -360,18 +363,18 @@ impl Supervisor {
         self.settled = true;
     }
 
-    fn on_reset(&mut self, now_us: i64, cause: Option<ResetCause>) {
+    fn on_reset(&mut self, now_us: i64, cause: Option<RestartCause>) {
         self.restarts += 1;
         self.alarm = None;
         self.work_zero = None;
-        let asked_for = matches!(cause, None | Some(ResetCause::Host));
+        let asked_for = matches!(cause, None | Some(RestartCause::Host));
         let stop = self.stop.as_mut().filter(|stop| stop.outcome().is_none());
         let kept = stop.is_some_and(|stop| stop.on_reset(now_us)) && asked_for;
         if !kept {
             self.zero_deg = None;
         }
         if !self.is_stopping() && self.motion.is_some() {
-            self.fail(now_us, Fault::Restarted(cause));
+            self.fail(now_us, MotionFault::Restarted(cause));
         }
     }
 
@@ -382,7 +385,7 @@ impl Supervisor {
             self.zero_deg = None;
         }
         if self.motion.is_some() && !self.is_stopping() {
-            self.fail(now_us, Fault::Alarm(alarm));
+            self.fail(now_us, MotionFault::Alarm(alarm));
         }
     }
 }

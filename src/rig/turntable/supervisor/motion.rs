@@ -1,9 +1,9 @@
 //! Watching a motion: whether it goes on, and where it ends.
 
-use super::{Habits, Seen};
+use super::{ControllerTraits, PositionReport};
 use crate::turntable::Alarm;
-use crate::turntable::error::Fault;
-use crate::turntable::wire::State;
+use crate::turntable::error::MotionFault;
+use crate::turntable::wire::ControllerState;
 
 /// Silence after which a table in motion counts as lost, microseconds.
 const SILENCE_US: i64 = 2_000_000;
@@ -64,23 +64,28 @@ impl Motion {
     /// A report has come: what it says against the motion.
     pub(super) fn on_report(
         &mut self,
-        seen: &Seen,
+        seen: &PositionReport,
         alarm: Option<u8>,
-        habits: &Habits,
-    ) -> Option<Fault> {
+        traits: &ControllerTraits,
+    ) -> Option<MotionFault> {
         self.last_report_us = seen.came_us;
         let Course::To { target_deg, .. } = self.course else {
             return None;
         };
         let stands_us = self.stands_for(seen);
         match seen.state {
-            State::Run | State::Jog => (stands_us > STALL_US).then_some(Fault::Stalled {
-                machine_deg: seen.machine_deg,
-            }),
-            State::Idle => self.on_idle(seen, target_deg, stands_us, habits),
-            State::Held | State::Holding | State::Door | State::Sleep => Some(Fault::Held),
-            State::Alarm => Some(Fault::Alarm(Alarm(alarm))),
-            state @ (State::Home | State::Check) => Some(Fault::Astray {
+            ControllerState::Run | ControllerState::Jog => {
+                (stands_us > STALL_US).then_some(MotionFault::Stalled {
+                    machine_deg: seen.machine_deg,
+                })
+            }
+            ControllerState::Idle => self.on_idle(seen, target_deg, stands_us, traits),
+            ControllerState::Held
+            | ControllerState::Holding
+            | ControllerState::Door
+            | ControllerState::Sleep => Some(MotionFault::Held),
+            ControllerState::Alarm => Some(MotionFault::Alarm(Alarm(alarm))),
+            state @ (ControllerState::Home | ControllerState::Check) => Some(MotionFault::Astray {
                 state,
                 machine_deg: seen.machine_deg,
                 target_deg,
@@ -90,22 +95,22 @@ impl Motion {
 
     fn on_idle(
         &mut self,
-        seen: &Seen,
+        seen: &PositionReport,
         target_deg: f64,
         stands_us: i64,
-        habits: &Habits,
-    ) -> Option<Fault> {
+        traits: &ControllerTraits,
+    ) -> Option<MotionFault> {
         let accepted_us = self.accepted_us?;
         let after = seen
             .asked_us
             .is_some_and(|asked_us| asked_us >= accepted_us);
         let off = (seen.machine_deg - target_deg).abs();
-        if after && off <= habits.step_deg + PRINTED_DEG {
+        if after && off <= traits.step_deg + PRINTED_DEG {
             self.at_target = true;
             return None;
         }
-        (after && !self.at_target && stands_us > ASTRAY_US).then_some(Fault::Astray {
-            state: State::Idle,
+        (after && !self.at_target && stands_us > ASTRAY_US).then_some(MotionFault::Astray {
+            state: ControllerState::Idle,
             machine_deg: seen.machine_deg,
             target_deg,
         })
@@ -113,7 +118,7 @@ impl Motion {
 
     /// How long the table has certainly been at the place of this report, microseconds: from when
     /// the first report of it came to when this one was asked for.
-    fn stands_for(&mut self, seen: &Seen) -> i64 {
+    fn stands_for(&mut self, seen: &PositionReport) -> i64 {
         match self.place {
             Some((place, since_us)) if place == seen.machine_deg => {
                 let asked_us = seen.asked_us.filter(|_| seen.certain);
@@ -133,16 +138,16 @@ impl Motion {
     }
 
     /// What the passing of time says against the motion.
-    pub(super) fn overdue(&self, now_us: i64, habits: &Habits) -> Option<Fault> {
+    pub(super) fn overdue(&self, now_us: i64, traits: &ControllerTraits) -> Option<MotionFault> {
         let silent_us = now_us - self.last_report_us;
         match self.course {
-            Course::Homing if !habits.reports_homing => None,
+            Course::Homing if !traits.reports_homing => None,
             Course::To { within_us, .. }
                 if !self.at_target && self.runs_for(now_us) > within_us =>
             {
-                Some(Fault::Late)
+                Some(MotionFault::Late)
             }
-            _ => (silent_us > SILENCE_US).then_some(Fault::Silent {
+            _ => (silent_us > SILENCE_US).then_some(MotionFault::Silent {
                 milliseconds: silent_us / 1000,
             }),
         }

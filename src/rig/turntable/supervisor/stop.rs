@@ -3,8 +3,8 @@
 //! `!` ramps it down; at a standstill a reset drops what it was still to do, and so loses no
 //! position. Only where the table does not answer, or does not slow down, is it reset in motion.
 
-use super::Seen;
-use crate::turntable::wire::{Machine, State, realtime};
+use super::PositionReport;
+use crate::turntable::wire::{ControllerState, Machine, realtime};
 
 /// How often a stop byte is sent again, microseconds.
 const REPEAT_US: i64 = 250_000;
@@ -33,7 +33,7 @@ pub(crate) enum StopOutcome {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Phase {
+enum TurnPhase {
     /// `!` was sent.
     Braking,
     /// A reset was sent; `gentle` when the table stood.
@@ -48,7 +48,7 @@ enum Phase {
 /// A stop under way, or its end.
 #[derive(Debug)]
 pub(crate) struct Stop {
-    phase: Phase,
+    phase: TurnPhase,
     since_us: i64,
     sent_us: i64,
     heard_us: i64,
@@ -64,7 +64,7 @@ impl Stop {
     pub(super) fn begin(now_us: i64, unsettled: bool, wire: &mut Machine) -> Self {
         wire.realtime(realtime::HOLD);
         Self {
-            phase: Phase::Braking,
+            phase: TurnPhase::Braking,
             since_us: now_us,
             sent_us: now_us,
             heard_us: now_us,
@@ -76,12 +76,12 @@ impl Stop {
 
     pub(crate) fn outcome(&self) -> Option<StopOutcome> {
         match self.phase {
-            Phase::Done(outcome) => Some(outcome),
+            TurnPhase::Done(outcome) => Some(outcome),
             _ => None,
         }
     }
 
-    fn enter(&mut self, now_us: i64, phase: Phase) {
+    fn enter(&mut self, now_us: i64, phase: TurnPhase) {
         self.phase = phase;
         self.since_us = now_us;
         self.sent_us = now_us;
@@ -90,29 +90,29 @@ impl Stop {
 
     fn reset(&mut self, now_us: i64, gentle: bool, wire: &mut Machine) {
         wire.realtime(realtime::RESET);
-        self.enter(now_us, Phase::Resetting { gentle });
+        self.enter(now_us, TurnPhase::Resetting { gentle });
     }
 
     pub(super) fn on_time(&mut self, now_us: i64, wire: &mut Machine) {
         let lasted_us = now_us - self.since_us;
         let unsent_us = now_us - self.sent_us;
         match self.phase {
-            Phase::Braking if now_us - self.heard_us > SILENT_US || lasted_us > RAMP_US => {
+            TurnPhase::Braking if now_us - self.heard_us > SILENT_US || lasted_us > RAMP_US => {
                 self.reset(now_us, false, wire);
             }
-            Phase::Braking if unsent_us >= REPEAT_US && self.standing.is_none() => {
+            TurnPhase::Braking if unsent_us >= REPEAT_US && self.standing.is_none() => {
                 self.sent_us = now_us;
                 wire.realtime(realtime::HOLD);
             }
-            Phase::Resetting { .. } if lasted_us > RESTART_US => {
-                self.enter(now_us, Phase::Done(StopOutcome::Unknown));
+            TurnPhase::Resetting { .. } if lasted_us > RESTART_US => {
+                self.enter(now_us, TurnPhase::Done(StopOutcome::Unknown));
             }
-            Phase::Resetting { .. } if unsent_us >= RESET_REPEAT_US => {
+            TurnPhase::Resetting { .. } if unsent_us >= RESET_REPEAT_US => {
                 self.sent_us = now_us;
                 wire.realtime(realtime::RESET);
             }
-            Phase::Checking if lasted_us > CHECK_US => {
-                self.enter(now_us, Phase::Done(StopOutcome::Unknown));
+            TurnPhase::Checking if lasted_us > CHECK_US => {
+                self.enter(now_us, TurnPhase::Done(StopOutcome::Unknown));
             }
             _ => {}
         }
@@ -121,14 +121,14 @@ impl Stop {
     /// The controller has restarted. Whether that is the reset of a standing table, which keeps
     /// its position.
     pub(super) fn on_reset(&mut self, now_us: i64) -> bool {
-        let gentle = self.phase == Phase::Resetting { gentle: true };
+        let gentle = self.phase == TurnPhase::Resetting { gentle: true };
         if self.outcome().is_none() {
-            self.enter(now_us, Phase::Checking);
+            self.enter(now_us, TurnPhase::Checking);
         }
         gentle
     }
 
-    pub(super) fn on_report(&mut self, now_us: i64, seen: &Seen, wire: &mut Machine) {
+    pub(super) fn on_report(&mut self, now_us: i64, seen: &PositionReport, wire: &mut Machine) {
         self.heard_us = now_us;
         if seen
             .asked_us
@@ -138,30 +138,32 @@ impl Stop {
         }
         match (self.phase, seen.state) {
             // Only a reset ends a search for the index.
-            (Phase::Braking, State::Home) => self.reset(now_us, false, wire),
-            (Phase::Braking | Phase::Checking, state) if state.may_move() => self.standing = None,
-            (Phase::Braking, state) if self.stands(seen) => {
-                if self.unsettled || matches!(state, State::Held) {
+            (TurnPhase::Braking, ControllerState::Home) => self.reset(now_us, false, wire),
+            (TurnPhase::Braking | TurnPhase::Checking, state) if state.may_move() => {
+                self.standing = None
+            }
+            (TurnPhase::Braking, state) if self.stands(seen) => {
+                if self.unsettled || matches!(state, ControllerState::Held) {
                     self.stood_at = Some(seen.machine_deg);
                     self.reset(now_us, true, wire);
                 } else {
-                    self.enter(now_us, Phase::Done(StopOutcome::Standing));
+                    self.enter(now_us, TurnPhase::Done(StopOutcome::Standing));
                 }
             }
-            (Phase::Checking, _) if self.stands(seen) => {
+            (TurnPhase::Checking, _) if self.stands(seen) => {
                 let same = self.stood_at.is_none_or(|place| place == seen.machine_deg);
                 let outcome = if same {
                     StopOutcome::Standing
                 } else {
                     StopOutcome::Displaced
                 };
-                self.enter(now_us, Phase::Done(outcome));
+                self.enter(now_us, TurnPhase::Done(outcome));
             }
             _ => {}
         }
     }
 
-    fn stands(&mut self, seen: &Seen) -> bool {
+    fn stands(&mut self, seen: &PositionReport) -> bool {
         let count = match self.standing {
             Some((place, count)) if place == seen.machine_deg => count + 1,
             _ => 1,

@@ -11,8 +11,8 @@ mod line;
 #[cfg(test)]
 mod tests;
 
-use super::supervisor::Seen;
-use super::wire::State;
+use super::supervisor::PositionReport;
+use super::wire::ControllerState;
 use line::{Fit, Line};
 
 /// Least reports a track is made of.
@@ -216,7 +216,7 @@ impl Point {
 }
 
 /// The track of a turn by its reports.
-pub(crate) fn fit(seen: &[Seen], course: &Course) -> Result<Track, TrackError> {
+pub(crate) fn fit(seen: &[PositionReport], course: &Course) -> Result<Track, TrackError> {
     let points = points(seen, course);
     enough(&points, course)?;
     let stamped = points.iter().all(|point| point.chip_us.is_some());
@@ -246,10 +246,11 @@ struct Fitted {
     chip_rate: Option<f64>,
 }
 
-fn points(seen: &[Seen], course: &Course) -> Vec<Point> {
+fn points(seen: &[PositionReport], course: &Course) -> Vec<Point> {
     let half_step = course.sign() * course.step_deg / 2.0;
-    let point = |seen: &Seen| {
-        let usable = seen.certain && seen.state == State::Run && course.covers(seen.machine_deg);
+    let point = |seen: &PositionReport| {
+        let usable =
+            seen.certain && seen.state == ControllerState::Run && course.covers(seen.machine_deg);
         usable.then_some(Point {
             asked_us: seen.asked_us? as f64,
             came_us: seen.came_us as f64,

@@ -1,29 +1,29 @@
 //! What the machine tells: events, and what becomes of a line.
 
-use super::message::{Message, ResetCause};
+use super::message::{Message, RestartCause};
 use super::polling::Poll;
 
 /// Something the controller did.
 #[derive(Debug, PartialEq)]
-pub enum Event {
+pub enum WireEvent {
     /// The line `id` has its answer, or will never have one.
     Answered {
         /// What [`Machine::send`](super::Machine::send) gave.
         id: u64,
         /// What became of it.
-        outcome: Outcome,
+        outcome: LineOutcome,
     },
     /// A status report.
     Status(Poll),
     /// The controller has restarted.
-    Reset(Option<ResetCause>),
+    Reset(Option<RestartCause>),
     /// An alarm, by its number.
     Alarm(u8),
 }
 
 /// What became of a line.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
+pub enum LineOutcome {
     /// Accepted; with the lines that stood in front of the answer.
     Done(Vec<Message>),
     /// Refused with Grbl's number: it did nothing.
@@ -71,7 +71,7 @@ pub enum SendError {
 pub struct Counts {
     /// Lines sent, without repetitions.
     pub lines: u64,
-    /// Status reports that came.
+    /// TableStatus reports that came.
     pub reports: u64,
     /// Lines sent again.
     pub repeats: u64,

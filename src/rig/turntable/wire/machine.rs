@@ -3,10 +3,10 @@
 use std::collections::VecDeque;
 
 use super::checksum::{Sealed, seal, unseal};
-use super::event::{Counts, Event, LineFault, Outcome, SendError};
+use super::event::{Counts, LineFault, LineOutcome, SendError, WireEvent};
 use super::lines::{LineReader, Piece};
-use super::message::{Message, ResetCause, parse};
-use super::pending::{Due, Patience, Pending};
+use super::message::{Message, RestartCause, parse};
+use super::pending::{Due, Pending, ReplyTimeout};
 use super::polling::Polling;
 use super::realtime;
 
@@ -45,7 +45,7 @@ pub struct Machine {
     polling: Polling,
     realtime: Vec<u8>,
     lines: Vec<u8>,
-    events: VecDeque<Event>,
+    events: VecDeque<WireEvent>,
     next_id: u64,
     counts: Counts,
 }
@@ -81,7 +81,12 @@ impl Machine {
     ///
     /// # Errors
     /// [`SendError`]; then nothing was sent.
-    pub fn send(&mut self, now_us: i64, block: &str, patience: Patience) -> Result<u64, SendError> {
+    pub fn send(
+        &mut self,
+        now_us: i64,
+        block: &str,
+        timeout: ReplyTimeout,
+    ) -> Result<u64, SendError> {
         let plain = |b: u8| (b' '..=b'~').contains(&b) && !matches!(b, b'?' | b'!' | b'~' | b'*');
         if block.len() > LONGEST_BLOCK || !block.bytes().all(plain) {
             return Err(SendError::Unsendable);
@@ -89,9 +94,9 @@ impl Machine {
         match self.session {
             Session::Checked { next } => {
                 let text = seal(&format!("N{next} {block}"));
-                self.launch(now_us, &text, Some(next), patience)
+                self.launch(now_us, &text, Some(next), timeout)
             }
-            Session::Plain | Session::Opening => self.launch(now_us, block, None, patience),
+            Session::Plain | Session::Opening => self.launch(now_us, block, None, timeout),
         }
     }
 
@@ -100,7 +105,7 @@ impl Machine {
     /// # Errors
     /// [`SendError`]; then nothing was sent.
     pub fn open_session(&mut self, now_us: i64) -> Result<u64, SendError> {
-        let id = self.launch(now_us, &seal("N0"), Some(0), Patience::Short)?;
+        let id = self.launch(now_us, &seal("N0"), Some(0), ReplyTimeout::AtOnce)?;
         self.session = Session::Opening;
         Ok(id)
     }
@@ -110,7 +115,7 @@ impl Machine {
         now_us: i64,
         text: &str,
         seq: Option<u32>,
-        patience: Patience,
+        timeout: ReplyTimeout,
     ) -> Result<u64, SendError> {
         if self.pending.is_some() {
             return Err(SendError::Busy);
@@ -120,7 +125,7 @@ impl Machine {
         }
         let id = self.next_id;
         self.next_id += 1;
-        let pending = Pending::new(id, text, seq, patience, now_us);
+        let pending = Pending::new(id, text, seq, timeout, now_us);
         self.lines.extend_from_slice(&pending.bytes);
         self.pending = Some(pending);
         self.counts.lines += 1;
@@ -150,7 +155,7 @@ impl Machine {
     }
 
     /// The next event.
-    pub fn next_event(&mut self) -> Option<Event> {
+    pub fn next_event(&mut self) -> Option<WireEvent> {
         self.events.pop_front()
     }
 
@@ -234,11 +239,11 @@ impl Machine {
         match message {
             Message::Ok { seq } => self.on_answer(now_us, seq, None),
             Message::Error { code, seq } => self.on_answer(now_us, seq, Some(code)),
-            Message::Alarm(code) => self.events.push_back(Event::Alarm(code)),
+            Message::Alarm(code) => self.events.push_back(WireEvent::Alarm(code)),
             Message::Status(report) => {
                 self.counts.reports += 1;
                 let poll = self.polling.answered(report, first_us);
-                self.events.push_back(Event::Status(poll));
+                self.events.push_back(WireEvent::Status(poll));
             }
             Message::Banner(banner) => self.reset(banner.cause),
             other => {
@@ -267,7 +272,7 @@ impl Machine {
             None => self.accept(),
             Some(NO_SESSION) if seq.is_some() => self.reset(None),
             Some(OUT_OF_ORDER) if seq.is_some() => self.fail(LineFault::OutOfOrder),
-            Some(code) => self.answer(Outcome::Refused(code)),
+            Some(code) => self.answer(LineOutcome::Refused(code)),
         }
     }
 
@@ -282,16 +287,16 @@ impl Machine {
             .pending
             .as_mut()
             .map(|line| std::mem::take(&mut line.info));
-        self.answer(Outcome::Done(info.unwrap_or_default()));
+        self.answer(LineOutcome::Done(info.unwrap_or_default()));
     }
 
     /// The controller has dealt with the line: the next one has the next number.
-    fn answer(&mut self, outcome: Outcome) {
+    fn answer(&mut self, outcome: LineOutcome) {
         let Some(pending) = self.pending.take() else {
             return;
         };
         self.lines.clear();
-        let opened = matches!(outcome, Outcome::Done(_));
+        let opened = matches!(outcome, LineOutcome::Done(_));
         self.session = match (self.session, pending.seq) {
             (Session::Checked { .. }, Some(LAST_SEQ)) => Session::Plain,
             (Session::Checked { .. }, Some(seq)) => Session::Checked { next: seq + 1 },
@@ -300,25 +305,25 @@ impl Machine {
             (session, _) => session,
         };
         let id = pending.id;
-        self.events.push_back(Event::Answered { id, outcome });
+        self.events.push_back(WireEvent::Answered { id, outcome });
     }
 
     fn fail(&mut self, fault: LineFault) {
         if let Some(Pending { id, .. }) = self.pending.take() {
             self.unsure = true;
-            let outcome = Outcome::Failed(fault);
-            self.events.push_back(Event::Answered { id, outcome });
+            let outcome = LineOutcome::Failed(fault);
+            self.events.push_back(WireEvent::Answered { id, outcome });
         }
     }
 
     /// The controller has restarted: nothing from before is answered, and it takes plain lines.
-    fn reset(&mut self, cause: Option<ResetCause>) {
+    fn reset(&mut self, cause: Option<RestartCause>) {
         self.fail(LineFault::Restarted);
         self.lines.clear();
         self.session = Session::Plain;
         self.unsure = false;
         self.unchecked = 0;
         self.polling.forget();
-        self.events.push_back(Event::Reset(cause));
+        self.events.push_back(WireEvent::Reset(cause));
     }
 }

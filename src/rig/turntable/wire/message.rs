@@ -7,7 +7,7 @@ use super::status::StatusReport;
 
 /// Why the controller started, where it says so.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ResetCause {
+pub enum RestartCause {
     /// Its power came on.
     PowerOn,
     /// Its reset pin, which an Uno's USB side pulls when the port is opened.
@@ -20,16 +20,16 @@ pub enum ResetCause {
     Host,
 }
 
-impl ResetCause {
-    const NAMES: [(ResetCause, &'static str); 5] = [
-        (ResetCause::PowerOn, "power-on"),
-        (ResetCause::External, "external"),
-        (ResetCause::BrownOut, "brown-out"),
-        (ResetCause::Watchdog, "watchdog"),
-        (ResetCause::Host, "host"),
+impl RestartCause {
+    const NAMES: [(RestartCause, &'static str); 5] = [
+        (RestartCause::PowerOn, "power-on"),
+        (RestartCause::External, "external"),
+        (RestartCause::BrownOut, "brown-out"),
+        (RestartCause::Watchdog, "watchdog"),
+        (RestartCause::Host, "host"),
     ];
 
-    fn parse(text: &str) -> Option<ResetCause> {
+    fn parse(text: &str) -> Option<RestartCause> {
         let mut names = Self::NAMES.iter();
         names
             .find(|(_, name)| *name == text)
@@ -37,7 +37,7 @@ impl ResetCause {
     }
 }
 
-impl fmt::Display for ResetCause {
+impl fmt::Display for RestartCause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut names = Self::NAMES.iter();
         let found = names.find(|(cause, _)| cause == self);
@@ -51,7 +51,7 @@ pub struct Banner {
     /// Grbl's version, such as `1.1h`.
     pub version: String,
     /// Why it started, where it says so.
-    pub cause: Option<ResetCause>,
+    pub cause: Option<RestartCause>,
 }
 
 /// A line from the controller.
@@ -152,7 +152,7 @@ fn banner(line: &str) -> Option<Message> {
         "" => None,
         _ => {
             let words = rest.strip_prefix(" [reset: ")?.strip_suffix(']')?;
-            Some(ResetCause::parse(words)?)
+            Some(RestartCause::parse(words)?)
         }
     };
     let version = version.to_owned();

@@ -24,12 +24,12 @@ mod properties;
 #[cfg(test)]
 mod tests;
 
-pub use event::{Counts, Event, LineFault, Outcome, SendError};
+pub use event::{Counts, LineFault, LineOutcome, SendError, WireEvent};
 pub use machine::Machine;
-pub use message::{Banner, Message, ResetCause, parse};
-pub use pending::Patience;
+pub use message::{Banner, Message, RestartCause, parse};
+pub use pending::ReplyTimeout;
 pub use polling::Poll;
-pub use status::{Pins, Position, State, StatusReport};
+pub use status::{ControllerState, Pins, Position, StatusReport};
 
 /// Real-time bytes: taken by the controller from anywhere in the stream, never part of a line.
 pub mod realtime {

@@ -14,11 +14,11 @@ const MOST_INFO: usize = 128;
 
 /// How long a line's answer may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Patience {
+pub enum ReplyTimeout {
     /// It is answered at once.
-    Short,
+    AtOnce,
     /// It is answered after something else has happened, within so many microseconds.
-    Long(i64),
+    Within(i64),
 }
 
 /// What has become of a line.
@@ -42,7 +42,7 @@ pub(super) struct Pending {
     pub(super) tries: u32,
     /// What came since it was sent and is no answer.
     pub(super) info: Vec<Message>,
-    patience: Patience,
+    timeout: ReplyTimeout,
     first_us: i64,
     last_us: i64,
 }
@@ -52,7 +52,7 @@ impl Pending {
         id: u64,
         text: &str,
         seq: Option<u32>,
-        patience: Patience,
+        timeout: ReplyTimeout,
         now_us: i64,
     ) -> Self {
         Self {
@@ -61,7 +61,7 @@ impl Pending {
             seq,
             tries: 1,
             info: Vec::new(),
-            patience,
+            timeout,
             first_us: now_us,
             last_us: now_us,
         }
@@ -70,17 +70,17 @@ impl Pending {
     /// What is to be done with a line that has no answer yet.
     pub(super) fn due(&self, now_us: i64) -> Due {
         let waited_us = now_us - self.last_us;
-        let over = match self.patience {
-            Patience::Short => {
+        let over = match self.timeout {
+            ReplyTimeout::AtOnce => {
                 waited_us >= ANSWER_US && (self.seq.is_none() || self.tries >= TRIES)
             }
-            Patience::Long(limit_us) => now_us - self.first_us >= limit_us,
+            ReplyTimeout::Within(limit_us) => now_us - self.first_us >= limit_us,
         };
         // A line whose answer takes long is asked after at growing distances: the controller may
         // be unable to read it, and its buffer is small.
-        let again_us = match self.patience {
-            Patience::Short => ANSWER_US,
-            Patience::Long(_) => ANSWER_US << self.tries.min(TRIES),
+        let again_us = match self.timeout {
+            ReplyTimeout::AtOnce => ANSWER_US,
+            ReplyTimeout::Within(_) => ANSWER_US << self.tries.min(TRIES),
         };
         if over {
             Due::Lost

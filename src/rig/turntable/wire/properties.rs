@@ -7,11 +7,11 @@ use proptest::prelude::*;
 
 use super::tests::{checked, events, outcome};
 use super::*;
-use crate::turntable::peer::{Peer, seal};
+use crate::turntable::fake_grbl::{FakeGrbl, seal};
 
 /// What the wire does to a line.
 #[derive(Debug, Clone, Copy)]
-enum Fault {
+enum MotionFault {
     None,
     Drop(usize),
     Flip(usize),
@@ -20,26 +20,26 @@ enum Fault {
     Lose,
 }
 
-fn fault() -> impl Strategy<Value = Fault> {
+fn fault() -> impl Strategy<Value = MotionFault> {
     prop_oneof![
-        6 => Just(Fault::None),
-        1 => any::<usize>().prop_map(Fault::Drop),
-        1 => any::<usize>().prop_map(Fault::Flip),
-        1 => Just(Fault::Twice),
-        1 => Just(Fault::Merge),
-        1 => Just(Fault::Lose),
+        6 => Just(MotionFault::None),
+        1 => any::<usize>().prop_map(MotionFault::Drop),
+        1 => any::<usize>().prop_map(MotionFault::Flip),
+        1 => Just(MotionFault::Twice),
+        1 => Just(MotionFault::Merge),
+        1 => Just(MotionFault::Lose),
     ]
 }
 
-fn harm(bytes: &[u8], fault: Fault) -> Vec<u8> {
+fn harm(bytes: &[u8], fault: MotionFault) -> Vec<u8> {
     let mut harmed = bytes.to_vec();
     match fault {
-        Fault::None => {}
-        Fault::Drop(at) => drop(harmed.remove(at % bytes.len())),
-        Fault::Flip(at) => harmed[at / 8 % bytes.len()] ^= 1 << (at % 8),
-        Fault::Twice => harmed.extend(bytes),
-        Fault::Merge => harmed.retain(|byte| !matches!(byte, b'\r' | b'\n')),
-        Fault::Lose => harmed.clear(),
+        MotionFault::None => {}
+        MotionFault::Drop(at) => drop(harmed.remove(at % bytes.len())),
+        MotionFault::Flip(at) => harmed[at / 8 % bytes.len()] ^= 1 << (at % 8),
+        MotionFault::Twice => harmed.extend(bytes),
+        MotionFault::Merge => harmed.retain(|byte| !matches!(byte, b'\r' | b'\n')),
+        MotionFault::Lose => harmed.clear(),
     }
     harmed
 }
@@ -47,21 +47,21 @@ fn harm(bytes: &[u8], fault: Fault) -> Vec<u8> {
 /// Sends one line through a harmed wire until it is done or has failed.
 fn exchange(
     machine: &mut Machine,
-    peer: &mut Peer,
+    fake_grbl: &mut FakeGrbl,
     now_us: &mut i64,
     block: &str,
-    faults: &mut impl Iterator<Item = Fault>,
-) -> Outcome {
-    machine.send(*now_us, block, Patience::Short).unwrap();
+    faults: &mut impl Iterator<Item = MotionFault>,
+) -> LineOutcome {
+    machine.send(*now_us, block, ReplyTimeout::AtOnce).unwrap();
     for _ in 0..2000 {
         *now_us += 5000;
         machine.on_time(*now_us);
         let output = machine.take_output(*now_us);
         if !output.is_empty() {
-            peer.take(&harm(&output, faults.next().unwrap()));
+            fake_grbl.take(&harm(&output, faults.next().unwrap()));
         }
-        peer.advance(*now_us);
-        for line in peer.give().split_inclusive(|byte| *byte == b'\n') {
+        fake_grbl.advance(*now_us);
+        for line in fake_grbl.give().split_inclusive(|byte| *byte == b'\n') {
             machine.on_bytes(*now_us, &harm(line, faults.next().unwrap()));
         }
         if let Some(outcome) = outcome(machine) {
@@ -76,11 +76,11 @@ proptest! {
 
     #[test]
     fn on_a_harmed_wire_a_checked_line_is_done_once_or_fails(faults in vec(fault(), 50)) {
-        let (mut peer, mut machine, mut now_us) = (Peer::new(true), checked(), 1);
-        peer.advance(1);
-        peer.take(format!("{}\n", seal("N0")).as_bytes());
-        peer.advance(10_000);
-        peer.give();
+        let (mut fake_grbl, mut machine, mut now_us) = (FakeGrbl::new(true), checked(), 1);
+        fake_grbl.advance(1);
+        fake_grbl.take(format!("{}\n", seal("N0")).as_bytes());
+        fake_grbl.advance(10_000);
+        fake_grbl.give();
         let mut faults = faults.into_iter().cycle();
         for number in 0..40 {
             // A flipped bit can make the reset byte of a digit.
@@ -88,13 +88,13 @@ proptest! {
                 break;
             }
             let block = format!("G4P{number}");
-            let before = peer.executed.len();
-            let outcome = exchange(&mut machine, &mut peer, &mut now_us, &block, &mut faults);
-            let done = peer.executed[before..].to_vec();
+            let before = fake_grbl.executed.len();
+            let outcome = exchange(&mut machine, &mut fake_grbl, &mut now_us, &block, &mut faults);
+            let done = fake_grbl.executed[before..].to_vec();
             match outcome {
-                Outcome::Done(_) => prop_assert_eq!(done, [block]),
-                Outcome::Refused(code) => prop_assert!(false, "refused with {}", code),
-                Outcome::Failed(_) => {
+                LineOutcome::Done(_) => prop_assert_eq!(done, [block]),
+                LineOutcome::Refused(code) => prop_assert!(false, "refused with {}", code),
+                LineOutcome::Failed(_) => {
                     prop_assert!(done.is_empty() || done == [block.clone()], "{:?} for {}", done, block);
                     break;
                 }
@@ -105,13 +105,13 @@ proptest! {
     #[test]
     fn any_bytes_are_taken_without_harm(pieces in vec(vec(any::<u8>(), 0..40), 0..30)) {
         for mut machine in [Machine::new(), checked()] {
-            machine.send(0, "$X", Patience::Short).unwrap();
+            machine.send(0, "$X", ReplyTimeout::AtOnce).unwrap();
             for (now_us, piece) in (0..).zip(&pieces) {
                 machine.on_bytes(now_us * 100_000, piece);
                 machine.on_time(now_us * 100_000);
             }
             let done = events(&mut machine).into_iter().any(|event| {
-                matches!(event, Event::Answered { outcome: Outcome::Done(_), .. })
+                matches!(event, WireEvent::Answered { outcome: LineOutcome::Done(_), .. })
             });
             prop_assert!(!done || !machine.is_checked());
         }
@@ -140,7 +140,7 @@ fn seq() -> impl Strategy<Value = Option<u32>> {
 }
 
 fn report() -> impl Strategy<Value = StatusReport> {
-    use State::*;
+    use ControllerState::*;
     let state = [
         Idle, Run, Held, Holding, Jog, Home, Alarm, Check, Door, Sleep,
     ];
@@ -173,11 +173,11 @@ fn report() -> impl Strategy<Value = StatusReport> {
 
 fn message() -> impl Strategy<Value = Message> {
     let cause = [
-        ResetCause::PowerOn,
-        ResetCause::External,
-        ResetCause::BrownOut,
-        ResetCause::Watchdog,
-        ResetCause::Host,
+        RestartCause::PowerOn,
+        RestartCause::External,
+        RestartCause::BrownOut,
+        RestartCause::Watchdog,
+        RestartCause::Host,
     ];
     let cause = proptest::option::of(proptest::sample::select(cause.to_vec()));
     prop_oneof![

@@ -1,4 +1,4 @@
-//! Status reports: `<Run|MPos:12.345,0.000,0.000|FS:432,0|T:123456789|Bat:11.84|Pn:X>`.
+//! TableStatus reports: `<Run|MPos:12.345,0.000,0.000|FS:432,0|T:123456789|Bat:11.84|Pn:X>`.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use super::number::{decimal, whole};
 /// What the controller is doing, in Grbl's words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum State {
+pub enum ControllerState {
     /// At rest, ready.
     Idle,
     /// Moving by G-code, or waiting within it.
@@ -30,50 +30,54 @@ pub enum State {
     Sleep,
 }
 
-impl State {
+impl ControllerState {
     /// Whether the table may be moving, or will move on without being told.
     #[must_use]
     pub fn may_move(self) -> bool {
         matches!(
             self,
-            State::Run | State::Holding | State::Jog | State::Home | State::Door
+            ControllerState::Run
+                | ControllerState::Holding
+                | ControllerState::Jog
+                | ControllerState::Home
+                | ControllerState::Door
         )
     }
 
-    fn parse(text: &str) -> Option<State> {
+    fn parse(text: &str) -> Option<ControllerState> {
         let (name, sub) = match text.split_once(':') {
             Some((name, sub)) => (name, Some(whole(sub)?)),
             None => (text, None),
         };
         Some(match (name, sub) {
-            ("Idle", None) => State::Idle,
-            ("Run", None) => State::Run,
-            ("Hold", Some(0)) => State::Held,
-            ("Hold", Some(1)) => State::Holding,
-            ("Jog", None) => State::Jog,
-            ("Home", None) => State::Home,
-            ("Alarm", None) => State::Alarm,
-            ("Check", None) => State::Check,
-            ("Door", Some(0..=3)) => State::Door,
-            ("Sleep", None) => State::Sleep,
+            ("Idle", None) => ControllerState::Idle,
+            ("Run", None) => ControllerState::Run,
+            ("Hold", Some(0)) => ControllerState::Held,
+            ("Hold", Some(1)) => ControllerState::Holding,
+            ("Jog", None) => ControllerState::Jog,
+            ("Home", None) => ControllerState::Home,
+            ("Alarm", None) => ControllerState::Alarm,
+            ("Check", None) => ControllerState::Check,
+            ("Door", Some(0..=3)) => ControllerState::Door,
+            ("Sleep", None) => ControllerState::Sleep,
             _ => return None,
         })
     }
 }
 
-impl fmt::Display for State {
+impl fmt::Display for ControllerState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            State::Idle => "Idle",
-            State::Run => "Run",
-            State::Held => "Hold:0",
-            State::Holding => "Hold:1",
-            State::Jog => "Jog",
-            State::Home => "Home",
-            State::Alarm => "Alarm",
-            State::Check => "Check",
-            State::Door => "Door:0",
-            State::Sleep => "Sleep",
+            ControllerState::Idle => "Idle",
+            ControllerState::Run => "Run",
+            ControllerState::Held => "Hold:0",
+            ControllerState::Holding => "Hold:1",
+            ControllerState::Jog => "Jog",
+            ControllerState::Home => "Home",
+            ControllerState::Alarm => "Alarm",
+            ControllerState::Check => "Check",
+            ControllerState::Door => "Door:0",
+            ControllerState::Sleep => "Sleep",
         })
     }
 }
@@ -100,7 +104,7 @@ pub struct Pins {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StatusReport {
     /// What the controller is doing.
-    pub state: State,
+    pub state: ControllerState,
     /// Where the table is.
     pub position: Position,
     /// Speed, the controller's unit a minute.
@@ -122,7 +126,7 @@ impl StatusReport {
             return None;
         }
         let mut fields = inside.split('|');
-        let state = State::parse(fields.next()?)?;
+        let state = ControllerState::parse(fields.next()?)?;
         let mut read = Fields::default();
         for field in fields {
             let (name, value) = field.split_once(':')?;

@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 
 use crc::{CRC_16_IBM_3740, Crc};
 
-pub(super) use port::PeerPort;
+pub(super) use port::FakePort;
 
 const STEPS: f64 = 88.889;
 const ACCELERATION: f64 = 36.0;
@@ -51,7 +51,7 @@ enum Mode {
 }
 
 #[derive(Debug)]
-pub(super) struct Peer {
+pub(super) struct FakeGrbl {
     pub(super) trouble: Trouble,
     rig: bool,
     homing: bool,
@@ -75,9 +75,9 @@ pub(super) struct Peer {
     pub(super) truth: Vec<(i64, f64)>,
 }
 
-impl Peer {
-    pub(super) fn new(rig: bool) -> Peer {
-        let mut peer = Peer {
+impl FakeGrbl {
+    pub(super) fn new(rig: bool) -> FakeGrbl {
+        let mut fake_grbl = FakeGrbl {
             trouble: Trouble::default(),
             rig,
             homing: false,
@@ -98,12 +98,12 @@ impl Peer {
             resets: 0,
             truth: Vec::new(),
         };
-        peer.banner("power-on");
-        peer
+        fake_grbl.banner("power-on");
+        fake_grbl
     }
 
     /// With an index sensor, which is there or not.
-    pub(super) fn with_homing(mut self, found: bool) -> Peer {
+    pub(super) fn with_homing(mut self, found: bool) -> FakeGrbl {
         self.homing = true;
         self.found = found;
         self
@@ -255,7 +255,7 @@ impl Peer {
         };
     }
 
-    /// Takes bytes at the time of the last [`Peer::advance`].
+    /// Takes bytes at the time of the last [`FakeGrbl::advance`].
     pub(super) fn take(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             match byte {

@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use crate::turntable::wire::{Pins, Poll, Position, State};
+use crate::turntable::wire::{ControllerState, Pins, Poll, Position};
 
 /// A report in degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Seen {
-    pub(crate) state: State,
+pub(crate) struct PositionReport {
+    pub(crate) state: ControllerState,
     /// Degrees from machine zero.
     pub(crate) machine_deg: f64,
     /// Degrees a second.
@@ -21,19 +21,23 @@ pub(crate) struct Seen {
     pub(crate) certain: bool,
 }
 
-impl Seen {
+impl PositionReport {
     /// A report in degrees; `None` while it tells its place from a zero that is not known yet.
-    pub(super) fn of(poll: &Poll, work_zero: Option<f64>, habits: &Habits) -> Option<Seen> {
+    pub(super) fn of(
+        poll: &Poll,
+        work_zero: Option<f64>,
+        traits: &ControllerTraits,
+    ) -> Option<PositionReport> {
         let report = poll.report;
         let units = match report.position {
             Position::Machine(at) => at,
             Position::Work(at) => at + work_zero?,
         };
-        Some(Seen {
+        Some(PositionReport {
             state: report.state,
-            machine_deg: units * habits.degrees_per_unit,
-            speed: report.feed.unwrap_or(0.0) * habits.degrees_per_unit / 60.0,
-            chip_us: report.chip_us.filter(|_| habits.stamps),
+            machine_deg: units * traits.degrees_per_unit,
+            speed: report.feed.unwrap_or(0.0) * traits.degrees_per_unit / 60.0,
+            chip_us: report.chip_us.filter(|_| traits.stamps),
             battery_v: report.battery_v,
             pins: report.pins,
             asked_us: poll.asked_us,
@@ -43,7 +47,7 @@ impl Seen {
     }
 
     /// Whether the report after this one says the same; where a table moves places differ.
-    pub(super) fn confirms(&self, next: &Seen) -> bool {
+    pub(super) fn confirms(&self, next: &PositionReport) -> bool {
         let same = self.machine_deg == next.machine_deg || next.state.may_move();
         self.state == next.state && same
     }
@@ -51,7 +55,7 @@ impl Seen {
 
 /// How the controller tells its position, and how often it is asked in motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Habits {
+pub(crate) struct ControllerTraits {
     /// Degrees in one unit of its reports.
     pub(crate) degrees_per_unit: f64,
     /// Between two reports in motion.
