@@ -88,7 +88,7 @@ fn wake(link: &Link, resets: bool) -> Result<(), TurntableError> {
         if supervisor.closed().is_some() {
             return Some(None);
         }
-        supervisor.seen().map(|seen| Some(seen.state))
+        supervisor.last_report().map(|report| Some(report.state))
     });
     match state {
         Some(Some(ControllerState::Idle | ControllerState::Alarm | ControllerState::Check)) => {}

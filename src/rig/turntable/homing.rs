@@ -2,7 +2,7 @@
 
 use super::codes::Alarm;
 use super::error::TurntableError;
-use super::supervisor::Course;
+use super::supervisor::MotionGoal;
 use super::table::{Table, refused};
 use super::wire::{ControllerState, LineOutcome, ReplyTimeout};
 
@@ -30,7 +30,7 @@ impl Table {
         if !self.identity().homing {
             return self.home_where_it_stands();
         }
-        self.begin(Course::Homing)?;
+        self.begin(MotionGoal::Homing)?;
         let searched = self.search_index();
         self.link().supervisor().end_motion();
         searched

@@ -140,9 +140,9 @@ impl Link {
             if let Some(error) = port_lost(supervisor) {
                 return Some(Err(error));
             }
-            let seen = supervisor.seen()?;
-            let fresh = seen.asked_us.is_some_and(|us| us >= asked_us);
-            (fresh && supervisor.is_confirmed()).then(|| Ok(TableStatus::of(seen, supervisor)))
+            let report = supervisor.last_report()?;
+            let fresh = report.asked_us.is_some_and(|us| us >= asked_us);
+            (fresh && supervisor.is_confirmed()).then(|| Ok(TableStatus::of(report, supervisor)))
         });
         status.unwrap_or(Err(TurntableError::Silent {
             milliseconds: REPORT_WAIT.as_millis() as u64,

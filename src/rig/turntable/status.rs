@@ -28,16 +28,16 @@ pub struct TableStatus {
 }
 
 impl TableStatus {
-    pub(super) fn of(seen: &PositionReport, supervisor: &Supervisor) -> TableStatus {
+    pub(super) fn of(report: &PositionReport, supervisor: &Supervisor) -> TableStatus {
         let zero = supervisor.zero_deg();
         TableStatus {
-            state: seen.state,
-            angle_deg: seen.machine_deg - zero.unwrap_or(0.0),
-            machine_deg: seen.machine_deg,
-            degrees_per_second: seen.speed,
-            battery_v: seen.battery_v,
-            index: seen.pins.index,
-            emergency_stop: seen.pins.emergency_stop,
+            state: report.state,
+            angle_deg: report.machine_deg - zero.unwrap_or(0.0),
+            machine_deg: report.machine_deg,
+            degrees_per_second: report.speed,
+            battery_v: report.battery_v,
+            index: report.pins.index,
+            emergency_stop: report.pins.emergency_stop,
             homed: zero.is_some(),
             alarm: supervisor.alarm(),
         }

@@ -11,7 +11,7 @@ use super::owner::{Claim, Server};
 use super::plan::TurnPlan;
 use super::port::{Port, SerialPort};
 use super::status::TableStatus;
-use super::supervisor::Course;
+use super::supervisor::MotionGoal;
 use super::turn::Turn;
 use super::wire::{ControllerState, Counts, LineOutcome, Message, ReplyTimeout};
 use super::{LEASE_S, TableOptions};
@@ -178,7 +178,7 @@ impl Table {
         speed: f64,
     ) -> Result<(), TurntableError> {
         let time = self.travel_time(distance, speed);
-        self.begin(Course::To {
+        self.begin(MotionGoal::To {
             target_deg,
             within_us: i64::try_from(time.as_micros()).unwrap_or(i64::MAX),
         })?;
@@ -223,13 +223,13 @@ impl Table {
     }
 
     /// Starts watching a motion, unless one is under way.
-    pub(super) fn begin(&self, course: Course) -> Result<(), TurntableError> {
+    pub(super) fn begin(&self, goal: MotionGoal) -> Result<(), TurntableError> {
         self.secure()?;
         let mut supervisor = self.link.supervisor();
         if supervisor.is_stopping() || supervisor.motion().is_some() {
             return Err(TurntableError::Busy);
         }
-        supervisor.begin_motion(self.clock().now_us(), course);
+        supervisor.begin_motion(self.clock().now_us(), goal);
         Ok(())
     }
 

@@ -337,7 +337,7 @@ fn a_stop_from_elsewhere_ends_a_jog_with_that_reason() {
     let clock = rig.table.clock().clone();
     let stopper = clock.spawn("stopper", move || {
         link.wait(Duration::from_secs(10), |s| {
-            s.seen()?.state.may_move().then_some(())
+            s.last_report()?.state.may_move().then_some(())
         });
         link.stop()
     });

@@ -85,7 +85,7 @@ impl<'table> Turn<'table> {
         {
             return Ok(TurnPhase::AtEnd);
         }
-        let gone = supervisor.recorded().last().map(|seen| self.gone(seen));
+        let gone = supervisor.recorded().last().map(|report| self.gone(report));
         Ok(match gone {
             Some(gone) if gone > self.plan.constant_deg() => TurnPhase::Ending,
             Some(gone) if gone >= 0.0 => TurnPhase::Constant,
@@ -98,13 +98,13 @@ impl<'table> Turn<'table> {
     #[must_use]
     pub fn last_angle(&self) -> Option<(f64, i64)> {
         let supervisor = self.table.link().supervisor();
-        let seen = supervisor.recorded().last()?;
-        Some((seen.machine_deg - self.zero_deg, seen.came_us))
+        let report = supervisor.recorded().last()?;
+        Some((report.machine_deg - self.zero_deg, report.came_us))
     }
 
     /// Degrees since the speed became constant; negative before.
-    fn gone(&self, seen: &PositionReport) -> f64 {
-        let angle = seen.machine_deg - self.zero_deg - self.plan.constant_from_deg();
+    fn gone(&self, report: &PositionReport) -> f64 {
+        let angle = report.machine_deg - self.zero_deg - self.plan.constant_from_deg();
         angle * self.plan.direction().sign()
     }
 
@@ -119,19 +119,19 @@ impl<'table> Turn<'table> {
             if supervisor.fault().is_some() {
                 return Some(None);
             }
-            let constant = |seen: &&PositionReport| {
-                seen.state == ControllerState::Run && self.gone(seen) >= 0.0
+            let constant = |report: &&PositionReport| {
+                report.state == ControllerState::Run && self.gone(report) >= 0.0
             };
-            let seen = supervisor.recorded().iter().rev().find(constant)?;
-            Some(Some((*seen, self.gone(seen))))
+            let report = supervisor.recorded().iter().rev().find(constant)?;
+            Some(Some((*report, self.gone(report))))
         });
         self.check()?;
-        let Some(Some((seen, gone))) = found else {
+        let Some(Some((report, gone))) = found else {
             self.stop()?;
             return Err(super::error::MotionFault::Late.into());
         };
-        let at_us = seen.asked_us.map_or(seen.came_us, |asked_us| {
-            i64::midpoint(asked_us, seen.came_us)
+        let at_us = report.asked_us.map_or(report.came_us, |asked_us| {
+            i64::midpoint(asked_us, report.came_us)
         });
         let micros = |degrees: f64| (degrees / speed * 1e6).round() as i64;
         Ok(ConstantPart {
@@ -151,9 +151,9 @@ impl<'table> Turn<'table> {
         let distance = (plan.end_deg() - plan.back_deg()).abs();
         let limit = self.table.travel_time(distance, plan.degrees_per_second());
         let arrived = self.table.wait_arrival(limit);
-        let seen = self.leave();
+        let reports = self.leave();
         arrived?;
-        let track = sync::fit(&seen, &self.course());
+        let track = sync::fit(&reports, &self.expected());
         if self.plan.unwind() {
             let start_deg = self.zero_deg + self.plan.start_deg();
             self.table.go(start_deg, self.table.brisk())?;
@@ -161,8 +161,8 @@ impl<'table> Turn<'table> {
         Ok(track?)
     }
 
-    fn course(&self) -> sync::Course {
-        sync::Course {
+    fn expected(&self) -> sync::ExpectedTurn {
+        sync::ExpectedTurn {
             from_deg: self.zero_deg + self.plan.constant_from_deg(),
             to_deg: self.zero_deg + self.plan.constant_to_deg(),
             degrees_per_second: self.plan.degrees_per_second(),

@@ -16,7 +16,7 @@ use super::wire::{
     ControllerState, Counts, LineFault, LineOutcome, Machine, Poll, ReplyTimeout, RestartCause,
     SendError, WireEvent,
 };
-pub(crate) use motion::{Course, Motion};
+pub(crate) use motion::{Motion, MotionGoal};
 pub(crate) use position_report::{ControllerTraits, PositionReport};
 pub(crate) use stop::{Stop, StopOutcome};
 
@@ -33,7 +33,7 @@ pub(crate) struct Supervisor {
     wire: Machine,
     traits: ControllerTraits,
     answer: Option<(u64, LineOutcome)>,
-    seen: Option<PositionReport>,
+    last_report: Option<PositionReport>,
     confirmed: bool,
     work_zero: Option<f64>,
     /// The angle counted as zero, from machine zero; `None` while the position is not known.
@@ -58,7 +58,7 @@ impl Supervisor {
             wire: Machine::new(),
             traits,
             answer: None,
-            seen: None,
+            last_report: None,
             confirmed: false,
             work_zero: None,
             zero_deg: None,
@@ -87,8 +87,8 @@ impl Supervisor {
         self.wire.is_checked()
     }
 
-    pub(crate) fn seen(&self) -> Option<&PositionReport> {
-        self.seen.as_ref()
+    pub(crate) fn last_report(&self) -> Option<&PositionReport> {
+        self.last_report.as_ref()
     }
 
     /// Whether the last report can be relied on: it came with a checksum, or the one before says
@@ -112,8 +112,8 @@ impl Supervisor {
 
     pub(crate) fn alarm(&self) -> Option<Alarm> {
         let locked = self
-            .seen
-            .is_some_and(|seen| seen.state == ControllerState::Alarm);
+            .last_report
+            .is_some_and(|report| report.state == ControllerState::Alarm);
         locked.then_some(Alarm(self.alarm))
     }
 
@@ -175,9 +175,9 @@ impl Supervisor {
     }
 
     /// Starts watching a motion; faults from before are forgotten.
-    pub(crate) fn begin_motion(&mut self, now_us: i64, course: Course) {
+    pub(crate) fn begin_motion(&mut self, now_us: i64, goal: MotionGoal) {
         self.fault = None;
-        self.motion = Some(Motion::new(now_us, course));
+        self.motion = Some(Motion::new(now_us, goal));
     }
 
     /// The controller has accepted the line that moves the table.
@@ -236,7 +236,8 @@ impl Supervisor {
 
     /// Whether the table was moving when it was last heard of.
     pub(crate) fn moves(&self) -> bool {
-        self.seen.is_some_and(|seen| seen.state.may_move())
+        self.last_report
+            .is_some_and(|report| report.state.may_move())
     }
 
     fn begin_stop(&mut self, now_us: i64) {
@@ -325,27 +326,29 @@ impl Supervisor {
 
     fn on_report(&mut self, now_us: i64, poll: &Poll) {
         self.work_zero = poll.report.work_zero.or(self.work_zero);
-        let Some(seen) = PositionReport::of(poll, self.work_zero, &self.traits) else {
+        let Some(report) = PositionReport::of(poll, self.work_zero, &self.traits) else {
             return;
         };
-        self.confirmed = self.seen.is_some_and(|before| before.confirms(&seen));
-        self.seen = Some(seen);
-        if seen.state != ControllerState::Alarm {
+        self.confirmed = self
+            .last_report
+            .is_some_and(|before| before.confirms(&report));
+        self.last_report = Some(report);
+        if report.state != ControllerState::Alarm {
             self.alarm = None;
         }
         if let Some(recorded) = &mut self.recorded
             && recorded.len() < MOST_RECORDED
         {
-            recorded.push(seen);
+            recorded.push(report);
         }
         if self.is_stopping() {
             if let Some(stop) = &mut self.stop {
-                stop.on_report(now_us, &seen, &mut self.wire);
+                stop.on_report(now_us, &report, &mut self.wire);
             }
             self.settle();
         } else if self.fault.is_none()
             && let Some(motion) = &mut self.motion
-            && let Some(fault) = motion.on_report(&seen, self.alarm, &self.traits)
+            && let Some(fault) = motion.on_report(&report, self.alarm, &self.traits)
         {
             self.fail(now_us, fault);
         }

@@ -17,7 +17,7 @@ const PRINTED_DEG: f64 = 0.002;
 
 /// Where a motion goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Course {
+pub(crate) enum MotionGoal {
     /// To a place, degrees from machine zero.
     To {
         /// The place.
@@ -32,7 +32,7 @@ pub(crate) enum Course {
 /// A motion under way.
 #[derive(Debug)]
 pub(crate) struct Motion {
-    course: Course,
+    goal: MotionGoal,
     accepted_us: Option<i64>,
     last_report_us: i64,
     /// The last place, and since when it is reported.
@@ -41,9 +41,9 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    pub(super) fn new(now_us: i64, course: Course) -> Self {
+    pub(super) fn new(now_us: i64, goal: MotionGoal) -> Self {
         Self {
-            course,
+            goal,
             accepted_us: None,
             last_report_us: now_us,
             place: None,
@@ -64,22 +64,22 @@ impl Motion {
     /// A report has come: what it says against the motion.
     pub(super) fn on_report(
         &mut self,
-        seen: &PositionReport,
+        report: &PositionReport,
         alarm: Option<u8>,
         traits: &ControllerTraits,
     ) -> Option<MotionFault> {
-        self.last_report_us = seen.came_us;
-        let Course::To { target_deg, .. } = self.course else {
+        self.last_report_us = report.came_us;
+        let MotionGoal::To { target_deg, .. } = self.goal else {
             return None;
         };
-        let stands_us = self.stands_for(seen);
-        match seen.state {
+        let stands_us = self.stands_for(report);
+        match report.state {
             ControllerState::Run | ControllerState::Jog => {
                 (stands_us > STALL_US).then_some(MotionFault::Stalled {
-                    machine_deg: seen.machine_deg,
+                    machine_deg: report.machine_deg,
                 })
             }
-            ControllerState::Idle => self.on_idle(seen, target_deg, stands_us, traits),
+            ControllerState::Idle => self.on_idle(report, target_deg, stands_us, traits),
             ControllerState::Held
             | ControllerState::Holding
             | ControllerState::Door
@@ -87,7 +87,7 @@ impl Motion {
             ControllerState::Alarm => Some(MotionFault::Alarm(Alarm(alarm))),
             state @ (ControllerState::Home | ControllerState::Check) => Some(MotionFault::Astray {
                 state,
-                machine_deg: seen.machine_deg,
+                machine_deg: report.machine_deg,
                 target_deg,
             }),
         }
@@ -95,37 +95,37 @@ impl Motion {
 
     fn on_idle(
         &mut self,
-        seen: &PositionReport,
+        report: &PositionReport,
         target_deg: f64,
         stands_us: i64,
         traits: &ControllerTraits,
     ) -> Option<MotionFault> {
         let accepted_us = self.accepted_us?;
-        let after = seen
+        let after = report
             .asked_us
             .is_some_and(|asked_us| asked_us >= accepted_us);
-        let off = (seen.machine_deg - target_deg).abs();
+        let off = (report.machine_deg - target_deg).abs();
         if after && off <= traits.step_deg + PRINTED_DEG {
             self.at_target = true;
             return None;
         }
         (after && !self.at_target && stands_us > ASTRAY_US).then_some(MotionFault::Astray {
             state: ControllerState::Idle,
-            machine_deg: seen.machine_deg,
+            machine_deg: report.machine_deg,
             target_deg,
         })
     }
 
     /// How long the table has certainly been at the place of this report, microseconds: from when
     /// the first report of it came to when this one was asked for.
-    fn stands_for(&mut self, seen: &PositionReport) -> i64 {
+    fn stands_for(&mut self, report: &PositionReport) -> i64 {
         match self.place {
-            Some((place, since_us)) if place == seen.machine_deg => {
-                let asked_us = seen.asked_us.filter(|_| seen.certain);
+            Some((place, since_us)) if place == report.machine_deg => {
+                let asked_us = report.asked_us.filter(|_| report.certain);
                 asked_us.map_or(0, |asked_us| asked_us - since_us)
             }
             _ => {
-                self.place = Some((seen.machine_deg, seen.came_us));
+                self.place = Some((report.machine_deg, report.came_us));
                 0
             }
         }
@@ -140,9 +140,9 @@ impl Motion {
     /// What the passing of time says against the motion.
     pub(super) fn overdue(&self, now_us: i64, traits: &ControllerTraits) -> Option<MotionFault> {
         let silent_us = now_us - self.last_report_us;
-        match self.course {
-            Course::Homing if !traits.reports_homing => None,
-            Course::To { within_us, .. }
+        match self.goal {
+            MotionGoal::Homing if !traits.reports_homing => None,
+            MotionGoal::To { within_us, .. }
                 if !self.at_target && self.runs_for(now_us) > within_us =>
             {
                 Some(MotionFault::Late)

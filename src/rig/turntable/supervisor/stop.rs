@@ -33,7 +33,7 @@ pub(crate) enum StopOutcome {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum TurnPhase {
+enum Step {
     /// `!` was sent.
     Braking,
     /// A reset was sent; `gentle` when the table stood.
@@ -48,7 +48,7 @@ enum TurnPhase {
 /// A stop under way, or its end.
 #[derive(Debug)]
 pub(crate) struct Stop {
-    phase: TurnPhase,
+    step: Step,
     since_us: i64,
     sent_us: i64,
     heard_us: i64,
@@ -64,7 +64,7 @@ impl Stop {
     pub(super) fn begin(now_us: i64, unsettled: bool, wire: &mut Machine) -> Self {
         wire.realtime(realtime::HOLD);
         Self {
-            phase: TurnPhase::Braking,
+            step: Step::Braking,
             since_us: now_us,
             sent_us: now_us,
             heard_us: now_us,
@@ -75,14 +75,14 @@ impl Stop {
     }
 
     pub(crate) fn outcome(&self) -> Option<StopOutcome> {
-        match self.phase {
-            TurnPhase::Done(outcome) => Some(outcome),
+        match self.step {
+            Step::Done(outcome) => Some(outcome),
             _ => None,
         }
     }
 
-    fn enter(&mut self, now_us: i64, phase: TurnPhase) {
-        self.phase = phase;
+    fn enter(&mut self, now_us: i64, step: Step) {
+        self.step = step;
         self.since_us = now_us;
         self.sent_us = now_us;
         self.standing = None;
@@ -90,29 +90,29 @@ impl Stop {
 
     fn reset(&mut self, now_us: i64, gentle: bool, wire: &mut Machine) {
         wire.realtime(realtime::RESET);
-        self.enter(now_us, TurnPhase::Resetting { gentle });
+        self.enter(now_us, Step::Resetting { gentle });
     }
 
     pub(super) fn on_time(&mut self, now_us: i64, wire: &mut Machine) {
         let lasted_us = now_us - self.since_us;
         let unsent_us = now_us - self.sent_us;
-        match self.phase {
-            TurnPhase::Braking if now_us - self.heard_us > SILENT_US || lasted_us > RAMP_US => {
+        match self.step {
+            Step::Braking if now_us - self.heard_us > SILENT_US || lasted_us > RAMP_US => {
                 self.reset(now_us, false, wire);
             }
-            TurnPhase::Braking if unsent_us >= REPEAT_US && self.standing.is_none() => {
+            Step::Braking if unsent_us >= REPEAT_US && self.standing.is_none() => {
                 self.sent_us = now_us;
                 wire.realtime(realtime::HOLD);
             }
-            TurnPhase::Resetting { .. } if lasted_us > RESTART_US => {
-                self.enter(now_us, TurnPhase::Done(StopOutcome::Unknown));
+            Step::Resetting { .. } if lasted_us > RESTART_US => {
+                self.enter(now_us, Step::Done(StopOutcome::Unknown));
             }
-            TurnPhase::Resetting { .. } if unsent_us >= RESET_REPEAT_US => {
+            Step::Resetting { .. } if unsent_us >= RESET_REPEAT_US => {
                 self.sent_us = now_us;
                 wire.realtime(realtime::RESET);
             }
-            TurnPhase::Checking if lasted_us > CHECK_US => {
-                self.enter(now_us, TurnPhase::Done(StopOutcome::Unknown));
+            Step::Checking if lasted_us > CHECK_US => {
+                self.enter(now_us, Step::Done(StopOutcome::Unknown));
             }
             _ => {}
         }
@@ -121,54 +121,54 @@ impl Stop {
     /// The controller has restarted. Whether that is the reset of a standing table, which keeps
     /// its position.
     pub(super) fn on_reset(&mut self, now_us: i64) -> bool {
-        let gentle = self.phase == TurnPhase::Resetting { gentle: true };
+        let gentle = self.step == Step::Resetting { gentle: true };
         if self.outcome().is_none() {
-            self.enter(now_us, TurnPhase::Checking);
+            self.enter(now_us, Step::Checking);
         }
         gentle
     }
 
-    pub(super) fn on_report(&mut self, now_us: i64, seen: &PositionReport, wire: &mut Machine) {
+    pub(super) fn on_report(&mut self, now_us: i64, report: &PositionReport, wire: &mut Machine) {
         self.heard_us = now_us;
-        if seen
+        if report
             .asked_us
             .is_none_or(|asked_us| asked_us < self.since_us)
         {
             return;
         }
-        match (self.phase, seen.state) {
+        match (self.step, report.state) {
             // Only a reset ends a search for the index.
-            (TurnPhase::Braking, ControllerState::Home) => self.reset(now_us, false, wire),
-            (TurnPhase::Braking | TurnPhase::Checking, state) if state.may_move() => {
-                self.standing = None
-            }
-            (TurnPhase::Braking, state) if self.stands(seen) => {
+            (Step::Braking, ControllerState::Home) => self.reset(now_us, false, wire),
+            (Step::Braking | Step::Checking, state) if state.may_move() => self.standing = None,
+            (Step::Braking, state) if self.stands(report) => {
                 if self.unsettled || matches!(state, ControllerState::Held) {
-                    self.stood_at = Some(seen.machine_deg);
+                    self.stood_at = Some(report.machine_deg);
                     self.reset(now_us, true, wire);
                 } else {
-                    self.enter(now_us, TurnPhase::Done(StopOutcome::Standing));
+                    self.enter(now_us, Step::Done(StopOutcome::Standing));
                 }
             }
-            (TurnPhase::Checking, _) if self.stands(seen) => {
-                let same = self.stood_at.is_none_or(|place| place == seen.machine_deg);
+            (Step::Checking, _) if self.stands(report) => {
+                let same = self
+                    .stood_at
+                    .is_none_or(|place| place == report.machine_deg);
                 let outcome = if same {
                     StopOutcome::Standing
                 } else {
                     StopOutcome::Displaced
                 };
-                self.enter(now_us, TurnPhase::Done(outcome));
+                self.enter(now_us, Step::Done(outcome));
             }
             _ => {}
         }
     }
 
-    fn stands(&mut self, seen: &PositionReport) -> bool {
+    fn stands(&mut self, report: &PositionReport) -> bool {
         let count = match self.standing {
-            Some((place, count)) if place == seen.machine_deg => count + 1,
+            Some((place, count)) if place == report.machine_deg => count + 1,
             _ => 1,
         };
-        self.standing = Some((seen.machine_deg, count));
+        self.standing = Some((report.machine_deg, count));
         count >= STANDING
     }
 }

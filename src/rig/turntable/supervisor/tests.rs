@@ -57,11 +57,11 @@ impl Desk {
     }
 
     fn moving(&mut self, target_deg: f64) {
-        let course = Course::To {
+        let goal = MotionGoal::To {
             target_deg,
             within_us: 60_000_000,
         };
-        self.supervisor.begin_motion(self.now_us, course);
+        self.supervisor.begin_motion(self.now_us, goal);
         self.supervisor.motion_accepted(self.now_us);
     }
 }
@@ -196,15 +196,15 @@ fn a_motion_that_takes_too_long_is_late() {
 fn work_positions_count_once_their_zero_is_told_and_inches_are_degrees_too() {
     let mut desk = Desk::new();
     desk.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0>");
-    assert!(desk.supervisor.seen().is_none());
+    assert!(desk.supervisor.last_report().is_none());
     desk.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0|WCO:2.000,0.000,0.000>");
-    assert_eq!(desk.supervisor.seen().unwrap().machine_deg, 3.0);
+    assert_eq!(desk.supervisor.last_report().unwrap().machine_deg, 3.0);
     desk.supervisor.set_traits(ControllerTraits {
         degrees_per_unit: 25.4,
         ..TRAITS
     });
     desk.hear("<Idle|MPos:1.000,0.000,0.000|FS:0,0>");
-    assert_eq!(desk.supervisor.seen().unwrap().machine_deg, 25.4);
+    assert_eq!(desk.supervisor.last_report().unwrap().machine_deg, 25.4);
 }
 
 #[test]

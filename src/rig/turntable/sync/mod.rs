@@ -169,7 +169,7 @@ impl Track {
 
 /// What the turn was to be, degrees from machine zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Course {
+pub(crate) struct ExpectedTurn {
     /// Where the part at constant speed starts.
     pub(crate) from_deg: f64,
     /// Where it ends.
@@ -182,7 +182,7 @@ pub(crate) struct Course {
     pub(crate) step_deg: f64,
 }
 
-impl Course {
+impl ExpectedTurn {
     fn sign(&self) -> f64 {
         (self.to_deg - self.from_deg).signum()
     }
@@ -216,14 +216,17 @@ impl Point {
 }
 
 /// The track of a turn by its reports.
-pub(crate) fn fit(seen: &[PositionReport], course: &Course) -> Result<Track, TrackError> {
-    let points = points(seen, course);
-    enough(&points, course)?;
+pub(crate) fn fit(
+    reports: &[PositionReport],
+    expected: &ExpectedTurn,
+) -> Result<Track, TrackError> {
+    let points = points(reports, expected);
+    enough(&points, expected)?;
     let stamped = points.iter().all(|point| point.chip_us.is_some());
     let fitted = if stamped {
-        by_the_chip(&points, course)?
+        by_the_chip(&points, expected)?
     } else {
-        by_the_middle(&points, course)
+        by_the_middle(&points, expected)
     };
     if fitted.outliers as f64 > points.len() as f64 * MOST_OUTLIERS {
         return Err(TrackError::Uneven {
@@ -232,11 +235,11 @@ pub(crate) fn fit(seen: &[PositionReport], course: &Course) -> Result<Track, Tra
         });
     }
     let measured = fitted.line.slope * 1e6;
-    let planned = course.degrees_per_second * course.sign();
+    let planned = expected.degrees_per_second * expected.sign();
     if (measured / planned - 1.0).abs() > MOST_OFF {
         return Err(TrackError::Speed { measured, planned });
     }
-    Ok(track(&points, course, &fitted))
+    Ok(track(&points, expected, &fitted))
 }
 
 /// The line of angles over the host's time, and what it is made of.
@@ -246,22 +249,23 @@ struct Fitted {
     chip_rate: Option<f64>,
 }
 
-fn points(seen: &[PositionReport], course: &Course) -> Vec<Point> {
-    let half_step = course.sign() * course.step_deg / 2.0;
-    let point = |seen: &PositionReport| {
-        let usable =
-            seen.certain && seen.state == ControllerState::Run && course.covers(seen.machine_deg);
+fn points(reports: &[PositionReport], expected: &ExpectedTurn) -> Vec<Point> {
+    let half_step = expected.sign() * expected.step_deg / 2.0;
+    let point = |report: &PositionReport| {
+        let usable = report.certain
+            && report.state == ControllerState::Run
+            && expected.covers(report.machine_deg);
         usable.then_some(Point {
-            asked_us: seen.asked_us? as f64,
-            came_us: seen.came_us as f64,
-            chip_us: seen.chip_us,
-            angle_deg: seen.machine_deg + half_step - course.zero_deg,
+            asked_us: report.asked_us? as f64,
+            came_us: report.came_us as f64,
+            chip_us: report.chip_us,
+            angle_deg: report.machine_deg + half_step - expected.zero_deg,
         })
     };
-    seen.iter().filter_map(point).collect()
+    reports.iter().filter_map(point).collect()
 }
 
-fn enough(points: &[Point], course: &Course) -> Result<(), TrackError> {
+fn enough(points: &[Point], expected: &ExpectedTurn) -> Result<(), TrackError> {
     if points.len() < LEAST_POLLS {
         return Err(TrackError::TooFew {
             polls: points.len(),
@@ -269,7 +273,7 @@ fn enough(points: &[Point], course: &Course) -> Result<(), TrackError> {
     }
     let angles = || points.iter().map(|point| point.angle_deg);
     let covered = angles().fold(f64::MIN, f64::max) - angles().fold(f64::MAX, f64::min);
-    let cover = covered / (course.to_deg - course.from_deg).abs();
+    let cover = covered / (expected.to_deg - expected.from_deg).abs();
     if cover < LEAST_COVER {
         return Err(TrackError::Gaps {
             percent: cover * 100.0,
@@ -278,13 +282,13 @@ fn enough(points: &[Point], course: &Course) -> Result<(), TrackError> {
     Ok(())
 }
 
-fn by_the_middle(points: &[Point], course: &Course) -> Fitted {
+fn by_the_middle(points: &[Point], expected: &ExpectedTurn) -> Fitted {
     let pair = |point: &Point| (point.middle_us(), point.angle_deg);
     let pairs: Vec<_> = fastest(points).iter().map(pair).collect();
-    let Fit { line, .. } = line::robust(&pairs, course.step_deg);
+    let Fit { line, .. } = line::robust(&pairs, expected.step_deg);
     // A slow answer lies off the line by its delay, and is none of an uneven table's.
     let allowed =
-        |point: &Point| course.step_deg * 2.0 + point.round_trip_us() / 2.0 * line.slope.abs();
+        |point: &Point| expected.step_deg * 2.0 + point.round_trip_us() / 2.0 * line.slope.abs();
     let off =
         |point: &&Point| (point.angle_deg - line.at(point.middle_us())).abs() > allowed(point);
     Fitted {
@@ -294,14 +298,14 @@ fn by_the_middle(points: &[Point], course: &Course) -> Fitted {
     }
 }
 
-fn by_the_chip(points: &[Point], course: &Course) -> Result<Fitted, TrackError> {
+fn by_the_chip(points: &[Point], expected: &ExpectedTurn) -> Result<Fitted, TrackError> {
     let stamps = unwrapped(points);
     let angles: Vec<_> = stamps
         .iter()
         .zip(points)
         .map(|(&chip, p)| (chip, p.angle_deg))
         .collect();
-    let by_chip = line::robust(&angles, course.step_deg * 2.0);
+    let by_chip = line::robust(&angles, expected.step_deg * 2.0);
 
     let stamped = points
         .iter()
@@ -362,10 +366,10 @@ fn fastest_by<T: Copy>(items: &[T], point: impl Fn(&T) -> &Point) -> Vec<T> {
     chosen
 }
 
-fn track(points: &[Point], course: &Course, fitted: &Fitted) -> Track {
+fn track(points: &[Point], expected: &ExpectedTurn, fitted: &Fitted) -> Track {
     let line = fitted.line;
     let time = |machine_deg: f64| {
-        let t_us = line.inverse(machine_deg - course.zero_deg);
+        let t_us = line.inverse(machine_deg - expected.zero_deg);
         t_us.unwrap_or_default()
     };
     let quick = fastest(points);
@@ -375,8 +379,8 @@ fn track(points: &[Point], course: &Course, fitted: &Fitted) -> Track {
     let trips = quick.iter().map(Point::round_trip_us);
     Track {
         line,
-        from_us: time(course.from_deg).ceil() as i64,
-        to_us: time(course.to_deg).floor() as i64,
+        from_us: time(expected.from_deg).ceil() as i64,
+        to_us: time(expected.to_deg).floor() as i64,
         residuals: Residuals {
             median_deg: line::quantile(&offs, 0.5),
             p99_deg: line::quantile(&offs, 0.99),

@@ -6,7 +6,7 @@ use super::*;
 use crate::turntable::wire::Pins;
 
 const STEP: f64 = 1.0 / 88.889;
-const COURSE: Course = Course {
+const COURSE: ExpectedTurn = ExpectedTurn {
     from_deg: -2.0,
     to_deg: 362.0,
     degrees_per_second: 7.2,
@@ -195,7 +195,7 @@ fn turns_that_give_no_track_are_told_apart() {
         fit(&reports[..400], &COURSE),
         Err(TrackError::Gaps { .. })
     ));
-    let fast = Course {
+    let fast = ExpectedTurn {
         degrees_per_second: 7.6,
         ..COURSE
     };
@@ -212,8 +212,8 @@ fn turns_that_give_no_track_are_told_apart() {
         Err(TrackError::Uneven { .. })
     ));
     let mut stamped = USUAL.reports(1);
-    for seen in &mut stamped {
-        seen.chip_us = seen.chip_us.map(|us| us / 2);
+    for report in &mut stamped {
+        report.chip_us = report.chip_us.map(|us| us / 2);
     }
     assert!(matches!(
         fit(&stamped, &COURSE),
@@ -224,9 +224,9 @@ fn turns_that_give_no_track_are_told_apart() {
 #[test]
 fn reports_whose_question_is_not_certain_are_not_used() {
     let mut reports = USUAL.reports(1);
-    for seen in reports.iter_mut().step_by(2) {
-        seen.certain = false;
-        seen.came_us += 1_000_000;
+    for report in reports.iter_mut().step_by(2) {
+        report.certain = false;
+        report.came_us += 1_000_000;
     }
     let track = fit(&reports, &COURSE).unwrap();
     assert!(track.polls() < 400 && track.outliers() == 0);
@@ -254,14 +254,14 @@ proptest! {
         reports in proptest::collection::vec(
             (any::<i32>(), any::<u16>(), -500.0..500.0f64, proptest::option::of(any::<u32>())), 0..80),
     ) {
-        let seen = |(asked, took, machine_deg, chip_us): &(i32, u16, f64, Option<u32>)| PositionReport {
+        let report = |(asked, took, machine_deg, chip_us): &(i32, u16, f64, Option<u32>)| PositionReport {
             machine_deg: *machine_deg,
             chip_us: *chip_us,
             asked_us: Some(i64::from(*asked)),
             came_us: i64::from(*asked) + i64::from(*took),
             ..USUAL.report(0, &mut Chance(1))
         };
-        let reports: Vec<PositionReport> = reports.iter().map(seen).collect();
+        let reports: Vec<PositionReport> = reports.iter().map(report).collect();
         if let Ok(track) = fit(&reports, &COURSE) {
             let (from_us, to_us) = track.constant_us();
             prop_assert!(from_us <= to_us && track.angle_at(from_us).unwrap().is_finite());
