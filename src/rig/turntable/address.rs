@@ -8,8 +8,8 @@ use serialport::{SerialPortType, UsbPortInfo};
 
 use super::error::TurntableError;
 
-/// USB ids of what stands between a computer and a Grbl controller: vendor, product (`None`: all
-/// of that vendor's), by the lists of usb.ids and the vendors' drivers.
+/// USB ids of the serial adapters that Grbl controllers use: vendor, product (`None`: all products
+/// of that vendor). From usb.ids and the vendors' drivers.
 const ADAPTERS: [(u16, Option<u16>); 8] = [
     (0x2341, None),         // Arduino
     (0x2a03, None),         // Arduino (arduino.org)
@@ -24,7 +24,7 @@ const ADAPTERS: [(u16, Option<u16>); 8] = [
 /// A turntable's address.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TurntableAddress {
-    /// A serial port; `None`: look for the one that a controller is at.
+    /// A serial port; `None`: look for the one that has a controller.
     Serial(Option<PathBuf>),
     /// A simulated table.
     Simulated(SimulatedAddress),
@@ -35,9 +35,9 @@ pub enum TurntableAddress {
 /// How a simulated table behaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatedAddress {
-    /// How many times faster than real time it runs; 0: as fast as is sensible.
+    /// How many times faster than real time it runs; 0: as fast as possible.
     pub speed: f64,
-    /// The faults that its wire has, in the simulator's words.
+    /// The faults to inject, as [`TableFaults`](crate::simulator::TableFaults) reads them.
     pub fault: Option<String>,
 }
 
@@ -118,12 +118,12 @@ impl fmt::Display for TurntableAddress {
     }
 }
 
-/// The one serial port with a USB adapter that a controller has.
+/// The only serial port with a USB adapter that controllers use.
 ///
 /// # Errors
 /// [`TurntableError::NoCandidate`], or [`TurntableError::SeveralCandidates`] with their names.
 pub fn find_serial() -> Result<PathBuf, TurntableError> {
-    // The listing takes the kernel's folder of terminals for granted.
+    // `available_ports` panics without the kernel's folder of terminals.
     if !Path::new("/sys/class/tty").is_dir() {
         return Err(TurntableError::NoCandidate);
     }
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_address_is_told_with_the_forms() {
+    fn a_text_that_is_no_address_is_refused_with_the_valid_forms() {
         for text in [
             "",
             "usb",

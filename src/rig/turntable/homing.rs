@@ -6,26 +6,26 @@ use super::supervisor::MotionGoal;
 use super::table::{Table, refused};
 use super::wire::{ControllerState, LineOutcome, ReplyTimeout};
 
-/// How long the search for the index may take.
+/// Time limit of the search for the index.
 const HOMING: ReplyTimeout = ReplyTimeout::Within(120_000_000);
-/// Grbl's refusal of `$H` where homing is switched off.
+/// Grbl's error for `$H` if homing is switched off.
 const HOMING_OFF: u8 = 5;
 
-/// What homing did.
+/// The result of homing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Homed {
-    /// The index was found: the angle 0 is there.
+    /// The index was found; the angle 0 is there.
     Index,
-    /// There is no index sensor: the angle 0 is where the table stood.
+    /// There is no index sensor; the angle 0 is where the table stood.
     WhereItStands,
 }
 
 impl Table {
-    /// Looks for the index, or, where the controller has no index sensor, counts the angle 0 from
-    /// where the table stands.
+    /// Searches for the index. Without an index sensor, the table's present position becomes the
+    /// angle 0.
     ///
     /// # Errors
-    /// [`TurntableError::Homing`] where no index was found; what stops a motion.
+    /// [`TurntableError::Homing`] if no index was found, or the fault that has ended the search.
     pub fn home(&self) -> Result<Homed, TurntableError> {
         if !self.identity().homing {
             return self.home_where_it_stands();

@@ -1,5 +1,4 @@
-//! The one thread that carries bytes between port and supervisor, and the waits for what comes of
-//! it.
+//! The I/O thread between port and supervisor, and the waits for its results.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, MutexGuard};
@@ -12,25 +11,26 @@ use super::supervisor::{ControllerTraits, StopOutcome, Supervisor};
 use super::wire::{LineOutcome, ReplyTimeout, SendError};
 use crate::clock::{Clock, JoinHandle, Waitable};
 
-/// Longest wait for bytes before time and output are looked at again.
+/// Longest wait for bytes until the next check of time and output.
 const READ_WAIT: Duration = Duration::from_millis(2);
-/// How long a report may take; a loaded host keeps its thread from running for a part of it.
+/// How long a report may take, including pauses of the I/O thread on a loaded machine.
 const REPORT_WAIT: Duration = Duration::from_secs(3);
-/// How long a line's answer may take at most, with all repetitions. The wire gives up sooner.
+/// How long a line's answer may take, including all repetitions. The wire normally gives up
+/// earlier.
 const ANSWER_WAIT: Duration = Duration::from_secs(6);
-/// What is added to it for a line that is answered after something else has happened.
+/// Added to the time limit of a line that is not answered at once.
 const LATE_ANSWER: Duration = Duration::from_secs(2);
-/// How long a stop may take, with all its repetitions.
+/// How long a stop may take, including all repetitions.
 const STOP_WAIT: Duration = Duration::from_secs(16);
 
-/// The wire to a table with its thread; copies share both.
+/// The connection to a table. Clones share it.
 #[derive(Clone)]
 pub(super) struct Link {
     supervisor: Arc<Waitable<Supervisor>>,
     port_name: Arc<str>,
 }
 
-/// The thread that has the port. Dropped, it ends, and so closes the port.
+/// The thread that owns the port. Dropping it ends the thread and closes the port.
 pub(super) struct IoThread {
     quit: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -40,7 +40,7 @@ impl Drop for IoThread {
     fn drop(&mut self) {
         self.quit.store(true, Ordering::Release);
         if let Some(thread) = self.thread.take() {
-            // A thread that has panicked has closed the port as well.
+            // If the thread has panicked, the port is closed as well.
             let _ = thread.join();
         }
     }
@@ -74,13 +74,12 @@ impl Link {
         &self.port_name
     }
 
-    /// The supervisor, for a moment.
+    /// Locks the supervisor.
     pub(super) fn supervisor(&self) -> MutexGuard<'_, Supervisor> {
         self.supervisor.lock()
     }
 
-    /// Looks at the supervisor after each change until `look` finds something, or until `limit`
-    /// of the table's clock is over.
+    /// Calls `look` now and after each change until it returns something; `None` after `limit`.
     pub(super) fn wait<T>(
         &self,
         limit: Duration,
@@ -130,8 +129,8 @@ impl Link {
         }))
     }
 
-    /// The table's state by a report that was asked for just now, and by one more where they have
-    /// no checksum.
+    /// The table's status by a report that is requested now; without checksums, confirmed by a
+    /// second one.
     pub(super) fn status(&self) -> Result<TableStatus, TurntableError> {
         let asked_us = self.clock().now_us();
         let until_us = self.clock().after(REPORT_WAIT);
@@ -149,7 +148,7 @@ impl Link {
         }))
     }
 
-    /// Brings the table to a standstill, and drops what it was still to do.
+    /// Brings the table to a standstill and discards its remaining motions.
     pub(super) fn stop(&self) -> Result<TableStatus, TurntableError> {
         let now_us = self.clock().now_us();
         self.supervisor().request_stop(now_us);
@@ -157,7 +156,7 @@ impl Link {
         self.status()
     }
 
-    /// Waits until a stop under way has ended.
+    /// Waits for the end of a stop.
     pub(super) fn wait_stopped(&self) -> Result<(), TurntableError> {
         let ended = self.wait(STOP_WAIT, |supervisor| match port_lost(supervisor) {
             Some(error) => Some(Err(error)),
@@ -175,7 +174,7 @@ fn port_lost(supervisor: &Supervisor) -> Option<TurntableError> {
     Some(MotionFault::PortLost(why.to_owned()).into())
 }
 
-/// The thread: what is due goes out, what comes is taken, until it is to end or the port is gone.
+/// The I/O thread: sends what is due and reads what comes, until `quit` is set or the port is gone.
 fn carry(mut port: Box<dyn Port>, shared: &Waitable<Supervisor>, quit: &AtomicBool) {
     let clock = shared.clock();
     let mut buffer = [0; 512];
@@ -187,8 +186,8 @@ fn carry(mut port: Box<dyn Port>, shared: &Waitable<Supervisor>, quit: &AtomicBo
         let now_us = clock.now_us();
         let mut supervisor = shared.lock();
         match read {
-            // Nothing had come by the time the port was asked. What came later, while this thread
-            // perhaps had to wait for a processor, is no silence.
+            // The time at which the read began: this thread may have been paused since, and bytes
+            // that arrived during the pause must not count as silence.
             Ok(0) => supervisor.on_time(asked_us),
             Ok(count) => supervisor.on_bytes(now_us, buffer.get(..count).unwrap_or_default()),
             Err(error) => supervisor.close(error.to_string()),

@@ -137,12 +137,18 @@ fn a_jog_beyond_the_limit_or_at_no_speed_is_not_sent() {
         jog(400.1, None),
         TurntableError::BeyondLimit { .. }
     ));
-    assert!(matches!(jog(f64::NAN, None), TurntableError::Figure { .. }));
+    assert!(matches!(
+        jog(f64::NAN, None),
+        TurntableError::OutOfRange { .. }
+    ));
     assert!(matches!(
         jog(1.0, Some(36.1)),
-        TurntableError::Figure { .. }
+        TurntableError::OutOfRange { .. }
     ));
-    assert!(matches!(jog(1.0, Some(0.0)), TurntableError::Figure { .. }));
+    assert!(matches!(
+        jog(1.0, Some(0.0)),
+        TurntableError::OutOfRange { .. }
+    ));
     assert_eq!(rig.executed(), before);
 }
 

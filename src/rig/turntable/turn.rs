@@ -1,4 +1,4 @@
-//! One turn under way.
+//! A turn in progress.
 
 use std::time::Duration;
 
@@ -10,12 +10,12 @@ use super::sync::{self, Track};
 use super::table::{Table, straight};
 use super::wire::ControllerState;
 
-/// How long the table rests before it starts, so that it has stopped swinging.
+/// Rest before the start, until the table has stopped swinging.
 const SETTLE: Duration = Duration::from_millis(300);
-/// What is added to the time the ramp should take.
+/// Added to the computed time of the ramp.
 const RAMP_SLACK: Duration = Duration::from_secs(3);
 
-/// When the table is at constant speed, as expected by its first reports there.
+/// When the table moves at constant speed, extrapolated from its first reports there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConstantPart {
     /// Start, microseconds of the host's clock.
@@ -24,20 +24,20 @@ pub struct ConstantPart {
     pub to_us: i64,
 }
 
-/// How far a turn is.
+/// The phase of a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TurnPhase {
-    /// Getting up to speed.
+    /// Accelerating.
     Starting,
     /// At constant speed.
     Constant,
-    /// Slowing down.
+    /// Decelerating.
     Ending,
     /// At rest at its end.
     AtEnd,
 }
 
-/// A turn under way. Dropped before its end, it stops the table.
+/// A turn in progress. Dropping it before its end stops the table.
 pub struct Turn<'table> {
     table: &'table Table,
     plan: TurnPlan,
@@ -72,10 +72,10 @@ impl<'table> Turn<'table> {
         &self.plan
     }
 
-    /// How far it is.
+    /// Its phase.
     ///
     /// # Errors
-    /// What has ended it; the table has been stopped then.
+    /// The fault that has ended it; the table has been stopped.
     pub fn state(&mut self) -> Result<TurnPhase, TurntableError> {
         self.check()?;
         let supervisor = self.table.link().supervisor();
@@ -93,7 +93,7 @@ impl<'table> Turn<'table> {
         })
     }
 
-    /// The table's angle by the last report, degrees, and when that was, microseconds of the
+    /// The table's angle in the last report, degrees, and the report's time, microseconds of the
     /// host's clock.
     #[must_use]
     pub fn last_angle(&self) -> Option<(f64, i64)> {
@@ -111,7 +111,7 @@ impl<'table> Turn<'table> {
     /// Waits until the speed is constant.
     ///
     /// # Errors
-    /// What has ended the turn; the table has been stopped then.
+    /// The fault that has ended the turn; the table has been stopped.
     pub fn wait_constant(&mut self) -> Result<ConstantPart, TurntableError> {
         let speed = self.plan.degrees_per_second();
         let ramp = self.table.travel_time(0.0, speed) + RAMP_SLACK;
@@ -140,12 +140,12 @@ impl<'table> Turn<'table> {
         })
     }
 
-    /// Waits until the table has come to rest at the turn's end, turns it back where the plan says
-    /// so, and tells its angles.
+    /// Waits until the table rests at the turn's end, turns it back if the plan says so, and returns
+    /// its angles over time.
     ///
     /// # Errors
-    /// What has ended the turn; the table has been stopped then. [`TurntableError::Track`] where
-    /// the turn is whole and its angles cannot be told.
+    /// The fault that has ended the turn; the table has been stopped. [`TurntableError::Track`] if
+    /// the turn is complete but its angles cannot be determined.
     pub fn wait_end(mut self) -> Result<Track, TurntableError> {
         let plan = &self.plan;
         let distance = (plan.end_deg() - plan.back_deg()).abs();
@@ -185,7 +185,7 @@ impl<'table> Turn<'table> {
         stopped
     }
 
-    /// Ends the turn where a fault has.
+    /// Ends the turn if a fault has occurred.
     fn check(&mut self) -> Result<(), TurntableError> {
         match self.table.end_by_fault() {
             Ok(None) => Ok(()),
@@ -196,7 +196,7 @@ impl<'table> Turn<'table> {
         }
     }
 
-    /// Stops watching; gives the reports.
+    /// Ends the monitoring; returns the reports.
     fn leave(&mut self) -> Vec<PositionReport> {
         self.over = true;
         let mut supervisor = self.table.link().supervisor();
@@ -208,7 +208,7 @@ impl<'table> Turn<'table> {
 impl Drop for Turn<'_> {
     fn drop(&mut self) {
         if !self.over {
-            // Whoever drops a turn is told nothing; the table's own end looks again.
+            // A drop cannot return an error. Dropping the table stops it again.
             let _ = self.stop();
         }
     }

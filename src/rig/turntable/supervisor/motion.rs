@@ -1,41 +1,41 @@
-//! Watching a motion: whether it goes on, and where it ends.
+//! Monitoring a motion: whether it goes on, and where it ends.
 
 use super::{ControllerTraits, PositionReport};
 use crate::turntable::Alarm;
 use crate::turntable::error::MotionFault;
 use crate::turntable::wire::ControllerState;
 
-/// Silence after which a table in motion counts as lost, microseconds.
+/// Longest silence of a controller in motion, microseconds.
 const SILENCE_US: i64 = 2_000_000;
-/// How long a table may report the same place in motion, microseconds.
+/// How long a moving table may report the same position, microseconds.
 const STALL_US: i64 = 800_000;
-/// How long a table may stand elsewhere than at its target before that counts, microseconds:
-/// between accepting a line and starting, a controller is idle for a moment.
+/// How long a table may stand away from its target, microseconds: between accepting a line and
+/// starting, a controller is idle for a moment.
 const ASTRAY_US: i64 = 600_000;
-/// What the printing of a position loses, degrees.
+/// Rounding error of a printed position, degrees.
 const PRINTED_DEG: f64 = 0.002;
 
-/// Where a motion goes.
+/// The goal of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum MotionGoal {
-    /// To a place, degrees from machine zero.
+    /// Move to a position.
     To {
-        /// The place.
+        /// The position, degrees from machine zero.
         target_deg: f64,
-        /// How long after the controller has taken the line it has to be there, microseconds.
+        /// Time limit after the controller has accepted the line, microseconds.
         within_us: i64,
     },
-    /// Looking for the index.
+    /// Search for the index.
     Homing,
 }
 
-/// A motion under way.
+/// A motion in progress.
 #[derive(Debug)]
 pub(crate) struct Motion {
     goal: MotionGoal,
     accepted_us: Option<i64>,
     last_report_us: i64,
-    /// The last place, and since when it is reported.
+    /// The last reported position, and the time of its first report.
     place: Option<(f64, i64)>,
     at_target: bool,
 }
@@ -56,12 +56,12 @@ impl Motion {
         self.place = None;
     }
 
-    /// Whether the table has come to rest at its target.
+    /// Whether the table rests at its target.
     pub(crate) fn is_at_target(&self) -> bool {
         self.at_target
     }
 
-    /// A report has come: what it says against the motion.
+    /// Processes a report; returns the fault that it shows.
     pub(super) fn on_report(
         &mut self,
         report: &PositionReport,
@@ -116,8 +116,8 @@ impl Motion {
         })
     }
 
-    /// How long the table has certainly been at the place of this report, microseconds: from when
-    /// the first report of it came to when this one was asked for.
+    /// How long the table has certainly been at the position of this report, microseconds: from the
+    /// arrival of the first report of it to the request for this one.
     fn stands_for(&mut self, report: &PositionReport) -> i64 {
         match self.place {
             Some((place, since_us)) if place == report.machine_deg => {
@@ -131,13 +131,13 @@ impl Motion {
         }
     }
 
-    /// How long ago the controller took the line, microseconds.
+    /// Time since the controller accepted the line, microseconds.
     fn runs_for(&self, now_us: i64) -> i64 {
         self.accepted_us
             .map_or(0, |accepted_us| now_us - accepted_us)
     }
 
-    /// What the passing of time says against the motion.
+    /// The fault that the passing of time shows.
     pub(super) fn overdue(&self, now_us: i64, traits: &ControllerTraits) -> Option<MotionFault> {
         let silent_us = now_us - self.last_report_us;
         match self.goal {

@@ -1,28 +1,28 @@
-//! What was seen of the table, and how its controller tells it.
+//! Status reports converted to degrees.
 
 use std::time::Duration;
 
 use crate::turntable::wire::{ControllerState, Pins, Poll, Position};
 
-/// A report in degrees.
+/// A status report in degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionReport {
     pub(crate) state: ControllerState,
     /// Degrees from machine zero.
     pub(crate) machine_deg: f64,
-    /// Degrees a second.
+    /// Degrees/s.
     pub(crate) speed: f64,
     pub(crate) chip_us: Option<u32>,
     pub(crate) battery_v: Option<f64>,
     pub(crate) pins: Pins,
     pub(crate) asked_us: Option<i64>,
     pub(crate) came_us: i64,
-    /// Whether question and report certainly belong together.
+    /// Whether the report certainly answers the request at `asked_us`.
     pub(crate) certain: bool,
 }
 
 impl PositionReport {
-    /// A report in degrees; `None` while it tells its place from a zero that is not known yet.
+    /// Converts a report; `None` if its position is relative to a zero that is not known yet.
     pub(super) fn of(
         poll: &Poll,
         work_zero: Option<f64>,
@@ -46,24 +46,24 @@ impl PositionReport {
         })
     }
 
-    /// Whether the report after this one says the same; where a table moves places differ.
+    /// Whether the next report agrees with this one. In motion, positions differ.
     pub(super) fn confirms(&self, next: &PositionReport) -> bool {
         let same = self.machine_deg == next.machine_deg || next.state.may_move();
         self.state == next.state && same
     }
 }
 
-/// How the controller tells its position, and how often it is asked in motion.
+/// What has to be known of a controller to read its reports.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ControllerTraits {
     /// Degrees in one unit of its reports.
     pub(crate) degrees_per_unit: f64,
-    /// Between two reports in motion.
+    /// Interval of reports in motion.
     pub(crate) poll: Duration,
     /// Whether its reports carry the chip's time.
     pub(crate) stamps: bool,
-    /// Whether it answers `?` while it looks for the index.
+    /// Whether it answers `?` while it searches for the index.
     pub(crate) reports_homing: bool,
-    /// Smallest distance it can stand off its target, degrees.
+    /// One step, degrees: how far it may stand from its target.
     pub(crate) step_deg: f64,
 }

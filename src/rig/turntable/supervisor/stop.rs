@@ -1,34 +1,35 @@
-//! Bringing the table to a standstill, and making sure that it stands.
+//! Bringing the table to a standstill and verifying that it stands.
 //!
-//! `!` ramps it down; at a standstill a reset drops what it was still to do, and so loses no
-//! position. Only where the table does not answer, or does not slow down, is it reset in motion.
+//! `!` ramps the table down. At a standstill, a reset discards the remaining motions without losing
+//! the position. The table is reset in motion only if it does not answer or does not slow down.
 
 use super::PositionReport;
 use crate::turntable::wire::{ControllerState, Machine, realtime};
 
-/// How often a stop byte is sent again, microseconds.
+/// Interval at which the feed hold is repeated, microseconds.
 const REPEAT_US: i64 = 250_000;
-/// How often a reset is sent again, microseconds.
+/// Interval at which a reset is repeated, microseconds.
 const RESET_REPEAT_US: i64 = 1_000_000;
-/// How long a table that answers may take to ramp down, microseconds.
+/// Longest ramp down of a table that answers, microseconds.
 const RAMP_US: i64 = 5_000_000;
-/// How long a table may be silent before it is reset in motion, microseconds.
+/// Longest silence before the table is reset in motion, microseconds.
 const SILENT_US: i64 = 800_000;
-/// How long a controller may take to restart, microseconds.
+/// Longest restart of a controller, microseconds.
 const RESTART_US: i64 = 4_000_000;
-/// How long it may take to be seen at rest after that, microseconds.
+/// Longest wait for reports at rest after a restart, microseconds.
 const CHECK_US: i64 = 2_000_000;
-/// So many reports of the same place, asked for after the stop, are a standstill.
+/// Number of reports of the same position, requested after the stop, that prove a standstill.
 const STANDING: u32 = 2;
 
 /// How a stop ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StopOutcome {
-    /// The table was seen at rest.
+    /// The table was reported at rest.
     Standing,
-    /// The table was seen at rest, and counts its position from elsewhere than before.
+    /// The table was reported at rest, but at another position than before the reset: the controller
+    /// has lost its position.
     Displaced,
-    /// Nobody can tell: it does not answer, or goes on moving.
+    /// Unknown: it does not answer, or still moves.
     Unknown,
 }
 
@@ -36,26 +37,26 @@ pub(crate) enum StopOutcome {
 enum Step {
     /// `!` was sent.
     Braking,
-    /// A reset was sent; `gentle` when the table stood.
+    /// A reset was sent; `gentle` if the table stood.
     Resetting {
         gentle: bool,
     },
-    /// It has restarted; it is to be seen at rest.
+    /// It has restarted and has to be reported at rest.
     Checking,
     Done(StopOutcome),
 }
 
-/// A stop under way, or its end.
+/// A stop in progress, or its result.
 #[derive(Debug)]
 pub(crate) struct Stop {
     step: Step,
     since_us: i64,
     sent_us: i64,
     heard_us: i64,
-    /// Something is left in the controller or on the wire that only a reset drops.
+    /// Something is left in the controller or on the wire that only a reset discards.
     unsettled: bool,
     standing: Option<(f64, u32)>,
-    /// Where it stood before it was reset gently.
+    /// Where it stood before it was reset at a standstill.
     stood_at: Option<f64>,
 }
 
@@ -118,8 +119,8 @@ impl Stop {
         }
     }
 
-    /// The controller has restarted. Whether that is the reset of a standing table, which keeps
-    /// its position.
+    /// Notes that the controller has restarted; returns whether this was the reset of a standing
+    /// table, which keeps its position.
     pub(super) fn on_reset(&mut self, now_us: i64) -> bool {
         let gentle = self.step == Step::Resetting { gentle: true };
         if self.outcome().is_none() {
