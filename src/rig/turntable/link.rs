@@ -4,6 +4,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, MutexGuard};
 use std::time::Duration;
 
+use relit_data::causes::with_causes;
+
 use super::error::{MotionFault, TurntableError};
 use super::port::Port;
 use super::status::TableStatus;
@@ -190,7 +192,7 @@ fn carry(mut port: Box<dyn Port>, shared: &Waitable<Supervisor>, quit: &AtomicBo
             // that arrived during the pause must not count as silence.
             Ok(0) => supervisor.on_time(asked_us),
             Ok(count) => supervisor.on_bytes(now_us, buffer.get(..count).unwrap_or_default()),
-            Err(error) => supervisor.close(error.to_string()),
+            Err(error) => supervisor.close(with_causes(&error)),
         }
         let (changed, gone) = (supervisor.take_changed(), supervisor.closed().is_some());
         drop(supervisor);

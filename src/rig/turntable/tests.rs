@@ -1,4 +1,4 @@
-//! The table from outside, against a fake_grbl that goes wrong on demand, on virtual time.
+//! The table as a whole, against a fake controller with faults on demand, on virtual time.
 
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
@@ -67,7 +67,7 @@ impl Rig {
 }
 
 #[test]
-fn the_rigs_controller_is_known_by_what_it_says_and_spoken_to_in_checked_lines() {
+fn the_rigs_controller_is_recognised_by_its_options_and_gets_checked_lines() {
     let rig = open(FakeGrbl::new(true));
     let identity = rig.table.identity();
     assert!(!identity.is_stock() && identity.extras.checked_lines);
@@ -86,7 +86,7 @@ fn a_session_that_a_killed_owner_left_open_is_taken_over() {
 }
 
 #[test]
-fn answers_to_an_echo_of_the_banner_are_passed_over() {
+fn answers_to_an_echo_of_the_banner_are_ignored() {
     for rig in [true, false] {
         let mut fake_grbl = FakeGrbl::new(rig);
         fake_grbl.trouble.echo = true;
@@ -96,7 +96,7 @@ fn answers_to_an_echo_of_the_banner_are_passed_over() {
 }
 
 #[test]
-fn nothing_behind_the_port_is_no_controller() {
+fn a_silent_port_has_no_controller() {
     let mut fake_grbl = FakeGrbl::new(false);
     fake_grbl.trouble.silent_from_us = Some(0);
     fake_grbl.give();
@@ -202,7 +202,7 @@ fn a_lost_answer_of_a_stock_board_stops_the_table_with_the_reason() {
 }
 
 #[test]
-fn a_line_damaged_unnoticed_is_no_success() {
+fn an_undetected_damage_of_a_line_is_no_success() {
     let rig = open(FakeGrbl::new(false));
     rig.set(|trouble, _| trouble.wrong_digits = 1);
     let error = rig.table.jog(25.0, None).unwrap_err();
@@ -213,7 +213,7 @@ fn a_line_damaged_unnoticed_is_no_success() {
 }
 
 #[test]
-fn a_turn_tells_where_the_table_was_and_unwinds() {
+fn a_turn_has_the_angles_of_the_table_and_unwinds() {
     for stock in [false, true] {
         let rig = open(FakeGrbl::new(!stock));
         rig.fake_grbl.lock().unwrap().rate = 1.004;
@@ -257,7 +257,8 @@ fn a_turn_needs_a_position_and_the_place_it_was_planned_from() {
     ));
 }
 
-/// Ends a turn by what `change` does to the fake_grbl; gives the fault and how long that took.
+/// Breaks a turn by a change of the controller's faults; returns the fault that ended it, and the time
+/// until then.
 fn broken(stock: bool, change: impl FnOnce(&mut Trouble, i64)) -> (Rig, MotionFault, i64) {
     let rig = open(FakeGrbl::new(!stock));
     rig.table.home().unwrap();
@@ -314,7 +315,7 @@ fn a_controller_that_falls_silent_for_two_seconds_ends_the_turn() {
         "{found:?}"
     );
     assert!((1_900_000..4_000_000).contains(&took_us), "{took_us} us");
-    // Nobody can tell whether it stands.
+    // Whether it stands is unknown.
     assert!(matches!(turn.state(), Err(TurntableError::NotStopped)));
     drop(turn);
     assert!(rig.table.link().supervisor().zero_deg().is_none());
@@ -337,7 +338,7 @@ fn a_stop_in_the_middle_keeps_the_position_and_the_table_goes_on() {
 }
 
 #[test]
-fn a_stop_from_elsewhere_ends_a_jog_with_that_reason() {
+fn a_stop_from_another_thread_ends_a_jog_with_that_reason() {
     let rig = open(FakeGrbl::new(true));
     let link = rig.table.link().clone();
     let clock = rig.table.clock().clone();

@@ -1,4 +1,4 @@
-//! The lines that the fake_grbl takes: checked or plain, commands and motions.
+//! The lines that the fake controller accepts: checked or plain, commands and motions.
 
 use super::{FakeGrbl, Mode, checksum};
 

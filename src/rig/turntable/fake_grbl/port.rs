@@ -6,7 +6,7 @@ use super::{FakeGrbl, TICK_US};
 use crate::clock::Clock;
 use crate::turntable::port::Port;
 
-/// The fake_grbl at the end of a port.
+/// A port to the fake controller.
 pub(in crate::turntable) struct FakePort {
     pub(in crate::turntable) fake_grbl: Arc<Mutex<FakeGrbl>>,
     pub(in crate::turntable) clock: Clock,
@@ -24,7 +24,7 @@ impl Port for FakePort {
             if !bytes.is_empty() {
                 assert!(
                     bytes.len() <= buffer.len(),
-                    "the fake_grbl says too much at once"
+                    "the controller sends too much at once"
                 );
                 buffer[..bytes.len()].copy_from_slice(&bytes);
                 return Ok(bytes.len());

@@ -1,4 +1,4 @@
-//! The other side: asking a port's owner.
+//! The client: sends requests to a port's owner.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::net::UnixStream;
@@ -6,15 +6,17 @@ use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use relit_data::causes::with_causes;
+
 use super::claim::{Files, owner_pid, try_lock};
 use super::{Answer, Question};
 use crate::turntable::error::TurntableError;
 use crate::turntable::status::TableStatus;
 
-/// How long an owner that is just opening the port may take until it answers.
+/// How long an owner that is opening its port may take until its socket exists.
 const OPENING: Duration = Duration::from_secs(15);
 const PAUSE: Duration = Duration::from_millis(100);
-/// How long an answer may take: a stop takes its time.
+/// How long an answer may take: a stop takes many seconds.
 const ANSWER: Duration = Duration::from_secs(25);
 /// Longest answer, bytes.
 const LONGEST: u64 = 65_536;
@@ -27,11 +29,11 @@ pub struct Owner {
 }
 
 impl Owner {
-    /// The owner of `port`, where it has one. Looks at the lock only, never at the port.
+    /// The owner of `port`, if it has one. Checks the lock and does not open the port.
     ///
     /// # Errors
-    /// [`TurntableError::Open`] where there is no such port, [`TurntableError::Claim`] where the
-    /// lock cannot be looked at.
+    /// [`TurntableError::Open`] if there is no such port, [`TurntableError::Claim`] if the lock cannot
+    /// be checked.
     pub fn find(port: &Path, runtime_folder: &Path) -> Result<Option<Owner>, TurntableError> {
         let files = Files::of(port, runtime_folder)?;
         if try_lock(&files)?.is_some() {
@@ -41,21 +43,21 @@ impl Owner {
         Ok(Some(Owner { files, pid }))
     }
 
-    /// Its process number.
+    /// Its process id.
     #[must_use]
     pub fn pid(&self) -> u32 {
         self.pid
     }
 
-    /// Asks it what the table is doing.
+    /// Requests the table's status.
     ///
     /// # Errors
-    /// [`TurntableError::Owner`] where it does not answer, [`TurntableError::OwnerSays`].
+    /// [`TurntableError::Owner`] if it does not answer, [`TurntableError::OwnerSays`].
     pub fn status(&self) -> Result<TableStatus, TurntableError> {
         self.ask(Question::Status)
     }
 
-    /// Asks it to stop the table, and waits until it stands.
+    /// Requests a stop, and waits until the table stands.
     ///
     /// # Errors
     /// As [`Owner::status`].
@@ -71,14 +73,14 @@ impl Owner {
         };
         let line = self
             .exchange(question)
-            .map_err(|error| failed(error.to_string()))?;
+            .map_err(|error| failed(with_causes(&error)))?;
         match serde_json::from_str(&line) {
             Ok(Answer::Status(status)) => Ok(status),
             Ok(Answer::Error(message)) => Err(TurntableError::OwnerSays {
                 pid: self.pid,
                 message,
             }),
-            Err(_) => Err(failed("its answer is no answer".to_owned())),
+            Err(_) => Err(failed("its answer is not valid".to_owned())),
         }
     }
 

@@ -16,13 +16,13 @@ use crate::clock::Clock;
 use crate::turntable::fake_grbl::FakeGrbl;
 use crate::turntable::{ControllerState, MotionFault, Table, TableOptions, TurntableError};
 
-/// A fake_grbl at a pseudo terminal.
+/// A fake controller at a pseudoterminal.
 struct Terminal {
     path: PathBuf,
     quit: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     runtime: tempfile::TempDir,
-    // Kept open, so that the other end is not told of a hang-up between two openings.
+    // Kept open, so that the other end sees no hang-up between two openings.
     _slave: TTYPort,
 }
 
@@ -32,11 +32,11 @@ impl Terminal {
         master.set_timeout(Duration::from_millis(1)).unwrap();
         let path = PathBuf::from(slave.name().unwrap());
         let quit = Arc::new(AtomicBool::new(false));
-        let told = Arc::clone(&quit);
+        let flag = Arc::clone(&quit);
         let thread = thread::spawn(move || {
             let (clock, mut fake_grbl) = (Clock::monotonic(), FakeGrbl::new(true));
             let mut buffer = [0; 256];
-            while !told.load(Ordering::Acquire) {
+            while !flag.load(Ordering::Acquire) {
                 let count = master.read(&mut buffer).unwrap_or(0);
                 fake_grbl.advance(clock.now_us());
                 fake_grbl.take(&buffer[..count]);
@@ -77,7 +77,7 @@ impl Drop for Terminal {
 }
 
 #[test]
-fn a_port_has_one_owner_who_answers_for_it_until_it_is_closed() {
+fn a_port_has_one_owner_that_answers_until_it_is_closed() {
     let terminal = Terminal::new();
     assert!(terminal.owner().is_none());
     let table = terminal.open().unwrap();
@@ -94,7 +94,7 @@ fn a_port_has_one_owner_who_answers_for_it_until_it_is_closed() {
 }
 
 #[test]
-fn a_stop_asked_of_the_owner_stops_the_table_and_ends_its_motion() {
+fn a_stop_requested_from_the_owner_stops_the_table_and_ends_its_motion() {
     let terminal = Terminal::new();
     let table = terminal.open().unwrap();
     let owner = terminal.owner().unwrap();
@@ -116,7 +116,7 @@ fn a_stop_asked_of_the_owner_stops_the_table_and_ends_its_motion() {
 }
 
 #[test]
-fn what_a_killed_owner_left_behind_is_nobodys() {
+fn lock_and_socket_of_a_killed_owner_belong_to_nobody() {
     let terminal = Terminal::new();
     let files = terminal.files();
     std::fs::write(&files.lock, "4194304").unwrap();
@@ -131,7 +131,7 @@ fn what_a_killed_owner_left_behind_is_nobodys() {
 }
 
 #[test]
-fn somebody_who_asks_badly_or_says_nothing_harms_nobody_else() {
+fn a_bad_or_a_silent_client_does_not_affect_others() {
     let terminal = Terminal::new();
     let _table = terminal.open().unwrap();
     let socket = terminal.files().socket;
@@ -159,7 +159,7 @@ fn a_folder_that_others_can_write_in_is_not_used() {
 }
 
 #[test]
-fn a_port_that_is_not_there_is_told_by_its_path() {
+fn a_missing_port_is_named_in_the_error() {
     let options = TableOptions::default();
     let path = PathBuf::from("/dev/there-is-no-such-port");
     let error = Table::open_serial(&path, &options).map(|_| ()).unwrap_err();

@@ -1,11 +1,11 @@
 //! From reports to angles: where the table was at any time of the host's clock.
 //!
-//! Over the part of a turn at constant speed the angle is a straight line over time. A controller
-//! that stamps its reports gives that line against its own clock, free of the wire's delays, and
-//! the chip's clock is laid against the host's by the questions that were answered fastest. A
-//! controller that does not stamp them leaves the middle between question and report.
+//! In the part of a turn at constant speed the angle is a linear function of time. If the controller
+//! stamps its reports, the line is fitted against the chip's clock, without the wire's delays, and
+//! the chip's clock is fitted against the host's by the requests that were answered fastest. Without
+//! stamps, a report counts for the middle between request and arrival.
 //!
-//! This room knows reports and lines, and nothing of the wire.
+//! This module knows reports and lines, and nothing of the wire.
 
 mod line;
 #[cfg(test)]
@@ -15,24 +15,25 @@ use super::supervisor::PositionReport;
 use super::wire::ControllerState;
 use line::{Fit, Line};
 
-/// Least reports a track is made of.
+/// Minimum number of reports.
 const LEAST_POLLS: usize = 12;
-/// Least part of the constant-speed angle that they cover.
+/// Minimum fraction of the angle at constant speed that the reports cover.
 const LEAST_COVER: f64 = 0.8;
-/// Largest part of them that may be outliers.
+/// Largest fraction of outliers.
 const MOST_OUTLIERS: f64 = 0.25;
-/// How far chip and speed may be off: ceramic resonators are good to half a per cent.
+/// Largest relative error of the chip's clock and of the speed: ceramic resonators are accurate to
+/// half a per cent.
 const MOST_OFF: f64 = 0.03;
-/// The time is cut into so many parts, and the fastest answers of each are taken.
+/// The turn is divided into so many parts, and the fastest answers of each are used.
 const PARTS: usize = 10;
-/// The fastest answers of a part: one in so many.
+/// One in so many answers of a part counts as one of the fastest.
 const FASTEST: usize = 4;
-/// Residuals below this are never outliers, of the host's clock, microseconds.
+/// Smallest residual that can be an outlier in the fit of the clocks, microseconds.
 const CLOCK_FLOOR_US: f64 = 200.0;
-/// Microseconds after which a chip's clock starts again.
+/// Period after which the chip's time stamps wrap around, microseconds.
 const WRAP_US: f64 = 4_294_967_296.0;
 
-/// Why reports give no angles.
+/// Why the reports do not determine the angles.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TrackError {
     /// Too few reports.
@@ -40,10 +41,10 @@ pub enum TrackError {
         "only {polls} reports fall into the part at constant speed, and {LEAST_POLLS} are needed: check the serial line"
     )]
     TooFew {
-        /// How many.
+        /// Their number.
         polls: usize,
     },
-    /// They leave gaps.
+    /// The reports leave gaps.
     #[error(
         "the reports cover {percent:.0} % of the part at constant speed: check the serial line"
     )]
@@ -51,48 +52,48 @@ pub enum TrackError {
         /// Per cent.
         percent: f64,
     },
-    /// They do not lie on a line.
+    /// The reports do not lie on a line.
     #[error(
         "{outliers} of {polls} reports lie off the line of the others: the table did not turn evenly, or the serial line is bad"
     )]
     Uneven {
-        /// Off the line.
+        /// Number of reports off the line.
         outliers: usize,
-        /// All.
+        /// Number of all reports.
         polls: usize,
     },
-    /// The chip's clock is off.
+    /// The chip's clock is wrong.
     #[error(
         "the controller's clock runs {factor:.4} times as fast as the host's: its firmware is made for another crystal"
     )]
     Clock {
-        /// Chip seconds in a second of the host.
+        /// Chip seconds per second of the host.
         factor: f64,
     },
-    /// The speed is off.
+    /// The speed is wrong.
     #[error(
         "the table turned at {measured:.4} degrees/s instead of {planned:.4}: check $100, $110 and the microsteps"
     )]
     Speed {
-        /// By the reports.
+        /// Measured by the reports, degrees/s.
         measured: f64,
-        /// By the plan.
+        /// Planned, degrees/s.
         planned: f64,
     },
 }
 
-/// How far reports lie off the track, degrees.
+/// Residuals of the reports from the track, degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residuals {
-    /// Half of them are below this.
+    /// Median.
     pub median_deg: f64,
-    /// 99 of 100 are below this.
+    /// 99th percentile.
     pub p99_deg: f64,
-    /// The largest.
+    /// Maximum.
     pub max_deg: f64,
 }
 
-/// Where the table was: a straight line over the part of a turn at constant speed.
+/// The table's angle over time, in the part of a turn at constant speed: a straight line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Track {
     line: Line,
@@ -106,7 +107,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// The table's angle at `t_us` microseconds of the host's clock, degrees; `None` outside of
+    /// The table's angle at `t_us` microseconds of the host's clock, degrees; `None` outside
     /// the part at constant speed.
     #[must_use]
     pub fn angle_at(&self, t_us: i64) -> Option<f64> {
@@ -115,7 +116,7 @@ impl Track {
             .then(|| self.line.at(t_us as f64))
     }
 
-    /// When the table was at `angle_deg`, microseconds of the host's clock; `None` outside of the
+    /// When the table was at `angle_deg`, microseconds of the host's clock; `None` outside the
     /// part at constant speed.
     #[must_use]
     pub fn time_at(&self, angle_deg: f64) -> Option<i64> {
@@ -129,54 +130,54 @@ impl Track {
         (self.from_us, self.to_us)
     }
 
-    /// Speed by the host's clock, degrees a second; negative for turns the other way.
+    /// Speed by the host's clock, degrees/s; negative for turns in the negative direction.
     #[must_use]
     pub fn degrees_per_second(&self) -> f64 {
         self.line.slope * 1e6
     }
 
-    /// How far the reports that were answered fastest lie off the track.
+    /// Residuals of the reports that were answered fastest.
     #[must_use]
     pub fn residuals(&self) -> Residuals {
         self.residuals
     }
 
-    /// Reports that the track is made of.
+    /// Number of reports used.
     #[must_use]
     pub fn polls(&self) -> usize {
         self.polls
     }
 
-    /// Reports that were left out because they lie off the line of the others.
+    /// Number of reports left out as outliers.
     #[must_use]
     pub fn outliers(&self) -> usize {
         self.outliers
     }
 
-    /// Half the time of the fastest answers, microseconds: the track's times cannot be wrong by
-    /// more, however unequal the delays there and back are.
+    /// Half the shortest round trip, microseconds: an upper bound of the track's time error, however
+    /// unequal the delays in the two directions are.
     #[must_use]
     pub fn half_round_trip_us(&self) -> f64 {
         self.half_round_trip_us
     }
 
-    /// Seconds of the chip's clock in a second of the host's; `None` where reports have no stamp.
+    /// Seconds of the chip's clock per second of the host's; `None` if reports have no stamps.
     #[must_use]
     pub fn chip_rate(&self) -> Option<f64> {
         self.chip_rate
     }
 }
 
-/// What the turn was to be, degrees from machine zero.
+/// The turn as it was planned, degrees from machine zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ExpectedTurn {
     /// Where the part at constant speed starts.
     pub(crate) from_deg: f64,
     /// Where it ends.
     pub(crate) to_deg: f64,
-    /// Speed without sign.
+    /// Speed, without sign.
     pub(crate) degrees_per_second: f64,
-    /// The angle counted as zero.
+    /// Machine position of the angle 0.
     pub(crate) zero_deg: f64,
     /// One step.
     pub(crate) step_deg: f64,
@@ -187,7 +188,7 @@ impl ExpectedTurn {
         (self.to_deg - self.from_deg).signum()
     }
 
-    /// Whether a place is inside of the part at constant speed, a step away from its ends.
+    /// Whether a position is in the part at constant speed, at least a step away from its ends.
     fn covers(&self, machine_deg: f64) -> bool {
         let gone = (machine_deg - self.from_deg) * self.sign();
         let length = (self.to_deg - self.from_deg).abs();
@@ -195,8 +196,8 @@ impl ExpectedTurn {
     }
 }
 
-/// A report as a point: the bracket in time around it, and the angle in the middle of the step
-/// that the table was on.
+/// A report as a point of the fit: the times of request and arrival, and the angle in the middle of
+/// the step.
 #[derive(Debug, Clone, Copy)]
 struct Point {
     asked_us: f64,
@@ -215,7 +216,7 @@ impl Point {
     }
 }
 
-/// The track of a turn by its reports.
+/// Fits the track of a turn to its reports.
 pub(crate) fn fit(
     reports: &[PositionReport],
     expected: &ExpectedTurn,
@@ -242,7 +243,7 @@ pub(crate) fn fit(
     Ok(track(&points, expected, &fitted))
 }
 
-/// The line of angles over the host's time, and what it is made of.
+/// The line of angles over the host's time.
 struct Fitted {
     line: Line,
     outliers: usize,
@@ -286,7 +287,7 @@ fn by_the_middle(points: &[Point], expected: &ExpectedTurn) -> Fitted {
     let pair = |point: &Point| (point.middle_us(), point.angle_deg);
     let pairs: Vec<_> = fastest(points).iter().map(pair).collect();
     let Fit { line, .. } = line::robust(&pairs, expected.step_deg);
-    // A slow answer lies off the line by its delay, and is none of an uneven table's.
+    // A slow answer lies off the line by its delay; it does not show that the table turned unevenly.
     let allowed =
         |point: &Point| expected.step_deg * 2.0 + point.round_trip_us() / 2.0 * line.slope.abs();
     let off =
@@ -333,8 +334,8 @@ fn by_the_chip(points: &[Point], expected: &ExpectedTurn) -> Result<Fitted, Trac
     })
 }
 
-/// The chip's time of each point since the first one, microseconds. A stamp starts again every 71
-/// minutes; the host's clock tells how often it has.
+/// The chip's time of each point since the first one, microseconds. Stamps wrap around every 71
+/// minutes; the host's clock shows how many times they did.
 fn unwrapped(points: &[Point]) -> Vec<f64> {
     let Some(first) = points.first() else {
         return Vec::new();
@@ -352,7 +353,7 @@ fn fastest(points: &[Point]) -> Vec<Point> {
     fastest_by(points, |point| point)
 }
 
-/// The fastest answers of each part of the time, in order.
+/// The fastest answers of each part of the turn, in order.
 fn fastest_by<T: Copy>(items: &[T], point: impl Fn(&T) -> &Point) -> Vec<T> {
     let size = items.len().div_ceil(PARTS).max(1);
     let mut chosen = Vec::new();

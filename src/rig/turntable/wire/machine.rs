@@ -1,4 +1,4 @@
-//! The state machine: one line in flight, checked or plain, and what comes back.
+//! The protocol's state machine: one line in flight, checked or plain, and the answers.
 
 use std::collections::VecDeque;
 
@@ -10,16 +10,16 @@ use super::pending::{Due, Pending, ReplyTimeout};
 use super::polling::Polling;
 use super::realtime;
 
-/// Longest block sent, bytes: with number and checksum it fits Grbl's line buffer of 80.
+/// Longest block, bytes: with number and checksum it fits into Grbl's line buffer of 80.
 const LONGEST_BLOCK: usize = 60;
 /// Largest number of a checked line.
 const LAST_SEQ: u32 = 9_999_999;
-/// So many well-formed lines without checksum in a row mean that the controller has left the
-/// checked session, that is, has restarted.
+/// Number of consecutive well-formed lines without checksum that show that the controller has left
+/// the checked session, which means that it has restarted.
 const UNCHECKED: u32 = 3;
-/// The controller's complaint of a number out of order.
+/// The controller's error for a line number out of order.
 const OUT_OF_ORDER: u8 = 71;
-/// The controller's complaint of a checked line outside of a session.
+/// The controller's error for a checked line outside a session.
 const NO_SESSION: u8 = 72;
 
 /// How lines are sent.
@@ -27,19 +27,19 @@ const NO_SESSION: u8 = 72;
 enum Session {
     #[default]
     Plain,
-    /// The line that opens a checked session is under way.
+    /// The line that opens a checked session waits for its answer.
     Opening,
     /// Checked; the next line has this number.
     Checked { next: u32 },
 }
 
-/// The byte state machine. Takes bytes and time, gives bytes and events.
+/// The protocol's state machine: takes bytes and times, returns bytes and events.
 #[derive(Debug, Default)]
 pub struct Machine {
     reader: LineReader,
     session: Session,
     pending: Option<Pending>,
-    /// A line was given up whose answer may still come.
+    /// A line was given up whose answer may still arrive.
     unsure: bool,
     unchecked: u32,
     polling: Polling,
@@ -51,13 +51,13 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// A machine that sends plain lines and asks for nothing.
+    /// A machine that sends plain lines and requests no reports.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// What went wrong so far.
+    /// Counters since the start.
     pub fn counts(&self) -> Counts {
         self.counts
     }
@@ -67,20 +67,20 @@ impl Machine {
         matches!(self.session, Session::Checked { .. })
     }
 
-    /// Whether a line waits for its answer, or one was given up whose answer may still come.
+    /// Whether a line waits for its answer, or the answer to one that was given up may still arrive.
     pub fn is_open(&self) -> bool {
         self.pending.is_some() || self.unsure
     }
 
-    /// Asks for a report every so many microseconds from now on, or no more.
+    /// Sets the interval of report requests, microseconds; `None` for no requests.
     pub fn poll_every(&mut self, every_us: Option<i64>) {
         self.polling.set_every(every_us);
     }
 
-    /// Sends a line, checked where a session is open.
+    /// Sends a line; checked if a session is open.
     ///
     /// # Errors
-    /// [`SendError`]; then nothing was sent.
+    /// [`SendError`]; nothing was sent.
     pub fn send(
         &mut self,
         now_us: i64,
@@ -100,10 +100,10 @@ impl Machine {
         }
     }
 
-    /// Opens a checked session, or starts it anew.
+    /// Opens a checked session, or restarts it.
     ///
     /// # Errors
-    /// [`SendError`]; then nothing was sent.
+    /// [`SendError`]; nothing was sent.
     pub fn open_session(&mut self, now_us: i64) -> Result<u64, SendError> {
         let id = self.launch(now_us, &seal("N0"), Some(0), ReplyTimeout::AtOnce)?;
         self.session = Session::Opening;
@@ -132,18 +132,18 @@ impl Machine {
         Ok(id)
     }
 
-    /// Sends a real-time byte, ahead of what waits to be sent.
+    /// Sends a real-time command before everything else that waits to be sent.
     pub fn realtime(&mut self, byte: u8) {
         self.realtime.push(byte);
     }
 
-    /// Gives up the line in flight. What is left of it is not sent, but it may have been executed.
+    /// Gives up the line in flight. Its unsent rest is discarded, but it may have been executed.
     pub fn give_up(&mut self) {
         self.lines.clear();
         self.fail(LineFault::GivenUp);
     }
 
-    /// What is to be sent now. Call it right before writing: it notes the time of questions.
+    /// The bytes to be sent now. Call it right before writing: it notes the time of requests.
     pub fn take_output(&mut self, now_us: i64) -> Vec<u8> {
         let mut output = std::mem::take(&mut self.realtime);
         if self.polling.is_due(now_us) {
@@ -159,7 +159,7 @@ impl Machine {
         self.events.pop_front()
     }
 
-    /// Time has passed: lines without answer are sent again or given up.
+    /// Processes the passing of time: repeats or gives up lines without answer.
     pub fn on_time(&mut self, now_us: i64) {
         let due = self
             .pending
@@ -186,7 +186,7 @@ impl Machine {
         }
     }
 
-    /// Bytes have come.
+    /// Processes received bytes.
     pub fn on_bytes(&mut self, now_us: i64, bytes: &[u8]) {
         for &byte in bytes {
             match self.reader.push(now_us, byte) {
@@ -215,7 +215,7 @@ impl Machine {
         }
     }
 
-    /// A line without checksum where each should have one: its tail was lost, or the controller
+    /// Processes a line without checksum in a checked session: its end was lost, or the controller
     /// has restarted and left the session.
     fn on_unchecked(&mut self, line: &str) {
         self.counts.noise += 1;
@@ -260,8 +260,8 @@ impl Machine {
             return;
         };
         if awaited != seq {
-            // In a session an answer without number is a complaint of damage, and one with
-            // another number a repetition.
+            // In a session, an answer without number reports a damaged line, and one with another
+            // number is a repetition.
             match (awaited, seq) {
                 (Some(_), None) => self.on_damaged(now_us),
                 _ => self.counts.strays += 1,
@@ -290,7 +290,7 @@ impl Machine {
         self.answer(LineOutcome::Done(info.unwrap_or_default()));
     }
 
-    /// The controller has dealt with the line: the next one has the next number.
+    /// Notes that the controller has processed the line: the next one gets the next number.
     fn answer(&mut self, outcome: LineOutcome) {
         let Some(pending) = self.pending.take() else {
             return;
@@ -316,7 +316,7 @@ impl Machine {
         }
     }
 
-    /// The controller has restarted: nothing from before is answered, and it takes plain lines.
+    /// Notes that the controller has restarted: it answers no earlier line and takes plain lines.
     fn reset(&mut self, cause: Option<RestartCause>) {
         self.fail(LineFault::Restarted);
         self.lines.clear();

@@ -1,22 +1,22 @@
-//! What a controller says, a line at a time.
+//! The lines that a controller sends.
 
 use std::fmt;
 
 use super::number::{decimal, whole};
 use super::status::StatusReport;
 
-/// Why the controller started, where it says so.
+/// Why the controller started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RestartCause {
     /// Its power came on.
     PowerOn,
     /// Its reset pin, which an Uno's USB side pulls when the port is opened.
     External,
-    /// Its supply voltage sank.
+    /// Its supply voltage dropped.
     BrownOut,
     /// It hung, and its watchdog restarted it.
     Watchdog,
-    /// The host sent the reset byte.
+    /// The host sent the reset command.
     Host,
 }
 
@@ -45,12 +45,12 @@ impl fmt::Display for RestartCause {
     }
 }
 
-/// The line a controller starts with.
+/// The line with which a controller starts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Banner {
     /// Grbl's version, such as `1.1h`.
     pub version: String,
-    /// Why it started, where it says so.
+    /// Why it started, if it reports that.
     pub cause: Option<RestartCause>,
 }
 
@@ -64,12 +64,12 @@ pub enum Message {
     },
     /// A line was refused.
     Error {
-        /// Why: Grbl's number.
+        /// Grbl's error number.
         code: u8,
         /// The checked line's number.
         seq: Option<u32>,
     },
-    /// Something stopped the table: Grbl's number.
+    /// An alarm, with Grbl's number.
     Alarm(u8),
     /// A status report.
     Status(StatusReport),
@@ -84,20 +84,20 @@ pub enum Message {
     },
     /// `[OPT:..]`: how the firmware was built.
     Build {
-        /// A letter an option.
+        /// One letter per option.
         letters: String,
-        /// Blocks its planner holds.
+        /// Size of the planner buffer, blocks.
         blocks: u32,
-        /// Bytes its receive buffer holds.
+        /// Size of the receive buffer, bytes.
         buffer: u32,
     },
-    /// `[MSG:..]`: words for a person.
+    /// `[MSG:..]`: a text for the user.
     Note(String),
     /// Any other line in brackets, such as `[GC:G0 G54 ..]`.
     Info {
-        /// What stands before the colon.
+        /// The text before the colon.
         tag: String,
-        /// What stands after it.
+        /// The text after it.
         text: String,
     },
     /// `$100=88.889`: a setting.
@@ -111,7 +111,7 @@ pub enum Message {
     Startup(String),
 }
 
-/// Reads one line without its end; `None` where it is nothing a Grbl 1.1 controller says.
+/// Parses one line without its line end; `None` if it is no line of a Grbl 1.1 controller.
 #[must_use]
 pub fn parse(line: &str) -> Option<Message> {
     match line.as_bytes().first()? {

@@ -1,4 +1,4 @@
-//! Properties of parser and machine: on a harmed wire, and on any bytes at all.
+//! Properties of parser and state machine on a damaged wire and on arbitrary bytes.
 
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
@@ -9,9 +9,9 @@ use super::tests::{checked, events, outcome};
 use super::*;
 use crate::turntable::fake_grbl::{FakeGrbl, seal};
 
-/// What the wire does to a line.
+/// A fault of the wire that changes a line.
 #[derive(Debug, Clone, Copy)]
-enum MotionFault {
+enum WireFault {
     None,
     Drop(usize),
     Flip(usize),
@@ -20,37 +20,37 @@ enum MotionFault {
     Lose,
 }
 
-fn fault() -> impl Strategy<Value = MotionFault> {
+fn fault() -> impl Strategy<Value = WireFault> {
     prop_oneof![
-        6 => Just(MotionFault::None),
-        1 => any::<usize>().prop_map(MotionFault::Drop),
-        1 => any::<usize>().prop_map(MotionFault::Flip),
-        1 => Just(MotionFault::Twice),
-        1 => Just(MotionFault::Merge),
-        1 => Just(MotionFault::Lose),
+        6 => Just(WireFault::None),
+        1 => any::<usize>().prop_map(WireFault::Drop),
+        1 => any::<usize>().prop_map(WireFault::Flip),
+        1 => Just(WireFault::Twice),
+        1 => Just(WireFault::Merge),
+        1 => Just(WireFault::Lose),
     ]
 }
 
-fn harm(bytes: &[u8], fault: MotionFault) -> Vec<u8> {
-    let mut harmed = bytes.to_vec();
+fn damage(bytes: &[u8], fault: WireFault) -> Vec<u8> {
+    let mut damaged = bytes.to_vec();
     match fault {
-        MotionFault::None => {}
-        MotionFault::Drop(at) => drop(harmed.remove(at % bytes.len())),
-        MotionFault::Flip(at) => harmed[at / 8 % bytes.len()] ^= 1 << (at % 8),
-        MotionFault::Twice => harmed.extend(bytes),
-        MotionFault::Merge => harmed.retain(|byte| !matches!(byte, b'\r' | b'\n')),
-        MotionFault::Lose => harmed.clear(),
+        WireFault::None => {}
+        WireFault::Drop(at) => drop(damaged.remove(at % bytes.len())),
+        WireFault::Flip(at) => damaged[at / 8 % bytes.len()] ^= 1 << (at % 8),
+        WireFault::Twice => damaged.extend(bytes),
+        WireFault::Merge => damaged.retain(|byte| !matches!(byte, b'\r' | b'\n')),
+        WireFault::Lose => damaged.clear(),
     }
-    harmed
+    damaged
 }
 
-/// Sends one line through a harmed wire until it is done or has failed.
+/// Sends one line through a faulty wire until it is done or has failed.
 fn exchange(
     machine: &mut Machine,
     fake_grbl: &mut FakeGrbl,
     now_us: &mut i64,
     block: &str,
-    faults: &mut impl Iterator<Item = MotionFault>,
+    faults: &mut impl Iterator<Item = WireFault>,
 ) -> LineOutcome {
     machine.send(*now_us, block, ReplyTimeout::AtOnce).unwrap();
     for _ in 0..2000 {
@@ -58,11 +58,11 @@ fn exchange(
         machine.on_time(*now_us);
         let output = machine.take_output(*now_us);
         if !output.is_empty() {
-            fake_grbl.take(&harm(&output, faults.next().unwrap()));
+            fake_grbl.take(&damage(&output, faults.next().unwrap()));
         }
         fake_grbl.advance(*now_us);
         for line in fake_grbl.give().split_inclusive(|byte| *byte == b'\n') {
-            machine.on_bytes(*now_us, &harm(line, faults.next().unwrap()));
+            machine.on_bytes(*now_us, &damage(line, faults.next().unwrap()));
         }
         if let Some(outcome) = outcome(machine) {
             return outcome;
@@ -75,7 +75,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
-    fn on_a_harmed_wire_a_checked_line_is_done_once_or_fails(faults in vec(fault(), 50)) {
+    fn on_a_faulty_wire_a_checked_line_is_done_once_or_fails(faults in vec(fault(), 50)) {
         let (mut fake_grbl, mut machine, mut now_us) = (FakeGrbl::new(true), checked(), 1);
         fake_grbl.advance(1);
         fake_grbl.take(format!("{}\n", seal("N0")).as_bytes());
@@ -83,7 +83,7 @@ proptest! {
         fake_grbl.give();
         let mut faults = faults.into_iter().cycle();
         for number in 0..40 {
-            // A flipped bit can make the reset byte of a digit.
+            // A flipped bit can turn a digit into the reset command.
             if !machine.is_checked() {
                 break;
             }
@@ -103,7 +103,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_taken_without_harm(pieces in vec(vec(any::<u8>(), 0..40), 0..30)) {
+    fn any_bytes_are_processed_without_a_panic(pieces in vec(vec(any::<u8>(), 0..40), 0..30)) {
         for mut machine in [Machine::new(), checked()] {
             machine.send(0, "$X", ReplyTimeout::AtOnce).unwrap();
             for (now_us, piece) in (0..).zip(&pieces) {

@@ -1,37 +1,37 @@
-//! TableStatus reports: `<Run|MPos:12.345,0.000,0.000|FS:432,0|T:123456789|Bat:11.84|Pn:X>`.
+//! Status reports: `<Run|MPos:12.345,0.000,0.000|FS:432,0|T:123456789|Bat:11.84|Pn:X>`.
 
 use std::fmt;
 
 use super::number::{decimal, whole};
 
-/// What the controller is doing, in Grbl's words.
+/// The controller's state, as Grbl names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ControllerState {
     /// At rest, ready.
     Idle,
-    /// Moving by G-code, or waiting within it.
+    /// Executing G-code.
     Run,
-    /// Held, and at rest.
+    /// Feed hold, at rest (`Hold:0`).
     Held,
-    /// Held, and still ramping down.
+    /// Feed hold, still ramping down (`Hold:1`).
     Holding,
     /// Jogging.
     Jog,
-    /// Looking for the index.
+    /// Searching for the index.
     Home,
     /// Locked after an alarm or at start-up.
     Alarm,
-    /// Reads G-code without moving.
+    /// Check mode: parses G-code without moving.
     Check,
-    /// The safety door is open, which tables have none of; stock boards can report it.
+    /// The safety door is open. A table has none, but a stock board can report it.
     Door,
     /// Asleep until a reset.
     Sleep,
 }
 
 impl ControllerState {
-    /// Whether the table may be moving, or will move on without being told.
+    /// Whether the table may be moving, or may start to move without a command.
     #[must_use]
     pub fn may_move(self) -> bool {
         matches!(
@@ -82,7 +82,7 @@ impl fmt::Display for ControllerState {
     }
 }
 
-/// Where the table is, in the controller's unit, by either of Grbl's two ways to say it.
+/// A position in the controller's unit, in either of Grbl's two forms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Position {
     /// From machine zero.
@@ -100,14 +100,14 @@ pub struct Pins {
     pub emergency_stop: bool,
 }
 
-/// A status report. Fields that are not known are skipped, as Grbl asks of its readers.
+/// A status report. Unknown fields are skipped, as Grbl's documentation demands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StatusReport {
-    /// What the controller is doing.
+    /// The controller's state.
     pub state: ControllerState,
-    /// Where the table is.
+    /// The table's position.
     pub position: Position,
-    /// Speed, the controller's unit a minute.
+    /// Speed, the controller's unit per minute.
     pub feed: Option<f64>,
     /// Microseconds of the chip's clock at the moment of the position; wraps.
     pub chip_us: Option<u32>,
@@ -155,7 +155,7 @@ struct Fields {
 }
 
 impl Fields {
-    /// Takes a field; `None` where a known one is damaged or comes twice.
+    /// Reads a field; `None` if a known one is damaged or repeated.
     fn take(&mut self, name: &str, value: &str) -> Option<()> {
         match name {
             "MPos" => once(&mut self.position, Position::Machine(first(value)?)),
@@ -180,7 +180,7 @@ fn once<T>(place: &mut Option<T>, value: T) -> Option<()> {
     place.replace(value).is_none().then_some(())
 }
 
-/// The first of a list of numbers, all of which have to be numbers.
+/// The first number of a list; `None` if one of them is not a number.
 fn first(list: &str) -> Option<f64> {
     let mut numbers = list.split(',').map(decimal);
     let first = numbers.next()??;

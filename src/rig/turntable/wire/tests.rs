@@ -30,7 +30,7 @@ pub(super) fn checked() -> Machine {
     machine
 }
 
-/// A whole line comes, with its checksum.
+/// Receives a complete line with its checksum.
 fn hear(machine: &mut Machine, now_us: i64, line: &str) {
     machine.on_bytes(now_us, format!("{}\r\n", seal(line)).as_bytes());
 }
