@@ -12,7 +12,7 @@ pub(crate) const STEP_DEG: f64 = 1.0 / 88.889;
 pub(crate) struct Rig {
     pub(crate) simulated: SimulatedTable,
     pub(crate) options: TableOptions,
-    _part: Participant,
+    _participant: Participant,
 }
 
 impl Rig {
@@ -23,7 +23,7 @@ impl Rig {
 
     pub(crate) fn with(faults: &str, options: SimulatorOptions) -> Rig {
         let clock = Clock::virtual_time();
-        let part = clock.take_part();
+        let participant = clock.take_part();
         let simulated = SimulatedTable::new(&SimulatorOptions {
             clock: clock.clone(),
             faults: faults.parse().unwrap(),
@@ -35,7 +35,7 @@ impl Rig {
                 clock,
                 ..TableOptions::default()
             },
-            _part: part,
+            _participant: participant,
         }
     }
 

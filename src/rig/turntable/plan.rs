@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_from_zero_has_its_ramps_outside_of_the_constant_part() {
+    fn a_turn_from_zero_has_its_ramps_outside_the_constant_part() {
         let plan = plan(0.0).unwrap();
         assert_eq!(plan.direction(), Direction::Positive);
         // 7.2^2 / (2 * 36) = 0.72 degrees of ramp.

@@ -12,7 +12,7 @@ use crate::clock::Participant;
 struct Rig {
     fake_grbl: Arc<Mutex<FakeGrbl>>,
     table: Table,
-    _part: Participant,
+    _participant: Participant,
 }
 
 fn open(fake_grbl: FakeGrbl) -> Rig {
@@ -24,7 +24,7 @@ fn try_open(fake_grbl: FakeGrbl) -> Result<Rig, TurntableError> {
 }
 
 fn open_on(clock: Clock, fake_grbl: FakeGrbl) -> Result<Rig, TurntableError> {
-    let part = clock.take_part();
+    let participant = clock.take_part();
     let fake_grbl = Arc::new(Mutex::new(fake_grbl));
     let port = FakePort {
         fake_grbl: Arc::clone(&fake_grbl),
@@ -38,7 +38,7 @@ fn open_on(clock: Clock, fake_grbl: FakeGrbl) -> Result<Rig, TurntableError> {
     Ok(Rig {
         fake_grbl,
         table,
-        _part: part,
+        _participant: participant,
     })
 }
 

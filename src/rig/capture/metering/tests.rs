@@ -162,7 +162,7 @@ impl Camera for Scene<'_> {
 /// Meters a light; gives the exposure found, and how far the table stands from where it was.
 fn metered(light: fn(f64) -> f64) -> (Result<i64, CaptureError>, f64, i64) {
     let clock = Clock::virtual_time();
-    let _part = clock.take_part();
+    let _participant = clock.take_part();
     let simulator = SimulatedTable::new(&SimulatorOptions {
         clock: clock.clone(),
         ..SimulatorOptions::default()

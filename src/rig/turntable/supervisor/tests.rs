@@ -193,7 +193,7 @@ fn a_motion_that_takes_too_long_is_late() {
 }
 
 #[test]
-fn work_positions_count_once_their_zero_is_told_and_inches_are_degrees_too() {
+fn work_positions_count_once_their_zero_is_known_and_inches_are_converted() {
     let mut desk = Desk::new();
     desk.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0>");
     assert!(desk.supervisor.last_report().is_none());
