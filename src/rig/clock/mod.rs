@@ -18,6 +18,10 @@
 //! - [`Clock::away`] encloses a wait for an event from outside, such as a request of a user;
 //! - a thread never waits while it holds a lock that another participant may want.
 //!
+//! If all participants wait and none of them has a deadline, every wait panics with a report of the
+//! threads and the places where they wait. This includes a wait without deadline for a thread that
+//! does not participate, unless it is in [`Clock::away`].
+//!
 //! On the monotonic clock these do the same as their counterparts in the standard library.
 //!
 //! ```

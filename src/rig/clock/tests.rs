@@ -177,6 +177,7 @@ fn a_wait_ends_at_its_deadline_with_a_last_look() {
 #[test]
 fn a_deadlock_is_reported_with_threads_and_places() {
     let clock = Clock::virtual_time();
+    let _participant = clock.take_part();
     let value = Arc::new(Waitable::new(&clock, ()));
     let other = clock
         .spawn("other", {
