@@ -26,13 +26,13 @@ struct Bench {
     clock: Clock,
     port: SimulatedPort,
     heard: String,
-    _part: Participant,
+    _participant: Participant,
 }
 
 impl Bench {
     fn new(options: SimulatorOptions) -> Bench {
         let clock = Clock::virtual_time();
-        let part = clock.take_part();
+        let participant = clock.take_part();
         let table = SimulatedTable::new(&SimulatorOptions {
             clock: clock.clone(),
             ..options
@@ -42,7 +42,7 @@ impl Bench {
             table,
             clock,
             heard: String::new(),
-            _part: part,
+            _participant: participant,
         }
     }
 
@@ -112,7 +112,7 @@ fn whoever_opens_the_port_resets_the_chip() {
 }
 
 #[test]
-fn a_turn_is_told_step_by_step() {
+fn a_turn_has_all_its_steps() {
     let mut bench = Bench::ready(SimulatorOptions::default());
     bench.ask("G1 X360 F432");
     bench.wait("Idle");

@@ -266,9 +266,9 @@ fn a_serial_line_that_is_unplugged_ends_the_take_and_the_next_one_finds_it_again
             port: simulated.open(),
             unplugged: Arc::clone(unplugged),
         };
-        let options = turntable::Options {
+        let options = turntable::TableOptions {
             clock: clock.clone(),
-            ..turntable::Options::default()
+            ..turntable::TableOptions::default()
         };
         Table::open(port, &options).unwrap()
     };

@@ -6,7 +6,7 @@
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 use relit_rig::simulator::SimulatorOptions;
-use relit_rig::turntable::{State, Table, TurntableError};
+use relit_rig::turntable::{ControllerState, Table, TurntableError};
 
 use crate::rig::{Rig, STEP_DEG};
 
@@ -99,7 +99,7 @@ fn recover(rig: &Rig, table: Table, outcome: &mut Outcome) -> Table {
     let _unlocked = table.unlock();
     let ready = table
         .status()
-        .is_ok_and(|status| status.state == State::Idle);
+        .is_ok_and(|status| status.state == ControllerState::Idle);
     let probe = table.jog(0.0, None);
     if ready && !matches!(probe, Err(TurntableError::Unsent { .. })) {
         return table;

@@ -2,7 +2,7 @@
 
 use relit_rig::clock::{Clock, Participant};
 use relit_rig::simulator::{SimulatedTable, Simulator, SimulatorOptions};
-use relit_rig::turntable::{Options, Table, TurnPlan, TurnRequest, TurntableError};
+use relit_rig::turntable::{Table, TableOptions, TurnPlan, TurnRequest, TurntableError};
 use tempfile::TempDir;
 
 /// Degrees in one step, at the firmware's default of 88.889 steps a degree.
@@ -11,8 +11,8 @@ pub(crate) const STEP_DEG: f64 = 1.0 / 88.889;
 /// A simulated table on virtual time. The test's thread takes part in it.
 pub(crate) struct Rig {
     pub(crate) simulated: SimulatedTable,
-    pub(crate) options: Options,
-    _part: Participant,
+    pub(crate) options: TableOptions,
+    _participant: Participant,
 }
 
 impl Rig {
@@ -23,7 +23,7 @@ impl Rig {
 
     pub(crate) fn with(faults: &str, options: SimulatorOptions) -> Rig {
         let clock = Clock::virtual_time();
-        let part = clock.take_part();
+        let participant = clock.take_part();
         let simulated = SimulatedTable::new(&SimulatorOptions {
             clock: clock.clone(),
             faults: faults.parse().unwrap(),
@@ -31,11 +31,11 @@ impl Rig {
         });
         Rig {
             simulated,
-            options: Options {
+            options: TableOptions {
                 clock,
-                ..Options::default()
+                ..TableOptions::default()
             },
-            _part: part,
+            _participant: participant,
         }
     }
 
@@ -63,7 +63,7 @@ impl Rig {
 /// A simulated table on a pseudoterminal, in real time.
 pub(crate) struct PacedRig {
     pub(crate) simulator: Simulator,
-    pub(crate) options: Options,
+    pub(crate) options: TableOptions,
     _folder: TempDir,
 }
 
@@ -72,9 +72,9 @@ impl PacedRig {
         let folder = TempDir::new().unwrap();
         PacedRig {
             simulator: Simulator::start(options, None).unwrap(),
-            options: Options {
+            options: TableOptions {
                 runtime_folder: folder.path().to_owned(),
-                ..Options::default()
+                ..TableOptions::default()
             },
             _folder: folder,
         }

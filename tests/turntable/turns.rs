@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use relit_rig::simulator::SimulatorOptions;
-use relit_rig::turntable::{Fault, Homed, State, TurntableError};
+use relit_rig::turntable::{ControllerState, Homed, MotionFault, TurntableError};
 
 use crate::rig::{PacedRig, Rig, STEP_DEG, paper_turn, spread, turn_by};
 
@@ -97,7 +97,7 @@ fn a_restart_in_the_middle_of_a_turn_fails_it_with_that_reason() {
     let turn = table.start_turn(paper_turn(&table)).unwrap();
     let error = turn.wait_end().unwrap_err();
     assert!(
-        matches!(error, TurntableError::Motion(Fault::Restarted(_))),
+        matches!(error, TurntableError::Motion(MotionFault::Restarted(_))),
         "{error}"
     );
     assert!(matches!(
@@ -142,7 +142,7 @@ fn a_turn_that_is_dropped_stops_the_table() {
     turn.wait_constant().unwrap();
     drop(turn);
     check_stands(&rig);
-    assert_eq!(table.stop().unwrap().state, State::Idle);
+    assert_eq!(table.stop().unwrap().state, ControllerState::Idle);
 }
 
 fn check_stands(rig: &Rig) {

@@ -136,7 +136,7 @@ struct RigArguments {
     camera: CameraAddress,
     /// The turntable's address.
     #[arg(long, value_name = "ADDRESS", default_value = "serial:")]
-    turntable: turntable::Address,
+    turntable: turntable::TurntableAddress,
     /// Speed of the turn, degrees a second.
     #[arg(long, value_name = "SPEED", default_value_t = 7.2, value_parser = speed)]
     degrees_per_second: f64,

@@ -11,7 +11,7 @@ use relit_rig::capture::{
     Stopped, capture, salvage,
 };
 use relit_rig::state::{Monitor, Phase, RigState, Verdict};
-use relit_rig::turntable::Address;
+use relit_rig::turntable::TurntableAddress;
 use serde_json::json;
 
 use crate::arguments::Record;
@@ -29,7 +29,7 @@ pub(crate) fn run(console: Console, record: Record) -> Result<Outcome, CaptureEr
         yes,
     } = record;
     make_root(&settings)?;
-    if !yes && matches!(settings.turntable, Address::Serial(_)) && !agreed(console)? {
+    if !yes && matches!(settings.turntable, TurntableAddress::Serial(_)) && !agreed(console)? {
         console.warn("the table was not turned: nobody agreed; --yes agrees beforehand");
         return Ok(Outcome::Wrong);
     }

@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use crate::camera::{self, Camera, CameraAddress, ReplaySpeed};
 use crate::clock::Clock;
 use crate::simulator::{self, SimulatedTable, SimulatorOptions};
-use crate::turntable::{Address, Options, Table, find_serial};
+use crate::turntable::{Table, TableOptions, TurntableAddress, find_serial};
 
 use super::error::{CaptureError, Refusal};
 use super::settings::Settings;
@@ -107,7 +107,7 @@ impl Equipment {
     /// Whether a table is to be there.
     #[must_use]
     pub fn wants_table(&self) -> bool {
-        self.settings.turntable != Address::None
+        self.settings.turntable != TurntableAddress::None
     }
 
     /// Opens the camera where it is not.
@@ -134,16 +134,16 @@ impl Equipment {
     }
 
     fn connect(&mut self) -> Result<Option<Table>, CaptureError> {
-        let options = Options {
+        let options = TableOptions {
             clock: self.clock.clone(),
             runtime_folder: self.settings.runtime_folder.clone(),
-            ..Options::default()
+            ..TableOptions::default()
         };
         let path = match &self.settings.turntable {
-            Address::None => return Ok(None),
-            Address::Serial(Some(path)) => path.clone(),
-            Address::Serial(None) => find_serial()?,
-            Address::Simulated(address) => {
+            TurntableAddress::None => return Ok(None),
+            TurntableAddress::Serial(Some(path)) => path.clone(),
+            TurntableAddress::Serial(None) => find_serial()?,
+            TurntableAddress::Simulated(address) => {
                 let fault = address.fault.clone();
                 let port = self.simulated(fault.as_deref())?.open();
                 return Ok(Some(Table::open(port, &options)?));
@@ -153,7 +153,10 @@ impl Equipment {
     }
 
     /// The simulated table, switched on the first time.
-    fn simulated(&mut self, fault: Option<&str>) -> Result<&SimulatedTable, simulator::Error> {
+    fn simulated(
+        &mut self,
+        fault: Option<&str>,
+    ) -> Result<&SimulatedTable, simulator::SimulatorError> {
         let simulator = match self.simulator.take() {
             Some(simulator) => simulator,
             None => SimulatedTable::new(&SimulatorOptions {

@@ -39,7 +39,7 @@ pub enum CaptureError {
     Recording(#[from] RecordingError),
     /// The simulated table.
     #[error(transparent)]
-    Simulator(#[from] simulator::Error),
+    Simulator(#[from] simulator::SimulatorError),
     /// The camera is away.
     #[error("there is no camera at the moment: plug it in")]
     NoCamera,

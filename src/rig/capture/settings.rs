@@ -29,7 +29,7 @@ pub struct Settings {
     /// The camera.
     pub camera: CameraAddress,
     /// The turntable.
-    pub turntable: turntable::Address,
+    pub turntable: turntable::TurntableAddress,
     /// The camera's mode.
     pub mode: ModePreference,
     /// Values of its controls; what is not given stays as the camera has it.
@@ -54,7 +54,11 @@ impl Settings {
     /// Settings with the usual figures: 7.2 degrees/s at 30 frames/s, no frame may be missing, one
     /// more try.
     #[must_use]
-    pub fn new(root: PathBuf, camera: CameraAddress, turntable: turntable::Address) -> Self {
+    pub fn new(
+        root: PathBuf,
+        camera: CameraAddress,
+        turntable: turntable::TurntableAddress,
+    ) -> Self {
         Self {
             root,
             camera,
@@ -89,7 +93,7 @@ impl Settings {
     /// # Errors
     /// [`Refusal::Pace`] where one side is real and the other is to run faster.
     pub fn speed(&self) -> Result<f64, Refusal> {
-        use turntable::Address as Table;
+        use turntable::TurntableAddress as Table;
         let replayed = match &self.camera {
             CameraAddress::Replay { speed, .. } => Some(match speed {
                 ReplaySpeed::AsRead => 0.0,

@@ -9,7 +9,7 @@ use super::recording::{Recorder, Window};
 use super::take::CaptureContext;
 use crate::clock::Clock;
 use crate::state::{Monitor, Phase, TableState};
-use crate::turntable::{State, Table, Track, TurnPlan, TurntableError};
+use crate::turntable::{ControllerState, Table, Track, TurnPlan, TurntableError};
 
 /// How often table and state are looked at while frames are recorded.
 const LOOK: Duration = Duration::from_millis(100);
@@ -109,7 +109,7 @@ impl TurnRecording<'_> {
     fn enter_without_reports(&self, phase: Phase) {
         self.context.monitor.update(|state| {
             state.phase = phase;
-            state.table.state = State::Run.to_string();
+            state.table.state = ControllerState::Run.to_string();
             state.table.angle_deg = None;
             state.table.degrees_per_second = None;
         });

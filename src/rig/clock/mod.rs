@@ -1,25 +1,28 @@
-//! The one clock of a capture: what time it is, and every wait for a later one.
+//! The clock of a capture: the time, and all waits.
 //!
-//! Microseconds of the system's monotonic clock, with which cameras stamp their frames (V4L2 does so
-//! in the kernel) and against which the turntable's angles are fitted. It does not follow changes of
-//! the time of day.
+//! In a capture it is the system's monotonic clock in microseconds. Cameras stamp their frames with
+//! it (V4L2 does so in the kernel), and the turntable's angles are fitted against it. It does not
+//! follow changes of the time of day.
 //!
-//! A rehearsal or a test has no hardware to wait for. It runs on *virtual time*
-//! ([`Clock::virtual_time`], [`Clock::paced`]): a clock that stands still while any of the threads
-//! that take part in it runs, and jumps to the earliest deadline once all of them wait. A thread
-//! that the system keeps from running, or that waits for a disk, counts as running: no deadline
-//! can pass it by, however loaded the machine is. A turn of 50 s takes as long as its work does.
+//! A rehearsal or a test has no hardware to wait for and runs on *virtual time*
+//! ([`Clock::virtual_time`], [`Clock::paced`]). A virtual clock stands still while any participating
+//! thread runs. When all of them wait, it jumps to the earliest deadline. A thread that is waiting for
+//! a processor or a disk counts as running, so that no deadline passes while it is kept from working,
+//! however loaded the machine is. A turn of 50 s takes only as long as its computation.
 //!
-//! This needs every wait to go through the clock:
+//! For this, every wait of a participating thread has to go through the clock:
 //!
-//! - [`Clock::sleep`] and [`Clock::sleep_until`] in place of `thread::sleep`;
-//! - a [`Waitable`] in place of a mutex with a condition variable, or of a channel's `recv_timeout`;
-//! - [`Clock::spawn`] or [`Clock::scope`] for threads that take part, whose ends are waited for on
-//!   the clock too;
-//! - [`Clock::away`] around a wait for something outside that no thread of this clock brings about;
-//! - and no lock is held over a wait.
+//! - [`Clock::sleep`] and [`Clock::sleep_until`] replace `thread::sleep`;
+//! - a [`Waitable`] replaces a mutex with a condition variable, and the timeouts of channels;
+//! - [`Clock::spawn`] and [`Clock::scope`] start participating threads and wait for their ends;
+//! - [`Clock::away`] encloses a wait for an event from outside, such as a request of a user;
+//! - a thread never waits while it holds a lock that another participant may want.
 //!
-//! On the monotonic clock all of these are what the standard library offers.
+//! If all participants wait and none of them has a deadline, every wait panics with a report of the
+//! threads and the places where they wait. This includes a wait without deadline for a thread that
+//! does not participate, unless it is in [`Clock::away`].
+//!
+//! On the monotonic clock these do the same as their counterparts in the standard library.
 //!
 //! ```
 //! use relit_rig::clock::{Clock, Waitable};
@@ -28,7 +31,7 @@
 //!
 //! let clock = Clock::virtual_time();
 //! // From here on, time passes only while this thread waits.
-//! let _part = clock.take_part();
+//! let _participant = clock.take_part();
 //! let door = Arc::new(Waitable::new(&clock, false));
 //! let opener = clock.spawn("opener", {
 //!     let (clock, door) = (clock.clone(), Arc::clone(&door));
@@ -47,7 +50,7 @@
 //! # Ok::<(), std::io::Error>(())
 //! ```
 //!
-//! This module knows no other.
+//! This module knows no other module.
 
 mod scheduler;
 #[cfg(test)]
@@ -65,7 +68,7 @@ use scheduler::Scheduler;
 pub use threads::{JoinHandle, Participant, Scope, ScopedJoinHandle};
 pub use waitable::Waitable;
 
-/// Microseconds, and the waits for them: real, or virtual. Clones are the same clock.
+/// A clock in microseconds, monotonic or virtual. Clones are the same clock.
 #[derive(Debug, Clone)]
 pub struct Clock {
     kind: Kind,
@@ -104,16 +107,16 @@ impl Clock {
         }
     }
 
-    /// A virtual clock of its own, which jumps from deadline to deadline without delay. It starts
-    /// at the same time whenever it is made.
+    /// A new virtual clock that jumps to the next deadline without delay. All virtual clocks start at
+    /// the same time.
     pub fn virtual_time() -> Clock {
         Clock {
             kind: Kind::Virtual(Arc::new(Scheduler::new(None))),
         }
     }
 
-    /// A virtual clock that runs at most `factor` times as fast as real time: where the machine
-    /// cannot keep up, it falls behind, and catches up as soon as it can.
+    /// A new virtual clock that runs at most `factor` times as fast as real time. On a machine that
+    /// cannot keep up it falls behind, and catches up as soon as possible.
     ///
     /// A factor that is not a positive number counts as 1.
     pub fn paced(factor: f64) -> Clock {
@@ -161,13 +164,13 @@ impl Clock {
         own.div_f64(self.factor().max(f64::MIN_POSITIVE))
     }
 
-    /// Waits until this clock has gone on by `duration`.
+    /// Waits for `duration` of this clock.
     #[track_caller]
     pub fn sleep(&self, duration: Duration) {
         self.sleep_until(self.after(duration));
     }
 
-    /// Waits until this clock shows `us`; not at all where it does so already.
+    /// Waits until the time `us`; returns at once if it has passed.
     #[track_caller]
     pub fn sleep_until(&self, us: i64) {
         match &self.kind {
@@ -176,7 +179,7 @@ impl Clock {
                 std::thread::sleep(self.real(Duration::from_micros(left)));
             }
             Kind::Virtual(scheduler) => {
-                let _part = self.take_part();
+                let _participant = self.take_part();
                 if let Some(ticket) = scheduler.register(None, Some(us), Location::caller()) {
                     scheduler.block(ticket);
                 }
@@ -184,7 +187,7 @@ impl Clock {
         }
     }
 
-    /// What this clock will show in so long, microseconds.
+    /// The time of this clock after `duration` from now, microseconds.
     pub fn after(&self, duration: Duration) -> i64 {
         let us = i64::try_from(duration.as_micros()).unwrap_or(i64::MAX);
         self.now_us().saturating_add(us)

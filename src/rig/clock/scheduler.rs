@@ -1,4 +1,4 @@
-//! Virtual time: who takes part, who waits until when, and the jump to the next deadline.
+//! Virtual time: the participating threads, their waits, and the jumps to the next deadline.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
@@ -8,31 +8,31 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, Thread, ThreadId};
 use std::time::{Duration, Instant};
 
-/// What a virtual clock shows when it is made: late enough that times before it are positive.
+/// Start time of a virtual clock, microseconds; large enough that earlier times are positive.
 const START_US: i64 = 1_000_000_000;
 
-/// Names something that can be waited for.
+/// Identifies something that threads wait for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct WaitId(u64);
 
 impl WaitId {
-    /// One that no other has.
+    /// A new id, different from all others.
     pub(super) fn unique() -> WaitId {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         WaitId(NEXT.fetch_add(1, Ordering::Relaxed))
     }
 }
 
-/// Names a wait that was announced and may have begun.
+/// Identifies a registered wait.
 #[derive(Debug)]
 pub(super) struct Ticket(u64);
 
 /// How a wait ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ended {
-    /// By its deadline or by a notification.
+    /// The deadline has come, or a notification.
     Woken,
-    /// Everybody waits for ever, and this thread is unwinding already.
+    /// There is a deadlock, and this thread is already unwinding.
     Abandoned,
 }
 
@@ -43,7 +43,7 @@ pub(super) struct Scheduler {
     state: Mutex<State>,
 }
 
-/// The upper limit of how fast virtual time passes.
+/// The upper limit of the speed of virtual time.
 #[derive(Debug)]
 struct Pace {
     started: Instant,
@@ -51,7 +51,7 @@ struct Pace {
 }
 
 impl Pace {
-    /// How long in real time until the clock may show `us`.
+    /// Real time until the clock may reach `us`.
     fn left(&self, us: i64) -> Duration {
         let since_start = us.saturating_sub(START_US).max(0) as f64 / 1e6 / self.factor;
         let due = Duration::try_from_secs_f64(since_start).unwrap_or(Duration::MAX);
@@ -61,15 +61,15 @@ impl Pace {
 
 #[derive(Default)]
 struct State {
-    /// The threads that take part, and how often each has said so.
+    /// The participating threads, with the number of their open [`Scheduler::enter`].
     members: HashMap<ThreadId, usize>,
-    /// Threads that take part and are in no wait, those about to start among them.
+    /// Number of participants that are not in a wait, including threads about to start.
     running: usize,
-    /// Threads that take part and wait for something outside.
+    /// Number of threads in [`Clock::away`](super::Clock::away).
     away: usize,
     waiters: BTreeMap<u64, Waiter>,
     next_ticket: u64,
-    /// Who waits for whom, once nobody can go on any more.
+    /// The report of a deadlock, once there is one.
     deadlock: Option<String>,
 }
 
@@ -97,7 +97,7 @@ impl Scheduler {
         self.now_us.load(Ordering::Acquire)
     }
 
-    /// This thread takes part until it has left as often as it has entered.
+    /// Makes this thread a participant, until it has called [`Scheduler::leave`] as many times.
     pub(super) fn enter(&self) {
         let mut state = self.lock();
         let depth = state.members.entry(thread::current().id()).or_default();
@@ -107,7 +107,7 @@ impl Scheduler {
         }
     }
 
-    /// Takes back one [`Scheduler::enter`] or [`Scheduler::arrive`].
+    /// Ends one [`Scheduler::enter`] or [`Scheduler::arrive`].
     pub(super) fn leave(&self) {
         let mut state = self.lock();
         let id = thread::current().id();
@@ -122,24 +122,24 @@ impl Scheduler {
         }
     }
 
-    /// A thread is about to start that takes part: no time passes until it does.
+    /// Announces a new participating thread: no time passes until it has started.
     pub(super) fn expect(&self) {
         self.lock().running += 1;
     }
 
-    /// The thread that was expected is this one.
+    /// Makes this thread the participant that was announced.
     pub(super) fn arrive(&self) {
         self.lock().members.insert(thread::current().id(), 1);
     }
 
-    /// The thread that was expected does not come.
+    /// Withdraws the announcement of a thread.
     pub(super) fn expect_no_more(&self) {
         let mut state = self.lock();
         state.running -= 1;
         self.advance(&mut state);
     }
 
-    /// This thread does not take part for now; gives how often it had said that it does.
+    /// Suspends this thread's participation; returns what [`Scheduler::come_back`] needs.
     pub(super) fn go_away(&self) -> Option<usize> {
         let mut state = self.lock();
         let depth = state.members.remove(&thread::current().id())?;
@@ -157,8 +157,8 @@ impl Scheduler {
         state.away -= 1;
     }
 
-    /// Announces a wait of this thread, which takes part: from now on nothing that it waits for is
-    /// missed. `None` where the deadline is past.
+    /// Registers a wait of this participating thread: no notification after this call is missed.
+    /// `None` if the deadline has passed.
     pub(super) fn register(
         &self,
         id: Option<WaitId>,
@@ -182,7 +182,7 @@ impl Scheduler {
         Some(Ticket(ticket))
     }
 
-    /// Waits as announced. Holds no lock of the caller's.
+    /// Performs a registered wait. The caller must hold no lock.
     pub(super) fn block(&self, ticket: Ticket) -> Ended {
         let Ticket(ticket) = ticket;
         let mut state = self.lock();
@@ -208,12 +208,12 @@ impl Scheduler {
         Ended::Woken
     }
 
-    /// Wakes all who wait for `id`. They count as running before this returns.
+    /// Wakes all threads that wait for `id`. When this returns, they count as running.
     pub(super) fn notify(&self, id: WaitId) {
         self.lock().wake(|waiter| waiter.id == Some(id));
     }
 
-    /// Where everybody waits, lets time go on to the next deadline, as far as the pace allows.
+    /// If all participants wait, advances the time to the next deadline, as far as the pace allows.
     fn advance(&self, state: &mut State) {
         if state.running > 0 || state.waiters.is_empty() || state.deadlock.is_some() {
             return;
@@ -232,13 +232,13 @@ impl Scheduler {
             self.now_us.store(deadline_us, Ordering::Release);
             state.wake(|waiter| waiter.deadline_us.is_some_and(|at| at <= deadline_us));
         } else if let Some(waiter) = state.waiters.get(&first) {
-            // It looks at the real time itself.
+            // That thread waits for the rest of the real time.
             waiter.wake.notify_one();
         }
     }
 
-    /// How long this waiter has to wait in real time before it lets the clock go on: it does so
-    /// where its deadline is the next one.
+    /// Real time that this waiter has to wait before it advances the clock; `None` if that is another
+    /// thread's task.
     fn left(&self, state: &State, ticket: u64) -> Option<Duration> {
         let pace = self.pace.as_ref().filter(|_| state.running == 0)?;
         let (first, deadline_us) = state.first_deadline()?;
@@ -251,7 +251,7 @@ impl Scheduler {
 }
 
 impl State {
-    /// The waiter with the earliest deadline, of several the one that came first.
+    /// The waiter with the earliest deadline; among equal ones, the first.
     fn first_deadline(&self) -> Option<(u64, i64)> {
         let deadlines = self
             .waiters
@@ -269,19 +269,20 @@ impl State {
 
     fn report(&self) -> String {
         let mut report =
-            "every thread on this virtual clock waits, and none for a time:".to_owned();
+            "deadlock: every thread on this virtual clock waits, and none has a deadline:"
+                .to_owned();
         for Waiter { thread, place, .. } in self.waiters.values() {
-            let name = thread.name().unwrap_or("a thread without name");
+            let name = thread.name().unwrap_or("unnamed thread");
             report += &format!(" {name} at {}:{};", place.file(), place.line());
         }
         report
     }
 }
 
-/// Tells a deadlock, unless the thread is about to end by another panic.
+/// Panics because of a deadlock, unless the thread is already unwinding.
 #[expect(
     clippy::panic,
-    reason = "threads that wait for each other are a mistake in the program, and a wait has no other way to say so"
+    reason = "a deadlock is an error in the program, and a wait cannot return it"
 )]
 fn give_up(report: String) -> Ended {
     if !thread::panicking() {

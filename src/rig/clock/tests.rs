@@ -5,7 +5,7 @@
 )]
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
@@ -68,7 +68,7 @@ fn a_paced_clock_is_no_faster_than_its_pace() {
 #[test]
 fn a_paced_clock_wakes_whoever_is_next_whatever_the_others_wait_for() {
     let clock = Clock::paced(1000.0);
-    let _part = clock.take_part();
+    let _participant = clock.take_part();
     let value = Waitable::new(&clock, 0);
     clock.scope(|scope| {
         scope.spawn("late", || clock.sleep(SECOND * 9)).unwrap();
@@ -88,7 +88,7 @@ fn a_paced_clock_wakes_whoever_is_next_whatever_the_others_wait_for() {
 #[test]
 fn no_time_passes_while_a_thread_that_takes_part_runs() {
     let clock = Clock::virtual_time();
-    let _part = clock.take_part();
+    let _participant = clock.take_part();
     let start_us = clock.now_us();
     let sleeper = clock
         .spawn("sleeper", {
@@ -108,7 +108,7 @@ fn no_time_passes_while_a_thread_that_takes_part_runs() {
 #[test]
 fn time_passes_without_a_thread_that_is_away_and_not_after_it_came_back() {
     let clock = Clock::virtual_time();
-    let _part = clock.take_part();
+    let _participant = clock.take_part();
     let start_us = clock.now_us();
     let (sender, receiver) = std::sync::mpsc::sync_channel(1);
     let sleeper = clock
@@ -121,8 +121,8 @@ fn time_passes_without_a_thread_that_is_away_and_not_after_it_came_back() {
             }
         })
         .unwrap();
-    let told = clock.away(|| receiver.recv().unwrap());
-    assert_eq!(told, start_us + 1_000_000);
+    let sent_us = clock.away(|| receiver.recv().unwrap());
+    assert_eq!(sent_us, start_us + 1_000_000);
     let back_us = clock.now_us();
     std::thread::sleep(ms(20));
     assert_eq!(clock.now_us(), back_us);
@@ -133,7 +133,7 @@ fn time_passes_without_a_thread_that_is_away_and_not_after_it_came_back() {
 #[test]
 fn who_is_notified_looks_before_time_passes() {
     let clock = Clock::virtual_time();
-    let _part = clock.take_part();
+    let _participant = clock.take_part();
     let value = Arc::new(Waitable::new(&clock, 0));
     let seen = clock
         .spawn("watcher", {
@@ -175,8 +175,9 @@ fn a_wait_ends_at_its_deadline_with_a_last_look() {
 }
 
 #[test]
-fn threads_that_wait_for_each_other_are_told_who_and_where() {
+fn a_deadlock_is_reported_with_threads_and_places() {
     let clock = Clock::virtual_time();
+    let _participant = clock.take_part();
     let value = Arc::new(Waitable::new(&clock, ()));
     let other = clock
         .spawn("other", {
@@ -184,10 +185,10 @@ fn threads_that_wait_for_each_other_are_told_who_and_where() {
             move || value.wait(|()| None::<()>)
         })
         .unwrap();
-    let told = catch_unwind(AssertUnwindSafe(|| value.wait(|()| None::<()>))).unwrap_err();
-    let told = told.downcast::<String>().unwrap();
-    assert!(told.contains("other at "), "{told}");
-    assert!(told.matches("clock/tests.rs").count() >= 2, "{told}");
+    let report = catch_unwind(AssertUnwindSafe(|| value.wait(|()| None::<()>))).unwrap_err();
+    let report = report.downcast::<String>().unwrap();
+    assert!(report.contains("other at "), "{report}");
+    assert!(report.matches("clock/tests.rs").count() >= 2, "{report}");
     while !other.is_finished() {
         std::thread::sleep(ms(1));
     }
@@ -197,7 +198,7 @@ fn threads_that_wait_for_each_other_are_told_who_and_where() {
 #[test]
 fn a_thread_that_panics_takes_no_part_any_more_and_its_end_is_seen() {
     let clock = Clock::virtual_time();
-    let _part = clock.take_part();
+    let _participant = clock.take_part();
     let broken = clock.spawn("broken", || panic!("as asked")).unwrap();
     clock.sleep(SECOND);
     assert!(broken.is_finished());
@@ -215,22 +216,19 @@ fn a_thread_that_panics_takes_no_part_any_more_and_its_end_is_seen() {
 #[test]
 fn a_scope_waits_for_its_threads_on_the_clock() {
     for clock in [Clock::virtual_time(), Clock::monotonic()] {
-        let _part = clock.take_part();
-        let over = AtomicBool::new(false);
-        let looked = clock.scope(|scope| {
-            let watcher = scope.spawn("watcher", || {
-                let mut looks = 0;
-                while !over.load(Ordering::Acquire) {
-                    clock.sleep(ms(1));
-                    looks += 1;
-                }
-                looks
-            });
-            clock.sleep(ms(10));
-            over.store(true, Ordering::Release);
-            watcher.unwrap().join().unwrap()
+        let _participant = clock.take_part();
+        let ended = AtomicUsize::new(0);
+        clock.scope(|scope| {
+            for naps in [1, 20] {
+                let (clock, ended) = (&clock, &ended);
+                let sleeper = scope.spawn("sleeper", move || {
+                    clock.sleep(ms(naps));
+                    ended.fetch_add(1, Ordering::Release);
+                });
+                sleeper.unwrap();
+            }
         });
-        assert!(looked >= 1);
+        assert_eq!(ended.load(Ordering::Acquire), 2);
     }
 }
 
@@ -247,7 +245,7 @@ proptest! {
         let clock = if paced { Clock::paced(1e6) } else { Clock::virtual_time() };
         let start_us = clock.now_us();
         let log = Mutex::new(Vec::new());
-        let part = clock.take_part();
+        let participant = clock.take_part();
         clock.scope(|scope| {
             for naps in &naps {
                 let (clock, log) = (&clock, &log);
@@ -261,7 +259,7 @@ proptest! {
                 }).unwrap();
             }
         });
-        drop(part);
+        drop(participant);
         let log = log.into_inner().unwrap();
         prop_assert_eq!(log.len(), naps.iter().map(Vec::len).sum::<usize>());
         prop_assert!(log.iter().all(|(now_us, due_us)| now_us == due_us));
@@ -277,7 +275,7 @@ proptest! {
         patience in 1..2000_u64,
     ) {
         let clock = Clock::virtual_time();
-        let part = clock.take_part();
+        let participant = clock.take_part();
         let slot = Waitable::new(&clock, None);
         let late = clock.scope(|scope| {
             let taker = scope.spawn("taker", || {
@@ -301,7 +299,7 @@ proptest! {
             }
             taker.join().unwrap()
         });
-        drop(part);
+        drop(participant);
         prop_assert_eq!(late, 0);
     }
 }

@@ -1,4 +1,4 @@
-//! Threads that take part in a clock, and waiting for their ends.
+//! Threads that participate in a clock, and the waits for their ends.
 
 use std::io;
 use std::marker::PhantomData;
@@ -7,13 +7,13 @@ use std::thread;
 
 use super::{Clock, Waitable};
 
-/// While this lives, the thread that made it takes part in its clock: virtual time passes only
+/// While this exists, the thread that created it participates in the clock: virtual time passes only
 /// while that thread waits on the clock.
 #[derive(Debug)]
-#[must_use = "the thread takes part as long as this lives"]
+#[must_use = "the thread participates as long as this exists"]
 pub struct Participant {
     clock: Clock,
-    /// A part is the thread's own.
+    /// Participation belongs to one thread.
     _not_send: PhantomData<*const ()>,
 }
 
@@ -34,7 +34,7 @@ impl Drop for Participant {
     }
 }
 
-/// A thread started by [`Clock::spawn`]. Dropped, it lets the thread go on by itself.
+/// A thread started by [`Clock::spawn`]. Dropping it detaches the thread.
 #[derive(Debug)]
 pub struct JoinHandle<T> {
     thread: thread::JoinHandle<T>,
@@ -42,10 +42,10 @@ pub struct JoinHandle<T> {
 }
 
 impl<T> JoinHandle<T> {
-    /// Waits until the thread has ended; gives what it gave, or what it panicked with.
+    /// Waits until the thread has ended; returns its result.
     ///
     /// # Errors
-    /// What the thread panicked with.
+    /// The panic of the thread.
     #[track_caller]
     pub fn join(self) -> thread::Result<T> {
         self.ended.wait(|ended| ended.then_some(()));
@@ -58,12 +58,12 @@ impl<T> JoinHandle<T> {
     }
 }
 
-/// Threads that end before [`Clock::scope`] does.
+/// A scope for threads that end before [`Clock::scope`] returns.
 #[derive(Debug)]
 pub struct Scope<'scope, 'env: 'scope> {
     scope: &'scope thread::Scope<'scope, 'env>,
     clock: Clock,
-    /// How many threads have not ended.
+    /// Number of threads that have not ended.
     open: Arc<Waitable<usize>>,
 }
 
@@ -75,10 +75,10 @@ pub struct ScopedJoinHandle<'scope, T> {
 }
 
 impl<T> ScopedJoinHandle<'_, T> {
-    /// Waits until the thread has ended; gives what it gave, or what it panicked with.
+    /// Waits until the thread has ended; returns its result.
     ///
     /// # Errors
-    /// What the thread panicked with.
+    /// The panic of the thread.
     #[track_caller]
     pub fn join(self) -> thread::Result<T> {
         self.ended.wait(|ended| ended.then_some(()));
@@ -92,8 +92,8 @@ impl<T> ScopedJoinHandle<'_, T> {
 }
 
 impl Clock {
-    /// Lets this thread take part until what is given is dropped. A thread that only now and then
-    /// waits on the clock does without: it takes part while it waits.
+    /// Makes this thread a participant until the returned value is dropped. Other threads may also
+    /// wait on the clock; they participate during their waits only.
     pub fn take_part(&self) -> Participant {
         if let Some(scheduler) = self.scheduler() {
             scheduler.enter();
@@ -101,10 +101,10 @@ impl Clock {
         Participant::of(self)
     }
 
-    /// Starts a thread that takes part from now on.
+    /// Starts a participating thread. No time passes until it runs.
     ///
     /// # Errors
-    /// The system gives no thread.
+    /// The system cannot start a thread.
     pub fn spawn<T: Send + 'static>(
         &self,
         name: &str,
@@ -116,15 +116,14 @@ impl Clock {
         let thread = thread::Builder::new()
             .name(name.to_owned())
             .spawn(move || {
-                let _part = expected.arrive();
+                let _participant = expected.arrive();
                 let _end = end;
                 work()
             })?;
         Ok(JoinHandle { thread, ended })
     }
 
-    /// Runs `body`, which may start threads that borrow from around it, and waits on the clock for
-    /// their ends.
+    /// Runs `body`, which may start threads that borrow local values, and waits for their ends.
     pub fn scope<'env, T>(&self, body: impl for<'scope> FnOnce(&Scope<'scope, 'env>) -> T) -> T {
         thread::scope(|scope| {
             let scope = Scope {
@@ -137,8 +136,8 @@ impl Clock {
         })
     }
 
-    /// Runs `wait`, which waits for something outside: on a virtual clock, time goes on without
-    /// this thread meanwhile.
+    /// Runs `wait`, which waits for an event from outside. On a virtual clock, time passes without this
+    /// thread meanwhile.
     pub fn away<T>(&self, wait: impl FnOnce() -> T) -> T {
         let _back = self.scheduler().and_then(|scheduler| {
             let depth = scheduler.go_away()?;
@@ -149,10 +148,10 @@ impl Clock {
 }
 
 impl<'scope> Scope<'scope, '_> {
-    /// Starts a thread that takes part from now on.
+    /// Starts a participating thread. No time passes until it runs.
     ///
     /// # Errors
-    /// The system gives no thread.
+    /// The system cannot start a thread.
     pub fn spawn<T: Send + 'scope>(
         &self,
         name: &str,
@@ -167,7 +166,7 @@ impl<'scope> Scope<'scope, '_> {
             thread::Builder::new()
                 .name(name.to_owned())
                 .spawn_scoped(self.scope, move || {
-                    let _part = expected.arrive();
+                    let _participant = expected.arrive();
                     let (_count, _end) = (count, end);
                     work()
                 })?;
@@ -175,7 +174,7 @@ impl<'scope> Scope<'scope, '_> {
     }
 }
 
-/// A thread about to start: counts as running, and no more where it does not start after all.
+/// A thread about to start: counts as running until it has started or failed to.
 struct Expected(Option<Clock>);
 
 impl Expected {
@@ -186,7 +185,7 @@ impl Expected {
         Self(Some(clock.clone()))
     }
 
-    /// This thread is the one: it takes part.
+    /// Makes this thread the announced participant.
     fn arrive(mut self) -> Option<Participant> {
         let clock = self.0.take()?;
         if let Some(scheduler) = clock.scheduler() {
@@ -204,7 +203,7 @@ impl Drop for Expected {
     }
 }
 
-/// Tells that the thread has ended, also by a panic.
+/// Marks the thread as ended, also after a panic.
 struct SetAtEnd(Arc<Waitable<bool>>);
 
 impl Drop for SetAtEnd {
@@ -213,7 +212,7 @@ impl Drop for SetAtEnd {
     }
 }
 
-/// Counts a scope's thread as ended.
+/// Marks one of the scope's threads as ended.
 struct CountDown(Arc<Waitable<usize>>);
 
 impl Drop for CountDown {
@@ -222,7 +221,7 @@ impl Drop for CountDown {
     }
 }
 
-/// Waits for a scope's threads, also when its body panics.
+/// Waits for the scope's threads, also if its body panics.
 struct WaitForAll(Arc<Waitable<usize>>);
 
 impl Drop for WaitForAll {

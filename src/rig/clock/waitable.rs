@@ -1,4 +1,4 @@
-//! A value whose changes can be waited for until a time of a clock.
+//! A value whose changes threads can wait for.
 
 use std::panic::Location;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -7,11 +7,11 @@ use std::time::Duration;
 use super::Clock;
 use super::scheduler::{Ended, WaitId};
 
-/// A value behind a lock, whose changes can be waited for until a deadline on a clock.
+/// A value behind a lock, with waits for its changes that have deadlines on a clock.
 ///
-/// Who changes it through [`Waitable::lock`] calls [`Waitable::notify`] afterwards;
-/// [`Waitable::update`] does both. Those who wait are woken by either and look again. Hold no lock
-/// while you wait, and wait for nothing while you look.
+/// After a change through [`Waitable::lock`], call [`Waitable::notify`]; [`Waitable::update`] does
+/// both. The closure `look` of a wait is called with the value locked: it must not wait for anything
+/// itself.
 #[derive(Debug)]
 pub struct Waitable<T> {
     clock: Clock,
@@ -21,7 +21,7 @@ pub struct Waitable<T> {
 }
 
 impl<T> Waitable<T> {
-    /// A value whose waits go by `clock`.
+    /// A value whose waits use `clock`.
     pub fn new(clock: &Clock, value: T) -> Self {
         Self {
             clock: clock.clone(),
@@ -31,17 +31,17 @@ impl<T> Waitable<T> {
         }
     }
 
-    /// The clock that its waits go by.
+    /// The clock of its waits.
     pub fn clock(&self) -> &Clock {
         &self.clock
     }
 
-    /// The value, for a moment. One that a panicking thread has left behind is given as it is.
+    /// Locks the value, also if a thread has panicked while it had the lock.
     pub fn lock(&self) -> MutexGuard<'_, T> {
         self.value.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Wakes all who wait. On a virtual clock no time passes before they have looked.
+    /// Wakes all waiting threads. On a virtual clock, no time passes until they have looked.
     pub fn notify(&self) {
         match self.clock.scheduler() {
             Some(scheduler) => scheduler.notify(self.id),
@@ -49,14 +49,14 @@ impl<T> Waitable<T> {
         }
     }
 
-    /// Changes the value and wakes all who wait.
+    /// Changes the value and wakes all waiting threads.
     pub fn update<R>(&self, change: impl FnOnce(&mut T) -> R) -> R {
         let changed = change(&mut self.lock());
         self.notify();
         changed
     }
 
-    /// Looks at the value, and again after each change, until `look` finds something.
+    /// Calls `look` now and after each change, until it returns something.
     #[track_caller]
     pub fn wait<R>(&self, mut look: impl FnMut(&mut T) -> Option<R>) -> R {
         let place = Location::caller();
@@ -64,13 +64,13 @@ impl<T> Waitable<T> {
             if let Some(found) = self.watch(None, place, &mut look) {
                 return found;
             }
-            // Only while a deadlock unwinds all threads: the others end, each for itself.
+            // Reached only while all threads unwind because of a deadlock.
             std::thread::yield_now();
         }
     }
 
-    /// Looks at the value, and again after each change, until `look` finds something or `timeout`
-    /// is over; then once more.
+    /// Calls `look` now, after each change, and a last time after `timeout`, until it returns
+    /// something.
     #[track_caller]
     pub fn wait_for<R>(
         &self,
@@ -80,8 +80,8 @@ impl<T> Waitable<T> {
         self.wait_until(self.clock.after(timeout), look)
     }
 
-    /// Looks at the value, and again after each change, until `look` finds something or the clock
-    /// shows `deadline_us`; then once more.
+    /// Calls `look` now, after each change, and a last time at `deadline_us`, until it returns
+    /// something.
     #[track_caller]
     pub fn wait_until<R>(
         &self,
@@ -97,7 +97,7 @@ impl<T> Waitable<T> {
         place: &'static Location<'static>,
         look: &mut dyn FnMut(&mut T) -> Option<R>,
     ) -> Option<R> {
-        let _part = self.clock.take_part();
+        let _participant = self.clock.take_part();
         let mut value = self.lock();
         loop {
             if let Some(found) = look(&mut value) {
@@ -107,7 +107,7 @@ impl<T> Waitable<T> {
         }
     }
 
-    /// Gives the lock away until something changes or the deadline comes; `None` where it is past.
+    /// Releases the lock until a change or the deadline; `None` if the deadline has passed.
     fn wait_for_change<'a>(
         &'a self,
         value: MutexGuard<'a, T>,

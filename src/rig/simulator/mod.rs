@@ -1,25 +1,25 @@
-//! A turntable without hardware: the firmware's core, as a function of time.
+//! A turntable without hardware: the firmware's core, simulated over time.
 //!
-//! A [`SimulatedTable`] runs the very code that runs on the chip, up to whatever its [`Clock`] shows
-//! when somebody looks. Its port leads through memory; a [`Simulator`] puts it on a pseudoterminal, for
-//! other programs. Either looks like an Arduino's: whoever opens it resets the chip, bytes take the
-//! time of 115 200 baud, and the wire can be as bad as [`Faults`] asks. What no real table reports, this
-//! one does: where it stood at any moment.
+//! A [`SimulatedTable`] runs the same code as the chip, up to the present time of its [`Clock`]. Its
+//! port works in memory; a [`Simulator`] provides it as a pseudoterminal for other programs. Both
+//! behave like an Arduino's: opening the port resets the chip, bytes take as long as at 115 200 baud,
+//! and faults of the wire and the chip are injected on demand ([`TableFaults`]). Unlike a real table,
+//! it also gives its true angle at any time.
 //!
 //! ```
 //! use relit_rig::clock::Clock;
 //! use relit_rig::simulator::{SimulatedTable, SimulatorOptions};
-//! use relit_rig::turntable::{Options, Table};
+//! use relit_rig::turntable::{TableOptions, Table};
 //!
 //! let clock = Clock::virtual_time();
-//! let _part = clock.take_part();
+//! let _participant = clock.take_part();
 //! let simulated = SimulatedTable::new(&SimulatorOptions {
 //!     clock: clock.clone(),
 //!     ..SimulatorOptions::default()
 //! });
-//! let options = Options {
+//! let options = TableOptions {
 //!     clock: clock.clone(),
-//!     ..Options::default()
+//!     ..TableOptions::default()
 //! };
 //! let table = Table::open(simulated.open(), &options)?;
 //! table.jog(90.0, None)?;
@@ -27,7 +27,8 @@
 //! # Ok::<(), relit_rig::turntable::TurntableError>(())
 //! ```
 //!
-//! This module knows the clock, the firmware's core, and of the host's side only what a port is.
+//! This module knows the clock and the firmware's core, and of the host's side only the trait of a
+//! port.
 
 mod chip;
 mod faults;
@@ -48,7 +49,7 @@ use serde::Serialize;
 
 use crate::clock::{Clock, JoinHandle};
 
-pub use faults::{Faults, WireFaults};
+pub use faults::{TableFaults, WireFaults};
 pub use table::{SimulatedPort, SimulatedTable};
 pub use truth::{STEPS_PER_TURN, StepEdge};
 pub use wire::WireCounts;
@@ -56,10 +57,10 @@ pub use wire::WireCounts;
 use table::LOOK;
 use terminal::Terminal;
 
-/// Why there is no simulated table.
+/// An error of the simulator.
 #[derive(Debug, thiserror::Error)]
-pub enum Error {
-    /// A fault that nobody can make.
+pub enum SimulatorError {
+    /// A fault that does not exist.
     #[error("the fault {item:?} is not understood: {why}")]
     Fault {
         /// The fault.
@@ -67,49 +68,49 @@ pub enum Error {
         /// What is wrong with it.
         why: &'static str,
     },
-    /// The system gave no pseudoterminal.
+    /// A pseudoterminal could not be set up.
     #[error(
         "could not {step} a pseudoterminal: {errno}; see that /dev/pts is mounted and not full"
     )]
     Terminal {
         /// The step that failed.
         step: &'static str,
-        /// What the system said.
+        /// The system's error.
         errno: Errno,
     },
-    /// The link to the port could not be made.
+    /// The link to the port could not be created.
     #[error("could not make {path} a link to the simulated port: {source}; choose another name")]
     Link {
         /// The link.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// The system gave no thread.
+    /// The thread could not be started.
     #[error("could not start the simulated table's thread: {0}; end other programs and try again")]
     Thread(io::Error),
 }
 
-/// How a simulated table is.
+/// Options of a simulated table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatorOptions {
-    /// The clock that its time follows; give the same one to whatever works with it.
+    /// Its clock. Everything that works with the table needs the same one.
     pub clock: Clock,
-    /// What goes wrong.
-    pub faults: Faults,
-    /// What makes random faults repeatable.
+    /// The faults to inject.
+    pub faults: TableFaults,
+    /// Seed of the random faults.
     pub seed: u64,
-    /// The angle at which the table stands when it is switched on, degrees.
+    /// Angle at which the table stands at power-on, degrees.
     pub start_angle: f64,
-    /// The angle at which the index becomes active in a positive turn, degrees.
+    /// Angle at which the index becomes active in a positive turn, degrees.
     pub index_at: f64,
-    /// How far the index stays active, degrees.
+    /// Range in which the index stays active, degrees.
     pub index_width: f64,
-    /// Volts of the battery.
+    /// Battery voltage, volts.
     pub battery: f64,
-    /// How much faster than the clock the chip's crystal goes, parts in a million.
+    /// Deviation of the chip's crystal from the clock, parts per million; positive is faster.
     pub drift_ppm: f64,
-    /// Whether opening the port resets the chip, as with an Arduino.
+    /// Whether opening the port resets the chip, as it does on an Arduino.
     pub reset_on_open: bool,
 }
 
@@ -117,7 +118,7 @@ impl Default for SimulatorOptions {
     fn default() -> Self {
         SimulatorOptions {
             clock: Clock::monotonic(),
-            faults: Faults::default(),
+            faults: TableFaults::default(),
             seed: 0,
             start_angle: 0.0,
             index_at: 30.0,
@@ -129,24 +130,24 @@ impl Default for SimulatorOptions {
     }
 }
 
-/// What happened so far.
+/// Counters since power-on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct SimulatorCounts {
     /// On the way to the chip.
     pub to_chip: WireCounts,
     /// On the way from the chip.
     pub from_chip: WireCounts,
-    /// How often the port was opened.
+    /// How many times the port was opened.
     pub opened: u64,
-    /// How often a fault restarted the chip.
+    /// How many times a fault restarted the chip.
     pub resets: u64,
     /// Whether a fault stopped the chip.
     pub stalled: bool,
 }
 
-/// A simulated table on a pseudoterminal, with a thread, until it is stopped or dropped.
+/// A simulated table at a pseudoterminal, with a thread. Runs until it is stopped or dropped.
 ///
-/// Its time is the clock's, which other programs go by as well: the monotonic one, or a
+/// Other programs cannot take part in virtual time: the clock has to be the monotonic one, or a
 /// [paced](Clock::paced) one for a table that runs faster than real time.
 pub struct Simulator {
     table: SimulatedTable,
@@ -157,11 +158,14 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// Switches a table on. `link` becomes a second name of its port.
+    /// Starts a table. `link`: path of a symbolic link to its port, to be created.
     ///
     /// # Errors
-    /// Where the system gives no pseudoterminal, link or thread.
-    pub fn start(options: &SimulatorOptions, link: Option<&Path>) -> Result<Simulator, Error> {
+    /// [`SimulatorError::Terminal`], [`SimulatorError::Link`] or [`SimulatorError::Thread`].
+    pub fn start(
+        options: &SimulatorOptions,
+        link: Option<&Path>,
+    ) -> Result<Simulator, SimulatorError> {
         let terminal = Terminal::open()?;
         let path = terminal.path().to_owned();
         if let Some(link) = link {
@@ -179,21 +183,21 @@ impl Simulator {
         let thread = options.clock.spawn("simulator", move || {
             carry(&clock, &table, terminal, &stop);
         });
-        simulator.thread = Some(thread.map_err(Error::Thread)?);
+        simulator.thread = Some(thread.map_err(SimulatorError::Thread)?);
         Ok(simulator)
     }
 
-    /// The port that a host opens.
+    /// Path of the port that a host opens.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The table behind the port.
+    /// The table at the port.
     pub fn table(&self) -> &SimulatedTable {
         &self.table
     }
 
-    /// Switches the table off; gives what happened.
+    /// Ends the thread; returns the counters.
     pub fn stop(mut self) -> SimulatorCounts {
         self.end();
         self.table.counts()
@@ -202,13 +206,13 @@ impl Simulator {
     fn end(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic in there was reported by the thread itself.
+            // A panic was already reported by the thread itself.
             let _ended = thread.join();
         }
         if let Some(link) = self.link.take()
             && fs::read_link(&link).is_ok_and(|target| target == self.path)
         {
-            // A link that stays behind leads nowhere, and the next start replaces it.
+            // If this fails, the next start replaces the link.
             let _removed = fs::remove_file(&link);
         }
     }
@@ -220,7 +224,7 @@ impl Drop for Simulator {
     }
 }
 
-/// The thread: carries bytes between table and pseudoterminal.
+/// The thread: transfers bytes between table and pseudoterminal.
 fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &AtomicBool) {
     const LARGEST: usize = 4096;
     let mut buffer = [0; LARGEST];
@@ -231,18 +235,18 @@ fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &A
             model.open(now_us);
         }
         let room = model.room().min(LARGEST);
-        let heard = terminal.read(buffer.get_mut(..room).unwrap_or_default());
-        model.hear(now_us, heard);
-        let said = model.speak(now_us, usize::MAX);
+        let received = terminal.read(buffer.get_mut(..room).unwrap_or_default());
+        model.receive(now_us, received);
+        let output = model.take_output(now_us, usize::MAX);
         drop(model);
-        terminal.write(&said);
+        terminal.write(&output);
         clock.sleep(LOOK);
     }
 }
 
-/// Makes the link; one that was left behind is replaced, anything else is not.
-fn make_link(port: &Path, link: &Path) -> Result<(), Error> {
-    let failed = |source| Error::Link {
+/// Creates the link. A link that exists is replaced, any other file is not.
+fn make_link(port: &Path, link: &Path) -> Result<(), SimulatorError> {
+    let failed = |source| SimulatorError::Link {
         path: link.to_owned(),
         source,
     };

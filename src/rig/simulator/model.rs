@@ -1,4 +1,4 @@
-//! The table as a function of time: chip, wire and motor, brought up to a moment on demand.
+//! The simulation of chip, wire and motor, advanced to a given time on demand.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -10,12 +10,12 @@ use super::truth::{STEPS_PER_TURN, StepEdge, Truth};
 use super::wire::{Timed, Wire};
 use super::{SimulatorCounts, SimulatorOptions};
 
-/// Ticks of the chip's timer in a microsecond.
+/// Ticks of the chip's timer per microsecond.
 const TICKS_PER_US: f64 = 2.0;
-/// Bytes that may be under way to the chip; a host that sends more waits, as at a real port.
+/// Largest number of bytes in transit to the chip.
 const UNDERWAY: usize = 4096;
 
-/// Chip ticks and microseconds of the clock.
+/// Converts between chip ticks and microseconds of the clock.
 #[derive(Debug, Clone, Copy)]
 struct Timebase {
     start_us: i64,
@@ -32,8 +32,7 @@ impl Timebase {
     }
 }
 
-/// A table that was brought up to some moment. Every call that takes a time brings it up to then
-/// first; what happens in between depends on nothing else.
+/// A simulated table at some time. Every method that takes a time advances it to that time first.
 pub(super) struct Model {
     timebase: Timebase,
     chip: Chip,
@@ -42,7 +41,7 @@ pub(super) struct Model {
     from_chip: Wire,
     outbox: VecDeque<Timed>,
     reset_on_open: bool,
-    /// When faults restart the chip, the next one last.
+    /// Times of restarts by faults, the next one last.
     resets: Vec<u64>,
     stall: Option<u64>,
     truth: Truth,
@@ -50,7 +49,7 @@ pub(super) struct Model {
 }
 
 impl Model {
-    /// A table that is switched on at `start_us`.
+    /// A table whose power comes on at `start_us`.
     pub(super) fn new(options: &SimulatorOptions, pins: Pins, start_us: i64) -> Model {
         let timebase = Timebase {
             start_us,
@@ -79,7 +78,7 @@ impl Model {
         }
     }
 
-    /// Lets happen what happens until `now_us`.
+    /// Simulates the time until `now_us`.
     pub(super) fn advance(&mut self, now_us: i64) {
         let now = self.timebase.ticks(now_us);
         while let Some(at) = self.resets.pop_if(|at| *at <= now) {
@@ -113,13 +112,13 @@ impl Model {
         }
     }
 
-    /// How many bytes the wire to the chip takes now.
+    /// How many bytes the wire to the chip can take now.
     pub(super) fn room(&mut self) -> usize {
         UNDERWAY.saturating_sub(self.chip.inbox().len())
     }
 
-    /// The host has sent bytes.
-    pub(super) fn hear(&mut self, now_us: i64, bytes: &[u8]) {
+    /// Takes bytes that the host sends now.
+    pub(super) fn receive(&mut self, now_us: i64, bytes: &[u8]) {
         self.advance(now_us);
         let now = self.timebase.ticks(now_us);
         for &byte in bytes {
@@ -127,16 +126,16 @@ impl Model {
         }
     }
 
-    /// What has come to the host by now, at most so many bytes.
-    pub(super) fn speak(&mut self, now_us: i64, most: usize) -> Vec<u8> {
+    /// The bytes that have arrived at the host, at most `limit`.
+    pub(super) fn take_output(&mut self, now_us: i64, limit: usize) -> Vec<u8> {
         self.advance(now_us);
         let now = self.timebase.ticks(now_us);
         let due = self.outbox.iter().take_while(|(at, _)| *at <= now).count();
-        let bytes = self.outbox.drain(..due.min(most));
+        let bytes = self.outbox.drain(..due.min(limit));
         bytes.map(|(_, byte)| byte).collect()
     }
 
-    /// Changes what is wired to the chip.
+    /// Changes the chip's input pins.
     pub(super) fn change_pins(&mut self, now_us: i64, change: impl FnOnce(&mut Pins)) {
         self.advance(now_us);
         change(&mut self.pins);

@@ -1,4 +1,4 @@
-//! The simulated table as a program holds it, and the port that leads to it through memory.
+//! The simulated table, and its port in memory.
 
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,17 +11,17 @@ use super::{SimulatorCounts, SimulatorOptions};
 use crate::clock::Clock;
 use crate::turntable::Port;
 
-/// How often a port looks whether bytes have come.
+/// Interval at which a port checks for bytes.
 pub(super) const LOOK: Duration = Duration::from_micros(500);
-/// Volts at the battery input's full scale.
+/// Voltage at the battery input's full scale.
 const BATTERY_SCALE: f64 = 15.5;
-/// The converter's highest value.
+/// The converter's value at full scale.
 const BATTERY_FULL: f64 = 1023.0;
 
-/// A simulated table, switched on when it is made. Clones are the same table.
+/// A simulated table. Clones share it.
 ///
-/// It has no thread: whoever looks at it or exchanges bytes with it finds it as it is at that time of
-/// its clock. On [virtual time](Clock::virtual_time) a turn takes no longer than its computation.
+/// It has no thread: each access first simulates the time that has passed on its clock. On
+/// [virtual time](Clock::virtual_time), a turn takes no longer than its simulation.
 #[derive(Clone)]
 pub struct SimulatedTable {
     clock: Clock,
@@ -30,7 +30,7 @@ pub struct SimulatedTable {
 }
 
 impl SimulatedTable {
-    /// Switches a table on.
+    /// A table whose power comes on now.
     pub fn new(options: &SimulatorOptions) -> SimulatedTable {
         let pins = Pins {
             index: IndexInput::ByAngle,
@@ -45,7 +45,7 @@ impl SimulatedTable {
         }
     }
 
-    /// Opens the table's port, which resets the chip where an Arduino's would.
+    /// Opens the table's port. This resets the chip if the options say so.
     pub fn open(&self) -> SimulatedPort {
         self.model().open(self.clock.now_us());
         SimulatedPort {
@@ -53,34 +53,34 @@ impl SimulatedTable {
         }
     }
 
-    /// Where the table stood at a time of its clock: degrees, not wound back after a turn. What has
-    /// not happened yet counts as rest.
+    /// The table's true angle at a time of its clock, degrees; not reduced to one turn. After the
+    /// present, the table counts as standing still.
     pub fn angle_at(&self, us: i64) -> f64 {
         self.now().truth().angle_at(us)
     }
 
-    /// Every step so far; of very many, the last two million.
+    /// All steps so far, at most the last two million.
     pub fn edges(&self) -> Vec<StepEdge> {
         self.now().truth().edges()
     }
 
-    /// What happened so far.
+    /// Counters since power-on.
     pub fn counts(&self) -> SimulatorCounts {
         self.now().counts()
     }
 
-    /// Holds the index input closed or open, or (`None`) lets the angle decide.
+    /// Fixes the level of the index input; `None`: it depends on the angle.
     pub fn hold_index(&self, level: Option<bool>) {
         let index = level.map_or(IndexInput::ByAngle, IndexInput::Held);
         self.change_pins(|pins| pins.index = index);
     }
 
-    /// Presses the emergency stop, or releases it.
+    /// Presses or releases the emergency stop.
     pub fn press_emergency_stop(&self, pressed: bool) {
         self.change_pins(|pins| pins.emergency = pressed);
     }
 
-    /// Sets the battery's voltage.
+    /// Sets the battery's voltage, volts.
     pub fn set_battery(&self, volts: f64) {
         self.change_pins(|pins| pins.battery = battery_reading(volts));
     }
@@ -90,12 +90,12 @@ impl SimulatedTable {
         self.model().change_pins(now_us, change);
     }
 
-    /// The table as it was left.
+    /// The simulation at the time of the last access.
     pub(super) fn model(&self) -> MutexGuard<'_, Model> {
         self.model.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The table as it is now.
+    /// The simulation, advanced to the present.
     fn now(&self) -> MutexGuard<'_, Model> {
         let mut model = self.model();
         model.advance(self.clock.now_us());
@@ -109,7 +109,7 @@ fn battery_reading(volts: f64) -> u16 {
         .clamp(0.0, BATTERY_FULL) as u16
 }
 
-/// A port to a [`SimulatedTable`] through memory, on its clock.
+/// A port to a [`SimulatedTable`], in memory and on its clock.
 pub struct SimulatedPort {
     table: SimulatedTable,
 }
@@ -120,7 +120,7 @@ impl Port for SimulatedPort {
         let deadline_us = clock.after(wait);
         loop {
             let now_us = clock.now_us();
-            let bytes = self.table.model().speak(now_us, buffer.len());
+            let bytes = self.table.model().take_output(now_us, buffer.len());
             if let Some(place) = buffer.get_mut(..bytes.len()).filter(|_| !bytes.is_empty()) {
                 place.copy_from_slice(&bytes);
                 return Ok(bytes.len());
@@ -137,7 +137,7 @@ impl Port for SimulatedPort {
         if bytes.len() > model.room() {
             return Err(io::Error::from(io::ErrorKind::TimedOut));
         }
-        model.hear(self.table.clock.now_us(), bytes);
+        model.receive(self.table.clock.now_us(), bytes);
         Ok(())
     }
 

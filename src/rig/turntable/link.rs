@@ -1,36 +1,38 @@
-//! The one thread that carries bytes between port and supervisor, and the waits for what comes of
-//! it.
+//! The I/O thread between port and supervisor, and the waits for its results.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, MutexGuard};
 use std::time::Duration;
 
-use super::error::{Fault, TurntableError};
+use relit_data::causes::with_causes;
+
+use super::error::{MotionFault, TurntableError};
 use super::port::Port;
-use super::status::Status;
-use super::supervisor::{Habits, StopOutcome, Supervisor};
-use super::wire::{Outcome, Patience, SendError};
+use super::status::TableStatus;
+use super::supervisor::{ControllerTraits, StopOutcome, Supervisor};
+use super::wire::{LineOutcome, ReplyTimeout, SendError};
 use crate::clock::{Clock, JoinHandle, Waitable};
 
-/// Longest wait for bytes before time and output are looked at again.
+/// Longest wait for bytes until the next check of time and output.
 const READ_WAIT: Duration = Duration::from_millis(2);
-/// How long a report may take; a loaded host keeps its thread from running for a part of it.
+/// How long a report may take, including pauses of the I/O thread on a loaded machine.
 const REPORT_WAIT: Duration = Duration::from_secs(3);
-/// How long a line's answer may take at most, with all repetitions. The wire gives up sooner.
+/// How long a line's answer may take, including all repetitions. The wire normally gives up
+/// earlier.
 const ANSWER_WAIT: Duration = Duration::from_secs(6);
-/// What is added to it for a line that is answered after something else has happened.
+/// Added to the time limit of a line that is not answered at once.
 const LATE_ANSWER: Duration = Duration::from_secs(2);
-/// How long a stop may take, with all its repetitions.
+/// How long a stop may take, including all repetitions.
 const STOP_WAIT: Duration = Duration::from_secs(16);
 
-/// The wire to a table with its thread; copies share both.
+/// The connection to a table. Clones share it.
 #[derive(Clone)]
 pub(super) struct Link {
     supervisor: Arc<Waitable<Supervisor>>,
     port_name: Arc<str>,
 }
 
-/// The thread that has the port. Dropped, it ends, and so closes the port.
+/// The thread that owns the port. Dropping it ends the thread and closes the port.
 pub(super) struct IoThread {
     quit: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -40,7 +42,7 @@ impl Drop for IoThread {
     fn drop(&mut self) {
         self.quit.store(true, Ordering::Release);
         if let Some(thread) = self.thread.take() {
-            // A thread that has panicked has closed the port as well.
+            // If the thread has panicked, the port is closed as well.
             let _ = thread.join();
         }
     }
@@ -51,11 +53,11 @@ impl Link {
     pub(super) fn start(
         port: Box<dyn Port>,
         clock: &Clock,
-        habits: Habits,
+        traits: ControllerTraits,
     ) -> Result<(Link, IoThread), TurntableError> {
         let link = Link {
             port_name: port.name().into(),
-            supervisor: Arc::new(Waitable::new(clock, Supervisor::new(habits))),
+            supervisor: Arc::new(Waitable::new(clock, Supervisor::new(traits))),
         };
         let quit = Arc::new(AtomicBool::new(false));
         let thread = clock.spawn("turntable", {
@@ -74,13 +76,12 @@ impl Link {
         &self.port_name
     }
 
-    /// The supervisor, for a moment.
+    /// Locks the supervisor.
     pub(super) fn supervisor(&self) -> MutexGuard<'_, Supervisor> {
         self.supervisor.lock()
     }
 
-    /// Looks at the supervisor after each change until `look` finds something, or until `limit`
-    /// of the table's clock is over.
+    /// Calls `look` now and after each change until it returns something; `None` after `limit`.
     pub(super) fn wait<T>(
         &self,
         limit: Duration,
@@ -90,32 +91,36 @@ impl Link {
     }
 
     /// Sends a line and waits for its answer.
-    pub(super) fn line(&self, block: &str, patience: Patience) -> Result<Outcome, TurntableError> {
+    pub(super) fn line(
+        &self,
+        block: &str,
+        timeout: ReplyTimeout,
+    ) -> Result<LineOutcome, TurntableError> {
         let now_us = self.clock().now_us();
-        let sent = self.supervisor().send(now_us, block, patience);
-        self.answer(block, sent, patience)
+        let sent = self.supervisor().send(now_us, block, timeout);
+        self.answer(block, sent, timeout)
     }
 
     /// Opens a checked session.
-    pub(super) fn open_session(&self) -> Result<Outcome, TurntableError> {
+    pub(super) fn open_session(&self) -> Result<LineOutcome, TurntableError> {
         let now_us = self.clock().now_us();
         let sent = self.supervisor().open_session(now_us);
-        self.answer("N0", sent, Patience::Short)
+        self.answer("N0", sent, ReplyTimeout::AtOnce)
     }
 
     fn answer(
         &self,
         block: &str,
         sent: Result<u64, SendError>,
-        patience: Patience,
-    ) -> Result<Outcome, TurntableError> {
+        timeout: ReplyTimeout,
+    ) -> Result<LineOutcome, TurntableError> {
         let id = sent.map_err(|why| TurntableError::Unsent {
             block: block.to_owned(),
             why,
         })?;
-        let limit = match patience {
-            Patience::Short => ANSWER_WAIT,
-            Patience::Long(us) => Duration::from_micros(us.unsigned_abs()) + LATE_ANSWER,
+        let limit = match timeout {
+            ReplyTimeout::AtOnce => ANSWER_WAIT,
+            ReplyTimeout::Within(us) => Duration::from_micros(us.unsigned_abs()) + LATE_ANSWER,
         };
         let outcome = self.wait(limit, |supervisor| match port_lost(supervisor) {
             Some(error) => Some(Err(error)),
@@ -126,9 +131,9 @@ impl Link {
         }))
     }
 
-    /// The table's state by a report that was asked for just now, and by one more where they have
-    /// no checksum.
-    pub(super) fn status(&self) -> Result<Status, TurntableError> {
+    /// The table's status by a report that is requested now; without checksums, confirmed by a
+    /// second one.
+    pub(super) fn status(&self) -> Result<TableStatus, TurntableError> {
         let asked_us = self.clock().now_us();
         let until_us = self.clock().after(REPORT_WAIT);
         self.supervisor().want_reports(until_us);
@@ -136,24 +141,24 @@ impl Link {
             if let Some(error) = port_lost(supervisor) {
                 return Some(Err(error));
             }
-            let seen = supervisor.seen()?;
-            let fresh = seen.asked_us.is_some_and(|us| us >= asked_us);
-            (fresh && supervisor.is_confirmed()).then(|| Ok(Status::of(seen, supervisor)))
+            let report = supervisor.last_report()?;
+            let fresh = report.asked_us.is_some_and(|us| us >= asked_us);
+            (fresh && supervisor.is_confirmed()).then(|| Ok(TableStatus::of(report, supervisor)))
         });
         status.unwrap_or(Err(TurntableError::Silent {
             milliseconds: REPORT_WAIT.as_millis() as u64,
         }))
     }
 
-    /// Brings the table to a standstill, and drops what it was still to do.
-    pub(super) fn stop(&self) -> Result<Status, TurntableError> {
+    /// Brings the table to a standstill and discards its remaining motions.
+    pub(super) fn stop(&self) -> Result<TableStatus, TurntableError> {
         let now_us = self.clock().now_us();
         self.supervisor().request_stop(now_us);
         self.wait_stopped()?;
         self.status()
     }
 
-    /// Waits until a stop under way has ended.
+    /// Waits for the end of a stop.
     pub(super) fn wait_stopped(&self) -> Result<(), TurntableError> {
         let ended = self.wait(STOP_WAIT, |supervisor| match port_lost(supervisor) {
             Some(error) => Some(Err(error)),
@@ -168,10 +173,10 @@ impl Link {
 
 fn port_lost(supervisor: &Supervisor) -> Option<TurntableError> {
     let why = supervisor.closed()?;
-    Some(Fault::PortLost(why.to_owned()).into())
+    Some(MotionFault::PortLost(why.to_owned()).into())
 }
 
-/// The thread: what is due goes out, what comes is taken, until it is to end or the port is gone.
+/// The I/O thread: sends what is due and reads what comes, until `quit` is set or the port is gone.
 fn carry(mut port: Box<dyn Port>, shared: &Waitable<Supervisor>, quit: &AtomicBool) {
     let clock = shared.clock();
     let mut buffer = [0; 512];
@@ -183,11 +188,11 @@ fn carry(mut port: Box<dyn Port>, shared: &Waitable<Supervisor>, quit: &AtomicBo
         let now_us = clock.now_us();
         let mut supervisor = shared.lock();
         match read {
-            // Nothing had come by the time the port was asked. What came later, while this thread
-            // perhaps had to wait for a processor, is no silence.
+            // The time at which the read began: this thread may have been paused since, and bytes
+            // that arrived during the pause must not count as silence.
             Ok(0) => supervisor.on_time(asked_us),
             Ok(count) => supervisor.on_bytes(now_us, buffer.get(..count).unwrap_or_default()),
-            Err(error) => supervisor.close(error.to_string()),
+            Err(error) => supervisor.close(with_causes(&error)),
         }
         let (changed, gone) = (supervisor.take_changed(), supervisor.closed().is_some());
         drop(supervisor);

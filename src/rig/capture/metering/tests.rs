@@ -10,7 +10,7 @@ use crate::camera::{
 use crate::capture::preflight::ready_table;
 use crate::clock::Clock;
 use crate::simulator::{SimulatedTable, SimulatorOptions};
-use crate::turntable::Options;
+use crate::turntable::TableOptions;
 
 const EXPOSURE: ControlId = ControlId(1);
 const AUTOMATIC: ControlId = ControlId(2);
@@ -162,16 +162,16 @@ impl Camera for Scene<'_> {
 /// Meters a light; gives the exposure found, and how far the table stands from where it was.
 fn metered(light: fn(f64) -> f64) -> (Result<i64, CaptureError>, f64, i64) {
     let clock = Clock::virtual_time();
-    let _part = clock.take_part();
+    let _participant = clock.take_part();
     let simulator = SimulatedTable::new(&SimulatorOptions {
         clock: clock.clone(),
         ..SimulatorOptions::default()
     });
     let locks = tempfile::tempdir().unwrap();
-    let options = Options {
+    let options = TableOptions {
         clock: clock.clone(),
         runtime_folder: locks.path().to_owned(),
-        ..Options::default()
+        ..TableOptions::default()
     };
     let table = Table::open(simulator.open(), &options).unwrap();
     let mut settings = Settings::new(

@@ -1,6 +1,7 @@
-//! A table to test against: what the published interface says, and nothing of the firmware's code.
+//! A fake Grbl controller for tests: an own implementation of the published interface, without any
+//! code of the firmware.
 //!
-//! It moves with ramps, answers after a delay, and goes wrong on demand.
+//! It moves with ramps, answers after a delay, and has faults on demand.
 
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
@@ -11,32 +12,32 @@ use std::collections::VecDeque;
 
 use crc::{CRC_16_IBM_3740, Crc};
 
-pub(super) use port::PeerPort;
+pub(super) use port::FakePort;
 
 const STEPS: f64 = 88.889;
 const ACCELERATION: f64 = 36.0;
-/// Motion is followed in steps of this.
+/// Time step of the motion.
 const TICK_US: i64 = 1000;
 
-/// What goes wrong.
+/// The faults to inject.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Trouble {
-    /// It answers nothing from this time on.
+    /// From this time on it answers nothing.
     pub(super) silent_from_us: Option<i64>,
     /// It restarts at this time.
     pub(super) reset_at_us: Option<i64>,
-    /// It reports motion and stands, from this time on.
+    /// From this time on it reports motion but stands still.
     pub(super) stall_from_us: Option<i64>,
-    /// This alarm comes at this time.
+    /// It raises this alarm at this time.
     pub(super) alarm_at_us: Option<(i64, u8)>,
-    /// Somebody presses hold at this time.
+    /// Somebody presses feed hold at this time.
     pub(super) hold_at_us: Option<i64>,
-    /// So many answers to lines are lost.
+    /// Number of answers to lines that are lost.
     pub(super) lose_answers: u32,
-    /// The first so many lines with a motion lose the digit after X.
+    /// Number of lines with a motion that lose the digit after X.
     pub(super) wrong_digits: u32,
-    /// Its banner was echoed: soon after its first report it answers a part of that, and takes the
-    /// rest for the beginning of a line.
+    /// Its banner was echoed: soon after its first report it answers a part of the echo and keeps the
+    /// rest as the beginning of a line.
     pub(super) echo: bool,
 }
 
@@ -51,7 +52,7 @@ enum Mode {
 }
 
 #[derive(Debug)]
-pub(super) struct Peer {
+pub(super) struct FakeGrbl {
     pub(super) trouble: Trouble,
     rig: bool,
     homing: bool,
@@ -68,16 +69,16 @@ pub(super) struct Peer {
     out: VecDeque<(i64, Vec<u8>)>,
     session: Option<(u32, String)>,
     pub(super) lease: f64,
-    /// Lines that were carried out, without number and checksum.
+    /// Executed lines, without number and checksum.
     pub(super) executed: Vec<String>,
     pub(super) resets: u32,
-    /// Where it was, a millisecond apart, while it moved.
+    /// Times and true positions while it moved, every millisecond.
     pub(super) truth: Vec<(i64, f64)>,
 }
 
-impl Peer {
-    pub(super) fn new(rig: bool) -> Peer {
-        let mut peer = Peer {
+impl FakeGrbl {
+    pub(super) fn new(rig: bool) -> FakeGrbl {
+        let mut fake_grbl = FakeGrbl {
             trouble: Trouble::default(),
             rig,
             homing: false,
@@ -98,12 +99,12 @@ impl Peer {
             resets: 0,
             truth: Vec::new(),
         };
-        peer.banner("power-on");
-        peer
+        fake_grbl.banner("power-on");
+        fake_grbl
     }
 
-    /// With an index sensor, which is there or not.
-    pub(super) fn with_homing(mut self, found: bool) -> Peer {
+    /// With homing enabled; `found`: whether the index sensor works.
+    pub(super) fn with_homing(mut self, found: bool) -> FakeGrbl {
         self.homing = true;
         self.found = found;
         self
@@ -182,7 +183,7 @@ impl Peer {
         self.banner(cause);
     }
 
-    /// Follows the motion up to `now_us`.
+    /// Advances to `now_us`.
     pub(super) fn advance(&mut self, now_us: i64) {
         if self.now_us == 0 {
             self.now_us = now_us;
@@ -255,7 +256,7 @@ impl Peer {
         };
     }
 
-    /// Takes bytes at the time of the last [`Peer::advance`].
+    /// Receives bytes at the time of the last [`FakeGrbl::advance`].
     pub(super) fn take(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             match byte {
@@ -276,7 +277,7 @@ impl Peer {
         }
     }
 
-    /// What comes from it by now.
+    /// The bytes that it has sent by now.
     pub(super) fn give(&mut self) -> Vec<u8> {
         let mut bytes = Vec::new();
         while let Some((_, text)) = self.out.pop_front_if(|(due, _)| *due <= self.now_us) {

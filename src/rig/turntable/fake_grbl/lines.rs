@@ -1,8 +1,8 @@
-//! The lines that the peer takes: checked or plain, commands and motions.
+//! The lines that the fake controller accepts: checked or plain, commands and motions.
 
-use super::{Mode, Peer, checksum};
+use super::{FakeGrbl, Mode, checksum};
 
-impl Peer {
+impl FakeGrbl {
     pub(super) fn read(&mut self, line: &str) {
         let sealed = line
             .rsplit_once('*')

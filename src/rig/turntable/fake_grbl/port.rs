@@ -2,29 +2,29 @@ use std::io;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use super::{Peer, TICK_US};
+use super::{FakeGrbl, TICK_US};
 use crate::clock::Clock;
 use crate::turntable::port::Port;
 
-/// The peer at the end of a port.
-pub(in crate::turntable) struct PeerPort {
-    pub(in crate::turntable) peer: Arc<Mutex<Peer>>,
+/// A port to the fake controller.
+pub(in crate::turntable) struct FakePort {
+    pub(in crate::turntable) fake_grbl: Arc<Mutex<FakeGrbl>>,
     pub(in crate::turntable) clock: Clock,
 }
 
-impl Port for PeerPort {
+impl Port for FakePort {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
         let deadline_us = self.clock.after(wait);
         loop {
             let now_us = self.clock.now_us();
-            let mut peer = self.peer.lock().unwrap();
-            peer.advance(now_us);
-            let bytes = peer.give();
-            drop(peer);
+            let mut fake_grbl = self.fake_grbl.lock().unwrap();
+            fake_grbl.advance(now_us);
+            let bytes = fake_grbl.give();
+            drop(fake_grbl);
             if !bytes.is_empty() {
                 assert!(
                     bytes.len() <= buffer.len(),
-                    "the peer says too much at once"
+                    "the controller sends too much at once"
                 );
                 buffer[..bytes.len()].copy_from_slice(&bytes);
                 return Ok(bytes.len());
@@ -37,9 +37,9 @@ impl Port for PeerPort {
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        let mut peer = self.peer.lock().unwrap();
-        peer.advance(self.clock.now_us());
-        peer.take(bytes);
+        let mut fake_grbl = self.fake_grbl.lock().unwrap();
+        fake_grbl.advance(self.clock.now_us());
+        fake_grbl.take(bytes);
         Ok(())
     }
 
