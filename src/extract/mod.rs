@@ -396,7 +396,7 @@ pub enum Error {
     Session(#[from] session::Error),
     /// The video cannot be used.
     #[error(transparent)]
-    Video(#[from] video::Error),
+    Video(#[from] video::VideoError),
     /// A frame cannot be converted.
     #[error(
         "frame {number}: {fault}; convert the video to another pixel format, for example with ffmpeg"
@@ -405,7 +405,7 @@ pub enum Error {
         /// The frame.
         number: u64,
         /// What is wrong with it.
-        fault: video::FrameFault,
+        fault: video::DecodeFault,
     },
     /// The data set cannot be written.
     #[error(transparent)]

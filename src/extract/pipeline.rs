@@ -13,7 +13,7 @@ use super::plan::Uses;
 use super::{Error, Scaler};
 use relit_data::geometry::Rect;
 use relit_data::shard::{self, MaskSpans, Measures};
-use relit_video::{FrameFault, Pending, Reader, Video};
+use relit_video::{DecodeFault, Pending, Reader, Video};
 
 /// What is done with every frame of one video.
 pub(super) struct Stage<'a> {
@@ -37,7 +37,7 @@ pub(super) struct Processed {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Lost {
     pub(super) number: u64,
-    pub(super) fault: FrameFault,
+    pub(super) fault: DecodeFault,
 }
 
 type Finished = Result<Result<Processed, Lost>, Error>;
@@ -80,7 +80,7 @@ impl Stage<'_> {
         let crop = match crop {
             Ok(crop) => crop,
             // Of a format that cannot be converted no other frame can be either.
-            Err(fault @ FrameFault::PixelFormat(_)) => return Err(Error::Frame { number, fault }),
+            Err(fault @ DecodeFault::PixelFormat(_)) => return Err(Error::Frame { number, fault }),
             Err(fault) => return Ok(Err(Lost { number, fault })),
         };
         let measures = self.spans.measure(&crop, self.saturation_level)?;

@@ -67,7 +67,7 @@ pub enum Error {
     Session(#[from] session::Error),
     /// The video cannot be read.
     #[error(transparent)]
-    Video(#[from] relit_video::Error),
+    Video(#[from] relit_video::VideoError),
     /// The file system refused.
     #[error("{path} could not be {doing}")]
     Io {

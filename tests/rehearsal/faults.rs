@@ -4,9 +4,14 @@
 use std::thread;
 use std::time::{Duration, Instant};
 
+use relit_data::causes::with_causes;
 use relit_data::session::{Status, recordings};
+use relit_rig::camera::{
+    self, Camera, CameraError, Control, ControlId, DeviceInfo, Frame, GrantedMode, Mode,
+    ModeRequest,
+};
 use relit_rig::capture::preflight::check_disk;
-use relit_rig::capture::{CaptureError, MeterFault, Refusal, Stopped};
+use relit_rig::capture::{CaptureError, MeterFault, Refusal, Settings, Stopped};
 use relit_rig::simulator::{Simulator, SimulatorOptions};
 use relit_rig::state::{TakeSummary, Verdict};
 
@@ -69,6 +74,83 @@ fn a_take_with_a_dropped_frame_is_repeated_and_both_are_kept() {
             .starts_with("the take is repeated: 1 frame lost"),
         "{told:?}"
     );
+}
+
+#[test]
+fn a_tolerated_take_is_not_repeated_with_the_usual_settings() {
+    let mut rig = Rehearsal::with(SHORT, "&drop=220", "sim:?speed=3", |settings| {
+        let usual = Settings::new(
+            settings.root.clone(),
+            settings.camera.clone(),
+            settings.turntable.clone(),
+        );
+        settings.retries = usual.retries;
+        settings.degrees_per_second = 36.0;
+        settings.max_dropped = 5;
+    });
+    let captured = rig.capture_all(false).unwrap();
+    assert_eq!(captured.take.verdict, Verdict::Tolerated, "{captured:?}");
+    assert_eq!(captured.repeated, 0);
+    assert_eq!(recordings(rig.root.path()).unwrap().len(), 1);
+    assert!(rig.monitor.state().faults.is_empty());
+}
+
+/// A camera that loses a frame the first time that it streams.
+struct LosesOneFrame {
+    camera: Box<dyn Camera>,
+    frames_until_loss: u32,
+}
+
+impl Camera for LosesOneFrame {
+    fn info(&self) -> &DeviceInfo {
+        self.camera.info()
+    }
+
+    fn modes(&mut self) -> Result<Vec<Mode>, CameraError> {
+        self.camera.modes()
+    }
+
+    fn controls(&mut self) -> Result<Vec<Control>, CameraError> {
+        self.camera.controls()
+    }
+
+    fn set_control(&mut self, id: ControlId, value: i64) -> Result<i64, CameraError> {
+        self.camera.set_control(id, value)
+    }
+
+    fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
+        self.camera.start(want)
+    }
+
+    fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError> {
+        self.frames_until_loss = self.frames_until_loss.saturating_sub(1);
+        if self.frames_until_loss == 1 {
+            let _lost = self.camera.next_frame(timeout)?;
+        }
+        self.camera.next_frame(timeout)
+    }
+
+    fn stop(&mut self) -> Result<(), CameraError> {
+        self.camera.stop()
+    }
+}
+
+#[test]
+fn a_clean_take_after_one_that_is_not_usable_counts_and_the_first_is_kept() {
+    let mut rig = Rehearsal::with(SHORT, "", "sim:?speed=3", |settings| {
+        settings.degrees_per_second = 36.0;
+        settings.retries = 1;
+    });
+    let equipment = &mut rig.equipment;
+    let camera = camera::open(&equipment.settings().camera, equipment.clock()).unwrap();
+    equipment.camera = Some(Box::new(LosesOneFrame {
+        camera,
+        frames_until_loss: 220,
+    }));
+    let captured = rig.capture_all(false).unwrap();
+    assert_eq!(captured.take.verdict, Verdict::Clean, "{captured:?}");
+    assert_eq!(captured.repeated, 1);
+    assert_eq!(recordings(rig.root.path()).unwrap().len(), 2);
 }
 
 #[test]
@@ -155,14 +237,7 @@ fn a_stop_ends_the_take_within_seconds_and_stops_the_table() {
 fn a_serial_line_that_is_unplugged_ends_the_take_and_the_next_one_finds_it_again() {
     let ports = tempfile::tempdir().unwrap();
     let link = ports.path().join("table");
-    let table = || {
-        let link = Some(link.clone());
-        Simulator::start(SimulatorOptions {
-            link,
-            ..SimulatorOptions::default()
-        })
-        .unwrap()
-    };
+    let table = || Simulator::start(&SimulatorOptions::default(), Some(&link)).unwrap();
     let simulator = table();
     let address = format!("serial:{}", link.display());
     let mut rig = Rehearsal::with(SHORT, "", &address, |settings| {
@@ -198,12 +273,13 @@ fn what_preflight_refuses_is_said_with_its_numbers_and_nothing_turns() {
         error,
         CaptureError::Refused(Refusal::DiskFull { .. })
     ));
-    assert!(error.to_string().contains("1383505805529 MB"), "{error}");
+    let error = with_causes(&error);
+    assert!(error.contains("1383505805529 MB"), "{error}");
 
     let mut rig = Rehearsal::with(SHORT, "", "sim:?speed=3", |settings| {
         settings.min_battery_v = Some(13.0);
     });
-    let error = rig.capture(false).unwrap_err().to_string();
+    let error = with_causes(&rig.capture(false).unwrap_err());
     assert!(error.contains("V and 13.00 V are demanded"), "{error}");
     let simulator = rig.equipment.simulator().unwrap();
     assert_eq!(simulator.angle_at(rig.equipment.clock().now_us()), 0.0);
@@ -212,7 +288,7 @@ fn what_preflight_refuses_is_said_with_its_numbers_and_nothing_turns() {
     let mut rig = Rehearsal::with(SHORT, "", "sim:?speed=3", |settings| {
         settings.mode.fps = 60.0;
     });
-    let error = rig.capture(false).unwrap_err().to_string();
+    let error = with_causes(&rig.capture(false).unwrap_err());
     assert!(
         error.contains("does not offer any format of any size at 60"),
         "{error}"

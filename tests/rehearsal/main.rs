@@ -2,6 +2,7 @@
 //! runs faster than real time.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod commands;
 mod daemon;
 mod faults;
 mod support;

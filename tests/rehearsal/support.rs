@@ -5,7 +5,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use relit_data::session::Recording;
 use relit_rig::capture::{
-    CaptureError, Equipment, Onlookers, Order, Settings, StopRequest, capture,
+    CaptureContext, CaptureError, CaptureRequest, Captured, Equipment, Settings, StopRequest,
+    capture,
 };
 use relit_rig::state::{Monitor, TakeSummary};
 
@@ -67,17 +68,22 @@ impl Rehearsal {
         }
     }
 
+    /// Captures, and gives the take that counts.
     pub(crate) fn capture(&mut self, meter: bool) -> Result<TakeSummary, CaptureError> {
-        let on = Onlookers {
+        Ok(self.capture_all(meter)?.take)
+    }
+
+    pub(crate) fn capture_all(&mut self, meter: bool) -> Result<Captured, CaptureError> {
+        let context = CaptureContext {
             monitor: &self.monitor,
             viewer: None,
             stop: &self.stop,
         };
-        let order = Order {
+        let request = CaptureRequest {
             object: "mug".to_owned(),
             meter,
         };
-        capture(&mut self.equipment, &order, on)
+        capture(&mut self.equipment, &request, context)
     }
 
     /// The session that a take left.

@@ -4,9 +4,9 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use relit_rig::camera::lock::Wanted;
-use relit_rig::camera::{self, Fourcc};
-use relit_rig::capture::{FrameSize, ModeWish, Settings};
+use relit_rig::camera::hold::ManualValues;
+use relit_rig::camera::{CameraAddress, Fourcc};
+use relit_rig::capture::{FrameSize, ModePreference, Settings};
 use relit_rig::serve::Token;
 use relit_rig::turntable;
 
@@ -138,7 +138,7 @@ struct RigArguments {
     root: PathBuf,
     /// The camera's address.
     #[arg(long, value_name = "ADDRESS", default_value = "v4l2:/dev/video0")]
-    camera: camera::Address,
+    camera: CameraAddress,
     /// The turntable's address.
     #[arg(long, value_name = "ADDRESS", default_value = "serial:")]
     turntable: turntable::Address,
@@ -210,12 +210,12 @@ pub(crate) fn parse() -> Arguments {
 impl From<RigArguments> for Settings {
     fn from(line: RigArguments) -> Self {
         let mut settings = Self::new(line.root, line.camera, line.turntable);
-        settings.mode = ModeWish {
+        settings.mode = ModePreference {
             fourcc: line.fourcc,
             size: line.size,
             fps: line.fps,
         };
-        settings.wanted = Wanted {
+        settings.wanted = ManualValues {
             exposure: line.exposure,
             gain: line.gain,
             white_balance: line.white_balance,
@@ -235,7 +235,7 @@ impl From<RigArguments> for Settings {
 fn fourcc(text: &str) -> Result<Fourcc, String> {
     let known = || "give four characters such as MJPG, H264 or YUYV".to_owned();
     let fourcc = Fourcc(text.as_bytes().try_into().map_err(|_| known())?);
-    match fourcc.encoding() {
+    match fourcc.pixel_format() {
         Some(_) => Ok(fourcc),
         None => Err(format!("{text} frames cannot be recorded: {}", known())),
     }

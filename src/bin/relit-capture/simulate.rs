@@ -19,10 +19,10 @@ use relit::console::{Console, Outcome};
 const LOOK: Duration = Duration::from_millis(50);
 
 pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome, Error> {
-    let simulator = Simulator::start(SimulatorOptions {
+    let options = SimulatorOptions {
         clock: match asked.speed {
             1.0 => Clock::monotonic(),
-            factor => Clock::scaled(factor),
+            factor => Clock::paced(factor),
         },
         faults: asked.fault.join(",").parse::<Faults>()?,
         seed: asked.seed,
@@ -31,9 +31,9 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
         battery: asked.battery,
         drift_ppm: asked.drift_ppm,
         reset_on_open: !asked.no_reset,
-        link: asked.link.clone(),
         ..SimulatorOptions::default()
-    })?;
+    };
+    let simulator = Simulator::start(&options, asked.link.as_deref())?;
     let port = asked.link.as_deref().unwrap_or(simulator.path());
     console.say(
         &format!(

@@ -19,8 +19,8 @@ pub use crate::naming::is_session_name;
 pub use claim::Claim;
 pub use frames::{FrameEntry, FrameIndex, Gap, IndexFault};
 pub use manifest::{
-    CameraFacts, Fault, MANIFEST_SCHEMA, Manifest, ManifestFault, SoftwareFacts, Status,
-    TurntableFacts, VideoFacts, object_of,
+    CameraFacts, Fault, FrameClock, MANIFEST_SCHEMA, Manifest, ManifestFault, SoftwareFacts,
+    Status, TurntableFacts, VideoFacts, object_of,
 };
 pub use recording::{Notice, Recording, recordings};
 pub use unended::Unended;

@@ -2,10 +2,10 @@
 
 use crate::camera::{self, Camera};
 use crate::clock::Clock;
-use crate::simulator::{self, Simulator, SimulatorOptions};
+use crate::simulator::{self, SimulatedTable, SimulatorOptions};
 use crate::turntable::{Address, Options, Table, find_serial};
 
-use super::failure::CaptureError;
+use super::error::CaptureError;
 use super::settings::Settings;
 
 /// Camera and table of a rig.
@@ -15,7 +15,7 @@ pub struct Equipment {
     pub camera: Option<Box<dyn Camera>>,
     /// The table; `None` while it is gone, and where there is none.
     pub table: Option<Table>,
-    simulator: Option<Simulator>,
+    simulator: Option<SimulatedTable>,
     settings: Settings,
     clock: Clock,
 }
@@ -45,12 +45,12 @@ impl Equipment {
     /// The clock that everything goes by.
     #[must_use]
     pub fn clock(&self) -> Clock {
-        self.clock
+        self.clock.clone()
     }
 
     /// The simulated table, where the table is one and was opened.
     #[must_use]
-    pub fn simulator(&self) -> Option<&Simulator> {
+    pub fn simulator(&self) -> Option<&SimulatedTable> {
         self.simulator.as_ref()
     }
 
@@ -67,7 +67,7 @@ impl Equipment {
     pub fn open_camera(&mut self) -> Result<&mut dyn Camera, CaptureError> {
         let opened = match self.camera.take() {
             Some(camera) => camera,
-            None => camera::open(&self.settings.camera, self.clock)?,
+            None => camera::open(&self.settings.camera, self.clock.clone())?,
         };
         Ok(self.camera.insert(opened).as_mut())
     }
@@ -85,7 +85,7 @@ impl Equipment {
 
     fn connect(&mut self) -> Result<Option<Table>, CaptureError> {
         let options = Options {
-            clock: self.clock,
+            clock: self.clock.clone(),
             runtime_folder: self.settings.runtime_folder.clone(),
             ..Options::default()
         };
@@ -95,21 +95,22 @@ impl Equipment {
             Address::Serial(None) => find_serial()?,
             Address::Simulated(address) => {
                 let fault = address.fault.clone();
-                self.simulated(fault.as_deref())?.path().to_owned()
+                let port = self.simulated(fault.as_deref())?.open();
+                return Ok(Some(Table::open(port, &options)?));
             }
         };
         Ok(Some(Table::open_serial(&path, &options)?))
     }
 
     /// The simulated table, switched on the first time.
-    fn simulated(&mut self, fault: Option<&str>) -> Result<&Simulator, simulator::Error> {
+    fn simulated(&mut self, fault: Option<&str>) -> Result<&SimulatedTable, simulator::Error> {
         let simulator = match self.simulator.take() {
             Some(simulator) => simulator,
-            None => Simulator::start(SimulatorOptions {
-                clock: self.clock,
+            None => SimulatedTable::new(&SimulatorOptions {
+                clock: self.clock.clone(),
                 faults: fault.unwrap_or_default().parse()?,
                 ..SimulatorOptions::default()
-            })?,
+            }),
         };
         Ok(self.simulator.insert(simulator))
     }

@@ -4,9 +4,9 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use super::failure::{CaptureError, Refusal};
-use crate::camera::lock::Wanted;
-use crate::camera::{self, Fourcc, Mode, ModeRequest, Rate, Rates};
+use super::error::{CaptureError, Refusal};
+use crate::camera::hold::ManualValues;
+use crate::camera::{CameraAddress, Fourcc, Mode, ModeRequest, Rate, Rates, ReplaySpeed};
 use crate::clock::Clock;
 use crate::lockfile::{self, LockError, LockFile};
 use crate::turntable;
@@ -30,13 +30,13 @@ pub struct Settings {
     /// The folder in which sessions are made.
     pub root: PathBuf,
     /// The camera.
-    pub camera: camera::Address,
+    pub camera: CameraAddress,
     /// The turntable.
     pub turntable: turntable::Address,
     /// The camera's mode.
-    pub mode: ModeWish,
+    pub mode: ModePreference,
     /// Values of its controls; what is not given stays as the camera has it.
-    pub wanted: Wanted,
+    pub wanted: ManualValues,
     /// Speed of the turn, degrees a second.
     pub degrees_per_second: f64,
     /// Least voltage of the table's battery.
@@ -57,13 +57,13 @@ impl Settings {
     /// Settings with the usual figures: 7.2 degrees/s at 30 frames/s, no frame may be missing, one
     /// more try.
     #[must_use]
-    pub fn new(root: PathBuf, camera: camera::Address, turntable: turntable::Address) -> Self {
+    pub fn new(root: PathBuf, camera: CameraAddress, turntable: turntable::Address) -> Self {
         Self {
             root,
             camera,
             turntable,
-            mode: ModeWish::default(),
-            wanted: Wanted::default(),
+            mode: ModePreference::default(),
+            wanted: ManualValues::default(),
             degrees_per_second: 7.2,
             min_battery_v: None,
             max_dropped: 0,
@@ -80,9 +80,7 @@ impl Settings {
     /// [`LockError::Held`] with the holder's process number, or what the file system answers.
     pub fn lock_camera(&self) -> Result<Option<LockFile>, LockError> {
         match &self.camera {
-            camera::Address::V4l2(path) => {
-                LockFile::of_device(path, &self.runtime_folder).map(Some)
-            }
+            CameraAddress::V4l2(path) => LockFile::of_device(path, &self.runtime_folder).map(Some),
             _ => Ok(None),
         }
     }
@@ -100,9 +98,9 @@ impl Settings {
             speed => speed,
         };
         let replayed = match &self.camera {
-            camera::Address::Replay { speed, .. } => Some(match speed {
-                camera::Speed::AsRead => FASTEST_REHEARSAL,
-                camera::Speed::Times(times) => *times,
+            CameraAddress::Replay { speed, .. } => Some(match speed {
+                ReplaySpeed::AsRead => FASTEST_REHEARSAL,
+                ReplaySpeed::Times(times) => *times,
             }),
             _ => None,
         };
@@ -118,8 +116,8 @@ impl Settings {
             (None, None, _) => 1.0,
             _ => return Err(Refusal::Pace.into()),
         };
-        if let camera::Address::Replay { speed, .. } = &mut self.camera {
-            *speed = camera::Speed::Times(times);
+        if let CameraAddress::Replay { speed, .. } = &mut self.camera {
+            *speed = ReplaySpeed::Times(times);
         }
         if let Table::Simulated(table) = &mut self.turntable {
             table.speed = times;
@@ -146,7 +144,7 @@ impl Settings {
 
 /// What is wished of a camera's mode; what is not given is chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ModeWish {
+pub struct ModePreference {
     /// Pixel format.
     pub fourcc: Option<Fourcc>,
     /// Frame size.
@@ -155,7 +153,7 @@ pub struct ModeWish {
     pub fps: f64,
 }
 
-impl Default for ModeWish {
+impl Default for ModePreference {
     fn default() -> Self {
         Self {
             fourcc: None,
@@ -165,7 +163,7 @@ impl Default for ModeWish {
     }
 }
 
-impl fmt::Display for ModeWish {
+impl fmt::Display for ModePreference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.fourcc {
             Some(fourcc) => write!(f, "{fourcc}")?,
@@ -211,7 +209,7 @@ impl FromStr for FrameSize {
     }
 }
 
-impl ModeWish {
+impl ModePreference {
     /// The mode to ask the camera for: of those that fulfil the wish the largest, and of those the
     /// one whose frames take least room.
     ///
@@ -308,8 +306,8 @@ mod tests {
         ] {
             let (paced, clock) = settings(camera, table).on_one_clock().unwrap();
             assert_eq!(clock.factor(), factor, "{camera} {table}");
-            if let camera::Address::Replay { speed, .. } = paced.camera {
-                assert_eq!(speed, camera::Speed::Times(factor));
+            if let CameraAddress::Replay { speed, .. } = paced.camera {
+                assert_eq!(speed, ReplaySpeed::Times(factor));
             }
         }
     }
@@ -333,16 +331,16 @@ mod tests {
             mode(Fourcc::MJPG, 1920, 1080, &[30, 60]),
             mode(Fourcc::MJPG, 3840, 2160, &[15]),
         ];
-        let chosen = ModeWish::default().choose(&modes).unwrap();
+        let chosen = ModePreference::default().choose(&modes).unwrap();
         assert_eq!(chosen.to_string(), "MJPG:1920x1080@30");
-        let wish = ModeWish {
+        let wish = ModePreference {
             fourcc: Some(Fourcc::YUYV),
-            ..ModeWish::default()
+            ..ModePreference::default()
         };
         assert_eq!(wish.choose(&modes).unwrap().fourcc, Fourcc::YUYV);
-        let wish = ModeWish {
+        let wish = ModePreference {
             fps: 15.0,
-            ..ModeWish::default()
+            ..ModePreference::default()
         };
         assert_eq!(wish.choose(&modes).unwrap().width, 3840);
     }
@@ -350,7 +348,10 @@ mod tests {
     #[test]
     fn a_wish_that_no_mode_fulfils_is_told_with_what_there_is() {
         let modes = [mode(Fourcc::MJPG, 640, 480, &[25])];
-        let error = ModeWish::default().choose(&modes).unwrap_err().to_string();
+        let error = ModePreference::default()
+            .choose(&modes)
+            .unwrap_err()
+            .to_string();
         assert!(
             error.contains("any format of any size at 30 frames/s"),
             "{error}"

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::viewer::Viewer;
-use crate::camera::lock::ManualPlan;
+use crate::camera::hold::ManualPlan;
 use crate::camera::{Camera, CameraError, GrantedMode};
 use crate::capture::CaptureError;
 use crate::capture::Equipment;
 use crate::capture::preflight::free_bytes;
+use crate::capture::turn::show_table;
 use crate::clock::Clock;
 use crate::state::{CameraState, Monitor, TableState};
-use crate::turntable::Table;
 
 /// Longest wait for a frame in one go.
 const GLANCE: Duration = Duration::from_millis(50);
@@ -197,29 +197,12 @@ impl Idle {
     }
 }
 
-/// Asks the table and shows its answer.
-pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), CaptureError> {
-    let status = table.status()?;
-    monitor.update(|state| {
-        state.table = TableState {
-            present: true,
-            state: status.state.to_string(),
-            angle_deg: Some(status.angle_deg),
-            degrees_per_second: Some(status.degrees_per_second),
-            homed: status.homed,
-            battery_v: status.battery_v,
-            fault: status.alarm.map(|alarm| alarm.to_string()),
-        };
-    });
-    Ok(())
-}
-
 /// The settings that are held during a capture, as they are now.
 fn held_controls(camera: &mut dyn Camera) -> Vec<(String, i64)> {
     let Ok(controls) = camera.controls() else {
         return Vec::new();
     };
-    let plan = ManualPlan::new(&controls, &crate::camera::lock::Wanted::default());
+    let plan = ManualPlan::new(&controls, &crate::camera::hold::ManualValues::default());
     let value = |name: &str| controls.iter().find(|control| control.name == name)?.value;
     let held = plan.steps.iter();
     held.filter_map(|step| Some((step.name.clone(), value(&step.name)?)))

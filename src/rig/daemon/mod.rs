@@ -234,19 +234,7 @@ fn check_object(object: &str) -> Result<(), Refused> {
 /// Salvages what an earlier run left, and shows what came of it.
 fn report_salvaged(root: &Path, monitor: &Monitor) -> Result<(), CaptureError> {
     for found in salvage(root)? {
-        let session = found
-            .folder
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy();
-        let report = match &found.saved {
-            Ok(saved) => format!("{session} was interrupted, and is kept as aborted: {saved}"),
-            Err(error) => format!(
-                "{session} was interrupted and could not be salvaged: {}",
-                with_causes(error)
-            ),
-        };
-        monitor.fault(Clock::monotonic().now_us(), report);
+        monitor.fault(Clock::monotonic().now_us(), found.to_string());
     }
     Ok(())
 }

@@ -13,12 +13,11 @@ use std::time::{Duration, Instant};
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 
-use crate::camera::{Encoding, Frame};
+use crate::camera::Frame;
 use crate::capture::look::{clipped, focus, middle};
-use crate::capture::recorder::coding;
 use crate::state::Monitor;
 use relit_data::geometry::Rect;
-use relit_video::{LiveDecoder, Picture, is_key};
+use relit_video::{LiveDecoder, Picture, PixelFormat, is_key};
 
 /// Frames that wait for the viewer's thread.
 const WAITING: usize = 8;
@@ -75,7 +74,7 @@ impl Drop for Viewer {
 /// The thread's own.
 struct Showing {
     monitor: Monitor,
-    decoder: Option<(Encoding, u32, u32, LiveDecoder)>,
+    decoder: Option<(PixelFormat, u32, u32, LiveDecoder)>,
     shown: Option<Instant>,
     figured: Option<Instant>,
     /// Counter of the last frame of a chain that was decoded.
@@ -104,21 +103,21 @@ impl Showing {
     }
 
     fn take(&mut self, frame: &Frame) {
-        let Some(encoding) = frame.fourcc.encoding() else {
+        let Some(format) = frame.fourcc.pixel_format() else {
             return;
         };
         let show = due(self.shown, SHOWING);
         let figure = due(self.figured, FIGURING);
-        let chained = encoding == Encoding::H264;
+        let chained = format == PixelFormat::H264;
         if !(show || figure || chained) || frame.fault().is_some() {
             return;
         }
-        let as_it_is = encoding == Encoding::Mjpeg && has_tables(&frame.data);
+        let as_it_is = format == PixelFormat::Mjpeg && has_tables(&frame.data);
         if show && as_it_is {
             self.show(frame, frame.data.as_slice().into());
         }
         if (figure || chained || !as_it_is)
-            && let Some(rgb) = self.decode(encoding, frame)
+            && let Some(rgb) = self.decode(format, frame)
         {
             if figure {
                 self.figure(&rgb);
@@ -150,11 +149,11 @@ impl Showing {
     }
 
     /// The frame's picture, where it can be had.
-    fn decode(&mut self, encoding: Encoding, frame: &Frame) -> Option<RgbImage> {
-        if encoding == Encoding::H264 && !self.continues_chain(frame) {
+    fn decode(&mut self, format: PixelFormat, frame: &Frame) -> Option<RgbImage> {
+        if format == PixelFormat::H264 && !self.continues_chain(frame) {
             return None;
         }
-        let picture = self.decoder_of(encoding, frame)?.decode(&frame.data);
+        let picture = self.decoder_of(format, frame)?.decode(&frame.data);
         whole(&picture.ok()??)
     }
 
@@ -173,15 +172,15 @@ impl Showing {
         false
     }
 
-    fn decoder_of(&mut self, encoding: Encoding, frame: &Frame) -> Option<&mut LiveDecoder> {
+    fn decoder_of(&mut self, format: PixelFormat, frame: &Frame) -> Option<&mut LiveDecoder> {
         let kept = self.decoder.take().filter(|(known, width, height, _)| {
-            (*known, *width, *height) == (encoding, frame.width, frame.height)
+            (*known, *width, *height) == (format, frame.width, frame.height)
         });
         let decoder = match kept {
             Some(kept) => kept,
             None => {
-                let live = LiveDecoder::new(coding(encoding), frame.width, frame.height);
-                (encoding, frame.width, frame.height, live.ok()?)
+                let live = LiveDecoder::new(format, frame.width, frame.height);
+                (format, frame.width, frame.height, live.ok()?)
             }
         };
         Some(&mut self.decoder.insert(decoder).3)

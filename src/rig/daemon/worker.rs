@@ -7,15 +7,16 @@ use std::time::Duration;
 use relit_data::causes::with_causes;
 
 use super::Dispatcher;
-use super::idle::{Idle, show_table};
+use super::idle::Idle;
 use super::schedule::{Job, Next};
 use super::viewer::Viewer;
 use crate::camera::Camera;
-use crate::camera::lock::{ManualPlan, Wanted};
+use crate::camera::hold::{ManualPlan, ManualValues};
 use crate::capture::CaptureError;
 use crate::capture::Equipment;
 use crate::capture::StopRequest;
-use crate::capture::{Onlookers, Order, capture};
+use crate::capture::turn::show_table;
+use crate::capture::{CaptureContext, CaptureRequest, capture};
 use crate::state::Verdict;
 use crate::turntable::{Table, TurntableError};
 
@@ -67,7 +68,7 @@ impl Worker {
     fn do_job(&mut self, job: Job, stop: &StopRequest) -> Result<bool, CaptureError> {
         match job {
             Job::Capture { object, meter } => {
-                return self.capture(&Order { object, meter }, stop);
+                return self.capture(&CaptureRequest { object, meter }, stop);
             }
             Job::StopTable if !self.equipment.wants_table() => {}
             Job::StopTable => self.with_table(stop, |table| table.stop().map(|_| ()))?,
@@ -81,16 +82,20 @@ impl Worker {
         Ok(true)
     }
 
-    fn capture(&mut self, order: &Order, stop: &StopRequest) -> Result<bool, CaptureError> {
+    fn capture(
+        &mut self,
+        request: &CaptureRequest,
+        stop: &StopRequest,
+    ) -> Result<bool, CaptureError> {
         let monitor = &self.dispatcher.monitor;
-        let on = Onlookers {
+        let context = CaptureContext {
             monitor,
             viewer: Some(&self.viewer),
             stop,
         };
-        let taken = capture(&mut self.equipment, order, on);
+        let captured = capture(&mut self.equipment, request, context);
         monitor.update(|state| state.session = None);
-        let summary = taken?;
+        let summary = captured?.take;
         if let Some(reason) = summary.reason {
             self.report(format!("{}: {reason}", summary.session));
         }
@@ -143,7 +148,7 @@ impl Worker {
             // An automatic may rule it: that is switched off, as it is for every capture.
             Err(CaptureError::Camera(_)) => {
                 let controls = camera.controls()?;
-                ManualPlan::new(&controls, &Wanted::default()).apply(camera)?;
+                ManualPlan::new(&controls, &ManualValues::default()).apply(camera)?;
                 set_by_name(camera, name, value)
             }
             set => set,

@@ -90,9 +90,9 @@ impl<K: Hash + Eq, V: Clone> Cache<K, V> {
     }
 }
 
-fn failed(error: relit_video::Error) -> Failure {
+fn failed(error: relit_video::VideoError) -> Failure {
     match error {
-        relit_video::Error::NoSuchFrame { .. } => Failure::not_found(with_causes(&error)),
+        relit_video::VideoError::NoSuchFrame { .. } => Failure::not_found(with_causes(&error)),
         _ => Failure::broken(with_causes(&error)),
     }
 }

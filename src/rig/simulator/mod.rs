@@ -1,15 +1,38 @@
-//! A turntable without hardware: the firmware's core on a pseudoterminal.
+//! A turntable without hardware: the firmware's core, as a function of time.
 //!
-//! A thread lets the very code that runs on the chip work in virtual time, which follows a
-//! [`Clock`]: in real time, or faster. The port looks like an Arduino's: whoever opens it resets
-//! the chip, bytes take the time of 115 200 baud, and the wire can be as bad as [`Faults`] asks.
-//! What no real table tells, this one does: where it stood at any moment.
+//! A [`SimulatedTable`] runs the very code that runs on the chip, up to whatever its [`Clock`] shows
+//! when somebody looks. Its port leads through memory; a [`Simulator`] puts it on a pseudoterminal, for
+//! other programs. Either looks like an Arduino's: whoever opens it resets the chip, bytes take the
+//! time of 115 200 baud, and the wire can be as bad as [`Faults`] asks. What no real table reports, this
+//! one does: where it stood at any moment.
 //!
-//! Knows the clock and the firmware's core; nothing of the host's side of the line.
+//! ```
+//! use relit_rig::clock::Clock;
+//! use relit_rig::simulator::{SimulatedTable, SimulatorOptions};
+//! use relit_rig::turntable::{Options, Table};
+//!
+//! let clock = Clock::virtual_time();
+//! let _part = clock.take_part();
+//! let simulated = SimulatedTable::new(&SimulatorOptions {
+//!     clock: clock.clone(),
+//!     ..SimulatorOptions::default()
+//! });
+//! let options = Options {
+//!     clock: clock.clone(),
+//!     ..Options::default()
+//! };
+//! let table = Table::open(simulated.open(), &options)?;
+//! table.jog(90.0, None)?;
+//! assert!((simulated.angle_at(clock.now_us()) - 90.0).abs() < 0.02);
+//! # Ok::<(), relit_rig::turntable::TurntableError>(())
+//! ```
+//!
+//! This module knows the clock, the firmware's core, and of the host's side only what a port is.
 
 mod chip;
 mod faults;
-mod rig;
+mod model;
+mod table;
 mod terminal;
 mod truth;
 mod wire;
@@ -17,28 +40,21 @@ mod wire;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
 
 use rustix::io::Errno;
 use serde::Serialize;
 
-use crate::clock::Clock;
+use crate::clock::{Clock, JoinHandle};
 
 pub use faults::{Faults, WireFaults};
+pub use table::{SimulatedPort, SimulatedTable};
 pub use truth::{STEPS_PER_TURN, StepEdge};
 pub use wire::WireCounts;
 
-use chip::{IndexInput, Pins};
-use rig::Rig;
+use table::LOOK;
 use terminal::Terminal;
-use truth::Truth;
-
-/// Volts at the battery input's full scale.
-const BATTERY_SCALE: f64 = 15.5;
-/// The converter's highest value.
-const BATTERY_FULL: f64 = 1023.0;
 
 /// Why there is no simulated table.
 #[derive(Debug, thiserror::Error)]
@@ -95,8 +111,6 @@ pub struct SimulatorOptions {
     pub drift_ppm: f64,
     /// Whether opening the port resets the chip, as with an Arduino.
     pub reset_on_open: bool,
-    /// A second name for the port.
-    pub link: Option<PathBuf>,
 }
 
 impl Default for SimulatorOptions {
@@ -111,7 +125,6 @@ impl Default for SimulatorOptions {
             battery: 12.0,
             drift_ppm: 0.0,
             reset_on_open: true,
-            link: None,
         }
     }
 }
@@ -131,54 +144,42 @@ pub struct SimulatorCounts {
     pub stalled: bool,
 }
 
-/// What the thread and the handle share.
-struct Shared {
-    stop: AtomicBool,
-    pins: Mutex<Pins>,
-    truth: Mutex<Truth>,
-    counts: Mutex<SimulatorCounts>,
-}
-
-/// A simulated table that runs until it is stopped or dropped.
+/// A simulated table on a pseudoterminal, with a thread, until it is stopped or dropped.
+///
+/// Its time is the clock's, which other programs go by as well: the monotonic one, or a
+/// [paced](Clock::paced) one for a table that runs faster than real time.
 pub struct Simulator {
+    table: SimulatedTable,
     path: PathBuf,
     link: Option<PathBuf>,
-    shared: Arc<Shared>,
+    stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Simulator {
-    /// Switches a table on.
+    /// Switches a table on. `link` becomes a second name of its port.
     ///
     /// # Errors
     /// Where the system gives no pseudoterminal, link or thread.
-    pub fn start(options: SimulatorOptions) -> Result<Simulator, Error> {
+    pub fn start(options: &SimulatorOptions, link: Option<&Path>) -> Result<Simulator, Error> {
         let terminal = Terminal::open()?;
         let path = terminal.path().to_owned();
-        if let Some(link) = &options.link {
+        if let Some(link) = link {
             make_link(&path, link)?;
         }
-        let start_us = options.clock.now_us();
-        let pins = Pins {
-            index: IndexInput::ByAngle,
-            emergency: false,
-            battery: battery_reading(options.battery),
-        };
-        let shared = Arc::new(Shared {
-            stop: AtomicBool::new(false),
-            pins: Mutex::new(pins),
-            truth: Mutex::new(Truth::new(options.start_angle, start_us)),
-            counts: Mutex::new(SimulatorCounts::default()),
-        });
         let mut simulator = Simulator {
+            table: SimulatedTable::new(options),
             path,
-            link: options.link.clone(),
-            shared: Arc::clone(&shared),
+            link: link.map(Path::to_owned),
+            stop: Arc::default(),
             thread: None,
         };
-        let rig = Rig::new(options, terminal, shared, start_us);
-        let thread = std::thread::Builder::new().name("simulator".to_owned());
-        simulator.thread = Some(thread.spawn(move || rig.run()).map_err(Error::Thread)?);
+        let (table, stop) = (simulator.table.clone(), Arc::clone(&simulator.stop));
+        let clock = options.clock.clone();
+        let thread = options.clock.spawn("simulator", move || {
+            carry(&clock, &table, terminal, &stop);
+        });
+        simulator.thread = Some(thread.map_err(Error::Thread)?);
         Ok(simulator)
     }
 
@@ -187,50 +188,21 @@ impl Simulator {
         &self.path
     }
 
-    /// Where the table stood at a time of the simulator's clock: degrees, not wound back after
-    /// a turn. What has not happened yet counts as rest.
-    pub fn angle_at(&self, us: i64) -> f64 {
-        lock(&self.shared.truth).angle_at(us)
+    /// The table behind the port.
+    pub fn table(&self) -> &SimulatedTable {
+        &self.table
     }
 
-    /// Every step so far; of very many, the last two million.
-    pub fn edges(&self) -> Vec<StepEdge> {
-        lock(&self.shared.truth).edges()
-    }
-
-    /// What happened so far.
-    pub fn counts(&self) -> SimulatorCounts {
-        *lock(&self.shared.counts)
-    }
-
-    /// Holds the index input closed or open, or (`None`) lets the angle decide.
-    pub fn hold_index(&self, level: Option<bool>) {
-        lock(&self.shared.pins).index = match level {
-            Some(level) => IndexInput::Held(level),
-            None => IndexInput::ByAngle,
-        };
-    }
-
-    /// Presses the emergency stop, or releases it.
-    pub fn press_emergency_stop(&self, pressed: bool) {
-        lock(&self.shared.pins).emergency = pressed;
-    }
-
-    /// Sets the battery's voltage.
-    pub fn set_battery(&self, volts: f64) {
-        lock(&self.shared.pins).battery = battery_reading(volts);
-    }
-
-    /// Switches the table off, and tells what happened.
+    /// Switches the table off; gives what happened.
     pub fn stop(mut self) -> SimulatorCounts {
         self.end();
-        self.counts()
+        self.table.counts()
     }
 
     fn end(&mut self) {
-        self.shared.stop.store(true, Ordering::Relaxed);
+        self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic in there has been told by the thread itself.
+            // A panic in there was reported by the thread itself.
             let _ended = thread.join();
         }
         if let Some(link) = self.link.take()
@@ -248,14 +220,24 @@ impl Drop for Simulator {
     }
 }
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn battery_reading(volts: f64) -> u16 {
-    (volts / BATTERY_SCALE * BATTERY_FULL)
-        .round()
-        .clamp(0.0, BATTERY_FULL) as u16
+/// The thread: carries bytes between table and pseudoterminal.
+fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &AtomicBool) {
+    const LARGEST: usize = 4096;
+    let mut buffer = [0; LARGEST];
+    while !stop.load(Ordering::Relaxed) {
+        let now_us = clock.now_us();
+        let mut model = table.model();
+        for _ in 0..terminal.opened() {
+            model.open(now_us);
+        }
+        let room = model.room().min(LARGEST);
+        let heard = terminal.read(buffer.get_mut(..room).unwrap_or_default());
+        model.hear(now_us, heard);
+        let said = model.speak(now_us, usize::MAX);
+        drop(model);
+        terminal.write(&said);
+        clock.sleep(LOOK);
+    }
 }
 
 /// Makes the link; one that was left behind is replaced, anything else is not.

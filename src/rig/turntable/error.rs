@@ -41,6 +41,9 @@ pub enum TurntableError {
         /// The owner.
         pid: u32,
     },
+    /// The system gave no thread for the port.
+    #[error("no thread could be started for the port: {0}; end other programs and try again")]
+    Thread(std::io::Error),
     /// The port could not be opened.
     #[error(
         "{path} could not be opened: {source}; check that the controller is plugged in, that no other program has the port, and that you may use it (group dialout)"

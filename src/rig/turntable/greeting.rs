@@ -82,7 +82,7 @@ fn rouse(link: &Link, resets: bool) -> Result<(), TurntableError> {
     link.wait(limit, |supervisor| {
         (supervisor.restarts() > 0).then_some(())
     });
-    let until_us = link.clock().now_us() + PROBE_WAIT.as_micros() as i64;
+    let until_us = link.clock().after(PROBE_WAIT);
     link.supervisor().want_reports(until_us);
     let state = link.wait(PROBE_WAIT, |supervisor| {
         if supervisor.closed().is_some() {

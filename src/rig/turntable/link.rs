@@ -1,53 +1,44 @@
-//! One thread that carries bytes between port and supervisor, and waits on what comes of it.
+//! The one thread that carries bytes between port and supervisor, and the waits for what comes of
+//! it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::sync::{Arc, MutexGuard};
+use std::time::Duration;
 
-use super::error::TurntableError;
+use super::error::{Fault, TurntableError};
 use super::port::Port;
 use super::status::Status;
 use super::supervisor::{Habits, StopOutcome, Supervisor};
 use super::wire::{Outcome, Patience, SendError};
-use crate::clock::Clock;
+use crate::clock::{Clock, JoinHandle, Waitable};
 
 /// Longest wait for bytes before time and output are looked at again.
 const READ_WAIT: Duration = Duration::from_millis(2);
-/// Shortest such wait, however fast the clock runs.
-const LEAST_WAIT: Duration = Duration::from_micros(200);
-/// How long a report may take.
-const REPORT_WAIT: Duration = Duration::from_millis(1500);
+/// How long a report may take; a loaded host keeps its thread from running for a part of it.
+const REPORT_WAIT: Duration = Duration::from_secs(3);
+/// How long a line's answer may take at most, with all repetitions. The wire gives up sooner.
+const ANSWER_WAIT: Duration = Duration::from_secs(6);
+/// What is added to it for a line that is answered after something else has happened.
+const LATE_ANSWER: Duration = Duration::from_secs(2);
 /// How long a stop may take, with all its repetitions.
 const STOP_WAIT: Duration = Duration::from_secs(16);
-/// How long a thread may have to wait for a processor, in real time.
-const PAUSE: Duration = Duration::from_millis(300);
-/// What is added in real time to every wait: a line's five tries may each meet such a pause.
-const GRACE: Duration = Duration::from_millis(1500);
 
 /// The wire to a table with its thread; copies share both.
 #[derive(Clone)]
 pub(super) struct Link {
-    shared: Arc<Shared>,
-    clock: Clock,
+    supervisor: Arc<Waitable<Supervisor>>,
+    port_name: Arc<str>,
 }
 
-struct Shared {
-    supervisor: Mutex<Supervisor>,
-    changed: Condvar,
-    quit: AtomicBool,
-    name: String,
-}
-
-/// Ends the link's thread, and so closes the port, when it is dropped.
-pub(super) struct Carrier {
-    shared: Arc<Shared>,
+/// The thread that has the port. Dropped, it ends, and so closes the port.
+pub(super) struct IoThread {
+    quit: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Drop for Carrier {
+impl Drop for IoThread {
     fn drop(&mut self) {
-        self.shared.quit.store(true, Ordering::Release);
+        self.quit.store(true, Ordering::Release);
         if let Some(thread) = self.thread.take() {
             // A thread that has panicked has closed the port as well.
             let _ = thread.join();
@@ -57,33 +48,35 @@ impl Drop for Carrier {
 
 impl Link {
     /// Starts the thread.
-    pub(super) fn start(port: Box<dyn Port>, clock: Clock, habits: Habits) -> (Link, Carrier) {
-        let shared = Arc::new(Shared {
-            supervisor: Mutex::new(Supervisor::new(habits, slack_us(&clock))),
-            changed: Condvar::new(),
-            quit: AtomicBool::new(false),
-            name: port.name(),
-        });
-        let carried = Arc::clone(&shared);
-        let thread = thread::spawn(move || carry(port, &carried, clock));
-        let carrier = Carrier {
-            shared: Arc::clone(&shared),
-            thread: Some(thread),
+    pub(super) fn start(
+        port: Box<dyn Port>,
+        clock: &Clock,
+        habits: Habits,
+    ) -> Result<(Link, IoThread), TurntableError> {
+        let link = Link {
+            port_name: port.name().into(),
+            supervisor: Arc::new(Waitable::new(clock, Supervisor::new(habits))),
         };
-        (Link { shared, clock }, carrier)
+        let quit = Arc::new(AtomicBool::new(false));
+        let thread = clock.spawn("turntable", {
+            let (supervisor, quit) = (Arc::clone(&link.supervisor), Arc::clone(&quit));
+            move || carry(port, &supervisor, &quit)
+        });
+        let thread = Some(thread.map_err(TurntableError::Thread)?);
+        Ok((link, IoThread { quit, thread }))
     }
 
-    pub(super) fn clock(&self) -> Clock {
-        self.clock
+    pub(super) fn clock(&self) -> &Clock {
+        self.supervisor.clock()
     }
 
     pub(super) fn port_name(&self) -> &str {
-        &self.shared.name
+        &self.port_name
     }
 
     /// The supervisor, for a moment.
     pub(super) fn supervisor(&self) -> MutexGuard<'_, Supervisor> {
-        self.shared.lock()
+        self.supervisor.lock()
     }
 
     /// Looks at the supervisor after each change until `look` finds something, or until `limit`
@@ -91,33 +84,21 @@ impl Link {
     pub(super) fn wait<T>(
         &self,
         limit: Duration,
-        mut look: impl FnMut(&mut Supervisor) -> Option<T>,
+        look: impl FnMut(&mut Supervisor) -> Option<T>,
     ) -> Option<T> {
-        let until = Instant::now() + self.clock.real(limit) + GRACE;
-        let mut supervisor = self.shared.lock();
-        loop {
-            if let Some(found) = look(&mut supervisor) {
-                return Some(found);
-            }
-            let left = until.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return None;
-            }
-            let waited = self.shared.changed.wait_timeout(supervisor, left);
-            supervisor = waited.unwrap_or_else(PoisonError::into_inner).0;
-        }
+        self.supervisor.wait_for(limit, look)
     }
 
     /// Sends a line and waits for its answer.
     pub(super) fn line(&self, block: &str, patience: Patience) -> Result<Outcome, TurntableError> {
-        let now_us = self.clock.now_us();
+        let now_us = self.clock().now_us();
         let sent = self.supervisor().send(now_us, block, patience);
         self.answer(block, sent, patience)
     }
 
     /// Opens a checked session.
     pub(super) fn open_session(&self) -> Result<Outcome, TurntableError> {
-        let now_us = self.clock.now_us();
+        let now_us = self.clock().now_us();
         let sent = self.supervisor().open_session(now_us);
         self.answer("N0", sent, Patience::Short)
     }
@@ -133,15 +114,12 @@ impl Link {
             why,
         })?;
         let limit = match patience {
-            Patience::Short => Duration::from_secs(4),
-            Patience::Long(us) => Duration::from_micros(us.unsigned_abs()) + GRACE,
+            Patience::Short => ANSWER_WAIT,
+            Patience::Long(us) => Duration::from_micros(us.unsigned_abs()) + LATE_ANSWER,
         };
-        let outcome = self.wait(limit, |supervisor| {
-            let lost = || supervisor_lost(supervisor);
-            lost().map_or_else(
-                || supervisor.take_answer(id).map(Ok),
-                |error| Some(Err(error)),
-            )
+        let outcome = self.wait(limit, |supervisor| match port_lost(supervisor) {
+            Some(error) => Some(Err(error)),
+            None => supervisor.take_answer(id).map(Ok),
         });
         outcome.unwrap_or(Err(TurntableError::Silent {
             milliseconds: limit.as_millis() as u64,
@@ -151,11 +129,11 @@ impl Link {
     /// The table's state by a report that was asked for just now, and by one more where they have
     /// no checksum.
     pub(super) fn status(&self) -> Result<Status, TurntableError> {
-        let asked_us = self.clock.now_us();
-        let until_us = asked_us + REPORT_WAIT.as_micros() as i64;
+        let asked_us = self.clock().now_us();
+        let until_us = self.clock().after(REPORT_WAIT);
         self.supervisor().want_reports(until_us);
         let status = self.wait(REPORT_WAIT, |supervisor| {
-            if let Some(error) = supervisor_lost(supervisor) {
+            if let Some(error) = port_lost(supervisor) {
                 return Some(Err(error));
             }
             let seen = supervisor.seen()?;
@@ -169,14 +147,15 @@ impl Link {
 
     /// Brings the table to a standstill, and drops what it was still to do.
     pub(super) fn stop(&self) -> Result<Status, TurntableError> {
-        self.supervisor().request_stop(self.clock.now_us());
+        let now_us = self.clock().now_us();
+        self.supervisor().request_stop(now_us);
         self.wait_stopped()?;
         self.status()
     }
 
     /// Waits until a stop under way has ended.
     pub(super) fn wait_stopped(&self) -> Result<(), TurntableError> {
-        let ended = self.wait(STOP_WAIT, |supervisor| match supervisor_lost(supervisor) {
+        let ended = self.wait(STOP_WAIT, |supervisor| match port_lost(supervisor) {
             Some(error) => Some(Err(error)),
             None => supervisor.stopped().map(Ok),
         });
@@ -187,34 +166,20 @@ impl Link {
     }
 }
 
-fn supervisor_lost(supervisor: &Supervisor) -> Option<TurntableError> {
+fn port_lost(supervisor: &Supervisor) -> Option<TurntableError> {
     let why = supervisor.closed()?;
-    Some(super::error::Fault::PortLost(why.to_owned()).into())
+    Some(Fault::PortLost(why.to_owned()).into())
 }
 
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, Supervisor> {
-        self.supervisor
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// What a wait of a fast clock has to allow for: threads run no faster for it. Microseconds.
-fn slack_us(clock: &Clock) -> i64 {
-    ((clock.factor() - 1.0).max(0.0) * PAUSE.as_micros() as f64) as i64
-}
-
-/// The thread: what is due goes out, what comes is taken, until the link is dropped or the port
-/// is gone.
-fn carry(mut port: Box<dyn Port>, shared: &Shared, clock: Clock) {
-    let wait = clock.real(READ_WAIT).clamp(LEAST_WAIT, READ_WAIT);
+/// The thread: what is due goes out, what comes is taken, until it is to end or the port is gone.
+fn carry(mut port: Box<dyn Port>, shared: &Waitable<Supervisor>, quit: &AtomicBool) {
+    let clock = shared.clock();
     let mut buffer = [0; 512];
-    while !shared.quit.load(Ordering::Acquire) {
+    while !quit.load(Ordering::Acquire) {
         let output = shared.lock().take_output(clock.now_us());
         let written = port.write(&output);
         let asked_us = clock.now_us();
-        let read = written.and_then(|()| port.read(&mut buffer, wait));
+        let read = written.and_then(|()| port.read(&mut buffer, READ_WAIT));
         let now_us = clock.now_us();
         let mut supervisor = shared.lock();
         match read {
@@ -224,9 +189,11 @@ fn carry(mut port: Box<dyn Port>, shared: &Shared, clock: Clock) {
             Ok(count) => supervisor.on_bytes(now_us, buffer.get(..count).unwrap_or_default()),
             Err(error) => supervisor.close(error.to_string()),
         }
-        let gone = supervisor.closed().is_some();
+        let (changed, gone) = (supervisor.take_changed(), supervisor.closed().is_some());
         drop(supervisor);
-        shared.changed.notify_all();
+        if changed {
+            shared.notify();
+        }
         if gone {
             return;
         }

@@ -1,13 +1,12 @@
 //! The table: what a program does with it.
 
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use super::error::TurntableError;
 use super::greeting;
 use super::identity::Identity;
-use super::link::{Carrier, Link};
+use super::link::{IoThread, Link};
 use super::owner::{Claim, Server};
 use super::plan::TurnPlan;
 use super::port::{Port, SerialPort};
@@ -16,7 +15,7 @@ use super::supervisor::Course;
 use super::turn::Turn;
 use super::wire::{Counts, Message, Outcome, Patience, State};
 use super::{LEASE_S, Options};
-use crate::clock::Clock;
+use crate::clock::{Clock, Waitable};
 
 /// What is added to the time a motion should take.
 const MOTION_SLACK: Duration = Duration::from_secs(4);
@@ -29,11 +28,11 @@ pub struct Table {
     // another process may have it.
     server: Option<Server>,
     link: Link,
-    _carrier: Carrier,
+    _io_thread: IoThread,
     _claim: Option<Claim>,
     identity: Identity,
-    /// Held while a line waits for its answer.
-    line: Mutex<()>,
+    /// Whether a line waits for its answer.
+    line_open: Waitable<bool>,
 }
 
 impl Table {
@@ -64,16 +63,16 @@ impl Table {
         options: &Options,
     ) -> Result<Table, TurntableError> {
         let resets = port.resets();
-        let (link, carrier) = Link::start(port, options.clock, greeting::STRANGER);
+        let (link, io_thread) = Link::start(port, &options.clock, greeting::STRANGER)?;
         let identity = greeting::greet(&link, resets, options)?;
         let server = claim.as_ref().map(|claim| claim.serve(link.clone()));
         Ok(Table {
             server: server.transpose()?,
             link,
-            _carrier: carrier,
+            _io_thread: io_thread,
             _claim: claim,
             identity,
-            line: Mutex::new(()),
+            line_open: Waitable::new(&options.clock, false),
         })
     }
 
@@ -89,7 +88,7 @@ impl Table {
         self.link.supervisor().counts()
     }
 
-    pub(super) fn clock(&self) -> Clock {
+    pub(super) fn clock(&self) -> &Clock {
         self.link.clock()
     }
 
@@ -308,7 +307,7 @@ impl Table {
 
     /// Opens a checked session where the controller offers one and none is open.
     fn secure(&self) -> Result<(), TurntableError> {
-        let _line = self.line.lock().unwrap_or_else(PoisonError::into_inner);
+        let _turn = LineTurn::take(&self.line_open);
         greeting::secure(&self.link, &self.identity.extras)
     }
 
@@ -318,7 +317,7 @@ impl Table {
         patience: Patience,
     ) -> Result<Outcome, TurntableError> {
         self.secure()?;
-        let _line = self.line.lock().unwrap_or_else(PoisonError::into_inner);
+        let _turn = LineTurn::take(&self.line_open);
         self.link.line(block, patience)
     }
 
@@ -343,6 +342,22 @@ impl Table {
                 fault,
             },
         }
+    }
+}
+
+/// The right to send a line and to wait for its answer, which one thread has at a time.
+struct LineTurn<'a>(&'a Waitable<bool>);
+
+impl<'a> LineTurn<'a> {
+    fn take(open: &'a Waitable<bool>) -> Self {
+        open.wait(|open| (!std::mem::replace(open, true)).then_some(()));
+        Self(open)
+    }
+}
+
+impl Drop for LineTurn<'_> {
+    fn drop(&mut self) {
+        self.0.update(|open| *open = false);
     }
 }
 

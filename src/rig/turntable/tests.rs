@@ -1,19 +1,18 @@
-//! The table from outside, against a peer that goes wrong on demand, on a clock that runs ahead.
+//! The table from outside, against a peer that goes wrong on demand, on virtual time.
 
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::peer::{Peer, PeerPort, Trouble};
 use super::*;
-
-/// How much faster than real time the tests run.
-const SPEED: f64 = 20.0;
+use crate::clock::Participant;
 
 struct Rig {
     peer: Arc<Mutex<Peer>>,
     table: Table,
+    _part: Participant,
 }
 
 fn open(peer: Peer) -> Rig {
@@ -21,21 +20,26 @@ fn open(peer: Peer) -> Rig {
 }
 
 fn try_open(peer: Peer) -> Result<Rig, TurntableError> {
-    open_at(Clock::scaled(SPEED), peer)
+    open_on(Clock::virtual_time(), peer)
 }
 
-fn open_at(clock: Clock, peer: Peer) -> Result<Rig, TurntableError> {
+fn open_on(clock: Clock, peer: Peer) -> Result<Rig, TurntableError> {
+    let part = clock.take_part();
     let peer = Arc::new(Mutex::new(peer));
     let port = PeerPort {
         peer: Arc::clone(&peer),
-        clock,
+        clock: clock.clone(),
     };
     let options = Options {
         clock,
         ..Options::default()
     };
     let table = Table::open(port, &options)?;
-    Ok(Rig { peer, table })
+    Ok(Rig {
+        peer,
+        table,
+        _part: part,
+    })
 }
 
 impl Rig {
@@ -105,9 +109,10 @@ fn nothing_behind_the_port_is_no_controller() {
 #[test]
 fn a_table_found_moving_is_stopped_first() {
     let mut peer = Peer::new(false);
-    peer.advance(Clock::monotonic().now_us());
+    let clock = Clock::virtual_time();
+    peer.advance(clock.now_us());
     peer.take(b"G1X300F432\n");
-    let rig = open(peer);
+    let rig = open_on(clock, peer).unwrap();
     assert_eq!(rig.table.status().unwrap().state, State::Idle);
     assert!(rig.peer.lock().unwrap().at < 100.0);
 }
@@ -226,8 +231,7 @@ fn a_turn_tells_where_the_table_was_and_unwinds() {
             .collect();
         off.sort_by(f64::total_cmp);
         assert!(off.len() > 11_000);
-        // Twenty times real time, threads that sleep are late by as much.
-        assert!(off[off.len() * 99 / 100] < 0.2, "{:?}", off.last());
+        assert!(off[off.len() * 99 / 100] < 0.05, "{:?}", off.last());
         assert!(peer.at.abs() < 0.02, "not unwound: {}", peer.at);
         assert_eq!(peer.lease, if stock { 0.0 } else { 3.0 });
     }
@@ -285,7 +289,7 @@ fn whatever_breaks_a_turn_ends_it_with_its_reason_and_stops_the_table() {
 
 #[test]
 fn a_controller_that_falls_silent_for_two_seconds_ends_the_turn() {
-    let rig = open_at(Clock::monotonic(), Peer::new(true)).unwrap();
+    let rig = open(Peer::new(true));
     rig.table.home().unwrap();
     let mut turn = rig.turn(90.0);
     turn.wait_constant().unwrap();
@@ -324,12 +328,14 @@ fn a_stop_in_the_middle_keeps_the_position_and_the_table_goes_on() {
 fn a_stop_from_elsewhere_ends_a_jog_with_that_reason() {
     let rig = open(Peer::new(true));
     let link = rig.table.link().clone();
-    let stopper = std::thread::spawn(move || {
+    let clock = rig.table.clock().clone();
+    let stopper = clock.spawn("stopper", move || {
         link.wait(Duration::from_secs(10), |s| {
             s.seen()?.state.may_move().then_some(())
         });
         link.stop()
     });
+    let stopper = stopper.unwrap();
     let error = rig.table.jog(300.0, Some(5.0)).unwrap_err();
     assert!(
         matches!(error, TurntableError::Motion(Fault::Stopped)),
@@ -359,7 +365,7 @@ fn a_dropped_turn_and_a_dropped_table_stand_still_and_leave_no_session() {
     turn.wait_constant().unwrap();
     drop(turn);
     assert!(!rig.peer.lock().unwrap().is_moving());
-    let Rig { peer, table } = rig;
+    let Rig { peer, table, .. } = rig;
     drop(table);
     let mut peer = peer.lock().unwrap();
     let before = peer.executed.len();
@@ -375,12 +381,13 @@ fn a_dropped_turn_and_a_dropped_table_stand_still_and_leave_no_session() {
 fn every_wait_ends() {
     let rig = open(Peer::new(false));
     rig.set(|trouble, now| trouble.silent_from_us = Some(now));
-    let start = Instant::now();
+    let clock = rig.table.clock().clone();
+    let start_us = clock.now_us();
     assert!(matches!(
         rig.table.status(),
         Err(TurntableError::Silent { .. })
     ));
     assert!(matches!(rig.table.stop(), Err(TurntableError::NotStopped)));
     drop(rig);
-    assert!(start.elapsed() < Duration::from_secs(30));
+    assert!(clock.now_us() - start_us < 30_000_000);
 }

@@ -2,7 +2,7 @@ use std::io;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use super::Peer;
+use super::{Peer, TICK_US};
 use crate::clock::Clock;
 use crate::turntable::port::Port;
 
@@ -14,10 +14,11 @@ pub(in crate::turntable) struct PeerPort {
 
 impl Port for PeerPort {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
-        let until = std::time::Instant::now() + wait;
+        let deadline_us = self.clock.after(wait);
         loop {
+            let now_us = self.clock.now_us();
             let mut peer = self.peer.lock().unwrap();
-            peer.advance(self.clock.now_us());
+            peer.advance(now_us);
             let bytes = peer.give();
             drop(peer);
             if !bytes.is_empty() {
@@ -28,10 +29,10 @@ impl Port for PeerPort {
                 buffer[..bytes.len()].copy_from_slice(&bytes);
                 return Ok(bytes.len());
             }
-            if std::time::Instant::now() >= until {
+            if now_us >= deadline_us {
                 return Ok(0);
             }
-            std::thread::sleep(Duration::from_micros(100));
+            self.clock.sleep_until(deadline_us.min(now_us + TICK_US));
         }
     }
 

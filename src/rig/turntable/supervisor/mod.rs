@@ -31,7 +31,6 @@ const MOST_RECORDED: usize = 54_000;
 pub(crate) struct Supervisor {
     wire: Machine,
     habits: Habits,
-    slack_us: i64,
     answer: Option<(u64, Outcome)>,
     seen: Option<Seen>,
     confirmed: bool,
@@ -48,15 +47,14 @@ pub(crate) struct Supervisor {
     recorded: Option<Vec<Seen>>,
     wanted_until_us: i64,
     closed: Option<String>,
+    /// Something has happened that somebody may wait for.
+    changed: bool,
 }
 
 impl Supervisor {
-    /// `slack_us` is added to every wait for the controller: more than 0 only on a clock that runs
-    /// faster than the machines that follow it.
-    pub(crate) fn new(habits: Habits, slack_us: i64) -> Self {
+    pub(crate) fn new(habits: Habits) -> Self {
         Self {
-            wire: Machine::with_slack(slack_us),
-            slack_us,
+            wire: Machine::new(),
             habits,
             answer: None,
             seen: None,
@@ -72,6 +70,7 @@ impl Supervisor {
             recorded: None,
             wanted_until_us: i64::MIN,
             closed: None,
+            changed: false,
         }
     }
 
@@ -135,6 +134,11 @@ impl Supervisor {
         self.zero_deg = None;
     }
 
+    /// Whether something has happened since the last call that somebody may wait for.
+    pub(crate) fn take_changed(&mut self) -> bool {
+        std::mem::take(&mut self.changed)
+    }
+
     /// Sends a line. Nothing is sent while the table is being stopped.
     pub(crate) fn send(
         &mut self,
@@ -164,7 +168,7 @@ impl Supervisor {
 
     /// Asks for reports for the next while.
     pub(crate) fn want_reports(&mut self, until_us: i64) {
-        self.wanted_until_us = self.wanted_until_us.max(until_us + self.slack_us);
+        self.wanted_until_us = self.wanted_until_us.max(until_us);
     }
 
     /// Starts watching a motion; faults from before are forgotten.
@@ -214,7 +218,7 @@ impl Supervisor {
     /// Brings the table to a standstill and drops what it was still to do, because somebody asked.
     pub(crate) fn request_stop(&mut self, now_us: i64) {
         if self.motion.is_some() {
-            self.fault.get_or_insert(Fault::Stopped);
+            self.raise(Fault::Stopped);
         }
         self.begin_stop(now_us);
     }
@@ -241,12 +245,7 @@ impl Supervisor {
         if !self.is_stopping() {
             self.settled = false;
             self.wire.give_up();
-            self.stop = Some(Stop::begin(
-                now_us,
-                unsettled,
-                self.slack_us,
-                &mut self.wire,
-            ));
+            self.stop = Some(Stop::begin(now_us, unsettled, &mut self.wire));
         }
     }
 
@@ -257,6 +256,7 @@ impl Supervisor {
     }
 
     fn raise(&mut self, fault: Fault) {
+        self.changed = true;
         self.fault.get_or_insert(fault);
     }
 
@@ -285,7 +285,7 @@ impl Supervisor {
             && let Some(fault) = self
                 .motion
                 .as_ref()
-                .and_then(|m| m.overdue(now_us - self.slack_us, &self.habits))
+                .and_then(|m| m.overdue(now_us, &self.habits))
         {
             self.fail(now_us, fault);
         }
@@ -299,6 +299,7 @@ impl Supervisor {
 
     fn on_events(&mut self, now_us: i64) {
         while let Some(event) = self.wire.next_event() {
+            self.changed = true;
             match event {
                 Event::Answered { id, outcome } => self.on_answer(now_us, id, outcome),
                 Event::Status(poll) => self.on_report(now_us, &poll),
@@ -355,6 +356,7 @@ impl Supervisor {
         if !self.settled && outcome != StopOutcome::Standing {
             self.zero_deg = None;
         }
+        self.changed |= !self.settled;
         self.settled = true;
     }
 

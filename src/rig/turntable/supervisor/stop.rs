@@ -52,7 +52,6 @@ pub(crate) struct Stop {
     since_us: i64,
     sent_us: i64,
     heard_us: i64,
-    slack_us: i64,
     /// Something is left in the controller or on the wire that only a reset drops.
     unsettled: bool,
     standing: Option<(f64, u32)>,
@@ -62,14 +61,13 @@ pub(crate) struct Stop {
 
 impl Stop {
     /// Sends the feed hold. `unsettled`: a line without answer may still be executed.
-    pub(super) fn begin(now_us: i64, unsettled: bool, slack_us: i64, wire: &mut Machine) -> Self {
+    pub(super) fn begin(now_us: i64, unsettled: bool, wire: &mut Machine) -> Self {
         wire.realtime(realtime::HOLD);
         Self {
             phase: Phase::Braking,
             since_us: now_us,
             sent_us: now_us,
             heard_us: now_us,
-            slack_us,
             unsettled,
             standing: None,
             stood_at: None,
@@ -96,12 +94,10 @@ impl Stop {
     }
 
     pub(super) fn on_time(&mut self, now_us: i64, wire: &mut Machine) {
-        let lasted_us = now_us - self.since_us - self.slack_us;
+        let lasted_us = now_us - self.since_us;
         let unsent_us = now_us - self.sent_us;
         match self.phase {
-            Phase::Braking
-                if now_us - self.heard_us - self.slack_us > SILENT_US || lasted_us > RAMP_US =>
-            {
+            Phase::Braking if now_us - self.heard_us > SILENT_US || lasted_us > RAMP_US => {
                 self.reset(now_us, false, wire);
             }
             Phase::Braking if unsent_us >= REPEAT_US && self.standing.is_none() => {

@@ -20,7 +20,7 @@ struct Desk {
 
 impl Desk {
     fn new() -> Desk {
-        let supervisor = Supervisor::new(HABITS, 0);
+        let supervisor = Supervisor::new(HABITS);
         let mut desk = Desk {
             supervisor,
             now_us: 0,

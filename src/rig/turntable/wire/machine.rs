@@ -42,7 +42,6 @@ pub struct Machine {
     /// A line was given up whose answer may still come.
     unsure: bool,
     unchecked: u32,
-    slack_us: i64,
     polling: Polling,
     realtime: Vec<u8>,
     lines: Vec<u8>,
@@ -56,16 +55,6 @@ impl Machine {
     #[must_use]
     pub fn new() -> Self {
         Self::default()
-    }
-
-    /// A machine that waits so many microseconds longer than the interface needs, for clocks that
-    /// run faster than the machines that follow them.
-    #[must_use]
-    pub fn with_slack(slack_us: i64) -> Self {
-        Self {
-            slack_us,
-            ..Self::default()
-        }
     }
 
     /// What went wrong so far.
@@ -170,7 +159,7 @@ impl Machine {
         let due = self
             .pending
             .as_ref()
-            .map_or(Due::Wait, |line| line.due(now_us - self.slack_us));
+            .map_or(Due::Wait, |line| line.due(now_us));
         self.follow(due, now_us);
     }
 

@@ -24,7 +24,7 @@ impl Random {
 
 /// A camera's stamps with seeded gaps, and what is missing in truth: (exposure, count, before).
 struct Made {
-    stamps: Vec<Stamp>,
+    stamps: Vec<FrameStamp>,
     fps: f64,
     missing: Vec<(u64, u64, usize)>,
 }
@@ -58,7 +58,7 @@ fn made(seed: u64) -> Made {
             continue;
         }
         let due = begun + period * (exposure as f64 + jitter * random.either_way());
-        made.stamps.push(Stamp {
+        made.stamps.push(FrameStamp {
             sequence: Some(counted_from + exposure),
             t_us: due.round() as i64,
         });
@@ -66,8 +66,8 @@ fn made(seed: u64) -> Made {
     made
 }
 
-fn found(trace: &Trace) -> Vec<(u64, u64, usize)> {
-    let all = trace.missing.iter();
+fn found(timing: &FrameTiming) -> Vec<(u64, u64, usize)> {
+    let all = timing.missing.iter();
     all.map(|missing| (missing.exposure, missing.count, missing.before))
         .collect()
 }
@@ -75,16 +75,20 @@ fn found(trace: &Trace) -> Vec<(u64, u64, usize)> {
 fn every_gap_is_found(seeds: std::ops::Range<u64>) {
     for seed in seeds {
         let made = made(seed);
-        let trace = Trace::of(&made.stamps, made.fps);
-        assert_eq!(found(&trace), made.missing, "seed {seed}");
-        assert!(trace.doubts.is_empty(), "seed {seed}: {:?}", trace.doubts);
+        let timing = FrameTiming::of(&made.stamps, made.fps);
+        assert_eq!(found(&timing), made.missing, "seed {seed}");
         assert!(
-            trace
+            timing.anomalies.is_empty(),
+            "seed {seed}: {:?}",
+            timing.anomalies
+        );
+        assert!(
+            timing
                 .missing
                 .iter()
-                .all(|missing| missing.seen_by == Witness::Both)
+                .all(|missing| missing.evidence == Evidence::Both)
         );
-        assert_eq!(trace.counter, Counter::Counts);
+        assert_eq!(timing.counter, Counter::Counts);
     }
 }
 
@@ -95,14 +99,18 @@ fn every_gap_is_found_without_a_counter(seeds: std::ops::Range<u64>) {
         made.stamps
             .iter_mut()
             .for_each(|stamp| stamp.sequence = stands);
-        let trace = Trace::of(&made.stamps, made.fps);
-        assert_eq!(found(&trace), made.missing, "seed {seed}");
-        assert!(trace.doubts.is_empty(), "seed {seed}: {:?}", trace.doubts);
+        let timing = FrameTiming::of(&made.stamps, made.fps);
+        assert_eq!(found(&timing), made.missing, "seed {seed}");
         assert!(
-            trace
+            timing.anomalies.is_empty(),
+            "seed {seed}: {:?}",
+            timing.anomalies
+        );
+        assert!(
+            timing
                 .missing
                 .iter()
-                .all(|missing| missing.seen_by == Witness::Time)
+                .all(|missing| missing.evidence == Evidence::Time)
         );
     }
 }
@@ -118,10 +126,10 @@ fn every_gap_is_found_by_time_stamps_alone() {
 }
 
 /// A camera of 30 frames/s without gaps, with some jitter.
-fn regular(frames: u64) -> Vec<Stamp> {
+fn regular(frames: u64) -> Vec<FrameStamp> {
     let mut random = Random(5);
     (0..frames)
-        .map(|n| Stamp {
+        .map(|n| FrameStamp {
             sequence: Some(900 + n),
             t_us: (33_333.3 * (n as f64 + 0.1 * random.either_way())) as i64,
         })
@@ -129,60 +137,63 @@ fn regular(frames: u64) -> Vec<Stamp> {
 }
 
 #[test]
-fn a_gap_in_the_time_stamps_that_the_driver_did_not_count_is_missing_and_told() {
+fn a_gap_in_the_time_stamps_that_the_driver_did_not_count_is_missing_and_reported() {
     let mut stamps = regular(600);
     stamps.drain(250..253);
     for (n, stamp) in stamps.iter_mut().enumerate() {
         stamp.sequence = Some(n as u64);
     }
-    let trace = Trace::of(&stamps, 30.0);
-    let told = Doubt::Contradiction {
+    let timing = FrameTiming::of(&stamps, 30.0);
+    let reported = TimingAnomaly::Contradiction {
         before: 250,
         counted: 1,
         timed: 4,
     };
-    assert_eq!(trace.doubts, [told]);
-    assert_eq!(found(&trace), [(250, 3, 250)]);
-    assert_eq!(trace.missing[0].seen_by, Witness::TimeAgainstCounter);
+    assert_eq!(timing.anomalies, [reported]);
+    assert_eq!(found(&timing), [(250, 3, 250)]);
+    assert_eq!(timing.missing[0].evidence, Evidence::TimeAgainstCounter);
 }
 
 #[test]
-fn a_jump_of_the_counter_that_no_time_stamp_shows_is_told_and_nothing_is_missing() {
+fn a_jump_of_the_counter_that_no_time_stamp_shows_is_reported_and_nothing_is_missing() {
     let mut stamps = regular(600);
     for stamp in &mut stamps[400..] {
         stamp.sequence = stamp.sequence.map(|sequence| sequence + 5);
     }
-    let trace = Trace::of(&stamps, 30.0);
-    assert!(trace.missing.is_empty());
-    let told = Doubt::Contradiction {
+    let timing = FrameTiming::of(&stamps, 30.0);
+    assert!(timing.missing.is_empty());
+    let reported = TimingAnomaly::Contradiction {
         before: 400,
         counted: 6,
         timed: 1,
     };
-    assert_eq!(trace.doubts, [told]);
+    assert_eq!(timing.anomalies, [reported]);
 }
 
 #[test]
 fn a_counter_that_repeats_a_number_and_catches_up_loses_nothing() {
     let mut stamps = regular(300);
     stamps[100].sequence = stamps[99].sequence;
-    let trace = Trace::of(&stamps, 30.0);
-    assert_eq!((trace.counter, trace.missing_count()), (Counter::Counts, 0));
-    assert_eq!(trace.exposures, (0..300).collect::<Vec<_>>());
-    assert!(!trace.doubts.is_empty());
+    let timing = FrameTiming::of(&stamps, 30.0);
+    assert_eq!(
+        (timing.counter, timing.missing_count()),
+        (Counter::Counts, 0)
+    );
+    assert_eq!(timing.exposures, (0..300).collect::<Vec<_>>());
+    assert!(!timing.anomalies.is_empty());
 }
 
 #[test]
-fn a_counter_that_starts_anew_is_told_and_loses_nothing() {
+fn a_counter_that_starts_anew_is_reported_and_loses_nothing() {
     let mut stamps = regular(300);
     for (n, stamp) in stamps[120..].iter_mut().enumerate() {
         stamp.sequence = Some(n as u64);
     }
-    let trace = Trace::of(&stamps, 30.0);
-    assert_eq!(trace.missing_count(), 0);
+    let timing = FrameTiming::of(&stamps, 30.0);
+    assert_eq!(timing.missing_count(), 0);
     assert!(matches!(
-        trace.doubts[..],
-        [Doubt::Contradiction {
+        timing.anomalies[..],
+        [TimingAnomaly::Contradiction {
             before: 120,
             timed: 1,
             ..
@@ -191,43 +202,50 @@ fn a_counter_that_starts_anew_is_told_and_loses_nothing() {
 }
 
 #[test]
-fn a_single_late_stamp_is_told_and_is_no_gap() {
+fn a_single_late_stamp_is_reported_and_is_no_gap() {
     let mut stamps = regular(300);
     stamps[150].t_us += 36_000;
-    let trace = Trace::of(&stamps, 30.0);
-    assert_eq!(trace.missing_count(), 0);
-    assert_eq!(trace.doubts, [Doubt::OddTime { frame: 150, off: 1 }]);
+    let timing = FrameTiming::of(&stamps, 30.0);
+    assert_eq!(timing.missing_count(), 0);
+    assert_eq!(
+        timing.anomalies,
+        [TimingAnomaly::OddTime { frame: 150, off: 1 }]
+    );
 }
 
 #[test]
-fn stamps_that_tell_nothing_leave_the_counter_as_witness() {
+fn irregular_stamps_leave_the_counter_as_evidence() {
     let mut random = Random(11);
     let mut stamps = regular(400);
     for (n, stamp) in stamps.iter_mut().enumerate() {
         stamp.t_us = 33_333 * n as i64 + random.below(200_000) as i64;
     }
     stamps.drain(77..79);
-    let trace = Trace::of(&stamps, 30.0);
-    assert_eq!(found(&trace), [(77, 2, 77)]);
-    assert_eq!(trace.missing[0].seen_by, Witness::Counter);
-    assert!(trace.doubts.contains(&Doubt::Irregular));
+    let timing = FrameTiming::of(&stamps, 30.0);
+    assert_eq!(found(&timing), [(77, 2, 77)]);
+    assert_eq!(timing.missing[0].evidence, Evidence::Counter);
+    assert!(timing.anomalies.contains(&TimingAnomaly::Irregular));
 }
 
 #[test]
-fn a_camera_at_half_the_rate_is_told_with_and_without_a_counter() {
+fn a_camera_at_half_the_rate_is_reported_with_and_without_a_counter() {
     for counts in [true, false] {
-        let stamps: Vec<Stamp> = (0..500_u64)
-            .map(|n| Stamp {
+        let stamps: Vec<FrameStamp> = (0..500_u64)
+            .map(|n| FrameStamp {
                 sequence: counts.then_some(n),
                 t_us: 66_667 * n as i64,
             })
             .collect();
-        let trace = Trace::of(&stamps, 30.0);
-        let told = trace.doubts.iter().find_map(|doubt| match doubt {
-            Doubt::Rate { measured, .. } => Some(*measured),
+        let timing = FrameTiming::of(&stamps, 30.0);
+        let reported = timing.anomalies.iter().find_map(|doubt| match doubt {
+            TimingAnomaly::Rate { measured, .. } => Some(*measured),
             _ => None,
         });
-        assert!((told.unwrap() - 15.0).abs() < 0.1, "{:?}", trace.doubts);
+        assert!(
+            (reported.unwrap() - 15.0).abs() < 0.1,
+            "{:?}",
+            timing.anomalies
+        );
     }
 }
 
@@ -235,15 +253,15 @@ fn a_camera_at_half_the_rate_is_told_with_and_without_a_counter() {
 fn no_stamps_make_it_panic() {
     for seed in 0..300 {
         let mut random = Random(seed);
-        let stamps: Vec<Stamp> = (0..random.below(40))
-            .map(|_| Stamp {
+        let stamps: Vec<FrameStamp> = (0..random.below(40))
+            .map(|_| FrameStamp {
                 sequence: (random.below(4) > 0).then(|| random.next()),
                 t_us: random.next().cast_signed(),
             })
             .collect();
         let fps = [30.0, 0.0, f64::NAN, -1.0, 1e300][random.below(5) as usize];
-        let trace = Trace::of(&stamps, fps);
-        assert_eq!(trace.exposures.len(), stamps.len());
-        assert!(trace.exposures.windows(2).all(|pair| pair[0] < pair[1]));
+        let timing = FrameTiming::of(&stamps, fps);
+        assert_eq!(timing.exposures.len(), stamps.len());
+        assert!(timing.exposures.windows(2).all(|pair| pair[0] < pair[1]));
     }
 }

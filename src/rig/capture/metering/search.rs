@@ -1,18 +1,18 @@
-//! The exposure meter's mind: which exposure comes next, by what was seen of the turn so far.
+//! The exposure search: which exposure to try next, by what was seen of the turn so far.
 //!
-//! The table turns slowly while the meter begins at the brightest exposure. Every frame in which
+//! The table turns slowly while the search begins at the brightest exposure. Every frame in which
 //! more of the middle saturates than is allowed makes the exposure darker at once. A degree of the
-//! turn counts as seen when a frame of it stayed within what is allowed; what is seen at one
-//! exposure need not be looked at again at a darker one, since less light saturates less.
-//! The meter is done when all 360 degrees have been seen, which takes one turn, and those parts
-//! of a second one that went by while it was changing the exposure.
+//! turn counts as seen when a frame of it stayed within what is allowed. It need not be seen again
+//! at a darker exposure, since less light saturates less. The search is done when all 360 degrees
+//! have been seen: after one turn, and those parts of a second one that went by while the exposure
+//! was changed.
 //!
 //! What it guarantees: of every degree of the turn there was a frame that did not saturate more
-//! than allowed, at the exposure found or a brighter one. The exposure is at most a step (a sixth
-//! of a stop where little was too bright, a stop where much was) darker than it had to be, and never brighter than
-//! where it began. Pure: no camera, no table, no clock.
+//! than allowed, at the exposure found or a brighter one. The exposure is at most one step darker
+//! than it had to be (a sixth of a stop where little was too bright, a stop where much was), and
+//! never brighter than where it began. Pure: no camera, no table, no clock.
 
-use super::failure::MeterFault;
+use crate::capture::error::MeterFault;
 
 /// Degrees of a turn, each seen or not.
 const DEGREES: usize = 360;
@@ -25,16 +25,16 @@ const MUCH: f64 = 10.0;
 
 /// The exposures that a camera can be set to, in the control's own units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Exposures {
+pub(super) struct ExposureRange {
     /// The darkest, at least 1.
-    pub darkest: i64,
+    pub(super) darkest: i64,
     /// The brightest that a frame's time allows.
-    pub brightest: i64,
+    pub(super) brightest: i64,
     /// The distance between two.
-    pub step: i64,
+    pub(super) step: i64,
 }
 
-impl Exposures {
+impl ExposureRange {
     /// The exposure next to `factor` times `now`, at least a step darker.
     fn darker(&self, now: i64, factor: f64) -> Option<i64> {
         let step = self.step.max(1);
@@ -46,84 +46,72 @@ impl Exposures {
     }
 }
 
-/// What is to be done after a frame.
+/// What to do after a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Advice {
-    /// Look at more.
-    GoOn,
-    /// Set this exposure, and pass over frames taken before it has effect.
-    Set(i64),
-    /// This exposure it is.
-    Done(i64),
+pub(super) enum Advice {
+    /// More frames are needed.
+    Continue,
+    /// Set the search's exposure, and skip frames taken before it has effect.
+    Set,
+    /// The exposure is found.
+    Done,
 }
 
-/// Finds the exposure over a turn.
+/// A search for the exposure over a turn.
 #[derive(Debug, Clone)]
-pub struct Meter {
-    exposures: Exposures,
-    now: i64,
+pub(super) struct ExposureSearch {
+    range: ExposureRange,
+    exposure: i64,
     allowed: f64,
     seen: [bool; DEGREES],
-    left: usize,
 }
 
-impl Meter {
-    /// Begins at the brightest exposure. `allowed`: the part of the pixels that may saturate, 0 to 1.
-    #[must_use]
-    pub fn new(exposures: Exposures, allowed: f64) -> Self {
+impl ExposureSearch {
+    /// Begins at the brightest exposure. `allowed`: the part of the pixels that may saturate, 0 to
+    /// 1.
+    pub(super) fn new(range: ExposureRange, allowed: f64) -> Self {
         Self {
-            exposures,
-            now: exposures.brightest.max(exposures.darkest),
+            range,
+            exposure: range.brightest.max(range.darkest),
             allowed,
             seen: [false; DEGREES],
-            left: DEGREES,
         }
     }
 
-    /// The exposure to begin with, and the present one later.
-    #[must_use]
-    pub fn exposure(&self) -> i64 {
-        self.now
+    /// The exposure to begin with, the present one later, and the one found at the end.
+    pub(super) fn exposure(&self) -> i64 {
+        self.exposure
     }
 
-    /// Degrees of the turn that are still to be seen.
-    #[must_use]
-    pub fn left(&self) -> usize {
-        self.left
+    /// Degrees of the turn that were not seen yet.
+    pub(super) fn unseen(&self) -> usize {
+        self.seen.iter().filter(|seen| !**seen).count()
     }
 
-    /// Takes a frame that was exposed with the present exposure at `angle_deg`.
+    /// Adds a frame at `angle_deg` that was exposed with the present exposure; `clipped`: the part
+    /// of its pixels that saturates, 0 to 1.
     ///
     /// # Errors
     /// [`MeterFault::TooBright`] where it clips at the darkest exposure.
-    pub fn look(&mut self, angle_deg: f64, clipped: f64) -> Result<Advice, MeterFault> {
+    pub(super) fn add(&mut self, angle_deg: f64, clipped: f64) -> Result<Advice, MeterFault> {
         let degree = (angle_deg.rem_euclid(360.0) as usize).min(DEGREES - 1);
-        if clipped <= self.allowed {
-            if !std::mem::replace(&mut self.seen[degree], true) {
-                self.left -= 1;
-            }
-            return Ok(match self.left {
-                0 => Advice::Done(self.now),
-                _ => Advice::GoOn,
+        // Where it is above the limit, the degree has to be seen again.
+        self.seen[degree] = clipped <= self.allowed;
+        if self.seen[degree] {
+            return Ok(match self.unseen() {
+                0 => Advice::Done,
+                _ => Advice::Continue,
             });
-        }
-        // Seen within the limit a moment ago, and beyond it now: it has to be looked at again.
-        if std::mem::replace(&mut self.seen[degree], false) {
-            self.left += 1;
         }
         let much = clipped > MUCH * self.allowed;
         let factor = if much { COARSE } else { FINE };
-        match self.exposures.darker(self.now, factor) {
-            Some(next) => {
-                self.now = next;
-                Ok(Advice::Set(next))
-            }
-            None => Err(MeterFault::TooBright {
-                exposure: self.now,
-                clipped,
-                allowed: self.allowed,
-            }),
-        }
+        let darker = self.range.darker(self.exposure, factor);
+        self.exposure = darker.ok_or(MeterFault::TooBright {
+            exposure: self.exposure,
+            clipped,
+            allowed: self.allowed,
+        })?;
+        Ok(Advice::Set)
     }
 }
 
@@ -133,7 +121,7 @@ mod tests {
 
     use super::*;
 
-    const WEBCAM: Exposures = Exposures {
+    const WEBCAM: ExposureRange = ExposureRange {
         darkest: 3,
         brightest: 333,
         step: 1,
@@ -145,26 +133,26 @@ mod tests {
         (light * exposure as f64 - 1.0).clamp(0.0, 1.0)
     }
 
-    /// Turns up to two turns with a frame every `pace` degrees; `late` frames have no say after
-    /// a change.
+    /// Turns up to two turns with a frame every `pace` degrees; `late` frames are skipped after a
+    /// change.
     fn meter(light: impl Fn(f64) -> f64, pace: f64, late: u32) -> Result<(i64, f64), MeterFault> {
-        let mut meter = Meter::new(WEBCAM, 0.005);
+        let mut search = ExposureSearch::new(WEBCAM, 0.005);
         let (mut angle, mut passed_over) = (0.0, 0);
         while angle < 720.0 {
-            let clip = clipped(light(angle % 360.0), meter.exposure());
+            let clip = clipped(light(angle % 360.0), search.exposure());
             if passed_over > 0 {
                 passed_over -= 1;
             } else {
-                match meter.look(angle, clip)? {
-                    Advice::GoOn => {}
-                    Advice::Set(_) => passed_over = late,
-                    Advice::Done(exposure) => return Ok((exposure, angle)),
+                match search.add(angle, clip)? {
+                    Advice::Continue => {}
+                    Advice::Set => passed_over = late,
+                    Advice::Done => return Ok((search.exposure(), angle)),
                 }
             }
             angle += pace;
         }
         Err(MeterFault::Unseen {
-            degrees: meter.left(),
+            degrees: search.unseen(),
         })
     }
 
@@ -190,13 +178,13 @@ mod tests {
     }
 
     #[test]
-    fn light_that_clips_at_the_darkest_exposure_is_told() {
+    fn light_that_clips_at_the_darkest_exposure_is_reported() {
         let error = meter(|_| 1.0, 0.48, 6).unwrap_err();
         assert!(matches!(error, MeterFault::TooBright { exposure: 3, .. }));
     }
 
     #[test]
-    fn a_camera_with_few_frames_does_not_see_every_degree_and_is_told_so() {
+    fn a_camera_with_few_frames_does_not_see_every_degree_and_is_reported() {
         assert!(matches!(
             meter(|_| 0.001, 7.0, 0),
             Err(MeterFault::Unseen { degrees: 1.. })
@@ -229,18 +217,18 @@ mod tests {
 
         #[test]
         fn exposures_stay_on_the_cameras_steps(darkest in 1i64..50, steps in 0i64..400, step in 1i64..20) {
-            let exposures = Exposures { darkest, brightest: darkest + steps * step, step };
-            let mut meter = Meter::new(exposures, 0.005);
+            let exposures = ExposureRange { darkest, brightest: darkest + steps * step, step };
+            let mut search = ExposureSearch::new(exposures, 0.005);
             loop {
-                let now = meter.exposure();
+                let now = search.exposure();
                 prop_assert_eq!((now - darkest) % step, 0);
-                match meter.look(0.0, 1.0) {
-                    Ok(Advice::Set(next)) => prop_assert!(next < now),
+                match search.add(0.0, 1.0) {
+                    Ok(Advice::Set) => prop_assert!(search.exposure() < now),
                     Ok(other) => prop_assert!(false, "{:?}", other),
                     Err(_) => break,
                 }
             }
-            prop_assert_eq!(meter.exposure(), darkest);
+            prop_assert_eq!(search.exposure(), darkest);
         }
     }
 }

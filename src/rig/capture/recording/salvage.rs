@@ -8,7 +8,8 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::Error;
+use super::error::RecordingError;
+use relit_data::causes::with_causes;
 use relit_data::session::{self, FrameIndex, MANIFEST_FILE, Manifest, Status, Unended};
 use relit_video::Video;
 
@@ -46,17 +47,36 @@ pub struct Salvaged {
     /// The session folder.
     pub folder: PathBuf,
     /// What was saved, or why it could not be.
-    pub saved: Result<Saved, Error>,
+    pub saved: Result<Saved, RecordingError>,
+}
+
+impl fmt::Display for Salvaged {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let folder = self.folder.display();
+        match &self.saved {
+            Ok(saved) => write!(
+                f,
+                "{folder} was interrupted, and is kept as aborted: {saved}"
+            ),
+            Err(error) => {
+                let why = with_causes(error);
+                write!(
+                    f,
+                    "{folder} was interrupted and could not be salvaged: {why}"
+                )
+            }
+        }
+    }
 }
 
 /// Looks for interrupted sessions in a folder of sessions and brings each to its end. Those that are
 /// being recorded by a living process are left alone.
 ///
 /// # Errors
-/// [`Error::List`] where the folder cannot be looked through. What goes wrong with one session
+/// [`RecordingError::List`] where the folder cannot be looked through. What goes wrong with one session
 /// stands in its [`Salvaged`].
-pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, Error> {
-    let failed = |source| Error::List {
+pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, RecordingError> {
+    let failed = |source| RecordingError::List {
         path: root.to_owned(),
         source,
     };
@@ -70,7 +90,7 @@ pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, Error> {
     folders.sort();
     let salvaged = folders.into_iter().filter_map(|folder| {
         let saved = match salvage_session(&folder) {
-            Err(Error::Session(session::Error::InUse(_) | session::Error::Ended(_))) => {
+            Err(RecordingError::Session(session::Error::InUse(_) | session::Error::Ended(_))) => {
                 return None;
             }
             saved => saved,
@@ -84,9 +104,9 @@ pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, Error> {
 ///
 /// # Errors
 /// [`session::Error::InUse`] where its recorder lives, [`session::Error::Ended`] where there is
-/// nothing to do, [`Error::NotMended`], or what the file system answers; its status stays
-/// "recording" then, but for [`Error::NotMended`].
-pub fn salvage_session(folder: &Path) -> Result<Saved, Error> {
+/// nothing to do, [`RecordingError::NotMended`], or what the file system answers; its status stays
+/// "recording" then, but for [`RecordingError::NotMended`].
+pub fn salvage_session(folder: &Path) -> Result<Saved, RecordingError> {
     let unended = Unended::open(folder)?;
     let entries = unended.index().entries();
     let frames = whole_frames(&unended.video_path()).min(entries.len());
@@ -121,7 +141,7 @@ pub(super) fn whole_frames(path: &Path) -> usize {
 }
 
 /// Reads the session back as any user of it would.
-fn verify(folder: &Path, wanted: usize) -> Result<(), Error> {
+fn verify(folder: &Path, wanted: usize) -> Result<(), RecordingError> {
     if wanted == 0 {
         return Ok(());
     }
@@ -134,7 +154,7 @@ fn verify(folder: &Path, wanted: usize) -> Result<(), Error> {
     let found = lines.min(frames);
     if found != wanted || lines != wanted {
         let folder = folder.to_owned();
-        return Err(Error::NotMended {
+        return Err(RecordingError::NotMended {
             folder,
             wanted,
             found,

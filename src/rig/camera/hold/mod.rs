@@ -6,6 +6,8 @@
 
 use std::fmt;
 
+use relit_data::causes::with_causes;
+
 use super::{Camera, CameraError, Control, ControlId, ControlKind};
 
 /// What is to stand still.
@@ -111,7 +113,7 @@ enum Manual {
 
 /// Values to hold in place of those that the camera has now; in the control's own units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Wanted {
+pub struct ManualValues {
     /// Exposure time; of `exposure_time_absolute`, units of 100 us.
     pub exposure: Option<i64>,
     /// Gain.
@@ -125,7 +127,7 @@ pub struct Wanted {
     pub power_line: Option<i64>,
 }
 
-impl Wanted {
+impl ManualValues {
     fn of(&self, name: &str, aspect: Aspect) -> Option<i64> {
         match aspect {
             Aspect::Exposure => self.exposure,
@@ -140,7 +142,7 @@ impl Wanted {
 
 /// One control to set.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Step {
+pub struct ControlSetting {
     /// What for.
     pub aspect: Aspect,
     /// The control.
@@ -153,7 +155,7 @@ pub struct Step {
 
 /// Something that cannot be made to stand still by a control.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Lack {
+pub enum MissingControl {
     /// The camera has no control for it: fixed, or ruled by the camera alone.
     #[error("the camera has no control of its {0}")]
     NoControl(Aspect),
@@ -182,21 +184,49 @@ pub enum Lack {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ManualPlan {
     /// In this order: all automatics off first, then the values, which automatics would refuse.
-    pub steps: Vec<Step>,
+    pub steps: Vec<ControlSetting>,
     /// What cannot be made to stand still.
-    pub lacks: Vec<Lack>,
+    pub missing: Vec<MissingControl>,
 }
 
 /// A control whose value is not what it should be.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{name} is {} where {should} was set", value_words(*.is))]
-pub struct Moved {
+pub struct ControlDrift {
     /// The control's name.
     pub name: String,
     /// What was set, or read before.
     pub should: i64,
     /// What was read; `None` where it can no longer be read.
     pub is: Option<i64>,
+}
+
+/// What the controls show when they are read after a take.
+#[derive(Debug)]
+pub enum ReadBack {
+    /// They stand as they stood before.
+    Unchanged,
+    /// These do not.
+    Drifted(Vec<ControlDrift>),
+    /// They could not be read, so that nobody knows.
+    Unreadable(CameraError),
+}
+
+impl ReadBack {
+    /// What speaks against the take, a sentence each.
+    pub fn faults(&self) -> Vec<String> {
+        match self {
+            Self::Unchanged => Vec::new(),
+            Self::Drifted(drifts) => drifts
+                .iter()
+                .map(|drift| format!("the camera's settings changed during the turn: {drift}"))
+                .collect(),
+            Self::Unreadable(error) => vec![format!(
+                "the camera's settings could not be read back after the turn: {}",
+                with_causes(error)
+            )],
+        }
+    }
 }
 
 fn value_words(value: Option<i64>) -> String {
@@ -206,24 +236,24 @@ fn value_words(value: Option<i64>) -> String {
 impl ManualPlan {
     /// Makes the plan. Values are the wanted ones, else those that the camera has now, which an
     /// automatic may have found; brought into the control's range and onto its steps.
-    pub fn new(controls: &[Control], wanted: &Wanted) -> Self {
+    pub fn new(controls: &[Control], wanted: &ManualValues) -> Self {
         let mut plan = Self::default();
         let mut values = Vec::new();
         for aspect in Aspect::ALL {
-            let before = plan.lacks.len();
+            let before = plan.missing.len();
             let switched = plan.switch_off(controls, aspect);
             let held = plan.hold(controls, wanted, aspect, &mut values);
             if aspect == Aspect::FrameRate || aspect == Aspect::Backlight {
                 // A camera without these has a fixed rate and no correction: nothing lacks.
                 continue;
             }
-            if plan.lacks.len() == before && !held {
+            if plan.missing.len() == before && !held {
                 let lack = if switched {
-                    Lack::NoValue
+                    MissingControl::NoValue
                 } else {
-                    Lack::NoControl
+                    MissingControl::NoControl
                 };
-                plan.lacks.push(lack(aspect));
+                plan.missing.push(lack(aspect));
             }
         }
         plan.steps.extend(values);
@@ -232,7 +262,7 @@ impl ManualPlan {
 
     /// What was asked for and is not planned, because the camera has no control for it: aspect and
     /// value of each, in words.
-    pub fn without(&self, wanted: &Wanted) -> Vec<String> {
+    pub fn without(&self, wanted: &ManualValues) -> Vec<String> {
         let asked = [
             (Aspect::Exposure, wanted.exposure),
             (Aspect::Gain, wanted.gain),
@@ -264,7 +294,7 @@ impl ManualPlan {
                     self.steps.push(step(aspect, control, value));
                     switched = true;
                 }
-                _ => self.lacks.push(Lack::NoManual {
+                _ => self.missing.push(MissingControl::NoManual {
                     aspect,
                     control: control.name.clone(),
                 }),
@@ -277,9 +307,9 @@ impl ManualPlan {
     fn hold(
         &mut self,
         controls: &[Control],
-        wanted: &Wanted,
+        wanted: &ManualValues,
         aspect: Aspect,
-        steps: &mut Vec<Step>,
+        steps: &mut Vec<ControlSetting>,
     ) -> bool {
         let mut held = false;
         for names in aspect.values() {
@@ -287,7 +317,7 @@ impl ManualPlan {
                 continue;
             };
             if !may_be_set(control) {
-                self.lacks.push(Lack::NotSettable {
+                self.missing.push(MissingControl::NotSettable {
                     aspect,
                     control: control.name.clone(),
                 });
@@ -309,15 +339,34 @@ impl ManualPlan {
     ///
     /// # Errors
     /// What [`Camera::set_control`] and [`Camera::controls`] answer.
-    pub fn apply(&self, camera: &mut dyn Camera) -> Result<Vec<Moved>, CameraError> {
+    pub fn apply(&self, camera: &mut dyn Camera) -> Result<Vec<ControlDrift>, CameraError> {
         for step in &self.steps {
             camera.set_control(step.id, step.value)?;
         }
         Ok(self.check(&camera.controls()?))
     }
 
+    /// Reads the controls after a take and compares them with the plan, and with how they stood
+    /// `before` the take.
+    pub fn read_back(&self, before: &[Control], camera: &mut dyn Camera) -> ReadBack {
+        let after = match camera.controls() {
+            Ok(after) => after,
+            Err(error) => return ReadBack::Unreadable(error),
+        };
+        let mut drifts = self.check(&after);
+        for drift in drift_between(before, &after) {
+            if drifts.iter().all(|known| known.name != drift.name) {
+                drifts.push(drift);
+            }
+        }
+        match drifts.is_empty() {
+            true => ReadBack::Unchanged,
+            false => ReadBack::Drifted(drifts),
+        }
+    }
+
     /// What is not as the plan sets it.
-    pub fn check(&self, controls: &[Control]) -> Vec<Moved> {
+    pub fn check(&self, controls: &[Control]) -> Vec<ControlDrift> {
         let steps = self.steps.iter();
         steps
             .filter_map(|step| moved(&step.name, step.id, step.value, controls))
@@ -328,17 +377,17 @@ impl ManualPlan {
 /// Controls whose values differ between two readings, by name. Those that the hardware changes by
 /// itself count only where they had been set: [`ManualPlan::check`]. Those that nobody can set are
 /// readings, not settings: they do not count.
-pub fn moved_between(before: &[Control], after: &[Control]) -> Vec<Moved> {
+fn drift_between(before: &[Control], after: &[Control]) -> Vec<ControlDrift> {
     let settings = |control: &&Control| !control.flags.volatile && !control.flags.read_only;
     let held = before.iter().filter(settings);
     held.filter_map(|control| moved(&control.name, control.id, control.value?, after))
         .collect()
 }
 
-fn moved(name: &str, id: ControlId, should: i64, controls: &[Control]) -> Option<Moved> {
+fn moved(name: &str, id: ControlId, should: i64, controls: &[Control]) -> Option<ControlDrift> {
     let control = controls.iter().find(|control| control.id == id);
     let is = control.and_then(|control| control.value);
-    (is != Some(should)).then(|| Moved {
+    (is != Some(should)).then(|| ControlDrift {
         name: name.to_owned(),
         should,
         is,
@@ -380,8 +429,8 @@ fn may_be_set(control: &Control) -> bool {
     !control.flags.read_only && !control.flags.grabbed
 }
 
-fn step(aspect: Aspect, control: &Control, value: i64) -> Step {
-    Step {
+fn step(aspect: Aspect, control: &Control, value: i64) -> ControlSetting {
+    ControlSetting {
         aspect,
         id: control.id,
         name: control.name.clone(),

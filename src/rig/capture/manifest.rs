@@ -1,4 +1,4 @@
-//! What is known of a session at its start.
+//! The manifest of a session at its start.
 
 use std::collections::BTreeMap;
 
@@ -6,12 +6,12 @@ use jiff::Timestamp;
 use serde_json::Value;
 
 use super::equipment::Equipment;
-use super::preflight::Held;
+use super::locked_camera::LockedCamera;
 use super::settings::Settings;
 use crate::camera::{Control, ControlKind};
 use crate::turntable::Table;
 use relit_data::session::{
-    CameraFacts, Manifest, SoftwareFacts, Status, TurntableFacts, VideoFacts,
+    CameraFacts, Fault, FrameClock, Manifest, SoftwareFacts, Status, TurntableFacts, VideoFacts,
 };
 
 /// The manifest of a take that is to begin `now`.
@@ -19,7 +19,7 @@ pub(super) fn manifest(
     equipment: &Equipment,
     object: &str,
     now: Timestamp,
-    held: &Held,
+    locked: &LockedCamera,
 ) -> Manifest {
     let settings = equipment.settings();
     let camera = settings.camera.clone();
@@ -36,11 +36,12 @@ pub(super) fn manifest(
             backend: camera.backend().to_owned(),
             device: camera.device(),
             name: name.unwrap_or_default(),
-            fourcc: held.mode.fourcc.to_string(),
-            width: held.mode.width,
-            height: held.mode.height,
-            fps: held.fps(),
-            controls: controls_by_name(&held.controls),
+            fourcc: locked.mode.fourcc.to_string(),
+            width: locked.mode.width,
+            height: locked.mode.height,
+            fps: locked.fps(),
+            clock: locked.clock,
+            controls: controls_by_name(&locked.controls),
         },
         turntable: equipment
             .table
@@ -53,12 +54,27 @@ pub(super) fn manifest(
             bytes: None,
             blake3: None,
         },
-        faults: Vec::new(),
+        faults: not_held(locked),
         software: SoftwareFacts {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             commit: settings.commit.clone(),
         },
     }
+}
+
+/// What a camera changes as it likes where it is not the driver that is asked: nobody can see that in
+/// the recording afterwards.
+fn not_held(locked: &LockedCamera) -> Vec<Fault> {
+    if locked.clock == FrameClock::Driver {
+        return Vec::new();
+    }
+    let missing = locked.plan.missing.iter();
+    missing
+        .map(|missing| Fault {
+            t_us: 0,
+            what: format!("not held during the turn: {missing}"),
+        })
+        .collect()
 }
 
 fn facts_of(table: &Table, settings: &Settings) -> TurntableFacts {

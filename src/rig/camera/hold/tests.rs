@@ -1,7 +1,9 @@
 //! Plans for the control lists of real cameras, as `v4l2-ctl --list-ctrls-menus` prints them.
 
+use std::time::Duration;
+
 use super::*;
-use crate::camera::{ControlFlags, MenuItem};
+use crate::camera::{ControlFlags, DeviceInfo, Frame, GrantedMode, MenuItem, Mode, ModeRequest};
 
 fn control(name: &str, kind: ControlKind, range: (i64, i64), value: i64) -> Control {
     // Any number will do, as long as each name has its own.
@@ -104,7 +106,7 @@ fn steps(plan: &ManualPlan) -> Vec<(&str, i64)> {
 
 #[test]
 fn automatics_go_off_before_values_are_held() {
-    let plan = ManualPlan::new(&c920_new(), &Wanted::default());
+    let plan = ManualPlan::new(&c920_new(), &ManualValues::default());
     assert_eq!(
         steps(&plan),
         [
@@ -120,12 +122,12 @@ fn automatics_go_off_before_values_are_held() {
             ("backlight_compensation", 0),
         ]
     );
-    assert_eq!(plan.lacks, []);
+    assert_eq!(plan.missing, []);
 }
 
 #[test]
 fn names_from_before_linux_5_17_are_known_too() {
-    let plan = ManualPlan::new(&c920_old(), &Wanted::default());
+    let plan = ManualPlan::new(&c920_old(), &ManualValues::default());
     let found = steps(&plan);
     for wanted in [
         ("exposure_auto_priority", 0),
@@ -137,26 +139,26 @@ fn names_from_before_linux_5_17_are_known_too() {
     ] {
         assert!(found.contains(&wanted), "{wanted:?} in {found:?}");
     }
-    assert_eq!(plan.lacks, []);
+    assert_eq!(plan.missing, []);
 }
 
 #[test]
 fn what_a_camera_lacks_is_named() {
-    let plan = ManualPlan::new(&laptop(), &Wanted::default());
+    let plan = ManualPlan::new(&laptop(), &ManualValues::default());
     assert_eq!(
-        plan.lacks,
+        plan.missing,
         [
-            Lack::NoControl(Aspect::Gain),
-            Lack::NoControl(Aspect::Focus)
+            MissingControl::NoControl(Aspect::Gain),
+            MissingControl::NoControl(Aspect::Focus)
         ]
     );
-    let none = ManualPlan::new(&[], &Wanted::default());
+    let none = ManualPlan::new(&[], &ManualValues::default());
     assert_eq!(none.steps, []);
     assert_eq!(
-        none.lacks.len(),
+        none.missing.len(),
         5,
         "frame rate and backlight lack nothing: {:?}",
-        none.lacks
+        none.missing
     );
 }
 
@@ -168,7 +170,7 @@ fn wanted_values_go_into_the_range_and_onto_the_steps() {
         .find(|control| control.name == "focus_absolute")
         .unwrap();
     coarse.step = 5;
-    let wanted = Wanted {
+    let wanted = ManualValues {
         exposure: Some(1_000_000),
         gain: Some(-4),
         white_balance: Some(5000),
@@ -193,8 +195,8 @@ fn an_exposure_without_a_manual_mode_is_named() {
     let mut controls = laptop();
     controls.retain(|control| control.name != "auto_exposure");
     controls.push(menu("auto_exposure", &[(3, "Aperture Priority Mode")], 3));
-    let plan = ManualPlan::new(&controls, &Wanted::default());
-    assert!(plan.lacks.contains(&Lack::NoManual {
+    let plan = ManualPlan::new(&controls, &ManualValues::default());
+    assert!(plan.missing.contains(&MissingControl::NoManual {
         aspect: Aspect::Exposure,
         control: "auto_exposure".to_owned()
     }));
@@ -212,15 +214,15 @@ fn a_read_only_value_is_named_and_an_automatic_without_value_too() {
         control.flags.read_only = control.name == "gain";
     }
     controls.retain(|control| control.name != "white_balance_temperature");
-    let plan = ManualPlan::new(&controls, &Wanted::default());
+    let plan = ManualPlan::new(&controls, &ManualValues::default());
     assert_eq!(
-        plan.lacks,
+        plan.missing,
         [
-            Lack::NotSettable {
+            MissingControl::NotSettable {
                 aspect: Aspect::Gain,
                 control: "gain".to_owned()
             },
-            Lack::NoValue(Aspect::WhiteBalance)
+            MissingControl::NoValue(Aspect::WhiteBalance)
         ]
     );
 }
@@ -228,7 +230,7 @@ fn a_read_only_value_is_named_and_an_automatic_without_value_too() {
 #[test]
 fn a_value_that_moved_is_found_by_plan_and_by_comparison() {
     let before = c920_new();
-    let plan = ManualPlan::new(&before, &Wanted::default());
+    let plan = ManualPlan::new(&before, &ManualValues::default());
     let mut after = before.clone();
     for control in &mut after {
         for step in &plan.steps {
@@ -241,12 +243,12 @@ fn a_value_that_moved_is_found_by_plan_and_by_comparison() {
     let set = after.clone();
     let gain = after.iter_mut().find(|control| control.name == "gain");
     gain.unwrap().value = Some(70);
-    let moved = Moved {
+    let moved = ControlDrift {
         name: "gain".to_owned(),
         should: 64,
         is: Some(70),
     };
-    assert_eq!(plan.check(&after), moved_between(&set, &after));
+    assert_eq!(plan.check(&after), drift_between(&set, &after));
     assert_eq!(plan.check(&after), std::slice::from_ref(&moved));
     assert_eq!(moved.to_string(), "gain is 70 where 64 was set");
 }
@@ -259,10 +261,83 @@ fn a_reading_that_nobody_can_set_may_move() {
     before.push(temperature);
     let mut after = before.clone();
     after.last_mut().unwrap().value = Some(38);
-    assert_eq!(moved_between(&before, &after), []);
+    assert_eq!(drift_between(&before, &after), []);
     let gain = after.iter_mut().find(|control| control.name == "gain");
     gain.unwrap().value = Some(70);
-    assert_eq!(moved_between(&before, &after).len(), 1);
+    assert_eq!(drift_between(&before, &after).len(), 1);
+}
+
+/// A camera of which only the controls are asked.
+struct Answers(Vec<Control>, bool);
+
+impl Camera for Answers {
+    fn info(&self) -> &DeviceInfo {
+        panic!("only the controls are asked")
+    }
+    fn modes(&mut self) -> Result<Vec<Mode>, CameraError> {
+        panic!("only the controls are asked")
+    }
+    fn controls(&mut self) -> Result<Vec<Control>, CameraError> {
+        match self.1 {
+            true => Ok(self.0.clone()),
+            false => Err(CameraError::Unplugged {
+                device: "/dev/video9".to_owned(),
+                source: Some(std::io::Error::from_raw_os_error(19)),
+            }),
+        }
+    }
+    fn set_control(&mut self, _: ControlId, value: i64) -> Result<i64, CameraError> {
+        Ok(value)
+    }
+    fn start(&mut self, _: &ModeRequest) -> Result<GrantedMode, CameraError> {
+        panic!("only the controls are asked")
+    }
+    fn next_frame(&mut self, _: Duration) -> Result<Frame, CameraError> {
+        panic!("only the controls are asked")
+    }
+    fn stop(&mut self) -> Result<(), CameraError> {
+        panic!("only the controls are asked")
+    }
+}
+
+#[test]
+fn reading_back_tells_unchanged_drifted_and_unreadable_apart() {
+    let mut held = c920_new();
+    let plan = ManualPlan::new(&held, &ManualValues::default());
+    for setting in &plan.steps {
+        let control = held.iter_mut().find(|control| control.id == setting.id);
+        control.unwrap().value = Some(setting.value);
+    }
+    let read = |controls: &[Control], answers| {
+        plan.read_back(&held, &mut Answers(controls.to_vec(), answers))
+    };
+    let unchanged = read(&held, true);
+    assert!(matches!(unchanged, ReadBack::Unchanged), "{unchanged:?}");
+    assert_eq!(unchanged.faults(), [] as [&str; 0]);
+    let mut drifted = held.clone();
+    for control in &mut drifted {
+        match control.name.as_str() {
+            "gain" => control.value = Some(70),
+            "focus_absolute" => control.value = None,
+            _ => {}
+        }
+    }
+    assert_eq!(
+        read(&drifted, true).faults(),
+        [
+            "the camera's settings changed during the turn: gain is 70 where 64 was set",
+            "the camera's settings changed during the turn: focus_absolute is unreadable where 30 was set",
+        ]
+    );
+    let unreadable = read(&held, false);
+    assert!(
+        matches!(unreadable, ReadBack::Unreadable(_)),
+        "{unreadable:?}"
+    );
+    let faults = unreadable.faults();
+    assert!(faults[0].contains("could not be read back"), "{faults:?}");
+    assert!(faults[0].contains("/dev/video9"), "{faults:?}");
+    assert!(faults[0].ends_with("(os error 19)"), "{faults:?}");
 }
 
 #[test]
@@ -270,7 +345,7 @@ fn odd_ranges_upset_nothing() {
     for (minimum, maximum, step) in [(5, 5, 0), (9, 2, 3), (i64::MIN, i64::MAX, u64::MAX)] {
         let mut odd = number("gain", (minimum, maximum), 7);
         odd.step = step;
-        let plan = ManualPlan::new(&[odd], &Wanted::default());
+        let plan = ManualPlan::new(&[odd], &ManualValues::default());
         assert_eq!(plan.steps.len(), 1);
     }
 }

@@ -4,20 +4,20 @@ use super::*;
 use crate::capture::tests::frame;
 
 /// Plays frames into a cutter, announces the window when frame `at` has come, and answers the
-/// numbers of the frames chosen, and the count.
-fn cut(frames: impl Iterator<Item = Frame>, window: Window, at: usize) -> (Vec<i64>, Count) {
+/// numbers of the frames selected, and the count.
+fn cut(frames: impl Iterator<Item = Frame>, window: Window, at: usize) -> (Vec<i64>, TurnCount) {
     let mut cutter = Cutter::new(30.0, None);
-    let mut chosen = Vec::new();
+    let mut selected = Vec::new();
     for (n, frame) in frames.enumerate() {
-        chosen.extend(cutter.push(Arc::new(frame)));
+        selected.extend(cutter.push(Arc::new(frame)));
         if n == at {
-            chosen.extend(cutter.announce(window));
+            selected.extend(cutter.announce(window));
         }
     }
     let (rest, count) = cutter.end();
-    chosen.extend(rest);
-    let number = |chosen: &Chosen| (chosen.frame.t_us as f64 / 33_333.3).round() as i64;
-    (chosen.iter().map(number).collect(), count)
+    selected.extend(rest);
+    let number = |selected: &TurnFrame| (selected.frame.t_us as f64 / 33_333.3).round() as i64;
+    (selected.iter().map(number).collect(), count)
 }
 
 fn frames(numbers: impl Iterator<Item = u64>) -> impl Iterator<Item = Frame> {
@@ -35,25 +35,25 @@ fn seconds(from: f64, to: f64) -> Window {
 #[test]
 fn fifty_seconds_at_thirty_frames_a_second_are_1500_frames() {
     for at in [0, 40] {
-        let (chosen, count) = cut(frames(0..1600), seconds(1.01, 51.01), at);
-        assert_eq!(chosen, (31..1531).collect::<Vec<_>>());
+        let (selected, count) = cut(frames(0..1600), seconds(1.01, 51.01), at);
+        assert_eq!(selected, (31..1531).collect::<Vec<_>>());
         assert_eq!((count.expected, count.missing_count()), (1500, 0));
-        assert!(count.doubts.is_empty());
+        assert!(count.anomalies.is_empty());
     }
 }
 
 #[test]
 fn a_stream_that_ends_with_the_turn_is_whole() {
-    let (chosen, count) = cut(frames(0..1500), seconds(0.0, 50.0), 0);
-    assert_eq!(chosen.len(), 1500);
+    let (selected, count) = cut(frames(0..1500), seconds(0.0, 50.0), 0);
+    assert_eq!(selected.len(), 1500);
     assert_eq!((count.expected, count.missing_count()), (1500, 0));
 }
 
 #[test]
 fn frames_missing_at_both_ends_and_between_are_counted_in_the_turn() {
     let lost = |n: &u64| ![29, 30, 31, 100, 101, 328, 329, 330].contains(n);
-    let (chosen, count) = cut(frames((0..400).filter(lost)), seconds(0.99, 10.99), 0);
-    assert_eq!(chosen.len(), 300 - 6);
+    let (selected, count) = cut(frames((0..400).filter(lost)), seconds(0.99, 10.99), 0);
+    assert_eq!(selected.len(), 300 - 6);
     let found: Vec<_> = count
         .missing
         .iter()
@@ -64,68 +64,68 @@ fn frames_missing_at_both_ends_and_between_are_counted_in_the_turn() {
 
 #[test]
 fn a_turn_that_is_announced_too_late_lacks_its_begin() {
-    let (chosen, count) = cut(frames(0..600), seconds(1.01, 11.01), 200);
+    let (selected, count) = cut(frames(0..600), seconds(1.01, 11.01), 200);
     assert_eq!(count.expected, 300);
-    assert_eq!(count.exposures.len(), chosen.len());
+    assert_eq!(count.exposures.len(), selected.len());
     assert_eq!(count.missing[0].before, 0);
-    assert_eq!(count.missing_count(), 300 - chosen.len() as u64);
+    assert_eq!(count.missing_count(), 300 - selected.len() as u64);
     assert!(count.missing_count() > 40);
 }
 
 #[test]
 fn a_stream_that_breaks_off_lacks_the_rest() {
-    let (chosen, count) = cut(frames(0..130), seconds(0.99, 10.99), 0);
-    assert_eq!(chosen.len(), 100);
+    let (selected, count) = cut(frames(0..130), seconds(0.99, 10.99), 0);
+    assert_eq!(selected.len(), 100);
     assert_eq!(count.missing_count(), 200);
     assert_eq!(count.missing.last().unwrap().before, 100);
 }
 
 #[test]
 fn without_any_frame_all_of_the_turn_is_missing() {
-    let (chosen, count) = cut(frames(0..3), seconds(5.0, 15.0), 0);
-    assert!(chosen.is_empty());
+    let (selected, count) = cut(frames(0..3), seconds(5.0, 15.0), 0);
+    assert!(selected.is_empty());
     assert_eq!((count.expected, count.missing_count()), (300, 300));
 }
 
 #[test]
 fn a_chain_of_frames_is_recorded_from_its_key_frame_on() {
     let mut cutter = Cutter::new(30.0, Some(|data| data == [1]));
-    let mut chosen = Vec::new();
+    let mut selected = Vec::new();
     for (n, mut frame) in frames(0..100).enumerate() {
         frame.data = vec![u8::from(n % 12 == 0)];
-        chosen.extend(cutter.push(Arc::new(frame)));
+        selected.extend(cutter.push(Arc::new(frame)));
         if n == 35 {
-            chosen.extend(cutter.announce(seconds(1.01, 2.01)));
+            selected.extend(cutter.announce(seconds(1.01, 2.01)));
         }
     }
     let (rest, count) = cutter.end();
-    chosen.extend(rest);
+    selected.extend(rest);
     // The turn begins with frame 31, the chain with frame 24.
-    let lead = chosen
+    let lead = selected
         .iter()
-        .filter(|chosen| chosen.delivered.is_none())
+        .filter(|selected| selected.delivered.is_none())
         .count();
-    assert_eq!((lead, chosen.len() - lead, count.expected), (7, 30, 30));
-    assert_eq!(chosen[0].frame.data, [1]);
+    assert_eq!((lead, selected.len() - lead, count.expected), (7, 30, 30));
+    assert_eq!(selected[0].frame.data, [1]);
 }
 
 #[test]
 fn a_chain_is_kept_from_its_key_frame_on_however_long_ago_that_was() {
     let mut cutter = Cutter::new(30.0, Some(|data| data == [1]));
-    let mut chosen = Vec::new();
+    let mut selected = Vec::new();
     for (n, mut frame) in frames(0..600).enumerate() {
         frame.data = vec![u8::from(n % 250 == 0)];
-        chosen.extend(cutter.push(Arc::new(frame)));
+        selected.extend(cutter.push(Arc::new(frame)));
         if n == 480 {
-            chosen.extend(cutter.announce(seconds(15.01, 17.01)));
+            selected.extend(cutter.announce(seconds(15.01, 17.01)));
         }
     }
     let (rest, count) = cutter.end();
-    chosen.extend(rest);
+    selected.extend(rest);
     assert_eq!((count.expected, count.missing_count()), (60, 0));
-    assert_eq!(chosen[0].frame.data, [1]);
+    assert_eq!(selected[0].frame.data, [1]);
     // From frame 250 on, before frame 451.
-    assert_eq!(chosen.len(), 201 + 60);
+    assert_eq!(selected.len(), 201 + 60);
 }
 
 proptest! {
@@ -145,8 +145,8 @@ proptest! {
             frame.t_us = (33_333.333 * (1.0 + rate) * n as f64) as i64 + off;
             frame
         });
-        let (chosen, count) = cut(stream, window, 0);
+        let (selected, count) = cut(stream, window, 0);
         prop_assert_eq!((count.expected, count.missing_count()), (600, 0), "{:?}", count.missing);
-        prop_assert_eq!(chosen.len(), 600);
+        prop_assert_eq!(selected.len(), 600);
     }
 }

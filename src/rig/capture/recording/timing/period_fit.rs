@@ -1,48 +1,47 @@
-//! The comb under a row of time stamps: the period and the phase at which a camera exposes, found
-//! from the stamps alone.
+//! A camera's exposure period and phase, found from time stamps alone.
 //!
-//! For a period `p`, the stamps are put on a circle of circumference `p`. They gather on one side of
-//! it for the true period, also where each is off by up to 40 % of it, and spread all around for
-//! any other: the length of their mean vector is a periodogram (M. S. Bartlett, *Periodogram
-//! analysis and continuous spectra*, Biometrika 37, 1950).
+//! For a period `p`, the stamps are put on a circle of circumference `p`. For the true period they
+//! gather on one side of it, even where each is off by up to 40 % of the period; for any other they
+//! spread all around. The length of their mean vector is a periodogram (M. S. Bartlett,
+//! *Periodogram analysis and continuous spectra*, Biometrika 37, 1950).
 
-use super::Line;
+use super::line::Line;
 
-/// How far the true period may be off from the one around which it is sought, as a part of it.
+/// Largest relative difference between the true period and the expected one.
 const RANGE: f64 = 0.025;
 /// Cycles of drift over all stamps between one period tried and the next.
 const STEP_CYCLES: f64 = 0.25;
 /// Most periods tried.
 const MOST_STEPS: f64 = 4000.0;
-/// Mean vector from which the stamps are a comb. Those off by up to 40 % either way give
-/// sin(0.8 pi) / (0.8 pi) = 0.234, and few of them by chance less.
+/// Length of the mean vector from which the fit is accepted. Stamps off by up to 40 % either way
+/// give sin(0.8 pi) / (0.8 pi) = 0.234, and random ones rarely more than this.
 const CERTAIN: f64 = 0.15;
-/// Mean vector from which they are one if also no stamp lies between two teeth.
+/// Length from which the fit is accepted if also no stamp lies midway between two exposures.
 const POSSIBLE: f64 = 0.08;
-/// Distance from the nearest tooth from which a stamp lies between two, periods.
-const BETWEEN: f64 = 0.46;
-/// Rounds of numbering and fitting until both agree.
+/// Distance from the nearest exposure from which a stamp lies midway, in periods.
+const MIDWAY: f64 = 0.46;
+/// Most rounds of numbering the stamps and fitting the line again.
 const ROUNDS: usize = 12;
 
-/// A period, a phase, and the number that each stamp has by them.
-pub(super) struct Comb {
+/// Period and phase, and the exposure number that they give each stamp.
+pub(super) struct PeriodFit {
     pub(super) line: Line,
     pub(super) numbers: Vec<i64>,
 }
 
-impl Comb {
-    /// Finds the comb whose period is near `about`; `None` where the stamps are too irregular.
-    pub(super) fn find(times: &[f64], about: f64) -> Option<Self> {
-        let (frequency, vector) = strongest(times, 1.0 / about);
+impl PeriodFit {
+    /// Fits a period near `expected`; `None` where the stamps are too irregular.
+    pub(super) fn find(times: &[f64], expected: f64) -> Option<Self> {
+        let (frequency, vector) = strongest(times, 1.0 / expected);
         let length = vector.0.hypot(vector.1) / times.len() as f64;
         let period = 1.0 / frequency;
         let start = vector.1.atan2(vector.0) / std::f64::consts::TAU * period;
-        let comb = Self::settled(times, Line { start, period });
-        let is_one = length >= CERTAIN || (length >= POSSIBLE && comb.none_between(times));
-        is_one.then_some(comb)
+        let fit = Self::refined(times, Line { start, period });
+        let accepted = length >= CERTAIN || (length >= POSSIBLE && fit.none_midway(times));
+        accepted.then_some(fit)
     }
 
-    /// Too few stamps to find a period from: the nominal one, from the first stamp on.
+    /// For too few stamps to find a period from: the nominal one, from the first stamp on.
     pub(super) fn of_few(times: &[f64], nominal: f64) -> Self {
         let start = times.first().copied().unwrap_or(0.0);
         let line = Line {
@@ -53,15 +52,14 @@ impl Comb {
         Self { line, numbers }
     }
 
-    /// With stamps at random, a tenth of them would lie there.
-    fn none_between(&self, times: &[f64]) -> bool {
+    /// A tenth of random stamps would lie midway.
+    fn none_midway(&self, times: &[f64]) -> bool {
         let mut pairs = self.numbers.iter().zip(times);
-        pairs.all(|(&number, &time)| self.line.off(number, time).abs() < BETWEEN)
+        pairs.all(|(&number, &time)| self.line.off(number, time).abs() < MIDWAY)
     }
 
-    /// Numbers the stamps by the line, fits the line to the numbers, and so on until nothing
-    /// changes.
-    fn settled(times: &[f64], mut line: Line) -> Self {
+    /// Numbers the stamps by the line and fits the line to the numbers, until nothing changes.
+    fn refined(times: &[f64], mut line: Line) -> Self {
         let number = |line: Line| -> Vec<i64> { times.iter().map(|&t| line.nearest(t)).collect() };
         let mut numbers = number(line);
         for _ in 0..ROUNDS {
@@ -79,13 +77,13 @@ impl Comb {
     }
 }
 
-/// The frequency near `about` at which the stamps gather best, and the sum of their vectors.
-fn strongest(times: &[f64], about: f64) -> (f64, (f64, f64)) {
+/// The frequency near `expected` at which the stamps gather best, and the sum of their vectors.
+fn strongest(times: &[f64], expected: f64) -> (f64, (f64, f64)) {
     let span = times.iter().fold(0.0, |most: f64, &time| most.max(time));
-    let cycles = span * about * 2.0 * RANGE;
+    let cycles = span * expected * 2.0 * RANGE;
     let steps = (cycles / STEP_CYCLES).clamp(8.0, MOST_STEPS).round();
-    let lowest = about * (1.0 - RANGE);
-    let step = about * 2.0 * RANGE / steps;
+    let lowest = expected * (1.0 - RANGE);
+    let step = expected * 2.0 * RANGE / steps;
     // Each stamp's vector turns by the same angle from one frequency to the next.
     let mut vectors: Vec<[f64; 4]> = times
         .iter()
