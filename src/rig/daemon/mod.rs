@@ -5,9 +5,8 @@
 //! are given. When the daemon is dropped, a take under way is aborted and closed, the table stands, and
 //! the thread has ended.
 
-pub(crate) mod idle;
+mod idle;
 mod schedule;
-mod viewer;
 mod worker;
 
 use std::path::{Path, PathBuf};
@@ -23,10 +22,10 @@ use crate::capture::{StopRequest, Stopped};
 use crate::capture::{preflight, salvage};
 use crate::clock::Clock;
 use crate::lockfile::LockFile;
+use crate::preview::Preview;
 use crate::serve::rig::{Command, Refused, Rig};
 use crate::state::{Monitor, Phase};
 use schedule::{Job, Next, Schedule, StopTarget};
-pub use viewer::Viewer;
 use worker::Worker;
 
 /// Farthest that a table is turned by one command, degrees.
@@ -57,8 +56,8 @@ impl Daemon {
         let equipment = Equipment::new(settings)?;
         let wants_table = equipment.wants_table();
         let thread = |source| CaptureError::system("a thread", "started")(source);
-        let viewer = Viewer::start(dispatcher.monitor.clone()).map_err(thread)?;
-        let mut worker = Worker::new(equipment, Arc::clone(&dispatcher), viewer);
+        let preview = Preview::start(dispatcher.monitor.clone()).map_err(thread)?;
+        let mut worker = Worker::new(equipment, Arc::clone(&dispatcher), preview);
         let worker = std::thread::Builder::new()
             .name("relit-rig".to_owned())
             .spawn(move || worker.run())

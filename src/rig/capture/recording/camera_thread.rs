@@ -59,7 +59,6 @@ impl CameraThread {
             }
         };
         self.shared.control().progress.ended = true;
-        self.shared.preview.end();
         let (rest, count) = self.cutter.end();
         let until = Instant::now() + LAST_WAIT;
         for frame in rest {
@@ -112,7 +111,9 @@ impl CameraThread {
             return Err(End::OtherSize(fault));
         }
         let frame = Arc::new(frame);
-        self.shared.preview.publish(&frame);
+        if let Some(preview) = &self.shared.preview {
+            preview.publish(&frame);
+        }
         let frames = self.cutter.push(frame);
         self.enqueue_all(frames)
     }

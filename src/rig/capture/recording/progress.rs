@@ -3,7 +3,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::window::Window;
-use crate::capture::preview::Preview;
+use crate::preview::Preview;
 
 /// How far a recording has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -29,13 +29,16 @@ pub(super) struct Control {
 /// Shared by the owner and the threads.
 #[derive(Debug, Default)]
 pub(super) struct Shared {
-    pub(super) preview: Preview,
+    pub(super) preview: Option<Preview>,
     control: Mutex<Control>,
 }
 
 impl Shared {
-    pub(super) fn new(window: Option<Window>) -> Self {
-        let shared = Self::default();
+    pub(super) fn new(preview: Option<Preview>, window: Option<Window>) -> Self {
+        let shared = Self {
+            preview,
+            ..Self::default()
+        };
         shared.control().window = window;
         shared
     }
