@@ -41,17 +41,16 @@ enum Step {
     Fail(fn() -> CameraError),
 }
 
-/// A camera that does as it is told.
+/// A camera that follows a script: frames come when their time stamps are due on its clock.
 struct Scripted {
     info: DeviceInfo,
     steps: Box<dyn Iterator<Item = Step> + Send>,
-    /// Frames come when their time stamps are due, not at once.
-    clock: Option<Clock>,
+    clock: Clock,
     silent: bool,
 }
 
 impl Scripted {
-    fn new(steps: impl Iterator<Item = Step> + Send + 'static) -> Box<Self> {
+    fn new(clock: &Clock, steps: impl Iterator<Item = Step> + Send + 'static) -> Box<Self> {
         Box::new(Self {
             info: DeviceInfo {
                 address: "v4l2:/dev/video0".parse().unwrap(),
@@ -68,7 +67,7 @@ impl Scripted {
                 problems: Vec::new(),
             },
             steps: Box::new(steps),
-            clock: None,
+            clock: clock.clone(),
             silent: false,
         })
     }
@@ -104,10 +103,7 @@ impl Camera for Scripted {
         let step = if self.silent { None } else { self.steps.next() };
         match step {
             Some(Step::Frame(frame)) => {
-                if let Some(clock) = &self.clock {
-                    let early = frame.t_us - clock.now_us();
-                    thread::sleep(Duration::from_micros(early.max(0) as u64));
-                }
+                self.clock.sleep_until(frame.t_us);
                 Ok(*frame)
             }
             Some(Step::Fail(error)) => Err(error()),
@@ -116,7 +112,7 @@ impl Camera for Scripted {
                 self.next_frame(timeout)
             }
             None if self.silent => {
-                thread::sleep(timeout);
+                self.clock.sleep(timeout);
                 Err(CameraError::Timeout {
                     device: "scripted".to_owned(),
                     waited: timeout,
@@ -135,6 +131,8 @@ impl Camera for Scripted {
 }
 
 const PERIOD_US: i64 = 33_333;
+/// How long a frame may wait for a disk that is busy with something else.
+const WAIT: Duration = Duration::from_secs(60);
 const SIZE: (u32, u32) = (480, 360);
 
 /// The JPEGs of a fixture, which are the packets of its video.
@@ -215,7 +213,7 @@ fn manifest(id: &str) -> Manifest {
     }
 }
 
-fn plan(root: &Path, max_dropped: u64) -> Plan {
+fn plan(root: &Path, clock: &Clock, max_dropped: u64) -> Plan {
     Plan {
         root: root.to_owned(),
         manifest: manifest("20261120T093015Z-cow"),
@@ -229,7 +227,8 @@ fn plan(root: &Path, max_dropped: u64) -> Plan {
         window: None,
         max_dropped,
         queue_wait: Duration::ZERO,
-        stall: Duration::from_millis(400),
+        stall: Duration::from_secs(2),
+        clock: clock.clone(),
         preview: None,
     }
 }
@@ -249,9 +248,11 @@ fn record_with(
     steps: impl Iterator<Item = Step> + Send + 'static,
     control_faults: &[String],
 ) -> Take {
-    let mut plan = plan(root, max_dropped);
+    let clock = Clock::virtual_time();
+    let mut plan = plan(root, &clock, max_dropped);
+    plan.queue_wait = WAIT;
     plan.window = Some(turn(120, 0));
-    let recorder = Recorder::start(Scripted::new(steps), plan).unwrap();
+    let recorder = Recorder::start(Scripted::new(&clock, steps), plan).unwrap();
     let (_camera, recorded) = recorder.wait().unwrap();
     let angle = |t_us: i64| Some((t_us - 10 * PERIOD_US) as f64 / PERIOD_US as f64 * 3.0);
     let summary = recorded.finish(&angle, control_faults).unwrap();
@@ -350,18 +351,20 @@ fn a_whole_turn_is_a_clean_take_of_exactly_its_frames() {
 #[test]
 fn a_turn_may_be_announced_seconds_after_it_began() {
     let root = tempfile::tempdir().unwrap();
-    let clock = Clock::monotonic();
-    let begun = clock.now_us() + 100_000;
-    let mut camera = Scripted::new(steps(stream(110, begun)));
-    camera.clock = Some(clock);
-    let recorder = Recorder::start(camera, plan(root.path(), 0)).unwrap();
-    thread::sleep(Duration::from_millis(1500));
+    let clock = Clock::virtual_time();
+    let _part = clock.take_part();
+    let begun = clock.now_us();
+    let camera = Scripted::new(&clock, steps(stream(210, begun)));
+    let mut plan = plan(root.path(), &clock, 0);
+    plan.queue_wait = WAIT;
+    let recorder = Recorder::start(camera, plan).unwrap();
+    clock.sleep(Duration::from_millis(4200));
     assert_eq!(recorder.progress().frames, 0);
-    recorder.announce(turn(90, begun));
+    recorder.announce(turn(190, begun));
     let (_camera, recorded) = recorder.wait().unwrap();
     let take = Take::read(root.path(), recorded.finish(&|_| None, &[]).unwrap());
     take.check_verdict(Verdict::Clean);
-    assert_eq!(take.counts(), (90, 0));
+    assert_eq!(take.counts(), (190, 0));
 }
 
 #[test]
@@ -491,7 +494,7 @@ fn what_the_system_said_of_a_broken_stream_is_in_the_manifest() {
 fn a_camera_that_falls_silent_ends_the_recording() {
     let root = tempfile::tempdir().unwrap();
     let take = record(root.path(), 5, steps(stream(55, 0)).chain([Step::Silence]));
-    take.check_rejected("gave no frame for 0.");
+    take.check_rejected("gave no frame for 2.0 s");
     assert_eq!(take.frames_in_video(), 45);
 }
 
@@ -513,21 +516,23 @@ fn another_size_than_agreed_ends_the_recording() {
 #[test]
 fn a_recording_can_be_stopped() {
     let root = tempfile::tempdir().unwrap();
-    let clock = Clock::monotonic();
+    let clock = Clock::virtual_time();
+    let _part = clock.take_part();
     let begun = clock.now_us();
-    let mut camera = Scripted::new(steps(stream(3000, begun)));
-    camera.clock = Some(clock);
-    let recorder = Recorder::start(camera, plan(root.path(), 0)).unwrap();
+    let camera = Scripted::new(&clock, steps(stream(3000, begun)));
+    let mut plan = plan(root.path(), &clock, 0);
+    plan.queue_wait = WAIT;
+    let recorder = Recorder::start(camera, plan).unwrap();
     recorder.announce(turn(1500, begun));
-    while recorder.progress().frames < 10 {
-        thread::sleep(Duration::from_millis(20));
-    }
+    // Between two frames.
+    clock.sleep_until(begun + 100 * PERIOD_US - 1);
     recorder.stop();
+    assert!(recorder.wait_ended(Duration::from_millis(100)));
     let (_camera, recorded) = recorder.wait().unwrap();
     assert!(matches!(recorded.end(), End::Stopped));
     let take = Take::read(root.path(), recorded.finish(&|_| None, &[]).unwrap());
     take.check_rejected("stopped before the turn was over");
-    assert_eq!(take.frames_in_video() as u64, take.summary.frames);
+    assert_eq!((take.frames_in_video(), take.summary.frames), (91, 91));
 }
 
 #[test]
@@ -554,13 +559,15 @@ fn a_camera_at_half_the_agreed_rate_makes_a_take_unusable() {
 #[test]
 fn a_viewer_that_never_gives_the_picture_back_costs_no_frame() {
     let root = tempfile::tempdir().unwrap();
+    let clock = Clock::virtual_time();
     let monitor = Monitor::default();
     let pictures = monitor.pictures();
     let held = pictures.borrow();
-    let mut plan = plan(root.path(), 0);
+    let mut plan = plan(root.path(), &clock, 0);
     plan.window = Some(turn(120, 0));
+    plan.queue_wait = WAIT;
     plan.preview = Some(Preview::start(monitor.clone()).unwrap());
-    let recorder = Recorder::start(Scripted::new(steps(stream(200, 0))), plan).unwrap();
+    let recorder = Recorder::start(Scripted::new(&clock, steps(stream(200, 0))), plan).unwrap();
     let (_camera, recorded) = recorder.wait().unwrap();
     drop(held);
     let take = Take::read(root.path(), recorded.finish(&|_| None, &[]).unwrap());
@@ -579,7 +586,7 @@ fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -
     let address: CameraAddress = format!("replay:{}?speed=0", path.display())
         .parse()
         .unwrap();
-    let clock = address.clock();
+    let clock = Clock::virtual_time();
     let mut camera = open(&address, clock.clone()).unwrap();
     let mode = camera.modes().unwrap().remove(0);
     let (width, height) = mode.sizes.largest();
@@ -590,9 +597,9 @@ fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -
         height,
         rate,
     };
-    let mut plan = plan(root, 0);
+    let mut plan = plan(root, &clock, 0);
     plan.fps = rate.per_second();
-    plan.queue_wait = Duration::from_secs(60);
+    plan.queue_wait = WAIT;
     // A frame's way from the start of the replay to its time stamp is less than half a period.
     let begun = clock.now_us() as f64;
     plan.mode = camera.start(&request).unwrap();
@@ -710,14 +717,20 @@ fn a_full_disk_ends_the_recording_and_says_how_much_is_missing() {
 #[ignore = "run by the tests that kill a recorder"]
 fn child_that_records_until_it_is_killed() {
     let root = PathBuf::from(std::env::var("RELIT_TEST_ROOT").unwrap());
-    let clock = Clock::monotonic();
+    let clock = match std::env::var("RELIT_TEST_CLOCK").as_deref() {
+        Ok("real") => Clock::monotonic(),
+        _ => Clock::paced(20.0),
+    };
     let begun = clock.now_us();
-    let mut camera = Scripted::new(steps(stream(100_000, begun)));
-    camera.clock = Some(clock);
-    let recorder = Recorder::start(camera, plan(&root, 0)).unwrap();
+    let camera = Scripted::new(&clock, steps(stream(100_000, begun)));
+    let mut plan = plan(&root, &clock, 0);
+    plan.queue_wait = WAIT;
+    let recorder = Recorder::start(camera, plan).unwrap();
     recorder.announce(turn(90_000, begun));
-    println!("RECORDING");
-    recorder.wait().unwrap();
+    while !recorder.progress().ended {
+        println!("WROTE {}", recorder.progress().frames);
+        thread::sleep(Duration::from_millis(2));
+    }
 }
 
 struct Silent;
@@ -760,23 +773,33 @@ fn extracts(folder: &Path, out: &Path) {
     assert_eq!((tally.extracted, tally.lossy), (1, 1));
 }
 
-/// Kills a recorder `after` its start, salvages, and answers how much was lost, microseconds.
-fn kill_and_salvage(after: Duration) -> i64 {
+/// What a killed recorder lost.
+struct Lost {
+    /// Frames that it had written.
+    frames: u64,
+    /// Time since the last frame that was saved, by the system's clock, microseconds.
+    us: i64,
+}
+
+/// Kills a recorder that has written so many frames, and salvages its session. `clock`: whether it
+/// goes by `real` time.
+fn kill_and_salvage(clock: &str, frames: u64) -> Lost {
     let root = tempfile::tempdir().unwrap();
     let mut child = again("child_that_records_until_it_is_killed", "", root.path())
+        .env("RELIT_TEST_CLOCK", clock)
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
     let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-    let mut lines = lines.map(Result::unwrap);
-    assert!(lines.any(|line| line.contains("RECORDING")));
+    let mut written = lines.filter_map(|line| line.unwrap().strip_prefix("WROTE ")?.parse().ok());
     let folder = root.path().join("20261120T093015Z-cow");
-    thread::sleep(after);
+    assert!(written.any(|written: u64| written >= frames));
     // A session under way is left alone.
     assert!(salvage(root.path()).unwrap().is_empty());
     let killed_us = Clock::monotonic().now_us();
     child.kill().unwrap();
     child.wait().unwrap();
+    let written = written.last().unwrap_or(frames);
 
     let video = folder.join("video.mkv");
     let before = fs::read(&video).unwrap();
@@ -787,7 +810,6 @@ fn kill_and_salvage(after: Duration) -> i64 {
         before == fs::read(&video).unwrap(),
         "the video stays as it is"
     );
-    assert!(saved.frames > 0 && saved.frames > (after.as_secs_f64() * 30.0) as usize / 2);
 
     let recording = Recording::open(&folder).unwrap();
     let status = recording.manifest.unwrap().status;
@@ -802,44 +824,47 @@ fn kill_and_salvage(after: Duration) -> i64 {
     assert!(salvage(root.path()).unwrap().is_empty());
     assert!(salvage_session(&folder).is_err());
     extracts(&folder, &root.path().join("out"));
-    killed_us - last.t_us
+    Lost {
+        frames: written.saturating_sub(frames as u64),
+        us: killed_us - last.t_us,
+    }
 }
 
-fn kill_at_random_moments(times: u32) {
-    let mut worst = 0;
-    let mut state = u64::from(std::process::id()) ^ Clock::monotonic().now_us() as u64;
-    for time in 0..times {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        let after = Duration::from_millis(1100 + (state >> 33) % 1500);
-        let lost = kill_and_salvage(after);
-        worst = worst.max(lost);
-        assert!(
-            lost <= 1_000_000,
-            "kill {time} after {after:?} lost {lost} us"
-        );
-    }
-    println!("{times} kills, at most {worst} us lost");
+/// Numbers of frames after which a recorder is killed.
+fn random_moments() -> impl Iterator<Item = u64> {
+    let seed = u64::from(std::process::id()) ^ Clock::monotonic().now_us() as u64;
+    let next = |state: &u64| {
+        let state = state.wrapping_mul(6_364_136_223_846_793_005);
+        Some(state.wrapping_add(1))
+    };
+    std::iter::successors(Some(seed), next).map(|state| 30 + (state >> 33) % 45)
 }
 
 #[test]
-fn a_killed_recording_is_salvaged_and_loses_a_second_at_most() {
-    kill_at_random_moments(5);
+fn a_killed_recording_is_salvaged_and_loses_a_second_of_what_was_written_at_most() {
+    for frames in random_moments().take(5) {
+        let lost = kill_and_salvage("paced", frames);
+        assert!(lost.frames <= 30, "{} frames lost", lost.frames);
+    }
 }
 
 /// `cargo test --test capture -- --ignored --nocapture a_hundred_killed`
 #[test]
 #[ignore = "takes five minutes"]
 fn a_hundred_killed_recordings_are_salvaged_and_lose_a_second_at_most() {
-    kill_at_random_moments(100);
+    let lost = random_moments().map(|frames| kill_and_salvage("real", frames).us);
+    let worst = lost.take(100).max().unwrap();
+    println!("at most {worst} us lost");
+    assert!(worst <= 1_000_000, "{worst} us lost");
 }
 
 #[test]
 fn a_recording_killed_before_its_first_frame_is_salvaged_as_such() {
     let root = tempfile::tempdir().unwrap();
     let script = steps(stream(5, 0)).chain([Step::Silence]);
-    let recorder = Recorder::start(Scripted::new(script), plan(root.path(), 0)).unwrap();
+    let clock = Clock::virtual_time();
+    let camera = Scripted::new(&clock, script);
+    let recorder = Recorder::start(camera, plan(root.path(), &clock, 0)).unwrap();
     let folder = recorder.folder().to_owned();
     recorder.stop();
     drop(recorder.wait().unwrap());
@@ -855,9 +880,11 @@ fn a_recording_killed_before_its_first_frame_is_salvaged_as_such() {
 #[test]
 fn frames_whose_content_a_power_cut_took_are_cut_from_the_index() {
     let root = tempfile::tempdir().unwrap();
-    let mut plan = plan(root.path(), 0);
+    let clock = Clock::virtual_time();
+    let mut plan = plan(root.path(), &clock, 0);
+    plan.queue_wait = WAIT;
     plan.window = Some(turn(120, 0));
-    let recorder = Recorder::start(Scripted::new(steps(stream(200, 0))), plan).unwrap();
+    let recorder = Recorder::start(Scripted::new(&clock, steps(stream(200, 0))), plan).unwrap();
     let folder = recorder.folder().to_owned();
     drop(recorder.wait().unwrap());
     // The last bytes never reached the disk: the file has its length, and zeros there.

@@ -10,7 +10,7 @@ use relit_rig::daemon::Daemon;
 use relit_rig::serve::rig::{Command, Refused, Rig};
 use relit_rig::state::{Phase, RigState, Verdict};
 
-use crate::support::{SHORT, alone, fixture};
+use crate::support::{SHORT, fixture};
 
 fn settings(root: &Path, camera: &str, table: &str) -> Settings {
     let camera = format!("replay:{}?loop=1{camera}", fixture(SHORT).display());
@@ -60,7 +60,6 @@ fn is_ready(state: &RigState) -> bool {
 
 #[test]
 fn a_queue_is_captured_object_by_object_and_a_second_start_is_refused() {
-    let _alone = alone();
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3")).unwrap();
     once(&daemon, is_ready);
@@ -112,7 +111,6 @@ fn a_stopped_take_leaves_its_object_at_the_head_and_the_stop_does_not_reach_the_
 
 #[test]
 fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
-    let _alone = alone();
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3")).unwrap();
     once(&daemon, is_ready);
@@ -146,7 +144,6 @@ fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
 
 #[test]
 fn a_camera_that_was_unplugged_comes_back_without_a_restart() {
-    let _alone = alone();
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "&unplug=60", "sim:?speed=3")).unwrap();
     once(&daemon, |state| state.camera.present);

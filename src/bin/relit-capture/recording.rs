@@ -35,10 +35,10 @@ pub(crate) fn run(console: Console, record: Record) -> Result<Outcome, CaptureEr
     }
     let _camera = settings.lock_camera()?;
     report_salvaged(console, &settings)?;
-    let stop = StopRequest::default();
+    let mut equipment = Equipment::new(settings)?;
+    let stop = StopRequest::new(&equipment.clock());
     let asked = stop.clone();
     at_end(move || asked.ask(Stopped::Shutdown)).map_err(system("the signals", "listened to"))?;
-    let mut equipment = Equipment::new(settings)?;
     let monitor = Monitor::default();
     let request = CaptureRequest { object, meter };
     let context = CaptureContext {

@@ -4,15 +4,12 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use super::error::{CaptureError, Refusal};
+use super::error::Refusal;
 use crate::camera::hold::ManualValues;
 use crate::camera::{CameraAddress, Fourcc, Mode, ModeRequest, Rate, Rates, ReplaySpeed};
-use crate::clock::Clock;
 use crate::lockfile::{self, LockError, LockFile};
 use crate::turntable;
 
-/// How much faster than real time a rehearsal runs that is to be as fast as is sensible.
-const FASTEST_REHEARSAL: f64 = 20.0;
 /// Formats from the one that is preferred: what the camera compresses by frames comes first.
 const PREFERRED: [Fourcc; 5] = [
     Fourcc::MJPG,
@@ -85,48 +82,31 @@ impl Settings {
         }
     }
 
-    /// Brings replayed camera and simulated table onto one clock, and gives that clock. The
-    /// table's speed counts where it is simulated, else the replay's; as fast as it goes (0)
-    /// means twenty times real time. A camera or a table of flesh and blood goes by real time.
+    /// How many times faster than real time the rig runs at most; 0 means as fast as the machine
+    /// computes. A simulated table's speed counts, else the replay's; a real camera or table goes
+    /// by real time.
     ///
     /// # Errors
     /// [`Refusal::Pace`] where one side is real and the other is to run faster.
-    pub fn on_one_clock(mut self) -> Result<(Self, Clock), CaptureError> {
+    pub fn speed(&self) -> Result<f64, Refusal> {
         use turntable::Address as Table;
-        let sensible = |speed: f64| match speed {
-            0.0 => FASTEST_REHEARSAL,
-            speed => speed,
-        };
         let replayed = match &self.camera {
             CameraAddress::Replay { speed, .. } => Some(match speed {
-                ReplaySpeed::AsRead => FASTEST_REHEARSAL,
+                ReplaySpeed::AsRead => 0.0,
                 ReplaySpeed::Times(times) => *times,
             }),
             _ => None,
         };
         let simulated = match &self.turntable {
-            Table::Simulated(table) => Some(sensible(table.speed)),
+            Table::Simulated(table) => Some(table.speed),
             _ => None,
         };
-        let times = match (replayed, simulated, &self.turntable) {
-            (Some(_), Some(table), _) => table,
-            (Some(camera), None, Table::None) => camera,
-            (Some(camera), None, _) if camera == 1.0 => camera,
-            (None, Some(table), _) if table == 1.0 => table,
-            (None, None, _) => 1.0,
-            _ => return Err(Refusal::Pace.into()),
-        };
-        if let CameraAddress::Replay { speed, .. } = &mut self.camera {
-            *speed = ReplaySpeed::Times(times);
+        match (replayed, simulated, &self.turntable) {
+            (Some(_), Some(table), _) => Ok(table),
+            (Some(camera), None, Table::None) => Ok(camera),
+            (Some(1.0), None, _) | (None, Some(1.0), _) | (None, None, _) => Ok(1.0),
+            _ => Err(Refusal::Pace),
         }
-        if let Table::Simulated(table) = &mut self.turntable {
-            table.speed = times;
-        }
-        let clock = match times {
-            1.0 => Clock::monotonic(),
-            times => Clock::scaled(times),
-        };
-        Ok((self, clock))
     }
 
     /// Frames of a turn at this rate.
@@ -294,21 +274,18 @@ mod tests {
     }
 
     #[test]
-    fn a_rehearsal_has_one_clock_at_the_tables_speed() {
-        for (camera, table, factor) in [
+    fn a_rehearsal_runs_at_the_tables_speed() {
+        for (camera, table, speed) in [
             ("replay:a?speed=3", "sim:?speed=5", 5.0),
-            ("replay:a", "sim:?speed=0", 20.0),
-            ("replay:a?speed=0", "none", 20.0),
+            ("replay:a", "sim:?speed=0", 0.0),
+            ("replay:a?speed=0", "none", 0.0),
             ("replay:a?speed=7", "none", 7.0),
             ("v4l2:/dev/video0", "sim:", 1.0),
             ("replay:a", "serial:/dev/ttyUSB0", 1.0),
             ("v4l2:/dev/video0", "serial:", 1.0),
         ] {
-            let (paced, clock) = settings(camera, table).on_one_clock().unwrap();
-            assert_eq!(clock.factor(), factor, "{camera} {table}");
-            if let CameraAddress::Replay { speed, .. } = paced.camera {
-                assert_eq!(speed, ReplaySpeed::Times(factor));
-            }
+            let found = settings(camera, table).speed().unwrap();
+            assert_eq!(found, speed, "{camera} {table}");
         }
     }
 
@@ -319,8 +296,8 @@ mod tests {
             ("replay:a?speed=2", "serial:"),
             ("replay:a?speed=0", "serial:"),
         ] {
-            let error = settings(camera, table).on_one_clock().unwrap_err();
-            assert!(matches!(error, CaptureError::Refused(Refusal::Pace)));
+            let refusal = settings(camera, table).speed().unwrap_err();
+            assert!(matches!(refusal, Refusal::Pace));
         }
     }
 

@@ -25,8 +25,6 @@ use crate::preview::Preview;
 use crate::state::{Check, Monitor, Phase, TakeSummary, Verdict};
 use crate::turntable::{Table, TurnPlan};
 
-/// Session names have whole seconds: two takes begin at least so far apart.
-const NAME_SPACING: Duration = Duration::from_millis(1100);
 /// How long a replayed camera waits for the disk, so that a rehearsal on a slow disk loses nothing.
 const REPLAY_WAIT: Duration = Duration::from_secs(60);
 
@@ -90,11 +88,13 @@ pub fn capture(
     request: &CaptureRequest,
     context: CaptureContext<'_>,
 ) -> Result<Captured, CaptureError> {
+    let clock = equipment.clock();
+    let _part = clock.take_part();
     preflight::check_object(&request.object)?;
     let retries = equipment.settings().retries;
     let mut repeated = 0;
     loop {
-        let begun = Timestamp::now();
+        let begun = equipment.session_time();
         // The exposure that a first take found stays set.
         let meter = request.meter && repeated == 0;
         let (take, repeatable) = run_take(equipment, &request.object, meter, begun, context)?;
@@ -105,11 +105,9 @@ pub fn capture(
         }
         repeated += 1;
         let reason = take.reason.unwrap_or_default();
-        let now_us = equipment.clock().now_us();
+        let now_us = clock.now_us();
         let fault = format!("the take is repeated: {reason}");
         context.monitor.fault(now_us, fault);
-        let since = Duration::try_from(Timestamp::now().duration_since(begun));
-        std::thread::sleep(NAME_SPACING.saturating_sub(since.unwrap_or_default()));
     }
 }
 
@@ -215,7 +213,8 @@ fn prepare(
         window: None,
         max_dropped: settings.max_dropped,
         queue_wait,
-        stall: NEXT_FRAME.max(equipment.clock().real(NEXT_FRAME)),
+        stall: NEXT_FRAME,
+        clock: equipment.clock(),
         preview: context.preview.cloned(),
     };
     Ok(Prepared {
@@ -237,14 +236,11 @@ fn prepare_table(
 ) -> Result<TurnPlan, CaptureError> {
     let stop = context.stop;
     let ready = stop.over(table, || preflight::ready_table(table, settings));
-    stop.check()?;
-    context.note(ready?);
+    context.note(stop.explain(ready)?);
     if with_metering {
         context.enter(Phase::Metering);
-        let metered = meter(camera, table, locked, settings, stop);
-        // A wish to stop explains better why the table did not go on.
-        stop.check()?;
-        let found = format!("metered: {}", metered?);
+        let exposure = meter(camera, table, locked, settings, stop)?;
+        let found = format!("metered: {exposure}");
         context.note([Check::passed("exposure", found)]);
     }
     let (turn, check) = preflight::plan_turn(table, settings)?;

@@ -15,7 +15,7 @@ use crate::turntable::{State, Table, Track, TurnPlan, TurntableError};
 const LOOK: Duration = Duration::from_millis(100);
 /// Time between the announcement of a turn without table and its beginning, microseconds.
 const LEAD_US: i64 = 200_000;
-/// How long after the turn's last frame was due the recording may take to end, of real time.
+/// How long after the turn's last frame was due the recording may take to end.
 const END_WAIT: Duration = Duration::from_secs(10);
 
 /// The recording of one turn.
@@ -31,7 +31,8 @@ impl TurnRecording<'_> {
     /// Turns the table and records its turn; returns the angles. The table is back where it stood,
     /// or, where something failed, stands where it was stopped.
     pub(super) fn with_table(&self, table: &Table, plan: TurnPlan) -> Result<Track, CaptureError> {
-        self.context.stop.over(table, || self.turn(table, plan))
+        let stop = self.context.stop;
+        stop.explain(stop.over(table, || self.turn(table, plan)))
     }
 
     /// Records as long as a turn takes, from now on.
@@ -42,12 +43,12 @@ impl TurnRecording<'_> {
     fn turn(&self, table: &Table, plan: TurnPlan) -> Result<Track, CaptureError> {
         self.enter_without_reports(Phase::MovingBack);
         let margin_us = preflight::margin_us(&plan);
-        let mut turn = self.or_stopped(table.start_turn(plan))?;
+        let mut turn = table.start_turn(plan)?;
         self.context.enter(Phase::Starting);
-        let part = self.or_stopped(turn.wait_constant())?;
+        let part = turn.wait_constant()?;
         let from_us = part.from_us.saturating_add(margin_us);
         let recorded = self.record_from(from_us, || {
-            self.or_stopped(turn.state())?;
+            turn.state()?;
             // A table that does not answer ends the turn, as its state shows the next time.
             let _shown = show_table(self.context.monitor, table);
             Ok(())
@@ -55,7 +56,7 @@ impl TurnRecording<'_> {
         match recorded {
             Ok(()) => {
                 self.enter_without_reports(Phase::Unwinding);
-                self.or_stopped(turn.wait_end())
+                Ok(turn.wait_end()?)
             }
             Err(error @ CaptureError::NotWithTheTurn) => {
                 turn.abort()?;
@@ -83,7 +84,7 @@ impl TurnRecording<'_> {
             let late = Duration::from_micros(u64::try_from(late_us).unwrap_or(0));
             match ended {
                 true if late_us >= 0 => return Ok(()),
-                false if self.clock.real(late) <= END_WAIT => {}
+                false if late <= END_WAIT => {}
                 _ => return Err(CaptureError::NotWithTheTurn),
             }
         }
@@ -105,14 +106,6 @@ impl TurnRecording<'_> {
             state.table.angle_deg = None;
             state.table.degrees_per_second = None;
         });
-    }
-
-    /// What the table answers; a stop that was asked for explains an error better.
-    fn or_stopped<T>(&self, answer: Result<T, TurntableError>) -> Result<T, CaptureError> {
-        if answer.is_err() {
-            self.context.stop.check()?;
-        }
-        Ok(answer?)
     }
 }
 

@@ -50,10 +50,10 @@ impl Daemon {
     /// the system answers.
     pub fn start(settings: Settings) -> Result<Self, CaptureError> {
         let locks = (LockFile::of_root(&settings.root)?, settings.lock_camera()?);
-        let dispatcher = Arc::new(Dispatcher::default());
-        report_salvaged(&settings.root, &dispatcher.monitor)?;
         let root = settings.root.clone();
-        let equipment = Equipment::new(settings)?;
+        let equipment = Equipment::for_viewers(settings)?;
+        let dispatcher = Arc::new(Dispatcher::new(equipment.clock()));
+        report_salvaged(&root, &dispatcher.monitor)?;
         let wants_table = equipment.wants_table();
         let thread = |source| CaptureError::system("a thread", "started")(source);
         let preview = Preview::start(dispatcher.monitor.clone()).map_err(thread)?;
@@ -164,13 +164,14 @@ impl Drop for Daemon {
 }
 
 /// What those who give commands and the worker share: the schedule, and where its state is shown.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Dispatcher {
+    clock: Clock,
     monitor: Monitor,
     plan: Mutex<Plan>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Plan {
     schedule: Schedule,
     /// The stop of the job under way: each job has its own.
@@ -178,6 +179,18 @@ struct Plan {
 }
 
 impl Dispatcher {
+    fn new(clock: Clock) -> Self {
+        let plan = Plan {
+            schedule: Schedule::default(),
+            stop: StopRequest::new(&clock),
+        };
+        Self {
+            clock,
+            monitor: Monitor::default(),
+            plan: Mutex::new(plan),
+        }
+    }
+
     /// Changes the schedule, and shows what came of it.
     fn change<T>(&self, change: impl FnOnce(&mut Schedule) -> T) -> T {
         let mut plan = lock(&self.plan);
@@ -216,7 +229,7 @@ impl Dispatcher {
         let mut plan = lock(&self.plan);
         let next = plan.schedule.begin();
         if matches!(next, Next::Job(_)) {
-            plan.stop = StopRequest::default();
+            plan.stop = StopRequest::new(&self.clock);
         }
         (next, plan.stop.clone())
     }

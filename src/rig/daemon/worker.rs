@@ -122,7 +122,7 @@ impl Worker {
         };
         let (camera, idle) = (&mut self.equipment.camera, &mut self.idle);
         let monitor = &self.dispatcher.monitor;
-        let moved = stop.over(table, || {
+        stop.over(table, || {
             std::thread::scope(|scope| {
                 let moving = scope.spawn(|| motion(table));
                 while !moving.is_finished() {
@@ -133,11 +133,11 @@ impl Worker {
                     }
                     std::thread::sleep(PERIOD);
                 }
-                moving.join()
+                // A motion that panicked was stopped by what it left behind, and nobody saw it.
+                let moved = moving.join();
+                moved.unwrap_or(Err(TurntableError::NotStopped))
             })
-        });
-        // A motion that broke down was stopped by what it left behind, and nobody saw it.
-        Ok(moved.unwrap_or(Err(TurntableError::NotStopped))?)
+        })
     }
 
     fn set_control(&mut self, name: &str, value: i64) -> Result<(), CaptureError> {

@@ -57,7 +57,7 @@ pub(super) fn meter(
         late: LATE_FRAMES,
     };
     metering.set_exposure()?;
-    let found = stop.over(table, || metering.turn(table, fps))?;
+    let found = stop.explain(stop.over(table, || metering.turn(table, fps)))?;
     locked.relock(camera, at, found)?;
     Ok(found)
 }

@@ -180,7 +180,7 @@ fn metered(light: fn(f64) -> f64) -> (Result<i64, CaptureError>, f64, i64) {
         "sim:".parse().unwrap(),
     );
     settings.wanted.exposure = Some(40);
-    let stop = StopRequest::default();
+    let stop = StopRequest::new(&clock);
     let mut scene = Scene::new(clock, &simulator, light);
     let mut locked = LockedCamera::lock(&mut scene, &settings, &stop).unwrap();
     ready_table(&table, &settings).unwrap();

@@ -52,19 +52,20 @@ impl CameraThread {
 
     /// Records until something ends it; gives the camera back, still started.
     pub(super) fn run(mut self) -> (Box<dyn Camera>, CameraOutcome) {
-        let mut last = Instant::now();
+        let mut last_us = self.shared.control.clock().now_us();
         let end = loop {
-            if let Err(end) = self.step(&mut last) {
+            if let Err(end) = self.step(&mut last_us) {
                 break end;
             }
         };
-        self.shared.control().progress.ended = true;
         let (rest, count) = self.cutter.end();
         let until = Instant::now() + LAST_WAIT;
         for frame in rest {
             // A disk that refuses is the writer's to report.
             let _ = self.enqueue(frame, until);
         }
+        let control = &self.shared.control;
+        control.update(|control| control.progress.ended = true);
         let outcome = CameraOutcome {
             end,
             count,
@@ -73,18 +74,23 @@ impl CameraThread {
         (self.camera, outcome)
     }
 
-    /// Takes the next frame; `last`: when the one before came.
-    fn step(&mut self, last: &mut Instant) -> Result<(), End> {
+    /// Takes the next frame; `last_us`: when the one before came.
+    fn step(&mut self, last_us: &mut i64) -> Result<(), End> {
         self.obey()?;
-        match self.camera.next_frame(FRAME_WAIT.min(self.stall)) {
+        let frame = self.camera.next_frame(FRAME_WAIT.min(self.stall));
+        let now_us = self.shared.control.clock().now_us();
+        match frame {
             Ok(frame) => {
-                *last = Instant::now();
+                *last_us = now_us;
                 self.take(frame)
             }
-            Err(CameraError::Timeout { .. }) => match last.elapsed() {
-                waited if waited >= self.stall => Err(End::Stalled { waited }),
-                _ => Ok(()),
-            },
+            Err(CameraError::Timeout { .. }) => {
+                let waited = Duration::from_micros(now_us.abs_diff(*last_us));
+                match waited >= self.stall {
+                    true => Err(End::Stalled { waited }),
+                    false => Ok(()),
+                }
+            }
             Err(CameraError::EndOfRecording { .. }) => Err(End::SourceOver),
             Err(error) => Err(End::Camera(error)),
         }
@@ -93,7 +99,7 @@ impl CameraThread {
     /// Does what the owner wants.
     fn obey(&mut self) -> Result<(), End> {
         let (stop, window) = {
-            let control = self.shared.control();
+            let control = self.shared.control.lock();
             (control.stop, control.window)
         };
         match window {
@@ -137,7 +143,7 @@ impl CameraThread {
             match self.queue.send_deadline(frame, until) {
                 Ok(()) => fault.map(FrameIssue::Damaged),
                 Err(SendTimeoutError::Timeout(_)) => {
-                    self.shared.control().progress.overrun += 1;
+                    self.shared.control.lock().progress.overrun += 1;
                     Some(FrameIssue::QueueFull)
                 }
                 Err(SendTimeoutError::Disconnected(_)) => return Err(End::Disk),

@@ -1,8 +1,7 @@
 //! What a recording's owner and its two threads share: wishes one way, figures the other.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use super::window::Window;
+use crate::clock::{Clock, Waitable};
 use crate::preview::Preview;
 
 /// How far a recording has come.
@@ -27,24 +26,22 @@ pub(super) struct Control {
 }
 
 /// Shared by the owner and the threads.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Shared {
     pub(super) preview: Option<Preview>,
-    control: Mutex<Control>,
+    /// Locked for moments only: the camera's thread looks at it between two frames.
+    pub(super) control: Waitable<Control>,
 }
 
 impl Shared {
-    pub(super) fn new(preview: Option<Preview>, window: Option<Window>) -> Self {
-        let shared = Self {
-            preview,
-            ..Self::default()
+    pub(super) fn new(clock: &Clock, preview: Option<Preview>, window: Option<Window>) -> Self {
+        let control = Control {
+            window,
+            ..Control::default()
         };
-        shared.control().window = window;
-        shared
-    }
-
-    /// For a moment only: the camera's thread looks at it between two frames.
-    pub(super) fn control(&self) -> MutexGuard<'_, Control> {
-        self.control.lock().unwrap_or_else(PoisonError::into_inner)
+        Self {
+            preview,
+            control: Waitable::new(clock, control),
+        }
     }
 }

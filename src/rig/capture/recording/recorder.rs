@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::thread;
+use std::time::Duration;
 
 use super::camera_thread::CameraThread;
 use super::error::RecordingError;
@@ -13,6 +13,7 @@ use super::verdict::Recorded;
 use super::window::Window;
 use super::writer_thread::WriterThread;
 use crate::camera::{Camera, GrantedMode};
+use crate::clock::{Clock, JoinHandle};
 use crate::preview::Preview;
 use relit_data::session::{Fault, Manifest, SessionWriter};
 use relit_video::{PixelFormat, StreamFormat};
@@ -42,20 +43,22 @@ pub struct Plan {
     /// How long a frame may wait for a place in the queue before it is dropped. A camera does not
     /// wait: zero. A replay does.
     pub queue_wait: Duration,
-    /// Without a frame for so long the camera counts as failed.
+    /// Without a frame for so long, by the clock, the camera counts as failed.
     pub stall: Duration,
+    /// The clock that the camera's frames are stamped with.
+    pub clock: Clock,
     /// Where every frame is shown.
     pub preview: Option<Preview>,
 }
 
 type CameraHandle = JoinHandle<(Box<dyn Camera>, CameraOutcome)>;
+type WriterHandle = thread::JoinHandle<WriterOutcome>;
 
 /// A recording under way. Dropped, it is asked to stop, and its session is left to be salvaged.
-#[derive(Debug)]
 pub struct Recorder {
     shared: Arc<Shared>,
     folder: PathBuf,
-    threads: Option<(CameraHandle, JoinHandle<WriterOutcome>)>,
+    threads: Option<(CameraHandle, WriterHandle)>,
     max_dropped: u64,
 }
 
@@ -81,13 +84,18 @@ impl Recorder {
         fill_in(&mut manifest, &stream, &plan.mode);
         let session = SessionWriter::create(&plan.root, manifest)?;
         let folder = session.folder().to_owned();
-        let shared = Arc::new(Shared::new(plan.preview, plan.window));
+        let shared = Arc::new(Shared::new(&plan.clock, plan.preview, plan.window));
         let (sender, queue) = crossbeam_channel::bounded(queue_places(&stream));
         let writer = WriterThread::new(stream, session, queue, Arc::clone(&shared))?;
         let (stall, wait) = (plan.stall, plan.queue_wait);
         let camera = CameraThread::new(camera, &stream, stall, wait, sender, Arc::clone(&shared));
-        let writer = spawn("writer", move || writer.run())?;
-        let camera = spawn("camera", move || camera.run())?;
+        // The disk goes by real time: only the camera's thread takes part in the clock.
+        let refused = |what| move |source| RecordingError::Thread { what, source };
+        let thread = thread::Builder::new().name("relit-writer".to_owned());
+        let writer = thread.spawn(move || writer.run());
+        let writer = writer.map_err(refused("writer"))?;
+        let camera = plan.clock.spawn("relit-camera", move || camera.run());
+        let camera = camera.map_err(refused("camera"))?;
         Ok(Self {
             shared,
             folder,
@@ -99,12 +107,12 @@ impl Recorder {
     /// Sets when the turn is. It may have begun up to four seconds ago: so long frames are kept.
     /// Only the first window counts.
     pub fn announce(&self, window: Window) {
-        self.shared.control().window.get_or_insert(window);
+        self.shared.control.lock().window.get_or_insert(window);
     }
 
     /// Asks the recording to stop, and returns at once.
     pub fn stop(&self) {
-        self.shared.control().stop = true;
+        self.shared.control.lock().stop = true;
     }
 
     /// The session folder.
@@ -116,17 +124,15 @@ impl Recorder {
     /// Waits until nothing more is recorded, or `timeout` is over; true where it has ended.
     #[must_use]
     pub fn wait_ended(&self, timeout: Duration) -> bool {
-        let until = Instant::now() + timeout;
-        while !self.progress().ended && Instant::now() < until {
-            thread::sleep(Duration::from_millis(5));
-        }
-        self.progress().ended
+        let control = &self.shared.control;
+        let ended = control.wait_for(timeout, |control| control.progress.ended.then_some(()));
+        ended.is_some()
     }
 
     /// How far it has come.
     #[must_use]
     pub fn progress(&self) -> Progress {
-        self.shared.control().progress
+        self.shared.control.lock().progress
     }
 
     /// Waits until the turn is over, something ends the recording, or it is stopped; gives the
@@ -149,14 +155,6 @@ impl Drop for Recorder {
     }
 }
 
-fn spawn<T: Send + 'static>(
-    what: &'static str,
-    run: impl FnOnce() -> T + Send + 'static,
-) -> Result<JoinHandle<T>, RecordingError> {
-    let thread = thread::Builder::new().name(format!("relit-{what}"));
-    let refused = |source| RecordingError::Thread { what, source };
-    thread.spawn(run).map_err(refused)
-}
 /// How many frames may wait for the disk, by the largest that they can reasonably be.
 fn queue_places(stream: &StreamFormat) -> usize {
     let pixels = stream.width as usize * stream.height as usize;

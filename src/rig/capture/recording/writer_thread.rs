@@ -68,7 +68,7 @@ impl WriterThread {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
-            self.shared.control().progress.frames = self.muxer.frames();
+            self.shared.control.lock().progress.frames = self.muxer.frames();
             if Instant::now() >= due {
                 self.muxer.sync()?;
                 self.session.sync()?;
