@@ -11,7 +11,6 @@ mod worker;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
 
 use relit_data::causes::with_causes;
 
@@ -20,7 +19,7 @@ use crate::capture::Equipment;
 use crate::capture::Settings;
 use crate::capture::{StopRequest, Stopped};
 use crate::capture::{preflight, salvage};
-use crate::clock::Clock;
+use crate::clock::{Clock, JoinHandle};
 use crate::lockfile::LockFile;
 use crate::preview::Preview;
 use crate::serve::rig::{Command, Refused, Rig};
@@ -57,10 +56,10 @@ impl Daemon {
         let wants_table = equipment.wants_table();
         let thread = |source| CaptureError::system("a thread", "started")(source);
         let preview = Preview::start(dispatcher.monitor.clone()).map_err(thread)?;
+        let clock = equipment.clock();
         let mut worker = Worker::new(equipment, Arc::clone(&dispatcher), preview);
-        let worker = std::thread::Builder::new()
-            .name("relit-rig".to_owned())
-            .spawn(move || worker.run())
+        let worker = clock
+            .spawn("relit-rig", move || worker.run())
             .map_err(thread)?;
         Ok(Self {
             dispatcher,

@@ -120,22 +120,24 @@ impl Worker {
         let Some(table) = self.equipment.table.as_ref() else {
             return Err(CaptureError::NoTable);
         };
+        let clock = self.equipment.clock();
         let (camera, idle) = (&mut self.equipment.camera, &mut self.idle);
         let monitor = &self.dispatcher.monitor;
         stop.over(table, || {
-            std::thread::scope(|scope| {
-                let moving = scope.spawn(|| motion(table));
+            clock.scope(|scope| {
+                let moving = scope.spawn("relit-motion", || motion(table));
+                let moving = moving.map_err(CaptureError::system("a thread", "started"))?;
                 while !moving.is_finished() {
                     // What is wrong with either shows when the motion is over.
                     let _ = show_table(monitor, table);
                     if let Some(camera) = camera.as_mut() {
                         let _ = idle.take_frame(camera.as_mut());
                     }
-                    std::thread::sleep(PERIOD);
+                    clock.sleep(PERIOD);
                 }
                 // A motion that panicked was stopped by what it left behind, and nobody saw it.
                 let moved = moving.join();
-                moved.unwrap_or(Err(TurntableError::NotStopped))
+                Ok::<_, CaptureError>(moved.unwrap_or(Err(TurntableError::NotStopped))?)
             })
         })
     }
