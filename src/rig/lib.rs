@@ -20,6 +20,7 @@ pub mod capture;
 pub mod clock;
 pub mod daemon;
 pub mod lockfile;
+pub mod preview;
 pub mod serve;
 pub mod simulator;
 pub mod state;

@@ -83,7 +83,7 @@ impl Rehearsal {
     pub(crate) fn capture_all(&mut self, meter: bool) -> Result<Captured, CaptureError> {
         let context = CaptureContext {
             monitor: &self.monitor,
-            viewer: None,
+            preview: None,
             stop: &self.stop,
         };
         let request = CaptureRequest {

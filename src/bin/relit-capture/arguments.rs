@@ -59,6 +59,7 @@ pub(crate) struct Serve {
     pub(crate) settings: Settings,
     pub(crate) address: SocketAddr,
     pub(crate) token: Option<Token>,
+    pub(crate) token_file: Option<PathBuf>,
     pub(crate) names: Vec<String>,
 }
 
@@ -116,9 +117,13 @@ struct ServeArguments {
     /// Address and port to listen on.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8420")]
     listen: SocketAddr,
-    /// What a client has to know [default: random where other machines can reach the address].
-    #[arg(long, value_name = "TOKEN")]
+    /// What a client has to know, 16 to 128 letters, digits, '-' and '_' [default: random where other
+    /// machines can reach the address]. Other accounts of this machine can see it: prefer --token-file.
+    #[arg(long, value_name = "TOKEN", conflicts_with = "token_file")]
     token: Option<Token>,
+    /// A file that holds the token, which only its owner and its group can read.
+    #[arg(long, value_name = "FILE")]
+    token_file: Option<PathBuf>,
     /// A name under which clients reach this machine, such as rig.local; may be given several times.
     #[arg(long = "name", value_name = "NAME")]
     names: Vec<String>,
@@ -190,6 +195,7 @@ pub(crate) fn parse() -> Arguments {
             settings: line.rig.into(),
             address: line.listen,
             token: line.token,
+            token_file: line.token_file,
             names: line.names,
         })),
         Verb::Turntable(line) => Command::Turntable(line),

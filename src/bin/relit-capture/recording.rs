@@ -43,7 +43,7 @@ pub(crate) fn run(console: Console, record: Record) -> Result<Outcome, CaptureEr
     let request = CaptureRequest { object, meter };
     let context = CaptureContext {
         monitor: &monitor,
-        viewer: None,
+        preview: None,
         stop: &stop,
     };
     let captured = while_reporting(console, &monitor, || {

@@ -16,7 +16,6 @@ pub mod look;
 mod manifest;
 mod metering;
 pub mod preflight;
-pub(crate) mod preview;
 pub mod recording;
 mod settings;
 mod stop;
@@ -26,7 +25,6 @@ pub(crate) mod turn;
 pub use equipment::Equipment;
 pub use error::{CaptureError, MeterFault, Refusal};
 pub use locked_camera::LockedCamera;
-pub use preview::Preview;
 pub use recording::{
     End, Plan, Progress, Recorded, Recorder, RecordingError, Salvaged, Saved, Window, salvage,
     salvage_session,
@@ -36,4 +34,4 @@ pub use stop::{StopRequest, Stopped};
 pub use take::{CaptureContext, CaptureRequest, Captured, capture};
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -21,7 +21,7 @@ use super::settings::Settings;
 use super::stop::StopRequest;
 use super::turn::TurnRecording;
 use crate::camera::{Camera, CameraAddress};
-use crate::daemon::Viewer;
+use crate::preview::Preview;
 use crate::state::{Check, Monitor, Phase, TakeSummary, Verdict};
 use crate::turntable::{Table, TurnPlan};
 
@@ -42,8 +42,8 @@ pub struct CaptureRequest {
 pub struct CaptureContext<'a> {
     /// Gets the state.
     pub monitor: &'a Monitor,
-    /// Gets the newest frames.
-    pub viewer: Option<&'a Viewer>,
+    /// Gets the frames.
+    pub preview: Option<&'a Preview>,
     /// May be asked for at any time.
     pub stop: &'a StopRequest,
 }
@@ -215,6 +215,7 @@ fn prepare(
         queue_wait,
         stall: NEXT_FRAME,
         clock: equipment.clock(),
+        preview: context.preview.cloned(),
     };
     Ok(Prepared {
         locked,

@@ -3,7 +3,7 @@
 use crate::camera::{Fourcc, Frame, Sequence, StampSource};
 
 /// Frame `n` of a camera of 30 frames/s.
-pub(super) fn frame(n: u64) -> Frame {
+pub(crate) fn frame(n: u64) -> Frame {
     Frame {
         fourcc: Fourcc::GREY,
         width: 2,

@@ -75,12 +75,11 @@ impl TurnRecording<'_> {
         let window = Window::lasting(from_us, self.turn_us);
         self.recorder.announce(window);
         self.context.enter(Phase::Recording);
-        let mut shown = 0;
         loop {
             self.context.stop.check()?;
             check()?;
             let ended = self.recorder.wait_ended(LOOK);
-            self.show_progress(&mut shown);
+            self.show_progress();
             let late_us = self.clock.now_us().saturating_sub(window.to_us());
             let late = Duration::from_micros(u64::try_from(late_us).unwrap_or(0));
             match ended {
@@ -91,18 +90,12 @@ impl TurnRecording<'_> {
         }
     }
 
-    /// Shows the figures, and the newest frame where it is newer than number `shown`.
-    fn show_progress(&self, shown: &mut u64) {
+    fn show_progress(&self) {
         let progress = self.recorder.progress();
         self.context.monitor.update(|state| {
             state.frames = progress.frames;
             state.dropped = progress.overrun;
         });
-        let newest = self.recorder.preview().newer_than(*shown, Duration::ZERO);
-        if let (Some(viewer), Some((number, frame))) = (self.context.viewer, newest) {
-            *shown = number;
-            viewer.offer(&frame);
-        }
     }
 
     /// Enters a phase in which the table moves, and its reports are not shown until it is there.

@@ -5,14 +5,12 @@
 //! are given. When the daemon is dropped, a take under way is aborted and closed, the table stands, and
 //! the thread has ended.
 
-pub(crate) mod idle;
+mod idle;
 mod schedule;
-mod viewer;
 mod worker;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
 
 use relit_data::causes::with_causes;
 
@@ -21,12 +19,12 @@ use crate::capture::Equipment;
 use crate::capture::Settings;
 use crate::capture::{StopRequest, Stopped};
 use crate::capture::{preflight, salvage};
-use crate::clock::Clock;
+use crate::clock::{Clock, JoinHandle};
 use crate::lockfile::LockFile;
+use crate::preview::Preview;
 use crate::serve::rig::{Command, Refused, Rig};
 use crate::state::{Monitor, Phase};
 use schedule::{Job, Next, Schedule, StopTarget};
-pub use viewer::Viewer;
 use worker::Worker;
 
 /// Farthest that a table is turned by one command, degrees.
@@ -57,11 +55,11 @@ impl Daemon {
         report_salvaged(&root, &dispatcher.monitor)?;
         let wants_table = equipment.wants_table();
         let thread = |source| CaptureError::system("a thread", "started")(source);
-        let viewer = Viewer::start(dispatcher.monitor.clone()).map_err(thread)?;
-        let mut worker = Worker::new(equipment, Arc::clone(&dispatcher), viewer);
-        let worker = std::thread::Builder::new()
-            .name("relit-rig".to_owned())
-            .spawn(move || worker.run())
+        let preview = Preview::start(dispatcher.monitor.clone()).map_err(thread)?;
+        let clock = equipment.clock();
+        let mut worker = Worker::new(equipment, Arc::clone(&dispatcher), preview);
+        let worker = clock
+            .spawn("relit-rig", move || worker.run())
             .map_err(thread)?;
         Ok(Self {
             dispatcher,

@@ -9,7 +9,6 @@ use relit_data::causes::with_causes;
 use super::Dispatcher;
 use super::idle::Idle;
 use super::schedule::{Job, Next};
-use super::viewer::Viewer;
 use crate::camera::Camera;
 use crate::camera::hold::{ManualPlan, ManualValues};
 use crate::capture::CaptureError;
@@ -17,6 +16,7 @@ use crate::capture::Equipment;
 use crate::capture::StopRequest;
 use crate::capture::turn::show_table;
 use crate::capture::{CaptureContext, CaptureRequest, capture};
+use crate::preview::Preview;
 use crate::state::Verdict;
 use crate::turntable::{Table, TurntableError};
 
@@ -28,17 +28,21 @@ pub(super) struct Worker {
     // The table is stopped with the equipment, before anything else ends.
     equipment: Equipment,
     dispatcher: Arc<Dispatcher>,
-    viewer: Viewer,
+    preview: Preview,
     idle: Idle,
 }
 
 impl Worker {
-    pub(super) fn new(equipment: Equipment, dispatcher: Arc<Dispatcher>, viewer: Viewer) -> Self {
+    pub(super) fn new(equipment: Equipment, dispatcher: Arc<Dispatcher>, preview: Preview) -> Self {
         Self {
-            idle: Idle::new(dispatcher.monitor.clone()),
+            idle: Idle::new(
+                dispatcher.monitor.clone(),
+                preview.clone(),
+                equipment.clock(),
+            ),
             equipment,
             dispatcher,
-            viewer,
+            preview,
         }
     }
 
@@ -47,7 +51,7 @@ impl Worker {
         loop {
             match self.dispatcher.begin() {
                 (Next::Job(job), stop) => self.work(job, &stop),
-                (Next::Idle, _) => self.idle.glance(&mut self.equipment, &self.viewer),
+                (Next::Idle, _) => self.idle.poll(&mut self.equipment),
                 (Next::End, _) => return,
             }
         }
@@ -58,7 +62,7 @@ impl Worker {
         if let Err(error) = &done {
             self.report(with_causes(error));
         }
-        self.idle.begin_again();
+        self.idle.restart();
         let succeeded = done.unwrap_or(false);
         self.dispatcher
             .change(|schedule| schedule.finish(succeeded));
@@ -90,7 +94,7 @@ impl Worker {
         let monitor = &self.dispatcher.monitor;
         let context = CaptureContext {
             monitor,
-            viewer: Some(&self.viewer),
+            preview: Some(&self.preview),
             stop,
         };
         let captured = capture(&mut self.equipment, request, context);
@@ -116,22 +120,24 @@ impl Worker {
         let Some(table) = self.equipment.table.as_ref() else {
             return Err(CaptureError::NoTable);
         };
-        let (camera, viewer, idle) = (&mut self.equipment.camera, &self.viewer, &mut self.idle);
+        let clock = self.equipment.clock();
+        let (camera, idle) = (&mut self.equipment.camera, &mut self.idle);
         let monitor = &self.dispatcher.monitor;
         stop.over(table, || {
-            std::thread::scope(|scope| {
-                let moving = scope.spawn(|| motion(table));
+            clock.scope(|scope| {
+                let moving = scope.spawn("relit-motion", || motion(table));
+                let moving = moving.map_err(CaptureError::system("a thread", "started"))?;
                 while !moving.is_finished() {
                     // What is wrong with either shows when the motion is over.
                     let _ = show_table(monitor, table);
                     if let Some(camera) = camera.as_mut() {
-                        let _ = idle.take_frame(camera.as_mut(), viewer);
+                        let _ = idle.take_frame(camera.as_mut());
                     }
-                    std::thread::sleep(PERIOD);
+                    clock.sleep(PERIOD);
                 }
                 // A motion that panicked was stopped by what it left behind, and nobody saw it.
                 let moved = moving.join();
-                moved.unwrap_or(Err(TurntableError::NotStopped))
+                Ok::<_, CaptureError>(moved.unwrap_or(Err(TurntableError::NotStopped))?)
             })
         })
     }

@@ -64,7 +64,6 @@ impl CameraThread {
             // A disk that refuses is the writer's to report.
             let _ = self.enqueue(frame, until);
         }
-        self.shared.preview.end();
         let control = &self.shared.control;
         control.update(|control| control.progress.ended = true);
         let outcome = CameraOutcome {
@@ -118,7 +117,9 @@ impl CameraThread {
             return Err(End::OtherSize(fault));
         }
         let frame = Arc::new(frame);
-        self.shared.preview.publish(&frame);
+        if let Some(preview) = &self.shared.preview {
+            preview.publish(&frame);
+        }
         let frames = self.cutter.push(frame);
         self.enqueue_all(frames)
     }

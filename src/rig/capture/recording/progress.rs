@@ -1,8 +1,8 @@
 //! What a recording's owner and its two threads share: wishes one way, figures the other.
 
 use super::window::Window;
-use crate::capture::preview::Preview;
 use crate::clock::{Clock, Waitable};
+use crate::preview::Preview;
 
 /// How far a recording has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -28,19 +28,19 @@ pub(super) struct Control {
 /// Shared by the owner and the threads.
 #[derive(Debug)]
 pub(super) struct Shared {
-    pub(super) preview: Preview,
+    pub(super) preview: Option<Preview>,
     /// Locked for moments only: the camera's thread looks at it between two frames.
     pub(super) control: Waitable<Control>,
 }
 
 impl Shared {
-    pub(super) fn new(clock: &Clock, window: Option<Window>) -> Self {
+    pub(super) fn new(clock: &Clock, preview: Option<Preview>, window: Option<Window>) -> Self {
         let control = Control {
             window,
             ..Control::default()
         };
         Self {
-            preview: Preview::default(),
+            preview,
             control: Waitable::new(clock, control),
         }
     }

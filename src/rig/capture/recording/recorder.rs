@@ -13,8 +13,8 @@ use super::verdict::Recorded;
 use super::window::Window;
 use super::writer_thread::WriterThread;
 use crate::camera::{Camera, GrantedMode};
-use crate::capture::preview::Preview;
 use crate::clock::{Clock, JoinHandle};
+use crate::preview::Preview;
 use relit_data::session::{Fault, Manifest, SessionWriter};
 use relit_video::{PixelFormat, StreamFormat};
 
@@ -47,6 +47,8 @@ pub struct Plan {
     pub stall: Duration,
     /// The clock that the camera's frames are stamped with.
     pub clock: Clock,
+    /// Where every frame is shown.
+    pub preview: Option<Preview>,
 }
 
 type CameraHandle = JoinHandle<(Box<dyn Camera>, CameraOutcome)>;
@@ -82,7 +84,7 @@ impl Recorder {
         fill_in(&mut manifest, &stream, &plan.mode);
         let session = SessionWriter::create(&plan.root, manifest)?;
         let folder = session.folder().to_owned();
-        let shared = Arc::new(Shared::new(&plan.clock, plan.window));
+        let shared = Arc::new(Shared::new(&plan.clock, plan.preview, plan.window));
         let (sender, queue) = crossbeam_channel::bounded(queue_places(&stream));
         let writer = WriterThread::new(stream, session, queue, Arc::clone(&shared))?;
         let (stall, wait) = (plan.stall, plan.queue_wait);
@@ -117,12 +119,6 @@ impl Recorder {
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
-    }
-
-    /// The newest frame, for viewers.
-    #[must_use]
-    pub fn preview(&self) -> &Preview {
-        &self.shared.preview
     }
 
     /// Waits until nothing more is recorded, or `timeout` is over; true where it has ended.

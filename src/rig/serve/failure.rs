@@ -1,6 +1,7 @@
 //! Answers that are not what was asked for: a status and a sentence.
 
 use axum::Json;
+use axum::extract::rejection::QueryRejection;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -57,6 +58,12 @@ impl From<Refused> for Failure {
             Refused::Unavailable(error) => (StatusCode::SERVICE_UNAVAILABLE, error),
         };
         Self { status, error }
+    }
+}
+
+impl From<QueryRejection> for Failure {
+    fn from(query: QueryRejection) -> Self {
+        Self::bad(query.body_text())
     }
 }
 

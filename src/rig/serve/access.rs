@@ -10,9 +10,7 @@ use axum::http::{StatusCode, Uri};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use super::answer::Failure;
-use super::page;
-use super::server::Server;
+use super::failure::Failure;
 use super::token::Token;
 
 /// How long a browser keeps the token, seconds: 30 days.
@@ -42,20 +40,30 @@ const HEADERS: [(HeaderName, &str); 6] = [
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Local(pub(super) IpAddr);
 
-/// Checks who may come in.
+/// Which requests are let in.
 #[derive(Debug)]
-pub(super) struct Door {
+pub(super) struct AccessPolicy {
     token: Option<Token>,
     names: Vec<String>,
+    /// Paths that need no token.
+    open_paths: Vec<&'static str>,
     /// Browsers share cookies between ports: the name keeps two rigs on one machine apart.
     cookie: String,
 }
 
-impl Door {
-    pub(super) fn new(port: u16, token: Option<Token>, names: Vec<String>) -> Self {
+impl AccessPolicy {
+    /// The policy of a server at `port` that demands `token`, save for `open_paths`, and is known
+    /// under `names` besides its addresses.
+    pub(super) fn new(
+        port: u16,
+        token: Option<Token>,
+        names: Vec<String>,
+        open_paths: Vec<&'static str>,
+    ) -> Self {
         Self {
             token,
             names,
+            open_paths,
             cookie: format!("relit-{port}"),
         }
     }
@@ -63,7 +71,7 @@ impl Door {
     fn admit(&self, local: IpAddr, uri: &Uri, headers: &HeaderMap) -> Result<(), Failure> {
         let host = self.host(local, headers)?;
         check_origin(host, headers)?;
-        if page::is_open(uri.path()) || self.knows_token(headers) {
+        if self.open_paths.contains(&uri.path()) || self.has_token(headers) {
             return Ok(());
         }
         let error = "this needs the token: open the address that was printed at the start, or send \
@@ -93,7 +101,7 @@ impl Door {
     }
 
     /// True where no token is asked for, or the right one came.
-    fn knows_token(&self, headers: &HeaderMap) -> bool {
+    fn has_token(&self, headers: &HeaderMap) -> bool {
         let Some(token) = &self.token else {
             return true;
         };
@@ -159,22 +167,21 @@ fn cookies(headers: &HeaderMap) -> impl Iterator<Item = (&str, &str)> {
         .filter_map(|pair| pair.trim().split_once('='))
 }
 
-/// Lets a request through or refuses it, and dresses the answer.
-pub(super) async fn pass(
-    State(server): State<Arc<Server>>,
+/// Lets a request through or refuses it, and gives the answer the headers that all have.
+pub(super) async fn guard(
+    State(policy): State<Arc<AccessPolicy>>,
     request: Request,
     next: Next,
 ) -> Response {
     let local = request.extensions().get::<Local>().copied();
     let admitted = match local {
-        Some(Local(ip)) => server.door.admit(ip, request.uri(), request.headers()),
+        Some(Local(ip)) => policy.admit(ip, request.uri(), request.headers()),
         None => Err(Failure::broken("the connection's address is not known")),
     };
     let mut response = match admitted {
         Ok(()) => next.run(request).await,
         Err(failure) => failure.into_response(),
     };
-    server.counts.answered(response.status());
     let headers = response.headers_mut();
     for (name, value) in HEADERS {
         headers.insert(name, HeaderValue::from_static(value));
@@ -199,9 +206,9 @@ mod tests {
 
     fn verdict(local: &str, path: &'static str, pairs: &[(&'static str, &str)]) -> u16 {
         let token = "0123456789abcdef".parse().unwrap();
-        let door = Door::new(80, Some(token), vec!["rig.local".to_owned()]);
+        let policy = AccessPolicy::new(80, Some(token), vec!["rig.local".to_owned()], vec!["/"]);
         let local = local.parse().unwrap();
-        match door.admit(local, &Uri::from_static(path), &headers(pairs)) {
+        match policy.admit(local, &Uri::from_static(path), &headers(pairs)) {
             Ok(()) => 200,
             Err(failure) => failure.status.as_u16(),
         }
