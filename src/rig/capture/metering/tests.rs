@@ -5,8 +5,8 @@ use std::time::Duration;
 use super::super::preflight::{hold_camera, ready_table};
 use super::*;
 use crate::camera::{
-    Capabilities, ControlFlags, ControlId, ControlKind, DeviceInfo, Fourcc, GrantedMode, MenuItem,
-    Mode, ModeRequest, Rate, Rates, Sequence, Sizes, StampSource,
+    ControlFlags, ControlId, ControlKind, DeviceInfo, Fourcc, GrantedMode, MenuItem, Mode,
+    ModeRequest, Rate, Rates, Sequence, Sizes, StampSource,
 };
 use crate::clock::Clock;
 use crate::simulator::{Simulator, SimulatorOptions};
@@ -39,11 +39,6 @@ impl<'a> Scene<'a> {
             bus: String::new(),
             modes: Vec::new(),
             other_formats: Vec::new(),
-            capabilities: Capabilities {
-                sequence: true,
-                driver_time: true,
-                controls: true,
-            },
             problems: Vec::new(),
         };
         Self {
