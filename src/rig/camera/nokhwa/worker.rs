@@ -14,7 +14,6 @@ use std::time::Duration;
 use ::nokhwa::utils::{CameraFormat, FrameFormat, RequestedFormat, RequestedFormatType};
 use ::nokhwa::{Camera as Library, NokhwaError};
 
-use super::super::frame::jpeg_length;
 use super::super::{CameraError, Frame, StampSource};
 use crate::clock::Clock;
 
@@ -73,13 +72,13 @@ impl Worker {
         let doing = "it was opened";
         let spawned = thread::Builder::new().name("nokhwa".to_owned()).spawn(work);
         spawned.map_err(|error| failed(&device, doing, error))?;
-        wait(&device, doing, &answer)?;
-        let jobs = Some(jobs);
-        Ok(Self {
+        let worker = Self {
             device,
-            jobs,
+            jobs: Some(jobs),
             ended,
-        })
+        };
+        worker.wait(doing, &answer)?;
+        Ok(worker)
     }
 
     /// Has the thread do something with the camera, and waits for what comes of it.
@@ -92,14 +91,29 @@ impl Worker {
         let job: Job = Box::new(move |owner| drop(reply.send(work(owner))));
         let sent = self.jobs.as_ref().map(|jobs| jobs.try_send(job));
         match sent {
-            Some(Ok(())) => wait(&self.device, doing, &answer),
+            Some(Ok(())) => self.wait(doing, &answer),
             // The job before this one was never done.
             Some(Err(TrySendError::Full(_))) => Err(failed(&self.device, doing, "it hangs")),
             Some(Err(TrySendError::Disconnected(_))) | None => Err(self.gone()),
         }
     }
 
-    /// The error of a thread that is over: the library gave up.
+    fn wait<T>(
+        &self,
+        doing: &'static str,
+        answer: &Receiver<Result<T, NokhwaError>>,
+    ) -> Result<T, CameraError> {
+        match answer.recv_timeout(ANSWERING) {
+            Ok(answer) => answer.map_err(|error| self.failed(doing, error)),
+            Err(RecvTimeoutError::Timeout) => {
+                let waited = format!("it did not answer for {} s", ANSWERING.as_secs());
+                Err(failed(&self.device, doing, waited))
+            }
+            Err(RecvTimeoutError::Disconnected) => Err(self.gone()),
+        }
+    }
+
+    /// The error of a thread that is over: the library panicked, as it does when a device goes away.
     pub(super) fn gone(&self) -> CameraError {
         CameraError::Unplugged {
             device: self.device.clone(),
@@ -128,21 +142,6 @@ fn failed(
         device: device.to_owned(),
         doing,
         source: source.into(),
-    }
-}
-
-fn wait<T>(
-    device: &str,
-    doing: &'static str,
-    answer: &Receiver<Result<T, NokhwaError>>,
-) -> Result<T, CameraError> {
-    match answer.recv_timeout(ANSWERING) {
-        Ok(answer) => answer.map_err(|error| failed(device, doing, error)),
-        Err(RecvTimeoutError::Timeout) => Err(CameraError::Timeout {
-            device: device.to_owned(),
-            waited: ANSWERING,
-        }),
-        Err(RecvTimeoutError::Disconnected) => Err(failed(device, doing, "the library gave up")),
     }
 }
 
@@ -229,5 +228,24 @@ impl Stream {
             stamp: StampSource::Arrival,
             flagged: false,
         }
+    }
+}
+
+/// How many bytes of `data` are the JPEG with which it begins; `None` where its end is missing.
+pub(super) fn jpeg_length(data: &[u8]) -> Option<usize> {
+    let mut at = 2;
+    loop {
+        let &[marker, code] = data.get(at..)?.first_chunk()?;
+        at += match (marker, code) {
+            (0xff, 0xd9) => return Some(at + 2),
+            (0xff, 0xff) => 1,
+            // Values that look like a marker, and markers that stand alone.
+            (0xff, 0x00 | 0x01 | 0xd0..=0xd8) => 2,
+            (0xff, _) => {
+                let &[_, _, high, low] = data.get(at..)?.first_chunk()?;
+                2 + usize::from(u16::from_be_bytes([high, low]))
+            }
+            _ => data[at..].iter().position(|&byte| byte == 0xff)?,
+        };
     }
 }
