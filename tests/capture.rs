@@ -24,8 +24,8 @@ use relit_data::session::{
 };
 use relit_data::shard::{Dataset, ImageSize};
 use relit_rig::camera::{
-    Camera, CameraAddress, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc,
-    Frame, GrantedMode, Mode, ModeRequest, Rate, Sequence, StampSource, open,
+    Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
+    Mode, ModeRequest, Rate, Sequence, StampSource, open,
 };
 use relit_rig::capture::{End, Plan, Recorder, Window, salvage, salvage_session};
 use relit_rig::clock::Clock;
@@ -59,11 +59,6 @@ impl Scripted {
                 bus: String::new(),
                 modes: Vec::new(),
                 other_formats: Vec::new(),
-                capabilities: Capabilities {
-                    sequence: true,
-                    driver_time: true,
-                    controls: false,
-                },
                 problems: Vec::new(),
             },
             steps: Box::new(steps),

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use super::*;
 use crate::camera::{
-    Capabilities, ControlFlags, ControlId, ControlKind, DeviceInfo, Fourcc, GrantedMode, MenuItem,
-    Mode, ModeRequest, Rate, Rates, Sequence, Sizes, StampSource,
+    ControlFlags, ControlId, ControlKind, DeviceInfo, Fourcc, GrantedMode, MenuItem, Mode,
+    ModeRequest, Rate, Rates, Sequence, Sizes, StampSource,
 };
 use crate::capture::preflight::ready_table;
 use crate::clock::Clock;
@@ -39,11 +39,6 @@ impl<'a> Scene<'a> {
             bus: String::new(),
             modes: Vec::new(),
             other_formats: Vec::new(),
-            capabilities: Capabilities {
-                sequence: true,
-                driver_time: true,
-                controls: true,
-            },
             problems: Vec::new(),
         };
         Self {
