@@ -8,7 +8,7 @@ use relit_rig::turntable::{
 };
 use serde_json::json;
 
-use crate::environment::{at_end, runtime_folder};
+use crate::environment::at_end;
 use crate::table_arguments::{Action, TurntableArguments};
 use relit::console::{Console, Outcome};
 
@@ -20,10 +20,7 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
             return Err(no_port(&asked.turntable));
         }
     };
-    let options = TableOptions {
-        runtime_folder: runtime_folder(),
-        ..TableOptions::default()
-    };
+    let options = TableOptions::default();
     match asked.action {
         Action::Status => status(console, &port, &options),
         Action::Stop => stop(console, &port, &options),

@@ -1,12 +1,21 @@
 //! Camera and table, opened on one clock, and opened again after they were gone.
 
-use crate::camera::{self, Camera};
+use std::time::Duration;
+
+use jiff::Timestamp;
+
+use crate::camera::{self, Camera, CameraAddress, ReplaySpeed};
 use crate::clock::Clock;
 use crate::simulator::{self, SimulatedTable, SimulatorOptions};
 use crate::turntable::{Table, TableOptions, TurntableAddress, find_serial};
 
-use super::failure::CaptureError;
+use super::error::{CaptureError, Refusal};
 use super::settings::Settings;
+
+/// How many times faster than real time a rehearsal runs at most where people look at it.
+const FASTEST_SHOWN: f64 = 20.0;
+/// Session names have whole seconds: two sessions begin at least so far apart.
+const NAME_SPACING: Duration = Duration::from_secs(1);
 
 /// Camera and table of a rig.
 pub struct Equipment {
@@ -18,22 +27,52 @@ pub struct Equipment {
     simulator: Option<SimulatedTable>,
     settings: Settings,
     clock: Clock,
+    /// When the last session was named.
+    named: Option<Timestamp>,
 }
 
 impl Equipment {
-    /// Nothing opened yet. Brings camera and table onto one clock.
+    /// Nothing opened yet. Camera and table go by one clock: where neither is real, by
+    /// [virtual time](Clock::virtual_time), at most as fast as their addresses say.
     ///
     /// # Errors
-    /// [`super::Refusal::Pace`].
-    pub fn new(settings: Settings) -> Result<Self, CaptureError> {
-        let (settings, clock) = settings.on_one_clock()?;
-        Ok(Self {
+    /// [`Refusal::Pace`].
+    pub fn new(settings: Settings) -> Result<Self, Refusal> {
+        let speed = settings.speed()?;
+        Ok(Self::at_speed(settings, speed))
+    }
+
+    /// The same for a rig that people look at, and that runs while nothing is captured: as fast as it
+    /// goes is 20 times real time.
+    ///
+    /// # Errors
+    /// [`Refusal::Pace`].
+    pub fn for_viewers(settings: Settings) -> Result<Self, Refusal> {
+        let speed = match settings.speed()? {
+            0.0 => FASTEST_SHOWN,
+            speed => speed,
+        };
+        Ok(Self::at_speed(settings, speed))
+    }
+
+    fn at_speed(mut settings: Settings, speed: f64) -> Self {
+        if let CameraAddress::Replay { speed, .. } = &mut settings.camera {
+            // It goes as fast as the clock does.
+            *speed = ReplaySpeed::Times(1.0);
+        }
+        let clock = match speed {
+            0.0 => Clock::virtual_time(),
+            1.0 => Clock::monotonic(),
+            times => Clock::paced(times),
+        };
+        Self {
             camera: None,
             table: None,
             simulator: None,
             settings,
             clock,
-        })
+            named: None,
+        }
     }
 
     /// The settings, with the addresses as they are opened.
@@ -46,6 +85,17 @@ impl Equipment {
     #[must_use]
     pub fn clock(&self) -> Clock {
         self.clock.clone()
+    }
+
+    /// The time of day for the next session's name, which has whole seconds: waits until it differs
+    /// from the one before.
+    pub(super) fn session_time(&mut self) -> Timestamp {
+        let passed = self
+            .named
+            .map(|named| Timestamp::now().duration_since(named));
+        let passed = passed.map_or(NAME_SPACING, |passed| passed.unsigned_abs());
+        std::thread::sleep(NAME_SPACING.saturating_sub(passed));
+        *self.named.insert(Timestamp::now())
     }
 
     /// The simulated table, where the table is one and was opened.

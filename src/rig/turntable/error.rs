@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::codes::{Alarm, meaning_of_error};
 use super::wire::{ControllerState, LineFault, RestartCause, SendError};
+use crate::lockfile::LockError;
 
 /// An error of a turntable.
 #[derive(Debug, thiserror::Error)]
@@ -54,17 +55,8 @@ pub enum TurntableError {
         source: std::io::Error,
     },
     /// Lock, socket or folder of the port's owner could not be used.
-    #[error(
-        "{path} could not be {doing}, and without it two programs could move one table: check the folder and who owns it"
-    )]
-    Claim {
-        /// The file.
-        path: PathBuf,
-        /// What was to be done, as a participle.
-        doing: &'static str,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Lock(#[from] LockError),
     /// The process that owns the port could not be asked.
     #[error("process {pid}, which has {path}, did not answer: {why}; ask again, or end it")]
     Owner {

@@ -69,6 +69,7 @@ pub mod wire;
 use std::path::PathBuf;
 
 use crate::clock::Clock;
+use crate::lockfile;
 
 pub use address::{SimulatedAddress, TurntableAddress, find_serial};
 pub use codes::Alarm;
@@ -92,8 +93,8 @@ const LEASE_S: u32 = 3;
 pub struct TableOptions {
     /// The clock of all waits and time stamps. A simulated table needs the clock of its simulator.
     pub clock: Clock,
-    /// Folder for the lock and the socket of a port's owner: `$XDG_RUNTIME_DIR`, or any folder that
-    /// all programs on the machine agree on.
+    /// Folder for the lock and the socket of a port's owner: one that every program on the machine
+    /// agrees on, such as [`lockfile::standard_folder`].
     pub runtime_folder: PathBuf,
     /// How far the table may turn from the angle 0 in either direction before its cable is wound
     /// up, degrees. Applies if the controller has no limit of its own.
@@ -107,7 +108,7 @@ impl Default for TableOptions {
     fn default() -> Self {
         Self {
             clock: Clock::monotonic(),
-            runtime_folder: PathBuf::from("/tmp"),
+            runtime_folder: lockfile::standard_folder(),
             travel_deg: 400.0,
             extras: true,
         }

@@ -7,7 +7,7 @@
 //!
 //! Time stamps are those recorded, moved so that the first frame is due when the stream starts. A
 //! frame comes when the clock shows its time stamp, so that a replay at a multiple of real time
-//! wants a clock that runs as much faster ([`Address::clock`]); on another clock its time stamps
+//! wants a clock that runs as much faster ([`CameraAddress::clock`]); on another clock its time stamps
 //! are as much closer together. As fast as it is read, time stamps run ahead of the clock. No frame
 //! is lost where the reader is slow: a replay waits.
 
@@ -21,12 +21,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use self::description::{controls, describe, rate};
-use self::faults::Spoiler;
+use self::faults::FaultInjector;
 use self::source::{Delivery, Source, Taken};
 use self::timeline::{Moment, Timeline};
 use super::{
-    Address, Camera, CameraError, Control, ControlId, DeviceInfo, Faults, Frame, GrantedMode, Mode,
-    ModeRequest, Sequence, Speed, StampSource,
+    Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
+    Mode, ModeRequest, ReplayFaults, ReplaySpeed, Sequence, StampSource,
 };
 use crate::clock::Clock;
 use relit_data::session::Recording;
@@ -43,8 +43,8 @@ pub(super) struct ReplayCamera {
     controls: Vec<Control>,
     pace: Pace,
     repeat: bool,
-    faults: Faults,
-    spoiler: Spoiler,
+    faults: ReplayFaults,
+    injector: FaultInjector,
     playing: Option<Playing>,
 }
 
@@ -82,9 +82,9 @@ enum End {
 impl ReplayCamera {
     pub(super) fn open(
         path: &Path,
-        speed: Speed,
+        speed: ReplaySpeed,
         repeat: bool,
-        faults: &Faults,
+        faults: &ReplayFaults,
         clock: Clock,
     ) -> Result<Self, CameraError> {
         let recording = Recording::open(path)?;
@@ -94,13 +94,13 @@ impl ReplayCamera {
         let (width, height) = delivery.size(&video);
         let manifest = recording.manifest.as_ref();
         let mode = GrantedMode {
-            fourcc: delivery.fourcc,
+            fourcc: Fourcc::of(delivery.format),
             width,
             height,
             rate: rate(manifest, &timeline),
         };
-        let spoiler = Spoiler::new(path, faults, &mode)?;
-        let address = Address::Replay {
+        let injector = FaultInjector::new(path, faults, &mode)?;
+        let address = CameraAddress::Replay {
             path: path.to_owned(),
             speed,
             repeat,
@@ -117,7 +117,7 @@ impl ReplayCamera {
             pace: Pace::new(speed, clock),
             repeat,
             faults: faults.clone(),
-            spoiler,
+            injector,
             playing: None,
         })
     }
@@ -129,7 +129,10 @@ impl ReplayCamera {
                 path: self.path.clone(),
                 frames: delivered,
             },
-            End::Unplugged => CameraError::Unplugged { device },
+            End::Unplugged => CameraError::Unplugged {
+                device,
+                source: None,
+            },
             End::Stalled => CameraError::Timeout { device, waited },
         }
     }
@@ -244,7 +247,7 @@ impl ReplayCamera {
             }
             playing.delivered += 1;
             let frame = self.frame(taken, moment, due_us);
-            return Ok(Step::Frame(self.spoiler.spoil(
+            return Ok(Step::Frame(self.injector.inject(
                 frame,
                 position,
                 &self.faults,
@@ -283,14 +286,14 @@ impl ReplayCamera {
 }
 
 impl Pace {
-    fn new(speed: Speed, clock: Clock) -> Self {
+    fn new(speed: ReplaySpeed, clock: Clock) -> Self {
         match speed {
-            Speed::AsRead => Self {
+            ReplaySpeed::AsRead => Self {
                 clock,
                 stretch: 1.0,
                 wait: false,
             },
-            Speed::Times(times) => Self {
+            ReplaySpeed::Times(times) => Self {
                 stretch: clock.factor() / times,
                 clock,
                 wait: true,

@@ -197,7 +197,7 @@ fn a_loop_counts_on_and_its_faults_too() {
 #[test]
 fn frames_come_when_the_clock_shows_their_time_stamp() {
     let path = fixture(SHORT);
-    let address: Address = format!("replay:{}?speed=20", path.display())
+    let address: CameraAddress = format!("replay:{}?speed=20", path.display())
         .parse()
         .unwrap();
     let clock = address.clock();

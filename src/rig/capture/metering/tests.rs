@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use super::super::preflight::{hold_camera, ready_table};
 use super::*;
 use crate::camera::{
     Capabilities, ControlFlags, ControlId, ControlKind, DeviceInfo, Fourcc, GrantedMode, MenuItem,
     Mode, ModeRequest, Rate, Rates, Sequence, Sizes, StampSource,
 };
+use crate::capture::preflight::ready_table;
 use crate::clock::Clock;
 use crate::simulator::{SimulatedTable, SimulatorOptions};
 use crate::turntable::TableOptions;
@@ -180,12 +180,12 @@ fn metered(light: fn(f64) -> f64) -> (Result<i64, CaptureError>, f64, i64) {
         "sim:".parse().unwrap(),
     );
     settings.wanted.exposure = Some(40);
-    let stop = StopRequest::default();
+    let stop = StopRequest::new(&clock);
     let mut scene = Scene::new(clock, &simulator, light);
-    let mut held = hold_camera(&mut scene, &settings, &stop).unwrap();
+    let mut locked = LockedCamera::lock(&mut scene, &settings, &stop).unwrap();
     ready_table(&table, &settings).unwrap();
     let before = table.status().unwrap().angle_deg;
-    let found = meter(&mut scene, &table, &mut held, &settings, &stop);
+    let found = meter(&mut scene, &table, &mut locked, &settings, &stop);
     let off = table.status().unwrap().angle_deg - before;
     (found, off, scene.exposure)
 }
@@ -214,7 +214,7 @@ fn a_dark_scene_gets_the_brightest_exposure_that_a_frame_has_time_for() {
 }
 
 #[test]
-fn a_scene_that_is_too_bright_at_the_darkest_exposure_is_told() {
+fn a_scene_that_is_too_bright_at_the_darkest_exposure_is_reported() {
     let (found, ..) = metered(|_| 200.0);
     let error = found.unwrap_err();
     assert!(

@@ -1,6 +1,6 @@
 //! The client: sends requests to a port's owner.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::thread;
@@ -8,8 +8,9 @@ use std::time::{Duration, Instant};
 
 use relit_data::causes::with_causes;
 
-use super::claim::{Files, owner_pid, try_lock};
+use super::claim::Files;
 use super::{Answer, Question};
+use crate::lockfile::LockFile;
 use crate::turntable::error::TurntableError;
 use crate::turntable::status::TableStatus;
 
@@ -29,18 +30,18 @@ pub struct Owner {
 }
 
 impl Owner {
-    /// The owner of `port`, if it has one. Checks the lock and does not open the port.
+    /// The owner of `port`, if it has one. Reads the lock and does not open the port.
     ///
     /// # Errors
-    /// [`TurntableError::Open`] if there is no such port, [`TurntableError::Claim`] if the lock cannot
-    /// be checked.
+    /// [`TurntableError::Open`] if there is no such port, [`TurntableError::Lock`] if it cannot be
+    /// known whether it has an owner: then nobody may open it either.
     pub fn find(port: &Path, runtime_folder: &Path) -> Result<Option<Owner>, TurntableError> {
         let files = Files::of(port, runtime_folder)?;
-        if try_lock(&files)?.is_some() {
-            return Ok(None);
-        }
-        let pid = owner_pid(&files.lock);
-        Ok(Some(Owner { files, pid }))
+        let holder = LockFile::holder(&files.lock)?;
+        Ok(holder.map(|holder| Owner {
+            files,
+            pid: holder.pid.unwrap_or(0),
+        }))
     }
 
     /// Its process id.
@@ -101,7 +102,11 @@ impl Owner {
         let until = Instant::now() + OPENING;
         loop {
             match UnixStream::connect(&self.files.socket) {
-                Err(_) if Instant::now() < until => thread::sleep(PAUSE),
+                Err(error)
+                    if error.kind() != ErrorKind::PermissionDenied && Instant::now() < until =>
+                {
+                    thread::sleep(PAUSE);
+                }
                 connected => return connected,
             }
         }

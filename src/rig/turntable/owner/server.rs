@@ -11,8 +11,8 @@ use std::time::Duration;
 
 use relit_data::causes::with_causes;
 
-use super::claim::claim_error;
 use super::{Answer, Question};
+use crate::lockfile::LockError;
 use crate::turntable::error::TurntableError;
 use crate::turntable::link::Link;
 
@@ -47,7 +47,7 @@ impl Server {
                 thread: Some(thread::spawn(move || serve(&listener, &link, &flag))),
             }
         })
-        .map_err(claim_error(socket, "bound"))
+        .map_err(|source| LockError::system(socket, "bound")(source).into())
     }
 }
 

@@ -13,6 +13,7 @@ use serialport::{SerialPort as _, TTYPort};
 use super::claim::Files;
 use super::*;
 use crate::clock::Clock;
+use crate::lockfile::accounts::{OPERATOR, SERVICE, STRANGER, as_user, share};
 use crate::turntable::fake_grbl::FakeGrbl;
 use crate::turntable::{ControllerState, MotionFault, Table, TableOptions, TurntableError};
 
@@ -93,19 +94,21 @@ fn a_port_has_one_owner_that_answers_until_it_is_closed() {
     assert!(terminal.open().is_ok());
 }
 
+fn stop_once_it_moves(owner: &Owner) -> TableStatus {
+    for _ in 0..200 {
+        if owner.status().unwrap().state.may_move() {
+            break;
+        }
+    }
+    owner.stop().unwrap()
+}
+
 #[test]
 fn a_stop_requested_from_the_owner_stops_the_table_and_ends_its_motion() {
     let terminal = Terminal::new();
     let table = terminal.open().unwrap();
     let owner = terminal.owner().unwrap();
-    let stopper = thread::spawn(move || {
-        for _ in 0..200 {
-            if owner.status().unwrap().state.may_move() {
-                break;
-            }
-        }
-        owner.stop().unwrap()
-    });
+    let stopper = thread::spawn(move || stop_once_it_moves(&owner));
     let error = table.jog(300.0, Some(5.0)).unwrap_err();
     assert!(
         matches!(error, TurntableError::Motion(MotionFault::Stopped)),
@@ -149,13 +152,46 @@ fn a_bad_or_a_silent_client_does_not_affect_others() {
 fn a_folder_that_others_can_write_in_is_not_used() {
     use std::os::unix::fs::PermissionsExt;
     let terminal = Terminal::new();
-    let files = terminal.files();
-    let folder = files.lock.parent().unwrap();
-    std::fs::set_permissions(folder, std::fs::Permissions::from_mode(0o777)).unwrap();
+    let open = std::fs::Permissions::from_mode(0o777);
+    std::fs::set_permissions(terminal.runtime.path(), open).unwrap();
     assert!(matches!(
         terminal.open().map(|_| ()),
-        Err(TurntableError::Claim { .. })
+        Err(TurntableError::Lock(_))
     ));
+}
+
+#[test]
+fn an_operator_asks_and_stops_the_table_of_a_service_and_a_stranger_opens_nothing() {
+    let terminal = Terminal::new();
+    if !share(terminal.runtime.path()) {
+        return;
+    }
+    std::os::unix::fs::chown(&terminal.path, Some(SERVICE), None).unwrap();
+    let table = as_user(SERVICE, || terminal.open()).unwrap();
+    as_user(OPERATOR, || {
+        let owner = terminal.owner().unwrap();
+        assert_eq!(owner.status().unwrap().state, ControllerState::Idle);
+        let opened = terminal.open().map(|_| ());
+        assert!(
+            matches!(opened, Err(TurntableError::Owned { .. })),
+            "{opened:?}"
+        );
+    });
+    let error = thread::scope(|scope| {
+        let moving = scope.spawn(|| table.jog(300.0, Some(5.0)).unwrap_err());
+        as_user(OPERATOR, || stop_once_it_moves(&terminal.owner().unwrap()));
+        moving.join().unwrap()
+    });
+    assert!(
+        matches!(error, TurntableError::Motion(MotionFault::Stopped)),
+        "{error}"
+    );
+    as_user(STRANGER, || {
+        let found = Owner::find(&terminal.path, terminal.runtime.path());
+        assert!(matches!(found, Err(TurntableError::Lock(_))), "{found:?}");
+        let opened = terminal.open().map(|_| ());
+        assert!(matches!(opened, Err(TurntableError::Lock(_))), "{opened:?}");
+    });
 }
 
 #[test]
