@@ -125,7 +125,7 @@ pub enum ExtractError {
     Session(#[from] session::SessionError),
     /// The video cannot be used.
     #[error(transparent)]
-    Video(#[from] video::Error),
+    Video(#[from] video::VideoError),
     /// A frame cannot be converted.
     #[error(
         "frame {number}: {fault}; convert the video to another pixel format, for example with ffmpeg"
@@ -134,7 +134,7 @@ pub enum ExtractError {
         /// The frame.
         number: u64,
         /// What is wrong with it.
-        fault: video::FrameFault,
+        fault: video::DecodeFault,
     },
     /// The data set cannot be written.
     #[error(transparent)]

@@ -11,7 +11,7 @@ use rayon::iter::{ParallelBridge, ParallelIterator};
 
 use relit_data::geometry::Rect;
 use relit_data::shard::{self, MaskSpans, Measures};
-use relit_video::{FrameFault, Pending, Reader, Video};
+use relit_video::{DecodeFault, Pending, Reader, Video};
 
 use super::plan::Assignments;
 use super::{ExtractError, Scaler};
@@ -38,7 +38,7 @@ pub(super) struct ProcessedFrame {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct LostFrame {
     pub(super) number: u64,
-    pub(super) fault: FrameFault,
+    pub(super) fault: DecodeFault,
 }
 
 /// The inner error is a frame that is lost, the outer one ends the extraction.
@@ -82,7 +82,7 @@ impl Stage<'_> {
         let crop = match crop {
             Ok(crop) => crop,
             // The other frames have the same pixel format.
-            Err(fault @ FrameFault::PixelFormat(_)) => {
+            Err(fault @ DecodeFault::PixelFormat(_)) => {
                 return Err(ExtractError::Frame { number, fault });
             }
             Err(fault) => return Ok(Err(LostFrame { number, fault })),

@@ -67,7 +67,7 @@ pub enum MaskingError {
     Session(#[from] session::SessionError),
     /// The video cannot be read.
     #[error(transparent)]
-    Video(#[from] relit_video::Error),
+    Video(#[from] relit_video::VideoError),
     /// A file could not be read or written.
     #[error("{path} could not be {doing}")]
     Io {

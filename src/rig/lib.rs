@@ -19,6 +19,8 @@ pub mod camera;
 pub mod capture;
 pub mod clock;
 pub mod daemon;
+pub mod lockfile;
+pub mod preview;
 pub mod serve;
 pub mod simulator;
 pub mod state;

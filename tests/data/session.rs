@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
 use relit_data::session::{
-    CameraFacts, FrameEntry, FrameIndex, Manifest, Notice, Recording, SessionError, SessionWriter,
-    SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of, recordings,
+    CameraFacts, FrameClock, FrameEntry, FrameIndex, Manifest, Notice, Recording, SessionError,
+    SessionWriter, SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of, recordings,
 };
 use tempfile::TempDir;
 
@@ -28,6 +28,7 @@ fn manifest() -> Manifest {
             width: 640,
             height: 480,
             fps: 30.0,
+            clock: FrameClock::default(),
             controls: BTreeMap::from([("gain".to_owned(), 4.into())]),
         },
         turntable: Some(TurntableFacts {
@@ -104,6 +105,19 @@ fn a_session_is_read_as_it_was_written() {
         recording.frames.unwrap().entries(),
         (0..10).map(entry).collect::<Vec<_>>()
     );
+}
+
+#[test]
+fn a_manifest_names_the_clock_only_where_it_is_not_the_drivers() {
+    let driver = manifest();
+    let text = String::from_utf8(driver.to_json().unwrap()).unwrap();
+    assert!(!text.contains("clock"), "{text}");
+    assert_eq!(Manifest::from_json(text.as_bytes()).unwrap(), driver);
+    let mut host = manifest();
+    host.camera.clock = FrameClock::Host;
+    let text = String::from_utf8(host.to_json().unwrap()).unwrap();
+    assert!(text.contains("\"clock\": \"host\""), "{text}");
+    assert_eq!(Manifest::from_json(text.as_bytes()).unwrap(), host);
 }
 
 #[test]

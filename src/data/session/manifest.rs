@@ -62,8 +62,29 @@ pub struct CameraFacts {
     pub height: u32,
     /// Nominal frames per second.
     pub fps: f64,
+    /// What stamped the frames; not written where it is the driver.
+    #[serde(default, skip_serializing_if = "FrameClock::is_driver")]
+    pub clock: FrameClock,
     /// Every control's value, by name.
     pub controls: BTreeMap<String, Value>,
+}
+
+/// What stamped the frames of a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FrameClock {
+    /// The camera's driver, when the frame was exposed or its last data came.
+    #[default]
+    Driver,
+    /// The recording program, when it got the frame: later by what the camera and the system took,
+    /// and less regular.
+    Host,
+}
+
+impl FrameClock {
+    fn is_driver(&self) -> bool {
+        *self == Self::Driver
+    }
 }
 
 /// The turntable and its settings.

@@ -24,8 +24,8 @@ pub use frames::{FrameEntry, FrameIndex, Gap, IndexFault};
 pub use interrupted::InterruptedSession;
 pub use lock::SessionLock;
 pub use manifest::{
-    CameraFacts, Fault, MANIFEST_SCHEMA, Manifest, ManifestFault, SoftwareFacts, Status,
-    TurntableFacts, VideoFacts, object_of,
+    CameraFacts, Fault, FrameClock, MANIFEST_SCHEMA, Manifest, ManifestFault, SoftwareFacts,
+    Status, TurntableFacts, VideoFacts, object_of,
 };
 pub use recording::{Notice, Recording, recordings};
 pub use writer::SessionWriter;

@@ -7,7 +7,7 @@
 //! capture runs on it without hardware.
 //!
 //! Frames are handed out as they came: this room counts nothing, judges nothing, and knows nothing
-//! of turntables, captures or masks. [`lock::ManualPlan`] says which controls to set so that
+//! of turntables, captures or masks. [`hold::ManualPlan`] says which controls to set so that
 //! exposure, gain, white balance and focus stand still; it is a pure function over the list of
 //! controls.
 
@@ -16,7 +16,7 @@ mod control;
 mod error;
 mod format;
 mod frame;
-pub mod lock;
+pub mod hold;
 mod nokhwa;
 mod rate;
 mod replay;
@@ -27,26 +27,26 @@ mod v4l2;
 use std::path::Path;
 use std::time::Duration;
 
-pub use address::{Address, Faults, Speed};
+pub use address::{CameraAddress, ReplayFaults, ReplaySpeed};
 pub use control::{Control, ControlFlags, ControlId, ControlKind, MenuItem, snake_case};
 pub use error::{AddressFault, CameraError, ControlFault};
-pub use format::{Bayer, Encoding, Fourcc, Mode, Rates, Sizes};
+pub use format::{Fourcc, Mode, Rates, Sizes};
 pub use frame::{Frame, FrameFault, Sequence, SequenceUnwrapper, StampSource, jpeg_size};
 pub use rate::Rate;
 pub use request::{GrantedMode, ModeRequest};
 
 use crate::clock::Clock;
 
-/// Opens a camera. A replay goes by the clock given; see [`Address::clock`].
+/// Opens a camera. A replay goes by the clock given; see [`CameraAddress::clock`].
 ///
 /// # Errors
 /// [`CameraError::NotThere`], [`CameraError::NotPermitted`], [`CameraError::NotACamera`],
 /// [`CameraError::InUse`], what a recording's session or video answers, or what the device does.
-pub fn open(address: &Address, clock: Clock) -> Result<Box<dyn Camera>, CameraError> {
+pub fn open(address: &CameraAddress, clock: Clock) -> Result<Box<dyn Camera>, CameraError> {
     Ok(match address {
-        Address::V4l2(path) => open_v4l2(path)?,
-        Address::Nokhwa(number) => Box::new(nokhwa::NokhwaCamera::open(*number)?),
-        Address::Replay {
+        CameraAddress::V4l2(path) => open_v4l2(path)?,
+        CameraAddress::Nokhwa(number) => Box::new(nokhwa::NokhwaCamera::open(*number)?),
+        CameraAddress::Replay {
             path,
             speed,
             repeat,
@@ -112,7 +112,8 @@ pub trait Camera: Send {
     /// device answers; the camera is then stopped and may be started again.
     fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError>;
 
-    /// The next frame, in order. Waits for at most `timeout` of real time.
+    /// The next frame, in order. Waits for at most `timeout`, of real time or, for a replay, of its
+    /// clock.
     ///
     /// # Errors
     /// [`CameraError::Timeout`] (the stream goes on), [`CameraError::Unplugged`],
@@ -130,7 +131,7 @@ pub trait Camera: Send {
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeviceInfo {
     /// How to open it again.
-    pub address: Address,
+    pub address: CameraAddress,
     /// Its name, such as "HD Pro Webcam C920".
     pub name: String,
     /// The driver, such as `uvcvideo`.

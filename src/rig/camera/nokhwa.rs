@@ -18,8 +18,8 @@ use ::nokhwa::utils::{
 use ::nokhwa::{Camera as Library, NokhwaError, query};
 
 use super::{
-    Address, Camera, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc, Frame,
-    GrantedMode, Mode, ModeRequest, Rate, Rates, Sizes, StampSource,
+    Camera, CameraAddress, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc,
+    Frame, GrantedMode, Mode, ModeRequest, Rate, Rates, Sizes, StampSource,
 };
 use crate::clock::Clock;
 
@@ -63,7 +63,7 @@ pub(super) fn list() -> Vec<DeviceInfo> {
 
 fn describe(number: u32, name: String, modes: Vec<Mode>) -> DeviceInfo {
     DeviceInfo {
-        address: Address::Nokhwa(number),
+        address: CameraAddress::Nokhwa(number),
         name,
         driver: "nokhwa".to_owned(),
         bus: String::new(),
@@ -84,6 +84,7 @@ impl NokhwaCamera {
         let name = listed.map(|camera| camera.human_name());
         let name = name.ok_or_else(|| CameraError::NotThere {
             device: device(number),
+            source: None,
         })?;
         let modes = modes(number)?;
         Ok(Self {
@@ -149,7 +150,10 @@ impl Camera for NokhwaCamera {
                 device,
                 waited: timeout,
             }),
-            Err(RecvTimeoutError::Disconnected) => Err(CameraError::Unplugged { device }),
+            Err(RecvTimeoutError::Disconnected) => Err(CameraError::Unplugged {
+                device,
+                source: None,
+            }),
         }
     }
 
@@ -172,14 +176,14 @@ impl Drop for NokhwaCamera {
 }
 
 fn device(number: u32) -> String {
-    Address::Nokhwa(number).to_string()
+    CameraAddress::Nokhwa(number).to_string()
 }
 
 fn failed(number: u32, doing: &'static str, error: &NokhwaError) -> CameraError {
     CameraError::Backend {
         device: device(number),
         doing,
-        why: error.to_string(),
+        source: Box::new(error.clone()),
     }
 }
 
@@ -195,7 +199,7 @@ fn on_thread<T: Send + 'static>(
     let broken = |why: String| CameraError::Backend {
         device: device(number),
         doing,
-        why,
+        source: why.into(),
     };
     started.map_err(|error| broken(error.to_string()))?;
     match receiver.recv_timeout(OPENING) {
@@ -361,7 +365,7 @@ mod tests {
     #[test]
     fn what_is_listed_names_the_address_to_open() {
         for info in list() {
-            assert!(matches!(info.address, Address::Nokhwa(_)), "{info:?}");
+            assert!(matches!(info.address, CameraAddress::Nokhwa(_)), "{info:?}");
             assert_eq!(info.capabilities, CAPABILITIES);
         }
     }

@@ -4,8 +4,8 @@ use serde_json::Value;
 
 use super::timeline::Timeline;
 use crate::camera::{
-    Address, Capabilities, Control, ControlFlags, ControlId, ControlKind, DeviceInfo, GrantedMode,
-    MenuItem, Mode, Rate, Rates, Sizes,
+    CameraAddress, Capabilities, Control, ControlFlags, ControlId, ControlKind, DeviceInfo,
+    GrantedMode, MenuItem, Mode, Rate, Rates, Sizes,
 };
 use relit_data::session::{Manifest, Recording};
 use relit_video::Video;
@@ -18,7 +18,7 @@ pub(super) fn rate(manifest: Option<&Manifest>, timeline: &Timeline) -> Option<R
 
 /// What a recording says of itself as a camera.
 pub(super) fn describe(
-    address: Address,
+    address: CameraAddress,
     recording: &Recording,
     video: &Video,
     mode: &GrantedMode,
