@@ -6,8 +6,8 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 /// An axis-parallel rectangle of whole pixels, written `[x, y, w, h]` in JSON and `X,Y,W,H` on a
-/// command line. x grows to the right, y downwards; the corner (x, y) is the upper left pixel.
-/// A rectangle may reach beyond the image it is used with (negative x or y).
+/// command line. x grows to the right, y downwards; (x, y) is the upper left pixel. A rectangle may
+/// extend beyond the image it is used with (negative x or y).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(from = "(i32, i32, u32, u32)", into = "(i32, i32, u32, u32)")]
 pub struct Rect {
@@ -40,7 +40,7 @@ impl Rect {
         i64::from(self.y) + i64::from(self.h)
     }
 
-    /// The part that lies in an image of `width` x `height`, if any does.
+    /// The part that lies inside an image of `width` x `height`, if there is any.
     #[must_use]
     pub fn clipped_to(self, width: u32, height: u32) -> Option<Self> {
         let x0 = i64::from(self.x).max(0);

@@ -1,4 +1,4 @@
-//! The scene that the tests cut: a bright disc on a dark ground, and hints for it.
+//! The image that the tests segment: a bright disc on a dark background, and hints for it.
 
 use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage};
 use relit_mask::{Hints, Seeds};

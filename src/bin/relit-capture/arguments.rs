@@ -6,11 +6,10 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use relit_rig::camera::hold::ManualValues;
 use relit_rig::camera::{CameraAddress, Fourcc};
-use relit_rig::capture::{FrameSize, ModeWish, Settings};
+use relit_rig::capture::{FrameSize, ModePreference, Settings};
 use relit_rig::serve::Token;
 use relit_rig::turntable;
 
-use crate::environment::runtime_folder;
 use crate::table_arguments::{
     SIMULATE_EXAMPLES, SimulateArguments, TURNTABLE_EXAMPLES, TurntableArguments,
 };
@@ -60,6 +59,7 @@ pub(crate) struct Serve {
     pub(crate) settings: Settings,
     pub(crate) address: SocketAddr,
     pub(crate) token: Option<Token>,
+    pub(crate) token_file: Option<PathBuf>,
     pub(crate) names: Vec<String>,
 }
 
@@ -117,9 +117,13 @@ struct ServeArguments {
     /// Address and port to listen on.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8420")]
     listen: SocketAddr,
-    /// What a client has to know [default: random where other machines can reach the address].
-    #[arg(long, value_name = "TOKEN")]
+    /// What a client has to know, 16 to 128 letters, digits, '-' and '_' [default: random where other
+    /// machines can reach the address]. Other accounts of this machine can see it: prefer --token-file.
+    #[arg(long, value_name = "TOKEN", conflicts_with = "token_file")]
     token: Option<Token>,
+    /// A file that holds the token, which only its owner and its group can read.
+    #[arg(long, value_name = "FILE")]
+    token_file: Option<PathBuf>,
     /// A name under which clients reach this machine, such as rig.local; may be given several times.
     #[arg(long = "name", value_name = "NAME")]
     names: Vec<String>,
@@ -137,7 +141,7 @@ struct RigArguments {
     camera: CameraAddress,
     /// The turntable's address.
     #[arg(long, value_name = "ADDRESS", default_value = "serial:")]
-    turntable: turntable::Address,
+    turntable: turntable::TurntableAddress,
     /// Speed of the turn, degrees a second.
     #[arg(long, value_name = "SPEED", default_value_t = 7.2, value_parser = speed)]
     degrees_per_second: f64,
@@ -191,6 +195,7 @@ pub(crate) fn parse() -> Arguments {
             settings: line.rig.into(),
             address: line.listen,
             token: line.token,
+            token_file: line.token_file,
             names: line.names,
         })),
         Verb::Turntable(line) => Command::Turntable(line),
@@ -205,7 +210,7 @@ pub(crate) fn parse() -> Arguments {
 impl From<RigArguments> for Settings {
     fn from(line: RigArguments) -> Self {
         let mut settings = Self::new(line.root, line.camera, line.turntable);
-        settings.mode = ModeWish {
+        settings.mode = ModePreference {
             fourcc: line.fourcc,
             size: line.size,
             fps: line.fps,
@@ -222,7 +227,6 @@ impl From<RigArguments> for Settings {
         settings.max_dropped = line.max_dropped;
         settings.retries = line.retries;
         settings.meter_clip = line.meter_clip / 100.0;
-        settings.runtime_folder = runtime_folder();
         settings.commit = option_env!("RELIT_COMMIT").unwrap_or_default().to_owned();
         settings
     }

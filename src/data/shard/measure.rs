@@ -1,18 +1,18 @@
-//! What is measured on the pixels under a mask. Knows images and nothing of files.
+//! Statistics of the pixels under a mask. Knows images and nothing of files.
 //!
-//! Everything is summed in integers, so a figure is exact and the same on every machine and for
-//! every order of the work: what was written can be compared for equality when it is read back.
+//! Everything is summed in integers, so the figures are exact and do not depend on the machine or on
+//! the order of the work: they can be compared for equality when a data set is read back.
 
 use image::{GrayImage, RgbImage};
 
-use super::Error;
+use super::ShardError;
 
-/// Luma of a pixel in thousandths of a grey value, 0..=255 000.
+/// Luma of a pixel in thousandths of a grey level, 0..=255 000.
 fn luma(r: u8, g: u8, b: u8) -> i32 {
     299 * i32::from(r) + 587 * i32::from(g) + 114 * i32::from(b)
 }
 
-/// Figures of one image under one mask.
+/// Statistics of one image under one mask.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measures {
     /// Pixels under the mask.
@@ -21,25 +21,24 @@ pub struct Measures {
     pub saturated_px: u64,
     /// Pixels under the mask with any channel at or above the level.
     pub saturated_any_px: u64,
-    /// Mean red, green and blue under the mask, 0..=255; 0 where the mask is empty.
+    /// Mean red, green and blue under the mask, 0..=255; 0 if the mask is empty.
     pub mean_rgb: [f64; 3],
-    /// Population variance of the Laplacian (4 neighbours) of luma, over the pixels that are,
-    /// with their four neighbours, under the mask; luma = 0.299 R + 0.587 G + 0.114 B, 0..=255.
-    /// 0 where there is no such pixel.
+    /// Population variance of the Laplacian (4 neighbours) of luma, over the pixels that are under
+    /// the mask together with their four neighbours; luma = 0.299 R + 0.587 G + 0.114 B, 0..=255.
+    /// 0 if there is no such pixel.
     pub sharpness: f64,
 }
 
 impl Measures {
-    /// `saturated_px / mask_px`, 0..=1; 0 where the mask is empty.
+    /// `saturated_px / mask_px`, 0..=1; 0 if the mask is empty.
     #[must_use]
     pub fn saturated_fraction(&self) -> f64 {
         fraction(self.saturated_px, self.mask_px)
     }
 }
 
-/// `part / whole`, or 0 where `whole` is 0.
+/// `part / whole`, or 0 if `whole` is 0.
 #[must_use]
-#[allow(clippy::cast_precision_loss)]
 pub fn fraction(part: u64, whole: u64) -> f64 {
     if whole == 0 {
         0.0
@@ -55,14 +54,14 @@ struct Span {
     end: usize,
 }
 
-/// A mask, prepared for measuring many images: the runs of each row that lie under it.
+/// A mask prepared for measuring many images, as runs of pixels in each row.
 #[derive(Debug, Clone)]
 pub struct MaskSpans {
     width: u32,
     height: u32,
     /// Runs under the mask, row by row.
     rows: Vec<Vec<Span>>,
-    /// Runs of pixels whose four neighbours are under the mask too, row by row.
+    /// Runs of pixels that are under the mask with all four neighbours, row by row.
     inner: Vec<Vec<Span>>,
     pixels: u64,
 }
@@ -110,8 +109,8 @@ impl MaskSpans {
     /// Pixels outside the mask have no influence.
     ///
     /// # Errors
-    /// [`Error::SizeMismatch`] where image and mask differ in size.
-    pub fn measure(&self, image: &RgbImage, level: u8) -> Result<Measures, Error> {
+    /// [`ShardError::SizeMismatch`] if image and mask differ in size.
+    pub fn measure(&self, image: &RgbImage, level: u8) -> Result<Measures, ShardError> {
         self.check_size(image)?;
         let row_bytes = self.width as usize * 3;
         let mut sums = [0_u64; 3];
@@ -144,8 +143,8 @@ impl MaskSpans {
     /// The first pixel (x, y) outside the mask that is not black, if there is one.
     ///
     /// # Errors
-    /// [`Error::SizeMismatch`] where image and mask differ in size.
-    pub fn first_lit_outside(&self, image: &RgbImage) -> Result<Option<(u32, u32)>, Error> {
+    /// [`ShardError::SizeMismatch`] if image and mask differ in size.
+    pub fn first_lit_outside(&self, image: &RgbImage) -> Result<Option<(u32, u32)>, ShardError> {
         self.check_size(image)?;
         let row_bytes = self.width as usize * 3;
         let rows = image.as_raw().chunks_exact(row_bytes.max(3));
@@ -166,12 +165,12 @@ impl MaskSpans {
         Ok(None)
     }
 
-    fn check_size(&self, image: &RgbImage) -> Result<(), Error> {
+    fn check_size(&self, image: &RgbImage) -> Result<(), ShardError> {
         let size = [image.width(), image.height()];
         if size == self.size() {
             Ok(())
         } else {
-            Err(Error::SizeMismatch {
+            Err(ShardError::SizeMismatch {
                 what: "the image",
                 size,
                 expected: self.size(),
@@ -200,7 +199,7 @@ fn runs(row: &[bool]) -> Vec<Span> {
     spans
 }
 
-/// Which pixels of row `y` are under the mask with all four neighbours.
+/// For each pixel of row `y`, whether it is under the mask with all four neighbours.
 fn inner_row(under: &[Vec<bool>], y: usize) -> Vec<bool> {
     let at = |x: usize, y: usize| under.get(y).and_then(|row| row.get(x)).is_some_and(|&u| u);
     let width = under.get(y).map_or(0, Vec::len);
@@ -222,8 +221,8 @@ struct Counts {
     any: u64,
 }
 
-/// Sums a run of RGB pixels. In short pieces, so that the inner loop stays in 32 bits and the
-/// compiler can do many pixels at once.
+/// Sums a run of RGB pixels, in short pieces so that the inner loop needs 32 bits only and can be
+/// vectorised.
 fn count(pixels: &[u8], level: u8) -> Counts {
     let mut total = Counts {
         sums: [0; 3],
@@ -250,7 +249,7 @@ fn count(pixels: &[u8], level: u8) -> Counts {
     total
 }
 
-/// Sums of the Laplacian over an image that passes row by row; holds three rows of luma.
+/// Sums of the Laplacian over an image that is added row by row; holds three rows of luma.
 struct Laplacian {
     above: Vec<i32>,
     here: Vec<i32>,
@@ -273,8 +272,8 @@ impl Laplacian {
         }
     }
 
-    /// Takes row `y`; the Laplacian of the row above it is then complete and is summed over the
-    /// runs that `inner` has for that row.
+    /// Adds row `y`. The Laplacian of the row above is then complete, and is summed over that row's
+    /// runs in `inner`.
     fn add_row(&mut self, row: &[u8], y: usize, inner: &[Vec<Span>]) {
         std::mem::swap(&mut self.above, &mut self.here);
         std::mem::swap(&mut self.here, &mut self.below);
@@ -312,8 +311,7 @@ impl Laplacian {
         self.squares += u128::from(squares);
     }
 
-    /// Population variance in squared grey values (the sums are in thousandths of them).
-    #[allow(clippy::cast_precision_loss)]
+    /// Population variance in squared grey levels (the sums are in thousandths of a level).
     fn variance(&self) -> f64 {
         if self.count == 0 {
             return 0.0;
@@ -415,16 +413,14 @@ mod tests {
     }
 
     #[test]
-    fn a_lit_pixel_outside_the_mask_is_found_at_its_place() {
+    fn a_lit_pixel_outside_the_mask_is_found_at_its_position() {
         let mask = GrayImage::from_fn(6, 4, |x, _| Luma([if x == 2 { 255 } else { 0 }]));
-        for place in [(0, 0), (1, 2), (3, 3), (5, 1)] {
+        for at in [(0, 0), (1, 2), (3, 3), (5, 1)] {
             let mut image = RgbImage::new(6, 4);
             image.put_pixel(2, 1, Rgb([9; 3]));
-            image.put_pixel(place.0, place.1, Rgb([0, 0, 1]));
-            assert_eq!(
-                MaskSpans::of(&mask).first_lit_outside(&image).unwrap(),
-                Some(place)
-            );
+            image.put_pixel(at.0, at.1, Rgb([0, 0, 1]));
+            let found = MaskSpans::of(&mask).first_lit_outside(&image).unwrap();
+            assert_eq!(found, Some(at));
         }
     }
 

@@ -180,7 +180,7 @@ pub enum CameraError {
     },
     /// The session of a replay cannot be read.
     #[error(transparent)]
-    Session(#[from] session::Error),
+    Session(#[from] session::SessionError),
     /// The video of a replay cannot be read.
     #[error(transparent)]
     Video(#[from] video::VideoError),

@@ -148,7 +148,8 @@ pub trait Camera: Send {
     /// device answers; the camera is then stopped and may be started again.
     fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError>;
 
-    /// The next frame, in order. Waits for at most `timeout` of real time.
+    /// The next frame, in order. Waits for at most `timeout`, of real time or, for a replay, of its
+    /// clock.
     ///
     /// # Errors
     /// [`CameraError::Timeout`] (the stream goes on), [`CameraError::Unplugged`],

@@ -4,14 +4,12 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use super::failure::{CaptureError, Refusal};
+use super::error::Refusal;
 use crate::camera::hold::ManualValues;
 use crate::camera::{CameraAddress, Fourcc, Mode, ModeRequest, Rate, Rates, ReplaySpeed};
-use crate::clock::Clock;
+use crate::lockfile::{self, LockError, LockFile};
 use crate::turntable;
 
-/// How much faster than real time a rehearsal runs that is to be as fast as is sensible.
-const FASTEST_REHEARSAL: f64 = 20.0;
 /// Formats from the one that is preferred: what the camera compresses by frames comes first.
 const PREFERRED: [Fourcc; 5] = [
     Fourcc::MJPG,
@@ -31,9 +29,9 @@ pub struct Settings {
     /// The camera.
     pub camera: CameraAddress,
     /// The turntable.
-    pub turntable: turntable::Address,
+    pub turntable: turntable::TurntableAddress,
     /// The camera's mode.
-    pub mode: ModeWish,
+    pub mode: ModePreference,
     /// Values of its controls; what is not given stays as the camera has it.
     pub wanted: ManualValues,
     /// Speed of the turn, degrees a second.
@@ -46,7 +44,7 @@ pub struct Settings {
     pub retries: u32,
     /// The part of the pixels in the middle that metering lets saturate, 0 to 1.
     pub meter_clip: f64,
-    /// Where owners of serial ports leave their locks.
+    /// Where those who use cameras and serial ports leave their locks.
     pub runtime_folder: PathBuf,
     /// The commit that the program was built from, or nothing.
     pub commit: String,
@@ -56,65 +54,63 @@ impl Settings {
     /// Settings with the usual figures: 7.2 degrees/s at 30 frames/s, no frame may be missing, one
     /// more try.
     #[must_use]
-    pub fn new(root: PathBuf, camera: CameraAddress, turntable: turntable::Address) -> Self {
+    pub fn new(
+        root: PathBuf,
+        camera: CameraAddress,
+        turntable: turntable::TurntableAddress,
+    ) -> Self {
         Self {
             root,
             camera,
             turntable,
-            mode: ModeWish::default(),
+            mode: ModePreference::default(),
             wanted: ManualValues::default(),
             degrees_per_second: 7.2,
             min_battery_v: None,
             max_dropped: 0,
             retries: 1,
             meter_clip: 0.005,
-            runtime_folder: PathBuf::from("/tmp"),
+            runtime_folder: lockfile::standard_folder(),
             commit: String::new(),
         }
     }
 
-    /// Brings replayed camera and simulated table onto one clock, and gives that clock. The
-    /// table's speed counts where it is simulated, else the replay's; as fast as it goes (0)
-    /// means twenty times real time. A camera or a table of flesh and blood goes by real time.
+    /// Takes the camera for this process; `None` for one that any number of programs can have.
+    ///
+    /// # Errors
+    /// [`LockError::Held`] with the holder's process number, or what the file system answers.
+    pub fn lock_camera(&self) -> Result<Option<LockFile>, LockError> {
+        match &self.camera {
+            CameraAddress::V4l2(path) => LockFile::of_device(path, &self.runtime_folder).map(Some),
+            _ => Ok(None),
+        }
+    }
+
+    /// How many times faster than real time the rig runs at most; 0 means as fast as the machine
+    /// computes. A simulated table's speed counts, else the replay's; a real camera or table goes
+    /// by real time.
     ///
     /// # Errors
     /// [`Refusal::Pace`] where one side is real and the other is to run faster.
-    pub fn on_one_clock(mut self) -> Result<(Self, Clock), CaptureError> {
-        use turntable::Address as Table;
-        let sensible = |speed: f64| match speed {
-            0.0 => FASTEST_REHEARSAL,
-            speed => speed,
-        };
+    pub fn speed(&self) -> Result<f64, Refusal> {
+        use turntable::TurntableAddress as Table;
         let replayed = match &self.camera {
             CameraAddress::Replay { speed, .. } => Some(match speed {
-                ReplaySpeed::AsRead => FASTEST_REHEARSAL,
+                ReplaySpeed::AsRead => 0.0,
                 ReplaySpeed::Times(times) => *times,
             }),
             _ => None,
         };
         let simulated = match &self.turntable {
-            Table::Simulated(table) => Some(sensible(table.speed)),
+            Table::Simulated(table) => Some(table.speed),
             _ => None,
         };
-        let times = match (replayed, simulated, &self.turntable) {
-            (Some(_), Some(table), _) => table,
-            (Some(camera), None, Table::None) => camera,
-            (Some(camera), None, _) if camera == 1.0 => camera,
-            (None, Some(table), _) if table == 1.0 => table,
-            (None, None, _) => 1.0,
-            _ => return Err(Refusal::Pace.into()),
-        };
-        if let CameraAddress::Replay { speed, .. } = &mut self.camera {
-            *speed = ReplaySpeed::Times(times);
+        match (replayed, simulated, &self.turntable) {
+            (Some(_), Some(table), _) => Ok(table),
+            (Some(camera), None, Table::None) => Ok(camera),
+            (Some(1.0), None, _) | (None, Some(1.0), _) | (None, None, _) => Ok(1.0),
+            _ => Err(Refusal::Pace),
         }
-        if let Table::Simulated(table) = &mut self.turntable {
-            table.speed = times;
-        }
-        let clock = match times {
-            1.0 => Clock::monotonic(),
-            times => Clock::scaled(times),
-        };
-        Ok((self, clock))
     }
 
     /// Frames of a turn at this rate.
@@ -132,7 +128,7 @@ impl Settings {
 
 /// What is wished of a camera's mode; what is not given is chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ModeWish {
+pub struct ModePreference {
     /// Pixel format.
     pub fourcc: Option<Fourcc>,
     /// Frame size.
@@ -141,7 +137,7 @@ pub struct ModeWish {
     pub fps: f64,
 }
 
-impl Default for ModeWish {
+impl Default for ModePreference {
     fn default() -> Self {
         Self {
             fourcc: None,
@@ -151,7 +147,7 @@ impl Default for ModeWish {
     }
 }
 
-impl fmt::Display for ModeWish {
+impl fmt::Display for ModePreference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.fourcc {
             Some(fourcc) => write!(f, "{fourcc}")?,
@@ -197,7 +193,7 @@ impl FromStr for FrameSize {
     }
 }
 
-impl ModeWish {
+impl ModePreference {
     /// The mode to ask the camera for: of those that fulfil the wish the largest, and of those the
     /// one whose frames take least room.
     ///
@@ -282,21 +278,18 @@ mod tests {
     }
 
     #[test]
-    fn a_rehearsal_has_one_clock_at_the_tables_speed() {
-        for (camera, table, factor) in [
+    fn a_rehearsal_runs_at_the_tables_speed() {
+        for (camera, table, speed) in [
             ("replay:a?speed=3", "sim:?speed=5", 5.0),
-            ("replay:a", "sim:?speed=0", 20.0),
-            ("replay:a?speed=0", "none", 20.0),
+            ("replay:a", "sim:?speed=0", 0.0),
+            ("replay:a?speed=0", "none", 0.0),
             ("replay:a?speed=7", "none", 7.0),
             ("v4l2:/dev/video0", "sim:", 1.0),
             ("replay:a", "serial:/dev/ttyUSB0", 1.0),
             ("v4l2:/dev/video0", "serial:", 1.0),
         ] {
-            let (paced, clock) = settings(camera, table).on_one_clock().unwrap();
-            assert_eq!(clock.factor(), factor, "{camera} {table}");
-            if let CameraAddress::Replay { speed, .. } = paced.camera {
-                assert_eq!(speed, ReplaySpeed::Times(factor));
-            }
+            let found = settings(camera, table).speed().unwrap();
+            assert_eq!(found, speed, "{camera} {table}");
         }
     }
 
@@ -307,8 +300,8 @@ mod tests {
             ("replay:a?speed=2", "serial:"),
             ("replay:a?speed=0", "serial:"),
         ] {
-            let error = settings(camera, table).on_one_clock().unwrap_err();
-            assert!(matches!(error, CaptureError::Refused(Refusal::Pace)));
+            let refusal = settings(camera, table).speed().unwrap_err();
+            assert!(matches!(refusal, Refusal::Pace));
         }
     }
 
@@ -319,16 +312,16 @@ mod tests {
             mode(Fourcc::MJPG, 1920, 1080, &[30, 60]),
             mode(Fourcc::MJPG, 3840, 2160, &[15]),
         ];
-        let chosen = ModeWish::default().choose(&modes).unwrap();
+        let chosen = ModePreference::default().choose(&modes).unwrap();
         assert_eq!(chosen.to_string(), "MJPG:1920x1080@30");
-        let wish = ModeWish {
+        let wish = ModePreference {
             fourcc: Some(Fourcc::YUYV),
-            ..ModeWish::default()
+            ..ModePreference::default()
         };
         assert_eq!(wish.choose(&modes).unwrap().fourcc, Fourcc::YUYV);
-        let wish = ModeWish {
+        let wish = ModePreference {
             fps: 15.0,
-            ..ModeWish::default()
+            ..ModePreference::default()
         };
         assert_eq!(wish.choose(&modes).unwrap().width, 3840);
     }
@@ -336,7 +329,10 @@ mod tests {
     #[test]
     fn a_wish_that_no_mode_fulfils_is_told_with_what_there_is() {
         let modes = [mode(Fourcc::MJPG, 640, 480, &[25])];
-        let error = ModeWish::default().choose(&modes).unwrap_err().to_string();
+        let error = ModePreference::default()
+            .choose(&modes)
+            .unwrap_err()
+            .to_string();
         assert!(
             error.contains("any format of any size at 30 frames/s"),
             "{error}"

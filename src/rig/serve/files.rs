@@ -1,24 +1,25 @@
 //! A session's video as a file, whole or a part of it (RFC 9110, section 14).
 
-use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::SeekFrom;
 use std::sync::Arc;
 use std::time::UNIX_EPOCH;
 
-use axum::body::{Body, Bytes};
+use axum::body::Body;
 use axum::extract::{Path, State};
-use axum::http::{HeaderMap, HeaderName, StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use futures_util::stream;
+use futures_util::StreamExt;
+use tokio::fs::File;
+use tokio::io::{AsyncReadExt, AsyncSeekExt};
 use tokio::sync::OwnedSemaphorePermit;
-use tokio::task::spawn_blocking;
+use tokio_util::io::ReaderStream;
 
-use super::answer::{Failure, Problem};
-use super::library::Stamp;
-use super::server::{Server, Work, place};
+use super::failure::{Failure, Problem};
+use super::library::{FileVersion, Library};
+use super::permits::{Permits, Work, permit};
 
 /// Bytes that are read at a time.
-const PIECE: u64 = 128 * 1024;
+const PIECE: usize = 128 * 1024;
 
 /// The video file
 ///
@@ -37,29 +38,64 @@ const PIECE: u64 = 128 * 1024;
     )
 )]
 pub(super) async fn video(
-    State(server): State<Arc<Server>>,
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Failure> {
-    let place = place(&server.places.downloads, "downloads")?;
-    let name = id.clone();
-    let opened = server.block_on(Work::Listing, move |server| {
-        let footage = server.library.footage(&id)?;
-        let file = File::open(&footage.path).map_err(|error| {
-            Failure::broken(format!("the video of {id} cannot be read: {error}"))
-        })?;
-        Ok((file, footage.stamp))
-    });
-    let (file, stamp) = opened.await?;
-    let tag = entity_tag(stamp);
-    let range = Range::asked(&headers, stamp.0, &tag);
+    let permit = permit(&permits.downloads, "downloads")?;
     let common = [
         (header::CONTENT_TYPE, "video/x-matroska".to_owned()),
         (header::ACCEPT_RANGES, "bytes".to_owned()),
-        (header::ETAG, tag),
-        (header::CONTENT_DISPOSITION, attachment(&name)),
+        (header::CONTENT_DISPOSITION, attachment(&id)),
     ];
-    Ok(range.answer(file, stamp.0, common, place))
+    let unreadable = format!("the video of {id} cannot be read");
+    let unreadable = |error| Failure::broken(format!("{unreadable}: {error}"));
+    let found = permits.run(Work::Listing, move || library.video_file(&id));
+    let found = found.await?;
+    let file = File::open(&found.path).await.map_err(unreadable)?;
+    let size = found.version.bytes;
+    let tag = entity_tag(found.version);
+    let range = Range::asked(&headers, size, &tag);
+    let (first, length) = match range {
+        Range::All => (0, size),
+        Range::Part { first, length } => (first, length),
+        Range::Beyond => {
+            let error = format!("the range lies beyond the end: the file has {size} bytes");
+            let failure = Failure::new(StatusCode::RANGE_NOT_SATISFIABLE, error);
+            let sized = [(header::CONTENT_RANGE, format!("bytes */{size}"))];
+            return Ok((sized, failure).into_response());
+        }
+    };
+    let body = download(file, first, length, permit).await;
+    let body = body.map_err(unreadable)?;
+    let common = (
+        common,
+        [
+            (header::ETAG, tag),
+            (header::CONTENT_LENGTH, length.to_string()),
+        ],
+    );
+    if range == Range::All {
+        return Ok((common.0, common.1, body).into_response());
+    }
+    let part = format!("bytes {first}-{}/{size}", first + length - 1);
+    let part = [(header::CONTENT_RANGE, part)];
+    Ok((StatusCode::PARTIAL_CONTENT, common.0, common.1, part, body).into_response())
+}
+
+/// `length` bytes of a file from `first` on; the permit is given back with them.
+async fn download(
+    mut file: File,
+    first: u64,
+    length: u64,
+    permit: OwnedSemaphorePermit,
+) -> std::io::Result<Body> {
+    file.seek(SeekFrom::Start(first)).await?;
+    let pieces = ReaderStream::with_capacity(file.take(length), PIECE);
+    Ok(Body::from_stream(pieces.inspect(move |_| {
+        let _held = &permit;
+    })))
 }
 
 /// Which bytes of a file are asked for.
@@ -89,43 +125,6 @@ impl Range {
         }
     }
 
-    /// The bytes, with the headers that tell which they are.
-    fn answer(
-        self,
-        file: File,
-        size: u64,
-        common: [(HeaderName, String); 4],
-        place: OwnedSemaphorePermit,
-    ) -> Response {
-        let (first, length) = match self {
-            Self::All => (0, size),
-            Self::Part { first, length } => (first, length),
-            Self::Beyond => {
-                let error = format!("the range lies beyond the end: the file has {size} bytes");
-                let failure = Failure::new(StatusCode::RANGE_NOT_SATISFIABLE, error);
-                let told = [(header::CONTENT_RANGE, format!("bytes */{size}"))];
-                return (told, failure).into_response();
-            }
-        };
-        let download = Download {
-            file: Arc::new(file),
-            at: first,
-            left: length,
-            _place: place,
-        };
-        let body = Body::from_stream(stream::try_unfold(download, Download::piece));
-        let sized = [(header::CONTENT_LENGTH, length.to_string())];
-        if self == Self::All {
-            return (common, sized, body).into_response();
-        }
-        let last = first + length - 1;
-        let told = [(
-            header::CONTENT_RANGE,
-            format!("bytes {first}-{last}/{size}"),
-        )];
-        (StatusCode::PARTIAL_CONTENT, common, sized, told, body).into_response()
-    }
-
     /// Of a `Range` header, for a file of `size` bytes. What is no single range of bytes is passed over,
     /// as the standard has it.
     fn read(text: &str, size: u64) -> Self {
@@ -150,38 +149,10 @@ impl Range {
     }
 }
 
-struct Download {
-    file: Arc<File>,
-    at: u64,
-    left: u64,
-    _place: OwnedSemaphorePermit,
-}
-
-impl Download {
-    /// The next piece, read on a thread that may block.
-    async fn piece(mut self) -> io::Result<Option<(Bytes, Self)>> {
-        if self.left == 0 {
-            return Ok(None);
-        }
-        let (file, at, wanted) = (self.file.clone(), self.at, self.left.min(PIECE));
-        let read = spawn_blocking(move || {
-            let mut file: &File = &file;
-            file.seek(SeekFrom::Start(at))?;
-            let mut piece = vec![0; wanted as usize];
-            file.read_exact(&mut piece)?;
-            Ok::<_, io::Error>(piece)
-        });
-        let piece = read.await.map_err(io::Error::other)??;
-        self.at += wanted;
-        self.left -= wanted;
-        Ok(Some((piece.into(), self)))
-    }
-}
-
 /// Changes with the file.
-fn entity_tag((size, modified): Stamp) -> String {
+fn entity_tag(FileVersion { bytes, modified }: FileVersion) -> String {
     let since = modified.and_then(|time| time.duration_since(UNIX_EPOCH).ok());
-    format!("\"{size:x}-{:x}\"", since.unwrap_or_default().as_micros())
+    format!("\"{bytes:x}-{:x}\"", since.unwrap_or_default().as_micros())
 }
 
 /// The name under which a browser saves the file (RFC 6266, RFC 8187).

@@ -18,7 +18,7 @@ mod timeline;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use self::description::{controls, describe, rate, stamp};
 use self::faults::FaultInjector;
@@ -50,7 +50,7 @@ pub(super) struct ReplayCamera {
 }
 
 /// How time stamps of the recording become those of the clock, and whether they are waited for.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 struct Pace {
     clock: Clock,
     /// Time on the clock for one of the recording.
@@ -174,20 +174,20 @@ impl Camera for ReplayCamera {
     }
 
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError> {
-        let deadline = Instant::now().checked_add(timeout);
+        let deadline_us = self.pace.clock.after(timeout);
         let Some(mut playing) = self.playing.take() else {
             return Err(CameraError::NotStarted {
                 device: self.info.address.to_string(),
             });
         };
-        let found = self.advance(&mut playing, deadline);
+        let found = self.advance(&mut playing, deadline_us);
         let delivered = playing.delivered;
         self.playing = Some(playing);
         match found? {
             Step::Frame(frame) => Ok(frame),
             Step::TooEarly => Err(self.end_error(End::Stalled, delivered, timeout)),
             Step::End(End::Stalled) => {
-                std::thread::sleep(timeout);
+                self.pace.clock.sleep_until(deadline_us);
                 Err(self.end_error(End::Stalled, delivered, timeout))
             }
             Step::End(end) => Err(self.end_error(end, delivered, timeout)),
@@ -209,11 +209,7 @@ enum Step {
 }
 
 impl ReplayCamera {
-    fn advance(
-        &mut self,
-        playing: &mut Playing,
-        deadline: Option<Instant>,
-    ) -> Result<Step, CameraError> {
+    fn advance(&mut self, playing: &mut Playing, deadline_us: i64) -> Result<Step, CameraError> {
         loop {
             if let Some(end) = playing.ended {
                 return Ok(Step::End(end));
@@ -240,7 +236,7 @@ impl ReplayCamera {
             }
             let moment = self.timeline.moment(taken.number, playing.round);
             let due_us = self.pace.due_us(playing.start_us, moment.since_first_us);
-            if !self.pace.wait_until(due_us, deadline) {
+            if !self.pace.wait_until(due_us, deadline_us) {
                 playing.next = Some(taken);
                 return Ok(Step::TooEarly);
             }
@@ -300,8 +296,8 @@ impl Pace {
                 wait: false,
             },
             ReplaySpeed::Times(times) => Self {
-                clock,
                 stretch: clock.factor() / times,
+                clock,
                 wait: true,
             },
         }
@@ -318,26 +314,11 @@ impl Pace {
     }
 
     /// Waits until the clock shows this, or until the deadline; true where the clock shows it.
-    fn wait_until(&self, due_us: i64, deadline: Option<Instant>) -> bool {
-        if !self.wait {
-            return true;
+    fn wait_until(&self, due_us: i64, deadline_us: i64) -> bool {
+        if self.wait {
+            self.clock.sleep_until(due_us.min(deadline_us));
         }
-        let left = due_us.saturating_sub(self.clock.now_us());
-        let Ok(left @ 1..) = u64::try_from(left) else {
-            return true;
-        };
-        let left = self.clock.real(Duration::from_micros(left));
-        let allowed = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
-        match allowed {
-            Some(allowed) if allowed < left => {
-                std::thread::sleep(allowed);
-                false
-            }
-            _ => {
-                std::thread::sleep(left);
-                true
-            }
-        }
+        !self.wait || due_us <= deadline_us
     }
 }
 

@@ -173,7 +173,7 @@ fn a_stalled_camera_times_out_again_and_again() {
     let waited = Duration::from_millis(30);
     assert!(camera.next_frame(waited).is_ok());
     for _ in 0..2 {
-        let start = Instant::now();
+        let start = std::time::Instant::now();
         let error = camera.next_frame(waited).unwrap_err();
         assert!(matches!(error, CameraError::Timeout { .. }), "{error}");
         assert!(start.elapsed() >= waited);
@@ -200,7 +200,7 @@ fn frames_come_when_the_clock_shows_their_time_stamp() {
         .parse()
         .unwrap();
     let clock = address.clock();
-    let mut camera = open(&address, clock).unwrap();
+    let mut camera = open(&address, clock.clone()).unwrap();
     camera.start(&request()).unwrap();
     let (frames, _) = play(&mut *camera);
     assert!(frames.last().unwrap().t_us <= clock.now_us());
