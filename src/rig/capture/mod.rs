@@ -12,7 +12,6 @@
 mod equipment;
 mod error;
 mod locked_camera;
-pub mod look;
 mod manifest;
 mod metering;
 mod mode_preference;

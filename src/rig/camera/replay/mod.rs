@@ -6,10 +6,9 @@
 //! in the raw format that holds the same samples.
 //!
 //! Time stamps are those recorded, moved so that the first frame is due when the stream starts. A
-//! frame comes when the clock shows its time stamp, so that a replay at a multiple of real time
-//! wants a clock that runs as much faster ([`CameraAddress::clock`]); on another clock its time stamps
-//! are as much closer together. As fast as it is read, time stamps run ahead of the clock. No frame
-//! is lost where the reader is slow: a replay waits.
+//! frame comes when the clock shows its time stamp. At a speed other than 1, time stamps are as much
+//! closer together on the clock; as fast as it is read, they run ahead of it. No frame is lost if the
+//! reader is slow: a replay waits.
 
 mod description;
 mod faults;
@@ -296,8 +295,8 @@ impl Pace {
                 wait: false,
             },
             ReplaySpeed::Times(times) => Self {
-                stretch: clock.factor() / times,
                 clock,
+                stretch: times.recip(),
                 wait: true,
             },
         }
