@@ -25,7 +25,7 @@ use relit_data::session::{
 use relit_data::shard::{Dataset, ImageSize};
 use relit_rig::camera::{
     Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
-    Mode, ModeRequest, Rate, Sequence, StampSource, open,
+    Mode, ModeRequest, Sequence, StampSource, open,
 };
 use relit_rig::capture::{End, Plan, Recorder, Window, salvage, salvage_session};
 use relit_rig::clock::Clock;
