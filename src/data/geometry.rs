@@ -28,6 +28,16 @@ impl Rect {
         Self { x, y, w, h }
     }
 
+    /// The middle of an image: half its width and height, at least one pixel.
+    #[must_use]
+    pub fn middle_of(width: u32, height: u32) -> Self {
+        let (w, h) = ((width / 2).max(1), (height / 2).max(1));
+        let edge = |whole: u32, part: u32| {
+            i32::try_from(whole.saturating_sub(part) / 2).unwrap_or(i32::MAX)
+        };
+        Self::new(edge(width, w), edge(height, h), w, h)
+    }
+
     /// One past the right edge, in pixels.
     #[must_use]
     pub fn right(self) -> i64 {
@@ -115,6 +125,12 @@ mod tests {
         let rect: Rect = "10, -4,30,40".parse().unwrap();
         assert_eq!(rect, Rect::new(10, -4, 30, 40));
         assert_eq!(rect.to_string(), "10,-4,30,40");
+    }
+
+    #[test]
+    fn the_middle_is_half_as_wide_and_high_and_never_empty() {
+        assert_eq!(Rect::middle_of(640, 480), Rect::new(160, 120, 320, 240));
+        assert_eq!(Rect::middle_of(1, 1), Rect::new(0, 0, 1, 1));
     }
 
     #[test]

@@ -10,11 +10,12 @@
 //! | [`shard`] | the data set: samples, records, statistics; writing, reading, verifying |
 //! | [`report`] | the HTML page of one extracted session |
 //! | [`geometry`] | pixel rectangles |
+//! | [`image_stats`] | statistics of an image's pixels, all or under a mask |
 //! | [`naming`] | the names that a session may have |
 //! | [`durable`] | files that appear whole or not at all |
 //! | [`causes`] | errors as text, with their causes |
 //!
-//! `report` and `shard` know `geometry`, `durable` and `naming`; `report` knows the records of `shard`;
+//! `report` and `shard` know `geometry`, `image_stats`, `durable` and `naming`; `report` knows the records of `shard`;
 //! `session` and `shard` do not know each other. `docs/formats.md` describes every file and field.
 //!
 //! # Read a session
@@ -47,9 +48,10 @@
 //!
 //! use image::{GrayImage, Luma, Rgb, RgbImage};
 //! use relit_data::geometry::Rect;
+//! use relit_data::image_stats::MaskSpans;
 //! use relit_data::shard::{
 //!     Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
-//!     MaskSpans, OutputFolder, Sample, SamplingBasis, SessionEntry, ShardReader, ShardWriter,
+//!     OutputFolder, Sample, SamplingBasis, SessionEntry, ShardReader, ShardWriter,
 //!     SourceVideo, decode_rgb, verify,
 //! };
 //!
@@ -151,6 +153,7 @@
 pub mod causes;
 pub mod durable;
 pub mod geometry;
+pub mod image_stats;
 pub mod naming;
 pub mod report;
 pub mod session;

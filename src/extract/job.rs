@@ -4,11 +4,12 @@ use std::path::Path;
 
 use rayon::ThreadPool;
 
+use relit_data::image_stats::MaskSpans;
 use relit_data::report::{self, Page};
 use relit_data::session::{INDEX_FILE, Notice, Recording};
 use relit_data::shard::{
-    Dataset, Digest, FrameRecord, ImageSize, MaskInfo, MaskSpans, OutputFolder, Sample,
-    SessionEntry, ShardEntry, ShardWriter, SourceVideo,
+    Dataset, Digest, FrameRecord, ImageSize, MaskInfo, OutputFolder, Sample, SessionEntry,
+    ShardEntry, ShardWriter, SourceVideo,
 };
 use relit_video::Video;
 

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::thread::available_parallelism;
 
+use relit_data::image_stats::SATURATION_LEVEL;
 use relit_data::shard::{Align, ExtractionSettings, ImageSize, Layout};
 
 use super::{ExtractError, scale};
@@ -47,7 +48,7 @@ impl Default for ExtractOptions {
             frames: 1500,
             size: ImageSize::Pixels(256),
             margin: 0.05,
-            saturation_level: 250,
+            saturation_level: SATURATION_LEVEL,
             gate: 0.05,
             layout: Layout::Webdataset,
             mask: None,

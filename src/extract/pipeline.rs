@@ -10,7 +10,8 @@ use rayon::ThreadPool;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 
 use relit_data::geometry::Rect;
-use relit_data::shard::{self, MaskSpans, Measures};
+use relit_data::image_stats::{MaskSpans, Measures};
+use relit_data::shard::{self, ShardError};
 use relit_video::{DecodeFault, Pending, Reader, Video};
 
 use super::plan::Assignments;
@@ -87,7 +88,8 @@ impl Stage<'_> {
             }
             Err(fault) => return Ok(Err(LostFrame { number, fault })),
         };
-        let measures = self.spans.measure(&crop, self.saturation_level)?;
+        let measures = self.spans.measure(&crop, self.saturation_level);
+        let measures = measures.map_err(ShardError::from)?;
         let image = self.scaler.scale(&crop, resizer)?;
         let png = shard::encode_rgb(&image)?;
         Ok(Ok(ProcessedFrame {

@@ -18,9 +18,9 @@ use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 
 use crate::camera::Frame;
-use crate::capture::look::{clipped, focus, middle};
 use crate::state::Monitor;
 use relit_data::geometry::Rect;
+use relit_data::image_stats::{SATURATION_LEVEL, measure_whole};
 use relit_video::{LiveDecoder, Picture, PixelFormat, is_key};
 
 /// Frames that wait for the thread.
@@ -119,10 +119,11 @@ impl PreviewEncoder {
     }
 
     fn measure(&self, rgb: &RgbImage) {
-        let Rect { x, y, w, h } = middle(rgb.width(), rgb.height());
+        let Rect { x, y, w, h } = Rect::middle_of(rgb.width(), rgb.height());
         let (x, y) = (x.unsigned_abs(), y.unsigned_abs());
-        let inner = image::imageops::crop_imm(rgb, x, y, w, h).to_image();
-        let (clipped, focus) = (clipped(rgb), focus(&inner));
+        let middle = image::imageops::crop_imm(rgb, x, y, w, h).to_image();
+        let clipped = measure_whole(rgb, SATURATION_LEVEL).saturated_fraction();
+        let focus = measure_whole(&middle, SATURATION_LEVEL).sharpness;
         self.monitor.update(|state| {
             state.camera.clipped = Some(clipped);
             state.camera.focus = Some(focus);

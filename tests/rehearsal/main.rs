@@ -4,5 +4,6 @@
 mod commands;
 mod daemon;
 mod faults;
+mod serving;
 mod support;
 mod turn;

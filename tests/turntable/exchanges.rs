@@ -140,7 +140,7 @@ fn faults() -> &'static str {
 #[test]
 fn no_motion_is_wrong_or_doubled_over_a_bad_wire() {
     let rig = Rig::new(faults());
-    let outcome = run(&rig, 5000, 1);
+    let outcome = run(&rig, 3000, 1);
     println!("{outcome:?}");
     assert!(outcome.wrong.is_empty(), "{:?}", outcome.wrong);
     assert!(outcome.done > 20, "{outcome:?}");
@@ -150,7 +150,7 @@ fn no_motion_is_wrong_or_doubled_over_a_bad_wire() {
 #[test]
 fn without_checksums_no_motion_is_wrong_or_doubled_either() {
     let rig = Rig::new("drop=0.0005,duplicate=0.01,merge=0.005").plain();
-    let outcome = run(&rig, 5000, 3);
+    let outcome = run(&rig, 3000, 3);
     println!("{outcome:?}");
     assert!(outcome.wrong.is_empty(), "{:?}", outcome.wrong);
 }

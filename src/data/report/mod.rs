@@ -19,7 +19,7 @@ mod turn;
 pub use error::ReportError;
 pub use page::{Page, THUMBNAIL_SIDE, Thumbnail};
 
-use crate::shard::measure::fraction;
+use crate::image_stats::fraction;
 use crate::shard::record::FrameRecord;
 use turn::Turn;
 

@@ -5,7 +5,7 @@ use super::html::{escape, table};
 use super::page::Page;
 use super::plot::{Level, Plot, Series};
 use super::turn::Turn;
-use crate::shard::measure::fraction;
+use crate::image_stats::fraction;
 use crate::shard::record::FrameRecord;
 
 /// Heights of the plotting areas; the width is 500.

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::image_stats::SizeMismatch;
+
 /// Why a data set could not be written, read or checked.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -309,6 +311,16 @@ impl ShardError {
             doing,
             path: path.to_owned(),
             source,
+        }
+    }
+}
+
+impl From<SizeMismatch> for ShardError {
+    fn from(SizeMismatch { size, expected }: SizeMismatch) -> Self {
+        Self::SizeMismatch {
+            what: "the image",
+            size,
+            expected,
         }
     }
 }

@@ -8,7 +8,6 @@
 //! | --- | --- |
 //! | [`record`], [`read_table`] | a frame's record, as JSON and as a row of the table |
 //! | [`order`](order()) | the order of the samples in a shard |
-//! | [`measure`] | statistics of the pixels under a mask |
 //! | [`encode_rgb`], [`decode_rgb`] and others | images as PNG (`codec`) |
 //! | [`Digest`], [`sample_key`] | BLAKE3 digests; names and whether they are safe |
 //! | [`OutputFolder`] | locks the folder; writes files that appear whole or not at all |
@@ -17,7 +16,7 @@
 //! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tarball`) |
 //! | [`verify`](verify()) | reads everything back and reports what is wrong |
 //!
-//! This module knows pixel rectangles and images. It knows nothing of videos, of how a mask was made,
+//! This module knows pixel rectangles, images and their statistics ([`image_stats`](crate::image_stats)). It knows nothing of videos, of how a mask was made,
 //! of the rig or of session folders: here a session is a name and its samples.
 
 mod codec;
@@ -27,7 +26,6 @@ mod error;
 mod file;
 mod folder;
 mod integrity;
-pub mod measure;
 mod names;
 mod order;
 mod output;
@@ -47,7 +45,6 @@ pub use dataset::{
 pub use digest::{Digest, NotADigest};
 pub use error::ShardError;
 pub use file::FileEntry;
-pub use measure::{MaskSpans, Measures};
 pub use names::{check_session, sample_key};
 pub use order::order;
 pub use output::OutputFolder;

@@ -12,7 +12,6 @@
 mod equipment;
 mod error;
 pub mod locked_camera;
-pub mod look;
 mod manifest;
 mod metering;
 pub mod preflight;

@@ -1,18 +1,21 @@
 //! The sessions on disk, as a list and one by one. Reads manifests and frame indexes, no video.
 
-use std::collections::HashMap;
-use std::fs;
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
+use std::{fs, io};
 
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::cache::Cache;
 use super::failure::Failure;
 use relit_data::causes::with_causes;
 use relit_data::naming::is_session_name;
 use relit_data::session::{FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, Status, object_of};
+
+/// Summaries that are kept.
+const SUMMARIES: usize = 4096;
 
 /// How far a session has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -78,14 +81,14 @@ pub(super) struct DroppedFrames {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct VideoFile {
     pub(super) path: PathBuf,
-    pub(super) version: FileVersion,
+    version: FileVersion,
 }
 
 /// What tells one state of a file from another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) struct FileVersion {
-    pub(super) bytes: u64,
-    pub(super) modified: Option<SystemTime>,
+struct FileVersion {
+    bytes: u64,
+    modified: Option<SystemTime>,
 }
 
 impl FileVersion {
@@ -103,15 +106,15 @@ impl FileVersion {
 #[derive(Debug)]
 pub(super) struct Library {
     root: PathBuf,
-    /// Summaries by name, each with the version of the manifest that it was made from.
-    known: Mutex<HashMap<String, (FileVersion, SessionSummary)>>,
+    /// Summaries by name, and the version of the manifest that each was made from.
+    summaries: Cache<(String, FileVersion), SessionSummary>,
 }
 
 impl Library {
     pub(super) fn new(root: PathBuf) -> Self {
         Self {
             root,
-            known: Mutex::new(HashMap::new()),
+            summaries: Cache::new(SUMMARIES),
         }
     }
 
@@ -144,15 +147,20 @@ impl Library {
 
     /// Names of all session folders, newest first: they begin with the date.
     fn names(&self) -> Result<Vec<String>, Failure> {
-        let failed = |error| {
+        let mut names = self.read_names().map_err(|error| {
             let root = self.root.display();
             Failure::broken(format!(
                 "the folder of sessions {root} cannot be read: {error}"
             ))
-        };
+        })?;
+        names.sort_unstable_by(|one, other| other.cmp(one));
+        Ok(names)
+    }
+
+    fn read_names(&self) -> io::Result<Vec<String>> {
         let mut names = Vec::new();
-        for entry in fs::read_dir(&self.root).map_err(failed)? {
-            let entry = entry.map_err(failed)?;
+        for entry in fs::read_dir(&self.root)? {
+            let entry = entry?;
             if let Ok(name) = entry.file_name().into_string()
                 && is_session_name(&name)
                 && entry.path().join(MANIFEST_FILE).is_file()
@@ -160,42 +168,24 @@ impl Library {
                 names.push(name);
             }
         }
-        names.sort_unstable_by(|one, other| other.cmp(one));
-        self.forget_all_but(&names);
         Ok(names)
-    }
-
-    fn forget_all_but(&self, names: &[String]) {
-        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        known.retain(|name, _| {
-            names
-                .binary_search_by(|other| name.as_str().cmp(other))
-                .is_ok()
-        });
     }
 
     /// The summary of a session. `None` where it has gone meanwhile.
     fn summary(&self, name: &str) -> Option<SessionSummary> {
         let folder = self.root.join(name);
         let version = FileVersion::of(&folder.join(MANIFEST_FILE))?;
-        {
-            let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some((of, summary)) = known.get(name)
-                && *of == version
-            {
-                return Some(summary.clone());
-            }
-        }
-        let summary = match read_manifest(&folder) {
-            Ok(manifest) => {
-                let index = read_index(&folder, &manifest);
-                summarise(name, &manifest, index.as_ref())
-            }
-            Err(reason) => unreadable(name, reason),
-        };
-        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        known.insert(name.to_owned(), (version, summary.clone()));
-        Some(summary)
+        let key = (name.to_owned(), version);
+        let summary = self.summaries.get_or_make(key, |_| {
+            Ok::<_, Infallible>(match read_manifest(&folder) {
+                Ok(manifest) => {
+                    let index = read_index(&folder, &manifest);
+                    summarise(name, &manifest, index.as_ref())
+                }
+                Err(reason) => unreadable(name, reason),
+            })
+        });
+        summary.ok()
     }
 
     /// All about one session.

@@ -96,6 +96,7 @@ pub(super) async fn metrics(
 /// Name, meaning and value; a value that is not known is left out.
 type Gauge = (&'static str, &'static str, Option<f64>);
 
+#[rustfmt::skip]
 fn gauges(state: &RigState) -> [Gauge; 20] {
     let whole = |value: u64| Some(value as f64);
     let yes = |is: bool| Some(flag(is));
@@ -106,85 +107,25 @@ fn gauges(state: &RigState) -> [Gauge; 20] {
     let faulty = "1 where something is wrong";
     [
         ("relit_take_frames", frames, whole(state.frames)),
-        (
-            "relit_take_frames_wanted",
-            "Frames of a whole take",
-            whole(state.frames_wanted),
-        ),
+        ("relit_take_frames_wanted", "Frames of a whole take", whole(state.frames_wanted)),
         ("relit_take_frames_dropped", missing, whole(state.dropped)),
-        (
-            "relit_last_take_frames",
-            frames,
-            last.map(|take| take.frames as f64),
-        ),
-        (
-            "relit_last_take_frames_dropped",
-            missing,
-            last.map(|take| take.dropped as f64),
-        ),
-        (
-            "relit_queue_objects",
-            "Objects that wait",
-            whole(state.queue.len() as u64),
-        ),
-        (
-            "relit_faults_shown",
-            "Faults in the list",
-            whole(state.faults.len() as u64),
-        ),
-        (
-            "relit_disk_free_bytes",
-            "Room for sessions",
-            whole(state.free_bytes),
-        ),
-        (
-            "relit_disk_needed_bytes",
-            "Expected size of a take",
-            whole(state.needed_bytes),
-        ),
-        (
-            "relit_table_present",
-            "1 where there is a table",
-            yes(table.present),
-        ),
-        (
-            "relit_table_homed",
-            "1 where its zero is known",
-            yes(table.homed),
-        ),
+        ("relit_last_take_frames", frames, last.map(|take| take.frames as f64)),
+        ("relit_last_take_frames_dropped", missing, last.map(|take| take.dropped as f64)),
+        ("relit_queue_objects", "Objects that wait", whole(state.queue.len() as u64)),
+        ("relit_faults_shown", "Faults in the list", whole(state.faults.len() as u64)),
+        ("relit_disk_free_bytes", "Space for sessions", whole(state.free_bytes)),
+        ("relit_disk_needed_bytes", "Expected size of a take", whole(state.needed_bytes)),
+        ("relit_table_present", "1 where there is a table", yes(table.present)),
+        ("relit_table_homed", "1 where its zero is known", yes(table.homed)),
         ("relit_table_faulty", faulty, yes(table.fault.is_some())),
-        (
-            "relit_table_angle_degrees",
-            "From machine zero",
-            table.angle_deg,
-        ),
-        (
-            "relit_table_degrees_per_second",
-            "Speed",
-            table.degrees_per_second,
-        ),
+        ("relit_table_angle_degrees", "From machine zero", table.angle_deg),
+        ("relit_table_degrees_per_second", "Speed", table.degrees_per_second),
         ("relit_table_battery_volts", "Battery", table.battery_v),
-        (
-            "relit_camera_present",
-            "1 where it can be reached",
-            yes(camera.present),
-        ),
+        ("relit_camera_present", "1 where it can be reached", yes(camera.present)),
         ("relit_camera_faulty", faulty, yes(camera.fault.is_some())),
-        (
-            "relit_camera_frames_per_second",
-            "Over the last second",
-            camera.fps,
-        ),
-        (
-            "relit_camera_clipped_ratio",
-            "Clipped pixels, 0 to 1",
-            camera.clipped,
-        ),
-        (
-            "relit_camera_focus",
-            "Variance of the Laplacian",
-            camera.focus,
-        ),
+        ("relit_camera_frames_per_second", "Over the last second", camera.fps),
+        ("relit_camera_clipped_ratio", "Clipped pixels, 0 to 1", camera.clipped),
+        ("relit_camera_focus", "Variance of the Laplacian", camera.focus),
     ]
 }
 

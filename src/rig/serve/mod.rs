@@ -14,13 +14,13 @@
 mod access;
 mod address;
 mod api;
+mod cache;
 mod extract;
 mod failure;
 mod files;
 mod library;
 mod listen;
 mod metrics;
-mod openapi;
 mod page;
 mod permits;
 mod pictures;

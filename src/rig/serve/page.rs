@@ -24,37 +24,21 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// All files but the page itself.
 pub(super) const ASSETS: [Asset; 6] = [
-    Asset {
-        path: "/page.css",
-        kind: "text/css; charset=utf-8",
-        text: include_str!("page/page.css"),
-    },
-    Asset {
-        path: "/page.js",
-        kind: SCRIPT,
-        text: include_str!("page/page.js"),
-    },
-    Asset {
-        path: "/link.js",
-        kind: SCRIPT,
-        text: include_str!("page/link.js"),
-    },
-    Asset {
-        path: "/preview.js",
-        kind: SCRIPT,
-        text: include_str!("page/preview.js"),
-    },
-    Asset {
-        path: "/sessions.js",
-        kind: SCRIPT,
-        text: include_str!("page/sessions.js"),
-    },
-    Asset {
-        path: "/icon.svg",
-        kind: "image/svg+xml",
-        text: include_str!("page/icon.svg"),
-    },
+    asset(
+        "/page.css",
+        "text/css; charset=utf-8",
+        include_str!("page/page.css"),
+    ),
+    asset("/page.js", SCRIPT, include_str!("page/page.js")),
+    asset("/link.js", SCRIPT, include_str!("page/link.js")),
+    asset("/preview.js", SCRIPT, include_str!("page/preview.js")),
+    asset("/sessions.js", SCRIPT, include_str!("page/sessions.js")),
+    asset("/icon.svg", "image/svg+xml", include_str!("page/icon.svg")),
 ];
+
+const fn asset(path: &'static str, kind: &'static str, text: &'static str) -> Asset {
+    Asset { path, kind, text }
+}
 
 impl Asset {
     pub(super) fn answer(&self) -> Response {

@@ -1,16 +1,14 @@
 //! Pictures out of recorded videos: a small one for the list, and any frame for the player.
 
-use std::hash::Hash;
-use std::num::NonZeroUsize;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use axum::body::Bytes;
 use image::codecs::jpeg::JpegEncoder;
 use image::{RgbImage, imageops};
-use lru::LruCache;
 use relit_data::causes::with_causes;
 use relit_video::Video;
 
+use super::cache::Cache;
 use super::failure::Failure;
 use super::library::VideoFile;
 
@@ -58,35 +56,6 @@ impl Pictures {
                 let video = self.videos.get_or_make(file.clone(), open)?;
                 encode(&video.frame(number).map_err(failed)?, width)
             })
-    }
-}
-
-/// The values that were used last.
-#[derive(Debug)]
-struct Cache<K: Hash + Eq, V>(Mutex<LruCache<K, V>>);
-
-impl<K: Hash + Eq, V: Clone> Cache<K, V> {
-    fn new(most: usize) -> Self {
-        let most = NonZeroUsize::new(most).unwrap_or(NonZeroUsize::MIN);
-        Self(Mutex::new(LruCache::new(most)))
-    }
-
-    /// The value of a key. While one is made, others can be had.
-    fn get_or_make(
-        &self,
-        key: K,
-        make: impl FnOnce(&K) -> Result<V, Failure>,
-    ) -> Result<V, Failure> {
-        if let Some(known) = self.lock().get(&key) {
-            return Ok(known.clone());
-        }
-        let value = make(&key)?;
-        self.lock().put(key, value.clone());
-        Ok(value)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, LruCache<K, V>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use relit_data::geometry::Rect;
+use relit_data::image_stats::MaskSpans;
 use relit_data::shard::{
     Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
-    MaskSpans, OutputFolder, Problem, Sample, SamplingBasis, SessionEntry, ShardWriter,
-    SourceVideo, VerifyReport, verify,
+    OutputFolder, Problem, Sample, SamplingBasis, SessionEntry, ShardWriter, SourceVideo,
+    VerifyReport, verify,
 };
 
 pub(crate) const SESSION: &str = "20261120T093015Z-mug";

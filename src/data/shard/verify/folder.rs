@@ -10,11 +10,11 @@ use rayon::prelude::*;
 use super::sample::{SessionMask, check_image};
 use super::session::{Found, SessionCheck};
 use crate::causes::with_causes;
+use crate::image_stats::MaskSpans;
 use crate::shard::codec::decode_rgb;
 use crate::shard::digest::{Digest, FolderHasher};
 use crate::shard::file::{FileEntry, compare};
 use crate::shard::folder::MeanImage;
-use crate::shard::measure::MaskSpans;
 use crate::shard::{ShardError, names, output};
 
 /// Largest file that is read, bytes.

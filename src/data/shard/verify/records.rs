@@ -2,8 +2,8 @@
 
 use std::collections::HashSet;
 
+use crate::image_stats::fraction;
 use crate::shard::dataset::SessionEntry;
-use crate::shard::measure::fraction;
 use crate::shard::record::FrameRecord;
 use crate::shard::settings::{ExtractionSettings, ImageSize};
 

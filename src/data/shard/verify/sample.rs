@@ -6,9 +6,9 @@ use image::RgbImage;
 
 use super::records::difference;
 use crate::causes::with_causes;
+use crate::image_stats::{MaskSpans, Measures};
 use crate::shard::codec::{check_mask, decode_mask, decode_rgb};
 use crate::shard::digest::Digest;
-use crate::shard::measure::{MaskSpans, Measures};
 use crate::shard::record::FrameRecord;
 use crate::shard::settings::{ExtractionSettings, ImageSize};
 use crate::shard::table::TableRow;

@@ -6,13 +6,14 @@ mod tests;
 
 use super::error::{CaptureError, MeterFault};
 use super::locked_camera::{LockedCamera, NEXT_FRAME};
-use super::look::{clipped, middle};
 use super::recording::RecordingError;
 use super::settings::Settings;
 use super::stop::StopRequest;
 use crate::camera::hold::{Aspect, ControlSetting};
 use crate::camera::{Camera, Control, Frame};
 use crate::turntable::{Table, Turn, TurnPlan, TurnRequest};
+use relit_data::geometry::Rect;
+use relit_data::image_stats::{SATURATION_LEVEL, measure_whole};
 use relit_video::LiveDecoder;
 use search::{Advice, ExposureRange, ExposureSearch};
 
@@ -163,8 +164,8 @@ impl MeteringLoop<'_> {
             return None;
         }
         let (width, height) = picture.size();
-        let rgb = picture.rgb(middle(width, height)).ok()?;
-        Some(clipped(&rgb))
+        let rgb = picture.rgb(Rect::middle_of(width, height)).ok()?;
+        Some(measure_whole(&rgb, SATURATION_LEVEL).saturated_fraction())
     }
 }
 

@@ -1,11 +1,23 @@
-//! Statistics of the pixels under a mask. Knows images and nothing of files.
+//! Statistics of the pixels of an image, all of them or those under a mask: saturation, mean colour,
+//! sharpness. Knows images and nothing of files.
 //!
 //! Everything is summed in integers, so the figures are exact and do not depend on the machine or on
 //! the order of the work: they can be compared for equality when a data set is read back.
 
 use image::{GrayImage, RgbImage};
 
-use super::ShardError;
+/// The channel value from which a pixel counts as saturated, where nobody asks for another.
+pub const SATURATION_LEVEL: u8 = 250;
+
+/// An image of another size than the mask that it is measured under.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the image is {}x{} pixels, but {}x{} were expected", size[0], size[1], expected[0], expected[1])]
+pub struct SizeMismatch {
+    /// Width and height of the image, pixels.
+    pub size: [u32; 2],
+    /// Width and height of the mask, pixels.
+    pub expected: [u32; 2],
+}
 
 /// Luma of a pixel in thousandths of a grey level, 0..=255 000.
 fn luma(r: u8, g: u8, b: u8) -> i32 {
@@ -47,6 +59,12 @@ pub fn fraction(part: u64, whole: u64) -> f64 {
     }
 }
 
+/// Measures all pixels of `image`; `level` is the saturation level, 0..=255.
+#[must_use]
+pub fn measure_whole(image: &RgbImage, level: u8) -> Measures {
+    MaskSpans::whole(image.width(), image.height()).sum(image, level)
+}
+
 /// Part of a row: columns `start..end`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Span {
@@ -67,6 +85,25 @@ pub struct MaskSpans {
 }
 
 impl MaskSpans {
+    /// All pixels of an image of this size.
+    fn whole(width: u32, height: u32) -> Self {
+        let (w, h) = (width as usize, height as usize);
+        let is_inner = |y: usize| w > 2 && y > 0 && y + 1 < h;
+        let inner = |y| {
+            is_inner(y).then_some(Span {
+                start: 1,
+                end: w - 1,
+            })
+        };
+        Self {
+            width,
+            height,
+            rows: vec![vec![Span { start: 0, end: w }]; h],
+            inner: (0..h).map(|y| inner(y).into_iter().collect()).collect(),
+            pixels: u64::from(width) * u64::from(height),
+        }
+    }
+
     /// The runs of `mask`, in which values of 128 and above are the object.
     #[must_use]
     pub fn of(mask: &GrayImage) -> Self {
@@ -109,9 +146,13 @@ impl MaskSpans {
     /// Pixels outside the mask have no influence.
     ///
     /// # Errors
-    /// [`ShardError::SizeMismatch`] if image and mask differ in size.
-    pub fn measure(&self, image: &RgbImage, level: u8) -> Result<Measures, ShardError> {
+    /// [`SizeMismatch`] if image and mask differ in size.
+    pub fn measure(&self, image: &RgbImage, level: u8) -> Result<Measures, SizeMismatch> {
         self.check_size(image)?;
+        Ok(self.sum(image, level))
+    }
+
+    fn sum(&self, image: &RgbImage, level: u8) -> Measures {
         let row_bytes = self.width as usize * 3;
         let mut sums = [0_u64; 3];
         let (mut all, mut any) = (0_u64, 0_u64);
@@ -131,20 +172,20 @@ impl MaskSpans {
             }
             laplacian.add_row(row, y, &self.inner);
         }
-        Ok(Measures {
+        Measures {
             mask_px: self.pixels,
             saturated_px: all,
             saturated_any_px: any,
             mean_rgb: sums.map(|sum| fraction(sum, self.pixels)),
             sharpness: laplacian.variance(),
-        })
+        }
     }
 
     /// The first pixel (x, y) outside the mask that is not black, if there is one.
     ///
     /// # Errors
-    /// [`ShardError::SizeMismatch`] if image and mask differ in size.
-    pub fn first_lit_outside(&self, image: &RgbImage) -> Result<Option<(u32, u32)>, ShardError> {
+    /// [`SizeMismatch`] if image and mask differ in size.
+    pub fn first_lit_outside(&self, image: &RgbImage) -> Result<Option<(u32, u32)>, SizeMismatch> {
         self.check_size(image)?;
         let row_bytes = self.width as usize * 3;
         let rows = image.as_raw().chunks_exact(row_bytes.max(3));
@@ -165,13 +206,12 @@ impl MaskSpans {
         Ok(None)
     }
 
-    fn check_size(&self, image: &RgbImage) -> Result<(), ShardError> {
+    fn check_size(&self, image: &RgbImage) -> Result<(), SizeMismatch> {
         let size = [image.width(), image.height()];
         if size == self.size() {
             Ok(())
         } else {
-            Err(ShardError::SizeMismatch {
-                what: "the image",
+            Err(SizeMismatch {
                 size,
                 expected: self.size(),
             })
@@ -399,6 +439,12 @@ mod tests {
         }
 
         #[test]
+        fn a_whole_image_is_measured_as_under_a_mask_of_everything((image, _) in images()) {
+            let everything = GrayImage::from_pixel(image.width(), image.height(), Luma([255]));
+            prop_assert_eq!(measure_whole(&image, 250), by_definition(&image, &everything, 250));
+        }
+
+        #[test]
         fn pixels_outside_the_mask_have_no_influence((image, mask) in images()) {
             let spans = MaskSpans::of(&mask);
             let mut masked = image.clone();
@@ -436,6 +482,22 @@ mod tests {
             .measure(&image, 250)
             .unwrap();
         assert_eq!((empty.mask_px, empty.saturated_fraction()), (0, 0.0));
+    }
+
+    #[test]
+    fn a_sharp_edge_has_a_greater_figure_than_a_soft_one() {
+        let sharpness = |period: u32| {
+            let stripes = RgbImage::from_fn(16, 16, |x, _| {
+                let distance = (x % (2 * period)).abs_diff(period) * 255 / period;
+                Rgb([distance as u8; 3])
+            });
+            measure_whole(&stripes, 250).sharpness
+        };
+        assert!(sharpness(1) > 4.0 * sharpness(4));
+        assert_eq!(
+            measure_whole(&RgbImage::new(0, 0), 250).saturated_fraction(),
+            0.0
+        );
     }
 
     #[test]
