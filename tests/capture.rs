@@ -7,8 +7,6 @@
     clippy::print_stdout
 )]
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, BufRead, BufReader};
@@ -25,12 +23,13 @@ use relit_data::session::{
 use relit_data::shard::{Dataset, ImageSize};
 use relit_rig::camera::{
     Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
-    Mode, ModeRequest, Rate, Sequence, StampSource, open,
+    Mode, ModeRequest, Sequence, StampSource, open,
 };
 use relit_rig::capture::{End, Plan, Recorder, Window, salvage, salvage_session};
 use relit_rig::clock::Clock;
 use relit_rig::preview::Preview;
 use relit_rig::state::{Monitor, TakeSummary, Verdict};
+use relit_test_support::{ffmpeg, packets};
 use relit_video::{PixelFormat, StreamFormat, Video};
 
 /// What the camera of a test does next.
@@ -136,7 +135,7 @@ const SIZE: (u32, u32) = (480, 360);
 fn jpegs() -> Vec<Vec<u8>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/20261120T101500Z-cow-short");
     let bytes = fs::read(folder.join("video.mkv")).unwrap();
-    let places = support::packets(&folder, "video.mkv");
+    let places = packets(&folder, "video.mkv");
     let found = places.iter().map(|place| {
         let from = (place.at..).find(|&at| bytes[at..].starts_with(&[0xFF, 0xD8]));
         bytes[from.unwrap()..][..place.size].to_vec()
@@ -341,7 +340,7 @@ fn a_whole_turn_is_a_clean_take_of_exactly_its_frames() {
     // The first frame is the first of the turn.
     let first = "-i video.mkv -c copy -frames 1 -f rawvideo -";
     let arguments: Vec<&str> = first.split(' ').collect();
-    assert!(support::ffmpeg(&take.folder, &arguments) == jpegs()[10]);
+    assert!(ffmpeg(&take.folder, &arguments) == jpegs()[10]);
 }
 
 #[test]
@@ -620,7 +619,7 @@ fn a_replayed_session_is_recorded_again_packet_for_packet() {
     assert_eq!(take.counts(), (150, 0));
     let hash = |folder: &Path| {
         let arguments = ["-i", "video.mkv", "-c", "copy", "-f", "md5", "-"];
-        support::ffmpeg(folder, &arguments)
+        ffmpeg(folder, &arguments)
     };
     assert_eq!(hash(&take.folder), hash(&fixture));
 }
@@ -630,7 +629,7 @@ fn a_turn_of_h264_keeps_the_frames_that_its_first_ones_build_on() {
     let root = tempfile::tempdir().unwrap();
     let made = "-f lavfi -i testsrc2=s=160x120:r=30:d=4 -c:v libx264 -bf 0 -g 12 -sc_threshold 0";
     let arguments: Vec<&str> = made.split(' ').chain(["a.mkv"]).collect();
-    support::ffmpeg(root.path(), &arguments);
+    ffmpeg(root.path(), &arguments);
     let path = root.path().join("a.mkv");
     // The turn begins with frame 31, and decoding with frame 24.
     let take = record_replay(root.path(), &path, 33_333.3, 30.5, 90.5);
@@ -868,7 +867,7 @@ fn frames_whose_content_a_power_cut_took_are_cut_from_the_index() {
     drop(recorder.wait().unwrap());
     // The last bytes never reached the disk: the file has its length, and zeros there.
     let path = folder.join("video.mkv");
-    let places = support::packets(&folder, "video.mkv");
+    let places = packets(&folder, "video.mkv");
     let mut bytes = fs::read(&path).unwrap();
     bytes[places[110].at + 100..].fill(0);
     fs::write(&path, bytes).unwrap();
