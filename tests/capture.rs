@@ -298,7 +298,7 @@ impl Take {
         faults.map(|fault| fault.what.as_str()).collect()
     }
 
-    /// The reason of a take that is not usable, which its manifest tells too.
+    /// The reason of a take that is not usable, which is in its manifest too.
     fn rejection(&self) -> &str {
         let reason = self.summary.reason.as_deref().unwrap();
         assert_eq!(self.summary.verdict, Verdict::Aborted, "{reason}");
@@ -733,7 +733,7 @@ fn child_that_records_until_it_is_killed() {
     }
 }
 
-/// `relit-extract` takes the session, with the loss told.
+/// `relit-extract` takes the session, and warns of the loss.
 fn extracts(folder: &Path, out: &Path) {
     let mask = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("fixtures/20261120T101500Z-cow-short/mask_gt.png");

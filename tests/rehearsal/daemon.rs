@@ -25,12 +25,12 @@ fn settings(root: &Path, camera: &str, table: &str) -> Settings {
     settings
 }
 
-/// The state once it is as wished; fails after a minute.
-fn once(daemon: &Daemon, wished: impl Fn(&RigState) -> bool) -> RigState {
+/// The state once it is as `wanted`; fails after a minute.
+fn once(daemon: &Daemon, wanted: impl Fn(&RigState) -> bool) -> RigState {
     let until = Instant::now() + Duration::from_secs(60);
     loop {
         let state = daemon.monitor().state();
-        if wished(&state) {
+        if wanted(&state) {
             return state;
         }
         assert!(Instant::now() < until, "{state:#?}");
@@ -174,10 +174,10 @@ fn a_session_whose_recorder_died_is_salvaged_at_the_start_and_told() {
     let manifest = Manifest::from_json(&json).unwrap();
     drop(SessionWriter::create(root.path(), manifest).unwrap());
     let daemon = Daemon::start(settings(root.path(), "", "none")).unwrap();
-    let told = daemon.monitor().state().faults;
+    let faults = daemon.monitor().state().faults;
     assert!(
-        told[0].what.contains(SHORT) && told[0].what.contains("was interrupted"),
-        "{told:?}"
+        faults[0].what.contains(SHORT) && faults[0].what.contains("was interrupted"),
+        "{faults:?}"
     );
 }
 

@@ -59,12 +59,12 @@ fn a_take_with_a_dropped_frame_is_repeated_and_both_are_kept() {
     check_aborted(&rig, &take, "1 frame lost");
     assert_eq!((take.frames, take.dropped), (299, 1));
     assert_eq!(recordings(rig.root.path()).unwrap().len(), 2);
-    let told = rig.monitor.state().faults;
+    let faults = rig.monitor.state().faults;
     assert!(
-        told[0]
+        faults[0]
             .what
             .starts_with("the take is repeated: 1 frame lost"),
-        "{told:?}"
+        "{faults:?}"
     );
 }
 
@@ -139,7 +139,7 @@ fn a_clean_take_after_one_that_is_not_usable_counts_and_the_first_is_kept() {
 }
 
 #[test]
-fn dropped_and_damaged_frames_within_the_limit_are_told_and_kept() {
+fn dropped_and_damaged_frames_within_the_limit_are_listed_and_kept() {
     let camera = "&drop=220&damage=240";
     let mut rig = Rehearsal::short(camera, |settings| settings.max_dropped = 2);
     let take = rig.capture(false).unwrap();
@@ -149,19 +149,19 @@ fn dropped_and_damaged_frames_within_the_limit_are_told_and_kept() {
         "{take:?}"
     );
     let manifest = rig.session(&take).manifest.unwrap();
-    let told: Vec<_> = manifest
+    let faults: Vec<_> = manifest
         .faults
         .iter()
         .map(|fault| fault.what.as_str())
         .collect();
     assert!(
-        told.iter()
+        faults.iter()
             .any(|what| what.contains("missing before frame")),
-        "{told:?}"
+        "{faults:?}"
     );
     assert!(
-        told.iter().any(|what| what.contains("is damaged")),
-        "{told:?}"
+        faults.iter().any(|what| what.contains("is damaged")),
+        "{faults:?}"
     );
 }
 
@@ -212,7 +212,7 @@ fn a_stop_ends_the_take_within_five_seconds_and_stops_the_table() {
     let took_us = clock.now_us() - asked_us;
     assert!(took_us < 5_000_000, "{took_us} us");
     check_aborted(&rig, &take, "the program was told to end");
-    // Whoever tries again while the program ends is refused.
+    // Another capture while the program ends is refused.
     let error = rig.capture(false).unwrap_err();
     assert!(matches!(error, CaptureError::Stopped(Stopped::Shutdown)));
 }
@@ -296,7 +296,7 @@ fn a_camera_whose_exposure_cannot_be_set_is_not_metered_and_nothing_is_recorded(
 }
 
 #[test]
-fn what_preflight_refuses_is_said_with_its_numbers_and_nothing_turns() {
+fn what_preflight_refuses_is_reported_with_its_numbers_and_nothing_turns() {
     let mut rig = Rehearsal::short("", |settings| settings.min_battery_v = Some(13.0));
     let error = with_causes(&rig.capture(false).unwrap_err());
     assert!(error.contains("V and 13.00 V are demanded"), "{error}");

@@ -120,7 +120,7 @@ pub enum Refusal {
     NotHeld(Vec<String>),
     /// Too little space.
     #[error(
-        "{folder} has {} MB free and the take needs {} MB (a fifth in reserve): make room, or give another --root",
+        "{folder} has {} MB free and the take needs {} MB (a fifth in reserve): free some space, or give another --root",
         .free / 1_000_000, .needed.div_ceil(1_000_000)
     )]
     DiskFull {
@@ -140,7 +140,7 @@ pub enum Refusal {
         least: f64,
     },
     /// The battery is not measured.
-    #[error("the table does not tell its battery's voltage: leave --min-battery out")]
+    #[error("the table does not report its battery's voltage: leave --min-battery out")]
     NoBattery,
     /// The time of day cannot be right.
     #[error(

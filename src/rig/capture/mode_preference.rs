@@ -53,7 +53,7 @@ impl fmt::Display for ModePreference {
 
 impl ModePreference {
     /// The mode to ask the camera for: of those that are as preferred the largest, and of those the
-    /// one whose frames take least room.
+    /// one whose frames take the least space.
     ///
     /// # Errors
     /// [`Refusal::NoMode`] with what there is.
@@ -136,16 +136,16 @@ mod tests {
         ];
         let chosen = ModePreference::default().choose(&modes).unwrap();
         assert_eq!(chosen.to_string(), "MJPG:1920x1080@30");
-        let wish = ModePreference {
+        let preference = ModePreference {
             fourcc: Some(Fourcc::YUYV),
             ..ModePreference::default()
         };
-        assert_eq!(wish.choose(&modes).unwrap().fourcc, Fourcc::YUYV);
-        let wish = ModePreference {
+        assert_eq!(preference.choose(&modes).unwrap().fourcc, Fourcc::YUYV);
+        let preference = ModePreference {
             fps: 15.0,
             ..ModePreference::default()
         };
-        assert_eq!(wish.choose(&modes).unwrap().width, 3840);
+        assert_eq!(preference.choose(&modes).unwrap().width, 3840);
     }
 
     #[test]

@@ -28,7 +28,7 @@ impl StopRequest {
         }
     }
 
-    /// Asks for a stop. That the program is to end outranks a person's wish.
+    /// Asks for a stop. The end of the program outranks a person.
     pub fn ask(&self, who: Stopped) {
         self.state
             .update(|state| state.asked = state.asked.max(Some(who)));

@@ -78,7 +78,7 @@ impl ExposureSearch {
         }
     }
 
-    /// The exposure to begin with, the present one later, and the one found at the end.
+    /// The exposure to start with, then the present one, and the one found at the end.
     pub(super) fn exposure(&self) -> i64 {
         self.exposure
     }

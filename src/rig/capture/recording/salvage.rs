@@ -1,8 +1,8 @@
-//! Bringing sessions to their end whose recorder died: killed, crashed, or without power.
+//! Closing sessions whose recorder died: killed, crashed, or without power.
 //!
-//! Nothing is deleted. The video stays as it is: what follows its last whole frame is passed over by
-//! every reader. The index is cut to the frames that the video holds, and stays as it was found under
-//! another name. The manifest tells what happened.
+//! Nothing is deleted. The video stays as it is: readers ignore what follows its last whole frame.
+//! The index is cut to the frames that the video holds, and kept as it was found under another name.
+//! The manifest says what happened.
 
 use std::fmt;
 use std::fs;
@@ -10,7 +10,9 @@ use std::path::{Path, PathBuf};
 
 use super::error::RecordingError;
 use relit_data::causes::with_causes;
-use relit_data::session::{self, FrameIndex, InterruptedSession, MANIFEST_FILE, Manifest, Status};
+use relit_data::session::{
+    InterruptedSession, MANIFEST_FILE, Manifest, Recording, SessionError, Status,
+};
 use relit_video::Video;
 
 /// How many frames at the end are tried until one decodes. A power cut can leave blocks of the last
@@ -30,13 +32,10 @@ pub struct Saved {
 
 impl fmt::Display for Saved {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            frames, seconds, ..
-        } = self;
-        match frames {
+        match self.frames {
             0 => f.write_str("no frame reached the disk"),
             1 => f.write_str("1 frame is there"),
-            _ => write!(f, "{frames} frames, {seconds:.1} seconds"),
+            frames => write!(f, "{frames} frames, {:.1} seconds", self.seconds),
         }
     }
 }
@@ -52,29 +51,20 @@ pub struct Salvaged {
 
 impl fmt::Display for Salvaged {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let folder = self.folder.display();
+        write!(f, "{} was interrupted", self.folder.display())?;
         match &self.saved {
-            Ok(saved) => write!(
-                f,
-                "{folder} was interrupted, and is kept as aborted: {saved}"
-            ),
-            Err(error) => {
-                let why = with_causes(error);
-                write!(
-                    f,
-                    "{folder} was interrupted and could not be salvaged: {why}"
-                )
-            }
+            Ok(saved) => write!(f, ", and is kept as aborted: {saved}"),
+            Err(error) => write!(f, " and could not be salvaged: {}", with_causes(error)),
         }
     }
 }
 
-/// Looks for interrupted sessions in a folder of sessions and brings each to its end. Those that are
-/// being recorded by a living process are left alone.
+/// Looks for interrupted sessions in a folder of sessions and closes them. Those that a living
+/// process is recording are left alone.
 ///
 /// # Errors
-/// [`RecordingError::List`] where the folder cannot be looked through. What goes wrong with one session
-/// stands in its [`Salvaged`].
+/// [`RecordingError::List`] where the folder cannot be listed. What goes wrong with one session
+/// is in its [`Salvaged`].
 pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, RecordingError> {
     let failed = |source| RecordingError::List {
         path: root.to_owned(),
@@ -89,29 +79,27 @@ pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, RecordingError> {
     }
     folders.sort();
     let salvaged = folders.into_iter().filter_map(|folder| {
-        let saved = match salvage_session(&folder) {
-            Err(RecordingError::Session(
-                session::SessionError::InUse(_) | session::SessionError::Ended(_),
-            )) => {
-                return None;
-            }
-            saved => saved,
-        };
-        Some(Salvaged { folder, saved })
+        let saved = salvage_session(&folder);
+        let other =
+            |error: &SessionError| matches!(error, SessionError::InUse(_) | SessionError::Ended(_));
+        match &saved {
+            Err(RecordingError::Session(error)) if other(error) => None,
+            _ => Some(Salvaged { folder, saved }),
+        }
     });
     Ok(salvaged.collect())
 }
 
-/// Brings one interrupted session to its end.
+/// Closes one interrupted session.
 ///
 /// # Errors
-/// [`session::SessionError::InUse`] where its recorder lives, [`session::SessionError::Ended`] where there is
-/// nothing to do, [`RecordingError::NotMended`], or what the file system answers; its status stays
-/// "recording" then, but for [`RecordingError::NotMended`].
+/// [`SessionError::InUse`] where its recorder lives, [`SessionError::Ended`] where there is nothing
+/// to do, [`RecordingError::NotMended`], or what the file system answers; its status stays
+/// "recording" then, except for [`RecordingError::NotMended`].
 pub fn salvage_session(folder: &Path) -> Result<Saved, RecordingError> {
-    let unended = InterruptedSession::open(folder)?;
-    let entries = unended.index().entries();
-    let frames = whole_frames(&unended.video_path()).min(entries.len());
+    let session = InterruptedSession::open(folder)?;
+    let entries = session.index().entries();
+    let frames = whole_frames(&session.video_path()).min(entries.len());
     let seconds = match entries.get(..frames) {
         Some([first, .., last]) => last.t_us.saturating_sub(first.t_us) as f64 / 1e6,
         _ => 0.0,
@@ -125,50 +113,45 @@ pub fn salvage_session(folder: &Path) -> Result<Saved, RecordingError> {
         0 => "recording was interrupted before its first frame was on the disk".to_owned(),
         _ => format!("recording was interrupted: {saved}"),
     };
-    unended.abort(frames, &reason)?;
+    session.abort(frames, &reason)?;
     verify(folder, frames)?;
     Ok(saved)
 }
 
-/// How many frames from the first on can be had; 0 where there is no video yet.
+/// How many frames from the first on are readable; 0 where there is no video yet.
 pub(super) fn whole_frames(path: &Path) -> usize {
     let Ok(video) = Video::open(path) else {
         return 0;
     };
     let all = video.frames().len();
     let decodes = |number: &usize| video.frame(*number as u64).is_ok();
-    // A damaged frame in the middle is no end: only those behind which nothing is whole.
+    // A damaged frame in the middle is kept: only damaged ones at the end are left out.
     let last = (0..all).rev().take(TRIED_AT_END).find(decodes);
     last.map_or(all.saturating_sub(TRIED_AT_END), |last| last + 1)
 }
 
-/// Reads the session back as any user of it would.
+/// Reads a session with frames back as any user of it would.
 fn verify(folder: &Path, wanted: usize) -> Result<(), RecordingError> {
     if wanted == 0 {
         return Ok(());
     }
-    let recording = session::Recording::open(folder)?;
-    let lines = recording
-        .frames
-        .as_ref()
-        .map_or(0, |index: &FrameIndex| index.entries().len());
+    let recording = Recording::open(folder)?;
+    let index = recording.frames.as_ref();
+    let lines = index.map_or(0, |index| index.entries().len());
     let frames = Video::open(&recording.video)?.frames().len();
-    let found = lines.min(frames);
-    if found != wanted || lines != wanted {
-        let folder = folder.to_owned();
-        return Err(RecordingError::NotMended {
-            folder,
-            wanted,
-            found,
-        });
+    if lines == wanted && frames >= wanted {
+        return Ok(());
     }
-    Ok(())
+    Err(RecordingError::NotMended {
+        folder: folder.to_owned(),
+        wanted,
+        found: lines.min(frames),
+    })
 }
 
-/// A quick look, to be looked at again once the session is claimed.
+/// Whether the manifest says so now; it is read again once the session is locked.
 fn says_recording(folder: &Path) -> bool {
     let manifest = fs::read(folder.join(MANIFEST_FILE)).ok();
-    manifest
-        .and_then(|bytes| Manifest::from_json(&bytes).ok())
-        .is_some_and(|manifest| manifest.status == Status::Recording)
+    let manifest = manifest.and_then(|bytes| Manifest::from_json(&bytes).ok());
+    manifest.is_some_and(|manifest| manifest.status == Status::Recording)
 }
