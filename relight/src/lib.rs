@@ -10,3 +10,4 @@
 //! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
 pub mod image;
 pub mod light;
+pub mod render;
