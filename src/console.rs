@@ -1,9 +1,9 @@
-//! The edge between the programs and a person or a machine: lines on the terminal, JSON lines,
-//! progress, exit codes. The one place that prints.
+//! The output of the programs, for a person or a machine: lines on the terminal, JSON lines, progress,
+//! exit codes. Nothing else in the toolkit prints.
 #![allow(
     clippy::print_stdout,
     clippy::print_stderr,
-    reason = "this is where printing belongs"
+    reason = "printing is the purpose of this module"
 )]
 
 use std::error::Error;
@@ -16,12 +16,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 use relit_data::causes::with_causes;
 use serde_json::Value;
 
-/// How a command that ran to its end came out.
+/// The outcome of a command that ran to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// All was done: exit code 0.
+    /// Everything was done: exit code 0.
     Whole,
-    /// Finished, and what was asked to be checked is wrong: exit code 1.
+    /// Finished, but nothing came out, or a check failed: exit code 1.
     Wrong,
     /// Finished, but something was left out or lost: exit code 3.
     Lossy,
@@ -37,7 +37,7 @@ impl From<Outcome> for ExitCode {
     }
 }
 
-/// Speaks for one program, to a person or, with `--json`, to a machine.
+/// The output of one program, for a person or, with `--json`, for a machine.
 #[derive(Debug, Clone, Copy)]
 pub struct Console {
     json: bool,
@@ -58,7 +58,7 @@ impl Console {
         }
     }
 
-    /// What is being done now: standard error for a person, a JSON line for a machine.
+    /// What is being done: on standard error for a person, as a JSON line for a machine.
     pub fn say_phase(self, text: &str, event: &Value) {
         if self.json {
             print_line(&event.to_string());
@@ -67,18 +67,18 @@ impl Console {
         }
     }
 
-    /// A question for a person at the terminal, on standard error.
+    /// A question to a person at the terminal, on standard error.
     pub fn ask(self, question: &str) {
         let _ = write!(io::stderr(), "{question}");
         let _ = io::stderr().flush();
     }
 
-    /// How many lines of a long list to print: `for_people`, or all for a machine.
+    /// Largest number of lines of a long list: `for_people`, or all for a machine.
     pub fn most_lines(self, for_people: usize) -> usize {
         if self.json { usize::MAX } else { for_people }
     }
 
-    /// A warning: standard error for a person, a JSON line for a machine.
+    /// A warning: on standard error for a person, as a JSON line for a machine.
     pub fn warn(self, text: &str) {
         if self.json {
             print_line(&serde_json::json!({ "event": "warning", "message": text }).to_string());
@@ -89,15 +89,15 @@ impl Console {
 
     /// An error, with its causes, as one sentence.
     pub fn error(self, error: &(dyn Error + 'static)) {
-        self.tell(&with_causes(error), None);
+        self.print_error(&with_causes(error), None);
     }
 
-    /// An error with one of several inputs.
+    /// An error that concerns one of several inputs.
     pub fn error_in(self, input: &Path, error: &(dyn Error + 'static)) {
-        self.tell(&with_causes(error), Some(input));
+        self.print_error(&with_causes(error), Some(input));
     }
 
-    fn tell(self, text: &str, input: Option<&Path>) {
+    fn print_error(self, text: &str, input: Option<&Path>) {
         if self.json {
             let event = serde_json::json!({ "event": "error", "message": text, "input": input.map(Path::to_string_lossy) });
             print_line(&event.to_string());
@@ -110,7 +110,7 @@ impl Console {
         }
     }
 
-    /// The exit code of a command, after its error, if any, was told.
+    /// Prints the command's error, if there is one, and returns the exit code.
     pub fn finish<E: Error + 'static>(self, result: Result<Outcome, E>) -> ExitCode {
         match result {
             Ok(outcome) => outcome.into(),
@@ -121,8 +121,7 @@ impl Console {
         }
     }
 
-    /// A progress bar over `length` steps; hidden with `--json` or where standard error is not a
-    /// terminal.
+    /// A progress bar of `length` steps; hidden with `--json` or if standard error is not a terminal.
     pub fn progress(self, length: u64, label: &str) -> ProgressBar {
         if self.json {
             return ProgressBar::hidden();
@@ -137,7 +136,7 @@ impl Console {
     }
 }
 
-/// Where nobody reads any more, there is nobody to tell, and the work goes on.
+/// Prints a line. If the output is closed, the work goes on without it.
 fn print_line(text: &str) {
     let _ = writeln!(io::stdout(), "{text}");
 }

@@ -7,30 +7,30 @@
     clippy::print_stdout
 )]
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{BufRead, BufReader};
+use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use relit::extract::{self, Observer, Options, Outcome};
+use relit::extract::{ExtractOptions, extract};
 use relit_data::session::{
-    CameraFacts, Manifest, Recording, SoftwareFacts, Status, TurntableFacts, VideoFacts,
+    CameraFacts, FrameClock, FrameIndex, Manifest, Recording, SoftwareFacts, Status,
+    TurntableFacts, VideoFacts,
 };
-use relit_data::shard::{Layout, Size};
+use relit_data::shard::{Dataset, ImageSize};
 use relit_rig::camera::{
-    Address, Camera, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc, Frame,
-    GrantedMode, Mode, ModeRequest, Rate, Sequence, StampSource, open,
+    Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
+    Mode, ModeRequest, Sequence, StampSource, open,
 };
-use relit_rig::capture::{
-    End, Plan, Recorder, Report, Stage, Take, WhenFull, Window, salvage, salvage_session,
-};
+use relit_rig::capture::{End, Plan, Recorder, Window, salvage, salvage_session};
 use relit_rig::clock::Clock;
-use relit_video::Video;
+use relit_rig::preview::Preview;
+use relit_rig::state::{Monitor, TakeSummary, Verdict};
+use relit_test_support::{ffmpeg, packets};
+use relit_video::{PixelFormat, StreamFormat, Video};
 
 /// What the camera of a test does next.
 enum Step {
@@ -40,17 +40,16 @@ enum Step {
     Fail(fn() -> CameraError),
 }
 
-/// A camera that does as it is told.
+/// A camera that follows a script: frames come when their time stamps are due on its clock.
 struct Scripted {
     info: DeviceInfo,
     steps: Box<dyn Iterator<Item = Step> + Send>,
-    /// Frames come when their time stamps are due, not at once.
-    clock: Option<Clock>,
+    clock: Clock,
     silent: bool,
 }
 
 impl Scripted {
-    fn new(steps: impl Iterator<Item = Step> + Send + 'static) -> Box<Self> {
+    fn new(clock: &Clock, steps: impl Iterator<Item = Step> + Send + 'static) -> Box<Self> {
         Box::new(Self {
             info: DeviceInfo {
                 address: "v4l2:/dev/video0".parse().unwrap(),
@@ -59,15 +58,10 @@ impl Scripted {
                 bus: String::new(),
                 modes: Vec::new(),
                 other_formats: Vec::new(),
-                capabilities: Capabilities {
-                    sequence: true,
-                    driver_time: true,
-                    controls: false,
-                },
                 problems: Vec::new(),
             },
             steps: Box::new(steps),
-            clock: None,
+            clock: clock.clone(),
             silent: false,
         })
     }
@@ -103,10 +97,7 @@ impl Camera for Scripted {
         let step = if self.silent { None } else { self.steps.next() };
         match step {
             Some(Step::Frame(frame)) => {
-                if let Some(clock) = self.clock {
-                    let early = frame.t_us - clock.now_us();
-                    thread::sleep(Duration::from_micros(early.max(0) as u64));
-                }
+                self.clock.sleep_until(frame.t_us);
                 Ok(*frame)
             }
             Some(Step::Fail(error)) => Err(error()),
@@ -115,7 +106,7 @@ impl Camera for Scripted {
                 self.next_frame(timeout)
             }
             None if self.silent => {
-                thread::sleep(timeout);
+                self.clock.sleep(timeout);
                 Err(CameraError::Timeout {
                     device: "scripted".to_owned(),
                     waited: timeout,
@@ -133,14 +124,18 @@ impl Camera for Scripted {
     }
 }
 
+/// The session that a test records.
+const ID: &str = "20261120T093015Z-cow";
 const PERIOD_US: i64 = 33_333;
+/// How long a frame may wait for a disk that is busy with something else.
+const WAIT: Duration = Duration::from_secs(60);
 const SIZE: (u32, u32) = (480, 360);
 
 /// The JPEGs of a fixture, which are the packets of its video.
 fn jpegs() -> Vec<Vec<u8>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/20261120T101500Z-cow-short");
     let bytes = fs::read(folder.join("video.mkv")).unwrap();
-    let places = support::packets(&folder, "video.mkv");
+    let places = packets(&folder, "video.mkv");
     let found = places.iter().map(|place| {
         let from = (place.at..).find(|&at| bytes[at..].starts_with(&[0xFF, 0xD8]));
         bytes[from.unwrap()..][..place.size].to_vec()
@@ -176,9 +171,9 @@ fn turn(frames: i64, begun: i64) -> Window {
     Window::new(from, from + frames * PERIOD_US).unwrap()
 }
 
-fn manifest(id: &str) -> Manifest {
+fn manifest() -> Manifest {
     Manifest {
-        id: id.to_owned(),
+        id: ID.to_owned(),
         object: "cow".to_owned(),
         created: "2026-11-20T09:30:15Z".parse().unwrap(),
         status: Status::Recording,
@@ -186,10 +181,11 @@ fn manifest(id: &str) -> Manifest {
             backend: "replay".to_owned(),
             device: "script".to_owned(),
             name: "scripted".to_owned(),
-            fourcc: String::new(),
-            width: 0,
-            height: 0,
+            fourcc: "MJPG".to_owned(),
+            width: SIZE.0,
+            height: SIZE.1,
             fps: 30.0,
+            clock: FrameClock::default(),
             controls: BTreeMap::new(),
         },
         turntable: Some(TurntableFacts {
@@ -213,21 +209,22 @@ fn manifest(id: &str) -> Manifest {
     }
 }
 
-fn plan(root: &Path, max_dropped: u64) -> Plan {
+fn plan(root: &Path, clock: &Clock, max_dropped: u64) -> Plan {
     Plan {
         root: root.to_owned(),
-        manifest: manifest("20261120T093015Z-cow"),
-        mode: GrantedMode {
-            fourcc: Fourcc::MJPG,
+        manifest: manifest(),
+        stream: StreamFormat {
+            format: PixelFormat::Mjpeg,
             width: SIZE.0,
             height: SIZE.1,
-            rate: Rate::new(30, 1),
+            fps: 30.0,
         },
-        fps: 30.0,
         window: None,
         max_dropped,
-        when_full: WhenFull::Drop,
-        stall: Duration::from_millis(400),
+        queue_wait: Duration::ZERO,
+        stall: Duration::from_secs(2),
+        clock: clock.clone(),
+        preview: None,
     }
 }
 
@@ -236,7 +233,7 @@ fn record(
     root: &Path,
     max_dropped: u64,
     steps: impl Iterator<Item = Step> + Send + 'static,
-) -> Report {
+) -> Take {
     record_with(root, max_dropped, steps, &[])
 }
 
@@ -244,143 +241,171 @@ fn record_with(
     root: &Path,
     max_dropped: u64,
     steps: impl Iterator<Item = Step> + Send + 'static,
-    moved: &[String],
-) -> Report {
-    let mut plan = plan(root, max_dropped);
+    control_faults: &[String],
+) -> Take {
+    let clock = Clock::virtual_time();
+    let mut plan = plan(root, &clock, max_dropped);
+    plan.queue_wait = WAIT;
     plan.window = Some(turn(120, 0));
-    let recorder = Recorder::start(Scripted::new(steps), plan).unwrap();
-    let (_camera, ended) = recorder.wait().unwrap();
+    let recorder = Recorder::start(Scripted::new(&clock, steps), plan).unwrap();
+    let (_camera, recorded) = recorder.wait().unwrap();
     let angle = |t_us: i64| Some((t_us - 10 * PERIOD_US) as f64 / PERIOD_US as f64 * 3.0);
-    ended.finish(&angle, moved).unwrap()
+    let summary = recorded.finish(&angle, control_faults).unwrap();
+    Take::read(root, summary)
 }
 
-fn read_back(report: &Report) -> (Recording, Video) {
-    let recording = Recording::open(&report.folder).unwrap();
-    let video = Video::open(&recording.video).unwrap();
-    (recording, video)
+/// A take as a user finds it: its summary, and its session on the disk.
+struct Take {
+    summary: TakeSummary,
+    folder: PathBuf,
+    recording: Recording,
+    video: Video,
 }
 
-fn bad(report: &Report) -> &str {
-    match &report.take {
-        Take::Bad { reason } => reason,
-        other => panic!("{other:?}"),
+impl Take {
+    fn read(root: &Path, summary: TakeSummary) -> Self {
+        let folder = root.join(&summary.session);
+        let recording = Recording::open(&folder).unwrap();
+        let video = Video::open(&recording.video).unwrap();
+        Self {
+            summary,
+            folder,
+            recording,
+            video,
+        }
+    }
+
+    /// Frames of the turn in the video, and frames lost.
+    fn counts(&self) -> (u64, u64) {
+        (self.summary.frames, self.summary.dropped)
+    }
+
+    fn frames_in_video(&self) -> usize {
+        self.video.frames().len()
+    }
+
+    fn index(&self) -> &FrameIndex {
+        self.recording.frames.as_ref().unwrap()
+    }
+
+    fn manifest(&self) -> &Manifest {
+        self.recording.manifest.as_ref().unwrap()
+    }
+
+    /// What the manifest lists.
+    fn faults(&self) -> Vec<&str> {
+        let faults = self.manifest().faults.iter();
+        faults.map(|fault| fault.what.as_str()).collect()
+    }
+
+    /// The reason of a take that is not usable, which its manifest tells too.
+    fn rejection(&self) -> &str {
+        let reason = self.summary.reason.as_deref().unwrap();
+        assert_eq!(self.summary.verdict, Verdict::Aborted, "{reason}");
+        let status = &self.manifest().status;
+        assert_eq!(*status, Status::Aborted(reason.to_owned()));
+        reason
+    }
+
+    #[track_caller]
+    fn check_rejected(&self, words: &str) {
+        let reason = self.rejection();
+        assert!(reason.contains(words), "{reason}");
+    }
+
+    #[track_caller]
+    fn check_verdict(&self, verdict: Verdict) {
+        assert_eq!(self.summary.verdict, verdict, "{:?}", self.summary);
+        assert_eq!(self.manifest().status, Status::Complete);
     }
 }
 
 #[test]
 fn a_whole_turn_is_a_clean_take_of_exactly_its_frames() {
     let root = tempfile::tempdir().unwrap();
-    let report = record(root.path(), 0, steps(stream(200, 0)));
-    assert_eq!(report.take, Take::Clean);
-    assert_eq!((report.expected, report.recorded), (120, 120));
-    let (recording, video) = read_back(&report);
-    assert!(recording.notices.is_empty(), "{:?}", recording.notices);
-    assert!(video.damage().is_empty(), "{:?}", video.damage());
-    assert_eq!(video.frames().len(), 120);
-    let manifest = recording.manifest.unwrap();
-    assert_eq!(manifest.status, Status::Complete);
-    assert_eq!(
-        (manifest.camera.fourcc.as_str(), manifest.camera.width),
-        ("MJPG", 480)
-    );
-    let frames = recording.frames.unwrap();
-    for (n, entry) in frames.entries().iter().enumerate() {
+    let take = record(root.path(), 0, steps(stream(200, 0)));
+    take.check_verdict(Verdict::Clean);
+    assert_eq!(take.counts(), (120, 0));
+    let notices = &take.recording.notices;
+    assert!(notices.is_empty(), "{notices:?}");
+    assert!(take.video.damage().is_empty(), "{:?}", take.video.damage());
+    assert_eq!(take.frames_in_video(), 120);
+    let video = &take.manifest().video;
+    assert_eq!((video.codec.as_str(), video.frames), ("mjpeg", Some(120)));
+    for (n, entry) in take.index().entries().iter().enumerate() {
         assert_eq!((entry.n, entry.sequence), (n as u64, n as u64 + 10));
         assert_eq!(entry.t_us, (n as i64 + 10) * PERIOD_US);
         assert!((entry.angle_deg.unwrap() - n as f64 * 3.0).abs() < 1e-9);
     }
     // The first frame is the first of the turn.
-    let folder = root.path().join("20261120T093015Z-cow");
-    let first = support::ffmpeg(
-        &folder,
-        &[
-            "-i",
-            "video.mkv",
-            "-c",
-            "copy",
-            "-frames",
-            "1",
-            "-f",
-            "rawvideo",
-            "-",
-        ],
-    );
-    assert!(first == jpegs()[10]);
+    let first = "-i video.mkv -c copy -frames 1 -f rawvideo -";
+    let arguments: Vec<&str> = first.split(' ').collect();
+    assert!(ffmpeg(&take.folder, &arguments) == jpegs()[10]);
 }
 
 #[test]
 fn a_turn_may_be_announced_seconds_after_it_began() {
     let root = tempfile::tempdir().unwrap();
-    let clock = Clock::monotonic();
-    let begun = clock.now_us() + 100_000;
-    let mut camera = Scripted::new(steps(stream(110, begun)));
-    camera.clock = Some(clock);
-    let recorder = Recorder::start(camera, plan(root.path(), 0)).unwrap();
-    thread::sleep(Duration::from_millis(1500));
-    assert_eq!(recorder.progress().stage, Stage::Waiting);
-    recorder.announce(turn(90, begun));
-    let (_camera, ended) = recorder.wait().unwrap();
-    let report = ended.finish(&|_| None, &[]).unwrap();
-    assert_eq!((report.take, report.recorded), (Take::Clean, 90));
+    let clock = Clock::virtual_time();
+    let _part = clock.take_part();
+    let begun = clock.now_us();
+    let camera = Scripted::new(&clock, steps(stream(210, begun)));
+    let mut plan = plan(root.path(), &clock, 0);
+    plan.queue_wait = WAIT;
+    let recorder = Recorder::start(camera, plan).unwrap();
+    clock.sleep(Duration::from_millis(4200));
+    assert_eq!(recorder.progress().frames, 0);
+    recorder.announce(turn(190, begun));
+    let (_camera, recorded) = recorder.wait().unwrap();
+    let take = Take::read(root.path(), recorded.finish(&|_| None, &[]).unwrap());
+    take.check_verdict(Verdict::Clean);
+    assert_eq!(take.counts(), (190, 0));
 }
 
 #[test]
-fn dropped_frames_are_told_at_their_index_and_make_a_take_bad_beyond_what_is_allowed() {
+fn dropped_frames_are_listed_at_their_index_and_make_a_take_unusable_beyond_what_is_allowed() {
     let lost = |frame: &Frame| ![50, 51, 90].contains(&(frame.t_us / PERIOD_US));
-    for (max_dropped, good) in [(0, false), (2, false), (3, true)] {
+    for (max_dropped, tolerated) in [(0, false), (2, false), (3, true)] {
         let root = tempfile::tempdir().unwrap();
-        let report = record(root.path(), max_dropped, steps(stream(200, 0).filter(lost)));
-        let missing: Vec<_> = report
-            .missing
-            .iter()
-            .map(|m| (m.exposure, m.count, m.before))
-            .collect();
-        assert_eq!(missing, [(40, 2, 40), (80, 1, 78)]);
-        assert_eq!((report.expected, report.recorded), (120, 117));
-        let (recording, video) = read_back(&report);
-        assert_eq!(video.frames().len(), 117);
-        assert_eq!(recording.frames.unwrap().gaps().len(), 2);
-        if good {
-            assert_eq!(report.take, Take::Tolerated);
-            assert_eq!(report.manifest.status, Status::Complete);
+        let take = record(root.path(), max_dropped, steps(stream(200, 0).filter(lost)));
+        assert_eq!(take.counts(), (117, 3));
+        assert_eq!(take.frames_in_video(), 117);
+        assert_eq!(take.index().gaps().len(), 2);
+        let faults = take.faults();
+        assert!(faults[0].starts_with("2 frames missing before frame 40,"));
+        assert!(faults[1].starts_with("1 frame missing before frame 78,"));
+        if tolerated {
+            take.check_verdict(Verdict::Tolerated);
+            assert_eq!(take.summary.reason.as_deref(), Some(faults[0]));
         } else {
-            assert!(bad(&report).contains("3 frames lost"), "{}", bad(&report));
-            assert!(matches!(report.manifest.status, Status::Aborted(_)));
+            take.check_rejected("3 frames lost");
         }
-        assert!(
-            report.manifest.faults[0]
-                .what
-                .contains("2 frames missing before frame 40")
-        );
     }
 }
 
 #[test]
 fn drops_are_found_by_time_where_the_driver_never_counts() {
     let root = tempfile::tempdir().unwrap();
-    let stands = stream(200, 0)
-        .filter(|f| f.t_us / PERIOD_US != 70)
-        .map(|mut frame| {
-            frame.sequence = Some(Sequence {
-                raw: 0,
-                unwrapped: 0,
-            });
-            frame
+    let not_counted = |mut frame: Frame| {
+        frame.sequence = Some(Sequence {
+            raw: 0,
+            unwrapped: 0,
         });
-    let report = record(root.path(), 1, steps(stands));
-    assert_eq!(report.take, Take::Tolerated);
+        frame
+    };
+    let stream = stream(200, 0).filter(|frame| frame.t_us / PERIOD_US != 70);
+    let take = record(root.path(), 1, steps(stream.map(not_counted)));
+    take.check_verdict(Verdict::Tolerated);
     assert_eq!(
-        (report.missing[0].exposure, report.missing[0].before),
-        (60, 60)
+        take.faults(),
+        ["1 frame missing before frame 60, by the time stamps"]
     );
-    let (recording, _) = read_back(&report);
-    let gaps = recording.frames.unwrap().gaps();
+    let gaps = take.index().gaps();
     assert_eq!((gaps.len(), gaps[0].before, gaps[0].missing), (1, 60, 1));
 }
 
 #[test]
-fn damaged_frames_are_recorded_as_they_came_and_told() {
-    let root = tempfile::tempdir().unwrap();
+fn damaged_frames_are_recorded_as_they_came_and_listed() {
     let damage = |mut frame: Frame| {
         match frame.t_us / PERIOD_US {
             30 => frame.data.truncate(frame.data.len() / 2),
@@ -389,30 +414,19 @@ fn damaged_frames_are_recorded_as_they_came_and_told() {
         }
         frame
     };
-    let report = record(root.path(), 2, steps(stream(200, 0).map(damage)));
-    assert_eq!(report.take, Take::Tolerated);
-    let places: Vec<usize> = report
-        .damaged
-        .iter()
-        .map(|damaged| damaged.delivered)
-        .collect();
-    assert_eq!(places, [20, 50]);
-    let (_, video) = read_back(&report);
-    assert_eq!(video.frames().len(), 120);
-    assert!(video.frame(20).is_err() && video.frame(50).is_ok());
-    assert!(
-        report.manifest.faults[0]
-            .what
-            .contains("frame 20 is damaged")
-    );
+    let root = tempfile::tempdir().unwrap();
+    let take = record(root.path(), 2, steps(stream(200, 0).map(damage)));
+    take.check_verdict(Verdict::Tolerated);
+    let faults = take.faults();
+    assert_eq!(faults.len(), 2, "{faults:?}");
+    assert!(faults[0].starts_with("frame 20 is damaged"), "{faults:?}");
+    assert!(faults[1].starts_with("frame 50 is damaged"), "{faults:?}");
+    assert_eq!(take.frames_in_video(), 120);
+    assert!(take.video.frame(20).is_err() && take.video.frame(50).is_ok());
 
     let strict = tempfile::tempdir().unwrap();
-    let report = record(strict.path(), 1, steps(stream(200, 0).map(damage)));
-    assert!(
-        bad(&report).contains("2 frames damaged"),
-        "{}",
-        bad(&report)
-    );
+    let take = record(strict.path(), 1, steps(stream(200, 0).map(damage)));
+    take.check_rejected("2 frames damaged");
 }
 
 #[test]
@@ -424,9 +438,23 @@ fn an_empty_frame_counts_as_lost() {
         }
         frame
     });
-    let report = record(root.path(), 0, steps(empty));
-    assert!(bad(&report).contains("1 frame lost"), "{}", bad(&report));
-    assert_eq!((report.left_out, report.recorded), (vec![30], 119));
+    let take = record(root.path(), 0, steps(empty));
+    take.check_rejected("1 frame lost");
+    assert_eq!(take.counts(), (119, 1));
+    assert!(take.faults()[0].starts_with("a frame before frame 30 could not be recorded"));
+}
+
+#[test]
+fn many_faults_of_one_kind_are_listed_up_to_a_number_and_counted() {
+    let root = tempfile::tempdir().unwrap();
+    let flag = |mut frame: Frame| {
+        frame.flagged = (20..=70).contains(&(frame.t_us / PERIOD_US));
+        frame
+    };
+    let take = record(root.path(), 51, steps(stream(200, 0).map(flag)));
+    take.check_verdict(Verdict::Tolerated);
+    let faults = take.faults();
+    assert_eq!((faults.len(), faults[40]), (41, "and 11 more of this kind"));
 }
 
 #[test]
@@ -434,36 +462,35 @@ fn an_unplugged_camera_leaves_what_was_recorded() {
     let root = tempfile::tempdir().unwrap();
     let unplugged: fn() -> CameraError = || CameraError::Unplugged {
         device: "/dev/video0".to_owned(),
+        source: None,
     };
     let script = steps(stream(55, 0)).chain([Step::Fail(unplugged)]);
-    let report = record(root.path(), 5, script);
-    assert!(
-        bad(&report).contains("/dev/video0 was unplugged"),
-        "{}",
-        bad(&report)
-    );
-    assert!(
-        bad(&report).contains("45 of 120 frames"),
-        "{}",
-        bad(&report)
-    );
-    let (recording, video) = read_back(&report);
-    assert_eq!(video.frames().len(), 45);
-    assert!(recording.notices[0].text().contains("unplugged"));
+    let take = record(root.path(), 5, script);
+    take.check_rejected("/dev/video0 was unplugged");
+    take.check_rejected("45 of 120 frames");
+    assert_eq!(take.frames_in_video(), 45);
+    assert!(take.recording.notices[0].text().contains("unplugged"));
 }
 
 #[test]
-fn a_camera_that_falls_silent_is_told_in_time() {
+fn what_the_system_said_of_a_broken_stream_is_in_the_manifest() {
     let root = tempfile::tempdir().unwrap();
-    let begun = Instant::now();
-    let report = record(root.path(), 5, steps(stream(55, 0)).chain([Step::Silence]));
-    assert!(begun.elapsed() < Duration::from_secs(20));
-    assert!(
-        bad(&report).contains("gave no frame for 0."),
-        "{}",
-        bad(&report)
-    );
-    assert_eq!(read_back(&report).1.frames().len(), 45);
+    let broken: fn() -> CameraError = || CameraError::Stream {
+        device: "/dev/video0".to_owned(),
+        doing: "read",
+        source: io::Error::from_raw_os_error(5),
+    };
+    let script = steps(stream(55, 0)).chain([Step::Fail(broken)]);
+    let take = record(root.path(), 5, script);
+    take.check_rejected("Input/output error (os error 5)");
+}
+
+#[test]
+fn a_camera_that_falls_silent_ends_the_recording() {
+    let root = tempfile::tempdir().unwrap();
+    let take = record(root.path(), 5, steps(stream(55, 0)).chain([Step::Silence]));
+    take.check_rejected("gave no frame for 2.0 s");
+    assert_eq!(take.frames_in_video(), 45);
 }
 
 #[test]
@@ -476,96 +503,86 @@ fn another_size_than_agreed_ends_the_recording() {
         }
         frame
     });
-    let report = record(root.path(), 5, steps(resized));
-    assert!(bad(&report).contains("480 x 360"), "{}", bad(&report));
-    assert_eq!(read_back(&report).1.frames().len(), 70);
+    let take = record(root.path(), 5, steps(resized));
+    take.check_rejected("480 x 360");
+    assert_eq!(take.frames_in_video(), 70);
 }
 
 #[test]
-fn a_recording_can_be_stopped_and_given_up() {
+fn a_recording_can_be_stopped() {
     let root = tempfile::tempdir().unwrap();
-    let clock = Clock::monotonic();
+    let clock = Clock::virtual_time();
+    let _part = clock.take_part();
     let begun = clock.now_us();
-    let mut camera = Scripted::new(steps(stream(3000, begun)));
-    camera.clock = Some(clock);
-    let recorder = Recorder::start(camera, plan(root.path(), 0)).unwrap();
+    let camera = Scripted::new(&clock, steps(stream(3000, begun)));
+    let mut plan = plan(root.path(), &clock, 0);
+    plan.queue_wait = WAIT;
+    let recorder = Recorder::start(camera, plan).unwrap();
     recorder.announce(turn(1500, begun));
-    let patience = Instant::now() + Duration::from_secs(30);
-    while recorder.progress().frames < 10 && Instant::now() < patience {
-        thread::sleep(Duration::from_millis(20));
-    }
-    let asked = Instant::now();
+    // Between two frames.
+    clock.sleep_until(begun + 100 * PERIOD_US - 1);
     recorder.stop();
-    let (_camera, ended) = recorder.wait().unwrap();
-    assert!(asked.elapsed() < Duration::from_secs(5));
-    assert!(matches!(ended.end(), End::Stopped));
-    let report = ended.finish(&|_| None, &[]).unwrap();
-    assert!(bad(&report).contains("stopped before the turn was over"));
-    assert_eq!(read_back(&report).1.frames().len() as u64, report.recorded);
+    assert!(recorder.wait_ended(Duration::from_millis(100)));
+    let (_camera, recorded) = recorder.wait().unwrap();
+    assert!(matches!(recorded.end(), End::Stopped));
+    let take = Take::read(root.path(), recorded.finish(&|_| None, &[]).unwrap());
+    take.check_rejected("stopped before the turn was over");
+    assert_eq!((take.frames_in_video(), take.summary.frames), (91, 91));
 }
 
 #[test]
-fn settings_that_moved_fail_the_take() {
+fn settings_that_changed_make_a_take_unusable() {
     let root = tempfile::tempdir().unwrap();
-    let moved = ["gain was 4 and is 7".to_owned()];
-    let report = record_with(root.path(), 9, steps(stream(200, 0)), &moved);
-    assert!(bad(&report).contains("gain was 4 and is 7"));
-    assert_eq!(read_back(&report).1.frames().len(), 120);
+    let changed = ["gain was 4 and is 7".to_owned()];
+    let take = record_with(root.path(), 9, steps(stream(200, 0)), &changed);
+    take.check_rejected("gain was 4 and is 7");
+    assert_eq!(take.faults(), changed);
+    assert_eq!(take.frames_in_video(), 120);
 }
 
 #[test]
-fn a_camera_at_half_the_agreed_rate_fails_the_take() {
+fn a_camera_at_half_the_agreed_rate_makes_a_take_unusable() {
     let root = tempfile::tempdir().unwrap();
     let slow = stream(120, 0).map(|mut frame| {
         frame.t_us *= 2;
         frame
     });
-    let report = record(root.path(), 9, steps(slow));
-    assert!(
-        bad(&report).contains("15.00 frames/s where 30.00"),
-        "{}",
-        bad(&report)
-    );
+    let take = record(root.path(), 9, steps(slow));
+    take.check_rejected("15.00 frames/s where 30.00");
 }
 
 #[test]
-fn viewers_that_never_come_back_cost_no_frame() {
+fn a_viewer_that_never_gives_the_picture_back_costs_no_frame() {
     let root = tempfile::tempdir().unwrap();
-    let mut plan = plan(root.path(), 0);
+    let clock = Clock::virtual_time();
+    let monitor = Monitor::default();
+    let pictures = monitor.pictures();
+    let held = pictures.borrow();
+    let mut plan = plan(root.path(), &clock, 0);
     plan.window = Some(turn(120, 0));
-    let recorder = Recorder::start(Scripted::new(steps(stream(200, 0))), plan).unwrap();
-    thread::scope(|scope| {
-        let viewers: Vec<_> = (0..50)
-            .map(|_| {
-                scope.spawn(|| {
-                    let mut seen = 0;
-                    while let Some((number, frame)) =
-                        recorder.preview().newer_than(seen, Duration::from_secs(10))
-                    {
-                        seen = number;
-                        thread::sleep(Duration::from_millis(50));
-                        assert!(!frame.data.is_empty());
-                    }
-                })
-            })
-            .collect();
-        for viewer in viewers {
-            viewer.join().unwrap();
-        }
-    });
-    let (_camera, ended) = recorder.wait().unwrap();
-    let report = ended.finish(&|_| None, &[]).unwrap();
-    assert_eq!((report.take, report.recorded), (Take::Clean, 120));
+    plan.queue_wait = WAIT;
+    plan.preview = Some(Preview::start(monitor.clone()).unwrap());
+    let recorder = Recorder::start(Scripted::new(&clock, steps(stream(200, 0))), plan).unwrap();
+    let (_camera, recorded) = recorder.wait().unwrap();
+    drop(held);
+    let take = Take::read(root.path(), recorded.finish(&|_| None, &[]).unwrap());
+    take.check_verdict(Verdict::Clean);
+    assert_eq!(take.counts(), (120, 0));
+    let until = Instant::now() + Duration::from_secs(60);
+    while monitor.preview().is_none() {
+        assert!(Instant::now() < until);
+        thread::sleep(Duration::from_millis(10));
+    }
 }
 
 /// Replays a recording as fast as it is read, and records the time from `from` to `to`, in frames
 /// of `period_us`, again.
-fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -> Report {
-    let address: Address = format!("replay:{}?speed=0", path.display())
+fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -> Take {
+    let address: CameraAddress = format!("replay:{}?speed=0", path.display())
         .parse()
         .unwrap();
-    let clock = address.clock();
-    let mut camera = open(&address, clock).unwrap();
+    let clock = Clock::virtual_time();
+    let mut camera = open(&address, clock.clone()).unwrap();
     let mode = camera.modes().unwrap().remove(0);
     let (width, height) = mode.sizes.largest();
     let rate = mode.rates.fastest().unwrap();
@@ -575,65 +592,57 @@ fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -
         height,
         rate,
     };
-    let mut plan = plan(root, 0);
-    plan.fps = rate.per_second();
-    plan.when_full = WhenFull::Wait;
+    let mut plan = plan(root, &clock, 0);
+    plan.queue_wait = WAIT;
     // A frame's way from the start of the replay to its time stamp is less than half a period.
     let begun = clock.now_us() as f64;
-    plan.mode = camera.start(&request).unwrap();
+    let mode = camera.start(&request).unwrap();
+    plan.stream = StreamFormat {
+        format: mode.fourcc.pixel_format().unwrap(),
+        width,
+        height,
+        fps: rate.per_second(),
+    };
     let at = |frames: f64| (begun + frames * period_us) as i64;
     plan.window = Window::new(at(from), at(to));
     let recorder = Recorder::start(camera, plan).unwrap();
-    let (_camera, ended) = recorder.wait().unwrap();
-    ended.finish(&|_| None, &[]).unwrap()
+    let (_camera, recorded) = recorder.wait().unwrap();
+    Take::read(root, recorded.finish(&|_| None, &[]).unwrap())
 }
 
 #[test]
 fn a_replayed_session_is_recorded_again_packet_for_packet() {
     let root = tempfile::tempdir().unwrap();
     let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/20261120T101500Z-cow-short");
-    let report = record_replay(root.path(), &fixture, 33_333.3, 0.0, 150.0);
-    assert_eq!((report.take.clone(), report.recorded), (Take::Clean, 150));
+    let take = record_replay(root.path(), &fixture, 33_333.3, 0.0, 150.0);
+    take.check_verdict(Verdict::Clean);
+    assert_eq!(take.counts(), (150, 0));
     let hash = |folder: &Path| {
         let arguments = ["-i", "video.mkv", "-c", "copy", "-f", "md5", "-"];
-        support::ffmpeg(folder, &arguments)
+        ffmpeg(folder, &arguments)
     };
-    assert_eq!(hash(&report.folder), hash(&fixture));
+    assert_eq!(hash(&take.folder), hash(&fixture));
 }
 
 #[test]
 fn a_turn_of_h264_keeps_the_frames_that_its_first_ones_build_on() {
     let root = tempfile::tempdir().unwrap();
-    let encode = [
-        "-c:v",
-        "libx264",
-        "-bf",
-        "0",
-        "-g",
-        "12",
-        "-sc_threshold",
-        "0",
-        "a.mkv",
-    ];
-    let source = ["-f", "lavfi", "-i", "testsrc2=s=160x120:r=30:d=4"];
-    support::ffmpeg(root.path(), &[&source[..], &encode].concat());
+    let made = "-f lavfi -i testsrc2=s=160x120:r=30:d=4 -c:v libx264 -bf 0 -g 12 -sc_threshold 0";
+    let arguments: Vec<&str> = made.split(' ').chain(["a.mkv"]).collect();
+    ffmpeg(root.path(), &arguments);
     let path = root.path().join("a.mkv");
     // The turn begins with frame 31, and decoding with frame 24.
-    let report = record_replay(root.path(), &path, 33_333.3, 30.5, 90.5);
-    assert_eq!((report.expected, report.recorded), (60, 60));
-    assert_eq!(report.take, Take::Clean);
-    let (recording, video) = read_back(&report);
+    let take = record_replay(root.path(), &path, 33_333.3, 30.5, 90.5);
+    take.check_verdict(Verdict::Clean);
+    assert_eq!(take.counts(), (60, 0));
+    assert_eq!(take.video.facts().codec, "h264");
     assert_eq!(
-        (video.facts().codec.as_str(), video.frames().len()),
-        ("h264", 67)
+        (take.frames_in_video(), take.index().entries().len()),
+        (67, 67)
     );
-    assert_eq!(recording.frames.unwrap().entries().len(), 67);
-    assert!(
-        recording.notices[0]
-            .text()
-            .contains("7 frames before the turn")
-    );
-    assert!(video.frame(66).is_ok() && video.damage().is_empty());
+    let notice = take.recording.notices[0].text();
+    assert!(notice.contains("7 frames before the turn"), "{notice}");
+    assert!(take.video.frame(66).is_ok() && take.video.damage().is_empty());
 }
 
 /// Runs this test binary again, with only the (ignored) test `name`, by way of `sh`.
@@ -653,8 +662,8 @@ fn again(name: &str, script: &str, root: &Path) -> Command {
 #[ignore = "run by a_full_disk_ends_the_recording_and_says_how_much_is_missing"]
 fn child_that_records_into_a_limit() {
     let root = PathBuf::from(std::env::var("RELIT_TEST_ROOT").unwrap());
-    let report = record(&root, 0, steps(stream(200, 0)));
-    println!("TOLD {}", bad(&report));
+    let take = record(&root, 0, steps(stream(200, 0)));
+    println!("REASON {}", take.rejection());
 }
 
 #[test]
@@ -667,14 +676,14 @@ fn a_full_disk_ends_the_recording_and_says_how_much_is_missing() {
         .unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success(), "{text}");
-    let told = text
+    let reason = text
         .lines()
-        .find_map(|line| line.strip_prefix("TOLD "))
+        .find_map(|line| line.strip_prefix("REASON "))
         .unwrap();
-    let folder = root.path().join("20261120T093015Z-cow");
-    assert!(told.contains("the disk is full"), "{told}");
-    assert!(told.contains(folder.to_str().unwrap()), "{told}");
-    let missing: u64 = told
+    let folder = root.path().join(ID);
+    assert!(reason.contains("the disk is full"), "{reason}");
+    assert!(reason.contains(folder.to_str().unwrap()), "{reason}");
+    let missing: u64 = reason
         .split("about ")
         .nth(1)
         .and_then(|rest| rest.split(' ').next())
@@ -682,7 +691,7 @@ fn a_full_disk_ends_the_recording_and_says_how_much_is_missing() {
         .parse()
         .unwrap();
     // The turn has 120 frames of 11.6 kB, of which 0.6 MB fitted.
-    assert!((600_000..1_000_000).contains(&missing), "{told}");
+    assert!((600_000..1_000_000).contains(&missing), "{reason}");
     let recording = Recording::open(&folder).unwrap();
     let index = recording.frames.unwrap();
     assert!(
@@ -708,32 +717,19 @@ fn a_full_disk_ends_the_recording_and_says_how_much_is_missing() {
 #[ignore = "run by the tests that kill a recorder"]
 fn child_that_records_until_it_is_killed() {
     let root = PathBuf::from(std::env::var("RELIT_TEST_ROOT").unwrap());
-    let clock = Clock::monotonic();
+    let clock = match std::env::var("RELIT_TEST_CLOCK").as_deref() {
+        Ok("real") => Clock::monotonic(),
+        _ => Clock::paced(20.0),
+    };
     let begun = clock.now_us();
-    let mut camera = Scripted::new(steps(stream(100_000, begun)));
-    camera.clock = Some(clock);
-    let recorder = Recorder::start(camera, plan(&root, 0)).unwrap();
+    let camera = Scripted::new(&clock, steps(stream(100_000, begun)));
+    let mut plan = plan(&root, &clock, 0);
+    plan.queue_wait = WAIT;
+    let recorder = Recorder::start(camera, plan).unwrap();
     recorder.announce(turn(90_000, begun));
-    println!("RECORDING");
-    recorder.wait().unwrap();
-}
-
-struct Silent;
-
-impl Observer for Silent {
-    fn begun(&self, _: &Path, _: u32) {}
-    fn advanced(&self) {}
-    fn ended(&self, recording: &Path, outcome: &Outcome) {
-        match outcome {
-            Outcome::Extracted(entry) => {
-                let told = entry
-                    .warnings
-                    .iter()
-                    .any(|w| w.contains("recording was interrupted"));
-                assert!(told, "{:?}", entry.warnings);
-            }
-            other => panic!("{}: {other:?}", recording.display()),
-        }
+    while !recorder.progress().ended {
+        println!("WROTE {}", recorder.progress().frames);
+        thread::sleep(Duration::from_millis(2));
     }
 }
 
@@ -741,40 +737,47 @@ impl Observer for Silent {
 fn extracts(folder: &Path, out: &Path) {
     let mask = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("fixtures/20261120T101500Z-cow-short/mask_gt.png");
-    let options = Options {
+    let options = ExtractOptions {
         frames: 4,
-        size: Size::Pixels(32),
-        margin: 0.1,
-        saturation_level: 250,
-        gate: 0.05,
-        layout: Layout::Webdataset,
+        size: ImageSize::Pixels(32),
         mask: Some(mask),
-        strict: false,
-        resume: false,
-        replace: false,
         threads: 1,
+        ..ExtractOptions::default()
     };
-    let tally = extract::extract(&[folder.to_owned()], out, &options, &Silent).unwrap();
+    let tally = extract(&[folder.to_owned()], out, &options, &()).unwrap();
     assert_eq!((tally.extracted, tally.lossy), (1, 1));
+    let warnings = &Dataset::read(out).unwrap().sessions[0].warnings;
+    let interrupted = |warning: &String| warning.contains("recording was interrupted");
+    assert!(warnings.iter().any(interrupted), "{warnings:?}");
 }
 
-/// Kills a recorder `after` its start, salvages, and answers how much was lost, microseconds.
-fn kill_and_salvage(after: Duration) -> i64 {
+/// What a killed recorder lost.
+struct Lost {
+    /// Frames that it had written.
+    frames: u64,
+    /// Time since the last frame that was saved, by the system's clock, microseconds.
+    us: i64,
+}
+
+/// Kills a recorder that has written so many frames, and salvages its session. `clock`: whether it
+/// goes by `real` time.
+fn kill_and_salvage(clock: &str, frames: u64) -> Lost {
     let root = tempfile::tempdir().unwrap();
     let mut child = again("child_that_records_until_it_is_killed", "", root.path())
+        .env("RELIT_TEST_CLOCK", clock)
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
     let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-    let mut lines = lines.map(Result::unwrap);
-    assert!(lines.any(|line| line.contains("RECORDING")));
-    let folder = root.path().join("20261120T093015Z-cow");
-    thread::sleep(after);
+    let mut written = lines.filter_map(|line| line.unwrap().strip_prefix("WROTE ")?.parse().ok());
+    let folder = root.path().join(ID);
+    assert!(written.any(|written: u64| written >= frames));
     // A session under way is left alone.
     assert!(salvage(root.path()).unwrap().is_empty());
     let killed_us = Clock::monotonic().now_us();
     child.kill().unwrap();
     child.wait().unwrap();
+    let written = written.last().unwrap_or(frames);
 
     let video = folder.join("video.mkv");
     let before = fs::read(&video).unwrap();
@@ -785,7 +788,6 @@ fn kill_and_salvage(after: Duration) -> i64 {
         before == fs::read(&video).unwrap(),
         "the video stays as it is"
     );
-    assert!(saved.frames > 0 && saved.frames > (after.as_secs_f64() * 30.0) as usize / 2);
 
     let recording = Recording::open(&folder).unwrap();
     let status = recording.manifest.unwrap().status;
@@ -800,45 +802,48 @@ fn kill_and_salvage(after: Duration) -> i64 {
     assert!(salvage(root.path()).unwrap().is_empty());
     assert!(salvage_session(&folder).is_err());
     extracts(&folder, &root.path().join("out"));
-    killed_us - last.t_us
+    Lost {
+        frames: written.saturating_sub(frames as u64),
+        us: killed_us - last.t_us,
+    }
 }
 
-fn kill_at_random_moments(times: u32) {
-    let mut worst = 0;
-    let mut state = u64::from(std::process::id()) ^ Clock::monotonic().now_us() as u64;
-    for time in 0..times {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        let after = Duration::from_millis(1100 + (state >> 33) % 1500);
-        let lost = kill_and_salvage(after);
-        worst = worst.max(lost);
-        assert!(
-            lost <= 1_000_000,
-            "kill {time} after {after:?} lost {lost} us"
-        );
-    }
-    println!("{times} kills, at most {worst} us lost");
+/// Numbers of frames after which a recorder is killed.
+fn random_moments() -> impl Iterator<Item = u64> {
+    let seed = u64::from(std::process::id()) ^ Clock::monotonic().now_us() as u64;
+    let next = |state: &u64| {
+        let state = state.wrapping_mul(6_364_136_223_846_793_005);
+        Some(state.wrapping_add(1))
+    };
+    std::iter::successors(Some(seed), next).map(|state| 30 + (state >> 33) % 45)
 }
 
 #[test]
-fn a_killed_recording_is_salvaged_and_loses_a_second_at_most() {
-    kill_at_random_moments(5);
+fn a_killed_recording_is_salvaged_and_loses_a_second_of_what_was_written_at_most() {
+    for frames in random_moments().take(5) {
+        let lost = kill_and_salvage("paced", frames);
+        assert!(lost.frames <= 30, "{} frames lost", lost.frames);
+    }
 }
 
 /// `cargo test --test capture -- --ignored --nocapture a_hundred_killed`
 #[test]
 #[ignore = "takes five minutes"]
 fn a_hundred_killed_recordings_are_salvaged_and_lose_a_second_at_most() {
-    kill_at_random_moments(100);
+    let lost = random_moments().map(|frames| kill_and_salvage("real", frames).us);
+    let worst = lost.take(100).max().unwrap();
+    println!("at most {worst} us lost");
+    assert!(worst <= 1_000_000, "{worst} us lost");
 }
 
 #[test]
 fn a_recording_killed_before_its_first_frame_is_salvaged_as_such() {
     let root = tempfile::tempdir().unwrap();
     let script = steps(stream(5, 0)).chain([Step::Silence]);
-    let recorder = Recorder::start(Scripted::new(script), plan(root.path(), 0)).unwrap();
-    let folder = recorder.folder().to_owned();
+    let clock = Clock::virtual_time();
+    let camera = Scripted::new(&clock, script);
+    let recorder = Recorder::start(camera, plan(root.path(), &clock, 0)).unwrap();
+    let folder = root.path().join(ID);
     recorder.stop();
     drop(recorder.wait().unwrap());
     let saved = salvage_session(&folder).unwrap();
@@ -853,14 +858,16 @@ fn a_recording_killed_before_its_first_frame_is_salvaged_as_such() {
 #[test]
 fn frames_whose_content_a_power_cut_took_are_cut_from_the_index() {
     let root = tempfile::tempdir().unwrap();
-    let mut plan = plan(root.path(), 0);
+    let clock = Clock::virtual_time();
+    let mut plan = plan(root.path(), &clock, 0);
+    plan.queue_wait = WAIT;
     plan.window = Some(turn(120, 0));
-    let recorder = Recorder::start(Scripted::new(steps(stream(200, 0))), plan).unwrap();
-    let folder = recorder.folder().to_owned();
+    let recorder = Recorder::start(Scripted::new(&clock, steps(stream(200, 0))), plan).unwrap();
+    let folder = root.path().join(ID);
     drop(recorder.wait().unwrap());
     // The last bytes never reached the disk: the file has its length, and zeros there.
     let path = folder.join("video.mkv");
-    let places = support::packets(&folder, "video.mkv");
+    let places = packets(&folder, "video.mkv");
     let mut bytes = fs::read(&path).unwrap();
     bytes[places[110].at + 100..].fill(0);
     fs::write(&path, bytes).unwrap();
@@ -897,12 +904,12 @@ fn cost_of_recording_a_video_as_fast_as_it_goes() {
     let root = tempfile::tempdir_in(path.parent().unwrap()).unwrap();
     let frames = Video::open(&path).unwrap().frames().len() as f64;
     let (cpu, begun) = (used().0, Instant::now());
-    let report = record_replay(root.path(), &path, 33_333.3, 0.0, frames);
+    let take = record_replay(root.path(), &path, 33_333.3, 0.0, frames);
     let (after, peak) = used();
     println!(
         "{:?}: {} frames, {:.2} CPU-s, {:.2} s, at most {peak} MiB",
-        report.take,
-        report.recorded,
+        take.summary.verdict,
+        take.summary.frames,
         after - cpu,
         begun.elapsed().as_secs_f64()
     );

@@ -1,14 +1,12 @@
-//! `relit-extract` from outside: what a user types, what comes out, and how it fails.
+//! The program `relit-extract`: command lines, results and failures.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
-mod support;
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use relit_data::shard::{Dataset, FrameRecord, ShardReader};
-use support::ffmpeg;
+use relit_test_support::{ffmpeg, packets};
 use tempfile::TempDir;
 
 /// Thirty frames in which the pattern moves; the object is a disc in the middle.
@@ -51,20 +49,22 @@ impl Bench {
             .unwrap()
     }
 
-    /// Runs, expects this exit code, and answers what was told on standard error.
-    fn told(&self, code: i32, line: &str) -> String {
+    /// Runs the program, asserts the exit code, and returns standard error.
+    #[track_caller]
+    fn errors(&self, code: i32, line: &str) -> String {
         let output = self.run(line);
-        let told = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(code), "{line}: {told}");
-        told
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{line}: {errors}");
+        errors
     }
 
-    /// What `verify` prints.
+    /// Runs `verify`, asserts the exit code, and returns standard output.
+    #[track_caller]
     fn verified(&self, code: i32, out: &str) -> String {
         let output = self.run(&format!("verify {out}"));
-        let told = String::from_utf8(output.stdout).unwrap();
-        assert_eq!(output.status.code(), Some(code), "{told}");
-        told
+        let printed = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{printed}");
+        printed
     }
 
     fn records(&self, shard: &str) -> Vec<FrameRecord> {
@@ -88,7 +88,7 @@ fn the_shard_is_the_same_bytes_for_any_number_of_threads() {
         let mut shards = Vec::new();
         for threads in [1, 2, 5] {
             let out = format!("out{threads}");
-            bench.told(
+            bench.errors(
                 0,
                 &format!(
                     "{name} --mask mask.png --frames 30 --size 40 -o {out} --threads {threads}"
@@ -104,14 +104,14 @@ fn the_shard_is_the_same_bytes_for_any_number_of_threads() {
 #[test]
 fn native_size_keeps_source_pixels_and_its_statistics_are_recomputed_by_verify() {
     let bench = Bench::new();
-    bench.told(
+    bench.errors(
         0,
         "clip.mkv --mask mask.png --frames 30 --size native -o out",
     );
     assert!(
         bench
             .verified(0, "out")
-            .contains("30 samples read back: all is well")
+            .contains("30 samples read back: no problems")
     );
     let record = &bench.records("out/clip.tar")[7];
     assert_eq!(record.size, [record.crop.w, record.crop.h]);
@@ -121,7 +121,7 @@ fn native_size_keeps_source_pixels_and_its_statistics_are_recomputed_by_verify()
 #[test]
 fn the_relit_layout_has_gap_free_names_and_is_verified() {
     let bench = Bench::new();
-    bench.told(
+    bench.errors(
         0,
         "clip.mkv --mask mask.png --frames 30 --size 32 --layout relit -o out",
     );
@@ -136,43 +136,43 @@ fn the_relit_layout_has_gap_free_names_and_is_verified() {
         bench.path("out/imgs/clip/4.png"),
     )
     .unwrap();
-    let told = bench.verified(1, "out");
-    assert!(told.contains("clip/0004"), "{told}");
+    let errors = bench.verified(1, "out");
+    assert!(errors.contains("clip/0004"), "{errors}");
 }
 
 #[test]
-fn more_samples_than_frames_are_flagged_and_refused_by_strict() {
+fn more_samples_than_frames_are_flagged_and_refused_with_strict() {
     let bench = Bench::new();
-    let told = bench.told(0, "clip.mkv --mask mask.png --frames 45 --size 32 -o out");
+    let errors = bench.errors(0, "clip.mkv --mask mask.png --frames 45 --size 32 -o out");
     assert!(
-        told.contains("15 of 45 samples repeat a source frame"),
-        "{told}"
+        errors.contains("15 of 45 samples repeat a source frame"),
+        "{errors}"
     );
     let records = bench.records("out/clip.tar");
     assert_eq!(records.iter().filter(|record| record.duplicate).count(), 15);
-    let told = bench.told(
+    let errors = bench.errors(
         1,
         "clip.mkv --mask mask.png --frames 45 --size 32 -o strict --strict",
     );
     assert!(
-        told.contains("refused by --strict: 15 samples would repeat"),
-        "{told}"
+        errors.contains("refused by --strict: 15 samples would repeat"),
+        "{errors}"
     );
     assert!(!bench.path("strict/clip.tar").exists());
 }
 
 #[test]
-fn where_frames_were_dropped_the_stand_ins_are_flagged_and_not_the_frames_themselves() {
+fn frames_that_replace_dropped_ones_are_flagged_and_not_the_originals() {
     let bench = Bench::new();
     let drop = r"noise=amount=0:drop=eq(n\,9)+eq(n\,10)+eq(n\,20)";
     ffmpeg(
         bench.folder.path(),
         &["-i", "clip.mkv", "-c", "copy", "-bsf:v", drop, "gaps.mkv"],
     );
-    let told = bench.told(0, "gaps.mkv --mask mask.png --frames 30 --size 32 -o out");
+    let errors = bench.errors(0, "gaps.mkv --mask mask.png --frames 30 --size 32 -o out");
     assert!(
-        told.contains("room for 2 more frames before frame 9"),
-        "{told}"
+        errors.contains("room for 2 more frames before frame 9"),
+        "{errors}"
     );
     let records = bench.records("out/gaps.tar");
     let flagged: Vec<u32> = records
@@ -184,7 +184,7 @@ fn where_frames_were_dropped_the_stand_ins_are_flagged_and_not_the_frames_themse
 }
 
 #[test]
-fn a_damaged_frame_is_replaced_by_a_neighbour_and_told() {
+fn a_damaged_frame_is_replaced_by_a_neighbour_and_reported() {
     let bench = Bench::new();
     bench.video("clip.avi", "-pix_fmt yuvj422p -c:v mjpeg -q:v 2");
     let mut bytes = fs::read(bench.path("clip.avi")).unwrap();
@@ -196,8 +196,8 @@ fn a_damaged_frame_is_replaced_by_a_neighbour_and_told() {
         pair.copy_from_slice(&[0xFF, 0xD9]);
     }
     fs::write(bench.path("clip.avi"), bytes).unwrap();
-    let told = bench.told(3, "clip.avi --mask mask.png --frames 30 --size 32 -o out");
-    assert!(told.contains("frame 4 cannot be decoded"), "{told}");
+    let errors = bench.errors(3, "clip.avi --mask mask.png --frames 30 --size 32 -o out");
+    assert!(errors.contains("frame 4 cannot be decoded"), "{errors}");
     let records = bench.records("out/clip.tar");
     assert_eq!(records.len(), 30);
     assert!(records[4].duplicate && [3, 5].contains(&records[4].source_frame));
@@ -208,11 +208,11 @@ fn a_damaged_frame_is_replaced_by_a_neighbour_and_told() {
             .all(|record| !record.duplicate)
     );
     bench.verified(0, "out");
-    let told = bench.told(
+    let errors = bench.errors(
         1,
         "clip.avi --mask mask.png --frames 30 --size 32 -o strict --strict",
     );
-    assert!(told.contains("refused by --strict: frame 4"), "{told}");
+    assert!(errors.contains("refused by --strict: frame 4"), "{errors}");
 }
 
 #[test]
@@ -220,8 +220,8 @@ fn a_truncated_video_gives_what_it_has_and_exit_code_3() {
     let bench = Bench::new();
     let whole = fs::read(bench.path("clip.mkv")).unwrap();
     fs::write(bench.path("cut.mkv"), &whole[..whole.len() / 2]).unwrap();
-    let told = bench.told(3, "cut.mkv --mask mask.png --frames 30 --size 32 -o out");
-    assert!(told.contains("the file is cut off"), "{told}");
+    let errors = bench.errors(3, "cut.mkv --mask mask.png --frames 30 --size 32 -o out");
+    assert!(errors.contains("the file is cut off"), "{errors}");
     assert_eq!(bench.records("out/cut.tar").len(), 30);
     bench.verified(0, "out");
 }
@@ -231,11 +231,11 @@ fn one_bad_input_does_not_stop_the_others() {
     let bench = Bench::new();
     fs::write(bench.path("bad.mkv"), "no video").unwrap();
     fs::copy(bench.path("clip.mkv"), bench.path("other.mkv")).unwrap();
-    let told = bench.told(
+    let errors = bench.errors(
         3,
         "clip.mkv bad.mkv other.mkv --mask mask.png --frames 30 --size 32 -o out",
     );
-    assert!(told.contains("bad.mkv"), "{told}");
+    assert!(errors.contains("bad.mkv"), "{errors}");
     let dataset = Dataset::read(&bench.path("out")).unwrap();
     let ids: Vec<&str> = dataset
         .sessions
@@ -244,35 +244,35 @@ fn one_bad_input_does_not_stop_the_others() {
         .collect();
     assert_eq!(ids, ["clip", "other"]);
     bench.verified(0, "out");
-    bench.told(1, "bad.mkv --mask mask.png -o none");
+    bench.errors(1, "bad.mkv --mask mask.png -o none");
 }
 
 #[test]
-fn an_input_that_is_not_there_does_not_stop_the_others() {
+fn a_missing_input_does_not_stop_the_others() {
     let bench = Bench::new();
-    let told = bench.told(
+    let errors = bench.errors(
         3,
         "nowhere.mkv clip.mkv --mask mask.png --frames 30 --size 32 -o out",
     );
-    assert!(told.contains("there is no nowhere.mkv"), "{told}");
+    assert!(errors.contains("there is no nowhere.mkv"), "{errors}");
     bench.verified(0, "out");
 }
 
 #[test]
-fn strict_does_not_take_over_what_it_would_refuse() {
+fn strict_does_not_skip_what_it_would_refuse() {
     let bench = Bench::new();
     let line = "clip.mkv --mask mask.png --frames 45 --size 32 -o out --resume";
-    bench.told(0, line);
-    bench.told(1, &format!("{line} --strict"));
+    bench.errors(0, line);
+    bench.errors(1, &format!("{line} --strict"));
     let whole = fs::read(bench.path("clip.mkv")).unwrap();
     fs::write(bench.path("cut.mkv"), &whole[..whole.len() / 2]).unwrap();
     let line = "cut.mkv --mask mask.png --frames 30 --size 32 -o cut --resume";
-    bench.told(3, line);
-    bench.told(3, line);
+    bench.errors(3, line);
+    bench.errors(3, line);
 }
 
 #[test]
-fn a_transparent_pixel_of_the_mask_is_not_the_objects() {
+fn transparent_pixels_of_the_mask_are_not_the_object() {
     let bench = Bench::new();
     let mask = image::open(bench.path("mask.png")).unwrap().into_luma8();
     image::RgbaImage::from_fn(96, 72, |x, y| {
@@ -281,7 +281,7 @@ fn a_transparent_pixel_of_the_mask_is_not_the_objects() {
     .save(bench.path("layer.png"))
     .unwrap();
     for (mask, out) in [("mask.png", "a"), ("layer.png", "b")] {
-        bench.told(
+        bench.errors(
             0,
             &format!("clip.mkv --mask {mask} --frames 30 --size 32 -o {out}"),
         );
@@ -298,18 +298,18 @@ fn damaged_h264_gives_the_same_shard_for_any_number_of_threads() {
         "-pix_fmt yuv420p -c:v libx264 -g 6 -bf 2 -sc_threshold 0",
     );
     let mut bytes = fs::read(bench.path("film.mkv")).unwrap();
-    let packet = support::packets(bench.folder.path(), "film.mkv")[14];
+    let packet = packets(bench.folder.path(), "film.mkv")[14];
     bytes[packet.at + 8..packet.at + packet.size].fill(0);
     fs::write(bench.path("film.mkv"), bytes).unwrap();
     let mut shards = Vec::new();
     for threads in [1, 2, 4, 8] {
         let out = format!("out{threads}");
-        let told = bench.told(
+        let errors = bench.errors(
             3,
             &format!("film.mkv --mask mask.png --frames 30 --size 40 -o {out} --threads {threads}"),
         );
         shards.push((
-            told,
+            errors,
             fs::read(bench.path(&format!("{out}/film.tar"))).unwrap(),
         ));
     }
@@ -321,11 +321,11 @@ fn damaged_h264_gives_the_same_shard_for_any_number_of_threads() {
 }
 
 #[test]
-fn names_that_ffmpeg_would_take_for_addresses_are_files() {
+fn names_that_look_like_ffmpeg_urls_are_files() {
     let bench = Bench::new();
     for name in ["09:30.mkv", "concat:clip.mkv", "ü.mkv"] {
         fs::copy(bench.path("clip.mkv"), bench.path(name)).unwrap();
-        bench.told(
+        bench.errors(
             0,
             &format!("{name} --mask mask.png --frames 30 --size 32 -o out"),
         );
@@ -333,7 +333,7 @@ fn names_that_ffmpeg_would_take_for_addresses_are_files() {
 }
 
 #[test]
-fn a_name_that_is_no_text_is_refused_and_the_others_come() {
+fn a_name_that_is_not_utf_8_is_refused_and_does_not_stop_the_others() {
     use std::os::unix::ffi::OsStrExt;
     let bench = Bench::new();
     let odd = bench
@@ -353,11 +353,11 @@ fn a_name_that_is_no_text_is_refused_and_the_others_come() {
 }
 
 #[test]
-fn resume_skips_what_is_vouched_for_and_makes_again_what_is_not() {
+fn resume_skips_what_is_intact_and_makes_again_what_is_damaged() {
     let bench = Bench::new();
     fs::copy(bench.path("clip.mkv"), bench.path("other.mkv")).unwrap();
     let line = "clip.mkv other.mkv --mask mask.png --frames 30 --size 32 -o out --resume";
-    bench.told(0, line);
+    bench.errors(0, line);
     let shard = bench.path("out/clip.tar");
     let good = fs::read(&shard).unwrap();
     let mut damaged = good.clone();
@@ -365,7 +365,7 @@ fn resume_skips_what_is_vouched_for_and_makes_again_what_is_not() {
     fs::write(&shard, damaged).unwrap();
     let output = bench.run(line);
     let printed = String::from_utf8(output.stdout).unwrap();
-    assert!(printed.contains("other: there already"), "{printed}");
+    assert!(printed.contains("other: already extracted"), "{printed}");
     assert!(
         printed.contains("1 extracted (0 with losses), 1 skipped"),
         "{printed}"
@@ -374,19 +374,19 @@ fn resume_skips_what_is_vouched_for_and_makes_again_what_is_not() {
 }
 
 #[test]
-fn a_data_set_keeps_to_its_settings() {
+fn a_data_set_keeps_its_settings() {
     let bench = Bench::new();
-    bench.told(0, "clip.mkv --mask mask.png --frames 30 --size 32 -o out");
-    let told = bench.told(1, "clip.mkv --mask mask.png --frames 30 --size 48 -o out");
+    bench.errors(0, "clip.mkv --mask mask.png --frames 30 --size 32 -o out");
+    let errors = bench.errors(1, "clip.mkv --mask mask.png --frames 30 --size 48 -o out");
     assert!(
-        told.contains("other settings (size 32 there, 48 now)"),
-        "{told}"
+        errors.contains("other settings (size 32 there, 48 now)"),
+        "{errors}"
     );
     bench.verified(0, "out");
 }
 
 #[test]
-fn what_is_missing_or_does_not_fit_is_told_in_a_sentence() {
+fn what_is_missing_or_does_not_fit_is_reported_in_one_line() {
     let bench = Bench::new();
     image::GrayImage::new(96, 72)
         .save(bench.path("empty.png"))
@@ -413,9 +413,9 @@ fn what_is_missing_or_does_not_fit_is_told_in_a_sentence() {
         ("nowhere --mask mask.png -o out", "there is no nowhere"),
         ("verify out/nothing", "out/nothing"),
     ] {
-        let told = bench.told(1, line);
-        assert!(told.contains(part), "{line}: {told}");
-        assert_eq!(told.lines().count(), 1, "{told}");
+        let errors = bench.errors(1, line);
+        assert!(errors.contains(part), "{line}: {errors}");
+        assert_eq!(errors.lines().count(), 1, "{errors}");
     }
     for line in [
         "",
@@ -423,22 +423,22 @@ fn what_is_missing_or_does_not_fit_is_told_in_a_sentence() {
         "clip.mkv -o out --size 0",
         "clip.mkv -o out --align correct",
     ] {
-        bench.told(2, line);
+        bench.errors(2, line);
     }
 }
 
 #[test]
-fn two_inputs_of_one_name_are_not_mixed_up() {
+fn two_inputs_with_the_same_name_are_not_mixed_up() {
     let bench = Bench::new();
     fs::create_dir(bench.path("b")).unwrap();
     fs::copy(bench.path("clip.mkv"), bench.path("b/clip.mkv")).unwrap();
-    let told = bench.told(
+    let errors = bench.errors(
         3,
         "clip.mkv b/clip.mkv --mask mask.png --frames 30 --size 32 -o out",
     );
     assert!(
-        told.contains("another recording of this call is named clip"),
-        "{told}"
+        errors.contains("another recording of this call is also named clip"),
+        "{errors}"
     );
 }
 
@@ -446,35 +446,35 @@ fn two_inputs_of_one_name_are_not_mixed_up() {
 fn another_video_of_the_same_name_is_not_replaced_unasked() {
     let bench = Bench::new();
     let line = "clip.mkv --mask mask.png --frames 30 --size 32 -o out";
-    bench.told(0, line);
+    bench.errors(0, line);
     let first = fs::read(bench.path("out/clip.tar")).unwrap();
     bench.video("clip.mkv", "-vf hue=h=90 -pix_fmt yuvj422p -c:v mjpeg");
     for more in ["", " --resume"] {
-        let told = bench.told(1, &format!("{line}{more}"));
+        let errors = bench.errors(1, &format!("{line}{more}"));
         assert!(
-            told.contains("holds a session clip of another video"),
-            "{told}"
+            errors.contains("holds a session clip from another video"),
+            "{errors}"
         );
     }
     assert!(fs::read(bench.path("out/clip.tar")).unwrap() == first);
-    bench.told(0, &format!("{line} --replace"));
+    bench.errors(0, &format!("{line} --replace"));
     assert!(fs::read(bench.path("out/clip.tar")).unwrap() != first);
     bench.verified(0, "out");
 }
 
 #[test]
-fn a_photograph_is_no_turn_and_a_session_folder_no_data_set() {
+fn a_photograph_is_not_a_turn_and_a_session_folder_not_a_data_set() {
     let bench = Bench::new();
-    let told = bench.told(1, "mask.png --mask mask.png -o out");
-    assert!(told.contains("one usable frame only"), "{told}");
+    let errors = bench.errors(1, "mask.png --mask mask.png -o out");
+    assert!(errors.contains("one usable frame only"), "{errors}");
     fs::create_dir(bench.path("session")).unwrap();
     fs::write(bench.path("session/session.json"), "{}").unwrap();
-    let told = bench.told(1, "clip.mkv --mask mask.png -o session");
-    assert!(told.contains("is a session's folder"), "{told}");
+    let errors = bench.errors(1, "clip.mkv --mask mask.png -o session");
+    assert!(errors.contains("is a session folder"), "{errors}");
 }
 
 #[test]
-fn machines_are_told_in_json_lines() {
+fn with_json_events_are_printed_as_json_lines() {
     let bench = Bench::new();
     let output = bench.run("clip.mkv --mask mask.png --frames 30 --size 32 -o out --json");
     assert!(output.stderr.is_empty());
@@ -489,9 +489,9 @@ fn machines_are_told_in_json_lines() {
 }
 
 #[test]
-fn what_lies_outside_the_mask_never_reaches_the_shard() {
+fn pixels_outside_the_mask_never_reach_the_shard() {
     let bench = Bench::new();
-    bench.told(0, "clip.mkv --mask mask.png --frames 30 --size 40 -o out");
+    bench.errors(0, "clip.mkv --mask mask.png --frames 30 --size 40 -o out");
     let shard = File::open(bench.path("out/clip.tar")).unwrap();
     for sample in ShardReader::new(shard) {
         let sample = sample.unwrap();
@@ -512,13 +512,13 @@ fn read(png: &[u8]) -> image::DynamicImage {
 }
 
 #[test]
-fn a_killed_run_leaves_nothing_that_looks_whole_and_the_next_one_clears_up() {
+fn what_a_killed_run_left_behind_is_removed_by_the_next() {
     let bench = Bench::new();
     fs::create_dir(bench.path("out")).unwrap();
     for name in [".clip.tar.partial", ".clip.spool"] {
         fs::write(bench.path("out").join(name), "half").unwrap();
     }
-    bench.told(0, "clip.mkv --mask mask.png --frames 30 --size 32 -o out");
+    bench.errors(0, "clip.mkv --mask mask.png --frames 30 --size 32 -o out");
     let names = names_in(&bench.path("out"));
     assert_eq!(
         names,

@@ -1,5 +1,5 @@
-//! Replay: every session folder in `fixtures/` goes through the programs as a user would send it,
-//! and comes out as its `expect.json` and `truth.json` say. A new folder there is a new test.
+//! Replay: every session folder in `fixtures/` is extracted by the program and compared with its
+//! `expect.json` and `truth.json`. A new folder there is a new test.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::fs::{self, File};
@@ -87,14 +87,14 @@ fn every_fixture_comes_out_as_it_says() {
             "64",
         ];
         let output = run(&arguments);
-        let told = String::from_utf8_lossy(&output.stderr);
+        let errors = String::from_utf8_lossy(&output.stderr);
         assert_eq!(
             output.status.code(),
             Some(if expect.lossy { 3 } else { 0 }),
-            "{name}: {told}"
+            "{name}: {errors}"
         );
-        let verdict = run(&["verify", to]);
-        assert_eq!(verdict.status.code(), Some(0), "{name}: {verdict:?}");
+        let verified = run(&["verify", to]);
+        assert_eq!(verified.status.code(), Some(0), "{name}: {verified:?}");
 
         let dataset = Dataset::read(&out).unwrap();
         check_entry(name, &expect, &dataset);

@@ -3,69 +3,79 @@
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a panic is how a test tells"
+    reason = "a panic is how a test reports"
 )]
 
 use std::io::{Read, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use relit_rig::clock::Clock;
-use relit_rig::simulator::{STEPS_PER_TURN, Simulator, SimulatorOptions};
+use relit_rig::clock::{Clock, Participant};
+use relit_rig::simulator::{
+    STEPS_PER_TURN, SimulatedPort, SimulatedTable, Simulator, SimulatorOptions,
+};
+use relit_rig::turntable::Port;
 use serialport::TTYPort;
 
-/// The longest that anything takes on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(30);
-const SPEED: f64 = 20.0;
+/// The longest that anything takes on the table's clock.
+const LONGEST: Duration = Duration::from_secs(120);
 
-/// A simulated table and a host at its port.
+/// A simulated table on virtual time and a host at its port.
 struct Bench {
-    table: Simulator,
+    table: SimulatedTable,
     clock: Clock,
-    port: TTYPort,
+    port: SimulatedPort,
     heard: String,
+    _participant: Participant,
 }
 
 impl Bench {
     fn new(options: SimulatorOptions) -> Bench {
-        let clock = options.clock;
-        let table = Simulator::start(options).unwrap();
-        let port = open(table.path());
-        let heard = String::new();
+        let clock = Clock::virtual_time();
+        let participant = clock.take_part();
+        let table = SimulatedTable::new(&SimulatorOptions {
+            clock: clock.clone(),
+            ..options
+        });
         Bench {
+            port: table.open(),
             table,
             clock,
-            port,
-            heard,
+            heard: String::new(),
+            _participant: participant,
         }
     }
 
-    fn ready() -> Bench {
-        let mut bench = Bench::new(fast());
+    /// A table whose chip has started.
+    fn ready(options: SimulatorOptions) -> Bench {
+        let mut bench = Bench::new(options);
         bench.until("external]\r\n");
         bench
     }
 
     fn say(&mut self, text: &str) {
-        self.port.write_all(text.as_bytes()).unwrap();
+        self.port.write(text.as_bytes()).unwrap();
     }
 
     /// Listens until the table says this, and gives what it said up to there.
     fn until(&mut self, text: &str) -> String {
-        let end = Instant::now() + PATIENCE;
-        while Instant::now() < end {
+        let end_us = self.clock.after(LONGEST);
+        while self.clock.now_us() < end_us {
             if let Some(at) = self.heard.find(text) {
                 let rest = self.heard.split_off(at + text.len());
                 return std::mem::replace(&mut self.heard, rest);
             }
-            self.listen();
+            self.listen(Duration::from_millis(5));
         }
         panic!("never {text:?}, but {:?}", self.heard);
     }
 
-    fn listen(&mut self) {
+    /// Takes what comes within this time.
+    fn listen(&mut self, wait: Duration) {
         let mut buffer = [0; 256];
-        if let Ok(count) = self.port.read(&mut buffer) {
+        let end_us = self.clock.after(wait);
+        while self.clock.now_us() < end_us {
+            let count = self.port.read(&mut buffer, wait).unwrap();
             self.heard += &String::from_utf8_lossy(&buffer[..count]);
         }
     }
@@ -77,8 +87,8 @@ impl Bench {
 
     /// Asks for status reports until one begins like this.
     fn wait(&mut self, state: &str) -> String {
-        let end = Instant::now() + PATIENCE;
-        while Instant::now() < end {
+        let end_us = self.clock.after(LONGEST);
+        while self.clock.now_us() < end_us {
             self.say("?");
             let report = self.until(">\r\n");
             if report.starts_with(&format!("<{state}")) {
@@ -90,33 +100,20 @@ impl Bench {
     }
 }
 
-fn fast() -> SimulatorOptions {
-    SimulatorOptions {
-        clock: Clock::scaled(SPEED),
-        ..SimulatorOptions::default()
-    }
-}
-
-fn open(path: &Path) -> TTYPort {
-    let port = serialport::new(path.to_string_lossy(), 115_200);
-    TTYPort::open(&port.timeout(Duration::from_millis(5))).unwrap()
-}
-
 #[test]
 fn whoever_opens_the_port_resets_the_chip() {
-    let mut bench = Bench::ready();
+    let mut bench = Bench::ready(SimulatorOptions::default());
     bench.ask("G0 X1");
     bench.wait("Idle");
-    drop(bench.port);
-    bench.port = open(bench.table.path());
+    bench.port = bench.table.open();
     bench.until("[reset: external]\r\n");
     assert!(bench.wait("Idle").contains("MPos:0.000"));
     assert_eq!(bench.table.counts().opened, 2);
 }
 
 #[test]
-fn a_turn_is_told_step_by_step() {
-    let mut bench = Bench::ready();
+fn a_turn_has_all_its_steps() {
+    let mut bench = Bench::ready(SimulatorOptions::default());
     bench.ask("G1 X360 F432");
     bench.wait("Idle");
     let edges = bench.table.edges();
@@ -130,7 +127,7 @@ fn a_turn_is_told_step_by_step() {
 
 #[test]
 fn a_report_and_the_truth_agree() {
-    let mut bench = Bench::ready();
+    let mut bench = Bench::ready(SimulatorOptions::default());
     let started = bench.clock.now_us();
     bench.ask("G1 X180 F432");
     bench.clock.sleep(Duration::from_secs(2));
@@ -148,12 +145,11 @@ fn a_report_and_the_truth_agree() {
 
 #[test]
 fn homing_finds_the_index_at_its_angle() {
-    let mut bench = Bench::new(SimulatorOptions {
+    let mut bench = Bench::ready(SimulatorOptions {
         start_angle: 100.0,
         index_at: 130.0,
-        ..fast()
+        ..SimulatorOptions::default()
     });
-    bench.until("external]\r\n");
     bench.ask("$22=1");
     bench.ask("$H");
     assert!(bench.wait("Idle").contains("MPos:0.000"));
@@ -164,7 +160,7 @@ fn homing_finds_the_index_at_its_angle() {
 
 #[test]
 fn pins_can_be_driven() {
-    let mut bench = Bench::ready();
+    let mut bench = Bench::ready(SimulatorOptions::default());
     bench.table.hold_index(Some(true));
     bench.table.set_battery(11.84);
     bench.clock.sleep(Duration::from_millis(500));
@@ -182,34 +178,30 @@ fn pins_can_be_driven() {
 
 #[test]
 fn a_reset_in_a_turn_shows_its_banner() {
-    let mut bench = Bench::new(SimulatorOptions {
+    let mut bench = Bench::ready(SimulatorOptions {
         faults: "reset@6s".parse().unwrap(),
-        ..fast()
+        ..SimulatorOptions::default()
     });
-    bench.until("external]\r\n");
     bench.ask("G1 X360 F432");
     bench.until("[reset: watchdog]\r\n");
-    assert_eq!(bench.table.stop().resets, 1);
+    assert_eq!(bench.table.counts().resets, 1);
 }
 
 #[test]
 fn a_stalled_chip_neither_answers_nor_moves() {
-    let mut bench = Bench::new(SimulatorOptions {
+    let mut bench = Bench::ready(SimulatorOptions {
         faults: "stall@6s".parse().unwrap(),
-        ..fast()
+        ..SimulatorOptions::default()
     });
-    bench.until("external]\r\n");
     bench.ask("G1 X360 F432");
-    let end = Instant::now() + PATIENCE;
-    while !bench.table.counts().stalled && Instant::now() < end {
-        bench.listen();
+    while !bench.table.counts().stalled {
+        bench.listen(Duration::from_millis(5));
     }
     bench.heard.clear();
     let edges = bench.table.edges().len();
     assert!(edges > 0);
     bench.say("?\n");
-    bench.clock.sleep(Duration::from_secs(3));
-    bench.listen();
+    bench.listen(Duration::from_secs(3));
     assert_eq!(bench.heard, "");
     assert_eq!(bench.table.edges().len(), edges);
 }
@@ -221,15 +213,14 @@ fn a_bad_wire_counts_what_it_does() {
             .parse()
             .unwrap(),
         seed: 7,
-        ..fast()
+        ..SimulatorOptions::default()
     });
     bench.clock.sleep(Duration::from_secs(1));
     for _ in 0..200 {
         bench.say("$X\n");
-        bench.clock.sleep(Duration::from_millis(40));
-        bench.listen();
+        bench.listen(Duration::from_millis(40));
     }
-    let counts = bench.table.stop();
+    let counts = bench.table.counts();
     assert_eq!(counts.to_chip.bytes, 600);
     assert!(counts.to_chip.dropped > 10, "{counts:?}");
     assert!(counts.to_chip.duplicated > 15, "{counts:?}");
@@ -239,36 +230,63 @@ fn a_bad_wire_counts_what_it_does() {
 }
 
 #[test]
-fn the_second_name_lives_as_long_as_the_table() {
-    let folder = tempfile::tempdir().unwrap();
-    let link = folder.path().join("table");
-    std::os::unix::fs::symlink("/nowhere", &link).unwrap();
-    let options = || SimulatorOptions {
-        link: Some(link.clone()),
-        ..fast()
-    };
-    let table = Simulator::start(options()).unwrap();
-    assert_eq!(std::fs::read_link(&link).unwrap(), table.path());
-    let mut port = open(&link);
-    port.write_all(b"\n").unwrap();
-    drop(table);
-    assert!(std::fs::read_link(&link).is_err());
-    std::fs::write(&link, "somebody's file").unwrap();
-    assert!(Simulator::start(options()).is_err());
-    assert_eq!(std::fs::read_to_string(&link).unwrap(), "somebody's file");
-}
-
-#[test]
 fn a_crystal_that_goes_wrong_shows_in_the_speed() {
-    let mut bench = Bench::new(SimulatorOptions {
+    let mut bench = Bench::ready(SimulatorOptions {
         drift_ppm: 5000.0,
-        ..fast()
+        ..SimulatorOptions::default()
     });
-    bench.until("external]\r\n");
     bench.ask("G1 X90 F432");
     bench.wait("Idle");
     let edges = bench.table.edges();
     let (first, last) = (edges[100], edges[edges.len() - 100]);
     let speed = (last.steps - first.steps) as f64 / (last.t_us - first.t_us) as f64 * 1e6;
     assert!((speed - 640.0 * 1.005).abs() < 0.01, "{speed}");
+}
+
+#[test]
+fn at_a_pseudoterminal_any_program_reaches_the_table() {
+    let table = Simulator::start(&SimulatorOptions::default(), None).unwrap();
+    let mut port = open(table.path());
+    let heard = hear(&mut port, "external]\r\n");
+    assert!(heard.contains("Grbl 1.1h"), "{heard}");
+    port.write_all(b"?").unwrap();
+    let report = hear(&mut port, ">\r\n");
+    assert!(report.contains("MPos:0.000"), "{report}");
+    drop(port);
+    hear(&mut open(table.path()), "external]\r\n");
+    assert_eq!(table.stop().opened, 2);
+}
+
+fn open(path: &Path) -> TTYPort {
+    let port = serialport::new(path.to_string_lossy(), 115_200);
+    TTYPort::open(&port.timeout(Duration::from_millis(5))).unwrap()
+}
+
+/// Listens until the table has said this.
+fn hear(port: &mut TTYPort, text: &str) -> String {
+    let (mut heard, mut buffer) = (String::new(), [0; 256]);
+    let end = Instant::now() + Duration::from_secs(30);
+    while !heard.contains(text) {
+        assert!(Instant::now() < end, "never {text:?}, but {heard:?}");
+        let count = port.read(&mut buffer).unwrap_or(0);
+        heard += &String::from_utf8_lossy(&buffer[..count]);
+    }
+    heard
+}
+
+#[test]
+fn the_second_name_lives_as_long_as_the_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("table");
+    std::os::unix::fs::symlink("/nowhere", &link).unwrap();
+    let start = || Simulator::start(&SimulatorOptions::default(), Some(&link));
+    let table = start().unwrap();
+    assert_eq!(std::fs::read_link(&link).unwrap(), table.path());
+    let mut port = open(&link);
+    port.write_all(b"\n").unwrap();
+    drop(table);
+    assert!(std::fs::read_link(&link).is_err());
+    std::fs::write(&link, "somebody's file").unwrap();
+    assert!(start().is_err());
+    assert_eq!(std::fs::read_to_string(&link).unwrap(), "somebody's file");
 }

@@ -16,10 +16,10 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use relit_rig::camera::lock::{Aspect, Lack, ManualPlan, Wanted};
+use relit_rig::camera::hold::{Aspect, ManualPlan, ManualValues, MissingControl};
 use relit_rig::camera::{
-    self, Address, Camera, CameraError, ControlFault, ControlId, ControlKind, Frame, GrantedMode,
-    StampSource,
+    self, Camera, CameraAddress, CameraError, ControlFault, ControlId, ControlKind, Frame,
+    GrantedMode, StampSource,
 };
 use relit_rig::clock::Clock;
 
@@ -245,19 +245,19 @@ fn controls_are_set_and_read_back() {
 fn a_camera_is_made_to_hold_still() {
     let mut camera = vivid();
     set(&mut *camera, "gain_automatic", 1);
-    let wanted = Wanted {
+    let wanted = ManualValues {
         gain: Some(33),
-        ..Wanted::default()
+        ..ManualValues::default()
     };
     let plan = ManualPlan::new(&camera.controls().unwrap(), &wanted);
     assert_eq!(plan.apply(&mut *camera).unwrap(), []);
-    let lacks = [
+    let missing = [
         Aspect::Exposure,
         Aspect::WhiteBalance,
         Aspect::Focus,
         Aspect::PowerLine,
     ];
-    assert_eq!(plan.lacks, lacks.map(Lack::NoControl));
+    assert_eq!(plan.missing, missing.map(MissingControl::NoControl));
     set(&mut *camera, "gain", 34);
     let moved = plan.check(&camera.controls().unwrap());
     assert_eq!(moved[0].to_string(), "gain is 34 where 33 was set");
@@ -465,10 +465,11 @@ fn a_timeout_is_bounded_and_costs_no_frame() {
     assert!(counted.is_sorted());
 }
 
+#[cfg(feature = "nokhwa")]
 #[test]
 #[ignore = "needs the driver vivid"]
 fn the_portable_library_shows_the_same_camera() {
-    let address = Address::Nokhwa(0).to_string();
+    let address = CameraAddress::Nokhwa(0).to_string();
     let mut camera = open(&address).unwrap();
     println!(
         "{}: {} modes",

@@ -58,7 +58,7 @@ fn conventions() -> Result<Rgb<Linear>, Box<dyn Error>> {
 /// From above: Monte Carlo, the lobe for light of order 24 and of order 2, and the paper's formula in the
 /// scale that suits best; from the left, smoothness from 5 to 200.
 fn highlights() -> Result<Rgb<Linear>, Box<dyn Error>> {
-    let normals = Normals::sphere(120);
+    let normals = Normals::sphere(96);
     let panorama = studio(Extent::new(256, 128))?;
     let light = panorama.project(Order::new(24)?);
     let second = light.with_order(Order::TWO);
@@ -110,7 +110,7 @@ fn materials() -> Result<Rgb<Linear>, Box<dyn Error>> {
     Ok(look.sweep(
         &mug(128)?,
         &light,
-        &[0.1, 0.3, 1.0],
+        &[0.04, 0.15, 0.4],
         &[5.0, 10.0, 20.0, 50.0, 100.0, 200.0],
     )?)
 }
@@ -155,9 +155,9 @@ fn painted(
 /// distance function.
 fn mug(side: usize) -> Result<Surface, Box<dyn Error>> {
     let extent = Extent::new(side, side);
-    let place = |at: usize| 2.4 * ((at as f64 + 0.5) / side as f64 - 0.5);
+    let place = |at: usize| 2.05 * ((at as f64 + 0.5) / side as f64 - 0.5);
     let hits: Vec<Option<[f64; 3]>> = (0..side * side)
-        .map(|at| march(place(at % side), -place(at / side)))
+        .map(|at| march(place(at % side) + 0.13, -place(at / side)))
         .collect();
     let normals = Planes::from_fn(extent, |x, y| {
         hits[y * side + x].map_or([0.0; 3], |hit| slope(hit).map(|v| v as f32))
@@ -190,7 +190,7 @@ fn slope(at: [f64; 3]) -> [f64; 3] {
             at[axis] += by;
             distance(at)
         };
-        moved(1e-4) - moved(-1e-4)
+        (moved(1e-4) - moved(-1e-4)) / 2e-4
     })
 }
 

@@ -14,7 +14,7 @@ use relight::render::{Gloss, Horizon, LobeLayer, MonteCarlo, PowerLayer};
 const SMOOTHNESSES: [f32; 6] = [5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
 
 /// Pixels of the sphere's picture, across.
-const SIDE: usize = 24;
+const SIDE: usize = 16;
 
 /// The columns of the table, apart from the smoothness.
 const COLUMNS: [&str; 8] = [
@@ -116,6 +116,6 @@ fn percent(part: f64) -> String {
     match part {
         part if part < 0.1 => format!("{:.2} %", 100.0 * part),
         part if part < 100.0 => format!("{:.1} %", 100.0 * part),
-        part => format!("{part:.0e} ×"),
+        part => format!("{part:.0} ×"),
     }
 }

@@ -30,7 +30,7 @@ pub enum Session {
 
 /// What to do with a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict<'a> {
+pub enum CheckedLine<'a> {
     /// Do what it says. Its answer names the sequence number, if there is one.
     Execute {
         /// The sequence number, in a session.
@@ -54,8 +54,8 @@ impl Session {
     }
 
     /// Judges a line; opens the session where the line asks for it.
-    pub fn judge<'a>(&mut self, line: &Line<'a>) -> Verdict<'a> {
-        let refuse = |sequence, error: Error| Verdict::Answer {
+    pub fn judge<'a>(&mut self, line: &Line<'a>) -> CheckedLine<'a> {
+        let refuse = |sequence, error: Error| CheckedLine::Answer {
             sequence,
             answer: error.code(),
         };
@@ -71,7 +71,7 @@ impl Session {
                 (Checksum::Absent, Session::Closed) if line.too_long => {
                     refuse(None, Error::LineTooLong)
                 }
-                (Checksum::Absent, Session::Closed) => Verdict::Execute {
+                (Checksum::Absent, Session::Closed) => CheckedLine::Execute {
                     sequence: None,
                     block: line.text,
                 },
@@ -80,7 +80,7 @@ impl Session {
         };
         if sequence == 0 && block.is_empty() && !line.too_long {
             *self = Session::Open { last: 0, answer: 0 };
-            return Verdict::Answer {
+            return CheckedLine::Answer {
                 sequence: Some(0),
                 answer: 0,
             };
@@ -90,14 +90,14 @@ impl Session {
         };
         let sequence = Some(sequence);
         if sequence == Some(last) {
-            Verdict::Answer { sequence, answer }
+            CheckedLine::Answer { sequence, answer }
         } else if sequence != last.checked_add(1) {
             refuse(sequence, Error::OutOfOrder)
         } else if line.too_long {
             self.remember(sequence, Error::LineTooLong.code());
             refuse(sequence, Error::LineTooLong)
         } else {
-            Verdict::Execute { sequence, block }
+            CheckedLine::Execute { sequence, block }
         }
     }
 
@@ -134,14 +134,14 @@ mod tests {
         line(text, Checksum::Right)
     }
 
-    fn answer(sequence: Option<u32>, answer: Answer) -> Verdict<'static> {
-        Verdict::Answer { sequence, answer }
+    fn answer(sequence: Option<u32>, answer: Answer) -> CheckedLine<'static> {
+        CheckedLine::Answer { sequence, answer }
     }
 
     #[test]
     fn outside_a_session_lines_are_plain_and_checked_ones_are_refused() {
         let mut session = Session::default();
-        let plain = Verdict::Execute {
+        let plain = CheckedLine::Execute {
             sequence: None,
             block: b"N5G0",
         };
@@ -160,7 +160,7 @@ mod tests {
     fn in_a_session_only_the_line_that_is_due_is_executed() {
         let mut session = Session::default();
         assert_eq!(session.judge(&right("N0")), answer(Some(0), 0));
-        let due = Verdict::Execute {
+        let due = CheckedLine::Execute {
             sequence: Some(1),
             block: b"G1X5",
         };
@@ -185,7 +185,7 @@ mod tests {
             last: MAX_SEQUENCE - 1,
             answer: 0,
         };
-        let due = Verdict::Execute {
+        let due = CheckedLine::Execute {
             sequence: Some(MAX_SEQUENCE),
             block: b"",
         };

@@ -12,7 +12,7 @@
 //!
 //! Knows degrees and directions; nothing of steps, lines or pins.
 
-use crate::settings::{Key, Settings};
+use crate::settings::{GrblSettings, Key};
 
 /// The way on which the index has to show up, thousandths of a degree: a turn and a bit.
 const SEEK: i32 = 375_000;
@@ -21,7 +21,7 @@ const MOVE_OFF: i32 = 45_000;
 
 /// Where homing is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
+pub enum HomingPhase {
     /// Leaving the index that was active at the start.
     MoveOff,
     /// Looking for the index, fast.
@@ -38,7 +38,7 @@ pub enum Phase {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Leg {
     /// The phase this is.
-    pub phase: Phase,
+    pub phase: HomingPhase,
     /// From which step the way counts: from where the index changed, or from where the table
     /// stands.
     pub from: Option<i32>,
@@ -52,7 +52,7 @@ pub struct Leg {
 
 /// How a leg ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
+pub enum HomingOutcome {
     /// Another leg follows.
     Go(Leg),
     /// This step is zero; another leg follows, counted from the new zero.
@@ -66,12 +66,12 @@ pub enum Outcome {
 }
 
 /// The first leg; `active`: the table stands on the index.
-pub fn start(settings: &Settings, active: bool) -> Leg {
+pub fn start(settings: &GrblSettings, active: bool) -> Leg {
     let feed = settings.amount(Key::HomingSeek);
     let (phase, way) = if active {
-        (Phase::MoveOff, -MOVE_OFF)
+        (HomingPhase::MoveOff, -MOVE_OFF)
     } else {
-        (Phase::Seek, SEEK)
+        (HomingPhase::Seek, SEEK)
     };
     Leg {
         phase,
@@ -84,42 +84,47 @@ pub fn start(settings: &Settings, active: bool) -> Leg {
 
 /// What follows a leg. `found`: the step at which the index changed as the leg asked; `active`: the
 /// table now stands on the index.
-pub fn next(settings: &Settings, phase: Phase, found: Option<i32>, active: bool) -> Outcome {
+pub fn next(
+    settings: &GrblSettings,
+    phase: HomingPhase,
+    found: Option<i32>,
+    active: bool,
+) -> HomingOutcome {
     let pull_off = settings.get(Key::HomingPullOff);
     match (phase, found) {
-        (Phase::MoveOff, None) => Outcome::StillActive,
-        (Phase::Seek | Phase::Approach, None) => Outcome::NotFound,
-        (Phase::MoveOff | Phase::Seek, Some(_)) => Outcome::Go(Leg {
-            phase: Phase::BackOff,
+        (HomingPhase::MoveOff, None) => HomingOutcome::StillActive,
+        (HomingPhase::Seek | HomingPhase::Approach, None) => HomingOutcome::NotFound,
+        (HomingPhase::MoveOff | HomingPhase::Seek, Some(_)) => HomingOutcome::Go(Leg {
+            phase: HomingPhase::BackOff,
             from: found,
             way: directed(settings, -pull_off),
             feed: settings.amount(Key::HomingSeek),
             until: None,
         }),
-        (Phase::BackOff, _) if active => Outcome::StillActive,
-        (Phase::BackOff, _) => Outcome::Go(Leg {
-            phase: Phase::Approach,
+        (HomingPhase::BackOff, _) if active => HomingOutcome::StillActive,
+        (HomingPhase::BackOff, _) => HomingOutcome::Go(Leg {
+            phase: HomingPhase::Approach,
             from: None,
             // Twice the pull-off and a degree for an index that comes later than it went.
             way: directed(settings, 2 * pull_off + 1000),
             feed: settings.amount(Key::HomingFeed),
             until: Some(true),
         }),
-        (Phase::Approach, Some(step)) => Outcome::Zero(
+        (HomingPhase::Approach, Some(step)) => HomingOutcome::Zero(
             step,
             Leg {
-                phase: Phase::Return,
+                phase: HomingPhase::Return,
                 from: Some(0),
                 way: 0,
                 feed: settings.amount(Key::HomingFeed),
                 until: None,
             },
         ),
-        (Phase::Return, _) => Outcome::Home,
+        (HomingPhase::Return, _) => HomingOutcome::Home,
     }
 }
 
-fn directed(settings: &Settings, way: i32) -> i32 {
+fn directed(settings: &GrblSettings, way: i32) -> i32 {
     if settings.flag(Key::HomingInverted) {
         -way
     } else {

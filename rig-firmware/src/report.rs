@@ -6,7 +6,7 @@
 use crate::board::Board;
 use crate::crc::Crc;
 use crate::number;
-use crate::settings::{Key, Kind, Settings};
+use crate::settings::{GrblSettings, Key, Kind};
 
 /// One line on its way out; [`Reply::end`] ends it.
 pub struct Reply<'a, B: Board> {
@@ -118,7 +118,7 @@ pub fn answer<B: Board>(board: &mut B, checked: bool, sequence: Option<u32>, ans
 }
 
 /// Tells one setting: `$100=88.889`.
-pub fn setting<B: Board>(board: &mut B, checked: bool, settings: &Settings, key: Key) {
+pub fn setting<B: Board>(board: &mut B, checked: bool, settings: &GrblSettings, key: Key) {
     let mut reply = Reply::new(board, checked);
     reply.text("$").whole(u32::from(key.number())).text("=");
     let decimals = match key.kind() {

@@ -179,21 +179,21 @@ impl Key {
 
 /// The values of all settings, each within its bounds and all fit for one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Settings {
+pub struct GrblSettings {
     values: [i32; COUNT],
 }
 
-impl Settings {
+impl GrblSettings {
     /// The values of a new table.
-    pub fn defaults() -> Settings {
-        Settings {
+    pub fn defaults() -> GrblSettings {
+        GrblSettings {
             values: Key::ALL.map(|key| key.spec().default),
         }
     }
 
     /// From stored values; `None` where one is not allowed.
-    pub fn from_values(values: [i32; COUNT]) -> Option<Settings> {
-        let settings = Settings { values };
+    pub fn from_values(values: [i32; COUNT]) -> Option<GrblSettings> {
+        let settings = GrblSettings { values };
         let allowed = Key::ALL.into_iter().all(|key| {
             let spec = key.spec();
             (spec.least..=spec.most).contains(&settings.get(key))
@@ -304,8 +304,8 @@ mod tests {
 
     #[test]
     fn the_defaults_are_allowed_and_found_by_their_numbers() {
-        let defaults = Settings::defaults();
-        assert_eq!(Settings::from_values(defaults.values), Some(defaults));
+        let defaults = GrblSettings::defaults();
+        assert_eq!(GrblSettings::from_values(defaults.values), Some(defaults));
         for (place, key) in Key::ALL.into_iter().enumerate() {
             assert_eq!(key as usize, place);
             assert_eq!(Key::of(u32::from(key.number())), Some(key));
@@ -316,7 +316,7 @@ mod tests {
 
     #[test]
     fn values_out_of_bounds_are_refused_and_change_nothing() {
-        let mut settings = Settings::defaults();
+        let mut settings = GrblSettings::defaults();
         let cases = [
             (Key::StepPulse, "2", Error::StepPulse),
             (Key::StepPulse, "101", Error::BadNumber),
@@ -333,13 +333,13 @@ mod tests {
             let (value, _) = crate::number::parse(text.as_bytes()).unwrap();
             assert_eq!(settings.set(key, value), Err(error), "{key:?}");
         }
-        assert_eq!(settings, Settings::defaults());
+        assert_eq!(settings, GrblSettings::defaults());
     }
 
     #[test]
     fn stored_values_that_do_not_fit_one_another_are_not_taken() {
-        let mut values = Settings::defaults().values;
+        let mut values = GrblSettings::defaults().values;
         values[Key::MaxFeed as usize] = 100_000_000;
-        assert_eq!(Settings::from_values(values), None);
+        assert_eq!(GrblSettings::from_values(values), None);
     }
 }

@@ -7,7 +7,7 @@
 
 use crate::board::Board;
 use crate::crc::Crc;
-use crate::settings::{COUNT, Settings};
+use crate::settings::{COUNT, GrblSettings};
 
 const VERSION: u8 = 1;
 const WORDS: u16 = COUNT as u16 + 1;
@@ -22,7 +22,7 @@ const BLANK: u8 = 0xFF;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stored {
     /// The settings.
-    pub settings: Settings,
+    pub settings: GrblSettings,
     /// Offset of the work zero (`G54`) from machine zero, thousandths of a degree.
     pub offset: i32,
 }
@@ -30,7 +30,7 @@ pub struct Stored {
 impl Stored {
     fn defaults() -> Stored {
         Stored {
-            settings: Settings::defaults(),
+            settings: GrblSettings::defaults(),
             offset: 0,
         }
     }
@@ -184,6 +184,6 @@ fn read(board: &mut impl Board, second: bool) -> Option<Stored> {
     let mut values = [0; COUNT];
     values.iter_mut().for_each(|value| *value = word());
     let offset = word();
-    let settings = Settings::from_values(values)?;
+    let settings = GrblSettings::from_values(values)?;
     Some(Stored { settings, offset })
 }

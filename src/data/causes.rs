@@ -1,13 +1,13 @@
-//! An error together with its causes, as the one sentence that a person reads.
+//! An error together with its causes, as one sentence for a person.
 //!
-//! Typed errors name their cause by `source`, and `Display` alone leaves it out: what becomes text
-//! (a terminal, `session.json`, a daemon's state, a page) goes through [`with_causes`], so that the
-//! system's own word (EIO, ENOSPC, EBUSY) is on the record. Knows nothing of any format.
+//! Typed errors carry their cause in `source`, which `Display` leaves out. Wherever an error becomes
+//! text (a terminal, `session.json`, a daemon's state, a page) it goes through [`with_causes`], so
+//! that the system's own reason (EIO, ENOSPC, EBUSY) is kept. Knows nothing of any format.
 
 use std::error::Error;
 
-/// The error and what caused it, outermost first, joined by `": "`. A cause that an error's own text
-/// already holds is not told twice.
+/// The error and its causes, outermost first, joined by `": "`. A cause that is already part of the
+/// text is not repeated.
 ///
 /// ```
 /// use std::io::{Error, ErrorKind};

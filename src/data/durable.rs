@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all. Knows nothing of what is in them.
+//! Files that appear whole or not at all. Knows nothing of their content.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
@@ -7,43 +7,44 @@ use std::path::{Path, PathBuf};
 use std::process;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bytes that are gathered before they are handed to the system.
+/// Bytes that are buffered before they are written.
 const BUFFER: usize = 1 << 18;
 
-/// A file that is being written under a temporary name, `.NAME.<process>.<counter>.partial` in the
-/// folder of its last one. No two writers share such a name, nor is one taken that stands there
-/// already, be it as a link. Dropped, the file is removed.
+/// A file that is being written under a temporary name, `.NAME.<process>.<counter>.partial`, in the
+/// folder of its final name. No two writers share a temporary name, and an existing file or link is
+/// never reused. Dropping it removes the file.
 #[derive(Debug)]
 pub struct Partial {
     writer: BufWriter<File>,
     names: Names,
 }
 
-/// A file that is whole and on the disk, still under its temporary name. Dropped, it is removed.
+/// A file that is complete and synced to disk, still under its temporary name. Dropping it removes
+/// the file.
 #[derive(Debug)]
 pub struct Sealed {
     names: Names,
 }
 
-/// Where a file is written and where it is to appear; removes the first when dropped.
+/// A file's temporary and final path; removes the temporary file when dropped.
 #[derive(Debug)]
 struct Names {
     temporary: PathBuf,
-    last: PathBuf,
+    target: PathBuf,
 }
 
 impl Drop for Names {
     fn drop(&mut self) {
-        // After publishing there is nothing under this name; an error has no one to go to.
+        // After publishing there is nothing under this name, and an error cannot be returned here.
         let _ = fs::remove_file(&self.temporary);
     }
 }
 
 impl Partial {
-    /// Starts the file that is to appear at `path`.
+    /// Starts the file that will appear at `path`.
     ///
     /// # Errors
-    /// Where `path` ends in no file name; whatever the file system answers.
+    /// If `path` has no file name, or the file cannot be created.
     pub fn create(path: &Path) -> io::Result<Self> {
         loop {
             let temporary = temporary_name(path)?;
@@ -52,7 +53,7 @@ impl Partial {
                 .create_new(true)
                 .open(&temporary);
             match opened {
-                // A killed process of the same number left it.
+                // Left behind by a killed process that had the same id.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
                 Ok(file) => {
@@ -60,7 +61,7 @@ impl Partial {
                         writer: BufWriter::with_capacity(BUFFER, file),
                         names: Names {
                             temporary,
-                            last: path.to_owned(),
+                            target: path.to_owned(),
                         },
                     });
                 }
@@ -68,10 +69,10 @@ impl Partial {
         }
     }
 
-    /// Brings all bytes to the disk.
+    /// Writes and syncs all bytes to disk.
     ///
     /// # Errors
-    /// Whatever the file system answers; the file is removed then.
+    /// If writing or syncing fails; the file is then removed.
     pub fn seal(self) -> io::Result<Sealed> {
         let Self { writer, names } = self;
         let file = writer
@@ -93,45 +94,45 @@ impl Write for Partial {
 }
 
 impl Sealed {
-    /// Gives the file its name, in place of an older one.
+    /// Renames the file to its final name, replacing an older one.
     ///
     /// # Errors
-    /// Whatever the file system answers; the file is removed then, if it has no name yet.
+    /// If renaming or syncing the folder fails; a file that has not been renamed is removed.
     pub fn publish(self) -> io::Result<()> {
-        publish(&self.names.temporary, &self.names.last)
+        publish(&self.names.temporary, &self.names.target)
     }
 }
 
-/// Writes `bytes` so that `path` holds either its old content or all of the new one, also after a
-/// power cut, and also where several write it at once: the last one wins.
+/// Writes `bytes` so that `path` holds either its old content or all of the new content, even after
+/// a power cut. If several write at once, the last one wins.
 ///
 /// # Errors
-/// Whatever the file system answers; the temporary file is removed then.
+/// If any step fails; the temporary file is then removed.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut partial = Partial::create(path)?;
     partial.write_all(bytes)?;
     partial.seal()?.publish()
 }
 
-/// Gives a finished, synced file or folder its final name and makes the name durable.
+/// Renames a finished, synced file or folder to its final name and syncs the rename to disk.
 ///
 /// # Errors
-/// Whatever the file system answers.
+/// If renaming or syncing the folder fails.
 pub fn publish(partial: &Path, path: &Path) -> io::Result<()> {
     fs::rename(partial, path)?;
     sync_folder(path.parent().unwrap_or(Path::new("")))
 }
 
-/// Makes the names in `folder` durable. The empty path is the current folder.
+/// Syncs the names in `folder` to disk. The empty path is the current folder.
 ///
 /// # Errors
-/// Whatever the file system answers.
+/// If the folder cannot be opened or synced.
 pub fn sync_folder(folder: &Path) -> io::Result<()> {
     let here = folder.as_os_str().is_empty();
     File::open(if here { Path::new(".") } else { folder })?.sync_all()
 }
 
-/// The name of the file that was to appear, if `name` is one under which a [`Partial`] is written.
+/// The final name of the file, if `name` is the temporary name of a [`Partial`].
 #[must_use]
 pub fn target_of(name: &str) -> Option<&str> {
     let (rest, counter) = name
@@ -148,7 +149,7 @@ fn temporary_name(path: &Path) -> io::Result<PathBuf> {
     static COUNTER: AtomicU64 = AtomicU64::new(0);
     let target = path
         .file_name()
-        .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"))?;
+        .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name"))?;
     let mut name = OsString::from(".");
     name.push(target);
     let counter = COUNTER.fetch_add(1, Ordering::Relaxed);
@@ -220,10 +221,10 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn what_stands_under_temporary_names_is_neither_followed_nor_in_the_way() {
+    fn links_under_temporary_names_are_neither_followed_nor_in_the_way() {
         let folder = tempfile::tempdir().unwrap();
         let (path, outside) = (folder.path().join("a"), folder.path().join("outside"));
-        // The counter is the process's: other tests may take some of these numbers.
+        // The counter is shared by the process: other tests may use some of these numbers.
         let next = temporary_name(&path).unwrap();
         let number = |name: &Path| -> u64 {
             let name = name.file_name().unwrap().to_str().unwrap();
@@ -251,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn temporary_names_tell_their_file() {
+    fn the_final_name_is_read_from_a_temporary_one() {
         assert_eq!(target_of(".a.tar.12.0.partial"), Some("a.tar"));
         for name in [
             ".a.tar.partial",

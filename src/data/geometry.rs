@@ -6,8 +6,8 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 /// An axis-parallel rectangle of whole pixels, written `[x, y, w, h]` in JSON and `X,Y,W,H` on a
-/// command line. x grows to the right, y downwards; the corner (x, y) is the upper left pixel.
-/// A rectangle may reach beyond the image it is used with (negative x or y).
+/// command line. x grows to the right, y downwards; (x, y) is the upper left pixel. A rectangle may
+/// extend beyond the image it is used with (negative x or y).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(from = "(i32, i32, u32, u32)", into = "(i32, i32, u32, u32)")]
 pub struct Rect {
@@ -28,6 +28,16 @@ impl Rect {
         Self { x, y, w, h }
     }
 
+    /// The middle of an image: half its width and height, at least one pixel.
+    #[must_use]
+    pub fn middle_of(width: u32, height: u32) -> Self {
+        let (w, h) = ((width / 2).max(1), (height / 2).max(1));
+        let edge = |whole: u32, part: u32| {
+            i32::try_from(whole.saturating_sub(part) / 2).unwrap_or(i32::MAX)
+        };
+        Self::new(edge(width, w), edge(height, h), w, h)
+    }
+
     /// One past the right edge, in pixels.
     #[must_use]
     pub fn right(self) -> i64 {
@@ -40,7 +50,7 @@ impl Rect {
         i64::from(self.y) + i64::from(self.h)
     }
 
-    /// The part that lies in an image of `width` x `height`, if any does.
+    /// The part that lies inside an image of `width` x `height`, if there is any.
     #[must_use]
     pub fn clipped_to(self, width: u32, height: u32) -> Option<Self> {
         let x0 = i64::from(self.x).max(0);
@@ -115,6 +125,12 @@ mod tests {
         let rect: Rect = "10, -4,30,40".parse().unwrap();
         assert_eq!(rect, Rect::new(10, -4, 30, 40));
         assert_eq!(rect.to_string(), "10,-4,30,40");
+    }
+
+    #[test]
+    fn the_middle_is_half_as_wide_and_high_and_never_empty() {
+        assert_eq!(Rect::middle_of(640, 480), Rect::new(160, 120, 320, 240));
+        assert_eq!(Rect::middle_of(1, 1), Rect::new(0, 0, 1, 1));
     }
 
     #[test]

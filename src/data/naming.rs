@@ -1,12 +1,12 @@
-//! Which names a session may have. Knows nothing else of sessions.
+//! The names that a session may have. Knows nothing else of sessions.
 
-/// Longest name of a session, bytes: a file name has room for 255, and a hidden temporary one adds
-/// its numbers and two extensions.
+/// Longest name of a session, bytes. A file name can have 255, and a temporary name adds two numbers
+/// and two extensions.
 const LONGEST: usize = 120;
 
-/// Whether `name` can be a session's: it becomes a folder's name, a file's stem and part of a
-/// sample's key. It has letters and digits of any script, `-`, `_` and `.`, does not start with
-/// `.`, and is 1 to 120 bytes long.
+/// Whether `name` can be a session's name, which becomes a folder's name, a file's stem and part of
+/// a sample's key: letters and digits of any script, `-`, `_` and `.`, not starting with `.`, 1 to
+/// 120 bytes.
 #[must_use]
 pub fn is_session_name(name: &str) -> bool {
     !name.is_empty()

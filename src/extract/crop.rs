@@ -1,10 +1,10 @@
-//! The one crop of a video: the mask's bounding box with a margin, made square.
+//! The crop of a video, the same for all frames: the mask's bounding box with a margin, made square.
 
 use image::GrayImage;
 
 use relit_data::geometry::Rect;
 
-/// The smallest rectangle that holds all non-zero pixels; `None` where there are none.
+/// The smallest rectangle that holds all non-zero pixels; `None` if there are none.
 #[must_use]
 pub fn bounding_box(mask: &GrayImage) -> Option<Rect> {
     let mut corners: Option<(u32, u32, u32, u32)> = None;
@@ -19,31 +19,31 @@ pub fn bounding_box(mask: &GrayImage) -> Option<Rect> {
 }
 
 /// The square around `object` whose side is the object's longer side plus `margin` (a fraction of
-/// that side) on both sides, centred on the object, moved into the frame where it fits. Where it
-/// does not fit, it reaches beyond the frame; there the image is 0.
+/// that side) on both sides. It is centred on the object and moved into the frame if it fits;
+/// otherwise it extends beyond the frame, where the image is 0.
 #[must_use]
 pub fn square_around(object: Rect, margin: f64, frame: (u32, u32)) -> Rect {
     let longer = object.w.max(object.h);
     let side = longer + 2 * (f64::from(longer) * margin).round() as u32;
-    let x = placed(object.x, object.w, side, frame.0);
-    let y = placed(object.y, object.h, side, frame.1);
+    let x = start_of(object.x, object.w, side, frame.0);
+    let y = start_of(object.y, object.h, side, frame.1);
     Rect::new(x, y, side, side)
 }
 
-/// Where `side` pixels begin that are centred on `start..start + extent`, inside `0..whole` where
+/// The start of `side` pixels that are centred on `start..start + extent`, and inside `0..whole` if
 /// they fit.
-fn placed(start: i32, extent: u32, side: u32, whole: u32) -> i32 {
+fn start_of(start: i32, extent: u32, side: u32, whole: u32) -> i32 {
     let centred = i64::from(start) - (i64::from(side) - i64::from(extent)).div_euclid(2);
-    let room = i64::from(whole) - i64::from(side);
-    let moved = if room >= 0 {
-        centred.clamp(0, room)
+    let free = i64::from(whole) - i64::from(side);
+    let moved = if free >= 0 {
+        centred.clamp(0, free)
     } else {
-        centred.clamp(room, 0)
+        centred.clamp(free, 0)
     };
     moved as i32
 }
 
-/// The part of the mask under `crop`; 0 where the crop reaches beyond it.
+/// The part of the mask under `crop`; 0 where the crop extends beyond it.
 #[must_use]
 pub fn cut(mask: &GrayImage, crop: Rect) -> GrayImage {
     GrayImage::from_fn(crop.w, crop.h, |x, y| {

@@ -1,25 +1,27 @@
-//! One recording from its files to its entry in the data set.
+//! The extraction of one recording, from its files to its entry in the data set.
 
 use std::path::Path;
 
 use rayon::ThreadPool;
 
-use super::made::Made;
-use super::object::Object;
-use super::pipeline::{Lost, Processed, Stage};
-use super::plan::{Plan, Use};
-use super::{Basis, Error, Observer, Options, Scaler, cut, square_around};
+use relit_data::image_stats::MaskSpans;
 use relit_data::report::{self, Page};
 use relit_data::session::{INDEX_FILE, Notice, Recording};
 use relit_data::shard::{
-    self, Dataset, Digest, FrameRecord, Input, MaskInfo, MaskSpans, OutputFolder, Sample,
-    SessionEntry, SessionWriter, ShardEntry, Size,
+    Dataset, Digest, FrameRecord, ImageSize, MaskInfo, OutputFolder, Sample, SessionEntry,
+    ShardEntry, ShardWriter, SourceVideo,
 };
 use relit_video::Video;
 
-/// How many places with damaged frames are told one by one.
-const TOLD: usize = 8;
-/// Most pixels of a crop: each thread works on a few pictures of this size.
+use super::collected::Collected;
+use super::object::ObjectMask;
+use super::pipeline::{LostFrame, ProcessedFrame, Stage};
+use super::plan::{Assignment, Plan};
+use super::{ExtractError, ExtractOptions, Observer, Scaler, cut, square_around};
+
+/// Number of runs of damaged frames that are reported one by one.
+const MAX_REPORTED: usize = 8;
+/// Largest crop, pixels: each thread needs memory for a few images of this size.
 const MAX_CROP_PIXELS: u64 = 1 << 26;
 
 /// A recording that can be extracted.
@@ -27,21 +29,21 @@ const MAX_CROP_PIXELS: u64 = 1 << 26;
 pub(super) struct Job {
     recording: Recording,
     video: Video,
-    input: Input,
-    object: Object,
+    input: SourceVideo,
+    mask: ObjectMask,
     notices: Vec<Notice>,
 }
 
 impl Job {
-    /// Opens recording, video and mask, and looks whether they belong together.
-    pub(super) fn open(path: &Path, options: &Options) -> Result<Self, Error> {
+    /// Opens recording, video and mask, and checks that they belong together.
+    pub(super) fn open(path: &Path, options: &ExtractOptions) -> Result<Self, ExtractError> {
         let recording = Recording::open(path)?;
         let video = Video::open(&recording.video)?;
         let size = (video.facts().width, video.facts().height);
-        let object = Object::open(&recording, options.mask.as_deref(), size)?;
+        let mask = ObjectMask::open(&recording, options.mask.as_deref(), size)?;
         let (bytes, blake3) = digest(&recording.video)?;
         let name = recording.video.file_name().unwrap_or_default();
-        let input = Input {
+        let input = SourceVideo {
             video: name.to_string_lossy().into_owned(),
             codec: video.facts().codec.clone(),
             frames: video.frames().len() as u64,
@@ -54,12 +56,12 @@ impl Job {
         notices.extend(contradictions(&recording, &video));
         notices.extend(video.damage().iter().map(|d| Notice::Loss(d.to_string())));
         notices.extend(video.notes().iter().cloned().map(Notice::Warning));
-        notices.extend(object.warning().map(Notice::Warning));
+        notices.extend(mask.warning().map(Notice::Warning));
         Ok(Self {
             recording,
             video,
             input,
-            object,
+            mask,
             notices,
         })
     }
@@ -68,21 +70,21 @@ impl Job {
         &self.recording.id
     }
 
-    /// The entry of this recording in the data set in `out`, if it was made of the same video, index
-    /// and mask, is whole on the disk, and is what these options would accept.
-    pub(super) fn vouched<'a>(
+    /// The entry of this recording in the data set in `out`, if it was made from the same video, index
+    /// and mask, its files are intact, and these options accept it.
+    pub(super) fn existing_entry<'a>(
         &self,
         dataset: &'a Dataset,
         out: &Path,
-        options: &Options,
+        options: &ExtractOptions,
     ) -> Option<&'a SessionEntry> {
         let entry = dataset.session(self.id())?;
-        let same = entry.input == self.input && entry.mask.blake3 == self.object.blake3;
+        let same = entry.input == self.input && entry.mask.blake3 == self.mask.blake3;
         let accepted = !options.strict || (!entry.lossy && entry.duplicates == 0);
-        (same && accepted && dataset.vouches_for(out, self.id()).is_ok()).then_some(entry)
+        (same && accepted && dataset.check_integrity(out, self.id()).is_ok()).then_some(entry)
     }
 
-    /// Whether the data set holds a session of this name that is of another video.
+    /// Whether the data set holds a session of this name from another video.
     pub(super) fn would_replace_another(&self, dataset: &Dataset) -> bool {
         dataset
             .session(self.id())
@@ -93,49 +95,49 @@ impl Job {
     pub(super) fn run(
         self,
         folder: &OutputFolder,
-        options: &Options,
+        options: &ExtractOptions,
         pool: &ThreadPool,
         observer: &dyn Observer,
-    ) -> Result<(SessionEntry, Vec<ShardEntry>), Error> {
+    ) -> Result<(SessionEntry, Vec<ShardEntry>), ExtractError> {
         let mut plan = Plan::new(&self.video, self.recording.frames.as_ref(), options.frames)?;
         let mut notices = self.notices.clone();
-        notices.extend(self.judge(&plan));
+        notices.extend(self.notices_of_plan(&plan));
         if options.strict {
-            refuse(&plan, &notices)?;
+            check_strict(&plan, &notices)?;
         }
         let stage = self.stage(options)?;
-        let mut writer = SessionWriter::create(
+        let mut writer = ShardWriter::create(
             folder.path(),
             options.layout,
             self.id(),
             options.frames,
             stage.scaler.mask(),
         )?;
-        let mut made = Made::new(options.frames);
-        let mut uses = plan.uses();
+        let mut collected = Collected::new(options.frames);
+        let mut assignments = plan.assignments();
         let mut lost = Vec::new();
-        while !uses.is_empty() {
-            let now_lost = stage.run(&uses, pool, |frame| {
-                for &chosen in uses.get(&frame.number).into_iter().flatten() {
-                    let record = self.record(&stage, &plan, &frame, chosen, options);
-                    made.keep(&record, &frame.image);
+        while !assignments.is_empty() {
+            let newly_lost = stage.run(&assignments, pool, |frame| {
+                for &sample in assignments.get(&frame.number).into_iter().flatten() {
+                    let record = self.record(&stage, &plan, &frame, sample, options);
+                    collected.add(&record, &frame.image);
                     let (image, png) = (frame.image.clone(), frame.png.clone());
                     writer.push(Sample { record, image, png })?;
                     observer.advanced();
                 }
                 Ok(())
             })?;
-            uses = plan.replace(&now_lost)?;
-            lost.extend(now_lost);
+            assignments = plan.replace(&newly_lost.iter().map(|frame| frame.number).collect())?;
+            lost.extend(newly_lost);
             if options.strict && !lost.is_empty() {
                 let first = notices_of_lost(&lost).swap_remove(0);
-                return Err(Error::Strict(first.text().to_owned()));
+                return Err(ExtractError::Strict(first.text().to_owned()));
             }
         }
         notices.extend(notices_of_lost(&lost));
-        let made = made.in_order();
-        // What can still fail comes before the shard of an earlier run is replaced.
-        let page = self.page(options, &made, &notices)?;
+        let collected = collected.sorted();
+        // Whatever can fail is done before the shard of an earlier run is replaced.
+        let page = self.page(options, &collected, &notices)?;
         let files = writer.finish()?;
         let report = folder.write(&format!("{}.html", self.id()), page.as_bytes())?;
         let entry = SessionEntry {
@@ -143,17 +145,14 @@ impl Job {
             object: self.recording.object.clone(),
             input: self.input.clone(),
             mask: MaskInfo {
-                blake3: self.object.blake3,
+                blake3: self.mask.blake3,
                 px: stage.spans.pixels(),
-                bounding_box: self.object.bounding_box,
+                bounding_box: self.mask.bounding_box,
             },
-            selection: match plan.selection.basis() {
-                Basis::Angle => shard::Selection::Angle,
-                Basis::Time => shard::Selection::Time,
-            },
+            selection: plan.selection.basis(),
             samples: options.frames,
-            duplicates: made.count(|r| r.duplicate),
-            spec_net: made.count(|r| r.spec_net),
+            duplicates: collected.count(|r| r.duplicate),
+            spec_net: collected.count(|r| r.spec_net),
             lossy: notices.iter().any(Notice::is_loss),
             warnings: texts(&notices),
             table: files.table,
@@ -162,20 +161,20 @@ impl Job {
         Ok((entry, files.shards))
     }
 
-    fn stage(&self, options: &Options) -> Result<Stage<'_>, Error> {
+    fn stage(&self, options: &ExtractOptions) -> Result<Stage<'_>, ExtractError> {
         let facts = self.video.facts();
         let crop = square_around(
-            self.object.bounding_box,
+            self.mask.bounding_box,
             options.margin,
             (facts.width, facts.height),
         );
         if u64::from(crop.w) * u64::from(crop.h) > MAX_CROP_PIXELS {
-            return Err(Error::CropTooLarge(crop));
+            return Err(ExtractError::CropTooLarge(crop));
         }
-        let crop_mask = cut(&self.object.mask, crop);
+        let crop_mask = cut(&self.mask.image, crop);
         let side = match options.size {
-            Size::Pixels(side) => Some(side),
-            Size::Native(_) => None,
+            ImageSize::Pixels(side) => Some(side),
+            ImageSize::Native(_) => None,
         };
         Ok(Stage {
             video: &self.video,
@@ -190,9 +189,9 @@ impl Job {
         &self,
         stage: &Stage<'_>,
         plan: &Plan,
-        frame: &Processed,
-        chosen: Use,
-        options: &Options,
+        frame: &ProcessedFrame,
+        sample: Assignment,
+        options: &ExtractOptions,
     ) -> FrameRecord {
         let candidate = plan.candidate(frame.number);
         let measures = &frame.measures;
@@ -200,11 +199,11 @@ impl Job {
         FrameRecord {
             session: self.recording.id.clone(),
             object: self.recording.object.clone(),
-            index: chosen.index,
+            index: sample.index,
             source_frame: frame.number,
             t_us: candidate.map_or(0, |candidate| candidate.t_us),
             angle_deg: candidate.and_then(|candidate| candidate.angle_deg),
-            duplicate: chosen.duplicate,
+            duplicate: sample.duplicate,
             crop: stage.crop,
             size: frame.image.dimensions().into(),
             shift_px: None,
@@ -219,20 +218,20 @@ impl Job {
         }
     }
 
-    /// What the plan shows: repeated frames, a turn that is not whole, gaps.
-    fn judge(&self, plan: &Plan) -> Vec<Notice> {
+    /// What the plan shows: repeated frames, an incomplete turn, gaps.
+    fn notices_of_plan(&self, plan: &Plan) -> Vec<Notice> {
         let mut notices = Vec::new();
         if self.recording.frames.is_none() {
             notices.extend(plan.gap_warnings().into_iter().map(Notice::Warning));
         }
         if let Some(left_out) = plan.without_angle() {
             notices.push(Notice::Warning(format!(
-                "{left_out} frames have no angle, where others have one, and are left out"
+                "{left_out} frames have no angle although others have one, and are left out"
             )));
         }
         if let Some(frame) = plan.runs_back_at() {
             notices.push(Notice::Warning(format!(
-                "the table's angle runs back at frame {frame}: look at {INDEX_FILE} there"
+                "the table's angle goes back at frame {frame}: check {INDEX_FILE} there"
             )));
         }
         let repeated = plan.repeated();
@@ -254,16 +253,21 @@ impl Job {
     }
 
     /// The session's page.
-    fn page(&self, options: &Options, made: &Made, notices: &[Notice]) -> Result<String, Error> {
+    fn page(
+        &self,
+        options: &ExtractOptions,
+        collected: &Collected,
+        notices: &[Notice],
+    ) -> Result<String, ExtractError> {
         let facts = self.video.facts();
         let pair = |name: &str, value: String| (name.to_owned(), value);
-        let crop = made
+        let crop = collected
             .records
             .first()
             .map_or_else(String::new, |record| record.crop.to_string());
         Ok(report::render(&Page {
-            records: &made.records,
-            thumbnails: &made.thumbnails,
+            records: &collected.records,
+            thumbnails: &collected.thumbnails,
             settings: &setting_rows(options),
             facts: &[
                 pair("video", self.input.video.clone()),
@@ -273,10 +277,10 @@ impl Job {
                     format!("{} x {} pixels", facts.width, facts.height),
                 ),
                 pair("frames in the video", self.input.frames.to_string()),
-                pair("mask, bounding box", self.object.bounding_box.to_string()),
+                pair("mask, bounding box", self.mask.bounding_box.to_string()),
                 pair("crop", crop),
                 pair("video BLAKE3", self.input.blake3.to_string()),
-                pair("mask BLAKE3", self.object.blake3.to_string()),
+                pair("mask BLAKE3", self.mask.blake3.to_string()),
             ],
             warnings: &texts(notices),
             gate: options.gate,
@@ -292,25 +296,25 @@ fn texts(notices: &[Notice]) -> Vec<String> {
         .collect()
 }
 
-/// With `strict`: an error where something is lost or a frame is repeated.
-fn refuse(plan: &Plan, notices: &[Notice]) -> Result<(), Error> {
+/// With `strict`: an error if something is lost or a frame is repeated.
+fn check_strict(plan: &Plan, notices: &[Notice]) -> Result<(), ExtractError> {
     if let Some(loss) = notices.iter().find(|notice| notice.is_loss()) {
-        return Err(Error::Strict(loss.text().to_owned()));
+        return Err(ExtractError::Strict(loss.text().to_owned()));
     }
     match plan.repeated() {
         0 => Ok(()),
-        n => Err(Error::Strict(format!(
+        n => Err(ExtractError::Strict(format!(
             "{n} samples would repeat a source frame"
         ))),
     }
 }
 
-/// One loss for each run of neighbouring frames that were lost for one reason.
-fn notices_of_lost(lost: &[Lost]) -> Vec<Notice> {
-    let mut sorted: Vec<&Lost> = lost.iter().collect();
+/// One loss for each run of consecutive frames that were lost for the same reason.
+fn notices_of_lost(lost: &[LostFrame]) -> Vec<Notice> {
+    let mut sorted: Vec<&LostFrame> = lost.iter().collect();
     sorted.sort_by_key(|frame| frame.number);
     let runs = sorted.chunk_by(|a, b| a.number + 1 == b.number && a.fault == b.fault);
-    let told = |run: &[&Lost]| {
+    let notice = |run: &[&LostFrame]| {
         let (first, last) = (run.first()?, run.last()?);
         let frames = match (first.number, last.number) {
             (first, last) if first == last => format!("frame {first}"),
@@ -318,19 +322,21 @@ fn notices_of_lost(lost: &[Lost]) -> Vec<Notice> {
         };
         let fault = &first.fault;
         Some(Notice::Loss(format!(
-            "{frames} cannot be decoded: {fault}; neighbours stand in"
+            "{frames} cannot be decoded: {fault}; neighbouring frames are used instead"
         )))
     };
-    let mut notices: Vec<Notice> = runs.filter_map(told).collect();
-    if notices.len() > TOLD {
-        let more = notices.len() - TOLD;
-        notices.truncate(TOLD);
-        notices.push(Notice::Loss(format!("and at {more} more places")));
+    let mut notices: Vec<Notice> = runs.filter_map(notice).collect();
+    if notices.len() > MAX_REPORTED {
+        let more = notices.len() - MAX_REPORTED;
+        notices.truncate(MAX_REPORTED);
+        notices.push(Notice::Loss(format!(
+            "frames cannot be decoded at {more} more positions"
+        )));
     }
     notices
 }
 
-fn setting_rows(options: &Options) -> Vec<(String, String)> {
+fn setting_rows(options: &ExtractOptions) -> Vec<(String, String)> {
     let settings = serde_json::to_value(options.settings()).unwrap_or_default();
     let rows = settings.as_object().into_iter().flatten();
     rows.map(|(name, value)| {
@@ -342,23 +348,23 @@ fn setting_rows(options: &Options) -> Vec<(String, String)> {
     .collect()
 }
 
-/// Of the frame index, where it was used.
-fn index_digest(recording: &Recording) -> Result<Option<Digest>, Error> {
+/// BLAKE3 of the frame index, if it was used.
+fn index_digest(recording: &Recording) -> Result<Option<Digest>, ExtractError> {
     match (&recording.frames, &recording.folder) {
         (Some(_), Some(folder)) => Ok(Some(digest(&folder.join(INDEX_FILE))?.1)),
         _ => Ok(None),
     }
 }
 
-fn digest(path: &Path) -> Result<(u64, Digest), Error> {
-    Digest::of_file(path).map_err(|source| Error::Read {
+fn digest(path: &Path) -> Result<(u64, Digest), ExtractError> {
+    Digest::of_file(path).map_err(|source| ExtractError::Read {
         path: path.to_owned(),
         source,
     })
 }
 
-/// Where the video is not what the manifest and the index say of it.
-fn differences(recording: &Recording, input: &Input) -> Vec<Notice> {
+/// Differences between the video and what manifest and index say about it.
+fn differences(recording: &Recording, input: &SourceVideo) -> Vec<Notice> {
     let file = &input.video;
     let found = input.frames;
     let mut notices = Vec::new();
@@ -376,21 +382,21 @@ fn differences(recording: &Recording, input: &Input) -> Vec<Notice> {
     let Some(manifest) = &recording.manifest else {
         return notices;
     };
-    if let Some(said) = manifest.video.frames
-        && said != found
-        && Some(said) != lines
+    if let Some(recorded) = manifest.video.frames
+        && recorded != found
+        && Some(recorded) != lines
     {
         notices.push(Notice::Loss(format!(
-            "{file} has {found} frames where the manifest says {said}"
+            "{file} has {found} frames, but the manifest says {recorded}"
         )));
     }
-    // A file of another size was told of when the recording was opened.
+    // Another file size was reported when the recording was opened.
     let same_size = manifest
         .video
         .bytes
         .is_none_or(|bytes| bytes == input.bytes);
-    if let Some(said) = &manifest.video.blake3
-        && !said.eq_ignore_ascii_case(&input.blake3.to_string())
+    if let Some(recorded) = &manifest.video.blake3
+        && !recorded.eq_ignore_ascii_case(&input.blake3.to_string())
         && same_size
     {
         notices.push(Notice::Loss(format!(
@@ -400,25 +406,25 @@ fn differences(recording: &Recording, input: &Input) -> Vec<Notice> {
     notices
 }
 
-/// Where the video is of another kind than the manifest says.
+/// Differences between the video's format and what the manifest says about it.
 fn contradictions(recording: &Recording, video: &Video) -> Vec<Notice> {
     let Some(manifest) = &recording.manifest else {
         return Vec::new();
     };
     let facts = video.facts();
     let mut notices = Vec::new();
-    let said = &manifest.video.codec;
-    if !said.eq_ignore_ascii_case(&facts.codec) {
+    let recorded = &manifest.video.codec;
+    if !recorded.eq_ignore_ascii_case(&facts.codec) {
         let found = &facts.codec;
         notices.push(Notice::Warning(format!(
-            "the video is {found} where the manifest says {said}"
+            "the video is {found}, but the manifest says {recorded}"
         )));
     }
-    let said = (manifest.camera.width, manifest.camera.height);
-    if said != (facts.width, facts.height) && said != (facts.height, facts.width) {
+    let recorded = (manifest.camera.width, manifest.camera.height);
+    if recorded != (facts.width, facts.height) && recorded != (facts.height, facts.width) {
         notices.push(Notice::Warning(format!(
-            "the frames are {} x {} pixels where the manifest says {} x {}",
-            facts.width, facts.height, said.0, said.1
+            "the frames are {} x {} pixels, but the manifest says {} x {}",
+            facts.width, facts.height, recorded.0, recorded.1
         )));
     }
     notices

@@ -1,64 +1,65 @@
-//! The object in the frames of one video: its mask, read from a file.
+//! The mask of the object, read from a file.
 
 use std::path::Path;
 
 use image::{GrayImage, Luma};
 
-use super::{Error, bounding_box};
 use relit_data::geometry::Rect;
 use relit_data::session::{MASK_FILE, Recording};
 use relit_data::shard::Digest;
 
-/// A pixel of the mask file is the object's from this level on, where it is not transparent.
+use super::{ExtractError, bounding_box};
+
+/// Pixels of the mask file with at least this level and this alpha belong to the object.
 const OBJECT: u8 = 128;
-/// Part of the frame above which a mask is suspicious.
-const MOST: f64 = 0.9;
+/// A mask that covers more than this fraction of the frame is suspicious.
+const LARGE: f64 = 0.9;
 
 /// The mask of a video.
 #[derive(Debug)]
-pub(super) struct Object {
-    /// 0 or 255, as large as the frames.
-    pub(super) mask: GrayImage,
+pub(super) struct ObjectMask {
+    /// 0 or 255, in the size of the frames.
+    pub(super) image: GrayImage,
     /// The smallest rectangle around the object, source pixels.
     pub(super) bounding_box: Rect,
-    /// Of the mask's file.
+    /// BLAKE3 of the mask's file.
     pub(super) blake3: Digest,
 }
 
-impl Object {
-    /// Reads the mask that was `named`, or else the one in the recording's folder, for frames of
-    /// this size. Transparent pixels are not the object's, whatever their colour.
+impl ObjectMask {
+    /// Reads the mask `named`, or else the one in the recording's folder, for frames of this size.
+    /// Transparent pixels do not belong to the object, whatever their colour.
     pub(super) fn open(
         recording: &Recording,
         named: Option<&Path>,
         frame: (u32, u32),
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, ExtractError> {
         let path = match (named, &recording.folder) {
             (Some(named), _) if named.is_file() => named.to_owned(),
-            (Some(named), _) => return Err(Error::MaskNotThere(named.to_owned())),
+            (Some(named), _) => return Err(ExtractError::MaskNotThere(named.to_owned())),
             (None, Some(folder)) if folder.join(MASK_FILE).is_file() => folder.join(MASK_FILE),
-            (None, Some(folder)) => return Err(Error::NoMask(folder.clone())),
-            (None, None) => return Err(Error::NoMask(recording.video.clone())),
+            (None, Some(folder)) => return Err(ExtractError::NoMask(folder.clone())),
+            (None, None) => return Err(ExtractError::NoMask(recording.video.clone())),
         };
-        let bytes = std::fs::read(&path).map_err(|source| Error::Read {
+        let bytes = std::fs::read(&path).map_err(|source| ExtractError::Read {
             path: path.clone(),
             source,
         })?;
         let image = image::load_from_memory(&bytes)
-            .map_err(|source| Error::Mask {
+            .map_err(|source| ExtractError::Mask {
                 path: path.clone(),
                 source,
             })?
             .into_luma_alpha8();
         let size = image.dimensions();
         if size != frame {
-            return Err(Error::MaskSize {
+            return Err(ExtractError::MaskSize {
                 path,
                 mask: size,
                 frame,
             });
         }
-        let mask = GrayImage::from_fn(size.0, size.1, |x, y| {
+        let mask_image = GrayImage::from_fn(size.0, size.1, |x, y| {
             let [level, alpha] = image.get_pixel(x, y).0;
             Luma([if level >= OBJECT && alpha >= OBJECT {
                 255
@@ -66,27 +67,23 @@ impl Object {
                 0
             }])
         });
-        let bounding_box = bounding_box(&mask).ok_or(Error::EmptyMask(path))?;
+        let bounding_box = bounding_box(&mask_image).ok_or(ExtractError::EmptyMask(path))?;
         Ok(Self {
-            mask,
+            image: mask_image,
             bounding_box,
             blake3: Digest::of(&bytes),
         })
     }
 
-    /// What is suspicious about the mask.
+    /// A warning, if the mask is suspicious.
     pub(super) fn warning(&self) -> Option<String> {
-        let under = self
-            .mask
-            .as_raw()
-            .iter()
-            .filter(|&&level| level != 0)
-            .count();
-        let part = under as f64 / self.mask.as_raw().len() as f64;
-        (part > MOST).then(|| {
+        let levels = self.image.as_raw();
+        let covered = levels.iter().filter(|&&level| level != 0).count();
+        let fraction = covered as f64 / levels.len() as f64;
+        (fraction > LARGE).then(|| {
             format!(
-                "the mask covers {:.0} % of the frame: is it the object's?",
-                100.0 * part
+                "the mask covers {:.0} % of the frame: check that it is the object's",
+                100.0 * fraction
             )
         })
     }

@@ -1,5 +1,5 @@
-//! The streaming part: wanted frames are read in order, turned into samples on all threads, and
-//! handed to the writer as they come. Every queue is bounded.
+//! The streaming part: the assigned frames are read in order, turned into samples on all threads,
+//! and passed to the writer as they are finished. Every queue is bounded.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
@@ -9,13 +9,15 @@ use image::RgbImage;
 use rayon::ThreadPool;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 
-use super::plan::Uses;
-use super::{Error, Scaler};
 use relit_data::geometry::Rect;
-use relit_data::shard::{self, MaskSpans, Measures};
-use relit_video::{FrameFault, Pending, Reader, Video};
+use relit_data::image_stats::{MaskSpans, Measures};
+use relit_data::shard::{self, ShardError};
+use relit_video::{DecodeFault, Pending, Reader, Video};
 
-/// What is done with every frame of one video.
+use super::plan::Assignments;
+use super::{ExtractError, Scaler};
+
+/// The processing of the frames of one video.
 pub(super) struct Stage<'a> {
     pub(super) video: &'a Video,
     pub(super) crop: Rect,
@@ -25,8 +27,8 @@ pub(super) struct Stage<'a> {
     pub(super) saturation_level: u8,
 }
 
-/// A frame as it goes into the data set.
-pub(super) struct Processed {
+/// A frame as it is written to the data set.
+pub(super) struct ProcessedFrame {
     pub(super) number: u64,
     pub(super) image: RgbImage,
     pub(super) png: Vec<u8>,
@@ -35,23 +37,24 @@ pub(super) struct Processed {
 
 /// A frame that could not be decoded.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Lost {
+pub(super) struct LostFrame {
     pub(super) number: u64,
-    pub(super) fault: FrameFault,
+    pub(super) fault: DecodeFault,
 }
 
-type Finished = Result<Result<Processed, Lost>, Error>;
+/// The inner error is a frame that is lost, the outer one ends the extraction.
+type Finished = Result<Result<ProcessedFrame, LostFrame>, ExtractError>;
 
 impl Stage<'_> {
-    /// Reads the frames that `uses` names and hands each to `accept`, in no order; answers the
+    /// Reads the assigned frames and passes each to `accept`, in no particular order; returns the
     /// lost ones, in order.
     pub(super) fn run(
         &self,
-        uses: &Uses,
+        assignments: &Assignments,
         pool: &ThreadPool,
-        mut accept: impl FnMut(Processed) -> Result<(), Error>,
-    ) -> Result<Vec<Lost>, Error> {
-        let wanted: Vec<u64> = uses.keys().copied().collect();
+        mut accept: impl FnMut(ProcessedFrame) -> Result<(), ExtractError>,
+    ) -> Result<Vec<LostFrame>, ExtractError> {
+        let wanted: Vec<u64> = assignments.keys().copied().collect();
         let threads = pool.current_num_threads();
         let reader = self.video.read(&wanted, threads)?;
         let (sender, receiver) = sync_channel(2 * threads);
@@ -61,9 +64,9 @@ impl Stage<'_> {
         })
     }
 
-    /// Works until the frames end or nobody takes the results.
+    /// Processes frames until they end or the receiver is gone.
     fn work(&self, reader: Reader<'_>, sender: SyncSender<Finished>) {
-        // An error means that the receiver has gone after an error of its own.
+        // An error means that the receiver has stopped after an error of its own.
         let _ = reader
             .par_bridge()
             .try_for_each_init(Resizer::new, |resizer, pending| {
@@ -79,14 +82,17 @@ impl Stage<'_> {
             .and_then(|picture| picture.rgb(self.crop));
         let crop = match crop {
             Ok(crop) => crop,
-            // Of a format that cannot be converted no other frame can be either.
-            Err(fault @ FrameFault::PixelFormat(_)) => return Err(Error::Frame { number, fault }),
-            Err(fault) => return Ok(Err(Lost { number, fault })),
+            // The other frames have the same pixel format.
+            Err(fault @ DecodeFault::PixelFormat(_)) => {
+                return Err(ExtractError::Frame { number, fault });
+            }
+            Err(fault) => return Ok(Err(LostFrame { number, fault })),
         };
-        let measures = self.spans.measure(&crop, self.saturation_level)?;
+        let measures = self.spans.measure(&crop, self.saturation_level);
+        let measures = measures.map_err(ShardError::from)?;
         let image = self.scaler.scale(&crop, resizer)?;
         let png = shard::encode_rgb(&image)?;
-        Ok(Ok(Processed {
+        Ok(Ok(ProcessedFrame {
             number,
             image,
             png,
@@ -97,8 +103,8 @@ impl Stage<'_> {
 
 fn collect(
     receiver: Receiver<Finished>,
-    accept: &mut impl FnMut(Processed) -> Result<(), Error>,
-) -> Result<Vec<Lost>, Error> {
+    accept: &mut impl FnMut(ProcessedFrame) -> Result<(), ExtractError>,
+) -> Result<Vec<LostFrame>, ExtractError> {
     let mut lost = Vec::new();
     for finished in receiver {
         match finished? {

@@ -1,51 +1,52 @@
-//! What is to be made of one video: which source frame serves which samples.
+//! Which source frame is used for which samples.
 
 use std::collections::{BTreeMap, HashSet};
 
-use super::pipeline::Lost;
-use super::select::{Candidate, Selection};
-use super::timeline::timeline;
-use super::{Error, runs_back_at, time_gaps};
 use relit_data::session::FrameIndex;
 use relit_video::Video;
 
-/// The frames of a video that may be chosen, and what was chosen among them.
+use super::select::{Candidate, Selection};
+use super::timeline::timeline;
+use super::{ExtractError, runs_back_at, time_gaps};
+
+/// The frames of a video that may be chosen, and those that were chosen.
 #[derive(Debug)]
 pub(super) struct Plan {
     samples: u32,
     candidates: Vec<Candidate>,
     without_angle: usize,
-    /// Source frames that already stand in a sample that is no duplicate.
-    taken: HashSet<u64>,
+    /// Source frames that are already used in a sample that is not a duplicate.
+    used: HashSet<u64>,
     pub(super) selection: Selection,
 }
 
-/// One sample that a source frame serves.
+/// A sample to which a source frame is assigned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Use {
+pub(super) struct Assignment {
+    /// Index of the sample.
     pub(super) index: u32,
-    /// Another sample has the same source frame, and is not flagged.
+    /// True if another sample has the same source frame and is not flagged.
     pub(super) duplicate: bool,
 }
 
 /// A sample and the frame that was chosen for it.
-struct Place {
+struct Choice {
     index: u32,
     frame: u64,
-    off_by: f64,
+    distance: f64,
 }
 
-/// The samples that each source frame serves.
-pub(super) type Uses = BTreeMap<u64, Vec<Use>>;
+/// The samples to which each source frame is assigned.
+pub(super) type Assignments = BTreeMap<u64, Vec<Assignment>>;
 
 impl Plan {
-    /// Chooses `samples` frames among those that are whole as far as the container knows, with the
-    /// driver's time stamps and angles where the session has them.
+    /// Chooses `samples` frames among those that are not damaged as far as the container shows, with
+    /// the driver's time stamps and angles if the session has them.
     pub(super) fn new(
         video: &Video,
         index: Option<&FrameIndex>,
         samples: u32,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, ExtractError> {
         let mut candidates = timeline(video.frames(), index)?;
         let all = candidates.len();
         if candidates
@@ -60,12 +61,12 @@ impl Plan {
             samples,
             candidates,
             without_angle,
-            taken: HashSet::new(),
+            used: HashSet::new(),
             selection,
         })
     }
 
-    /// What is known of a frame that was chosen.
+    /// Time stamp and angle of a frame that was chosen.
     pub(super) fn candidate(&self, frame: u64) -> Option<&Candidate> {
         let at = self
             .candidates
@@ -74,80 +75,85 @@ impl Plan {
         self.candidates.get(at)
     }
 
-    /// How many frames may be chosen.
+    /// Number of frames that may be chosen.
     pub(super) fn usable(&self) -> usize {
         self.candidates.len()
     }
 
-    /// How many samples repeat a source frame.
+    /// Number of samples that repeat a source frame.
     pub(super) fn repeated(&self) -> usize {
         let frames: HashSet<&u64> = self.selection.frames.iter().collect();
         self.selection.frames.len() - frames.len()
     }
 
-    /// How many frames are left out because they alone have no angle; `None` where there are none.
+    /// Number of frames that are left out because they have no angle although others have one;
+    /// `None` if there are none.
     pub(super) fn without_angle(&self) -> Option<usize> {
         (self.without_angle > 0).then_some(self.without_angle)
     }
 
-    /// The frame at which the angle runs back, if it does.
+    /// The frame at which the angle goes backwards, if there is one.
     pub(super) fn runs_back_at(&self) -> Option<u64> {
         runs_back_at(&self.candidates)
     }
 
-    /// The samples that each source frame serves.
-    pub(super) fn uses(&mut self) -> Uses {
-        let Selection { frames, off_by, .. } = &self.selection;
-        let places = (0..).zip(frames.iter().zip(off_by));
-        let chosen = places.map(|(index, (&frame, &off_by))| Place {
+    /// The samples to which each chosen frame is assigned.
+    pub(super) fn assignments(&mut self) -> Assignments {
+        let Selection {
+            frames, distances, ..
+        } = &self.selection;
+        let chosen = (0..).zip(frames.iter().zip(distances));
+        let chosen = chosen.map(|(index, (&frame, &distance))| Choice {
             index,
             frame,
-            off_by,
+            distance,
         });
-        self.note(chosen.collect())
+        self.assign(chosen.collect())
     }
 
-    /// Chooses again for the samples whose frames turned out to be damaged, among the others; the
-    /// samples that have a frame keep it. Answers the samples that each further frame serves:
-    /// none, where nothing is lost.
-    pub(super) fn replace(&mut self, lost: &[Lost]) -> Result<Uses, Error> {
+    /// Chooses again, without the frames `lost`, for the samples to which these were assigned. The
+    /// other samples keep their frames. Returns the new assignments; none if nothing is lost.
+    pub(super) fn replace(&mut self, lost: &HashSet<u64>) -> Result<Assignments, ExtractError> {
         if lost.is_empty() {
-            return Ok(Uses::new());
+            return Ok(Assignments::new());
         }
-        let lost: HashSet<u64> = lost.iter().map(|frame| frame.number).collect();
         self.candidates
             .retain(|candidate| !lost.contains(&candidate.frame));
-        let again = Selection::among(&self.candidates, self.selection.turn(), self.samples)?;
+        let again = Selection::among(&self.candidates, self.selection.span(), self.samples)?;
         let mut chosen = Vec::new();
-        for (index, (frame, &off_by)) in (0_u32..).zip(again.frames.iter().zip(&again.off_by)) {
-            let kept = &mut self.selection.frames[index as usize];
-            if lost.contains(kept) {
-                *kept = *frame;
-                chosen.push(Place {
+        let new = again.frames.iter().zip(&again.distances);
+        for (index, (&frame, &distance)) in (0_u32..).zip(new) {
+            let current = &mut self.selection.frames[index as usize];
+            if lost.contains(current) {
+                *current = frame;
+                chosen.push(Choice {
                     index,
-                    frame: *frame,
-                    off_by,
+                    frame,
+                    distance,
                 });
             }
         }
-        Ok(self.note(chosen))
+        Ok(self.assign(chosen))
     }
 
-    /// Of the samples of one source frame, the one whose place is nearest to the frame's own is
-    /// the original, and the others are duplicates.
-    fn note(&mut self, mut chosen: Vec<Place>) -> Uses {
-        chosen.sort_by(|a, b| a.off_by.total_cmp(&b.off_by).then(a.index.cmp(&b.index)));
-        let mut uses = Uses::new();
-        for Place { index, frame, .. } in chosen {
-            let duplicate = !self.taken.insert(frame);
-            uses.entry(frame)
-                .or_default()
-                .push(Use { index, duplicate });
+    /// Of the samples of one source frame, the one whose position in the turn is nearest to the
+    /// frame's is the original, and the others are duplicates.
+    fn assign(&mut self, mut chosen: Vec<Choice>) -> Assignments {
+        chosen.sort_by(|a, b| {
+            a.distance
+                .total_cmp(&b.distance)
+                .then(a.index.cmp(&b.index))
+        });
+        let mut assignments = Assignments::new();
+        for Choice { index, frame, .. } in chosen {
+            let duplicate = !self.used.insert(frame);
+            let samples = assignments.entry(frame).or_default();
+            samples.push(Assignment { index, duplicate });
         }
-        uses
+        assignments
     }
 
-    /// One sentence for every gap in the time stamps.
+    /// One warning for every gap in the time stamps.
     pub(super) fn gap_warnings(&self) -> Vec<String> {
         let gaps = time_gaps(&self.candidates);
         gaps.iter()

@@ -1,28 +1,27 @@
-//! Scaling a masked image to the output size without bleeding background into the object.
+//! Scaling a masked image to the output size without mixing background into the object.
 //!
-//! Light adds up linearly, sRGB values do not: the image is scaled in linear light. It is masked
-//! before that, so that outside the mask there is 0, and what the filter gathered is divided by
-//! the share of the mask that it gathered (its weights renormalised), so that the object's edge
-//! does not darken. The filter is never negative, so that nothing rings: Hamming where pixels are
-//! merged, bilinear where they are spread.
+//! Light adds up linearly, sRGB values do not: the image is scaled in linear light. Before that it is
+//! set to 0 outside the mask, and afterwards the filtered value is divided by the filtered mask (which
+//! renormalises the filter's weights), so that the object's edge does not darken. The filter has no
+//! negative weights, so that nothing rings: Hamming for scaling down, bilinear for scaling up.
 
 use fast_image_resize::images::{TypedImage, TypedImageRef};
 use fast_image_resize::pixels::{U16, U16x3};
 use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions, Resizer};
 use image::{GrayImage, RgbImage};
 
-use super::Error;
+use super::ExtractError;
 
-/// What `dataset.json` says of the scaling.
+/// The name of the method in `dataset.json`.
 pub(super) const METHOD: &str = "linear light, masked before, Hamming down, bilinear up";
-/// What it says where nothing is scaled.
+/// The name in `dataset.json` if nothing is scaled.
 pub(super) const NO_METHOD: &str = "none";
 
-/// Scales crops of one video, whose mask does not change.
+/// Scales the crops of one video, which share a mask.
 #[derive(Debug)]
 pub struct Scaler {
     crop_mask: GrayImage,
-    /// `None` where the source pixels are kept.
+    /// `None` if the source pixels are kept.
     to: Option<Target>,
 }
 
@@ -31,18 +30,18 @@ struct Target {
     side: u32,
     options: ResizeOptions,
     mask: GrayImage,
-    /// 1 / the mask's share in each output pixel; 0 outside the output's mask.
+    /// 1 / the filtered mask in each output pixel; 0 outside the output's mask.
     gain: Vec<f32>,
     to_linear: [u16; 256],
     to_srgb: Vec<u8>,
 }
 
 impl Scaler {
-    /// For crops under this mask (0 or 255), to `side` x `side` pixels, or as they are.
+    /// A scaler for crops with this mask (0 or 255), to `side` x `side` pixels or without scaling.
     ///
     /// # Errors
-    /// [`Error::ObjectTooSmall`] where no output pixel would be the object's by half or more.
-    pub fn new(crop_mask: GrayImage, side: Option<u32>) -> Result<Self, Error> {
+    /// [`ExtractError::ObjectTooSmall`] if the object covers half of no output pixel.
+    pub fn new(crop_mask: GrayImage, side: Option<u32>) -> Result<Self, ExtractError> {
         let to = match side {
             None => None,
             Some(side) => Some(Target::new(&crop_mask, side)?),
@@ -50,8 +49,8 @@ impl Scaler {
         Ok(Self { crop_mask, to })
     }
 
-    /// The mask of the scaled images, 0 or 255: the object's where the source mask covers at least
-    /// half of the pixel.
+    /// The mask of the scaled images: 255 where the source mask covers at least half of the pixel,
+    /// else 0.
     #[must_use]
     pub fn mask(&self) -> &GrayImage {
         self.to
@@ -59,13 +58,13 @@ impl Scaler {
             .map_or(&self.crop_mask, |target| &target.mask)
     }
 
-    /// Masks and scales one crop, which is as large as the mask.
+    /// Masks and scales one crop, which has the size of the mask.
     ///
     /// # Errors
-    /// [`Error::Scaling`] where the crop has another size.
-    pub fn scale(&self, crop: &RgbImage, resizer: &mut Resizer) -> Result<RgbImage, Error> {
+    /// [`ExtractError::Scaling`] if the crop has another size.
+    pub fn scale(&self, crop: &RgbImage, resizer: &mut Resizer) -> Result<RgbImage, ExtractError> {
         if crop.dimensions() != self.crop_mask.dimensions() {
-            return Err(Error::Scaling(
+            return Err(ExtractError::Scaling(
                 "the crop and its mask differ in size".to_owned(),
             ));
         }
@@ -87,7 +86,7 @@ fn masked(crop: &RgbImage, mask: &GrayImage) -> RgbImage {
 }
 
 impl Target {
-    fn new(crop_mask: &GrayImage, side: u32) -> Result<Self, Error> {
+    fn new(crop_mask: &GrayImage, side: u32) -> Result<Self, ExtractError> {
         let (width, height) = crop_mask.dimensions();
         let filter = if width.max(height) > side {
             FilterType::Hamming
@@ -114,7 +113,7 @@ impl Target {
             }
         }
         if mask.as_raw().iter().all(|&m| m == 0) {
-            return Err(Error::ObjectTooSmall { side });
+            return Err(ExtractError::ObjectTooSmall { side });
         }
         let to_linear = std::array::from_fn(|value| {
             (65535.0 * linear_from_srgb(value as f64 / 255.0)).round() as u16
@@ -137,7 +136,7 @@ impl Target {
         crop: &RgbImage,
         crop_mask: &GrayImage,
         resizer: &mut Resizer,
-    ) -> Result<RgbImage, Error> {
+    ) -> Result<RgbImage, ExtractError> {
         let linear: Vec<U16x3> = crop
             .pixels()
             .zip(crop_mask.as_raw())
@@ -169,8 +168,8 @@ impl Target {
     }
 }
 
-fn scaling(error: impl std::fmt::Display) -> Error {
-    Error::Scaling(error.to_string())
+fn scaling(error: impl std::fmt::Display) -> ExtractError {
+    ExtractError::Scaling(error.to_string())
 }
 
 /// IEC 61966-2-1, from a value in 0..=1 to light in 0..=1.
@@ -254,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn black_and_white_in_turn_become_half_the_light_and_not_half_the_value() {
+    fn a_black_and_white_pattern_becomes_half_the_light_and_not_half_the_value() {
         let mask = GrayImage::from_pixel(64, 64, Luma([255]));
         let board = RgbImage::from_fn(64, 64, |x, y| {
             Rgb([if (x + y) % 2 == 0 { 255 } else { 0 }; 3])
@@ -281,7 +280,7 @@ mod tests {
         mask.put_pixel(50, 50, Luma([255]));
         assert!(matches!(
             Scaler::new(mask, Some(8)),
-            Err(Error::ObjectTooSmall { side: 8 })
+            Err(ExtractError::ObjectTooSmall { side: 8 })
         ));
     }
 }

@@ -1,6 +1,8 @@
-//! Which source frame stands for which sample: `samples` of them, evenly spread over one turn.
+//! Choosing the source frames of the samples, evenly spread over one turn.
 
-use super::Error;
+use relit_data::shard::SamplingBasis;
+
+use super::ExtractError;
 
 /// A source frame that may be chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,24 +15,15 @@ pub struct Candidate {
     pub angle_deg: Option<f64>,
 }
 
-/// By what the samples are spread evenly.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Basis {
-    /// By the table's angle.
-    Angle,
-    /// By time, over the whole video.
-    Time,
-}
-
-/// A turn that lacks less than this counts as whole: its last samples repeat a frame, which is
+/// A turn that lacks less than this counts as complete: its last samples repeat a frame, which is
 /// flagged.
 const TURN_TOLERANCE_DEG: f64 = 1.0;
 const TURN_DEG: f64 = 360.0;
 
-/// The stretch over which samples are spread: from where, in which direction, how far.
+/// The range over which samples are spread: its start, direction and extent.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Turn {
-    basis: Basis,
+pub struct TurnSpan {
+    basis: SamplingBasis,
     /// Angle (degrees) or time stamp (microseconds) of sample 0.
     origin: f64,
     /// 1 or -1.
@@ -40,50 +33,51 @@ pub struct Turn {
     covered_deg: Option<f64>,
 }
 
-impl Turn {
-    /// The turn that these candidates, in order of time, show.
+impl TurnSpan {
+    /// The span of these candidates, which are in order of time.
     ///
-    /// By angle where every candidate has one: a full turn from the first frame's angle in the
-    /// direction in which the table turns, or as much of it as the candidates cover. Without angles,
-    /// the time from the first frame to the end of the last.
+    /// If every candidate has an angle: a full turn from the first frame's angle in the direction in
+    /// which the table turns, or as much of it as the candidates cover. Otherwise: the time from the
+    /// first frame to the end of the last.
     ///
     /// # Errors
-    /// [`Error::NoFrameLeft`] without candidates, [`Error::OneFrame`] with one,
-    /// [`Error::TableStands`] where the angle does not change.
-    pub fn of(candidates: &[Candidate]) -> Result<Self, Error> {
+    /// [`ExtractError::NoFrameLeft`] without candidates, [`ExtractError::OneFrame`] with one,
+    /// [`ExtractError::TableStands`] if the angle does not change.
+    pub fn of(candidates: &[Candidate]) -> Result<Self, ExtractError> {
         let (first, last) = match candidates {
-            [] => return Err(Error::NoFrameLeft),
-            [_] => return Err(Error::OneFrame),
+            [] => return Err(ExtractError::NoFrameLeft),
+            [_] => return Err(ExtractError::OneFrame),
             [first, .., last] => (first, last),
         };
         let all_have_angles = candidates
             .iter()
             .all(|candidate| candidate.angle_deg.is_some());
-        let mut turn = match (first.angle_deg, last.angle_deg) {
+        let mut span = match (first.angle_deg, last.angle_deg) {
             (Some(from), Some(to)) if all_have_angles => {
-                Self::from(Basis::Angle, from, if to < from { -1.0 } else { 1.0 })
+                let direction = if to < from { -1.0 } else { 1.0 };
+                Self::starting_at(SamplingBasis::Angle, from, direction)
             }
-            _ => Self::from(Basis::Time, first.t_us as f64, 1.0),
+            _ => Self::starting_at(SamplingBasis::Time, first.t_us as f64, 1.0),
         };
-        let places: Vec<f64> = candidates
+        let positions: Vec<f64> = candidates
             .iter()
-            .map(|candidate| turn.place(candidate))
+            .map(|candidate| span.position(candidate))
             .collect();
-        let span = turn.place(last);
-        turn.extent = span + median_step(&places);
-        if turn.basis == Basis::Angle {
-            if span < TURN_TOLERANCE_DEG {
-                return Err(Error::TableStands { degrees: span });
+        let to_last = span.position(last);
+        span.extent = to_last + median_step(&positions);
+        if span.basis == SamplingBasis::Angle {
+            if to_last < TURN_TOLERANCE_DEG {
+                return Err(ExtractError::TableStands { degrees: to_last });
             }
-            turn.covered_deg = Some(turn.extent.min(TURN_DEG));
-            if turn.extent >= TURN_DEG - TURN_TOLERANCE_DEG {
-                turn.extent = TURN_DEG;
+            span.covered_deg = Some(span.extent.min(TURN_DEG));
+            if span.extent >= TURN_DEG - TURN_TOLERANCE_DEG {
+                span.extent = TURN_DEG;
             }
         }
-        Ok(turn)
+        Ok(span)
     }
 
-    fn from(basis: Basis, origin: f64, direction: f64) -> Self {
+    fn starting_at(basis: SamplingBasis, origin: f64, direction: f64) -> Self {
         Self {
             basis,
             origin,
@@ -93,35 +87,39 @@ impl Turn {
         }
     }
 
-    /// Where a candidate stands, from the turn's begin on.
-    fn place(&self, candidate: &Candidate) -> f64 {
+    /// The position of a candidate relative to the start of the span.
+    fn position(&self, candidate: &Candidate) -> f64 {
         let at = match (self.basis, candidate.angle_deg) {
-            (Basis::Angle, Some(angle)) => angle,
+            (SamplingBasis::Angle, Some(angle)) => angle,
             _ => candidate.t_us as f64,
         };
         (at - self.origin) * self.direction
     }
 
-    /// For each of `samples` places, evenly spread over the turn, the candidate nearest to it, the
-    /// earlier one of two at the same distance; and the distances.
+    /// For each of `samples` positions, evenly spread over the span, the nearest candidate (the
+    /// earlier one of two at the same distance) and its distance.
     fn nearest(&self, candidates: &[Candidate], samples: u32) -> (Vec<u64>, Vec<f64>) {
         let mut sorted: Vec<(f64, u64)> = candidates
             .iter()
-            .map(|candidate| (self.place(candidate), candidate.frame))
+            .map(|candidate| (self.position(candidate), candidate.frame))
             .collect();
         sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let first_from = |place: f64| sorted.partition_point(|candidate| candidate.0 < place);
+        let first_from = |position: f64| sorted.partition_point(|candidate| candidate.0 < position);
         (0..samples)
             .map(|k| {
                 let target = f64::from(k) * self.extent / f64::from(samples);
-                let off = |at: usize| (sorted[at].0 - target).abs();
+                let distance = |at: usize| (sorted[at].0 - target).abs();
                 let after = first_from(target);
                 let before = after.checked_sub(1).map(|last| first_from(sorted[last].0));
                 let at = match before {
-                    Some(before) if after == sorted.len() || off(before) <= off(after) => before,
+                    Some(before)
+                        if after == sorted.len() || distance(before) <= distance(after) =>
+                    {
+                        before
+                    }
                     _ => after,
                 };
-                (sorted[at].1, off(at))
+                (sorted[at].1, distance(at))
             })
             .unzip()
     }
@@ -130,58 +128,62 @@ impl Turn {
 /// The chosen frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Selection {
-    turn: Turn,
+    span: TurnSpan,
     /// The source frame of each sample, by index.
     pub frames: Vec<u64>,
-    /// How far each sample's frame lies from the place it stands for, by index: degrees or
+    /// The distance of each sample's frame from the sample's position, by index: degrees or
     /// microseconds.
-    pub off_by: Vec<f64>,
+    pub distances: Vec<f64>,
 }
 
 impl Selection {
-    /// Chooses `samples` frames, evenly spread over the turn that the candidates show.
+    /// Chooses `samples` frames, evenly spread over the turn that the candidates cover.
     ///
     /// # Errors
-    /// As [`Turn::of`].
-    pub fn choose(candidates: &[Candidate], samples: u32) -> Result<Self, Error> {
-        Self::among(candidates, Turn::of(candidates)?, samples)
+    /// As [`TurnSpan::of`].
+    pub fn choose(candidates: &[Candidate], samples: u32) -> Result<Self, ExtractError> {
+        Self::among(candidates, TurnSpan::of(candidates)?, samples)
     }
 
-    /// Chooses `samples` frames, evenly spread over a turn that is known.
+    /// Chooses `samples` frames, evenly spread over a given span.
     ///
     /// # Errors
-    /// [`Error::NoFrameLeft`] without candidates.
-    pub fn among(candidates: &[Candidate], turn: Turn, samples: u32) -> Result<Self, Error> {
+    /// [`ExtractError::NoFrameLeft`] without candidates.
+    pub fn among(
+        candidates: &[Candidate],
+        span: TurnSpan,
+        samples: u32,
+    ) -> Result<Self, ExtractError> {
         if candidates.is_empty() {
-            return Err(Error::NoFrameLeft);
+            return Err(ExtractError::NoFrameLeft);
         }
-        let (frames, off_by) = turn.nearest(candidates, samples);
+        let (frames, distances) = span.nearest(candidates, samples);
         Ok(Self {
-            turn,
+            span,
             frames,
-            off_by,
+            distances,
         })
     }
 
-    /// The turn over which the samples are spread.
+    /// The span over which the samples are spread.
     #[must_use]
-    pub fn turn(&self) -> Turn {
-        self.turn
+    pub fn span(&self) -> TurnSpan {
+        self.span
     }
 
-    /// By what the samples are spread.
+    /// The quantity over which the samples are evenly spread.
     #[must_use]
-    pub fn basis(&self) -> Basis {
-        self.turn.basis
+    pub fn basis(&self) -> SamplingBasis {
+        self.span.basis
     }
 
-    /// How much of a turn the candidates cover, 0..=360 degrees; `None` where there are no angles.
+    /// The part of a turn that the candidates cover, 0..=360 degrees; `None` without angles.
     #[must_use]
     pub fn covered_deg(&self) -> Option<f64> {
-        self.turn.covered_deg
+        self.span.covered_deg
     }
 
-    /// True where the candidates cover less than a turn.
+    /// True if the candidates cover less than a turn.
     #[must_use]
     pub fn is_partial(&self) -> bool {
         self.covered_deg()
@@ -189,7 +191,7 @@ impl Selection {
     }
 }
 
-/// The median distance of neighbours, 0 for a single one.
+/// The median distance between neighbours, 0 for a single position.
 fn median_step(positions: &[f64]) -> f64 {
     let mut steps: Vec<f64> = positions.windows(2).map(|pair| pair[1] - pair[0]).collect();
     if steps.is_empty() {
@@ -199,7 +201,7 @@ fn median_step(positions: &[f64]) -> f64 {
     steps[steps.len() / 2]
 }
 
-/// The first frame at which the table runs back against its direction by more than a degree.
+/// The first frame at which the table goes back against its direction by more than a degree.
 #[must_use]
 pub fn runs_back_at(candidates: &[Candidate]) -> Option<u64> {
     let angles: Option<Vec<f64>> = candidates.iter().map(|c| c.angle_deg).collect();
@@ -210,12 +212,12 @@ pub fn runs_back_at(candidates: &[Candidate]) -> Option<u64> {
     Some(candidates[at + 1].frame)
 }
 
-/// A place where frames seem to be missing.
+/// A gap in the time stamps, where frames seem to be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TimeGap {
     /// The frame after the gap.
     pub before: u64,
-    /// How many frames would fit into it.
+    /// Number of frames that would fit into it.
     pub missing: u64,
 }
 
@@ -277,7 +279,7 @@ mod tests {
         assert_eq!(by_angle.frames, by_time.frames);
         assert_eq!(
             (by_time.basis(), by_angle.basis()),
-            (Basis::Time, Basis::Angle)
+            (SamplingBasis::Time, SamplingBasis::Angle)
         );
     }
 
@@ -296,7 +298,7 @@ mod tests {
         assert_eq!(selection.frames.len(), 100);
         assert_eq!(selection.frames[39..44], [39, 39, 40, 40, 41]);
         assert_eq!(selection.frames[69..72], [67, 67, 68]);
-        // What stands in the video after the gaps still stands at its own place of the turn.
+        // Frames after the gaps keep their own position in the turn.
         assert_eq!(selection.frames[99], 96);
     }
 
@@ -335,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn half_a_turn_is_spread_over_all_samples_and_told() {
+    fn half_a_turn_is_spread_over_all_samples_and_reported() {
         let angles = (0..750).map(|n| f64::from(n) * 0.24);
         let selection = Selection::choose(&turned(angles), 1500).unwrap();
         assert!(selection.is_partial());
@@ -353,14 +355,14 @@ mod tests {
     }
 
     #[test]
-    fn a_table_that_stands_is_refused() {
+    fn a_table_that_does_not_turn_is_refused() {
         let candidates = turned((0..100).map(|n| f64::from(n) * 1e-4));
         let error = Selection::choose(&candidates, 100).unwrap_err();
-        assert!(matches!(error, Error::TableStands { .. }), "{error}");
+        assert!(matches!(error, ExtractError::TableStands { .. }), "{error}");
     }
 
     #[test]
-    fn an_angle_that_runs_back_is_found() {
+    fn an_angle_that_goes_back_is_found() {
         let angles =
             |wrong: f64| (0..150).map(move |n| if n == 50 { wrong } else { 2.4 * f64::from(n) });
         assert_eq!(runs_back_at(&turned(angles(0.0))), Some(50));
@@ -370,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn a_repeated_angle_holds_up_nothing() {
+    fn a_repeated_angle_shifts_no_other_sample() {
         for doubled in [1, 59] {
             let angles = (0..150).map(|n| 2.4 * f64::from(if n == doubled { n - 1 } else { n }));
             let selection = Selection::choose(&turned(angles), 150).unwrap();
@@ -382,8 +384,8 @@ mod tests {
     #[test]
     fn frames_lost_at_the_start_shift_no_other_sample() {
         let candidates = turned((0..150).map(|n| f64::from(n) * 2.4));
-        let turn = Turn::of(&candidates).unwrap();
-        let again = Selection::among(&candidates[10..], turn, 150).unwrap();
+        let span = TurnSpan::of(&candidates).unwrap();
+        let again = Selection::among(&candidates[10..], span, 150).unwrap();
         assert_eq!(again.frames[..10], [10; 10]);
         assert_eq!(again.frames[10..], (10..150).collect::<Vec<u64>>());
     }
@@ -401,11 +403,11 @@ mod tests {
             prop_assert_eq!(selection.frames[0], 0);
             prop_assert!(selection.frames.windows(2).all(|pair| pair[0] <= pair[1]));
             for (k, frame) in (0_u32..).zip(&selection.frames) {
-                let place = |t_us: i64| (t_us - candidates[0].t_us) as f64;
-                let target = f64::from(k) * selection.turn.extent / f64::from(samples);
-                let off = (place(candidates[*frame as usize].t_us) - target).abs();
-                let least = candidates.iter().map(|c| (place(c.t_us) - target).abs());
-                prop_assert!(off <= least.fold(f64::INFINITY, f64::min));
+                let position = |t_us: i64| (t_us - candidates[0].t_us) as f64;
+                let target = f64::from(k) * selection.span.extent / f64::from(samples);
+                let distance = (position(candidates[*frame as usize].t_us) - target).abs();
+                let others = candidates.iter().map(|c| (position(c.t_us) - target).abs());
+                prop_assert!(distance <= others.fold(f64::INFINITY, f64::min));
             }
         }
     }

@@ -1,33 +1,34 @@
-//! One row of candidates from the video's frames and the session's frame index.
+//! The candidates for a selection, from the video's frames and the session's frame index.
 
-use super::Error;
-use super::select::Candidate;
 use relit_data::session::{FrameEntry, FrameIndex};
 use relit_video::FrameInfo;
 
-/// The frames that are whole as far as the container knows, with the driver's time stamps and
-/// angles where the session has them.
+use super::ExtractError;
+use super::select::Candidate;
+
+/// The frames that are not damaged as far as the container shows, with the driver's time stamps and
+/// angles if the session has them.
 ///
-/// Line n of the index is frame n of the video. Where their numbers differ, one of them has lost
-/// something: frames and lines are then matched by their time stamps, whose clocks differ by a
-/// constant; frames without a line are left out.
+/// Line n of the index is frame n of the video. If their numbers differ, frames are missing in one of
+/// them: frames and lines are then matched by their time stamps, whose clocks differ by a constant,
+/// and frames without a line are left out.
 ///
 /// # Errors
-/// [`Error::IndexMismatch`] where the time stamps do not match either.
+/// [`ExtractError::IndexMismatch`] if the time stamps do not match either.
 pub(super) fn timeline(
     frames: &[FrameInfo],
     index: Option<&FrameIndex>,
-) -> Result<Vec<Candidate>, Error> {
-    let whole = || frames.iter().filter(|frame| !frame.damaged);
+) -> Result<Vec<Candidate>, ExtractError> {
+    let intact = || frames.iter().filter(|frame| !frame.damaged);
     let Some(index) = index else {
-        let bare = |frame: &FrameInfo| candidate(frame, frame.t_us, None);
-        return Ok(whole().map(bare).collect());
+        let without_entry = |frame: &FrameInfo| candidate(frame, frame.t_us, None);
+        return Ok(intact().map(without_entry).collect());
     };
     let entries = index.entries();
     let entry_of: Vec<Option<&FrameEntry>> = if entries.len() == frames.len() {
         entries.iter().map(Some).collect()
     } else {
-        let mismatch = || Error::IndexMismatch {
+        let mismatch = || ExtractError::IndexMismatch {
             lines: entries.len() as u64,
             frames: frames.len() as u64,
         };
@@ -37,7 +38,7 @@ pub(super) fn timeline(
         let entry = (*entry_of.get(usize::try_from(frame.number).ok()?)?)?;
         Some(candidate(frame, entry.t_us, entry.angle_deg))
     };
-    Ok(whole().filter_map(with_entry).collect())
+    Ok(intact().filter_map(with_entry).collect())
 }
 
 fn candidate(frame: &FrameInfo, t_us: i64, angle_deg: Option<f64>) -> Candidate {
@@ -48,28 +49,29 @@ fn candidate(frame: &FrameInfo, t_us: i64, angle_deg: Option<f64>) -> Candidate 
     }
 }
 
-/// The line of each frame; `None` where the clocks cannot be brought together.
+/// The line of each frame; `None` if the clocks cannot be matched.
 fn matched_by_time<'a>(
     frames: &[FrameInfo],
     entries: &'a [FrameEntry],
 ) -> Option<Vec<Option<&'a FrameEntry>>> {
     let (first, last) = (entries.first()?, entries.last()?);
-    // The file's clock began with the recording, or with its first frame; or both end together.
-    let ties = [
+    // The video's clock starts with the recording or with the first frame, or both end together.
+    let offsets = [
         first.t_us,
         first.t_us.saturating_sub(frames.first()?.t_us),
         last.t_us.saturating_sub(frames.last()?.t_us),
     ];
-    ties.into_iter()
-        .find_map(|ahead| matched_with(frames, entries, ahead))
+    offsets
+        .into_iter()
+        .find_map(|offset| matched_with(frames, entries, offset))
 }
 
-/// The line of each frame, if the index's clock is `ahead` microseconds ahead of the video's and
-/// every line or every frame has its partner.
+/// The line of each frame, if the index's clock is `offset` microseconds ahead of the video's and
+/// every line or every frame has a counterpart.
 fn matched_with<'a>(
     frames: &[FrameInfo],
     entries: &'a [FrameEntry],
-    ahead: i64,
+    offset: i64,
 ) -> Option<Vec<Option<&'a FrameEntry>>> {
     let mut steps: Vec<i64> = entries
         .windows(2)
@@ -78,24 +80,24 @@ fn matched_with<'a>(
     steps.sort_unstable();
     let half = steps.get(steps.len() / 2)? / 2;
     let mut at = 0;
-    let mut partners = 0;
+    let mut pairs = 0;
     let found = frames.iter().map(|frame| {
-        let due = frame.t_us.saturating_add(ahead);
+        let expected = frame.t_us.saturating_add(offset);
         while entries
             .get(at)
-            .is_some_and(|entry| entry.t_us < due.saturating_sub(half))
+            .is_some_and(|entry| entry.t_us < expected.saturating_sub(half))
         {
             at += 1;
         }
         let entry = entries
             .get(at)
-            .filter(|entry| entry.t_us <= due.saturating_add(half))?;
+            .filter(|entry| entry.t_us <= expected.saturating_add(half))?;
         at += 1;
-        partners += 1;
+        pairs += 1;
         Some(entry)
     });
     let found = found.collect();
-    (partners == frames.len().min(entries.len())).then_some(found)
+    (pairs == frames.len().min(entries.len())).then_some(found)
 }
 
 #[cfg(test)]
@@ -169,12 +171,12 @@ mod tests {
     }
 
     #[test]
-    fn clocks_that_cannot_be_brought_together_are_refused() {
+    fn clocks_that_cannot_be_matched_are_refused() {
         let fast = frames((0..8).map(|n| n * 20_000));
         let refused = timeline(&fast, Some(&index()));
         assert!(matches!(
             refused,
-            Err(Error::IndexMismatch {
+            Err(ExtractError::IndexMismatch {
                 lines: 10,
                 frames: 8
             })

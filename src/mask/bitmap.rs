@@ -1,8 +1,8 @@
-//! Bits in rows and columns: parts that hang together, growing, counting.
+//! One bit per pixel: connected components, dilation, counting.
 
 use relit_data::geometry::Rect;
 
-/// A bit for each pixel of an image. At least one pixel, sides under 2^31.
+/// One bit for each pixel of an image. At least one pixel, sides below 2^31.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Bitmap {
     width: usize,
@@ -10,34 +10,34 @@ pub(super) struct Bitmap {
     bits: Vec<bool>,
 }
 
-/// Which neighbours hang together.
+/// Which neighbours of a pixel are connected to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Connectivity {
     /// Left, right, above, below.
     Four,
-    /// Those and the diagonals.
+    /// Also the diagonal ones.
     Eight,
 }
 
-/// Pixels of equal value that hang together.
+/// A connected component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Part {
-    /// Pixels.
+pub(super) struct Component {
+    /// Number of pixels.
     pub(super) area: u64,
     /// The smallest rectangle around it.
     pub(super) bounds: Rect,
 }
 
-/// The set pixels of a bitmap, part by part, in the order of their first pixels.
+/// The connected components of the set pixels, in the order of their first pixels.
 #[derive(Debug)]
-pub(super) struct Parts {
-    /// For each pixel the index of its part in `list`, plus 1; 0 for pixels that are not set.
+pub(super) struct Components {
+    /// For each pixel the index of its component in `list`, plus 1; 0 for pixels that are not set.
     label: Vec<u32>,
-    pub(super) list: Vec<Part>,
+    pub(super) list: Vec<Component>,
 }
 
 impl Bitmap {
-    /// The bits row by row; those that `bits` lacks are not set, those too many are dropped.
+    /// The bits row by row; missing bits are not set, surplus bits are dropped.
     pub(super) fn new((width, height): (u32, u32), bits: impl Iterator<Item = bool>) -> Self {
         let (width, height) = (width as usize, height as usize);
         let mut bits: Vec<bool> = bits.take(width * height).collect();
@@ -57,21 +57,21 @@ impl Bitmap {
         self.bits.iter().filter(|&&bit| bit).count() as u64
     }
 
-    /// The smallest rectangle around the set pixels; of no size where none is set.
+    /// The smallest rectangle around the set pixels; of size 0 if none is set.
     pub(super) fn bounds(&self) -> Rect {
         let mut bounds = Bounds::default();
         for (at, _) in self.bits.iter().enumerate().filter(|&(_, &bit)| bit) {
-            bounds.take(at % self.width, at / self.width);
+            bounds.add(at % self.width, at / self.width);
         }
         bounds.rect()
     }
 
-    /// The set pixels where the others are not, and the other way round.
+    /// The bitmap with all bits inverted.
     pub(super) fn inverted(&self) -> Self {
         self.map(|_, bit| !bit)
     }
 
-    /// A bitmap of the same size whose bits are `f` of position and bit.
+    /// A bitmap of the same size whose bits are `f(position, bit)`.
     pub(super) fn map(&self, f: impl Fn(usize, bool) -> bool) -> Self {
         let bits = self.bits.iter().enumerate();
         Self {
@@ -80,8 +80,8 @@ impl Bitmap {
         }
     }
 
-    /// Sets all pixels within `radius` rows and columns of a set one.
-    pub(super) fn grown(&self, radius: usize) -> Self {
+    /// Dilation: all pixels within `radius` rows and columns of a set one.
+    pub(super) fn dilated(&self, radius: usize) -> Self {
         let mut across = Self {
             bits: vec![false; self.bits.len()],
             ..*self
@@ -95,52 +95,59 @@ impl Bitmap {
                 to[x.saturating_sub(radius)..(x + radius + 1).min(self.width)].fill(true);
             }
         }
-        let mut grown = across.bits.clone();
+        let mut dilated = across.bits.clone();
         for y in 0..self.height {
             for near in y.saturating_sub(radius)..(y + radius + 1).min(self.height) {
                 let from = &across.bits[near * self.width..(near + 1) * self.width];
-                let to = &mut grown[y * self.width..(y + 1) * self.width];
+                let to = &mut dilated[y * self.width..(y + 1) * self.width];
                 to.iter_mut().zip(from).for_each(|(to, &from)| *to |= from);
             }
         }
         Self {
-            bits: grown,
+            bits: dilated,
             ..*self
         }
     }
 
-    /// The set pixels, part by part.
-    pub(super) fn parts(&self, connectivity: Connectivity) -> Parts {
-        let mut parts = Parts {
+    /// The connected components of the set pixels.
+    pub(super) fn components(&self, connectivity: Connectivity) -> Components {
+        let mut components = Components {
             label: vec![0; self.bits.len()],
             list: Vec::new(),
         };
         for start in 0..self.bits.len() {
-            if self.bits[start] && parts.label[start] == 0 {
-                let part = self.flood(start, connectivity, &mut parts);
-                parts.list.push(part);
+            if self.bits[start] && components.label[start] == 0 {
+                let component = self.flood_fill(start, connectivity, &mut components);
+                components.list.push(component);
             }
         }
-        parts
+        components
     }
 
-    fn flood(&self, start: usize, connectivity: Connectivity, parts: &mut Parts) -> Part {
-        let number = parts.list.len() as u32 + 1;
+    /// Labels the component that contains the pixel `start`.
+    fn flood_fill(
+        &self,
+        start: usize,
+        connectivity: Connectivity,
+        components: &mut Components,
+    ) -> Component {
+        let label = &mut components.label;
+        let number = components.list.len() as u32 + 1;
         let mut bounds = Bounds::default();
         let mut area = 0;
-        let mut waiting = vec![start];
-        parts.label[start] = number;
-        while let Some(at) = waiting.pop() {
+        let mut pending = vec![start];
+        label[start] = number;
+        while let Some(at) = pending.pop() {
             area += 1;
-            bounds.take(at % self.width, at / self.width);
+            bounds.add(at % self.width, at / self.width);
             for next in self.neighbours(at, connectivity) {
-                if self.bits[next] && parts.label[next] == 0 {
-                    parts.label[next] = number;
-                    waiting.push(next);
+                if self.bits[next] && label[next] == 0 {
+                    label[next] = number;
+                    pending.push(next);
                 }
             }
         }
-        Part {
+        Component {
             area,
             bounds: bounds.rect(),
         }
@@ -161,16 +168,16 @@ impl Bitmap {
     }
 }
 
-impl Parts {
-    /// The index in `list` of the part that the pixel belongs to.
+impl Components {
+    /// The index in `list` of the component that contains the pixel.
     pub(super) fn at(&self, pixel: usize) -> Option<usize> {
         let label = self.label.get(pixel).copied().unwrap_or(0);
         (label as usize).checked_sub(1)
     }
 
-    /// The index in `list` of the largest part, the first of several.
+    /// The index in `list` of the largest component, the first one if there are several.
     pub(super) fn largest(&self) -> Option<usize> {
-        let areas = self.list.iter().map(|part| part.area).enumerate();
+        let areas = self.list.iter().map(|component| component.area).enumerate();
         areas.rev().max_by_key(|&(_, area)| area).map(|(at, _)| at)
     }
 }
@@ -195,7 +202,7 @@ impl Default for Bounds {
 }
 
 impl Bounds {
-    fn take(&mut self, x: usize, y: usize) {
+    fn add(&mut self, x: usize, y: usize) {
         self.left = self.left.min(x);
         self.top = self.top.min(y);
         self.right = self.right.max(x + 1);
@@ -225,39 +232,36 @@ mod tests {
     use super::*;
 
     #[test]
-    fn diagonal_neighbours_hang_together_only_with_eight() {
+    fn diagonal_neighbours_are_connected_only_with_eight() {
         let bitmap = Bitmap::drawn(&["#..", ".#.", "..."]);
-        assert_eq!(bitmap.parts(Connectivity::Eight).list.len(), 1);
-        assert_eq!(bitmap.parts(Connectivity::Four).list.len(), 2);
+        assert_eq!(bitmap.components(Connectivity::Eight).list.len(), 1);
+        assert_eq!(bitmap.components(Connectivity::Four).list.len(), 2);
     }
 
     #[test]
-    fn parts_carry_area_and_bounds_and_the_first_of_equals_is_the_largest() {
+    fn components_have_area_and_bounds_and_the_first_of_equals_is_the_largest() {
         let bitmap = Bitmap::drawn(&["##...", "....#", "....#"]);
-        let parts = bitmap.parts(Connectivity::Eight);
-        let found: Vec<_> = parts.list.iter().map(|p| (p.area, p.bounds)).collect();
+        let components = bitmap.components(Connectivity::Eight);
+        let found: Vec<_> = components.list.iter().map(|c| (c.area, c.bounds)).collect();
         let wanted = [(2, Rect::new(0, 0, 2, 1)), (2, Rect::new(4, 1, 1, 2))];
         assert_eq!(found, wanted);
-        assert_eq!(parts.largest(), Some(0));
-        assert_eq!(
-            (parts.at(1), parts.at(2), parts.at(9)),
-            (Some(0), None, Some(1))
-        );
-        assert_eq!(parts.at(99), None);
+        assert_eq!(components.largest(), Some(0));
+        let at = [1, 2, 9, 99].map(|pixel| components.at(pixel));
+        assert_eq!(at, [Some(0), None, Some(1), None]);
     }
 
     #[test]
-    fn growing_stops_at_the_border() {
+    fn dilation_stops_at_the_border() {
         let bitmap = Bitmap::drawn(&["#....", ".....", ".....", "....."]);
         let wanted = Bitmap::drawn(&["###..", "###..", "###..", "....."]);
-        assert_eq!(bitmap.grown(2), wanted);
-        assert_eq!(bitmap.grown(9).count(), 20);
+        assert_eq!(bitmap.dilated(2), wanted);
+        assert_eq!(bitmap.dilated(9).count(), 20);
     }
 
     #[test]
-    fn an_empty_bitmap_has_no_parts_and_no_bounds() {
+    fn an_empty_bitmap_has_no_components_and_no_bounds() {
         let bitmap = Bitmap::drawn(&["...", "..."]);
-        assert_eq!(bitmap.parts(Connectivity::Eight).largest(), None);
+        assert_eq!(bitmap.components(Connectivity::Eight).largest(), None);
         assert_eq!(bitmap.bounds(), Rect::new(0, 0, 0, 0));
         assert_eq!(bitmap.inverted().bounds(), Rect::new(0, 0, 3, 2));
     }

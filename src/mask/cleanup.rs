@@ -1,45 +1,46 @@
-//! From the raw cut to a mask: stray parts dropped, holes filled, the edge softened.
+//! From GrabCut's result to a mask: small components dropped, holes filled, the edge softened.
 
 use image::GrayImage;
 use opencv::core::{self, Mat, Size};
 use opencv::imgproc;
 
-use super::bitmap::{Bitmap, Connectivity, Part};
-use super::{Error, Feather, Mark, Seeds};
+use super::bitmap::{Bitmap, Component, Connectivity};
+use super::{Feather, Mark, MaskError, Seeds};
 
-/// Rise from 10 % to 90 % of a Gaussian edge, in standard deviations.
+/// Width of the rise from 10 % to 90 % of a Gaussian edge, in standard deviations.
 const RISE: f64 = 2.563;
 
-/// A cut after its clean-up, and what was done to it.
+/// The cleaned mask, and what was changed.
 #[derive(Debug)]
 pub(super) struct Cleaned {
     pub(super) mask: Bitmap,
-    /// Parts of the raw cut, 8-connected.
+    /// Number of 8-connected components before the clean-up.
     pub(super) components: usize,
+    /// Number of components that were kept.
     pub(super) kept: usize,
-    /// The parts that were dropped, in the order of their first pixels.
-    pub(super) dropped: Vec<Part>,
-    /// Pixels that the seeds mark as object and that were dropped all the same.
+    /// The components that were dropped, in the order of their first pixels.
+    pub(super) dropped: Vec<Component>,
+    /// Pixels that the seeds mark as object and that were dropped nevertheless.
     pub(super) dropped_marks_px: u64,
     /// The holes that were filled, in the order of their first pixels.
-    pub(super) holes: Vec<Part>,
+    pub(super) holes: Vec<Component>,
 }
 
-/// Keeps the largest part, or with `keep_all` every part, and fills holes, except those in which
+/// Keeps the largest component, or with `keep_all` every one, and fills holes, except those in which
 /// the seeds mark background.
 pub(super) fn clean(raw: &Bitmap, seeds: Option<&Seeds>, keep_all: bool) -> Cleaned {
-    let parts = raw.parts(Connectivity::Eight);
-    let largest = parts.largest();
-    let is_kept = |part: usize| keep_all || Some(part) == largest;
-    let kept = raw.map(|at, _| parts.at(at).is_some_and(is_kept));
+    let components = raw.components(Connectivity::Eight);
+    let largest = components.largest();
+    let is_kept = |component: usize| keep_all || Some(component) == largest;
+    let kept = raw.map(|at, _| components.at(at).is_some_and(is_kept));
     let (mask, holes) = fill_holes(&kept, seeds);
-    let parts_list = || parts.list.iter().enumerate();
+    let all = || components.list.iter().enumerate();
     Cleaned {
-        components: parts.list.len(),
-        kept: parts_list().filter(|&(part, _)| is_kept(part)).count(),
-        dropped: parts_list()
-            .filter(|&(part, _)| !is_kept(part))
-            .map(|(_, part)| *part)
+        components: components.list.len(),
+        kept: all().filter(|&(index, _)| is_kept(index)).count(),
+        dropped: all()
+            .filter(|&(index, _)| !is_kept(index))
+            .map(|(_, component)| *component)
             .collect(),
         dropped_marks_px: marked(seeds, Mark::Object)
             .filter(|&at| !mask.bits().get(at).copied().unwrap_or(true))
@@ -49,32 +50,34 @@ pub(super) fn clean(raw: &Bitmap, seeds: Option<&Seeds>, keep_all: bool) -> Clea
     }
 }
 
-/// Holes are what the border does not reach through 4-connected background: the counterpart of
-/// an 8-connected object.
-fn fill_holes(object: &Bitmap, seeds: Option<&Seeds>) -> (Bitmap, Vec<Part>) {
+/// Fills the holes: background that is not 4-connected to the border (4, because the object is
+/// 8-connected).
+fn fill_holes(object: &Bitmap, seeds: Option<&Seeds>) -> (Bitmap, Vec<Component>) {
     let ground = object.inverted();
-    let parts = ground.parts(Connectivity::Four);
-    let all = object.inverted().map(|_, _| true).bounds();
-    let mut is_hole: Vec<bool> = parts
+    let components = ground.components(Connectivity::Four);
+    let frame = object.map(|_, _| true).bounds();
+    let mut is_hole: Vec<bool> = components
         .list
         .iter()
-        .map(|part| {
-            let bounds = part.bounds;
+        .map(|component| {
+            let bounds = component.bounds;
             bounds.x > 0
                 && bounds.y > 0
-                && bounds.right() < all.right()
-                && bounds.bottom() < all.bottom()
+                && bounds.right() < frame.right()
+                && bounds.bottom() < frame.bottom()
         })
         .collect();
-    for part in marked(seeds, Mark::Background).filter_map(|at| parts.at(at)) {
-        is_hole[part] = false;
+    for index in marked(seeds, Mark::Background).filter_map(|at| components.at(at)) {
+        is_hole[index] = false;
     }
-    let filled = object.map(|at, bit| bit || parts.at(at).is_some_and(|part| is_hole[part]));
-    let holes = parts.list.iter().zip(is_hole).filter(|&(_, hole)| hole);
-    (filled, holes.map(|(part, _)| *part).collect())
+    let in_hole = |at: usize| components.at(at).is_some_and(|index| is_hole[index]);
+    let filled = object.map(|at, bit| bit || in_hole(at));
+    let holes = components.list.iter().zip(&is_hole);
+    let holes = holes.filter(|&(_, &hole)| hole).map(|(hole, _)| *hole);
+    (filled, holes.collect())
 }
 
-/// The pixels that the seeds mark so.
+/// The pixels that the seeds mark as `wanted`.
 fn marked(seeds: Option<&Seeds>, wanted: Mark) -> impl Iterator<Item = usize> {
     let marks = seeds.map_or(&[][..], Seeds::marks).iter().enumerate();
     marks
@@ -82,13 +85,13 @@ fn marked(seeds: Option<&Seeds>, wanted: Mark) -> impl Iterator<Item = usize> {
         .map(|(at, _)| at)
 }
 
-/// The mask as a picture: 0 and 255, with a Gaussian edge between them where `feather` asks for
-/// one. Set pixels are at least 128 and the others less, so that a threshold gives the mask back.
+/// The mask as an image: 0 and 255, with a Gaussian edge between them if `feather` is not 0. Set pixels
+/// are at least 128 and the others less, so that a threshold gives the mask back.
 pub(super) fn soften(
     mask: &Bitmap,
     size: (u32, u32),
     feather: Feather,
-) -> Result<GrayImage, Error> {
+) -> Result<GrayImage, MaskError> {
     let hard: Vec<u8> = mask
         .bits()
         .iter()
@@ -106,15 +109,15 @@ pub(super) fn soften(
     Ok(GrayImage::from_raw(size.0, size.1, levels).unwrap_or_default())
 }
 
-fn blur(levels: &[u8], (width, height): (u32, u32), sigma: f64) -> Result<Vec<u8>, Error> {
+fn blur(levels: &[u8], (width, height): (u32, u32), sigma: f64) -> Result<Vec<u8>, MaskError> {
     let doing = "softening the mask's edge";
     let mut soft = vec![0; levels.len()];
     let from = Mat::new_rows_cols_with_data(height as i32, width as i32, levels)
-        .map_err(Error::opencv(doing))?;
+        .map_err(MaskError::opencv(doing))?;
     let mut to = Mat::new_rows_cols_with_data_mut(height as i32, width as i32, &mut soft)
-        .map_err(Error::opencv(doing))?;
+        .map_err(MaskError::opencv(doing))?;
     let by_sigma = Size::new(0, 0);
-    // The frame's border is no edge of the object.
+    // The frame's border is not an edge of the object.
     imgproc::gaussian_blur(
         &from,
         &mut to,
@@ -123,7 +126,7 @@ fn blur(levels: &[u8], (width, height): (u32, u32), sigma: f64) -> Result<Vec<u8
         sigma,
         core::BORDER_REPLICATE,
     )
-    .map_err(Error::opencv(doing))?;
+    .map_err(MaskError::opencv(doing))?;
     drop(to);
     Ok(soft)
 }
@@ -152,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_part_stays_and_its_hole_is_filled() {
+    fn the_largest_component_is_kept_and_its_hole_is_filled() {
         let cleaned = clean(&Bitmap::drawn(&RING), None, false);
         let wanted = [
             "#......", ".####..", ".####..", ".####..", ".......", ".......",
@@ -164,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn every_part_stays_where_all_are_to_be_kept() {
+    fn every_component_is_kept_on_request() {
         let cleaned = clean(&Bitmap::drawn(&RING), None, true);
         assert_eq!((cleaned.components, cleaned.kept), (2, 2));
         assert!(cleaned.dropped.is_empty());
@@ -187,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bay_that_opens_to_the_border_is_no_hole() {
+    fn a_bay_that_is_open_to_the_border_is_not_a_hole() {
         let bay = Bitmap::drawn(&["###", "#.#", "#.#"]);
         assert_eq!(clean(&bay, None, false).mask, bay);
     }

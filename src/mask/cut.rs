@@ -1,17 +1,17 @@
-//! The door to OpenCV's GrabCut: hints to labels, labels to a cut.
+//! OpenCV's GrabCut: from hints to initial labels, and from these to object and background.
 
 use image::RgbImage;
 use opencv::core::{self, Mat, Vec3b};
 use opencv::imgproc;
-
-use super::bitmap::Bitmap;
-use super::{Error, Hints, Iterations, Mark};
 use relit_data::geometry::Rect;
 
-/// Any fixed number: GrabCut's first clusters are drawn at random.
-const SEED: i32 = 1;
+use super::bitmap::Bitmap;
+use super::{Hints, Iterations, Mark, MaskError};
 
-/// GrabCut's labels; the numbers are OpenCV's.
+/// Seed of OpenCV's random numbers, from which GrabCut draws its first clusters; any fixed number.
+const RNG_SEED: i32 = 1;
+
+/// GrabCut's labels, with OpenCV's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 enum Label {
@@ -25,24 +25,24 @@ impl Label {
     const OBJECT: [u8; 2] = [Self::Object as u8, Self::ProbablyObject as u8];
 }
 
-/// What GrabCut starts from.
+/// The labels with which GrabCut starts.
 #[derive(Debug)]
-pub(super) struct Start {
+pub(super) struct InitialLabels {
     size: (u32, u32),
     labels: Vec<u8>,
-    /// Learn the first colour models from the marks alone.
-    marks_teach: bool,
-    /// The part of the hinted rectangle that lies in the frame.
+    /// True if the first colour models are learned from the marks alone.
+    learn_from_marks: bool,
+    /// The part of the hinted rectangle that is inside the frame.
     pub(super) rect: Option<Rect>,
 }
 
-impl Start {
-    /// Lays the hints over a frame of `size`.
-    pub(super) fn new(hints: &Hints, size: (u32, u32)) -> Result<Self, Error> {
+impl InitialLabels {
+    /// The labels that the hints give to a frame of `size`.
+    pub(super) fn new(hints: &Hints, size: (u32, u32)) -> Result<Self, MaskError> {
         let rect = hints.rect().map(|rect| clip(rect, size)).transpose()?;
         let seeds = hints.seeds();
         if let Some(seeds) = seeds.filter(|seeds| seeds.size() != size) {
-            return Err(Error::SeedsSize {
+            return Err(MaskError::SeedsSize {
                 seeds: seeds.size(),
                 frame: size,
             });
@@ -50,7 +50,7 @@ impl Start {
         let marks = seeds.map_or(&[][..], |seeds| seeds.marks());
         let unmarked = |at: usize| match rect {
             None => Label::ProbablyBackground,
-            Some(rect) if holds(rect, at, size.0) => Label::ProbablyObject,
+            Some(rect) if contains(rect, at, size.0) => Label::ProbablyObject,
             Some(_) => Label::Background,
         };
         let label = |at: usize| match marks.get(at) {
@@ -59,32 +59,32 @@ impl Start {
             Some(Mark::Unknown) | None => unmarked(at),
         };
         let pixels = size.0 as usize * size.1 as usize;
-        let start = Self {
+        let initial = Self {
             size,
             labels: (0..pixels).map(|at| label(at) as u8).collect(),
-            marks_teach: rect.is_none() && marks.contains(&Mark::Background),
+            learn_from_marks: rect.is_none() && marks.contains(&Mark::Background),
             rect,
         };
-        start.check(hints)?;
-        Ok(start)
+        initial.check(hints)?;
+        Ok(initial)
     }
 
-    fn check(&self, hints: &Hints) -> Result<(), Error> {
+    fn check(&self, hints: &Hints) -> Result<(), MaskError> {
         let object = self.labels.iter().filter(|at| Label::OBJECT.contains(at));
         let object = object.count();
         if object == self.labels.len() {
             let (width, height) = self.size;
-            return Err(Error::NoBackground { width, height });
+            return Err(MaskError::NoBackground { width, height });
         }
         match hints.rect() {
-            Some(rect) if object == 0 => Err(Error::NoObject { rect }),
+            Some(rect) if object == 0 => Err(MaskError::NoObject { rect }),
             _ => Ok(()),
         }
     }
 }
 
-fn clip(rect: Rect, (width, height): (u32, u32)) -> Result<Rect, Error> {
-    let outside = Error::RectOutside {
+fn clip(rect: Rect, (width, height): (u32, u32)) -> Result<Rect, MaskError> {
+    let outside = MaskError::RectOutside {
         rect,
         width,
         height,
@@ -92,46 +92,53 @@ fn clip(rect: Rect, (width, height): (u32, u32)) -> Result<Rect, Error> {
     rect.clipped_to(width, height).ok_or(outside)
 }
 
-fn holds(rect: Rect, at: usize, width: u32) -> bool {
+fn contains(rect: Rect, at: usize, width: u32) -> bool {
     let (x, y) = ((at % width as usize) as i64, (at / width as usize) as i64);
     (i64::from(rect.x)..rect.right()).contains(&x)
         && (i64::from(rect.y)..rect.bottom()).contains(&y)
 }
 
-/// Separates object from background in `frame`, which has the size that `start` was made for.
-/// The same input gives the same bits.
-pub(super) fn cut(frame: &RgbImage, start: Start, iterations: Iterations) -> Result<Bitmap, Error> {
-    let Start {
-        size, mut labels, ..
-    } = start;
-    // OpenCV's order of channels, so that its other users get the same mask.
+/// Separates object from background in `frame`, which has the size of the labels. The same input gives
+/// the same bits.
+pub(super) fn cut(
+    frame: &RgbImage,
+    initial: InitialLabels,
+    iterations: Iterations,
+) -> Result<Bitmap, MaskError> {
+    let InitialLabels {
+        size,
+        mut labels,
+        learn_from_marks,
+        ..
+    } = initial;
+    // BGR, the usual order in OpenCV, so that other programs get the same mask.
     let pixels: Vec<Vec3b> = frame
         .pixels()
         .map(|pixel| Vec3b::from([pixel.0[2], pixel.0[1], pixel.0[0]]))
         .collect();
-    run(&pixels, size, &mut labels, start.marks_teach, iterations)
-        .map_err(Error::opencv("cutting the object out"))??;
+    grab_cut(&pixels, size, &mut labels, learn_from_marks, iterations)
+        .map_err(MaskError::opencv("cutting the object out"))??;
     let is_object = labels.iter().map(|label| Label::OBJECT.contains(label));
     Ok(Bitmap::new(size, is_object))
 }
 
-/// The outer result is OpenCV's, the inner one says whether there is a cut.
-fn run(
+/// The outer error is OpenCV's, the inner one is a result with one side only.
+fn grab_cut(
     pixels: &[Vec3b],
     size: (u32, u32),
     labels: &mut [u8],
-    marks_teach: bool,
+    learn_from_marks: bool,
     iterations: Iterations,
-) -> opencv::Result<Result<(), Error>> {
-    core::set_rng_seed(SEED)?;
-    let mut models = Models::default();
+) -> opencv::Result<Result<(), MaskError>> {
+    core::set_rng_seed(RNG_SEED)?;
+    let mut models = ColourModels::default();
     let mut mode = imgproc::GC_INIT_WITH_MASK;
-    if marks_teach {
+    if learn_from_marks {
         models.learn_from_marks(pixels, labels)?;
         models.step(pixels, size, labels, imgproc::GC_EVAL_FREEZE_MODEL)?;
         mode = imgproc::GC_EVAL;
     }
-    // Round by round, because OpenCV goes on with models of nothing once a side has run empty.
+    // One iteration at a time: OpenCV does not stop when one side has no pixels left.
     for _ in 0..iterations.get() {
         models.step(pixels, size, labels, mode)?;
         mode = imgproc::GC_EVAL;
@@ -142,16 +149,16 @@ fn run(
     Ok(Ok(()))
 }
 
-/// The colours of the two sides, as GrabCut keeps them between its rounds.
+/// The colours of the two sides, which GrabCut keeps between its iterations.
 #[derive(Default)]
-struct Models {
+struct ColourModels {
     background: Mat,
     object: Mat,
 }
 
-impl Models {
-    /// Learns from the marked pixels only. Unmarked ones would teach the background the object's
-    /// colours, or the object the background's: a few strokes leave nearly all pixels unmarked.
+impl ColourModels {
+    /// Learns from the marked pixels only. A few strokes leave nearly all pixels unmarked, and these
+    /// would mix the colours of object and background.
     fn learn_from_marks(&mut self, pixels: &[Vec3b], labels: &[u8]) -> opencv::Result<()> {
         let sure = [Label::Background as u8, Label::Object as u8];
         let marked = pixels.iter().copied().zip(labels.iter().copied());
@@ -161,7 +168,7 @@ impl Models {
         self.step(&row, size, &mut marks, imgproc::GC_INIT_WITH_MASK)
     }
 
-    /// One round over a picture of `size`.
+    /// One iteration on an image of `size`.
     fn step(
         &mut self,
         pixels: &[Vec3b],
@@ -178,13 +185,13 @@ impl Models {
     }
 }
 
-fn both_sides(labels: &[u8]) -> Result<(), Error> {
+fn both_sides(labels: &[u8]) -> Result<(), MaskError> {
     let is_object = |label: &u8| Label::OBJECT.contains(label);
     if !labels.iter().any(is_object) {
-        return Err(Error::Empty);
+        return Err(MaskError::Empty);
     }
     if labels.iter().all(is_object) {
-        return Err(Error::Everything);
+        return Err(MaskError::Everything);
     }
     Ok(())
 }

@@ -1,16 +1,17 @@
-//! What can go wrong between an image with hints and its mask.
+//! The errors of making a mask.
 
 use std::io;
 use std::path::PathBuf;
 
-use super::{Feather, Iterations, MAX_PIXELS, MIN_SIDE};
 use relit_data::geometry::Rect;
 
-/// Why there is no mask.
+use super::settings::{MAX_PIXELS, MIN_SIDE};
+
+/// Why no mask could be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Error {
-    /// A side of the frame is under [`MIN_SIDE`].
+pub enum MaskError {
+    /// A side of the frame is shorter than [`MIN_SIDE`].
     #[error(
         "the frame is {width} x {height} pixels, too small to segment: at least {MIN_SIDE} a side are needed"
     )]
@@ -30,9 +31,9 @@ pub enum Error {
         /// The frame's height, pixels.
         height: u32,
     },
-    /// Nothing of the rectangle lies in the frame.
+    /// The rectangle is outside the frame.
     #[error(
-        "the rectangle {rect} lies outside the frame of {width} x {height} pixels: give one that holds the object"
+        "the rectangle {rect} is outside the frame of {width} x {height} pixels: give one that contains the object"
     )]
     RectOutside {
         /// The rectangle as given.
@@ -42,7 +43,7 @@ pub enum Error {
         /// The frame's height, pixels.
         height: u32,
     },
-    /// No pixel is left from which to learn the background.
+    /// No pixel could be background.
     #[error(
         "the hints leave no background in the frame of {width} x {height} pixels: draw the rectangle smaller than the frame, or mark background black in the seeds"
     )]
@@ -52,7 +53,7 @@ pub enum Error {
         /// The frame's height, pixels.
         height: u32,
     },
-    /// The seeds mark background everywhere in the rectangle, and no object.
+    /// The seeds mark the whole rectangle as background.
     #[error(
         "the seeds leave no pixel of the rectangle {rect} that could be the object: mark some of the object white"
     )]
@@ -60,15 +61,15 @@ pub enum Error {
         /// The rectangle as given.
         rect: Rect,
     },
-    /// Neither rectangle nor seeds.
-    #[error("nothing says where the object is: give a rectangle, seeds, or both")]
+    /// There are neither a rectangle nor seeds.
+    #[error("there is no hint where the object is: give a rectangle, seeds, or both")]
     NoHints,
-    /// Seeds alone that mark no object.
+    /// There is no rectangle, and the seeds mark no object.
     #[error(
         "the seeds mark no pixel as the object and there is no rectangle: paint white on the object, or give --rect too"
     )]
     NothingMarked,
-    /// The seeds have another size than the frame.
+    /// Seeds and frame differ in size.
     #[error(
         "the seeds are {} x {} pixels and the frame is {} x {}: paint them on an image of the frame's size", .seeds.0, .seeds.1, .frame.0, .frame.1
     )]
@@ -78,7 +79,7 @@ pub enum Error {
         /// Width and height of the frame, pixels.
         frame: (u32, u32),
     },
-    /// A seeds image that is of no use.
+    /// An image that cannot be used as seeds.
     #[error("the seeds {path} cannot be used: {fault}")]
     Seeds {
         /// The image.
@@ -86,51 +87,45 @@ pub enum Error {
         /// What is wrong with it.
         fault: SeedsFault,
     },
-    /// A number of iterations out of range.
-    #[error("{0} iterations are out of range: give 1 to {most}", most = Iterations::MOST)]
-    Iterations(u32),
-    /// A feather out of range.
-    #[error("a feather of {0} pixels is out of range: give 0 to {most}", most = Feather::MOST)]
-    Feather(u32),
-    /// GrabCut took every pixel for background.
+    /// GrabCut classified every pixel as background.
     #[error(
-        "nothing was left as the object: it does not differ enough from its background for this hint; draw the rectangle closer, or mark the object white in seeds"
+        "no object was found: it does not differ enough from its background for this hint; draw the rectangle closer, or mark the object white in seeds"
     )]
     Empty,
-    /// GrabCut took every pixel for object.
+    /// GrabCut classified every pixel as object.
     #[error(
-        "the whole frame was taken for the object: mark background black in the seeds, or give a rectangle"
+        "the whole frame was classified as the object: mark background black in the seeds, or give a rectangle"
     )]
     Everything,
-    /// OpenCV refused.
+    /// OpenCV reported an error.
     #[error("OpenCV failed while {doing}")]
     OpenCv {
-        /// What was being done: "cutting".
+        /// What was being done, as in "cutting the object out".
         doing: &'static str,
-        /// OpenCV's word.
+        /// OpenCV's error.
         source: opencv::Error,
     },
-    /// A picture could not be turned into PNG.
+    /// An image could not be encoded as PNG.
     #[error("{what} could not be encoded as PNG")]
     Encode {
-        /// What was encoded: "the mask".
+        /// The image, as in "the mask".
         what: &'static str,
-        /// The encoder's word.
+        /// The encoder's error.
         source: image::ImageError,
     },
-    /// The file system refused.
+    /// A file could not be read.
     #[error("{path} could not be {doing}")]
     Io {
         /// The file.
         path: PathBuf,
-        /// What was to be done, as a participle: "read".
+        /// What was attempted, as a participle: "read".
         doing: &'static str,
-        /// The system's answer.
+        /// The system's error.
         source: io::Error,
     },
 }
 
-impl Error {
+impl MaskError {
     pub(super) fn io(
         path: impl Into<PathBuf>,
         doing: &'static str,
@@ -148,11 +143,11 @@ impl Error {
     }
 }
 
-/// Why an image cannot serve as seeds.
+/// Why an image cannot be used as seeds.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SeedsFault {
-    /// Not a PNG; a lossy format would smear the marks.
+    /// Not a PNG. A lossy format would blur the marks.
     #[error("it is not a PNG file; save the seeds as PNG")]
     NotPng,
     /// A PNG that cannot be decoded.
@@ -163,7 +158,7 @@ pub enum SeedsFault {
         "no pixel of it is white (object) or black (background): paint with a hard brush, nearly white is unknown"
     )]
     WithoutMark,
-    /// A recorded seeds image holds a level that stands for nothing.
-    #[error("it holds grey level {0}, where only 0, 128 and 255 stand for something")]
+    /// A recorded seeds image has an invalid grey level.
+    #[error("it has the grey level {0}, but only 0, 128 and 255 are valid")]
     Level(u8),
 }

@@ -1,4 +1,4 @@
-//! What a person says about where the object is: a rectangle, seeds, or both.
+//! Hints from a person where the object is: a rectangle, seeds, or both.
 
 use std::fs;
 use std::io::Cursor;
@@ -6,27 +6,28 @@ use std::path::Path;
 
 use image::{DynamicImage, GrayImage, ImageFormat, ImageReader, RgbaImage};
 
-use super::error::SeedsFault;
-use super::{Error, encode};
 use relit_data::geometry::Rect;
 
-/// Every channel at or above this marks the object.
+use super::error::SeedsFault;
+use super::{MaskError, encode};
+
+/// A pixel marks the object if all its channels are at least this.
 const OBJECT_FROM: u8 = 250;
-/// Every channel at or below this marks the background.
+/// A pixel marks the background if all its channels are at most this.
 const BACKGROUND_TO: u8 = 5;
-/// Alpha below this makes a pixel unknown, whatever its colour.
+/// A pixel with a smaller alpha is unknown, whatever its colour.
 const OPAQUE_FROM: u8 = 128;
-/// Channels further apart than this make a colour; less is the grey of a soft brush.
+/// A larger spread of the channels is a colour, a smaller one the grey of a soft brush.
 const COLOURED_FROM: u8 = 16;
 
-/// What a seed says of a pixel.
+/// What the seeds say about a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Mark {
-    /// Background for sure.
+    /// It is background.
     Background,
-    /// Left to GrabCut.
+    /// GrabCut decides.
     Unknown,
-    /// Object for sure.
+    /// It is object.
     Object,
 }
 
@@ -72,8 +73,8 @@ pub struct Seeds {
 }
 
 impl Seeds {
-    /// Reads the marks off a painted image: white (all channels >= 250) is object, black (all
-    /// <= 5) background, everything else and what is more than half transparent unknown.
+    /// Reads the marks of a painted image: white (all channels >= 250) is object, black (all <= 5) is
+    /// background, everything else and what is more than half transparent is unknown.
     ///
     /// # Errors
     /// [`SeedsFault::WithoutMark`].
@@ -95,10 +96,10 @@ impl Seeds {
     /// [`Self::from_png`] on a file.
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::Seeds`].
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let bytes = fs::read(path).map_err(Error::io(path, "read"))?;
-        Self::from_png(&bytes).map_err(|fault| Error::Seeds {
+    /// [`MaskError::Io`] or [`MaskError::Seeds`].
+    pub fn read(path: &Path) -> Result<Self, MaskError> {
+        let bytes = fs::read(path).map_err(MaskError::io(path, "read"))?;
+        Self::from_png(&bytes).map_err(|fault| MaskError::Seeds {
             path: path.to_owned(),
             fault,
         })
@@ -110,7 +111,7 @@ impl Seeds {
         (self.width, self.height)
     }
 
-    /// True where some pixel marks the object.
+    /// True if at least one pixel marks the object.
     #[must_use]
     pub fn mark_the_object(&self) -> bool {
         self.marks.contains(&Mark::Object)
@@ -122,14 +123,14 @@ impl Seeds {
         &self.marks
     }
 
-    /// How many pixels of the painted image had a colour and were taken as unknown.
+    /// Number of pixels of the painted image that had a colour and therefore count as unknown.
     #[must_use]
     pub fn coloured_px(&self) -> u64 {
         self.coloured_px
     }
 
     /// The marks as a grey PNG: 255 object, 0 background, 128 unknown.
-    pub(super) fn to_record(&self) -> Result<Vec<u8>, Error> {
+    pub(super) fn to_record(&self) -> Result<Vec<u8>, MaskError> {
         let levels = self.marks.iter().map(|mark| mark.level()).collect();
         let image = GrayImage::from_raw(self.width, self.height, levels).unwrap_or_default();
         encode::grey_png(&image, "the seeds")
@@ -175,14 +176,14 @@ fn count_coloured(painted: &RgbaImage) -> u64 {
     painted.pixels().filter(coloured).count() as u64
 }
 
-/// Where the object is, as far as a person said.
+/// Hints from a person where the object is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Hints {
-    /// The object lies in the rectangle, all of it.
+    /// The whole object is inside the rectangle.
     Rect(Rect),
-    /// Some of the object and, better still, some of the background is marked.
+    /// Parts of the object are marked, and preferably parts of the background too.
     Seeds(Seeds),
-    /// A rectangle, and marks that overrule it; black ones alone will do.
+    /// A rectangle, and marks that overrule it; background marks alone are enough.
     Both {
         /// The rectangle.
         rect: Rect,
@@ -192,16 +193,16 @@ pub enum Hints {
 }
 
 impl Hints {
-    /// The hints that are there.
+    /// The hints from a rectangle, seeds, or both.
     ///
     /// # Errors
-    /// [`Error::NoHints`] where there are none, [`Error::NothingMarked`] where seeds alone mark no
-    /// object.
-    pub fn from_parts(rect: Option<Rect>, seeds: Option<Seeds>) -> Result<Self, Error> {
+    /// [`MaskError::NoHints`] without either, [`MaskError::NothingMarked`] for seeds without rectangle that
+    /// mark no object.
+    pub fn from_parts(rect: Option<Rect>, seeds: Option<Seeds>) -> Result<Self, MaskError> {
         match (rect, seeds) {
-            (None, None) => Err(Error::NoHints),
+            (None, None) => Err(MaskError::NoHints),
             (Some(rect), None) => Ok(Self::Rect(rect)),
-            (None, Some(seeds)) if !seeds.mark_the_object() => Err(Error::NothingMarked),
+            (None, Some(seeds)) if !seeds.mark_the_object() => Err(MaskError::NothingMarked),
             (None, Some(seeds)) => Ok(Self::Seeds(seeds)),
             (Some(rect), Some(seeds)) => Ok(Self::Both { rect, seeds }),
         }
@@ -240,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn white_black_and_the_rest_are_told_apart() {
+    fn white_black_and_the_rest_are_distinguished() {
         let pixels = [
             [255, 250, 251, 255],
             [0, 5, 3, 255],
@@ -258,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn grey_and_deep_images_are_taken() {
+    fn grey_and_16_bit_images_are_accepted() {
         let grey = ImageBuffer::from_fn(3, 1, |x, _| Luma([[0u8, 128, 255][x as usize]]));
         let deep = ImageBuffer::from_fn(3, 1, |x, _| Luma([[0u16, 30000, 65535][x as usize]]));
         let grey = Seeds::from_png(&png(grey)).unwrap();
@@ -270,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn palette_images_are_taken() {
+    fn palette_images_are_accepted() {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 2, 1);
         encoder.set_color(png::ColorType::Indexed);
@@ -284,14 +285,14 @@ mod tests {
     }
 
     #[test]
-    fn seeds_without_object_are_refused_but_with_a_rectangle() {
+    fn seeds_without_object_are_accepted_only_with_a_rectangle() {
         let grey = ImageBuffer::from_pixel(4, 4, Rgb([128u8, 128, 128]));
         let unmarked = Seeds::from_png(&png(grey));
         assert!(matches!(unmarked, Err(SeedsFault::WithoutMark)));
         let black = ImageBuffer::from_pixel(4, 4, Rgb([0u8, 0, 0]));
         let seeds = Seeds::from_png(&png(black)).unwrap();
         let alone = Hints::from_parts(None, Some(seeds.clone()));
-        assert!(matches!(alone, Err(Error::NothingMarked)));
+        assert!(matches!(alone, Err(MaskError::NothingMarked)));
         assert!(Hints::from_parts(Some(Rect::new(0, 0, 2, 2)), Some(seeds)).is_ok());
     }
 

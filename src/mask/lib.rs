@@ -1,13 +1,43 @@
-//! Which pixels of a frame are the object: hints of a person, OpenCV's GrabCut, clean-up.
+//! Which pixels of an image are the object: hints from a person, OpenCV's GrabCut, clean-up.
 //!
-//! Camera and object ride on one turntable, so one mask serves all frames of a turn. [`segment`]
-//! makes it from one image; what is written beside a mask is a [`MaskRecord`]. Knows nothing of
-//! videos, sessions and shards, nor of how masks are used.
+//! Camera and object ride on the same turntable, so one mask fits all frames of a turn. [`segment`]
+//! makes it from one image; [`preview`] shows it for a person to check; a [`MaskRecord`] is what is
+//! written beside a mask to make it again.
 //!
-//! With a rectangle its outside is background for sure and its inside probably object; seeds
-//! overrule it. Where there are only seeds, the colours of the marked pixels decide first; with no
-//! background marked, unmarked pixels start as probable background. Of the cut the largest 8-connected part is kept, and holes, which are background that does not reach
-//! the border through 4-connected pixels, are filled, except those in which seeds mark background.
+//! The crate needs OpenCV (core and imgproc) and nothing else: neither FFmpeg nor a session. It knows
+//! nothing of videos, session folders and shards, nor of how masks are used.
+//!
+//! # Cut an object out by a rectangle
+//!
+//! ```
+//! use image::{Rgb, RgbImage};
+//! use relit_data::geometry::Rect;
+//! use relit_mask::{Hints, SegmentSettings, segment};
+//!
+//! // A yellow disc of radius 18 on a dark ground. From a file: image::open(path)?.into_rgb8()
+//! let inside = |x: u32, y: u32| (f64::from(x) - 48.0).hypot(f64::from(y) - 32.0) <= 18.0;
+//! let image = RgbImage::from_fn(96, 64, |x, y| {
+//!     Rgb(if inside(x, y) { [220, 180, 40] } else { [20, (x % 7) as u8, 60] })
+//! });
+//!
+//! // The object lies inside the rectangle; what is outside is background.
+//! let hints = Hints::Rect(Rect::new(24, 8, 50, 48));
+//! let mask = segment(&image, &hints, &SegmentSettings::default())?;
+//!
+//! assert_eq!(mask.image().get_pixel(48, 32).0, [255]);
+//! assert_eq!(mask.image().get_pixel(10, 10).0, [0]);
+//! assert_eq!(mask.statistics().bounding_box, Rect::new(30, 14, 37, 37));
+//! assert!(mask.warnings().is_empty());
+//! # Ok::<(), relit_mask::MaskError>(())
+//! ```
+//!
+//! # How it decides
+//!
+//! With a rectangle, pixels outside are background and pixels inside are probably object; seeds
+//! overrule both. With seeds alone, the colours of the marked pixels decide first; if no background is
+//! marked, unmarked pixels start as probable background. Of the result the largest 8-connected
+//! component is kept. Holes (background that is not 4-connected to the border) are filled, except
+//! those in which seeds mark background.
 
 mod bitmap;
 mod cleanup;
@@ -17,105 +47,17 @@ mod error;
 mod hints;
 mod preview;
 mod record;
+mod segment;
 mod settings;
 mod warning;
 
-use image::{GrayImage, RgbImage};
-
-use relit_data::geometry::Rect;
-
 pub use encode::{grey_png, rgb_png};
-pub use error::{Error, SeedsFault};
+pub use error::{MaskError, SeedsFault};
 pub use hints::{Hints, Mark, Seeds};
 pub use preview::preview;
 pub use record::{
-    MASK_SCHEMA, MaskRecord, RecordFault, RecordedHints, RecordedResult, Software, Source,
+    MASK_SCHEMA, MaskRecord, MaskSoftware, RecordFault, RecordedHints, RecordedResult, SourceFrame,
 };
-pub use settings::{Feather, Iterations, Settings};
+pub use segment::{Mask, MaskStatistics, segment};
+pub use settings::{Feather, Iterations, MAX_PIXELS, MIN_SIDE, SegmentSettings, SettingsFault};
 pub use warning::{Side, Warning};
-
-/// The least width and height of a frame, pixels.
-pub const MIN_SIDE: u32 = 16;
-
-/// The most pixels of a frame, 8192 x 4320: GrabCut's graph takes about 250 bytes for each.
-pub const MAX_PIXELS: u64 = 8192 * 4320;
-
-/// An object's mask on one frame.
-#[derive(Debug, Clone)]
-pub struct Mask {
-    image: GrayImage,
-    figures: Figures,
-    warnings: Vec<Warning>,
-}
-
-/// A mask in numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Figures {
-    /// Pixels of the object: at or above 128, at least 1.
-    pub area_px: u64,
-    /// The smallest rectangle around them.
-    pub bounding_box: Rect,
-    /// Parts of the cut before the clean-up, at least 1.
-    pub components: usize,
-    /// Parts that were kept.
-    pub components_kept: usize,
-    /// Pixels of the holes that were filled.
-    pub holes_filled_px: u64,
-}
-
-impl Mask {
-    /// The mask, as large as the frame: 255 object, 0 background; with a feather also between.
-    #[must_use]
-    pub fn image(&self) -> &GrayImage {
-        &self.image
-    }
-
-    /// Area and parts.
-    #[must_use]
-    pub fn figures(&self) -> Figures {
-        self.figures
-    }
-
-    /// What its user has to look at.
-    #[must_use]
-    pub fn warnings(&self) -> &[Warning] {
-        &self.warnings
-    }
-}
-
-/// Finds the object on `frame`. The same input gives the same mask, with any number of threads.
-///
-/// # Errors
-/// [`Error::FrameTooSmall`], [`Error::FrameTooLarge`]; hints that do not fit the frame
-/// ([`Error::RectOutside`], [`Error::NoBackground`], [`Error::NoObject`], [`Error::SeedsSize`]);
-/// a cut that leaves one side empty ([`Error::Empty`], [`Error::Everything`]);
-/// [`Error::OpenCv`].
-pub fn segment(frame: &RgbImage, hints: &Hints, settings: &Settings) -> Result<Mask, Error> {
-    let size = frame.dimensions();
-    check_size(size)?;
-    let start = cut::Start::new(hints, size)?;
-    let rect = start.rect;
-    let raw = cut::cut(frame, start, settings.iterations)?;
-    let cleaned = cleanup::clean(&raw, hints.seeds(), settings.keep_all);
-    Ok(Mask {
-        image: cleanup::soften(&cleaned.mask, size, settings.feather)?,
-        figures: Figures {
-            area_px: cleaned.mask.count(),
-            bounding_box: cleaned.mask.bounds(),
-            components: cleaned.components,
-            components_kept: cleaned.kept,
-            holes_filled_px: cleaned.holes.iter().map(|hole| hole.area).sum(),
-        },
-        warnings: warning::of(hints, rect, &cleaned, size),
-    })
-}
-
-fn check_size((width, height): (u32, u32)) -> Result<(), Error> {
-    if width.min(height) < MIN_SIDE {
-        return Err(Error::FrameTooSmall { width, height });
-    }
-    if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        return Err(Error::FrameTooLarge { width, height });
-    }
-    Ok(())
-}

@@ -1,21 +1,21 @@
-//! The picture by which a person judges a mask.
+//! The image by which a person checks a mask.
 
 use image::{GrayImage, RgbImage};
 
 use super::bitmap::Bitmap;
 
-/// A pixel is in the mask from here on.
+/// Pixels at or above this level belong to the mask.
 const INSIDE_FROM: u8 = 128;
 const BRIGHT: [u8; 3] = [0, 255, 80];
 const DARK: [u8; 3] = [10, 10, 10];
-/// What is left of the background's brightness, in percent.
+/// Brightness of the dimmed background, percent.
 const DIMMED: u16 = 60;
-/// One more pixel of outline for so many pixels of the frame's short side.
+/// The outline is one pixel wide for each so many pixels of the frame's shorter side.
 const SIDE_PER_PX: u32 = 500;
 
-/// The frame with its background dimmed and a bright outline just around the mask, dark-rimmed
-/// on both sides. The outline is 2 pixels wide, more on frames over 1500 pixels. A mask of
-/// another size than the frame gives the frame as it is.
+/// The frame with its background dimmed and a bright outline around the mask, with a dark rim on both
+/// sides. The outline is 2 pixels wide, and wider for frames above 1500 pixels. If mask and frame
+/// differ in size, the frame is returned unchanged.
 #[must_use]
 pub fn preview(frame: &RgbImage, mask: &GrayImage) -> RgbImage {
     let size = frame.dimensions();
@@ -27,11 +27,11 @@ pub fn preview(frame: &RgbImage, mask: &GrayImage) -> RgbImage {
         mask.as_raw().iter().map(|&level| level >= INSIDE_FROM),
     );
     let width = (size.0.min(size.1) / SIDE_PER_PX).max(2) as usize;
-    let line = object.grown(width);
-    let outer_rim = line.grown(1);
-    let ground = object.inverted().grown(1);
-    let mut picture = frame.clone();
-    for (at, pixel) in picture.pixels_mut().enumerate() {
+    let line = object.dilated(width);
+    let outer_rim = line.dilated(1);
+    let ground = object.inverted().dilated(1);
+    let mut image = frame.clone();
+    for (at, pixel) in image.pixels_mut().enumerate() {
         let is = |bitmap: &Bitmap| bitmap.bits()[at];
         pixel.0 = match (is(&object), is(&line), is(&outer_rim)) {
             (true, ..) if is(&ground) => DARK,
@@ -41,7 +41,7 @@ pub fn preview(frame: &RgbImage, mask: &GrayImage) -> RgbImage {
             (false, false, false) => pixel.0.map(dimmed),
         };
     }
-    picture
+    image
 }
 
 fn dimmed(level: u8) -> u8 {
@@ -55,12 +55,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_outline_lies_around_the_mask_and_the_object_keeps_its_colours() {
+    fn the_outline_is_around_the_mask_and_the_object_keeps_its_colours() {
         let frame = RgbImage::from_pixel(40, 40, Rgb([200, 100, 50]));
         let inside = |x: u32, y: u32| (10..30).contains(&x) && (10..30).contains(&y);
         let mask = GrayImage::from_fn(40, 40, |x, y| Luma([if inside(x, y) { 255 } else { 0 }]));
-        let picture = preview(&frame, &mask);
-        let row: Vec<[u8; 3]> = (5..13).map(|x| picture.get_pixel(x, 20).0).collect();
+        let image = preview(&frame, &mask);
+        let row: Vec<[u8; 3]> = (5..13).map(|x| image.get_pixel(x, 20).0).collect();
         let (ground, object) = ([120, 60, 30], [200, 100, 50]);
         let wanted = [ground, ground, DARK, BRIGHT, BRIGHT, DARK, object, object];
         assert_eq!(row, wanted);

@@ -1,32 +1,32 @@
-//! `mask.json`: how a mask was made, enough to make it again.
+//! `mask.json`: how a mask was made, with everything needed to make it again.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use relit_data::geometry::Rect;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::error::SeedsFault;
-use super::{Error, Figures, Hints, Seeds, Settings};
-use relit_data::geometry::Rect;
+use super::{Hints, MaskError, MaskStatistics, Seeds, SegmentSettings};
 
-/// The schema that is written and read.
+/// The schema that this version writes and reads.
 pub const MASK_SCHEMA: &str = "relit.mask/1";
 
-/// What `mask.json` holds.
+/// The content of `mask.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MaskRecord {
     /// [`MASK_SCHEMA`].
     pub schema: String,
-    /// What made the mask.
-    pub software: Software,
+    /// The software that made the mask.
+    pub software: MaskSoftware,
     /// The frame it was made on.
-    pub source: Source,
-    /// What a person said of the object.
+    pub source: SourceFrame,
+    /// The hints.
     pub hints: RecordedHints,
-    /// How it was made.
-    pub settings: Settings,
-    /// What came out.
+    /// The settings.
+    pub settings: SegmentSettings,
+    /// The result.
     pub result: RecordedResult,
     /// The warnings, as sentences.
     pub warnings: Vec<String>,
@@ -35,17 +35,17 @@ pub struct MaskRecord {
 /// The versions on which a mask's bytes depend.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Software {
+pub struct MaskSoftware {
     /// Version of relit.
     pub version: String,
     /// Version of OpenCV.
     pub opencv: String,
 }
 
-/// The frame that a mask was made on.
+/// The frame on which a mask was made.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Source {
+pub struct SourceFrame {
     /// File name of the video, without folders.
     pub video: String,
     /// The frame's number, 0-based.
@@ -64,16 +64,16 @@ pub struct Source {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordedHints {
-    /// The rectangle as given, null where there was none.
+    /// The rectangle as given; null without one.
     pub rect: Option<Rect>,
-    /// The seeds as a grey PNG in base64 (255 object, 0 background, 128 unknown), null where
-    /// there were none.
+    /// The seeds as a grey PNG in base64 (255 object, 0 background, 128 unknown); null without
+    /// seeds.
     pub seeds: Option<String>,
-    /// Coloured pixels of the painted seeds, which count as unknown.
+    /// Number of coloured pixels of the painted seeds, which count as unknown.
     pub seeds_coloured_px: u64,
 }
 
-/// A mask's numbers as they are recorded.
+/// [`MaskStatistics`] and hash of a mask as they are recorded.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordedResult {
@@ -83,19 +83,19 @@ pub struct RecordedResult {
     pub area_px: u64,
     /// The smallest rectangle around them.
     pub bounding_box: Rect,
-    /// Parts of the cut before the clean-up.
+    /// Connected components before the clean-up.
     pub components: u64,
-    /// Parts that were kept.
+    /// Connected components that were kept.
     pub components_kept: u64,
     /// Pixels of the holes that were filled.
     pub holes_filled_px: u64,
 }
 
-/// Why a file is not a mask's record, or not one that can be followed.
+/// Why a file is not a mask's record, or cannot be used to make the mask again.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordFault {
-    /// No JSON, or not the fields of a record.
+    /// Not JSON, or without the fields of a record.
     #[error("{0}")]
     Json(#[from] serde_json::Error),
     /// Another schema.
@@ -110,8 +110,8 @@ pub enum RecordFault {
     /// Seeds that are not base64.
     #[error("its seeds are not base64 ({0})")]
     Base64(#[from] base64::DecodeError),
-    /// Seeds that are not the image that is recorded.
-    #[error("of its seeds: {0}")]
+    /// Seeds that are not a valid image.
+    #[error("its seeds are not valid: {0}")]
     Seeds(#[from] SeedsFault),
 }
 
@@ -134,7 +134,7 @@ impl MaskRecord {
     /// The content of a `mask.json`.
     ///
     /// # Errors
-    /// What `serde_json` answers; it has no reason to.
+    /// If serialization fails, which does not happen.
     pub fn to_json(&self) -> serde_json::Result<Vec<u8>> {
         let mut bytes = serde_json::to_vec_pretty(self)?;
         bytes.push(b'\n');
@@ -142,10 +142,10 @@ impl MaskRecord {
     }
 }
 
-impl Software {
-    /// What runs here.
+impl MaskSoftware {
+    /// The versions of this program.
     #[must_use]
-    pub fn here() -> Self {
+    pub fn current() -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             opencv: opencv::core::get_version_string().unwrap_or_else(|_| "unknown".to_owned()),
@@ -153,18 +153,18 @@ impl Software {
     }
 }
 
-impl std::fmt::Display for Software {
+impl std::fmt::Display for MaskSoftware {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "relit {} with OpenCV {}", self.version, self.opencv)
     }
 }
 
 impl RecordedHints {
-    /// The hints, ready to be recorded.
+    /// The hints in the form in which they are recorded.
     ///
     /// # Errors
-    /// [`Error::Encode`].
-    pub fn new(hints: &Hints) -> Result<Self, Error> {
+    /// [`MaskError::Encode`].
+    pub fn new(hints: &Hints) -> Result<Self, MaskError> {
         let seeds = hints.seeds().map(Seeds::to_record).transpose()?;
         Ok(Self {
             rect: hints.rect(),
@@ -190,16 +190,16 @@ impl RecordedHints {
 }
 
 impl RecordedResult {
-    /// The numbers of a mask whose file is `png`.
+    /// The statistics and the hash of a mask whose file has the bytes `png`.
     #[must_use]
-    pub fn new(figures: Figures, png: &[u8]) -> Self {
+    pub fn new(statistics: MaskStatistics, png: &[u8]) -> Self {
         Self {
             mask_blake3: blake3::hash(png).to_hex().to_string(),
-            area_px: figures.area_px,
-            bounding_box: figures.bounding_box,
-            components: figures.components as u64,
-            components_kept: figures.components_kept as u64,
-            holes_filled_px: figures.holes_filled_px,
+            area_px: statistics.area_px,
+            bounding_box: statistics.bounding_box,
+            components: statistics.components as u64,
+            components_kept: statistics.components_kept as u64,
+            holes_filled_px: statistics.holes_filled_px,
         }
     }
 }
@@ -209,7 +209,7 @@ mod tests {
     use super::*;
 
     fn record() -> MaskRecord {
-        let figures = Figures {
+        let statistics = MaskStatistics {
             area_px: 12,
             bounding_box: Rect::new(1, 2, 3, 4),
             components: 2,
@@ -218,8 +218,8 @@ mod tests {
         };
         MaskRecord {
             schema: MASK_SCHEMA.to_owned(),
-            software: Software::here(),
-            source: Source {
+            software: MaskSoftware::current(),
+            source: SourceFrame {
                 video: "video.mkv".to_owned(),
                 frame: 3,
                 t_us: 100_000,
@@ -228,8 +228,8 @@ mod tests {
                 frame_blake3: "00".to_owned(),
             },
             hints: RecordedHints::new(&Hints::Rect(Rect::new(-1, 2, 30, 40))).unwrap(),
-            settings: Settings::default(),
-            result: RecordedResult::new(figures, b"png"),
+            settings: SegmentSettings::default(),
+            result: RecordedResult::new(statistics, b"png"),
             warnings: vec!["look".to_owned()],
         }
     }
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn hints_that_cannot_be_followed_are_refused() {
+    fn invalid_recorded_hints_are_refused() {
         let of = |rect, seeds: Option<&str>| RecordedHints {
             rect,
             seeds: seeds.map(str::to_owned),

@@ -1,25 +1,43 @@
-//! How a mask is made, apart from the hints.
+//! The settings of a segmentation, and the limits on its input.
 
 use serde::{Deserialize, Serialize};
 
-use super::Error;
+/// The smallest width and height of a frame, pixels.
+pub const MIN_SIDE: u32 = 16;
 
-/// Rounds of GrabCut, 1..=[`Iterations::MOST`].
+/// The most pixels of a frame, 8192 x 4320: GrabCut's graph needs about 250 bytes for each.
+pub const MAX_PIXELS: u64 = 8192 * 4320;
+
+/// A setting that is out of range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SettingsFault {
+    /// A number of iterations.
+    #[error("{0} iterations are out of range: give 1 to {max}", max = Iterations::MAX)]
+    Iterations(u32),
+    /// A feather.
+    #[error("a feather of {0} pixels is out of range: give 0 to {max}", max = Feather::MAX)]
+    Feather(u32),
+}
+
+/// Number of GrabCut's iterations, 1..=[`Iterations::MAX`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "u32", into = "u32")]
 pub struct Iterations(u32);
 
 impl Iterations {
-    /// The most that is accepted; a bound on the time that a slip of the finger can cost.
-    pub const MOST: u32 = 100;
+    /// The largest number, which bounds the time that a typing error can cost.
+    pub const MAX: u32 = 100;
 
+    /// Checks the number.
+    ///
     /// # Errors
-    /// [`Error::Iterations`] outside 1..=[`Self::MOST`].
-    pub fn new(count: u32) -> Result<Self, Error> {
-        if (1..=Self::MOST).contains(&count) {
+    /// [`SettingsFault::Iterations`] outside 1..=[`Self::MAX`].
+    pub fn new(count: u32) -> Result<Self, SettingsFault> {
+        if (1..=Self::MAX).contains(&count) {
             Ok(Self(count))
         } else {
-            Err(Error::Iterations(count))
+            Err(SettingsFault::Iterations(count))
         }
     }
 
@@ -36,23 +54,25 @@ impl Default for Iterations {
     }
 }
 
-/// Width of the mask's soft edge, pixels, 0..=[`Feather::MOST`]: over that distance the mask
-/// rises from 10 % to 90 % at a straight edge. 0 is a hard edge.
+/// Width of the mask's soft edge, pixels, 0..=[`Feather::MAX`]: the distance over which the mask rises
+/// from 10 % to 90 % at a straight edge. 0 is a hard edge.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "u32", into = "u32")]
 pub struct Feather(u32);
 
 impl Feather {
-    /// The widest edge, pixels.
-    pub const MOST: u32 = 100;
+    /// The largest width, pixels.
+    pub const MAX: u32 = 100;
 
+    /// Checks the width.
+    ///
     /// # Errors
-    /// [`Error::Feather`] above [`Self::MOST`].
-    pub fn new(px: u32) -> Result<Self, Error> {
-        if px <= Self::MOST {
+    /// [`SettingsFault::Feather`] above [`Self::MAX`].
+    pub fn new(px: u32) -> Result<Self, SettingsFault> {
+        if px <= Self::MAX {
             Ok(Self(px))
         } else {
-            Err(Error::Feather(px))
+            Err(SettingsFault::Feather(px))
         }
     }
 
@@ -63,22 +83,22 @@ impl Feather {
     }
 }
 
-/// How a mask is made, apart from the hints.
+/// How a mask is made from an image and hints.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Settings {
-    /// Rounds of GrabCut.
+pub struct SegmentSettings {
+    /// Number of GrabCut's iterations.
     pub iterations: Iterations,
-    /// Keep every part of the object, not only the largest.
+    /// Keep every connected component, not only the largest.
     pub keep_all: bool,
     /// Width of the soft edge.
     pub feather: Feather,
 }
 
 impl TryFrom<u32> for Iterations {
-    type Error = Error;
+    type Error = SettingsFault;
 
-    fn try_from(count: u32) -> Result<Self, Error> {
+    fn try_from(count: u32) -> Result<Self, SettingsFault> {
         Self::new(count)
     }
 }
@@ -90,9 +110,9 @@ impl From<Iterations> for u32 {
 }
 
 impl TryFrom<u32> for Feather {
-    type Error = Error;
+    type Error = SettingsFault;
 
-    fn try_from(px: u32) -> Result<Self, Error> {
+    fn try_from(px: u32) -> Result<Self, SettingsFault> {
         Self::new(px)
     }
 }
@@ -110,14 +130,14 @@ mod tests {
     #[test]
     fn no_iterations_and_too_many_are_refused() {
         assert!(Iterations::new(0).is_err());
-        assert!(Iterations::new(Iterations::MOST + 1).is_err());
+        assert!(Iterations::new(Iterations::MAX + 1).is_err());
         assert_eq!(Iterations::new(7).unwrap().get(), 7);
         assert!(serde_json::from_str::<Iterations>("0").is_err());
     }
 
     #[test]
-    fn a_feather_wider_than_the_most_is_refused() {
-        assert!(Feather::new(Feather::MOST + 1).is_err());
+    fn a_feather_above_the_limit_is_refused() {
+        assert!(Feather::new(Feather::MAX + 1).is_err());
         assert_eq!(Feather::new(0).unwrap(), Feather::default());
     }
 }

@@ -1,19 +1,20 @@
-//! What a person should look at before the mask is used.
+//! Warnings: what a person should check before using a mask.
 
 use std::fmt;
 
-use super::bitmap::{Bitmap, Part};
-use super::cleanup::Cleaned;
-use super::{Hints, Seeds};
 use relit_data::geometry::Rect;
 
-/// Under this part of the frame a mask is small.
+use super::bitmap::{Bitmap, Component};
+use super::cleanup::Cleaned;
+use super::{Hints, Seeds};
+
+/// A mask that covers a smaller fraction of the frame is small.
 const SMALL: f64 = 0.005;
-/// Over this part of the frame a mask is large.
+/// A mask that covers a larger fraction of the frame is large.
 const LARGE: f64 = 0.9;
-/// Dropped parts and filled holes are worth a word from this part of the mask's area on.
+/// Dropped components and filled holes are reported from this fraction of the mask's area on.
 const LARGE_PART: f64 = 0.05;
-/// From this part of the rectangle on the mask nearly equals it.
+/// A mask that covers at least this fraction of the rectangle nearly equals it.
 const NEARLY_RECT: f64 = 0.97;
 
 /// A side of the frame.
@@ -23,73 +24,73 @@ pub enum Side {
     Left,
     /// y = 0.
     Top,
-    /// The greatest x.
+    /// The largest x.
     Right,
-    /// The greatest y.
+    /// The largest y.
     Bottom,
 }
 
-/// Something about a mask, or about how it was made, that its user has to look at.
+/// Something about a mask, or about how it was made, that its user should check.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
-    /// The rectangle reaches beyond the frame; only `used` counts.
+    /// The rectangle extends beyond the frame; only `used` counts.
     RectClipped {
         /// The rectangle as given.
         given: Rect,
-        /// The part of it that lies in the frame.
+        /// The part of it that is inside the frame.
         used: Rect,
     },
-    /// The seeds hold pixels of a colour that stands for nothing.
+    /// The seeds have coloured pixels, which have no meaning.
     ColouredSeeds {
-        /// How many, taken as unknown.
+        /// Number of such pixels, which count as unknown.
         px: u64,
     },
-    /// The mask reaches the frame's border.
+    /// The mask touches the frame's border.
     TouchesBorder {
-        /// Where.
+        /// The sides that it touches.
         sides: Vec<Side>,
     },
-    /// The mask is a very small part of the frame.
+    /// The mask covers very little of the frame.
     Small {
-        /// Its part of the frame, 0..=1.
+        /// The fraction of the frame, 0..=1.
         fraction: f64,
     },
-    /// The mask is nearly all of the frame.
+    /// The mask covers nearly the whole frame.
     Large {
-        /// Its part of the frame, 0..=1.
+        /// The fraction of the frame, 0..=1.
         fraction: f64,
     },
-    /// Parts of a size that may belong to the object were dropped.
+    /// Large connected components, which may belong to the object, were dropped.
     PartsDropped {
-        /// How many.
+        /// Number of such components.
         count: usize,
-        /// Where the largest is.
+        /// Bounds of the largest.
         largest: Rect,
     },
-    /// Pixels that the seeds mark as object were dropped with the part that they are in.
+    /// Pixels that the seeds mark as object were dropped with their component.
     MarksDropped {
-        /// How many.
+        /// Number of such pixels.
         px: u64,
     },
-    /// A hole of a size that may be an opening was filled.
+    /// A large hole, which may be an opening of the object, was filled.
     HoleFilled {
         /// Its area, pixels.
         px: u64,
-        /// Where it is.
+        /// Its bounds.
         bounds: Rect,
     },
-    /// The mask is the rectangle, more or less: nothing was cut.
+    /// The mask nearly equals the rectangle: hardly anything was cut away.
     NearlyRect {
-        /// The part of the rectangle that the mask fills, 0..=1.
+        /// The fraction of the rectangle that the mask covers, 0..=1.
         fraction: f64,
     },
-    /// The recipe was followed on another frame, or by other software, and gave another mask.
+    /// Following a recipe on another frame, or with other software, gave another mask.
     NotReproduced,
 }
 
-/// What is to be said of a mask that was cut by these hints.
-pub(super) fn of(
+/// The warnings about a mask that was made with these hints.
+pub(super) fn warnings(
     hints: &Hints,
     used: Option<Rect>,
     cleaned: &Cleaned,
@@ -133,23 +134,23 @@ fn touches(bounds: Rect, (width, height): (u32, u32)) -> Option<Warning> {
     (!sides.is_empty()).then_some(Warning::TouchesBorder { sides })
 }
 
-fn dropped(parts: &[Part], area: f64) -> Option<Warning> {
-    let large = parts
+fn dropped(components: &[Component], area: f64) -> Option<Warning> {
+    let large = components
         .iter()
-        .filter(|part| part.area as f64 >= LARGE_PART * area);
-    let largest = large.clone().max_by_key(|part| part.area)?.bounds;
+        .filter(|component| component.area as f64 >= LARGE_PART * area);
+    let largest = large.clone().max_by_key(|component| component.area)?.bounds;
     let count = large.count();
     Some(Warning::PartsDropped { count, largest })
 }
 
-fn filled(holes: &[Part], area: f64) -> Option<Warning> {
+fn filled(holes: &[Component], area: f64) -> Option<Warning> {
     let largest = holes.iter().max_by_key(|hole| hole.area)?;
     let (px, bounds) = (largest.area, largest.bounds);
     (px as f64 >= LARGE_PART * area).then_some(Warning::HoleFilled { px, bounds })
 }
 
 fn nearly_rect(rect: Rect, mask: &Bitmap) -> Option<Warning> {
-    // Only seeds can mark object outside the rectangle; that is a shape of its own.
+    // With seeds the object can extend beyond the rectangle; then its shape is not the rectangle's.
     let bounds = mask.bounds();
     let inside = bounds.x >= rect.x
         && bounds.y >= rect.y
@@ -175,17 +176,17 @@ impl fmt::Display for Warning {
         match self {
             Self::RectClipped { given, used } => write!(
                 f,
-                "the rectangle {given} reaches beyond the frame and was cut to {used}: check its numbers"
+                "the rectangle {given} extends beyond the frame and was clipped to {used}: check its numbers"
             ),
             Self::ColouredSeeds { px } => write!(
                 f,
-                "{px} coloured pixels of the seeds were taken as unknown: only white marks the object and only black the background"
+                "{px} coloured pixels of the seeds count as unknown: only white marks the object and only black the background"
             ),
             Self::TouchesBorder { sides } => {
                 let sides: Vec<String> = sides.iter().map(Side::to_string).collect();
                 write!(
                     f,
-                    "the mask touches the {} border of the frame: the object is cut off there, or background was taken for it",
+                    "the mask touches the {} border of the frame: the object is cut off there, or background was included",
                     sides.join(", ")
                 )
             }
@@ -196,16 +197,16 @@ impl fmt::Display for Warning {
             ),
             Self::Large { fraction } => write!(
                 f,
-                "the mask covers {:.0} % of the frame: check that background was not taken for the object",
+                "the mask covers {:.0} % of the frame: check that it does not include background",
                 100.0 * fraction
             ),
             Self::PartsDropped { count, largest } => write!(
                 f,
-                "{count} large part(s) were dropped, the largest at {largest}: if they belong to the object, mark what joins them white in seeds, or give --keep-all"
+                "{count} large part(s) were dropped, the largest at {largest}: if they belong to the object, mark what connects them white in seeds, or give --keep-all"
             ),
             Self::MarksDropped { px } => write!(
                 f,
-                "{px} pixels that the seeds mark as object are not in the mask, because they hang together with no more than a smaller part: mark what joins the parts, or give --keep-all"
+                "{px} pixels that the seeds mark as object are not in the mask, because they are connected to a smaller part only: mark what connects the parts, or give --keep-all"
             ),
             Self::HoleFilled { px, bounds } => write!(
                 f,
@@ -213,7 +214,7 @@ impl fmt::Display for Warning {
             ),
             Self::NearlyRect { fraction } => write!(
                 f,
-                "the mask fills {:.0} % of the rectangle: nearly nothing was cut away; draw the rectangle a little larger, or give seeds",
+                "the mask covers {:.0} % of the rectangle: hardly anything was cut away; draw the rectangle a little larger, or give seeds",
                 100.0 * fraction
             ),
             Self::NotReproduced => {
@@ -227,24 +228,24 @@ impl fmt::Display for Warning {
 mod tests {
     use super::*;
 
-    fn warnings(rows: &[&str], rect: Rect) -> Vec<Warning> {
+    fn warnings_of(rows: &[&str], rect: Rect) -> Vec<Warning> {
         let raw = Bitmap::drawn(rows);
         let size = (rows[0].len() as u32, rows.len() as u32);
         let cleaned = super::super::cleanup::clean(&raw, None, false);
         let used = rect.clipped_to(size.0, size.1);
-        of(&Hints::Rect(rect), used, &cleaned, size)
+        warnings(&Hints::Rect(rect), used, &cleaned, size)
     }
 
     #[test]
-    fn a_mask_in_the_middle_is_not_worth_a_word() {
+    fn a_mask_in_the_middle_gives_no_warning() {
         let rows = [".......", "..##...", "..###..", "......."];
-        assert_eq!(warnings(&rows, Rect::new(1, 1, 5, 2)), []);
+        assert_eq!(warnings_of(&rows, Rect::new(1, 1, 5, 2)), []);
     }
 
     #[test]
-    fn a_mask_at_the_border_is_told_with_its_sides() {
+    fn a_mask_at_the_border_gives_a_warning_with_its_sides() {
         let rows = [".......", ".....##", "......#"];
-        let found = warnings(&rows, Rect::new(1, 1, 9, 2));
+        let found = warnings_of(&rows, Rect::new(1, 1, 9, 2));
         let sides = vec![Side::Right, Side::Bottom];
         assert!(found.contains(&Warning::TouchesBorder { sides }));
         let (given, used) = (Rect::new(1, 1, 9, 2), Rect::new(1, 1, 6, 2));
@@ -252,26 +253,26 @@ mod tests {
     }
 
     #[test]
-    fn a_mask_that_is_the_rectangle_is_told() {
+    fn a_mask_that_equals_the_rectangle_gives_a_warning() {
         let rows = [".....", ".###.", ".###.", "....."];
         let wanted = [Warning::NearlyRect { fraction: 1.0 }];
-        assert_eq!(warnings(&rows, Rect::new(1, 1, 3, 2)), wanted);
+        assert_eq!(warnings_of(&rows, Rect::new(1, 1, 3, 2)), wanted);
     }
 
     #[test]
-    fn large_dropped_parts_and_large_holes_are_told() {
+    fn large_dropped_parts_and_large_holes_give_warnings() {
         let rows = [".......", ".###.#.", ".#.#.#.", ".###...", "......."];
         let (largest, bounds) = (Rect::new(5, 1, 1, 2), Rect::new(2, 2, 1, 1));
         let wanted = [
             Warning::PartsDropped { count: 1, largest },
             Warning::HoleFilled { px: 1, bounds },
         ];
-        assert_eq!(warnings(&rows, Rect::new(0, 0, 7, 5)), wanted);
+        assert_eq!(warnings_of(&rows, Rect::new(0, 0, 7, 5)), wanted);
     }
 
     #[test]
     fn every_warning_is_one_line() {
-        for warning in warnings(&["##", "##"], Rect::new(-1, 0, 9, 2)) {
+        for warning in warnings_of(&["##", "##"], Rect::new(-1, 0, 9, 2)) {
             assert!(!warning.to_string().contains('\n'));
         }
     }

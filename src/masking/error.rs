@@ -1,26 +1,26 @@
-//! What can go wrong between a recording and its mask on disk.
+//! The errors of making the mask of a recording.
 
 use std::io;
 use std::path::PathBuf;
 
 use relit_data::session;
 
-/// Why a recording has no mask.
+/// Why the mask of a recording could not be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Error {
-    /// The frame cannot be segmented as asked.
+pub enum MaskingError {
+    /// The frame cannot be segmented with these hints.
     #[error(transparent)]
-    Mask(#[from] relit_mask::Error),
+    Mask(#[from] relit_mask::MaskError),
     /// A name for the mask that does not end in `.png`.
     #[error("{0} cannot be the mask's name: give one that ends in .png")]
     OutputName(PathBuf),
-    /// A mask for which no record vouches.
+    /// A mask that differs from its record, or has none.
     #[error(
-        "{0} was not made by this program, or was changed since: it may be somebody's handwork and is kept; give --force to replace it, or another name with -o"
+        "{0} was not made by this program, or was changed since: it may have been painted by hand and is kept; give --force to replace it, or another name with -o"
     )]
     Handmade(PathBuf),
-    /// Where the record would be written stands another file.
+    /// Another file has the name of the record.
     #[error(
         "{path} would be overwritten, but is not a mask's record ({why}): move it away, or give another name with -o"
     )]
@@ -30,7 +30,7 @@ pub enum Error {
         /// What is wrong with it.
         why: String,
     },
-    /// A recipe that cannot be followed.
+    /// A record that cannot be used as a recipe.
     #[error("{path} cannot be used as a recipe: {why}")]
     Recipe {
         /// The record.
@@ -38,9 +38,9 @@ pub enum Error {
         /// What is wrong with it.
         why: String,
     },
-    /// The frame is not the one that the recipe was recorded on.
+    /// The frame is not the one on which the recipe was recorded.
     #[error(
-        "frame {frame} of {video} is not the frame that {recipe} was recorded on: give hints of its own, or --force to use the recorded ones"
+        "frame {frame} of {video} is not the frame on which {recipe} was recorded: give other hints, or --force to use the recorded ones"
     )]
     OtherFrame {
         /// The frame's number.
@@ -52,7 +52,7 @@ pub enum Error {
     },
     /// The recipe was followed on the same frame and gave another mask.
     #[error(
-        "the mask made after {recipe} differs from the recorded one, though the frame is the same (made by {made_by}, now {now}): nothing was written; give --force to take the new mask"
+        "the mask made with {recipe} differs from the recorded one, although the frame is the same (made by {made_by}, now {now}): nothing was written; give --force to accept the new mask"
     )]
     NotReproduced {
         /// The record.
@@ -64,21 +64,21 @@ pub enum Error {
     },
     /// The recording cannot be opened.
     #[error(transparent)]
-    Session(#[from] session::Error),
+    Session(#[from] session::SessionError),
     /// The video cannot be read.
     #[error(transparent)]
-    Video(#[from] relit_video::Error),
-    /// The file system refused.
+    Video(#[from] relit_video::VideoError),
+    /// A file could not be read or written.
     #[error("{path} could not be {doing}")]
     Io {
         /// The file.
         path: PathBuf,
-        /// What was to be done, as a participle: "read".
+        /// What was attempted, as a participle: "read".
         doing: &'static str,
-        /// The system's answer.
+        /// The system's error.
         source: io::Error,
     },
-    /// Any of the others, with the recording that it concerns.
+    /// Any of the others, with the recording's id.
     #[error("no mask for {recording}: {source}")]
     Recording {
         /// The recording's id.
@@ -88,7 +88,7 @@ pub enum Error {
     },
 }
 
-impl Error {
+impl MaskingError {
     pub(super) fn io(
         path: impl Into<PathBuf>,
         doing: &'static str,

@@ -1,7 +1,9 @@
-//! The mask of a recording: one frame read, three files written beside each other.
+//! The mask of a recording: reads one frame and writes three files.
 //!
-//! `NAME.png` is the mask, `NAME.json` its record, `NAME-preview.png` the picture to judge it by.
-//! A mask is replaced only where its record vouches for it, because then it can be made again.
+//! `NAME.png` is the mask, `NAME.json` its record, `NAME-preview.png` the image for checking it. An
+//! existing mask is replaced only if its record has its hash, because then it can be made again.
+//!
+//! This module brings frames and folders to `relit-mask`. It knows nothing of data sets and the rig.
 
 mod error;
 
@@ -14,44 +16,44 @@ use image::RgbImage;
 use relit_data::durable;
 use relit_data::session::{MASK_FILE, Notice, Recording};
 use relit_mask::{
-    Hints, MASK_SCHEMA, Mask, MaskRecord, RecordFault, RecordedHints, RecordedResult, Settings,
-    Software, Source, Warning, grey_png, preview, rgb_png, segment,
+    Hints, MASK_SCHEMA, Mask, MaskRecord, MaskSoftware, RecordFault, RecordedHints, RecordedResult,
+    SegmentSettings, SourceFrame, Warning, grey_png, preview, rgb_png, segment,
 };
 use relit_video::Video;
 
-pub use error::Error;
+pub use error::MaskingError;
 
-/// What is to be made.
+/// How to make a mask.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct MaskRequest {
     frame: u64,
     hints: Hints,
-    settings: Settings,
+    settings: SegmentSettings,
     recipe: Option<Recipe>,
     force: bool,
 }
 
-/// A record that is to be followed to the same bytes.
+/// A record whose mask has to be reproduced byte for byte.
 #[derive(Debug, Clone)]
 struct Recipe {
     path: PathBuf,
     record: MaskRecord,
 }
 
-/// A mask on disk.
+/// A mask that was written.
 #[derive(Debug, Clone)]
-pub struct Made {
+pub struct MaskOutput {
     /// The recording's id.
     pub recording: String,
-    /// Where the three files are.
+    /// The three files.
     pub files: MaskFiles,
-    /// What the record says.
+    /// The record.
     pub record: MaskRecord,
-    /// What the user has to know of the recording.
+    /// What the user should know about the recording.
     pub notices: Vec<Notice>,
 }
 
-/// The names of a mask's three files.
+/// The paths of a mask's three files.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MaskFiles {
     /// The mask.
@@ -62,10 +64,10 @@ pub struct MaskFiles {
     pub preview: PathBuf,
 }
 
-impl Request {
-    /// A mask on frame number `frame`, 0-based, by `hints`.
+impl MaskRequest {
+    /// A mask on frame number `frame`, 0-based, with these hints.
     #[must_use]
-    pub fn new(frame: u64, hints: Hints, settings: Settings) -> Self {
+    pub fn new(frame: u64, hints: Hints, settings: SegmentSettings) -> Self {
         Self {
             frame,
             hints,
@@ -75,16 +77,16 @@ impl Request {
         }
     }
 
-    /// The mask that the record `path` tells of, to the same bytes.
+    /// The mask that the record `path` describes, to the same bytes.
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::Recipe`].
-    pub fn from_recipe(path: &Path) -> Result<Self, Error> {
-        let wrong = |fault: RecordFault| Error::Recipe {
+    /// [`MaskingError::Io`] or [`MaskingError::Recipe`].
+    pub fn from_recipe(path: &Path) -> Result<Self, MaskingError> {
+        let wrong = |fault: RecordFault| MaskingError::Recipe {
             path: path.to_owned(),
             why: fault.to_string(),
         };
-        let bytes = fs::read(path).map_err(Error::io(path, "read"))?;
+        let bytes = fs::read(path).map_err(MaskingError::io(path, "read"))?;
         let record = MaskRecord::from_json(&bytes).map_err(wrong)?;
         let hints = record.hints.hints().map_err(wrong)?;
         let path = path.to_owned();
@@ -97,7 +99,8 @@ impl Request {
         })
     }
 
-    /// Replace a mask that nothing vouches for, and follow a recipe also to other bytes.
+    /// With `force`, replaces a mask that differs from its record, and accepts another result of a
+    /// recipe.
     #[must_use]
     pub fn with_force(self, force: bool) -> Self {
         Self { force, ..self }
@@ -105,11 +108,11 @@ impl Request {
 }
 
 impl MaskFiles {
-    /// The files of the mask `mask`, whose name has to end in `.png`.
+    /// The files of the mask `mask`, whose name must end in `.png`.
     ///
     /// # Errors
-    /// [`Error::OutputName`].
-    pub fn of(mask: &Path) -> Result<Self, Error> {
+    /// [`MaskingError::OutputName`].
+    pub fn of(mask: &Path) -> Result<Self, MaskingError> {
         let is_png = mask
             .extension()
             .is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
@@ -123,55 +126,63 @@ impl MaskFiles {
                     preview: mask.with_file_name(preview),
                 })
             }
-            _ => Err(Error::OutputName(mask.to_owned())),
+            _ => Err(MaskingError::OutputName(mask.to_owned())),
         }
     }
 }
 
 /// Makes the mask of the recording at `input`, a session folder or a video file, and writes its
-/// files: to `output`, else as `mask.png` in the session folder or, for a bare video, in the
-/// working directory. Each file appears whole or not at all, the mask last; nothing is written
-/// where anything fails before.
+/// files: to `output`, or else as `mask.png` into the session folder or, for a bare video, into the
+/// working directory. Each file appears whole or not at all, the mask last; nothing is written if
+/// anything before fails.
 ///
 /// # Errors
-/// [`Error::Session`] where there is no recording; else [`Error::Recording`] around any other.
-pub fn make(input: &Path, output: Option<MaskFiles>, request: &Request) -> Result<Made, Error> {
+/// [`MaskingError::Session`] if there is no recording; otherwise [`MaskingError::Recording`] around the cause.
+pub fn make_mask(
+    input: &Path,
+    output: Option<MaskFiles>,
+    request: &MaskRequest,
+) -> Result<MaskOutput, MaskingError> {
     let recording = Recording::open(input)?;
-    match make_unnamed(&recording, output, request) {
-        Ok((files, record)) => Ok(Made {
+    match mask_recording(&recording, output, request) {
+        Ok((files, record)) => Ok(MaskOutput {
             recording: recording.id,
             files,
             record,
             notices: recording.notices,
         }),
-        Err(source) => Err(Error::Recording {
+        Err(source) => Err(MaskingError::Recording {
             recording: recording.id,
             source: Box::new(source),
         }),
     }
 }
 
-fn make_unnamed(
+fn mask_recording(
     recording: &Recording,
     output: Option<MaskFiles>,
-    request: &Request,
-) -> Result<(MaskFiles, MaskRecord), Error> {
+    request: &MaskRequest,
+) -> Result<(MaskFiles, MaskRecord), MaskingError> {
     let files = match output {
         Some(files) => files,
         None => MaskFiles::of(&recording.folder.clone().unwrap_or_default().join(MASK_FILE))?,
     };
-    may_write(&files, request.force)?;
-    let record = cut_and_write(&recording.video, &files, request)?;
+    check_replaceable(&files, request.force)?;
+    let record = segment_and_write(&recording.video, &files, request)?;
     Ok((files, record))
 }
 
-fn cut_and_write(video: &Path, files: &MaskFiles, request: &Request) -> Result<MaskRecord, Error> {
+fn segment_and_write(
+    video: &Path,
+    files: &MaskFiles,
+    request: &MaskRequest,
+) -> Result<MaskRecord, MaskingError> {
     let (frame, source) = read_frame(video, request.frame)?;
     if let Some(recipe) = &request.recipe
         && !request.force
-        && !same_picture(&recipe.record.source, &source)
+        && !same_image(&recipe.record.source, &source)
     {
-        return Err(Error::OtherFrame {
+        return Err(MaskingError::OtherFrame {
             frame: request.frame,
             video: video.to_owned(),
             recipe: recipe.path.clone(),
@@ -180,21 +191,21 @@ fn cut_and_write(video: &Path, files: &MaskFiles, request: &Request) -> Result<M
     let mask = segment(&frame, &request.hints, &request.settings)?;
     let png = grey_png(mask.image(), "the mask")?;
     let record = record_of(source, request, &mask, &png)?;
-    let picture = rgb_png(&preview(&frame, mask.image()), "the preview")?;
+    let preview_png = rgb_png(&preview(&frame, mask.image()), "the preview")?;
     let json = record.to_json();
-    let json = json.map_err(|error| Error::io(&files.record, "written")(error.into()))?;
-    write(&files.preview, &picture)?;
+    let json = json.map_err(|error| MaskingError::io(&files.record, "written")(error.into()))?;
+    write(&files.preview, &preview_png)?;
     write(&files.record, &json)?;
     write(&files.mask, &png)?;
     Ok(record)
 }
 
-fn read_frame(path: &Path, number: u64) -> Result<(RgbImage, Source), Error> {
+fn read_frame(path: &Path, number: u64) -> Result<(RgbImage, SourceFrame), MaskingError> {
     let video = Video::open(path)?;
     let frame = video.frame(number)?;
     let info = video.frames().iter().find(|info| info.number == number);
     let name = path.file_name().unwrap_or_default();
-    let source = Source {
+    let source = SourceFrame {
         video: name.to_string_lossy().into_owned(),
         frame: number,
         t_us: info.map_or(0, |info| info.t_us),
@@ -205,24 +216,24 @@ fn read_frame(path: &Path, number: u64) -> Result<(RgbImage, Source), Error> {
     Ok((frame, source))
 }
 
-fn same_picture(a: &Source, b: &Source) -> bool {
+fn same_image(a: &SourceFrame, b: &SourceFrame) -> bool {
     (a.width, a.height, &a.frame_blake3) == (b.width, b.height, &b.frame_blake3)
 }
 
 fn record_of(
-    source: Source,
-    request: &Request,
+    source: SourceFrame,
+    request: &MaskRequest,
     mask: &Mask,
     png: &[u8],
-) -> Result<MaskRecord, Error> {
-    let result = RecordedResult::new(mask.figures(), png);
+) -> Result<MaskRecord, MaskingError> {
+    let result = RecordedResult::new(mask.statistics(), png);
     let mut warnings: Vec<String> = mask.warnings().iter().map(Warning::to_string).collect();
-    let software = Software::here();
+    let software = MaskSoftware::current();
     if let Some(Recipe { path, record }) = &request.recipe
         && record.result.mask_blake3 != result.mask_blake3
     {
         if !request.force {
-            return Err(Error::NotReproduced {
+            return Err(MaskingError::NotReproduced {
                 recipe: path.clone(),
                 made_by: record.software.to_string(),
                 now: software.to_string(),
@@ -241,41 +252,42 @@ fn record_of(
     })
 }
 
-/// Whether what stands where the files would go can be replaced.
-fn may_write(files: &MaskFiles, force: bool) -> Result<(), Error> {
-    let record = match read_if_there(&files.record)? {
+/// Checks that existing files may be replaced.
+fn check_replaceable(files: &MaskFiles, force: bool) -> Result<(), MaskingError> {
+    let record = match read_if_exists(&files.record)? {
         None => None,
         Some(bytes) => {
-            let record = MaskRecord::from_json(&bytes).map_err(|fault| Error::ForeignFile {
-                path: files.record.clone(),
-                why: fault.to_string(),
-            })?;
+            let record =
+                MaskRecord::from_json(&bytes).map_err(|fault| MaskingError::ForeignFile {
+                    path: files.record.clone(),
+                    why: fault.to_string(),
+                })?;
             Some(record)
         }
     };
     if force {
         return Ok(());
     }
-    let Some(mask) = read_if_there(&files.mask)? else {
+    let Some(mask) = read_if_exists(&files.mask)? else {
         return Ok(());
     };
     let found = blake3::hash(&mask).to_hex();
     match record {
         Some(record) if record.result.mask_blake3 == found.as_str() => Ok(()),
-        _ => Err(Error::Handmade(files.mask.clone())),
+        _ => Err(MaskingError::Handmade(files.mask.clone())),
     }
 }
 
-fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, Error> {
+fn read_if_exists(path: &Path) -> Result<Option<Vec<u8>>, MaskingError> {
     match fs::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(Error::io(path, "read")(error)),
+        Err(error) => Err(MaskingError::io(path, "read")(error)),
     }
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    durable::write_whole(path, bytes).map_err(Error::io(path, "written"))
+fn write(path: &Path, bytes: &[u8]) -> Result<(), MaskingError> {
+    durable::write_whole(path, bytes).map_err(MaskingError::io(path, "written"))
 }
 
 #[cfg(test)]
@@ -283,36 +295,39 @@ mod tests {
     use super::*;
 
     #[test]
-    fn record_and_preview_stand_beside_the_mask() {
+    fn record_and_preview_are_named_after_the_mask() {
         let files = MaskFiles::of(Path::new("a/mug.v2.PNG")).unwrap();
         assert_eq!(files.record, Path::new("a/mug.v2.json"));
         assert_eq!(files.preview, Path::new("a/mug.v2-preview.png"));
     }
 
     #[test]
-    fn a_mask_has_to_be_called_png() {
+    fn the_name_of_a_mask_must_end_in_png() {
         for name in ["mask", "mask.jpg", "session.json", ".png", ""] {
             let files = MaskFiles::of(Path::new(name));
-            assert!(matches!(files, Err(Error::OutputName(_))), "{name}");
+            assert!(matches!(files, Err(MaskingError::OutputName(_))), "{name}");
         }
     }
 
     #[test]
-    fn a_file_that_is_no_record_is_never_replaced() {
+    fn a_file_that_is_not_a_record_is_never_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let files = MaskFiles::of(&folder.path().join("session.png")).unwrap();
         fs::write(&files.record, r#"{"schema": "relit.session/1"}"#).unwrap();
-        let result = may_write(&files, true);
-        assert!(matches!(result, Err(Error::ForeignFile { .. })));
+        let result = check_replaceable(&files, true);
+        assert!(matches!(result, Err(MaskingError::ForeignFile { .. })));
     }
 
     #[test]
-    fn a_mask_without_record_is_replaced_only_by_force() {
+    fn a_mask_without_record_is_replaced_only_with_force() {
         let folder = tempfile::tempdir().unwrap();
         let files = MaskFiles::of(&folder.path().join("mask.png")).unwrap();
-        assert!(may_write(&files, false).is_ok());
+        assert!(check_replaceable(&files, false).is_ok());
         fs::write(&files.mask, "painted").unwrap();
-        assert!(matches!(may_write(&files, false), Err(Error::Handmade(_))));
-        assert!(may_write(&files, true).is_ok());
+        assert!(matches!(
+            check_replaceable(&files, false),
+            Err(MaskingError::Handmade(_))
+        ));
+        assert!(check_replaceable(&files, true).is_ok());
     }
 }

@@ -1,13 +1,14 @@
 //! What the rig is doing, as everybody beside it sees it: terminal, page, metrics.
 //!
-//! One [`Monitor`] a rig. The capture writes into it, any number of viewers read; none of them can
-//! hold the capture up. Knows nobody.
+//! One [`Monitor`] a rig. The capture writes into it, any number of viewers read or subscribe; none of
+//! them can hold the capture up. Knows nobody.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use serde::Serialize;
+use tokio::sync::watch;
 use utoipa::ToSchema;
 
 /// Faults kept for display; older ones are in the sessions' manifests.
@@ -201,7 +202,8 @@ pub struct Monitor {
 struct Shared {
     state: Mutex<RigState>,
     changed: Condvar,
-    preview: Mutex<Option<PreviewFrame>>,
+    version: watch::Sender<u64>,
+    picture: watch::Sender<Option<PreviewFrame>>,
 }
 
 impl Monitor {
@@ -216,6 +218,7 @@ impl Monitor {
         change(&mut state);
         state.version = state.version.wrapping_add(1);
         self.shared.changed.notify_all();
+        self.shared.version.send_replace(state.version);
     }
 
     /// Adds a fault to the list that is shown.
@@ -243,16 +246,32 @@ impl Monitor {
         state.clone()
     }
 
+    /// The versions of the state as they come; who falls behind skips some.
+    pub fn versions(&self) -> watch::Receiver<u64> {
+        self.shared.version.subscribe()
+    }
+
     /// Shows a picture; the one before is forgotten.
     pub fn show(&self, t_us: i64, jpeg: Arc<[u8]>) {
-        let mut preview = lock(&self.shared.preview);
-        let number = preview.as_ref().map_or(0, |last| last.number) + 1;
-        *preview = Some(PreviewFrame { number, t_us, jpeg });
+        self.shared.picture.send_modify(|picture| {
+            let number = picture.as_ref().map_or(0, |last| last.number) + 1;
+            *picture = Some(PreviewFrame { number, t_us, jpeg });
+        });
     }
 
     /// The newest picture.
     pub fn preview(&self) -> Option<PreviewFrame> {
-        lock(&self.shared.preview).clone()
+        self.shared.picture.borrow().clone()
+    }
+
+    /// The newest picture, again and again; who falls behind skips some.
+    pub fn pictures(&self) -> watch::Receiver<Option<PreviewFrame>> {
+        self.shared.picture.subscribe()
+    }
+
+    /// Whether anybody is waiting for pictures.
+    pub fn is_watched(&self) -> bool {
+        self.shared.picture.receiver_count() > 0
     }
 }
 

@@ -7,7 +7,7 @@ use ffmpeg_next::codec::threading;
 use ffmpeg_next::codec::{self, Parameters, decoder};
 use ffmpeg_next::{Packet, frame};
 
-use super::FrameFault;
+use super::DecodeFault;
 
 pub(super) use ffmpeg_next::codec::decoder::Video as VideoDecoder;
 
@@ -55,7 +55,7 @@ impl Pool {
     }
 
     /// Decodes one packet that is a whole picture.
-    pub(super) fn decode(&self, packet: &Packet) -> Result<frame::Video, FrameFault> {
+    pub(super) fn decode(&self, packet: &Packet) -> Result<frame::Video, DecodeFault> {
         let idle = self
             .idle
             .lock()
@@ -63,20 +63,20 @@ impl Pool {
             .pop();
         let mut decoder = match idle {
             Some(decoder) => decoder,
-            None => self.open().map_err(FrameFault::Damaged)?,
+            None => self.open().map_err(DecodeFault::Damaged)?,
         };
         let mut picture = frame::Video::empty();
-        decoder.send_packet(packet).map_err(FrameFault::Damaged)?;
+        decoder.send_packet(packet).map_err(DecodeFault::Damaged)?;
         // A decoder that failed is not brought back: it may hold on to what broke it.
         decoder
             .receive_frame(&mut picture)
-            .map_err(FrameFault::Damaged)?;
+            .map_err(DecodeFault::Damaged)?;
         self.idle
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .push(decoder);
         if picture.is_corrupt() || picture.has_decode_errors() {
-            return Err(FrameFault::Concealed);
+            return Err(DecodeFault::Concealed);
         }
         Ok(picture)
     }

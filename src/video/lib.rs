@@ -14,6 +14,7 @@
 mod annexb;
 mod decoder;
 mod ffv1;
+mod format;
 mod live;
 mod lossless;
 mod matroska;
@@ -34,21 +35,20 @@ use std::sync::Once;
 
 use ffmpeg_next::format::context::Input;
 
+pub use format::{BayerPattern, PixelFormat};
 pub use live::LiveDecoder;
-pub use lossless::RawFormat;
-pub use matroska::{Cut, find_cut};
-pub use mux::{Coding, Muxer, StreamFormat, Written};
+pub use matroska::{Truncation, find_truncation};
+pub use mux::{Muxer, StreamFormat, Written};
 pub use nal::is_key;
 pub use packets::{CodedFrame, Packets};
 pub use picture::Picture;
-pub use raw::RawLayout;
 pub use reader::{Pending, Reader};
 pub use scan::{Damage, Facts, FrameInfo, Video};
 pub use seek::first_picture;
 
 /// Why a video could not be read or written.
 #[derive(Debug, thiserror::Error)]
-pub enum Error {
+pub enum VideoError {
     /// FFmpeg cannot make anything of the file.
     #[error(
         "{path} cannot be opened as a video ({why}): is it whole, and is it a video? `ffprobe` on it tells more"
@@ -96,7 +96,7 @@ pub enum Error {
         /// The frame.
         number: u64,
         /// What is wrong with it.
-        fault: FrameFault,
+        fault: DecodeFault,
     },
     /// The disk is full.
     #[error(
@@ -166,7 +166,7 @@ fn folder_of(path: &Path) -> &Path {
 
 /// Why one frame yields no picture.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum FrameFault {
+pub enum DecodeFault {
     /// The decoder refused its data.
     #[error("its data are damaged ({0})")]
     Damaged(ffmpeg_next::Error),
@@ -200,11 +200,11 @@ pub enum FrameFault {
 }
 
 /// Opens a file, and nothing but a file: FFmpeg would take a name with a colon for an address.
-fn open_input(path: &Path) -> Result<Input, Error> {
+fn open_input(path: &Path) -> Result<Input, VideoError> {
     initialise();
     let name = path.to_str().filter(|name| !name.contains('\0'));
-    let name = name.ok_or_else(|| Error::Name(path.to_owned()))?;
-    let failed = |why| Error::Open {
+    let name = name.ok_or_else(|| VideoError::Name(path.to_owned()))?;
+    let failed = |why| VideoError::Open {
         path: path.to_owned(),
         why,
     };

@@ -4,14 +4,14 @@ use ffmpeg_next::codec::{self, decoder};
 use ffmpeg_next::{Packet, frame};
 
 use super::decoder::VideoDecoder;
-use super::mux::Coding;
+use super::lossless;
 use super::orientation::Orientation;
 use super::picture::{Colour, Picture};
-use super::{FrameFault, initialise};
+use super::{DecodeFault, PixelFormat, initialise};
 
 /// Decodes one frame after the other, in the order in which the camera delivers them.
 pub struct LiveDecoder {
-    coding: Coding,
+    format: PixelFormat,
     width: u32,
     height: u32,
     decoder: Option<VideoDecoder>,
@@ -23,25 +23,25 @@ impl std::fmt::Debug for LiveDecoder {
         write!(
             f,
             "LiveDecoder({:?}, {} x {})",
-            self.coding, self.width, self.height
+            self.format, self.width, self.height
         )
     }
 }
 
 impl LiveDecoder {
-    /// For frames of this coding and size.
+    /// For frames of this format and size.
     ///
     /// # Errors
-    /// [`FrameFault::Damaged`] where this FFmpeg lacks the codec.
-    pub fn new(coding: Coding, width: u32, height: u32) -> Result<Self, FrameFault> {
+    /// [`DecodeFault::Damaged`] where this FFmpeg lacks the codec.
+    pub fn new(format: PixelFormat, width: u32, height: u32) -> Result<Self, DecodeFault> {
         initialise();
-        let decoder = match coding {
-            Coding::Mjpeg => Some(open(codec::Id::MJPEG)?),
-            Coding::H264 => Some(open(codec::Id::H264)?),
-            Coding::Raw(_) => None,
+        let decoder = match format {
+            PixelFormat::Mjpeg => Some(open(codec::Id::MJPEG)?),
+            PixelFormat::H264 => Some(open(codec::Id::H264)?),
+            _ => None,
         };
         Ok(Self {
-            coding,
+            format,
             width,
             height,
             decoder,
@@ -53,17 +53,15 @@ impl LiveDecoder {
     /// frame.
     ///
     /// # Errors
-    /// [`FrameFault`] where the data are damaged; the next frame may be whole again.
-    pub fn decode(&mut self, data: &[u8]) -> Result<Option<Picture>, FrameFault> {
-        let frame = match (&mut self.decoder, self.coding) {
-            (Some(decoder), _) => match compressed(decoder, data)? {
+    /// [`DecodeFault`] where the data are damaged; the next frame may be whole again.
+    pub fn decode(&mut self, data: &[u8]) -> Result<Option<Picture>, DecodeFault> {
+        let frame = match &mut self.decoder {
+            Some(decoder) => match compressed(decoder, data)? {
                 Some(frame) => frame,
                 None => return Ok(None),
             },
-            (None, Coding::Raw(raw)) => raw
-                .frame(data, self.width, self.height)
-                .ok_or(FrameFault::Concealed)?,
-            (None, _) => return Ok(None),
+            None => lossless::frame(self.format, data, self.width, self.height)
+                .ok_or(DecodeFault::NotWhole)?,
         };
         let (range, space) = (frame.color_range(), frame.color_space());
         let colour = Colour::stated(frame.format(), range, space, frame.height());
@@ -73,25 +71,28 @@ impl LiveDecoder {
     }
 }
 
-fn open(id: codec::Id) -> Result<VideoDecoder, FrameFault> {
+fn open(id: codec::Id) -> Result<VideoDecoder, DecodeFault> {
     let found = decoder::find(id).ok_or(ffmpeg_next::Error::DecoderNotFound);
-    let context = codec::Context::new_with_codec(found.map_err(FrameFault::Damaged)?);
+    let context = codec::Context::new_with_codec(found.map_err(DecodeFault::Damaged)?);
     let mut decoder = context.decoder();
     // A picture is wanted for each frame, without waiting for those that follow.
     decoder.set_flags(codec::Flags::LOW_DELAY);
-    decoder.video().map_err(FrameFault::Damaged)
+    decoder.video().map_err(DecodeFault::Damaged)
 }
 
-fn compressed(decoder: &mut VideoDecoder, data: &[u8]) -> Result<Option<frame::Video>, FrameFault> {
+fn compressed(
+    decoder: &mut VideoDecoder,
+    data: &[u8],
+) -> Result<Option<frame::Video>, DecodeFault> {
     decoder
         .send_packet(&Packet::copy(data))
-        .map_err(FrameFault::Damaged)?;
+        .map_err(DecodeFault::Damaged)?;
     let mut newest = None;
     loop {
         let mut picture = frame::Video::empty();
         match decoder.receive_frame(&mut picture) {
             Ok(()) if picture.is_corrupt() || picture.has_decode_errors() => {
-                return Err(FrameFault::Concealed);
+                return Err(DecodeFault::Concealed);
             }
             Ok(()) => newest = Some(picture),
             Err(_) => return Ok(newest),
@@ -102,12 +103,11 @@ fn compressed(decoder: &mut VideoDecoder, data: &[u8]) -> Result<Option<frame::V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::RawFormat;
     use relit_data::geometry::Rect;
 
     #[test]
     fn a_raw_picture_is_shown_as_the_camera_sent_it() {
-        let mut live = LiveDecoder::new(Coding::Raw(RawFormat::Rgb24), 2, 2).unwrap();
+        let mut live = LiveDecoder::new(PixelFormat::Rgb24, 2, 2).unwrap();
         let bytes = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
         let picture = live.decode(&bytes).unwrap().unwrap();
         let rgb = picture.rgb(Rect::new(0, 0, 2, 2)).unwrap();
@@ -116,10 +116,10 @@ mod tests {
 
     #[test]
     fn data_that_are_no_picture_are_a_fault_and_the_next_one_is_shown() {
-        let mut live = LiveDecoder::new(Coding::Raw(RawFormat::Grey), 2, 2).unwrap();
+        let mut live = LiveDecoder::new(PixelFormat::Grey, 2, 2).unwrap();
         assert!(live.decode(&[1, 2]).is_err());
         assert!(live.decode(&[1, 2, 3, 4]).unwrap().is_some());
-        let mut live = LiveDecoder::new(Coding::Mjpeg, 2, 2).unwrap();
+        let mut live = LiveDecoder::new(PixelFormat::Mjpeg, 2, 2).unwrap();
         assert!(live.decode(b"no jpeg").is_err());
     }
 }

@@ -7,122 +7,107 @@ use ffmpeg_next::codec::{self, encoder, threading};
 use ffmpeg_next::format::Pixel;
 use ffmpeg_next::{Dictionary, Rational, color, frame};
 
+use super::PixelFormat;
+
 /// Threads of an encoder: as many as it has slices.
 const SLICES: usize = 4;
 
-/// An uncompressed format with 8 bits a value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RawFormat {
-    /// Y U Y V, two pixels in four bytes; kept as 4:2:2 planes.
-    Yuyv,
-    /// A plane of luma and one of colour pairs, 4:2:0; kept as three planes.
-    Nv12,
-    /// Red, green, blue, three bytes a pixel.
-    Rgb24,
-    /// One byte a pixel.
-    Grey,
-    /// One byte a pixel under a colour filter, kept as grey: the pattern is that of the fourcc.
-    Bayer,
+/// The bytes of a picture that FFV1 can keep; `None` where the format is compressed or cannot have
+/// this size without sharing colour between a picture's edge and nothing.
+pub(super) fn picture_bytes(format: PixelFormat, width: u32, height: u32) -> Option<usize> {
+    let (even_width, even_height) = (width.is_multiple_of(2), height.is_multiple_of(2));
+    let possible = match format {
+        PixelFormat::Yuyv => even_width,
+        PixelFormat::Nv12 => even_width && even_height,
+        _ => true,
+    };
+    format
+        .frame_bytes(width, height)
+        .filter(|&bytes| possible && bytes > 0)
 }
 
-impl RawFormat {
-    /// The bytes of one picture without padding; `None` where the format cannot have this size.
-    #[must_use]
-    pub fn picture_bytes(self, width: u32, height: u32) -> Option<usize> {
-        let (width, height) = (usize::try_from(width).ok()?, usize::try_from(height).ok()?);
-        let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0)?;
-        match self {
-            Self::Yuyv if !width.is_multiple_of(2) => None,
-            Self::Nv12 if !width.is_multiple_of(2) || !height.is_multiple_of(2) => None,
-            Self::Yuyv => pixels.checked_mul(2),
-            Self::Nv12 => Some(pixels / 2).and_then(|half| half.checked_mul(3)),
-            Self::Rgb24 => pixels.checked_mul(3),
-            Self::Grey | Self::Bayer => Some(pixels),
-        }
+/// The planes in which FFV1 keeps a format.
+fn planes(format: PixelFormat) -> Pixel {
+    match format {
+        PixelFormat::Yuyv => Pixel::YUV422P,
+        PixelFormat::Nv12 => Pixel::YUV420P,
+        // Blue, green, red and an unused byte: FFV1 codes it as three planes.
+        PixelFormat::Rgb24 => Pixel::BGRZ,
+        _ => Pixel::GRAY8,
     }
+}
 
-    /// The planes in which FFV1 keeps it.
-    fn pixel(self) -> Pixel {
-        match self {
-            Self::Yuyv => Pixel::YUV422P,
-            Self::Nv12 => Pixel::YUV420P,
-            // Blue, green, red and an unused byte: FFV1 codes it as three planes.
-            Self::Rgb24 => Pixel::BGRZ,
-            Self::Grey | Self::Bayer => Pixel::GRAY8,
+/// An FFV1 encoder whose frames stand alone, are checked by checksums and come at once.
+pub(super) fn encoder(
+    format: PixelFormat,
+    width: u32,
+    height: u32,
+) -> Result<encoder::video::Encoder, ffmpeg_next::Error> {
+    let codec = encoder::find(codec::Id::FFV1).ok_or(ffmpeg_next::Error::EncoderNotFound)?;
+    let mut context = codec::Context::new_with_codec(codec);
+    // Threads that share a frame add no delay, as those with a frame each would.
+    context.set_threading(threading::Config {
+        kind: threading::Type::Slice,
+        count: SLICES,
+        ..Default::default()
+    });
+    let mut video = context.encoder().video()?;
+    video.set_width(width);
+    video.set_height(height);
+    video.set_format(planes(format));
+    video.set_time_base(Rational::new(1, 1_000_000));
+    video.set_gop(1);
+    match format {
+        // What Video4Linux means where a driver states nothing: limited range, BT.601.
+        PixelFormat::Yuyv | PixelFormat::Nv12 => {
+            video.set_color_range(color::Range::MPEG);
+            video.set_colorspace(color::Space::SMPTE170M);
         }
+        _ => video.set_color_range(color::Range::JPEG),
     }
+    let mut options = Dictionary::new();
+    options.set("level", "3");
+    options.set("slicecrc", "1");
+    options.set("slices", &SLICES.to_string());
+    // The Golomb-Rice coder: some per cent larger than the range coder, and twice as fast.
+    options.set("coder", "0");
+    video.open_as_with(codec, options)
+}
 
-    /// An FFV1 encoder whose frames stand alone, are checked by checksums and come at once.
-    pub(super) fn encoder(
-        self,
-        width: u32,
-        height: u32,
-    ) -> Result<encoder::video::Encoder, ffmpeg_next::Error> {
-        let codec = encoder::find(codec::Id::FFV1).ok_or(ffmpeg_next::Error::EncoderNotFound)?;
-        let mut context = codec::Context::new_with_codec(codec);
-        // Threads that share a frame add no delay, as those with a frame each would.
-        context.set_threading(threading::Config {
-            kind: threading::Type::Slice,
-            count: SLICES,
-            ..Default::default()
-        });
-        let mut video = context.encoder().video()?;
-        video.set_width(width);
-        video.set_height(height);
-        video.set_format(self.pixel());
-        video.set_time_base(Rational::new(1, 1_000_000));
-        video.set_gop(1);
-        match self {
-            // What Video4Linux means where a driver states nothing: limited range, BT.601.
-            Self::Yuyv | Self::Nv12 => {
-                video.set_color_range(color::Range::MPEG);
-                video.set_colorspace(color::Space::SMPTE170M);
-            }
-            Self::Rgb24 | Self::Grey | Self::Bayer => video.set_color_range(color::Range::JPEG),
-        }
-        let mut options = Dictionary::new();
-        options.set("level", "3");
-        options.set("slicecrc", "1");
-        options.set("slices", &SLICES.to_string());
-        // The Golomb-Rice coder: some per cent larger than the range coder, and twice as fast.
-        options.set("coder", "0");
-        video.open_as_with(codec, options)
+/// The picture as a frame for the encoder; `None` where `bytes` is not one picture.
+pub(super) fn frame(
+    format: PixelFormat,
+    bytes: &[u8],
+    width: u32,
+    height: u32,
+) -> Option<frame::Video> {
+    if bytes.len() != picture_bytes(format, width, height)? {
+        return None;
     }
-
-    /// The picture as a frame for the encoder; `None` where `bytes` is not one picture.
-    pub(super) fn frame(self, bytes: &[u8], width: u32, height: u32) -> Option<frame::Video> {
-        if bytes.len() != self.picture_bytes(width, height)? {
-            return None;
-        }
-        let mut frame = frame::Video::new(self.pixel(), width, height);
-        let row = width as usize;
-        match self {
-            Self::Grey | Self::Bayer => {
-                for (to, from) in rows(&mut frame, 0).zip(bytes.chunks_exact(row)) {
-                    to[..row].copy_from_slice(from);
+    let mut frame = frame::Video::new(planes(format), width, height);
+    let row = width as usize;
+    match format {
+        PixelFormat::Rgb24 => {
+            for (to, from) in rows(&mut frame, 0).zip(bytes.chunks_exact(3 * row)) {
+                for (to, from) in to.chunks_exact_mut(4).zip(from.chunks_exact(3)) {
+                    to.copy_from_slice(&[from[2], from[1], from[0], 0]);
                 }
             }
-            Self::Rgb24 => {
-                for (to, from) in rows(&mut frame, 0).zip(bytes.chunks_exact(3 * row)) {
-                    for (to, from) in to.chunks_exact_mut(4).zip(from.chunks_exact(3)) {
-                        to.copy_from_slice(&[from[2], from[1], from[0], 0]);
-                    }
-                }
-            }
-            Self::Yuyv => {
-                spread(&mut frame, 0, bytes, 2 * row, 0, 2);
-                spread(&mut frame, 1, bytes, 2 * row, 1, 4);
-                spread(&mut frame, 2, bytes, 2 * row, 3, 4);
-            }
-            Self::Nv12 => {
-                let (luma, colour) = bytes.split_at(row * height as usize);
-                spread(&mut frame, 0, luma, row, 0, 1);
-                spread(&mut frame, 1, colour, row, 0, 2);
-                spread(&mut frame, 2, colour, row, 1, 2);
-            }
         }
-        Some(frame)
+        PixelFormat::Yuyv => {
+            spread(&mut frame, 0, bytes, 2 * row, 0, 2);
+            spread(&mut frame, 1, bytes, 2 * row, 1, 4);
+            spread(&mut frame, 2, bytes, 2 * row, 3, 4);
+        }
+        PixelFormat::Nv12 => {
+            let (luma, colour) = bytes.split_at(row * height as usize);
+            spread(&mut frame, 0, luma, row, 0, 1);
+            spread(&mut frame, 1, colour, row, 0, 2);
+            spread(&mut frame, 2, colour, row, 1, 2);
+        }
+        _ => spread(&mut frame, 0, bytes, row, 0, 1),
     }
+    Some(frame)
 }
 
 /// The rows of a plane, with their padding.

@@ -11,7 +11,7 @@ const CLUSTER: u32 = 0x1F43_B675;
 
 /// Where a file ends too early, or an element does not fit where it stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Cut {
+pub struct Truncation {
     /// Where the element begins that is not whole, bytes from the file's start.
     pub element_at: u64,
     /// How many bytes of it are missing, where the file says how large it was to be.
@@ -22,7 +22,7 @@ pub struct Cut {
 ///
 /// # Errors
 /// What reading answers.
-pub fn find_cut(file: &mut (impl Read + Seek)) -> io::Result<Option<Cut>> {
+pub fn find_truncation(file: &mut (impl Read + Seek)) -> io::Result<Option<Truncation>> {
     let length = file.seek(SeekFrom::End(0))?;
     file.seek(SeekFrom::Start(0))?;
     let mut at = 0;
@@ -35,7 +35,7 @@ pub fn find_cut(file: &mut (impl Read + Seek)) -> io::Result<Option<Cut>> {
             cluster_end = length;
         }
         let Some(header) = Header::read(file, at)? else {
-            return Ok((at > 0).then_some(Cut {
+            return Ok((at > 0).then_some(Truncation {
                 element_at: at,
                 missing: None,
             }));
@@ -44,7 +44,7 @@ pub fn find_cut(file: &mut (impl Read + Seek)) -> io::Result<Option<Cut>> {
             return Ok(None);
         }
         let broken = |missing| {
-            Ok(Some(Cut {
+            Ok(Some(Truncation {
                 element_at: at,
                 missing,
             }))
@@ -57,7 +57,7 @@ pub fn find_cut(file: &mut (impl Read + Seek)) -> io::Result<Option<Cut>> {
             Some(end) if end > cluster_end && !enters => return broken(None),
             Some(end) if enters => {
                 if end > length {
-                    open = Some(Cut {
+                    open = Some(Truncation {
                         element_at: at,
                         missing: Some(end - length),
                     });
@@ -171,17 +171,20 @@ mod tests {
     #[test]
     fn a_whole_file_has_no_cut() {
         for known in [false, true] {
-            assert_eq!(find_cut(&mut Cursor::new(file(known))).unwrap(), None);
+            assert_eq!(
+                find_truncation(&mut Cursor::new(file(known))).unwrap(),
+                None
+            );
         }
     }
 
     #[test]
     fn a_cut_is_found_with_its_place_and_what_is_missing() {
         let whole = file(false);
-        let cut = find_cut(&mut Cursor::new(&whole[..whole.len() - 3])).unwrap();
+        let cut = find_truncation(&mut Cursor::new(&whole[..whole.len() - 3])).unwrap();
         assert_eq!(
             cut,
-            Some(Cut {
+            Some(Truncation {
                 element_at: whole.len() as u64 - 9,
                 missing: Some(3)
             })
@@ -191,7 +194,7 @@ mod tests {
     #[test]
     fn a_file_that_is_not_matroska_is_left_alone() {
         for bytes in [&b""[..], b"\0\0\0\x18ftypmp42", b"\xFF\xD8\xFF"] {
-            assert_eq!(find_cut(&mut Cursor::new(bytes)).unwrap(), None);
+            assert_eq!(find_truncation(&mut Cursor::new(bytes)).unwrap(), None);
         }
     }
 
@@ -204,10 +207,10 @@ mod tests {
             &element(&[BLOCK], b"frame 2"),
         ));
         damaged[second + 1] += 3;
-        let cut = find_cut(&mut Cursor::new(damaged)).unwrap();
+        let cut = find_truncation(&mut Cursor::new(damaged)).unwrap();
         assert_eq!(
             cut,
-            Some(Cut {
+            Some(Truncation {
                 element_at: second as u64,
                 missing: None
             })
@@ -219,7 +222,7 @@ mod tests {
         let whole = file(true);
         let cluster_body = whole.len() - 18;
         for length in cluster_body..whole.len() {
-            let cut = find_cut(&mut Cursor::new(&whole[..length])).unwrap();
+            let cut = find_truncation(&mut Cursor::new(&whole[..length])).unwrap();
             assert!(cut.is_some(), "cut to {length} of {}", whole.len());
         }
     }

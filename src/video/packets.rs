@@ -7,7 +7,7 @@ use ffmpeg_next::format::stream::Stream;
 
 use super::annexb::ByteStream;
 use super::scan::Video;
-use super::{Error, open_input};
+use super::{VideoError, open_input};
 
 /// One frame as it is coded in the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,16 +40,16 @@ impl Video {
     /// Opens the file again to hand out its coded frames.
     ///
     /// # Errors
-    /// What opening the file answers; [`Error::NoVideo`] where the stream is gone or its
+    /// What opening the file answers; [`VideoError::NoVideo`] where the stream is gone or its
     /// parameters cannot be read.
-    pub fn packets(&self) -> Result<Packets, Error> {
+    pub fn packets(&self) -> Result<Packets, VideoError> {
         let input = open_input(self.path())?;
         let stream = input.stream(self.track.stream);
         let byte_stream = stream.and_then(|stream| match self.track.codec {
             Id::H264 => ByteStream::from_extra_data(&extra_data(&stream)),
             _ => Some(ByteStream::AsIs),
         });
-        let byte_stream = byte_stream.ok_or_else(|| Error::NoVideo(self.path().to_owned()))?;
+        let byte_stream = byte_stream.ok_or_else(|| VideoError::NoVideo(self.path().to_owned()))?;
         Ok(Packets {
             input,
             stream: self.track.stream,

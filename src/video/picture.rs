@@ -7,7 +7,7 @@ use ffmpeg_next::software::scaling;
 use image::{GenericImage, RgbImage};
 use yuv::{YuvGrayImage, YuvPlanarImage, YuvRange, YuvStandardMatrix};
 
-use super::FrameFault;
+use super::DecodeFault;
 use super::orientation::Orientation;
 use relit_data::geometry::Rect;
 
@@ -159,8 +159,8 @@ impl Picture {
     /// pixels; 0 where the region reaches beyond the picture.
     ///
     /// # Errors
-    /// [`FrameFault::PixelFormat`] where the format cannot be converted.
-    pub fn rgb(&self, region: Rect) -> Result<RgbImage, FrameFault> {
+    /// [`DecodeFault::PixelFormat`] where the format cannot be converted.
+    pub fn rgb(&self, region: Rect) -> Result<RgbImage, DecodeFault> {
         let (width, height) = self.size();
         let Some(inside) = region.clipped_to(width, height) else {
             return Ok(RgbImage::new(region.w, region.h));
@@ -180,7 +180,7 @@ impl Picture {
     }
 
     /// The RGB of a rectangle that lies inside the coded picture.
-    fn coded_rgb(&self, rect: Rect) -> Result<RgbImage, FrameFault> {
+    fn coded_rgb(&self, rect: Rect) -> Result<RgbImage, DecodeFault> {
         let format = self.frame.format();
         if is_direct(format) && strides_are_forward(&self.frame) {
             return planes_to_rgb(&self.frame, format, self.colour, rect)
@@ -192,8 +192,8 @@ impl Picture {
     }
 }
 
-fn unconvertible(format: Pixel) -> FrameFault {
-    FrameFault::PixelFormat(name_of(format).to_owned())
+fn unconvertible(format: Pixel) -> DecodeFault {
+    DecodeFault::PixelFormat(name_of(format).to_owned())
 }
 
 /// Formats that go to RGB without a step between.

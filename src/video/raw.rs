@@ -2,23 +2,10 @@
 
 use ffmpeg_next::format::Pixel;
 
-use super::FrameFault;
 use super::orientation::Orientation;
 use super::picture::{Picture, plane};
+use super::{DecodeFault, PixelFormat};
 use relit_data::geometry::Rect;
-
-/// How a raw picture's bytes are laid out, without padding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RawLayout {
-    /// Luma alone, one byte a pixel.
-    Grey,
-    /// Red, green, blue.
-    Rgb24,
-    /// 4:2:0: luma, then interleaved Cb and Cr.
-    Nv12,
-    /// 4:2:2: Y, Cb, Y, Cr.
-    Yuyv,
-}
 
 impl Picture {
     /// The picture in the raw layout that holds the same samples, where there is one; else, and
@@ -26,8 +13,8 @@ impl Picture {
     /// [`Self::size`].
     ///
     /// # Errors
-    /// [`FrameFault::PixelFormat`] where the format cannot be converted.
-    pub fn raw(&self) -> Result<(RawLayout, Vec<u8>), FrameFault> {
+    /// [`DecodeFault::PixelFormat`] where the format cannot be converted.
+    pub fn raw(&self) -> Result<(PixelFormat, Vec<u8>), DecodeFault> {
         if self.orientation == Orientation::default()
             && let Some(raw) = self.same_samples()
         {
@@ -35,18 +22,18 @@ impl Picture {
         }
         let (width, height) = self.size();
         let rgb = self.rgb(Rect::new(0, 0, width, height))?;
-        Ok((RawLayout::Rgb24, rgb.into_raw()))
+        Ok((PixelFormat::Rgb24, rgb.into_raw()))
     }
 
-    fn same_samples(&self) -> Option<(RawLayout, Vec<u8>)> {
+    fn same_samples(&self) -> Option<(PixelFormat, Vec<u8>)> {
         let (width, height) = (self.frame.width() as usize, self.frame.height() as usize);
         let even = width.is_multiple_of(2);
         match self.frame.format() {
-            Pixel::GRAY8 => Some((RawLayout::Grey, self.rows(0, width, height)?)),
-            Pixel::YUYV422 if even => Some((RawLayout::Yuyv, self.rows(0, 2 * width, height)?)),
+            Pixel::GRAY8 => Some((PixelFormat::Grey, self.rows(0, width, height)?)),
+            Pixel::YUYV422 if even => Some((PixelFormat::Yuyv, self.rows(0, 2 * width, height)?)),
             _ if self.colour.full_range || !even => None,
-            Pixel::YUV420P => Some((RawLayout::Nv12, self.nv12(width, height)?)),
-            Pixel::YUV422P => Some((RawLayout::Yuyv, self.yuyv(width, height)?)),
+            Pixel::YUV420P => Some((PixelFormat::Nv12, self.nv12(width, height)?)),
+            Pixel::YUV422P => Some((PixelFormat::Yuyv, self.yuyv(width, height)?)),
             _ => None,
         }
     }

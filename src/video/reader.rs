@@ -9,7 +9,7 @@ use ffmpeg_next::{Packet, frame};
 use super::decoder::{self as opening, Pool};
 use super::picture::Picture;
 use super::scan::{Track, Video};
-use super::{Error, FrameFault, open_input};
+use super::{DecodeFault, VideoError, open_input};
 
 /// A wanted frame on its way to a picture: still compressed, decoded, or lost.
 /// [`Video::picture`] makes the picture of it, on any thread.
@@ -23,7 +23,7 @@ pub struct Pending {
 enum State {
     Coded(PacketBox),
     Decoded(Picture),
-    Lost(FrameFault),
+    Lost(DecodeFault),
 }
 
 /// A packet, which has no `Debug` of its own.
@@ -42,7 +42,7 @@ impl Pending {
         self.number
     }
 
-    pub(super) fn decode(self, track: &Track, pool: &Pool) -> Result<Picture, FrameFault> {
+    pub(super) fn decode(self, track: &Track, pool: &Pool) -> Result<Picture, DecodeFault> {
         match self.state {
             State::Coded(packet) => track.picture(self.number, pool.decode(&packet.0)?),
             State::Decoded(picture) => Ok(picture),
@@ -53,11 +53,11 @@ impl Pending {
 
 impl Track {
     /// A decoded frame as a picture of this track.
-    pub(super) fn picture(&self, number: u64, frame: frame::Video) -> Result<Picture, FrameFault> {
+    pub(super) fn picture(&self, number: u64, frame: frame::Video) -> Result<Picture, DecodeFault> {
         let (wanted_w, wanted_h) = self.coded;
         let (found_w, found_h) = (frame.width(), frame.height());
         if (found_w, found_h) != self.coded {
-            return Err(FrameFault::Size {
+            return Err(DecodeFault::Size {
                 found_w,
                 found_h,
                 wanted_w,
@@ -91,17 +91,21 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    pub(super) fn open(video: &'a Video, wanted: &[u64], threads: usize) -> Result<Self, Error> {
+    pub(super) fn open(
+        video: &'a Video,
+        wanted: &[u64],
+        threads: usize,
+    ) -> Result<Self, VideoError> {
         let path = || video.path().to_owned();
         let input = open_input(video.path())?;
         let stream = input
             .stream(video.track.stream)
-            .ok_or_else(|| Error::NoVideo(path()))?;
+            .ok_or_else(|| VideoError::NoVideo(path()))?;
         let chain = if opening::frames_stand_alone(video.track.codec) {
             None
         } else {
             let chain = Chain::open(stream.parameters(), threads);
-            Some(chain.map_err(|why| Error::Decoder {
+            Some(chain.map_err(|why| VideoError::Decoder {
                 path: path(),
                 codec: video.facts().codec.clone(),
                 why,
@@ -154,7 +158,7 @@ impl<'a> Reader<'a> {
         for number in self.wanted.rest() {
             self.ready.push_back(Pending {
                 number,
-                state: State::Lost(FrameFault::NoPicture),
+                state: State::Lost(DecodeFault::NoPicture),
             });
         }
     }
@@ -301,10 +305,10 @@ impl Chain {
             self.broken_by = None;
         }
         if picture.is_corrupt() || picture.has_decode_errors() {
-            return self.lose(number, FrameFault::Concealed, wanted, ready);
+            return self.lose(number, DecodeFault::Concealed, wanted, ready);
         }
         if let Some(damaged) = self.broken_by {
-            return self.lose(number, FrameFault::BuildsOnDamaged(damaged), wanted, ready);
+            return self.lose(number, DecodeFault::BuildsOnDamaged(damaged), wanted, ready);
         }
         if wanted.take(number) {
             let state = match track.picture(number, picture) {
@@ -318,7 +322,7 @@ impl Chain {
     fn lose(
         &mut self,
         number: u64,
-        fault: FrameFault,
+        fault: DecodeFault,
         wanted: &mut Wanted,
         ready: &mut VecDeque<Pending>,
     ) {

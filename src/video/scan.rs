@@ -13,7 +13,7 @@ use super::decoder::{self, Pool, VideoDecoder};
 use super::order::{Ordered, Stamp, mark_wrong_checksums};
 use super::orientation::Orientation;
 use super::picture::Colour;
-use super::{Cut, Error, FrameFault, Pending, Reader, find_cut, open_input};
+use super::{DecodeFault, Pending, Reader, Truncation, VideoError, find_truncation, open_input};
 use relit_data::geometry::Rect;
 
 /// What is known of one frame before it is decoded.
@@ -47,7 +47,7 @@ pub struct Facts {
 pub enum Damage {
     /// The file ends inside an element, or an element does not fit where it stands.
     #[error("the file {what} at byte {at}", what = cut_words(.0), at = .0.element_at)]
-    CutOff(Cut),
+    CutOff(Truncation),
     /// The container promises more frames than there are.
     #[error("the file promises {promised} frames and holds {found}")]
     FewerFrames {
@@ -85,7 +85,7 @@ pub enum Damage {
     },
 }
 
-fn cut_words(cut: &Cut) -> String {
+fn cut_words(cut: &Truncation) -> String {
     match cut.missing {
         Some(1) => "is cut off: 1 byte is missing of what begins".to_owned(),
         Some(n) => format!("is cut off: {n} bytes are missing of what begins"),
@@ -130,14 +130,14 @@ impl Video {
     /// Opens a file and reads through it once.
     ///
     /// # Errors
-    /// [`Error::Open`], [`Error::NoVideo`], [`Error::NoFrames`] or [`Error::Decoder`]. A file that
+    /// [`VideoError::Open`], [`VideoError::NoVideo`], [`VideoError::NoFrames`] or [`VideoError::Decoder`]. A file that
     /// is damaged but has frames is opened; [`Self::damage`] tells.
-    pub fn open(path: &Path) -> Result<Self, Error> {
+    pub fn open(path: &Path) -> Result<Self, VideoError> {
         let mut input = open_input(path)?;
         let stream = input
             .streams()
             .best(media::Type::Video)
-            .ok_or_else(|| Error::NoVideo(path.to_owned()))?;
+            .ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
         let index = stream.index();
         let (time_base, rate) = (stream.time_base(), stream.avg_frame_rate());
         let promised = Promised {
@@ -155,11 +155,11 @@ impl Video {
         mark_wrong_checksums(&mut stamps);
         let ordered = Ordered::from(&stamps, time_base, rate);
         if ordered.frames.is_empty() {
-            return Err(Error::NoFrames(path.to_owned()));
+            return Err(VideoError::NoFrames(path.to_owned()));
         }
         let decoder = decoder::open(parameters.clone(), 1).map_err(|why| {
             let codec = format!("{:?}", parameters.id());
-            Error::Decoder {
+            VideoError::Decoder {
                 path: path.to_owned(),
                 codec,
                 why,
@@ -226,11 +226,11 @@ impl Video {
     /// `threads` threads where FFmpeg decodes ahead itself.
     ///
     /// # Errors
-    /// [`Error::NoSuchFrame`], or what opening the file again answers.
-    pub fn read(&self, wanted: &[u64], threads: usize) -> Result<Reader<'_>, Error> {
+    /// [`VideoError::NoSuchFrame`], or what opening the file again answers.
+    pub fn read(&self, wanted: &[u64], threads: usize) -> Result<Reader<'_>, VideoError> {
         let last = self.frames.len() as u64 - 1;
         if let Some(&number) = wanted.iter().find(|&&number| number > last) {
-            return Err(Error::NoSuchFrame {
+            return Err(VideoError::NoSuchFrame {
                 path: self.path.clone(),
                 number,
                 last,
@@ -242,9 +242,9 @@ impl Video {
     /// Decodes one frame to RGB, as displayed.
     ///
     /// # Errors
-    /// [`Error::NoSuchFrame`], [`Error::Frame`], or what opening the file again answers.
-    pub fn frame(&self, number: u64) -> Result<RgbImage, Error> {
-        let wrong = |fault| Error::Frame {
+    /// [`VideoError::NoSuchFrame`], [`VideoError::Frame`], or what opening the file again answers.
+    pub fn frame(&self, number: u64) -> Result<RgbImage, VideoError> {
+        let wrong = |fault| VideoError::Frame {
             path: self.path.clone(),
             number,
             fault,
@@ -255,13 +255,13 @@ impl Video {
             .iter()
             .any(|frame| frame.number == number && frame.damaged)
         {
-            return Err(wrong(FrameFault::NotWhole));
+            return Err(wrong(DecodeFault::NotWhole));
         }
         let all = Rect::new(0, 0, self.facts.width, self.facts.height);
         if let Some(picture) = self.sought(number) {
             return picture.rgb(all).map_err(wrong);
         }
-        let pending = reader.next().ok_or_else(|| wrong(FrameFault::NoPicture))?;
+        let pending = reader.next().ok_or_else(|| wrong(DecodeFault::NoPicture))?;
         self.picture(pending)
             .and_then(|picture| picture.rgb(all))
             .map_err(wrong)
@@ -271,8 +271,8 @@ impl Video {
     /// once.
     ///
     /// # Errors
-    /// [`FrameFault`] where the frame yields no picture.
-    pub fn picture(&self, pending: Pending) -> Result<super::Picture, FrameFault> {
+    /// [`DecodeFault`] where the frame yields no picture.
+    pub fn picture(&self, pending: Pending) -> Result<super::Picture, DecodeFault> {
         pending.decode(&self.track, &self.pool)
     }
 }
@@ -342,7 +342,7 @@ fn find_damage(
 ) -> Vec<Damage> {
     let found = frames.len() as u64;
     let mut damage = Vec::new();
-    let cut = File::open(path).and_then(|file| find_cut(&mut BufReader::new(file)));
+    let cut = File::open(path).and_then(|file| find_truncation(&mut BufReader::new(file)));
     if let Ok(Some(cut)) = cut {
         damage.push(Damage::CutOff(cut));
     }

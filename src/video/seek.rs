@@ -11,7 +11,7 @@ use image::RgbImage;
 use super::decoder::{self as opening, VideoDecoder};
 use super::picture::{Colour, Picture};
 use super::scan::{Video, orientation};
-use super::{Error, FrameFault, open_input};
+use super::{DecodeFault, VideoError, open_input};
 use relit_data::geometry::Rect;
 
 /// Packets that are read in search of one frame: more than lie between two key frames.
@@ -21,17 +21,17 @@ const MOST_PACKETS: usize = 600;
 /// that the time it takes does not grow with the file.
 ///
 /// # Errors
-/// As [`Video::open`]; [`Error::NoFrames`] where nothing at the file's beginning can be decoded.
-pub fn first_picture(path: &Path) -> Result<RgbImage, Error> {
+/// As [`Video::open`]; [`VideoError::NoFrames`] where nothing at the file's beginning can be decoded.
+pub fn first_picture(path: &Path) -> Result<RgbImage, VideoError> {
     let mut input = open_input(path)?;
     let stream = input
         .streams()
         .best(media::Type::Video)
-        .ok_or_else(|| Error::NoVideo(path.to_owned()))?;
+        .ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
     let (index, parameters) = (stream.index(), stream.parameters());
     let (orientation, _) = orientation(&stream);
     let codec = format!("{:?}", parameters.id());
-    let mut decoder = opening::open(parameters, 1).map_err(|why| Error::Decoder {
+    let mut decoder = opening::open(parameters, 1).map_err(|why| VideoError::Decoder {
         path: path.to_owned(),
         codec,
         why,
@@ -48,10 +48,10 @@ pub fn first_picture(path: &Path) -> Result<RgbImage, Error> {
             false => Found::Earlier,
         }
     });
-    let frame = frame.ok_or_else(|| Error::NoFrames(path.to_owned()))?;
+    let frame = frame.ok_or_else(|| VideoError::NoFrames(path.to_owned()))?;
     let picture = Picture::new(0, frame, colour, orientation);
     let (width, height) = picture.size();
-    let wrong = |fault: FrameFault| Error::Frame {
+    let wrong = |fault: DecodeFault| VideoError::Frame {
         path: path.to_owned(),
         number: 0,
         fault,
@@ -169,7 +169,7 @@ mod tests {
         }
         assert!(matches!(
             first_picture(&fixture("no such session")),
-            Err(Error::Open { .. })
+            Err(VideoError::Open { .. })
         ));
     }
 }

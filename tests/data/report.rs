@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use image::{Rgb, RgbImage};
 use relit_data::geometry::Rect;
-use relit_data::report::{Error, Page, Thumbnail, render};
+use relit_data::report::{Page, ReportError, Thumbnail, render};
 use relit_data::shard::record::FrameRecord;
 
 /// A turn of a glossy object: highlights come and go with the lights.
@@ -47,7 +47,7 @@ fn turn(frames: u32) -> Vec<FrameRecord> {
     (0..frames).map(|index| record(index, frames)).collect()
 }
 
-/// A ball lit from where the light stands, black around it.
+/// A ball lit from the light's direction, on black.
 fn thumbnail(record: &FrameRecord) -> Thumbnail {
     let light = record.angle_deg.unwrap_or(0.0).to_radians();
     let image = RgbImage::from_fn(256, 256, |x, y| {
@@ -302,13 +302,13 @@ fn a_very_long_turn_still_gives_a_small_page() {
 
 #[test]
 fn what_cannot_be_shown_is_refused_with_the_place() {
-    assert!(matches!(render(&page(&[], &[])), Err(Error::Empty)));
+    assert!(matches!(render(&page(&[], &[])), Err(ReportError::Empty)));
 
     let mut swapped = turn(3);
     swapped.swap(1, 2);
     assert!(matches!(
         render(&page(&swapped, &[])),
-        Err(Error::Order {
+        Err(ReportError::Order {
             index: 1,
             before: 2
         })
@@ -318,7 +318,7 @@ fn what_cannot_be_shown_is_refused_with_the_place() {
     mixed[2].session = "another".to_owned();
     assert!(matches!(
         render(&page(&mixed, &[])),
-        Err(Error::Session { index: 2, .. })
+        Err(ReportError::Session { index: 2, .. })
     ));
 
     for damage in [
@@ -332,7 +332,7 @@ fn what_cannot_be_shown_is_refused_with_the_place() {
         damage(&mut damaged[1]);
         assert!(matches!(
             render(&page(&damaged, &[])),
-            Err(Error::Value { index: 1, .. })
+            Err(ReportError::Value { index: 1, .. })
         ));
     }
 
@@ -341,22 +341,22 @@ fn what_cannot_be_shown_is_refused_with_the_place() {
         gate: f64::NAN,
         ..page(&records, &[])
     };
-    assert!(matches!(render(&nan_gate), Err(Error::Gate(_))));
+    assert!(matches!(render(&nan_gate), Err(ReportError::Gate(_))));
 
-    let stray = Thumbnail {
+    let unknown = Thumbnail {
         index: 3,
         image: RgbImage::new(4, 4),
     };
     assert!(matches!(
-        render(&page(&records, &[stray])),
-        Err(Error::Stray(3))
+        render(&page(&records, &[unknown])),
+        Err(ReportError::UnknownSample(3))
     ));
     for (width, height) in [(0, 0), (257, 4)] {
         let image = RgbImage::new(width, height);
         let odd = [Thumbnail { index: 1, image }];
         assert!(matches!(
             render(&page(&records, &odd)),
-            Err(Error::Size { index: 1, .. })
+            Err(ReportError::Size { index: 1, .. })
         ));
     }
 }

@@ -1,5 +1,4 @@
-//! The session room from outside: folders written and read, and damaged in every way that was
-//! thought of.
+//! Session folders: written, read back, and damaged in many ways.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::collections::BTreeMap;
@@ -8,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
 use relit_data::session::{
-    CameraFacts, Error, FrameEntry, FrameIndex, Manifest, Notice, Recording, SessionWriter,
-    SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of, recordings,
+    CameraFacts, FrameClock, FrameEntry, FrameIndex, Manifest, Notice, Recording, SessionError,
+    SessionWriter, SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of, recordings,
 };
 use tempfile::TempDir;
 
@@ -29,6 +28,7 @@ fn manifest() -> Manifest {
             width: 640,
             height: 480,
             fps: 30.0,
+            clock: FrameClock::default(),
             controls: BTreeMap::from([("gain".to_owned(), 4.into())]),
         },
         turntable: Some(TurntableFacts {
@@ -108,7 +108,20 @@ fn a_session_is_read_as_it_was_written() {
 }
 
 #[test]
-fn a_session_under_way_says_so_until_it_is_ended() {
+fn a_manifest_names_the_clock_only_where_it_is_not_the_drivers() {
+    let driver = manifest();
+    let text = String::from_utf8(driver.to_json().unwrap()).unwrap();
+    assert!(!text.contains("clock"), "{text}");
+    assert_eq!(Manifest::from_json(text.as_bytes()).unwrap(), driver);
+    let mut host = manifest();
+    host.camera.clock = FrameClock::Host;
+    let text = String::from_utf8(host.to_json().unwrap()).unwrap();
+    assert!(text.contains("\"clock\": \"host\""), "{text}");
+    assert_eq!(Manifest::from_json(text.as_bytes()).unwrap(), host);
+}
+
+#[test]
+fn a_session_is_marked_as_recording_until_it_ends() {
     let root = tempfile::tempdir().unwrap();
     let mut writer = SessionWriter::create(root.path(), manifest()).unwrap();
     fs::write(writer.video_path(), b"some").unwrap();
@@ -116,7 +129,7 @@ fn a_session_under_way_says_so_until_it_is_ended() {
     let folder = writer.folder().to_owned();
     assert!(matches!(
         Recording::open(&folder),
-        Err(Error::StillRecording(_))
+        Err(SessionError::StillRecording(_))
     ));
     writer.abort("the camera was unplugged").unwrap();
     let recording = Recording::open(&folder).unwrap();
@@ -135,17 +148,17 @@ fn a_capture_that_failed_before_its_first_frame_can_be_aborted() {
 }
 
 #[test]
-fn a_session_is_never_written_over_another() {
+fn a_session_never_replaces_another_one() {
     let (root, _folder) = whole();
     assert!(matches!(
         SessionWriter::create(root.path(), manifest()),
-        Err(Error::Exists(_))
+        Err(SessionError::Exists(_))
     ));
     let mut outside = manifest();
     outside.id = "../mug".to_owned();
     assert!(matches!(
         SessionWriter::create(root.path(), outside),
-        Err(Error::BadName(_))
+        Err(SessionError::BadName(_))
     ));
 }
 
@@ -156,7 +169,7 @@ fn an_entry_that_does_not_follow_is_refused_and_leaves_the_index_whole() {
     writer.push(entry(0)).unwrap();
     assert!(matches!(
         writer.push(entry(2)),
-        Err(Error::BadEntry { n: 2, .. })
+        Err(SessionError::BadEntry { n: 2, .. })
     ));
     writer.push(entry(1)).unwrap();
     let text = fs::read(writer.folder().join("frames.jsonl")).unwrap();
@@ -192,31 +205,30 @@ fn what_is_wrong_in_a_manifest_is_named() {
 }
 
 #[test]
-fn a_video_that_was_cut_is_a_loss_and_a_missing_one_an_error() {
+fn a_truncated_video_is_a_loss_and_a_missing_one_an_error() {
     let (_root, folder) = whole();
     fs::write(folder.join("video.mkv"), b"ten").unwrap();
     let recording = Recording::open(&folder).unwrap();
-    let told = losses(&recording);
     assert_eq!(
-        told,
-        ["video.mkv has 3 bytes where the manifest says 10: it was cut or changed"]
+        losses(&recording),
+        ["video.mkv has 3 bytes, but the manifest says 10: it was truncated or changed"]
     );
     fs::remove_file(folder.join("video.mkv")).unwrap();
     assert!(matches!(
         Recording::open(&folder),
-        Err(Error::VideoMissing(_))
+        Err(SessionError::VideoMissing(_))
     ));
 }
 
 #[test]
-fn damage_to_the_index_is_told_by_line_or_as_a_loss() {
+fn damage_to_the_index_is_reported_by_line_or_as_a_loss() {
     let (_root, folder) = whole();
     let path = folder.join("frames.jsonl");
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replace("\"n\":4", "\"n\":5")).unwrap();
     let message = Recording::open(&folder).unwrap_err().to_string();
     assert!(
-        message.contains("line 5 says n = 5 where 4 is due"),
+        message.contains("line 5 says n = 5, but 4 was expected"),
         "{message}"
     );
     fs::write(&path, &text[..text.len() - 10]).unwrap();
@@ -226,7 +238,7 @@ fn damage_to_the_index_is_told_by_line_or_as_a_loss() {
 }
 
 #[test]
-fn dropped_frames_and_faults_are_warned_of() {
+fn dropped_frames_and_faults_are_reported() {
     let (_root, folder) = whole();
     let path = folder.join("frames.jsonl");
     let text = fs::read_to_string(&path).unwrap();
@@ -237,9 +249,9 @@ fn dropped_frames_and_faults_are_warned_of() {
         r#""faults": [{"t_us": 5, "what": "the table was slow"}]"#,
     );
     let recording = Recording::open(&folder).unwrap();
-    let told: Vec<_> = recording.notices.iter().map(Notice::text).collect();
+    let texts: Vec<_> = recording.notices.iter().map(Notice::text).collect();
     assert_eq!(
-        told,
+        texts,
         [
             "during the capture: the table was slow",
             "the camera dropped 2 frames before frame 9"
@@ -257,9 +269,12 @@ fn inputs_are_sessions_folders_of_them_or_videos() {
     assert_eq!(Recording::open(&bare).unwrap().id, "clip_one");
     fs::remove_file(&bare).unwrap();
     assert_eq!(recordings(root.path()).unwrap(), [folder]);
-    assert!(matches!(recordings(&bare), Err(Error::NotThere(_))));
+    assert!(matches!(recordings(&bare), Err(SessionError::NotThere(_))));
     let empty = tempfile::tempdir().unwrap();
-    assert!(matches!(recordings(empty.path()), Err(Error::NoSession(_))));
+    assert!(matches!(
+        recordings(empty.path()),
+        Err(SessionError::NoSession(_))
+    ));
 }
 
 #[test]
@@ -268,22 +283,25 @@ fn a_video_beside_sessions_does_not_hide_them() {
     fs::write(root.path().join("preview.mkv"), b"").unwrap();
     assert!(matches!(
         recordings(root.path()),
-        Err(Error::VideoAmongSessions { .. })
+        Err(SessionError::VideoAmongSessions { .. })
     ));
 }
 
 #[test]
-fn a_session_that_lost_its_manifest_and_video_is_not_passed_over() {
+fn a_session_that_lost_its_manifest_and_video_is_not_skipped() {
     let (root, folder) = whole();
     let lost = root.path().join("lost");
     fs::create_dir(&lost).unwrap();
     fs::write(lost.join("frames.jsonl"), b"").unwrap();
     assert_eq!(recordings(root.path()).unwrap(), [folder, lost.clone()]);
-    assert!(matches!(Recording::open(&lost), Err(Error::NoSession(_))));
+    assert!(matches!(
+        Recording::open(&lost),
+        Err(SessionError::NoSession(_))
+    ));
 }
 
 #[test]
-fn a_folder_with_one_video_and_no_manifest_is_taken_with_a_warning() {
+fn a_folder_with_one_video_and_no_manifest_is_read_with_a_warning() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("spot");
     fs::create_dir(&folder).unwrap();
@@ -294,7 +312,7 @@ fn a_folder_with_one_video_and_no_manifest_is_taken_with_a_warning() {
     fs::write(folder.join("other.mp4"), b"").unwrap();
     assert!(matches!(
         Recording::open(&folder),
-        Err(Error::SeveralVideos { count: 2, .. })
+        Err(SessionError::SeveralVideos { count: 2, .. })
     ));
 }
 

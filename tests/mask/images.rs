@@ -1,27 +1,45 @@
-//! Masks on images alone.
+//! Masks of images.
 #![allow(
-    dead_code,
     clippy::unwrap_used,
-    clippy::panic,
-    reason = "helpers of tests may fail loudly, and the scene serves the program's tests too"
+    reason = "a test fails by a panic, in its helpers too"
 )]
 
 mod scene;
 
-use image::{GrayImage, Luma, Rgb, RgbImage};
+use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage};
 use proptest::prelude::*;
 use relit_data::geometry::Rect;
-use relit_mask::{Error, Feather, Hints, Iterations, Seeds, Settings, Warning, segment};
+use relit_mask::{Feather, Hints, Iterations, MaskError, Seeds, SegmentSettings, Warning, segment};
 
-use scene::{AROUND, HEIGHT, WIDTH, around, disc, disc_share, seeds, strokes};
+use scene::{AROUND, HEIGHT, WIDTH, disc_share, in_disc, seeds_image, strokes};
+
+/// A bright disc of radius 18 around (48, 32) on a dark ground, both with some texture.
+fn disc() -> RgbImage {
+    RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        let noise = ((x * 7 + y * 13) % 11) as u8;
+        if in_disc(x, y) {
+            Rgb([200 + noise, 150 + noise, 60])
+        } else {
+            Rgb([20 + noise, 30, 40 + noise])
+        }
+    })
+}
+
+fn around() -> Hints {
+    Hints::Rect(AROUND.parse().unwrap())
+}
+
+fn seeds(marks: impl Fn(u32, u32) -> u8) -> Seeds {
+    Seeds::from_image(&DynamicImage::from(seeds_image(marks))).unwrap()
+}
 
 #[test]
 fn a_rectangle_finds_the_object_in_it() {
-    let mask = segment(&disc(), &around(), &Settings::default()).unwrap();
+    let mask = segment(&disc(), &around(), &SegmentSettings::default()).unwrap();
     assert!(disc_share(mask.image()) > 0.98);
     assert!(mask.image().pixels().all(|p| p.0[0] == 0 || p.0[0] == 255));
     assert_eq!(mask.warnings(), []);
-    let figures = mask.figures();
+    let figures = mask.statistics();
     let set = mask.image().pixels().filter(|p| p.0[0] == 255).count();
     assert_eq!(figures.area_px, set as u64);
     assert_eq!(figures.components_kept, 1);
@@ -30,14 +48,14 @@ fn a_rectangle_finds_the_object_in_it() {
 #[test]
 fn strokes_alone_find_the_object() {
     let hints = Hints::Seeds(seeds(strokes));
-    let mask = segment(&disc(), &hints, &Settings::default()).unwrap();
+    let mask = segment(&disc(), &hints, &SegmentSettings::default()).unwrap();
     assert!(disc_share(mask.image()) > 0.98);
 }
 
 #[test]
-fn a_stroke_on_the_object_alone_is_enough_for_a_plain_ground() {
+fn a_stroke_on_the_object_alone_is_enough_on_a_plain_background() {
     let hints = Hints::Seeds(seeds(|x, y| strokes(x, y).max(128)));
-    let mask = segment(&disc(), &hints, &Settings::default()).unwrap();
+    let mask = segment(&disc(), &hints, &SegmentSettings::default()).unwrap();
     assert!(disc_share(mask.image()) > 0.9);
 }
 
@@ -55,7 +73,7 @@ fn seeds_overrule_the_rectangle() {
         rect,
         seeds: seeds(marks),
     };
-    let mask = segment(&disc(), &hints, &Settings::default()).unwrap();
+    let mask = segment(&disc(), &hints, &SegmentSettings::default()).unwrap();
     assert!((20..44).all(|y| mask.image().get_pixel(33, y).0[0] == 0));
     assert_eq!(mask.image().get_pixel(48, 31).0[0], 255);
 }
@@ -66,7 +84,7 @@ fn the_same_input_gives_the_same_mask_with_any_number_of_threads() {
         opencv::core::set_num_threads(threads).unwrap();
         let hints = [around(), Hints::Seeds(seeds(strokes))];
         hints.map(|hints| {
-            segment(&noisy(), &hints, &Settings::default())
+            segment(&noisy(), &hints, &SegmentSettings::default())
                 .unwrap()
                 .image()
                 .clone()
@@ -91,50 +109,50 @@ fn noisy() -> RgbImage {
 
 #[test]
 fn a_feathered_mask_gives_the_hard_one_back_at_half() {
-    let feathered = Settings {
+    let feathered = SegmentSettings {
         feather: Feather::new(8).unwrap(),
-        ..Settings::default()
+        ..SegmentSettings::default()
     };
-    let hard = segment(&disc(), &around(), &Settings::default()).unwrap();
+    let hard = segment(&disc(), &around(), &SegmentSettings::default()).unwrap();
     let soft = segment(&disc(), &around(), &feathered).unwrap();
     assert!(soft.image().pixels().any(|p| (1..255).contains(&p.0[0])));
     for (soft, hard) in soft.image().pixels().zip(hard.image().pixels()) {
         assert_eq!(soft.0[0] >= 128, hard.0[0] == 255);
     }
-    assert_eq!(soft.figures(), hard.figures());
+    assert_eq!(soft.statistics(), hard.statistics());
 }
 
 #[test]
 fn hints_that_do_not_fit_the_frame_are_refused_with_a_sentence() {
     let refused = |hints: Hints| {
-        let error = segment(&disc(), &hints, &Settings::default()).unwrap_err();
+        let error = segment(&disc(), &hints, &SegmentSettings::default()).unwrap_err();
         assert!(error.to_string().contains(": "), "{error}");
         error
     };
     let rect = |x, y, w, h| Hints::Rect(Rect::new(x, y, w, h));
     assert!(matches!(
         refused(rect(96, 0, 5, 5)),
-        Error::RectOutside { .. }
+        MaskError::RectOutside { .. }
     ));
     assert!(matches!(
         refused(rect(-9, -9, 9, 9)),
-        Error::RectOutside { .. }
+        MaskError::RectOutside { .. }
     ));
     assert!(matches!(
         refused(rect(5, 5, 0, 9)),
-        Error::RectOutside { .. }
+        MaskError::RectOutside { .. }
     ));
     assert!(matches!(
         refused(rect(0, 0, 96, 64)),
-        Error::NoBackground { .. }
+        MaskError::NoBackground { .. }
     ));
     assert!(matches!(
         refused(rect(-1, -1, 999, 999)),
-        Error::NoBackground { .. }
+        MaskError::NoBackground { .. }
     ));
     assert!(matches!(
         refused(Hints::Seeds(seeds(|_, _| 255))),
-        Error::NoBackground { .. }
+        MaskError::NoBackground { .. }
     ));
     let other = GrayImage::from_pixel(9, 7, Luma([255]));
     let other = Seeds::from_image(&other.into()).unwrap();
@@ -145,10 +163,10 @@ fn hints_that_do_not_fit_the_frame_are_refused_with_a_sentence() {
 #[test]
 fn frames_that_cannot_be_segmented_are_refused() {
     let tiny = RgbImage::new(15, 400);
-    let result = segment(&tiny, &around(), &Settings::default());
+    let result = segment(&tiny, &around(), &SegmentSettings::default());
     assert!(matches!(
         result,
-        Err(Error::FrameTooSmall { width: 15, .. })
+        Err(MaskError::FrameTooSmall { width: 15, .. })
     ));
 }
 
@@ -156,15 +174,15 @@ fn frames_that_cannot_be_segmented_are_refused() {
 fn a_frame_of_one_colour_yields_a_mask_with_a_warning_or_a_refusal() {
     for level in [0, 128, 255] {
         let plain = RgbImage::from_pixel(WIDTH, HEIGHT, Rgb([level; 3]));
-        match segment(&plain, &around(), &Settings::default()) {
+        match segment(&plain, &around(), &SegmentSettings::default()) {
             Ok(mask) => assert!(!mask.warnings().is_empty()),
-            Err(error) => assert!(matches!(error, Error::Empty), "{error}"),
+            Err(error) => assert!(matches!(error, MaskError::Empty), "{error}"),
         }
     }
 }
 
 #[test]
-fn an_object_at_the_border_is_told() {
+fn an_object_at_the_border_gives_warnings() {
     let frame = RgbImage::from_fn(64, 64, |x, y| {
         let object = x < 30 && (20..40).contains(&y);
         Rgb(if object {
@@ -174,7 +192,7 @@ fn an_object_at_the_border_is_told() {
         })
     });
     let hints = Hints::Rect(Rect::new(-10, 15, 50, 30));
-    let mask = segment(&frame, &hints, &Settings::default()).unwrap();
+    let mask = segment(&frame, &hints, &SegmentSettings::default()).unwrap();
     let is_border = |w: &Warning| matches!(w, Warning::TouchesBorder { .. });
     let is_clipped = |w: &Warning| matches!(w, Warning::RectClipped { .. });
     assert!(mask.warnings().iter().any(is_border));
@@ -224,15 +242,15 @@ proptest! {
         feather in 0u32..20,
         keep_all in any::<bool>(),
     ) {
-        let settings = Settings {
+        let settings = SegmentSettings {
             iterations: Iterations::new(count).unwrap(),
             feather: Feather::new(feather).unwrap(),
             keep_all,
         };
         if let Some(hints) = hints {
             match segment(&frame, &hints, &settings) {
-                Ok(mask) => prop_assert!(mask.figures().area_px > 0),
-                Err(error) => prop_assert!(!matches!(error, Error::OpenCv { .. }), "{error}"),
+                Ok(mask) => prop_assert!(mask.statistics().area_px > 0),
+                Err(error) => prop_assert!(!matches!(error, MaskError::OpenCv { .. }), "{error}"),
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The program on recordings.
+//! The program `relit-mask` on recordings.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -201,7 +201,7 @@ fn wrong_usage_exits_with_2_and_a_failure_with_1() {
 }
 
 #[test]
-fn the_frame_beyond_the_end_is_told_with_the_last_one() {
+fn a_frame_beyond_the_end_is_reported_with_the_last_one() {
     let folder = clip();
     let output = relit_mask(
         folder.path(),
@@ -267,7 +267,7 @@ fn each_session_of_a_folder_gets_its_mask_and_a_failing_one_stops_no_other() {
 }
 
 #[test]
-fn one_name_for_the_masks_of_several_sessions_is_wrong_usage() {
+fn one_name_for_the_masks_of_several_sessions_is_a_usage_error() {
     let root = tempfile::tempdir().unwrap();
     session(root.path(), "20261120T093015Z-a");
     session(root.path(), "20261120T093115Z-b");

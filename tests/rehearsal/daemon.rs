@@ -10,7 +10,7 @@ use relit_rig::daemon::Daemon;
 use relit_rig::serve::rig::{Command, Refused, Rig};
 use relit_rig::state::{Phase, RigState, Verdict};
 
-use crate::support::{SHORT, alone, fixture};
+use crate::support::{SHORT, fixture};
 
 fn settings(root: &Path, camera: &str, table: &str) -> Settings {
     let camera = format!("replay:{}?loop=1{camera}", fixture(SHORT).display());
@@ -38,25 +38,37 @@ fn once(daemon: &Daemon, wished: impl Fn(&RigState) -> bool) -> RigState {
     }
 }
 
+fn dequeue(place: usize) -> Command {
+    Command::Dequeue {
+        place,
+        object: None,
+    }
+}
+
+const NEXT: Command = Command::Next { object: None };
+
+fn enqueue(daemon: &Daemon, objects: &[&str]) {
+    for object in objects {
+        let object = (*object).to_owned();
+        daemon.command(Command::Enqueue { object }).unwrap();
+    }
+}
+
 fn is_ready(state: &RigState) -> bool {
     state.camera.present && state.table.present
 }
 
 #[test]
 fn a_queue_is_captured_object_by_object_and_a_second_start_is_refused() {
-    let _alone = alone();
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3")).unwrap();
     once(&daemon, is_ready);
     once(&daemon, |state| state.camera.focus.is_some());
     assert!(daemon.monitor().preview().is_some());
-    for object in ["mug", "cow"] {
-        let object = object.to_owned();
-        daemon.command(Command::Enqueue { object }).unwrap();
-    }
+    enqueue(&daemon, &["mug", "cow"]);
     once(&daemon, |state| state.phase == Phase::WaitingForObject);
-    daemon.command(Command::Next).unwrap();
-    let again = daemon.command(Command::Next).unwrap_err();
+    daemon.command(NEXT).unwrap();
+    let again = daemon.command(NEXT).unwrap_err();
     assert!(matches!(again, Refused::Busy(_)), "{again}");
     let state = once(&daemon, |state| {
         state.last_take.is_some() && state.session.is_none()
@@ -68,13 +80,37 @@ fn a_queue_is_captured_object_by_object_and_a_second_start_is_refused() {
         once(&daemon, |state| state.phase == Phase::WaitingForObject).queue,
         ["cow"]
     );
-    daemon.command(Command::Dequeue { place: 0 }).unwrap();
+    daemon.command(dequeue(0)).unwrap();
     assert_eq!(daemon.monitor().state().phase, Phase::Idle);
 }
 
 #[test]
+fn a_stopped_take_leaves_its_object_at_the_head_and_the_stop_does_not_reach_the_next_job() {
+    let root = tempfile::tempdir().unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "none")).unwrap();
+    once(&daemon, |state| state.camera.present);
+    enqueue(&daemon, &["mug", "cow", "bust"]);
+    daemon.command(NEXT).unwrap();
+    once(&daemon, |state| state.frames > 5);
+    // A removal in the middle of the take takes out what stands at that place, and nothing else.
+    daemon.command(dequeue(1)).unwrap();
+    daemon.command(Command::Stop).unwrap();
+    let state = once(&daemon, |state| state.phase == Phase::WaitingForObject);
+    assert_eq!(state.last_take.unwrap().verdict, Verdict::Aborted);
+    assert_eq!(state.queue, ["mug", "bust"]);
+    let other = Command::Next {
+        object: Some("bust".to_owned()),
+    };
+    let refused = daemon.command(other).unwrap_err();
+    assert!(matches!(refused, Refused::Busy(_)), "{refused}");
+    daemon.command(NEXT).unwrap();
+    once(&daemon, |state| {
+        state.phase == Phase::Recording && state.frames > 5
+    });
+}
+
+#[test]
 fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
-    let _alone = alone();
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3")).unwrap();
     once(&daemon, is_ready);
@@ -108,7 +144,6 @@ fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
 
 #[test]
 fn a_camera_that_was_unplugged_comes_back_without_a_restart() {
-    let _alone = alone();
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "&unplug=60", "sim:?speed=3")).unwrap();
     once(&daemon, |state| state.camera.present);
@@ -124,7 +159,7 @@ fn a_second_daemon_is_refused_with_the_process_that_has_the_folder() {
     let root = tempfile::tempdir().unwrap();
     let _first = Daemon::start(settings(root.path(), "", "none")).unwrap();
     let error = Daemon::start(settings(root.path(), "", "none")).unwrap_err();
-    assert!(matches!(error, CaptureError::Taken { pid: Some(_), .. }));
+    assert!(matches!(error, CaptureError::Lock(_)));
     let pid = std::process::id();
     assert!(
         error.to_string().contains(&format!("process {pid}")),
@@ -163,11 +198,8 @@ fn commands_that_make_no_sense_are_refused_where_they_are_given() {
         refused(Command::Enqueue { object: object() }),
         Refused::Invalid(_)
     ));
-    assert!(matches!(
-        refused(Command::Dequeue { place: 0 }),
-        Refused::Invalid(_)
-    ));
-    assert!(matches!(refused(Command::Next), Refused::Invalid(_)));
+    assert!(matches!(refused(dequeue(0)), Refused::Invalid(_)));
+    assert!(matches!(refused(NEXT), Refused::Invalid(_)));
     assert!(matches!(refused(Command::Home), Refused::Unavailable(_)));
     assert!(matches!(
         refused(Command::Jog { degrees: f64::NAN }),

@@ -1,12 +1,15 @@
 //! A rig of a replayed camera and a simulated table, and what it leaves.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use relit_data::session::Recording;
 use relit_rig::capture::{
-    CaptureError, Equipment, Onlookers, Order, Settings, StopRequest, capture,
+    CaptureContext, CaptureError, CaptureRequest, Captured, Equipment, Settings, StopRequest,
+    capture,
 };
+use relit_rig::clock::Participant;
+use relit_rig::simulator::SimulatedTable;
 use relit_rig::state::{Monitor, TakeSummary};
 
 /// A whole turn, H.264 out of order, which a replay delivers as raw pictures.
@@ -20,34 +23,37 @@ pub(crate) fn fixture(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// Rigs that run faster than real time need the machine for themselves: one test at a time.
-pub(crate) fn alone() -> MutexGuard<'static, ()> {
-    static ONE: Mutex<()> = Mutex::new(());
-    ONE.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// A rig whose sessions go into a folder of its own.
+/// A rig on virtual time, whose sessions go into a folder of its own. The test's thread takes part.
 pub(crate) struct Rehearsal {
     pub(crate) root: tempfile::TempDir,
     pub(crate) equipment: Equipment,
     pub(crate) monitor: Monitor,
     pub(crate) stop: StopRequest,
-    _alone: MutexGuard<'static, ()>,
+    _part: Participant,
 }
 
 impl Rehearsal {
-    /// `camera`: options of the replay, such as `drop=7`; `table`: options of the simulator.
-    pub(crate) fn new(fixture_name: &str, camera: &str, table: &str) -> Self {
-        Self::with(fixture_name, camera, table, |_| {})
+    /// A whole turn; `table`: options of the simulated table, such as `&fault=stall@35s`.
+    pub(crate) fn whole(fixture_name: &str, table: &str) -> Self {
+        let table = format!("sim:?speed=0{table}");
+        Self::with(fixture_name, "", &table, |_| {})
     }
 
+    /// A turn of ten seconds, 300 frames; `camera`: options of the replay, such as `&drop=7`.
+    pub(crate) fn short(camera: &str, change: impl FnOnce(&mut Settings)) -> Self {
+        Self::with(SHORT, camera, "sim:?speed=0", |settings| {
+            settings.degrees_per_second = 36.0;
+            change(settings);
+        })
+    }
+
+    /// `table`: its address. Takes are not repeated, unless `change` says so.
     pub(crate) fn with(
         fixture_name: &str,
         camera: &str,
         table: &str,
         change: impl FnOnce(&mut Settings),
     ) -> Self {
-        let alone = alone();
         let root = tempfile::tempdir().unwrap();
         let camera = format!("replay:{}?loop=1{camera}", fixture(fixture_name).display());
         let mut settings = Settings::new(
@@ -58,26 +64,33 @@ impl Rehearsal {
         settings.runtime_folder = root.path().to_owned();
         settings.retries = 0;
         change(&mut settings);
+        let equipment = Equipment::new(settings).unwrap();
+        let clock = equipment.clock();
         Self {
             root,
-            equipment: Equipment::new(settings).unwrap(),
+            equipment,
             monitor: Monitor::default(),
-            stop: StopRequest::default(),
-            _alone: alone,
+            stop: StopRequest::new(&clock),
+            _part: clock.take_part(),
         }
     }
 
+    /// Captures, and gives the take that counts.
     pub(crate) fn capture(&mut self, meter: bool) -> Result<TakeSummary, CaptureError> {
-        let on = Onlookers {
+        Ok(self.capture_all(meter)?.take)
+    }
+
+    pub(crate) fn capture_all(&mut self, meter: bool) -> Result<Captured, CaptureError> {
+        let context = CaptureContext {
             monitor: &self.monitor,
-            viewer: None,
+            preview: None,
             stop: &self.stop,
         };
-        let order = Order {
+        let request = CaptureRequest {
             object: "mug".to_owned(),
             meter,
         };
-        capture(&mut self.equipment, &order, on)
+        capture(&mut self.equipment, &request, context)
     }
 
     /// The session that a take left.
@@ -85,13 +98,17 @@ impl Rehearsal {
         Recording::open(&self.root.path().join(&take.session)).unwrap()
     }
 
-    /// Asks the simulator whether its table stands.
+    /// Whether the equipment's simulated table stands.
     pub(crate) fn table_stands(&self) -> bool {
-        let simulator = self.equipment.simulator().unwrap();
+        self.stands(self.equipment.simulator().unwrap())
+    }
+
+    /// Whether a simulated table stands.
+    pub(crate) fn stands(&self, table: &SimulatedTable) -> bool {
         let clock = self.equipment.clock();
-        let at = simulator.angle_at(clock.now_us());
-        // Half a second of the table's time: it would be degrees further.
-        clock.sleep(std::time::Duration::from_millis(500));
-        (simulator.angle_at(clock.now_us()) - at).abs() < 1e-9
+        let at = table.angle_at(clock.now_us());
+        // It would be degrees further.
+        clock.sleep(Duration::from_millis(500));
+        (table.angle_at(clock.now_us()) - at).abs() < 1e-9
     }
 }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread;
 
-use relit_rig::turntable::{Options, Table, Track};
+use relit_rig::turntable::{Table, TableOptions, Track};
 use tempfile::TempDir;
 
 use crate::rig::{STEP_DEG, paper_turn, spread};
@@ -55,9 +55,9 @@ impl Chip {
     }
 
     fn open(&self) -> Table {
-        let options = Options {
+        let options = TableOptions {
             runtime_folder: self.folder.path().to_owned(),
-            ..Options::default()
+            ..TableOptions::default()
         };
         Table::open_serial(&self.folder.path().join("table"), &options).unwrap()
     }

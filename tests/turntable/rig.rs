@@ -1,48 +1,41 @@
-//! A simulated table, and a host that has its port.
+//! A simulated table and its host, on virtual time or at a port in real time.
 
-use relit_rig::clock::Clock;
-use relit_rig::simulator::{Simulator, SimulatorOptions};
-use relit_rig::turntable::{Options, Table, TurnPlan, TurnRequest};
+use relit_rig::clock::{Clock, Participant};
+use relit_rig::simulator::{SimulatedTable, Simulator, SimulatorOptions};
+use relit_rig::turntable::{Table, TableOptions, TurnPlan, TurnRequest, TurntableError};
 use tempfile::TempDir;
 
 /// Degrees in one step, at the firmware's default of 88.889 steps a degree.
 pub(crate) const STEP_DEG: f64 = 1.0 / 88.889;
 
-/// A simulated table and the folder in which its owner leaves lock and socket.
+/// A simulated table on virtual time. The test's thread takes part in it.
 pub(crate) struct Rig {
-    pub(crate) simulator: Simulator,
-    pub(crate) options: Options,
-    _folder: TempDir,
+    pub(crate) simulated: SimulatedTable,
+    pub(crate) options: TableOptions,
+    _participant: Participant,
 }
 
 impl Rig {
-    /// A table that runs `speed` times faster than real time, with `faults`.
-    pub(crate) fn new(speed: f64, faults: &str) -> Rig {
-        Rig::with(speed, faults, SimulatorOptions::default())
+    /// A table with `faults`.
+    pub(crate) fn new(faults: &str) -> Rig {
+        Rig::with(faults, SimulatorOptions::default())
     }
 
-    pub(crate) fn with(speed: f64, faults: &str, options: SimulatorOptions) -> Rig {
-        let clock = if speed == 1.0 {
-            Clock::monotonic()
-        } else {
-            Clock::scaled(speed)
-        };
-        let simulator = Simulator::start(SimulatorOptions {
-            clock,
+    pub(crate) fn with(faults: &str, options: SimulatorOptions) -> Rig {
+        let clock = Clock::virtual_time();
+        let participant = clock.take_part();
+        let simulated = SimulatedTable::new(&SimulatorOptions {
+            clock: clock.clone(),
             faults: faults.parse().unwrap(),
             ..options
-        })
-        .unwrap();
-        let folder = TempDir::new().unwrap();
-        let options = Options {
-            clock,
-            runtime_folder: folder.path().to_owned(),
-            ..Options::default()
-        };
+        });
         Rig {
-            simulator,
-            options,
-            _folder: folder,
+            simulated,
+            options: TableOptions {
+                clock,
+                ..TableOptions::default()
+            },
+            _participant: participant,
         }
     }
 
@@ -54,20 +47,54 @@ impl Rig {
 
     /// Opens the port as a program would.
     pub(crate) fn open(&self) -> Table {
-        Table::open_serial(self.simulator.path(), &self.options).unwrap()
+        self.try_open().unwrap()
+    }
+
+    pub(crate) fn try_open(&self) -> Result<Table, TurntableError> {
+        Table::open(self.simulated.open(), &self.options)
     }
 
     /// Where the table stands in truth, degrees.
     pub(crate) fn truth(&self) -> f64 {
-        self.simulator.angle_at(self.options.clock.now_us())
+        self.simulated.angle_at(self.options.clock.now_us())
+    }
+}
+
+/// A simulated table on a pseudoterminal, in real time.
+pub(crate) struct PacedRig {
+    pub(crate) simulator: Simulator,
+    pub(crate) options: TableOptions,
+    _folder: TempDir,
+}
+
+impl PacedRig {
+    pub(crate) fn new(options: &SimulatorOptions) -> PacedRig {
+        let folder = TempDir::new().unwrap();
+        PacedRig {
+            simulator: Simulator::start(options, None).unwrap(),
+            options: TableOptions {
+                runtime_folder: folder.path().to_owned(),
+                ..TableOptions::default()
+            },
+            _folder: folder,
+        }
+    }
+
+    pub(crate) fn open(&self) -> Table {
+        Table::open_serial(self.simulator.path(), &self.options).unwrap()
     }
 }
 
 /// The paper's turn: 360 degrees at 7.2 degrees/s, between margins.
 pub(crate) fn paper_turn(table: &Table) -> TurnPlan {
+    turn_by(table, 360.0)
+}
+
+/// As much of the paper's turn.
+pub(crate) fn turn_by(table: &Table, turn_deg: f64) -> TurnPlan {
     let request = TurnRequest {
         degrees_per_second: 7.2,
-        turn_deg: 360.0,
+        turn_deg,
         margin_deg: 3.6,
         direction: None,
         unwind: true,

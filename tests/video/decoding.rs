@@ -1,16 +1,13 @@
 //! The video room from outside, on files that the `ffmpeg` program makes.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[path = "../support/mod.rs"]
-mod support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
 use relit_data::geometry::Rect;
-use relit_video::{CodedFrame, Damage, Error, FrameFault, RawLayout, Video};
-use support::{ffmpeg, packets};
+use relit_test_support::{ffmpeg, packets};
+use relit_video::{CodedFrame, Damage, DecodeFault, PixelFormat, Video, VideoError};
 use tempfile::TempDir;
 
 const PATTERN: &str = "testsrc2=size=70x50:rate=25:duration=0.4";
@@ -397,9 +394,9 @@ fn a_damaged_jpeg_is_an_error_and_the_frames_around_it_come() {
     assert!(
         matches!(
             fault,
-            Error::Frame {
+            VideoError::Frame {
                 number: 4,
-                fault: FrameFault::Damaged(_),
+                fault: DecodeFault::Damaged(_),
                 ..
             }
         ),
@@ -524,7 +521,7 @@ fn what_is_no_video_is_refused_with_a_sentence() {
         "{message}"
     );
     let (_folder, path) = made("sine=duration=0.2", "a.wav", "");
-    assert!(matches!(Video::open(&path), Err(Error::NoVideo(_))));
+    assert!(matches!(Video::open(&path), Err(VideoError::NoVideo(_))));
 }
 
 #[test]
@@ -533,7 +530,7 @@ fn a_frame_beyond_the_end_is_refused() {
     let video = Video::open(&path).unwrap();
     assert!(matches!(
         video.frame(10),
-        Err(Error::NoSuchFrame {
+        Err(VideoError::NoSuchFrame {
             number: 10,
             last: 9,
             ..
@@ -615,10 +612,10 @@ fn frames_that_stand_out_of_order_are_told() {
 #[test]
 fn raw_pictures_hold_the_samples_of_the_video() {
     for (pixels, layout, raw) in [
-        ("yuv420p", RawLayout::Nv12, "nv12"),
-        ("yuv422p", RawLayout::Yuyv, "yuyv422"),
-        ("gray", RawLayout::Grey, "gray"),
-        ("bgr0", RawLayout::Rgb24, "rgb24"),
+        ("yuv420p", PixelFormat::Nv12, "nv12"),
+        ("yuv422p", PixelFormat::Yuyv, "yuyv422"),
+        ("gray", PixelFormat::Grey, "gray"),
+        ("bgr0", PixelFormat::Rgb24, "rgb24"),
     ] {
         let encoding = format!("-c:v ffv1 -pix_fmt {pixels}");
         let (folder, path) = made(PATTERN, "clip.mkv", &encoding);

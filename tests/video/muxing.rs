@@ -1,20 +1,19 @@
 //! Recording a stream to a file: what comes back is what went in, also where the recorder dies.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[path = "../support/mod.rs"]
-mod support;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
 use proptest::prelude::*;
-use relit_video::{Coding, Damage, Error, Muxer, RawFormat, StreamFormat, Video, Written};
-use support::ffmpeg;
+use relit_test_support::{ffmpeg, packets};
+use relit_video::{
+    BayerPattern, Damage, Muxer, PixelFormat, StreamFormat, Video, VideoError, Written,
+};
 
-fn stream(coding: Coding, width: u32, height: u32) -> StreamFormat {
+fn stream(format: PixelFormat, width: u32, height: u32) -> StreamFormat {
     StreamFormat {
-        coding,
+        format,
         width,
         height,
         fps: 30.0,
@@ -26,7 +25,7 @@ fn jpegs() -> Vec<Vec<u8>> {
     let folder =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/20261120T101500Z-cow-short");
     let bytes = fs::read(folder.join("video.mkv")).unwrap();
-    let places = support::packets(&folder, "video.mkv");
+    let places = packets(&folder, "video.mkv");
     let found = places.iter().map(|place| {
         let from = (place.at..).find(|&at| bytes[at..].starts_with(&[0xFF, 0xD8]));
         bytes[from.unwrap()..][..place.size].to_vec()
@@ -74,7 +73,7 @@ fn jpegs_come_back_byte_for_byte_with_their_times_to_the_millisecond() {
     let times: Vec<i64> = (0..jpegs.len() as i64)
         .map(|n| 77_000_123_456 + n * 33_367 + (n % 7) * 911)
         .collect();
-    let mut muxer = Muxer::create(&path, stream(Coding::Mjpeg, 480, 360)).unwrap();
+    let mut muxer = Muxer::create(&path, stream(PixelFormat::Mjpeg, 480, 360)).unwrap();
     for (jpeg, &t_us) in jpegs.iter().zip(&times) {
         assert_eq!(muxer.write(jpeg, t_us).unwrap(), Written::Kept);
     }
@@ -96,7 +95,7 @@ fn jpegs_come_back_byte_for_byte_with_their_times_to_the_millisecond() {
 fn what_was_synced_is_read_without_the_recorder_having_ended_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("video.mkv");
-    let mut muxer = Muxer::create(&path, stream(Coding::Mjpeg, 480, 360)).unwrap();
+    let mut muxer = Muxer::create(&path, stream(PixelFormat::Mjpeg, 480, 360)).unwrap();
     for (jpeg, n) in jpegs().iter().zip(0..) {
         muxer.write(jpeg, n * 33_333).unwrap();
         if n % 10 == 9 {
@@ -115,7 +114,7 @@ fn what_was_synced_is_read_without_the_recorder_having_ended_the_file() {
 fn without_a_sync_half_a_second_at_most_is_held_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("video.mkv");
-    let mut muxer = Muxer::create(&path, stream(Coding::Mjpeg, 480, 360)).unwrap();
+    let mut muxer = Muxer::create(&path, stream(PixelFormat::Mjpeg, 480, 360)).unwrap();
     for (jpeg, n) in jpegs().iter().zip(0..) {
         muxer.write(jpeg, n * 33_333).unwrap();
         let held = n + 1 - frames_in(&path);
@@ -134,7 +133,7 @@ fn h264_begins_at_a_key_frame_and_decodes_to_the_same_pictures() {
     let units = access_units(folder.path(), 45);
     assert_eq!(units.len(), 45);
     let path = folder.path().join("video.mkv");
-    let mut muxer = Muxer::create(&path, stream(Coding::H264, 160, 120)).unwrap();
+    let mut muxer = Muxer::create(&path, stream(PixelFormat::H264, 160, 120)).unwrap();
     let written: Vec<Written> = (0..)
         .zip(&units)
         .skip(3)
@@ -168,39 +167,40 @@ fn h264_begins_at_a_key_frame_and_decodes_to_the_same_pictures() {
 fn h264_without_start_codes_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("video.mkv");
-    let mut muxer = Muxer::create(&path, stream(Coding::H264, 160, 120)).unwrap();
+    let mut muxer = Muxer::create(&path, stream(PixelFormat::H264, 160, 120)).unwrap();
     let refused = muxer.write(&[0, 0, 0, 9, 0x65, 1, 2, 3], 0);
-    assert!(matches!(refused, Err(Error::NotAnnexB(_))));
+    assert!(matches!(refused, Err(VideoError::NotAnnexB(_))));
 }
 
 /// The name of the planar format that holds the same values, and a picture's planes in a row.
-fn planar(raw: RawFormat, picture: &[u8], pixels: usize) -> (&'static str, Vec<u8>) {
+fn planar(raw: PixelFormat, picture: &[u8], pixels: usize) -> (&'static str, Vec<u8>) {
     let every = |bytes: &[u8], first: usize, step: usize| -> Vec<u8> {
         bytes.iter().copied().skip(first).step_by(step).collect()
     };
     match raw {
-        RawFormat::Grey | RawFormat::Bayer => ("gray", picture.to_vec()),
-        RawFormat::Rgb24 => ("rgb24", picture.to_vec()),
-        RawFormat::Yuyv => {
+        PixelFormat::Grey | PixelFormat::Bayer(_) => ("gray", picture.to_vec()),
+        PixelFormat::Rgb24 => ("rgb24", picture.to_vec()),
+        PixelFormat::Yuyv => {
             let planes = [(0, 2), (1, 4), (3, 4)].map(|(first, step)| every(picture, first, step));
             ("yuv422p", planes.concat())
         }
-        RawFormat::Nv12 => {
+        PixelFormat::Nv12 => {
             let (luma, colour) = picture.split_at(pixels);
             let planes = [luma.to_vec(), every(colour, 0, 2), every(colour, 1, 2)];
             ("yuv420p", planes.concat())
         }
+        PixelFormat::Mjpeg | PixelFormat::H264 => panic!("{raw:?} is compressed"),
     }
 }
 
 /// Records pictures of noise and compares them with what FFmpeg's own program decodes.
-fn there_and_back(raw: RawFormat, size: (u32, u32), seed: u64) {
+fn there_and_back(raw: PixelFormat, size: (u32, u32), seed: u64) {
     let folder = tempfile::tempdir().unwrap();
     let (width, height) = size;
     let path = folder.path().join("video.mkv");
-    let bytes = raw.picture_bytes(width, height).unwrap();
+    let bytes = raw.frame_bytes(width, height).unwrap();
     let pictures: Vec<Vec<u8>> = (0..4).map(|n| noise(bytes, seed + n)).collect();
-    let mut muxer = Muxer::create(&path, stream(Coding::Raw(raw), width, height)).unwrap();
+    let mut muxer = Muxer::create(&path, stream(raw, width, height)).unwrap();
     for (picture, n) in pictures.iter().zip(0..) {
         assert_eq!(muxer.write(picture, n * 40_000).unwrap(), Written::Kept);
     }
@@ -239,11 +239,11 @@ fn there_and_back(raw: RawFormat, size: (u32, u32), seed: u64) {
 fn uncompressed_pictures_come_back_bit_for_bit() {
     // Widths that fill no row of FFmpeg's alignment.
     let formats = [
-        (RawFormat::Yuyv, (162, 91)),
-        (RawFormat::Nv12, (162, 90)),
-        (RawFormat::Rgb24, (161, 91)),
-        (RawFormat::Grey, (161, 91)),
-        (RawFormat::Bayer, (162, 90)),
+        (PixelFormat::Yuyv, (162, 91)),
+        (PixelFormat::Nv12, (162, 90)),
+        (PixelFormat::Rgb24, (161, 91)),
+        (PixelFormat::Grey, (161, 91)),
+        (PixelFormat::Bayer(BayerPattern::Grbg), (162, 90)),
     ];
     for (raw, size) in formats {
         there_and_back(raw, size, 7);
@@ -254,7 +254,7 @@ fn uncompressed_pictures_come_back_bit_for_bit() {
 fn every_slice_of_ffv1_is_checked_by_its_checksum() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("video.mkv");
-    let format = stream(Coding::Raw(RawFormat::Grey), 160, 120);
+    let format = stream(PixelFormat::Grey, 160, 120);
     let mut muxer = Muxer::create(&path, format).unwrap();
     for n in 0..5 {
         muxer
@@ -263,7 +263,7 @@ fn every_slice_of_ffv1_is_checked_by_its_checksum() {
     }
     muxer.finish().unwrap();
     let mut bytes = fs::read(&path).unwrap();
-    let places = support::packets(folder.path(), "video.mkv");
+    let places = packets(folder.path(), "video.mkv");
     bytes[places[2].at + places[2].size / 3] ^= 0x10;
     fs::write(&path, bytes).unwrap();
     let video = Video::open(&path).unwrap();
@@ -275,12 +275,12 @@ fn every_slice_of_ffv1_is_checked_by_its_checksum() {
 fn a_picture_of_another_size_is_refused_and_the_next_may_follow() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("video.mkv");
-    let format = stream(Coding::Raw(RawFormat::Yuyv), 64, 48);
+    let format = stream(PixelFormat::Yuyv, 64, 48);
     let mut muxer = Muxer::create(&path, format).unwrap();
     let refused = muxer.write(&noise(100, 1), 0);
     assert!(matches!(
         refused,
-        Err(Error::PictureBytes {
+        Err(VideoError::PictureBytes {
             found: 100,
             wanted: 6144,
             ..
@@ -291,9 +291,9 @@ fn a_picture_of_another_size_is_refused_and_the_next_may_follow() {
     assert_eq!(Video::open(&path).unwrap().frames().len(), 1);
     let odd = Muxer::create(
         &folder.path().join("odd.mkv"),
-        stream(format.coding, 63, 48),
+        stream(format.format, 63, 48),
     );
-    assert!(matches!(odd, Err(Error::PictureSize { .. })));
+    assert!(matches!(odd, Err(VideoError::PictureSize { .. })));
 }
 
 #[test]
@@ -301,8 +301,8 @@ fn a_file_is_never_written_over() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("video.mkv");
     fs::write(&path, b"precious").unwrap();
-    let refused = Muxer::create(&path, stream(Coding::Mjpeg, 64, 48));
-    assert!(matches!(refused, Err(Error::Write { .. })));
+    let refused = Muxer::create(&path, stream(PixelFormat::Mjpeg, 64, 48));
+    assert!(matches!(refused, Err(VideoError::Write { .. })));
     assert_eq!(fs::read(&path).unwrap(), b"precious");
 }
 
@@ -311,7 +311,7 @@ fn a_file_is_never_written_over() {
 #[ignore = "run by a_full_disk_is_told_with_folder_and_missing_bytes"]
 fn child_that_writes_into_a_limit() {
     let path = std::env::var("RELIT_TEST_FILE").unwrap();
-    let format = stream(Coding::Mjpeg, 480, 360);
+    let format = stream(PixelFormat::Mjpeg, 480, 360);
     let mut muxer = Muxer::create(Path::new(&path), format).unwrap();
     let jpegs = jpegs();
     let error = (0..1000)
@@ -353,11 +353,11 @@ proptest! {
         which in 0_usize..5, width in 8_u32..70, height in 8_u32..50, seed in any::<u64>(),
     ) {
         let raw = [
-            RawFormat::Yuyv,
-            RawFormat::Nv12,
-            RawFormat::Rgb24,
-            RawFormat::Grey,
-            RawFormat::Bayer,
+            PixelFormat::Yuyv,
+            PixelFormat::Nv12,
+            PixelFormat::Rgb24,
+            PixelFormat::Grey,
+            PixelFormat::Bayer(BayerPattern::Rggb),
         ][which];
         let even = |value: u32| value & !1;
         let size = if which < 2 { (even(width), even(height)) } else { (width, height) };

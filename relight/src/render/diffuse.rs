@@ -178,12 +178,12 @@ impl Kernel<3, 3> for DiffuseLayer {
         let surface = Lanes::surface(normal);
         let ambient = Lanes::of(self.ambient());
         let mut shading = [Lanes::all(0.0); 3];
-        for channel in 0..3 {
+        for (channel, shading) in shading.iter_mut().enumerate() {
             let mut sum = Lanes::all(0.0);
-            for at in 0..9 {
-                sum = sum + terms[at] * Lanes::of(self.coefficients[at][channel]);
+            for (term, c) in terms.iter().zip(&self.coefficients) {
+                sum = sum + *term * Lanes::of(c[channel]);
             }
-            shading[channel] = (sum.at_least_zero() + ambient) * surface;
+            *shading = (sum.at_least_zero() + ambient) * surface;
         }
         shading
     }

@@ -211,26 +211,24 @@ impl<K: Kernel<I, O>, const I: usize, const O: usize> WithSimd for Block<'_, K, 
         // Loops instead of closures: a closure may be left as a call, without the vector instructions.
         for start in (0..whole).step_by(WIDTH) {
             let mut group = [Lanes::all(0.0); I];
-            for plane in 0..I {
-                group[plane]
-                    .0
-                    .copy_from_slice(&self.inputs[plane][start..start + WIDTH]);
+            for (lanes, plane) in group.iter_mut().zip(&self.inputs) {
+                lanes.0.copy_from_slice(&plane[start..start + WIDTH]);
             }
             let results = self.kernel.run(&mut scratch, group);
-            for plane in 0..O {
-                self.outputs[plane][start..start + WIDTH].copy_from_slice(&results[plane].0);
+            for (lanes, plane) in results.iter().zip(&mut self.outputs) {
+                plane[start..start + WIDTH].copy_from_slice(&lanes.0);
             }
         }
         if whole < length {
             // Places beyond the end are 0.
             let rest = length - whole;
             let mut group = [Lanes::all(0.0); I];
-            for plane in 0..I {
-                group[plane].0[..rest].copy_from_slice(&self.inputs[plane][whole..]);
+            for (lanes, plane) in group.iter_mut().zip(&self.inputs) {
+                lanes.0[..rest].copy_from_slice(&plane[whole..]);
             }
             let results = self.kernel.run(&mut scratch, group);
-            for plane in 0..O {
-                self.outputs[plane][whole..].copy_from_slice(&results[plane].0[..rest]);
+            for (lanes, plane) in results.iter().zip(&mut self.outputs) {
+                plane[whole..].copy_from_slice(&lanes.0[..rest]);
             }
         }
     }

@@ -21,7 +21,7 @@ pub use lobe::LobeLayer;
 pub use maps::{Map, MapFiles, NormalsFrame};
 pub use power::PowerLayer;
 pub use reference::{Estimate, Horizon, MonteCarlo};
-pub use shots::{Look, exposure_for};
+pub use shots::{Look, exposure_for, mirror_reflectance};
 pub use surface::{Gloss, Surface};
 
 use crate::image::{ImageError, Linear, Planes, Rgb};

@@ -107,11 +107,9 @@ impl Kernel<7, 3> for PowerLayer {
 
     #[inline(always)]
     fn run(&self, (): &mut (), [x, y, z, red, green, blue, smoothness]: [Lanes; 7]) -> [Lanes; 3] {
-        let terms = terms([x, y, z]);
         let [mut r, mut g, mut b] = [Lanes::all(0.0); 3];
-        for at in 0..9 {
-            let power = terms[at].signed_power(smoothness);
-            let c = self.coefficients[at];
+        for (term, c) in terms([x, y, z]).iter().zip(&self.coefficients) {
+            let power = term.signed_power(smoothness);
             r = r + power * Lanes::of(c[0]);
             g = g + power * Lanes::of(c[1]);
             b = b + power * Lanes::of(c[2]);

@@ -45,8 +45,9 @@ impl Look {
         self.image(surface, &light.rotated(&turn))
     }
 
-    /// One image of the surface in each material: a row for each specular reflectance (the same in
-    /// all channels), in it a column for each smoothness.
+    /// One image of the surface in each material: a row for each part of the light that is reflected towards
+    /// the viewer at a right angle, in it a column for each smoothness. So a row reflects the same
+    /// amount of light, in smaller and brighter highlights: see [`mirror_reflectance`].
     ///
     /// # Errors
     /// As [`Look::image`].
@@ -54,12 +55,13 @@ impl Look {
         &self,
         surface: &Surface,
         light: &ShLight,
-        reflectances: &[f32],
+        parts: &[f32],
         smoothnesses: &[f32],
     ) -> Result<Rgb<Linear>, ImageError> {
         let mut tiles = Vec::new();
-        for &reflectance in reflectances {
+        for &part in parts {
             for &smoothness in smoothnesses {
+                let reflectance = mirror_reflectance(part, smoothness);
                 let gloss = Gloss::even(surface.extent(), [reflectance; 3], smoothness);
                 let glossy = surface.clone().with_gloss(Some(gloss))?;
                 tiles.push(self.image(&glossy, light)?.into_planes());
@@ -67,6 +69,13 @@ impl Look {
         }
         Ok(Rgb::new(Planes::sheet(&tiles, smoothnesses.len())?))
     }
+}
+
+/// The s_p with which a surface of smoothness α that faces the viewer reflects this part of even light:
+/// part (α + 2) / 8. H alone, with a fixed s_p, falls with α as 8π / (α + 2).
+#[must_use]
+pub fn mirror_reflectance(part: f32, smoothness: f32) -> f32 {
+    part * (smoothness + 2.0) / 8.0
 }
 
 /// The exposure that shows a white matt surface, turned to where the light is strongest, as 1. It does not
@@ -150,7 +159,29 @@ mod tests {
         let middle =
             |column: usize, row: usize| sheet.planes().pixel(31 * column + 15, 31 * row + 15)[0];
         assert!((middle(0, 0) - middle(2, 0)).abs() < 1e-5);
-        assert!(middle(0, 1) > middle(1, 1) && middle(1, 1) > middle(2, 1));
-        assert!(middle(2, 1) > middle(2, 0));
+        // Light from the viewer: the smoother, the more of it comes back from the middle.
+        assert!(middle(0, 1) < middle(1, 1) && middle(1, 1) < middle(2, 1));
+    }
+
+    #[test]
+    fn a_mirror_reflectance_gives_back_its_part_of_even_light() {
+        let (surface, _) = scene();
+        let even = ShLight::even(Order::TWO, [2.0; 3]);
+        let black = Rgb::new(Planes::zeros(surface.extent()));
+        for smoothness in [5.0, 80.0] {
+            let gloss = Gloss::even(
+                surface.extent(),
+                [mirror_reflectance(0.3, smoothness); 3],
+                smoothness,
+            );
+            let mirror =
+                Surface::new(surface.normals().clone(), black.clone(), Some(gloss)).unwrap();
+            let look = Look {
+                exposure: crate::render::EXPOSURE,
+                ..LOOK
+            };
+            let image = look.image(&mirror, &even).unwrap();
+            assert!((image.planes().pixel(15, 15)[0] - 0.6).abs() < 0.01);
+        }
     }
 }

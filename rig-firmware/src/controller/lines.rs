@@ -2,13 +2,13 @@
 
 use super::{Alarm, Controller, Job, Mode, Stop, Way};
 use crate::board::{Board, Events};
-use crate::checked::Verdict;
+use crate::checked::CheckedLine;
 use crate::dollar::{self, Dollar};
 use crate::error::Error;
 use crate::gcode::{self, Action, Block, Jog, Motion};
 use crate::number::Decimal;
 use crate::report::{self, Reply};
-use crate::settings::{Key, Settings};
+use crate::settings::{GrblSettings, Key};
 use crate::store::Stored;
 
 /// Most bytes that one round of the main loop reads.
@@ -42,10 +42,10 @@ impl Controller {
             self.reader.lose();
         }
         match self.session.judge(&self.reader.line()) {
-            Verdict::Answer { sequence, answer } => {
+            CheckedLine::Answer { sequence, answer } => {
                 report::answer(board, self.session.is_open(), sequence, answer);
             }
-            Verdict::Execute { sequence, block } => {
+            CheckedLine::Execute { sequence, block } => {
                 let locked = self.jogging || matches!(self.mode, Mode::Alarm(_));
                 self.sequence = sequence;
                 // What is read is a value of its own: the line's text is not needed any more.
@@ -212,7 +212,7 @@ impl Controller {
     ) -> Result<(), Error> {
         self.require_rest(board)?;
         if settings {
-            self.settings = Settings::defaults();
+            self.settings = GrblSettings::defaults();
             self.apply_settings(board);
         }
         if offsets {

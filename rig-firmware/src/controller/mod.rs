@@ -12,11 +12,11 @@ mod status;
 use crate::board::{Board, Events, ResetCause};
 use crate::checked::Session;
 use crate::gcode::Modal;
-use crate::homing::Phase;
+use crate::homing::HomingPhase;
 use crate::line::LineReader;
 use crate::ramp::Profile;
 use crate::report;
-use crate::settings::{Key, Settings};
+use crate::settings::{GrblSettings, Key};
 use crate::store::{Health, Store, Stored};
 
 /// Why the table is locked: the numbers of `ALARM:N`.
@@ -81,7 +81,7 @@ enum Job {
         since: Option<u32>,
         left: u32,
     },
-    Home(Phase),
+    Home(HomingPhase),
     /// The alarm that refuses the line.
     Refusal,
 }
@@ -138,7 +138,7 @@ pub struct Controller {
     heard: u32,
     store: Store,
     profile: Profile,
-    settings: Settings,
+    settings: GrblSettings,
     reader: LineReader,
 }
 

@@ -4,7 +4,7 @@ use super::{Alarm, Controller, Driver, Job, Mode, Planned, Way};
 use crate::board::Board;
 use crate::error::Error;
 use crate::gcode::Target;
-use crate::homing::{self, Leg, Outcome, Phase};
+use crate::homing::{self, HomingOutcome, HomingPhase, Leg};
 use crate::number::{end_towards, scaled};
 use crate::settings::Key;
 use crate::stepper::{Full, Move};
@@ -134,7 +134,7 @@ impl Controller {
         self.job = Job::Home(leg.phase);
     }
 
-    fn advance_homing<B: Board>(&mut self, board: &mut B, phase: Phase) {
+    fn advance_homing<B: Board>(&mut self, board: &mut B, phase: HomingPhase) {
         let under_way = board.with_stepper(|stepper, _| {
             stepper.is_moving() || (stepper.has_plan() && !stepper.has_found())
         });
@@ -145,14 +145,14 @@ impl Controller {
         self.drop_plans(board);
         let active = self.index_is_active(board);
         match homing::next(&self.settings, phase, found, active) {
-            Outcome::Go(leg) => self.start_leg(board, leg),
-            Outcome::Zero(step, leg) => {
+            HomingOutcome::Go(leg) => self.start_leg(board, leg),
+            HomingOutcome::Zero(step, leg) => {
                 board.with_stepper(|stepper, _| stepper.move_origin(step));
                 self.start_leg(board, leg);
             }
-            Outcome::Home => self.finish(board, Ok(())),
-            Outcome::StillActive => self.fail_homing(board, Alarm::IndexStaysActive),
-            Outcome::NotFound => self.fail_homing(board, Alarm::IndexNotFound),
+            HomingOutcome::Home => self.finish(board, Ok(())),
+            HomingOutcome::StillActive => self.fail_homing(board, Alarm::IndexStaysActive),
+            HomingOutcome::NotFound => self.fail_homing(board, Alarm::IndexNotFound),
         }
     }
 

@@ -4,13 +4,12 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use relit_rig::camera::lock::Wanted;
-use relit_rig::camera::{self, Fourcc};
-use relit_rig::capture::{FrameSize, ModeWish, Settings};
+use relit_rig::camera::hold::ManualValues;
+use relit_rig::camera::{CameraAddress, Fourcc};
+use relit_rig::capture::{ModePreference, Settings};
 use relit_rig::serve::Token;
 use relit_rig::turntable;
 
-use crate::environment::runtime_folder;
 use crate::table_arguments::{
     SIMULATE_EXAMPLES, SimulateArguments, TURNTABLE_EXAMPLES, TurntableArguments,
 };
@@ -60,6 +59,7 @@ pub(crate) struct Serve {
     pub(crate) settings: Settings,
     pub(crate) address: SocketAddr,
     pub(crate) token: Option<Token>,
+    pub(crate) token_file: Option<PathBuf>,
     pub(crate) names: Vec<String>,
 }
 
@@ -117,9 +117,13 @@ struct ServeArguments {
     /// Address and port to listen on.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8420")]
     listen: SocketAddr,
-    /// What a client has to know [default: random where other machines can reach the address].
-    #[arg(long, value_name = "TOKEN")]
+    /// What a client has to know, 16 to 128 letters, digits, '-' and '_' [default: random where other
+    /// machines can reach the address]. Other accounts of this machine can see it: prefer --token-file.
+    #[arg(long, value_name = "TOKEN", conflicts_with = "token_file")]
     token: Option<Token>,
+    /// A file that holds the token, which only its owner and its group can read.
+    #[arg(long, value_name = "FILE")]
+    token_file: Option<PathBuf>,
     /// A name under which clients reach this machine, such as rig.local; may be given several times.
     #[arg(long = "name", value_name = "NAME")]
     names: Vec<String>,
@@ -134,10 +138,10 @@ struct RigArguments {
     root: PathBuf,
     /// The camera's address.
     #[arg(long, value_name = "ADDRESS", default_value = "v4l2:/dev/video0")]
-    camera: camera::Address,
+    camera: CameraAddress,
     /// The turntable's address.
     #[arg(long, value_name = "ADDRESS", default_value = "serial:")]
-    turntable: turntable::Address,
+    turntable: turntable::TurntableAddress,
     /// Speed of the turn, degrees a second.
     #[arg(long, value_name = "SPEED", default_value_t = 7.2, value_parser = speed)]
     degrees_per_second: f64,
@@ -145,8 +149,8 @@ struct RigArguments {
     #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
     fps: f64,
     /// Frame size, such as 1920x1080 [default: the largest at that rate].
-    #[arg(long, value_name = "WIDTHxHEIGHT")]
-    size: Option<FrameSize>,
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
+    size: Option<(u32, u32)>,
     /// Pixel format: MJPG, H264, YUYV, NV12, RGB3, GREY or 8-bit Bayer [default: compressed before raw].
     #[arg(long, value_name = "FORMAT", value_parser = fourcc)]
     fourcc: Option<Fourcc>,
@@ -191,6 +195,7 @@ pub(crate) fn parse() -> Arguments {
             settings: line.rig.into(),
             address: line.listen,
             token: line.token,
+            token_file: line.token_file,
             names: line.names,
         })),
         Verb::Turntable(line) => Command::Turntable(line),
@@ -205,12 +210,12 @@ pub(crate) fn parse() -> Arguments {
 impl From<RigArguments> for Settings {
     fn from(line: RigArguments) -> Self {
         let mut settings = Self::new(line.root, line.camera, line.turntable);
-        settings.mode = ModeWish {
+        settings.mode = ModePreference {
             fourcc: line.fourcc,
             size: line.size,
             fps: line.fps,
         };
-        settings.wanted = Wanted {
+        settings.wanted = ManualValues {
             exposure: line.exposure,
             gain: line.gain,
             white_balance: line.white_balance,
@@ -222,7 +227,6 @@ impl From<RigArguments> for Settings {
         settings.max_dropped = line.max_dropped;
         settings.retries = line.retries;
         settings.meter_clip = line.meter_clip / 100.0;
-        settings.runtime_folder = runtime_folder();
         settings.commit = option_env!("RELIT_COMMIT").unwrap_or_default().to_owned();
         settings
     }
@@ -231,10 +235,18 @@ impl From<RigArguments> for Settings {
 fn fourcc(text: &str) -> Result<Fourcc, String> {
     let known = || "give four characters such as MJPG, H264 or YUYV".to_owned();
     let fourcc = Fourcc(text.as_bytes().try_into().map_err(|_| known())?);
-    match fourcc.encoding() {
+    match fourcc.pixel_format() {
         Some(_) => Ok(fourcc),
         None => Err(format!("{text} frames cannot be recorded: {}", known())),
     }
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let side = |text: &str| text.parse().ok().filter(|&pixels: &u32| pixels > 0);
+    let sides = text.split_once('x');
+    sides
+        .and_then(|(width, height)| Some((side(width)?, side(height)?)))
+        .ok_or_else(|| format!("{text:?} is no size: write it as 1920x1080"))
 }
 
 fn figure(text: &str, low: f64, high: f64, what: &str) -> Result<f64, String> {
@@ -258,4 +270,17 @@ fn percent(text: &str) -> Result<f64, String> {
 
 fn volts(text: &str) -> Result<f64, String> {
     figure(text, 0.0, 100.0, "volts")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_written_with_an_x() {
+        assert_eq!(size("1920x1080"), Ok((1920, 1080)));
+        for text in ["", "1920", "0x5", "axb", "1920x1080x3"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+    }
 }

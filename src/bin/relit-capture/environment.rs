@@ -1,11 +1,10 @@
 //! What the program takes from its surroundings: signals and environment variables.
 
-use std::env;
-use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use relit_rig::serve::ServiceManager;
+use relit_rig::serve::Heartbeat;
+use sd_notify::NotifyState;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use signal_hook::low_level::emulate_default_handler;
@@ -13,27 +12,18 @@ use signal_hook::low_level::emulate_default_handler;
 /// Signals within this time are one wish to end: `timeout` and a closing terminal send several.
 const TOGETHER: Duration = Duration::from_secs(1);
 
-/// The folder for locks and sockets: one for the whole machine, so that a service and a person who
-/// logs in find each other.
-pub(crate) fn runtime_folder() -> PathBuf {
-    let locks = Path::new("/run/lock");
-    if locks.is_dir() {
-        locks.to_owned()
-    } else {
-        env::temp_dir()
-    }
+/// What the service manager that started the program wants to hear all the time, where one does.
+pub(crate) fn heartbeat() -> Option<Heartbeat> {
+    Some(Heartbeat {
+        period: sd_notify::watchdog_enabled()? / 3,
+        beat: || notify_service(&[NotifyState::Watchdog]),
+    })
 }
 
-/// The service manager that started the program, where one did and wants to be told.
-pub(crate) fn service_manager() -> Option<ServiceManager> {
-    let socket = env::var("NOTIFY_SOCKET").ok()?;
-    let watchdog = env::var("WATCHDOG_USEC")
-        .ok()
-        .and_then(|us| us.parse().ok());
-    Some(ServiceManager {
-        socket,
-        watchdog: watchdog.map(Duration::from_micros),
-    })
+/// Says something to the service manager that started the program, where one did.
+pub(crate) fn notify_service(states: &[NotifyState<'_>]) {
+    // A manager that cannot be reached hears nothing, and does what it is there for.
+    let _ = sd_notify::notify(states);
 }
 
 /// Calls `end` when the program is told to end, also by a terminal that is closed. Another signal

@@ -7,11 +7,11 @@ use std::thread;
 use std::time::Duration;
 
 use relit_rig::capture::{
-    CaptureError, Equipment, Exclusive, Onlookers, Order, Settings, StopRequest, Stopped, capture,
-    salvage,
+    CaptureContext, CaptureError, CaptureRequest, Captured, Equipment, Settings, StopRequest,
+    Stopped, capture, salvage,
 };
-use relit_rig::state::{Monitor, Phase, RigState, TakeSummary, Verdict};
-use relit_rig::turntable::Address;
+use relit_rig::state::{Monitor, Phase, RigState, Verdict};
+use relit_rig::turntable::TurntableAddress;
 use serde_json::json;
 
 use crate::arguments::Record;
@@ -19,7 +19,7 @@ use crate::environment::at_end;
 use relit::console::{Console, Outcome};
 
 /// How often progress is looked at.
-const GLANCE: Duration = Duration::from_millis(100);
+const UPDATE: Duration = Duration::from_millis(100);
 
 pub(crate) fn run(console: Console, record: Record) -> Result<Outcome, CaptureError> {
     let Record {
@@ -29,28 +29,28 @@ pub(crate) fn run(console: Console, record: Record) -> Result<Outcome, CaptureEr
         yes,
     } = record;
     make_root(&settings)?;
-    if !yes && matches!(settings.turntable, Address::Serial(_)) && !agreed(console)? {
+    if !yes && matches!(settings.turntable, TurntableAddress::Serial(_)) && !agreed(console)? {
         console.warn("the table was not turned: nobody agreed; --yes agrees beforehand");
         return Ok(Outcome::Wrong);
     }
-    let _camera = Exclusive::camera(&settings)?;
-    tell_salvaged(console, &settings)?;
-    let stop = StopRequest::default();
+    let _camera = settings.lock_camera()?;
+    report_salvaged(console, &settings)?;
+    let mut equipment = Equipment::new(settings)?;
+    let stop = StopRequest::new(&equipment.clock());
     let asked = stop.clone();
     at_end(move || asked.ask(Stopped::Shutdown)).map_err(system("the signals", "listened to"))?;
-    let mut equipment = Equipment::new(settings)?;
     let monitor = Monitor::default();
-    let order = Order { object, meter };
-    let taken = while_telling(console, &monitor, || {
-        let on = Onlookers {
-            monitor: &monitor,
-            viewer: None,
-            stop: &stop,
-        };
-        capture(&mut equipment, &order, on)
+    let request = CaptureRequest { object, meter };
+    let context = CaptureContext {
+        monitor: &monitor,
+        preview: None,
+        stop: &stop,
+    };
+    let captured = while_reporting(console, &monitor, || {
+        capture(&mut equipment, &request, context)
     })?;
-    let root = equipment.settings().root.join(&taken.session);
-    Ok(tell(console, &taken, &root.display().to_string()))
+    let folder = equipment.settings().root.join(&captured.take.session);
+    Ok(report(console, &captured, &folder.display().to_string()))
 }
 
 fn system(what: &'static str, doing: &'static str) -> impl FnOnce(io::Error) -> CaptureError {
@@ -83,28 +83,25 @@ fn agreed(console: Console) -> Result<bool, CaptureError> {
     Ok(matches!(answer.trim(), "y" | "Y" | "yes"))
 }
 
-fn tell_salvaged(console: Console, settings: &Settings) -> Result<(), CaptureError> {
-    for found in salvage(&settings.root)? {
-        let folder = found.folder.display();
-        console.warn(&match found.saved {
-            Ok(saved) => format!("{folder} was interrupted, and is kept as aborted: {saved}"),
-            Err(error) => format!("{folder} was interrupted and could not be salvaged: {error}"),
-        });
-    }
+fn report_salvaged(console: Console, settings: &Settings) -> Result<(), CaptureError> {
+    let salvaged = salvage(&settings.root)?;
+    salvaged
+        .iter()
+        .for_each(|found| console.warn(&found.to_string()));
     Ok(())
 }
 
-/// Runs `work` while another thread tells what the monitor shows.
-fn while_telling<T>(console: Console, monitor: &Monitor, work: impl FnOnce() -> T) -> T {
+/// Runs `work` while another thread reports what the monitor shows.
+fn while_reporting<T>(console: Console, monitor: &Monitor, work: impl FnOnce() -> T) -> T {
     let over = AtomicBool::new(false);
     thread::scope(|scope| {
         scope.spawn(|| {
-            let mut teller = Teller::new(console);
+            let mut reporter = Reporter::new(console);
             while !over.load(Ordering::Relaxed) {
-                teller.tell(&monitor.wait_newer(teller.version, GLANCE));
+                reporter.report(&monitor.wait_newer(reporter.version, UPDATE));
             }
-            teller.tell(&monitor.state());
-            teller.bar.finish_and_clear();
+            reporter.report(&monitor.state());
+            reporter.bar.finish_and_clear();
         });
         let done = work();
         over.store(true, Ordering::Relaxed);
@@ -112,8 +109,8 @@ fn while_telling<T>(console: Console, monitor: &Monitor, work: impl FnOnce() -> 
     })
 }
 
-/// What was told of a capture.
-struct Teller {
+/// What was reported of a capture so far.
+struct Reporter {
     console: Console,
     bar: indicatif::ProgressBar,
     version: u64,
@@ -122,7 +119,7 @@ struct Teller {
     faults: usize,
 }
 
-impl Teller {
+impl Reporter {
     fn new(console: Console) -> Self {
         Self {
             console,
@@ -134,7 +131,7 @@ impl Teller {
         }
     }
 
-    fn tell(&mut self, state: &RigState) {
+    fn report(&mut self, state: &RigState) {
         self.version = state.version;
         if state.checks.len() < self.checks {
             self.checks = 0;
@@ -187,22 +184,55 @@ fn words(phase: Phase) -> &'static str {
     }
 }
 
-fn tell(console: Console, taken: &TakeSummary, folder: &str) -> Outcome {
-    let (judgement, outcome) = match taken.verdict {
-        Verdict::Clean => ("clean", Outcome::Whole),
-        Verdict::Tolerated => ("whole, with remarks", Outcome::Lossy),
-        Verdict::Aborted => ("not usable, kept as aborted", Outcome::Wrong),
-    };
-    let reason = taken
-        .reason
-        .as_ref()
-        .map_or(String::new(), |reason| format!(": {reason}"));
+fn report(console: Console, captured: &Captured, folder: &str) -> Outcome {
+    let take = &captured.take;
+    let (verdict, outcome) = judgement(captured);
+    let reason = take.reason.as_ref();
+    let reason = reason.map_or(String::new(), |reason| format!(": {reason}"));
     console.say(
         &format!(
-            "{folder}: {} frames, {} dropped, {judgement}{reason}",
-            taken.frames, taken.dropped
+            "{folder}: {} frames, {} dropped, {verdict}{reason}",
+            take.frames, take.dropped
         ),
-        &json!({ "event": "done", "session": folder, "take": taken }),
+        &json!({ "event": "done", "session": folder, "take": take }),
     );
     outcome
+}
+
+/// What a capture is worth, in words and as an exit code.
+fn judgement(captured: &Captured) -> (&'static str, Outcome) {
+    match captured.take.verdict {
+        Verdict::Clean if captured.repeated == 0 => ("clean", Outcome::Whole),
+        Verdict::Clean => ("clean, after a take that is not usable", Outcome::Lossy),
+        Verdict::Tolerated => ("whole, with remarks", Outcome::Lossy),
+        Verdict::Aborted => ("not usable, kept as aborted", Outcome::Wrong),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use relit_rig::state::TakeSummary;
+
+    use super::*;
+
+    #[test]
+    fn only_a_clean_first_take_ends_without_a_remark() {
+        for (verdict, repeated, outcome) in [
+            (Verdict::Clean, 0, Outcome::Whole),
+            (Verdict::Clean, 1, Outcome::Lossy),
+            (Verdict::Tolerated, 0, Outcome::Lossy),
+            (Verdict::Tolerated, 1, Outcome::Lossy),
+            (Verdict::Aborted, 0, Outcome::Wrong),
+            (Verdict::Aborted, 1, Outcome::Wrong),
+        ] {
+            let take = TakeSummary {
+                session: String::new(),
+                verdict,
+                frames: 0,
+                dropped: 0,
+                reason: None,
+            };
+            assert_eq!(judgement(&Captured { take, repeated }).1, outcome);
+        }
+    }
 }

@@ -5,11 +5,14 @@ use std::sync::Arc;
 
 use relit_rig::capture::CaptureError;
 use relit_rig::daemon::Daemon;
-use relit_rig::serve::{Announcement, ServeError, ServeOptions, Shutdown, serve};
+use relit_rig::serve::{
+    Announcement, ServeError, ServeOptions, Shutdown, Token, TokenFileError, serve,
+};
+use sd_notify::NotifyState;
 use serde_json::json;
 
 use crate::arguments::Serve;
-use crate::environment::{at_end, service_manager};
+use crate::environment::{at_end, heartbeat, notify_service};
 use relit::console::{Console, Outcome};
 
 /// Why the rig is not served.
@@ -21,6 +24,9 @@ pub(crate) enum Error {
     /// The server.
     #[error(transparent)]
     Serve(#[from] ServeError),
+    /// The token's file.
+    #[error(transparent)]
+    Token(#[from] TokenFileError),
 }
 
 pub(crate) fn run(console: Console, asked: Serve) -> Result<Outcome, Error> {
@@ -32,19 +38,29 @@ pub(crate) fn run(console: Console, asked: Serve) -> Result<Outcome, Error> {
             source,
         }
     };
+    let token = match &asked.token_file {
+        Some(path) => Some(Token::from_file(path)?),
+        None => asked.token,
+    };
     fs::create_dir_all(root).map_err(failed(root.display().to_string(), "made"))?;
     let shutdown = Shutdown::new();
-    let told = shutdown.clone();
-    at_end(move || told.request()).map_err(failed("the signals".to_owned(), "listened to"))?;
+    let ending = shutdown.clone();
+    let end = move || {
+        notify_service(&[NotifyState::Stopping]);
+        ending.cancel();
+    };
+    at_end(end).map_err(failed("the signals".to_owned(), "listened to"))?;
     let rig = Arc::new(Daemon::start(asked.settings)?);
     let options = ServeOptions {
-        token: asked.token,
+        token,
         names: asked.names,
-        service: service_manager(),
+        heartbeat: heartbeat(),
         ..ServeOptions::at(asked.address)
     };
     serve(rig.clone(), options, &shutdown, |announcement| {
-        announce(console, announcement)
+        let status = format!("Serving on {}", announcement.address);
+        notify_service(&[NotifyState::Ready, NotifyState::Status(&status)]);
+        announce(console, announcement);
     })?;
     // Threads of the server may hold the rig a moment longer: its end does not wait for them.
     rig.end();

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use relit_rig::clock::Clock;
 use relit_rig::simulator::{
-    Error, Faults, Simulator, SimulatorCounts, SimulatorOptions, WireCounts,
+    Simulator, SimulatorCounts, SimulatorError, SimulatorOptions, TableFaults, WireCounts,
 };
 use serde_json::json;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -18,22 +18,22 @@ use relit::console::{Console, Outcome};
 /// How often a look is taken at whether to end.
 const LOOK: Duration = Duration::from_millis(50);
 
-pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome, Error> {
-    let simulator = Simulator::start(SimulatorOptions {
+pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome, SimulatorError> {
+    let options = SimulatorOptions {
         clock: match asked.speed {
             1.0 => Clock::monotonic(),
-            factor => Clock::scaled(factor),
+            factor => Clock::paced(factor),
         },
-        faults: asked.fault.join(",").parse::<Faults>()?,
+        faults: asked.fault.join(",").parse::<TableFaults>()?,
         seed: asked.seed,
         start_angle: asked.start_angle,
         index_at: asked.index_at,
         battery: asked.battery,
         drift_ppm: asked.drift_ppm,
         reset_on_open: !asked.no_reset,
-        link: asked.link.clone(),
         ..SimulatorOptions::default()
-    })?;
+    };
+    let simulator = Simulator::start(&options, asked.link.as_deref())?;
     let port = asked.link.as_deref().unwrap_or(simulator.path());
     console.say(
         &format!(
@@ -43,7 +43,7 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
         &json!({ "event": "ready", "port": port, "speed": asked.speed }),
     );
     wait(console, asked.for_seconds);
-    tell(console, &simulator.stop());
+    report(console, &simulator.stop());
     Ok(Outcome::Whole)
 }
 
@@ -64,7 +64,7 @@ fn wait(console: Console, for_seconds: Option<f64>) {
     }
 }
 
-fn tell(console: Console, counts: &SimulatorCounts) {
+fn report(console: Console, counts: &SimulatorCounts) {
     let text = format!(
         "opened {} times; restarted by faults {} times{}\nto the table:   {}\nfrom the table: {}",
         counts.opened,

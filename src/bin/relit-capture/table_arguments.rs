@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use relit_rig::turntable::Address;
+use relit_rig::turntable::TurntableAddress;
 
 pub(crate) const TURNTABLE_EXAMPLES: &str = "\
 Examples:
@@ -32,7 +32,7 @@ Faults: drop=SHARE flip=SHARE duplicate=SHARE merge=SHARE delay=SHARE:TIME of by
 pub(crate) struct TurntableArguments {
     /// The table: serial:/dev/ttyUSB0, or serial: (the only controller plugged in).
     #[arg(long, value_name = "ADDRESS", default_value = "serial:", global = true)]
-    pub(crate) turntable: Address,
+    pub(crate) turntable: TurntableAddress,
     #[command(subcommand)]
     pub(crate) action: Action,
 }

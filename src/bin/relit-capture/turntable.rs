@@ -4,24 +4,23 @@ use std::path::Path;
 use std::sync::Arc;
 
 use relit_rig::turntable::{
-    Address, Homed, Options, Owner, Status, Table, TurntableError, find_serial,
+    Homed, Owner, Table, TableOptions, TableStatus, TurntableAddress, TurntableError, find_serial,
 };
 use serde_json::json;
 
-use crate::environment::{at_end, runtime_folder};
+use crate::environment::at_end;
 use crate::table_arguments::{Action, TurntableArguments};
 use relit::console::{Console, Outcome};
 
 pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcome, TurntableError> {
     let port = match &asked.turntable {
-        Address::Serial(Some(path)) => path.clone(),
-        Address::Serial(None) => find_serial()?,
-        Address::Simulated(_) | Address::None => return Err(no_port(&asked.turntable)),
+        TurntableAddress::Serial(Some(path)) => path.clone(),
+        TurntableAddress::Serial(None) => find_serial()?,
+        TurntableAddress::Simulated(_) | TurntableAddress::None => {
+            return Err(no_port(&asked.turntable));
+        }
     };
-    let options = Options {
-        runtime_folder: runtime_folder(),
-        ..Options::default()
-    };
+    let options = TableOptions::default();
     match asked.action {
         Action::Status => status(console, &port, &options),
         Action::Stop => stop(console, &port, &options),
@@ -43,7 +42,7 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
 fn open_to_move(
     console: Console,
     port: &Path,
-    options: &Options,
+    options: &TableOptions,
 ) -> Result<Arc<Table>, TurntableError> {
     let table = Arc::new(Table::open_serial(port, options)?);
     // Held weakly, so that the table is let go, and its port, when the motion has ended.
@@ -62,7 +61,7 @@ fn open_to_move(
     Ok(table)
 }
 
-fn no_port(address: &Address) -> TurntableError {
+fn no_port(address: &TurntableAddress) -> TurntableError {
     TurntableError::Address {
         text: address.to_string(),
         why: "it has no port that outlives this command; for a simulated table start \
@@ -71,7 +70,11 @@ fn no_port(address: &Address) -> TurntableError {
     }
 }
 
-fn status(console: Console, port: &Path, options: &Options) -> Result<Outcome, TurntableError> {
+fn status(
+    console: Console,
+    port: &Path,
+    options: &TableOptions,
+) -> Result<Outcome, TurntableError> {
     let status = match Owner::find(port, &options.runtime_folder)? {
         Some(owner) => owner.status()?,
         None => Table::open_serial(port, options)?.status()?,
@@ -80,7 +83,7 @@ fn status(console: Console, port: &Path, options: &Options) -> Result<Outcome, T
     Ok(Outcome::Whole)
 }
 
-fn stop(console: Console, port: &Path, options: &Options) -> Result<Outcome, TurntableError> {
+fn stop(console: Console, port: &Path, options: &TableOptions) -> Result<Outcome, TurntableError> {
     let status = match Owner::find(port, &options.runtime_folder)? {
         Some(owner) => owner.stop()?,
         None => Table::open_serial(port, options)?.stop()?,
@@ -102,7 +105,7 @@ fn home(console: Console, table: &Table) -> Result<Outcome, TurntableError> {
     Ok(Outcome::Whole)
 }
 
-fn tell(console: Console, event: &str, status: &Status) {
+fn tell(console: Console, event: &str, status: &TableStatus) {
     let mut value = json!({ "event": event });
     if let (Some(map), Ok(facts)) = (value.as_object_mut(), serde_json::to_value(status))
         && let Some(facts) = facts.as_object()
@@ -112,7 +115,7 @@ fn tell(console: Console, event: &str, status: &Status) {
     console.say(&in_words(status), &value);
 }
 
-fn in_words(status: &Status) -> String {
+fn in_words(status: &TableStatus) -> String {
     let mut text = format!("{}, {:.3} degrees", status.state, status.angle_deg);
     if !status.homed {
         text += " (not homed: from where it was switched on)";

@@ -1,20 +1,19 @@
 //! The command line, and what it asks for.
 
 use std::path::PathBuf;
-use std::thread::available_parallelism;
 
 use clap::builder::RangedU64ValueParser;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
-use relit::extract::{MAX_MARGIN, MAX_SIDE, Options};
-use relit_data::shard::{Layout, Size};
+use relit::extract::{ExtractOptions, MAX_MARGIN, MAX_SIDE};
+use relit_data::shard::{ImageSize, Layout};
 
 const EXAMPLES: &str = "\
 Examples:
   relit-extract sessions/20261120T093015Z-mug -o dataset
       one recorded session with the mask.png in its folder
   relit-extract sessions -o dataset --resume
-      every session in a folder; what is there already is skipped
+      every session in a folder; those that are there already are skipped
   relit-extract clip.mp4 --mask mask.png -o dataset --size native
       a bare video, in its own pixels
   relit-extract verify dataset
@@ -22,18 +21,18 @@ Examples:
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost.";
 
-/// What the command line asks for.
+/// The parsed command line.
 pub(crate) struct Arguments {
     pub(crate) json: bool,
     pub(crate) command: Command,
 }
 
-/// The two things that the program does.
+/// The two commands of the program.
 pub(crate) enum Command {
     Extract {
         inputs: Vec<PathBuf>,
         out: PathBuf,
-        options: Options,
+        options: ExtractOptions,
     },
     Verify {
         out: PathBuf,
@@ -58,13 +57,13 @@ struct CommandLine {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Read a data set back and check all of it.
+    /// Read a data set back and check everything in it.
     #[command(after_help = "Example:\n  relit-extract verify dataset")]
     Verify {
         /// The data set's folder.
         #[arg(value_name = "OUT")]
         out: PathBuf,
-        /// Print one JSON line an event on standard output.
+        /// Print one JSON line per event on standard output.
         #[arg(long)]
         json: bool,
     },
@@ -75,55 +74,55 @@ struct ExtractArguments {
     /// A session folder, a folder of sessions, or a video file.
     #[arg(value_name = "INPUT", required = true)]
     inputs: Vec<PathBuf>,
-    /// The data set's folder; made where it is missing.
+    /// The data set's folder; created if it does not exist.
     #[arg(short, long, value_name = "OUT")]
     out: PathBuf,
     /// The mask for all inputs [default: each session folder's mask.png].
     #[arg(long, value_name = "PNG")]
     mask: Option<PathBuf>,
-    /// Samples a session, evenly spread over one turn.
+    /// Samples per session, evenly spread over one turn.
     #[arg(long, value_name = "N", default_value_t = 1500, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     frames: u32,
     /// Side of images and masks in pixels, or "native" for the source's own pixels.
     #[arg(long, value_name = "PIXELS", default_value = "256", value_parser = size)]
-    size: Size,
+    size: ImageSize,
     /// Margin around the object, as a fraction of its longer side.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.05, value_parser = margin)]
     margin: f64,
     /// A channel is saturated from this 8-bit value on.
     #[arg(long, value_name = "0-255", default_value_t = 250)]
     saturation_level: u8,
-    /// Spec-Net is to run above this fraction of saturated pixels.
+    /// Spec-Net should run above this fraction of saturated pixels.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.05, value_parser = fraction)]
     gate: f64,
-    /// How the data set lies on disk.
+    /// How samples are stored.
     #[arg(long, value_enum, default_value_t = LayoutName::Webdataset)]
     layout: LayoutName,
-    /// What is done about shifts of the object in the picture.
+    /// How shifts of the object in the image are handled.
     #[arg(long, value_enum, default_value_t = AlignName::Off)]
     align: AlignName,
-    /// Refuse recordings of which a frame would be used twice or something is lost.
+    /// Refuse recordings in which a frame would be used twice or something is lost.
     #[arg(long)]
     strict: bool,
-    /// Skip sessions that the data set already holds, whole and from the same video and mask.
+    /// Skip sessions that the data set already holds, intact and from the same video and mask.
     #[arg(long)]
     resume: bool,
-    /// Replace sessions of the same name that were made of another video.
+    /// Replace sessions of the same name that were made from another video.
     #[arg(long)]
     replace: bool,
-    /// Threads that work side by side [default: as many as there are cores].
+    /// Number of worker threads [default: one per core].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
-    /// Print one JSON line an event on standard output.
+    /// Print one JSON line per event on standard output.
     #[arg(long)]
     json: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum LayoutName {
-    /// One tar a session, as WebDataset reads it.
+    /// One tar per session, as WebDataset reads it.
     Webdataset,
-    /// Folders of images, as the released data set is read.
+    /// Folders of images, as in the released data set.
     Relit,
 }
 
@@ -142,7 +141,7 @@ impl From<LayoutName> for Layout {
     }
 }
 
-/// Reads the command line; ends the program with exit code 2 where it is wrong.
+/// Parses the command line; ends the program with exit code 2 if it is wrong.
 pub(crate) fn parse() -> Arguments {
     let line = CommandLine::parse();
     match (line.verb, line.extract) {
@@ -154,7 +153,7 @@ pub(crate) fn parse() -> Arguments {
         (None, None) => CommandLine::command()
             .error(
                 ErrorKind::MissingRequiredArgument,
-                "INPUT and --out are needed",
+                "INPUT and --out are required",
             )
             .exit(),
     }
@@ -163,8 +162,8 @@ pub(crate) fn parse() -> Arguments {
 impl From<ExtractArguments> for Arguments {
     fn from(line: ExtractArguments) -> Self {
         let AlignName::Off = line.align;
-        let cores = || available_parallelism().map_or(1, std::num::NonZero::get);
-        let options = Options {
+        let defaults = ExtractOptions::default();
+        let options = ExtractOptions {
             frames: line.frames,
             size: line.size,
             margin: line.margin,
@@ -175,7 +174,7 @@ impl From<ExtractArguments> for Arguments {
             strict: line.strict,
             resume: line.resume,
             replace: line.replace,
-            threads: line.threads.unwrap_or_else(cores),
+            threads: line.threads.unwrap_or(defaults.threads),
         };
         let command = Command::Extract {
             inputs: line.inputs,
@@ -189,12 +188,12 @@ impl From<ExtractArguments> for Arguments {
     }
 }
 
-fn size(text: &str) -> Result<Size, String> {
+fn size(text: &str) -> Result<ImageSize, String> {
     if text == "native" {
-        return Ok(Size::NATIVE);
+        return Ok(ImageSize::NATIVE);
     }
     match text.parse() {
-        Ok(side) if (1..=MAX_SIDE).contains(&side) => Ok(Size::Pixels(side)),
+        Ok(side) if (1..=MAX_SIDE).contains(&side) => Ok(ImageSize::Pixels(side)),
         _ => Err(format!("give 1 to {MAX_SIDE} pixels, or native")),
     }
 }

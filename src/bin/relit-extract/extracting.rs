@@ -1,28 +1,26 @@
-//! `relit-extract INPUT... -o OUT`: progress and results of the extraction, for a person or a
-//! machine.
+//! `relit-extract INPUT... -o OUT`: progress and results of the extraction.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use indicatif::ProgressBar;
-use relit::extract::{Error, Observer, Options, Outcome, extract};
+use relit::console::{Console, Outcome};
+use relit::extract::{ExtractError, ExtractOptions, Observer, RecordingOutcome, extract};
 use relit_data::shard::SessionEntry;
 use serde_json::json;
-
-use relit::console::{self, Console};
 
 pub(crate) fn run(
     console: Console,
     inputs: &[PathBuf],
     out: &Path,
-    options: &Options,
-) -> Result<console::Outcome, Error> {
-    let teller = Teller {
+    options: &ExtractOptions,
+) -> Result<Outcome, ExtractError> {
+    let reporter = Reporter {
         console,
         out,
         bar: Mutex::new(ProgressBar::hidden()),
     };
-    let tally = extract(inputs, out, options, &teller)?;
+    let tally = extract(inputs, out, options, &reporter)?;
     console.say(
         &format!(
             "{}: {} extracted ({} with losses), {} skipped, {} failed",
@@ -43,20 +41,20 @@ pub(crate) fn run(
     );
     let nothing_came_out = tally.extracted + tally.skipped == 0;
     Ok(match (tally.failed, tally.lossy) {
-        (0, 0) => console::Outcome::Whole,
-        (1.., _) if nothing_came_out => console::Outcome::Wrong,
-        _ => console::Outcome::Lossy,
+        (0, 0) => Outcome::Whole,
+        (1.., _) if nothing_came_out => Outcome::Wrong,
+        _ => Outcome::Lossy,
     })
 }
 
-/// Tells what happens, recording by recording.
-struct Teller<'a> {
+/// Prints the progress and the outcome of each recording.
+struct Reporter<'a> {
     console: Console,
     out: &'a Path,
     bar: Mutex<ProgressBar>,
 }
 
-impl Teller<'_> {
+impl Reporter<'_> {
     fn bar(&self) -> std::sync::MutexGuard<'_, ProgressBar> {
         self.bar.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -68,7 +66,7 @@ impl Teller<'_> {
             ""
         };
         self.console.say(
-            &format!("{}: there already, skipped{lossy}", entry.id),
+            &format!("{}: already extracted, skipped{lossy}", entry.id),
             &json!({ "event": "skipped", "id": entry.id, "lossy": entry.lossy }),
         );
     }
@@ -92,8 +90,8 @@ impl Teller<'_> {
     }
 }
 
-impl Observer for Teller<'_> {
-    fn begun(&self, recording: &Path, samples: u32) {
+impl Observer for Reporter<'_> {
+    fn started(&self, recording: &Path, samples: u32) {
         let name = recording
             .file_name()
             .unwrap_or(recording.as_os_str())
@@ -105,12 +103,12 @@ impl Observer for Teller<'_> {
         self.bar().inc(1);
     }
 
-    fn ended(&self, recording: &Path, outcome: &Outcome) {
+    fn ended(&self, recording: &Path, outcome: &RecordingOutcome) {
         self.bar().finish_and_clear();
         match outcome {
-            Outcome::Extracted(entry) => self.extracted(entry),
-            Outcome::Skipped(entry) => self.skipped(entry),
-            Outcome::Failed(error) => self.console.error_in(recording, error),
+            RecordingOutcome::Extracted(entry) => self.extracted(entry),
+            RecordingOutcome::Skipped(entry) => self.skipped(entry),
+            RecordingOutcome::Failed(error) => self.console.error_in(recording, error),
         }
     }
 }

@@ -1,5 +1,4 @@
-//! `relit-extract`: recorded turns become masked frames in training shards; `verify` reads a data
-//! set back.
+//! `relit-extract`: turns recordings into training shards of masked frames, and verifies them.
 
 mod arguments;
 mod extracting;

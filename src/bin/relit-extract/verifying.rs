@@ -1,59 +1,58 @@
-//! `relit-extract verify OUT`: the verdict on a data set, for a person or a machine.
+//! `relit-extract verify OUT`: the problems of a data set.
 
 use std::path::Path;
 
-use relit_data::shard::{Error, verify};
+use relit::console::{Console, Outcome};
+use relit_data::shard::{ShardError, verify};
 use serde_json::json;
 
-use relit::console::{Console, Outcome};
+/// Number of problems that are printed for a person.
+const MAX_PRINTED: usize = 50;
 
-/// How many problems a person is told one by one.
-const TOLD: usize = 50;
-
-pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, Error> {
+pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ShardError> {
     let bar = console.progress(0, "verify");
-    let verdict = verify(out, &|done, total| {
+    let report = verify(out, &|done, total| {
         bar.set_length(total);
         bar.set_position(done);
     })?;
     bar.finish_and_clear();
-    let wrong = verdict.problems.len();
-    for problem in &verdict.problems[..wrong.min(console.most_lines(TOLD))] {
+    let count = report.problems.len();
+    for problem in &report.problems[..count.min(console.most_lines(MAX_PRINTED))] {
         let (file, sample, what) = (&problem.file, &problem.sample, &problem.what);
         console.say(
             &problem.to_string(),
             &json!({ "event": "problem", "file": file, "sample": sample, "message": what }),
         );
     }
-    if wrong > console.most_lines(TOLD) {
+    if count > console.most_lines(MAX_PRINTED) {
         console.warn(&format!(
             "{} more problems: --json lists them all",
-            wrong - TOLD
+            count - MAX_PRINTED
         ));
     }
-    let judgement = match wrong {
-        0 => "all is well".to_owned(),
+    let summary = match count {
+        0 => "no problems".to_owned(),
         1 => "1 problem".to_owned(),
         n => format!("{n} problems"),
     };
     console.say(
         &format!(
-            "{}: {} sessions, {} shards, {} samples read back: {judgement}",
+            "{}: {} sessions, {} shards, {} samples read back: {summary}",
             out.display(),
-            verdict.sessions,
-            verdict.shards,
-            verdict.samples
+            report.sessions,
+            report.shards,
+            report.samples
         ),
         &json!({
             "event": "verified",
             "out": out.to_string_lossy(),
-            "sessions": verdict.sessions,
-            "shards": verdict.shards,
-            "samples": verdict.samples,
-            "problems": wrong,
+            "sessions": report.sessions,
+            "shards": report.shards,
+            "samples": report.samples,
+            "problems": count,
         }),
     );
-    Ok(if wrong == 0 {
+    Ok(if count == 0 {
         Outcome::Whole
     } else {
         Outcome::Wrong

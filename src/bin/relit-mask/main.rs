@@ -1,4 +1,4 @@
-//! relit-mask: which pixels of a recording are the object.
+//! `relit-mask`: finds the object in recordings.
 
 mod arguments;
 mod report;
@@ -7,12 +7,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use relit::masking::Error;
-use relit::masking::make;
+use relit::console::{Console, Outcome};
+use relit::masking::{MaskingError, make_mask};
 use relit_data::session::recordings;
 
 use arguments::Arguments;
-use relit::console::{Console, Outcome};
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
@@ -22,20 +21,24 @@ fn main() -> ExitCode {
         Err(error) => return console.finish(Err(error)),
     };
     if let Err(usage) = arguments.check_output(paths.len()) {
-        // Where standard error is closed there is nobody to tell.
+        // Nothing can be done if standard error is closed.
         let _ = usage.print();
         return ExitCode::from(2);
     }
     console.finish(run(&paths, &arguments, console))
 }
 
-fn run(paths: &[PathBuf], arguments: &Arguments, console: Console) -> Result<Outcome, Error> {
+fn run(
+    paths: &[PathBuf],
+    arguments: &Arguments,
+    console: Console,
+) -> Result<Outcome, MaskingError> {
     let request = arguments.request()?;
     let bar = console.progress(paths.len() as u64, "masks");
     let mut failed = 0;
     for path in paths {
-        match make(path, arguments.output.clone(), &request) {
-            Ok(made) => bar.suspend(|| report::tell(&made, console)),
+        match make_mask(path, arguments.output.clone(), &request) {
+            Ok(output) => bar.suspend(|| report::print(&output, console)),
             Err(error) if paths.len() == 1 => return Err(error),
             Err(error) => {
                 failed += 1;

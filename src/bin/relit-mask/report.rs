@@ -1,40 +1,39 @@
-//! What relit-mask says of a mask that it made.
-
-use relit::masking::Made;
-use serde_json::json;
+//! What `relit-mask` prints about a mask.
 
 use relit::console::Console;
+use relit::masking::MaskOutput;
+use serde_json::json;
 
-/// Tells of one mask: its warnings, then where it is and how large.
-pub(crate) fn tell(made: &Made, console: Console) {
-    let id = &made.recording;
-    for notice in &made.notices {
+/// Prints the warnings about one mask, its files and its size.
+pub(crate) fn print(output: &MaskOutput, console: Console) {
+    let id = &output.recording;
+    for notice in &output.notices {
         console.warn(&format!("{id}: {}", notice.text()));
     }
-    for warning in &made.record.warnings {
+    for warning in &output.record.warnings {
         console.warn(&format!("{id}: {warning}"));
     }
-    let (source, result) = (&made.record.source, &made.record.result);
+    let (source, result) = (&output.record.source, &output.record.result);
     let frame_px = f64::from(source.width) * f64::from(source.height);
     let text = format!(
-        "{id}: {} with {} pixels ({:.1} % of the frame) at {}, {} of {} parts; look at {}",
-        made.files.mask.display(),
+        "{id}: {} with {} pixels ({:.1} % of the frame) at {}, {} of {} parts; check {}",
+        output.files.mask.display(),
         result.area_px,
         100.0 * result.area_px as f64 / frame_px,
         result.bounding_box,
         result.components_kept,
         result.components,
-        made.files.preview.display(),
+        output.files.preview.display(),
     );
     let event = json!({
         "event": "mask",
         "recording": id,
-        "mask": made.files.mask.to_string_lossy(),
-        "record": made.files.record.to_string_lossy(),
-        "preview": made.files.preview.to_string_lossy(),
+        "mask": output.files.mask.to_string_lossy(),
+        "record": output.files.record.to_string_lossy(),
+        "preview": output.files.preview.to_string_lossy(),
         "source": source,
         "result": result,
-        "warnings": made.record.warnings,
+        "warnings": output.record.warnings,
     });
     console.say(&text, &event);
 }

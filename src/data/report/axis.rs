@@ -1,17 +1,17 @@
-//! Axes from zero with round ticks, and numbers as people write them.
+//! Axes that start at zero and have round ticks, and the formatting of numbers.
 
 /// An axis from 0 to `top` with a tick each `step`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Axis {
     /// The upper end, a multiple of `step`.
     pub(super) top: f64,
-    /// Distance of two ticks.
+    /// Distance between two ticks.
     pub(super) step: f64,
 }
 
 impl Axis {
-    /// The axis that shows values in 0..=`largest`, which is finite, in at most `intervals`
-    /// steps. All zero gives 0 to 1.
+    /// The axis that shows values in 0..=`largest`, which is finite, in at most `intervals` steps.
+    /// If `largest` is 0, the axis is 0 to 1.
     pub(super) fn holding(largest: f64, intervals: f64) -> Self {
         let largest = if largest > 1e-6 { largest } else { 1.0 };
         let raw = largest / intervals;
@@ -35,13 +35,13 @@ impl Axis {
             .take_while(move |tick| *tick <= self.top + step / 2.0)
     }
 
-    /// Where `value` lies on the axis: 0 at zero, 1 at the top.
-    pub(super) fn place(self, value: f64) -> f64 {
+    /// The position of `value` on the axis: 0 at zero, 1 at the top.
+    pub(super) fn position(self, value: f64) -> f64 {
         value / self.top
     }
 }
 
-/// `value` with at most `decimals` decimals and no idle zeros.
+/// `value` with at most `decimals` decimals and no trailing zeros.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let text = if text.contains('.') {
@@ -56,7 +56,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A tick's label; thousands are shortened so that the margin holds it.
+/// A tick's label; large numbers are shortened to fit into the margin.
 pub(super) fn tick_label(value: f64) -> String {
     if value >= 1e7 {
         format!("{} M", number(value / 1e6, 1))
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_carry_no_idle_zeros() {
+    fn numbers_have_no_trailing_zeros() {
         assert_eq!(number(5.0, 2), "5");
         assert_eq!(number(0.19, 2), "0.19");
         assert_eq!(number(100.0, 0), "100");
@@ -115,7 +115,7 @@ mod tests {
         #[test]
         fn any_largest_value_lies_on_its_axis(largest in 0.0..1e9f64) {
             let axis = Axis::holding(largest, 5.0);
-            prop_assert!(axis.place(largest) <= 1.0 + 1e-9);
+            prop_assert!(axis.position(largest) <= 1.0 + 1e-9);
             prop_assert!((3..=6).contains(&axis.ticks().count()));
         }
     }

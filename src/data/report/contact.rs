@@ -1,4 +1,4 @@
-//! The contact sheet: frames over the turn, inside the page.
+//! The contact sheet: thumbnails over the turn, embedded in the page.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -7,27 +7,32 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder as _, RgbImage};
 
 use super::axis::{degrees, percent};
+use super::error::ReportError;
+use super::page::{Page, THUMBNAIL_SIDE, Thumbnail};
 use super::turn::Turn;
-use super::{Error, Page, THUMBNAIL_SIDE, Thumbnail};
 use crate::shard::record::FrameRecord;
 
 /// Good enough to judge mask and light; a quarter of a PNG's size on a real frame.
 const JPEG_QUALITY: u8 = 85;
 
-/// The thumbnails as figures, in their order.
-pub(super) fn sheet(page: &Page<'_>, turn: &Turn) -> Result<String, Error> {
+/// The thumbnails as figures, in the given order.
+pub(super) fn sheet(page: &Page<'_>, turn: &Turn) -> Result<String, ReportError> {
     page.thumbnails
         .iter()
         .map(|thumbnail| figure(page.records, turn, thumbnail))
         .collect()
 }
 
-fn figure(records: &[FrameRecord], turn: &Turn, thumbnail: &Thumbnail) -> Result<String, Error> {
-    let stray = || Error::Stray(thumbnail.index);
+fn figure(
+    records: &[FrameRecord],
+    turn: &Turn,
+    thumbnail: &Thumbnail,
+) -> Result<String, ReportError> {
+    let unknown = || ReportError::UnknownSample(thumbnail.index);
     let position = records
         .binary_search_by_key(&thumbnail.index, |r| r.index)
-        .map_err(|_| stray())?;
-    let record = records.get(position).ok_or_else(stray)?;
+        .map_err(|_| unknown())?;
+    let record = records.get(position).ok_or_else(unknown)?;
     let angle = turn
         .degrees
         .get(position)
@@ -62,19 +67,19 @@ fn marks(record: &FrameRecord) -> String {
     format!("{spec_net}{duplicate}")
 }
 
-/// The image as JPEG or PNG, whichever is smaller: PNG wins on small and flat images.
-fn data_uri(thumbnail: &Thumbnail) -> Result<String, Error> {
+/// The image as JPEG or PNG, whichever is smaller: PNG is smaller for small and flat images.
+fn data_uri(thumbnail: &Thumbnail) -> Result<String, ReportError> {
     let (index, image) = (thumbnail.index, &thumbnail.image);
     let (width, height) = image.dimensions();
     let fits = |side| (1..=THUMBNAIL_SIDE).contains(&side);
     if !fits(width) || !fits(height) {
-        return Err(Error::Size {
+        return Err(ReportError::Size {
             index,
             width,
             height,
         });
     }
-    let failed = |source| Error::Encode { index, source };
+    let failed = |source| ReportError::Encode { index, source };
     let jpeg = jpeg(image).map_err(failed)?;
     let png = png(image).map_err(failed)?;
     Ok(if jpeg.len() < png.len() {

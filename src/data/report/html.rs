@@ -1,7 +1,7 @@
-//! Text that is safe inside HTML, whatever a session, an object or a path is called.
+//! Text that is safe inside HTML, for any name of a session, an object or a path.
 
 /// `text` for an element's content or a quoted attribute: markup is escaped, and characters that
-/// HTML does not allow or that would reorder their surroundings are replaced by U+FFFD.
+/// HTML does not allow or that change the writing direction are replaced by U+FFFD.
 pub(super) fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for character in text.chars() {
@@ -29,7 +29,7 @@ fn is_direction_override(c: char) -> bool {
     matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// Name and value, a row each; empty text where there are none.
+/// A table of names and values, one row each; empty text if there are none.
 pub(super) fn table(heading: &str, rows: &[(String, String)]) -> String {
     if rows.is_empty() {
         return String::new();

@@ -5,20 +5,20 @@ use super::turn::FULL;
 
 /// Width of a plot, in its own units; the page scales it to the column.
 const WIDTH: f64 = 600.0;
-/// Edges of the plotting area. The margins hold the labels at the size they have on a phone.
+/// Edges of the plotting area. The margins have space for the labels at a phone's text size.
 const LEFT: f64 = 54.0;
 const RIGHT: f64 = 554.0;
 const TOP: f64 = 30.0;
 const BELOW: f64 = 52.0;
-/// Distance of the ticks of the horizontal axis, degrees.
+/// Distance between ticks of the horizontal axis, degrees.
 const ANGLE_STEP: u16 = 45;
-/// Least distance of two ticks of the vertical axis.
+/// Smallest distance between ticks of the vertical axis.
 const TICK_GAP: f64 = 36.0;
-/// From the plotting area to a label on its right.
+/// Distance from the plotting area to a label on its right.
 const LABEL_INDENT: f64 = 8.0;
-/// Least distance of two labels at the lines' ends.
+/// Smallest distance between two labels at the ends of lines.
 const LABEL_GAP: f64 = 17.0;
-/// Longest line that is drawn point by point.
+/// Most points of a line that is drawn without thinning.
 const MOST_POINTS: usize = 2000;
 
 /// One line.
@@ -26,16 +26,16 @@ const MOST_POINTS: usize = 2000;
 pub(super) struct Series {
     /// Class in the style sheet.
     pub(super) class: &'static str,
-    /// Written at the line's end; empty for none.
+    /// Label at the line's end; empty for none.
     pub(super) label: &'static str,
     /// (degrees, value), by ascending degrees, at least one point.
     pub(super) points: Vec<(f64, f64)>,
 }
 
-/// A level that is drawn across the plot, with the region above it tinted.
+/// A horizontal line across the plot, with the region above it tinted.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Level {
-    /// Where, in the unit of the vertical axis.
+    /// Its value, in the unit of the vertical axis.
     pub(super) at: f64,
     /// The same as a fraction, for the label.
     pub(super) fraction: f64,
@@ -44,7 +44,7 @@ pub(super) struct Level {
 /// A plot over the turn.
 #[derive(Debug)]
 pub(super) struct Plot<'a> {
-    /// Says in words what is seen, for those who do not see it.
+    /// Text alternative for readers who do not see the plot.
     pub(super) alternative: &'a str,
     /// Quantity and unit of the vertical axis.
     pub(super) quantity: &'a str,
@@ -80,7 +80,7 @@ impl Plot<'_> {
         )
     }
 
-    /// Holds every line, and twice the level so that the region above it is seen.
+    /// Covers every line, and twice the level so that the region above it is visible.
     fn axis(&self) -> Axis {
         let values = self
             .series
@@ -98,7 +98,7 @@ impl Plot<'_> {
     }
 
     fn y(&self, axis: Axis, value: f64) -> f64 {
-        self.bottom() - self.height * axis.place(value)
+        self.bottom() - self.height * axis.position(value)
     }
 
     fn tint(&self, axis: Axis) -> String {
@@ -154,7 +154,7 @@ impl Plot<'_> {
                 format!("{},{}", number(x(angle), 1), number(self.y(axis, value), 1))
             })
             .collect();
-        // A line of one point is not drawn; from a point to itself it is a dot.
+        // A line of one point would not be drawn; a line from a point to itself is a dot.
         if let [only] = points.as_slice() {
             points.push(only.clone());
         }
@@ -165,7 +165,7 @@ impl Plot<'_> {
         )
     }
 
-    /// The level's label stands in the margin, where no line can cross it.
+    /// The level's label is in the margin, where no line crosses it.
     fn level_line(&self, axis: Axis) -> String {
         let Some(level) = self.level else {
             return String::new();
@@ -179,7 +179,7 @@ impl Plot<'_> {
         )
     }
 
-    /// The lines' names at their ends, moved apart where they would cover each other.
+    /// The lines' labels at their ends, moved apart if they would overlap.
     fn end_labels(&self, axis: Axis) -> String {
         let mut labels: Vec<(f64, &Series)> = self
             .series
@@ -211,8 +211,8 @@ fn x(angle: f64) -> f64 {
     LEFT + (RIGHT - LEFT) * angle / FULL
 }
 
-/// A long line with fewer points and the same outline: of each stretch its lowest and its highest
-/// point, so that a single bright frame is never lost.
+/// A long line with fewer points and the same outline: the lowest and the highest point of each
+/// stretch, so that a single bright frame is never lost.
 fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     if points.len() <= MOST_POINTS {
         return points.to_vec();
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gate_lies_at_its_height() {
+    fn the_gate_is_drawn_at_its_height() {
         // The axis reaches 10 %, so 5 % is half way up a plot of 200 units.
         let svg = plot(vec![line(vec![(0.0, 1.0), (360.0, 9.0)])]).svg();
         assert!(

@@ -1,13 +1,14 @@
-//! The page's parts, from the title to the tables.
+//! The sections of the page, from the title to the tables.
 
 use super::axis::{degrees, number, percent};
 use super::html::{escape, table};
+use super::page::Page;
 use super::plot::{Level, Plot, Series};
 use super::turn::Turn;
-use super::{Page, any_fraction};
+use crate::image_stats::fraction;
 use crate::shard::record::FrameRecord;
 
-/// Heights of the plotting areas, in units of which the width has 500.
+/// Heights of the plotting areas; the width is 500.
 const TALL: f64 = 240.0;
 const LOW: f64 = 120.0;
 
@@ -156,10 +157,15 @@ fn saturated(page: &Page<'_>, turn: &Turn) -> String {
     figure(&plot, &caption)
 }
 
-/// Apart from the gated fraction, which it exceeds tenfold on a coloured object: on one axis the
-/// gate could not be read.
+/// Fraction of the mask in which any channel is saturated, 0..=1.
+fn any_channel(record: &FrameRecord) -> f64 {
+    fraction(record.saturated_any_px, record.mask_px)
+}
+
+/// A plot of its own: on a coloured object this fraction is ten times the gated one, and on a common
+/// axis the gate would be unreadable.
 fn saturated_any(page: &Page<'_>, turn: &Turn) -> String {
-    let extremes = Extremes::of(page.records, turn, any_fraction);
+    let extremes = Extremes::of(page.records, turn, any_channel);
     let caption = format!(
         "Pixels with at least one channel at {level} or above; not gated. {extremes}",
         level = page.saturation_level,
@@ -173,7 +179,7 @@ fn saturated_any(page: &Page<'_>, turn: &Turn) -> String {
         series: vec![Series {
             class: "any",
             label: "",
-            points: turn.points(page.records, |r| 100.0 * any_fraction(r)),
+            points: turn.points(page.records, |r| 100.0 * any_channel(r)),
         }],
         level: None,
     };
@@ -232,7 +238,7 @@ fn figure(plot: &Plot<'_>, caption: &str) -> String {
     )
 }
 
-/// Least, mean and largest value of a quantity, and where the extremes lie.
+/// Smallest, mean and largest value of a quantity, with the angles of the extremes.
 struct Extremes {
     least: (f64, f64),
     mean: f64,

@@ -1,22 +1,22 @@
-//! Where each record lies on the turn, 0 to 360 degrees.
+//! The position of each record on the turn, 0 to 360 degrees.
 
 use crate::shard::record::FrameRecord;
 
 /// Degrees of one turn.
 pub(super) const FULL: f64 = 360.0;
 
-/// The places of a session's records on the turn.
+/// The positions of a session's records on the turn.
 #[derive(Debug)]
 pub(super) struct Turn {
-    /// True where the places are the table's angles.
+    /// True if the positions are the table's angles.
     pub(super) measured: bool,
-    /// A place for each record, degrees, 0..=360.
+    /// One position per record, degrees, 0..=360.
     pub(super) degrees: Vec<f64>,
 }
 
 impl Turn {
-    /// By the table's angle where every record has one, else by the index: a mixture of both would
-    /// draw a line between two different axes.
+    /// By the table's angle if every record has one, else by the index: mixing them would draw a
+    /// line between two different axes.
     pub(super) fn of(records: &[FrameRecord]) -> Self {
         let angles: Option<Vec<f64>> = records
             .iter()
@@ -48,7 +48,7 @@ impl Turn {
         }
     }
 
-    /// Where the places come from, as a sentence.
+    /// The origin of the positions, as a sentence.
     pub(super) fn origin(&self) -> &'static str {
         if self.measured {
             "Angles are the table\u{2019}s, as recorded."
@@ -58,8 +58,8 @@ impl Turn {
         }
     }
 
-    /// The points (place, `value`), from 0 to 360 degrees. A turn that starts at 90 degrees and
-    /// passes 360 is drawn from 0 on like any other.
+    /// The points (position, `value`), sorted from 0 to 360 degrees, also for a turn that starts at
+    /// 90 degrees and passes 360.
     pub(super) fn points(
         &self,
         records: &[FrameRecord],

@@ -2,23 +2,23 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Largest angle that is believed, degrees: some thousands of turns either way.
+/// Largest plausible angle, degrees: some thousands of turns in either direction.
 const MOST_DEGREES: f64 = 1e6;
 
-/// One frame, as the recorder knew it.
+/// One frame as it was recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FrameEntry {
     /// Position in the video, 0-based.
     pub n: u64,
-    /// The driver's counter: a gap is a dropped frame.
+    /// The driver's frame counter; a gap means dropped frames.
     pub sequence: u64,
     /// The driver's monotonic time stamp, microseconds.
     pub t_us: i64,
-    /// Interpolated angle of the table, degrees; `None` where there is no table.
+    /// Interpolated angle of the table, degrees; `None` without a table.
     pub angle_deg: Option<f64>,
 }
 
-/// Frames that the driver counted and the video lacks.
+/// Frames that the driver counted and that are missing in the video.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Gap {
     /// Position in the video of the frame after the gap.
@@ -35,17 +35,17 @@ pub enum IndexFault {
     Line {
         /// 1-based line.
         line: u64,
-        /// The parser's words.
+        /// The parser's message.
         what: String,
     },
     /// Positions do not count up from 0.
-    #[error("line {line} says n = {found} where {expected} is due")]
+    #[error("line {line} says n = {found}, but {expected} was expected")]
     Position {
         /// 1-based line.
         line: u64,
-        /// The number that is due.
+        /// The expected position.
         expected: u64,
-        /// What stands there.
+        /// The position in the file.
         found: u64,
     },
     /// The driver's counter did not grow.
@@ -53,32 +53,30 @@ pub enum IndexFault {
     Sequence {
         /// 1-based line.
         line: u64,
-        /// The counter of the line before.
+        /// The counter in the line before.
         previous: u64,
-        /// What stands there.
+        /// The counter in this line.
         found: u64,
     },
     /// Time did not grow.
-    #[error(
-        "line {line} does not come later than the line before ({found} us after {previous} us)"
-    )]
+    #[error("line {line} is not later than the line before ({found} us after {previous} us)")]
     Time {
         /// 1-based line.
         line: u64,
-        /// The time stamp of the line before, microseconds.
+        /// The time stamp in the line before, microseconds.
         previous: i64,
-        /// What stands there.
+        /// The time stamp in this line, microseconds.
         found: i64,
     },
-    /// The angle cannot be one.
-    #[error("line {line} has an angle that no table reaches")]
+    /// The angle is not finite, or implausibly large.
+    #[error("line {line} has an angle that no turntable reaches")]
     Angle {
         /// 1-based line.
         line: u64,
     },
 }
 
-/// All frames of a session, in order, checked: `entries()[i].n == i`, sequence and time grow.
+/// All frames of a session, checked: `entries()[i].n == i`, and sequence and time grow.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameIndex {
     entries: Vec<FrameEntry>,
@@ -87,10 +85,10 @@ pub struct FrameIndex {
 
 impl FrameIndex {
     /// Reads an index from the bytes of its file. A last line without line feed that cannot be
-    /// read is what a power cut leaves: it is passed over, and [`Self::is_torn`] tells.
+    /// parsed was cut off by a power failure: it is skipped, and [`Self::is_torn`] is true.
     ///
     /// # Errors
-    /// [`IndexFault`] names the first line that is wrong.
+    /// [`IndexFault`] with the first line that is wrong.
     pub fn parse(bytes: &[u8]) -> Result<Self, IndexFault> {
         let mut index = Self::default();
         let mut lines = bytes
@@ -113,10 +111,10 @@ impl FrameIndex {
         Ok(index)
     }
 
-    /// Reads an index as far as it is whole, and says what is wrong from there on: what a power cut
-    /// leaves need not be a line.
+    /// Reads an index up to the first fault, and returns that fault too: after a power cut the end of
+    /// the file can hold anything.
     #[must_use]
-    pub fn parse_as_far_as_whole(bytes: &[u8]) -> (Self, Option<IndexFault>) {
+    pub fn parse_until_fault(bytes: &[u8]) -> (Self, Option<IndexFault>) {
         let mut index = Self::default();
         for (text, line) in bytes.split_inclusive(|&byte| byte == b'\n').zip(1_u64..) {
             let read = match serde_json::from_slice::<FrameEntry>(text) {
@@ -137,7 +135,7 @@ impl FrameIndex {
     /// The index as the bytes of its file.
     ///
     /// # Errors
-    /// Where an entry is not JSON, which no checked one is.
+    /// If an entry cannot be serialized, which does not happen to a checked one.
     pub fn to_jsonl(&self) -> Result<Vec<u8>, serde_json::Error> {
         let mut bytes = Vec::with_capacity(self.entries.len() * 72);
         for entry in &self.entries {
@@ -147,7 +145,7 @@ impl FrameIndex {
         Ok(bytes)
     }
 
-    /// Forgets all frames from position `frames` on.
+    /// Removes all frames from position `frames` on.
     pub fn truncate(&mut self, frames: usize) {
         self.entries.truncate(frames);
     }
@@ -155,7 +153,7 @@ impl FrameIndex {
     /// Adds the next frame.
     ///
     /// # Errors
-    /// [`IndexFault`] where the entry does not continue the index; the index stays as it was.
+    /// [`IndexFault`] if the entry does not continue the index, which is then unchanged.
     pub fn push(&mut self, entry: FrameEntry) -> Result<(), IndexFault> {
         self.push_as(entry, self.entries.len() as u64 + 1)
     }
@@ -202,13 +200,13 @@ impl FrameIndex {
         &self.entries
     }
 
-    /// True where the file's last line was cut in the middle.
+    /// True if the file's last line was cut off.
     #[must_use]
     pub fn is_torn(&self) -> bool {
         self.torn
     }
 
-    /// Where the driver's counter jumps, in order.
+    /// The jumps of the driver's counter, in order.
     #[must_use]
     pub fn gaps(&self) -> Vec<Gap> {
         let pairs = self.entries.windows(2);
@@ -270,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_last_line_cut_by_a_power_cut_is_passed_over_and_told() {
+    fn a_last_line_that_was_cut_off_is_skipped_and_reported() {
         let whole = text(&[entry(0), entry(1)]);
         let index = FrameIndex::parse(&whole.as_bytes()[..whole.len() - 9]).unwrap();
         assert_eq!(index.entries().len(), 1);
@@ -278,13 +276,13 @@ mod tests {
     }
 
     #[test]
-    fn an_index_is_read_as_far_as_it_is_whole() {
+    fn an_index_is_read_up_to_its_first_fault() {
         let whole = text(&[entry(0), entry(1)]);
-        let (index, fault) = FrameIndex::parse_as_far_as_whole(whole.as_bytes());
+        let (index, fault) = FrameIndex::parse_until_fault(whole.as_bytes());
         assert_eq!((index.entries().len(), fault), (2, None));
         assert_eq!(index.to_jsonl().unwrap(), whole.as_bytes());
         let zeros = [whole.as_bytes(), &[0; 100]].concat();
-        let (index, fault) = FrameIndex::parse_as_far_as_whole(&zeros);
+        let (index, fault) = FrameIndex::parse_until_fault(&zeros);
         assert_eq!(index.entries().len(), 2);
         assert!(matches!(fault, Some(IndexFault::Line { line: 3, .. })));
     }

@@ -11,7 +11,7 @@ use super::is_session_name;
 /// The schema that this version reads and writes.
 pub const MANIFEST_SCHEMA: &str = "relit.session/1";
 
-/// What is known of a session as a whole.
+/// The description of a session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Manifest {
     /// The session's name: `<UTC date>T<time>Z-<object>`.
@@ -20,26 +20,26 @@ pub struct Manifest {
     pub object: String,
     /// When the capture began, UTC.
     pub created: Timestamp,
-    /// Whether the capture came to its end.
+    /// Whether the capture is running, complete or aborted.
     pub status: Status,
     /// The camera and its settings.
     pub camera: CameraFacts,
-    /// The turntable; `None` where the camera recorded without one.
+    /// The turntable; `None` if the camera recorded without one.
     pub turntable: Option<TurntableFacts>,
     /// The video file.
     pub video: VideoFacts,
-    /// What went wrong on the way, in order of time.
+    /// What went wrong during the capture, in order of time.
     pub faults: Vec<Fault>,
     /// The program that recorded.
     pub software: SoftwareFacts,
 }
 
-/// How far a capture has come.
+/// The state of a capture.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Status {
-    /// Not ended: running, or its recorder died and nothing was salvaged yet.
+    /// Running, or interrupted and not yet salvaged.
     Recording,
-    /// Whole.
+    /// Finished, with all frames.
     Complete,
     /// Ended early or salvaged, for this reason.
     Aborted(String),
@@ -62,16 +62,37 @@ pub struct CameraFacts {
     pub height: u32,
     /// Nominal frames per second.
     pub fps: f64,
+    /// What stamped the frames; not written where it is the driver.
+    #[serde(default, skip_serializing_if = "FrameClock::is_driver")]
+    pub clock: FrameClock,
     /// Every control's value, by name.
     pub controls: BTreeMap<String, Value>,
 }
 
-/// The turntable's facts.
+/// What stamped the frames of a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FrameClock {
+    /// The camera's driver, when the frame was exposed or its last data came.
+    #[default]
+    Driver,
+    /// The recording program, when it got the frame: later by what the camera and the system took,
+    /// and less regular.
+    Host,
+}
+
+impl FrameClock {
+    fn is_driver(&self) -> bool {
+        *self == Self::Driver
+    }
+}
+
+/// The turntable and its settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TurntableFacts {
     /// The serial port.
     pub port: String,
-    /// What the controller says it runs.
+    /// The firmware and version that the controller reports.
     pub firmware: String,
     /// Speed of the constant part, degrees a second.
     pub degrees_per_second: f64,
@@ -79,14 +100,14 @@ pub struct TurntableFacts {
     pub steps_per_degree: f64,
 }
 
-/// The video file. The last three are `None` only while the capture is not complete.
+/// The video file. The last three fields are `None` only while the capture is not complete.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct VideoFacts {
-    /// Its name in the session folder.
+    /// Its file name in the session folder.
     pub file: String,
     /// `mjpeg`, `h264` or `ffv1`.
     pub codec: String,
-    /// Frames in it.
+    /// Number of frames.
     #[serde(default)]
     pub frames: Option<u64>,
     /// Its size, bytes.
@@ -118,13 +139,13 @@ pub struct SoftwareFacts {
 /// What is wrong in a manifest.
 #[derive(Debug, thiserror::Error)]
 pub enum ManifestFault {
-    /// Not JSON, or a field is missing or of another type.
+    /// Not JSON, or a field is missing or has another type.
     #[error("{0}")]
     Json(#[from] serde_json::Error),
-    /// Another schema, probably of a newer version.
+    /// Another schema, probably from a newer version.
     #[error("its schema is {found:?}, and this version reads {MANIFEST_SCHEMA:?}")]
     Schema {
-        /// What stands there.
+        /// The schema in the file.
         found: String,
     },
     /// The id cannot be a session's name.
@@ -133,27 +154,27 @@ pub enum ManifestFault {
     /// The object has no name.
     #[error("its object is empty")]
     NoObject,
-    /// `status` is none of the three.
+    /// `status` has an unknown value.
     #[error("its status {0:?} is none of \"recording\", \"complete\", \"aborted\"")]
     Status(String),
     /// Aborted without a reason.
-    #[error("its status is \"aborted\" and no reason stands there")]
+    #[error("its status is \"aborted\", but it has no reason")]
     NoReason,
-    /// A complete session lacks a fact about its video.
-    #[error("its status is \"complete\" and video.{0} is missing")]
+    /// A field about the video of a complete session is missing.
+    #[error("its status is \"complete\", but video.{0} is missing")]
     Incomplete(&'static str),
-    /// The video's name leads out of the session folder.
+    /// The video's file name is a path.
     #[error("its video.file {0:?} is not a plain file name")]
     VideoName(String),
-    /// The hash is not one.
+    /// The hash is malformed.
     #[error("its video.blake3 {0:?} is not a hash of 64 hexadecimal digits")]
     Hash(String),
-    /// A number that must be positive and finite is not.
-    #[error("its {field} is {value}, which cannot be")]
+    /// A number is not positive and finite.
+    #[error("its {field} is {value}, but must be positive")]
     Number {
         /// The field.
         field: &'static str,
-        /// What stands there.
+        /// The value in the file.
         value: f64,
     },
 }
@@ -162,33 +183,33 @@ impl Manifest {
     /// Reads a manifest from the bytes of its file.
     ///
     /// # Errors
-    /// [`ManifestFault`] names the first thing that is wrong.
+    /// [`ManifestFault`] with the first fault found.
     pub fn from_json(bytes: &[u8]) -> Result<Self, ManifestFault> {
-        // The schema first: of another version, no other field's complaint would be of use.
+        // The schema first: complaints about the fields of another version would mislead.
         let schema: SchemaOnly = serde_json::from_slice(bytes)?;
         if schema.schema != MANIFEST_SCHEMA {
             return Err(ManifestFault::Schema {
                 found: schema.schema,
             });
         }
-        let wire: Wire = serde_json::from_slice(bytes)?;
-        let status = match (wire.status.as_str(), wire.reason) {
+        let file: ManifestFile = serde_json::from_slice(bytes)?;
+        let status = match (file.status.as_str(), file.reason) {
             ("recording", _) => Status::Recording,
             ("complete", _) => Status::Complete,
             ("aborted", Some(reason)) => Status::Aborted(reason),
             ("aborted", None) => return Err(ManifestFault::NoReason),
-            _ => return Err(ManifestFault::Status(wire.status)),
+            _ => return Err(ManifestFault::Status(file.status)),
         };
         let manifest = Self {
-            id: wire.id,
-            object: wire.object,
-            created: wire.created,
+            id: file.id,
+            object: file.object,
+            created: file.created,
             status,
-            camera: wire.camera,
-            turntable: wire.turntable,
-            video: wire.video,
-            faults: wire.faults,
-            software: wire.software,
+            camera: file.camera,
+            turntable: file.turntable,
+            video: file.video,
+            faults: file.faults,
+            software: file.software,
         };
         manifest.check()?;
         Ok(manifest)
@@ -197,7 +218,7 @@ impl Manifest {
     /// The manifest as the bytes of its file: indented JSON with a final line feed.
     ///
     /// # Errors
-    /// As [`Self::from_json`] would give for it: nothing is written that cannot be read back.
+    /// As [`Self::from_json`]: what could not be read back is not written.
     pub fn to_json(&self) -> Result<Vec<u8>, ManifestFault> {
         self.check()?;
         let (status, reason) = match &self.status {
@@ -205,7 +226,7 @@ impl Manifest {
             Status::Complete => ("complete", None),
             Status::Aborted(reason) => ("aborted", Some(reason.clone())),
         };
-        let wire = Wire {
+        let file = ManifestFile {
             schema: MANIFEST_SCHEMA.to_owned(),
             id: self.id.clone(),
             object: self.object.clone(),
@@ -218,7 +239,7 @@ impl Manifest {
             faults: self.faults.clone(),
             software: self.software.clone(),
         };
-        let mut bytes = serde_json::to_vec_pretty(&wire)?;
+        let mut bytes = serde_json::to_vec_pretty(&file)?;
         bytes.push(b'\n');
         Ok(bytes)
     }
@@ -257,8 +278,8 @@ impl Manifest {
     }
 }
 
-/// The object's name that a session's id holds: what follows `<UTC date>T<time>Z-`, or all of it where the
-/// id is not of that form.
+/// The object's name in a session's id: what follows `<UTC date>T<time>Z-`, or the whole id if it does
+/// not have that form.
 #[must_use]
 pub fn object_of(id: &str) -> &str {
     let Some((stamp, object)) = id.split_once("Z-") else {
@@ -289,9 +310,9 @@ struct SchemaOnly {
     schema: String,
 }
 
-/// The manifest as it stands in the file, where `status` and `reason` are two fields.
+/// The manifest as it is in the file, where `status` and `reason` are two fields.
 #[derive(Serialize, Deserialize)]
-struct Wire {
+struct ManifestFile {
     schema: String,
     id: String,
     object: String,

@@ -1,28 +1,28 @@
-//! A recording as a program is given it: a session folder, or a bare video.
+//! The input of the programs: a session folder, or a bare video.
 
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{
-    Error, FrameIndex, INDEX_FILE, MANIFEST_FILE, MASK_FILE, Manifest, Status, is_session_name,
-    object_of,
+    FrameIndex, INDEX_FILE, MANIFEST_FILE, MASK_FILE, Manifest, SessionError, Status,
+    is_session_name, object_of,
 };
 
-/// File name endings that are taken for videos in a folder without manifest.
+/// File extensions that count as videos in a folder without manifest.
 const VIDEO_ENDINGS: [&str; 7] = ["mkv", "mp4", "mov", "avi", "webm", "m4v", "nut"];
 
-/// Something about a recording that its user has to know.
+/// Something about a recording that its user should know.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Notice {
     /// Worth a look; nothing is lost.
     Warning(String),
-    /// Something that was recorded, or should have been, is not there.
+    /// Something that was recorded, or should have been, is missing.
     Loss(String),
 }
 
 impl Notice {
-    /// The sentence.
+    /// The text, one sentence.
     #[must_use]
     pub fn text(&self) -> &str {
         match self {
@@ -30,7 +30,7 @@ impl Notice {
         }
     }
 
-    /// True where something is lost.
+    /// True if something is lost.
     #[must_use]
     pub fn is_loss(&self) -> bool {
         matches!(self, Self::Loss(_))
@@ -50,20 +50,19 @@ pub struct Recording {
     pub video: PathBuf,
     /// The manifest; `None` for a bare video.
     pub manifest: Option<Manifest>,
-    /// The frame index, where there is one.
+    /// The frame index, if there is one.
     pub frames: Option<FrameIndex>,
-    /// What the user has to know.
+    /// What the user should know.
     pub notices: Vec<Notice>,
 }
 
 impl Recording {
-    /// Opens a session folder or a bare video file. The video itself is not looked into, except
-    /// for its size.
+    /// Opens a session folder or a bare video file. Of the video only the size is checked.
     ///
     /// # Errors
-    /// [`Error`] where manifest or index are not usable, the session has not ended, or there is no
-    /// video. What is short but usable becomes a [`Notice`].
-    pub fn open(path: &Path) -> Result<Self, Error> {
+    /// [`SessionError`] if manifest or index are not usable, the session has not ended, or there is no video.
+    /// What is incomplete but usable becomes a [`Notice`].
+    pub fn open(path: &Path) -> Result<Self, SessionError> {
         if path.is_dir() {
             if path.join(MANIFEST_FILE).exists() {
                 return Self::open_session(path);
@@ -71,22 +70,22 @@ impl Recording {
             return Self::open_plain_folder(path);
         }
         if !path.is_file() {
-            return Err(Error::NotThere(path.to_owned()));
+            return Err(SessionError::NotThere(path.to_owned()));
         }
         Ok(Self::bare(path, path.file_stem(), None))
     }
 
-    fn open_session(folder: &Path) -> Result<Self, Error> {
+    fn open_session(folder: &Path) -> Result<Self, SessionError> {
         let manifest_path = folder.join(MANIFEST_FILE);
-        let bytes = fs::read(&manifest_path).map_err(Error::io(&manifest_path, "read"))?;
-        let manifest = Manifest::from_json(&bytes).map_err(|fault| Error::Manifest {
+        let bytes = fs::read(&manifest_path).map_err(SessionError::io(&manifest_path, "read"))?;
+        let manifest = Manifest::from_json(&bytes).map_err(|fault| SessionError::Manifest {
             path: manifest_path,
             fault,
         })?;
         let mut notices = Vec::new();
         match &manifest.status {
             Status::Complete => {}
-            Status::Recording => return Err(Error::StillRecording(folder.to_owned())),
+            Status::Recording => return Err(SessionError::StillRecording(folder.to_owned())),
             Status::Aborted(reason) => {
                 notices.push(Notice::Loss(format!("the capture was aborted: {reason}")));
             }
@@ -94,14 +93,14 @@ impl Recording {
         let video = folder.join(&manifest.video.file);
         let found = match fs::metadata(&video) {
             Ok(data) if data.is_file() => data.len(),
-            _ => return Err(Error::VideoMissing(video)),
+            _ => return Err(SessionError::VideoMissing(video)),
         };
-        if let Some(said) = manifest.video.bytes
-            && said != found
+        if let Some(recorded) = manifest.video.bytes
+            && recorded != found
         {
             let file = &manifest.video.file;
             notices.push(Notice::Loss(format!(
-                "{file} has {found} bytes where the manifest says {said}: it was cut or changed"
+                "{file} has {found} bytes, but the manifest says {recorded}: it was truncated or changed"
             )));
         }
         for fault in &manifest.faults {
@@ -122,20 +121,20 @@ impl Recording {
         })
     }
 
-    fn open_plain_folder(folder: &Path) -> Result<Self, Error> {
+    fn open_plain_folder(folder: &Path) -> Result<Self, SessionError> {
         let mut videos = videos_in(folder)?;
         match (videos.pop(), videos.len()) {
-            (None, _) => Err(Error::NoSession(folder.to_owned())),
+            (None, _) => Err(SessionError::NoSession(folder.to_owned())),
             (Some(video), 0) => {
-                // A name such as "." tells nothing; the real one does.
+                // A path such as "." has no usable name.
                 let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
                 let mut recording = Self::bare(&video, real.file_name(), Some(folder));
                 recording.notices.push(Notice::Warning(
-                    "the folder has no session.json: its video is taken without angles and driver's time stamps".to_owned(),
+                    "the folder has no session.json: its video is used without angles and without the driver's time stamps".to_owned(),
                 ));
                 Ok(recording)
             }
-            (Some(_), more) => Err(Error::SeveralVideos {
+            (Some(_), more) => Err(SessionError::SeveralVideos {
                 folder: folder.to_owned(),
                 count: more + 1,
             }),
@@ -156,52 +155,51 @@ impl Recording {
     }
 }
 
-/// The recordings that a path stands for: a session folder or a video file is one, a folder of
-/// sessions is each of them, sorted by name. A folder in it that has lost its manifest or its video
-/// counts too, so that opening it tells.
+/// The recordings at a path: the path itself for a session folder or a video file; for a folder of
+/// sessions each of them, sorted by name. A session folder that has lost its manifest or its video is
+/// listed too, so that opening it reports the loss.
 ///
 /// # Errors
-/// [`Error::NotThere`], [`Error::NoSession`], [`Error::VideoAmongSessions`], or what the file
-/// system answers.
-pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, Error> {
+/// [`SessionError::NotThere`], [`SessionError::NoSession`], [`SessionError::VideoAmongSessions`], or [`SessionError::Io`].
+pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, SessionError> {
     if !path.exists() {
-        return Err(Error::NotThere(path.to_owned()));
+        return Err(SessionError::NotThere(path.to_owned()));
     }
     if path.is_file() || path.join(MANIFEST_FILE).exists() {
         return Ok(vec![path.to_owned()]);
     }
     if !path.is_dir() {
-        return Err(Error::NoSession(path.to_owned()));
+        return Err(SessionError::NoSession(path.to_owned()));
     }
     let mut inner = Vec::new();
-    for entry in fs::read_dir(path).map_err(Error::io(path, "listed"))? {
-        let folder = entry.map_err(Error::io(path, "listed"))?.path();
-        if folder.is_dir() && is_of_a_session(&folder)? {
+    for entry in fs::read_dir(path).map_err(SessionError::io(path, "listed"))? {
+        let folder = entry.map_err(SessionError::io(path, "listed"))?.path();
+        if folder.is_dir() && is_session_folder(&folder)? {
             inner.push(folder);
         }
     }
     inner.sort();
     match (videos_in(path)?.into_iter().next(), inner.is_empty()) {
-        (None, true) => Err(Error::NoSession(path.to_owned())),
+        (None, true) => Err(SessionError::NoSession(path.to_owned())),
         (None, false) => Ok(inner),
         (Some(_), true) => Ok(vec![path.to_owned()]),
-        (Some(video), false) => Err(Error::VideoAmongSessions {
+        (Some(video), false) => Err(SessionError::VideoAmongSessions {
             folder: path.to_owned(),
             video,
         }),
     }
 }
 
-/// Whether a folder is a session's, whole or not.
-fn is_of_a_session(folder: &Path) -> Result<bool, Error> {
+/// Whether a folder is a session, complete or not.
+fn is_session_folder(folder: &Path) -> Result<bool, SessionError> {
     let parts = [MANIFEST_FILE, INDEX_FILE, MASK_FILE];
     Ok(parts.iter().any(|part| folder.join(part).exists()) || !videos_in(folder)?.is_empty())
 }
 
-fn videos_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+fn videos_in(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
     let mut videos = Vec::new();
-    for entry in fs::read_dir(folder).map_err(Error::io(folder, "listed"))? {
-        let path = entry.map_err(Error::io(folder, "listed"))?.path();
+    for entry in fs::read_dir(folder).map_err(SessionError::io(folder, "listed"))? {
+        let path = entry.map_err(SessionError::io(folder, "listed"))?.path();
         let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default();
         if VIDEO_ENDINGS.contains(&ending.to_ascii_lowercase().as_str()) && path.is_file() {
             videos.push(path);
@@ -211,7 +209,7 @@ fn videos_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(videos)
 }
 
-/// A session's name made from a file's: what cannot stand in one becomes '_'.
+/// A session's name made from a file name: invalid characters become '_'.
 fn name_from(name: Option<&OsStr>) -> String {
     let name = name.unwrap_or_default().to_string_lossy();
     let mut id: String = name
@@ -238,7 +236,7 @@ fn read_index(
     folder: &Path,
     manifest: &Manifest,
     notices: &mut Vec<Notice>,
-) -> Result<Option<FrameIndex>, Error> {
+) -> Result<Option<FrameIndex>, SessionError> {
     let path = folder.join(INDEX_FILE);
     if !path.exists() {
         notices.push(Notice::Loss(format!(
@@ -246,22 +244,22 @@ fn read_index(
         )));
         return Ok(None);
     }
-    let bytes = fs::read(&path).map_err(Error::io(&path, "read"))?;
-    let index = FrameIndex::parse(&bytes).map_err(|fault| Error::Index {
+    let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
+    let index = FrameIndex::parse(&bytes).map_err(|fault| SessionError::Index {
         path: path.clone(),
         fault,
     })?;
     if index.is_torn() {
         notices.push(Notice::Loss(format!(
-            "the last line of {INDEX_FILE} was cut and is lost"
+            "the last line of {INDEX_FILE} is incomplete and lost"
         )));
     }
     let counted = index.entries().len() as u64;
-    if let Some(said) = manifest.video.frames
-        && said != counted
+    if let Some(recorded) = manifest.video.frames
+        && recorded != counted
     {
         notices.push(Notice::Loss(format!(
-            "{INDEX_FILE} has {counted} frames where the manifest says {said}"
+            "{INDEX_FILE} has {counted} frames, but the manifest says {recorded}"
         )));
     }
     for gap in index.gaps() {

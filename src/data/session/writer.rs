@@ -5,54 +5,55 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::{
-    Claim, Error, FrameEntry, FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, Status,
+    FrameEntry, FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, SessionError, SessionLock, Status,
     is_session_name,
 };
 use crate::durable;
 
-/// Name under which the index is kept as it was found, where lines of it had to go.
+/// Name under which the original index is kept if lines of it are removed.
 pub(super) const INDEX_AS_FOUND: &str = "frames.interrupted.jsonl";
 
-/// A session folder under way. The manifest says "recording" until [`Self::finish`] or
-/// [`Self::abort`]; a writer that is dropped leaves it so, which is what the next start of a
-/// capture looks for. While it lives, the folder is claimed: see [`Claim`].
+/// A session folder that is being recorded. The manifest says "recording" until [`Self::finish`] or
+/// [`Self::abort`]. A writer that is dropped leaves it so, for the next start of a capture to find
+/// ([`InterruptedSession`](super::InterruptedSession)). The folder is locked while the writer lives:
+/// see [`SessionLock`].
 #[derive(Debug)]
 pub struct SessionWriter {
     folder: PathBuf,
     manifest: Manifest,
     index: FrameIndex,
     lines: File,
-    /// Bytes of the index file's whole lines.
+    /// Bytes of the complete lines in the index file.
     length: u64,
-    /// True where the index in memory says more than its file, or less.
+    /// True if entries were amended since their lines were written.
     rewrite: bool,
-    /// True where lines of the file have to go.
+    /// True if frames were removed whose lines are in the file.
     truncated: bool,
-    claim: Claim,
+    lock: SessionLock,
 }
 
 impl SessionWriter {
-    /// Makes the folder `root/<id>` with a manifest whose status is "recording". The manifest's
-    /// own status and the video's figures are not looked at: they are known at the end.
+    /// Creates the folder `root/<id>` with a manifest whose status is "recording". The status and the
+    /// video's figures in `manifest` are ignored: they are set at the end.
     ///
     /// # Errors
-    /// [`Error::Exists`], [`Error::BadName`], a manifest that could not be read back, or what the
-    /// file system answers.
-    pub fn create(root: &Path, mut manifest: Manifest) -> Result<Self, Error> {
+    /// [`SessionError::Exists`], [`SessionError::BadName`], [`SessionError::Manifest`] if the manifest could not be read
+    /// back, or [`SessionError::Io`].
+    pub fn create(root: &Path, mut manifest: Manifest) -> Result<Self, SessionError> {
         if !is_session_name(&manifest.id) {
-            return Err(Error::BadName(manifest.id));
+            return Err(SessionError::BadName(manifest.id));
         }
         let folder = root.join(&manifest.id);
         match fs::create_dir(&folder) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-                return Err(Error::Exists(folder));
+                return Err(SessionError::Exists(folder));
             }
-            made => made.map_err(Error::io(&folder, "made"))?,
+            made => made.map_err(SessionError::io(&folder, "made"))?,
         }
-        durable::sync_folder(root).map_err(Error::io(root, "synced"))?;
-        // Claimed before there is a manifest: never does it stand there as if interrupted.
-        let mut claim = Claim::take(&folder)?;
-        claim.reserve()?;
+        durable::sync_folder(root).map_err(SessionError::io(root, "synced"))?;
+        // Locked before the manifest exists, so that the session never looks interrupted.
+        let mut lock = SessionLock::acquire(&folder)?;
+        lock.reserve()?;
         manifest.status = Status::Recording;
         manifest.video.frames = None;
         manifest.video.bytes = None;
@@ -63,8 +64,8 @@ impl SessionWriter {
             .create_new(true)
             .append(true)
             .open(&path)
-            .map_err(Error::io(path, "made"))?;
-        durable::sync_folder(&folder).map_err(Error::io(&folder, "synced"))?;
+            .map_err(SessionError::io(path, "made"))?;
+        durable::sync_folder(&folder).map_err(SessionError::io(&folder, "synced"))?;
         Ok(Self {
             folder,
             manifest,
@@ -73,7 +74,7 @@ impl SessionWriter {
             length: 0,
             rewrite: false,
             truncated: false,
-            claim,
+            lock,
         })
     }
 
@@ -83,13 +84,13 @@ impl SessionWriter {
         &self.folder
     }
 
-    /// Where the video belongs.
+    /// Path at which the video has to be written.
     #[must_use]
     pub fn video_path(&self) -> PathBuf {
         self.folder.join(&self.manifest.video.file)
     }
 
-    /// The manifest, to note faults and what became known after the start.
+    /// The manifest, to add faults and what became known after the start.
     pub fn manifest_mut(&mut self) -> &mut Manifest {
         &mut self.manifest
     }
@@ -97,44 +98,46 @@ impl SessionWriter {
     /// Appends a frame's line to the index.
     ///
     /// # Errors
-    /// [`Error::BadEntry`] where it does not continue the index, or what the file system answers.
-    /// The index stays as it was, and the same entry may be pushed again.
-    pub fn push(&mut self, entry: FrameEntry) -> Result<(), Error> {
-        self.keep(entry)?;
-        let written = self.append(&entry);
+    /// [`SessionError::BadEntry`] if it does not continue the index, or [`SessionError::Io`]. The index is then
+    /// unchanged, and the same entry may be pushed again.
+    pub fn push(&mut self, entry: FrameEntry) -> Result<(), SessionError> {
+        self.push_to_index(entry)?;
+        let written = self.append_line(&entry);
         if written.is_err() {
-            self.take_back();
+            self.remove_last();
         }
-        written.map_err(Error::io(self.folder.join(INDEX_FILE), "written"))
+        written.map_err(SessionError::io(self.folder.join(INDEX_FILE), "written"))
     }
 
-    fn keep(&mut self, entry: FrameEntry) -> Result<(), Error> {
-        self.index.push(entry).map_err(|fault| Error::BadEntry {
-            path: self.folder.join(INDEX_FILE),
-            n: entry.n,
-            fault,
-        })
+    fn push_to_index(&mut self, entry: FrameEntry) -> Result<(), SessionError> {
+        self.index
+            .push(entry)
+            .map_err(|fault| SessionError::BadEntry {
+                path: self.folder.join(INDEX_FILE),
+                n: entry.n,
+                fault,
+            })
     }
 
-    /// Writes an entry's line behind the last whole one.
-    fn append(&mut self, entry: &FrameEntry) -> io::Result<()> {
+    /// Writes an entry's line after the last complete one.
+    fn append_line(&mut self, entry: &FrameEntry) -> io::Result<()> {
         let mut line = serde_json::to_vec(entry).map_err(io::Error::other)?;
         line.push(b'\n');
-        self.cut()?;
+        self.drop_partial_line()?;
         self.lines.write_all(&line)?;
         self.length += line.len() as u64;
         Ok(())
     }
 
-    /// Cuts off what a line that could not be written whole left in the file.
-    fn cut(&self) -> io::Result<()> {
+    /// Truncates the file to its complete lines, in case the last write failed half-way.
+    fn drop_partial_line(&self) -> io::Result<()> {
         self.lines.set_len(self.length)
     }
 
-    /// Forgets the last entry, whose line could not be written.
-    fn take_back(&mut self) {
-        // Where the file cannot be cut now, it is cut before the next line and before a sync.
-        let _ = self.cut();
+    /// Removes the last entry, whose line could not be written.
+    fn remove_last(&mut self) {
+        // If truncating fails now, it is repeated before the next line and before a sync.
+        let _ = self.drop_partial_line();
         self.index
             .truncate(self.index.entries().len().saturating_sub(1));
     }
@@ -145,16 +148,19 @@ impl SessionWriter {
         &self.index
     }
 
-    /// Gives each frame what became known of it since its line was written, such as its angle. The
-    /// file is rewritten, whole or not at all, when the session ends.
+    /// Changes entries after their lines were written, for example to add the angle. The file is
+    /// rewritten, whole or not at all, when the session ends.
     ///
     /// # Errors
-    /// [`Error::BadEntry`] for the first entry that does not fit; none is changed then.
-    pub fn amend(&mut self, amended: impl Fn(&FrameEntry) -> FrameEntry) -> Result<(), Error> {
+    /// [`SessionError::BadEntry`] for the first invalid entry; then none is changed.
+    pub fn amend(
+        &mut self,
+        amended: impl Fn(&FrameEntry) -> FrameEntry,
+    ) -> Result<(), SessionError> {
         let mut index = FrameIndex::default();
         for entry in self.index.entries() {
             let entry = amended(entry);
-            index.push(entry).map_err(|fault| Error::BadEntry {
+            index.push(entry).map_err(|fault| SessionError::BadEntry {
                 path: self.folder.join(INDEX_FILE),
                 n: entry.n,
                 fault,
@@ -165,8 +171,8 @@ impl SessionWriter {
         Ok(())
     }
 
-    /// Forgets all frames from position `frames` on, as the video lacks them. The index as it was
-    /// stays beside the one that is written when the session ends, `frames.interrupted.jsonl`.
+    /// Removes all frames from position `frames` on, which the video does not have. When the session
+    /// ends, the original index is kept as `frames.interrupted.jsonl`.
     pub fn truncate(&mut self, frames: usize) {
         if frames < self.index.entries().len() {
             self.index.truncate(frames);
@@ -174,36 +180,36 @@ impl SessionWriter {
         }
     }
 
-    /// Makes the index durable up to the last frame pushed.
+    /// Syncs the index to disk, up to the last frame pushed.
     ///
     /// # Errors
-    /// What the file system answers.
-    pub fn sync(&self) -> Result<(), Error> {
-        self.cut()
+    /// [`SessionError::Io`].
+    pub fn sync(&self) -> Result<(), SessionError> {
+        self.drop_partial_line()
             .and_then(|()| self.lines.sync_data())
-            .map_err(Error::io(self.folder.join(INDEX_FILE), "synced"))
+            .map_err(SessionError::io(self.folder.join(INDEX_FILE), "synced"))
     }
 
-    /// Ends a whole session: takes the video's size, hash and number of frames into the manifest
-    /// and marks it complete. The video must have been closed.
+    /// Ends a complete session: adds the video's size, hash and number of frames to the manifest and
+    /// marks it complete. The video must have been closed.
     ///
     /// # Errors
-    /// [`Error::VideoMissing`], or what the file system answers; the status stays "recording".
-    pub fn finish(self) -> Result<Manifest, Error> {
+    /// [`SessionError::VideoMissing`] or [`SessionError::Io`]; the status then stays "recording".
+    pub fn finish(self) -> Result<Manifest, SessionError> {
         self.end(Status::Complete)
     }
 
-    /// Ends a session that is not whole, for this reason. What was recorded stays.
+    /// Marks an incomplete session as aborted, with this reason. What was recorded stays.
     ///
     /// # Errors
     /// As [`Self::finish`].
-    pub fn abort(self, reason: &str) -> Result<Manifest, Error> {
+    pub fn abort(self, reason: &str) -> Result<Manifest, SessionError> {
         self.end(Status::Aborted(reason.to_owned()))
     }
 
-    fn end(self, status: Status) -> Result<Manifest, Error> {
-        // On a full disk this is the room for what follows.
-        self.claim.release_reserve()?;
+    fn end(self, status: Status) -> Result<Manifest, SessionError> {
+        // On a full disk this frees the space for what follows.
+        self.lock.release_reserve()?;
         self.sync()?;
         if self.truncated {
             keep_as_found(&self.folder)?;
@@ -213,42 +219,42 @@ impl SessionWriter {
         }
         let frames = self.index.entries().len() as u64;
         let manifest = close(&self.folder, self.manifest, frames, status)?;
-        self.claim.end()?;
+        self.lock.remove()?;
         Ok(manifest)
     }
 }
 
-/// Gives the index as it is a second name, unless an earlier try did.
-pub(super) fn keep_as_found(folder: &Path) -> Result<(), Error> {
+/// Keeps the index as it is under a second name, unless an earlier attempt did so.
+pub(super) fn keep_as_found(folder: &Path) -> Result<(), SessionError> {
     let (path, kept) = (folder.join(INDEX_FILE), folder.join(INDEX_AS_FOUND));
     if kept.exists() || !path.exists() {
         return Ok(());
     }
-    // Not every file system has links.
+    // Not every file system has hard links.
     let linked = fs::hard_link(&path, &kept).or_else(|_| fs::copy(&path, &kept).map(|_| ()));
-    linked.map_err(Error::io(kept, "written"))
+    linked.map_err(SessionError::io(kept, "written"))
 }
 
-/// Takes the video's size and hash into the manifest and writes it with its last status.
+/// Adds the video's size and hash to the manifest and writes it with its final status.
 pub(super) fn close(
     folder: &Path,
     mut manifest: Manifest,
     frames: u64,
     status: Status,
-) -> Result<Manifest, Error> {
+) -> Result<Manifest, SessionError> {
     let path = folder.join(&manifest.video.file);
-    // A capture can fail before its first frame: it is aborted without a video.
+    // A capture that failed before its first frame is aborted without a video.
     if path.is_file() {
-        let file = File::open(&path).map_err(Error::io(&path, "read"))?;
-        file.sync_all().map_err(Error::io(&path, "synced"))?;
+        let file = File::open(&path).map_err(SessionError::io(&path, "read"))?;
+        file.sync_all().map_err(SessionError::io(&path, "synced"))?;
         let mut hasher = blake3::Hasher::new();
         let hashed = hasher
             .update_reader(file)
-            .map_err(Error::io(&path, "read"))?;
+            .map_err(SessionError::io(&path, "read"))?;
         manifest.video.bytes = Some(hashed.count());
         manifest.video.blake3 = Some(hashed.finalize().to_hex().to_string());
     } else if status == Status::Complete {
-        return Err(Error::VideoMissing(path));
+        return Err(SessionError::VideoMissing(path));
     }
     manifest.status = status;
     manifest.video.frames = Some(frames);
@@ -256,21 +262,21 @@ pub(super) fn close(
     Ok(manifest)
 }
 
-pub(super) fn write_index(folder: &Path, index: &FrameIndex) -> Result<(), Error> {
+pub(super) fn write_index(folder: &Path, index: &FrameIndex) -> Result<(), SessionError> {
     let path = folder.join(INDEX_FILE);
     let bytes = index.to_jsonl().map_err(io::Error::other);
     bytes
         .and_then(|bytes| durable::write_whole(&path, &bytes))
-        .map_err(Error::io(&path, "written"))
+        .map_err(SessionError::io(&path, "written"))
 }
 
-fn write_manifest(folder: &Path, manifest: &Manifest) -> Result<(), Error> {
+fn write_manifest(folder: &Path, manifest: &Manifest) -> Result<(), SessionError> {
     let path = folder.join(MANIFEST_FILE);
-    let bytes = manifest.to_json().map_err(|fault| Error::Manifest {
+    let bytes = manifest.to_json().map_err(|fault| SessionError::Manifest {
         path: path.clone(),
         fault,
     })?;
-    durable::write_whole(&path, &bytes).map_err(Error::io(path, "written"))
+    durable::write_whole(&path, &bytes).map_err(SessionError::io(path, "written"))
 }
 
 #[cfg(test)]
@@ -301,13 +307,16 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_line_that_was_not_written_whole_is_taken_back_and_can_be_pushed_again() {
+    fn a_line_that_was_not_written_completely_is_removed_and_can_be_pushed_again() {
         let root = tempfile::tempdir().unwrap();
         let mut writer = writer(root.path());
         writer.push(entry(0)).unwrap();
         let path = writer.folder().join(INDEX_FILE);
         let whole = std::mem::replace(&mut writer.lines, File::open(&path).unwrap());
-        assert!(matches!(writer.push(entry(1)), Err(Error::Io { .. })));
+        assert!(matches!(
+            writer.push(entry(1)),
+            Err(SessionError::Io { .. })
+        ));
         writer.lines = whole;
         writer.lines.write_all(b"{\"n\":1,\"seq").unwrap();
         writer.push(entry(1)).unwrap();
@@ -335,7 +344,10 @@ pub(super) mod tests {
         fs::write(writer.video_path(), b"two frames").unwrap();
         let path = writer.folder().join(INDEX_FILE);
         let wrong = |entry: &FrameEntry| FrameEntry { n: 7, ..*entry };
-        assert!(matches!(writer.amend(wrong), Err(Error::BadEntry { .. })));
+        assert!(matches!(
+            writer.amend(wrong),
+            Err(SessionError::BadEntry { .. })
+        ));
         writer.amend(with_angle).unwrap();
         writer.finish().unwrap();
         let index = FrameIndex::parse(&fs::read(path).unwrap()).unwrap();

@@ -5,38 +5,38 @@ use std::io::Cursor;
 use image::{GrayImage, RgbImage};
 use png::{BitDepth, ColorType, Compression};
 
-use super::Error;
+use super::ShardError;
 
 /// Largest image that is decoded, pixels: 64 Mi, 192 MiB of RGB.
-const MOST_PIXELS: u64 = 1 << 26;
+const MAX_PIXELS: u64 = 1 << 26;
 
 /// An image as PNG, 8-bit RGB.
 ///
 /// # Errors
-/// [`Error::Encode`] where the image has no pixels.
-pub fn encode_rgb(image: &RgbImage) -> Result<Vec<u8>, Error> {
+/// [`ShardError::Encode`] if the image has no pixels.
+pub fn encode_rgb(image: &RgbImage) -> Result<Vec<u8>, ShardError> {
     encode(image.as_raw(), image.dimensions(), ColorType::Rgb)
 }
 
 /// A mask as PNG, 8-bit grey.
 ///
 /// # Errors
-/// [`Error::Encode`] where the mask has no pixels.
-pub fn encode_mask(mask: &GrayImage) -> Result<Vec<u8>, Error> {
+/// [`ShardError::Encode`] if the mask has no pixels.
+pub fn encode_mask(mask: &GrayImage) -> Result<Vec<u8>, ShardError> {
     encode(mask.as_raw(), mask.dimensions(), ColorType::Grayscale)
 }
 
 /// The image in a PNG of 8-bit RGB.
 ///
 /// # Errors
-/// [`Error::Decode`] where the PNG is damaged, [`Error::PixelFormat`] where it has other pixels,
-/// [`Error::TooManyPixels`] above 64 Mi pixels.
-pub fn decode_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
+/// [`ShardError::Decode`] if the PNG is damaged, [`ShardError::PixelFormat`] if it has another pixel format,
+/// [`ShardError::TooManyPixels`] above 64 Mi pixels.
+pub fn decode_rgb(bytes: &[u8]) -> Result<RgbImage, ShardError> {
     let (width, height, pixels) = decode(bytes, ColorType::Rgb, "8-bit RGB")?;
-    RgbImage::from_raw(width, height, pixels).ok_or(Error::TooManyPixels {
+    RgbImage::from_raw(width, height, pixels).ok_or(ShardError::TooManyPixels {
         width,
         height,
-        most: MOST_PIXELS,
+        limit: MAX_PIXELS,
     })
 }
 
@@ -44,22 +44,22 @@ pub fn decode_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
 ///
 /// # Errors
 /// As [`decode_rgb`].
-pub fn decode_mask(bytes: &[u8]) -> Result<GrayImage, Error> {
+pub fn decode_mask(bytes: &[u8]) -> Result<GrayImage, ShardError> {
     let (width, height, pixels) = decode(bytes, ColorType::Grayscale, "8-bit grey")?;
-    GrayImage::from_raw(width, height, pixels).ok_or(Error::TooManyPixels {
+    GrayImage::from_raw(width, height, pixels).ok_or(ShardError::TooManyPixels {
         width,
         height,
-        most: MOST_PIXELS,
+        limit: MAX_PIXELS,
     })
 }
 
-/// Whether a mask holds 0 and 255 only.
-pub(super) fn check_mask(mask: &GrayImage) -> Result<(), Error> {
+/// Checks that a mask holds 0 and 255 only.
+pub(super) fn check_mask(mask: &GrayImage) -> Result<(), ShardError> {
     match mask
         .enumerate_pixels()
         .find(|(_, _, pixel)| !matches!(pixel.0[0], 0 | 255))
     {
-        Some((x, y, pixel)) => Err(Error::MaskValue {
+        Some((x, y, pixel)) => Err(ShardError::MaskValue {
             value: pixel.0[0],
             x,
             y,
@@ -68,8 +68,12 @@ pub(super) fn check_mask(mask: &GrayImage) -> Result<(), Error> {
     }
 }
 
-fn encode(pixels: &[u8], (width, height): (u32, u32), color: ColorType) -> Result<Vec<u8>, Error> {
-    let failed = |source| Error::Encode {
+fn encode(
+    pixels: &[u8],
+    (width, height): (u32, u32),
+    color: ColorType,
+) -> Result<Vec<u8>, ShardError> {
+    let failed = |source| ShardError::Encode {
         width,
         height,
         source,
@@ -89,7 +93,7 @@ fn decode(
     bytes: &[u8],
     color: ColorType,
     expected: &'static str,
-) -> Result<(u32, u32, Vec<u8>), Error> {
+) -> Result<(u32, u32, Vec<u8>), ShardError> {
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.ignore_checksums(false);
     let mut reader = decoder.read_info()?;
@@ -97,14 +101,14 @@ fn decode(
     let (width, height) = (info.width, info.height);
     if (info.color_type, info.bit_depth) != (color, BitDepth::Eight) {
         let found = format!("{:?} with {} bits", info.color_type, info.bit_depth as u8);
-        return Err(Error::PixelFormat { found, expected });
+        return Err(ShardError::PixelFormat { found, expected });
     }
-    let too_many = Error::TooManyPixels {
+    let too_many = ShardError::TooManyPixels {
         width,
         height,
-        most: MOST_PIXELS,
+        limit: MAX_PIXELS,
     };
-    if u64::from(width) * u64::from(height) > MOST_PIXELS {
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
         return Err(too_many);
     }
     let mut pixels = vec![0; reader.output_buffer_size().ok_or(too_many)?];
@@ -133,14 +137,17 @@ mod tests {
     }
 
     #[test]
-    fn pixels_of_another_kind_are_refused() {
+    fn another_pixel_format_is_refused() {
         let png = encode_rgb(&image()).unwrap();
-        assert!(matches!(decode_mask(&png), Err(Error::PixelFormat { .. })));
+        assert!(matches!(
+            decode_mask(&png),
+            Err(ShardError::PixelFormat { .. })
+        ));
         assert!(encode_rgb(&RgbImage::new(0, 3)).is_err());
     }
 
     #[test]
-    fn a_png_that_claims_a_huge_image_is_refused_before_memory_is_taken() {
+    fn a_png_that_claims_a_huge_image_is_refused_before_memory_is_allocated() {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 1 << 30, 1 << 30);
         encoder.set_color(ColorType::Rgb);

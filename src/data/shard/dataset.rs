@@ -1,4 +1,4 @@
-//! `dataset.json`: what a data set holds and vouches for.
+//! `dataset.json`: the description of a data set, with the digest of every file.
 
 use std::io;
 use std::path::Path;
@@ -6,33 +6,23 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::digest::Digest;
-use super::settings::Settings;
-use super::{Error, names, output};
+use super::file::FileEntry;
+use super::settings::ExtractionSettings;
+use super::{ShardError, names, output};
 use crate::geometry::Rect;
 
-/// The schema that is written and read here.
+/// The schema that this version writes and reads.
 const SCHEMA: &str = "relit.dataset/1";
 /// Largest description that is read, bytes.
-const MOST_BYTES: u64 = 1 << 30;
+const MAX_BYTES: u64 = 1 << 30;
 
-/// What wrote the data set.
+/// The program that wrote the data set.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Software {
+pub struct DatasetSoftware {
     /// The program's name.
     pub name: String,
     /// Its version.
     pub version: String,
-}
-
-/// A file that the data set vouches for.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FileEntry {
-    /// Path relative to the data set, with `/`.
-    pub file: String,
-    /// Its length, bytes.
-    pub bytes: u64,
-    /// BLAKE3 of its bytes.
-    pub blake3: Digest,
 }
 
 /// A shard: a tar, or in the layout `relit` a folder of images.
@@ -46,8 +36,8 @@ pub struct ShardEntry {
     pub samples: u32,
     /// Length of the tar, or of all images of the folder together, bytes.
     pub bytes: u64,
-    /// BLAKE3 of the tar; for a folder, BLAKE3 over the digests (32 bytes each) of its images,
-    /// one after the other in the order of their indices.
+    /// BLAKE3 of the tar; for a folder, BLAKE3 over the digests (32 bytes each) of its images in
+    /// index order.
     pub blake3: Digest,
     /// Layout `relit`: the session's mask, `masks/<session>.png`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -59,7 +49,7 @@ pub struct ShardEntry {
 
 /// The video that a session was extracted from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Input {
+pub struct SourceVideo {
     /// The video's file name, without folders.
     pub video: String,
     /// The codec's name.
@@ -70,7 +60,7 @@ pub struct Input {
     pub bytes: u64,
     /// BLAKE3 of the file.
     pub blake3: Digest,
-    /// BLAKE3 of the session's `frames.jsonl`; `None` where there is none.
+    /// BLAKE3 of the session's `frames.jsonl`; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub index_blake3: Option<Digest>,
 }
@@ -86,13 +76,13 @@ pub struct MaskInfo {
     pub bounding_box: Rect,
 }
 
-/// How frames were chosen.
+/// The quantity over which the samples are evenly spaced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Selection {
-    /// Uniform in the table's angle over one turn.
+pub enum SamplingBasis {
+    /// The table's angle, over one turn.
     Angle,
-    /// Uniform in time over the whole video.
+    /// Time, over the whole video.
     Time,
 }
 
@@ -104,24 +94,24 @@ pub struct SessionEntry {
     /// The object's name.
     pub object: String,
     /// The video.
-    pub input: Input,
+    pub input: SourceVideo,
     /// The mask.
     pub mask: MaskInfo,
-    /// How frames were chosen.
-    pub selection: Selection,
+    /// The quantity over which the samples are evenly spaced.
+    pub selection: SamplingBasis,
     /// Number of samples.
     pub samples: u32,
     /// Samples with `duplicate`.
     pub duplicates: u32,
     /// Samples with `spec_net`.
     pub spec_net: u32,
-    /// True where something of the source was lost, as the warnings tell.
+    /// True if something of the source was lost; the warnings say what.
     pub lossy: bool,
     /// What a user should know, one sentence each.
     pub warnings: Vec<String>,
     /// The table, `<session>.parquet`.
     pub table: FileEntry,
-    /// The page, `<session>.html`; null where there is none.
+    /// The page, `<session>.html`, if there is one.
     pub report: Option<FileEntry>,
 }
 
@@ -130,10 +120,10 @@ pub struct SessionEntry {
 pub struct Dataset {
     /// `relit.dataset/1`.
     pub schema: String,
-    /// What wrote it.
-    pub software: Software,
+    /// The program that wrote it.
+    pub software: DatasetSoftware,
     /// How all sessions were extracted.
-    pub settings: Settings,
+    pub settings: ExtractionSettings,
     /// The sessions, sorted by id.
     pub sessions: Vec<SessionEntry>,
     /// The shards, sorted by file.
@@ -141,15 +131,15 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// Its name in the folder of the data set.
+    /// Its file name in the data set's folder.
     pub const FILE: &'static str = "dataset.json";
 
-    /// A data set without sessions, written by this version of this software.
+    /// A data set without sessions, written by this version of relit.
     #[must_use]
-    pub fn new(settings: Settings) -> Self {
+    pub fn new(settings: ExtractionSettings) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
-            software: Software {
+            software: DatasetSoftware {
                 name: "relit".to_owned(),
                 version: env!("CARGO_PKG_VERSION").to_owned(),
             },
@@ -162,28 +152,28 @@ impl Dataset {
     /// Reads the description of the data set in the folder `out`.
     ///
     /// # Errors
-    /// [`Error::NoDataset`] where there is none, [`Error::Schema`] where it is of another
-    /// version, [`Error::Description`] where it is damaged, [`Error::UnsafePath`] or
-    /// [`Error::SessionName`] where it names a file outside the folder, [`Error::Io`].
-    pub fn read(out: &Path) -> Result<Self, Error> {
+    /// [`ShardError::NoDataset`] if there is none, [`ShardError::Schema`] if it is from another version,
+    /// [`ShardError::Description`] if it is damaged, [`ShardError::UnsafePath`] or [`ShardError::SessionName`] if
+    /// it names a file outside the folder, [`ShardError::Io`].
+    pub fn read(out: &Path) -> Result<Self, ShardError> {
         let path = out.join(Self::FILE);
         let bytes = read_limited(&path).map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound => Error::NoDataset {
+            io::ErrorKind::NotFound => ShardError::NoDataset {
                 path: out.to_owned(),
             },
-            _ => Error::Io {
+            _ => ShardError::Io {
                 doing: "read",
                 path: path.clone(),
                 source,
             },
         })?;
-        let damaged = |source| Error::Description {
+        let damaged = |source| ShardError::Description {
             path: path.clone(),
             source,
         };
         let Header { schema } = serde_json::from_slice(&bytes).map_err(damaged)?;
         if schema != SCHEMA {
-            return Err(Error::Schema {
+            return Err(ShardError::Schema {
                 path,
                 found: schema,
                 expected: SCHEMA,
@@ -197,11 +187,11 @@ impl Dataset {
     /// Writes the description into the folder `out`, whole or not at all.
     ///
     /// # Errors
-    /// [`Error::UnsafePath`] or [`Error::SessionName`] where an entry could not be read back,
-    /// [`Error::Json`] where a number is not finite, [`Error::Io`].
-    pub fn write(&self, out: &Path) -> Result<(), Error> {
+    /// [`ShardError::UnsafePath`] or [`ShardError::SessionName`] if an entry could not be read back,
+    /// [`ShardError::Json`] if a number is not finite, [`ShardError::Io`].
+    pub fn write(&self, out: &Path) -> Result<(), ShardError> {
         self.check_names()?;
-        let mut bytes = serde_json::to_vec_pretty(self).map_err(|source| Error::Json {
+        let mut bytes = serde_json::to_vec_pretty(self).map_err(|source| ShardError::Json {
             what: Self::FILE.to_owned(),
             source,
         })?;
@@ -221,7 +211,7 @@ impl Dataset {
         self.shards.iter().filter(move |shard| shard.session == id)
     }
 
-    /// Enters a session with its shards, in place of an older entry with this id.
+    /// Adds a session and its shards, replacing an older entry with the same id.
     pub fn replace(&mut self, session: SessionEntry, shards: Vec<ShardEntry>) {
         self.remove(&session.id);
         self.sessions.push(session);
@@ -230,32 +220,27 @@ impl Dataset {
         self.shards.sort_by(|a, b| a.file.cmp(&b.file));
     }
 
-    /// Takes the entry of a session and its shards out. The files stay.
+    /// Removes the entry of a session and its shards. The files stay.
     pub fn remove(&mut self, id: &str) {
         self.sessions.retain(|session| session.id != id);
         self.shards.retain(|shard| shard.session != id);
     }
 
-    /// All files that the description names, of all sessions. Folders of images stand for
-    /// themselves.
+    /// All files of all sessions that the description lists. A folder of images counts as one.
     pub(super) fn files(&self) -> impl Iterator<Item = &str> {
-        let of_sessions = self.sessions.iter().flat_map(|session| {
+        let session_files = self.sessions.iter().flat_map(|session| {
             std::iter::once(&session.table)
                 .chain(&session.report)
                 .map(|entry| &entry.file)
         });
-        let of_shards = self.shards.iter().flat_map(|shard| {
-            let beside = shard
-                .mask
-                .iter()
-                .chain(&shard.mean_img)
-                .map(|entry| &entry.file);
-            std::iter::once(&shard.file).chain(beside)
+        let shard_files = self.shards.iter().flat_map(|shard| {
+            let others = shard.mask.iter().chain(&shard.mean_img);
+            std::iter::once(&shard.file).chain(others.map(|entry| &entry.file))
         });
-        of_sessions.chain(of_shards).map(String::as_str)
+        session_files.chain(shard_files).map(String::as_str)
     }
 
-    fn check_names(&self) -> Result<(), Error> {
+    fn check_names(&self) -> Result<(), ShardError> {
         self.sessions
             .iter()
             .try_for_each(|session| names::check_session(&session.id))?;
@@ -266,7 +251,7 @@ impl Dataset {
     }
 }
 
-/// The one field that is read before the rest.
+/// The field that is read first.
 #[derive(Deserialize)]
 struct Header {
     schema: String,
@@ -274,9 +259,9 @@ struct Header {
 
 fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
     let length = std::fs::metadata(path)?.len();
-    if length > MOST_BYTES {
+    if length > MAX_BYTES {
         return Err(io::Error::other(format!(
-            "{length} bytes are more than are read"
+            "it has {length} bytes, more than the limit of {MAX_BYTES}"
         )));
     }
     std::fs::read(path)

@@ -1,4 +1,4 @@
-//! BLAKE3 digests, and files and streams that are hashed as they pass.
+//! BLAKE3 digests of bytes, files, streams and folders.
 
 use std::fmt;
 use std::fs::File;
@@ -23,7 +23,7 @@ impl Digest {
     /// The length in bytes and the digest of the file at `path`, which is read once, in pieces.
     ///
     /// # Errors
-    /// What opening or reading the file gives.
+    /// If the file cannot be opened or read.
     pub fn of_file(path: &Path) -> io::Result<(u64, Self)> {
         let mut reader = HashingReader::new(File::open(path)?);
         reader.drain()?;
@@ -63,7 +63,7 @@ impl fmt::Display for Digest {
     }
 }
 
-/// Why a text is not a digest.
+/// A text that is not a digest.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0:?} is not a BLAKE3 digest: 64 hexadecimal digits were expected")]
 pub struct NotADigest(String);
@@ -77,8 +77,7 @@ impl FromStr for Digest {
     }
 }
 
-/// The digest of a row of parts: BLAKE3 over their digests, 32 bytes each, one after the other.
-/// This is how a folder of images is vouched for.
+/// The digest of a folder of images: BLAKE3 over the digests of the images, 32 bytes each, in order.
 #[derive(Default)]
 pub(super) struct FolderHasher(blake3::Hasher);
 
@@ -92,7 +91,7 @@ impl FolderHasher {
     }
 }
 
-/// Passes bytes on to a writer, counts and hashes them.
+/// A writer that counts and hashes the bytes that pass through it.
 pub(super) struct HashingWriter<W> {
     inner: W,
     hasher: blake3::Hasher,
@@ -127,7 +126,7 @@ impl<W: Write> Write for HashingWriter<W> {
     }
 }
 
-/// Passes bytes on from a reader, counts and hashes them.
+/// A reader that counts and hashes the bytes that pass through it.
 pub(super) struct HashingReader<R> {
     inner: R,
     hasher: blake3::Hasher,
@@ -143,7 +142,7 @@ impl<R: Read> HashingReader<R> {
         }
     }
 
-    /// Reads to the end and tells how many bytes that were.
+    /// Reads to the end and returns the number of bytes read.
     pub(super) fn drain(&mut self) -> io::Result<u64> {
         let mut buffer = vec![0; 1 << 17];
         let before = self.bytes;
@@ -192,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stream_has_the_digest_of_its_bytes_whichever_way_it_passes() {
+    fn a_stream_has_the_digest_of_its_bytes_when_written_and_when_read() {
         let bytes = vec![7_u8; 300_000];
         let mut writer = HashingWriter::new(Vec::new());
         writer.write_all(&bytes).unwrap();

@@ -1,26 +1,28 @@
-//! What can go wrong in this room.
+//! The errors of reading and writing data sets.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why a data set could not be written, read or vouched for.
+use crate::image_stats::SizeMismatch;
+
+/// Why a data set could not be written, read or checked.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Error {
-    /// The operating system refused.
+pub enum ShardError {
+    /// A file or folder could not be read or written.
     #[error(
-        "could not {doing} {path}: check that it exists, may be read and written, and that the disk has room",
+        "could not {doing} {path}: check that it exists, may be read and written, and that the disk has space",
         path = .path.display()
     )]
     Io {
-        /// What was tried, as a verb.
+        /// What was attempted, as a verb.
         doing: &'static str,
-        /// With what.
+        /// The file or folder.
         path: PathBuf,
-        /// The operating system's reason.
+        /// The system's error.
         source: io::Error,
     },
-    /// Another process writes into the folder.
+    /// Another process is writing into the folder.
     #[error(
         "{path} is being written by another process: wait for it to end, or give another folder",
         path = .path.display()
@@ -38,7 +40,7 @@ pub enum Error {
         /// The file or folder in the way.
         path: PathBuf,
     },
-    /// A session's id cannot be the name of a file.
+    /// The id is not a valid session name.
     #[error(
         "{name:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most 120 bytes, not starting with '.'"
     )]
@@ -46,7 +48,8 @@ pub enum Error {
         /// The name.
         name: String,
     },
-    /// A path, in `dataset.json` or asked for, that leads out of the data set or is spelled oddly.
+    /// A path in `dataset.json`, or one given by the caller, that is not a plain path inside the data
+    /// set.
     #[error(
         "{path:?} cannot be a file of a data set: use a relative path with `/`, without `..`, `\\` and `:`; do not trust a dataset.json that names it"
     )]
@@ -54,16 +57,16 @@ pub enum Error {
         /// The path.
         path: String,
     },
-    /// A layout of an unknown name.
+    /// An unknown layout.
     #[error("{name:?} is not a layout: give webdataset or relit")]
     UnknownLayout {
         /// The name.
         name: String,
     },
-    /// A session of no samples, or of too many.
+    /// A session without samples, or with too many.
     #[error("a session of {samples} samples cannot be written: give 1 to {most}", most = super::MAX_SAMPLES)]
     SampleCount {
-        /// The number asked for.
+        /// The requested number.
         samples: u32,
     },
     /// A sample of another session was pushed.
@@ -77,13 +80,13 @@ pub enum Error {
         expected: String,
     },
     /// A sample with an index that the session does not have.
-    #[error("session {session:?} has samples 0 to {last}, and sample {index} was given")]
+    #[error("session {session:?} has samples 0 to {last}, but sample {index} was given")]
     OutOfRange {
         /// The session.
         session: String,
         /// The sample's index.
         index: u32,
-        /// The largest index there is.
+        /// The largest valid index.
         last: u32,
     },
     /// A sample was pushed twice.
@@ -96,14 +99,14 @@ pub enum Error {
     },
     /// Samples were not pushed.
     #[error(
-        "session {session:?} is not whole: sample {index} is the first of {missing} that were not given"
+        "session {session:?} is not complete: {missing} samples were not given, the first is sample {index}"
     )]
     MissingSample {
         /// The session.
         session: String,
         /// The smallest missing index.
         index: u32,
-        /// How many are missing.
+        /// Number of missing samples.
         missing: usize,
     },
     /// A record with a number that JSON cannot hold.
@@ -116,45 +119,45 @@ pub enum Error {
         /// The record's field.
         field: &'static str,
     },
-    /// Two sizes that must be equal are not.
-    #[error("{what} is {}x{} pixels where {}x{} were expected", size[0], size[1], expected[0], expected[1])]
+    /// An image or mask of the wrong size.
+    #[error("{what} is {}x{} pixels, but {}x{} were expected", size[0], size[1], expected[0], expected[1])]
     SizeMismatch {
         /// What has the wrong size.
         what: &'static str,
         /// Its width and height, pixels.
         size: [u32; 2],
-        /// Width and height that it should have, pixels.
+        /// The expected width and height, pixels.
         expected: [u32; 2],
     },
-    /// A mask with a value between object and background.
+    /// A mask with a value other than 0 and 255.
     #[error("the mask has the value {value} at pixel ({x}, {y}): only 0 and 255 are allowed")]
     MaskValue {
         /// The value.
         value: u8,
-        /// Column, pixels.
+        /// Column of the pixel.
         x: u32,
-        /// Row, pixels.
+        /// Row of the pixel.
         y: u32,
     },
-    /// An image that PNG cannot hold.
+    /// An image that cannot be stored as PNG.
     #[error("could not encode an image of {width}x{height} pixels as PNG")]
     Encode {
         /// Width, pixels.
         width: u32,
         /// Height, pixels.
         height: u32,
-        /// The encoder's reason.
+        /// The encoder's error.
         source: png::EncodingError,
     },
     /// A PNG that cannot be decoded.
-    #[error("the PNG is damaged: restore it, or extract the session anew")]
+    #[error("the PNG is damaged: restore it, or extract the session again")]
     Decode {
-        /// The decoder's reason.
+        /// The decoder's error.
         #[from]
         source: png::DecodingError,
     },
-    /// A PNG of another kind than the data set has.
-    #[error("the PNG is {found} where {expected} was expected")]
+    /// A PNG with an unexpected pixel format.
+    #[error("the PNG is {found}, but {expected} was expected")]
     PixelFormat {
         /// Its pixel format.
         found: String,
@@ -162,27 +165,27 @@ pub enum Error {
         expected: &'static str,
     },
     /// A PNG that is too large to be decoded.
-    #[error("the PNG claims {width}x{height} pixels: more than {most} are not decoded")]
+    #[error("the PNG claims {width}x{height} pixels, more than the limit of {limit}")]
     TooManyPixels {
         /// Width, pixels.
         width: u32,
         /// Height, pixels.
         height: u32,
         /// The limit, pixels.
-        most: u64,
+        limit: u64,
     },
     /// A table that could not be written or read.
     #[error("the table {path} could not be {doing}", path = .path.display())]
     Table {
         /// The table.
         path: PathBuf,
-        /// Written or read.
+        /// What was attempted: "written" or "read".
         doing: &'static str,
-        /// The Parquet library's reason.
+        /// The Parquet library's error.
         source: parquet::errors::ParquetError,
     },
-    /// A table without a column, or with a value that its column cannot have.
-    #[error("the table {path} is not one of this data set: row {row} has no valid {column}", path = .path.display())]
+    /// A table in which a column is missing or has an invalid value.
+    #[error("the table {path} does not belong to this data set: row {row} has no valid {column}", path = .path.display())]
     TableValue {
         /// The table.
         path: PathBuf,
@@ -191,17 +194,17 @@ pub enum Error {
         /// The column.
         column: &'static str,
     },
-    /// `dataset.json` is not what it should be.
-    #[error("{path} is not a valid description of a data set: restore it, or write the data set anew", path = .path.display())]
+    /// `dataset.json` is damaged.
+    #[error("{path} is not a valid description of a data set: restore it, or write the data set again", path = .path.display())]
     Description {
         /// The file.
         path: PathBuf,
-        /// Where and why.
+        /// The parser's error, with line and column.
         source: serde_json::Error,
     },
-    /// `dataset.json` of another version.
+    /// `dataset.json` from another version.
     #[error(
-        "{path} has the schema {found:?}, but {expected:?} is read here: use the version of relit that wrote it",
+        "{path} has the schema {found:?}, and this version reads {expected:?}: use the version of relit that wrote it",
         path = .path.display()
     )]
     Schema {
@@ -209,15 +212,15 @@ pub enum Error {
         path: PathBuf,
         /// Its schema.
         found: String,
-        /// The schema that is read here.
+        /// The schema that this version reads.
         expected: &'static str,
     },
-    /// A record could not be turned to JSON.
+    /// A value could not be written as JSON.
     #[error("could not write {what} as JSON")]
     Json {
-        /// What was to be written.
+        /// What was being written.
         what: String,
-        /// The reason.
+        /// The serializer's error.
         source: serde_json::Error,
     },
     /// A folder without `dataset.json`.
@@ -242,7 +245,7 @@ pub enum Error {
         session: String,
     },
     /// A file of the data set is not the one that was written.
-    #[error("{file} is not the file that dataset.json vouches for: {what}")]
+    #[error("{file} differs from its entry in dataset.json: {what}")]
     Changed {
         /// The file, relative to the data set.
         file: String,
@@ -250,21 +253,19 @@ pub enum Error {
         what: String,
     },
     /// A tar that ends too early.
-    #[error("the shard ends at byte {offset}, in the middle: it was cut off, copy it again")]
+    #[error("the shard is truncated: it ends at byte {offset}; copy it again")]
     ShardTruncated {
-        /// How many bytes there are.
+        /// Number of bytes that were read.
         offset: u64,
     },
-    /// A block of a tar that should be a header and is none.
+    /// A block of a tar that is not a header although one is expected.
     #[error("the block at byte {offset} of the shard is not a tar header: the shard is damaged")]
     ShardHeader {
         /// Where the block starts.
         offset: u64,
     },
     /// A member, or a sample, that is too large to be held in memory.
-    #[error(
-        "{path:?} at byte {offset} of the shard claims more than {limit} bytes: it is not read"
-    )]
+    #[error("{path:?} at byte {offset} of the shard claims more than the limit of {limit} bytes")]
     ShardTooLarge {
         /// The member.
         path: String,
@@ -273,15 +274,15 @@ pub enum Error {
         /// The limit, bytes.
         limit: u64,
     },
-    /// A member whose name is not text.
+    /// A member whose name is not UTF-8.
     #[error("the name of the member at byte {offset} of the shard is not UTF-8")]
     ShardName {
         /// Where its header starts.
         offset: u64,
     },
-    /// A sample with the same member twice, or with too many.
+    /// A sample with the same member twice, or with too many members.
     #[error(
-        "sample {key:?} has {path:?} twice, or has more than {most} members: pack the shard anew, each member once"
+        "sample {key:?} has {path:?} twice, or has more than {limit} members: pack the shard again, each member once"
     )]
     ShardSample {
         /// The sample's key.
@@ -289,27 +290,37 @@ pub enum Error {
         /// The member.
         path: String,
         /// The largest number of members.
-        most: usize,
+        limit: usize,
     },
     /// A shard that could not be read.
     #[error(
         "could not read the shard at byte {offset}: check the disk or connection that it comes from, and read it again"
     )]
     ShardRead {
-        /// How many bytes were read.
+        /// Number of bytes that were read.
         offset: u64,
-        /// The operating system's reason.
+        /// The system's error.
         source: io::Error,
     },
 }
 
-impl Error {
-    /// For `map_err`: an I/O error with what was tried and with what.
+impl ShardError {
+    /// For `map_err`: an I/O error with what was attempted and the path.
     pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Io {
             doing,
             path: path.to_owned(),
             source,
+        }
+    }
+}
+
+impl From<SizeMismatch> for ShardError {
+    fn from(SizeMismatch { size, expected }: SizeMismatch) -> Self {
+        Self::SizeMismatch {
+            what: "the image",
+            size,
+            expected,
         }
     }
 }

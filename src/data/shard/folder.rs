@@ -1,4 +1,4 @@
-//! The layout `relit`: images in a folder that takes its name when it is whole.
+//! The layout `relit`: images in a folder that gets its final name when it is complete.
 
 use std::fs;
 use std::io;
@@ -10,10 +10,10 @@ use super::codec::encode_rgb;
 use super::dataset::ShardEntry;
 use super::digest::FolderHasher;
 use super::output;
-use super::table::Row;
-use super::{Error, names};
+use super::table::TableRow;
+use super::{ShardError, names};
 
-/// The images of a session on their way into a folder.
+/// The images of a session that are written into a folder.
 pub(super) struct FolderStore {
     out: PathBuf,
     session: String,
@@ -40,15 +40,15 @@ impl FolderStore {
         session: &str,
         samples: u32,
         size: [u32; 2],
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, ShardError> {
         for folder in [names::IMAGES, names::MASKS, names::MEANS] {
             let path = out.join(folder);
-            fs::create_dir_all(&path).map_err(Error::io("make the folder", &path))?;
+            fs::create_dir_all(&path).map_err(ShardError::io("make the folder", &path))?;
         }
         let path = out.join(names::IMAGES).join(names::partial(session));
         fs::create_dir(&path).map_err(|source| match source.kind() {
-            io::ErrorKind::AlreadyExists => Error::Busy { path: path.clone() },
-            _ => Error::Io {
+            io::ErrorKind::AlreadyExists => ShardError::Busy { path: path.clone() },
+            _ => ShardError::Io {
                 doing: "make the folder",
                 path: path.clone(),
                 source,
@@ -68,22 +68,31 @@ impl FolderStore {
         &self.out
     }
 
-    pub(super) fn push(&mut self, index: u32, png: &[u8], image: &RgbImage) -> Result<(), Error> {
+    pub(super) fn push(
+        &mut self,
+        index: u32,
+        png: &[u8],
+        image: &RgbImage,
+    ) -> Result<(), ShardError> {
         let path = self.image_path(index);
-        fs::write(&path, png).map_err(Error::io("write", &path))?;
+        fs::write(&path, png).map_err(ShardError::io("write", &path))?;
         self.mean.add(image);
         self.bytes += png.len() as u64;
         Ok(())
     }
 
-    /// Gives folder, mask and mean image their names, in place of older ones.
-    pub(super) fn publish(self, rows: &[Row], mask_png: &[u8]) -> Result<ShardEntry, Error> {
+    /// Renames folder, mask and mean image to their final names, replacing older ones.
+    pub(super) fn publish(
+        self,
+        rows: &[TableRow],
+        mask_png: &[u8],
+    ) -> Result<ShardEntry, ShardError> {
         (0..self.samples).try_for_each(|index| output::sync(&self.image_path(index)))?;
         output::sync(&self.partial.path)?;
         let mask = output::seal_whole(&self.out, &names::mask_file(&self.session), mask_png)?;
         let mean_png = encode_rgb(&self.mean.image()?)?;
         let mean_img = output::seal_whole(&self.out, &names::mean_file(&self.session), &mean_png)?;
-        self.take_name()?;
+        self.replace_folder()?;
         let mut hasher = FolderHasher::default();
         rows.iter().for_each(|row| hasher.add(&row.png_blake3));
         Ok(ShardEntry {
@@ -97,26 +106,26 @@ impl FolderStore {
         })
     }
 
-    /// Puts the folder in the place of an older one, which stays whole until then.
-    fn take_name(&self) -> Result<(), Error> {
+    /// Renames the folder to its final name. An older folder stays complete until then.
+    fn replace_folder(&self) -> Result<(), ShardError> {
         let images = self.out.join(names::IMAGES);
-        let place = images.join(&self.session);
-        let aside = images.join(names::outgoing(&self.session));
-        output::remove_folder(&aside)?;
-        if place.exists() {
-            fs::rename(&place, &aside).map_err(Error::io("set aside", &place))?;
+        let path = images.join(&self.session);
+        let old = images.join(names::outgoing(&self.session));
+        output::remove_folder(&old)?;
+        if path.exists() {
+            fs::rename(&path, &old).map_err(ShardError::io("move away", &path))?;
         }
-        if let Err(source) = fs::rename(&self.partial.path, &place) {
-            // The older one comes back; where that fails too, the next locked run does it.
-            let _ = fs::rename(&aside, &place);
-            return Err(Error::Io {
+        if let Err(source) = fs::rename(&self.partial.path, &path) {
+            // Restore the older one; if that fails too, the next run does it.
+            let _ = fs::rename(&old, &path);
+            return Err(ShardError::Io {
                 doing: "rename a finished folder to",
-                path: place,
+                path,
                 source,
             });
         }
         output::sync(&images)?;
-        output::remove_folder(&aside)
+        output::remove_folder(&old)
     }
 
     fn image_path(&self, index: u32) -> PathBuf {
@@ -149,14 +158,14 @@ impl MeanImage {
         self.count += 1;
     }
 
-    pub(super) fn image(&self) -> Result<RgbImage, Error> {
+    pub(super) fn image(&self) -> Result<RgbImage, ShardError> {
         let [width, height] = self.size;
         let round = |sum: &u64| (2 * sum + self.count) / (2 * self.count).max(1);
         let pixels = self
             .sums
             .iter()
             .map(|sum| u8::try_from(round(sum)).unwrap_or(u8::MAX));
-        RgbImage::from_raw(width, height, pixels.collect()).ok_or(Error::SizeMismatch {
+        RgbImage::from_raw(width, height, pixels.collect()).ok_or(ShardError::SizeMismatch {
             what: "the mean image",
             size: self.size,
             expected: self.size,

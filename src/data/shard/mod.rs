@@ -1,32 +1,31 @@
-//! The data set on disk: samples, records, tables; write, read, verify.
+//! The data set: writing, reading and verifying shards of samples with records and tables.
 //!
-//! A data set is a folder. `dataset.json` describes it and vouches for every other file by
-//! length and BLAKE3; each session has a shard (a tar, or in the layout `relit` a folder of
-//! images), a table of its records, and possibly a page. `docs/formats.md` tells every file and
-//! field.
+//! A data set is a folder. `dataset.json` describes it and lists every other file with length and
+//! BLAKE3. Each session has a shard (a tar, or in the layout `relit` a folder of images), a table of
+//! its records, and usually a report. `docs/formats.md` describes every file and field.
 //!
-//! | file | concern |
+//! | item | purpose |
 //! | --- | --- |
-//! | [`record`], [`table`](read_table) | what is known of a frame: as JSON, as a row |
-//! | [`order`](order()) | in which order samples stand in a shard |
-//! | [`measure`] | what is counted under a mask |
-//! | `codec` | PNG |
-//! | `digest`, `names` | BLAKE3; which names are used and which are safe |
-//! | [`OutputFolder`] | one writer a folder; files that appear whole or not at all |
-//! | [`SessionWriter`] | samples in any order in, files out; `spool` and `folder` are its layouts |
-//! | [`Dataset`], [`Settings`] | `dataset.json`; `vouch` compares files with it |
-//! | [`ShardReader`] | any WebDataset shard as a stream of samples; `tarball` is the tar below it |
-//! | [`verify`](verify()) | reads everything back and names what is wrong |
+//! | [`record`], [`read_table`] | a frame's record, as JSON and as a row of the table |
+//! | [`order`](order()) | the order of the samples in a shard |
+//! | [`encode_rgb`], [`decode_rgb`] and others | images as PNG (`codec`) |
+//! | [`Digest`], [`sample_key`] | BLAKE3 digests; names and whether they are safe |
+//! | [`OutputFolder`] | locks the folder; writes files that appear whole or not at all |
+//! | [`ShardWriter`] | writes one session (layouts: `spool` for the tar, `folder` for images) |
+//! | [`Dataset`], [`ExtractionSettings`] | `dataset.json`; `integrity` compares the files with it |
+//! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tarball`) |
+//! | [`verify`](verify()) | reads everything back and reports what is wrong |
 //!
-//! This room knows pixel rectangles and images. It knows nothing of videos, of how a mask was
-//! made, of a rig or of its sessions on disk: a session here is a name with samples.
+//! This module knows pixel rectangles, images and their statistics ([`image_stats`](crate::image_stats)). It knows nothing of videos, of how a mask was made,
+//! of the rig or of session folders: here a session is a name and its samples.
 
 mod codec;
 mod dataset;
 mod digest;
 mod error;
+mod file;
 mod folder;
-pub mod measure;
+mod integrity;
 mod names;
 mod order;
 mod output;
@@ -37,25 +36,24 @@ mod spool;
 mod table;
 mod tarball;
 mod verify;
-mod vouch;
 mod writer;
 
 pub use codec::{decode_mask, decode_rgb, encode_mask, encode_rgb};
 pub use dataset::{
-    Dataset, FileEntry, Input, MaskInfo, Selection, SessionEntry, ShardEntry, Software,
+    Dataset, DatasetSoftware, MaskInfo, SamplingBasis, SessionEntry, ShardEntry, SourceVideo,
 };
 pub use digest::{Digest, NotADigest};
-pub use error::Error;
-pub use measure::{MaskSpans, Measures};
+pub use error::ShardError;
+pub use file::FileEntry;
 pub use names::{check_session, sample_key};
 pub use order::order;
 pub use output::OutputFolder;
 pub use reader::{ShardReader, ShardSample};
 pub use record::FrameRecord;
-pub use settings::{Align, Layout, Native, Settings, Size};
-pub use table::{Row, read_table};
-pub use verify::{Problem, Verdict, verify};
-pub use writer::{Sample, SessionFiles, SessionWriter};
+pub use settings::{Align, ExtractionSettings, ImageSize, Layout, Native};
+pub use table::{TableRow, read_table};
+pub use verify::{Problem, VerifyReport, verify};
+pub use writer::{Sample, ShardFiles, ShardWriter};
 
-/// Most samples that a session may have.
+/// Largest number of samples of a session.
 pub const MAX_SAMPLES: u32 = 1_000_000;

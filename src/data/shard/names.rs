@@ -1,32 +1,32 @@
-//! Names: of sessions, samples, members and files, and which of them are safe.
+//! Names of sessions, samples, members and files, and checks that they are safe.
 
-use super::Error;
+use super::ShardError;
 use crate::durable;
 use crate::naming::is_session_name;
 
-/// Whether `name` can name a session, by the rule of [`is_session_name`].
+/// Checks that `name` can be a session's name, by the rule of [`is_session_name`].
 ///
 /// # Errors
-/// [`Error::SessionName`] where it cannot.
-pub fn check_session(name: &str) -> Result<(), Error> {
+/// [`ShardError::SessionName`] if it cannot.
+pub fn check_session(name: &str) -> Result<(), ShardError> {
     if is_session_name(name) {
         Ok(())
     } else {
-        Err(Error::SessionName {
+        Err(ShardError::SessionName {
             name: name.to_owned(),
         })
     }
 }
 
-/// Whether `path` stays inside the data set: relative, parts separated by `/`, none of them
+/// Checks that `path` stays inside the data set: relative, parts separated by `/`, none of them
 /// empty, `.` or `..`.
-pub(super) fn check_path(path: &str) -> Result<(), Error> {
+pub(super) fn check_path(path: &str) -> Result<(), ShardError> {
     let plain = |part: &str| !matches!(part, "" | "." | "..");
-    let odd = |c: char| c == '\\' || c == ':' || c.is_control();
-    if path.split('/').all(plain) && !path.contains(odd) {
+    let forbidden = |c: char| c == '\\' || c == ':' || c.is_control();
+    if path.split('/').all(plain) && !path.contains(forbidden) {
         Ok(())
     } else {
-        Err(Error::UnsafePath {
+        Err(ShardError::UnsafePath {
             path: path.to_owned(),
         })
     }
@@ -41,10 +41,10 @@ pub(super) enum Part {
 }
 
 impl Part {
-    /// In the order in which they stand in a shard.
+    /// All parts, in their order in a shard.
     pub(super) const ALL: [Self; 3] = [Self::Image, Self::Mask, Self::Record];
 
-    /// What follows the key and a dot in the member's name.
+    /// The member's name after the key and a dot.
     pub(super) const fn suffix(self) -> &'static str {
         match self {
             Self::Image => "png",
@@ -69,7 +69,7 @@ pub(super) fn member(session: &str, index: u32, part: Part) -> String {
     format!("{}.{}", sample_key(session, index), part.suffix())
 }
 
-/// The sample and the part that a member's name stands for, if it is one of this session.
+/// The sample and the part that a member's name denotes, if it belongs to this session.
 pub(super) fn parse_member(session: &str, path: &str) -> Option<(u32, Part)> {
     let (number, suffix) = path
         .strip_prefix(session)?
@@ -77,7 +77,7 @@ pub(super) fn parse_member(session: &str, path: &str) -> Option<(u32, Part)> {
         .split_once('.')?;
     let index: u32 = number.parse().ok()?;
     let part = Part::of_suffix(suffix)?;
-    // Only the one spelling that the writer uses: no sign, no other number of zeros.
+    // Only the form that the writer uses: no sign, no other number of leading zeros.
     (member(session, index, part) == path).then_some((index, part))
 }
 
@@ -107,27 +107,27 @@ pub(super) const IMAGES: &str = "imgs";
 pub(super) const MASKS: &str = "masks";
 pub(super) const MEANS: &str = "mean_img";
 
-/// The name under which a folder of images is written before it is whole.
+/// The name under which a folder of images is written before it is complete.
 pub(super) fn partial(session: &str) -> String {
     format!(".{session}.partial")
 }
 
-/// The name of the file in which a session's images wait for their place in the tar.
+/// The name of the file that holds a session's images until the tar is written.
 pub(super) fn spool(session: &str) -> String {
     format!(".{session}.spool")
 }
 
-/// The name to which a folder of images steps aside while its successor takes its place.
+/// The name to which a folder of images is moved while another one replaces it.
 pub(super) fn outgoing(session: &str) -> String {
     format!(".{session}.outgoing")
 }
 
-/// The session whose folder of images stepped aside to `name`, if it is such a name.
+/// The session whose folder of images was moved to `name`, if `name` has that form.
 pub(super) fn session_of_outgoing(name: &str) -> Option<&str> {
     name.strip_prefix('.')?.strip_suffix(".outgoing")
 }
 
-/// Whether a file of this name directly in the data set is a leftover of an interrupted writer.
+/// Whether a file of this name in the data set's folder was left behind by an interrupted writer.
 pub(super) fn is_leftover(name: &str) -> bool {
     let Some(rest) = name.strip_prefix('.') else {
         return false;
@@ -137,7 +137,7 @@ pub(super) fn is_leftover(name: &str) -> bool {
             .iter()
             .any(|end| file.ends_with(end))
     };
-    // Earlier writers used no numbers in the name.
+    // Earlier versions used no numbers in the name.
     let written = |plain| finished(durable::target_of(name).unwrap_or(plain));
     rest.ends_with(".spool") || rest.strip_suffix(".partial").is_some_and(written)
 }
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_member_is_known_by_its_only_spelling() {
+    fn a_member_name_has_one_valid_form() {
         assert_eq!(member("s.1", 7, Part::Mask), "s.1/0007.mask.png");
         assert_eq!(
             parse_member("s.1", "s.1/0007.mask.png"),
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_session_that_is_taken_can_name_all_its_files() {
+    fn a_valid_session_name_gives_valid_file_names() {
         let longest = "x".repeat(120);
         for session in ["20261120T093015Z-mug", "Ölkanne.v2", &longest] {
             check_session(session).unwrap();
@@ -181,7 +181,7 @@ mod tests {
         for name in ["a:b", "../a", ""] {
             assert!(matches!(
                 check_session(name),
-                Err(Error::SessionName { .. })
+                Err(ShardError::SessionName { .. })
             ));
         }
     }

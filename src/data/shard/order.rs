@@ -1,21 +1,21 @@
-//! The order of the samples in a shard: any 12 neighbours cover the whole turn.
+//! The order of the samples in a shard: any 12 consecutive samples cover the whole turn.
 //!
 //! Position `j` of `n` holds sample `j * s mod n`, with one stride `s` for the whole shard. The
 //! stride is the number coprime to `n` that is nearest to `n * (5/12 + 0.618034/144)` among those
-//! with which no 12 neighbours leave a gap of more than 45 degrees. Twelve steps of 5/12 of a turn
-//! would meet the twelve hours of a clock face once each; the golden part of 1/144 keeps the next
-//! twelve from meeting the same hours, and spreads shorter runs too. For 1500 samples `s` is 631:
-//! any 12 neighbours leave at most 37.2 degrees between them, any 7 at most 57.1.
+//! with which no 12 consecutive samples leave a gap of more than 45 degrees. Twelve steps of 5/12 of a
+//! turn would visit each of the twelve hours of a clock face once; the golden section of 1/144 keeps
+//! the next twelve from visiting the same hours, and spreads shorter runs too. For 1500 samples `s` is
+//! 631: any 12 consecutive samples leave gaps of at most 37.2 degrees, any 7 of at most 57.1.
 //!
-//! For 13, 14, 15 and 22 samples, and for fewer than 8, no stride keeps within 45 degrees; the
-//! nearest coprime number is taken.
+//! For 13, 14, 15 and 22 samples, and for fewer than 8, no stride keeps the gaps within 45 degrees;
+//! then the nearest coprime number is used.
 
 use std::num::NonZeroU32;
 
-/// How many neighbours are to cover the turn.
+/// Number of consecutive samples that should cover the turn.
 const RUN: u32 = 12;
-/// The stride that is aimed at, as a fraction of the turn: 5/12 + 0.618034/144, in units of
-/// 1/144 000 000, so that the choice is made in integers and is the same on every machine.
+/// The ideal stride as a fraction of the turn, 5/12 + 0.618034/144, in units of 1/144 000 000: the
+/// choice is made in integers and is the same on every machine.
 const AIM: i128 = 60_618_034;
 const AIM_UNITS: i128 = 144_000_000;
 
@@ -48,7 +48,7 @@ fn stride(count: NonZeroU32) -> u32 {
     nearest.unwrap_or(1)
 }
 
-/// All of `1..=n`, the nearest to the aim first.
+/// The numbers `1..=n`, nearest to the ideal stride first.
 fn by_distance_from_aim(n: u32) -> impl Iterator<Item = u32> {
     let aim = i128::from(n) * AIM;
     let distance = move |s: u32| (i128::from(s) * AIM_UNITS - aim).abs();
@@ -68,8 +68,8 @@ fn by_distance_from_aim(n: u32) -> impl Iterator<Item = u32> {
     })
 }
 
-/// The largest gap that 12 neighbours leave on the circle of `n` samples. All runs of neighbours
-/// are rotations of one another, so the first stands for all.
+/// The largest gap that 12 consecutive samples leave on the circle of `n` samples. All runs are
+/// rotations of one another, so it is enough to look at the first.
 fn largest_gap(n: u32, stride: u32) -> u32 {
     let mut run: Vec<u32> = (0..u64::from(RUN.min(n)))
         .filter_map(|j| u32::try_from(j * u64::from(stride) % u64::from(n)).ok())
@@ -93,7 +93,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Largest gap between any `run` neighbours of `order`, degrees.
+    /// Largest gap between any `run` consecutive samples of `order`, degrees.
     fn worst_gap(order: &[u32], run: usize) -> f64 {
         let n = u32::try_from(order.len()).unwrap();
         let mut worst = 0;
@@ -117,7 +117,7 @@ mod tests {
         }
 
         #[test]
-        fn any_twelve_neighbours_cover_the_turn(n in 100_u32..4000) {
+        fn any_twelve_consecutive_samples_cover_the_turn(n in 100_u32..4000) {
             prop_assert!(worst_gap(&order(n), 12) <= 45.0);
         }
     }

@@ -1,39 +1,37 @@
-//! Writing files that the data set can vouch for, and one writer a folder.
+//! The folder of a data set: one writer at a time, and files that appear whole and hashed.
 
-use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use super::dataset::FileEntry;
 use super::digest::HashingWriter;
-use super::{Error, names};
+use super::file::FileEntry;
+use super::{ShardError, names};
 use crate::durable::{Partial, Sealed};
 
-/// The folder of a data set, held by this process alone until it is dropped.
+/// The folder of a data set, locked by this process until it is dropped.
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
-    /// The lock lives as long as this handle.
+    /// The lock is held as long as this handle.
     _handle: File,
 }
 
 impl OutputFolder {
-    /// Makes the folder where it does not exist, takes it for this process, and clears away what
-    /// a killed writer left behind: files under temporary names. An image folder that was being
-    /// replaced comes back under its name.
+    /// Creates the folder if it does not exist, locks it, and removes the temporary files that a
+    /// killed writer left behind. An image folder that was being replaced gets its name back.
     ///
     /// # Errors
-    /// [`Error::Locked`] where another process has it; [`Error::Io`] where it cannot be made,
-    /// opened, locked or cleared.
-    pub fn lock(out: &Path) -> Result<Self, Error> {
-        fs::create_dir_all(out).map_err(Error::io("make the folder", out))?;
-        let handle = File::open(out).map_err(Error::io("open the folder", out))?;
+    /// [`ShardError::Locked`] if another process holds the lock; [`ShardError::Io`] if the folder cannot be
+    /// created, opened, locked or cleaned.
+    pub fn lock(out: &Path) -> Result<Self, ShardError> {
+        fs::create_dir_all(out).map_err(ShardError::io("make the folder", out))?;
+        let handle = File::open(out).map_err(ShardError::io("open the folder", out))?;
         handle.try_lock().map_err(|reason| match reason {
-            TryLockError::WouldBlock => Error::Locked {
+            TryLockError::WouldBlock => ShardError::Locked {
                 path: out.to_owned(),
             },
-            TryLockError::Error(source) => Error::Io {
+            TryLockError::Error(source) => ShardError::Io {
                 doing: "lock the folder",
                 path: out.to_owned(),
                 source,
@@ -52,38 +50,39 @@ impl OutputFolder {
         &self.path
     }
 
-    /// Writes a file directly in the folder, whole or not at all, and returns the entry that
-    /// vouches for it. For the page of a session, for example.
+    /// Writes a file into the folder, whole or not at all, and returns its entry for `dataset.json`:
+    /// the page of a session, for example.
     ///
     /// # Errors
-    /// [`Error::UnsafePath`] where `name` is not a plain path; [`Error::Io`].
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<FileEntry, Error> {
+    /// [`ShardError::UnsafePath`] if `name` is not a relative path inside the folder; [`ShardError::Io`].
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<FileEntry, ShardError> {
         write_whole(&self.path, name, bytes)
     }
 }
 
 /// Writes `bytes` to `file`, a path relative to `out`, whole or not at all.
-pub(super) fn write_whole(out: &Path, file: &str, bytes: &[u8]) -> Result<FileEntry, Error> {
+pub(super) fn write_whole(out: &Path, file: &str, bytes: &[u8]) -> Result<FileEntry, ShardError> {
     seal_whole(out, file, bytes)?.publish()
 }
 
-/// As [`write_whole`], up to the name.
-pub(super) fn seal_whole(out: &Path, file: &str, bytes: &[u8]) -> Result<SealedFile, Error> {
+/// As [`write_whole`], without the final rename.
+pub(super) fn seal_whole(out: &Path, file: &str, bytes: &[u8]) -> Result<SealedFile, ShardError> {
     let mut partial = PartialFile::create(out, file)?;
     partial
         .write_all(bytes)
-        .map_err(Error::io("write", &partial.path))?;
+        .map_err(ShardError::io("write", &partial.path))?;
     partial.seal()
 }
 
-/// A file of the data set that is being written, counted and hashed. Dropped, it is removed.
+/// A file of the data set that is being written and hashed. Dropping it removes the file.
 pub(super) struct PartialFile {
     writer: HashingWriter<Partial>,
     path: PathBuf,
     file: String,
 }
 
-/// A file that is whole and on the disk, without its name yet. Dropped, it is removed.
+/// A file that is complete and synced to disk, still under its temporary name. Dropping it removes
+/// the file.
 pub(super) struct SealedFile {
     sealed: Sealed,
     path: PathBuf,
@@ -92,10 +91,10 @@ pub(super) struct SealedFile {
 
 impl PartialFile {
     /// Starts `file`, a path relative to `out`.
-    pub(super) fn create(out: &Path, file: &str) -> Result<Self, Error> {
+    pub(super) fn create(out: &Path, file: &str) -> Result<Self, ShardError> {
         names::check_path(file)?;
         let path = out.join(file);
-        let partial = Partial::create(&path).map_err(Error::io("create", &path))?;
+        let partial = Partial::create(&path).map_err(ShardError::io("create", &path))?;
         Ok(Self {
             writer: HashingWriter::new(partial),
             path,
@@ -103,11 +102,11 @@ impl PartialFile {
         })
     }
 
-    /// Brings all bytes to the disk.
-    pub(super) fn seal(self) -> Result<SealedFile, Error> {
+    /// Writes and syncs all bytes to disk.
+    pub(super) fn seal(self) -> Result<SealedFile, ShardError> {
         let Self { writer, path, file } = self;
         let (partial, bytes, blake3) = writer.finish();
-        let sealed = partial.seal().map_err(Error::io("write", &path))?;
+        let sealed = partial.seal().map_err(ShardError::io("write", &path))?;
         let entry = FileEntry {
             file,
             bytes,
@@ -132,32 +131,32 @@ impl Write for PartialFile {
 }
 
 impl SealedFile {
-    /// Gives the file its name, in place of an older one.
-    pub(super) fn publish(self) -> Result<FileEntry, Error> {
+    /// Renames the file to its final name, replacing an older one.
+    pub(super) fn publish(self) -> Result<FileEntry, ShardError> {
         self.sealed
             .publish()
-            .map_err(Error::io("give its name to", &self.path))?;
+            .map_err(ShardError::io("rename a finished file to", &self.path))?;
         Ok(self.entry)
     }
 }
 
-/// A file of which only the handle is wanted, created where there is none; removed when dropped.
+/// A temporary file for reading and writing; removed when dropped.
 pub(super) struct ScratchFile {
     pub(super) file: File,
     pub(super) path: PathBuf,
 }
 
 impl ScratchFile {
-    pub(super) fn create(path: PathBuf) -> Result<Self, Error> {
-        let options = OpenOptions::new()
+    pub(super) fn create(path: PathBuf) -> Result<Self, ShardError> {
+        let opened = OpenOptions::new()
             .read(true)
             .write(true)
             .create_new(true)
             .open(&path);
-        match options {
+        match opened {
             Ok(file) => Ok(Self { file, path }),
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Err(Error::Busy { path }),
-            Err(source) => Err(Error::Io {
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Err(ShardError::Busy { path }),
+            Err(source) => Err(ShardError::Io {
                 doing: "create",
                 path,
                 source,
@@ -172,17 +171,17 @@ impl Drop for ScratchFile {
     }
 }
 
-/// Brings a file or folder to the disk.
-pub(super) fn sync(path: &Path) -> Result<(), Error> {
+/// Syncs a file or folder to disk.
+pub(super) fn sync(path: &Path) -> Result<(), ShardError> {
     File::open(path)
         .and_then(|file| file.sync_all())
-        .map_err(Error::io("write", path))
+        .map_err(ShardError::io("write", path))
 }
 
-/// Removes a folder and all in it, if it is there.
-pub(super) fn remove_folder(path: &Path) -> Result<(), Error> {
+/// Removes a folder and its content, if it exists.
+pub(super) fn remove_folder(path: &Path) -> Result<(), ShardError> {
     match fs::remove_dir_all(path) {
-        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(Error::Io {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(ShardError::Io {
             doing: "remove",
             path: path.to_owned(),
             source: e,
@@ -191,14 +190,14 @@ pub(super) fn remove_folder(path: &Path) -> Result<(), Error> {
     }
 }
 
-/// The names in a folder, sorted; none where there is no such folder. A name that is not UTF-8
-/// is none of ours, and is given with its odd bytes replaced.
-pub(super) fn names_in(folder: &Path) -> Result<Vec<String>, Error> {
+/// The names in a folder, sorted; none if there is no such folder. In a name that is not UTF-8,
+/// invalid bytes are replaced: the writer uses no such names.
+pub(super) fn names_in(folder: &Path) -> Result<Vec<String>, ShardError> {
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
         Err(source) => {
-            return Err(Error::Io {
+            return Err(ShardError::Io {
                 doing: "list",
                 path: folder.to_owned(),
                 source,
@@ -206,18 +205,14 @@ pub(super) fn names_in(folder: &Path) -> Result<Vec<String>, Error> {
         }
     };
     let mut names = entries
-        .map(|entry| entry.map(|e| lossless_or_marked(&e.file_name())))
+        .map(|entry| entry.map(|e| e.file_name().to_string_lossy().into_owned()))
         .collect::<Result<Vec<_>, _>>()
-        .map_err(Error::io("list", folder))?;
+        .map_err(ShardError::io("list", folder))?;
     names.sort_unstable();
     Ok(names)
 }
 
-fn lossless_or_marked(name: &OsStr) -> String {
-    name.to_string_lossy().into_owned()
-}
-
-fn clear_leftovers(out: &Path) -> Result<(), Error> {
+fn clear_leftovers(out: &Path) -> Result<(), ShardError> {
     for folder in [
         out.to_owned(),
         out.join(names::MASKS),
@@ -233,26 +228,26 @@ fn clear_leftovers(out: &Path) -> Result<(), Error> {
     clear_image_leftovers(&out.join(names::IMAGES))
 }
 
-/// Removes what is not a folder: a link is removed itself, wherever it leads.
-fn remove_leftover(path: &Path) -> Result<(), Error> {
-    let found = fs::symlink_metadata(path).map_err(Error::io("look at", path))?;
+/// Removes a file or a link (not its target), and leaves folders alone.
+fn remove_leftover(path: &Path) -> Result<(), ShardError> {
+    let found = fs::symlink_metadata(path).map_err(ShardError::io("look at", path))?;
     if found.is_dir() {
         return Ok(());
     }
-    fs::remove_file(path).map_err(Error::io("remove", path))
+    fs::remove_file(path).map_err(ShardError::io("remove", path))
 }
 
-fn clear_image_leftovers(images: &Path) -> Result<(), Error> {
+fn clear_image_leftovers(images: &Path) -> Result<(), ShardError> {
     let found = names_in(images)?;
     for name in &found {
-        // The writer was killed between taking the old folder away and giving its name to the
-        // new one: the old one, which dataset.json vouches for, comes back.
+        // The writer was killed between moving the old folder away and renaming the new one: the old
+        // one, which dataset.json still describes, gets its name back.
         if let Some(session) = names::session_of_outgoing(name) {
-            let (aside, place) = (images.join(name), images.join(session));
-            if place.exists() {
-                remove_folder(&aside)?;
+            let (old, path) = (images.join(name), images.join(session));
+            if path.exists() {
+                remove_folder(&old)?;
             } else {
-                fs::rename(&aside, &place).map_err(Error::io("bring back", &place))?;
+                fs::rename(&old, &path).map_err(ShardError::io("restore", &path))?;
             }
         }
     }
@@ -274,7 +269,7 @@ mod tests {
         let first = OutputFolder::lock(dir.path()).unwrap();
         assert!(matches!(
             OutputFolder::lock(dir.path()),
-            Err(Error::Locked { .. })
+            Err(ShardError::Locked { .. })
         ));
         drop(first);
         assert!(OutputFolder::lock(dir.path()).is_ok());
@@ -317,14 +312,14 @@ mod tests {
     }
 
     #[test]
-    fn a_written_file_is_vouched_for_by_its_entry() {
+    fn a_written_file_gets_an_entry_with_its_length() {
         let dir = tempfile::tempdir().unwrap();
         let folder = OutputFolder::lock(dir.path()).unwrap();
         let entry = folder.write("a.html", b"page").unwrap();
         assert_eq!((entry.file.as_str(), entry.bytes), ("a.html", 4));
         assert!(matches!(
             folder.write("../a.html", b""),
-            Err(Error::UnsafePath { .. })
+            Err(ShardError::UnsafePath { .. })
         ));
     }
 }

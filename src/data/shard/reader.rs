@@ -1,24 +1,24 @@
-//! Reading a shard as a stream of samples, whoever wrote it. Knows nothing of sessions and
-//! records: a sample is a key and the members that share it.
+//! Reading any WebDataset shard as a stream of samples. Knows nothing of sessions and records: a
+//! sample is a key and the members that share it.
 
 use std::io::Read;
 
-use super::Error;
+use super::ShardError;
 use super::tarball::{Member, TarReader};
 
-/// Largest sum of the members of a sample, bytes.
-const MOST_BYTES: u64 = 256 << 20;
+/// Largest total size of the members of a sample, bytes.
+const MAX_BYTES: u64 = 256 << 20;
 /// Largest number of members of a sample.
-const MOST_MEMBERS: usize = 64;
+const MAX_MEMBERS: usize = 64;
 
 /// One sample of a shard.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ShardSample {
-    /// The members' common name up to the first dot of its last part, with folders:
-    /// `20261120T093015Z-mug/0007`. Only a label: it may be absolute or lead anywhere.
+    /// The members' common path up to the first dot of its last part:
+    /// `20261120T093015Z-mug/0007`. A label only: it may be absolute or contain `..`.
     pub key: String,
-    /// What follows the key and the dot (`png`, `mask.png`, `json`), and the bytes, in the order
-    /// of the tar.
+    /// For each member, in the order of the tar, its name after the key and the dot (`png`,
+    /// `mask.png`, `json`) and its bytes.
     pub members: Vec<(String, Vec<u8>)>,
 }
 
@@ -33,14 +33,13 @@ impl ShardSample {
     }
 }
 
-/// An iterator over the samples of a shard, by the rule of WebDataset: neighbouring members with
-/// the same key are one sample. Names without a dot are passed over. At most one sample is in
-/// memory, of at most 256 MiB and 64 members.
+/// An iterator over the samples of a shard, by the rule of WebDataset: adjacent members with the
+/// same key are one sample. Names without a dot are skipped. At most one sample is in memory, of at
+/// most 256 MiB and 64 members.
 ///
-/// A shard that is damaged or cut off gives an error ([`Error::ShardTruncated`],
-/// [`Error::ShardHeader`], [`Error::ShardTooLarge`], [`Error::ShardName`],
-/// [`Error::ShardSample`], [`Error::ShardRead`]) and then ends; the sample in which it happens is
-/// not given.
+/// A shard that is damaged or truncated gives one error ([`ShardError::ShardTruncated`],
+/// [`ShardError::ShardHeader`], [`ShardError::ShardTooLarge`], [`ShardError::ShardName`], [`ShardError::ShardSample`],
+/// [`ShardError::ShardRead`]) and then ends; the sample that is affected is not returned.
 pub struct ShardReader<R> {
     tar: TarReader<R>,
     /// The first member of the next sample.
@@ -49,16 +48,16 @@ pub struct ShardReader<R> {
 }
 
 impl<R: Read> ShardReader<R> {
-    /// Reads a tar from `source`, which is best buffered.
+    /// Reads a tar from `source`, which should be buffered.
     pub fn new(source: R) -> Self {
         Self {
-            tar: TarReader::new(source, MOST_BYTES),
+            tar: TarReader::new(source, MAX_BYTES),
             ahead: None,
             ended: false,
         }
     }
 
-    fn next_sample(&mut self) -> Result<Option<ShardSample>, Error> {
+    fn next_sample(&mut self) -> Result<Option<ShardSample>, ShardError> {
         let first = match self.ahead.take() {
             Some(first) => Some(first),
             None => self.next_member()?,
@@ -77,12 +76,12 @@ impl<R: Read> ShardReader<R> {
                 break;
             }
             bytes += data.len() as u64;
-            sample.take(suffix, data, bytes)?;
+            sample.add(suffix, data, bytes)?;
         }
         Ok(Some(sample))
     }
 
-    fn next_member(&mut self) -> Result<Option<(String, String, Vec<u8>)>, Error> {
+    fn next_member(&mut self) -> Result<Option<(String, String, Vec<u8>)>, ShardError> {
         while let Some(Member { path, data, .. }) = self.tar.next()? {
             if let Some((key, suffix)) = split(&path) {
                 return Ok(Some((key, suffix, data)));
@@ -93,21 +92,21 @@ impl<R: Read> ShardReader<R> {
 }
 
 impl ShardSample {
-    fn take(&mut self, suffix: String, data: Vec<u8>, bytes: u64) -> Result<(), Error> {
+    fn add(&mut self, suffix: String, data: Vec<u8>, bytes: u64) -> Result<(), ShardError> {
         let path = || format!("{}.{suffix}", self.key);
-        if bytes > MOST_BYTES {
-            return Err(Error::ShardTooLarge {
+        if bytes > MAX_BYTES {
+            return Err(ShardError::ShardTooLarge {
                 path: path(),
                 offset: bytes,
-                limit: MOST_BYTES,
+                limit: MAX_BYTES,
             });
         }
-        if self.member(&suffix).is_some() || self.members.len() == MOST_MEMBERS {
+        if self.member(&suffix).is_some() || self.members.len() == MAX_MEMBERS {
             let (key, path) = (self.key.clone(), path());
-            return Err(Error::ShardSample {
+            return Err(ShardError::ShardSample {
                 key,
                 path,
-                most: MOST_MEMBERS,
+                limit: MAX_MEMBERS,
             });
         }
         self.members.push((suffix, data));
@@ -116,7 +115,7 @@ impl ShardSample {
 }
 
 impl<R: Read> Iterator for ShardReader<R> {
-    type Item = Result<ShardSample, Error>;
+    type Item = Result<ShardSample, ShardError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.ended {
@@ -128,7 +127,7 @@ impl<R: Read> Iterator for ShardReader<R> {
     }
 }
 
-/// Key and suffix of a member's name; none where its last part has no dot, or starts with it.
+/// Key and suffix of a member's name; none if its last part has no dot or starts with one.
 fn split(path: &str) -> Option<(String, String)> {
     let base = path.rfind('/').map_or(0, |slash| slash + 1);
     let dot = base + path.get(base..)?.find('.')?;
@@ -144,12 +143,12 @@ mod tests {
     use crate::shard::tarball::tests::tar_of;
     use proptest::prelude::*;
 
-    fn read(bytes: &[u8]) -> Vec<Result<ShardSample, Error>> {
+    fn read(bytes: &[u8]) -> Vec<Result<ShardSample, ShardError>> {
         ShardReader::new(bytes).collect()
     }
 
     #[test]
-    fn neighbours_with_one_key_are_one_sample() {
+    fn adjacent_members_with_one_key_are_one_sample() {
         let tar = tar_of(&[
             ("README", b"no sample"),
             ("a.b/0001.png", b"1"),
@@ -172,11 +171,11 @@ mod tests {
             ("b.png", b"3"),
         ]));
         assert_eq!(results.len(), 1);
-        assert!(matches!(results[0], Err(Error::ShardSample { .. })));
+        assert!(matches!(results[0], Err(ShardError::ShardSample { .. })));
     }
 
     #[test]
-    fn the_samples_before_a_cut_are_given() {
+    fn the_samples_before_a_truncation_are_returned() {
         let tar = tar_of(&[("a.png", b"1"), ("b.png", b"2"), ("c.png", b"3")]);
         let results = read(&tar[..tar.len() - 1500]);
         let keys: Vec<_> = results

@@ -1,10 +1,10 @@
-//! The record of one frame: what a sample's JSON member and a row of the table hold.
+//! The record of one frame, which is both a sample's JSON member and a row of the table.
 
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Rect;
 
-/// What is known of one sample, as it stands in `<session>/<kkkk>.json`.
+/// The record of one sample, as it is in `<session>/<kkkk>.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrameRecord {
@@ -14,26 +14,26 @@ pub struct FrameRecord {
     pub object: String,
     /// Which sample of the turn this is, `0..frames` (0..=1499 by default).
     pub index: u32,
-    /// Position of the source frame in the video, 0-based, in order of presentation.
+    /// Position of the source frame in the video, 0-based, in presentation order.
     pub source_frame: u64,
-    /// The source frame's time stamp, microseconds: the driver's monotonic clock where the
-    /// session has it, else the video's own time stamp.
+    /// The source frame's time stamp, microseconds: from the driver's monotonic clock if the session
+    /// has it, else from the video.
     pub t_us: i64,
-    /// Angle of the table, degrees; null where there is no table.
+    /// Angle of the table, degrees; null without a table.
     pub angle_deg: Option<f64>,
-    /// True where another sample of the session shows the same source frame and is not flagged: of
-    /// all samples of one source frame, exactly one is not a duplicate. Where frames were dropped, it
-    /// is the one whose place in the turn is the frame's own.
+    /// True if another sample of the session shows the same source frame. Of all samples of a source
+    /// frame exactly one is not flagged: the one whose position in the turn is nearest to the
+    /// frame's.
     pub duplicate: bool,
-    /// The part of the source frame that the image shows, source pixels. May reach beyond the
+    /// The part of the source frame that the image shows, source pixels. It may extend beyond the
     /// frame, where the image is 0.
     pub crop: Rect,
     /// Width and height of image and mask, pixels.
     pub size: [u32; 2],
-    /// Measured shift of the object against the mask's frame, [right, down], source pixels; null
-    /// where it was not measured.
+    /// Measured shift of the object against the mask's frame, [right, down], source pixels; null if
+    /// it was not measured.
     pub shift_px: Option<[f64; 2]>,
-    /// True where `shift_px` was corrected in the image.
+    /// True if `shift_px` was corrected in the image.
     pub shift_applied: bool,
     /// Source pixels under the mask.
     pub mask_px: u64,
@@ -43,7 +43,7 @@ pub struct FrameRecord {
     pub saturated_fraction: f64,
     /// Source pixels under the mask with any channel at or above the saturation level.
     pub saturated_any_px: u64,
-    /// The gate: `saturated_fraction` is above the gate (5 %), so Spec-Net is to run.
+    /// True if `saturated_fraction` is above the gate (5 % by default): Spec-Net should run.
     pub spec_net: bool,
     /// Mean 8-bit sRGB value of the source pixels under the mask, red, green, blue, 0..=255.
     pub mean_rgb: [f64; 3],

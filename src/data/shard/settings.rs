@@ -1,17 +1,17 @@
-//! How the sessions of a data set are extracted and laid out: what `dataset.json` holds of it.
+//! How the sessions of a data set are extracted and stored, as `dataset.json` records it.
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Error, names};
+use super::{ShardError, names};
 
-/// How samples lie on disk.
+/// How samples are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Layout {
-    /// One tar a session: `<session>.tar`, with members `<session>/<kkkk>.{png,mask.png,json}`.
+    /// One tar per session: `<session>.tar`, with members `<session>/<kkkk>.{png,mask.png,json}`.
     Webdataset,
     /// Folders: `imgs/<session>/<k>.png`, `masks/<session>.png`, `mean_img/<session>.png`.
     Relit,
@@ -46,11 +46,11 @@ impl fmt::Display for Layout {
 }
 
 impl FromStr for Layout {
-    type Err = Error;
+    type Err = ShardError;
 
-    fn from_str(text: &str) -> Result<Self, Error> {
+    fn from_str(text: &str) -> Result<Self, ShardError> {
         let found = Self::ALL.into_iter().find(|layout| layout.name() == text);
-        found.ok_or_else(|| Error::UnknownLayout {
+        found.ok_or_else(|| ShardError::UnknownLayout {
             name: text.to_owned(),
         })
     }
@@ -59,7 +59,7 @@ impl FromStr for Layout {
 /// The size of images and masks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Size {
+pub enum ImageSize {
     /// Scaled to a square of this side, pixels.
     Pixels(u32),
     /// The source's own pixels: `"native"`.
@@ -74,12 +74,12 @@ pub enum Native {
     Native,
 }
 
-impl Size {
+impl ImageSize {
     /// The source's own pixels.
     pub const NATIVE: Self = Self::Native(Native::Native);
 }
 
-/// What is done about a shift of the object.
+/// How shifts of the object are handled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Align {
@@ -89,22 +89,22 @@ pub enum Align {
 
 /// How the sessions of a data set were extracted; the same for all of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
-    /// Samples a session.
+pub struct ExtractionSettings {
+    /// Samples per session.
     pub frames: u32,
-    /// Size of images and masks.
-    pub size: Size,
+    /// ImageSize of images and masks.
+    pub size: ImageSize,
     /// Margin around the mask's bounding box, as a fraction of its longer side, 0 and above.
     pub margin: f64,
     /// The 8-bit value from which a channel is saturated, 0..=255.
     pub saturation_level: u8,
     /// The fraction of saturated pixels above which `spec_net` is set, 0..=1.
     pub gate: f64,
-    /// What is done about shifts.
+    /// How shifts are handled.
     pub align: Align,
-    /// How samples lie on disk.
+    /// How samples are stored.
     pub layout: Layout,
-    /// The name of the method by which images were scaled.
+    /// The name of the method that scaled the images.
     pub scaling: String,
 }
 
@@ -114,11 +114,14 @@ mod tests {
 
     #[test]
     fn the_size_is_a_number_or_the_word_native() {
-        for (size, json) in [(Size::Pixels(256), "256"), (Size::NATIVE, "\"native\"")] {
+        for (size, json) in [
+            (ImageSize::Pixels(256), "256"),
+            (ImageSize::NATIVE, "\"native\""),
+        ] {
             assert_eq!(serde_json::to_string(&size).unwrap(), json);
-            assert_eq!(serde_json::from_str::<Size>(json).unwrap(), size);
+            assert_eq!(serde_json::from_str::<ImageSize>(json).unwrap(), size);
         }
-        assert!(serde_json::from_str::<Size>("\"large\"").is_err());
+        assert!(serde_json::from_str::<ImageSize>("\"large\"").is_err());
     }
 
     #[test]

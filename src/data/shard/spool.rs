@@ -1,4 +1,5 @@
-//! The layout `webdataset`: images wait in a spool file for their place in the tar.
+//! The layout `webdataset`: images are collected in a spool file and then written to the tar in the
+//! shard's order.
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -7,26 +8,27 @@ use super::dataset::ShardEntry;
 use super::names::{self, Part};
 use super::order::order;
 use super::output::{PartialFile, ScratchFile, SealedFile};
-use super::table::Row;
-use super::{Error, tarball};
+use super::table::TableRow;
+use super::{ShardError, tarball};
 
-/// Where an image lies in the spool.
+/// Part of the spool that holds an image.
 #[derive(Debug, Clone, Copy, Default)]
-struct Place {
+struct Extent {
     offset: u64,
     bytes: u64,
 }
 
-/// The images of a session on their way into a tar.
+/// The images of a session that will be written into a tar.
 pub(super) struct SpoolStore {
     out: PathBuf,
     session: String,
     scratch: ScratchFile,
-    places: Vec<Place>,
+    /// The extent of each image, by index.
+    extents: Vec<Extent>,
     bytes: u64,
 }
 
-/// A tar that is whole, still under its temporary name.
+/// A complete tar, still under its temporary name.
 pub(super) struct SealedShard {
     file: SealedFile,
     session: String,
@@ -34,12 +36,12 @@ pub(super) struct SealedShard {
 }
 
 impl SpoolStore {
-    pub(super) fn create(out: &Path, session: &str, samples: u32) -> Result<Self, Error> {
+    pub(super) fn create(out: &Path, session: &str, samples: u32) -> Result<Self, ShardError> {
         Ok(Self {
             out: out.to_owned(),
             session: session.to_owned(),
             scratch: ScratchFile::create(out.join(names::spool(session)))?,
-            places: vec![Place::default(); samples as usize],
+            extents: vec![Extent::default(); samples as usize],
             bytes: 0,
         })
     }
@@ -48,36 +50,40 @@ impl SpoolStore {
         &self.out
     }
 
-    pub(super) fn push(&mut self, index: u32, png: &[u8]) -> Result<(), Error> {
-        let place = Place {
+    pub(super) fn push(&mut self, index: u32, png: &[u8]) -> Result<(), ShardError> {
+        let extent = Extent {
             offset: self.bytes,
             bytes: png.len() as u64,
         };
         let file = &mut self.scratch.file;
-        // A push that failed half-way may have left bytes: each starts at its own offset.
-        file.seek(SeekFrom::Start(place.offset))
+        // A failed push may have left bytes behind: each image is written at its own offset.
+        file.seek(SeekFrom::Start(extent.offset))
             .and_then(|_| file.write_all(png))
-            .map_err(Error::io("write", &self.scratch.path))?;
-        self.bytes += place.bytes;
-        if let Some(slot) = self.places.get_mut(index as usize) {
-            *slot = place;
+            .map_err(ShardError::io("write", &self.scratch.path))?;
+        self.bytes += extent.bytes;
+        if let Some(slot) = self.extents.get_mut(index as usize) {
+            *slot = extent;
         }
         Ok(())
     }
 
-    /// Writes the tar under its temporary name; the spool stays until it is dropped.
-    pub(super) fn seal(&self, rows: &[Row], mask_png: &[u8]) -> Result<SealedShard, Error> {
+    /// Writes the tar under its temporary name. The spool is removed when `self` is dropped.
+    pub(super) fn seal(
+        &self,
+        rows: &[TableRow],
+        mask_png: &[u8],
+    ) -> Result<SealedShard, ShardError> {
         let partial = PartialFile::create(&self.out, &names::tar_file(&self.session))?;
         let samples = u32::try_from(rows.len()).unwrap_or(u32::MAX);
         let mut tar = tar::Builder::new(partial);
         let mut png = Vec::new();
         for index in order(samples) {
             let slot = index as usize;
-            let (Some(row), Some(&place)) = (rows.get(slot), self.places.get(slot)) else {
+            let (Some(row), Some(&extent)) = (rows.get(slot), self.extents.get(slot)) else {
                 continue;
             };
-            self.read(place, &mut png)?;
-            let json = serde_json::to_vec(&row.record).map_err(|source| Error::Json {
+            self.read(extent, &mut png)?;
+            let json = serde_json::to_vec(&row.record).map_err(|source| ShardError::Json {
                 what: format!("the record of {}", names::sample_key(&self.session, index)),
                 source,
             })?;
@@ -102,16 +108,16 @@ impl SpoolStore {
         tar: &mut tar::Builder<PartialFile>,
         path: &str,
         data: &[u8],
-    ) -> Result<(), Error> {
+    ) -> Result<(), ShardError> {
         tarball::header(path, data.len() as u64)
             .and_then(|header| tar.append(&header, data))
             .map_err(self.failed_to_write())
     }
 
-    fn failed_to_write(&self) -> impl FnOnce(io::Error) -> Error {
+    fn failed_to_write(&self) -> impl FnOnce(io::Error) -> ShardError {
         move |source| {
             let path = self.out.join(names::tar_file(&self.session));
-            Error::Io {
+            ShardError::Io {
                 doing: "write",
                 path,
                 source,
@@ -119,24 +125,24 @@ impl SpoolStore {
         }
     }
 
-    fn read(&self, place: Place, png: &mut Vec<u8>) -> Result<(), Error> {
+    fn read(&self, extent: Extent, png: &mut Vec<u8>) -> Result<(), ShardError> {
         png.clear();
         let mut file = &self.scratch.file;
-        file.seek(SeekFrom::Start(place.offset))
-            .and_then(|_| file.take(place.bytes).read_to_end(png))
+        file.seek(SeekFrom::Start(extent.offset))
+            .and_then(|_| file.take(extent.bytes).read_to_end(png))
             .and_then(|read| {
-                let whole = read as u64 == place.bytes;
-                whole
+                let complete = read as u64 == extent.bytes;
+                complete
                     .then_some(())
                     .ok_or_else(|| io::ErrorKind::UnexpectedEof.into())
             })
-            .map_err(Error::io("read back", &self.scratch.path))
+            .map_err(ShardError::io("read back", &self.scratch.path))
     }
 }
 
 impl SealedShard {
-    /// Gives the tar its name, in place of an older one.
-    pub(super) fn publish(self) -> Result<ShardEntry, Error> {
+    /// Renames the tar to its final name, replacing an older one.
+    pub(super) fn publish(self) -> Result<ShardEntry, ShardError> {
         let entry = self.file.publish()?;
         Ok(ShardEntry {
             file: entry.file,

@@ -1,7 +1,7 @@
-//! The table of a session, `<session>.parquet`: all records, one row a frame, in index order.
+//! The table of a session, `<session>.parquet`: all records, one row per sample, in index order.
 //!
-//! Written without compression and without a time or a place in it: the same rows always give
-//! the same bytes.
+//! It is written without compression and holds neither time nor path: the same rows always give the
+//! same bytes.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -19,17 +19,16 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::record::Field;
 use parquet::schema::parser::parse_message_type;
 
-use super::dataset::FileEntry;
 use super::digest::{Digest, HashingReader};
+use super::file::{FileEntry, compare};
 use super::record::FrameRecord;
-use super::vouch::compare;
-use super::{Error, MAX_SAMPLES, names};
+use super::{MAX_SAMPLES, ShardError, names};
 use crate::geometry::Rect;
 
-/// One row: the record of a frame and the digests of its files, by which damage is pinned to
-/// its sample.
+/// One row: the record of a sample and the digests of its files, which allow to attribute damage to
+/// the sample.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct TableRow {
     /// The record.
     pub record: FrameRecord,
     /// BLAKE3 of the image's PNG file.
@@ -40,14 +39,14 @@ pub struct Row {
 
 /// How a column gets its value from a row.
 enum Column {
-    Text(fn(&Row) -> String),
-    U32(fn(&Row) -> u32),
-    I32(fn(&Row) -> i32),
-    U64(fn(&Row) -> u64),
-    I64(fn(&Row) -> i64),
-    Real(fn(&Row) -> f64),
-    MaybeReal(fn(&Row) -> Option<f64>),
-    Flag(fn(&Row) -> bool),
+    Text(fn(&TableRow) -> String),
+    U32(fn(&TableRow) -> u32),
+    I32(fn(&TableRow) -> i32),
+    U64(fn(&TableRow) -> u64),
+    I64(fn(&TableRow) -> i64),
+    Real(fn(&TableRow) -> f64),
+    MaybeReal(fn(&TableRow) -> Option<f64>),
+    Flag(fn(&TableRow) -> bool),
 }
 
 impl Column {
@@ -108,8 +107,8 @@ const COLUMNS: [(&str, Column); 27] = [
     ("mask_blake3", Column::Text(|r| r.mask_blake3.to_string())),
 ];
 
-/// Writes the rows to `out`, in the order in which they stand.
-pub(super) fn write_rows(out: &mut (impl Write + Send), rows: &[Row]) -> ParquetResult<()> {
+/// Writes the rows to `out` in the given order.
+pub(super) fn write_rows(out: &mut (impl Write + Send), rows: &[TableRow]) -> ParquetResult<()> {
     let lines: String = COLUMNS
         .iter()
         .map(|(name, column)| column.declaration(name))
@@ -135,8 +134,12 @@ pub(super) fn write_rows(out: &mut (impl Write + Send), rows: &[Row]) -> Parquet
     Ok(())
 }
 
-fn write_column(writer: &mut ColumnWriter<'_>, column: &Column, rows: &[Row]) -> ParquetResult<()> {
-    fn all<T>(rows: &[Row], value: impl Fn(&Row) -> T) -> Vec<T> {
+fn write_column(
+    writer: &mut ColumnWriter<'_>,
+    column: &Column,
+    rows: &[TableRow],
+) -> ParquetResult<()> {
+    fn all<T>(rows: &[TableRow], value: impl Fn(&TableRow) -> T) -> Vec<T> {
         rows.iter().map(value).collect()
     }
     match (writer, column) {
@@ -174,17 +177,17 @@ fn write_column(writer: &mut ColumnWriter<'_>, column: &Column, rows: &[Row]) ->
     .map(|_| ())
 }
 
-/// Reads the table that `entry` vouches for in the data set `out`. A file whose length or BLAKE3
-/// differs is refused before it is parsed, so that damage cannot reach the parser.
+/// Reads the table that `entry` lists in the data set `out`. A file whose length or BLAKE3 differs
+/// is refused before it is parsed, so that the parser never sees damaged data.
 ///
 /// # Errors
-/// [`Error::Changed`] where the file is another one, [`Error::Table`] where it is no Parquet,
-/// [`Error::TableValue`] where a column is missing or a value is out of range, [`Error::Io`],
-/// [`Error::UnsafePath`].
-pub fn read_table(out: &Path, entry: &FileEntry) -> Result<Vec<Row>, Error> {
+/// [`ShardError::Changed`] if the file differs from its entry, [`ShardError::Table`] if it is not Parquet,
+/// [`ShardError::TableValue`] if a column is missing or a value is out of range, [`ShardError::Io`],
+/// [`ShardError::UnsafePath`].
+pub fn read_table(out: &Path, entry: &FileEntry) -> Result<Vec<TableRow>, ShardError> {
     names::check_path(&entry.file)?;
     let path = out.join(&entry.file);
-    let io = |doing| Error::io(doing, &path);
+    let io = |doing| ShardError::io(doing, &path);
     let file = File::open(&path).map_err(io("open"))?;
     let mut hashed = HashingReader::new(&file);
     hashed.drain().map_err(io("read"))?;
@@ -192,13 +195,13 @@ pub fn read_table(out: &Path, entry: &FileEntry) -> Result<Vec<Row>, Error> {
     read_rows(file, &path)
 }
 
-/// Parses a table. The parser panics on some files that are no tables; for a file that was
-/// vouched for this takes intent, but it shall not end the program. The panic hook is called all
-/// the same: by default it prints a message to standard error.
-fn read_rows(file: File, path: &Path) -> Result<Vec<Row>, Error> {
+/// Parses a table. The parser panics on some files that are not tables. A file with the right digest
+/// is only such a file if somebody meant it, but it must not end the program. The panic hook still
+/// runs: by default it prints a message to standard error.
+fn read_rows(file: File, path: &Path) -> Result<Vec<TableRow>, ShardError> {
     std::panic::catch_unwind(|| parse_rows(file, path)).unwrap_or_else(|_| {
         let source = ParquetError::General("the file is malformed".to_owned());
-        Err(Error::Table {
+        Err(ShardError::Table {
             path: path.to_owned(),
             doing: "read",
             source,
@@ -206,8 +209,8 @@ fn read_rows(file: File, path: &Path) -> Result<Vec<Row>, Error> {
     })
 }
 
-fn parse_rows(file: File, path: &Path) -> Result<Vec<Row>, Error> {
-    let failed = |source| Error::Table {
+fn parse_rows(file: File, path: &Path) -> Result<Vec<TableRow>, ShardError> {
+    let failed = |source| ShardError::Table {
         path: path.to_owned(),
         doing: "read",
         source,
@@ -237,7 +240,7 @@ struct Fields<'a> {
 }
 
 impl Fields<'_> {
-    fn row(&self) -> Result<Row, Error> {
+    fn row(&self) -> Result<TableRow, ShardError> {
         let record = FrameRecord {
             session: self.text("session")?,
             object: self.text("object")?,
@@ -273,7 +276,7 @@ impl Fields<'_> {
         };
         let png_blake3 = self.digest("png_blake3")?;
         let mask_blake3 = self.digest("mask_blake3")?;
-        Ok(Row {
+        Ok(TableRow {
             record,
             png_blake3,
             mask_blake3,
@@ -284,68 +287,68 @@ impl Fields<'_> {
         &self,
         column: &'static str,
         read: impl FnOnce(&Field) -> Option<T>,
-    ) -> Result<T, Error> {
+    ) -> Result<T, ShardError> {
         self.fields
             .get(column)
             .and_then(read)
             .ok_or_else(|| self.invalid(column))
     }
 
-    fn invalid(&self, column: &'static str) -> Error {
-        Error::TableValue {
+    fn invalid(&self, column: &'static str) -> ShardError {
+        ShardError::TableValue {
             path: self.path.to_owned(),
             row: self.number,
             column,
         }
     }
 
-    fn text(&self, column: &'static str) -> Result<String, Error> {
+    fn text(&self, column: &'static str) -> Result<String, ShardError> {
         self.get(column, |field| match field {
             Field::Str(text) => Some(text.clone()),
             _ => None,
         })
     }
 
-    fn digest(&self, column: &'static str) -> Result<Digest, Error> {
+    fn digest(&self, column: &'static str) -> Result<Digest, ShardError> {
         self.text(column)?.parse().map_err(|_| self.invalid(column))
     }
 
-    fn u32(&self, column: &'static str) -> Result<u32, Error> {
+    fn u32(&self, column: &'static str) -> Result<u32, ShardError> {
         self.get(column, |field| match field {
             Field::UInt(value) => Some(*value),
             _ => None,
         })
     }
 
-    fn i32(&self, column: &'static str) -> Result<i32, Error> {
+    fn i32(&self, column: &'static str) -> Result<i32, ShardError> {
         self.get(column, |field| match field {
             Field::Int(value) => Some(*value),
             _ => None,
         })
     }
 
-    fn u64(&self, column: &'static str) -> Result<u64, Error> {
+    fn u64(&self, column: &'static str) -> Result<u64, ShardError> {
         self.get(column, |field| match field {
             Field::ULong(value) => Some(*value),
             _ => None,
         })
     }
 
-    fn i64(&self, column: &'static str) -> Result<i64, Error> {
+    fn i64(&self, column: &'static str) -> Result<i64, ShardError> {
         self.get(column, |field| match field {
             Field::Long(value) => Some(*value),
             _ => None,
         })
     }
 
-    fn real(&self, column: &'static str) -> Result<f64, Error> {
+    fn real(&self, column: &'static str) -> Result<f64, ShardError> {
         self.get(column, |field| match field {
             Field::Double(value) => Some(*value),
             _ => None,
         })
     }
 
-    fn maybe_real(&self, column: &'static str) -> Result<Option<f64>, Error> {
+    fn maybe_real(&self, column: &'static str) -> Result<Option<f64>, ShardError> {
         self.get(column, |field| match field {
             Field::Double(value) => Some(Some(*value)),
             Field::Null => Some(None),
@@ -353,7 +356,7 @@ impl Fields<'_> {
         })
     }
 
-    fn flag(&self, column: &'static str) -> Result<bool, Error> {
+    fn flag(&self, column: &'static str) -> Result<bool, ShardError> {
         self.get(column, |field| match field {
             Field::Bool(value) => Some(*value),
             _ => None,
@@ -365,9 +368,9 @@ impl Fields<'_> {
 mod tests {
     use super::*;
 
-    fn row(index: u32) -> Row {
+    fn row(index: u32) -> TableRow {
         let even = index.is_multiple_of(2);
-        Row {
+        TableRow {
             record: FrameRecord {
                 session: "s".to_owned(),
                 object: "mug \"ö\"".to_owned(),
@@ -393,7 +396,7 @@ mod tests {
         }
     }
 
-    fn written(rows: &[Row]) -> Vec<u8> {
+    fn written(rows: &[TableRow]) -> Vec<u8> {
         let mut bytes = Vec::new();
         write_rows(&mut bytes, rows).unwrap();
         bytes
@@ -415,7 +418,7 @@ mod tests {
 
     #[test]
     fn every_value_comes_back_and_the_bytes_are_the_same_each_time() {
-        let rows: Vec<Row> = (0..50).map(row).collect();
+        let rows: Vec<TableRow> = (0..50).map(row).collect();
         let bytes = written(&rows);
         assert_eq!(bytes, written(&rows));
         let (dir, entry) = on_disk(&bytes);
@@ -431,16 +434,16 @@ mod tests {
             damaged[at] ^= 0x10;
             std::fs::write(dir.path().join("s.parquet"), damaged).unwrap();
             let error = read_table(dir.path(), &entry).unwrap_err();
-            assert!(matches!(error, Error::Changed { .. }), "{at}: {error}");
+            assert!(matches!(error, ShardError::Changed { .. }), "{at}: {error}");
         }
     }
 
     #[test]
-    fn a_file_that_is_vouched_for_but_is_no_table_is_an_error() {
+    fn a_file_with_the_right_digest_that_is_not_a_table_is_an_error() {
         let (dir, entry) = on_disk(b"PAR1 and nothing that belongs to it PAR1");
         assert!(matches!(
             read_table(dir.path(), &entry),
-            Err(Error::Table { .. })
+            Err(ShardError::Table { .. })
         ));
     }
 }

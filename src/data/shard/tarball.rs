@@ -1,20 +1,20 @@
-//! A tar as this room writes it, and any tar as it is read: member by member, with bounded
-//! memory and without trust in a single byte.
+//! The tar that a shard is: headers as they are written, and a reader for any tar, member by member,
+//! with bounded memory and without trusting the input.
 
 use std::io::{self, Read};
 
 use tar::{EntryType, Header};
 
-use super::Error;
+use super::ShardError;
 
-/// The unit of a tar, bytes.
+/// Size of a tar's blocks, bytes.
 pub(super) const BLOCK: usize = 512;
 /// Largest extension header (long names) that is read, bytes.
-const MOST_EXTENSION: u64 = 1 << 20;
+const MAX_EXTENSION: u64 = 1 << 20;
 
 type Block = [u8; BLOCK];
 
-/// The header of a member as it is written: nothing of the time, the user or the machine.
+/// The header of a member as it is written: without time, user or machine.
 pub(super) fn header(path: &str, bytes: u64) -> io::Result<Header> {
     let mut header = Header::new_ustar();
     header.set_path(path)?;
@@ -30,23 +30,23 @@ pub(super) fn header(path: &str, bytes: u64) -> io::Result<Header> {
 
 /// One file in a tar.
 pub(super) struct Member {
-    /// Where its header starts.
+    /// Offset of its header, bytes.
     pub(super) offset: u64,
-    /// Its name. Only a label: it may be absolute or lead anywhere.
+    /// Its name. A label only: it may be absolute or contain `..`.
     pub(super) path: String,
     pub(super) data: Vec<u8>,
-    /// True where the header is, byte for byte, the one that is written here, and the padding
-    /// after the data is zero.
+    /// True if the header is byte for byte what [`header`] gives, and the padding after the data is
+    /// zero.
     pub(super) canonical: bool,
 }
 
-/// Reads a tar as a stream of its regular files. Folders, links and the like are passed over;
-/// long names of GNU tar and of pax are understood.
+/// Reads the regular files of a tar as a stream. Folders, links and the like are skipped; long names
+/// of GNU tar and of pax are supported.
 pub(super) struct TarReader<R> {
     source: R,
-    /// Bytes taken from the source.
+    /// Bytes read from the source.
     offset: u64,
-    /// A header that was found while looking for one.
+    /// The header at which [`Self::resume`] stopped.
     found: Option<Block>,
     limit: u64,
     ended: bool,
@@ -64,13 +64,13 @@ impl<R: Read> TarReader<R> {
         }
     }
 
-    /// The source, after what was read of it.
+    /// The source, positioned after what was read.
     pub(super) fn into_inner(self) -> R {
         self.source
     }
 
     /// The next file; `None` after the two empty blocks that end a tar.
-    pub(super) fn next(&mut self) -> Result<Option<Member>, Error> {
+    pub(super) fn next(&mut self) -> Result<Option<Member>, ShardError> {
         let mut named = Extensions::default();
         while !self.ended {
             let start = self.offset
@@ -83,10 +83,10 @@ impl<R: Read> TarReader<R> {
             if is_zero(&block) {
                 return self.end(start);
             }
-            let header = valid_header(&block).ok_or(Error::ShardHeader { offset: start })?;
+            let header = valid_header(&block).ok_or(ShardError::ShardHeader { offset: start })?;
             let claimed = header
                 .entry_size()
-                .map_err(|_| Error::ShardHeader { offset: start })?;
+                .map_err(|_| ShardError::ShardHeader { offset: start })?;
             let bytes = named.size.unwrap_or(claimed);
             match header.entry_type() {
                 EntryType::Regular | EntryType::Continuous => {
@@ -94,10 +94,10 @@ impl<R: Read> TarReader<R> {
                 }
                 EntryType::GNULongName | EntryType::XHeader => {
                     let path = String::from("an extension header");
-                    let data = self.data(start, &path, claimed, MOST_EXTENSION)?.0;
+                    let data = self.data(start, &path, claimed, MAX_EXTENSION)?.0;
                     named.add(header.entry_type(), &data);
                 }
-                EntryType::GNUSparse => return Err(Error::ShardHeader { offset: start }),
+                EntryType::GNUSparse => return Err(ShardError::ShardHeader { offset: start }),
                 EntryType::GNULongLink | EntryType::XGlobalHeader => self.skip(claimed)?,
                 _ => {
                     self.skip(bytes)?;
@@ -108,14 +108,14 @@ impl<R: Read> TarReader<R> {
         Ok(None)
     }
 
-    /// After an error in the middle of a tar: looks, block by block, for the next header. False
-    /// where there is none.
-    pub(super) fn resume(&mut self) -> Result<bool, Error> {
+    /// After an error in the middle of a tar: searches block by block for the next header. False if
+    /// there is none.
+    pub(super) fn resume(&mut self) -> Result<bool, ShardError> {
         self.skip_padding()?;
         loop {
             let block = match self.header_block() {
                 Ok(block) => block,
-                Err(Error::ShardTruncated { .. }) => return Ok(false),
+                Err(ShardError::ShardTruncated { .. }) => return Ok(false),
                 Err(error) => return Err(error),
             };
             if valid_header(&block).is_some() {
@@ -125,12 +125,12 @@ impl<R: Read> TarReader<R> {
         }
     }
 
-    fn end(&mut self, start: u64) -> Result<Option<Member>, Error> {
+    fn end(&mut self, start: u64) -> Result<Option<Member>, ShardError> {
         if is_zero(&self.header_block()?) {
             self.ended = true;
             Ok(None)
         } else {
-            Err(Error::ShardHeader { offset: start })
+            Err(ShardError::ShardHeader { offset: start })
         }
     }
 
@@ -140,10 +140,10 @@ impl<R: Read> TarReader<R> {
         own: &Header,
         bytes: u64,
         named: Extensions,
-    ) -> Result<Member, Error> {
+    ) -> Result<Member, ShardError> {
         let extended = named.path.is_some() || named.size.is_some();
         let name = named.path.unwrap_or_else(|| own.path_bytes().into_owned());
-        let path = String::from_utf8(name).map_err(|_| Error::ShardName { offset });
+        let path = String::from_utf8(name).map_err(|_| ShardError::ShardName { offset });
         let label = path.as_deref().unwrap_or("a member without a name");
         let (data, padding_is_zero) = self.data(offset, label, bytes, self.limit)?;
         let path = path?;
@@ -158,17 +158,17 @@ impl<R: Read> TarReader<R> {
         })
     }
 
-    /// The data of a member and whether the padding after it is zero. Memory grows with what is
-    /// really there, not with what the header claims.
+    /// The data of a member, and whether the padding after it is zero. Memory grows with the data
+    /// that is there, not with the size that the header claims.
     fn data(
         &mut self,
         start: u64,
         path: &str,
         bytes: u64,
         limit: u64,
-    ) -> Result<(Vec<u8>, bool), Error> {
+    ) -> Result<(Vec<u8>, bool), ShardError> {
         if bytes > limit {
-            return Err(Error::ShardTooLarge {
+            return Err(ShardError::ShardTooLarge {
                 path: path.to_owned(),
                 offset: start,
                 limit,
@@ -177,20 +177,20 @@ impl<R: Read> TarReader<R> {
         let mut data = Vec::new();
         let read = (&mut self.source).take(bytes).read_to_end(&mut data);
         self.offset += data.len() as u64;
-        read.map_err(|source| Error::ShardRead {
+        read.map_err(|source| ShardError::ShardRead {
             offset: self.offset,
             source,
         })?;
         if (data.len() as u64) < bytes {
-            return Err(Error::ShardTruncated {
+            return Err(ShardError::ShardTruncated {
                 offset: self.offset,
             });
         }
         Ok((data, self.skip_padding()?))
     }
 
-    /// Goes to the next multiple of a block; whether all that was passed over is zero.
-    fn skip_padding(&mut self) -> Result<bool, Error> {
+    /// Skips to the next block; returns whether all skipped bytes are zero.
+    fn skip_padding(&mut self) -> Result<bool, ShardError> {
         let over = usize::try_from(self.offset % BLOCK as u64).unwrap_or(0);
         if over == 0 {
             return Ok(true);
@@ -202,24 +202,24 @@ impl<R: Read> TarReader<R> {
         Ok(is_zero(padding))
     }
 
-    fn skip(&mut self, bytes: u64) -> Result<(), Error> {
+    fn skip(&mut self, bytes: u64) -> Result<(), ShardError> {
         let skipped =
             io::copy(&mut (&mut self.source).take(bytes), &mut io::sink()).map_err(|source| {
-                Error::ShardRead {
+                ShardError::ShardRead {
                     offset: self.offset,
                     source,
                 }
             })?;
         self.offset += skipped;
         if skipped < bytes {
-            return Err(Error::ShardTruncated {
+            return Err(ShardError::ShardTruncated {
                 offset: self.offset,
             });
         }
         self.skip_padding().map(|_| ())
     }
 
-    fn header_block(&mut self) -> Result<Block, Error> {
+    fn header_block(&mut self) -> Result<Block, ShardError> {
         if let Some(block) = self.found.take() {
             return Ok(block);
         }
@@ -229,14 +229,14 @@ impl<R: Read> TarReader<R> {
         Ok(block)
     }
 
-    fn count(&mut self, read: io::Result<usize>, wanted: usize) -> Result<(), Error> {
-        let read = read.map_err(|source| Error::ShardRead {
+    fn count(&mut self, read: io::Result<usize>, wanted: usize) -> Result<(), ShardError> {
+        let read = read.map_err(|source| ShardError::ShardRead {
             offset: self.offset,
             source,
         })?;
         self.offset += read as u64;
         if read < wanted {
-            return Err(Error::ShardTruncated {
+            return Err(ShardError::ShardTruncated {
                 offset: self.offset,
             });
         }
@@ -244,7 +244,7 @@ impl<R: Read> TarReader<R> {
     }
 }
 
-/// What extension headers say of the member that follows them.
+/// Path and size that extension headers give for the member that follows them.
 #[derive(Default)]
 struct Extensions {
     path: Option<Vec<u8>>,
@@ -275,7 +275,7 @@ impl Extensions {
     }
 }
 
-/// The records `LENGTH KEY=VALUE\n` of a pax header, up to the first that is malformed.
+/// The records `LENGTH KEY=VALUE\n` of a pax header, up to the first malformed one.
 fn pax_records(mut data: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
     std::iter::from_fn(move || {
         let space = data.iter().position(|&byte| byte == b' ')?;
@@ -287,7 +287,7 @@ fn pax_records(mut data: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
     })
 }
 
-/// The block as a header, if its checksum is right.
+/// The block as a header, if its checksum is correct.
 fn valid_header(block: &Block) -> Option<&Header> {
     if is_zero(block) {
         return None;
@@ -324,7 +324,7 @@ fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
 pub(super) mod tests {
     use super::*;
 
-    fn read_all(bytes: &[u8]) -> Result<Vec<(String, Vec<u8>, bool)>, Error> {
+    fn read_all(bytes: &[u8]) -> Result<Vec<(String, Vec<u8>, bool)>, ShardError> {
         let mut reader = TarReader::new(bytes, 1 << 20);
         let mut members = Vec::new();
         while let Some(member) = reader.next()? {
@@ -344,7 +344,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_is_written_here_is_read_back_and_known_as_ours() {
+    fn written_members_are_read_back_as_canonical() {
         let long = format!("{}/0000.mask.png", "x".repeat(150));
         let members: [(&str, &[u8]); 3] = [("s/0000.png", b"abc"), (&long, b""), ("b", &[9; 512])];
         let read = read_all(&tar_of(&members)).unwrap();
@@ -385,12 +385,12 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_tar_cut_off_anywhere_is_an_error() {
+    fn a_tar_truncated_anywhere_is_an_error() {
         let tar = tar_of(&[("a.png", b"abc"), ("b.png", b"def")]);
         for end in 0..tar.len() {
             let error = read_all(&tar[..end]).unwrap_err();
             assert!(
-                matches!(error, Error::ShardTruncated { .. }),
+                matches!(error, ShardError::ShardTruncated { .. }),
                 "{end}: {error}"
             );
         }
@@ -404,7 +404,7 @@ pub(super) mod tests {
         assert_eq!(reader.next().unwrap().unwrap().path, "a.png");
         assert!(matches!(
             reader.next(),
-            Err(Error::ShardHeader { offset: 1024 })
+            Err(ShardError::ShardHeader { offset: 1024 })
         ));
         assert!(reader.resume().unwrap());
         let member = reader.next().unwrap().unwrap();
@@ -413,14 +413,14 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_claim_of_more_than_the_limit_takes_no_memory() {
+    fn a_size_above_the_limit_allocates_no_memory() {
         let block = header("a.png", u64::MAX >> 3).unwrap();
         let read = read_all(block.as_bytes());
-        assert!(matches!(read, Err(Error::ShardTooLarge { .. })));
+        assert!(matches!(read, Err(ShardError::ShardTooLarge { .. })));
         let block = header("a.png", 1 << 20).unwrap();
         assert!(matches!(
             read_all(block.as_bytes()),
-            Err(Error::ShardTruncated { .. })
+            Err(ShardError::ShardTruncated { .. })
         ));
     }
 }

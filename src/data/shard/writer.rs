@@ -1,38 +1,39 @@
-//! Writing one session: samples in any order in, files in their places out.
+//! Writing the shard and the table of one session from samples in any order.
 
 use std::path::Path;
 
 use image::{GrayImage, RgbImage};
 
 use super::codec::{check_mask, encode_mask, encode_rgb};
-use super::dataset::{FileEntry, ShardEntry};
+use super::dataset::ShardEntry;
 use super::digest::Digest;
+use super::file::FileEntry;
 use super::folder::FolderStore;
 use super::output::{PartialFile, SealedFile};
 use super::record::FrameRecord;
 use super::settings::Layout;
 use super::spool::SpoolStore;
-use super::table::{Row, write_rows};
-use super::{Error, MAX_SAMPLES, names};
+use super::table::{TableRow, write_rows};
+use super::{MAX_SAMPLES, ShardError, names};
 
 /// One sample, ready to be written.
 #[derive(Debug, Clone)]
 pub struct Sample {
-    /// What is known of it.
+    /// The frame's record.
     pub record: FrameRecord,
     /// The image, 0 outside the mask.
     pub image: RgbImage,
-    /// The image as PNG, as [`encode_rgb`] gives it.
+    /// The image as PNG, encoded by [`encode_rgb`].
     pub png: Vec<u8>,
 }
 
 impl Sample {
-    /// A sample of this record and image; encodes the image, which is the part worth doing on
+    /// A sample of this record and image. It encodes the image, which is the part worth running on
     /// many threads.
     ///
     /// # Errors
-    /// [`Error::Encode`] where the image has no pixels.
-    pub fn encode(record: FrameRecord, image: RgbImage) -> Result<Self, Error> {
+    /// [`ShardError::Encode`] if the image has no pixels.
+    pub fn encode(record: FrameRecord, image: RgbImage) -> Result<Self, ShardError> {
         let png = encode_rgb(&image)?;
         Ok(Self { record, image, png })
     }
@@ -40,53 +41,52 @@ impl Sample {
 
 /// The files of a session that was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SessionFiles {
+pub struct ShardFiles {
     /// The shards: one.
     pub shards: Vec<ShardEntry>,
     /// The table.
     pub table: FileEntry,
 }
 
-/// Where images wait until the session is whole.
+/// Where images are kept until the session is complete.
 enum Store {
     Spool(SpoolStore),
     Folder(FolderStore),
 }
 
-/// Writes one session. Its files appear under their names in [`finish`](Self::finish) and not
-/// before; a writer that is dropped leaves nothing behind. Memory does not grow with the images:
-/// they wait on the disk for their place. The bytes of all files are the same whatever the order
-/// in which samples come.
+/// Writes the shard and the table of one session. The files appear under their names in
+/// [`finish`](Self::finish); a writer that is dropped leaves nothing behind. Memory does not grow with
+/// the images, which are kept on disk. The bytes of all files do not depend on the order in which the
+/// samples come.
 ///
-/// The folder should be held by an [`OutputFolder`](super::OutputFolder). Several sessions may be
-/// written into it at a time.
-pub struct SessionWriter {
+/// The folder should be locked by an [`OutputFolder`](super::OutputFolder). Several sessions may be
+/// written into it at the same time.
+pub struct ShardWriter {
     session: String,
     size: [u32; 2],
     mask_png: Vec<u8>,
     mask_blake3: Digest,
-    rows: Vec<Option<Row>>,
+    rows: Vec<Option<TableRow>>,
     store: Store,
 }
 
-impl SessionWriter {
+impl ShardWriter {
     /// Starts the session `session` of `samples` samples (1 to [`MAX_SAMPLES`]) in the folder
     /// `out`, which must exist. `mask` holds 0 and 255 only and has the size of the images.
     ///
     /// # Errors
-    /// [`Error::SessionName`], [`Error::SampleCount`], [`Error::MaskValue`], [`Error::Encode`]
-    /// where the mask is empty, [`Error::Busy`] where the session is being written already,
-    /// [`Error::Io`].
+    /// [`ShardError::SessionName`], [`ShardError::SampleCount`], [`ShardError::MaskValue`], [`ShardError::Encode`] if the
+    /// mask has no pixels, [`ShardError::Busy`] if the session is being written already, [`ShardError::Io`].
     pub fn create(
         out: &Path,
         layout: Layout,
         session: &str,
         samples: u32,
         mask: &GrayImage,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, ShardError> {
         names::check_session(session)?;
         if samples == 0 || samples > MAX_SAMPLES {
-            return Err(Error::SampleCount { samples });
+            return Err(ShardError::SampleCount { samples });
         }
         check_mask(mask)?;
         let mask_png = encode_mask(mask)?;
@@ -105,24 +105,24 @@ impl SessionWriter {
         })
     }
 
-    /// Takes a sample. Each index must come exactly once; the order is free.
+    /// Adds a sample. Each index must be given exactly once, in any order.
     ///
     /// # Errors
-    /// [`Error::WrongSession`], [`Error::OutOfRange`], [`Error::DoubledSample`],
-    /// [`Error::SizeMismatch`] where image, record and mask differ in size,
-    /// [`Error::NotFinite`], [`Error::Io`]. The sample is then not taken.
-    pub fn push(&mut self, sample: Sample) -> Result<(), Error> {
+    /// [`ShardError::WrongSession`], [`ShardError::OutOfRange`], [`ShardError::DoubledSample`],
+    /// [`ShardError::SizeMismatch`] if image, record and mask differ in size, [`ShardError::NotFinite`],
+    /// [`ShardError::Io`]. The sample is then not added.
+    pub fn push(&mut self, sample: Sample) -> Result<(), ShardError> {
         let Sample { record, image, png } = sample;
         self.check(&record, &image)?;
         let index = record.index;
-        let out_of_range = || Error::OutOfRange {
+        let out_of_range = || ShardError::OutOfRange {
             session: self.session.clone(),
             index,
             last: u32::try_from(self.rows.len()).unwrap_or(MAX_SAMPLES) - 1,
         };
         let slot = index as usize;
         if self.rows.get(slot).ok_or_else(out_of_range)?.is_some() {
-            return Err(Error::DoubledSample {
+            return Err(ShardError::DoubledSample {
                 session: self.session.clone(),
                 index,
             });
@@ -132,7 +132,7 @@ impl SessionWriter {
             Store::Folder(folder) => folder.push(index, &png, &image)?,
         }
         if let Some(row) = self.rows.get_mut(slot) {
-            *row = Some(Row {
+            *row = Some(TableRow {
                 png_blake3: Digest::of(&png),
                 record,
                 mask_blake3: self.mask_blake3,
@@ -141,14 +141,13 @@ impl SessionWriter {
         Ok(())
     }
 
-    /// Gives the session's files their names, in place of older ones.
+    /// Writes the session's files under their final names, replacing older ones.
     ///
     /// # Errors
-    /// [`Error::MissingSample`] with the first index that did not come; [`Error::Io`],
-    /// [`Error::Table`] or [`Error::Json`] where a file could not be written. Nothing of the
-    /// session is then left, except that files may have been given their names before the error:
-    /// `dataset.json` does not vouch for those.
-    pub fn finish(self) -> Result<SessionFiles, Error> {
+    /// [`ShardError::MissingSample`] if samples were not given; [`ShardError::Io`], [`ShardError::Table`] or
+    /// [`ShardError::Json`] if a file could not be written. Then nothing of the session is left, except
+    /// files that got their names before the error, which `dataset.json` does not list.
+    pub fn finish(self) -> Result<ShardFiles, ShardError> {
         let Self {
             session,
             mask_png,
@@ -161,7 +160,7 @@ impl SessionWriter {
             Store::Spool(spool) => {
                 let shard = spool.seal(&rows, &mask_png)?;
                 let table = seal_table(spool.out(), &session, &rows)?;
-                Ok(SessionFiles {
+                Ok(ShardFiles {
                     shards: vec![shard.publish()?],
                     table: table.publish()?,
                 })
@@ -169,7 +168,7 @@ impl SessionWriter {
             Store::Folder(folder) => {
                 let table = seal_table(folder.out(), &session, &rows)?;
                 let shard = folder.publish(&rows, &mask_png)?;
-                Ok(SessionFiles {
+                Ok(ShardFiles {
                     shards: vec![shard],
                     table: table.publish()?,
                 })
@@ -177,11 +176,11 @@ impl SessionWriter {
         }
     }
 
-    fn check(&self, record: &FrameRecord, image: &RgbImage) -> Result<(), Error> {
+    fn check(&self, record: &FrameRecord, image: &RgbImage) -> Result<(), ShardError> {
         let index = record.index;
         if record.session != self.session {
             let (found, expected) = (record.session.clone(), self.session.clone());
-            return Err(Error::WrongSession {
+            return Err(ShardError::WrongSession {
                 index,
                 found,
                 expected,
@@ -193,7 +192,7 @@ impl SessionWriter {
         ];
         for (what, size) in sizes {
             if size != self.size {
-                return Err(Error::SizeMismatch {
+                return Err(ShardError::SizeMismatch {
                     what,
                     size,
                     expected: self.size,
@@ -201,7 +200,7 @@ impl SessionWriter {
             }
         }
         match first_not_finite(record) {
-            Some(field) => Err(Error::NotFinite {
+            Some(field) => Err(ShardError::NotFinite {
                 session: self.session.clone(),
                 index,
                 field,
@@ -211,12 +210,12 @@ impl SessionWriter {
     }
 }
 
-/// All rows, or the first index that is missing.
-fn complete(session: &str, rows: Vec<Option<Row>>) -> Result<Vec<Row>, Error> {
+/// All rows, or an error with the first missing index.
+fn complete(session: &str, rows: Vec<Option<TableRow>>) -> Result<Vec<TableRow>, ShardError> {
     let missing = rows.iter().filter(|row| row.is_none()).count();
     if let Some(index) = rows.iter().position(Option::is_none) {
         let index = u32::try_from(index).unwrap_or(MAX_SAMPLES);
-        return Err(Error::MissingSample {
+        return Err(ShardError::MissingSample {
             session: session.to_owned(),
             index,
             missing,
@@ -241,10 +240,10 @@ fn first_not_finite(record: &FrameRecord) -> Option<&'static str> {
         .map(|(field, _)| field)
 }
 
-fn seal_table(out: &Path, session: &str, rows: &[Row]) -> Result<SealedFile, Error> {
+fn seal_table(out: &Path, session: &str, rows: &[TableRow]) -> Result<SealedFile, ShardError> {
     let file = names::table_file(session);
     let mut partial = PartialFile::create(out, &file)?;
-    write_rows(&mut partial, rows).map_err(|source| Error::Table {
+    write_rows(&mut partial, rows).map_err(|source| ShardError::Table {
         path: out.join(&file),
         doing: "written",
         source,

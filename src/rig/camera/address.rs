@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use super::{AddressFault, CameraError};
-use crate::clock::Clock;
 
 /// Fastest replay that may be asked for, times real time.
 const FASTEST: f64 = 1000.0;
@@ -31,7 +30,7 @@ const MOST_FRAMES: usize = 10_000;
 ///
 /// Frames are named by their position in the recording, 0-based, counted on where it loops.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Address {
+pub enum CameraAddress {
     /// A V4L2 device node.
     V4l2(PathBuf),
     /// The portable library's number of a camera.
@@ -41,17 +40,17 @@ pub enum Address {
         /// A session folder or a video file.
         path: PathBuf,
         /// How fast.
-        speed: Speed,
+        speed: ReplaySpeed,
         /// Whether it begins again at its end.
         repeat: bool,
         /// What is to go wrong.
-        faults: Faults,
+        faults: ReplayFaults,
     },
 }
 
 /// How fast a recording is replayed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Speed {
+pub enum ReplaySpeed {
     /// As fast as it is read.
     AsRead,
     /// This many times real time; positive, at most 1000.
@@ -60,7 +59,7 @@ pub enum Speed {
 
 /// What is to go wrong in a replay, for tests and rehearsals; positions in the recording.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Faults {
+pub struct ReplayFaults {
     /// Frames that are dropped.
     pub drop: BTreeSet<u64>,
     /// Frames whose data are cut in half.
@@ -75,26 +74,14 @@ pub struct Faults {
     pub resize: Option<u64>,
 }
 
-impl Address {
+impl CameraAddress {
     /// A replay in real time without faults.
     pub fn replay(path: impl Into<PathBuf>) -> Self {
         Self::Replay {
             path: path.into(),
-            speed: Speed::Times(1.0),
+            speed: ReplaySpeed::Times(1.0),
             repeat: false,
-            faults: Faults::default(),
-        }
-    }
-
-    /// The clock on which frames of this camera come as they were taken: the system's own, or a
-    /// faster one for a replay that runs faster. Everything of a capture goes by one such clock.
-    pub fn clock(&self) -> Clock {
-        match self {
-            Self::Replay {
-                speed: Speed::Times(times),
-                ..
-            } if *times != 1.0 => Clock::scaled(*times),
-            _ => Clock::monotonic(),
+            faults: ReplayFaults::default(),
         }
     }
 
@@ -116,7 +103,7 @@ impl Address {
     }
 }
 
-impl FromStr for Address {
+impl FromStr for CameraAddress {
     type Err = CameraError;
 
     fn from_str(text: &str) -> Result<Self, CameraError> {
@@ -127,22 +114,22 @@ impl FromStr for Address {
     }
 }
 
-fn parse(text: &str) -> Result<Address, AddressFault> {
+fn parse(text: &str) -> Result<CameraAddress, AddressFault> {
     let (scheme, rest) = text.split_once(':').ok_or(AddressFault::Scheme)?;
     match scheme {
         "v4l2" | "nokhwa" | "replay" if rest.is_empty() => Err(AddressFault::Empty),
         "v4l2" if rest.contains('\0') => Err(AddressFault::Path),
-        "v4l2" => Ok(Address::V4l2(rest.into())),
+        "v4l2" => Ok(CameraAddress::V4l2(rest.into())),
         "nokhwa" => rest
             .parse()
-            .map(Address::Nokhwa)
+            .map(CameraAddress::Nokhwa)
             .map_err(|_| AddressFault::Number),
         "replay" => parse_replay(rest),
         _ => Err(AddressFault::Scheme),
     }
 }
 
-fn parse_replay(text: &str) -> Result<Address, AddressFault> {
+fn parse_replay(text: &str) -> Result<CameraAddress, AddressFault> {
     let (path, options) = text.rsplit_once('?').unwrap_or((text, ""));
     if path.is_empty() {
         return Err(AddressFault::Empty);
@@ -150,7 +137,8 @@ fn parse_replay(text: &str) -> Result<Address, AddressFault> {
     if path.contains('\0') {
         return Err(AddressFault::Path);
     }
-    let (mut speed, mut repeat, mut faults) = (Speed::Times(1.0), false, Faults::default());
+    let (mut speed, mut repeat, mut faults) =
+        (ReplaySpeed::Times(1.0), false, ReplayFaults::default());
     let mut seen = BTreeSet::new();
     for option in options.split('&').filter(|option| !option.is_empty()) {
         let (name, value) = option.split_once('=').unwrap_or((option, ""));
@@ -174,7 +162,7 @@ fn parse_replay(text: &str) -> Result<Address, AddressFault> {
             _ => return Err(AddressFault::Option(name.to_owned())),
         }
     }
-    Ok(Address::Replay {
+    Ok(CameraAddress::Replay {
         path: path.into(),
         speed,
         repeat,
@@ -182,10 +170,12 @@ fn parse_replay(text: &str) -> Result<Address, AddressFault> {
     })
 }
 
-fn parse_speed(text: &str) -> Option<Speed> {
+fn parse_speed(text: &str) -> Option<ReplaySpeed> {
     match text.parse::<f64>().ok()? {
-        0.0 => Some(Speed::AsRead),
-        times if times.is_normal() && times > 0.0 && times <= FASTEST => Some(Speed::Times(times)),
+        0.0 => Some(ReplaySpeed::AsRead),
+        times if times.is_normal() && times > 0.0 && times <= FASTEST => {
+            Some(ReplaySpeed::Times(times))
+        }
         _ => None,
     }
 }
@@ -207,7 +197,7 @@ fn parse_frames(text: &str) -> Option<BTreeSet<u64>> {
     (frames.len() <= MOST_FRAMES).then_some(frames)
 }
 
-impl fmt::Display for Address {
+impl fmt::Display for CameraAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self::Replay {
             speed,
@@ -224,12 +214,12 @@ impl fmt::Display for Address {
             options.insert(0, "loop=1".to_owned());
         }
         match speed {
-            Speed::AsRead => options.insert(0, "speed=0".to_owned()),
+            ReplaySpeed::AsRead => options.insert(0, "speed=0".to_owned()),
             // A question mark in the path would otherwise begin the options.
-            Speed::Times(times) if *times != 1.0 || device.contains('?') => {
+            ReplaySpeed::Times(times) if *times != 1.0 || device.contains('?') => {
                 options.insert(0, format!("speed={times}"));
             }
-            Speed::Times(_) => {}
+            ReplaySpeed::Times(_) => {}
         }
         write!(f, "replay:{device}")?;
         if !options.is_empty() {
@@ -239,7 +229,7 @@ impl fmt::Display for Address {
     }
 }
 
-impl Faults {
+impl ReplayFaults {
     fn options(&self) -> Vec<String> {
         let sets = [
             ("drop", &self.drop),
@@ -270,11 +260,11 @@ mod tests {
 
     use super::*;
 
-    fn faults() -> impl Strategy<Value = Faults> {
+    fn faults() -> impl Strategy<Value = ReplayFaults> {
         let frames = || btree_set(any::<u64>(), 0..4);
         let at = || option::of(any::<u64>());
         (frames(), frames(), frames(), at(), at(), at()).prop_map(
-            |(drop, damage, flag, unplug, stall, resize)| Faults {
+            |(drop, damage, flag, unplug, stall, resize)| ReplayFaults {
                 drop,
                 damage,
                 flag,
@@ -285,18 +275,18 @@ mod tests {
         )
     }
 
-    fn address() -> impl Strategy<Value = Address> {
+    fn address() -> impl Strategy<Value = CameraAddress> {
         let path = || "[ -~]{1,20}".prop_map(PathBuf::from);
         let speed = prop_oneof![
-            Just(Speed::AsRead),
-            (0.01..FASTEST).prop_map(Speed::Times),
-            Just(Speed::Times(1.0))
+            Just(ReplaySpeed::AsRead),
+            (0.01..FASTEST).prop_map(ReplaySpeed::Times),
+            Just(ReplaySpeed::Times(1.0))
         ];
         prop_oneof![
-            path().prop_map(Address::V4l2),
-            any::<u32>().prop_map(Address::Nokhwa),
+            path().prop_map(CameraAddress::V4l2),
+            any::<u32>().prop_map(CameraAddress::Nokhwa),
             (path(), speed, any::<bool>(), faults()).prop_map(|(path, speed, repeat, faults)| {
-                Address::Replay {
+                CameraAddress::Replay {
                     path,
                     speed,
                     repeat,
@@ -309,27 +299,27 @@ mod tests {
     proptest! {
         #[test]
         fn an_address_is_read_as_it_is_shown(address in address()) {
-            prop_assert_eq!(address.to_string().parse::<Address>().unwrap(), address);
+            prop_assert_eq!(address.to_string().parse::<CameraAddress>().unwrap(), address);
         }
 
         #[test]
         fn no_text_upsets_the_parser(text in ".{0,60}", options in "[a-z0-9=&,?.-]{0,40}") {
-            let _ = text.parse::<Address>();
-            let _ = format!("replay:{text}?{options}").parse::<Address>();
+            let _ = text.parse::<CameraAddress>();
+            let _ = format!("replay:{text}?{options}").parse::<CameraAddress>();
         }
     }
 
     #[test]
     fn addresses_are_those_of_the_manual() {
-        let read = |text: &str| text.parse::<Address>().unwrap();
+        let read = |text: &str| text.parse::<CameraAddress>().unwrap();
         assert_eq!(
             read("v4l2:/dev/video0"),
-            Address::V4l2("/dev/video0".into())
+            CameraAddress::V4l2("/dev/video0".into())
         );
-        assert_eq!(read("nokhwa:3"), Address::Nokhwa(3));
-        assert_eq!(read("replay:clip.mp4"), Address::replay("clip.mp4"));
+        assert_eq!(read("nokhwa:3"), CameraAddress::Nokhwa(3));
+        assert_eq!(read("replay:clip.mp4"), CameraAddress::replay("clip.mp4"));
         let all = "replay:a b?speed=0&loop=1&drop=7,8&damage=5&flag=6&unplug=100&stall=20&resize=9";
-        let Address::Replay {
+        let CameraAddress::Replay {
             path,
             speed,
             repeat,
@@ -338,7 +328,10 @@ mod tests {
         else {
             panic!("{all} is a replay");
         };
-        assert_eq!((path, speed, repeat), ("a b".into(), Speed::AsRead, true));
+        assert_eq!(
+            (path, speed, repeat),
+            ("a b".into(), ReplaySpeed::AsRead, true)
+        );
         assert_eq!(faults.drop, BTreeSet::from([7, 8]));
         assert_eq!(
             (faults.unplug, faults.stall, faults.resize),
@@ -373,20 +366,6 @@ mod tests {
         ] {
             let found = parse(&format!("replay:a?{option}"));
             assert!(matches!(found, Err(AddressFault::Value { .. })), "{option}");
-        }
-    }
-
-    #[test]
-    fn a_faster_replay_goes_by_a_faster_clock() {
-        let factor = |text: &str| text.parse::<Address>().unwrap().clock().factor();
-        assert_eq!(factor("replay:a?speed=8"), 8.0);
-        for text in [
-            "replay:a",
-            "replay:a?speed=0",
-            "nokhwa:0",
-            "v4l2:/dev/video0",
-        ] {
-            assert_eq!(factor(text), 1.0, "{text}");
         }
     }
 }

@@ -9,7 +9,14 @@ use super::format::Fourcc;
 use relit_data::session;
 use relit_video as video;
 
-/// Why a camera could not be found, set, or read.
+/// How a user gets the right to use cameras.
+const PERMITTING: &str = match cfg!(target_os = "linux") {
+    true => "add the user to the group `video` and log in again",
+    false => "let this program use the camera in the system's privacy settings",
+};
+
+/// Why a camera could not be found, set, or read. What the system said is the `source`:
+/// [`relit_data::causes::with_causes`] puts both into one sentence.
 #[derive(Debug, thiserror::Error)]
 pub enum CameraError {
     /// A text that is no address or mode.
@@ -25,34 +32,54 @@ pub enum CameraError {
     NotThere {
         /// The device.
         device: String,
+        /// The system's answer, where there is one.
+        source: Option<io::Error>,
     },
     /// The device may not be opened.
-    #[error(
-        "{device} may not be opened by this user: add the user to the group `video` and log in again"
-    )]
+    #[error("{device} may not be opened by this user: {PERMITTING}")]
     NotPermitted {
         /// The device.
         device: String,
+        /// The system's answer, where there is one.
+        source: Option<io::Error>,
     },
     /// A device that gives no frames, or not in a way that can be used here.
     #[error("{device} cannot be used as a camera ({why}): give another device")]
     NotACamera {
         /// The device.
         device: String,
-        /// What it lacks.
+        /// What keeps it from being one.
         why: String,
+        /// The system's answer, where there is one.
+        source: Option<io::Error>,
     },
-    /// Another program streams from the device.
-    #[error("{device} is in use by another program: close that one (`fuser {device}` names it)")]
+    /// Another program has the stream of the device.
+    #[error("{device} is in use by {holders}: close that one")]
     InUse {
         /// The device.
         device: String,
+        /// The programs that have it open, or how to find them.
+        holders: String,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// The stream does not fit onto the bus beside those that run there.
+    #[error(
+        "the USB bus of {device} is full: no bandwidth is left for this mode; ask for a smaller size, a lower rate or MJPG, or plug it in at another controller"
+    )]
+    BusFull {
+        /// The device.
+        device: String,
+        /// The system's answer.
+        source: io::Error,
     },
     /// The device went away.
     #[error("{device} was unplugged: plug it in again and start anew")]
     Unplugged {
         /// The device.
         device: String,
+        /// The system's answer, where there is one.
+        source: Option<io::Error>,
     },
     /// No frame came in time.
     #[error(
@@ -112,6 +139,8 @@ pub enum CameraError {
         doing: String,
         /// Why not.
         fault: ControlFault,
+        /// The system's answer, where there is one.
+        source: Option<io::Error>,
     },
     /// Something that this kind of camera does not have.
     #[error("{device} cannot do this: {what}")]
@@ -122,14 +151,14 @@ pub enum CameraError {
         what: &'static str,
     },
     /// The portable camera library failed.
-    #[error("{device} failed when {doing} ({why}): check that no other program uses it")]
+    #[error("{device} failed when {doing}: check that no other program uses it")]
     Backend {
         /// The device.
         device: String,
         /// What was done: "it was opened".
         doing: &'static str,
-        /// The library's words.
-        why: String,
+        /// What the library, or the system under it, says.
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// A replay has come to its end.
     #[error(
@@ -151,10 +180,10 @@ pub enum CameraError {
     },
     /// The session of a replay cannot be read.
     #[error(transparent)]
-    Session(#[from] session::Error),
+    Session(#[from] session::SessionError),
     /// The video of a replay cannot be read.
     #[error(transparent)]
-    Video(#[from] video::Error),
+    Video(#[from] video::VideoError),
 }
 
 /// What is wrong in an address or mode.
@@ -194,7 +223,7 @@ pub enum AddressFault {
 }
 
 /// Why a control could not be read or set.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ControlFault {
     /// The camera has no such control.
     #[error("the camera has no such control")]
@@ -217,8 +246,8 @@ pub enum ControlFault {
     #[error("it is held while the camera streams, or by another program: stop that first")]
     Busy,
     /// Anything else.
-    #[error("the driver answers: {0}")]
-    Driver(io::Error),
+    #[error("the driver refuses")]
+    Driver,
 }
 
 fn list_words(values: &[i64]) -> String {

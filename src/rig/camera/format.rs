@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use relit_video::{BayerPattern, PixelFormat};
+
 use super::Rate;
 
 /// A pixel format's four characters, as V4L2 writes them.
@@ -32,21 +34,31 @@ impl Fourcc {
         u32::from_le_bytes(self.0)
     }
 
-    /// How its frames are to be understood; `None` for a format that is not taken here.
-    pub fn encoding(self) -> Option<Encoding> {
-        Some(match &self.0 {
-            b"MJPG" | b"JPEG" => Encoding::Mjpeg,
-            b"H264" => Encoding::H264,
-            b"YUYV" => Encoding::Yuyv,
-            b"NV12" => Encoding::Nv12,
-            b"RGB3" => Encoding::Rgb24,
-            b"GREY" => Encoding::Grey,
-            b"BA81" => Encoding::Bayer(Bayer::Bggr),
-            b"GBRG" => Encoding::Bayer(Bayer::Gbrg),
-            b"GRBG" => Encoding::Bayer(Bayer::Grbg),
-            b"RGGB" => Encoding::Bayer(Bayer::Rggb),
-            _ => return None,
-        })
+    /// The code by which cameras offer a format.
+    pub fn of(format: PixelFormat) -> Self {
+        match format {
+            PixelFormat::Mjpeg => Self::MJPG,
+            PixelFormat::H264 => Self::H264,
+            PixelFormat::Yuyv => Self::YUYV,
+            PixelFormat::Nv12 => Self::NV12,
+            PixelFormat::Rgb24 => Self::RGB3,
+            PixelFormat::Grey => Self::GREY,
+            PixelFormat::Bayer(BayerPattern::Bggr) => Self(*b"BA81"),
+            PixelFormat::Bayer(BayerPattern::Gbrg) => Self(*b"GBRG"),
+            PixelFormat::Bayer(BayerPattern::Grbg) => Self(*b"GRBG"),
+            PixelFormat::Bayer(BayerPattern::Rggb) => Self(*b"RGGB"),
+        }
+    }
+
+    /// How frames of this code are coded; `None` where they cannot be recorded.
+    pub fn pixel_format(self) -> Option<PixelFormat> {
+        let usual = if self == Self(*b"JPEG") {
+            Self::MJPG
+        } else {
+            self
+        };
+        let mut formats = PixelFormat::ALL.into_iter();
+        formats.find(|&format| Self::of(format) == usual)
     }
 }
 
@@ -65,62 +77,6 @@ impl fmt::Display for Fourcc {
 impl fmt::Debug for Fourcc {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Fourcc({self})")
-    }
-}
-
-/// The kinds of frames that are taken here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Encoding {
-    /// Every frame a JPEG of its own.
-    Mjpeg,
-    /// H.264 as a byte stream with start codes.
-    H264,
-    /// Packed 4:2:2, two bytes a pixel.
-    Yuyv,
-    /// 4:2:0 in two planes, one and a half bytes a pixel.
-    Nv12,
-    /// Packed red, green, blue.
-    Rgb24,
-    /// Luma alone, one byte a pixel.
-    Grey,
-    /// The sensor's mosaic, one byte a pixel.
-    Bayer(Bayer),
-}
-
-/// The colours of a Bayer mosaic's first two rows, in reading order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Bayer {
-    /// Blue, green / green, red.
-    Bggr,
-    /// Green, blue / red, green.
-    Gbrg,
-    /// Green, red / blue, green.
-    Grbg,
-    /// Red, green / green, blue.
-    Rggb,
-}
-
-impl Encoding {
-    /// Bytes of a row and number of rows of a raw frame without padding, all planes counted;
-    /// `None` for compressed ones and for sizes that no memory holds.
-    pub fn rows(self, width: u32, height: u32) -> Option<(usize, usize)> {
-        let (width, height) = (usize::try_from(width).ok()?, usize::try_from(height).ok()?);
-        Some(match self {
-            Self::Mjpeg | Self::H264 => return None,
-            Self::Yuyv => (width.div_ceil(2).checked_mul(4)?, height),
-            Self::Nv12 => (
-                width.div_ceil(2).checked_mul(2)?,
-                height.checked_add(height.div_ceil(2))?,
-            ),
-            Self::Rgb24 => (width.checked_mul(3)?, height),
-            Self::Grey | Self::Bayer(_) => (width, height),
-        })
-    }
-
-    /// Bytes of a raw frame; `None` as for [`Self::rows`].
-    pub fn frame_bytes(self, width: u32, height: u32) -> Option<usize> {
-        let (row, rows) = self.rows(width, height)?;
-        row.checked_mul(rows)
     }
 }
 
@@ -238,8 +194,6 @@ impl fmt::Display for Mode {
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
 
     #[test]
@@ -259,14 +213,5 @@ mod tests {
         assert_eq!(Fourcc::from_code(0x5659_5559).to_string(), "YUYV");
         assert_eq!(Fourcc(*b"Y1\0\xff").to_string(), "Y1..");
         assert_eq!(Fourcc::from_code(Fourcc::NV12.code()), Fourcc::NV12);
-    }
-
-    proptest! {
-        #[test]
-        fn no_size_upsets_the_reckoning(width in any::<u32>(), height in any::<u32>()) {
-            for code in [Fourcc::YUYV, Fourcc::NV12, Fourcc::RGB3, Fourcc::GREY] {
-                let _ = code.encoding().unwrap().frame_bytes(width, height);
-            }
-        }
     }
 }

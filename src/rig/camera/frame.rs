@@ -1,6 +1,9 @@
 //! One frame as a camera delivered it, and what can be wrong with it.
 
-use super::format::{Encoding, Fourcc};
+use relit_data::session::FrameClock;
+use relit_video::PixelFormat;
+
+use super::format::Fourcc;
 
 /// One frame as the camera delivered it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,6 +45,16 @@ pub enum StampSource {
     StartOfExposure,
     /// The driver has no monotonic time stamps: when this program got the frame.
     Arrival,
+}
+
+impl StampSource {
+    /// Whose clock it is.
+    pub fn clock(self) -> FrameClock {
+        match self {
+            Self::EndOfFrame | Self::StartOfExposure => FrameClock::Driver,
+            Self::Arrival => FrameClock::Host,
+        }
+    }
 }
 
 /// Takes the wraps out of a driver's 32-bit frame counter.
@@ -109,9 +122,9 @@ impl Frame {
         if self.data.is_empty() {
             return Some(FrameFault::Empty);
         }
-        match self.fourcc.encoding()? {
-            Encoding::Mjpeg => jpeg_fault(&self.data, self.width, self.height),
-            Encoding::H264 => None,
+        match self.fourcc.pixel_format()? {
+            PixelFormat::Mjpeg => jpeg_fault(&self.data, self.width, self.height),
+            PixelFormat::H264 => None,
             raw => {
                 let expected = raw.frame_bytes(self.width, self.height)?;
                 let found = self.data.len();

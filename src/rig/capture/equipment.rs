@@ -1,38 +1,84 @@
 //! Camera and table, opened on one clock, and opened again after they were gone.
 
-use crate::camera::{self, Camera};
-use crate::clock::Clock;
-use crate::simulator::{self, Simulator, SimulatorOptions};
-use crate::turntable::{Address, Options, Table, find_serial};
+use std::time::Duration;
 
-use super::failure::CaptureError;
+use jiff::Timestamp;
+
+use super::error::CaptureError;
 use super::settings::Settings;
+use crate::camera::{self, Camera, CameraAddress, ReplaySpeed};
+use crate::clock::Clock;
+use crate::simulator::{SimulatedTable, SimulatorOptions};
+use crate::turntable::{Table, TableOptions, TurntableAddress, find_serial};
+
+/// How many times faster than real time a rehearsal runs at most where people look at it.
+const FASTEST_SHOWN: f64 = 20.0;
+/// Session names have whole seconds: two sessions begin at least so far apart.
+const NAME_SPACING: Duration = Duration::from_secs(1);
 
 /// Camera and table of a rig.
 pub struct Equipment {
     // Dropped in this order: the table is stopped before its simulator is switched off.
-    /// The camera; `None` while it is gone.
+    /// The camera; `None` while it is gone, and before it is opened.
     pub camera: Option<Box<dyn Camera>>,
-    /// The table; `None` while it is gone, and where there is none.
+    /// The table; `None` while it is gone, before it is opened, and where there is none.
     pub table: Option<Table>,
-    simulator: Option<Simulator>,
+    simulator: Option<SimulatedTable>,
     settings: Settings,
     clock: Clock,
+    /// When the last session was named.
+    named: Option<Timestamp>,
 }
 
 impl Equipment {
-    /// Nothing opened yet. Brings camera and table onto one clock.
+    /// Nothing opened yet. Camera and table go by one clock: where neither is real, by
+    /// [virtual time](Clock::virtual_time), at most as fast as their addresses say.
     ///
     /// # Errors
-    /// [`super::Refusal::Pace`].
+    /// [`super::Refusal::Pace`], or a fault that the simulated table cannot make.
     pub fn new(settings: Settings) -> Result<Self, CaptureError> {
-        let (settings, clock) = settings.on_one_clock()?;
+        let speed = settings.speed()?;
+        Self::at_speed(settings, speed)
+    }
+
+    /// The same for a rig that people look at, and that runs while nothing is captured: as fast as
+    /// it goes is 20 times real time.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn for_viewers(settings: Settings) -> Result<Self, CaptureError> {
+        let speed = match settings.speed()? {
+            0.0 => FASTEST_SHOWN,
+            speed => speed,
+        };
+        Self::at_speed(settings, speed)
+    }
+
+    fn at_speed(mut settings: Settings, speed: f64) -> Result<Self, CaptureError> {
+        if let CameraAddress::Replay { speed, .. } = &mut settings.camera {
+            // It goes as fast as the clock does.
+            *speed = ReplaySpeed::Times(1.0);
+        }
+        let clock = match speed {
+            0.0 => Clock::virtual_time(),
+            1.0 => Clock::monotonic(),
+            times => Clock::paced(times),
+        };
+        let simulator = match &settings.turntable {
+            TurntableAddress::Simulated(address) => Some(SimulatedTable::new(&SimulatorOptions {
+                clock: clock.clone(),
+                faults: address.fault.as_deref().unwrap_or_default().parse()?,
+                ..SimulatorOptions::default()
+            })),
+            _ => None,
+        };
         Ok(Self {
             camera: None,
             table: None,
-            simulator: None,
+            simulator,
             settings,
             clock,
+            named: None,
         })
     }
 
@@ -45,19 +91,29 @@ impl Equipment {
     /// The clock that everything goes by.
     #[must_use]
     pub fn clock(&self) -> Clock {
-        self.clock
+        self.clock.clone()
     }
 
-    /// The simulated table, where the table is one and was opened.
+    /// The simulated table, where the table is one.
     #[must_use]
-    pub fn simulator(&self) -> Option<&Simulator> {
+    pub fn simulator(&self) -> Option<&SimulatedTable> {
         self.simulator.as_ref()
     }
 
     /// Whether a table is to be there.
     #[must_use]
     pub fn wants_table(&self) -> bool {
-        self.settings.turntable != Address::None
+        self.settings.turntable != TurntableAddress::None
+    }
+
+    /// The time of day for the next session's name: waits until it differs from the one before.
+    pub(super) fn session_time(&mut self) -> Timestamp {
+        let passed = self
+            .named
+            .map(|named| Timestamp::now().duration_since(named));
+        let passed = passed.map_or(NAME_SPACING, |passed| passed.unsigned_abs());
+        std::thread::sleep(NAME_SPACING.saturating_sub(passed));
+        *self.named.insert(Timestamp::now())
     }
 
     /// Opens the camera where it is not.
@@ -67,7 +123,7 @@ impl Equipment {
     pub fn open_camera(&mut self) -> Result<&mut dyn Camera, CaptureError> {
         let opened = match self.camera.take() {
             Some(camera) => camera,
-            None => camera::open(&self.settings.camera, self.clock)?,
+            None => camera::open(&self.settings.camera, self.clock.clone())?,
         };
         Ok(self.camera.insert(opened).as_mut())
     }
@@ -83,44 +139,20 @@ impl Equipment {
         Ok(self.table.as_ref())
     }
 
-    fn connect(&mut self) -> Result<Option<Table>, CaptureError> {
-        let options = Options {
-            clock: self.clock,
+    fn connect(&self) -> Result<Option<Table>, CaptureError> {
+        let options = TableOptions {
+            clock: self.clock.clone(),
             runtime_folder: self.settings.runtime_folder.clone(),
-            ..Options::default()
+            ..TableOptions::default()
         };
+        if let Some(simulator) = &self.simulator {
+            return Ok(Some(Table::open(simulator.open(), &options)?));
+        }
         let path = match &self.settings.turntable {
-            Address::None => return Ok(None),
-            Address::Serial(Some(path)) => path.clone(),
-            Address::Serial(None) => find_serial()?,
-            Address::Simulated(address) => {
-                let fault = address.fault.clone();
-                self.simulated(fault.as_deref())?.path().to_owned()
-            }
+            TurntableAddress::Serial(Some(path)) => path.clone(),
+            TurntableAddress::Serial(None) => find_serial()?,
+            TurntableAddress::Simulated(_) | TurntableAddress::None => return Ok(None),
         };
         Ok(Some(Table::open_serial(&path, &options)?))
-    }
-
-    /// The simulated table, switched on the first time.
-    fn simulated(&mut self, fault: Option<&str>) -> Result<&Simulator, simulator::Error> {
-        let simulator = match self.simulator.take() {
-            Some(simulator) => simulator,
-            None => Simulator::start(SimulatorOptions {
-                clock: self.clock,
-                faults: fault.unwrap_or_default().parse()?,
-                ..SimulatorOptions::default()
-            })?,
-        };
-        Ok(self.simulator.insert(simulator))
-    }
-
-    /// Forgets the camera, so that it is opened again.
-    pub fn drop_camera(&mut self) {
-        self.camera = None;
-    }
-
-    /// Forgets the table, so that it is opened again.
-    pub fn drop_table(&mut self) {
-        self.table = None;
     }
 }

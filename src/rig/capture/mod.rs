@@ -1,54 +1,39 @@
-//! The capture: from a rig that stands still to a session folder that holds one whole turn.
+//! The capture: from a rig at rest to a session folder that holds one whole turn.
 //!
 //! ```text
 //! settings -> equipment -> preflight -> (metering) -> turn + recorder -> angles, verdict -> session
 //! ```
 //!
-//! [`capture`] makes one session: it checks and holds everything, turns the table, and records
-//! exactly the frames of 360 degrees.
-//!
-//! A [`Recorder`] has the camera in a thread of its own, so that nothing that happens elsewhere
-//! costs a frame: a slow disk has a queue before it, and those who look at the [`Preview`] are never
-//! waited for. When the turn begins may be told after the fact ([`Window`]). What is on the disk is
-//! never older than a second, and [`salvage`] brings a session to its end whose recorder died. The
-//! recorder knows cameras, videos and sessions, and nothing of turntables: the time of a turn and
-//! the angle at a time are given to it.
+//! [`capture`] makes one session: it checks and locks everything, turns the table, and records
+//! exactly the frames of 360 degrees. A [`Recorder`] is what it records with, and knows nothing of
+//! turntables. What is under way shows in a [`Monitor`](crate::state::Monitor); who looks at that,
+//! and from where, the capture does not know.
 
+mod context;
 mod equipment;
 mod error;
-mod facts;
-mod failure;
-mod faults;
-mod film;
-mod lock;
-pub mod look;
-pub mod meter;
+mod locked_camera;
+mod manifest;
 mod metering;
-pub mod preflight;
-mod preview;
-pub(crate) mod recorder;
-mod salvage;
+mod mode_preference;
+pub(crate) mod preflight;
+mod recording;
 mod settings;
-mod shoot;
-mod sink;
 mod stop;
 mod take;
-pub mod trace;
-mod tracking;
-mod window;
+pub(crate) mod turn;
 
+pub use context::{CaptureContext, CaptureRequest};
 pub use equipment::Equipment;
-pub use error::Error;
-pub use failure::{CaptureError, MeterFault, Refusal};
-pub use lock::Exclusive;
-pub use preview::Preview;
-pub use recorder::{Ended, Plan, Progress, Recorder, Stage, WhenFull};
-pub use salvage::{Salvaged, Saved, salvage, salvage_session};
-pub use settings::{FrameSize, ModeWish, Settings};
-pub use shoot::{Onlookers, Order, capture};
-pub use stop::{StopRequest, Stopped};
-pub use take::{Damaged, End, Report, Take};
-pub use window::{Count, Window};
+pub use error::{CaptureError, MeterFault, Refusal, Stopped};
+pub use mode_preference::ModePreference;
+pub use recording::{
+    End, Plan, Progress, Recorded, Recorder, RecordingError, Salvaged, Saved, Window, salvage,
+    salvage_session,
+};
+pub use settings::Settings;
+pub use stop::StopRequest;
+pub use take::{Captured, capture};
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -1,27 +1,13 @@
 //! What a person decides about captures, once for all takes.
 
-use std::fmt;
 use std::path::PathBuf;
-use std::str::FromStr;
 
-use super::failure::{CaptureError, Refusal};
-use crate::camera::lock::Wanted;
-use crate::camera::{self, Fourcc, Mode, ModeRequest, Rate, Rates};
-use crate::clock::Clock;
-use crate::turntable;
-
-/// How much faster than real time a rehearsal runs that is to be as fast as is sensible.
-const FASTEST_REHEARSAL: f64 = 20.0;
-/// Formats from the one that is preferred: what the camera compresses by frames comes first.
-const PREFERRED: [Fourcc; 5] = [
-    Fourcc::MJPG,
-    Fourcc::H264,
-    Fourcc::YUYV,
-    Fourcc::NV12,
-    Fourcc::RGB3,
-];
-/// Rates that differ by less count as the same, frames a second: 29.97 is asked for as 30.
-const SAME_RATE: f64 = 0.05;
+use super::error::Refusal;
+use super::mode_preference::ModePreference;
+use crate::camera::hold::ManualValues;
+use crate::camera::{CameraAddress, ReplaySpeed};
+use crate::lockfile::{self, LockError, LockFile};
+use crate::turntable::TurntableAddress;
 
 /// Where a capture's parts are and what it is to be like.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,13 +15,13 @@ pub struct Settings {
     /// The folder in which sessions are made.
     pub root: PathBuf,
     /// The camera.
-    pub camera: camera::Address,
+    pub camera: CameraAddress,
     /// The turntable.
-    pub turntable: turntable::Address,
+    pub turntable: TurntableAddress,
     /// The camera's mode.
-    pub mode: ModeWish,
+    pub mode: ModePreference,
     /// Values of its controls; what is not given stays as the camera has it.
-    pub wanted: Wanted,
+    pub wanted: ManualValues,
     /// Speed of the turn, degrees a second.
     pub degrees_per_second: f64,
     /// Least voltage of the table's battery.
@@ -46,7 +32,7 @@ pub struct Settings {
     pub retries: u32,
     /// The part of the pixels in the middle that metering lets saturate, 0 to 1.
     pub meter_clip: f64,
-    /// Where owners of serial ports leave their locks.
+    /// Where those who use cameras and serial ports leave their locks.
     pub runtime_folder: PathBuf,
     /// The commit that the program was built from, or nothing.
     pub commit: String,
@@ -56,65 +42,58 @@ impl Settings {
     /// Settings with the usual figures: 7.2 degrees/s at 30 frames/s, no frame may be missing, one
     /// more try.
     #[must_use]
-    pub fn new(root: PathBuf, camera: camera::Address, turntable: turntable::Address) -> Self {
+    pub fn new(root: PathBuf, camera: CameraAddress, turntable: TurntableAddress) -> Self {
         Self {
             root,
             camera,
             turntable,
-            mode: ModeWish::default(),
-            wanted: Wanted::default(),
+            mode: ModePreference::default(),
+            wanted: ManualValues::default(),
             degrees_per_second: 7.2,
             min_battery_v: None,
             max_dropped: 0,
             retries: 1,
             meter_clip: 0.005,
-            runtime_folder: PathBuf::from("/tmp"),
+            runtime_folder: lockfile::standard_folder(),
             commit: String::new(),
         }
     }
 
-    /// Brings replayed camera and simulated table onto one clock, and gives that clock. The
-    /// table's speed counts where it is simulated, else the replay's; as fast as it goes (0)
-    /// means twenty times real time. A camera or a table of flesh and blood goes by real time.
+    /// Takes the camera for this process; `None` for one that any number of programs can have.
+    ///
+    /// # Errors
+    /// [`LockError::Held`] with the holder's process number, or what the file system answers.
+    pub fn lock_camera(&self) -> Result<Option<LockFile>, LockError> {
+        match &self.camera {
+            CameraAddress::V4l2(path) => LockFile::of_device(path, &self.runtime_folder).map(Some),
+            _ => Ok(None),
+        }
+    }
+
+    /// How many times faster than real time the rig runs at most; 0 means as fast as the machine
+    /// computes. A simulated table's speed counts, else the replay's; a real camera or table goes
+    /// by real time.
     ///
     /// # Errors
     /// [`Refusal::Pace`] where one side is real and the other is to run faster.
-    pub fn on_one_clock(mut self) -> Result<(Self, Clock), CaptureError> {
-        use turntable::Address as Table;
-        let sensible = |speed: f64| match speed {
-            0.0 => FASTEST_REHEARSAL,
-            speed => speed,
-        };
+    pub fn speed(&self) -> Result<f64, Refusal> {
         let replayed = match &self.camera {
-            camera::Address::Replay { speed, .. } => Some(match speed {
-                camera::Speed::AsRead => FASTEST_REHEARSAL,
-                camera::Speed::Times(times) => *times,
+            CameraAddress::Replay { speed, .. } => Some(match speed {
+                ReplaySpeed::AsRead => 0.0,
+                ReplaySpeed::Times(times) => *times,
             }),
             _ => None,
         };
         let simulated = match &self.turntable {
-            Table::Simulated(table) => Some(sensible(table.speed)),
+            TurntableAddress::Simulated(table) => Some(table.speed),
             _ => None,
         };
-        let times = match (replayed, simulated, &self.turntable) {
-            (Some(_), Some(table), _) => table,
-            (Some(camera), None, Table::None) => camera,
-            (Some(camera), None, _) if camera == 1.0 => camera,
-            (None, Some(table), _) if table == 1.0 => table,
-            (None, None, _) => 1.0,
-            _ => return Err(Refusal::Pace.into()),
-        };
-        if let camera::Address::Replay { speed, .. } = &mut self.camera {
-            *speed = camera::Speed::Times(times);
+        match (replayed, simulated, &self.turntable) {
+            (Some(_), Some(table), _) => Ok(table),
+            (Some(camera), None, TurntableAddress::None) => Ok(camera),
+            (Some(1.0), None, _) | (None, Some(1.0), _) | (None, None, _) => Ok(1.0),
+            _ => Err(Refusal::Pace),
         }
-        if let Table::Simulated(table) = &mut self.turntable {
-            table.speed = times;
-        }
-        let clock = match times {
-            1.0 => Clock::monotonic(),
-            times => Clock::scaled(times),
-        };
-        Ok((self, clock))
     }
 
     /// Frames of a turn at this rate.
@@ -130,135 +109,9 @@ impl Settings {
     }
 }
 
-/// What is wished of a camera's mode; what is not given is chosen.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ModeWish {
-    /// Pixel format.
-    pub fourcc: Option<Fourcc>,
-    /// Frame size.
-    pub size: Option<FrameSize>,
-    /// Frames a second.
-    pub fps: f64,
-}
-
-impl Default for ModeWish {
-    fn default() -> Self {
-        Self {
-            fourcc: None,
-            size: None,
-            fps: 30.0,
-        }
-    }
-}
-
-impl fmt::Display for ModeWish {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.fourcc {
-            Some(fourcc) => write!(f, "{fourcc}")?,
-            None => f.write_str("any format")?,
-        }
-        match self.size {
-            Some(size) => write!(f, " {size}")?,
-            None => f.write_str(" of any size")?,
-        }
-        write!(f, " at {} frames/s", self.fps)
-    }
-}
-
-/// Width and height of frames, pixels, written `1920x1080`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FrameSize {
-    /// Pixels across.
-    pub width: u32,
-    /// Pixels down.
-    pub height: u32,
-}
-
-impl fmt::Display for FrameSize {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}x{}", self.width, self.height)
-    }
-}
-
-impl FromStr for FrameSize {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let side = |text: &str| text.parse().ok().filter(|&pixels: &u32| pixels > 0);
-        let sides = text.split_once('x');
-        sides
-            .and_then(|(width, height)| {
-                Some(Self {
-                    width: side(width)?,
-                    height: side(height)?,
-                })
-            })
-            .ok_or_else(|| format!("{text:?} is no size: write it as 1920x1080"))
-    }
-}
-
-impl ModeWish {
-    /// The mode to ask the camera for: of those that fulfil the wish the largest, and of those the
-    /// one whose frames take least room.
-    ///
-    /// # Errors
-    /// [`Refusal::NoMode`] with what there is.
-    pub fn choose(&self, modes: &[Mode]) -> Result<ModeRequest, Refusal> {
-        let requests = modes.iter().filter_map(|mode| self.of(mode));
-        let rank = |fourcc: Fourcc| PREFERRED.iter().position(|&known| known == fourcc);
-        requests
-            .min_by_key(|request| {
-                let pixels = u64::from(request.width) * u64::from(request.height);
-                let rank = rank(request.fourcc).unwrap_or(PREFERRED.len());
-                (std::cmp::Reverse(pixels), rank)
-            })
-            .ok_or_else(|| Refusal::NoMode {
-                wish: *self,
-                offered: modes.iter().map(Mode::to_string).collect(),
-            })
-    }
-
-    fn of(&self, mode: &Mode) -> Option<ModeRequest> {
-        if self.fourcc.is_some_and(|fourcc| fourcc != mode.fourcc) {
-            return None;
-        }
-        let (width, height) = match self.size {
-            Some(size) if mode.sizes.contains(size.width, size.height) => (size.width, size.height),
-            Some(_) => return None,
-            None => mode.sizes.largest(),
-        };
-        Some(ModeRequest {
-            fourcc: mode.fourcc,
-            width,
-            height,
-            rate: self.rate(&mode.rates)?,
-        })
-    }
-
-    fn rate(&self, rates: &Rates) -> Option<Rate> {
-        match rates {
-            Rates::List(rates) => {
-                let distance = |rate: &Rate| (rate.per_second() - self.fps).abs();
-                let nearest = rates.iter().copied();
-                let nearest = nearest.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-                (distance(&nearest) < SAME_RATE).then_some(nearest)
-            }
-            Rates::Range { slowest, fastest } => {
-                let rate = Rate::from_per_second(self.fps)?;
-                let (low, high) = (slowest.per_second(), fastest.per_second());
-                (low - SAME_RATE..=high + SAME_RATE)
-                    .contains(&self.fps)
-                    .then_some(rate)
-            }
-            Rates::Unknown => Rate::from_per_second(self.fps),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Sizes;
 
     fn settings(camera: &str, table: &str) -> Settings {
         Settings::new(
@@ -268,35 +121,19 @@ mod tests {
         )
     }
 
-    fn mode(fourcc: Fourcc, width: u32, height: u32, rates: &[u32]) -> Mode {
-        Mode {
-            fourcc,
-            sizes: Sizes::One(width, height),
-            rates: Rates::List(
-                rates
-                    .iter()
-                    .filter_map(|&rate| Rate::new(rate, 1))
-                    .collect(),
-            ),
-        }
-    }
-
     #[test]
-    fn a_rehearsal_has_one_clock_at_the_tables_speed() {
-        for (camera, table, factor) in [
+    fn a_rehearsal_runs_at_the_tables_speed() {
+        for (camera, table, speed) in [
             ("replay:a?speed=3", "sim:?speed=5", 5.0),
-            ("replay:a", "sim:?speed=0", 20.0),
-            ("replay:a?speed=0", "none", 20.0),
+            ("replay:a", "sim:?speed=0", 0.0),
+            ("replay:a?speed=0", "none", 0.0),
             ("replay:a?speed=7", "none", 7.0),
             ("v4l2:/dev/video0", "sim:", 1.0),
             ("replay:a", "serial:/dev/ttyUSB0", 1.0),
             ("v4l2:/dev/video0", "serial:", 1.0),
         ] {
-            let (paced, clock) = settings(camera, table).on_one_clock().unwrap();
-            assert_eq!(clock.factor(), factor, "{camera} {table}");
-            if let camera::Address::Replay { speed, .. } = paced.camera {
-                assert_eq!(speed, camera::Speed::Times(factor));
-            }
+            let found = settings(camera, table).speed().unwrap();
+            assert_eq!(found, speed, "{camera} {table}");
         }
     }
 
@@ -307,60 +144,14 @@ mod tests {
             ("replay:a?speed=2", "serial:"),
             ("replay:a?speed=0", "serial:"),
         ] {
-            let error = settings(camera, table).on_one_clock().unwrap_err();
-            assert!(matches!(error, CaptureError::Refused(Refusal::Pace)));
+            let refusal = settings(camera, table).speed().unwrap_err();
+            assert!(matches!(refusal, Refusal::Pace));
         }
-    }
-
-    #[test]
-    fn the_largest_mode_at_the_rate_is_chosen_and_compressed_ones_before_raw_ones() {
-        let modes = [
-            mode(Fourcc::YUYV, 1920, 1080, &[5, 30]),
-            mode(Fourcc::MJPG, 1920, 1080, &[30, 60]),
-            mode(Fourcc::MJPG, 3840, 2160, &[15]),
-        ];
-        let chosen = ModeWish::default().choose(&modes).unwrap();
-        assert_eq!(chosen.to_string(), "MJPG:1920x1080@30");
-        let wish = ModeWish {
-            fourcc: Some(Fourcc::YUYV),
-            ..ModeWish::default()
-        };
-        assert_eq!(wish.choose(&modes).unwrap().fourcc, Fourcc::YUYV);
-        let wish = ModeWish {
-            fps: 15.0,
-            ..ModeWish::default()
-        };
-        assert_eq!(wish.choose(&modes).unwrap().width, 3840);
-    }
-
-    #[test]
-    fn a_wish_that_no_mode_fulfils_is_told_with_what_there_is() {
-        let modes = [mode(Fourcc::MJPG, 640, 480, &[25])];
-        let error = ModeWish::default().choose(&modes).unwrap_err().to_string();
-        assert!(
-            error.contains("any format of any size at 30 frames/s"),
-            "{error}"
-        );
-        assert!(error.contains("MJPG 640x480, 25 frames/s"), "{error}");
     }
 
     #[test]
     fn a_turn_of_the_usual_speed_has_1500_frames() {
         assert_eq!(settings("replay:a", "none").frames(30.0), 1500);
         assert_eq!(settings("replay:a", "none").turn_us(), 50_000_000);
-    }
-
-    #[test]
-    fn sizes_are_written_with_an_x() {
-        assert_eq!(
-            "1920x1080".parse(),
-            Ok(FrameSize {
-                width: 1920,
-                height: 1080
-            })
-        );
-        for text in ["", "1920", "0x5", "axb", "1920x1080x3"] {
-            assert!(text.parse::<FrameSize>().is_err(), "{text}");
-        }
     }
 }

@@ -1,55 +1,43 @@
-//! A wish to stop that reaches a capture wherever it is, also where it waits for the table.
+//! A request to stop that reaches a capture wherever it is, also while it waits for the table.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-use std::time::Duration;
 
+use super::error::{CaptureError, Stopped};
+use crate::clock::{Clock, Waitable};
 use crate::turntable::Table;
 
-/// How often the wish is looked at while something waits for the table.
-const LOOK: Duration = Duration::from_millis(20);
-
-/// Who wanted the stop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Stopped {
-    /// A person.
-    #[error("somebody asked for it")]
-    Person,
-    /// The program is to end.
-    #[error("the program was told to end")]
-    Shutdown,
+/// A stop that may be asked for at any time, from any thread; clones are the same request.
+#[derive(Debug, Clone)]
+pub struct StopRequest {
+    state: Arc<Waitable<State>>,
 }
 
-/// A stop that may be asked for at any time; copies are the same wish.
-#[derive(Debug, Clone, Default)]
-pub struct StopRequest {
-    wish: Arc<AtomicU8>,
+#[derive(Debug, Default)]
+struct State {
+    asked: Option<Stopped>,
+    /// Motions that were watched and have ended.
+    ended: u64,
 }
 
 impl StopRequest {
-    /// Asks for a stop. That the program is to end outranks a person's wish.
-    pub fn ask(&self, who: Stopped) {
-        let rank = match who {
-            Stopped::Person => 1,
-            Stopped::Shutdown => 2,
-        };
-        self.wish.fetch_max(rank, Ordering::Relaxed);
-    }
-
-    /// Whether somebody asked.
+    /// Nobody has asked yet. `clock`: that of the capture.
     #[must_use]
-    pub fn asked(&self) -> Option<Stopped> {
-        match self.wish.load(Ordering::Relaxed) {
-            0 => None,
-            1 => Some(Stopped::Person),
-            _ => Some(Stopped::Shutdown),
+    pub fn new(clock: &Clock) -> Self {
+        Self {
+            state: Arc::new(Waitable::new(clock, State::default())),
         }
     }
 
-    /// Forgets a person's wish, which has been fulfilled. The end of the program stays asked for.
-    pub fn forget(&self) {
-        let person = Ordering::Relaxed;
-        let _ = self.wish.compare_exchange(1, 0, person, person);
+    /// Asks for a stop. That the program is to end outranks a person's wish.
+    pub fn ask(&self, who: Stopped) {
+        self.state
+            .update(|state| state.asked = state.asked.max(Some(who)));
+    }
+
+    /// Who asked, if anybody did.
+    #[must_use]
+    pub fn asked(&self) -> Option<Stopped> {
+        self.state.lock().asked
     }
 
     /// An error where somebody asked.
@@ -60,33 +48,53 @@ impl StopRequest {
         self.asked().map_or(Ok(()), Err)
     }
 
-    /// Runs `motion`, and stops the table as soon as somebody asks, so that what waits in there for
-    /// the table comes back.
-    pub fn over<T>(&self, table: &Table, motion: impl FnOnce() -> T) -> T {
-        let over = AtomicBool::new(false);
-        std::thread::scope(|scope| {
-            scope.spawn(|| {
-                while !over.load(Ordering::Relaxed) {
-                    if self.asked().is_some() {
-                        // What waits for the table tells what came of it.
-                        let _ = table.stop();
-                        return;
-                    }
-                    std::thread::sleep(LOOK);
+    /// The result of something that may have been stopped: that a stop was asked for explains an
+    /// error better than what came of it.
+    ///
+    /// # Errors
+    /// [`CaptureError::Stopped`], or the error itself.
+    pub fn explain<T>(&self, result: Result<T, CaptureError>) -> Result<T, CaptureError> {
+        match self.asked() {
+            Some(who) if result.is_err() => Err(who.into()),
+            _ => result,
+        }
+    }
+
+    /// Runs `motion`, and stops the table as soon as somebody asks, so that what waits for the table
+    /// in `motion` returns.
+    ///
+    /// # Errors
+    /// What `motion` answers, or that the system gives no thread.
+    pub fn over<T, E: Into<CaptureError>>(
+        &self,
+        table: &Table,
+        motion: impl FnOnce() -> Result<T, E>,
+    ) -> Result<T, CaptureError> {
+        let ended = self.state.lock().ended;
+        self.state.clock().scope(|scope| {
+            let watcher = scope.spawn("relit-stop", || {
+                let asked = self.state.wait(|state| match state.asked {
+                    _ if state.ended > ended => Some(false),
+                    asked => asked.map(|_| true),
+                });
+                if asked {
+                    // What waits for the table reports what came of it.
+                    let _ = table.stop();
                 }
             });
-            let _end = SetAtEnd(&over);
-            motion()
+            let _end = EndAtDrop(&self.state);
+            watcher.map_err(CaptureError::system("a thread", "started"))?;
+            motion().map_err(Into::into)
         })
     }
 }
 
-/// Sets its flag however the block is left.
-struct SetAtEnd<'a>(&'a AtomicBool);
+/// Counts a motion as ended however its block is left.
+struct EndAtDrop<'a>(&'a Waitable<State>);
 
-impl Drop for SetAtEnd<'_> {
+impl Drop for EndAtDrop<'_> {
     fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.0.update(|state| state.ended += 1);
     }
 }
 
@@ -95,17 +103,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_end_of_the_program_outranks_a_person_and_is_not_forgotten() {
-        let stop = StopRequest::default();
+    fn the_end_of_the_program_outranks_a_person() {
+        let stop = StopRequest::new(&Clock::monotonic());
         assert_eq!(stop.check(), Ok(()));
         stop.ask(Stopped::Person);
         assert_eq!(stop.asked(), Some(Stopped::Person));
-        stop.forget();
-        assert_eq!(stop.asked(), None);
-        let copy = stop.clone();
-        copy.ask(Stopped::Shutdown);
+        stop.clone().ask(Stopped::Shutdown);
         stop.ask(Stopped::Person);
-        stop.forget();
         assert_eq!(stop.check(), Err(Stopped::Shutdown));
     }
 }

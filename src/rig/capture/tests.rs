@@ -1,9 +1,9 @@
-//! What the tests of this room share.
+//! What the tests of this module share.
 
 use crate::camera::{Fourcc, Frame, Sequence, StampSource};
 
 /// Frame `n` of a camera of 30 frames/s.
-pub(super) fn frame(n: u64) -> Frame {
+pub(crate) fn frame(n: u64) -> Frame {
     Frame {
         fourcc: Fourcc::GREY,
         width: 2,

@@ -2,131 +2,143 @@
 //! and cameras and tables that come back after they were unplugged.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use super::viewer::Viewer;
-use crate::camera::lock::ManualPlan;
-use crate::camera::{Camera, CameraError, GrantedMode};
+use relit_data::causes::with_causes;
+
+use crate::camera::hold::{ManualPlan, ManualValues};
+use crate::camera::{Camera, CameraError};
 use crate::capture::CaptureError;
 use crate::capture::Equipment;
 use crate::capture::preflight::free_bytes;
+use crate::capture::turn::show_table;
 use crate::clock::Clock;
-use crate::state::{CameraState, Monitor, TableState};
-use crate::turntable::Table;
+use crate::preview::Preview;
+use crate::state::{CameraState, Monitor, RigState, TableState};
 
-/// Longest wait for a frame in one go.
-const GLANCE: Duration = Duration::from_millis(50);
+/// Longest wait for a frame in one go: how late a command is noticed.
+const FRAME_WAIT: Duration = Duration::from_millis(50);
 /// Without a frame for so long the camera is opened anew.
-const SILENT: Duration = Duration::from_secs(2);
-/// How often the table is asked.
-const ASKING: Duration = Duration::from_millis(250);
-/// How often something that is gone is looked for, and free space is looked at.
-const LOOKING: Duration = Duration::from_secs(1);
+const SILENCE: Duration = Duration::from_secs(2);
+/// Time between two questions to the table.
+const TABLE_PERIOD: Duration = Duration::from_millis(250);
+/// Time between two searches for what is gone, and between two looks at the free space.
+const SEARCH_PERIOD: Duration = Duration::from_secs(1);
+/// Time over which the frame rate is measured.
+const RATE_PERIOD: Duration = Duration::from_secs(1);
 
-/// Keeps a rig's state true while nothing is captured.
+/// Keeps a rig's state and picture fresh while nothing is captured.
 pub(super) struct Idle {
     monitor: Monitor,
-    streams: Option<GrantedMode>,
-    last_frame: Instant,
-    counted: (Instant, u32),
-    asked: Option<Instant>,
-    looked: Option<Instant>,
+    preview: Preview,
+    clock: Clock,
+    /// Whether the camera was started.
+    streams: bool,
+    last_frame_us: i64,
+    /// Since when frames are counted, and how many came.
+    counted: (i64, u32),
+    table_due_us: i64,
+    search_due_us: i64,
 }
 
 impl Idle {
-    pub(super) fn new(monitor: Monitor) -> Self {
-        let now = Instant::now();
+    pub(super) fn new(monitor: Monitor, preview: Preview, clock: Clock) -> Self {
+        let now_us = clock.now_us();
         Self {
             monitor,
-            streams: None,
-            last_frame: now,
-            counted: (now, 0),
-            asked: None,
-            looked: None,
+            preview,
+            clock,
+            streams: false,
+            last_frame_us: now_us,
+            counted: (now_us, 0),
+            table_due_us: now_us,
+            search_due_us: now_us,
         }
     }
 
-    /// After something else had camera and table: looks at all of it anew.
-    pub(super) fn begin_again(&mut self) {
-        let now = Instant::now();
-        (self.last_frame, self.counted) = (now, (now, 0));
-        (self.asked, self.looked) = (None, None);
+    /// After something else used camera and table: looks at everything anew.
+    pub(super) fn restart(&mut self) {
+        let now_us = self.clock.now_us();
+        (self.last_frame_us, self.counted) = (now_us, (now_us, 0));
+        (self.table_due_us, self.search_due_us) = (now_us, now_us);
     }
 
-    /// One glance: takes a frame if one comes soon, asks the table if it is time.
-    pub(super) fn glance(&mut self, equipment: &mut Equipment, viewer: &Viewer) {
-        if due(&mut self.looked, LOOKING) {
-            self.look_for_what_is_gone(equipment);
+    /// Waits a moment for a frame, and does what is due.
+    pub(super) fn poll(&mut self, equipment: &mut Equipment) {
+        let now_us = self.clock.now_us();
+        if now_us >= self.search_due_us {
+            self.search_due_us = self.clock.after(SEARCH_PERIOD);
+            self.search(equipment);
             if let Ok(free) = free_bytes(&equipment.settings().root) {
                 self.monitor.update(|state| state.free_bytes = free);
             }
         }
-        if due(&mut self.asked, ASKING) {
-            self.ask_table(equipment);
+        if now_us >= self.table_due_us {
+            self.table_due_us = self.clock.after(TABLE_PERIOD);
+            self.check_table(equipment);
         }
-        let Some(camera) = equipment.camera.as_mut().filter(|_| self.streams.is_some()) else {
-            std::thread::sleep(GLANCE);
+        let Some(camera) = equipment.camera.as_mut().filter(|_| self.streams) else {
+            self.clock.sleep(FRAME_WAIT);
             return;
         };
-        if let Err(error) = self.take_frame(camera.as_mut(), viewer) {
-            self.lost_camera(equipment, &error);
+        if let Err(error) = self.take_frame(camera.as_mut()) {
+            self.lose_camera(equipment, &error);
         }
     }
 
-    /// Takes the next frame for the viewers.
-    pub(super) fn take_frame(
-        &mut self,
-        camera: &mut dyn Camera,
-        viewer: &Viewer,
-    ) -> Result<(), CameraError> {
-        match camera.next_frame(GLANCE) {
+    /// Takes the next frame for the preview.
+    pub(super) fn take_frame(&mut self, camera: &mut dyn Camera) -> Result<(), CameraError> {
+        let frame = camera.next_frame(FRAME_WAIT);
+        let now_us = self.clock.now_us();
+        match frame {
             Ok(frame) => {
-                viewer.offer(&Arc::new(frame));
-                self.last_frame = Instant::now();
-                self.count();
+                self.preview.publish(&Arc::new(frame));
+                self.last_frame_us = now_us;
+                self.count(now_us);
                 Ok(())
             }
-            Err(CameraError::Timeout { .. }) if self.last_frame.elapsed() < SILENT => Ok(()),
+            Err(CameraError::Timeout { .. }) if since(self.last_frame_us, now_us) < SILENCE => {
+                Ok(())
+            }
             Err(error) => Err(error),
         }
     }
 
-    fn count(&mut self) {
-        let (since, frames) = &mut self.counted;
+    fn count(&mut self, now_us: i64) {
+        let (begun_us, frames) = &mut self.counted;
         *frames += 1;
-        let elapsed = since.elapsed();
-        if elapsed >= LOOKING {
-            let fps = f64::from(*frames) / elapsed.as_secs_f64();
-            self.counted = (Instant::now(), 0);
+        let passed = since(*begun_us, now_us);
+        if passed >= RATE_PERIOD {
+            let fps = f64::from(*frames) / passed.as_secs_f64();
+            self.counted = (now_us, 0);
             self.monitor.update(|state| state.camera.fps = Some(fps));
         }
     }
 
-    fn look_for_what_is_gone(&mut self, equipment: &mut Equipment) {
-        if equipment.camera.is_none() {
-            self.streams = None;
-        }
-        if self.streams.is_none() {
+    /// Opens what is not open.
+    fn search(&mut self, equipment: &mut Equipment) {
+        self.streams &= equipment.camera.is_some();
+        if !self.streams {
             match self.start_camera(equipment) {
-                Ok(mode) => {
-                    self.streams = Some(mode);
-                    self.last_frame = Instant::now();
+                Ok(()) => {
+                    self.streams = true;
+                    self.last_frame_us = self.clock.now_us();
                 }
-                Err(error) => self.no_camera(&error.to_string()),
+                Err(error) => self.show_no_camera(with_causes(&error)),
             }
         }
         if equipment.wants_table()
             && equipment.table.is_none()
             && let Err(error) = equipment.open_table()
         {
-            self.no_table(&error.to_string());
+            self.show_no_table(with_causes(&error));
         }
     }
 
-    fn start_camera(&self, equipment: &mut Equipment) -> Result<GrantedMode, CaptureError> {
-        let wish = equipment.settings().mode;
+    fn start_camera(&self, equipment: &mut Equipment) -> Result<(), CaptureError> {
+        let preference = equipment.settings().mode;
         let camera = equipment.open_camera()?;
-        let request = wish.choose(&camera.modes()?)?;
+        let request = preference.choose(&camera.modes()?)?;
         let mode = camera.start(&request)?;
         let name = camera.info().name.clone();
         let controls = held_controls(camera);
@@ -139,7 +151,7 @@ impl Idle {
                 ..CameraState::default()
             };
         });
-        Ok(mode)
+        Ok(())
     }
 
     /// Shows the settings as the camera has them now.
@@ -149,69 +161,64 @@ impl Idle {
             .update(|state| state.camera.controls = controls);
     }
 
-    /// The camera is gone, and will be looked for.
-    pub(super) fn lost_camera(&mut self, equipment: &mut Equipment, error: &CameraError) {
-        self.streams = None;
+    /// Closes a camera that failed; it is searched for from now on.
+    fn lose_camera(&mut self, equipment: &mut Equipment, error: &CameraError) {
+        self.streams = false;
         // A replay that is over begins again with the next start.
         if matches!(error, CameraError::EndOfRecording { .. }) {
             return;
         }
-        equipment.drop_camera();
-        self.no_camera(&error.to_string());
+        equipment.camera = None;
+        self.show_no_camera(with_causes(error));
     }
 
-    fn no_camera(&self, why: &str) {
-        let told = self.monitor.state().camera.fault;
-        self.monitor.update(|state| {
-            state.camera.present = false;
-            state.camera.fps = None;
-            state.camera.fault = Some(why.to_owned());
-        });
-        if told.as_deref() != Some(why) {
-            self.monitor.fault(Clock::monotonic().now_us(), why);
-        }
-    }
-
-    fn no_table(&self, why: &str) {
-        let told = self.monitor.state().table.fault;
-        self.monitor.update(|state| {
-            state.table = TableState {
-                fault: Some(why.to_owned()),
-                ..TableState::default()
-            };
-        });
-        if told.as_deref() != Some(why) {
-            self.monitor.fault(Clock::monotonic().now_us(), why);
-        }
-    }
-
-    fn ask_table(&self, equipment: &mut Equipment) {
+    fn check_table(&self, equipment: &mut Equipment) {
         let Some(table) = equipment.table.as_ref() else {
             return;
         };
         if let Err(error) = show_table(&self.monitor, table) {
-            // Opening it again tells whether it has come back.
-            equipment.drop_table();
-            self.no_table(&error.to_string());
+            // Opening it again shows whether it has come back.
+            equipment.table = None;
+            self.show_no_table(with_causes(&error));
+        }
+    }
+
+    fn show_no_camera(&self, why: String) {
+        self.show_fault(why, |state, why| {
+            state.camera.present = false;
+            state.camera.fps = None;
+            state.camera.fault.replace(why)
+        });
+    }
+
+    fn show_no_table(&self, why: String) {
+        self.show_fault(why, |state, why| {
+            let before = state.table.fault.take();
+            state.table = TableState {
+                fault: Some(why),
+                ..TableState::default()
+            };
+            before
+        });
+    }
+
+    /// Shows a fault by `change`, which gives the one before; a new one is listed too.
+    fn show_fault(
+        &self,
+        why: String,
+        change: impl FnOnce(&mut RigState, String) -> Option<String>,
+    ) {
+        let mut before = None;
+        self.monitor
+            .update(|state| before = change(state, why.clone()));
+        if before.as_ref() != Some(&why) {
+            self.monitor.fault(self.clock.now_us(), why);
         }
     }
 }
 
-/// Asks the table and shows its answer.
-pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), CaptureError> {
-    let status = table.status()?;
-    monitor.update(|state| {
-        state.table = TableState {
-            present: true,
-            state: status.state.to_string(),
-            angle_deg: Some(status.angle_deg),
-            degrees_per_second: Some(status.degrees_per_second),
-            homed: status.homed,
-            battery_v: status.battery_v,
-            fault: status.alarm.map(|alarm| alarm.to_string()),
-        };
-    });
-    Ok(())
+fn since(earlier_us: i64, now_us: i64) -> Duration {
+    Duration::from_micros(now_us.abs_diff(earlier_us))
 }
 
 /// The settings that are held during a capture, as they are now.
@@ -219,18 +226,9 @@ fn held_controls(camera: &mut dyn Camera) -> Vec<(String, i64)> {
     let Ok(controls) = camera.controls() else {
         return Vec::new();
     };
-    let plan = ManualPlan::new(&controls, &crate::camera::lock::Wanted::default());
+    let plan = ManualPlan::new(&controls, &ManualValues::default());
     let value = |name: &str| controls.iter().find(|control| control.name == name)?.value;
     let held = plan.steps.iter();
     held.filter_map(|step| Some((step.name.clone(), value(&step.name)?)))
         .collect()
-}
-
-/// Whether it is time again; notes that it was.
-fn due(last: &mut Option<Instant>, every: Duration) -> bool {
-    let due = last.is_none_or(|last| last.elapsed() >= every);
-    if due {
-        *last = Some(Instant::now());
-    }
-    due
 }

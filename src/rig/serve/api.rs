@@ -12,11 +12,12 @@ use futures_util::{Stream, StreamExt, stream};
 use tokio::sync::{OwnedSemaphorePermit, watch};
 use tokio::time::{Instant, sleep_until, timeout};
 
-use super::answer::{Failure, Problem};
-use super::body::Payload;
-use super::server::{Server, Work, place};
-use super::watcher::{STATES, Seen};
-use crate::serve::rig::Command;
+use super::Shutdown;
+use super::extract::JsonBody;
+use super::failure::{Failure, Problem};
+use super::permits::{Permits, Work, permit};
+use super::rig::{Command, Rig};
+use super::snapshots::{PERIOD, Snapshot, Snapshots};
 use crate::state::RigState;
 
 /// A subscriber hears something at least so often: silence means a lost connection.
@@ -31,8 +32,12 @@ const COMMAND: Duration = Duration::from_secs(15);
     get, path = "/api/v1/state", tag = "rig",
     responses((status = 200, body = RigState), (status = 401, body = Problem))
 )]
-pub(super) async fn state(State(server): State<Arc<Server>>) -> Response {
-    let json = server.watcher.seen().json.clone();
+pub(super) async fn state(State(snapshots): State<Snapshots>) -> Response {
+    newest(&snapshots)
+}
+
+fn newest(snapshots: &Snapshots) -> Response {
+    let json = snapshots.newest().json.clone();
     ([(header::CONTENT_TYPE, "application/json")], json).into_response()
 }
 
@@ -50,27 +55,29 @@ pub(super) async fn state(State(server): State<Arc<Server>>) -> Response {
     )
 )]
 pub(super) async fn events(
-    State(server): State<Arc<Server>>,
+    State(snapshots): State<Snapshots>,
+    State(permits): State<Arc<Permits>>,
+    State(shutdown): State<Shutdown>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Failure> {
-    let mut states = server.watcher.states();
+    let mut states = snapshots.subscribe();
     states.mark_changed();
     let subscription = Subscription {
         states,
         next: Instant::now(),
-        _place: place(&server.places.subscribers, "pages that watch the rig")?,
+        _permit: permit(&permits.subscribers, "pages that watch the rig")?,
     };
     let events = stream::unfold(subscription, |mut subscription| async {
         let event = subscription.event().await;
         Some((Ok(event), subscription))
     });
-    Ok(Sse::new(events.take_until(server.closing())))
+    Ok(Sse::new(events.take_until(shutdown.cancelled_owned())))
 }
 
 struct Subscription {
-    states: watch::Receiver<Arc<Seen>>,
+    states: watch::Receiver<Arc<Snapshot>>,
     /// When the next state may be sent.
     next: Instant,
-    _place: OwnedSemaphorePermit,
+    _permit: OwnedSemaphorePermit,
 }
 
 impl Subscription {
@@ -81,9 +88,9 @@ impl Subscription {
         if changed.is_err() {
             return Event::default().event("beat").data("");
         }
-        self.next = Instant::now() + STATES;
-        let seen = self.states.borrow_and_update().clone();
-        Event::default().event("state").data(&seen.json)
+        self.next = Instant::now() + PERIOD;
+        let snapshot = self.states.borrow_and_update().clone();
+        Event::default().event("state").data(&snapshot.json)
     }
 }
 
@@ -108,19 +115,17 @@ impl Subscription {
     )
 )]
 pub(super) async fn command(
-    State(server): State<Arc<Server>>,
-    Payload(command): Payload<Command>,
+    State(rig): State<Arc<dyn Rig>>,
+    State(snapshots): State<Snapshots>,
+    State(permits): State<Arc<Permits>>,
+    JsonBody(command): JsonBody<Command>,
 ) -> Result<Response, Failure> {
-    let given = server.block_on(Work::Command, move |server| {
-        server.rig.command(command)?;
-        server.watcher.look();
-        Ok(())
-    });
+    let given = permits.run(Work::Command, move || Ok(rig.command(command)?));
     let answered = timeout(COMMAND, given).await;
     answered.map_err(|_| {
         let error = "the rig did not answer: look at it, and see its state before you try again";
         Failure::new(StatusCode::GATEWAY_TIMEOUT, error)
     })??;
-    let state = state(State(server)).await;
-    Ok((StatusCode::ACCEPTED, state).into_response())
+    snapshots.refresh();
+    Ok((StatusCode::ACCEPTED, newest(&snapshots)).into_response())
 }

@@ -1,17 +1,21 @@
 //! The sessions on disk, as a list and one by one. Reads manifests and frame indexes, no video.
 
-use std::collections::HashMap;
-use std::fs;
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
+use std::{fs, io};
 
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::answer::Failure;
+use super::cache::Cache;
+use super::failure::Failure;
+use relit_data::causes::with_causes;
 use relit_data::naming::is_session_name;
 use relit_data::session::{FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, Status, object_of};
+
+/// Summaries that are kept.
+const SUMMARIES: usize = 4096;
 
 /// How far a session has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -73,30 +77,44 @@ pub(super) struct DroppedFrames {
     pub(super) missing: u64,
 }
 
-/// A video that can be looked at.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Footage {
+/// The video of a session that has ended.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct VideoFile {
     pub(super) path: PathBuf,
-    /// Tells one state of the file from another: its size, and when it was changed.
-    pub(super) stamp: Stamp,
+    version: FileVersion,
 }
 
-/// A file's size, bytes, and the time of its last change.
-pub(super) type Stamp = (u64, Option<SystemTime>);
+/// What tells one state of a file from another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct FileVersion {
+    bytes: u64,
+    modified: Option<SystemTime>,
+}
+
+impl FileVersion {
+    /// `None` where there is no such file.
+    fn of(path: &Path) -> Option<Self> {
+        let data = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
+        Some(Self {
+            bytes: data.len(),
+            modified: data.modified().ok(),
+        })
+    }
+}
 
 /// The sessions under one folder.
 #[derive(Debug)]
 pub(super) struct Library {
     root: PathBuf,
-    /// Summaries by name, each with the stamp of the manifest that it was made from.
-    known: Mutex<HashMap<String, (Stamp, SessionSummary)>>,
+    /// Summaries by name, and the version of the manifest that each was made from.
+    summaries: Cache<(String, FileVersion), SessionSummary>,
 }
 
 impl Library {
     pub(super) fn new(root: PathBuf) -> Self {
         Self {
             root,
-            known: Mutex::new(HashMap::new()),
+            summaries: Cache::new(SUMMARIES),
         }
     }
 
@@ -129,15 +147,20 @@ impl Library {
 
     /// Names of all session folders, newest first: they begin with the date.
     fn names(&self) -> Result<Vec<String>, Failure> {
-        let failed = |error| {
+        let mut names = self.read_names().map_err(|error| {
             let root = self.root.display();
             Failure::broken(format!(
                 "the folder of sessions {root} cannot be read: {error}"
             ))
-        };
+        })?;
+        names.sort_unstable_by(|one, other| other.cmp(one));
+        Ok(names)
+    }
+
+    fn read_names(&self) -> io::Result<Vec<String>> {
         let mut names = Vec::new();
-        for entry in fs::read_dir(&self.root).map_err(failed)? {
-            let entry = entry.map_err(failed)?;
+        for entry in fs::read_dir(&self.root)? {
+            let entry = entry?;
             if let Ok(name) = entry.file_name().into_string()
                 && is_session_name(&name)
                 && entry.path().join(MANIFEST_FILE).is_file()
@@ -145,42 +168,24 @@ impl Library {
                 names.push(name);
             }
         }
-        names.sort_unstable_by(|one, other| other.cmp(one));
-        self.forget_all_but(&names);
         Ok(names)
-    }
-
-    fn forget_all_but(&self, names: &[String]) {
-        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        known.retain(|name, _| {
-            names
-                .binary_search_by(|other| name.as_str().cmp(other))
-                .is_ok()
-        });
     }
 
     /// The summary of a session. `None` where it has gone meanwhile.
     fn summary(&self, name: &str) -> Option<SessionSummary> {
         let folder = self.root.join(name);
-        let stamp = stamp(&folder.join(MANIFEST_FILE))?;
-        {
-            let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some((of, summary)) = known.get(name)
-                && *of == stamp
-            {
-                return Some(summary.clone());
-            }
-        }
-        let summary = match read_manifest(&folder) {
-            Ok(manifest) => {
-                let index = read_index(&folder, &manifest);
-                summarise(name, &manifest, index.as_ref())
-            }
-            Err(reason) => unreadable(name, reason),
-        };
-        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        known.insert(name.to_owned(), (stamp, summary.clone()));
-        Some(summary)
+        let version = FileVersion::of(&folder.join(MANIFEST_FILE))?;
+        let key = (name.to_owned(), version);
+        let summary = self.summaries.get_or_make(key, |_| {
+            Ok::<_, Infallible>(match read_manifest(&folder) {
+                Ok(manifest) => {
+                    let index = read_index(&folder, &manifest);
+                    summarise(name, &manifest, index.as_ref())
+                }
+                Err(reason) => unreadable(name, reason),
+            })
+        });
+        summary.ok()
     }
 
     /// All about one session.
@@ -189,7 +194,7 @@ impl Library {
         let manifest = read_manifest(&folder).map_err(Failure::broken)?;
         let index = read_index(&folder, &manifest);
         let summary = summarise(id, &manifest, index.as_ref());
-        let json = manifest.to_json().map_err(|fault| fault.to_string());
+        let json = manifest.to_json().map_err(|error| with_causes(&error));
         let json = json
             .and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string()));
         let index = index.unwrap_or_default();
@@ -212,7 +217,7 @@ impl Library {
     }
 
     /// The video of a session that is not being recorded.
-    pub(super) fn footage(&self, id: &str) -> Result<Footage, Failure> {
+    pub(super) fn video_file(&self, id: &str) -> Result<VideoFile, Failure> {
         let folder = self.folder(id)?;
         let manifest = read_manifest(&folder).map_err(Failure::broken)?;
         if manifest.status == Status::Recording {
@@ -221,8 +226,8 @@ impl Library {
         }
         let path = folder.join(&manifest.video.file);
         let missing = || Failure::not_found(format!("the video of {id} is missing"));
-        let stamp = stamp(&path).ok_or_else(missing)?;
-        Ok(Footage { path, stamp })
+        let version = FileVersion::of(&path).ok_or_else(missing)?;
+        Ok(VideoFile { path, version })
     }
 
     /// A session's folder. A name with which one could leave the root is nobody's.
@@ -236,21 +241,15 @@ impl Library {
     }
 }
 
-/// `None` where there is no such file.
-fn stamp(path: &Path) -> Option<Stamp> {
-    let data = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
-    Some((data.len(), data.modified().ok()))
-}
-
 fn read_manifest(folder: &Path) -> Result<Manifest, String> {
     let bytes = fs::read(folder.join(MANIFEST_FILE))
         .map_err(|error| format!("its {MANIFEST_FILE} cannot be read: {error}"))?;
     Manifest::from_json(&bytes)
-        .map_err(|fault| format!("its {MANIFEST_FILE} is not usable: {fault}"))
+        .map_err(|error| format!("its {MANIFEST_FILE} is not usable: {}", with_causes(&error)))
 }
 
 /// The frame index of a session that has ended. A damaged one counts as none: the programs that need it
-/// tell what is wrong with it.
+/// say what is wrong with it.
 fn read_index(folder: &Path, manifest: &Manifest) -> Option<FrameIndex> {
     if manifest.status == Status::Recording {
         return None;

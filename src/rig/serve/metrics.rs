@@ -4,13 +4,16 @@ use std::fmt::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use axum::extract::State;
-use axum::http::{StatusCode, header};
+use axum::extract::{Request, State};
+use axum::http::header;
+use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use super::answer::Problem;
-use super::server::Server;
-use crate::state::{CameraState, Phase, RigState, TableState};
+use super::ClientLimits;
+use super::failure::Problem;
+use super::permits::Permits;
+use super::snapshots::Snapshots;
+use crate::state::{Phase, RigState};
 
 const PHASES: [Phase; 9] = [
     Phase::Idle,
@@ -24,19 +27,22 @@ const PHASES: [Phase; 9] = [
     Phase::WaitingForObject,
 ];
 
-/// Answers counted by the first digit of their status, 2 to 5.
+/// Responses, counted by the first digit of their status, 2 to 5.
 #[derive(Debug, Default)]
-pub(super) struct Counts {
-    answers: [AtomicU64; 4],
-}
+pub(super) struct Responses([AtomicU64; 4]);
 
-impl Counts {
-    pub(super) fn answered(&self, status: StatusCode) {
-        let class = usize::from(status.as_u16() / 100).saturating_sub(2);
-        if let Some(count) = self.answers.get(class) {
-            count.fetch_add(1, Ordering::Relaxed);
-        }
+/// Counts the response to a request.
+pub(super) async fn count(
+    State(responses): State<Arc<Responses>>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let response = next.run(request).await;
+    let class = usize::from(response.status().as_u16() / 100).saturating_sub(2);
+    if let Some(count) = responses.0.get(class) {
+        count.fetch_add(1, Ordering::Relaxed);
     }
+    response
 }
 
 /// Figures for Prometheus
@@ -47,142 +53,84 @@ impl Counts {
         (status = 401, body = Problem),
     )
 )]
-pub(super) async fn metrics(State(server): State<Arc<Server>>) -> Response {
+pub(super) async fn metrics(
+    State(snapshots): State<Snapshots>,
+    State(limits): State<ClientLimits>,
+    State(permits): State<Arc<Permits>>,
+    State(responses): State<Arc<Responses>>,
+) -> Response {
+    let snapshot = snapshots.newest();
     let mut page = Page::default();
-    rig(&mut page, &server.watcher.seen().state);
+    page.head(
+        "relit_phase",
+        "gauge",
+        "1 for the phase that the capture is in",
+    );
+    for phase in PHASES {
+        let name = serde_json::to_string(&phase).unwrap_or_default();
+        let labels = format!("{{phase={name}}}");
+        page.line("relit_phase", &labels, flag(phase == snapshot.state.phase));
+    }
+    page.gauges(&gauges(&snapshot.state));
     page.head("relit_http_responses_total", "counter", "Answers by class");
-    for (count, class) in server.counts.answers.iter().zip(2..) {
-        let label = format!("{{class=\"{class}xx\"}}");
-        page.line("relit_http_responses_total", &label, load(count));
+    for (count, class) in responses.0.iter().zip(2..) {
+        let labels = format!("{{class=\"{class}xx\"}}");
+        let count = count.load(Ordering::Relaxed) as f64;
+        page.line("relit_http_responses_total", &labels, count);
     }
-    let (limits, places) = (&server.limits, &server.places);
-    for (name, most, places) in [
-        ("connections", limits.connections, &places.connections),
-        ("viewers", limits.viewers, &places.viewers),
-        ("subscribers", limits.subscribers, &places.subscribers),
-    ] {
-        let taken = most.saturating_sub(places.available_permits());
-        let name = format!("relit_http_{name}");
-        page.gauge(&name, "Clients now", Some(taken as f64));
-    }
+    let clients = |most: usize, permits: &tokio::sync::Semaphore| {
+        Some(most.saturating_sub(permits.available_permits()) as f64)
+    };
+    let connections = clients(limits.connections, &permits.connections);
+    let viewers = clients(limits.viewers, &permits.viewers);
+    let subscribers = clients(limits.subscribers, &permits.subscribers);
+    page.gauges(&[
+        ("relit_http_connections", "Clients now", connections),
+        ("relit_http_viewers", "Clients now", viewers),
+        ("relit_http_subscribers", "Clients now", subscribers),
+    ]);
     let kind = "text/plain; version=0.0.4; charset=utf-8";
     ([(header::CONTENT_TYPE, kind)], page.0).into_response()
 }
 
-fn rig(page: &mut Page, state: &RigState) {
-    let help = "1 for the phase that the capture is in";
-    page.head("relit_phase", "gauge", help);
-    for phase in PHASES {
-        let name = serde_json::to_string(&phase).unwrap_or_default();
-        let here = f64::from(u8::from(phase == state.phase));
-        page.line("relit_phase", &format!("{{phase={name}}}"), here);
-    }
-    take(page, state);
-    table(page, &state.table);
-    camera(page, &state.camera);
+/// Name, meaning and value; a value that is not known is left out.
+type Gauge = (&'static str, &'static str, Option<f64>);
+
+#[rustfmt::skip]
+fn gauges(state: &RigState) -> [Gauge; 20] {
+    let whole = |value: u64| Some(value as f64);
+    let yes = |is: bool| Some(flag(is));
+    let (table, camera) = (&state.table, &state.camera);
+    let last = state.last_take.as_ref();
+    let frames = "Frames written";
+    let missing = "Frames missing";
+    let faulty = "1 where something is wrong";
+    [
+        ("relit_take_frames", frames, whole(state.frames)),
+        ("relit_take_frames_wanted", "Frames of a whole take", whole(state.frames_wanted)),
+        ("relit_take_frames_dropped", missing, whole(state.dropped)),
+        ("relit_last_take_frames", frames, last.map(|take| take.frames as f64)),
+        ("relit_last_take_frames_dropped", missing, last.map(|take| take.dropped as f64)),
+        ("relit_queue_objects", "Objects that wait", whole(state.queue.len() as u64)),
+        ("relit_faults_shown", "Faults in the list", whole(state.faults.len() as u64)),
+        ("relit_disk_free_bytes", "Space for sessions", whole(state.free_bytes)),
+        ("relit_disk_needed_bytes", "Expected size of a take", whole(state.needed_bytes)),
+        ("relit_table_present", "1 where there is a table", yes(table.present)),
+        ("relit_table_homed", "1 where its zero is known", yes(table.homed)),
+        ("relit_table_faulty", faulty, yes(table.fault.is_some())),
+        ("relit_table_angle_degrees", "From machine zero", table.angle_deg),
+        ("relit_table_degrees_per_second", "Speed", table.degrees_per_second),
+        ("relit_table_battery_volts", "Battery", table.battery_v),
+        ("relit_camera_present", "1 where it can be reached", yes(camera.present)),
+        ("relit_camera_faulty", faulty, yes(camera.fault.is_some())),
+        ("relit_camera_frames_per_second", "Over the last second", camera.fps),
+        ("relit_camera_clipped_ratio", "Clipped pixels, 0 to 1", camera.clipped),
+        ("relit_camera_focus", "Variance of the Laplacian", camera.focus),
+    ]
 }
 
-fn take(page: &mut Page, state: &RigState) {
-    let mut count = |name, help, value| page.gauge(name, help, Some(value as f64));
-    let (frames, dropped) = ("Frames written", "Frames missing");
-    count("relit_take_frames", frames, state.frames);
-    count(
-        "relit_take_frames_wanted",
-        "Frames of a whole take",
-        state.frames_wanted,
-    );
-    count("relit_take_frames_dropped", dropped, state.dropped);
-    if let Some(last) = &state.last_take {
-        count("relit_last_take_frames", frames, last.frames);
-        count("relit_last_take_frames_dropped", dropped, last.dropped);
-    }
-    count(
-        "relit_queue_objects",
-        "Objects that wait",
-        state.queue.len() as u64,
-    );
-    count(
-        "relit_faults_shown",
-        "Faults in the list",
-        state.faults.len() as u64,
-    );
-    count(
-        "relit_disk_free_bytes",
-        "Room for sessions",
-        state.free_bytes,
-    );
-    count(
-        "relit_disk_needed_bytes",
-        "Expected size of a take",
-        state.needed_bytes,
-    );
-}
-
-fn table(page: &mut Page, table: &TableState) {
-    let mut gauge = |name, help, value| page.gauge(name, help, value);
-    gauge(
-        "relit_table_present",
-        "1 where there is a table",
-        yes(table.present),
-    );
-    gauge(
-        "relit_table_homed",
-        "1 where its zero is known",
-        yes(table.homed),
-    );
-    gauge(
-        "relit_table_faulty",
-        "1 where something is wrong",
-        yes(table.fault.is_some()),
-    );
-    gauge(
-        "relit_table_angle_degrees",
-        "From machine zero",
-        table.angle_deg,
-    );
-    gauge(
-        "relit_table_degrees_per_second",
-        "Speed",
-        table.degrees_per_second,
-    );
-    gauge("relit_table_battery_volts", "Battery", table.battery_v);
-}
-
-fn camera(page: &mut Page, camera: &CameraState) {
-    let mut gauge = |name, help, value| page.gauge(name, help, value);
-    gauge(
-        "relit_camera_present",
-        "1 where it can be reached",
-        yes(camera.present),
-    );
-    gauge(
-        "relit_camera_faulty",
-        "1 where something is wrong",
-        yes(camera.fault.is_some()),
-    );
-    gauge(
-        "relit_camera_frames_per_second",
-        "Over the last second",
-        camera.fps,
-    );
-    gauge(
-        "relit_camera_clipped_ratio",
-        "Clipped pixels, 0 to 1",
-        camera.clipped,
-    );
-    gauge(
-        "relit_camera_focus",
-        "Variance of the Laplacian",
-        camera.focus,
-    );
-}
-
-fn yes(is: bool) -> Option<f64> {
-    Some(f64::from(u8::from(is)))
-}
-
-fn load(count: &AtomicU64) -> f64 {
-    count.load(Ordering::Relaxed) as f64
+fn flag(is: bool) -> f64 {
+    f64::from(u8::from(is))
 }
 
 #[derive(Default)]
@@ -198,11 +146,12 @@ impl Page {
         let _ = writeln!(self.0, "{name}{labels} {value}");
     }
 
-    /// A figure that is not known is left out.
-    fn gauge(&mut self, name: &str, help: &str, value: Option<f64>) {
-        if let Some(value) = value {
-            self.head(name, "gauge", help);
-            self.line(name, "", value);
+    fn gauges(&mut self, gauges: &[Gauge]) {
+        for (name, help, value) in gauges {
+            if let Some(value) = value {
+                self.head(name, "gauge", help);
+                self.line(name, "", *value);
+            }
         }
     }
 }

@@ -1,38 +1,35 @@
 //! The rig over HTTP: a page for the phone beside the turntable, the same as JSON for scripts, and
 //! figures for Prometheus.
 //!
-//! It stands on [`Rig`]: it hands commands on, shows what the [`Monitor`](super::state::Monitor)
+//! It stands on [`rig::Rig`]: it hands commands on, shows what the [`Monitor`]
 //! holds and reads what lies in the session folder. It knows nothing of cameras, tables or how a
-//! capture goes. The capture is never held up by it: one task looks at the monitor ten times a
-//! second (thirty times for the picture) whatever the number of viewers, its threads give way to all
-//! others of the process, and whatever a client can ask for is bounded in number, size and time.
+//! capture goes. The capture is never held up by it: one task reads the state, at most ten times a
+//! second whatever the number of clients, its threads give way to all others of the process, and
+//! whatever a client can ask for is bounded in number, size and time.
 //!
 //! Who may do what: without a token only programs on this machine get in, and no web page but this
 //! one. Everywhere else a token of 128 random bits is demanded; the page's own files alone go
 //! without, as they hold nothing of the rig.
 
+mod access;
 mod address;
-mod answer;
 mod api;
-mod body;
+mod cache;
+mod extract;
+mod failure;
 mod files;
-mod gate;
 mod library;
 mod listen;
 mod metrics;
-mod openapi;
 mod page;
+mod permits;
 mod pictures;
 mod preview;
-mod recent;
+pub mod rig;
 mod routes;
-mod server;
-mod service;
 mod sessions;
-mod shutdown;
-mod stalling;
+mod snapshots;
 mod token;
-mod watcher;
 
 #[cfg(test)]
 mod tests;
@@ -42,12 +39,13 @@ use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::time::Duration;
 
-pub use self::address::Announcement;
-pub use self::service::ServiceManager;
-pub use self::shutdown::Shutdown;
-pub use self::token::{BadToken, Token};
-pub mod rig;
+use tokio::time::{MissedTickBehavior, interval};
+/// Asks a server to end, from any thread. Copies ask the same server.
+pub use tokio_util::sync::CancellationToken as Shutdown;
 
+pub use self::address::Announcement;
+pub use self::token::{InvalidToken, Token, TokenFileError};
+use crate::state::Monitor;
 use rig::Rig;
 
 /// Threads that carry requests; files and decoding have their own.
@@ -69,10 +67,10 @@ pub struct ServeOptions {
     /// Names, without port, under which clients reach this machine besides its addresses, such as
     /// `rig.local`. The first one stands in the announced URL.
     pub names: Vec<String>,
-    /// The service manager that is told of the start, of being alive and of the end.
-    pub service: Option<ServiceManager>,
+    /// Called all the time while the server is alive.
+    pub heartbeat: Option<Heartbeat>,
     /// What clients may take up.
-    pub limits: Limits,
+    pub limits: ClientLimits,
 }
 
 impl ServeOptions {
@@ -83,15 +81,24 @@ impl ServeOptions {
             address,
             token: None,
             names: Vec::new(),
-            service: None,
-            limits: Limits::default(),
+            heartbeat: None,
+            limits: ClientLimits::default(),
         }
     }
 }
 
+/// How a supervisor, such as the service manager, learns that the server is alive.
+#[derive(Debug, Clone, Copy)]
+pub struct Heartbeat {
+    /// Time between two beats.
+    pub period: Duration,
+    /// Called while requests are worked on and the rig's state can be read.
+    pub beat: fn(),
+}
+
 /// What all clients together may take up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Limits {
+pub struct ClientLimits {
     /// Connections at once; further ones wait to be accepted.
     pub connections: usize,
     /// Requests for the preview at once.
@@ -106,7 +113,7 @@ pub struct Limits {
     pub stall: Duration,
 }
 
-impl Default for Limits {
+impl Default for ClientLimits {
     fn default() -> Self {
         Self {
             connections: 256,
@@ -138,17 +145,10 @@ pub enum ServeError {
     /// No random numbers for a token.
     #[error("the system gave no random numbers for a token: {0}; give a token yourself")]
     Random(io::Error),
-    /// The service manager cannot be told.
-    #[error("the service manager at {socket} could not be told of the start: {source}")]
-    Service {
-        /// Its socket.
-        socket: String,
-        /// The system's answer.
-        source: io::Error,
-    },
 }
 
-/// Serves the rig until `shutdown` is asked for. `announce` is called once, when clients can connect.
+/// Serves the rig until `shutdown` is cancelled; it ends within a few seconds then. `announce` is called
+/// once, when clients can connect.
 ///
 /// # Errors
 /// [`ServeError`] where it cannot begin; later troubles concern single clients only.
@@ -181,17 +181,32 @@ pub fn serve(
         .build()
         .map_err(ServeError::Threads)?;
     let announcement = Announcement::new(address, &options.names, token.as_ref());
-    let door = gate::Door::new(address.port(), token, options.names);
-    let server = server::Server::new(rig, door, options.limits, shutdown.clone());
+    let policy = access::AccessPolicy::new(address.port(), token, options.names, page::paths());
+    let app = routes::App::new(rig, policy, options.limits, shutdown.clone());
     let served = runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(failed)?;
-        service::tell_ready(options.service.as_ref(), &announcement)?;
         announce(&announcement);
-        listen::run(listener, Arc::new(server), options.service).await;
+        tokio::spawn(app.snapshots.clone().follow());
+        if let Some(heartbeat) = options.heartbeat {
+            tokio::spawn(beat(heartbeat, app.monitor.clone()));
+        }
+        listen::run(listener, &app).await;
         Ok(())
     });
     runtime.shutdown_timeout(GRACE);
     served
+}
+
+/// Beats for as long as the server runs: that this goes on means that threads run and the monitor's
+/// locks come free.
+async fn beat(heartbeat: Heartbeat, monitor: Monitor) {
+    let mut ticks = interval(heartbeat.period);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        ticks.tick().await;
+        let _readable = monitor.state();
+        (heartbeat.beat)();
+    }
 }
 
 /// Lets every other thread of the process go first. Linux keeps this value for each thread; where the

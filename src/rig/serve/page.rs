@@ -7,8 +7,8 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Redirect, Response};
 use serde::Deserialize;
 
-use super::body::Asked;
-use super::server::Server;
+use super::access::AccessPolicy;
+use super::extract::QueryParams;
 
 const INDEX: &str = include_str!("page/index.html");
 
@@ -24,37 +24,21 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// All files but the page itself.
 pub(super) const ASSETS: [Asset; 6] = [
-    Asset {
-        path: "/page.css",
-        kind: "text/css; charset=utf-8",
-        text: include_str!("page/page.css"),
-    },
-    Asset {
-        path: "/page.js",
-        kind: SCRIPT,
-        text: include_str!("page/page.js"),
-    },
-    Asset {
-        path: "/link.js",
-        kind: SCRIPT,
-        text: include_str!("page/link.js"),
-    },
-    Asset {
-        path: "/preview.js",
-        kind: SCRIPT,
-        text: include_str!("page/preview.js"),
-    },
-    Asset {
-        path: "/sessions.js",
-        kind: SCRIPT,
-        text: include_str!("page/sessions.js"),
-    },
-    Asset {
-        path: "/icon.svg",
-        kind: "image/svg+xml",
-        text: include_str!("page/icon.svg"),
-    },
+    asset(
+        "/page.css",
+        "text/css; charset=utf-8",
+        include_str!("page/page.css"),
+    ),
+    asset("/page.js", SCRIPT, include_str!("page/page.js")),
+    asset("/link.js", SCRIPT, include_str!("page/link.js")),
+    asset("/preview.js", SCRIPT, include_str!("page/preview.js")),
+    asset("/sessions.js", SCRIPT, include_str!("page/sessions.js")),
+    asset("/icon.svg", "image/svg+xml", include_str!("page/icon.svg")),
 ];
+
+const fn asset(path: &'static str, kind: &'static str, text: &'static str) -> Asset {
+    Asset { path, kind, text }
+}
 
 impl Asset {
     pub(super) fn answer(&self) -> Response {
@@ -62,9 +46,10 @@ impl Asset {
     }
 }
 
-/// Whether a path is one of the page's files, which hold nothing of the rig and need no token.
-pub(super) fn is_open(path: &str) -> bool {
-    path == "/" || ASSETS.iter().any(|asset| asset.path == path)
+/// The paths of the page and its files, which hold nothing of the rig and need no token.
+pub(super) fn paths() -> Vec<&'static str> {
+    let assets = ASSETS.iter().map(|asset| asset.path);
+    assets.chain(["/"]).collect()
 }
 
 /// The token, as it stands in the address that is printed at the start.
@@ -76,15 +61,15 @@ pub(super) struct Entry {
 /// The page. With a token in the URL, the browser gets it as a cookie and goes on to the URL without it, so
 /// that it stays out of history and bookmarks.
 pub(super) async fn index(
-    State(server): State<Arc<Server>>,
-    Asked(Entry { token }): Asked<Entry>,
+    State(policy): State<Arc<AccessPolicy>>,
+    QueryParams(Entry { token }): QueryParams<Entry>,
 ) -> Response {
     let page = [(header::CONTENT_TYPE, "text/html; charset=utf-8")];
     match token {
         None => (page, INDEX).into_response(),
-        Some(given) => match server.door.cookie_for(&given) {
+        Some(given) => match policy.cookie_for(&given) {
             Some(cookie) => ([(header::SET_COOKIE, cookie)], Redirect::to("/")).into_response(),
-            None if server.door.is_open() => Redirect::to("/").into_response(),
+            None if policy.is_open() => Redirect::to("/").into_response(),
             None => (StatusCode::UNAUTHORIZED, page, INDEX).into_response(),
         },
     }

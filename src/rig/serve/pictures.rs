@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use axum::body::Bytes;
 use image::codecs::jpeg::JpegEncoder;
-use image::{ExtendedColorType, RgbImage, imageops};
-
-use super::answer::Failure;
-use super::library::Footage;
-use super::recent::Recent;
+use image::{RgbImage, imageops};
+use relit_data::causes::with_causes;
 use relit_video::Video;
+
+use super::cache::Cache;
+use super::failure::Failure;
+use super::library::VideoFile;
 
 /// Width of a thumbnail, pixels.
 const THUMBNAIL: u32 = 192;
@@ -25,62 +26,43 @@ const THUMBNAILS: usize = 512;
 /// Makes pictures, and keeps those that were asked for last.
 #[derive(Debug)]
 pub(super) struct Pictures {
-    videos: Recent<Footage, Arc<Video>>,
-    frames: Recent<(Footage, u64, u32), Bytes>,
-    thumbnails: Recent<Footage, Bytes>,
+    videos: Cache<VideoFile, Arc<Video>>,
+    frames: Cache<(VideoFile, u64, u32), Bytes>,
+    thumbnails: Cache<VideoFile, Bytes>,
 }
 
 impl Pictures {
     pub(super) fn new() -> Self {
         Self {
-            videos: Recent::new(VIDEOS),
-            frames: Recent::new(FRAMES),
-            thumbnails: Recent::new(THUMBNAILS),
+            videos: Cache::new(VIDEOS),
+            frames: Cache::new(FRAMES),
+            thumbnails: Cache::new(THUMBNAILS),
         }
     }
 
     /// The video's first frame, small. Reads no more of the file than that frame.
-    pub(super) fn thumbnail(&self, footage: Footage) -> Result<Bytes, Failure> {
-        if let Some(known) = self.thumbnails.get(&footage) {
-            return Ok(known);
-        }
-        let picture = relit_video::first_picture(&footage.path).map_err(failed)?;
-        let jpeg = encode(&picture, THUMBNAIL)?;
-        self.thumbnails.put(footage, jpeg.clone());
-        Ok(jpeg)
+    pub(super) fn thumbnail(&self, file: VideoFile) -> Result<Bytes, Failure> {
+        self.thumbnails.get_or_make(file, |file| {
+            let picture = relit_video::first_picture(&file.path).map_err(failed)?;
+            encode(&picture, THUMBNAIL)
+        })
     }
 
     /// Frame `number`, at most `width` pixels wide.
-    pub(super) fn frame(
-        &self,
-        footage: Footage,
-        number: u64,
-        width: u32,
-    ) -> Result<Bytes, Failure> {
-        let key = (footage, number, width);
-        if let Some(known) = self.frames.get(&key) {
-            return Ok(known);
-        }
-        let picture = self.video(&key.0)?.frame(number).map_err(failed)?;
-        let jpeg = encode(&picture, width)?;
-        self.frames.put(key, jpeg.clone());
-        Ok(jpeg)
-    }
-
-    fn video(&self, footage: &Footage) -> Result<Arc<Video>, Failure> {
-        if let Some(known) = self.videos.get(footage) {
-            return Ok(known);
-        }
-        let video = Arc::new(Video::open(&footage.path).map_err(failed)?);
-        self.videos.put(footage.clone(), video.clone());
-        Ok(video)
+    pub(super) fn frame(&self, file: VideoFile, number: u64, width: u32) -> Result<Bytes, Failure> {
+        self.frames
+            .get_or_make((file, number, width), |(file, ..)| {
+                let open = |file: &VideoFile| Video::open(&file.path).map(Arc::new).map_err(failed);
+                let video = self.videos.get_or_make(file.clone(), open)?;
+                encode(&video.frame(number).map_err(failed)?, width)
+            })
     }
 }
 
-fn failed(error: relit_video::Error) -> Failure {
+fn failed(error: relit_video::VideoError) -> Failure {
     match error {
-        relit_video::Error::NoSuchFrame { .. } => Failure::not_found(error.to_string()),
-        _ => Failure::broken(error.to_string()),
+        relit_video::VideoError::NoSuchFrame { .. } => Failure::not_found(with_causes(&error)),
+        _ => Failure::broken(with_causes(&error)),
     }
 }
 
@@ -94,12 +76,7 @@ fn encode(picture: &RgbImage, width: u32) -> Result<Bytes, Failure> {
     let picture = scaled.as_ref().unwrap_or(picture);
     let mut jpeg = Vec::new();
     JpegEncoder::new_with_quality(&mut jpeg, QUALITY)
-        .encode(
-            picture.as_raw(),
-            picture.width(),
-            picture.height(),
-            ExtendedColorType::Rgb8,
-        )
+        .encode_image(picture)
         .map_err(|error| Failure::broken(format!("the picture cannot be encoded: {error}")))?;
     Ok(jpeg.into())
 }

@@ -13,10 +13,11 @@ use tokio::sync::{OwnedSemaphorePermit, watch};
 use tokio::time::{Instant, sleep_until, timeout};
 use utoipa::IntoParams;
 
-use super::answer::{Failure, Problem};
-use super::body::Asked;
-use super::server::{Server, place};
-use crate::state::PreviewFrame;
+use super::Shutdown;
+use super::extract::QueryParams;
+use super::failure::{Failure, Problem};
+use super::permits::{Permits, permit};
+use crate::state::{Monitor, PreviewFrame};
 
 /// Shortest time between two pictures of a stream: 15 a second.
 const PERIOD: Duration = Duration::from_millis(66);
@@ -48,23 +49,23 @@ pub(super) struct After {
     )
 )]
 pub(super) async fn picture(
-    State(server): State<Arc<Server>>,
-    Asked(After { after }): Asked<After>,
+    State(monitor): State<Monitor>,
+    State(permits): State<Arc<Permits>>,
+    State(shutdown): State<Shutdown>,
+    QueryParams(After { after }): QueryParams<After>,
 ) -> Result<Response, Failure> {
     let Some(after) = after else {
         let none = || Failure::busy("there is no picture yet: the camera has not delivered one");
-        return Ok(jpeg(server.watcher.picture().ok_or_else(none)?));
+        return Ok(jpeg(monitor.preview().ok_or_else(none)?));
     };
-    let _place = place(&server.places.viewers, VIEWERS)?;
-    let mut pictures = server.watcher.pictures();
+    let _permit = permit(&permits.viewers, VIEWERS)?;
+    let mut pictures = monitor.pictures();
     let newer = pictures.wait_for(|picture| {
         let number = picture.as_ref().map(|picture| picture.number);
         number.is_some_and(|number| number != after)
     });
-    let newer = tokio::select! {
-        newer = timeout(WAIT, newer) => newer.ok().and_then(Result::ok).and_then(|found| found.clone()),
-        () = server.closing() => None,
-    };
+    let newer = shutdown.run_until_cancelled(timeout(WAIT, newer)).await;
+    let newer = newer.and_then(|waited| waited.ok()?.ok()?.clone());
     Ok(newer.map_or_else(|| StatusCode::NO_CONTENT.into_response(), jpeg))
 }
 
@@ -88,13 +89,17 @@ fn jpeg(picture: PreviewFrame) -> Response {
         (status = 503, description = "Too many viewers", body = Problem),
     )
 )]
-pub(super) async fn stream(State(server): State<Arc<Server>>) -> Result<Response, Failure> {
-    let mut pictures = server.watcher.pictures();
+pub(super) async fn stream(
+    State(monitor): State<Monitor>,
+    State(permits): State<Arc<Permits>>,
+    State(shutdown): State<Shutdown>,
+) -> Result<Response, Failure> {
+    let mut pictures = monitor.pictures();
     pictures.mark_changed();
     let viewer = Viewer {
         pictures,
         next: Instant::now(),
-        _place: place(&server.places.viewers, VIEWERS)?,
+        _permit: permit(&permits.viewers, VIEWERS)?,
     };
     // The boundary that ends a part is sent with it, so that the browser shows it at once.
     let opening = stream::iter([Ok::<_, axum::Error>(Bytes::from_static(b"--picture\r\n"))]);
@@ -102,7 +107,7 @@ pub(super) async fn stream(State(server): State<Arc<Server>>) -> Result<Response
         let part = viewer.part().await?;
         Some((Ok(part), viewer))
     });
-    let body = opening.chain(parts).take_until(server.closing());
+    let body = opening.chain(parts).take_until(shutdown.cancelled_owned());
     let kind = "multipart/x-mixed-replace; boundary=picture";
     Ok(([(header::CONTENT_TYPE, kind)], Body::from_stream(body)).into_response())
 }
@@ -111,7 +116,7 @@ struct Viewer {
     pictures: watch::Receiver<Option<PreviewFrame>>,
     /// When the next picture may be sent.
     next: Instant,
-    _place: OwnedSemaphorePermit,
+    _permit: OwnedSemaphorePermit,
 }
 
 impl Viewer {

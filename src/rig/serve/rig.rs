@@ -30,9 +30,17 @@ pub enum Command {
     Dequeue {
         /// Its place, 0 is next.
         place: usize,
+        /// The object that is meant: where another one stands there by now, the command is refused.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        object: Option<String>,
     },
-    /// The next object of the queue stands on the table: captures it.
-    Next,
+    /// The next object of the queue stands on the table: captures it. It leaves the queue when its take
+    /// is usable.
+    Next {
+        /// The object that is meant: where another one is next by now, the command is refused.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        object: Option<String>,
+    },
     /// Finds the table's zero.
     Home,
     /// Turns the table by so many degrees.

@@ -1,66 +1,141 @@
-//! Which path leads where.
+//! Which path leads where, and what the handlers share.
 
 use std::sync::Arc;
 
-use axum::Router;
-use axum::extract::Request;
+use axum::extract::{FromRef, Request};
 use axum::http::StatusCode;
 use axum::middleware::from_fn_with_state;
-use axum::routing::{MethodRouter, get, post};
+use axum::routing::get;
+use axum::{Json, Router};
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
+use utoipa::openapi::{Components, InfoBuilder, OpenApi, OpenApiBuilder};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
 
-use super::answer::Failure;
-use super::server::Server;
-use super::{api, files, gate, metrics, openapi, page, preview, sessions};
+use super::access::{AccessPolicy, guard};
+use super::failure::Failure;
+use super::library::Library;
+use super::metrics::Responses;
+use super::permits::Permits;
+use super::pictures::Pictures;
+use super::rig::Rig;
+use super::snapshots::Snapshots;
+use super::{ClientLimits, Shutdown, api, files, metrics, page, preview, sessions};
+use crate::state::Monitor;
 
-/// The interface for programs.
-pub(super) fn interface() -> [(&'static str, MethodRouter<Arc<Server>>); 13] {
-    [
-        ("/api/v1/state", get(api::state)),
-        ("/api/v1/events", get(api::events)),
-        ("/api/v1/command", post(api::command)),
-        ("/api/v1/preview.jpg", get(preview::picture)),
-        ("/api/v1/preview.mjpg", get(preview::stream)),
-        ("/api/v1/sessions", get(sessions::list)),
-        ("/api/v1/sessions/{id}", get(sessions::detail)),
-        (
-            "/api/v1/sessions/{id}/thumbnail.jpg",
-            get(sessions::thumbnail),
-        ),
-        ("/api/v1/sessions/{id}/frames/{frame}", get(sessions::frame)),
-        ("/api/v1/sessions/{id}/video", get(files::video)),
-        ("/api/v1/objects", get(sessions::objects)),
-        ("/api/v1/openapi.json", get(openapi::document)),
-        ("/metrics", get(metrics::metrics)),
-    ]
+/// What all requests share; each handler takes the parts that it needs.
+#[derive(Clone, FromRef)]
+pub(super) struct App {
+    pub(super) rig: Arc<dyn Rig>,
+    pub(super) monitor: Monitor,
+    pub(super) snapshots: Snapshots,
+    pub(super) policy: Arc<AccessPolicy>,
+    pub(super) limits: ClientLimits,
+    pub(super) permits: Arc<Permits>,
+    pub(super) library: Arc<Library>,
+    pub(super) pictures: Arc<Pictures>,
+    pub(super) responses: Arc<Responses>,
+    pub(super) shutdown: Shutdown,
+}
+
+impl App {
+    pub(super) fn new(
+        rig: Arc<dyn Rig>,
+        policy: AccessPolicy,
+        limits: ClientLimits,
+        shutdown: Shutdown,
+    ) -> Self {
+        Self {
+            monitor: rig.monitor().clone(),
+            snapshots: Snapshots::new(rig.monitor()),
+            policy: Arc::new(policy),
+            limits,
+            permits: Arc::new(Permits::new(&limits)),
+            library: Arc::new(Library::new(rig.root().to_owned())),
+            pictures: Arc::new(Pictures::new()),
+            responses: Arc::default(),
+            shutdown,
+            rig,
+        }
+    }
+}
+
+/// The interface for programs, with its description.
+pub(super) fn interface() -> OpenApiRouter<App> {
+    OpenApiRouter::with_openapi(description())
+        .routes(routes!(api::state))
+        .routes(routes!(api::events))
+        .routes(routes!(api::command))
+        .routes(routes!(preview::picture))
+        .routes(routes!(preview::stream))
+        .routes(routes!(sessions::list))
+        .routes(routes!(sessions::detail))
+        .routes(routes!(sessions::thumbnail))
+        .routes(routes!(sessions::frame))
+        .routes(routes!(sessions::objects))
+        .routes(routes!(files::video))
+        .routes(routes!(metrics::metrics))
+        .routes(routes!(document))
+}
+
+/// This description
+#[utoipa::path(
+    get, path = "/api/v1/openapi.json", tag = "description",
+    responses((status = 200, description = "OpenAPI 3.1", content_type = "application/json"))
+)]
+async fn document() -> Json<OpenApi> {
+    Json(interface().into_openapi())
+}
+
+/// What the description says besides the paths.
+fn description() -> OpenApi {
+    let token = HttpBuilder::new()
+        .scheme(HttpAuthScheme::Bearer)
+        .description(Some("Demanded on every address but loopback."))
+        .build();
+    let mut components = Components::new();
+    components.add_security_scheme("token", SecurityScheme::Http(token));
+    let none: [&str; 0] = [];
+    OpenApiBuilder::new()
+        .info(
+            InfoBuilder::new()
+                .title("relit-capture")
+                .version(env!("CARGO_PKG_VERSION"))
+                .description(Some(
+                    "A turntable rig: its state, commands to it, and what it recorded.",
+                ))
+                .build(),
+        )
+        .components(Some(components))
+        .security(Some([SecurityRequirement::new("token", none)]))
+        .build()
 }
 
 /// Everything that is served.
-pub(super) fn router(server: &Arc<Server>) -> Router {
-    let mut router = Router::new().route("/", get(page::index));
+pub(super) fn router(app: &App) -> Router {
+    let mut router = Router::from(interface()).route("/", get(page::index));
     for asset in &page::ASSETS {
         router = router.route(asset.path, get(async || asset.answer()));
     }
-    for (path, methods) in interface() {
-        router = router.route(path, methods);
-    }
     router
-        .fallback(nothing_here)
-        .method_not_allowed_fallback(not_so)
-        .layer(from_fn_with_state(server.clone(), gate::pass))
-        .with_state(server.clone())
+        .fallback(no_such_path)
+        .method_not_allowed_fallback(no_such_method)
+        .layer(from_fn_with_state(app.clone(), guard))
+        .layer(from_fn_with_state(app.clone(), metrics::count))
+        .with_state(app.clone())
 }
 
-async fn nothing_here(request: Request) -> Failure {
+async fn no_such_path(request: Request) -> Failure {
     let path = request.uri().path();
     Failure::not_found(format!(
-        "there is nothing at {path}: /api/v1/openapi.json tells what there is"
+        "there is nothing at {path}: /api/v1/openapi.json describes what there is"
     ))
 }
 
-async fn not_so(request: Request) -> Failure {
+async fn no_such_method(request: Request) -> Failure {
     let (method, path) = (request.method(), request.uri().path());
     let error = format!(
-        "{path} cannot be asked with {method}: /api/v1/openapi.json tells with what it can"
+        "{path} cannot be asked with {method}: /api/v1/openapi.json describes with what it can"
     );
     Failure::new(StatusCode::METHOD_NOT_ALLOWED, error)
 }

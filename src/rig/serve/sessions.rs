@@ -9,10 +9,11 @@ use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use utoipa::IntoParams;
 
-use super::answer::{Failure, Problem};
-use super::body::Asked;
-use super::library::{SessionDetail, SessionSummary};
-use super::server::{Server, Work};
+use super::extract::QueryParams;
+use super::failure::{Failure, Problem};
+use super::library::{Library, SessionDetail, SessionSummary};
+use super::permits::{Permits, Work};
+use super::pictures::Pictures;
 
 /// Sessions in one answer, unless asked otherwise, and at most.
 const SESSIONS: usize = 100;
@@ -41,13 +42,12 @@ pub(super) struct Part {
     responses((status = 200, body = [SessionSummary]), (status = 401, body = Problem))
 )]
 pub(super) async fn list(
-    State(server): State<Arc<Server>>,
-    Asked(Part { before, limit }): Asked<Part>,
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
+    QueryParams(Part { before, limit }): QueryParams<Part>,
 ) -> Result<Json<Vec<SessionSummary>>, Failure> {
     let most = limit.unwrap_or(SESSIONS).min(MOST_SESSIONS);
-    let list = server.block_on(Work::Listing, move |server| {
-        server.library.list(before.as_deref(), most)
-    });
+    let list = permits.run(Work::Listing, move || library.list(before.as_deref(), most));
     Ok(Json(list.await?))
 }
 
@@ -61,10 +61,11 @@ pub(super) async fn list(
     )
 )]
 pub(super) async fn detail(
-    State(server): State<Arc<Server>>,
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
 ) -> Result<Json<SessionDetail>, Failure> {
-    let detail = server.block_on(Work::Listing, move |server| server.library.detail(&id));
+    let detail = permits.run(Work::Listing, move || library.detail(&id));
     Ok(Json(detail.await?))
 }
 
@@ -80,11 +81,13 @@ pub(super) async fn detail(
     )
 )]
 pub(super) async fn thumbnail(
-    State(server): State<Arc<Server>>,
+    State(library): State<Arc<Library>>,
+    State(pictures): State<Arc<Pictures>>,
+    State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
 ) -> Result<Response, Failure> {
-    let jpeg = server.block_on(Work::Decoding, move |server| {
-        server.pictures.thumbnail(server.library.footage(&id)?)
+    let jpeg = permits.run(Work::Decoding, move || {
+        pictures.thumbnail(library.video_file(&id)?)
     });
     Ok(picture(jpeg.await?))
 }
@@ -113,17 +116,18 @@ pub(super) struct Size {
     )
 )]
 pub(super) async fn frame(
-    State(server): State<Arc<Server>>,
+    State(library): State<Arc<Library>>,
+    State(pictures): State<Arc<Pictures>>,
+    State(permits): State<Arc<Permits>>,
     Path((id, frame)): Path<(String, String)>,
-    Asked(Size { width }): Asked<Size>,
+    QueryParams(Size { width }): QueryParams<Size>,
 ) -> Result<Response, Failure> {
     let number = frame.strip_suffix(".jpg").and_then(|n| n.parse().ok());
     let unknown = || Failure::not_found("there is no such frame: ask for a number and \".jpg\"");
     let number: u64 = number.ok_or_else(unknown)?;
     let width = width.unwrap_or(WIDTH).clamp(*WIDTHS.start(), *WIDTHS.end());
-    let jpeg = server.block_on(Work::Decoding, move |server| {
-        let footage = server.library.footage(&id)?;
-        server.pictures.frame(footage, number, width)
+    let jpeg = permits.run(Work::Decoding, move || {
+        pictures.frame(library.video_file(&id)?, number, width)
     });
     Ok(picture(jpeg.await?))
 }
@@ -142,8 +146,9 @@ fn picture(jpeg: axum::body::Bytes) -> Response {
     responses((status = 200, body = [String]), (status = 401, body = Problem))
 )]
 pub(super) async fn objects(
-    State(server): State<Arc<Server>>,
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
 ) -> Result<Json<Vec<String>>, Failure> {
-    let objects = server.block_on(Work::Listing, |server| server.library.objects(OBJECTS));
+    let objects = permits.run(Work::Listing, move || library.objects(OBJECTS));
     Ok(Json(objects.await?))
 }

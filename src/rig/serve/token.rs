@@ -1,7 +1,10 @@
 //! The secret that lets a client in.
 
 use std::fmt;
-use std::io;
+use std::fs::File;
+use std::io::{self, Read};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use rustix::rand::{GetRandomFlags, getrandom};
@@ -15,10 +18,46 @@ const LENGTHS: std::ops::RangeInclusive<usize> = 16..=128;
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 
+/// Longest file that can hold a token, bytes.
+const LONGEST_FILE: u64 = 256;
+/// Permissions that a token's file must not give: to others any, to its group writing.
+const FORBIDDEN: u32 = 0o027;
+
 /// Why a text is no token.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("a token has 16 to 128 letters a-z, digits, '-' and '_': leave it out to get a random one")]
-pub struct BadToken;
+pub struct InvalidToken;
+
+/// Why a file gives no token.
+#[derive(Debug, thiserror::Error)]
+pub enum TokenFileError {
+    /// It cannot be read.
+    #[error("the token's file {path} could not be read")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// Other accounts can read or change it.
+    #[error(
+        "the token's file {path} is open to other accounts (mode {mode:03o}): `chmod 600` it, or 640 for a group that may know it"
+    )]
+    Exposed {
+        /// The file.
+        path: PathBuf,
+        /// Its permissions.
+        mode: u32,
+    },
+    /// What it holds is no token.
+    #[error("the token's file {path} holds no token")]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// What a token is.
+        source: InvalidToken,
+    },
+}
 
 impl Token {
     /// 128 random bits as 32 hexadecimal digits.
@@ -36,6 +75,34 @@ impl Token {
         ))
     }
 
+    /// The token that a file holds, which nobody but its owner and group can read. White space
+    /// around it, such as the end of the line, is no part of it.
+    ///
+    /// # Errors
+    /// [`TokenFileError`].
+    pub fn from_file(path: &Path) -> Result<Self, TokenFileError> {
+        let failed = |source| TokenFileError::Read {
+            path: path.to_owned(),
+            source,
+        };
+        let file = File::open(path).map_err(failed)?;
+        let mode = file.metadata().map_err(failed)?.mode() & 0o777;
+        if mode & FORBIDDEN != 0 {
+            let path = path.to_owned();
+            return Err(TokenFileError::Exposed { path, mode });
+        }
+        let mut text = String::new();
+        file.take(LONGEST_FILE)
+            .read_to_string(&mut text)
+            .map_err(failed)?;
+        text.trim()
+            .parse()
+            .map_err(|source| TokenFileError::Invalid {
+                path: path.to_owned(),
+                source,
+            })
+    }
+
     /// The secret itself.
     #[must_use]
     pub fn reveal(&self) -> &str {
@@ -50,16 +117,16 @@ impl Token {
 }
 
 impl FromStr for Token {
-    type Err = BadToken;
+    type Err = InvalidToken;
 
-    fn from_str(text: &str) -> Result<Self, BadToken> {
+    fn from_str(text: &str) -> Result<Self, InvalidToken> {
         let plain = text
             .bytes()
             .all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_'));
         if plain && LENGTHS.contains(&text.len()) {
             Ok(Self(text.to_owned()))
         } else {
-            Err(BadToken)
+            Err(InvalidToken)
         }
     }
 }
@@ -105,8 +172,38 @@ mod tests {
             "0123456789abcdef&x=1",
             "ä0123456789abcdef",
         ] {
-            assert_eq!(text.parse::<Token>(), Err(BadToken), "{text:?}");
+            assert_eq!(text.parse::<Token>(), Err(InvalidToken), "{text:?}");
         }
+    }
+
+    #[test]
+    fn a_tokens_file_is_read_only_where_it_is_kept_from_other_accounts() {
+        use std::fs::{self, Permissions};
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("token");
+        fs::write(&path, "0123456789abcdef\n").unwrap();
+        for (mode, is_taken) in [
+            (0o600, true),
+            (0o400, true),
+            (0o640, true),
+            (0o644, false),
+            (0o660, false),
+            (0o602, false),
+        ] {
+            fs::set_permissions(&path, Permissions::from_mode(mode)).unwrap();
+            let read = Token::from_file(&path);
+            assert_eq!(read.is_ok(), is_taken, "{mode:o}: {read:?}");
+        }
+        fs::set_permissions(&path, Permissions::from_mode(0o600)).unwrap();
+        fs::write(&path, "short").unwrap();
+        let read = Token::from_file(&path);
+        assert!(
+            matches!(read, Err(TokenFileError::Invalid { .. })),
+            "{read:?}"
+        );
+        let none = Token::from_file(&folder.path().join("none"));
+        assert!(matches!(none, Err(TokenFileError::Read { .. })), "{none:?}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
-//! The chip: the firmware's core on pins, timers and memory of virtual time.
+//! The chip: the firmware's core on simulated pins, timers and memory.
 //!
-//! Time is in ticks of the step timer, half a microsecond by the chip's own crystal.
+//! Times are ticks of the step timer: half microseconds of the chip's crystal.
 
 use std::collections::VecDeque;
 
@@ -15,22 +15,22 @@ use super::wire::{BYTE_TICKS, Timed};
 const RECEIVE_BUFFER: usize = 128;
 const SEND_BUFFER: usize = 64;
 const EEPROM_BYTES: usize = 1024;
-/// From a reset to the banner: the boot loader's time.
+/// Time from a reset to the banner: the boot loader's.
 const BOOT_TICKS: u64 = 600_000;
-/// Between two rounds of the main loop.
+/// Duration of one iteration of the main loop.
 const ROUND_TICKS: u64 = 400;
-/// From arming the step timer to its first call.
+/// Time from arming the step timer to its first interrupt.
 const ARM_TICKS: u64 = 10;
 const EEPROM_WRITE_TICKS: u64 = 6800;
 
-/// Whether the index is as the angle says, or as somebody holds it.
+/// What determines the level of the index input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum IndexInput {
     ByAngle,
     Held(bool),
 }
 
-/// What is wired to the chip.
+/// The chip's inputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pins {
     pub(super) index: IndexInput,
@@ -38,7 +38,7 @@ pub(super) struct Pins {
     pub(super) battery: u16,
 }
 
-/// Where the index is active: steps of the motor from where it was switched on, within a turn.
+/// Where the index is active: motor steps from the position at power-on, within one turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct IndexPlace {
     pub(super) at: f64,
@@ -51,7 +51,7 @@ enum State {
     Stalled,
 }
 
-/// The chip and what hangs on it.
+/// The chip with its peripherals.
 pub(super) struct Chip {
     bench: Bench,
     state: State,
@@ -68,7 +68,7 @@ impl Chip {
         }
     }
 
-    /// Starts the program anew; what the motor did and what the EEPROM holds stays.
+    /// Restarts the program. The motor's position and the EEPROM are kept.
     pub(super) fn restart(&mut self, cause: ResetCause) {
         self.bench.restart();
         self.state = State::Booting {
@@ -77,7 +77,7 @@ impl Chip {
         };
     }
 
-    /// Stops for good.
+    /// Stops the program for good.
     pub(super) fn stall(&mut self) {
         self.bench.restart();
         self.state = State::Stalled;
@@ -91,12 +91,12 @@ impl Chip {
         }
     }
 
-    /// Bytes on their way to the chip.
+    /// Bytes in transit to the chip.
     pub(super) fn inbox(&mut self) -> &mut VecDeque<Timed> {
         &mut self.bench.inbox
     }
 
-    /// Bytes that the chip has sent whole.
+    /// Bytes that the chip has sent completely.
     pub(super) fn take_sent(&mut self) -> impl Iterator<Item = Timed> + '_ {
         let now = self.bench.now;
         let whole = self.bench.outbox.iter().take_while(|(at, _)| *at <= now);
@@ -104,12 +104,12 @@ impl Chip {
         self.bench.outbox.drain(..count)
     }
 
-    /// Steps since the last call: when, and where the motor stood then.
+    /// Steps since the last call: time and motor position of each.
     pub(super) fn take_edges(&mut self) -> impl Iterator<Item = (u64, i64)> + '_ {
         self.bench.edges.drain(..)
     }
 
-    /// Lets the chip work until a tick.
+    /// Runs the chip until a tick.
     pub(super) fn run_until(&mut self, end: u64) {
         while self.bench.now < end {
             match &mut self.state {
@@ -131,14 +131,14 @@ impl Chip {
     }
 }
 
-/// The board that the core runs on.
+/// The board on which the core runs.
 struct Bench {
     now: u64,
     stepper: Stepper,
-    /// When the step timer fires.
+    /// When the step timer fires next.
     next_step: Option<u64>,
     forward: bool,
-    /// Where the motor stands, in steps from where it was switched on.
+    /// Motor position, steps from the position at power-on.
     turned: i64,
     edges: Vec<(u64, i64)>,
     inbox: VecDeque<Timed>,
@@ -188,7 +188,7 @@ impl Bench {
         }
     }
 
-    /// Lets time go on while the program runs, with all that interrupts do in it.
+    /// Lets time pass while the program runs, with the interrupts that occur.
     fn pass_until(&mut self, end: u64) {
         loop {
             let step = self.next_step.filter(|at| *at <= end);
@@ -202,7 +202,7 @@ impl Bench {
                 (_, Some(at)) => {
                     self.now = self.now.max(at);
                     if let Some((_, byte)) = self.inbox.pop_front() {
-                        self.hear(byte);
+                        self.receive_byte(byte);
                     }
                 }
                 _ => break,
@@ -211,7 +211,7 @@ impl Bench {
         self.now = self.now.max(end);
     }
 
-    /// Lets time go on while no program runs: bytes go by unheard.
+    /// Lets time pass while no program runs: received bytes are lost.
     fn sleep_until(&mut self, end: u64) {
         while self.inbox.front().is_some_and(|(at, _)| *at <= end) {
             self.inbox.pop_front();
@@ -231,7 +231,7 @@ impl Bench {
         self.next_step = fire.next.map(|ticks| at + u64::from(ticks));
     }
 
-    fn hear(&mut self, byte: u8) {
+    fn receive_byte(&mut self, byte: u8) {
         self.events.insert(Events::RECEIVED);
         match classify(byte) {
             Received::Data(_) if self.received.len() >= RECEIVE_BUFFER => {
@@ -246,7 +246,7 @@ impl Bench {
         }
     }
 
-    /// A halt leaves the timer nothing to fire for.
+    /// Disarms the step timer after a halt.
     fn stop_idle_timer(&mut self) {
         if self.stepper.is_halted() {
             self.next_step = None;

@@ -1,59 +1,59 @@
-//! What can go wrong, in words: `drop=0.01,flip=0.005,reset@12.5s`.
+//! The faults of a simulated table as text: `drop=0.01,flip=0.005,reset@12.5s`.
 
 use std::str::FromStr;
 use std::time::Duration;
 
-use super::Error;
+use super::SimulatorError;
 
-/// What goes wrong on the wire, and with the chip.
+/// Faults of the wire and of the chip.
 ///
-/// As text, parted by commas: `drop=0.01` loses that share of the bytes, `flip=` changes a bit in
-/// that share of the bytes, `duplicate=` sends that share of the lines twice, `merge=` loses the
-/// end of that share of the lines, `delay=0.02:30ms` lets that share of the bytes, and what follows
-/// them, come so much later. They hold for both directions; `to.drop=` is for bytes to the chip
-/// alone, `from.drop=` for those from it. `reset@12.5s` restarts the chip at that time, as a
-/// watchdog does; `stall@20s` makes it stop answering and moving. Times are by the simulator's
-/// clock, from its start.
+/// As text, separated by commas: `drop=0.01` loses that fraction of the bytes, `flip=` flips a bit
+/// in that fraction of the bytes, `duplicate=` repeats that fraction of the lines, `merge=` loses the
+/// end of that fraction of the lines, `delay=0.02:30ms` delays that fraction of the bytes, and what
+/// follows them, by that time. They apply to both directions, with the prefix `to.` only to bytes to
+/// the chip, with `from.` only to bytes from it. `reset@12.5s` restarts the chip at that time, as its
+/// watchdog does; `stall@20s` makes it stop answering and moving. Times count from the table's start
+/// on its clock.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Faults {
-    /// On the way to the chip.
+pub struct TableFaults {
+    /// Faults of the wire to the chip.
     pub to_chip: WireFaults,
-    /// On the way from the chip.
+    /// Faults of the wire from the chip.
     pub from_chip: WireFaults,
-    /// When the chip restarts.
+    /// Times at which the chip restarts.
     pub resets: Vec<Duration>,
-    /// When the chip stops for good.
+    /// Time at which the chip stops for good.
     pub stall: Option<Duration>,
 }
 
-/// How often a wire fails, in one direction; shares are between 0 and 1.
+/// Faults of one direction of the wire; fractions from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct WireFaults {
-    /// Share of the bytes that are lost.
+    /// Fraction of the bytes that are lost.
     pub drop: f64,
-    /// Share of the bytes in which one bit changes.
+    /// Fraction of the bytes in which one bit is flipped.
     pub flip: f64,
-    /// Share of the lines that come twice.
+    /// Fraction of the lines that arrive twice.
     pub duplicate: f64,
-    /// Share of the lines that lose their end, and run into the next one.
+    /// Fraction of the lines that lose their line end and merge with the next one.
     pub merge: f64,
-    /// Share of the bytes that come late.
+    /// Fraction of the bytes that arrive late.
     pub delay: f64,
-    /// How late they come.
+    /// Their delay.
     pub delay_by: Duration,
 }
 
-impl FromStr for Faults {
-    type Err = Error;
+impl FromStr for TableFaults {
+    type Err = SimulatorError;
 
-    fn from_str(text: &str) -> Result<Faults, Error> {
-        let mut faults = Faults::default();
+    fn from_str(text: &str) -> Result<TableFaults, SimulatorError> {
+        let mut faults = TableFaults::default();
         for item in text
             .split(',')
             .map(str::trim)
             .filter(|item| !item.is_empty())
         {
-            faults.add(item).map_err(|why| Error::Fault {
+            faults.add(item).map_err(|why| SimulatorError::Fault {
                 item: item.to_owned(),
                 why,
             })?;
@@ -62,7 +62,7 @@ impl FromStr for Faults {
     }
 }
 
-impl Faults {
+impl TableFaults {
     fn add(&mut self, item: &str) -> Result<(), &'static str> {
         if let Some((what, at)) = item.split_once('@') {
             let at = duration(at)?;
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn all_faults_are_read() {
-        let faults: Faults = "drop=0.01, to.flip=0.005,from.duplicate=1,merge=0,\
+        let faults: TableFaults = "drop=0.01, to.flip=0.005,from.duplicate=1,merge=0,\
                               delay=0.02:30ms,reset@12.5s,reset@20s,stall@30s"
             .parse()
             .unwrap();
@@ -144,7 +144,7 @@ mod tests {
             delay_by: Duration::from_millis(30),
             ..WireFaults::default()
         };
-        let expected = Faults {
+        let expected = TableFaults {
             to_chip: WireFaults {
                 flip: 0.005,
                 ..both
@@ -157,11 +157,11 @@ mod tests {
             stall: Some(Duration::from_secs(30)),
         };
         assert_eq!(faults, expected);
-        assert_eq!("".parse::<Faults>().unwrap(), Faults::default());
+        assert_eq!("".parse::<TableFaults>().unwrap(), TableFaults::default());
     }
 
     #[test]
-    fn what_is_no_fault_is_told_with_its_words() {
+    fn an_invalid_fault_is_named_in_the_error() {
         for text in [
             "drop",
             "drop=",
@@ -178,7 +178,7 @@ mod tests {
             "flip@3s",
             "to.reset=1",
         ] {
-            let error = text.parse::<Faults>().unwrap_err().to_string();
+            let error = text.parse::<TableFaults>().unwrap_err().to_string();
             assert!(error.contains(text), "{error}");
         }
     }

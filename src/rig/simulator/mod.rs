@@ -1,15 +1,39 @@
-//! A turntable without hardware: the firmware's core on a pseudoterminal.
+//! A turntable without hardware: the firmware's core, simulated over time.
 //!
-//! A thread lets the very code that runs on the chip work in virtual time, which follows a
-//! [`Clock`]: in real time, or faster. The port looks like an Arduino's: whoever opens it resets
-//! the chip, bytes take the time of 115 200 baud, and the wire can be as bad as [`Faults`] asks.
-//! What no real table tells, this one does: where it stood at any moment.
+//! A [`SimulatedTable`] runs the same code as the chip, up to the present time of its [`Clock`]. Its
+//! port works in memory; a [`Simulator`] provides it as a pseudoterminal for other programs. Both
+//! behave like an Arduino's: opening the port resets the chip, bytes take as long as at 115 200 baud,
+//! and faults of the wire and the chip are injected on demand ([`TableFaults`]). Unlike a real table,
+//! it also gives its true angle at any time.
 //!
-//! Knows the clock and the firmware's core; nothing of the host's side of the line.
+//! ```
+//! use relit_rig::clock::Clock;
+//! use relit_rig::simulator::{SimulatedTable, SimulatorOptions};
+//! use relit_rig::turntable::{TableOptions, Table};
+//!
+//! let clock = Clock::virtual_time();
+//! let _participant = clock.take_part();
+//! let simulated = SimulatedTable::new(&SimulatorOptions {
+//!     clock: clock.clone(),
+//!     ..SimulatorOptions::default()
+//! });
+//! let options = TableOptions {
+//!     clock: clock.clone(),
+//!     ..TableOptions::default()
+//! };
+//! let table = Table::open(simulated.open(), &options)?;
+//! table.jog(90.0, None)?;
+//! assert!((simulated.angle_at(clock.now_us()) - 90.0).abs() < 0.02);
+//! # Ok::<(), relit_rig::turntable::TurntableError>(())
+//! ```
+//!
+//! This module knows the clock and the firmware's core, and of the host's side only the trait of a
+//! port.
 
 mod chip;
 mod faults;
-mod rig;
+mod model;
+mod table;
 mod terminal;
 mod truth;
 mod wire;
@@ -17,33 +41,26 @@ mod wire;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
 
 use rustix::io::Errno;
 use serde::Serialize;
 
-use crate::clock::Clock;
+use crate::clock::{Clock, JoinHandle};
 
-pub use faults::{Faults, WireFaults};
+pub use faults::{TableFaults, WireFaults};
+pub use table::{SimulatedPort, SimulatedTable};
 pub use truth::{STEPS_PER_TURN, StepEdge};
 pub use wire::WireCounts;
 
-use chip::{IndexInput, Pins};
-use rig::Rig;
+use table::LOOK;
 use terminal::Terminal;
-use truth::Truth;
 
-/// Volts at the battery input's full scale.
-const BATTERY_SCALE: f64 = 15.5;
-/// The converter's highest value.
-const BATTERY_FULL: f64 = 1023.0;
-
-/// Why there is no simulated table.
+/// An error of the simulator.
 #[derive(Debug, thiserror::Error)]
-pub enum Error {
-    /// A fault that nobody can make.
+pub enum SimulatorError {
+    /// A fault that does not exist.
     #[error("the fault {item:?} is not understood: {why}")]
     Fault {
         /// The fault.
@@ -51,59 +68,57 @@ pub enum Error {
         /// What is wrong with it.
         why: &'static str,
     },
-    /// The system gave no pseudoterminal.
+    /// A pseudoterminal could not be set up.
     #[error(
         "could not {step} a pseudoterminal: {errno}; see that /dev/pts is mounted and not full"
     )]
     Terminal {
         /// The step that failed.
         step: &'static str,
-        /// What the system said.
+        /// The system's error.
         errno: Errno,
     },
-    /// The link to the port could not be made.
+    /// The link to the port could not be created.
     #[error("could not make {path} a link to the simulated port: {source}; choose another name")]
     Link {
         /// The link.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// The system gave no thread.
+    /// The thread could not be started.
     #[error("could not start the simulated table's thread: {0}; end other programs and try again")]
     Thread(io::Error),
 }
 
-/// How a simulated table is.
+/// Options of a simulated table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatorOptions {
-    /// The clock that its time follows; give the same one to whatever works with it.
+    /// Its clock. Everything that works with the table needs the same one.
     pub clock: Clock,
-    /// What goes wrong.
-    pub faults: Faults,
-    /// What makes random faults repeatable.
+    /// The faults to inject.
+    pub faults: TableFaults,
+    /// Seed of the random faults.
     pub seed: u64,
-    /// The angle at which the table stands when it is switched on, degrees.
+    /// Angle at which the table stands at power-on, degrees.
     pub start_angle: f64,
-    /// The angle at which the index becomes active in a positive turn, degrees.
+    /// Angle at which the index becomes active in a positive turn, degrees.
     pub index_at: f64,
-    /// How far the index stays active, degrees.
+    /// Range in which the index stays active, degrees.
     pub index_width: f64,
-    /// Volts of the battery.
+    /// Battery voltage, volts.
     pub battery: f64,
-    /// How much faster than the clock the chip's crystal goes, parts in a million.
+    /// Deviation of the chip's crystal from the clock, parts per million; positive is faster.
     pub drift_ppm: f64,
-    /// Whether opening the port resets the chip, as with an Arduino.
+    /// Whether opening the port resets the chip, as it does on an Arduino.
     pub reset_on_open: bool,
-    /// A second name for the port.
-    pub link: Option<PathBuf>,
 }
 
 impl Default for SimulatorOptions {
     fn default() -> Self {
         SimulatorOptions {
             clock: Clock::monotonic(),
-            faults: Faults::default(),
+            faults: TableFaults::default(),
             seed: 0,
             start_angle: 0.0,
             index_at: 30.0,
@@ -111,132 +126,93 @@ impl Default for SimulatorOptions {
             battery: 12.0,
             drift_ppm: 0.0,
             reset_on_open: true,
-            link: None,
         }
     }
 }
 
-/// What happened so far.
+/// Counters since power-on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct SimulatorCounts {
     /// On the way to the chip.
     pub to_chip: WireCounts,
     /// On the way from the chip.
     pub from_chip: WireCounts,
-    /// How often the port was opened.
+    /// How many times the port was opened.
     pub opened: u64,
-    /// How often a fault restarted the chip.
+    /// How many times a fault restarted the chip.
     pub resets: u64,
     /// Whether a fault stopped the chip.
     pub stalled: bool,
 }
 
-/// What the thread and the handle share.
-struct Shared {
-    stop: AtomicBool,
-    pins: Mutex<Pins>,
-    truth: Mutex<Truth>,
-    counts: Mutex<SimulatorCounts>,
-}
-
-/// A simulated table that runs until it is stopped or dropped.
+/// A simulated table at a pseudoterminal, with a thread. Runs until it is stopped or dropped.
+///
+/// Other programs cannot take part in virtual time: the clock has to be the monotonic one, or a
+/// [paced](Clock::paced) one for a table that runs faster than real time.
 pub struct Simulator {
+    table: SimulatedTable,
     path: PathBuf,
     link: Option<PathBuf>,
-    shared: Arc<Shared>,
+    stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Simulator {
-    /// Switches a table on.
+    /// Starts a table. `link`: path of a symbolic link to its port, to be created.
     ///
     /// # Errors
-    /// Where the system gives no pseudoterminal, link or thread.
-    pub fn start(options: SimulatorOptions) -> Result<Simulator, Error> {
+    /// [`SimulatorError::Terminal`], [`SimulatorError::Link`] or [`SimulatorError::Thread`].
+    pub fn start(
+        options: &SimulatorOptions,
+        link: Option<&Path>,
+    ) -> Result<Simulator, SimulatorError> {
         let terminal = Terminal::open()?;
         let path = terminal.path().to_owned();
-        if let Some(link) = &options.link {
+        if let Some(link) = link {
             make_link(&path, link)?;
         }
-        let start_us = options.clock.now_us();
-        let pins = Pins {
-            index: IndexInput::ByAngle,
-            emergency: false,
-            battery: battery_reading(options.battery),
-        };
-        let shared = Arc::new(Shared {
-            stop: AtomicBool::new(false),
-            pins: Mutex::new(pins),
-            truth: Mutex::new(Truth::new(options.start_angle, start_us)),
-            counts: Mutex::new(SimulatorCounts::default()),
-        });
         let mut simulator = Simulator {
+            table: SimulatedTable::new(options),
             path,
-            link: options.link.clone(),
-            shared: Arc::clone(&shared),
+            link: link.map(Path::to_owned),
+            stop: Arc::default(),
             thread: None,
         };
-        let rig = Rig::new(options, terminal, shared, start_us);
-        let thread = std::thread::Builder::new().name("simulator".to_owned());
-        simulator.thread = Some(thread.spawn(move || rig.run()).map_err(Error::Thread)?);
+        let (table, stop) = (simulator.table.clone(), Arc::clone(&simulator.stop));
+        let clock = options.clock.clone();
+        let thread = options.clock.spawn("simulator", move || {
+            carry(&clock, &table, terminal, &stop);
+        });
+        simulator.thread = Some(thread.map_err(SimulatorError::Thread)?);
         Ok(simulator)
     }
 
-    /// The port that a host opens.
+    /// Path of the port that a host opens.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Where the table stood at a time of the simulator's clock: degrees, not wound back after
-    /// a turn. What has not happened yet counts as rest.
-    pub fn angle_at(&self, us: i64) -> f64 {
-        lock(&self.shared.truth).angle_at(us)
+    /// The table at the port.
+    pub fn table(&self) -> &SimulatedTable {
+        &self.table
     }
 
-    /// Every step so far; of very many, the last two million.
-    pub fn edges(&self) -> Vec<StepEdge> {
-        lock(&self.shared.truth).edges()
-    }
-
-    /// What happened so far.
-    pub fn counts(&self) -> SimulatorCounts {
-        *lock(&self.shared.counts)
-    }
-
-    /// Holds the index input closed or open, or (`None`) lets the angle decide.
-    pub fn hold_index(&self, level: Option<bool>) {
-        lock(&self.shared.pins).index = match level {
-            Some(level) => IndexInput::Held(level),
-            None => IndexInput::ByAngle,
-        };
-    }
-
-    /// Presses the emergency stop, or releases it.
-    pub fn press_emergency_stop(&self, pressed: bool) {
-        lock(&self.shared.pins).emergency = pressed;
-    }
-
-    /// Sets the battery's voltage.
-    pub fn set_battery(&self, volts: f64) {
-        lock(&self.shared.pins).battery = battery_reading(volts);
-    }
-
-    /// Switches the table off, and tells what happened.
+    /// Ends the thread; returns the counters.
     pub fn stop(mut self) -> SimulatorCounts {
         self.end();
-        self.counts()
+        self.table.counts()
     }
 
     fn end(&mut self) {
-        self.shared.stop.store(true, Ordering::Relaxed);
+        self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic in there has been told by the thread itself.
+            // A panic was already reported by the thread itself.
             let _ended = thread.join();
         }
         if let Some(link) = self.link.take()
             && fs::read_link(&link).is_ok_and(|target| target == self.path)
         {
-            // A link that stays behind leads nowhere, and the next start replaces it.
+            // If this fails, the next start replaces the link.
             let _removed = fs::remove_file(&link);
         }
     }
@@ -248,19 +224,29 @@ impl Drop for Simulator {
     }
 }
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+/// The thread: transfers bytes between table and pseudoterminal.
+fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &AtomicBool) {
+    const LARGEST: usize = 4096;
+    let mut buffer = [0; LARGEST];
+    while !stop.load(Ordering::Relaxed) {
+        let now_us = clock.now_us();
+        let mut model = table.model();
+        for _ in 0..terminal.opened() {
+            model.open(now_us);
+        }
+        let room = model.room().min(LARGEST);
+        let received = terminal.read(buffer.get_mut(..room).unwrap_or_default());
+        model.receive(now_us, received);
+        let output = model.take_output(now_us, usize::MAX);
+        drop(model);
+        terminal.write(&output);
+        clock.sleep(LOOK);
+    }
 }
 
-fn battery_reading(volts: f64) -> u16 {
-    (volts / BATTERY_SCALE * BATTERY_FULL)
-        .round()
-        .clamp(0.0, BATTERY_FULL) as u16
-}
-
-/// Makes the link; one that was left behind is replaced, anything else is not.
-fn make_link(port: &Path, link: &Path) -> Result<(), Error> {
-    let failed = |source| Error::Link {
+/// Creates the link. A link that exists is replaced, any other file is not.
+fn make_link(port: &Path, link: &Path) -> Result<(), SimulatorError> {
+    let failed = |source| SimulatorError::Link {
         path: link.to_owned(),
         source,
     };

@@ -1,4 +1,4 @@
-//! The pseudoterminal that stands for the serial port.
+//! The pseudoterminal in place of the serial port.
 
 use std::mem::MaybeUninit;
 use std::os::fd::OwnedFd;
@@ -11,21 +11,21 @@ use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-use super::Error;
+use super::SimulatorError;
 
-/// The chip's end of the line.
+/// The chip's end of the serial line.
 pub(super) struct Terminal {
     line: OwnedFd,
-    /// Tells when somebody opens the port.
+    /// Reports openings of the port.
     watch: OwnedFd,
     path: PathBuf,
-    /// Nobody has the port open.
+    /// No process has the port open.
     closed: bool,
 }
 
 impl Terminal {
-    pub(super) fn open() -> Result<Terminal, Error> {
-        let failed = |step| move |errno: Errno| Error::Terminal { step, errno };
+    pub(super) fn open() -> Result<Terminal, SimulatorError> {
+        let failed = |step| move |errno: Errno| SimulatorError::Terminal { step, errno };
         let line = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)
             .map_err(failed("open"))?;
         grantpt(&line).map_err(failed("grant"))?;
@@ -34,10 +34,11 @@ impl Terminal {
         let path = PathBuf::from(std::ffi::OsString::from_vec(name.into_bytes()));
         let flags = fcntl_getfl(&line).map_err(failed("set up"))?;
         fcntl_setfl(&line, flags | OFlags::NONBLOCK).map_err(failed("set up"))?;
-        // Only a port that was closed once tells that nobody has it open.
+        // Reads report that no process has the port open only after it was opened and closed once.
         let port = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
         let port = open(&path, port, Mode::empty()).map_err(failed("try"))?;
-        // What the chip says before a host has set the line up must not come back to it as an echo.
+        // Without raw mode, the system would echo to the chip what it sends before a host has set up
+        // the line.
         let mut modes = tcgetattr(&port).map_err(failed("set up"))?;
         modes.make_raw();
         tcsetattr(&port, OptionalActions::Now, &modes).map_err(failed("set up"))?;
@@ -53,12 +54,12 @@ impl Terminal {
         })
     }
 
-    /// The port that a host opens.
+    /// Path of the port that a host opens.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// How often the port was opened since the last call.
+    /// How many times the port was opened since the last call.
     pub(super) fn opened(&self) -> u64 {
         let mut buffer = [MaybeUninit::uninit(); 1024];
         let mut reader = inotify::Reader::new(&self.watch, &mut buffer);
@@ -69,7 +70,7 @@ impl Terminal {
         times
     }
 
-    /// What the host has written, up to the size of the buffer.
+    /// Reads what the host has written, up to the size of the buffer.
     pub(super) fn read<'a>(&mut self, buffer: &'a mut [u8]) -> &'a [u8] {
         let count = match rustix::io::read(&self.line, &mut *buffer) {
             Ok(count) => Some(count),
@@ -80,8 +81,8 @@ impl Terminal {
         buffer.get(..count.unwrap_or(0)).unwrap_or(&[])
     }
 
-    /// Gives the host bytes. Those that nobody is there to take are lost, as on a wire: the number
-    /// of bytes that the host got.
+    /// Sends bytes to the host. They are lost if no process has the port open, or if its buffer is
+    /// full. Returns the number of bytes sent.
     pub(super) fn write(&self, mut bytes: &[u8]) -> usize {
         let whole = bytes.len();
         while !self.closed && !bytes.is_empty() {

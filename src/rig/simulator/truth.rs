@@ -1,24 +1,24 @@
-//! Where the table really stood, and when: every step, as the motor made it.
+//! The true position of the table over time: every step of the motor.
 
 use std::collections::VecDeque;
 
-/// Steps of the motor for one turn of the table.
+/// Motor steps per turn of the table.
 pub const STEPS_PER_TURN: f64 = 32_000.0;
-/// Steps that are remembered; the oldest go first.
+/// Number of steps kept; the oldest are discarded first.
 const LOG: usize = 1 << 21;
-/// A longer time between two steps is a rest, us.
+/// A longer time between two steps is a rest, microseconds.
 const REST_US: i64 = 100_000;
 
 /// A step of the motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepEdge {
-    /// When, microseconds of the simulator's clock.
+    /// Time, microseconds of the simulator's clock.
     pub t_us: i64,
-    /// Where the motor stood after it, in steps from where it was switched on.
+    /// Motor position after it, steps from the position at power-on.
     pub steps: i64,
 }
 
-/// All steps so far, up to a number.
+/// The steps so far.
 pub(super) struct Truth {
     start_angle: f64,
     edges: VecDeque<StepEdge>,
@@ -46,7 +46,7 @@ impl Truth {
         self.edges.iter().copied().collect()
     }
 
-    /// The table's angle in degrees, between two steps in proportion to the time.
+    /// The table's angle, degrees; linear over time between two steps.
     pub(super) fn angle_at(&self, us: i64) -> f64 {
         let after = self.edges.partition_point(|edge| edge.t_us <= us);
         let next = self.edges.get(after);

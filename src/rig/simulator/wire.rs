@@ -1,4 +1,4 @@
-//! One direction of the serial line: how long bytes take, and what happens to them on the way.
+//! One direction of the serial line: transmission times and faults.
 
 use std::collections::VecDeque;
 
@@ -7,32 +7,32 @@ use serde::Serialize;
 
 use super::faults::WireFaults;
 
-/// Timer ticks of one byte: ten bits at 115 200 baud, in half microseconds.
+/// Transmission time of one byte, ticks: ten bits at 115 200 baud, in half microseconds.
 pub(super) const BYTE_TICKS: u64 = 174;
-/// Ticks a second.
+/// Ticks per second.
 const TICKS_PER_SECOND: f64 = 2e6;
-/// The longest line that can come twice.
+/// Longest line that can be repeated, bytes.
 const LONGEST_LINE: usize = 256;
 
-/// A byte, and the tick at which it is whole.
+/// A byte with the tick at which its transmission ends.
 pub(super) type Timed = (u64, u8);
 
-/// What happened on one direction of the wire.
+/// Counters of one direction of the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct WireCounts {
-    /// Bytes that were given to it.
+    /// Bytes sent.
     pub bytes: u64,
-    /// Lines that were given to it.
+    /// Lines sent.
     pub lines: u64,
-    /// Bytes that were lost.
+    /// Bytes lost.
     pub dropped: u64,
-    /// Bytes in which a bit changed.
+    /// Bytes with a flipped bit.
     pub flipped: u64,
-    /// Lines that came twice.
+    /// Lines repeated.
     pub duplicated: u64,
-    /// Lines that lost their end.
+    /// Lines that lost their line end.
     pub merged: u64,
-    /// Bytes that came late, and others with them.
+    /// Bytes delayed, each with those after it.
     pub delayed: u64,
 }
 
@@ -40,13 +40,13 @@ pub struct WireCounts {
 pub(super) struct Wire {
     faults: WireFaults,
     random: Random,
-    /// Commands of one byte are no part of a line in this direction.
+    /// The direction to the chip, in which real-time commands are no part of a line.
     to_chip: bool,
-    /// The line so far, for the case that it comes twice.
+    /// The line so far, in case it is repeated.
     line: Vec<u8>,
-    /// The end of a line was lost at its first byte: the second goes too.
+    /// The first byte of a line end was lost: the second will be, too.
     losing_end: bool,
-    /// When the last byte is through.
+    /// When the transmission of the last byte ends.
     free_at: u64,
     pub(super) counts: WireCounts,
 }
@@ -64,7 +64,7 @@ impl Wire {
         }
     }
 
-    /// Takes a byte at a tick, and puts onto `out` what arrives of it.
+    /// Sends a byte at a tick; appends to `out` what arrives of it.
     pub(super) fn carry(&mut self, at: u64, byte: u8, out: &mut VecDeque<Timed>) {
         self.counts.bytes += 1;
         self.counts.lines += u64::from(byte == b'\n');
@@ -96,7 +96,7 @@ impl Wire {
         out.push_back((self.free_at, byte));
     }
 
-    /// Whether this byte belongs to the end of a line that is lost whole.
+    /// Whether this byte belongs to a line end that is lost.
     fn is_lost_end(&mut self, byte: u8) -> bool {
         let losing = std::mem::take(&mut self.losing_end);
         if losing && byte == b'\n' {
@@ -110,7 +110,7 @@ impl Wire {
         lost
     }
 
-    /// Sends a line again, once it has come to its line feed.
+    /// Repeats a line after its line feed, if the fault occurs.
     fn repeat_line(&mut self, byte: u8, arrived: u8, out: &mut VecDeque<Timed>) {
         if self.to_chip && matches!(classify(byte), Received::Realtime(_)) {
             return;
@@ -128,7 +128,7 @@ impl Wire {
     }
 }
 
-/// Random numbers that a seed makes repeatable: G. L. Steele's SplitMix64 (OOPSLA 2014).
+/// A seeded generator of random numbers: G. L. Steele's SplitMix64 (OOPSLA 2014).
 struct Random(u64);
 
 impl Random {

@@ -8,8 +8,8 @@ use serialport::{SerialPortType, UsbPortInfo};
 
 use super::error::TurntableError;
 
-/// USB ids of what stands between a computer and a Grbl controller: vendor, product (`None`: all
-/// of that vendor's), by the lists of usb.ids and the vendors' drivers.
+/// USB ids of the serial adapters that Grbl controllers use: vendor, product (`None`: all products
+/// of that vendor). From usb.ids and the vendors' drivers.
 const ADAPTERS: [(u16, Option<u16>); 8] = [
     (0x2341, None),         // Arduino
     (0x2a03, None),         // Arduino (arduino.org)
@@ -23,8 +23,8 @@ const ADAPTERS: [(u16, Option<u16>); 8] = [
 
 /// A turntable's address.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Address {
-    /// A serial port; `None`: look for the one that a controller is at.
+pub enum TurntableAddress {
+    /// A serial port; `None`: look for the one that has a controller.
     Serial(Option<PathBuf>),
     /// A simulated table.
     Simulated(SimulatedAddress),
@@ -35,9 +35,9 @@ pub enum Address {
 /// How a simulated table behaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatedAddress {
-    /// How many times faster than real time it runs; 0: as fast as is sensible.
+    /// How many times faster than real time it runs; 0: as fast as possible.
     pub speed: f64,
-    /// The faults that its wire has, in the simulator's words.
+    /// The faults to inject, as [`TableFaults`](crate::simulator::TableFaults) reads them.
     pub fault: Option<String>,
 }
 
@@ -50,7 +50,7 @@ impl Default for SimulatedAddress {
     }
 }
 
-impl FromStr for Address {
+impl FromStr for TurntableAddress {
     type Err = TurntableError;
 
     fn from_str(text: &str) -> Result<Self, TurntableError> {
@@ -59,16 +59,18 @@ impl FromStr for Address {
             why,
         };
         if text == "none" {
-            return Ok(Address::None);
+            return Ok(TurntableAddress::None);
         }
         let (kind, rest) = text
             .split_once(':')
             .ok_or_else(|| wrong("it has no colon".to_owned()))?;
         match kind {
-            "serial" if rest.is_empty() => Ok(Address::Serial(None)),
+            "serial" if rest.is_empty() => Ok(TurntableAddress::Serial(None)),
             "serial" if rest.contains('\0') => Err(wrong("a path has no zero byte".to_owned())),
-            "serial" => Ok(Address::Serial(Some(PathBuf::from(rest)))),
-            "sim" => simulated(rest).map(Address::Simulated).map_err(wrong),
+            "serial" => Ok(TurntableAddress::Serial(Some(PathBuf::from(rest)))),
+            "sim" => simulated(rest)
+                .map(TurntableAddress::Simulated)
+                .map_err(wrong),
             other => Err(wrong(format!("{other:?} is no kind of turntable"))),
         }
     }
@@ -99,13 +101,13 @@ fn simulated(rest: &str) -> Result<SimulatedAddress, String> {
     Ok(address)
 }
 
-impl fmt::Display for Address {
+impl fmt::Display for TurntableAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Address::Serial(None) => f.write_str("serial:"),
-            Address::Serial(Some(path)) => write!(f, "serial:{}", path.display()),
-            Address::None => f.write_str("none"),
-            Address::Simulated(SimulatedAddress { speed, fault }) => {
+            TurntableAddress::Serial(None) => f.write_str("serial:"),
+            TurntableAddress::Serial(Some(path)) => write!(f, "serial:{}", path.display()),
+            TurntableAddress::None => f.write_str("none"),
+            TurntableAddress::Simulated(SimulatedAddress { speed, fault }) => {
                 write!(f, "sim:?speed={speed}")?;
                 let Some(fault) = fault else {
                     return Ok(());
@@ -116,12 +118,12 @@ impl fmt::Display for Address {
     }
 }
 
-/// The one serial port with a USB adapter that a controller has.
+/// The only serial port with a USB adapter that controllers use.
 ///
 /// # Errors
 /// [`TurntableError::NoCandidate`], or [`TurntableError::SeveralCandidates`] with their names.
 pub fn find_serial() -> Result<PathBuf, TurntableError> {
-    // The listing takes the kernel's folder of terminals for granted.
+    // `available_ports` panics without the kernel's folder of terminals.
     if !Path::new("/sys/class/tty").is_dir() {
         return Err(TurntableError::NoCandidate);
     }
@@ -175,25 +177,28 @@ mod tests {
 
     #[test]
     fn the_forms_of_the_manual_are_addresses() {
-        let read = |text: &str| text.parse::<Address>().unwrap();
-        assert_eq!(read("none"), Address::None);
-        assert_eq!(read("serial:"), Address::Serial(None));
+        let read = |text: &str| text.parse::<TurntableAddress>().unwrap();
+        assert_eq!(read("none"), TurntableAddress::None);
+        assert_eq!(read("serial:"), TurntableAddress::Serial(None));
         let path = PathBuf::from("/dev/ttyUSB0");
-        assert_eq!(read("serial:/dev/ttyUSB0"), Address::Serial(Some(path)));
+        assert_eq!(
+            read("serial:/dev/ttyUSB0"),
+            TurntableAddress::Serial(Some(path))
+        );
         assert_eq!(
             read("sim:"),
-            Address::Simulated(SimulatedAddress::default())
+            TurntableAddress::Simulated(SimulatedAddress::default())
         );
         let fault = Some("drop=0.01,reset@12.5s".to_owned());
         let simulated = SimulatedAddress { speed: 10.0, fault };
         assert_eq!(
             read("sim:?speed=10&fault=drop=0.01,reset@12.5s"),
-            Address::Simulated(simulated)
+            TurntableAddress::Simulated(simulated)
         );
     }
 
     #[test]
-    fn what_is_no_address_is_told_with_the_forms() {
+    fn a_text_that_is_no_address_is_refused_with_the_valid_forms() {
         for text in [
             "",
             "usb",
@@ -206,7 +211,7 @@ mod tests {
             "sim:?fault=",
             "none:",
         ] {
-            let error = text.parse::<Address>().unwrap_err().to_string();
+            let error = text.parse::<TurntableAddress>().unwrap_err().to_string();
             assert!(error.contains("serial:/dev/ttyUSB0"), "{error}");
         }
     }
@@ -238,15 +243,15 @@ mod tests {
             fault in proptest::option::of("[a-z=@.,:0-9]{1,30}"),
         ) {
             let simulated = SimulatedAddress { speed, fault };
-            for address in [Address::Serial(Some(PathBuf::from(path))), Address::Simulated(simulated)] {
-                prop_assert_eq!(address.to_string().parse::<Address>().unwrap(), address);
+            for address in [TurntableAddress::Serial(Some(PathBuf::from(path))), TurntableAddress::Simulated(simulated)] {
+                prop_assert_eq!(address.to_string().parse::<TurntableAddress>().unwrap(), address);
             }
         }
 
         #[test]
         fn any_text_is_an_address_or_an_error(text in "\\PC*") {
-            if let Ok(address) = text.parse::<Address>() {
-                prop_assert_eq!(address.to_string().parse::<Address>().unwrap(), address);
+            if let Ok(address) = text.parse::<TurntableAddress>() {
+                prop_assert_eq!(address.to_string().parse::<TurntableAddress>().unwrap(), address);
             }
         }
     }

@@ -1,15 +1,15 @@
-//! What Grbl's numbers mean, in words. Numbers from 20 (alarms) and 70 (errors) on are the rig's
-//! own firmware's.
+//! The meanings of Grbl's alarm and error numbers. Alarms from 20 and errors from 70 on are those of
+//! the rig's own firmware.
 
 use std::fmt;
 
-/// What locked the table: Grbl's alarm number, or none where it was locked without telling, as at
-/// start-up or when the telling was lost.
+/// What locked the table: Grbl's alarm number, or none if no alarm was reported: a controller can
+/// start locked, and a message can be lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub struct Alarm(pub Option<u8>);
 
 impl Alarm {
-    /// Whether the table may stand elsewhere than it counts after this alarm.
+    /// Whether the counted position may be wrong after this alarm.
     #[must_use]
     pub fn loses_position(self) -> bool {
         !matches!(self.0, None | Some(2 | 4 | 5 | 20))

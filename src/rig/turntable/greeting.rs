@@ -1,32 +1,32 @@
-//! The first words with a controller: is it there, does it move, what is it.
+//! The first exchange with a controller: whether it is there, whether it moves, what it is.
 
 use std::time::Duration;
 
-use super::Options;
+use super::TableOptions;
 use super::error::TurntableError;
-use super::identity::{Extras, Identity, Settings};
+use super::identity::{Extras, GrblSettings, Identity};
 use super::link::Link;
-use super::supervisor::Habits;
-use super::wire::{Message, Outcome, Patience, State};
+use super::supervisor::ControllerTraits;
+use super::wire::{ControllerState, LineOutcome, Message, ReplyTimeout};
 
-/// How long an Arduino takes at most to start after its port was opened.
+/// Longest start of an Arduino after its port was opened.
 const START_WAIT: Duration = Duration::from_secs(4);
-/// How long a controller that was not reset is given to say that it was.
+/// How long to wait for the banner of a controller that opening the port should not have reset.
 const SHORT_WAIT: Duration = Duration::from_millis(300);
-/// How long a controller may take to answer its first `?`.
+/// Longest wait for the answer to the first `?`.
 const PROBE_WAIT: Duration = Duration::from_secs(5);
-/// How long answers to an echo may be under way.
+/// How long answers to an echo may be in transit.
 const ECHO_WAIT: Duration = Duration::from_millis(250);
-/// How often the settings are read until they are whole, and, unchecked, the same twice.
+/// Attempts to read the settings completely and, without checksums, twice the same.
 const READINGS: usize = 20;
-/// The complaint of a line without checksum in a checked session.
+/// Grbl's error for a line without checksum in a checked session.
 const SESSION_OPEN: u8 = 70;
-/// Between two reports in motion, with the chip's stamp and without.
+/// Interval of reports in motion, with and without the chip's time stamps.
 const POLL_STAMPED: Duration = Duration::from_micros(66_667);
 const POLL_STOCK: Duration = Duration::from_millis(200);
 
-/// What is assumed of a controller before it is known.
-pub(super) const STRANGER: Habits = Habits {
+/// What is assumed of a controller until its identity is known.
+pub(super) const UNKNOWN_CONTROLLER: ControllerTraits = ControllerTraits {
     degrees_per_unit: 1.0,
     poll: POLL_STOCK,
     stamps: false,
@@ -34,14 +34,14 @@ pub(super) const STRANGER: Habits = Habits {
     step_deg: 0.0,
 };
 
-/// Finds out who is there, stops the table if it moves, and opens a checked session where it is
-/// offered.
+/// Identifies the controller, stops the table if it moves, and opens a checked session if the
+/// controller offers one.
 pub(super) fn greet(
     link: &Link,
     resets: bool,
-    options: &Options,
+    options: &TableOptions,
 ) -> Result<Identity, TurntableError> {
-    rouse(link, resets)?;
+    wake(link, resets)?;
     let about = about(link)?;
     let build = |message: &Message| match message {
         Message::Build { letters, .. } => Some(Extras::of(letters)),
@@ -54,7 +54,7 @@ pub(super) fn greet(
     let mut identity = Identity::read(&about, &settings, options.travel_deg)?;
     identity.extras = extras;
     identity.lease_s = identity.lease_s.filter(|_| extras.lease);
-    link.supervisor().set_habits(Habits {
+    link.supervisor().set_traits(ControllerTraits {
         degrees_per_unit: identity.degrees_per_unit,
         poll: if extras.stamps {
             POLL_STAMPED
@@ -68,7 +68,7 @@ pub(super) fn greet(
     Ok(identity)
 }
 
-/// Opens a checked session where the controller offers one and none is open.
+/// Opens a checked session if the controller offers one and none is open.
 pub(super) fn secure(link: &Link, extras: &Extras) -> Result<(), TurntableError> {
     if !extras.checked_lines || link.supervisor().is_checked() {
         return Ok(());
@@ -76,40 +76,41 @@ pub(super) fn secure(link: &Link, extras: &Extras) -> Result<(), TurntableError>
     done(link, "N0", link.open_session()?).map(|_| ())
 }
 
-/// Waits for the banner, and for a first report; stops a table that moves or is held.
-fn rouse(link: &Link, resets: bool) -> Result<(), TurntableError> {
+/// Waits for the banner and for a first report; stops a table that moves or is held.
+fn wake(link: &Link, resets: bool) -> Result<(), TurntableError> {
     let limit = if resets { START_WAIT } else { SHORT_WAIT };
     link.wait(limit, |supervisor| {
         (supervisor.restarts() > 0).then_some(())
     });
-    let until_us = link.clock().now_us() + PROBE_WAIT.as_micros() as i64;
+    let until_us = link.clock().after(PROBE_WAIT);
     link.supervisor().want_reports(until_us);
     let state = link.wait(PROBE_WAIT, |supervisor| {
         if supervisor.closed().is_some() {
             return Some(None);
         }
-        supervisor.seen().map(|seen| Some(seen.state))
+        supervisor.last_report().map(|report| Some(report.state))
     });
     match state {
-        Some(Some(State::Idle | State::Alarm | State::Check)) => {}
+        Some(Some(ControllerState::Idle | ControllerState::Alarm | ControllerState::Check)) => {}
         Some(Some(_)) => link.stop().map(|_| ())?,
-        Some(None) | None => return Err(stranger(link)),
+        Some(None) | None => return Err(no_controller(link)),
     }
     forget_echo(link)
 }
 
-/// Until a port is set up, the system echoes what the controller says. The controller answers such
-/// lines with errors, which come here while no line waits for an answer; a part of one it keeps as
-/// the head of the next line, which is an empty one here, whatever the answer.
+/// Discards the effects of an echo. Until a port is set up, the system echoes what the controller
+/// sends. The controller answers such lines with errors, which arrive here while no line waits for
+/// an answer, and may keep a part of one as the beginning of the next line. That next line is an
+/// empty one here, and its answer does not matter.
 fn forget_echo(link: &Link) -> Result<(), TurntableError> {
     link.clock().sleep(ECHO_WAIT);
-    match link.line("", Patience::Short)? {
-        Outcome::Failed(_) => link.wait_stopped(),
-        Outcome::Done(_) | Outcome::Refused(_) => Ok(()),
+    match link.line("", ReplyTimeout::AtOnce)? {
+        LineOutcome::Failed(_) => link.wait_stopped(),
+        LineOutcome::Done(_) | LineOutcome::Refused(_) => Ok(()),
     }
 }
 
-fn stranger(link: &Link) -> TurntableError {
+fn no_controller(link: &Link) -> TurntableError {
     let supervisor = link.supervisor();
     let counts = supervisor.counts();
     let heard = match (supervisor.closed(), counts.noise) {
@@ -123,62 +124,64 @@ fn stranger(link: &Link) -> TurntableError {
     }
 }
 
-/// What `$I` gives, with the options in it.
+/// The answer to `$I`, complete with version and options.
 fn about(link: &Link) -> Result<Vec<Message>, TurntableError> {
-    let mut told = Vec::new();
+    let mut last = Vec::new();
     for _ in 0..READINGS {
-        let outcome = link.line("$I", Patience::Short)?;
-        if outcome == Outcome::Refused(SESSION_OPEN) {
-            // The last owner went away in the middle of a checked session: go on with it.
+        let outcome = link.line("$I", ReplyTimeout::AtOnce)?;
+        if outcome == LineOutcome::Refused(SESSION_OPEN) {
+            // The last owner ended in the middle of a checked session: continue it.
             done(link, "N0", link.open_session()?)?;
             continue;
         }
         let messages = match outcome {
-            Outcome::Failed(_) if link.wait_stopped().is_ok() => continue,
+            LineOutcome::Failed(_) if link.wait_stopped().is_ok() => continue,
             outcome => done(link, "$I", outcome)?,
         };
         let whole = |kind: fn(&Message) -> bool| messages.iter().any(kind);
         let options = whole(|message| matches!(message, Message::Build { .. }));
         let version = whole(|message| matches!(message, Message::Version { .. }));
-        if options && version && told == messages {
+        if options && version && last == messages {
             return Ok(messages);
         }
-        told = messages;
+        last = messages;
     }
-    Err(TurntableError::Untold(
+    Err(TurntableError::NotReported(
         "its version and options (`$I`) twice the same",
     ))
 }
 
-/// What `$$` gives, whole, and the same twice: without checksums a digit could be wrong.
-fn settings(link: &Link, extras: Extras) -> Result<Settings, TurntableError> {
-    let mut told = None;
+/// The answer to `$$`, complete and twice the same: without checksums a digit could be wrong.
+fn settings(link: &Link, extras: Extras) -> Result<GrblSettings, TurntableError> {
+    let mut last = None;
     for _ in 0..READINGS {
-        let messages = match link.line("$$", Patience::Short)? {
-            Outcome::Failed(_) if link.wait_stopped().is_ok() => {
+        let messages = match link.line("$$", ReplyTimeout::AtOnce)? {
+            LineOutcome::Failed(_) if link.wait_stopped().is_ok() => {
                 secure(link, &extras)?;
                 continue;
             }
             outcome => done(link, "$$", outcome)?,
         };
-        let settings = Settings::of(&messages);
+        let settings = GrblSettings::of(&messages);
         if !settings.is_whole(extras) {
             continue;
         }
-        if told.as_ref() == Some(&settings) {
+        if last.as_ref() == Some(&settings) {
             return Ok(settings);
         }
-        told = Some(settings);
+        last = Some(settings);
     }
-    Err(TurntableError::Untold("its settings (`$$`) twice the same"))
+    Err(TurntableError::NotReported(
+        "its settings (`$$`) twice the same",
+    ))
 }
 
-fn done(link: &Link, block: &str, outcome: Outcome) -> Result<Vec<Message>, TurntableError> {
+fn done(link: &Link, block: &str, outcome: LineOutcome) -> Result<Vec<Message>, TurntableError> {
     let block = block.to_owned();
     match outcome {
-        Outcome::Done(messages) => Ok(messages),
-        Outcome::Refused(code) => Err(TurntableError::Refused { block, code }),
-        Outcome::Failed(fault) => {
+        LineOutcome::Done(messages) => Ok(messages),
+        LineOutcome::Refused(code) => Err(TurntableError::Refused { block, code }),
+        LineOutcome::Failed(fault) => {
             link.wait_stopped()?;
             Err(TurntableError::Lost { block, fault })
         }

@@ -2,35 +2,35 @@
 
 use super::codes::Alarm;
 use super::error::TurntableError;
-use super::supervisor::Course;
+use super::supervisor::MotionGoal;
 use super::table::{Table, refused};
-use super::wire::{Outcome, Patience, State};
+use super::wire::{ControllerState, LineOutcome, ReplyTimeout};
 
-/// How long the search for the index may take.
-const HOMING: Patience = Patience::Long(120_000_000);
-/// Grbl's refusal of `$H` where homing is switched off.
+/// Time limit of the search for the index.
+const HOMING: ReplyTimeout = ReplyTimeout::Within(120_000_000);
+/// Grbl's error for `$H` if homing is switched off.
 const HOMING_OFF: u8 = 5;
 
-/// What homing did.
+/// The result of homing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Homed {
-    /// The index was found: the angle 0 is there.
+    /// The index was found; the angle 0 is there.
     Index,
-    /// There is no index sensor: the angle 0 is where the table stood.
+    /// There is no index sensor; the angle 0 is where the table stood.
     WhereItStands,
 }
 
 impl Table {
-    /// Looks for the index, or, where the controller has no index sensor, counts the angle 0 from
-    /// where the table stands.
+    /// Searches for the index. Without an index sensor, the table's present position becomes the
+    /// angle 0.
     ///
     /// # Errors
-    /// [`TurntableError::Homing`] where no index was found; what stops a motion.
+    /// [`TurntableError::Homing`] if no index was found, or the fault that has ended the search.
     pub fn home(&self) -> Result<Homed, TurntableError> {
         if !self.identity().homing {
             return self.home_where_it_stands();
         }
-        self.begin(Course::Homing)?;
+        self.begin(MotionGoal::Homing)?;
         let searched = self.search_index();
         self.link().supervisor().end_motion();
         searched
@@ -38,17 +38,17 @@ impl Table {
 
     fn search_index(&self) -> Result<Homed, TurntableError> {
         match self.outcome("$H", HOMING)? {
-            Outcome::Refused(HOMING_OFF) => return self.home_where_it_stands(),
-            Outcome::Refused(code) => return Err(refused("$H", code)),
-            Outcome::Failed(fault) => return Err(self.lost("$H", fault)),
-            Outcome::Done(_) => {}
+            LineOutcome::Refused(HOMING_OFF) => return self.home_where_it_stands(),
+            LineOutcome::Refused(code) => return Err(refused("$H", code)),
+            LineOutcome::Failed(fault) => return Err(self.lost("$H", fault)),
+            LineOutcome::Done(_) => {}
         }
         if let Some(fault) = self.end_by_fault()? {
             return Err(fault);
         }
         // A controller that has not found its index accepts `$H` all the same.
         let status = self.status()?;
-        if status.state != State::Idle {
+        if status.state != ControllerState::Idle {
             return Err(TurntableError::Homing(status.alarm.unwrap_or(Alarm(None))));
         }
         self.link().supervisor().set_zero_deg(0.0);

@@ -1,14 +1,14 @@
-//! What a controller is and can do, by what it says of itself.
+//! A controller's identity and settings, as it reports them.
 
 use std::collections::BTreeMap;
 
 use super::error::TurntableError;
 use super::wire::Message;
 
-/// Millimetres, here degrees, in the inch that a stock board can be set to report in.
+/// Degrees in a reported inch: a stock board can be set to report in inches.
 const INCH: f64 = 25.4;
 
-/// What the rig's own firmware offers beyond Grbl.
+/// Extensions of the rig's own firmware to Grbl.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Extras {
     /// Status reports carry the chip's time of the position.
@@ -20,7 +20,7 @@ pub struct Extras {
 }
 
 impl Extras {
-    /// What the letters of `[OPT:..]` say; Grbl's own are capitals.
+    /// Reads the letters of `[OPT:..]`; Grbl's own are capitals.
     pub(super) fn of(letters: &str) -> Extras {
         Extras {
             stamps: letters.contains('t'),
@@ -30,9 +30,9 @@ impl Extras {
     }
 }
 
-/// How far the table may turn, degrees from machine zero.
+/// The range in which the table may turn, degrees from machine zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub struct TravelLimits {
     /// Lower end.
     pub low_deg: f64,
     /// Upper end.
@@ -44,26 +44,26 @@ pub struct Limits {
 pub struct Identity {
     /// The firmware's version and note, such as `1.1h.20190830` or `1.1h.20261121 (relit)`.
     pub firmware: String,
-    /// What it offers beyond Grbl: nothing on a stock board.
+    /// Its extensions to Grbl: none on a stock board.
     pub extras: Extras,
-    /// Steps in a degree.
+    /// Steps per degree.
     pub steps_per_degree: f64,
-    /// Fastest turn, degrees a second.
+    /// Highest speed, degrees/s.
     pub max_degrees_per_second: f64,
     /// Acceleration, degrees/s^2.
     pub acceleration: f64,
-    /// How far it may turn.
-    pub limits: Limits,
-    /// Whether it can look for the index (`$22`).
+    /// The range in which it may turn.
+    pub limits: TravelLimits,
+    /// Whether homing with an index sensor is enabled (`$22`).
     pub homing: bool,
-    /// Its lease, seconds; 0 when it is off, `None` where there is none.
+    /// Its lease, seconds; 0 if it is off, `None` if the controller has none.
     pub lease_s: Option<f64>,
-    /// Degrees in a unit of its reports.
+    /// Degrees in one unit of its reports.
     pub(super) degrees_per_unit: f64,
 }
 
 impl Identity {
-    /// Whether this is a Grbl board without the rig's extras.
+    /// Whether this is a Grbl board without the rig's extensions.
     #[must_use]
     pub fn is_stock(&self) -> bool {
         self.extras == Extras::default()
@@ -75,11 +75,11 @@ impl Identity {
         self.steps_per_degree.recip()
     }
 
-    /// Reads what `$I` and `$$` gave. `travel_deg`: how far the table may turn either way where
-    /// the controller itself watches no limit.
+    /// Reads the answers to `$I` and `$$`. `travel_deg`: how far the table may turn in either
+    /// direction if the controller has no limit of its own.
     pub(super) fn read(
         about: &[Message],
-        settings: &Settings,
+        settings: &GrblSettings,
         travel_deg: f64,
     ) -> Result<Identity, TurntableError> {
         let mut firmware = None;
@@ -98,12 +98,12 @@ impl Identity {
                 _ => {}
             }
         }
-        let firmware = firmware.ok_or(TurntableError::Untold("its version ([VER:..])"))?;
-        let extras = extras.ok_or(TurntableError::Untold("its options ([OPT:..])"))?;
+        let firmware = firmware.ok_or(TurntableError::NotReported("its version ([VER:..])"))?;
+        let extras = extras.ok_or(TurntableError::NotReported("its options ([OPT:..])"))?;
         let positive = |number, what| {
             settings
                 .positive(number)
-                .ok_or(TurntableError::Untold(what))
+                .ok_or(TurntableError::NotReported(what))
         };
         Ok(Identity {
             firmware,
@@ -119,21 +119,21 @@ impl Identity {
     }
 }
 
-/// What `$$` gave.
+/// The answer to `$$`: a value for each setting's number.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Settings(BTreeMap<u16, f64>);
+pub(super) struct GrblSettings(BTreeMap<u16, f64>);
 
-impl Settings {
+impl GrblSettings {
     /// The settings among `messages`.
-    pub(super) fn of(messages: &[Message]) -> Settings {
+    pub(super) fn of(messages: &[Message]) -> GrblSettings {
         let setting = |message: &Message| match message {
             Message::Setting { number, value } => Some((*number, *value)),
             _ => None,
         };
-        Settings(messages.iter().filter_map(setting).collect())
+        GrblSettings(messages.iter().filter_map(setting).collect())
     }
 
-    /// Whether everything is there that a table is driven by.
+    /// Whether all settings are there that this program needs.
     pub(super) fn is_whole(&self, extras: Extras) -> bool {
         let mut needed = [13, 20, 22, 100, 110, 120, 130].iter();
         needed.all(|number| self.0.contains_key(number))
@@ -152,16 +152,16 @@ impl Settings {
         self.get(number).is_some_and(|value| value != 0.0)
     }
 
-    fn limits(&self, extras: Extras, travel_deg: f64) -> Result<Limits, TurntableError> {
+    fn limits(&self, extras: Extras, travel_deg: f64) -> Result<TravelLimits, TurntableError> {
         let reach_deg = match self.is_on(20) {
             true => self
                 .positive(130)
-                .ok_or(TurntableError::Untold("its soft limit ($130)"))?,
+                .ok_or(TurntableError::NotReported("its soft limit ($130)"))?,
             false => travel_deg,
         };
         // Stock Grbl's soft limits reach from the far end of the axis to machine zero.
         let stock = self.is_on(20) && extras == Extras::default();
-        Ok(Limits {
+        Ok(TravelLimits {
             low_deg: -reach_deg,
             high_deg: if stock { 0.0 } else { reach_deg },
         })
@@ -184,7 +184,7 @@ mod tests {
             (120, 36.0),
             (130, 400.0),
         ];
-        let settings = Settings(usual.iter().chain(changed).copied().collect());
+        let settings = GrblSettings(usual.iter().chain(changed).copied().collect());
         let about: Vec<_> = about.iter().filter_map(|line| parse(line)).collect();
         Identity::read(&about, &settings, 400.0)
     }
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_told_is_named() {
+    fn a_missing_setting_or_option_is_named_in_the_error() {
         let error = identity(&RIG[..1], &[]).unwrap_err();
         assert!(error.to_string().contains("[OPT:..]"), "{error}");
         let error = identity(&RIG, &[(100, 0.0)]).unwrap_err();

@@ -1,55 +1,48 @@
-//! One thread that carries bytes between port and supervisor, and waits on what comes of it.
+//! The I/O thread between port and supervisor, and the waits for its results.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::sync::{Arc, MutexGuard};
+use std::time::Duration;
 
-use super::error::TurntableError;
+use relit_data::causes::with_causes;
+
+use super::error::{MotionFault, TurntableError};
 use super::port::Port;
-use super::status::Status;
-use super::supervisor::{Habits, StopOutcome, Supervisor};
-use super::wire::{Outcome, Patience, SendError};
-use crate::clock::Clock;
+use super::status::TableStatus;
+use super::supervisor::{ControllerTraits, StopOutcome, Supervisor};
+use super::wire::{LineOutcome, ReplyTimeout, SendError};
+use crate::clock::{Clock, JoinHandle, Waitable};
 
-/// Longest wait for bytes before time and output are looked at again.
+/// Longest wait for bytes until the next check of time and output.
 const READ_WAIT: Duration = Duration::from_millis(2);
-/// Shortest such wait, however fast the clock runs.
-const LEAST_WAIT: Duration = Duration::from_micros(200);
-/// How long a report may take.
-const REPORT_WAIT: Duration = Duration::from_millis(1500);
-/// How long a stop may take, with all its repetitions.
+/// How long a report may take, including pauses of the I/O thread on a loaded machine.
+const REPORT_WAIT: Duration = Duration::from_secs(3);
+/// How long a line's answer may take, including all repetitions. The wire normally gives up
+/// earlier.
+const ANSWER_WAIT: Duration = Duration::from_secs(6);
+/// Added to the time limit of a line that is not answered at once.
+const LATE_ANSWER: Duration = Duration::from_secs(2);
+/// How long a stop may take, including all repetitions.
 const STOP_WAIT: Duration = Duration::from_secs(16);
-/// How long a thread may have to wait for a processor, in real time.
-const PAUSE: Duration = Duration::from_millis(300);
-/// What is added in real time to every wait: a line's five tries may each meet such a pause.
-const GRACE: Duration = Duration::from_millis(1500);
 
-/// The wire to a table with its thread; copies share both.
+/// The connection to a table. Clones share it.
 #[derive(Clone)]
 pub(super) struct Link {
-    shared: Arc<Shared>,
-    clock: Clock,
+    supervisor: Arc<Waitable<Supervisor>>,
+    port_name: Arc<str>,
 }
 
-struct Shared {
-    supervisor: Mutex<Supervisor>,
-    changed: Condvar,
-    quit: AtomicBool,
-    name: String,
-}
-
-/// Ends the link's thread, and so closes the port, when it is dropped.
-pub(super) struct Carrier {
-    shared: Arc<Shared>,
+/// The thread that owns the port. Dropping it ends the thread and closes the port.
+pub(super) struct IoThread {
+    quit: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Drop for Carrier {
+impl Drop for IoThread {
     fn drop(&mut self) {
-        self.shared.quit.store(true, Ordering::Release);
+        self.quit.store(true, Ordering::Release);
         if let Some(thread) = self.thread.take() {
-            // A thread that has panicked has closed the port as well.
+            // If the thread has panicked, the port is closed as well.
             let _ = thread.join();
         }
     }
@@ -57,126 +50,117 @@ impl Drop for Carrier {
 
 impl Link {
     /// Starts the thread.
-    pub(super) fn start(port: Box<dyn Port>, clock: Clock, habits: Habits) -> (Link, Carrier) {
-        let shared = Arc::new(Shared {
-            supervisor: Mutex::new(Supervisor::new(habits, slack_us(&clock))),
-            changed: Condvar::new(),
-            quit: AtomicBool::new(false),
-            name: port.name(),
-        });
-        let carried = Arc::clone(&shared);
-        let thread = thread::spawn(move || carry(port, &carried, clock));
-        let carrier = Carrier {
-            shared: Arc::clone(&shared),
-            thread: Some(thread),
+    pub(super) fn start(
+        port: Box<dyn Port>,
+        clock: &Clock,
+        traits: ControllerTraits,
+    ) -> Result<(Link, IoThread), TurntableError> {
+        let link = Link {
+            port_name: port.name().into(),
+            supervisor: Arc::new(Waitable::new(clock, Supervisor::new(traits))),
         };
-        (Link { shared, clock }, carrier)
+        let quit = Arc::new(AtomicBool::new(false));
+        let thread = clock.spawn("turntable", {
+            let (supervisor, quit) = (Arc::clone(&link.supervisor), Arc::clone(&quit));
+            move || carry(port, &supervisor, &quit)
+        });
+        let thread = Some(thread.map_err(TurntableError::Thread)?);
+        Ok((link, IoThread { quit, thread }))
     }
 
-    pub(super) fn clock(&self) -> Clock {
-        self.clock
+    pub(super) fn clock(&self) -> &Clock {
+        self.supervisor.clock()
     }
 
     pub(super) fn port_name(&self) -> &str {
-        &self.shared.name
+        &self.port_name
     }
 
-    /// The supervisor, for a moment.
+    /// Locks the supervisor.
     pub(super) fn supervisor(&self) -> MutexGuard<'_, Supervisor> {
-        self.shared.lock()
+        self.supervisor.lock()
     }
 
-    /// Looks at the supervisor after each change until `look` finds something, or until `limit`
-    /// of the table's clock is over.
+    /// Calls `look` now and after each change until it returns something; `None` after `limit`.
     pub(super) fn wait<T>(
         &self,
         limit: Duration,
-        mut look: impl FnMut(&mut Supervisor) -> Option<T>,
+        look: impl FnMut(&mut Supervisor) -> Option<T>,
     ) -> Option<T> {
-        let until = Instant::now() + self.clock.real(limit) + GRACE;
-        let mut supervisor = self.shared.lock();
-        loop {
-            if let Some(found) = look(&mut supervisor) {
-                return Some(found);
-            }
-            let left = until.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return None;
-            }
-            let waited = self.shared.changed.wait_timeout(supervisor, left);
-            supervisor = waited.unwrap_or_else(PoisonError::into_inner).0;
-        }
+        self.supervisor.wait_for(limit, look)
     }
 
     /// Sends a line and waits for its answer.
-    pub(super) fn line(&self, block: &str, patience: Patience) -> Result<Outcome, TurntableError> {
-        let now_us = self.clock.now_us();
-        let sent = self.supervisor().send(now_us, block, patience);
-        self.answer(block, sent, patience)
+    pub(super) fn line(
+        &self,
+        block: &str,
+        timeout: ReplyTimeout,
+    ) -> Result<LineOutcome, TurntableError> {
+        let now_us = self.clock().now_us();
+        let sent = self.supervisor().send(now_us, block, timeout);
+        self.answer(block, sent, timeout)
     }
 
     /// Opens a checked session.
-    pub(super) fn open_session(&self) -> Result<Outcome, TurntableError> {
-        let now_us = self.clock.now_us();
+    pub(super) fn open_session(&self) -> Result<LineOutcome, TurntableError> {
+        let now_us = self.clock().now_us();
         let sent = self.supervisor().open_session(now_us);
-        self.answer("N0", sent, Patience::Short)
+        self.answer("N0", sent, ReplyTimeout::AtOnce)
     }
 
     fn answer(
         &self,
         block: &str,
         sent: Result<u64, SendError>,
-        patience: Patience,
-    ) -> Result<Outcome, TurntableError> {
+        timeout: ReplyTimeout,
+    ) -> Result<LineOutcome, TurntableError> {
         let id = sent.map_err(|why| TurntableError::Unsent {
             block: block.to_owned(),
             why,
         })?;
-        let limit = match patience {
-            Patience::Short => Duration::from_secs(4),
-            Patience::Long(us) => Duration::from_micros(us.unsigned_abs()) + GRACE,
+        let limit = match timeout {
+            ReplyTimeout::AtOnce => ANSWER_WAIT,
+            ReplyTimeout::Within(us) => Duration::from_micros(us.unsigned_abs()) + LATE_ANSWER,
         };
-        let outcome = self.wait(limit, |supervisor| {
-            let lost = || supervisor_lost(supervisor);
-            lost().map_or_else(
-                || supervisor.take_answer(id).map(Ok),
-                |error| Some(Err(error)),
-            )
+        let outcome = self.wait(limit, |supervisor| match port_lost(supervisor) {
+            Some(error) => Some(Err(error)),
+            None => supervisor.take_answer(id).map(Ok),
         });
         outcome.unwrap_or(Err(TurntableError::Silent {
             milliseconds: limit.as_millis() as u64,
         }))
     }
 
-    /// The table's state by a report that was asked for just now, and by one more where they have
-    /// no checksum.
-    pub(super) fn status(&self) -> Result<Status, TurntableError> {
-        let asked_us = self.clock.now_us();
-        let until_us = asked_us + REPORT_WAIT.as_micros() as i64;
+    /// The table's status by a report that is requested now; without checksums, confirmed by a
+    /// second one.
+    pub(super) fn status(&self) -> Result<TableStatus, TurntableError> {
+        let asked_us = self.clock().now_us();
+        let until_us = self.clock().after(REPORT_WAIT);
         self.supervisor().want_reports(until_us);
         let status = self.wait(REPORT_WAIT, |supervisor| {
-            if let Some(error) = supervisor_lost(supervisor) {
+            if let Some(error) = port_lost(supervisor) {
                 return Some(Err(error));
             }
-            let seen = supervisor.seen()?;
-            let fresh = seen.asked_us.is_some_and(|us| us >= asked_us);
-            (fresh && supervisor.is_confirmed()).then(|| Ok(Status::of(seen, supervisor)))
+            let report = supervisor.last_report()?;
+            let fresh = report.asked_us.is_some_and(|us| us >= asked_us);
+            (fresh && supervisor.is_confirmed()).then(|| Ok(TableStatus::of(report, supervisor)))
         });
         status.unwrap_or(Err(TurntableError::Silent {
             milliseconds: REPORT_WAIT.as_millis() as u64,
         }))
     }
 
-    /// Brings the table to a standstill, and drops what it was still to do.
-    pub(super) fn stop(&self) -> Result<Status, TurntableError> {
-        self.supervisor().request_stop(self.clock.now_us());
+    /// Brings the table to a standstill and discards its remaining motions.
+    pub(super) fn stop(&self) -> Result<TableStatus, TurntableError> {
+        let now_us = self.clock().now_us();
+        self.supervisor().request_stop(now_us);
         self.wait_stopped()?;
         self.status()
     }
 
-    /// Waits until a stop under way has ended.
+    /// Waits for the end of a stop.
     pub(super) fn wait_stopped(&self) -> Result<(), TurntableError> {
-        let ended = self.wait(STOP_WAIT, |supervisor| match supervisor_lost(supervisor) {
+        let ended = self.wait(STOP_WAIT, |supervisor| match port_lost(supervisor) {
             Some(error) => Some(Err(error)),
             None => supervisor.stopped().map(Ok),
         });
@@ -187,46 +171,34 @@ impl Link {
     }
 }
 
-fn supervisor_lost(supervisor: &Supervisor) -> Option<TurntableError> {
+fn port_lost(supervisor: &Supervisor) -> Option<TurntableError> {
     let why = supervisor.closed()?;
-    Some(super::error::Fault::PortLost(why.to_owned()).into())
+    Some(MotionFault::PortLost(why.to_owned()).into())
 }
 
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, Supervisor> {
-        self.supervisor
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// What a wait of a fast clock has to allow for: threads run no faster for it. Microseconds.
-fn slack_us(clock: &Clock) -> i64 {
-    ((clock.factor() - 1.0).max(0.0) * PAUSE.as_micros() as f64) as i64
-}
-
-/// The thread: what is due goes out, what comes is taken, until the link is dropped or the port
-/// is gone.
-fn carry(mut port: Box<dyn Port>, shared: &Shared, clock: Clock) {
-    let wait = clock.real(READ_WAIT).clamp(LEAST_WAIT, READ_WAIT);
+/// The I/O thread: sends what is due and reads what comes, until `quit` is set or the port is gone.
+fn carry(mut port: Box<dyn Port>, shared: &Waitable<Supervisor>, quit: &AtomicBool) {
+    let clock = shared.clock();
     let mut buffer = [0; 512];
-    while !shared.quit.load(Ordering::Acquire) {
+    while !quit.load(Ordering::Acquire) {
         let output = shared.lock().take_output(clock.now_us());
         let written = port.write(&output);
         let asked_us = clock.now_us();
-        let read = written.and_then(|()| port.read(&mut buffer, wait));
+        let read = written.and_then(|()| port.read(&mut buffer, READ_WAIT));
         let now_us = clock.now_us();
         let mut supervisor = shared.lock();
         match read {
-            // Nothing had come by the time the port was asked. What came later, while this thread
-            // perhaps had to wait for a processor, is no silence.
+            // The time at which the read began: this thread may have been paused since, and bytes
+            // that arrived during the pause must not count as silence.
             Ok(0) => supervisor.on_time(asked_us),
             Ok(count) => supervisor.on_bytes(now_us, buffer.get(..count).unwrap_or_default()),
-            Err(error) => supervisor.close(error.to_string()),
+            Err(error) => supervisor.close(with_causes(&error)),
         }
-        let gone = supervisor.closed().is_some();
+        let (changed, gone) = (supervisor.take_changed(), supervisor.closed().is_some());
         drop(supervisor);
-        shared.changed.notify_all();
+        if changed {
+            shared.notify();
+        }
         if gone {
             return;
         }

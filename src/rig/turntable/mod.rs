@@ -1,32 +1,60 @@
-//! The turntable: a client of Grbl 1.1's serial interface that trusts nothing.
+//! The turntable: a client of Grbl 1.1's serial interface that verifies everything.
 //!
 //! ```text
-//! bytes <- port <- link (a thread) -> wire (lines, answers) -> supervisor (what is known, stops)
-//!                                                    table, turn, plan, sync -> angles over time
+//! bytes <- port <- link (a thread) -> wire (lines, answers) -> supervisor (state, stops)
+//!                                                  table, turn, plan, sync -> angles over time
 //! ```
 //!
 //! It works with a stock Grbl 1.1 board on which one millimetre of X is one degree, and with the
-//! rig's own firmware, whose extras it uses where `$I` offers them: reports with the chip's time,
-//! lines with number and checksum, and a lease that stops the table when the host falls silent.
+//! rig's own firmware. Of the latter it uses the extras that `$I` offers: reports with the chip's
+//! time, lines with number and checksum, and a lease that stops the table when the host falls
+//! silent.
 //!
-//! A line counts as done only when its own answer has come; a motion only when the table was seen
-//! at rest at its target. Whatever else happens (a restart, an alarm, silence, a hold that nobody
-//! here asked for, a table that stands still or elsewhere) ends the motion with that reason and
-//! stops the table. A position that may be lost is one that has to be homed again.
+//! A line counts as done only when its own answer has come, a motion only when the table was
+//! reported at rest at its target. Anything else (a restart, an alarm, silence, a hold that this
+//! program did not ask for, a table that stands still or in another place) ends the motion with
+//! that reason and stops the table. A position that may be lost has to be homed again.
 //!
-//! This room knows neither cameras nor sessions, and shares no code with the firmware: both are
-//! held to the published interface.
+//! ```
+//! use relit_rig::clock::Clock;
+//! use relit_rig::simulator::{SimulatedTable, SimulatorOptions};
+//! use relit_rig::turntable::{Table, TableOptions, TurnPlan, TurnRequest};
+//!
+//! # fn main() -> Result<(), relit_rig::turntable::TurntableError> {
+//! let clock = Clock::virtual_time();
+//! let _participant = clock.take_part();
+//! let simulated = SimulatedTable::new(&SimulatorOptions {
+//!     clock: clock.clone(),
+//!     ..SimulatorOptions::default()
+//! });
+//! let options = TableOptions {
+//!     clock,
+//!     ..TableOptions::default()
+//! };
+//! // A real one: `Table::open_serial(Path::new("/dev/ttyUSB0"), &options)`.
+//! let table = Table::open(simulated.open(), &options)?;
+//! table.home()?;
+//! let plan = TurnPlan::new(table.identity(), &table.status()?, &TurnRequest::default())?;
+//! let track = table.start_turn(plan)?.wait_end()?;
+//! let (from_us, to_us) = track.constant_us();
+//! assert!(track.angle_at(to_us) > track.angle_at(from_us));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! This module knows nothing of cameras and sessions, and shares no code with the firmware: both
+//! sides implement the published interface.
 
 mod address;
 mod codes;
 mod error;
+#[cfg(test)]
+mod fake_grbl;
 mod greeting;
 mod homing;
 mod identity;
 mod link;
 mod owner;
-#[cfg(test)]
-mod peer;
 mod plan;
 mod port;
 mod status;
@@ -41,46 +69,46 @@ pub mod wire;
 use std::path::PathBuf;
 
 use crate::clock::Clock;
+use crate::lockfile;
 
-pub use address::{Address, SimulatedAddress, find_serial};
+pub use address::{SimulatedAddress, TurntableAddress, find_serial};
 pub use codes::Alarm;
-pub use error::{Fault, TurntableError};
+pub use error::{MotionFault, TurntableError};
 pub use homing::Homed;
-pub use identity::{Extras, Identity, Limits};
+pub use identity::{Extras, Identity, TravelLimits};
 pub use owner::Owner;
 pub use plan::{Direction, TurnPlan, TurnRequest};
 pub use port::{Port, SerialPort};
-pub use status::Status;
+pub use status::TableStatus;
 pub use sync::{Residuals, Track, TrackError};
 pub use table::Table;
-pub use turn::{ConstantPart, Phase, Turn};
-pub use wire::{Counts, LineFault, ResetCause, SendError, State};
+pub use turn::{ConstantPart, Turn, TurnPhase};
+pub use wire::{ControllerState, Counts, LineFault, RestartCause, SendError};
 
-/// The lease that a turn sets where it is off, seconds.
+/// The lease that a turn sets if the controller's is off, seconds.
 const LEASE_S: u32 = 3;
 
 /// How a table is opened.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Options {
-    /// The clock that the table's times are told by. A simulated table that runs faster than real
-    /// time needs the same clock as its simulator.
+pub struct TableOptions {
+    /// The clock of all waits and time stamps. A simulated table needs the clock of its simulator.
     pub clock: Clock,
-    /// Where the owner of a port leaves its lock and its socket: `$XDG_RUNTIME_DIR`, or a folder
-    /// that every program on the machine agrees on.
+    /// Folder for the lock and the socket of a port's owner: one that every program on the machine
+    /// agrees on, such as [`lockfile::standard_folder`].
     pub runtime_folder: PathBuf,
-    /// How far the table may turn either way from the angle 0 before its cable is wound up, where
-    /// the controller itself watches no limit; degrees.
+    /// How far the table may turn from the angle 0 in either direction before its cable is wound
+    /// up, degrees. Applies if the controller has no limit of its own.
     pub travel_deg: f64,
-    /// Whether what the rig's firmware offers beyond Grbl is used; without, it is spoken to as
-    /// a stock board.
+    /// Whether to use what the rig's firmware offers beyond Grbl. If false, it is treated as a stock
+    /// board.
     pub extras: bool,
 }
 
-impl Default for Options {
+impl Default for TableOptions {
     fn default() -> Self {
         Self {
             clock: Clock::monotonic(),
-            runtime_folder: PathBuf::from("/tmp"),
+            runtime_folder: lockfile::standard_folder(),
             travel_deg: 400.0,
             extras: true,
         }

@@ -6,16 +6,16 @@
 //!                  |------------- constant speed -------------------|
 //! ```
 //!
-//! A ramp from rest to the speed v at the acceleration a is v^2 / 2a long. The plan chooses the
-//! direction in which all of it lies inside the limits.
+//! A ramp from rest to the speed v at the acceleration a has the length v^2 / 2a. The plan chooses
+//! a direction in which the whole turn lies inside the limits.
 
 use super::error::TurntableError;
 use super::identity::Identity;
-use super::status::Status;
+use super::status::TableStatus;
 
 /// Degrees added to a ramp for the rounding of its steps.
 const RAMP_SLACK_DEG: f64 = 0.1;
-/// What a target can gain when it is printed.
+/// Rounding error of a printed target, degrees.
 const PRINTED_DEG: f64 = 0.001;
 
 /// Which way a turn goes.
@@ -36,23 +36,23 @@ impl Direction {
     }
 }
 
-/// What is asked of a turn.
+/// The request for a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TurnRequest {
     /// Speed, degrees a second, above 0.
     pub degrees_per_second: f64,
     /// How far the table turns at constant speed, without margins, degrees, above 0.
     pub turn_deg: f64,
-    /// What is added to it at either end, degrees, 0 or more.
+    /// Added to it at either end, degrees, 0 or more.
     pub margin_deg: f64,
-    /// The only direction allowed; `None` takes the one that has room, angles growing first.
+    /// The only direction allowed; with `None`, positive if it fits, else negative.
     pub direction: Option<Direction>,
-    /// Whether the table turns back to where it started afterwards, so that no cable winds up.
+    /// Whether the table turns back to its start afterwards, so that the cable does not wind up.
     pub unwind: bool,
 }
 
 impl Default for TurnRequest {
-    /// One turn in 50 s, two degrees more at either end, unwound afterwards.
+    /// One turn in 50 s with two degrees more at either end, unwound afterwards.
     fn default() -> Self {
         Self {
             degrees_per_second: 7.2,
@@ -80,11 +80,11 @@ impl TurnPlan {
     /// Plans a turn from where the table stands.
     ///
     /// # Errors
-    /// [`TurntableError::NoRoom`], or [`TurntableError::Figure`] for a speed or angle that no
-    /// table can follow.
+    /// [`TurntableError::NoRoom`], or [`TurntableError::OutOfRange`] for a speed or angle that the
+    /// table cannot follow.
     pub fn new(
         identity: &Identity,
-        status: &Status,
+        status: &TableStatus,
         request: &TurnRequest,
     ) -> Result<TurnPlan, TurntableError> {
         check(identity, request)?;
@@ -127,7 +127,7 @@ impl TurnPlan {
         self.constant_deg
     }
 
-    /// Which way it turns.
+    /// Its direction.
     #[must_use]
     pub fn direction(&self) -> Direction {
         self.direction
@@ -139,13 +139,13 @@ impl TurnPlan {
         self.unwind
     }
 
-    /// The angle it was planned from.
+    /// The angle from which it was planned.
     #[must_use]
     pub fn start_deg(&self) -> f64 {
         self.start_deg
     }
 
-    /// Where it moves back to first.
+    /// Where it moves first: back by ramp and margin.
     #[must_use]
     pub fn back_deg(&self) -> f64 {
         self.start_deg - self.direction.sign() * (self.ramp_deg + self.margin_deg)
@@ -157,7 +157,7 @@ impl TurnPlan {
         self.start_deg - self.direction.sign() * self.margin_deg
     }
 
-    /// Where it starts to slow down.
+    /// Where it starts to decelerate.
     #[must_use]
     pub fn constant_to_deg(&self) -> f64 {
         self.constant_from_deg() + self.direction.sign() * self.constant_deg
@@ -171,9 +171,10 @@ impl TurnPlan {
 }
 
 impl Identity {
-    /// The limits as angles of a table whose angle and machine position are known: those of the
-    /// controller, and as far again either way from the angle 0, where the cable hangs free.
-    pub(super) fn limits_from(&self, status: &Status) -> (f64, f64) {
+    /// The limits as angles, for a table whose angle and machine position are known: those of the
+    /// controller, and the same distance in either direction from the angle 0, where the cable hangs
+    /// free.
+    pub(super) fn limits_from(&self, status: &TableStatus) -> (f64, f64) {
         let zero = status.machine_deg - status.angle_deg;
         let reach = self.limits.high_deg.max(-self.limits.low_deg);
         let low = (self.limits.low_deg - zero).max(-reach);
@@ -181,13 +182,13 @@ impl Identity {
         (low, high)
     }
 
-    /// A speed that the table can follow.
+    /// Checks that the table can follow a speed.
     pub(super) fn check_speed(&self, degrees_per_second: f64) -> Result<(), TurntableError> {
         let fastest = self.max_degrees_per_second;
         if degrees_per_second > 0.0 && degrees_per_second <= fastest * (1.0 + 1e-9) {
             return Ok(());
         }
-        Err(TurntableError::Figure {
+        Err(TurntableError::OutOfRange {
             what: "the speed in degrees/s",
             value: degrees_per_second,
             range: format!("it has to be above 0 and at most {fastest:.3} (setting $110)"),
@@ -202,7 +203,7 @@ fn check(identity: &Identity, request: &TurnRequest) -> Result<(), TurntableErro
             return Ok(());
         }
         let range = "it has to be an angle above 0 (a margin may be 0)".to_owned();
-        Err(TurntableError::Figure { what, value, range })
+        Err(TurntableError::OutOfRange { what, value, range })
     };
     angle(
         "the turn in degrees",
@@ -218,7 +219,7 @@ fn check(identity: &Identity, request: &TurnRequest) -> Result<(), TurntableErro
 
 fn no_room(
     plan: Option<&TurnPlan>,
-    status: &Status,
+    status: &TableStatus,
     (low_deg, high_deg): (f64, f64),
     request: &TurnRequest,
 ) -> TurntableError {
@@ -250,8 +251,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::turntable::identity::{Extras, Limits};
-    use crate::turntable::wire::State;
+    use crate::turntable::identity::{Extras, TravelLimits};
+    use crate::turntable::wire::ControllerState;
 
     fn identity(low_deg: f64, high_deg: f64) -> Identity {
         Identity {
@@ -260,16 +261,16 @@ mod tests {
             steps_per_degree: 88.889,
             max_degrees_per_second: 36.0,
             acceleration: 36.0,
-            limits: Limits { low_deg, high_deg },
+            limits: TravelLimits { low_deg, high_deg },
             homing: false,
             lease_s: None,
             degrees_per_unit: 1.0,
         }
     }
 
-    fn status(angle_deg: f64, machine_deg: f64) -> Status {
-        Status {
-            state: State::Idle,
+    fn status(angle_deg: f64, machine_deg: f64) -> TableStatus {
+        TableStatus {
+            state: ControllerState::Idle,
             angle_deg,
             machine_deg,
             degrees_per_second: 0.0,
@@ -291,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_from_zero_has_its_ramps_outside_of_the_constant_part() {
+    fn a_turn_from_zero_has_its_ramps_outside_the_constant_part() {
         let plan = plan(0.0).unwrap();
         assert_eq!(plan.direction(), Direction::Positive);
         // 7.2^2 / (2 * 36) = 0.72 degrees of ramp.
@@ -309,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn no_room_is_told_with_the_numbers_and_the_way_out() {
+    fn a_turn_without_room_is_refused_with_the_numbers_and_a_way_out() {
         let request = TurnRequest {
             direction: Some(Direction::Positive),
             ..TurnRequest::default()
@@ -328,11 +329,11 @@ mod tests {
     }
 
     #[test]
-    fn speeds_and_angles_that_no_table_follows_are_refused() {
+    fn speeds_and_angles_that_no_table_can_follow_are_refused() {
         let refused = |request: TurnRequest| {
             let planned = TurnPlan::new(&identity(-400.0, 400.0), &status(0.0, 0.0), &request);
             assert!(
-                matches!(planned, Err(TurntableError::Figure { .. })),
+                matches!(planned, Err(TurntableError::OutOfRange { .. })),
                 "{planned:?}"
             );
         };

@@ -1,4 +1,4 @@
-//! The serial port: bytes in and out, each wait bounded.
+//! The serial port: bytes in and out, with a limit on every wait.
 
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -8,14 +8,15 @@ use serialport::{SerialPort as _, TTYPort};
 
 use super::error::TurntableError;
 
-/// Grbl's speed, bits a second.
+/// Grbl's baud rate, bits/s.
 const BAUD: u32 = 115_200;
-/// How long one write may take before the port counts as lost.
+/// Longest time of one write; after it the port counts as lost.
 const WRITE_WAIT: Duration = Duration::from_millis(500);
 
-/// A byte stream to a controller. Reads and writes come back within their time.
+/// A byte stream to a controller. Reads and writes return within a limited time.
 pub trait Port: Send + 'static {
-    /// Reads what is there, waiting at most `wait` for the first byte; 0 when nothing came.
+    /// Reads the bytes that are there. If there are none, waits at most `wait` for the first one;
+    /// returns 0 if none came.
     ///
     /// # Errors
     /// The port is gone.
@@ -24,17 +25,17 @@ pub trait Port: Send + 'static {
     /// Writes all of `bytes`, or fails within a second.
     ///
     /// # Errors
-    /// The port is gone, or takes nothing.
+    /// The port is gone or accepts nothing.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// What a person knows it by.
+    /// Its name, for messages.
     fn name(&self) -> String;
 
     /// Whether opening it may have reset the controller, as an Arduino's USB side does.
     fn resets(&self) -> bool;
 }
 
-/// A serial port that nobody else can open.
+/// A serial port, opened exclusively.
 #[derive(Debug)]
 pub struct SerialPort {
     port: TTYPort,
@@ -43,7 +44,7 @@ pub struct SerialPort {
 }
 
 impl SerialPort {
-    /// Opens a port at Grbl's speed, for this process alone.
+    /// Opens a port exclusively, at Grbl's baud rate.
     ///
     /// # Errors
     /// [`TurntableError::Open`].
@@ -55,7 +56,7 @@ impl SerialPort {
             source: source.into(),
         };
         let mut port = TTYPort::open(&settings).map_err(open)?;
-        // A port without modem lines, such as a pseudo terminal, has none that could reset.
+        // A port without modem lines, such as a pseudoterminal, cannot reset the controller.
         let resets = port.read_clear_to_send().is_ok();
         Ok(SerialPort { port, name, resets })
     }

@@ -1,43 +1,43 @@
-//! What a table is doing.
+//! The status of a table.
 
 use super::codes::Alarm;
-use super::supervisor::{Seen, Supervisor};
-use super::wire::State;
+use super::supervisor::{PositionReport, Supervisor};
+use super::wire::ControllerState;
 
-/// What the table is doing, by a report of just now.
+/// The status of a table by a fresh report.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Status {
+pub struct TableStatus {
     /// The controller's state.
-    pub state: State,
-    /// Degrees from the angle counted as zero, or from machine zero while that is not known.
+    pub state: ControllerState,
+    /// Degrees from the angle 0, or from machine zero if the angle 0 is unknown.
     pub angle_deg: f64,
-    /// Degrees as the controller counts them.
+    /// Degrees from machine zero.
     pub machine_deg: f64,
     /// Speed, degrees a second.
     pub degrees_per_second: f64,
-    /// Battery, volts, where the controller measures it.
+    /// Battery, volts, if the controller measures it.
     pub battery_v: Option<f64>,
     /// Whether the index sensor is active.
     pub index: bool,
     /// Whether the emergency stop is pressed.
     pub emergency_stop: bool,
-    /// Whether the position can be trusted.
+    /// Whether the angle 0 is known.
     pub homed: bool,
-    /// What locked the table.
+    /// The alarm that locked the table.
     pub alarm: Option<Alarm>,
 }
 
-impl Status {
-    pub(super) fn of(seen: &Seen, supervisor: &Supervisor) -> Status {
+impl TableStatus {
+    pub(super) fn of(report: &PositionReport, supervisor: &Supervisor) -> TableStatus {
         let zero = supervisor.zero_deg();
-        Status {
-            state: seen.state,
-            angle_deg: seen.machine_deg - zero.unwrap_or(0.0),
-            machine_deg: seen.machine_deg,
-            degrees_per_second: seen.speed,
-            battery_v: seen.battery_v,
-            index: seen.pins.index,
-            emergency_stop: seen.pins.emergency_stop,
+        TableStatus {
+            state: report.state,
+            angle_deg: report.machine_deg - zero.unwrap_or(0.0),
+            machine_deg: report.machine_deg,
+            degrees_per_second: report.speed,
+            battery_v: report.battery_v,
+            index: report.pins.index,
+            emergency_stop: report.pins.emergency_stop,
             homed: zero.is_some(),
             alarm: supervisor.alarm(),
         }

@@ -1,58 +1,57 @@
-//! The table: what a program does with it.
+//! The table as other modules use it.
 
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use super::error::TurntableError;
 use super::greeting;
 use super::identity::Identity;
-use super::link::{Carrier, Link};
+use super::link::{IoThread, Link};
 use super::owner::{Claim, Server};
 use super::plan::TurnPlan;
 use super::port::{Port, SerialPort};
-use super::status::Status;
-use super::supervisor::Course;
+use super::status::TableStatus;
+use super::supervisor::MotionGoal;
 use super::turn::Turn;
-use super::wire::{Counts, Message, Outcome, Patience, State};
-use super::{LEASE_S, Options};
-use crate::clock::Clock;
+use super::wire::{ControllerState, Counts, LineOutcome, Message, ReplyTimeout};
+use super::{LEASE_S, TableOptions};
+use crate::clock::{Clock, Waitable};
 
-/// What is added to the time a motion should take.
+/// Added to the computed time of a motion.
 const MOTION_SLACK: Duration = Duration::from_secs(4);
-/// Fastest jog and unwinding that is not asked for otherwise, degrees a second.
+/// Speed limit of unwinding, and of jogs without a given speed, degrees/s.
 const BRISK: f64 = 30.0;
 
-/// A table, owned by this process. It is stopped when this is dropped.
+/// A table, owned by this process. Dropping it stops the table.
 pub struct Table {
-    // Fields are dropped in this order: nobody asks any more, the port is closed, and then
-    // another process may have it.
+    // Fields are dropped in this order: requests of other processes end, the port is closed, and
+    // only then the claim is released.
     server: Option<Server>,
     link: Link,
-    _carrier: Carrier,
+    _io_thread: IoThread,
     _claim: Option<Claim>,
     identity: Identity,
-    /// Held while a line waits for its answer.
-    line: Mutex<()>,
+    /// Whether a line waits for its answer.
+    line_open: Waitable<bool>,
 }
 
 impl Table {
     /// Takes over the controller behind `port`: waits until it has started, stops it if it moves,
-    /// and reads what it is.
+    /// and reads its identity and settings.
     ///
     /// # Errors
-    /// [`TurntableError::NoController`], or what else went wrong on the way.
-    pub fn open(port: impl Port, options: &Options) -> Result<Table, TurntableError> {
+    /// [`TurntableError::NoController`], or what else failed during the exchange.
+    pub fn open(port: impl Port, options: &TableOptions) -> Result<Table, TurntableError> {
         Self::greet(Box::new(port), None, options)
     }
 
-    /// Opens a serial port for this process alone, and lets other processes ask it for `status`
-    /// and `stop` through [`super::Owner`].
+    /// Opens a serial port exclusively, and answers requests of other processes for `status` and
+    /// `stop` (see [`super::Owner`]).
     ///
     /// # Errors
-    /// [`TurntableError::Owned`] where another process has it, and what [`Table::open`] says.
-    pub fn open_serial(path: &Path, options: &Options) -> Result<Table, TurntableError> {
-        // Opening the port resets an Arduino: nobody may own it by then.
+    /// [`TurntableError::Owned`] if another process has it, and the errors of [`Table::open`].
+    pub fn open_serial(path: &Path, options: &TableOptions) -> Result<Table, TurntableError> {
+        // Opening the port resets an Arduino: this must not happen to another owner's table.
         let claim = Claim::take(path, &options.runtime_folder)?;
         let port = SerialPort::open(path)?;
         Self::greet(Box::new(port), Some(claim), options)
@@ -61,35 +60,35 @@ impl Table {
     fn greet(
         port: Box<dyn Port>,
         claim: Option<Claim>,
-        options: &Options,
+        options: &TableOptions,
     ) -> Result<Table, TurntableError> {
         let resets = port.resets();
-        let (link, carrier) = Link::start(port, options.clock, greeting::STRANGER);
+        let (link, io_thread) = Link::start(port, &options.clock, greeting::UNKNOWN_CONTROLLER)?;
         let identity = greeting::greet(&link, resets, options)?;
         let server = claim.as_ref().map(|claim| claim.serve(link.clone()));
         Ok(Table {
             server: server.transpose()?,
             link,
-            _carrier: carrier,
+            _io_thread: io_thread,
             _claim: claim,
             identity,
-            line: Mutex::new(()),
+            line_open: Waitable::new(&options.clock, false),
         })
     }
 
-    /// What the controller is.
+    /// The controller's identity and settings.
     #[must_use]
     pub fn identity(&self) -> &Identity {
         &self.identity
     }
 
-    /// What went wrong on the wire so far and was put right or noticed.
+    /// Counters of lines, reports and wire errors since the table was opened.
     #[must_use]
     pub fn counts(&self) -> Counts {
         self.link.supervisor().counts()
     }
 
-    pub(super) fn clock(&self) -> Clock {
+    pub(super) fn clock(&self) -> &Clock {
         self.link.clock()
     }
 
@@ -97,24 +96,24 @@ impl Table {
         &self.link
     }
 
-    /// What the table is doing just now.
+    /// The table's present status.
     ///
     /// # Errors
     /// [`TurntableError::Silent`].
-    pub fn status(&self) -> Result<Status, TurntableError> {
+    pub fn status(&self) -> Result<TableStatus, TurntableError> {
         self.link.status()
     }
 
-    /// Turns by `degrees` and waits until the table is there. Speed in degrees a second; brisk
-    /// where it is not given.
+    /// Turns by `degrees` and waits until the table has arrived. `speed` in degrees/s; without it,
+    /// at most 30.
     ///
     /// # Errors
     /// [`TurntableError::BeyondLimit`], [`TurntableError::NotReady`], or what ended the motion.
-    pub fn jog(&self, degrees: f64, speed: Option<f64>) -> Result<Status, TurntableError> {
+    pub fn jog(&self, degrees: f64, speed: Option<f64>) -> Result<TableStatus, TurntableError> {
         let speed = speed.unwrap_or_else(|| self.brisk());
         self.identity.check_speed(speed)?;
         if !degrees.is_finite() {
-            return Err(TurntableError::Figure {
+            return Err(TurntableError::OutOfRange {
                 what: "the angle in degrees",
                 value: degrees,
                 range: "it has to be a number".to_owned(),
@@ -131,17 +130,18 @@ impl Table {
             });
         }
         let machine_deg = status.machine_deg + degrees;
-        // To a place instead of by an angle: sent twice it would still move once.
+        // An absolute target: a line that is executed twice still moves the table once.
         let block = format!("$J=G21G90G53X{machine_deg:.3}F{:.3}", speed * 60.0);
         self.travel(&block, &status, machine_deg, speed)?;
         self.status()
     }
 
+    /// Speed of unwinding, and of jogs without a given speed, degrees/s.
     pub(super) fn brisk(&self) -> f64 {
         self.identity.max_degrees_per_second.min(BRISK)
     }
 
-    /// Moves straight to a place, degrees from machine zero, and waits until the table is there.
+    /// Moves to `machine_deg`, degrees from machine zero, and waits until the table has arrived.
     pub(super) fn go(&self, machine_deg: f64, speed: f64) -> Result<(), TurntableError> {
         let status = self.ready()?;
         let block = straight(machine_deg, speed);
@@ -151,7 +151,7 @@ impl Table {
     fn travel(
         &self,
         block: &str,
-        from: &Status,
+        from: &TableStatus,
         machine_deg: f64,
         speed: f64,
     ) -> Result<(), TurntableError> {
@@ -162,7 +162,7 @@ impl Table {
         arrived
     }
 
-    /// Longest time that a motion may take.
+    /// Time limit of a motion.
     pub(super) fn travel_time(&self, distance_deg: f64, speed: f64) -> Duration {
         let ramps = speed / self.identity.acceleration;
         Duration::try_from_secs_f64((distance_deg / speed + ramps) * 1.05)
@@ -170,7 +170,7 @@ impl Table {
             .saturating_add(MOTION_SLACK)
     }
 
-    /// Sends the line that moves the table, and watches it from then on.
+    /// Sends the line that moves the table and starts to monitor the motion.
     pub(super) fn launch(
         &self,
         block: &str,
@@ -179,7 +179,7 @@ impl Table {
         speed: f64,
     ) -> Result<(), TurntableError> {
         let time = self.travel_time(distance, speed);
-        self.begin(Course::To {
+        self.begin(MotionGoal::To {
             target_deg,
             within_us: i64::try_from(time.as_micros()).unwrap_or(i64::MAX),
         })?;
@@ -192,7 +192,7 @@ impl Table {
         sent.map(|_| ())
     }
 
-    /// Waits until the table is at its target, or has been stopped by a fault.
+    /// Waits until the table is at its target or a fault has stopped it.
     pub(super) fn wait_arrival(&self, limit: Duration) -> Result<(), TurntableError> {
         let ended = self.link.wait(limit + MOTION_SLACK, |supervisor| {
             let arrived = supervisor
@@ -204,13 +204,13 @@ impl Table {
             Some(fault) => Err(fault),
             None if ended.is_none() => {
                 self.stop()?;
-                Err(super::error::Fault::Late.into())
+                Err(super::error::MotionFault::Late.into())
             }
             None => Ok(()),
         }
     }
 
-    /// The fault that has ended a motion, once the table has been stopped because of it.
+    /// The fault that has ended the motion, if any. Waits until the table has been stopped.
     pub(super) fn end_by_fault(&self) -> Result<Option<TurntableError>, TurntableError> {
         let fault = self.link.supervisor().fault().cloned();
         if let Some(fault) = fault {
@@ -223,26 +223,29 @@ impl Table {
         Ok(None)
     }
 
-    /// Starts watching a motion, unless one is under way.
-    pub(super) fn begin(&self, course: Course) -> Result<(), TurntableError> {
+    /// Starts to monitor a motion.
+    ///
+    /// # Errors
+    /// [`TurntableError::Busy`] if one is in progress.
+    pub(super) fn begin(&self, goal: MotionGoal) -> Result<(), TurntableError> {
         self.secure()?;
         let mut supervisor = self.link.supervisor();
         if supervisor.is_stopping() || supervisor.motion().is_some() {
             return Err(TurntableError::Busy);
         }
-        supervisor.begin_motion(self.clock().now_us(), course);
+        supervisor.begin_motion(self.clock().now_us(), goal);
         Ok(())
     }
 
-    /// The status of a table that can take a motion.
-    pub(super) fn ready(&self) -> Result<Status, TurntableError> {
+    /// The status of a table that is ready for a motion.
+    pub(super) fn ready(&self) -> Result<TableStatus, TurntableError> {
         let status = self.status()?;
         let supervisor = self.link.supervisor();
         if supervisor.is_stopping() || supervisor.motion().is_some() {
             return Err(TurntableError::Busy);
         }
         match status.state {
-            State::Idle => Ok(status),
+            ControllerState::Idle => Ok(status),
             state => Err(TurntableError::NotReady {
                 state,
                 alarm: status.alarm,
@@ -250,11 +253,11 @@ impl Table {
         }
     }
 
-    /// Ramps the table down, drops what it was still to do, and makes sure that it stands.
+    /// Ramps the table down, discards its remaining motions, and verifies that it stands.
     ///
     /// # Errors
-    /// [`TurntableError::NotStopped`] where it was not seen at rest.
-    pub fn stop(&self) -> Result<Status, TurntableError> {
+    /// [`TurntableError::NotStopped`] if it was not reported at rest.
+    pub fn stop(&self) -> Result<TableStatus, TurntableError> {
         self.link.stop()
     }
 
@@ -262,20 +265,19 @@ impl Table {
     ///
     /// # Errors
     /// [`TurntableError::Refused`] while the emergency stop is pressed.
-    pub fn unlock(&self) -> Result<Status, TurntableError> {
+    pub fn unlock(&self) -> Result<TableStatus, TurntableError> {
         self.command("$X")?;
         self.status()
     }
 
-    /// Moves back by the ramp, and starts the turn; it goes on by itself from then on, and is
-    /// watched until [`Turn`] ends or is dropped.
+    /// Moves back by the ramp and starts the turn. From then on the table moves by itself and is
+    /// monitored until the [`Turn`] ends or is dropped.
     ///
-    /// Where the controller offers a lease (`$60`) and it is off, it is set to 3 s first, so that
-    /// the table stops when this computer fails; that is stored in the controller and so done
-    /// once in its life.
+    /// If the controller offers a lease (`$60`) and it is off, it is set to 3 s first, so that the
+    /// table stops when this computer fails. The controller stores the setting.
     ///
     /// # Errors
-    /// [`TurntableError::NotHomed`], [`TurntableError::Moved`], or what stops a motion.
+    /// [`TurntableError::NotHomed`], [`TurntableError::MovedSincePlan`], or what stops a motion.
     pub fn start_turn(&self, plan: TurnPlan) -> Result<Turn<'_>, TurntableError> {
         self.secure()?;
         let status = self.ready()?;
@@ -284,7 +286,7 @@ impl Table {
         }
         let planned_deg = plan.start_deg();
         if (status.angle_deg - planned_deg).abs() > 2.0 * self.identity.step_deg() {
-            return Err(TurntableError::Moved {
+            return Err(TurntableError::MovedSincePlan {
                 planned_deg,
                 at_deg: status.angle_deg,
             });
@@ -306,36 +308,36 @@ impl Table {
         Ok(())
     }
 
-    /// Opens a checked session where the controller offers one and none is open.
+    /// Opens a checked session if the controller offers one and none is open.
     fn secure(&self) -> Result<(), TurntableError> {
-        let _line = self.line.lock().unwrap_or_else(PoisonError::into_inner);
+        let _turn = LineTurn::take(&self.line_open);
         greeting::secure(&self.link, &self.identity.extras)
     }
 
     pub(super) fn outcome(
         &self,
         block: &str,
-        patience: Patience,
-    ) -> Result<Outcome, TurntableError> {
+        timeout: ReplyTimeout,
+    ) -> Result<LineOutcome, TurntableError> {
         self.secure()?;
-        let _line = self.line.lock().unwrap_or_else(PoisonError::into_inner);
-        self.link.line(block, patience)
+        let _turn = LineTurn::take(&self.line_open);
+        self.link.line(block, timeout)
     }
 
-    /// Sends a line and waits for its `ok`; gives what stood in front of it.
+    /// Sends a line and waits for its `ok`; returns the messages before it.
     fn command(&self, block: &str) -> Result<Vec<Message>, TurntableError> {
-        match self.outcome(block, Patience::Short)? {
-            Outcome::Done(messages) => Ok(messages),
-            Outcome::Refused(code) => Err(refused(block, code)),
-            Outcome::Failed(fault) => Err(self.lost(block, fault)),
+        match self.outcome(block, ReplyTimeout::AtOnce)? {
+            LineOutcome::Done(messages) => Ok(messages),
+            LineOutcome::Refused(code) => Err(refused(block, code)),
+            LineOutcome::Failed(fault) => Err(self.lost(block, fault)),
         }
     }
 
-    /// A line without answer: the table is being stopped for it, and that is waited for.
+    /// The error for a line without answer. The supervisor stops the table then; waits for that.
     pub(super) fn lost(&self, block: &str, fault: super::wire::LineFault) -> TurntableError {
         match self.end_by_fault() {
             Err(error) => error,
-            Ok(Some(TurntableError::Motion(fault @ super::error::Fault::PortLost(_)))) => {
+            Ok(Some(TurntableError::Motion(fault @ super::error::MotionFault::PortLost(_)))) => {
                 fault.into()
             }
             Ok(_) => TurntableError::Lost {
@@ -346,12 +348,28 @@ impl Table {
     }
 }
 
+/// Permission to send a line and wait for its answer. One thread has it at a time.
+struct LineTurn<'a>(&'a Waitable<bool>);
+
+impl<'a> LineTurn<'a> {
+    fn take(open: &'a Waitable<bool>) -> Self {
+        open.wait(|open| (!std::mem::replace(open, true)).then_some(()));
+        Self(open)
+    }
+}
+
+impl Drop for LineTurn<'_> {
+    fn drop(&mut self) {
+        self.0.update(|open| *open = false);
+    }
+}
+
 impl Drop for Table {
     fn drop(&mut self) {
         self.server = None;
         self.link.supervisor().release(self.clock().now_us());
         if self.link.supervisor().is_stopping() {
-            // There is nobody left to tell; the lease, where there is one, stops the table too.
+            // Nobody is left to receive an error. The lease, if there is one, also stops the table.
             let _ = self.link.wait_stopped();
         }
     }
@@ -364,7 +382,7 @@ pub(super) fn refused(block: &str, code: u8) -> TurntableError {
     }
 }
 
-/// The line that moves straight to a place, degrees from machine zero.
+/// The line for a linear motion to `machine_deg`, degrees from machine zero.
 pub(super) fn straight(machine_deg: f64, speed: f64) -> String {
     format!("G21G90G53G1X{machine_deg:.3}F{:.3}", speed * 60.0)
 }

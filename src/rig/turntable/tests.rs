@@ -1,51 +1,55 @@
-//! The table from outside, against a peer that goes wrong on demand, on a clock that runs ahead.
+//! The table as a whole, against a fake controller with faults on demand, on virtual time.
 
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use super::peer::{Peer, PeerPort, Trouble};
+use super::fake_grbl::{FakeGrbl, FakePort, Trouble};
 use super::*;
-
-/// How much faster than real time the tests run.
-const SPEED: f64 = 20.0;
+use crate::clock::Participant;
 
 struct Rig {
-    peer: Arc<Mutex<Peer>>,
+    fake_grbl: Arc<Mutex<FakeGrbl>>,
     table: Table,
+    _participant: Participant,
 }
 
-fn open(peer: Peer) -> Rig {
-    try_open(peer).unwrap()
+fn open(fake_grbl: FakeGrbl) -> Rig {
+    try_open(fake_grbl).unwrap()
 }
 
-fn try_open(peer: Peer) -> Result<Rig, TurntableError> {
-    open_at(Clock::scaled(SPEED), peer)
+fn try_open(fake_grbl: FakeGrbl) -> Result<Rig, TurntableError> {
+    open_on(Clock::virtual_time(), fake_grbl)
 }
 
-fn open_at(clock: Clock, peer: Peer) -> Result<Rig, TurntableError> {
-    let peer = Arc::new(Mutex::new(peer));
-    let port = PeerPort {
-        peer: Arc::clone(&peer),
-        clock,
+fn open_on(clock: Clock, fake_grbl: FakeGrbl) -> Result<Rig, TurntableError> {
+    let participant = clock.take_part();
+    let fake_grbl = Arc::new(Mutex::new(fake_grbl));
+    let port = FakePort {
+        fake_grbl: Arc::clone(&fake_grbl),
+        clock: clock.clone(),
     };
-    let options = Options {
+    let options = TableOptions {
         clock,
-        ..Options::default()
+        ..TableOptions::default()
     };
     let table = Table::open(port, &options)?;
-    Ok(Rig { peer, table })
+    Ok(Rig {
+        fake_grbl,
+        table,
+        _participant: participant,
+    })
 }
 
 impl Rig {
     fn set(&self, change: impl FnOnce(&mut Trouble, i64)) {
         let now_us = self.table.clock().now_us();
-        change(&mut self.peer.lock().unwrap().trouble, now_us);
+        change(&mut self.fake_grbl.lock().unwrap().trouble, now_us);
     }
 
     fn executed(&self) -> Vec<String> {
-        self.peer.lock().unwrap().executed.clone()
+        self.fake_grbl.lock().unwrap().executed.clone()
     }
 
     fn plan(&self, turn_deg: f64) -> TurnPlan {
@@ -63,60 +67,61 @@ impl Rig {
 }
 
 #[test]
-fn the_rigs_controller_is_known_by_what_it_says_and_spoken_to_in_checked_lines() {
-    let rig = open(Peer::new(true));
+fn the_rigs_controller_is_recognised_by_its_options_and_gets_checked_lines() {
+    let rig = open(FakeGrbl::new(true));
     let identity = rig.table.identity();
     assert!(!identity.is_stock() && identity.extras.checked_lines);
     assert_eq!(identity.steps_per_degree, 88.889);
     let status = rig.table.status().unwrap();
-    assert_eq!((status.state, status.homed), (State::Idle, false));
+    assert_eq!((status.state, status.homed), (ControllerState::Idle, false));
     assert_eq!(status.battery_v, Some(11.84));
 }
 
 #[test]
 fn a_session_that_a_killed_owner_left_open_is_taken_over() {
-    let mut peer = Peer::new(true);
-    peer.leave_session_open();
-    let rig = open(peer);
+    let mut fake_grbl = FakeGrbl::new(true);
+    fake_grbl.leave_session_open();
+    let rig = open(fake_grbl);
     assert!(rig.table.jog(1.0, None).is_ok());
 }
 
 #[test]
-fn answers_to_an_echo_of_the_banner_are_passed_over() {
+fn answers_to_an_echo_of_the_banner_are_ignored() {
     for rig in [true, false] {
-        let mut peer = Peer::new(rig);
-        peer.trouble.echo = true;
-        let rig = open(peer);
+        let mut fake_grbl = FakeGrbl::new(rig);
+        fake_grbl.trouble.echo = true;
+        let rig = open(fake_grbl);
         assert!(rig.table.jog(1.0, None).is_ok());
     }
 }
 
 #[test]
-fn nothing_behind_the_port_is_no_controller() {
-    let mut peer = Peer::new(false);
-    peer.trouble.silent_from_us = Some(0);
-    peer.give();
+fn a_silent_port_has_no_controller() {
+    let mut fake_grbl = FakeGrbl::new(false);
+    fake_grbl.trouble.silent_from_us = Some(0);
+    fake_grbl.give();
     assert!(matches!(
-        try_open(peer),
+        try_open(fake_grbl),
         Err(TurntableError::NoController { .. })
     ));
 }
 
 #[test]
 fn a_table_found_moving_is_stopped_first() {
-    let mut peer = Peer::new(false);
-    peer.advance(Clock::monotonic().now_us());
-    peer.take(b"G1X300F432\n");
-    let rig = open(peer);
-    assert_eq!(rig.table.status().unwrap().state, State::Idle);
-    assert!(rig.peer.lock().unwrap().at < 100.0);
+    let mut fake_grbl = FakeGrbl::new(false);
+    let clock = Clock::virtual_time();
+    fake_grbl.advance(clock.now_us());
+    fake_grbl.take(b"G1X300F432\n");
+    let rig = open_on(clock, fake_grbl).unwrap();
+    assert_eq!(rig.table.status().unwrap().state, ControllerState::Idle);
+    assert!(rig.fake_grbl.lock().unwrap().at < 100.0);
 }
 
 #[test]
 fn a_jog_ends_at_its_place() {
-    for rig in [open(Peer::new(true)), open(Peer::new(false))] {
+    for rig in [open(FakeGrbl::new(true)), open(FakeGrbl::new(false))] {
         let status = rig.table.jog(12.5, Some(10.0)).unwrap();
-        assert_eq!(status.state, State::Idle);
+        assert_eq!(status.state, ControllerState::Idle);
         assert!((status.angle_deg - 12.5).abs() < 0.02, "{status:?}");
         let status = rig.table.jog(-20.0, None).unwrap();
         assert!((status.angle_deg + 7.5).abs() < 0.02, "{status:?}");
@@ -125,25 +130,31 @@ fn a_jog_ends_at_its_place() {
 
 #[test]
 fn a_jog_beyond_the_limit_or_at_no_speed_is_not_sent() {
-    let rig = open(Peer::new(true));
+    let rig = open(FakeGrbl::new(true));
     let before = rig.executed();
     let jog = |degrees, speed| rig.table.jog(degrees, speed).unwrap_err();
     assert!(matches!(
         jog(400.1, None),
         TurntableError::BeyondLimit { .. }
     ));
-    assert!(matches!(jog(f64::NAN, None), TurntableError::Figure { .. }));
+    assert!(matches!(
+        jog(f64::NAN, None),
+        TurntableError::OutOfRange { .. }
+    ));
     assert!(matches!(
         jog(1.0, Some(36.1)),
-        TurntableError::Figure { .. }
+        TurntableError::OutOfRange { .. }
     ));
-    assert!(matches!(jog(1.0, Some(0.0)), TurntableError::Figure { .. }));
+    assert!(matches!(
+        jog(1.0, Some(0.0)),
+        TurntableError::OutOfRange { .. }
+    ));
     assert_eq!(rig.executed(), before);
 }
 
 #[test]
 fn without_an_index_sensor_zero_is_where_the_table_stands() {
-    let rig = open(Peer::new(false));
+    let rig = open(FakeGrbl::new(false));
     rig.table.jog(30.0, None).unwrap();
     assert_eq!(rig.table.home().unwrap(), Homed::WhereItStands);
     let status = rig.table.status().unwrap();
@@ -152,10 +163,10 @@ fn without_an_index_sensor_zero_is_where_the_table_stands() {
 
 #[test]
 fn homing_finds_the_index_or_says_that_there_is_none_although_it_was_accepted() {
-    let rig = open(Peer::new(true).with_homing(true));
+    let rig = open(FakeGrbl::new(true).with_homing(true));
     assert_eq!(rig.table.home().unwrap(), Homed::Index);
     assert!(rig.table.status().unwrap().homed);
-    let rig = open(Peer::new(false).with_homing(false));
+    let rig = open(FakeGrbl::new(false).with_homing(false));
     let error = rig.table.home().unwrap_err();
     assert!(error.to_string().contains("ALARM:9"), "{error}");
     let status = rig.table.status().unwrap();
@@ -164,12 +175,12 @@ fn homing_finds_the_index_or_says_that_there_is_none_although_it_was_accepted() 
         rig.table.jog(1.0, None),
         Err(TurntableError::NotReady { .. })
     ));
-    assert_eq!(rig.table.unlock().unwrap().state, State::Idle);
+    assert_eq!(rig.table.unlock().unwrap().state, ControllerState::Idle);
 }
 
 #[test]
 fn a_lost_answer_is_recovered_with_checked_lines_and_moves_once() {
-    let rig = open(Peer::new(true));
+    let rig = open(FakeGrbl::new(true));
     rig.set(|trouble, _| trouble.lose_answers = 3);
     rig.table.jog(5.0, None).unwrap();
     let jogs = rig
@@ -182,42 +193,42 @@ fn a_lost_answer_is_recovered_with_checked_lines_and_moves_once() {
 
 #[test]
 fn a_lost_answer_of_a_stock_board_stops_the_table_with_the_reason() {
-    let rig = open(Peer::new(false));
+    let rig = open(FakeGrbl::new(false));
     rig.set(|trouble, _| trouble.lose_answers = 1);
     let error = rig.table.jog(300.0, Some(1.0)).unwrap_err();
     assert!(matches!(error, TurntableError::Lost { .. }), "{error}");
-    assert!(!rig.peer.lock().unwrap().is_moving());
+    assert!(!rig.fake_grbl.lock().unwrap().is_moving());
     assert!(rig.table.jog(1.0, None).is_ok());
 }
 
 #[test]
-fn a_line_damaged_unnoticed_is_no_success() {
-    let rig = open(Peer::new(false));
+fn an_undetected_damage_of_a_line_is_no_success() {
+    let rig = open(FakeGrbl::new(false));
     rig.set(|trouble, _| trouble.wrong_digits = 1);
     let error = rig.table.jog(25.0, None).unwrap_err();
     assert!(
-        matches!(error, TurntableError::Motion(Fault::Astray { .. })),
+        matches!(error, TurntableError::Motion(MotionFault::Astray { .. })),
         "{error}"
     );
 }
 
 #[test]
-fn a_turn_tells_where_the_table_was_and_unwinds() {
+fn a_turn_has_the_angles_of_the_table_and_unwinds() {
     for stock in [false, true] {
-        let rig = open(Peer::new(!stock));
-        rig.peer.lock().unwrap().rate = 1.004;
+        let rig = open(FakeGrbl::new(!stock));
+        rig.fake_grbl.lock().unwrap().rate = 1.004;
         rig.table.home().unwrap();
         let mut turn = rig.turn(90.0);
         let constant = turn.wait_constant().unwrap();
-        assert_eq!(turn.state().unwrap(), Phase::Constant);
+        assert_eq!(turn.state().unwrap(), TurnPhase::Constant);
         let track = turn.wait_end().unwrap();
         let (from_us, to_us) = track.constant_us();
         assert!((constant.from_us - from_us).abs() < 200_000);
         assert!((constant.to_us - to_us).abs() < 200_000);
         assert!((track.degrees_per_second() - 7.2 * 1.004).abs() < 0.01);
 
-        let peer = rig.peer.lock().unwrap();
-        let constant = peer
+        let fake_grbl = rig.fake_grbl.lock().unwrap();
+        let constant = fake_grbl
             .truth
             .iter()
             .filter(|(t, at)| *at > -2.0 && *at < 92.0 && (from_us..=to_us).contains(t));
@@ -226,27 +237,30 @@ fn a_turn_tells_where_the_table_was_and_unwinds() {
             .collect();
         off.sort_by(f64::total_cmp);
         assert!(off.len() > 11_000);
-        // Twenty times real time, threads that sleep are late by as much.
-        assert!(off[off.len() * 99 / 100] < 0.2, "{:?}", off.last());
-        assert!(peer.at.abs() < 0.02, "not unwound: {}", peer.at);
-        assert_eq!(peer.lease, if stock { 0.0 } else { 3.0 });
+        assert!(off[off.len() * 99 / 100] < 0.05, "{:?}", off.last());
+        assert!(fake_grbl.at.abs() < 0.02, "not unwound: {}", fake_grbl.at);
+        assert_eq!(fake_grbl.lease, if stock { 0.0 } else { 3.0 });
     }
 }
 
 #[test]
 fn a_turn_needs_a_position_and_the_place_it_was_planned_from() {
-    let rig = open(Peer::new(true));
+    let rig = open(FakeGrbl::new(true));
     let plan = rig.plan(90.0);
     let refused = |plan| rig.table.start_turn(plan).map(|_| ()).unwrap_err();
     assert!(matches!(refused(plan.clone()), TurntableError::NotHomed));
     rig.table.home().unwrap();
     rig.table.jog(1.0, None).unwrap();
-    assert!(matches!(refused(plan), TurntableError::Moved { .. }));
+    assert!(matches!(
+        refused(plan),
+        TurntableError::MovedSincePlan { .. }
+    ));
 }
 
-/// Ends a turn by what `change` does to the peer; gives the fault and how long that took.
-fn broken(stock: bool, change: impl FnOnce(&mut Trouble, i64)) -> (Rig, Fault, i64) {
-    let rig = open(Peer::new(!stock));
+/// Breaks a turn by a change of the controller's faults; returns the fault that ended it, and the time
+/// until then.
+fn broken(stock: bool, change: impl FnOnce(&mut Trouble, i64)) -> (Rig, MotionFault, i64) {
+    let rig = open(FakeGrbl::new(!stock));
     rig.table.home().unwrap();
     let mut turn = rig.turn(90.0);
     turn.wait_constant().unwrap();
@@ -264,28 +278,28 @@ fn broken(stock: bool, change: impl FnOnce(&mut Trouble, i64)) -> (Rig, Fault, i
 fn whatever_breaks_a_turn_ends_it_with_its_reason_and_stops_the_table() {
     for stock in [false, true] {
         let (rig, fault, _) = broken(stock, |trouble, now| trouble.reset_at_us = Some(now));
-        let cause = (!stock).then_some(ResetCause::Watchdog);
-        assert_eq!(fault, Fault::Restarted(cause));
+        let cause = (!stock).then_some(RestartCause::Watchdog);
+        assert_eq!(fault, MotionFault::Restarted(cause));
         assert!(!rig.table.status().unwrap().homed);
 
         let alarm = |trouble: &mut Trouble, now| trouble.alarm_at_us = Some((now, 10));
         let (rig, fault, _) = broken(stock, alarm);
-        assert_eq!(fault, Fault::Alarm(Alarm(Some(10))));
+        assert_eq!(fault, MotionFault::Alarm(Alarm(Some(10))));
         assert!(!rig.table.status().unwrap().homed);
 
         let (rig, fault, _) = broken(stock, |trouble, now| trouble.hold_at_us = Some(now));
-        assert_eq!(fault, Fault::Held);
+        assert_eq!(fault, MotionFault::Held);
         assert!(rig.table.status().unwrap().homed);
 
         let (rig, fault, _) = broken(stock, |trouble, now| trouble.stall_from_us = Some(now));
-        assert!(matches!(fault, Fault::Stalled { .. }), "{fault:?}");
+        assert!(matches!(fault, MotionFault::Stalled { .. }), "{fault:?}");
         drop(rig);
     }
 }
 
 #[test]
 fn a_controller_that_falls_silent_for_two_seconds_ends_the_turn() {
-    let rig = open_at(Clock::monotonic(), Peer::new(true)).unwrap();
+    let rig = open(FakeGrbl::new(true));
     rig.table.home().unwrap();
     let mut turn = rig.turn(90.0);
     turn.wait_constant().unwrap();
@@ -296,9 +310,12 @@ fn a_controller_that_falls_silent_for_two_seconds_ends_the_turn() {
         supervisor.fault().cloned()
     });
     let took_us = rig.table.clock().now_us() - start_us;
-    assert!(matches!(found, Some(Fault::Silent { .. })), "{found:?}");
+    assert!(
+        matches!(found, Some(MotionFault::Silent { .. })),
+        "{found:?}"
+    );
     assert!((1_900_000..4_000_000).contains(&took_us), "{took_us} us");
-    // Nobody can tell whether it stands.
+    // Whether it stands is unknown.
     assert!(matches!(turn.state(), Err(TurntableError::NotStopped)));
     drop(turn);
     assert!(rig.table.link().supervisor().zero_deg().is_none());
@@ -307,32 +324,34 @@ fn a_controller_that_falls_silent_for_two_seconds_ends_the_turn() {
 #[test]
 fn a_stop_in_the_middle_keeps_the_position_and_the_table_goes_on() {
     for stock in [false, true] {
-        let rig = open(Peer::new(!stock));
+        let rig = open(FakeGrbl::new(!stock));
         rig.table.home().unwrap();
         let mut turn = rig.turn(90.0);
         turn.wait_constant().unwrap();
         let status = turn.abort().unwrap();
         assert!(status.homed && !status.state.may_move(), "{status:?}");
         assert!(status.angle_deg < 60.0);
-        assert_eq!(rig.peer.lock().unwrap().resets, 1);
+        assert_eq!(rig.fake_grbl.lock().unwrap().resets, 1);
         let after = rig.table.jog(1.0, None).unwrap();
         assert!((after.angle_deg - status.angle_deg - 1.0).abs() < 0.03);
     }
 }
 
 #[test]
-fn a_stop_from_elsewhere_ends_a_jog_with_that_reason() {
-    let rig = open(Peer::new(true));
+fn a_stop_from_another_thread_ends_a_jog_with_that_reason() {
+    let rig = open(FakeGrbl::new(true));
     let link = rig.table.link().clone();
-    let stopper = std::thread::spawn(move || {
+    let clock = rig.table.clock().clone();
+    let stopper = clock.spawn("stopper", move || {
         link.wait(Duration::from_secs(10), |s| {
-            s.seen()?.state.may_move().then_some(())
+            s.last_report()?.state.may_move().then_some(())
         });
         link.stop()
     });
+    let stopper = stopper.unwrap();
     let error = rig.table.jog(300.0, Some(5.0)).unwrap_err();
     assert!(
-        matches!(error, TurntableError::Motion(Fault::Stopped)),
+        matches!(error, TurntableError::Motion(MotionFault::Stopped)),
         "{error}"
     );
     assert!(!stopper.join().unwrap().unwrap().state.may_move());
@@ -340,7 +359,7 @@ fn a_stop_from_elsewhere_ends_a_jog_with_that_reason() {
 
 #[test]
 fn one_motion_at_a_time() {
-    let rig = open(Peer::new(true));
+    let rig = open(FakeGrbl::new(true));
     rig.table.home().unwrap();
     let turn = rig.turn(90.0);
     assert!(matches!(
@@ -353,19 +372,21 @@ fn one_motion_at_a_time() {
 
 #[test]
 fn a_dropped_turn_and_a_dropped_table_stand_still_and_leave_no_session() {
-    let rig = open(Peer::new(true));
+    let rig = open(FakeGrbl::new(true));
     rig.table.home().unwrap();
     let mut turn = rig.turn(90.0);
     turn.wait_constant().unwrap();
     drop(turn);
-    assert!(!rig.peer.lock().unwrap().is_moving());
-    let Rig { peer, table } = rig;
+    assert!(!rig.fake_grbl.lock().unwrap().is_moving());
+    let Rig {
+        fake_grbl, table, ..
+    } = rig;
     drop(table);
-    let mut peer = peer.lock().unwrap();
-    let before = peer.executed.len();
-    peer.take(b"G4P1\n");
+    let mut fake_grbl = fake_grbl.lock().unwrap();
+    let before = fake_grbl.executed.len();
+    fake_grbl.take(b"G4P1\n");
     assert_eq!(
-        peer.executed.len(),
+        fake_grbl.executed.len(),
         before + 1,
         "a plain line is taken again"
     );
@@ -373,14 +394,15 @@ fn a_dropped_turn_and_a_dropped_table_stand_still_and_leave_no_session() {
 
 #[test]
 fn every_wait_ends() {
-    let rig = open(Peer::new(false));
+    let rig = open(FakeGrbl::new(false));
     rig.set(|trouble, now| trouble.silent_from_us = Some(now));
-    let start = Instant::now();
+    let clock = rig.table.clock().clone();
+    let start_us = clock.now_us();
     assert!(matches!(
         rig.table.status(),
         Err(TurntableError::Silent { .. })
     ));
     assert!(matches!(rig.table.stop(), Err(TurntableError::NotStopped)));
     drop(rig);
-    assert!(start.elapsed() < Duration::from_secs(30));
+    assert!(clock.now_us() - start_us < 30_000_000);
 }

@@ -1,21 +1,21 @@
-//! One turn under way.
+//! A turn in progress.
 
 use std::time::Duration;
 
 use super::error::TurntableError;
 use super::plan::TurnPlan;
-use super::status::Status;
-use super::supervisor::Seen;
+use super::status::TableStatus;
+use super::supervisor::PositionReport;
 use super::sync::{self, Track};
 use super::table::{Table, straight};
-use super::wire::State;
+use super::wire::ControllerState;
 
-/// How long the table rests before it starts, so that it has stopped swinging.
+/// Rest before the start, until the table has stopped swinging.
 const SETTLE: Duration = Duration::from_millis(300);
-/// What is added to the time the ramp should take.
+/// Added to the computed time of the ramp.
 const RAMP_SLACK: Duration = Duration::from_secs(3);
 
-/// When the table is at constant speed, as expected by its first reports there.
+/// When the table moves at constant speed, extrapolated from its first reports there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConstantPart {
     /// Start, microseconds of the host's clock.
@@ -24,20 +24,20 @@ pub struct ConstantPart {
     pub to_us: i64,
 }
 
-/// How far a turn is.
+/// The phase of a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
-    /// Getting up to speed.
+pub enum TurnPhase {
+    /// Accelerating.
     Starting,
     /// At constant speed.
     Constant,
-    /// Slowing down.
+    /// Decelerating.
     Ending,
     /// At rest at its end.
     AtEnd,
 }
 
-/// A turn under way. Dropped before its end, it stops the table.
+/// A turn in progress. Dropping it before its end stops the table.
 pub struct Turn<'table> {
     table: &'table Table,
     plan: TurnPlan,
@@ -72,46 +72,46 @@ impl<'table> Turn<'table> {
         &self.plan
     }
 
-    /// How far it is.
+    /// Its phase.
     ///
     /// # Errors
-    /// What has ended it; the table has been stopped then.
-    pub fn state(&mut self) -> Result<Phase, TurntableError> {
+    /// The fault that has ended it; the table has been stopped.
+    pub fn state(&mut self) -> Result<TurnPhase, TurntableError> {
         self.check()?;
         let supervisor = self.table.link().supervisor();
         if supervisor
             .motion()
             .is_some_and(|motion| motion.is_at_target())
         {
-            return Ok(Phase::AtEnd);
+            return Ok(TurnPhase::AtEnd);
         }
-        let gone = supervisor.recorded().last().map(|seen| self.gone(seen));
+        let gone = supervisor.recorded().last().map(|report| self.gone(report));
         Ok(match gone {
-            Some(gone) if gone > self.plan.constant_deg() => Phase::Ending,
-            Some(gone) if gone >= 0.0 => Phase::Constant,
-            _ => Phase::Starting,
+            Some(gone) if gone > self.plan.constant_deg() => TurnPhase::Ending,
+            Some(gone) if gone >= 0.0 => TurnPhase::Constant,
+            _ => TurnPhase::Starting,
         })
     }
 
-    /// The table's angle by the last report, degrees, and when that was, microseconds of the
+    /// The table's angle in the last report, degrees, and the report's time, microseconds of the
     /// host's clock.
     #[must_use]
     pub fn last_angle(&self) -> Option<(f64, i64)> {
         let supervisor = self.table.link().supervisor();
-        let seen = supervisor.recorded().last()?;
-        Some((seen.machine_deg - self.zero_deg, seen.came_us))
+        let report = supervisor.recorded().last()?;
+        Some((report.machine_deg - self.zero_deg, report.came_us))
     }
 
     /// Degrees since the speed became constant; negative before.
-    fn gone(&self, seen: &Seen) -> f64 {
-        let angle = seen.machine_deg - self.zero_deg - self.plan.constant_from_deg();
+    fn gone(&self, report: &PositionReport) -> f64 {
+        let angle = report.machine_deg - self.zero_deg - self.plan.constant_from_deg();
         angle * self.plan.direction().sign()
     }
 
     /// Waits until the speed is constant.
     ///
     /// # Errors
-    /// What has ended the turn; the table has been stopped then.
+    /// The fault that has ended the turn; the table has been stopped.
     pub fn wait_constant(&mut self) -> Result<ConstantPart, TurntableError> {
         let speed = self.plan.degrees_per_second();
         let ramp = self.table.travel_time(0.0, speed) + RAMP_SLACK;
@@ -119,17 +119,19 @@ impl<'table> Turn<'table> {
             if supervisor.fault().is_some() {
                 return Some(None);
             }
-            let constant = |seen: &&Seen| seen.state == State::Run && self.gone(seen) >= 0.0;
-            let seen = supervisor.recorded().iter().rev().find(constant)?;
-            Some(Some((*seen, self.gone(seen))))
+            let constant = |report: &&PositionReport| {
+                report.state == ControllerState::Run && self.gone(report) >= 0.0
+            };
+            let report = supervisor.recorded().iter().rev().find(constant)?;
+            Some(Some((*report, self.gone(report))))
         });
         self.check()?;
-        let Some(Some((seen, gone))) = found else {
+        let Some(Some((report, gone))) = found else {
             self.stop()?;
-            return Err(super::error::Fault::Late.into());
+            return Err(super::error::MotionFault::Late.into());
         };
-        let at_us = seen.asked_us.map_or(seen.came_us, |asked_us| {
-            i64::midpoint(asked_us, seen.came_us)
+        let at_us = report.asked_us.map_or(report.came_us, |asked_us| {
+            i64::midpoint(asked_us, report.came_us)
         });
         let micros = |degrees: f64| (degrees / speed * 1e6).round() as i64;
         Ok(ConstantPart {
@@ -138,20 +140,20 @@ impl<'table> Turn<'table> {
         })
     }
 
-    /// Waits until the table has come to rest at the turn's end, turns it back where the plan says
-    /// so, and tells its angles.
+    /// Waits until the table rests at the turn's end, turns it back if the plan says so, and returns
+    /// its angles over time.
     ///
     /// # Errors
-    /// What has ended the turn; the table has been stopped then. [`TurntableError::Track`] where
-    /// the turn is whole and its angles cannot be told.
+    /// The fault that has ended the turn; the table has been stopped. [`TurntableError::Track`] if
+    /// the turn is complete but its angles cannot be determined.
     pub fn wait_end(mut self) -> Result<Track, TurntableError> {
         let plan = &self.plan;
         let distance = (plan.end_deg() - plan.back_deg()).abs();
         let limit = self.table.travel_time(distance, plan.degrees_per_second());
         let arrived = self.table.wait_arrival(limit);
-        let seen = self.leave();
+        let reports = self.leave();
         arrived?;
-        let track = sync::fit(&seen, &self.course());
+        let track = sync::fit(&reports, &self.expected());
         if self.plan.unwind() {
             let start_deg = self.zero_deg + self.plan.start_deg();
             self.table.go(start_deg, self.table.brisk())?;
@@ -159,8 +161,8 @@ impl<'table> Turn<'table> {
         Ok(track?)
     }
 
-    fn course(&self) -> sync::Course {
-        sync::Course {
+    fn expected(&self) -> sync::ExpectedTurn {
+        sync::ExpectedTurn {
             from_deg: self.zero_deg + self.plan.constant_from_deg(),
             to_deg: self.zero_deg + self.plan.constant_to_deg(),
             degrees_per_second: self.plan.degrees_per_second(),
@@ -173,17 +175,17 @@ impl<'table> Turn<'table> {
     ///
     /// # Errors
     /// [`TurntableError::NotStopped`].
-    pub fn abort(mut self) -> Result<Status, TurntableError> {
+    pub fn abort(mut self) -> Result<TableStatus, TurntableError> {
         self.stop()
     }
 
-    fn stop(&mut self) -> Result<Status, TurntableError> {
+    fn stop(&mut self) -> Result<TableStatus, TurntableError> {
         let stopped = self.table.stop();
         self.leave();
         stopped
     }
 
-    /// Ends the turn where a fault has.
+    /// Ends the turn if a fault has occurred.
     fn check(&mut self) -> Result<(), TurntableError> {
         match self.table.end_by_fault() {
             Ok(None) => Ok(()),
@@ -194,8 +196,8 @@ impl<'table> Turn<'table> {
         }
     }
 
-    /// Stops watching; gives the reports.
-    fn leave(&mut self) -> Vec<Seen> {
+    /// Ends the monitoring; returns the reports.
+    fn leave(&mut self) -> Vec<PositionReport> {
         self.over = true;
         let mut supervisor = self.table.link().supervisor();
         supervisor.end_motion();
@@ -206,7 +208,7 @@ impl<'table> Turn<'table> {
 impl Drop for Turn<'_> {
     fn drop(&mut self) {
         if !self.over {
-            // Whoever drops a turn is told nothing; the table's own end looks again.
+            // A drop cannot return an error. Dropping the table stops it again.
             let _ = self.stop();
         }
     }

@@ -4,7 +4,8 @@ use ffmpeg_next::codec::{self, Parameters, encoder};
 use ffmpeg_next::format::context::{Output, StreamIo};
 use ffmpeg_next::{Dictionary, Rational, ffi, format, media};
 
-use super::{Coding, StreamFormat};
+use super::StreamFormat;
+use crate::PixelFormat;
 
 /// Longest stretch of video that is held back for one cluster, milliseconds.
 const CLUSTER_MS: &str = "400";
@@ -46,7 +47,7 @@ pub(super) fn open(
 fn copied(stream: &StreamFormat) -> Result<Parameters, ffmpeg_next::Error> {
     let mut parameters = Parameters::new();
     parameters.set_medium(media::Type::Video);
-    parameters.set_id(codec_id(stream.coding));
+    parameters.set_id(codec_id(stream.format));
     let context = codec::Context::from_parameters(parameters)?;
     let mut video = context.encoder().video()?;
     video.set_width(stream.width);
@@ -93,10 +94,10 @@ pub(super) fn end_cluster(output: &mut Output) -> Result<(), ffmpeg_next::Error>
     Ok(())
 }
 
-fn codec_id(coding: Coding) -> codec::Id {
-    match coding {
-        Coding::Mjpeg => codec::Id::MJPEG,
-        Coding::H264 => codec::Id::H264,
-        Coding::Raw(_) => codec::Id::FFV1,
+fn codec_id(format: PixelFormat) -> codec::Id {
+    match format {
+        PixelFormat::Mjpeg => codec::Id::MJPEG,
+        PixelFormat::H264 => codec::Id::H264,
+        _ => codec::Id::FFV1,
     }
 }

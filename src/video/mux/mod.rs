@@ -20,41 +20,17 @@ use ffmpeg_next::{Packet, packet};
 use self::container::{end_cluster, open};
 use self::file::{Refusal, Sink};
 
-use super::lossless::RawFormat;
 use super::nal::{self, ParameterSets};
-use super::{Error, initialise};
+use super::{PixelFormat, VideoError, initialise, lossless};
 
 /// Bytes that are gathered before they are handed to the system.
 const BUFFER: usize = 1 << 15;
-
-/// How a camera's frames are coded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Coding {
-    /// Each frame a JPEG.
-    Mjpeg,
-    /// H.264 with start codes, a frame a packet, in the order in which they are shown.
-    H264,
-    /// Uncompressed pictures without padding.
-    Raw(RawFormat),
-}
-
-impl Coding {
-    /// The name of the codec that the file gets: `mjpeg`, `h264` or `ffv1`.
-    #[must_use]
-    pub fn codec(self) -> &'static str {
-        match self {
-            Self::Mjpeg => "mjpeg",
-            Self::H264 => "h264",
-            Self::Raw(_) => "ffv1",
-        }
-    }
-}
 
 /// What a camera was set to deliver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StreamFormat {
     /// How its frames are coded.
-    pub coding: Coding,
+    pub format: PixelFormat,
     /// Frame width, pixels.
     pub width: u32,
     /// Frame height, pixels.
@@ -107,26 +83,26 @@ impl Muxer {
     /// Makes a new file at `path`.
     ///
     /// # Errors
-    /// [`Error::PictureSize`] where the format cannot have this size, [`Error::Write`] where the
-    /// file cannot be made or is there already, [`Error::Mux`] where this FFmpeg lacks the codec.
-    pub fn create(path: &Path, stream: StreamFormat) -> Result<Self, Error> {
+    /// [`VideoError::PictureSize`] where the format cannot have this size, [`VideoError::Write`] where the
+    /// file cannot be made or is there already, [`VideoError::Mux`] where this FFmpeg lacks the codec.
+    pub fn create(path: &Path, stream: StreamFormat) -> Result<Self, VideoError> {
         initialise();
-        let refused = |source| Error::Write {
+        let refused = |source| VideoError::Write {
             path: path.to_owned(),
             source,
         };
-        let failed = |why| Error::Mux {
+        let failed = |why| VideoError::Mux {
             path: path.to_owned(),
             why,
         };
-        let encoder = match stream.coding {
-            Coding::Raw(raw) => {
-                let (width, height) = (stream.width, stream.height);
-                raw.picture_bytes(width, height)
-                    .ok_or(Error::PictureSize { width, height })?;
-                Some(raw.encoder(width, height).map_err(failed)?)
+        let (format, width, height) = (stream.format, stream.width, stream.height);
+        let encoder = match format {
+            PixelFormat::Mjpeg | PixelFormat::H264 => None,
+            _ => {
+                lossless::picture_bytes(format, width, height)
+                    .ok_or(VideoError::PictureSize { width, height })?;
+                Some(lossless::encoder(format, width, height).map_err(failed)?)
             }
-            Coding::Mjpeg | Coding::H264 => None,
         };
         let mut options = OpenOptions::new();
         let file = options.write(true).create_new(true).open(path);
@@ -167,22 +143,20 @@ impl Muxer {
     /// Adds a frame that was taken at `t_us` microseconds of the camera's clock.
     ///
     /// # Errors
-    /// [`Error::NoRoom`] where the disk is full, [`Error::Write`] where it fails otherwise,
-    /// [`Error::PictureBytes`] where an uncompressed picture has not the bytes of one (nothing was
-    /// written then, and the next may follow), [`Error::NotAnnexB`], or [`Error::Mux`].
-    pub fn write(&mut self, data: &[u8], t_us: i64) -> Result<Written, Error> {
-        let key = match self.stream.coding {
-            Coding::H264 => {
-                if !nal::is_annex_b(data) {
-                    return Err(Error::NotAnnexB(self.path.clone()));
-                }
-                self.sets.gather(data);
-                nal::is_key(data)
+    /// [`VideoError::NoRoom`] where the disk is full, [`VideoError::Write`] where it fails otherwise,
+    /// [`VideoError::PictureBytes`] where an uncompressed picture has not the bytes of one (nothing was
+    /// written then, and the next may follow), [`VideoError::NotAnnexB`], or [`VideoError::Mux`].
+    pub fn write(&mut self, data: &[u8], t_us: i64) -> Result<Written, VideoError> {
+        let chained = self.stream.format == PixelFormat::H264;
+        if chained {
+            if !nal::is_annex_b(data) {
+                return Err(VideoError::NotAnnexB(self.path.clone()));
             }
-            Coding::Mjpeg | Coding::Raw(_) => true,
-        };
+            self.sets.gather(data);
+        }
+        let key = !chained || nal::is_key(data);
         if matches!(self.state, State::Waiting(_)) {
-            if !key || (self.stream.coding == Coding::H264 && self.sets.extradata().is_none()) {
+            if !key || (chained && self.sets.extradata().is_none()) {
                 return Ok(Written::BeforeKeyFrame);
             }
             self.begin()?;
@@ -195,9 +169,9 @@ impl Muxer {
         } else {
             ms.max(self.last_ms)
         };
-        let mut packet = match self.stream.coding {
-            Coding::Raw(raw) => self.encode(raw, data, ms)?,
-            Coding::Mjpeg | Coding::H264 => Packet::copy(data),
+        let mut packet = match self.stream.format {
+            PixelFormat::Mjpeg | PixelFormat::H264 => Packet::copy(data),
+            _ => self.encode(data, ms)?,
         };
         packet.set_stream(0);
         packet.set_pts(Some(ms));
@@ -217,7 +191,7 @@ impl Muxer {
     ///
     /// # Errors
     /// As [`Self::write`].
-    pub fn flush(&mut self) -> Result<(), Error> {
+    pub fn flush(&mut self) -> Result<(), VideoError> {
         if self.frames == 0 {
             return Ok(());
         }
@@ -228,7 +202,7 @@ impl Muxer {
     ///
     /// # Errors
     /// As [`Self::write`].
-    pub fn sync(&mut self) -> Result<(), Error> {
+    pub fn sync(&mut self) -> Result<(), VideoError> {
         self.flush()?;
         let synced = self.file.sync_data();
         synced.map_err(|source| self.refused(source))
@@ -239,7 +213,7 @@ impl Muxer {
     ///
     /// # Errors
     /// As [`Self::write`].
-    pub fn finish(mut self) -> Result<(), Error> {
+    pub fn finish(mut self) -> Result<(), VideoError> {
         if matches!(self.state, State::Running(_)) {
             self.run(|output| output.write_trailer())?;
             // What FFmpeg still holds is written when its side is closed.
@@ -251,7 +225,7 @@ impl Muxer {
     }
 
     /// Writes the header.
-    fn begin(&mut self) -> Result<(), Error> {
+    fn begin(&mut self) -> Result<(), VideoError> {
         let State::Waiting(io) = std::mem::replace(&mut self.state, State::Broken) else {
             return Ok(());
         };
@@ -267,16 +241,15 @@ impl Muxer {
         self.check()
     }
 
-    fn encode(&mut self, raw: RawFormat, data: &[u8], ms: i64) -> Result<Packet, Error> {
-        let (width, height) = (self.stream.width, self.stream.height);
-        let mut frame = raw
-            .frame(data, width, height)
-            .ok_or_else(|| Error::PictureBytes {
-                found: data.len(),
-                wanted: raw.picture_bytes(width, height).unwrap_or(0),
-                width,
-                height,
-            })?;
+    fn encode(&mut self, data: &[u8], ms: i64) -> Result<Packet, VideoError> {
+        let (format, width, height) = (self.stream.format, self.stream.width, self.stream.height);
+        let frame = lossless::frame(format, data, width, height);
+        let mut frame = frame.ok_or_else(|| VideoError::PictureBytes {
+            found: data.len(),
+            wanted: format.frame_bytes(width, height).unwrap_or(0),
+            width,
+            height,
+        })?;
         frame.set_pts(Some(ms));
         let mut packet = Packet::empty();
         let coded = match &mut self.encoder {
@@ -293,7 +266,7 @@ impl Muxer {
     fn run(
         &mut self,
         work: impl FnOnce(&mut Output) -> Result<(), ffmpeg_next::Error>,
-    ) -> Result<(), Error> {
+    ) -> Result<(), VideoError> {
         let done = match &mut self.state {
             State::Running(output) => work(output),
             State::Waiting(_) | State::Broken => Err(ffmpeg_next::Error::Exit),
@@ -302,7 +275,7 @@ impl Muxer {
         done.map_err(|why| self.failed(why))
     }
 
-    fn check(&mut self) -> Result<(), Error> {
+    fn check(&mut self) -> Result<(), VideoError> {
         match self.refusal.take() {
             None => Ok(()),
             Some(source) => {
@@ -312,20 +285,20 @@ impl Muxer {
         }
     }
 
-    fn failed(&self, why: ffmpeg_next::Error) -> Error {
+    fn failed(&self, why: ffmpeg_next::Error) -> VideoError {
         let path = self.path.clone();
-        Error::Mux { path, why }
+        VideoError::Mux { path, why }
     }
 
     /// What the system's refusal to write is called.
-    fn refused(&self, source: io::Error) -> Error {
+    fn refused(&self, source: io::Error) -> VideoError {
         let path = self.path.clone();
         if is_no_room(&source) {
             let kept = self.file.metadata().map_or(0, |data| data.len());
             let missing = self.taken.saturating_sub(kept).max(1);
-            return Error::NoRoom { path, missing };
+            return VideoError::NoRoom { path, missing };
         }
-        Error::Write { path, source }
+        VideoError::Write { path, source }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Damage to shards, tables and descriptions is found and named.
+//! Damage to shards, tables and descriptions is found and reported.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,8 +7,8 @@ use image::Rgb;
 use proptest::prelude::*;
 use relit_data::shard::{Dataset, Layout, Sample, encode_rgb, order};
 
-use crate::made::{
-    SAMPLES, SESSION, assert_names, assert_whole, dataset, settings, texts, verdict, write_with,
+use crate::sample_set::{
+    SAMPLES, SESSION, assert_intact, assert_names, dataset, settings, texts, verified, write_with,
 };
 
 const TAR: &str = "20261120T093015Z-mug.tar";
@@ -47,14 +47,14 @@ fn with_members(change: impl FnOnce(&mut Vec<Vec<u8>>)) -> tempfile::TempDir {
     dir
 }
 
-/// The sample that stands at a place of the tar.
-fn at(place: usize) -> Option<u32> {
-    Some(order(SAMPLES)[place])
+/// The sample at a position in the tar.
+fn at(position: usize) -> Option<u32> {
+    Some(order(SAMPLES)[position])
 }
 
 #[test]
-fn the_same_members_in_the_same_places_are_whole() {
-    assert_whole(with_members(|_| {}).path());
+fn the_same_members_in_the_same_order_are_intact() {
+    assert_intact(with_members(|_| {}).path());
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn a_missing_sample_is_named() {
 #[test]
 fn a_doubled_member_is_named() {
     let dir = with_members(|parts| parts.insert(10, parts[9].clone()));
-    assert_names(dir.path(), TAR, at(3), "its png stands in the shard twice");
+    assert_names(dir.path(), TAR, at(3), "its png is in the shard twice");
 }
 
 #[test]
@@ -83,22 +83,22 @@ fn swapped_samples_are_named() {
             parts.swap(3 + part, 27 + part);
         }
     });
-    assert_names(dir.path(), TAR, at(1), "another place");
-    assert_names(dir.path(), TAR, at(9), "another place");
+    assert_names(dir.path(), TAR, at(1), "not where it was written");
+    assert_names(dir.path(), TAR, at(9), "not where it was written");
     assert_names(dir.path(), TAR, None, "BLAKE3");
-    assert_eq!(verdict(dir.path()).problems.len(), 3);
+    assert_eq!(verified(dir.path()).problems.len(), 3);
 }
 
 #[test]
 fn swapped_contents_are_named() {
     let mut swapped = None;
     let dir = with_members(|parts| {
-        // Records of equal length change places under their old names.
-        let record = |place: usize| 3 * place + 2;
-        let size = |place: usize| &parts[record(place)][124..136];
-        let places = SAMPLES as usize;
-        let (a, b) = (0..places)
-            .flat_map(|a| (a + 1..places).map(move |b| (a, b)))
+        // Records of equal length are swapped under their old names.
+        let record = |position: usize| 3 * position + 2;
+        let size = |position: usize| &parts[record(position)][124..136];
+        let positions = SAMPLES as usize;
+        let (a, b) = (0..positions)
+            .flat_map(|a| (a + 1..positions).map(move |b| (a, b)))
             .find(|&(a, b)| size(a) == size(b))
             .unwrap();
         swapped = Some((a, b));
@@ -108,19 +108,19 @@ fn swapped_contents_are_named() {
         parts[b] = [&second[..512], &first[512..]].concat();
     });
     let (a, b) = swapped.unwrap();
-    for place in [a, b] {
+    for position in [a, b] {
         assert_names(
             dir.path(),
             TAR,
-            at(place),
+            at(position),
             "the record differs from the table in",
         );
     }
-    assert_eq!(verdict(dir.path()).problems.len(), 3);
+    assert_eq!(verified(dir.path()).problems.len(), 3);
 }
 
 #[test]
-fn a_stranger_in_the_tar_is_named() {
+fn an_unknown_member_is_named() {
     let dir = with_members(|parts| {
         let mut header = tar::Header::new_ustar();
         header.set_path("intruder.png").unwrap();
@@ -136,7 +136,7 @@ fn a_damaged_header_is_named_and_the_rest_is_read() {
     let dir = with_members(|parts| parts[3 * 5][20] ^= 1);
     assert_names(dir.path(), TAR, at(5), "not a tar header");
     assert_names(dir.path(), TAR, at(5), "its png is missing");
-    assert_eq!(verdict(dir.path()).problems.len(), 3);
+    assert_eq!(verified(dir.path()).problems.len(), 3);
 }
 
 #[test]
@@ -155,7 +155,7 @@ fn a_damaged_image_mask_and_record_are_named() {
 }
 
 #[test]
-fn a_tar_cut_off_anywhere_is_found() {
+fn a_tar_truncated_anywhere_is_found() {
     let dir = dataset(Layout::Webdataset);
     let whole = fs::read(tar_path(dir.path())).unwrap();
     for end in [
@@ -170,9 +170,9 @@ fn a_tar_cut_off_anywhere_is_found() {
     ] {
         fs::write(tar_path(dir.path()), &whole[..end]).unwrap();
         assert_names(dir.path(), TAR, None, "bytes, not");
-        let problems = texts(&verdict(dir.path()).problems);
+        let problems = texts(&verified(dir.path()).problems);
         assert!(
-            problems.iter().any(|p| p.contains("cut off")),
+            problems.iter().any(|p| p.contains("is truncated")),
             "{end}: {problems:#?}"
         );
     }
@@ -186,7 +186,7 @@ fn a_tar_cut_off_anywhere_is_found() {
 }
 
 #[test]
-fn bytes_behind_the_end_are_found() {
+fn bytes_after_the_end_are_found() {
     let dir = dataset(Layout::Webdataset);
     let mut tar = fs::read(tar_path(dir.path())).unwrap();
     tar.push(0);
@@ -198,18 +198,18 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
     #[test]
     fn a_flipped_byte_is_found_and_its_sample_named(
-        place in any::<prop::sample::Index>(),
+        offset in any::<prop::sample::Index>(),
         flip in 1_u8..,
     ) {
         let dir = dataset(Layout::Webdataset);
         let mut tar = fs::read(tar_path(dir.path())).unwrap();
         let (parts, _) = members(&tar);
-        let place = place.index(tar.len());
-        tar[place] ^= flip;
+        let offset = offset.index(tar.len());
+        tar[offset] ^= flip;
         fs::write(tar_path(dir.path()), &tar).unwrap();
         let ends = parts.iter().scan(0, |end, part| { *end += part.len(); Some(*end) });
-        let member = ends.filter(|&end| end <= place).count();
-        let problems = verdict(dir.path()).problems;
+        let member = ends.filter(|&end| end <= offset).count();
+        let problems = verified(dir.path()).problems;
         prop_assert!(problems.iter().all(|p| p.file == TAR));
         if member < parts.len() {
             let key = at(member / 3).map(|index| relit_data::shard::sample_key(SESSION, index));
@@ -233,12 +233,12 @@ fn a_damaged_table_is_found_and_does_not_hide_damage_in_the_shard() {
 }
 
 #[test]
-fn missing_files_and_strays_are_named() {
+fn missing_and_unlisted_files_are_named() {
     let dir = dataset(Layout::Webdataset);
     fs::create_dir(dir.path().join("imgs")).unwrap();
-    let unknown = "dataset.json does not vouch for it";
-    let left = "an interrupted writer left it behind";
-    for (stray, says) in [
+    let unknown = "dataset.json does not list it";
+    let left = "left behind by an interrupted writer";
+    for (name, says) in [
         ("b.tar", unknown),
         ("b.parquet", unknown),
         ("x.png", unknown),
@@ -246,11 +246,11 @@ fn missing_files_and_strays_are_named() {
         (".b.spool", left),
         (".b.tar.7.0.partial", left),
     ] {
-        fs::write(dir.path().join(stray), b"").unwrap();
-        assert_names(dir.path(), stray, None, says);
+        fs::write(dir.path().join(name), b"").unwrap();
+        assert_names(dir.path(), name, None, says);
     }
     fs::write(dir.path().join("notes.txt"), b"").unwrap();
-    assert_eq!(verdict(dir.path()).problems.len(), 6);
+    assert_eq!(verified(dir.path()).problems.len(), 6);
     fs::remove_file(tar_path(dir.path())).unwrap();
     assert_names(dir.path(), TAR, None, "could not open");
 }
@@ -280,7 +280,7 @@ fn a_description_that_contradicts_itself_is_found() {
         "the shard \"other.tar\"",
     );
     good.write(dir.path()).unwrap();
-    assert_whole(dir.path());
+    assert_intact(dir.path());
 }
 
 /// A data set whose samples were wrong when they were written.
@@ -302,7 +302,7 @@ fn written_wrong(change: impl Fn(&mut Sample)) -> tempfile::TempDir {
 }
 
 #[test]
-fn a_record_that_does_not_agree_with_itself_is_named() {
+fn a_record_that_contradicts_itself_is_named() {
     let says = |change: fn(&mut Sample), says: &str| {
         assert_names(written_wrong(change).path(), TABLE, Some(9), says);
     };
@@ -344,8 +344,8 @@ fn light_outside_the_mask_is_named_with_its_pixel() {
 fn settings_of_another_size_are_found() {
     let dir = dataset(Layout::Webdataset);
     let mut description = Dataset::read(dir.path()).unwrap();
-    description.settings = relit_data::shard::Settings {
-        size: relit_data::shard::Size::Pixels(256),
+    description.settings = relit_data::shard::ExtractionSettings {
+        size: relit_data::shard::ImageSize::Pixels(256),
         ..settings(Layout::Webdataset)
     };
     description.write(dir.path()).unwrap();

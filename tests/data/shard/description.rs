@@ -1,13 +1,13 @@
-//! `dataset.json`: what is written is read back, and what cannot be trusted is refused.
+//! `dataset.json`: what is written is read back, and unsafe content is refused.
 
 use std::fs;
 
-use relit_data::shard::{Dataset, Digest, Error, FileEntry, Layout, SessionEntry, SessionFiles};
+use relit_data::shard::{Dataset, Digest, FileEntry, Layout, SessionEntry, ShardError, ShardFiles};
 
-use crate::made::{self, settings};
+use crate::sample_set::{self, settings};
 
 fn entry(id: &str) -> SessionEntry {
-    let files = SessionFiles {
+    let files = ShardFiles {
         shards: Vec::new(),
         table: FileEntry {
             file: format!("{id}.parquet"),
@@ -15,7 +15,7 @@ fn entry(id: &str) -> SessionEntry {
             blake3: Digest::of(b""),
         },
     };
-    made::entry(id, &files, &[])
+    sample_set::entry(id, &files, &[])
 }
 
 #[test]
@@ -54,11 +54,11 @@ fn a_folder_without_a_description_and_one_of_another_version_are_told_apart() {
     let dir = tempfile::tempdir().unwrap();
     let read = || Dataset::read(dir.path()).unwrap_err();
     let write = |text: &str| fs::write(dir.path().join(Dataset::FILE), text).unwrap();
-    assert!(matches!(read(), Error::NoDataset { .. }));
+    assert!(matches!(read(), ShardError::NoDataset { .. }));
     write(r#"{"schema": "relit.dataset/2"}"#);
-    assert!(matches!(read(), Error::Schema { .. }));
+    assert!(matches!(read(), ShardError::Schema { .. }));
     write("{");
-    assert!(matches!(read(), Error::Description { .. }));
+    assert!(matches!(read(), ShardError::Description { .. }));
 }
 
 #[test]
@@ -70,12 +70,12 @@ fn a_description_that_points_out_of_its_folder_is_refused() {
     dataset.replace(bad, Vec::new());
     assert!(matches!(
         dataset.write(dir.path()),
-        Err(Error::UnsafePath { .. })
+        Err(ShardError::UnsafePath { .. })
     ));
     let json = serde_json::to_vec(&dataset).unwrap();
     fs::write(dir.path().join(Dataset::FILE), json).unwrap();
     assert!(matches!(
         Dataset::read(dir.path()),
-        Err(Error::UnsafePath { .. })
+        Err(ShardError::UnsafePath { .. })
     ));
 }

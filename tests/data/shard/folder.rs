@@ -2,9 +2,11 @@
 
 use std::fs;
 
-use relit_data::shard::{Dataset, Error, Layout, decode_mask, decode_rgb, encode_mask, encode_rgb};
+use relit_data::shard::{
+    Dataset, Layout, ShardError, decode_mask, decode_rgb, encode_mask, encode_rgb,
+};
 
-use crate::made::{SAMPLES, SESSION, assert_names, dataset, mask, sample, verdict};
+use crate::sample_set::{SAMPLES, SESSION, assert_names, dataset, mask, sample, verified};
 
 const IMAGES: &str = "imgs/20261120T093015Z-mug";
 const MASK: &str = "masks/20261120T093015Z-mug.png";
@@ -43,33 +45,23 @@ fn damage_to_an_image_is_named() {
     let mut bytes = good.clone();
     bytes[60] ^= 1;
     fs::write(&path, bytes).unwrap();
-    assert_names(
-        dir.path(),
-        IMAGES,
-        Some(6),
-        "not the one that the table vouches for",
-    );
+    assert_names(dir.path(), IMAGES, Some(6), "differs from the table's");
     assert_names(dir.path(), IMAGES, None, "BLAKE3");
     fs::remove_file(&path).unwrap();
     assert_names(dir.path(), IMAGES, Some(6), "the image is missing");
     let dataset = Dataset::read(dir.path()).unwrap();
     assert!(matches!(
-        dataset.vouches_for(dir.path(), SESSION),
-        Err(Error::Io { .. })
+        dataset.check_integrity(dir.path(), SESSION),
+        Err(ShardError::Io { .. })
     ));
     fs::write(&path, encode_rgb(&sample(SESSION, 7).image).unwrap()).unwrap();
-    assert_names(
-        dir.path(),
-        IMAGES,
-        Some(6),
-        "not the one that the table vouches for",
-    );
+    assert_names(dir.path(), IMAGES, Some(6), "differs from the table's");
     assert!(matches!(
-        dataset.vouches_for(dir.path(), SESSION),
-        Err(Error::Changed { .. })
+        dataset.check_integrity(dir.path(), SESSION),
+        Err(ShardError::Changed { .. })
     ));
     fs::write(&path, good).unwrap();
-    assert_eq!(verdict(dir.path()).problems, []);
+    assert_eq!(verified(dir.path()).problems, []);
 }
 
 #[test]
@@ -78,12 +70,7 @@ fn damage_to_mask_and_mean_is_named() {
     let mut other = mask();
     other.put_pixel(0, 0, image::Luma([255]));
     fs::write(dir.path().join(MASK), encode_mask(&other).unwrap()).unwrap();
-    assert_names(
-        dir.path(),
-        MASK,
-        None,
-        "not the one that the table vouches for",
-    );
+    assert_names(dir.path(), MASK, None, "differs from the table's");
     fs::write(dir.path().join(MASK), encode_mask(&mask()).unwrap()).unwrap();
     fs::write(
         dir.path().join(MEAN),
@@ -101,7 +88,7 @@ fn damage_to_mask_and_mean_is_named() {
 }
 
 #[test]
-fn strangers_in_the_folders_are_named() {
+fn unknown_files_in_the_folders_are_named() {
     let dir = dataset(Layout::Relit);
     for name in ["14.png", "06.png", "notes.txt"] {
         fs::write(dir.path().join(IMAGES).join(name), b"").unwrap();
@@ -109,17 +96,17 @@ fn strangers_in_the_folders_are_named() {
     }
     for name in ["imgs/another", "masks/another.png", "mean_img/another.png"] {
         fs::write(dir.path().join(name), b"").unwrap();
-        assert_names(dir.path(), name, None, "does not vouch");
+        assert_names(dir.path(), name, None, "does not list it");
     }
 }
 
 #[test]
-fn a_link_that_leads_nowhere_is_no_image() {
+fn a_dangling_link_is_not_an_image() {
     let dir = dataset(Layout::Relit);
     let image = dir.path().join(IMAGES).join("3.png");
     fs::remove_file(&image).unwrap();
     std::os::unix::fs::symlink("nowhere", &image).unwrap();
-    let verdict = verdict(dir.path());
-    assert_eq!(verdict.samples, u64::from(SAMPLES) - 1);
-    assert!(!verdict.problems.is_empty());
+    let report = verified(dir.path());
+    assert_eq!(report.samples, u64::from(SAMPLES) - 1);
+    assert!(!report.problems.is_empty());
 }

@@ -1,8 +1,8 @@
-//! The data set on disk, from outside: what is written is read back, and damage is named.
+//! Data sets: what is written is read back, and damage is reported.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod damage;
 mod description;
 mod folder;
-mod made;
+mod sample_set;
 mod write;

@@ -1,4 +1,4 @@
-//! Writing and reading back.
+//! Writing data sets and reading them back.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -9,12 +9,12 @@ use std::sync::Mutex;
 use image::{GrayImage, Luma};
 use proptest::prelude::*;
 use relit_data::shard::{
-    Dataset, Error, FrameRecord, Layout, OutputFolder, SessionWriter, ShardReader, decode_mask,
+    Dataset, FrameRecord, Layout, OutputFolder, ShardError, ShardReader, ShardWriter, decode_mask,
     decode_rgb, order, read_table, sample_key, verify,
 };
 
-use crate::made::{
-    SAMPLES, SESSION, assert_whole, dataset, mask, sample, verdict, write, write_with,
+use crate::sample_set::{
+    SAMPLES, SESSION, assert_intact, dataset, mask, sample, verified, write, write_with,
 };
 
 /// All files below a folder with their bytes.
@@ -65,25 +65,25 @@ fn a_shard_holds_every_sample_in_the_order_that_spreads_angles() {
 }
 
 #[test]
-fn what_was_written_is_vouched_for_and_found_whole() {
+fn what_was_written_is_intact() {
     for layout in Layout::ALL {
         let dir = dataset(layout);
-        let told = Mutex::new(Vec::new());
-        let verdict = verify(dir.path(), &|done, of| {
-            told.lock().unwrap().push((done, of))
+        let progress = Mutex::new(Vec::new());
+        let report = verify(dir.path(), &|done, of| {
+            progress.lock().unwrap().push((done, of))
         })
         .unwrap();
-        assert_eq!(verdict.problems, []);
+        assert_eq!(report.problems, []);
         let samples = u64::from(SAMPLES);
         assert_eq!(
-            (verdict.sessions, verdict.shards, verdict.samples),
+            (report.sessions, report.shards, report.samples),
             (1, 1, samples)
         );
-        assert_eq!(told.lock().unwrap().last(), Some(&(samples, samples)));
+        assert_eq!(progress.lock().unwrap().last(), Some(&(samples, samples)));
         let dataset = Dataset::read(dir.path()).unwrap();
-        dataset.vouches_for(dir.path(), SESSION).unwrap();
-        let unknown = dataset.vouches_for(dir.path(), "another");
-        assert!(matches!(unknown, Err(Error::NoSession { .. })));
+        dataset.check_integrity(dir.path(), SESSION).unwrap();
+        let unknown = dataset.check_integrity(dir.path(), "another");
+        assert!(matches!(unknown, Err(ShardError::NoSession { .. })));
         let rows = read_table(dir.path(), &dataset.sessions[0].table).unwrap();
         let records: Vec<_> = (0..SAMPLES).map(|k| sample(SESSION, k).record).collect();
         assert_eq!(
@@ -111,7 +111,7 @@ fn a_writer_that_is_dropped_leaves_nothing_behind() {
     for layout in Layout::ALL {
         let dir = tempfile::tempdir().unwrap();
         let mut writer =
-            SessionWriter::create(dir.path(), layout, SESSION, SAMPLES, &mask()).unwrap();
+            ShardWriter::create(dir.path(), layout, SESSION, SAMPLES, &mask()).unwrap();
         writer.push(sample(SESSION, 3)).unwrap();
         drop(writer);
         assert!(files(dir.path()).is_empty(), "{layout}");
@@ -119,11 +119,11 @@ fn a_writer_that_is_dropped_leaves_nothing_behind() {
 }
 
 #[test]
-fn a_session_that_is_not_whole_is_refused_with_the_first_missing_sample() {
+fn an_incomplete_session_is_refused_with_the_first_missing_sample() {
     for layout in Layout::ALL {
         let dir = tempfile::tempdir().unwrap();
         let mut writer =
-            SessionWriter::create(dir.path(), layout, SESSION, SAMPLES, &mask()).unwrap();
+            ShardWriter::create(dir.path(), layout, SESSION, SAMPLES, &mask()).unwrap();
         for index in [0, 1, 3] {
             writer.push(sample(SESSION, index)).unwrap();
         }
@@ -131,7 +131,7 @@ fn a_session_that_is_not_whole_is_refused_with_the_first_missing_sample() {
         assert!(
             matches!(
                 error,
-                Error::MissingSample {
+                ShardError::MissingSample {
                     index: 2,
                     missing: 11,
                     ..
@@ -144,17 +144,17 @@ fn a_session_that_is_not_whole_is_refused_with_the_first_missing_sample() {
 }
 
 #[test]
-fn what_a_killed_writer_left_is_cleared_by_the_next() {
+fn what_a_killed_writer_left_behind_is_removed_by_the_next() {
     for layout in Layout::ALL {
         let dir = tempfile::tempdir().unwrap();
         let mut killed =
-            SessionWriter::create(dir.path(), layout, SESSION, SAMPLES, &mask()).unwrap();
+            ShardWriter::create(dir.path(), layout, SESSION, SAMPLES, &mask()).unwrap();
         killed.push(sample(SESSION, 3)).unwrap();
         std::mem::forget(killed);
-        let busy = SessionWriter::create(dir.path(), layout, SESSION, SAMPLES, &mask());
-        assert!(matches!(busy, Err(Error::Busy { .. })));
+        let busy = ShardWriter::create(dir.path(), layout, SESSION, SAMPLES, &mask());
+        assert!(matches!(busy, Err(ShardError::Busy { .. })));
         write(dir.path(), layout);
-        assert_whole(dir.path());
+        assert_intact(dir.path());
     }
 }
 
@@ -162,7 +162,7 @@ fn what_a_killed_writer_left_is_cleared_by_the_next() {
 fn samples_that_do_not_fit_are_refused_and_do_no_harm() {
     let dir = tempfile::tempdir().unwrap();
     let mut writer =
-        SessionWriter::create(dir.path(), Layout::Webdataset, SESSION, SAMPLES, &mask()).unwrap();
+        ShardWriter::create(dir.path(), Layout::Webdataset, SESSION, SAMPLES, &mask()).unwrap();
     writer.push(sample(SESSION, 0)).unwrap();
     let mut refused = |change: fn(&mut relit_data::shard::Sample)| {
         let mut sample = sample(SESSION, 1);
@@ -171,28 +171,28 @@ fn samples_that_do_not_fit_are_refused_and_do_no_harm() {
     };
     assert!(matches!(
         refused(|s| s.record.index = 0),
-        Error::DoubledSample { index: 0, .. }
+        ShardError::DoubledSample { index: 0, .. }
     ));
     assert!(matches!(
         refused(|s| s.record.index = 14),
-        Error::OutOfRange { last: 13, .. }
+        ShardError::OutOfRange { last: 13, .. }
     ));
     assert!(matches!(
         refused(|s| s.record.session = "b".into()),
-        Error::WrongSession { .. }
+        ShardError::WrongSession { .. }
     ));
     assert!(matches!(
         refused(|s| s.record.size = [1, 1]),
-        Error::SizeMismatch { .. }
+        ShardError::SizeMismatch { .. }
     ));
     assert!(matches!(
         refused(|s| s.image = image::RgbImage::new(3, 3)),
-        Error::SizeMismatch { .. }
+        ShardError::SizeMismatch { .. }
     ));
     let error = refused(|s| s.record.sharpness = f64::NAN);
     assert!(matches!(
         error,
-        Error::NotFinite {
+        ShardError::NotFinite {
             field: "sharpness",
             ..
         }
@@ -207,23 +207,26 @@ fn samples_that_do_not_fit_are_refused_and_do_no_harm() {
 fn sessions_that_cannot_be_written_are_refused_at_the_start() {
     let dir = tempfile::tempdir().unwrap();
     let create = |session: &str, samples, mask: &GrayImage| {
-        SessionWriter::create(dir.path(), Layout::Webdataset, session, samples, mask)
+        ShardWriter::create(dir.path(), Layout::Webdataset, session, samples, mask)
             .err()
             .unwrap()
     };
     assert!(matches!(
         create("../a", 1, &mask()),
-        Error::SessionName { .. }
+        ShardError::SessionName { .. }
     ));
-    assert!(matches!(create("a", 0, &mask()), Error::SampleCount { .. }));
+    assert!(matches!(
+        create("a", 0, &mask()),
+        ShardError::SampleCount { .. }
+    ));
     assert!(matches!(
         create("a", u32::MAX, &mask()),
-        Error::SampleCount { .. }
+        ShardError::SampleCount { .. }
     ));
     let grey = GrayImage::from_pixel(4, 4, Luma([7]));
     assert!(matches!(
         create("a", 1, &grey),
-        Error::MaskValue {
+        ShardError::MaskValue {
             value: 7,
             x: 0,
             y: 0
@@ -231,22 +234,22 @@ fn sessions_that_cannot_be_written_are_refused_at_the_start() {
     ));
     assert!(matches!(
         create("a", 1, &GrayImage::new(0, 0)),
-        Error::Encode { .. }
+        ShardError::Encode { .. }
     ));
 }
 
 #[test]
-fn a_session_takes_the_place_of_an_older_one_and_leaves_others_alone() {
+fn a_session_replaces_an_older_one_and_leaves_others_alone() {
     for layout in Layout::ALL {
         let dir = dataset(layout);
         let before = files(dir.path());
         let indices: Vec<u32> = (0..SAMPLES).collect();
         write_with(dir.path(), layout, "another", &indices, |_| {});
-        assert_eq!(verdict(dir.path()).sessions, 2);
+        assert_eq!(verified(dir.path()).sessions, 2);
         write_with(dir.path(), layout, SESSION, &indices, |s| {
             s.record.t_us += 7
         });
-        assert_whole(dir.path());
+        assert_intact(dir.path());
         assert_ne!(
             files(dir.path())[&format!("{SESSION}.parquet")],
             before[&format!("{SESSION}.parquet")]
@@ -264,6 +267,6 @@ fn a_folder_can_be_locked_again_after_a_writer_is_done() {
     let held = OutputFolder::lock(dir.path()).unwrap();
     assert!(matches!(
         OutputFolder::lock(held.path()),
-        Err(Error::Locked { .. })
+        Err(ShardError::Locked { .. })
     ));
 }

@@ -3,12 +3,12 @@
 //! element is not ended. A whole file that loses its last byte has a cut, and of that one byte.
 
 #![no_main]
-#![allow(clippy::expect_used, reason = "a panic is how a target tells")]
+#![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]
 
 use std::io::{self, Cursor, Read, Seek, SeekFrom};
 
 use libfuzzer_sys::fuzz_target;
-use relit_video::{Cut, find_cut};
+use relit_video::{Truncation, find_truncation};
 
 /// The id of the element that a Matroska file begins with.
 const EBML: [u8; 4] = [0x1A, 0x45, 0xDF, 0xA3];
@@ -34,13 +34,13 @@ fn starts_as_matroska(bytes: &[u8]) -> bool {
     bytes.starts_with(&EBML) && bytes.get(EBML.len()) != Some(&0)
 }
 
-fn search(bytes: &[u8]) -> Option<Cut> {
+fn search(bytes: &[u8]) -> Option<Truncation> {
     let length = bytes.len() as u64;
     let mut file = Counted {
         bytes: Cursor::new(bytes),
         reads: 0,
     };
-    let found = find_cut(&mut file).expect("memory can be read");
+    let found = find_truncation(&mut file).expect("memory can be read");
     // All bytes and, once, the end.
     assert!(file.reads <= length + 1, "{} reads", file.reads);
     if let Some(cut) = found {

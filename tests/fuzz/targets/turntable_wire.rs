@@ -3,10 +3,10 @@
 //! its own number and checksum.
 
 #![no_main]
-#![allow(clippy::expect_used, reason = "a panic is how a target tells")]
+#![allow(clippy::expect_used, reason = "a panic is how a target reports")]
 
 use libfuzzer_sys::fuzz_target;
-use relit_rig::turntable::wire::{Event, Machine, Outcome, Patience, parse};
+use relit_rig::turntable::wire::{LineOutcome, Machine, ReplyTimeout, WireEvent, parse};
 
 /// Answers `ok N0`, with its checksum, to the line that opens a session.
 const OPENED: &[u8] = b"ok N0*B4B2\r\n";
@@ -24,7 +24,7 @@ fuzz_target!(|bytes: &[u8]| {
     checked(bytes);
 });
 
-/// Tells whether the line in flight was done by `bytes`.
+/// Whether the line in flight was done by `bytes`.
 fn hear(machine: &mut Machine, bytes: &[u8]) -> bool {
     let mut done = false;
     for (now_us, piece) in (0..).zip(bytes.chunks(7)) {
@@ -34,10 +34,10 @@ fn hear(machine: &mut Machine, bytes: &[u8]) -> bool {
         assert!(machine.take_output(now_us).len() < 200);
         while let Some(event) = machine.next_event() {
             let outcome = match event {
-                Event::Answered { outcome, .. } => outcome,
-                Event::Status(_) | Event::Reset(_) | Event::Alarm(_) => continue,
+                WireEvent::Answered { outcome, .. } => outcome,
+                WireEvent::Status(_) | WireEvent::Reset(_) | WireEvent::Alarm(_) => continue,
             };
-            done |= matches!(outcome, Outcome::Done(_));
+            done |= matches!(outcome, LineOutcome::Done(_));
         }
     }
     done
@@ -47,7 +47,7 @@ fn plain(bytes: &[u8]) {
     let mut machine = Machine::new();
     machine.poll_every(Some(100_000));
     machine
-        .send(0, "$$", Patience::Short)
+        .send(0, "$$", ReplyTimeout::AtOnce)
         .expect("nothing is in flight");
     if hear(&mut machine, bytes) {
         assert!(bytes.windows(2).any(|pair| pair == b"ok"));
@@ -60,7 +60,7 @@ fn checked(bytes: &[u8]) {
     machine.on_bytes(0, OPENED);
     assert!(machine.is_checked() && machine.next_event().is_some());
     machine
-        .send(0, "$X", Patience::Short)
+        .send(0, "$X", ReplyTimeout::AtOnce)
         .expect("nothing is in flight");
     if hear(&mut machine, bytes) {
         assert!(bytes.windows(6).any(|text| text == b"ok N1*"));

@@ -44,7 +44,7 @@ pub(in crate::cli) struct Arguments {
     /// Frames a second of a video.
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240))]
     fps: u32,
-    /// Render one sheet of the object in many materials: smoothness 5 to 200 across, specular reflectance 0 to 1 down.
+    /// Render one sheet of the object in many materials: smoothness 5 to 200 across, from 0 to 40 % of reflected light down.
     #[arg(long)]
     sweep: bool,
     /// Brightness in stops beyond a white matt surface under even light of radiance 1, or "auto": a white matt
@@ -288,10 +288,10 @@ fn still(
     surface: &Surface,
     light: &ShLight,
 ) -> Result<Rgb<Linear>, relight::image::ImageError> {
-    const REFLECTANCES: [f32; 4] = [0.0, 0.1, 0.3, 1.0];
+    const REFLECTED: [f32; 4] = [0.0, 0.04, 0.15, 0.4];
     const SMOOTHNESSES: [f32; 6] = [5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
     if arguments.sweep {
-        look.sweep(surface, light, &REFLECTANCES, &SMOOTHNESSES)
+        look.sweep(surface, light, &REFLECTED, &SMOOTHNESSES)
     } else {
         look.image(surface, light)
     }

@@ -1,6 +1,6 @@
-//! Whether a folder of images holds the samples of its session: the layout `relit`.
+//! Checks the layout `relit`: a folder of images with the session's samples.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -8,19 +8,18 @@ use image::RgbImage;
 use rayon::prelude::*;
 
 use super::sample::{SessionMask, check_image};
-use super::{Found, SessionCheck};
+use super::session::{Found, SessionCheck};
 use crate::causes::with_causes;
+use crate::image_stats::MaskSpans;
 use crate::shard::codec::decode_rgb;
-use crate::shard::dataset::FileEntry;
 use crate::shard::digest::{Digest, FolderHasher};
+use crate::shard::file::{FileEntry, compare};
 use crate::shard::folder::MeanImage;
-use crate::shard::measure::MaskSpans;
-use crate::shard::vouch::{check_file, compare};
-use crate::shard::{Error, names, output};
+use crate::shard::{ShardError, names, output};
 
 /// Largest file that is read, bytes.
-const MOST_BYTES: u64 = 256 << 20;
-/// Images that are checked side by side.
+const MAX_BYTES: u64 = 256 << 20;
+/// Images that are checked in parallel.
 const BATCH: usize = 32;
 
 pub(super) fn check(check: &mut SessionCheck<'_>) -> Found {
@@ -41,7 +40,7 @@ pub(super) fn check(check: &mut SessionCheck<'_>) -> Found {
     }
 }
 
-/// Whether the folder holds the images `0.png` to `n-1.png` and nothing else.
+/// Checks that the folder holds the images `0.png` to `n-1.png` and nothing else.
 fn check_names(check: &mut SessionCheck<'_>) {
     let folder = check.out.join(&check.shard.file);
     let listed = match output::names_in(&folder) {
@@ -49,52 +48,50 @@ fn check_names(check: &mut SessionCheck<'_>) {
         Err(error) => return check.note(None, with_causes(&error)),
     };
     let samples = check.session.samples;
-    let mut there = vec![false; samples as usize];
+    let mut present = vec![false; samples as usize];
     for name in listed {
         let number = name
             .strip_suffix(".png")
             .and_then(|number| number.parse::<u32>().ok());
         let index = number.filter(|index| format!("{index}.png") == name);
-        match index.and_then(|index| there.get_mut(index as usize)) {
+        match index.and_then(|index| present.get_mut(index as usize)) {
             Some(slot) => *slot = true,
             None => check.note(None, format!("{name:?} does not belong here")),
         }
     }
-    for (index, _) in (0..samples).zip(there).filter(|(_, there)| !there) {
+    for (index, _) in (0..samples).zip(present).filter(|(_, present)| !present) {
         check.note(Some(index), "the image is missing".to_owned());
     }
 }
 
-/// The session's mask, where it is right.
+/// The session's mask, if it is valid.
 fn check_mask(check: &mut SessionCheck<'_>) -> Option<MaskSpans> {
     let file = names::mask_file(&check.session.id);
-    let entry = beside(check, check.shard.mask.as_ref(), &file)?;
+    let entry = check_entry(check, check.shard.mask.as_ref(), &file)?;
     let png = match read(&check.out.join(&entry.file)) {
         Ok(png) => png,
         Err(error) => {
-            check
-                .problems
-                .push(check.at(&file, None, with_causes(&error)));
+            check.note_in(&file, None, with_causes(&error));
             return None;
         }
     };
     let mut mask = SessionMask::default();
-    let mut problems = mask.look(&png, check.row(0).map(|row| &row.mask_blake3));
+    let mut problems = mask.check(&png, check.row(0).map(|row| &row.mask_blake3));
     let rows = check.rows.as_deref().unwrap_or_default();
     if rows
         .windows(2)
         .any(|pair| pair[0].mask_blake3 != pair[1].mask_blake3)
     {
-        problems.push("the table tells more than one mask".to_owned());
+        problems.push("the table lists more than one mask".to_owned());
     }
     for what in problems {
-        check.problems.push(check.at(&file, None, what));
+        check.note_in(&file, None, what);
     }
     mask.get().map(|spans| MaskSpans::clone(&spans))
 }
 
-/// The entry of a file beside the images, after the file was compared with it.
-fn beside(
+/// Checks the mask or mean image `file` against its entry, and returns the entry.
+fn check_entry(
     check: &mut SessionCheck<'_>,
     entry: Option<&FileEntry>,
     file: &str,
@@ -102,28 +99,29 @@ fn beside(
     let problem = match entry {
         None => Some("dataset.json does not list it".to_owned()),
         Some(entry) if entry.file != file => Some(format!("it is listed as {:?}", entry.file)),
-        Some(entry) => check_file(check.out, entry)
+        Some(entry) => entry
+            .check(check.out)
             .err()
             .map(|error| with_causes(&error)),
     };
     if let Some(what) = problem {
-        check.problems.push(check.at(file, None, what));
+        check.note_in(file, None, what);
     }
     entry.filter(|entry| entry.file == file).cloned()
 }
 
-/// What was found in the images.
+/// The sums over all images.
 struct Images {
-    /// How many were there.
+    /// Number of images that were read.
     count: u64,
     bytes: u64,
     hasher: FolderHasher,
-    /// Their mean, where all could be decoded and have one size.
+    /// Their mean, if all could be decoded and have one size.
     mean: Option<MeanImage>,
 }
 
-/// One image that was read.
-struct Checked {
+/// One image that was checked.
+struct CheckedImage {
     problems: Vec<String>,
     read: Option<(u64, Digest)>,
     image: Option<RgbImage>,
@@ -139,7 +137,7 @@ fn check_images(check: &mut SessionCheck<'_>, mask: Option<&MaskSpans>) -> Image
     let indices: Vec<u32> = (0..check.session.samples).collect();
     for batch in indices.chunks(BATCH) {
         let all = &*check;
-        let checked: Vec<Checked> = batch
+        let checked: Vec<CheckedImage> = batch
             .par_iter()
             .map(|&index| check_one(all, index, mask))
             .collect();
@@ -155,7 +153,7 @@ fn check_images(check: &mut SessionCheck<'_>, mask: Option<&MaskSpans>) -> Image
 }
 
 impl Images {
-    fn add(&mut self, checked: &Checked, mask: Option<&MaskSpans>) {
+    fn add(&mut self, checked: &CheckedImage, mask: Option<&MaskSpans>) {
         if let Some((bytes, digest)) = &checked.read {
             self.count += 1;
             self.bytes += bytes;
@@ -171,44 +169,36 @@ impl Images {
     }
 }
 
-fn check_one(check: &SessionCheck<'_>, index: u32, mask: Option<&MaskSpans>) -> Checked {
-    let path = check
-        .out
-        .join(&check.shard.file)
-        .join(format!("{index}.png"));
-    let png = match read(&path) {
+fn check_one(check: &SessionCheck<'_>, index: u32, mask: Option<&MaskSpans>) -> CheckedImage {
+    let unread = |problems| CheckedImage {
+        problems,
+        read: None,
+        image: None,
+    };
+    let folder = check.out.join(&check.shard.file);
+    let png = match read(&folder.join(format!("{index}.png"))) {
         Ok(png) => png,
-        // That it is missing was told with the names.
-        Err(Error::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
-            return Checked {
-                problems: Vec::new(),
-                read: None,
-                image: None,
-            };
+        // Missing images are reported by `check_names`.
+        Err(ShardError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
+            return unread(Vec::new());
         }
-        Err(error) => {
-            return Checked {
-                problems: vec![with_causes(&error)],
-                read: None,
-                image: None,
-            };
-        }
+        Err(error) => return unread(vec![with_causes(&error)]),
     };
     let row = check.row(index);
     let record = row.map(|row| &row.record);
     let digest = Digest::of(&png);
     let (problems, image) = check_image(check.settings, &png, &digest, row, record, mask);
-    Checked {
+    CheckedImage {
         problems,
         read: Some((png.len() as u64, digest)),
         image,
     }
 }
 
-/// Whether the mean image is the mean of the images.
+/// Checks that the mean image is the mean of the images.
 fn check_mean(check: &mut SessionCheck<'_>, mean: Option<&MeanImage>) {
     let file = names::mean_file(&check.session.id);
-    let Some(entry) = beside(check, check.shard.mean_img.as_ref(), &file) else {
+    let Some(entry) = check_entry(check, check.shard.mean_img.as_ref(), &file) else {
         return;
     };
     let stored = read(&check.out.join(&entry.file)).and_then(|png| decode_rgb(&png));
@@ -219,22 +209,21 @@ fn check_mean(check: &mut SessionCheck<'_>, mean: Option<&MeanImage>) {
         }
         _ => return,
     };
-    check.problems.push(check.at(&file, None, what));
+    check.note_in(&file, None, what);
 }
 
-/// The bytes of a file, if they are not too many.
-fn read(path: &Path) -> Result<Vec<u8>, Error> {
-    let within = |file: File| {
+/// The bytes of a file of limited size.
+fn read(path: &Path) -> Result<Vec<u8>, ShardError> {
+    let read_limited = |file: File| {
         let mut bytes = Vec::new();
-        file.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 > MOST_BYTES {
-            return Err(io::Error::other(format!(
-                "it has more than {MOST_BYTES} bytes"
-            )));
+        file.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > MAX_BYTES {
+            let what = format!("it has more than {MAX_BYTES} bytes");
+            return Err(io::Error::other(what));
         }
         Ok(bytes)
     };
-    fs::File::open(path)
-        .and_then(within)
-        .map_err(Error::io("read", path))
+    File::open(path)
+        .and_then(read_limited)
+        .map_err(ShardError::io("read", path))
 }

@@ -1,33 +1,34 @@
-//! Whether `dataset.json` is consistent, and whether the folder holds files that it does not
-//! know.
+//! Checks that `dataset.json` is consistent and that the folder holds no files that it does not
+//! list.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use super::Problem;
+use super::problem::Problem;
 use crate::causes::with_causes;
 use crate::shard::dataset::{Dataset, SessionEntry, ShardEntry};
-use crate::shard::vouch::check_file;
-use crate::shard::{Error, MAX_SAMPLES, names, output};
+use crate::shard::{MAX_SAMPLES, ShardError, names, output};
 
-/// What is wrong with the list of sessions and shards, with pages, and with stray files.
-pub(super) fn check(out: &Path, dataset: &Dataset) -> Result<Vec<Problem>, Error> {
+const UNLISTED: &str = "dataset.json does not list it";
+
+/// The problems with the list of sessions and shards, with reports, and with unlisted files.
+pub(super) fn check(out: &Path, dataset: &Dataset) -> Result<Vec<Problem>, ShardError> {
     let mut problems = entries(dataset);
     for report in dataset
         .sessions
         .iter()
         .filter_map(|session| session.report.as_ref())
     {
-        if let Err(error) = check_file(out, report) {
+        if let Err(error) = report.check(out) {
             problems.push(about(&report.file, with_causes(&error)));
         }
     }
-    problems.extend(strays(out, dataset)?);
+    problems.extend(unlisted(out, dataset)?);
     Ok(problems)
 }
 
-/// The shard of a session, where it can be checked: there is one, and no more samples than a
-/// session may have.
+/// The shard of a session, if it can be checked: there is exactly one, and a valid number of
+/// samples.
 pub(super) fn only_shard<'a>(
     dataset: &'a Dataset,
     session: &'a SessionEntry,
@@ -59,14 +60,14 @@ fn entries(dataset: &Dataset) -> Vec<Problem> {
         }
     }
     for session in &dataset.sessions {
-        of_session(dataset, session)
+        session_entry(dataset, session)
             .into_iter()
             .for_each(&mut wrong);
     }
     for shard in &dataset.shards {
         if dataset.session(&shard.session).is_none() {
             wrong(format!(
-                "shard {:?} is of the unknown session {:?}",
+                "shard {:?} belongs to the unknown session {:?}",
                 shard.file, shard.session
             ));
         }
@@ -74,14 +75,12 @@ fn entries(dataset: &Dataset) -> Vec<Problem> {
     problems
 }
 
-fn of_session(dataset: &Dataset, session: &SessionEntry) -> Vec<String> {
+fn session_entry(dataset: &Dataset, session: &SessionEntry) -> Vec<String> {
     let SessionEntry { id, samples, .. } = session;
     let mut problems = Vec::new();
     let count = dataset.shards_of(id).count();
     if count != 1 {
-        problems.push(format!(
-            "session {id:?} has {count} shards where 1 was expected"
-        ));
+        problems.push(format!("session {id:?} has {count} shards instead of 1"));
     }
     if *samples != dataset.settings.frames || !(1..=MAX_SAMPLES).contains(samples) {
         let frames = dataset.settings.frames;
@@ -107,13 +106,13 @@ fn of_session(dataset: &Dataset, session: &SessionEntry) -> Vec<String> {
     problems
 }
 
-/// Each name with the number of times it occurs, in the order of first occurrence.
+/// Each name and how often it occurs, in order of first occurrence.
 fn counted<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(&'a str, u32)> {
-    let mut places = HashMap::new();
+    let mut positions = HashMap::new();
     let mut counts: Vec<(&str, u32)> = Vec::new();
     for name in names {
-        let place = *places.entry(name).or_insert(counts.len());
-        match counts.get_mut(place) {
+        let position = *positions.entry(name).or_insert(counts.len());
+        match counts.get_mut(position) {
             Some((_, count)) => *count += 1,
             None => counts.push((name, 1)),
         }
@@ -121,33 +120,27 @@ fn counted<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(&'a str, u32)> {
     counts
 }
 
-/// Shards, tables, images and temporary files in the folder that no entry vouches for.
-fn strays(out: &Path, dataset: &Dataset) -> Result<Vec<Problem>, Error> {
+/// Shards, tables, images and temporary files in the folder that have no entry.
+fn unlisted(out: &Path, dataset: &Dataset) -> Result<Vec<Problem>, ShardError> {
     let known: HashSet<&str> = dataset.files().collect();
     let mut problems = Vec::new();
     for name in output::names_in(out)? {
         if names::is_leftover(&name) {
-            problems.push(about(
-                &name,
-                "an interrupted writer left it behind".to_owned(),
-            ));
+            let what = "it was left behind by an interrupted writer";
+            problems.push(about(&name, what.to_owned()));
         } else if is_data(&name) && !known.contains(name.as_str()) {
-            problems.push(unknown(&name));
+            problems.push(about(&name, UNLISTED.to_owned()));
         }
     }
     for folder in [names::IMAGES, names::MASKS, names::MEANS] {
         for name in output::names_in(&out.join(folder))? {
             let path = format!("{folder}/{name}");
             if !known.contains(path.as_str()) {
-                problems.push(unknown(&path));
+                problems.push(about(&path, UNLISTED.to_owned()));
             }
         }
     }
     Ok(problems)
-}
-
-fn unknown(file: &str) -> Problem {
-    about(file, "dataset.json does not vouch for it".to_owned())
 }
 
 fn is_data(name: &str) -> bool {

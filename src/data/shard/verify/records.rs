@@ -1,27 +1,27 @@
-//! Whether records are consistent, in themselves and with one another. Knows no files.
+//! Checks that records are consistent, each in itself and with one another. Knows no files.
 
 use std::collections::HashSet;
 
+use crate::image_stats::fraction;
 use crate::shard::dataset::SessionEntry;
-use crate::shard::measure::fraction;
 use crate::shard::record::FrameRecord;
-use crate::shard::settings::{Settings, Size};
+use crate::shard::settings::{ExtractionSettings, ImageSize};
 
-/// What is wrong with the records of a session, which stand by index; `None` where a record could
-/// not be read. Each problem with its index, or without one where it is the session's.
+/// The problems with the records of a session, given by index (`None` if one could not be read).
+/// A problem with a sample has its index, one with the session has none.
 pub(super) fn check(
-    settings: &Settings,
+    settings: &ExtractionSettings,
     session: &SessionEntry,
     records: &[Option<&FrameRecord>],
 ) -> Vec<(Option<u32>, String)> {
     let mut problems = Vec::new();
     for (index, record) in (0..).zip(records) {
         let Some(record) = record else { continue };
-        let wrong = own(settings, session, index, record);
+        let wrong = record_problems(settings, session, index, record);
         problems.extend(wrong.into_iter().map(|what| (Some(index), what)));
     }
     problems.extend(
-        repeats(records)
+        duplicate_flags(records)
             .into_iter()
             .map(|(index, what)| (Some(index), what)),
     );
@@ -35,29 +35,28 @@ pub(super) fn check(
     problems
 }
 
-/// Where the flag `duplicate` does not fit: of the samples of one source frame exactly one is not
-/// flagged.
-fn repeats(records: &[Option<&FrameRecord>]) -> Vec<(u32, String)> {
+/// Wrong flags `duplicate`: of the samples of one source frame exactly one must not be flagged.
+fn duplicate_flags(records: &[Option<&FrameRecord>]) -> Vec<(u32, String)> {
     let known = || records.iter().flatten();
     let mut originals = HashSet::new();
     let mut wrong = Vec::new();
     for record in known().filter(|record| !record.duplicate) {
         if !originals.insert(record.source_frame) {
             let what = format!(
-                "duplicate is false, as in another sample of source frame {}",
+                "duplicate is false, but it is also false in another sample of source frame {}",
                 record.source_frame
             );
             wrong.push((record.index, what));
         }
     }
     if records.iter().any(Option::is_none) {
-        // The one that is not flagged may be the one that could not be read.
+        // The sample that is not flagged may be one that could not be read.
         return wrong;
     }
     for record in known().filter(|record| record.duplicate) {
         if !originals.contains(&record.source_frame) {
             let what = format!(
-                "duplicate is true, and so it is in every sample of source frame {}",
+                "duplicate is true, but it is true in every sample of source frame {}",
                 record.source_frame
             );
             wrong.push((record.index, what));
@@ -66,12 +65,17 @@ fn repeats(records: &[Option<&FrameRecord>]) -> Vec<(u32, String)> {
     wrong
 }
 
-/// What is wrong with one record in itself.
-fn own(settings: &Settings, session: &SessionEntry, index: u32, r: &FrameRecord) -> Vec<String> {
+/// The problems with one record in itself.
+fn record_problems(
+    settings: &ExtractionSettings,
+    session: &SessionEntry,
+    index: u32,
+    r: &FrameRecord,
+) -> Vec<String> {
     let expected_fraction = fraction(r.saturated_px, r.mask_px);
     let size = match settings.size {
-        Size::Native(_) => [r.crop.w, r.crop.h],
-        Size::Pixels(side) => [side, side],
+        ImageSize::Native(_) => [r.crop.w, r.crop.h],
+        ImageSize::Pixels(side) => [side, side],
     };
     let checks = [
         (
@@ -100,7 +104,7 @@ fn own(settings: &Settings, session: &SessionEntry, index: u32, r: &FrameRecord)
         (
             r.mask_px == session.mask.px,
             format!(
-                "mask_px is {}, dataset.json tells {} pixels under the mask",
+                "mask_px is {}, dataset.json says {} pixels under the mask",
                 r.mask_px, session.mask.px
             ),
         ),
@@ -133,7 +137,7 @@ fn own(settings: &Settings, session: &SessionEntry, index: u32, r: &FrameRecord)
         .collect()
 }
 
-/// What is wrong with the counts that the session's entry tells.
+/// The problems with the counts in the session's entry.
 fn totals(session: &SessionEntry, records: &[Option<&FrameRecord>]) -> Vec<String> {
     let count = |flag: fn(&FrameRecord) -> bool| {
         records
@@ -158,7 +162,7 @@ fn totals(session: &SessionEntry, records: &[Option<&FrameRecord>]) -> Vec<Strin
         .into_iter()
         .filter(|(_, listed, found)| listed != found)
         .map(|(what, listed, found)| {
-            format!("dataset.json tells {listed} samples with {what}, the records {found}")
+            format!("dataset.json says {listed} samples have {what}, the records say {found}")
         })
         .collect()
 }

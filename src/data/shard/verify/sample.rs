@@ -1,4 +1,4 @@
-//! Whether the parts of one sample are right. Knows bytes and pixels, and no files.
+//! Checks the parts of one sample. Knows bytes and pixels, and no files.
 
 use std::sync::Arc;
 
@@ -6,42 +6,42 @@ use image::RgbImage;
 
 use super::records::difference;
 use crate::causes::with_causes;
+use crate::image_stats::{MaskSpans, Measures};
 use crate::shard::codec::{check_mask, decode_mask, decode_rgb};
 use crate::shard::digest::Digest;
-use crate::shard::measure::{MaskSpans, Measures};
 use crate::shard::record::FrameRecord;
-use crate::shard::settings::{Settings, Size};
-use crate::shard::table::Row;
+use crate::shard::settings::{ExtractionSettings, ImageSize};
+use crate::shard::table::TableRow;
 
-/// The mask of a session, which all its samples share: decoded once.
+/// The mask of a session, which all its samples share. It is decoded once.
 #[derive(Default)]
 pub(super) struct SessionMask {
-    good: Option<(Digest, Arc<MaskSpans>)>,
+    valid: Option<(Digest, Arc<MaskSpans>)>,
 }
 
 impl SessionMask {
-    /// The mask, if one was seen.
+    /// The mask, if a valid one was found.
     pub(super) fn get(&self) -> Option<Arc<MaskSpans>> {
-        self.good.as_ref().map(|(_, spans)| Arc::clone(spans))
+        self.valid.as_ref().map(|(_, spans)| Arc::clone(spans))
     }
 
-    /// Looks at the bytes of a mask: what is wrong with it. `expected` is its digest by the
-    /// table. The first mask that is right is the session's.
-    pub(super) fn look(&mut self, png: &[u8], expected: Option<&Digest>) -> Vec<String> {
+    /// The problems with the bytes of a mask, whose digest in the table is `expected`. The first
+    /// valid mask becomes the session's.
+    pub(super) fn check(&mut self, png: &[u8], expected: Option<&Digest>) -> Vec<String> {
         let digest = Digest::of(png);
         let mut problems = wrong_digest("mask", &digest, expected);
         if self
-            .good
+            .valid
             .as_ref()
             .is_some_and(|(known, _)| *known == digest)
         {
             return problems;
         }
-        if self.good.is_some() && problems.is_empty() {
-            problems.push("the mask is not the one of the session's other samples".to_owned());
+        if self.valid.is_some() && problems.is_empty() {
+            problems.push("the mask differs from that of the session's other samples".to_owned());
         }
         match decode_mask(png).and_then(|mask| check_mask(&mask).map(|()| MaskSpans::of(&mask))) {
-            Ok(spans) if problems.is_empty() => self.good = Some((digest, Arc::new(spans))),
+            Ok(spans) if problems.is_empty() => self.valid = Some((digest, Arc::new(spans))),
             Ok(_) => {}
             Err(error) => problems.push(format!("mask: {}", with_causes(&error))),
         }
@@ -49,13 +49,13 @@ impl SessionMask {
     }
 }
 
-/// What is wrong with an image, and the image where it could be decoded. `row` is its row of the
-/// table, `record` its record from wherever there is one.
+/// The problems with an image, and the image if it could be decoded. `row` is its row of the table,
+/// `record` its record from the table or the shard.
 pub(super) fn check_image(
-    settings: &Settings,
+    settings: &ExtractionSettings,
     png: &[u8],
     digest: &Digest,
-    row: Option<&Row>,
+    row: Option<&TableRow>,
     record: Option<&FrameRecord>,
     mask: Option<&MaskSpans>,
 ) -> (Vec<String>, Option<RgbImage>) {
@@ -88,7 +88,7 @@ pub(super) fn check_image(
 }
 
 fn check_pixels(
-    settings: &Settings,
+    settings: &ExtractionSettings,
     image: &RgbImage,
     record: Option<&FrameRecord>,
     mask: &MaskSpans,
@@ -99,13 +99,13 @@ fn check_pixels(
         Ok(Some((x, y))) => problems.push(format!("pixel ({x}, {y}) outside the mask is not 0")),
         Err(error) => problems.push(with_causes(&error)),
     }
-    // Scaled or shifted pixels are not those that were measured.
-    let own_pixels = |record: &&FrameRecord| {
-        settings.size == Size::NATIVE
+    // Scaled or shifted pixels differ from those that were measured.
+    let has_source_pixels = |record: &&FrameRecord| {
+        settings.size == ImageSize::NATIVE
             && !record.shift_applied
             && [record.crop.w, record.crop.h] == mask.size()
     };
-    let Some(record) = record.filter(own_pixels) else {
+    let Some(record) = record.filter(has_source_pixels) else {
         return problems;
     };
     match mask.measure(image, settings.saturation_level) {
@@ -127,22 +127,27 @@ fn check_measures(record: &FrameRecord, found: &Measures) -> Vec<String> {
     ];
     let mut problems: Vec<String> = counts
         .into_iter()
-        .filter(|(_, told, found)| told != found)
-        .map(|(name, told, found)| format!("{name} is {told}, the pixels give {found}"))
+        .filter(|(_, recorded, found)| recorded != found)
+        .map(|(name, recorded, found)| format!("{name} is {recorded}, the pixels give {found}"))
         .collect();
     if record.mean_rgb != found.mean_rgb {
-        let (told, found) = (record.mean_rgb, found.mean_rgb);
-        problems.push(format!("mean_rgb is {told:?}, the pixels give {found:?}"));
+        let (recorded, found) = (record.mean_rgb, found.mean_rgb);
+        problems.push(format!(
+            "mean_rgb is {recorded:?}, the pixels give {found:?}"
+        ));
     }
     if record.sharpness != found.sharpness {
-        let (told, found) = (record.sharpness, found.sharpness);
-        problems.push(format!("sharpness is {told}, the pixels give {found}"));
+        let (recorded, found) = (record.sharpness, found.sharpness);
+        problems.push(format!("sharpness is {recorded}, the pixels give {found}"));
     }
     problems
 }
 
-/// What is wrong with the bytes of a record, and the record where it could be read.
-pub(super) fn check_record(json: &[u8], row: Option<&Row>) -> (Vec<String>, Option<FrameRecord>) {
+/// The problems with the bytes of a record, and the record if it could be read.
+pub(super) fn check_record(
+    json: &[u8],
+    row: Option<&TableRow>,
+) -> (Vec<String>, Option<FrameRecord>) {
     let record: FrameRecord = match serde_json::from_slice(json) {
         Ok(record) => record,
         Err(error) => return (vec![format!("record: {error}")], None),
@@ -156,7 +161,7 @@ pub(super) fn check_record(json: &[u8], row: Option<&Row>) -> (Vec<String>, Opti
                 fields.join(", ")
             ));
         } else if serde_json::to_vec(&row.record).ok().as_deref() != Some(json) {
-            problems.push("the record is spelled otherwise than it was written".to_owned());
+            problems.push("the record's JSON differs from what was written".to_owned());
         }
     }
     (problems, Some(record))
@@ -165,7 +170,7 @@ pub(super) fn check_record(json: &[u8], row: Option<&Row>) -> (Vec<String>, Opti
 fn wrong_digest(part: &str, digest: &Digest, expected: Option<&Digest>) -> Vec<String> {
     expected
         .filter(|&expected| expected != digest)
-        .map(|_| format!("the {part} is not the one that the table vouches for"))
+        .map(|_| format!("the BLAKE3 of the {part} differs from the table's"))
         .into_iter()
         .collect()
 }

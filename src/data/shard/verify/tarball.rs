@@ -1,4 +1,5 @@
-//! Whether a tar holds the samples of its session, each once, whole and in its place.
+//! Checks the layout `webdataset`: a tar with the session's samples, each once, complete and at its
+//! position.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -7,20 +8,20 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::sample::{SessionMask, check_image, check_record};
-use super::{Found, SessionCheck};
+use super::session::{Found, SessionCheck};
 use crate::causes::with_causes;
-use crate::shard::Error;
+use crate::image_stats::MaskSpans;
+use crate::shard::ShardError;
 use crate::shard::digest::{Digest, HashingReader};
-use crate::shard::measure::MaskSpans;
+use crate::shard::file::compare;
 use crate::shard::names::{Part, parse_member};
 use crate::shard::order::order;
 use crate::shard::record::FrameRecord;
 use crate::shard::tarball::{Member, TarReader};
-use crate::shard::vouch::compare;
 
 /// Largest member that is read, bytes.
-const MOST_BYTES: u64 = 256 << 20;
-/// Samples that are checked side by side, and the bytes after which no more are gathered.
+const MAX_BYTES: u64 = 256 << 20;
+/// A batch that is checked in parallel ends at so many samples or bytes.
 const BATCH_SAMPLES: usize = 64;
 const BATCH_BYTES: usize = 64 << 20;
 
@@ -29,10 +30,10 @@ type Source = HashingReader<BufReader<File>>;
 pub(super) fn check(check: &mut SessionCheck<'_>) -> Found {
     let path = check.out.join(&check.shard.file);
     let samples = check.session.samples as usize;
-    match File::open(&path).map_err(Error::io("open", &path)) {
+    match File::open(&path).map_err(ShardError::io("open", &path)) {
         Ok(file) => {
             let source = HashingReader::new(BufReader::with_capacity(1 << 18, file));
-            Walk::new(check, TarReader::new(source, MOST_BYTES)).run()
+            TarCheck::new(check, TarReader::new(source, MAX_BYTES)).run()
         }
         Err(error) => {
             check.note(None, with_causes(&error));
@@ -44,46 +45,46 @@ pub(super) fn check(check: &mut SessionCheck<'_>) -> Found {
     }
 }
 
-/// Neighbouring members of one sample.
-struct Gathered {
+/// Adjacent members of one sample.
+struct SampleMembers {
     index: u32,
     image: Option<Vec<u8>>,
     json: Option<Vec<u8>>,
     mask: Option<Arc<MaskSpans>>,
 }
 
-/// What was found in gathered members.
-struct Checked {
+/// The result of checking the members of one sample.
+struct CheckedMembers {
     index: u32,
     problems: Vec<String>,
     record: Option<FrameRecord>,
 }
 
-/// A walk through a tar.
-struct Walk<'a, 'b> {
+/// The check of a tar, member by member.
+struct TarCheck<'a, 'b> {
     check: &'a mut SessionCheck<'b>,
     tar: TarReader<Source>,
     order: Vec<u32>,
-    /// Place of each sample in the order, by index.
+    /// Position of each sample in the order, by index.
     rank: Vec<u32>,
-    /// Which parts were seen, by index.
+    /// Which parts were found, by index.
     seen: Vec<[bool; 3]>,
-    /// The places that the members seen should have, in the order in which they stand.
-    places: Vec<u32>,
+    /// The expected positions of the members, in the order in which they were found.
+    positions: Vec<u32>,
     mask: SessionMask,
-    batch: Vec<Gathered>,
+    batch: Vec<SampleMembers>,
     batch_bytes: usize,
     records: Vec<Option<FrameRecord>>,
 }
 
-impl<'a, 'b> Walk<'a, 'b> {
+impl<'a, 'b> TarCheck<'a, 'b> {
     fn new(check: &'a mut SessionCheck<'b>, tar: TarReader<Source>) -> Self {
         let samples = check.session.samples;
         let order = order(samples);
         let mut rank = vec![0; samples as usize];
-        for (place, &index) in (0..).zip(&order) {
+        for (position, &index) in (0..).zip(&order) {
             if let Some(slot) = rank.get_mut(index as usize) {
-                *slot = place;
+                *slot = position;
             }
         }
         Self {
@@ -92,7 +93,7 @@ impl<'a, 'b> Walk<'a, 'b> {
             order,
             rank,
             seen: vec![[false; 3]; samples as usize],
-            places: Vec::new(),
+            positions: Vec::new(),
             mask: SessionMask::default(),
             batch: Vec::new(),
             batch_bytes: 0,
@@ -103,16 +104,16 @@ impl<'a, 'b> Walk<'a, 'b> {
     fn run(mut self) -> Found {
         loop {
             match self.tar.next() {
-                Ok(Some(member)) => self.take(member),
+                Ok(Some(member)) => self.add(member),
                 Ok(None) => break,
                 Err(error) => {
                     let index = self.expected();
                     self.check.note(index, with_causes(&error));
-                    let over = matches!(
+                    let ended = matches!(
                         error,
-                        Error::ShardRead { .. } | Error::ShardTruncated { .. }
+                        ShardError::ShardRead { .. } | ShardError::ShardTruncated { .. }
                     );
-                    if over || !self.resume() {
+                    if ended || !self.resume() {
                         break;
                     }
                 }
@@ -124,7 +125,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         self.finish()
     }
 
-    /// Goes on behind damage; false where nothing follows.
+    /// Continues after damage; false if nothing follows.
     fn resume(&mut self) -> bool {
         self.tar.resume().unwrap_or_else(|error| {
             self.check.note(None, with_causes(&error));
@@ -132,13 +133,13 @@ impl<'a, 'b> Walk<'a, 'b> {
         })
     }
 
-    /// The sample of which the next member should be; none behind the last.
+    /// The sample to which the next member should belong; none after the last.
     fn expected(&self) -> Option<u32> {
-        let next = self.places.last().map_or(0, |place| place + 1);
+        let next = self.positions.last().map_or(0, |position| position + 1);
         self.order.get(next as usize / Part::ALL.len()).copied()
     }
 
-    fn take(&mut self, member: Member) {
+    fn add(&mut self, member: Member) {
         let Some((index, part)) = parse_member(&self.check.session.id, &member.path)
             .filter(|(index, _)| *index < self.check.session.samples)
         else {
@@ -150,7 +151,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         };
         let slot = index as usize;
         if !member.canonical {
-            let what = format!("header or padding of its {} are damaged", part.suffix());
+            let what = format!("header or padding of its {} is damaged", part.suffix());
             self.check.note(Some(index), what);
         }
         let seen = self
@@ -158,21 +159,21 @@ impl<'a, 'b> Walk<'a, 'b> {
             .get_mut(slot)
             .and_then(|parts| parts.get_mut(part as usize));
         if seen.is_none_or(|seen| std::mem::replace(seen, true)) {
-            let what = format!("its {} stands in the shard twice", part.suffix());
+            let what = format!("its {} is in the shard twice", part.suffix());
             return self.check.note(Some(index), what);
         }
         let rank = self.rank.get(slot).copied().unwrap_or_default();
-        self.places
+        self.positions
             .push(rank * Part::ALL.len() as u32 + part as u32);
-        self.gather(index, part, member.data);
+        self.add_to_batch(index, part, member.data);
     }
 
-    fn gather(&mut self, index: u32, part: Part, data: Vec<u8>) {
+    fn add_to_batch(&mut self, index: u32, part: Part, data: Vec<u8>) {
         if self.batch.last().is_none_or(|last| last.index != index) {
             if self.batch.len() >= BATCH_SAMPLES || self.batch_bytes >= BATCH_BYTES {
                 self.check_batch();
             }
-            self.batch.push(Gathered {
+            self.batch.push(SampleMembers {
                 index,
                 image: None,
                 json: None,
@@ -181,33 +182,33 @@ impl<'a, 'b> Walk<'a, 'b> {
         }
         if part == Part::Mask {
             let expected = self.check.row(index).map(|row| row.mask_blake3);
-            for what in self.mask.look(&data, expected.as_ref()) {
+            for what in self.mask.check(&data, expected.as_ref()) {
                 self.check.note(Some(index), what);
             }
         }
         let mask = self.mask.get();
-        let Some(gathered) = self.batch.last_mut() else {
+        let Some(sample) = self.batch.last_mut() else {
             return;
         };
-        gathered.mask = mask;
+        sample.mask = mask;
         if part != Part::Mask {
             self.batch_bytes += data.len();
         }
         match part {
-            Part::Image => gathered.image = Some(data),
-            Part::Record => gathered.json = Some(data),
+            Part::Image => sample.image = Some(data),
+            Part::Record => sample.json = Some(data),
             Part::Mask => {}
         }
     }
 
     fn check_batch(&mut self) {
         let check = &*self.check;
-        let checked: Vec<Checked> = self
+        let checked: Vec<CheckedMembers> = self
             .batch
             .par_iter()
-            .map(|gathered| check_gathered(check, gathered))
+            .map(|sample| check_members(check, sample))
             .collect();
-        for Checked {
+        for CheckedMembers {
             index,
             problems,
             record,
@@ -240,19 +241,20 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 
     fn note_displaced(&mut self) {
-        let mut samples: Vec<u32> = displaced(&self.places)
+        let sample_at = |position: u32| self.order.get(position as usize / Part::ALL.len());
+        let mut samples: Vec<u32> = displaced(&self.positions)
             .into_iter()
-            .filter_map(|place| self.order.get(place as usize / Part::ALL.len()).copied())
+            .filter_map(|position| sample_at(position).copied())
             .collect();
         samples.sort_unstable();
         samples.dedup();
         for index in samples {
-            let what = "it, or a member of it, stands in another place than it was written to";
+            let what = "it, or one of its members, is not where it was written";
             self.check.note(Some(index), what.to_owned());
         }
     }
 
-    /// Reads what is left, and compares the file as a whole.
+    /// Reads the rest and compares length and digest of the file.
     fn finish(self) -> Found {
         let Self {
             check,
@@ -265,46 +267,46 @@ impl<'a, 'b> Walk<'a, 'b> {
         match source.drain() {
             Ok(0) => {}
             Ok(bytes) => check.note(None, format!("{bytes} bytes follow the end of the tar")),
-            Err(error) => check.note(None, format!("could not be read to its end: {error}")),
+            Err(error) => check.note(None, format!("it could not be read to its end: {error}")),
         }
         let shard = check.shard;
         if let Err(error) = compare(&shard.file, (shard.bytes, shard.blake3), source.finish()) {
             check.note(None, with_causes(&error));
         }
-        let whole = seen
+        let complete = seen
             .iter()
             .filter(|parts| parts.iter().all(|&seen| seen))
             .count();
         Found {
-            samples: whole as u64,
+            samples: complete as u64,
             records,
         }
     }
 }
 
-fn check_gathered(check: &SessionCheck<'_>, gathered: &Gathered) -> Checked {
-    let row = check.row(gathered.index);
-    let (mut problems, record) = match &gathered.json {
+fn check_members(check: &SessionCheck<'_>, sample: &SampleMembers) -> CheckedMembers {
+    let row = check.row(sample.index);
+    let (mut problems, record) = match &sample.json {
         Some(json) => check_record(json, row),
         None => (Vec::new(), None),
     };
-    if let Some(png) = &gathered.image {
+    if let Some(png) = &sample.image {
         let known = row.map(|row| &row.record).or(record.as_ref());
         let digest = Digest::of(png);
-        let mask = gathered.mask.as_deref();
+        let mask = sample.mask.as_deref();
         problems.extend(check_image(check.settings, png, &digest, row, known, mask).0);
     }
-    Checked {
-        index: gathered.index,
+    CheckedMembers {
+        index: sample.index,
         problems,
         record,
     }
 }
 
-/// The fewest values that have to be taken out so that the rest ascends: those outside one
-/// longest ascending subsequence.
+/// The smallest set of values whose removal leaves the rest ascending: those outside a longest
+/// ascending subsequence.
 fn displaced(values: &[u32]) -> Vec<u32> {
-    // `tails[k]` is the position of the smallest value that ends an ascent of k + 1 values.
+    // `tails[k]` is the position of the smallest value that ends an ascending run of k + 1 values.
     let mut tails: Vec<usize> = Vec::new();
     let mut before: Vec<Option<usize>> = Vec::with_capacity(values.len());
     let at = |position: usize| values.get(position).copied().unwrap_or_default();

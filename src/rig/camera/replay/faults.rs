@@ -1,4 +1,4 @@
-//! Spoiling a replay's frames on purpose.
+//! Injecting faults into a replay's frames.
 
 use std::path::Path;
 
@@ -6,19 +6,20 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
 use super::CameraError;
-use crate::camera::{Encoding, Faults, Frame, GrantedMode};
+use crate::camera::{Frame, GrantedMode, ReplayFaults};
+use relit_video::PixelFormat;
 
 /// Makes damaged frames and frames of another size.
 #[derive(Debug)]
-pub(super) struct Spoiler {
+pub(super) struct FaultInjector {
     /// The data of a frame of half the width and height.
     other_size: Vec<u8>,
 }
 
-impl Spoiler {
+impl FaultInjector {
     pub(super) fn new(
         path: &Path,
-        faults: &Faults,
+        faults: &ReplayFaults,
         mode: &GrantedMode,
     ) -> Result<Self, CameraError> {
         let other_size = match faults.resize {
@@ -32,7 +33,7 @@ impl Spoiler {
     }
 
     /// The frame at this position as the faults have it.
-    pub(super) fn spoil(&self, mut frame: Frame, position: u64, faults: &Faults) -> Frame {
+    pub(super) fn inject(&self, mut frame: Frame, position: u64, faults: &ReplayFaults) -> Frame {
         if faults.resize.is_some_and(|from| from <= position) {
             frame.data.clone_from(&self.other_size);
         }
@@ -50,10 +51,10 @@ fn half_size(mode: &GrantedMode) -> Option<Vec<u8>> {
     if width == 0 || height == 0 {
         return None;
     }
-    match mode.fourcc.encoding()? {
-        Encoding::H264 => None,
-        Encoding::Mjpeg => {
-            let pixels = vec![128; Encoding::Grey.frame_bytes(width, height)?];
+    match mode.fourcc.pixel_format()? {
+        PixelFormat::H264 => None,
+        PixelFormat::Mjpeg => {
+            let pixels = vec![128; PixelFormat::Grey.frame_bytes(width, height)?];
             let mut jpeg = Vec::new();
             let encoder = JpegEncoder::new(&mut jpeg);
             let written = encoder.write_image(&pixels, width, height, ExtendedColorType::L8);

@@ -6,10 +6,9 @@
 //! in the raw format that holds the same samples.
 //!
 //! Time stamps are those recorded, moved so that the first frame is due when the stream starts. A
-//! frame comes when the clock shows its time stamp, so that a replay at a multiple of real time
-//! wants a clock that runs as much faster ([`Address::clock`]); on another clock its time stamps
-//! are as much closer together. As fast as it is read, time stamps run ahead of the clock. No frame
-//! is lost where the reader is slow: a replay waits.
+//! frame comes when the clock shows its time stamp. At a speed other than 1, time stamps are as much
+//! closer together on the clock; as fast as it is read, they run ahead of it. No frame is lost if the
+//! reader is slow: a replay waits.
 
 mod description;
 mod faults;
@@ -18,15 +17,15 @@ mod timeline;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use self::description::{controls, describe, rate};
-use self::faults::Spoiler;
+use self::description::{controls, describe, rate, stamp};
+use self::faults::FaultInjector;
 use self::source::{Delivery, Source, Taken};
 use self::timeline::{Moment, Timeline};
 use super::{
-    Address, Camera, CameraError, Control, ControlId, DeviceInfo, Faults, Frame, GrantedMode, Mode,
-    ModeRequest, Sequence, Speed, StampSource,
+    Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
+    Mode, ModeRequest, ReplayFaults, ReplaySpeed, Sequence, StampSource,
 };
 use crate::clock::Clock;
 use relit_data::session::Recording;
@@ -40,16 +39,17 @@ pub(super) struct ReplayCamera {
     delivery: Delivery,
     mode: GrantedMode,
     timeline: Timeline,
+    stamp: StampSource,
     controls: Vec<Control>,
     pace: Pace,
     repeat: bool,
-    faults: Faults,
-    spoiler: Spoiler,
+    faults: ReplayFaults,
+    injector: FaultInjector,
     playing: Option<Playing>,
 }
 
 /// How time stamps of the recording become those of the clock, and whether they are waited for.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 struct Pace {
     clock: Clock,
     /// Time on the clock for one of the recording.
@@ -82,9 +82,9 @@ enum End {
 impl ReplayCamera {
     pub(super) fn open(
         path: &Path,
-        speed: Speed,
+        speed: ReplaySpeed,
         repeat: bool,
-        faults: &Faults,
+        faults: &ReplayFaults,
         clock: Clock,
     ) -> Result<Self, CameraError> {
         let recording = Recording::open(path)?;
@@ -94,13 +94,13 @@ impl ReplayCamera {
         let (width, height) = delivery.size(&video);
         let manifest = recording.manifest.as_ref();
         let mode = GrantedMode {
-            fourcc: delivery.fourcc,
+            fourcc: Fourcc::of(delivery.format),
             width,
             height,
             rate: rate(manifest, &timeline),
         };
-        let spoiler = Spoiler::new(path, faults, &mode)?;
-        let address = Address::Replay {
+        let injector = FaultInjector::new(path, faults, &mode)?;
+        let address = CameraAddress::Replay {
             path: path.to_owned(),
             speed,
             repeat,
@@ -113,11 +113,12 @@ impl ReplayCamera {
             delivery,
             mode,
             timeline,
+            stamp: manifest.map_or(StampSource::EndOfFrame, stamp),
             controls: manifest.map(controls).unwrap_or_default(),
             pace: Pace::new(speed, clock),
             repeat,
             faults: faults.clone(),
-            spoiler,
+            injector,
             playing: None,
         })
     }
@@ -129,7 +130,10 @@ impl ReplayCamera {
                 path: self.path.clone(),
                 frames: delivered,
             },
-            End::Unplugged => CameraError::Unplugged { device },
+            End::Unplugged => CameraError::Unplugged {
+                device,
+                source: None,
+            },
             End::Stalled => CameraError::Timeout { device, waited },
         }
     }
@@ -169,20 +173,20 @@ impl Camera for ReplayCamera {
     }
 
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError> {
-        let deadline = Instant::now().checked_add(timeout);
+        let deadline_us = self.pace.clock.after(timeout);
         let Some(mut playing) = self.playing.take() else {
             return Err(CameraError::NotStarted {
                 device: self.info.address.to_string(),
             });
         };
-        let found = self.advance(&mut playing, deadline);
+        let found = self.advance(&mut playing, deadline_us);
         let delivered = playing.delivered;
         self.playing = Some(playing);
         match found? {
             Step::Frame(frame) => Ok(frame),
             Step::TooEarly => Err(self.end_error(End::Stalled, delivered, timeout)),
             Step::End(End::Stalled) => {
-                std::thread::sleep(timeout);
+                self.pace.clock.sleep_until(deadline_us);
                 Err(self.end_error(End::Stalled, delivered, timeout))
             }
             Step::End(end) => Err(self.end_error(end, delivered, timeout)),
@@ -204,11 +208,7 @@ enum Step {
 }
 
 impl ReplayCamera {
-    fn advance(
-        &mut self,
-        playing: &mut Playing,
-        deadline: Option<Instant>,
-    ) -> Result<Step, CameraError> {
+    fn advance(&mut self, playing: &mut Playing, deadline_us: i64) -> Result<Step, CameraError> {
         loop {
             if let Some(end) = playing.ended {
                 return Ok(Step::End(end));
@@ -235,7 +235,7 @@ impl ReplayCamera {
             }
             let moment = self.timeline.moment(taken.number, playing.round);
             let due_us = self.pace.due_us(playing.start_us, moment.since_first_us);
-            if !self.pace.wait_until(due_us, deadline) {
+            if !self.pace.wait_until(due_us, deadline_us) {
                 playing.next = Some(taken);
                 return Ok(Step::TooEarly);
             }
@@ -248,7 +248,7 @@ impl ReplayCamera {
             }
             playing.delivered += 1;
             let frame = self.frame(taken, moment, due_us);
-            return Ok(Step::Frame(self.spoiler.spoil(
+            return Ok(Step::Frame(self.injector.inject(
                 frame,
                 position,
                 &self.faults,
@@ -280,23 +280,23 @@ impl ReplayCamera {
                 unwrapped: moment.sequence,
             }),
             t_us,
-            stamp: StampSource::EndOfFrame,
+            stamp: self.stamp,
             flagged: taken.damaged,
         }
     }
 }
 
 impl Pace {
-    fn new(speed: Speed, clock: Clock) -> Self {
+    fn new(speed: ReplaySpeed, clock: Clock) -> Self {
         match speed {
-            Speed::AsRead => Self {
+            ReplaySpeed::AsRead => Self {
                 clock,
                 stretch: 1.0,
                 wait: false,
             },
-            Speed::Times(times) => Self {
+            ReplaySpeed::Times(times) => Self {
                 clock,
-                stretch: clock.factor() / times,
+                stretch: times.recip(),
                 wait: true,
             },
         }
@@ -313,26 +313,11 @@ impl Pace {
     }
 
     /// Waits until the clock shows this, or until the deadline; true where the clock shows it.
-    fn wait_until(&self, due_us: i64, deadline: Option<Instant>) -> bool {
-        if !self.wait {
-            return true;
+    fn wait_until(&self, due_us: i64, deadline_us: i64) -> bool {
+        if self.wait {
+            self.clock.sleep_until(due_us.min(deadline_us));
         }
-        let left = due_us.saturating_sub(self.clock.now_us());
-        let Ok(left @ 1..) = u64::try_from(left) else {
-            return true;
-        };
-        let left = self.clock.real(Duration::from_micros(left));
-        let allowed = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
-        match allowed {
-            Some(allowed) if allowed < left => {
-                std::thread::sleep(allowed);
-                false
-            }
-            _ => {
-                std::thread::sleep(left);
-                true
-            }
-        }
+        !self.wait || due_us <= deadline_us
     }
 }
 

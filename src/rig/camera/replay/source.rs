@@ -5,8 +5,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use super::CameraError;
-use crate::camera::Fourcc;
-use relit_video::{FrameFault, Packets, Pending, RawLayout, Video};
+use relit_video::{DecodeFault, Packets, Pending, PixelFormat, Video};
 
 /// Decoded frames that may wait to be fetched.
 const AHEAD: usize = 4;
@@ -16,9 +15,9 @@ const DECODING_THREADS: usize = 2;
 /// How a video's frames are delivered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Delivery {
-    pub(super) fourcc: Fourcc,
-    /// The layout to decode to; `None` where frames come as they are coded.
-    decoded: Option<RawLayout>,
+    pub(super) format: PixelFormat,
+    /// False where frames come as they are coded in the file.
+    decoded: bool,
 }
 
 /// A frame of the recording.
@@ -42,50 +41,44 @@ impl Delivery {
     pub(super) fn of(video: &Video) -> Result<Self, CameraError> {
         let facts = video.facts();
         let coded = match (facts.codec.as_str(), facts.pixel_format.as_str()) {
-            ("mjpeg", _) => Some(Fourcc::MJPG),
-            ("h264", _) => Some(Fourcc::H264),
-            ("rawvideo", "yuyv422") => Some(Fourcc::YUYV),
-            ("rawvideo", "nv12") => Some(Fourcc::NV12),
-            ("rawvideo", "rgb24") => Some(Fourcc::RGB3),
-            ("rawvideo", "gray") => Some(Fourcc::GREY),
+            ("mjpeg", _) => Some(PixelFormat::Mjpeg),
+            ("h264", _) => Some(PixelFormat::H264),
+            ("rawvideo", "yuyv422") => Some(PixelFormat::Yuyv),
+            ("rawvideo", "nv12") => Some(PixelFormat::Nv12),
+            ("rawvideo", "rgb24") => Some(PixelFormat::Rgb24),
+            ("rawvideo", "gray") => Some(PixelFormat::Grey),
             _ => None,
         };
-        if let Some(fourcc) = coded.filter(|_| video.is_in_order()) {
-            return Ok(Self {
-                fourcc,
-                decoded: None,
-            });
-        }
-        let layout = first_layout(video)?;
-        Ok(Self {
-            fourcc: match layout {
-                RawLayout::Grey => Fourcc::GREY,
-                RawLayout::Rgb24 => Fourcc::RGB3,
-                RawLayout::Nv12 => Fourcc::NV12,
-                RawLayout::Yuyv => Fourcc::YUYV,
+        Ok(match coded.filter(|_| video.is_in_order()) {
+            Some(format) => Self {
+                format,
+                decoded: false,
             },
-            decoded: Some(layout),
+            None => Self {
+                format: first_format(video)?,
+                decoded: true,
+            },
         })
     }
 
     /// Width and height of the frames delivered: a rotation is applied where they are decoded.
     pub(super) fn size(self, video: &Video) -> (u32, u32) {
         match self.decoded {
-            None => video.coded_size(),
-            Some(_) => (video.facts().width, video.facts().height),
+            false => video.coded_size(),
+            true => (video.facts().width, video.facts().height),
         }
     }
 
     /// Frames from the first on.
     pub(super) fn open(self, video: &Arc<Video>) -> Result<Source, CameraError> {
-        let Some(layout) = self.decoded else {
+        if !self.decoded {
             return Ok(Source::Coded(video.packets()?));
-        };
+        }
         let (sender, receiver) = sync_channel(AHEAD);
         let owned = Arc::clone(video);
         let decoder = thread::Builder::new().name("replay".to_owned());
         // The thread ends by itself: at the end of the video, or when nobody receives any more.
-        let started = decoder.spawn(move || decode(&owned, layout, &sender));
+        let started = decoder.spawn(move || decode(&owned, self.format, &sender));
         started.map_err(|error| CameraError::Replay {
             path: video.path().to_owned(),
             why: format!("no thread could be started to decode it ({error}); close other programs"),
@@ -110,7 +103,7 @@ impl Source {
 
 /// Decodes all frames in order. One that cannot be decoded is left out, as a camera that dropped it
 /// would: its counter is missing then.
-fn decode(video: &Video, layout: RawLayout, sender: &SyncSender<Taken>) {
+fn decode(video: &Video, format: PixelFormat, sender: &SyncSender<Taken>) {
     let wanted: Vec<u64> = (0..video.frames().len() as u64).collect();
     let Ok(reader) = video.read(&wanted, DECODING_THREADS) else {
         return;
@@ -120,7 +113,7 @@ fn decode(video: &Video, layout: RawLayout, sender: &SyncSender<Taken>) {
         let number = pending.number();
         match raw(video, pending) {
             // Lost frames may come late.
-            Ok((found, data)) if found == layout && number >= due => {
+            Ok((found, data)) if found == format && number >= due => {
                 due = number + 1;
                 let damaged = false;
                 let taken = Taken {
@@ -137,17 +130,17 @@ fn decode(video: &Video, layout: RawLayout, sender: &SyncSender<Taken>) {
     }
 }
 
-fn raw(video: &Video, pending: Pending) -> Result<(RawLayout, Vec<u8>), FrameFault> {
+fn raw(video: &Video, pending: Pending) -> Result<(PixelFormat, Vec<u8>), DecodeFault> {
     video.picture(pending)?.raw()
 }
 
-/// The raw layout of the first frame that can be decoded.
-fn first_layout(video: &Video) -> Result<RawLayout, CameraError> {
+/// The raw format of the first frame that can be decoded.
+fn first_format(video: &Video) -> Result<PixelFormat, CameraError> {
     let wanted: Vec<u64> = (0..video.frames().len() as u64).collect();
     let mut reader = video.read(&wanted, 1)?;
-    let layout = reader.find_map(|pending| raw(video, pending).ok());
-    layout
-        .map(|(layout, _)| layout)
+    let found = reader.find_map(|pending| raw(video, pending).ok());
+    found
+        .map(|(format, _)| format)
         .ok_or_else(|| CameraError::Replay {
             path: video.path().to_owned(),
             why: "not one of its frames can be decoded; give another recording".to_owned(),

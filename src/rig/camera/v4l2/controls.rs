@@ -5,7 +5,7 @@ use std::io;
 use rustix::io::Errno;
 use v4l::v4l_sys as sys;
 
-use super::{CameraError, Device};
+use super::{CameraError, Device, unplugged};
 use crate::camera::{
     Control, ControlFault, ControlFlags, ControlId, ControlKind, MenuItem, snake_case,
 };
@@ -115,6 +115,7 @@ impl Device {
                 control: id,
                 doing: setting(),
                 fault: ControlFault::Unknown,
+                source: None,
             });
         };
         let wide = kind == ControlKind::Integer64;
@@ -151,18 +152,19 @@ impl Device {
     ) -> CameraError {
         let device = self.name();
         let fault = match (Errno::from_io_error(&error), taken) {
-            (Some(Errno::NODEV), _) => return CameraError::Unplugged { device },
+            (Some(Errno::NODEV), _) => return unplugged(device, error),
             (Some(Errno::ACCESS | Errno::PERM), _) => ControlFault::Locked,
             (Some(Errno::BUSY), _) => ControlFault::Busy,
             // A value that does not fit into 32 bits never reaches the driver.
             (Some(Errno::RANGE | Errno::INVAL) | None, Some(taken)) => taken,
-            _ => ControlFault::Driver(error),
+            _ => ControlFault::Driver,
         };
         CameraError::Control {
             device,
             control,
             doing,
             fault,
+            source: Some(error),
         }
     }
 }
@@ -204,7 +206,7 @@ mod tests {
         assert!(matches!(fault(Errno::ACCESS), ControlFault::Locked));
         assert!(matches!(fault(Errno::BUSY), ControlFault::Busy));
         assert!(matches!(fault(Errno::RANGE), ControlFault::NoItem(_)));
-        assert!(matches!(fault(Errno::IO), ControlFault::Driver(_)));
+        assert!(matches!(fault(Errno::IO), ControlFault::Driver));
         let unplugged = error(Errno::NODEV.into());
         assert!(matches!(unplugged, CameraError::Unplugged { .. }));
         let too_wide = error(io::ErrorKind::InvalidInput.into());

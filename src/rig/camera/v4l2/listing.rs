@@ -3,9 +3,11 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use relit_data::causes::with_causes;
+
 use super::ioctl::{Listed, Node};
 use super::{Camera as _, CameraError, V4l2Camera};
-use crate::camera::{Address, Capabilities, DeviceInfo, Fourcc, Mode, Rate, Rates, Sizes};
+use crate::camera::{CameraAddress, DeviceInfo, Fourcc, Mode, Rate, Rates, Sizes};
 
 /// Most entries that are read of a driver's list: a faulty driver must not list for ever.
 const MOST_ENTRIES: u32 = 256;
@@ -39,18 +41,13 @@ fn nodes(folder: &Path) -> Vec<(u32, PathBuf)> {
 
 fn unreadable(path: PathBuf, error: &CameraError) -> DeviceInfo {
     DeviceInfo {
-        address: Address::V4l2(path),
+        address: CameraAddress::V4l2(path),
         name: String::new(),
         driver: String::new(),
         bus: String::new(),
         modes: Vec::new(),
         other_formats: Vec::new(),
-        capabilities: Capabilities {
-            sequence: false,
-            driver_time: false,
-            controls: false,
-        },
-        problems: vec![error.to_string()],
+        problems: vec![with_causes(error)],
     }
 }
 
@@ -59,7 +56,7 @@ pub(super) fn modes(node: &Node) -> io::Result<(Vec<Mode>, Vec<Fourcc>)> {
     let (mut modes, mut others) = (Vec::new(), Vec::new());
     for code in entries(|index| node.pixel_format(index))? {
         let fourcc = Fourcc::from_code(code);
-        if fourcc.encoding().is_none() {
+        if fourcc.pixel_format().is_none() {
             others.push(fourcc);
             continue;
         }
@@ -162,9 +159,11 @@ mod tests {
     fn a_device_that_cannot_be_looked_at_is_listed_with_the_reason() {
         let error = CameraError::NotPermitted {
             device: "/dev/video3".to_owned(),
+            source: Some(io::ErrorKind::PermissionDenied.into()),
         };
         let info = unreadable("/dev/video3".into(), &error);
         assert_eq!(info.address.to_string(), "v4l2:/dev/video3");
         assert!(info.problems[0].contains("group `video`"), "{info:?}");
+        assert!(info.problems[0].contains("permission denied"), "{info:?}");
     }
 }

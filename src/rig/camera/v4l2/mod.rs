@@ -1,6 +1,7 @@
 //! Cameras under Linux, by the kernel's Video4Linux2 interface: the recording path.
 
 mod controls;
+mod holders;
 mod ioctl;
 mod listing;
 mod stream;
@@ -9,14 +10,15 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use relit_data::causes::with_causes;
 use rustix::io::Errno;
 use v4l::v4l_sys as sys;
 
 use self::ioctl::{Identity, Node};
 use self::stream::Stream;
 use super::{
-    Address, Camera, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc, Frame,
-    GrantedMode, Mode, ModeRequest,
+    Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
+    Mode, ModeRequest,
 };
 
 pub(super) use listing::list;
@@ -115,23 +117,18 @@ impl Device {
         let mut problems = Vec::new();
         let (modes, other_formats) = match self.modes() {
             Err(error @ CameraError::Refused { .. }) => {
-                problems.push(error.to_string());
+                problems.push(with_causes(&error));
                 Default::default()
             }
             answer => answer?,
         };
         Ok(DeviceInfo {
-            address: Address::V4l2(self.path.clone()),
+            address: CameraAddress::V4l2(self.path.clone()),
             name: identity.card,
             driver: identity.driver,
             bus: identity.bus,
             modes,
             other_formats,
-            capabilities: Capabilities {
-                sequence: true,
-                driver_time: true,
-                controls: true,
-            },
             problems,
         })
     }
@@ -151,6 +148,7 @@ impl Device {
         Err(CameraError::NotACamera {
             device: self.name(),
             why: why.to_owned(),
+            source: None,
         })
     }
 
@@ -158,8 +156,9 @@ impl Device {
     fn error(&self, doing: &'static str, source: io::Error) -> CameraError {
         let device = self.name();
         match Errno::from_io_error(&source) {
-            Some(Errno::NODEV) => CameraError::Unplugged { device },
-            Some(Errno::BUSY) => CameraError::InUse { device },
+            Some(Errno::NODEV) => unplugged(device, source),
+            Some(Errno::BUSY) => in_use(&self.path, source),
+            Some(Errno::NOSPC) => CameraError::BusFull { device, source },
             _ => CameraError::Refused {
                 device,
                 doing,
@@ -172,8 +171,8 @@ impl Device {
     /// only then with its absence.
     fn stream_error(&self, doing: &'static str, source: io::Error) -> CameraError {
         let device = self.name();
-        if Errno::from_io_error(&source) == Some(Errno::NODEV) || self.is_gone() {
-            return CameraError::Unplugged { device };
+        if Errno::from_io_error(&source) == Some(Errno::NODEV) || self.absence().is_some() {
+            return unplugged(device, source);
         }
         CameraError::Stream {
             device,
@@ -182,9 +181,10 @@ impl Device {
         }
     }
 
-    fn is_gone(&self) -> bool {
-        let answer = self.node.identity();
-        answer.is_err_and(|error| Errno::from_io_error(&error) == Some(Errno::NODEV))
+    /// The answer of a device that went away.
+    fn absence(&self) -> Option<io::Error> {
+        let answer = self.node.identity().err();
+        answer.filter(|error| Errno::from_io_error(error) == Some(Errno::NODEV))
     }
 
     /// An error of the first call: a node of another kind does not know it.
@@ -193,6 +193,7 @@ impl Device {
             Some(Errno::NOTTY | Errno::INVAL) => CameraError::NotACamera {
                 device: self.name(),
                 why: "it does not answer as a camera".to_owned(),
+                source: Some(error),
             },
             _ => self.error("it was asked what it is", error),
         }
@@ -204,14 +205,36 @@ impl Device {
     }
 }
 
+fn unplugged(device: String, source: io::Error) -> CameraError {
+    CameraError::Unplugged {
+        device,
+        source: Some(source),
+    }
+}
+
+fn in_use(path: &Path, source: io::Error) -> CameraError {
+    let device = path.display().to_string();
+    let holders = holders::of(path)
+        .unwrap_or_else(|| format!("another program (`sudo fuser {device}` names it)"));
+    CameraError::InUse {
+        device,
+        holders,
+        source,
+    }
+}
+
 fn open_error(path: &Path, error: io::Error) -> CameraError {
     let device = path.display().to_string();
     match Errno::from_io_error(&error) {
-        Some(Errno::NOENT | Errno::NODEV | Errno::NXIO | Errno::NOTDIR) => {
-            CameraError::NotThere { device }
-        }
-        Some(Errno::ACCESS | Errno::PERM) => CameraError::NotPermitted { device },
-        Some(Errno::BUSY) => CameraError::InUse { device },
+        Some(Errno::NOENT | Errno::NODEV | Errno::NXIO | Errno::NOTDIR) => CameraError::NotThere {
+            device,
+            source: Some(error),
+        },
+        Some(Errno::ACCESS | Errno::PERM) => CameraError::NotPermitted {
+            device,
+            source: Some(error),
+        },
+        Some(Errno::BUSY) => in_use(path, error),
         _ => CameraError::Refused {
             device,
             doing: "it was opened",
@@ -258,6 +281,7 @@ mod tests {
         let error = |errno: Errno| null().error("its modes were read", errno.into());
         assert!(matches!(error(Errno::NODEV), CameraError::Unplugged { .. }));
         assert!(matches!(error(Errno::BUSY), CameraError::InUse { .. }));
+        assert!(matches!(error(Errno::NOSPC), CameraError::BusFull { .. }));
         assert!(matches!(error(Errno::INVAL), CameraError::Refused { .. }));
         let stream = |errno: Errno| null().stream_error("read", errno.into());
         assert!(matches!(
@@ -265,6 +289,25 @@ mod tests {
             CameraError::Unplugged { .. }
         ));
         assert!(matches!(stream(Errno::IO), CameraError::Stream { .. }));
+    }
+
+    #[test]
+    fn what_the_system_said_is_part_of_every_sentence() {
+        let device = null();
+        for (errno, words) in [
+            (Errno::NODEV, "was unplugged"),
+            (Errno::BUSY, "is in use by"),
+            (Errno::NOSPC, "USB bus of /dev/video9 is full"),
+            (Errno::IO, "refused when its stream was started"),
+        ] {
+            let told = with_causes(&device.error("its stream was started", errno.into()));
+            let answer = io::Error::from(errno).to_string();
+            assert!(told.contains(words) && told.ends_with(&answer), "{told}");
+            let told = with_causes(&device.stream_error("read", errno.into()));
+            assert!(told.ends_with(&answer), "{told}");
+            let told = with_causes(&open_error(Path::new("/dev/video9"), errno.into()));
+            assert!(told.ends_with(&answer), "{told}");
+        }
     }
 
     #[test]

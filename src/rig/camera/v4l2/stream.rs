@@ -5,13 +5,14 @@ use std::time::{Duration, Instant};
 
 use v4l::v4l_sys as sys;
 
-use super::ioctl::{Filled, Mapping, PixelLayout, Ready};
-use super::{CameraError, Device};
+use super::ioctl::{FilledBuffer, Mapping, PixelLayout, Ready};
+use super::{CameraError, Device, unplugged};
 use crate::camera::frame::without_padding;
 use crate::camera::{
-    Encoding, Fourcc, Frame, GrantedMode, ModeRequest, Rate, SequenceUnwrapper, StampSource,
+    Fourcc, Frame, GrantedMode, ModeRequest, Rate, SequenceUnwrapper, StampSource,
 };
 use crate::clock::Clock;
+use relit_video::PixelFormat;
 
 /// Buffers asked of the driver: at 30 frames/s, a quarter of a second in which nobody has to fetch
 /// a frame.
@@ -25,7 +26,7 @@ const LONGEST_WAIT: Duration = Duration::from_secs(60);
 #[derive(Debug)]
 pub(super) struct Stream {
     layout: PixelLayout,
-    encoding: Encoding,
+    format: PixelFormat,
     buffers: Vec<Mapping>,
     /// Buffers that the driver did not take back; they are offered again.
     idle: Vec<u32>,
@@ -42,7 +43,7 @@ impl Stream {
             .set_format(want.fourcc.code(), want.width, want.height)
             .map_err(|error| device.error("its format was set", error))?;
         let fourcc = Fourcc::from_code(layout.fourcc);
-        let encoding = fourcc.encoding().ok_or_else(|| CameraError::Format {
+        let format = fourcc.pixel_format().ok_or_else(|| CameraError::Format {
             device: device.name(),
             fourcc,
         })?;
@@ -53,7 +54,7 @@ impl Stream {
         let rate = interval.and_then(|(numerator, denominator)| Rate::new(denominator, numerator));
         let mut stream = Self {
             layout,
-            encoding,
+            format,
             buffers: Vec::new(),
             idle: Vec::new(),
             counter: SequenceUnwrapper::default(),
@@ -124,20 +125,17 @@ impl Stream {
     }
 
     fn too_late(&self, device: &Device, waited: Duration) -> CameraError {
-        let device_name = device.name();
-        if device.is_gone() {
-            return CameraError::Unplugged {
-                device: device_name,
-            };
-        }
-        CameraError::Timeout {
-            device: device_name,
-            waited,
+        match device.absence() {
+            Some(source) => unplugged(device.name(), source),
+            None => CameraError::Timeout {
+                device: device.name(),
+                waited,
+            },
         }
     }
 
     /// Copies a filled buffer's frame out and gives the buffer back at once.
-    fn take(&mut self, device: &Device, filled: Filled) -> Frame {
+    fn take(&mut self, device: &Device, filled: FilledBuffer) -> Frame {
         let arrived_us = Clock::monotonic().now_us();
         // An index that was never given out would be a driver's fault; the frame is then empty.
         let data = usize::try_from(filled.index)
@@ -156,7 +154,7 @@ impl Stream {
             height,
             stride,
         } = self.layout;
-        let data = match self.encoding.rows(width, height) {
+        let data = match self.format.rows(width, height) {
             Some((row, rows)) => without_padding(data, stride as usize, row, rows),
             None => data,
         };
@@ -193,7 +191,7 @@ impl Stream {
 }
 
 /// A frame's time stamp: the driver's where it goes by the monotonic clock, else the arrival.
-fn stamp(filled: Filled, arrived_us: i64) -> (i64, StampSource) {
+fn stamp(filled: FilledBuffer, arrived_us: i64) -> (i64, StampSource) {
     if filled.flags & sys::V4L2_BUF_FLAG_TIMESTAMP_MASK != sys::V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC {
         return (arrived_us, StampSource::Arrival);
     }
@@ -210,7 +208,7 @@ mod tests {
 
     #[test]
     fn a_time_stamp_of_another_clock_is_replaced_and_told() {
-        let filled = |flags| Filled {
+        let filled = |flags| FilledBuffer {
             index: 0,
             bytes_used: 0,
             flags,

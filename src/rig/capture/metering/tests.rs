@@ -2,15 +2,17 @@
 
 use std::time::Duration;
 
-use super::super::preflight::{hold_camera, ready_table};
+use relit_data::causes::with_causes;
+
 use super::*;
 use crate::camera::{
-    Capabilities, ControlFlags, ControlId, ControlKind, DeviceInfo, Fourcc, GrantedMode, MenuItem,
-    Mode, ModeRequest, Rate, Rates, Sequence, Sizes, StampSource,
+    ControlFlags, ControlId, ControlKind, DeviceInfo, Fourcc, GrantedMode, MenuItem, Mode,
+    ModeRequest, Rate, Rates, Sequence, Sizes, StampSource,
 };
+use crate::capture::preflight::ready_table;
 use crate::clock::Clock;
-use crate::simulator::{Simulator, SimulatorOptions};
-use crate::turntable::Options;
+use crate::simulator::{SimulatedTable, SimulatorOptions};
+use crate::turntable::TableOptions;
 
 const EXPOSURE: ControlId = ControlId(1);
 const AUTOMATIC: ControlId = ControlId(2);
@@ -20,7 +22,7 @@ const PERIOD_US: i64 = 33_333;
 /// A camera that sees nothing but how bright the light is at the table's angle.
 struct Scene<'a> {
     clock: Clock,
-    table: &'a Simulator,
+    table: &'a SimulatedTable,
     /// The grey value at exposure 1.
     light: fn(f64) -> f64,
     exposure: i64,
@@ -31,7 +33,7 @@ struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    fn new(clock: Clock, table: &'a Simulator, light: fn(f64) -> f64) -> Self {
+    fn new(clock: Clock, table: &'a SimulatedTable, light: fn(f64) -> f64) -> Self {
         let info = DeviceInfo {
             address: "v4l2:/dev/scene".parse().unwrap(),
             name: "scene".to_owned(),
@@ -39,21 +41,16 @@ impl<'a> Scene<'a> {
             bus: String::new(),
             modes: Vec::new(),
             other_formats: Vec::new(),
-            capabilities: Capabilities {
-                sequence: true,
-                driver_time: true,
-                controls: true,
-            },
             problems: Vec::new(),
         };
         Self {
+            due_us: clock.now_us(),
             clock,
             table,
             light,
             exposure: 40,
             automatic: 3,
             frames: 0,
-            due_us: clock.now_us(),
             info,
         }
     }
@@ -161,31 +158,31 @@ impl Camera for Scene<'_> {
 
 /// Meters a light; gives the exposure found, and how far the table stands from where it was.
 fn metered(light: fn(f64) -> f64) -> (Result<i64, CaptureError>, f64, i64) {
-    let clock = Clock::scaled(4.0);
-    let simulator = Simulator::start(SimulatorOptions {
-        clock,
+    let clock = Clock::virtual_time();
+    let _participant = clock.take_part();
+    let simulator = SimulatedTable::new(&SimulatorOptions {
+        clock: clock.clone(),
         ..SimulatorOptions::default()
     });
-    let simulator = simulator.unwrap();
     let locks = tempfile::tempdir().unwrap();
-    let options = Options {
-        clock,
+    let options = TableOptions {
+        clock: clock.clone(),
         runtime_folder: locks.path().to_owned(),
-        ..Options::default()
+        ..TableOptions::default()
     };
-    let table = Table::open_serial(simulator.path(), &options).unwrap();
+    let table = Table::open(simulator.open(), &options).unwrap();
     let mut settings = Settings::new(
         locks.path().to_owned(),
         "replay:a".parse().unwrap(),
         "sim:".parse().unwrap(),
     );
     settings.wanted.exposure = Some(40);
-    let stop = StopRequest::default();
+    let stop = StopRequest::new(&clock);
     let mut scene = Scene::new(clock, &simulator, light);
-    let mut held = hold_camera(&mut scene, &settings, &stop).unwrap();
+    let mut locked = LockedCamera::lock(&mut scene, &settings, &stop).unwrap();
     ready_table(&table, &settings).unwrap();
     let before = table.status().unwrap().angle_deg;
-    let found = meter(&mut scene, &table, &mut held, &settings, &stop);
+    let found = meter(&mut scene, &table, &mut locked, &settings, &stop);
     let off = table.status().unwrap().angle_deg - before;
     (found, off, scene.exposure)
 }
@@ -214,13 +211,9 @@ fn a_dark_scene_gets_the_brightest_exposure_that_a_frame_has_time_for() {
 }
 
 #[test]
-fn a_scene_that_is_too_bright_at_the_darkest_exposure_is_told() {
+fn a_scene_that_is_too_bright_at_the_darkest_exposure_is_reported() {
     let (found, ..) = metered(|_| 200.0);
-    let error = found.unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .contains("saturate at the darkest exposure (3)"),
-        "{error}"
-    );
+    let error = with_causes(&found.unwrap_err());
+    let words = "saturate at the darkest exposure (3)";
+    assert!(error.contains(words), "{error}");
 }

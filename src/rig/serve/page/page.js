@@ -94,7 +94,7 @@ function showTake() {
 function action() {
   const object = $("object").value.trim();
   if (!state) return { text: "Start" };
-  if (state.phase === "waiting-for-object") return { text: `Capture ${state.queue[0] ?? "the next object"}`, command: { command: "next" } };
+  if (state.phase === "waiting-for-object") return { text: `Capture ${state.queue[0] ?? "the next object"}`, command: { command: "next", object: state.queue[0] } };
   if (state.phase !== "idle") return { text: "Stop", stop: true, command: { command: "stop" } };
   if (!object) return { text: "Name the object" };
   return { text: `Start ${object}`, command: { command: "start", object, meter: $("meter").checked } };
@@ -120,13 +120,16 @@ function showQueue() {
   $("queue").hidden = state.queue.length === 0;
   $("next").hidden = state.phase !== "idle";
   $("next").textContent = `${state.queue[0]} stands on the table: capture`;
-  const key = JSON.stringify([state.queue, waiting]);
+  // An object stays in the queue until its take is usable.
+  const captured = !resting() && state.object === state.queue[0];
+  const key = JSON.stringify([state.queue, waiting, captured]);
   if ($("queue").dataset.key === key) return;
   $("queue").dataset.key = key;
   const lines = state.queue.map((object, place) => {
     const remove = make("button", { type: "button", text: "Remove", ariaLabel: `Take ${object} out of the queue` });
-    remove.addEventListener("click", () => order({ command: "dequeue", place }));
-    return make("li", {}, make("span", { text: object }), remove);
+    remove.addEventListener("click", () => order({ command: "dequeue", place, object }));
+    const text = place === 0 && captured ? `${object} (being captured)` : object;
+    return make("li", {}, make("span", { text }), remove);
   });
   $("queue-list").replaceChildren(...lines);
 }
@@ -233,7 +236,7 @@ $("enqueue").addEventListener("click", async () => {
     showGo();
   }
 });
-$("next").addEventListener("click", () => order({ command: "next" }));
+$("next").addEventListener("click", () => order({ command: "next", object: state.queue[0] }));
 $("home").addEventListener("click", () => order({ command: "home" }));
 $("unlock").addEventListener("click", () => order({ command: "unlock" }));
 for (const button of document.querySelectorAll("[data-jog]")) {

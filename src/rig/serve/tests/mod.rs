@@ -159,7 +159,7 @@ impl Serving {
     }
 
     fn stop(&mut self) {
-        self.shutdown.request();
+        self.shutdown.cancel();
         self.thread.take().unwrap().join().unwrap();
     }
 }

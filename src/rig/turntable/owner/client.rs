@@ -1,20 +1,23 @@
-//! The other side: asking a port's owner.
+//! The client: sends requests to a port's owner.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use super::claim::{Files, owner_pid, try_lock};
-use super::{Answer, Question};
-use crate::turntable::error::TurntableError;
-use crate::turntable::status::Status;
+use relit_data::causes::with_causes;
 
-/// How long an owner that is just opening the port may take until it answers.
+use super::claim::Files;
+use super::{Answer, Question};
+use crate::lockfile::LockFile;
+use crate::turntable::error::TurntableError;
+use crate::turntable::status::TableStatus;
+
+/// How long an owner that is opening its port may take until its socket exists.
 const OPENING: Duration = Duration::from_secs(15);
 const PAUSE: Duration = Duration::from_millis(100);
-/// How long an answer may take: a stop takes its time.
+/// How long an answer may take: a stop takes many seconds.
 const ANSWER: Duration = Duration::from_secs(25);
 /// Longest answer, bytes.
 const LONGEST: u64 = 65_536;
@@ -27,43 +30,43 @@ pub struct Owner {
 }
 
 impl Owner {
-    /// The owner of `port`, where it has one. Looks at the lock only, never at the port.
+    /// The owner of `port`, if it has one. Reads the lock and does not open the port.
     ///
     /// # Errors
-    /// [`TurntableError::Open`] where there is no such port, [`TurntableError::Claim`] where the
-    /// lock cannot be looked at.
+    /// [`TurntableError::Open`] if there is no such port, [`TurntableError::Lock`] if it cannot be
+    /// known whether it has an owner: then nobody may open it either.
     pub fn find(port: &Path, runtime_folder: &Path) -> Result<Option<Owner>, TurntableError> {
         let files = Files::of(port, runtime_folder)?;
-        if try_lock(&files)?.is_some() {
-            return Ok(None);
-        }
-        let pid = owner_pid(&files.lock);
-        Ok(Some(Owner { files, pid }))
+        let holder = LockFile::holder(&files.lock)?;
+        Ok(holder.map(|holder| Owner {
+            files,
+            pid: holder.pid.unwrap_or(0),
+        }))
     }
 
-    /// Its process number.
+    /// Its process id.
     #[must_use]
     pub fn pid(&self) -> u32 {
         self.pid
     }
 
-    /// Asks it what the table is doing.
+    /// Requests the table's status.
     ///
     /// # Errors
-    /// [`TurntableError::Owner`] where it does not answer, [`TurntableError::OwnerSays`].
-    pub fn status(&self) -> Result<Status, TurntableError> {
+    /// [`TurntableError::Owner`] if it does not answer, [`TurntableError::OwnerSays`].
+    pub fn status(&self) -> Result<TableStatus, TurntableError> {
         self.ask(Question::Status)
     }
 
-    /// Asks it to stop the table, and waits until it stands.
+    /// Requests a stop, and waits until the table stands.
     ///
     /// # Errors
     /// As [`Owner::status`].
-    pub fn stop(&self) -> Result<Status, TurntableError> {
+    pub fn stop(&self) -> Result<TableStatus, TurntableError> {
         self.ask(Question::Stop)
     }
 
-    fn ask(&self, question: Question) -> Result<Status, TurntableError> {
+    fn ask(&self, question: Question) -> Result<TableStatus, TurntableError> {
         let failed = |why: String| TurntableError::Owner {
             path: self.files.port.clone(),
             pid: self.pid,
@@ -71,14 +74,14 @@ impl Owner {
         };
         let line = self
             .exchange(question)
-            .map_err(|error| failed(error.to_string()))?;
+            .map_err(|error| failed(with_causes(&error)))?;
         match serde_json::from_str(&line) {
             Ok(Answer::Status(status)) => Ok(status),
             Ok(Answer::Error(message)) => Err(TurntableError::OwnerSays {
                 pid: self.pid,
                 message,
             }),
-            Err(_) => Err(failed("its answer is no answer".to_owned())),
+            Err(_) => Err(failed("its answer is not valid".to_owned())),
         }
     }
 
@@ -99,7 +102,11 @@ impl Owner {
         let until = Instant::now() + OPENING;
         loop {
             match UnixStream::connect(&self.files.socket) {
-                Err(_) if Instant::now() < until => thread::sleep(PAUSE),
+                Err(error)
+                    if error.kind() != ErrorKind::PermissionDenied && Instant::now() < until =>
+                {
+                    thread::sleep(PAUSE);
+                }
                 connected => return connected,
             }
         }

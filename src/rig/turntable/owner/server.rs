@@ -1,4 +1,4 @@
-//! The owner's side: answers at the socket.
+//! The owner's server: answers requests at the socket.
 
 use std::fs;
 use std::io::{self, BufRead, BufReader, Read, Write};
@@ -9,19 +9,21 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use super::claim::claim_error;
+use relit_data::causes::with_causes;
+
 use super::{Answer, Question};
+use crate::lockfile::LockError;
 use crate::turntable::error::TurntableError;
 use crate::turntable::link::Link;
 
-/// How long somebody who has connected may take to ask, or to take the answer.
+/// How long a client may take to send its request, or to read the answer.
 const WAIT: Duration = Duration::from_millis(300);
 /// Longest question, bytes.
 const LONGEST: u64 = 64;
-/// How long is waited after the system has refused a connection.
+/// Pause after a failed accept.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Answers other processes until it is dropped.
+/// Answers requests of other processes until it is dropped.
 pub(in crate::turntable) struct Server {
     socket: PathBuf,
     quit: Arc<AtomicBool>,
@@ -29,7 +31,8 @@ pub(in crate::turntable) struct Server {
 }
 
 impl Server {
-    /// Binds the socket; one that lies there is a dead process's, since this one has the lock.
+    /// Binds the socket. One that exists is left over from a killed process, since this process has the
+    /// lock.
     pub(super) fn start(socket: &Path, link: Link) -> Result<Server, TurntableError> {
         match fs::remove_file(socket) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
@@ -37,21 +40,21 @@ impl Server {
         }
         .map(|listener| {
             let quit = Arc::new(AtomicBool::new(false));
-            let told = Arc::clone(&quit);
+            let flag = Arc::clone(&quit);
             Server {
                 socket: socket.to_owned(),
                 quit,
-                thread: Some(thread::spawn(move || serve(&listener, &link, &told))),
+                thread: Some(thread::spawn(move || serve(&listener, &link, &flag))),
             }
         })
-        .map_err(claim_error(socket, "bound"))
+        .map_err(|source| LockError::system(socket, "bound")(source).into())
     }
 }
 
 impl Drop for Server {
     fn drop(&mut self) {
         self.quit.store(true, Ordering::Release);
-        // The thread sleeps until somebody connects.
+        // The thread waits until somebody connects.
         let woken = UnixStream::connect(&self.socket).is_ok();
         if let Some(thread) = self.thread.take().filter(|_| woken) {
             let _ = thread.join();
@@ -67,7 +70,7 @@ fn serve(listener: &UnixListener, link: &Link, quit: &AtomicBool) {
             return;
         }
         match stream {
-            // Somebody who asks badly or goes away harms nobody else.
+            // A bad request or a lost connection must not affect other clients.
             Ok(stream) => drop(answer(&stream, link)),
             Err(_) => thread::sleep(PAUSE),
         }
@@ -80,9 +83,9 @@ fn answer(stream: &UnixStream, link: &Link) -> io::Result<()> {
     let mut line = String::new();
     BufReader::new(stream.take(LONGEST)).read_line(&mut line)?;
     let done = match serde_json::from_str(&line) {
-        Ok(Question::Status) => link.status().map_err(|error| error.to_string()),
-        Ok(Question::Stop) => link.stop().map_err(|error| error.to_string()),
-        Err(_) => Err("the owner is asked for \"status\" or \"stop\"".to_owned()),
+        Ok(Question::Status) => link.status().map_err(|error| with_causes(&error)),
+        Ok(Question::Stop) => link.stop().map_err(|error| with_causes(&error)),
+        Err(_) => Err("the requests are \"status\" and \"stop\"".to_owned()),
     };
     let answer = match done {
         Ok(status) => Answer::Status(status),

@@ -13,16 +13,17 @@ use serialport::{SerialPort as _, TTYPort};
 use super::claim::Files;
 use super::*;
 use crate::clock::Clock;
-use crate::turntable::peer::Peer;
-use crate::turntable::{Fault, Options, State, Table, TurntableError};
+use crate::lockfile::accounts::{OPERATOR, SERVICE, STRANGER, as_user, share};
+use crate::turntable::fake_grbl::FakeGrbl;
+use crate::turntable::{ControllerState, MotionFault, Table, TableOptions, TurntableError};
 
-/// A peer at a pseudo terminal.
+/// A fake controller at a pseudoterminal.
 struct Terminal {
     path: PathBuf,
     quit: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     runtime: tempfile::TempDir,
-    // Kept open, so that the other end is not told of a hang-up between two openings.
+    // Kept open, so that the other end sees no hang-up between two openings.
     _slave: TTYPort,
 }
 
@@ -32,15 +33,15 @@ impl Terminal {
         master.set_timeout(Duration::from_millis(1)).unwrap();
         let path = PathBuf::from(slave.name().unwrap());
         let quit = Arc::new(AtomicBool::new(false));
-        let told = Arc::clone(&quit);
+        let flag = Arc::clone(&quit);
         let thread = thread::spawn(move || {
-            let (clock, mut peer) = (Clock::monotonic(), Peer::new(true));
+            let (clock, mut fake_grbl) = (Clock::monotonic(), FakeGrbl::new(true));
             let mut buffer = [0; 256];
-            while !told.load(Ordering::Acquire) {
+            while !flag.load(Ordering::Acquire) {
                 let count = master.read(&mut buffer).unwrap_or(0);
-                peer.advance(clock.now_us());
-                peer.take(&buffer[..count]);
-                master.write_all(&peer.give()).unwrap();
+                fake_grbl.advance(clock.now_us());
+                fake_grbl.take(&buffer[..count]);
+                master.write_all(&fake_grbl.give()).unwrap();
             }
         });
         Terminal {
@@ -53,9 +54,9 @@ impl Terminal {
     }
 
     fn open(&self) -> Result<Table, TurntableError> {
-        let options = Options {
+        let options = TableOptions {
             runtime_folder: self.runtime.path().to_owned(),
-            ..Options::default()
+            ..TableOptions::default()
         };
         Table::open_serial(&self.path, &options)
     }
@@ -77,13 +78,13 @@ impl Drop for Terminal {
 }
 
 #[test]
-fn a_port_has_one_owner_who_answers_for_it_until_it_is_closed() {
+fn a_port_has_one_owner_that_answers_until_it_is_closed() {
     let terminal = Terminal::new();
     assert!(terminal.owner().is_none());
     let table = terminal.open().unwrap();
     let owner = terminal.owner().unwrap();
     assert_eq!(owner.pid(), std::process::id());
-    assert_eq!(owner.status().unwrap().state, State::Idle);
+    assert_eq!(owner.status().unwrap().state, ControllerState::Idle);
     match terminal.open().map(|_| ()) {
         Err(TurntableError::Owned { pid, .. }) => assert_eq!(pid, std::process::id()),
         other => panic!("{other:?}"),
@@ -93,22 +94,24 @@ fn a_port_has_one_owner_who_answers_for_it_until_it_is_closed() {
     assert!(terminal.open().is_ok());
 }
 
+fn stop_once_it_moves(owner: &Owner) -> TableStatus {
+    for _ in 0..200 {
+        if owner.status().unwrap().state.may_move() {
+            break;
+        }
+    }
+    owner.stop().unwrap()
+}
+
 #[test]
-fn a_stop_asked_of_the_owner_stops_the_table_and_ends_its_motion() {
+fn a_stop_requested_from_the_owner_stops_the_table_and_ends_its_motion() {
     let terminal = Terminal::new();
     let table = terminal.open().unwrap();
     let owner = terminal.owner().unwrap();
-    let stopper = thread::spawn(move || {
-        for _ in 0..200 {
-            if owner.status().unwrap().state.may_move() {
-                break;
-            }
-        }
-        owner.stop().unwrap()
-    });
+    let stopper = thread::spawn(move || stop_once_it_moves(&owner));
     let error = table.jog(300.0, Some(5.0)).unwrap_err();
     assert!(
-        matches!(error, TurntableError::Motion(Fault::Stopped)),
+        matches!(error, TurntableError::Motion(MotionFault::Stopped)),
         "{error}"
     );
     let stopped = stopper.join().unwrap();
@@ -116,7 +119,7 @@ fn a_stop_asked_of_the_owner_stops_the_table_and_ends_its_motion() {
 }
 
 #[test]
-fn what_a_killed_owner_left_behind_is_nobodys() {
+fn lock_and_socket_of_a_killed_owner_belong_to_nobody() {
     let terminal = Terminal::new();
     let files = terminal.files();
     std::fs::write(&files.lock, "4194304").unwrap();
@@ -126,12 +129,12 @@ fn what_a_killed_owner_left_behind_is_nobodys() {
     let _table = terminal.open().unwrap();
     assert_eq!(
         terminal.owner().unwrap().status().unwrap().state,
-        State::Idle
+        ControllerState::Idle
     );
 }
 
 #[test]
-fn somebody_who_asks_badly_or_says_nothing_harms_nobody_else() {
+fn a_bad_or_a_silent_client_does_not_affect_others() {
     let terminal = Terminal::new();
     let _table = terminal.open().unwrap();
     let socket = terminal.files().socket;
@@ -149,18 +152,51 @@ fn somebody_who_asks_badly_or_says_nothing_harms_nobody_else() {
 fn a_folder_that_others_can_write_in_is_not_used() {
     use std::os::unix::fs::PermissionsExt;
     let terminal = Terminal::new();
-    let files = terminal.files();
-    let folder = files.lock.parent().unwrap();
-    std::fs::set_permissions(folder, std::fs::Permissions::from_mode(0o777)).unwrap();
+    let open = std::fs::Permissions::from_mode(0o777);
+    std::fs::set_permissions(terminal.runtime.path(), open).unwrap();
     assert!(matches!(
         terminal.open().map(|_| ()),
-        Err(TurntableError::Claim { .. })
+        Err(TurntableError::Lock(_))
     ));
 }
 
 #[test]
-fn a_port_that_is_not_there_is_told_by_its_path() {
-    let options = Options::default();
+fn an_operator_asks_and_stops_the_table_of_a_service_and_a_stranger_opens_nothing() {
+    let terminal = Terminal::new();
+    if !share(terminal.runtime.path()) {
+        return;
+    }
+    std::os::unix::fs::chown(&terminal.path, Some(SERVICE), None).unwrap();
+    let table = as_user(SERVICE, || terminal.open()).unwrap();
+    as_user(OPERATOR, || {
+        let owner = terminal.owner().unwrap();
+        assert_eq!(owner.status().unwrap().state, ControllerState::Idle);
+        let opened = terminal.open().map(|_| ());
+        assert!(
+            matches!(opened, Err(TurntableError::Owned { .. })),
+            "{opened:?}"
+        );
+    });
+    let error = thread::scope(|scope| {
+        let moving = scope.spawn(|| table.jog(300.0, Some(5.0)).unwrap_err());
+        as_user(OPERATOR, || stop_once_it_moves(&terminal.owner().unwrap()));
+        moving.join().unwrap()
+    });
+    assert!(
+        matches!(error, TurntableError::Motion(MotionFault::Stopped)),
+        "{error}"
+    );
+    as_user(STRANGER, || {
+        let found = Owner::find(&terminal.path, terminal.runtime.path());
+        assert!(matches!(found, Err(TurntableError::Lock(_))), "{found:?}");
+        let opened = terminal.open().map(|_| ());
+        assert!(matches!(opened, Err(TurntableError::Lock(_))), "{opened:?}");
+    });
+}
+
+#[test]
+fn a_missing_port_is_named_in_the_error() {
+    let options = TableOptions::default();
     let path = PathBuf::from("/dev/there-is-no-such-port");
     let error = Table::open_serial(&path, &options).map(|_| ()).unwrap_err();
     assert!(

@@ -1,65 +1,64 @@
-//! What is known of the table, and what is done without being asked: no I/O, no threads.
+//! The state machine above the wire, without I/O and without threads.
 //!
-//! It reads the wire's events, keeps the last report and whether the position can be trusted,
-//! watches a motion under way, and brings the table to a standstill when something goes wrong.
+//! It processes the wire's events, keeps the last report and whether the position is still known,
+//! monitors a motion in progress, and brings the table to a standstill when something goes wrong.
 //! It knows nothing of turns.
 
 mod motion;
-mod seen;
+mod position_report;
 mod stop;
 #[cfg(test)]
 mod tests;
 
 use super::Alarm;
-use super::error::Fault;
+use super::error::MotionFault;
 use super::wire::{
-    Counts, Event, LineFault, Machine, Outcome, Patience, Poll, ResetCause, SendError, State,
+    ControllerState, Counts, LineFault, LineOutcome, Machine, Poll, ReplyTimeout, RestartCause,
+    SendError, WireEvent,
 };
-pub(crate) use motion::{Course, Motion};
-pub(crate) use seen::{Habits, Seen};
+pub(crate) use motion::{Motion, MotionGoal};
+pub(crate) use position_report::{ControllerTraits, PositionReport};
 pub(crate) use stop::{Stop, StopOutcome};
 
-/// Between two reports while the table is being stopped, microseconds.
+/// Interval of reports while the table is being stopped, microseconds.
 const STOPPING_POLL_US: i64 = 50_000;
-/// Between two reports while somebody waits for one, microseconds.
+/// Interval of reports while somebody waits for one, microseconds.
 const WANTED_POLL_US: i64 = 100_000;
-/// Most reports recorded of one turn: an hour of them at 15 a second.
+/// Limit of recorded reports: an hour at 15 per second.
 const MOST_RECORDED: usize = 54_000;
 
-/// Everything known of one table, and the wire to it.
+/// The state of one table, and the wire to it.
 #[derive(Debug)]
 pub(crate) struct Supervisor {
     wire: Machine,
-    habits: Habits,
-    slack_us: i64,
-    answer: Option<(u64, Outcome)>,
-    seen: Option<Seen>,
+    traits: ControllerTraits,
+    answer: Option<(u64, LineOutcome)>,
+    last_report: Option<PositionReport>,
     confirmed: bool,
     work_zero: Option<f64>,
-    /// The angle counted as zero, from machine zero; `None` while the position is not known.
+    /// Machine position of the angle 0, degrees; `None` if it is unknown.
     zero_deg: Option<f64>,
     alarm: Option<u8>,
     restarts: u64,
     motion: Option<Motion>,
-    fault: Option<Fault>,
+    fault: Option<MotionFault>,
     stop: Option<Stop>,
-    /// What the last stop has done to the position is drawn.
+    /// The last stop's effect on the position has been applied.
     settled: bool,
-    recorded: Option<Vec<Seen>>,
+    recorded: Option<Vec<PositionReport>>,
     wanted_until_us: i64,
     closed: Option<String>,
+    /// Something has changed that a thread may be waiting for.
+    changed: bool,
 }
 
 impl Supervisor {
-    /// `slack_us` is added to every wait for the controller: more than 0 only on a clock that runs
-    /// faster than the machines that follow it.
-    pub(crate) fn new(habits: Habits, slack_us: i64) -> Self {
+    pub(crate) fn new(traits: ControllerTraits) -> Self {
         Self {
-            wire: Machine::with_slack(slack_us),
-            slack_us,
-            habits,
+            wire: Machine::new(),
+            traits,
             answer: None,
-            seen: None,
+            last_report: None,
             confirmed: false,
             work_zero: None,
             zero_deg: None,
@@ -72,11 +71,12 @@ impl Supervisor {
             recorded: None,
             wanted_until_us: i64::MIN,
             closed: None,
+            changed: false,
         }
     }
 
-    pub(crate) fn set_habits(&mut self, habits: Habits) {
-        self.habits = habits;
+    pub(crate) fn set_traits(&mut self, traits: ControllerTraits) {
+        self.traits = traits;
     }
 
     pub(crate) fn counts(&self) -> Counts {
@@ -87,17 +87,17 @@ impl Supervisor {
         self.wire.is_checked()
     }
 
-    pub(crate) fn seen(&self) -> Option<&Seen> {
-        self.seen.as_ref()
+    pub(crate) fn last_report(&self) -> Option<&PositionReport> {
+        self.last_report.as_ref()
     }
 
-    /// Whether the last report can be relied on: it came with a checksum, or the one before says
-    /// the same. Without, a digit may be wrong.
+    /// Whether the last report is reliable: it had a checksum, or the report before agrees with it.
+    /// Otherwise a digit may be wrong.
     pub(crate) fn is_confirmed(&self) -> bool {
         self.is_checked() || self.confirmed
     }
 
-    /// How often the controller has started since the port was opened.
+    /// Number of restarts of the controller since the port was opened.
     pub(crate) fn restarts(&self) -> u64 {
         self.restarts
     }
@@ -111,11 +111,13 @@ impl Supervisor {
     }
 
     pub(crate) fn alarm(&self) -> Option<Alarm> {
-        let locked = self.seen.is_some_and(|seen| seen.state == State::Alarm);
+        let locked = self
+            .last_report
+            .is_some_and(|report| report.state == ControllerState::Alarm);
         locked.then_some(Alarm(self.alarm))
     }
 
-    pub(crate) fn fault(&self) -> Option<&Fault> {
+    pub(crate) fn fault(&self) -> Option<&MotionFault> {
         self.fault.as_ref()
     }
 
@@ -123,29 +125,34 @@ impl Supervisor {
         self.motion.as_ref()
     }
 
-    /// Why the port is gone, where it is.
+    /// Why the port is gone, if it is.
     pub(crate) fn closed(&self) -> Option<&str> {
         self.closed.as_deref()
     }
 
-    /// The port is gone.
+    /// Notes that the port is gone.
     pub(crate) fn close(&mut self, why: String) {
-        self.raise(Fault::PortLost(why.clone()));
+        self.raise(MotionFault::PortLost(why.clone()));
         self.closed = Some(why);
         self.zero_deg = None;
     }
 
-    /// Sends a line. Nothing is sent while the table is being stopped.
+    /// Whether something has changed since the last call that a thread may be waiting for.
+    pub(crate) fn take_changed(&mut self) -> bool {
+        std::mem::take(&mut self.changed)
+    }
+
+    /// Sends a line, unless the table is being stopped.
     pub(crate) fn send(
         &mut self,
         now_us: i64,
         block: &str,
-        patience: Patience,
+        timeout: ReplyTimeout,
     ) -> Result<u64, SendError> {
         if self.is_stopping() {
             return Err(SendError::Busy);
         }
-        self.wire.send(now_us, block, patience)
+        self.wire.send(now_us, block, timeout)
     }
 
     /// Opens a checked session.
@@ -156,80 +163,81 @@ impl Supervisor {
         self.wire.open_session(now_us)
     }
 
-    /// The answer to line `id`, once.
-    pub(crate) fn take_answer(&mut self, id: u64) -> Option<Outcome> {
+    /// Takes the answer to line `id`.
+    pub(crate) fn take_answer(&mut self, id: u64) -> Option<LineOutcome> {
         let (_, outcome) = self.answer.take_if(|(answered, _)| *answered == id)?;
         Some(outcome)
     }
 
-    /// Asks for reports for the next while.
+    /// Requests reports until this time.
     pub(crate) fn want_reports(&mut self, until_us: i64) {
-        self.wanted_until_us = self.wanted_until_us.max(until_us + self.slack_us);
+        self.wanted_until_us = self.wanted_until_us.max(until_us);
     }
 
-    /// Starts watching a motion; faults from before are forgotten.
-    pub(crate) fn begin_motion(&mut self, now_us: i64, course: Course) {
+    /// Starts to monitor a motion; clears the last fault.
+    pub(crate) fn begin_motion(&mut self, now_us: i64, goal: MotionGoal) {
         self.fault = None;
-        self.motion = Some(Motion::new(now_us, course));
+        self.motion = Some(Motion::new(now_us, goal));
     }
 
-    /// The controller has accepted the line that moves the table.
+    /// Notes that the controller has accepted the line that moves the table.
     pub(crate) fn motion_accepted(&mut self, now_us: i64) {
         if let Some(motion) = &mut self.motion {
             motion.accepted(now_us);
         }
     }
 
-    /// Stops watching.
+    /// Ends the monitoring.
     pub(crate) fn end_motion(&mut self) {
         self.motion = None;
     }
 
-    /// Keeps reports from now on.
+    /// Records reports from now on.
     pub(crate) fn record(&mut self) {
         self.recorded = Some(Vec::new());
     }
 
-    pub(crate) fn recorded(&self) -> &[Seen] {
+    pub(crate) fn recorded(&self) -> &[PositionReport] {
         self.recorded.as_deref().unwrap_or_default()
     }
 
-    /// Ends keeping reports.
-    pub(crate) fn take_recorded(&mut self) -> Vec<Seen> {
+    /// Ends the recording; returns the reports.
+    pub(crate) fn take_recorded(&mut self) -> Vec<PositionReport> {
         self.recorded.take().unwrap_or_default()
     }
 
-    /// Whether the table is being stopped just now.
+    /// Whether a stop is in progress.
     pub(crate) fn is_stopping(&self) -> bool {
         self.stop
             .as_ref()
             .is_some_and(|stop| stop.outcome().is_none())
     }
 
-    /// How the last stop ended; `None` while it is under way or there was none.
+    /// How the last stop ended; `None` if it is in progress or there was none.
     pub(crate) fn stopped(&self) -> Option<StopOutcome> {
         self.stop.as_ref().and_then(Stop::outcome)
     }
 
-    /// Brings the table to a standstill and drops what it was still to do, because somebody asked.
+    /// Brings the table to a standstill and discards its remaining motions, on request.
     pub(crate) fn request_stop(&mut self, now_us: i64) {
         if self.motion.is_some() {
-            self.fault.get_or_insert(Fault::Stopped);
+            self.raise(MotionFault::Stopped);
         }
         self.begin_stop(now_us);
     }
 
-    /// Brings the table to a standstill and the controller back to how it starts, so that any
-    /// other program can go on with it.
+    /// Brings the table to a standstill and the controller to its initial state, so that any other
+    /// program can use it.
     pub(crate) fn release(&mut self, now_us: i64) {
         if self.is_checked() || self.motion.is_some() || self.moves() {
             self.halt(now_us, true);
         }
     }
 
-    /// Whether the table was moving when it was last heard of.
+    /// Whether the table moves according to the last report.
     pub(crate) fn moves(&self) -> bool {
-        self.seen.is_some_and(|seen| seen.state.may_move())
+        self.last_report
+            .is_some_and(|report| report.state.may_move())
     }
 
     fn begin_stop(&mut self, now_us: i64) {
@@ -241,31 +249,28 @@ impl Supervisor {
         if !self.is_stopping() {
             self.settled = false;
             self.wire.give_up();
-            self.stop = Some(Stop::begin(
-                now_us,
-                unsettled,
-                self.slack_us,
-                &mut self.wire,
-            ));
+            self.stop = Some(Stop::begin(now_us, unsettled, &mut self.wire));
         }
     }
 
-    /// Notes the first fault of a motion and stops the table.
-    fn fail(&mut self, now_us: i64, fault: Fault) {
+    /// Stops the table because of a fault.
+    fn fail(&mut self, now_us: i64, fault: MotionFault) {
         self.raise(fault);
         self.begin_stop(now_us);
     }
 
-    fn raise(&mut self, fault: Fault) {
+    /// Notes a fault. The first one of a motion is kept.
+    fn raise(&mut self, fault: MotionFault) {
+        self.changed = true;
         self.fault.get_or_insert(fault);
     }
 
-    /// What is to be sent now; call it right before writing.
+    /// The bytes to be sent now. Call it right before writing.
     pub(crate) fn take_output(&mut self, now_us: i64) -> Vec<u8> {
         let every_us = if self.is_stopping() {
             Some(STOPPING_POLL_US)
         } else if self.motion.is_some() {
-            Some(i64::try_from(self.habits.poll.as_micros()).unwrap_or(WANTED_POLL_US))
+            Some(i64::try_from(self.traits.poll.as_micros()).unwrap_or(WANTED_POLL_US))
         } else {
             (now_us < self.wanted_until_us).then_some(WANTED_POLL_US)
         };
@@ -273,7 +278,7 @@ impl Supervisor {
         self.wire.take_output(now_us)
     }
 
-    /// Time has passed.
+    /// Processes the passing of time.
     pub(crate) fn on_time(&mut self, now_us: i64) {
         self.wire.on_time(now_us);
         self.on_events(now_us);
@@ -285,13 +290,13 @@ impl Supervisor {
             && let Some(fault) = self
                 .motion
                 .as_ref()
-                .and_then(|m| m.overdue(now_us - self.slack_us, &self.habits))
+                .and_then(|m| m.overdue(now_us, &self.traits))
         {
             self.fail(now_us, fault);
         }
     }
 
-    /// Bytes have come.
+    /// Processes received bytes.
     pub(crate) fn on_bytes(&mut self, now_us: i64, bytes: &[u8]) {
         self.wire.on_bytes(now_us, bytes);
         self.on_events(now_us);
@@ -299,55 +304,58 @@ impl Supervisor {
 
     fn on_events(&mut self, now_us: i64) {
         while let Some(event) = self.wire.next_event() {
+            self.changed = true;
             match event {
-                Event::Answered { id, outcome } => self.on_answer(now_us, id, outcome),
-                Event::Status(poll) => self.on_report(now_us, &poll),
-                Event::Reset(cause) => self.on_reset(now_us, cause),
-                Event::Alarm(code) => self.on_alarm(now_us, code),
+                WireEvent::Answered { id, outcome } => self.on_answer(now_us, id, outcome),
+                WireEvent::Status(poll) => self.on_report(now_us, &poll),
+                WireEvent::Reset(cause) => self.on_reset(now_us, cause),
+                WireEvent::Alarm(code) => self.on_alarm(now_us, code),
             }
         }
     }
 
-    fn on_answer(&mut self, now_us: i64, id: u64, outcome: Outcome) {
-        // A line without answer may have been executed, and its answer may still come: only a
-        // table at rest after a reset is certain again.
-        if let Outcome::Failed(fault @ (LineFault::NoAnswer { .. } | LineFault::OutOfOrder)) =
+    fn on_answer(&mut self, now_us: i64, id: u64, outcome: LineOutcome) {
+        // A line without answer may have been executed, and its answer may still arrive: only a
+        // reset of a table at rest makes the state certain again.
+        if let LineOutcome::Failed(fault @ (LineFault::NoAnswer { .. } | LineFault::OutOfOrder)) =
             outcome
         {
-            self.fail(now_us, Fault::Line(fault));
+            self.fail(now_us, MotionFault::Line(fault));
         }
         self.answer = Some((id, outcome));
     }
 
     fn on_report(&mut self, now_us: i64, poll: &Poll) {
         self.work_zero = poll.report.work_zero.or(self.work_zero);
-        let Some(seen) = Seen::of(poll, self.work_zero, &self.habits) else {
+        let Some(report) = PositionReport::of(poll, self.work_zero, &self.traits) else {
             return;
         };
-        self.confirmed = self.seen.is_some_and(|before| before.confirms(&seen));
-        self.seen = Some(seen);
-        if seen.state != State::Alarm {
+        self.confirmed = self
+            .last_report
+            .is_some_and(|before| before.confirms(&report));
+        self.last_report = Some(report);
+        if report.state != ControllerState::Alarm {
             self.alarm = None;
         }
         if let Some(recorded) = &mut self.recorded
             && recorded.len() < MOST_RECORDED
         {
-            recorded.push(seen);
+            recorded.push(report);
         }
         if self.is_stopping() {
             if let Some(stop) = &mut self.stop {
-                stop.on_report(now_us, &seen, &mut self.wire);
+                stop.on_report(now_us, &report, &mut self.wire);
             }
             self.settle();
         } else if self.fault.is_none()
             && let Some(motion) = &mut self.motion
-            && let Some(fault) = motion.on_report(&seen, self.alarm, &self.habits)
+            && let Some(fault) = motion.on_report(&report, self.alarm, &self.traits)
         {
             self.fail(now_us, fault);
         }
     }
 
-    /// Forgets the position where a stop has cost it.
+    /// Forgets the position if a stop has lost it.
     fn settle(&mut self) {
         let Some(outcome) = self.stopped() else {
             return;
@@ -355,21 +363,22 @@ impl Supervisor {
         if !self.settled && outcome != StopOutcome::Standing {
             self.zero_deg = None;
         }
+        self.changed |= !self.settled;
         self.settled = true;
     }
 
-    fn on_reset(&mut self, now_us: i64, cause: Option<ResetCause>) {
+    fn on_reset(&mut self, now_us: i64, cause: Option<RestartCause>) {
         self.restarts += 1;
         self.alarm = None;
         self.work_zero = None;
-        let asked_for = matches!(cause, None | Some(ResetCause::Host));
+        let asked_for = matches!(cause, None | Some(RestartCause::Host));
         let stop = self.stop.as_mut().filter(|stop| stop.outcome().is_none());
         let kept = stop.is_some_and(|stop| stop.on_reset(now_us)) && asked_for;
         if !kept {
             self.zero_deg = None;
         }
         if !self.is_stopping() && self.motion.is_some() {
-            self.fail(now_us, Fault::Restarted(cause));
+            self.fail(now_us, MotionFault::Restarted(cause));
         }
     }
 
@@ -380,7 +389,7 @@ impl Supervisor {
             self.zero_deg = None;
         }
         if self.motion.is_some() && !self.is_stopping() {
-            self.fail(now_us, Fault::Alarm(alarm));
+            self.fail(now_us, MotionFault::Alarm(alarm));
         }
     }
 }

@@ -1,49 +1,49 @@
-//! Watching a motion: whether it goes on, and where it ends.
+//! Monitoring a motion: whether it goes on, and where it ends.
 
-use super::{Habits, Seen};
+use super::{ControllerTraits, PositionReport};
 use crate::turntable::Alarm;
-use crate::turntable::error::Fault;
-use crate::turntable::wire::State;
+use crate::turntable::error::MotionFault;
+use crate::turntable::wire::ControllerState;
 
-/// Silence after which a table in motion counts as lost, microseconds.
+/// Longest silence of a controller in motion, microseconds.
 const SILENCE_US: i64 = 2_000_000;
-/// How long a table may report the same place in motion, microseconds.
+/// How long a moving table may report the same position, microseconds.
 const STALL_US: i64 = 800_000;
-/// How long a table may stand elsewhere than at its target before that counts, microseconds:
-/// between accepting a line and starting, a controller is idle for a moment.
+/// How long a table may stand away from its target, microseconds: between accepting a line and
+/// starting, a controller is idle for a moment.
 const ASTRAY_US: i64 = 600_000;
-/// What the printing of a position loses, degrees.
+/// Rounding error of a printed position, degrees.
 const PRINTED_DEG: f64 = 0.002;
 
-/// Where a motion goes.
+/// The goal of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Course {
-    /// To a place, degrees from machine zero.
+pub(crate) enum MotionGoal {
+    /// Move to a position.
     To {
-        /// The place.
+        /// The position, degrees from machine zero.
         target_deg: f64,
-        /// How long after the controller has taken the line it has to be there, microseconds.
+        /// Time limit after the controller has accepted the line, microseconds.
         within_us: i64,
     },
-    /// Looking for the index.
+    /// Search for the index.
     Homing,
 }
 
-/// A motion under way.
+/// A motion in progress.
 #[derive(Debug)]
 pub(crate) struct Motion {
-    course: Course,
+    goal: MotionGoal,
     accepted_us: Option<i64>,
     last_report_us: i64,
-    /// The last place, and since when it is reported.
+    /// The last reported position, and the time of its first report.
     place: Option<(f64, i64)>,
     at_target: bool,
 }
 
 impl Motion {
-    pub(super) fn new(now_us: i64, course: Course) -> Self {
+    pub(super) fn new(now_us: i64, goal: MotionGoal) -> Self {
         Self {
-            course,
+            goal,
             accepted_us: None,
             last_report_us: now_us,
             place: None,
@@ -56,33 +56,38 @@ impl Motion {
         self.place = None;
     }
 
-    /// Whether the table has come to rest at its target.
+    /// Whether the table rests at its target.
     pub(crate) fn is_at_target(&self) -> bool {
         self.at_target
     }
 
-    /// A report has come: what it says against the motion.
+    /// Processes a report; returns the fault that it shows.
     pub(super) fn on_report(
         &mut self,
-        seen: &Seen,
+        report: &PositionReport,
         alarm: Option<u8>,
-        habits: &Habits,
-    ) -> Option<Fault> {
-        self.last_report_us = seen.came_us;
-        let Course::To { target_deg, .. } = self.course else {
+        traits: &ControllerTraits,
+    ) -> Option<MotionFault> {
+        self.last_report_us = report.came_us;
+        let MotionGoal::To { target_deg, .. } = self.goal else {
             return None;
         };
-        let stands_us = self.stands_for(seen);
-        match seen.state {
-            State::Run | State::Jog => (stands_us > STALL_US).then_some(Fault::Stalled {
-                machine_deg: seen.machine_deg,
-            }),
-            State::Idle => self.on_idle(seen, target_deg, stands_us, habits),
-            State::Held | State::Holding | State::Door | State::Sleep => Some(Fault::Held),
-            State::Alarm => Some(Fault::Alarm(Alarm(alarm))),
-            state @ (State::Home | State::Check) => Some(Fault::Astray {
+        let stands_us = self.stands_for(report);
+        match report.state {
+            ControllerState::Run | ControllerState::Jog => {
+                (stands_us > STALL_US).then_some(MotionFault::Stalled {
+                    machine_deg: report.machine_deg,
+                })
+            }
+            ControllerState::Idle => self.on_idle(report, target_deg, stands_us, traits),
+            ControllerState::Held
+            | ControllerState::Holding
+            | ControllerState::Door
+            | ControllerState::Sleep => Some(MotionFault::Held),
+            ControllerState::Alarm => Some(MotionFault::Alarm(Alarm(alarm))),
+            state @ (ControllerState::Home | ControllerState::Check) => Some(MotionFault::Astray {
                 state,
-                machine_deg: seen.machine_deg,
+                machine_deg: report.machine_deg,
                 target_deg,
             }),
         }
@@ -90,59 +95,59 @@ impl Motion {
 
     fn on_idle(
         &mut self,
-        seen: &Seen,
+        report: &PositionReport,
         target_deg: f64,
         stands_us: i64,
-        habits: &Habits,
-    ) -> Option<Fault> {
+        traits: &ControllerTraits,
+    ) -> Option<MotionFault> {
         let accepted_us = self.accepted_us?;
-        let after = seen
+        let after = report
             .asked_us
             .is_some_and(|asked_us| asked_us >= accepted_us);
-        let off = (seen.machine_deg - target_deg).abs();
-        if after && off <= habits.step_deg + PRINTED_DEG {
+        let off = (report.machine_deg - target_deg).abs();
+        if after && off <= traits.step_deg + PRINTED_DEG {
             self.at_target = true;
             return None;
         }
-        (after && !self.at_target && stands_us > ASTRAY_US).then_some(Fault::Astray {
-            state: State::Idle,
-            machine_deg: seen.machine_deg,
+        (after && !self.at_target && stands_us > ASTRAY_US).then_some(MotionFault::Astray {
+            state: ControllerState::Idle,
+            machine_deg: report.machine_deg,
             target_deg,
         })
     }
 
-    /// How long the table has certainly been at the place of this report, microseconds: from when
-    /// the first report of it came to when this one was asked for.
-    fn stands_for(&mut self, seen: &Seen) -> i64 {
+    /// How long the table has certainly been at the position of this report, microseconds: from the
+    /// arrival of the first report of it to the request for this one.
+    fn stands_for(&mut self, report: &PositionReport) -> i64 {
         match self.place {
-            Some((place, since_us)) if place == seen.machine_deg => {
-                let asked_us = seen.asked_us.filter(|_| seen.certain);
+            Some((place, since_us)) if place == report.machine_deg => {
+                let asked_us = report.asked_us.filter(|_| report.certain);
                 asked_us.map_or(0, |asked_us| asked_us - since_us)
             }
             _ => {
-                self.place = Some((seen.machine_deg, seen.came_us));
+                self.place = Some((report.machine_deg, report.came_us));
                 0
             }
         }
     }
 
-    /// How long ago the controller took the line, microseconds.
+    /// Time since the controller accepted the line, microseconds.
     fn runs_for(&self, now_us: i64) -> i64 {
         self.accepted_us
             .map_or(0, |accepted_us| now_us - accepted_us)
     }
 
-    /// What the passing of time says against the motion.
-    pub(super) fn overdue(&self, now_us: i64, habits: &Habits) -> Option<Fault> {
+    /// The fault that the passing of time shows.
+    pub(super) fn overdue(&self, now_us: i64, traits: &ControllerTraits) -> Option<MotionFault> {
         let silent_us = now_us - self.last_report_us;
-        match self.course {
-            Course::Homing if !habits.reports_homing => None,
-            Course::To { within_us, .. }
+        match self.goal {
+            MotionGoal::Homing if !traits.reports_homing => None,
+            MotionGoal::To { within_us, .. }
                 if !self.at_target && self.runs_for(now_us) > within_us =>
             {
-                Some(Fault::Late)
+                Some(MotionFault::Late)
             }
-            _ => (silent_us > SILENCE_US).then_some(Fault::Silent {
+            _ => (silent_us > SILENCE_US).then_some(MotionFault::Silent {
                 milliseconds: silent_us / 1000,
             }),
         }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::*;
 
-const HABITS: Habits = Habits {
+const TRAITS: ControllerTraits = ControllerTraits {
     degrees_per_unit: 1.0,
     poll: Duration::from_millis(67),
     stamps: true,
@@ -20,7 +20,7 @@ struct Desk {
 
 impl Desk {
     fn new() -> Desk {
-        let supervisor = Supervisor::new(HABITS, 0);
+        let supervisor = Supervisor::new(TRAITS);
         let mut desk = Desk {
             supervisor,
             now_us: 0,
@@ -57,11 +57,11 @@ impl Desk {
     }
 
     fn moving(&mut self, target_deg: f64) {
-        let course = Course::To {
+        let goal = MotionGoal::To {
             target_deg,
             within_us: 60_000_000,
         };
-        self.supervisor.begin_motion(self.now_us, course);
+        self.supervisor.begin_motion(self.now_us, goal);
         self.supervisor.motion_accepted(self.now_us);
     }
 }
@@ -82,7 +82,7 @@ fn a_stop_holds_waits_for_rest_and_resets_only_then() {
     desk.report("Idle", 11.2, 2);
     assert_eq!(desk.supervisor.stopped(), Some(StopOutcome::Standing));
     assert_eq!(desk.supervisor.zero_deg(), Some(0.0));
-    assert_eq!(desk.supervisor.fault(), Some(&Fault::Stopped));
+    assert_eq!(desk.supervisor.fault(), Some(&MotionFault::Stopped));
 }
 
 #[test]
@@ -149,7 +149,7 @@ fn a_restart_for_another_reason_during_a_stop_loses_the_position() {
 fn nothing_is_sent_while_the_table_is_being_stopped() {
     let mut desk = Desk::new();
     desk.supervisor.request_stop(0);
-    let sent = desk.supervisor.send(0, "$X", Patience::Short);
+    let sent = desk.supervisor.send(0, "$X", ReplyTimeout::AtOnce);
     assert_eq!(sent, Err(SendError::Busy));
 }
 
@@ -174,7 +174,7 @@ fn a_table_that_rests_elsewhere_is_astray_after_a_while() {
     desk.report("Idle", 0.0, 5);
     assert!(matches!(
         desk.supervisor.fault(),
-        Some(Fault::Astray { .. })
+        Some(MotionFault::Astray { .. })
     ));
     assert!(desk.supervisor.is_stopping());
 }
@@ -189,22 +189,22 @@ fn a_motion_that_takes_too_long_is_late() {
     assert_eq!(desk.supervisor.fault(), None);
     desk.report("Run", 80.0, 1);
     desk.pass(500);
-    assert_eq!(desk.supervisor.fault(), Some(&Fault::Late));
+    assert_eq!(desk.supervisor.fault(), Some(&MotionFault::Late));
 }
 
 #[test]
-fn work_positions_count_once_their_zero_is_told_and_inches_are_degrees_too() {
+fn work_positions_count_once_their_zero_is_known_and_inches_are_converted() {
     let mut desk = Desk::new();
     desk.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0>");
-    assert!(desk.supervisor.seen().is_none());
+    assert!(desk.supervisor.last_report().is_none());
     desk.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0|WCO:2.000,0.000,0.000>");
-    assert_eq!(desk.supervisor.seen().unwrap().machine_deg, 3.0);
-    desk.supervisor.set_habits(Habits {
+    assert_eq!(desk.supervisor.last_report().unwrap().machine_deg, 3.0);
+    desk.supervisor.set_traits(ControllerTraits {
         degrees_per_unit: 25.4,
-        ..HABITS
+        ..TRAITS
     });
     desk.hear("<Idle|MPos:1.000,0.000,0.000|FS:0,0>");
-    assert_eq!(desk.supervisor.seen().unwrap().machine_deg, 25.4);
+    assert_eq!(desk.supervisor.last_report().unwrap().machine_deg, 25.4);
 }
 
 #[test]
@@ -233,7 +233,7 @@ fn a_report_that_comes_twice_and_late_is_no_stall() {
     desk.report("Run", 5.0, 12);
     assert!(matches!(
         desk.supervisor.fault(),
-        Some(Fault::Stalled { .. })
+        Some(MotionFault::Stalled { .. })
     ));
 }
 

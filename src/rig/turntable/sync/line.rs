@@ -1,17 +1,17 @@
-//! Straight lines through points some of which are wrong.
+//! Robust fit of a straight line: some of the points may be wrong.
 //!
-//! The first guess takes medians, which a quarter of wrong points does not move (slopes of pairs
-//! half the data apart, after Theil 1950 and Sen 1968); least squares over the points near it,
-//! thrice, makes it exact.
+//! The initial estimate uses medians, on which up to a quarter of wrong points have little effect
+//! (slopes of pairs half the data apart, after Theil 1950 and Sen 1968). Three rounds of least squares
+//! over the points near the line refine it.
 
-/// Rounds of leaving out and fitting again.
+/// Rounds of rejecting outliers and fitting again.
 const ROUNDS: usize = 3;
-/// A point further off than so many standard deviations is an outlier.
+/// A point is an outlier beyond so many standard deviations.
 const SIGMAS: f64 = 4.0;
-/// A normal distribution's standard deviation over its median absolute deviation.
+/// Ratio of a normal distribution's standard deviation to its median absolute deviation.
 const SIGMA_OF_MAD: f64 = 1.4826;
 
-/// A straight line, told from a point near the data so that large coordinates cost no digits.
+/// A straight line, relative to a point near the data so that large coordinates lose no precision.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Line {
     pub(super) x0: f64,
@@ -29,7 +29,7 @@ impl Line {
         x.is_finite().then_some(x)
     }
 
-    /// This line over what `other` gives: where `other` maps x to z, z to y.
+    /// The line over z, where this line maps x to y and `other` maps x to z.
     pub(super) fn over(&self, other: &Line) -> Line {
         Line {
             x0: other.at(self.x0),
@@ -39,16 +39,16 @@ impl Line {
     }
 }
 
-/// A line and the points it goes through.
+/// A fitted line and the points used.
 #[derive(Debug)]
 pub(super) struct Fit {
     pub(super) line: Line,
-    /// For each point, whether it is no outlier.
+    /// For each point, whether it is not an outlier.
     pub(super) kept: Vec<bool>,
 }
 
-/// The line through `points`, in the order of x, most of which are right. Points off by less than
-/// `floor` are never outliers.
+/// Fits a line to `points`, which are sorted by x and most of which are right. Points with a residual
+/// below `floor` are never outliers.
 pub(super) fn robust(points: &[(f64, f64)], floor: f64) -> Fit {
     let mut line = guess(points);
     let mut kept = vec![true; points.len()];
@@ -96,7 +96,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     quantile(&values, 0.5)
 }
 
-/// The value below which `part` of the sorted values lie, 0 where there are none.
+/// The `part` quantile of sorted values; 0 if there are none.
 pub(super) fn quantile(sorted: &[f64], part: f64) -> f64 {
     let last = sorted.len().saturating_sub(1);
     let place = (part * last as f64).round() as usize;

@@ -1,38 +1,39 @@
 //! From reports to angles: where the table was at any time of the host's clock.
 //!
-//! Over the part of a turn at constant speed the angle is a straight line over time. A controller
-//! that stamps its reports gives that line against its own clock, free of the wire's delays, and
-//! the chip's clock is laid against the host's by the questions that were answered fastest. A
-//! controller that does not stamp them leaves the middle between question and report.
+//! In the part of a turn at constant speed the angle is a linear function of time. If the controller
+//! stamps its reports, the line is fitted against the chip's clock, without the wire's delays, and
+//! the chip's clock is fitted against the host's by the requests that were answered fastest. Without
+//! stamps, a report counts for the middle between request and arrival.
 //!
-//! This room knows reports and lines, and nothing of the wire.
+//! This module knows reports and lines, and nothing of the wire.
 
 mod line;
 #[cfg(test)]
 mod tests;
 
-use super::supervisor::Seen;
-use super::wire::State;
+use super::supervisor::PositionReport;
+use super::wire::ControllerState;
 use line::{Fit, Line};
 
-/// Least reports a track is made of.
+/// Minimum number of reports.
 const LEAST_POLLS: usize = 12;
-/// Least part of the constant-speed angle that they cover.
+/// Minimum fraction of the angle at constant speed that the reports cover.
 const LEAST_COVER: f64 = 0.8;
-/// Largest part of them that may be outliers.
+/// Largest fraction of outliers.
 const MOST_OUTLIERS: f64 = 0.25;
-/// How far chip and speed may be off: ceramic resonators are good to half a per cent.
+/// Largest relative error of the chip's clock and of the speed: ceramic resonators are accurate to
+/// half a per cent.
 const MOST_OFF: f64 = 0.03;
-/// The time is cut into so many parts, and the fastest answers of each are taken.
+/// The turn is divided into so many parts, and the fastest answers of each are used.
 const PARTS: usize = 10;
-/// The fastest answers of a part: one in so many.
+/// One in so many answers of a part counts as one of the fastest.
 const FASTEST: usize = 4;
-/// Residuals below this are never outliers, of the host's clock, microseconds.
+/// Smallest residual that can be an outlier in the fit of the clocks, microseconds.
 const CLOCK_FLOOR_US: f64 = 200.0;
-/// Microseconds after which a chip's clock starts again.
+/// Period after which the chip's time stamps wrap around, microseconds.
 const WRAP_US: f64 = 4_294_967_296.0;
 
-/// Why reports give no angles.
+/// Why the reports do not determine the angles.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TrackError {
     /// Too few reports.
@@ -40,10 +41,10 @@ pub enum TrackError {
         "only {polls} reports fall into the part at constant speed, and {LEAST_POLLS} are needed: check the serial line"
     )]
     TooFew {
-        /// How many.
+        /// Their number.
         polls: usize,
     },
-    /// They leave gaps.
+    /// The reports leave gaps.
     #[error(
         "the reports cover {percent:.0} % of the part at constant speed: check the serial line"
     )]
@@ -51,48 +52,48 @@ pub enum TrackError {
         /// Per cent.
         percent: f64,
     },
-    /// They do not lie on a line.
+    /// The reports do not lie on a line.
     #[error(
         "{outliers} of {polls} reports lie off the line of the others: the table did not turn evenly, or the serial line is bad"
     )]
     Uneven {
-        /// Off the line.
+        /// Number of reports off the line.
         outliers: usize,
-        /// All.
+        /// Number of all reports.
         polls: usize,
     },
-    /// The chip's clock is off.
+    /// The chip's clock is wrong.
     #[error(
         "the controller's clock runs {factor:.4} times as fast as the host's: its firmware is made for another crystal"
     )]
     Clock {
-        /// Chip seconds in a second of the host.
+        /// Chip seconds per second of the host.
         factor: f64,
     },
-    /// The speed is off.
+    /// The speed is wrong.
     #[error(
         "the table turned at {measured:.4} degrees/s instead of {planned:.4}: check $100, $110 and the microsteps"
     )]
     Speed {
-        /// By the reports.
+        /// Measured by the reports, degrees/s.
         measured: f64,
-        /// By the plan.
+        /// Planned, degrees/s.
         planned: f64,
     },
 }
 
-/// How far reports lie off the track, degrees.
+/// Residuals of the reports from the track, degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residuals {
-    /// Half of them are below this.
+    /// Median.
     pub median_deg: f64,
-    /// 99 of 100 are below this.
+    /// 99th percentile.
     pub p99_deg: f64,
-    /// The largest.
+    /// Maximum.
     pub max_deg: f64,
 }
 
-/// Where the table was: a straight line over the part of a turn at constant speed.
+/// The table's angle over time, in the part of a turn at constant speed: a straight line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Track {
     line: Line,
@@ -106,7 +107,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// The table's angle at `t_us` microseconds of the host's clock, degrees; `None` outside of
+    /// The table's angle at `t_us` microseconds of the host's clock, degrees; `None` outside
     /// the part at constant speed.
     #[must_use]
     pub fn angle_at(&self, t_us: i64) -> Option<f64> {
@@ -115,7 +116,7 @@ impl Track {
             .then(|| self.line.at(t_us as f64))
     }
 
-    /// When the table was at `angle_deg`, microseconds of the host's clock; `None` outside of the
+    /// When the table was at `angle_deg`, microseconds of the host's clock; `None` outside the
     /// part at constant speed.
     #[must_use]
     pub fn time_at(&self, angle_deg: f64) -> Option<i64> {
@@ -129,65 +130,65 @@ impl Track {
         (self.from_us, self.to_us)
     }
 
-    /// Speed by the host's clock, degrees a second; negative for turns the other way.
+    /// Speed by the host's clock, degrees/s; negative for turns in the negative direction.
     #[must_use]
     pub fn degrees_per_second(&self) -> f64 {
         self.line.slope * 1e6
     }
 
-    /// How far the reports that were answered fastest lie off the track.
+    /// Residuals of the reports that were answered fastest.
     #[must_use]
     pub fn residuals(&self) -> Residuals {
         self.residuals
     }
 
-    /// Reports that the track is made of.
+    /// Number of reports used.
     #[must_use]
     pub fn polls(&self) -> usize {
         self.polls
     }
 
-    /// Reports that were left out because they lie off the line of the others.
+    /// Number of reports left out as outliers.
     #[must_use]
     pub fn outliers(&self) -> usize {
         self.outliers
     }
 
-    /// Half the time of the fastest answers, microseconds: the track's times cannot be wrong by
-    /// more, however unequal the delays there and back are.
+    /// Half the shortest round trip, microseconds: an upper bound of the track's time error, however
+    /// unequal the delays in the two directions are.
     #[must_use]
     pub fn half_round_trip_us(&self) -> f64 {
         self.half_round_trip_us
     }
 
-    /// Seconds of the chip's clock in a second of the host's; `None` where reports have no stamp.
+    /// Seconds of the chip's clock per second of the host's; `None` if reports have no stamps.
     #[must_use]
     pub fn chip_rate(&self) -> Option<f64> {
         self.chip_rate
     }
 }
 
-/// What the turn was to be, degrees from machine zero.
+/// The turn as it was planned, degrees from machine zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Course {
+pub(crate) struct ExpectedTurn {
     /// Where the part at constant speed starts.
     pub(crate) from_deg: f64,
     /// Where it ends.
     pub(crate) to_deg: f64,
-    /// Speed without sign.
+    /// Speed, without sign.
     pub(crate) degrees_per_second: f64,
-    /// The angle counted as zero.
+    /// Machine position of the angle 0.
     pub(crate) zero_deg: f64,
     /// One step.
     pub(crate) step_deg: f64,
 }
 
-impl Course {
+impl ExpectedTurn {
     fn sign(&self) -> f64 {
         (self.to_deg - self.from_deg).signum()
     }
 
-    /// Whether a place is inside of the part at constant speed, a step away from its ends.
+    /// Whether a position is in the part at constant speed, at least a step away from its ends.
     fn covers(&self, machine_deg: f64) -> bool {
         let gone = (machine_deg - self.from_deg) * self.sign();
         let length = (self.to_deg - self.from_deg).abs();
@@ -195,8 +196,8 @@ impl Course {
     }
 }
 
-/// A report as a point: the bracket in time around it, and the angle in the middle of the step
-/// that the table was on.
+/// A report as a point of the fit: the times of request and arrival, and the angle in the middle of
+/// the step.
 #[derive(Debug, Clone, Copy)]
 struct Point {
     asked_us: f64,
@@ -215,15 +216,18 @@ impl Point {
     }
 }
 
-/// The track of a turn by its reports.
-pub(crate) fn fit(seen: &[Seen], course: &Course) -> Result<Track, TrackError> {
-    let points = points(seen, course);
-    enough(&points, course)?;
+/// Fits the track of a turn to its reports.
+pub(crate) fn fit(
+    reports: &[PositionReport],
+    expected: &ExpectedTurn,
+) -> Result<Track, TrackError> {
+    let points = points(reports, expected);
+    enough(&points, expected)?;
     let stamped = points.iter().all(|point| point.chip_us.is_some());
     let fitted = if stamped {
-        by_the_chip(&points, course)?
+        by_the_chip(&points, expected)?
     } else {
-        by_the_middle(&points, course)
+        by_the_middle(&points, expected)
     };
     if fitted.outliers as f64 > points.len() as f64 * MOST_OUTLIERS {
         return Err(TrackError::Uneven {
@@ -232,35 +236,37 @@ pub(crate) fn fit(seen: &[Seen], course: &Course) -> Result<Track, TrackError> {
         });
     }
     let measured = fitted.line.slope * 1e6;
-    let planned = course.degrees_per_second * course.sign();
+    let planned = expected.degrees_per_second * expected.sign();
     if (measured / planned - 1.0).abs() > MOST_OFF {
         return Err(TrackError::Speed { measured, planned });
     }
-    Ok(track(&points, course, &fitted))
+    Ok(track(&points, expected, &fitted))
 }
 
-/// The line of angles over the host's time, and what it is made of.
+/// The line of angles over the host's time.
 struct Fitted {
     line: Line,
     outliers: usize,
     chip_rate: Option<f64>,
 }
 
-fn points(seen: &[Seen], course: &Course) -> Vec<Point> {
-    let half_step = course.sign() * course.step_deg / 2.0;
-    let point = |seen: &Seen| {
-        let usable = seen.certain && seen.state == State::Run && course.covers(seen.machine_deg);
+fn points(reports: &[PositionReport], expected: &ExpectedTurn) -> Vec<Point> {
+    let half_step = expected.sign() * expected.step_deg / 2.0;
+    let point = |report: &PositionReport| {
+        let usable = report.certain
+            && report.state == ControllerState::Run
+            && expected.covers(report.machine_deg);
         usable.then_some(Point {
-            asked_us: seen.asked_us? as f64,
-            came_us: seen.came_us as f64,
-            chip_us: seen.chip_us,
-            angle_deg: seen.machine_deg + half_step - course.zero_deg,
+            asked_us: report.asked_us? as f64,
+            came_us: report.came_us as f64,
+            chip_us: report.chip_us,
+            angle_deg: report.machine_deg + half_step - expected.zero_deg,
         })
     };
-    seen.iter().filter_map(point).collect()
+    reports.iter().filter_map(point).collect()
 }
 
-fn enough(points: &[Point], course: &Course) -> Result<(), TrackError> {
+fn enough(points: &[Point], expected: &ExpectedTurn) -> Result<(), TrackError> {
     if points.len() < LEAST_POLLS {
         return Err(TrackError::TooFew {
             polls: points.len(),
@@ -268,7 +274,7 @@ fn enough(points: &[Point], course: &Course) -> Result<(), TrackError> {
     }
     let angles = || points.iter().map(|point| point.angle_deg);
     let covered = angles().fold(f64::MIN, f64::max) - angles().fold(f64::MAX, f64::min);
-    let cover = covered / (course.to_deg - course.from_deg).abs();
+    let cover = covered / (expected.to_deg - expected.from_deg).abs();
     if cover < LEAST_COVER {
         return Err(TrackError::Gaps {
             percent: cover * 100.0,
@@ -277,13 +283,13 @@ fn enough(points: &[Point], course: &Course) -> Result<(), TrackError> {
     Ok(())
 }
 
-fn by_the_middle(points: &[Point], course: &Course) -> Fitted {
+fn by_the_middle(points: &[Point], expected: &ExpectedTurn) -> Fitted {
     let pair = |point: &Point| (point.middle_us(), point.angle_deg);
     let pairs: Vec<_> = fastest(points).iter().map(pair).collect();
-    let Fit { line, .. } = line::robust(&pairs, course.step_deg);
-    // A slow answer lies off the line by its delay, and is none of an uneven table's.
+    let Fit { line, .. } = line::robust(&pairs, expected.step_deg);
+    // A slow answer lies off the line by its delay; it does not show that the table turned unevenly.
     let allowed =
-        |point: &Point| course.step_deg * 2.0 + point.round_trip_us() / 2.0 * line.slope.abs();
+        |point: &Point| expected.step_deg * 2.0 + point.round_trip_us() / 2.0 * line.slope.abs();
     let off =
         |point: &&Point| (point.angle_deg - line.at(point.middle_us())).abs() > allowed(point);
     Fitted {
@@ -293,14 +299,14 @@ fn by_the_middle(points: &[Point], course: &Course) -> Fitted {
     }
 }
 
-fn by_the_chip(points: &[Point], course: &Course) -> Result<Fitted, TrackError> {
+fn by_the_chip(points: &[Point], expected: &ExpectedTurn) -> Result<Fitted, TrackError> {
     let stamps = unwrapped(points);
     let angles: Vec<_> = stamps
         .iter()
         .zip(points)
         .map(|(&chip, p)| (chip, p.angle_deg))
         .collect();
-    let by_chip = line::robust(&angles, course.step_deg * 2.0);
+    let by_chip = line::robust(&angles, expected.step_deg * 2.0);
 
     let stamped = points
         .iter()
@@ -328,8 +334,8 @@ fn by_the_chip(points: &[Point], course: &Course) -> Result<Fitted, TrackError> 
     })
 }
 
-/// The chip's time of each point since the first one, microseconds. A stamp starts again every 71
-/// minutes; the host's clock tells how often it has.
+/// The chip's time of each point since the first one, microseconds. Stamps wrap around every 71
+/// minutes; the host's clock shows how many times they did.
 fn unwrapped(points: &[Point]) -> Vec<f64> {
     let Some(first) = points.first() else {
         return Vec::new();
@@ -347,7 +353,7 @@ fn fastest(points: &[Point]) -> Vec<Point> {
     fastest_by(points, |point| point)
 }
 
-/// The fastest answers of each part of the time, in order.
+/// The fastest answers of each part of the turn, in order.
 fn fastest_by<T: Copy>(items: &[T], point: impl Fn(&T) -> &Point) -> Vec<T> {
     let size = items.len().div_ceil(PARTS).max(1);
     let mut chosen = Vec::new();
@@ -361,10 +367,10 @@ fn fastest_by<T: Copy>(items: &[T], point: impl Fn(&T) -> &Point) -> Vec<T> {
     chosen
 }
 
-fn track(points: &[Point], course: &Course, fitted: &Fitted) -> Track {
+fn track(points: &[Point], expected: &ExpectedTurn, fitted: &Fitted) -> Track {
     let line = fitted.line;
     let time = |machine_deg: f64| {
-        let t_us = line.inverse(machine_deg - course.zero_deg);
+        let t_us = line.inverse(machine_deg - expected.zero_deg);
         t_us.unwrap_or_default()
     };
     let quick = fastest(points);
@@ -374,8 +380,8 @@ fn track(points: &[Point], course: &Course, fitted: &Fitted) -> Track {
     let trips = quick.iter().map(Point::round_trip_us);
     Track {
         line,
-        from_us: time(course.from_deg).ceil() as i64,
-        to_us: time(course.to_deg).floor() as i64,
+        from_us: time(expected.from_deg).ceil() as i64,
+        to_us: time(expected.to_deg).floor() as i64,
         residuals: Residuals {
             median_deg: line::quantile(&offs, 0.5),
             p99_deg: line::quantile(&offs, 0.99),

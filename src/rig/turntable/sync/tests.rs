@@ -6,7 +6,7 @@ use super::*;
 use crate::turntable::wire::Pins;
 
 const STEP: f64 = 1.0 / 88.889;
-const COURSE: Course = Course {
+const EXPECTED: ExpectedTurn = ExpectedTurn {
     from_deg: -2.0,
     to_deg: 362.0,
     degrees_per_second: 7.2,
@@ -15,7 +15,7 @@ const COURSE: Course = Course {
 };
 const START_US: i64 = 5_000_000_000;
 
-/// A simple generator of numbers in 0..1 (Lehmer; Park and Miller 1988).
+/// A simple generator of random numbers in 0..1 (Lehmer; Park and Miller 1988).
 struct Chance(u64);
 
 impl Chance {
@@ -27,17 +27,17 @@ impl Chance {
 
 /// A turn as its table would report it.
 struct Turn {
-    /// Between two questions.
+    /// Interval of requests.
     every_us: i64,
-    /// Delays there and back: the least, and the mean of what is added.
+    /// Delays in both directions: the minimum, and the mean of what is added.
     there_us: (f64, f64),
     back_us: (f64, f64),
-    /// Chip seconds in a second.
+    /// Chip seconds per second.
     rate: f64,
     stamps: bool,
     /// The chip's stamp at the start.
     stamp: u32,
-    /// Part of the reports that tell another place.
+    /// Fraction of the reports with a wrong position.
     wrong: f64,
 }
 
@@ -52,12 +52,12 @@ const USUAL: Turn = Turn {
 };
 
 impl Turn {
-    /// Where the table truly is.
+    /// The true angle.
     fn angle(&self, t_us: f64) -> f64 {
         -3.0 + 7.2 * self.rate * (t_us - START_US as f64) * 1e-6
     }
 
-    fn reports(&self, seed: u64) -> Vec<Seen> {
+    fn reports(&self, seed: u64) -> Vec<PositionReport> {
         let mut chance = Chance(seed % 2_000_000_000 + 1);
         let asked = (0..).map(|n| START_US + n * self.every_us);
         let asked = asked.take_while(|us| self.angle(*us as f64) < 363.0);
@@ -66,7 +66,7 @@ impl Turn {
             .collect()
     }
 
-    fn report(&self, asked_us: i64, chance: &mut Chance) -> Seen {
+    fn report(&self, asked_us: i64, chance: &mut Chance) -> PositionReport {
         let delay =
             |(least, added): (f64, f64), chance: &mut Chance| least - added * chance.next().ln();
         let latched = asked_us as f64 + delay(self.there_us, chance);
@@ -77,8 +77,8 @@ impl Turn {
             0.0
         };
         let chip = ((latched - START_US as f64) * self.rate) as u64;
-        Seen {
-            state: State::Run,
+        PositionReport {
+            state: ControllerState::Run,
             machine_deg: ((steps * STEP + off) * 1000.0).round() / 1000.0,
             speed: 7.2,
             chip_us: self.stamps.then_some(self.stamp.wrapping_add(chip as u32)),
@@ -92,7 +92,7 @@ impl Turn {
 
     /// The largest error of the track, degrees.
     fn error(&self, seed: u64) -> f64 {
-        let track = fit(&self.reports(seed), &COURSE).unwrap();
+        let track = fit(&self.reports(seed), &EXPECTED).unwrap();
         let (from_us, to_us) = track.constant_us();
         let error = |t_us: i64| (track.angle_at(t_us).unwrap() - self.angle(t_us as f64)).abs();
         (from_us..=to_us)
@@ -142,7 +142,7 @@ fn wrong_reports_are_left_out_and_counted() {
             ..USUAL
         };
         assert!(turn.error(7) < 0.02, "{}", turn.error(7));
-        let track = fit(&turn.reports(7), &COURSE).unwrap();
+        let track = fit(&turn.reports(7), &EXPECTED).unwrap();
         assert!(
             (40..120).contains(&track.outliers()),
             "{}",
@@ -152,7 +152,7 @@ fn wrong_reports_are_left_out_and_counted() {
 }
 
 #[test]
-fn a_chips_clock_that_starts_again_in_the_middle_is_followed() {
+fn a_chips_clock_that_wraps_around_in_the_middle_is_followed() {
     let wrapping = Turn {
         stamp: u32::MAX - 20_000_000,
         ..USUAL
@@ -161,8 +161,8 @@ fn a_chips_clock_that_starts_again_in_the_middle_is_followed() {
 }
 
 #[test]
-fn angle_and_time_are_each_others_inverse_inside_of_the_constant_part_only() {
-    let track = fit(&USUAL.reports(1), &COURSE).unwrap();
+fn angle_and_time_are_each_others_inverse_inside_the_constant_part_only() {
+    let track = fit(&USUAL.reports(1), &EXPECTED).unwrap();
     let (from_us, to_us) = track.constant_us();
     for angle in [-1.9, 0.0, 123.4, 361.9] {
         let t_us = track.time_at(angle).unwrap();
@@ -176,8 +176,8 @@ fn angle_and_time_are_each_others_inverse_inside_of_the_constant_part_only() {
 }
 
 #[test]
-fn a_track_says_how_good_it_is() {
-    let track = fit(&USUAL.reports(1), &COURSE).unwrap();
+fn a_track_has_residuals_and_counts() {
+    let track = fit(&USUAL.reports(1), &EXPECTED).unwrap();
     let residuals = track.residuals();
     assert!(residuals.median_deg <= residuals.p99_deg && residuals.p99_deg <= residuals.max_deg);
     assert!(residuals.max_deg < 0.05, "{residuals:?}");
@@ -187,17 +187,17 @@ fn a_track_says_how_good_it_is() {
 }
 
 #[test]
-fn turns_that_give_no_track_are_told_apart() {
+fn turns_without_a_track_are_distinguished_by_their_cause() {
     let reports = USUAL.reports(1);
-    let few = fit(&reports[200..210], &COURSE);
+    let few = fit(&reports[200..210], &EXPECTED);
     assert_eq!(few, Err(TrackError::TooFew { polls: 10 }));
     assert!(matches!(
-        fit(&reports[..400], &COURSE),
+        fit(&reports[..400], &EXPECTED),
         Err(TrackError::Gaps { .. })
     ));
-    let fast = Course {
+    let fast = ExpectedTurn {
         degrees_per_second: 7.6,
-        ..COURSE
+        ..EXPECTED
     };
     assert!(matches!(
         fit(&reports, &fast),
@@ -208,27 +208,27 @@ fn turns_that_give_no_track_are_told_apart() {
         ..USUAL
     };
     assert!(matches!(
-        fit(&mad.reports(1), &COURSE),
+        fit(&mad.reports(1), &EXPECTED),
         Err(TrackError::Uneven { .. })
     ));
     let mut stamped = USUAL.reports(1);
-    for seen in &mut stamped {
-        seen.chip_us = seen.chip_us.map(|us| us / 2);
+    for report in &mut stamped {
+        report.chip_us = report.chip_us.map(|us| us / 2);
     }
     assert!(matches!(
-        fit(&stamped, &COURSE),
+        fit(&stamped, &EXPECTED),
         Err(TrackError::Clock { .. })
     ));
 }
 
 #[test]
-fn reports_whose_question_is_not_certain_are_not_used() {
+fn reports_whose_request_is_uncertain_are_not_used() {
     let mut reports = USUAL.reports(1);
-    for seen in reports.iter_mut().step_by(2) {
-        seen.certain = false;
-        seen.came_us += 1_000_000;
+    for report in reports.iter_mut().step_by(2) {
+        report.certain = false;
+        report.came_us += 1_000_000;
     }
-    let track = fit(&reports, &COURSE).unwrap();
+    let track = fit(&reports, &EXPECTED).unwrap();
     assert!(track.polls() < 400 && track.outliers() == 0);
 }
 
@@ -254,15 +254,15 @@ proptest! {
         reports in proptest::collection::vec(
             (any::<i32>(), any::<u16>(), -500.0..500.0f64, proptest::option::of(any::<u32>())), 0..80),
     ) {
-        let seen = |(asked, took, machine_deg, chip_us): &(i32, u16, f64, Option<u32>)| Seen {
+        let report = |(asked, took, machine_deg, chip_us): &(i32, u16, f64, Option<u32>)| PositionReport {
             machine_deg: *machine_deg,
             chip_us: *chip_us,
             asked_us: Some(i64::from(*asked)),
             came_us: i64::from(*asked) + i64::from(*took),
             ..USUAL.report(0, &mut Chance(1))
         };
-        let reports: Vec<Seen> = reports.iter().map(seen).collect();
-        if let Ok(track) = fit(&reports, &COURSE) {
+        let reports: Vec<PositionReport> = reports.iter().map(report).collect();
+        if let Ok(track) = fit(&reports, &EXPECTED) {
             let (from_us, to_us) = track.constant_us();
             prop_assert!(from_us <= to_us && track.angle_at(from_us).unwrap().is_finite());
         }

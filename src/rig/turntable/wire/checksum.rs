@@ -5,14 +5,14 @@ use crc::{CRC_16_IBM_3740, Crc};
 
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 
-/// What a line says of its own wholeness.
+/// A line's checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sealed<'a> {
-    /// The text in front of a checksum that fits.
+    /// The checksum is correct; the text before it.
     Good(&'a str),
-    /// There is a checksum, and it does not fit.
+    /// The checksum is wrong.
     Bad,
-    /// There is no checksum.
+    /// The line has no checksum.
     Open,
 }
 
@@ -21,15 +21,15 @@ pub(super) fn seal(text: &str) -> String {
     format!("{text}*{:04X}", CRC.checksum(text.as_bytes()))
 }
 
-/// Takes the checksum off a line.
+/// Checks and removes a line's checksum.
 pub(super) fn unseal(line: &str) -> Sealed<'_> {
     let Some((text, digits)) = line.rsplit_once('*') else {
         return Sealed::Open;
     };
-    let told = (digits.len() == 4 && digits.bytes().all(is_digit))
+    let received = (digits.len() == 4 && digits.bytes().all(is_digit))
         .then(|| u16::from_str_radix(digits, 16).ok())
         .flatten();
-    if told == Some(CRC.checksum(text.as_bytes())) {
+    if received == Some(CRC.checksum(text.as_bytes())) {
         Sealed::Good(text)
     } else {
         Sealed::Bad
@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn any_flipped_bit_is_told() {
+    fn any_flipped_bit_is_detected() {
         let sealed = seal("ok N17");
         for bit in 0..sealed.len() * 8 {
             let mut bytes = sealed.clone().into_bytes();

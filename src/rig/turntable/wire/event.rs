@@ -1,47 +1,47 @@
-//! What the machine tells: events, and what becomes of a line.
+//! The events of the protocol's state machine, and the outcomes of lines.
 
-use super::message::{Message, ResetCause};
+use super::message::{Message, RestartCause};
 use super::polling::Poll;
 
-/// Something the controller did.
+/// An event from the controller.
 #[derive(Debug, PartialEq)]
-pub enum Event {
-    /// The line `id` has its answer, or will never have one.
+pub enum WireEvent {
+    /// The line `id` has been answered or has failed.
     Answered {
-        /// What [`Machine::send`](super::Machine::send) gave.
+        /// The id that [`Machine::send`](super::Machine::send) returned.
         id: u64,
-        /// What became of it.
-        outcome: Outcome,
+        /// The line's outcome.
+        outcome: LineOutcome,
     },
     /// A status report.
     Status(Poll),
     /// The controller has restarted.
-    Reset(Option<ResetCause>),
-    /// An alarm, by its number.
+    Reset(Option<RestartCause>),
+    /// An alarm with its number.
     Alarm(u8),
 }
 
-/// What became of a line.
+/// The outcome of a line.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
-    /// Accepted; with the lines that stood in front of the answer.
+pub enum LineOutcome {
+    /// Accepted; with the messages before the answer.
     Done(Vec<Message>),
-    /// Refused with Grbl's number: it did nothing.
+    /// Refused with Grbl's error number; not executed.
     Refused(u8),
-    /// It has no answer and will have none: it may or may not have been executed.
+    /// Not answered: it may or may not have been executed.
     Failed(LineFault),
 }
 
-/// Why a line has no answer.
+/// Why a line was not answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LineFault {
-    /// Nothing that answers it came.
+    /// No answer came.
     #[error("no answer came to {tries} of it")]
     NoAnswer {
-        /// How often it was sent.
+        /// How many times it was sent.
         tries: u32,
     },
-    /// The controller counts differently.
+    /// The controller expects another line number.
     #[error("the controller counts its lines differently")]
     OutOfOrder,
     /// The controller restarted.
@@ -58,25 +58,25 @@ pub enum SendError {
     /// Another line waits for its answer.
     #[error("another line waits for its answer")]
     Busy,
-    /// It is not known which answers are still to come; only a reset makes that certain again.
-    #[error("answers are outstanding that cannot be told apart: stop the table first")]
+    /// Answers to earlier lines may still arrive; only a reset makes the state certain again.
+    #[error("answers are outstanding that cannot be distinguished: stop the table first")]
     Unsure,
-    /// The line cannot be sent as one.
+    /// The text cannot be sent as one line.
     #[error("it is longer than 60 bytes or holds bytes that are no part of a line")]
     Unsendable,
 }
 
-/// What went wrong on the wire so far and was put right or noticed.
+/// Counters of lines, reports and wire errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     /// Lines sent, without repetitions.
     pub lines: u64,
-    /// Status reports that came.
+    /// Status reports received.
     pub reports: u64,
     /// Lines sent again.
     pub repeats: u64,
-    /// Lines that came damaged or were nothing a controller says.
+    /// Lines received damaged, or that no controller sends.
     pub noise: u64,
-    /// Answers that nothing waited for.
+    /// Answers for which no line was waiting.
     pub strays: u64,
 }

@@ -1,41 +1,41 @@
-//! Bytes to lines, each with the time its first byte came.
+//! Assembles lines from bytes, each with the arrival time of its first byte.
 
-/// Longest line taken, bytes; Grbl's longest answers stay well below it.
+/// Longest accepted line, bytes; Grbl's longest answers are much shorter.
 const LONGEST: usize = 160;
 
-/// What the bytes gave.
+/// The result of a line end.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Piece {
-    /// A line without its end.
+    /// A line, without its line end.
     Line {
         /// Its text.
         text: String,
-        /// When its first byte came, microseconds.
+        /// Arrival time of its first byte, microseconds.
         first_us: i64,
     },
-    /// Something that is no line: bytes outside printable ASCII, or far too many without an end.
+    /// Not a line: it has bytes outside printable ASCII, or is too long.
     Noise,
 }
 
-/// Puts lines together.
+/// Assembles lines.
 #[derive(Debug, Default)]
 pub(super) struct LineReader {
     bytes: Vec<u8>,
     first_us: i64,
-    spoilt: bool,
+    is_noise: bool,
 }
 
 impl LineReader {
-    /// Takes one byte that came at `now_us`; a line end gives what stood before it.
+    /// Takes one byte that arrived at `now_us`; a line end returns what stands before it.
     pub(super) fn push(&mut self, now_us: i64, byte: u8) -> Option<Piece> {
         if byte == b'\r' || byte == b'\n' {
             return self.end();
         }
-        if self.bytes.is_empty() && !self.spoilt {
+        if self.bytes.is_empty() && !self.is_noise {
             self.first_us = now_us;
         }
         if !(b' '..=b'~').contains(&byte) || self.bytes.len() == LONGEST {
-            self.spoilt = true;
+            self.is_noise = true;
         } else {
             self.bytes.push(byte);
         }
@@ -44,7 +44,7 @@ impl LineReader {
 
     fn end(&mut self) -> Option<Piece> {
         let bytes = std::mem::take(&mut self.bytes);
-        if std::mem::take(&mut self.spoilt) {
+        if std::mem::take(&mut self.is_noise) {
             return Some(Piece::Noise);
         }
         if bytes.is_empty() {

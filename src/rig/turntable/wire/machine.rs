@@ -1,25 +1,25 @@
-//! The state machine: one line in flight, checked or plain, and what comes back.
+//! The protocol's state machine: one line in flight, checked or plain, and the answers.
 
 use std::collections::VecDeque;
 
 use super::checksum::{Sealed, seal, unseal};
-use super::event::{Counts, Event, LineFault, Outcome, SendError};
+use super::event::{Counts, LineFault, LineOutcome, SendError, WireEvent};
 use super::lines::{LineReader, Piece};
-use super::message::{Message, ResetCause, parse};
-use super::pending::{Due, Patience, Pending};
+use super::message::{Message, RestartCause, parse};
+use super::pending::{Due, Pending, ReplyTimeout};
 use super::polling::Polling;
 use super::realtime;
 
-/// Longest block sent, bytes: with number and checksum it fits Grbl's line buffer of 80.
+/// Longest block, bytes: with number and checksum it fits into Grbl's line buffer of 80.
 const LONGEST_BLOCK: usize = 60;
 /// Largest number of a checked line.
 const LAST_SEQ: u32 = 9_999_999;
-/// So many well-formed lines without checksum in a row mean that the controller has left the
-/// checked session, that is, has restarted.
+/// Number of consecutive well-formed lines without checksum that show that the controller has left
+/// the checked session, which means that it has restarted.
 const UNCHECKED: u32 = 3;
-/// The controller's complaint of a number out of order.
+/// The controller's error for a line number out of order.
 const OUT_OF_ORDER: u8 = 71;
-/// The controller's complaint of a checked line outside of a session.
+/// The controller's error for a checked line outside a session.
 const NO_SESSION: u8 = 72;
 
 /// How lines are sent.
@@ -27,48 +27,37 @@ const NO_SESSION: u8 = 72;
 enum Session {
     #[default]
     Plain,
-    /// The line that opens a checked session is under way.
+    /// The line that opens a checked session waits for its answer.
     Opening,
     /// Checked; the next line has this number.
     Checked { next: u32 },
 }
 
-/// The byte state machine. Takes bytes and time, gives bytes and events.
+/// The protocol's state machine: takes bytes and times, returns bytes and events.
 #[derive(Debug, Default)]
 pub struct Machine {
     reader: LineReader,
     session: Session,
     pending: Option<Pending>,
-    /// A line was given up whose answer may still come.
+    /// A line was given up whose answer may still arrive.
     unsure: bool,
     unchecked: u32,
-    slack_us: i64,
     polling: Polling,
     realtime: Vec<u8>,
     lines: Vec<u8>,
-    events: VecDeque<Event>,
+    events: VecDeque<WireEvent>,
     next_id: u64,
     counts: Counts,
 }
 
 impl Machine {
-    /// A machine that sends plain lines and asks for nothing.
+    /// A machine that sends plain lines and requests no reports.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A machine that waits so many microseconds longer than the interface needs, for clocks that
-    /// run faster than the machines that follow them.
-    #[must_use]
-    pub fn with_slack(slack_us: i64) -> Self {
-        Self {
-            slack_us,
-            ..Self::default()
-        }
-    }
-
-    /// What went wrong so far.
+    /// Counters since the start.
     pub fn counts(&self) -> Counts {
         self.counts
     }
@@ -78,21 +67,26 @@ impl Machine {
         matches!(self.session, Session::Checked { .. })
     }
 
-    /// Whether a line waits for its answer, or one was given up whose answer may still come.
+    /// Whether a line waits for its answer, or the answer to one that was given up may still arrive.
     pub fn is_open(&self) -> bool {
         self.pending.is_some() || self.unsure
     }
 
-    /// Asks for a report every so many microseconds from now on, or no more.
+    /// Sets the interval of report requests, microseconds; `None` for no requests.
     pub fn poll_every(&mut self, every_us: Option<i64>) {
         self.polling.set_every(every_us);
     }
 
-    /// Sends a line, checked where a session is open.
+    /// Sends a line; checked if a session is open.
     ///
     /// # Errors
-    /// [`SendError`]; then nothing was sent.
-    pub fn send(&mut self, now_us: i64, block: &str, patience: Patience) -> Result<u64, SendError> {
+    /// [`SendError`]; nothing was sent.
+    pub fn send(
+        &mut self,
+        now_us: i64,
+        block: &str,
+        timeout: ReplyTimeout,
+    ) -> Result<u64, SendError> {
         let plain = |b: u8| (b' '..=b'~').contains(&b) && !matches!(b, b'?' | b'!' | b'~' | b'*');
         if block.len() > LONGEST_BLOCK || !block.bytes().all(plain) {
             return Err(SendError::Unsendable);
@@ -100,18 +94,18 @@ impl Machine {
         match self.session {
             Session::Checked { next } => {
                 let text = seal(&format!("N{next} {block}"));
-                self.launch(now_us, &text, Some(next), patience)
+                self.launch(now_us, &text, Some(next), timeout)
             }
-            Session::Plain | Session::Opening => self.launch(now_us, block, None, patience),
+            Session::Plain | Session::Opening => self.launch(now_us, block, None, timeout),
         }
     }
 
-    /// Opens a checked session, or starts it anew.
+    /// Opens a checked session, or restarts it.
     ///
     /// # Errors
-    /// [`SendError`]; then nothing was sent.
+    /// [`SendError`]; nothing was sent.
     pub fn open_session(&mut self, now_us: i64) -> Result<u64, SendError> {
-        let id = self.launch(now_us, &seal("N0"), Some(0), Patience::Short)?;
+        let id = self.launch(now_us, &seal("N0"), Some(0), ReplyTimeout::AtOnce)?;
         self.session = Session::Opening;
         Ok(id)
     }
@@ -121,7 +115,7 @@ impl Machine {
         now_us: i64,
         text: &str,
         seq: Option<u32>,
-        patience: Patience,
+        timeout: ReplyTimeout,
     ) -> Result<u64, SendError> {
         if self.pending.is_some() {
             return Err(SendError::Busy);
@@ -131,25 +125,25 @@ impl Machine {
         }
         let id = self.next_id;
         self.next_id += 1;
-        let pending = Pending::new(id, text, seq, patience, now_us);
+        let pending = Pending::new(id, text, seq, timeout, now_us);
         self.lines.extend_from_slice(&pending.bytes);
         self.pending = Some(pending);
         self.counts.lines += 1;
         Ok(id)
     }
 
-    /// Sends a real-time byte, ahead of what waits to be sent.
+    /// Sends a real-time command before everything else that waits to be sent.
     pub fn realtime(&mut self, byte: u8) {
         self.realtime.push(byte);
     }
 
-    /// Gives up the line in flight. What is left of it is not sent, but it may have been executed.
+    /// Gives up the line in flight. Its unsent rest is discarded, but it may have been executed.
     pub fn give_up(&mut self) {
         self.lines.clear();
         self.fail(LineFault::GivenUp);
     }
 
-    /// What is to be sent now. Call it right before writing: it notes the time of questions.
+    /// The bytes to be sent now. Call it right before writing: it notes the time of requests.
     pub fn take_output(&mut self, now_us: i64) -> Vec<u8> {
         let mut output = std::mem::take(&mut self.realtime);
         if self.polling.is_due(now_us) {
@@ -161,16 +155,16 @@ impl Machine {
     }
 
     /// The next event.
-    pub fn next_event(&mut self) -> Option<Event> {
+    pub fn next_event(&mut self) -> Option<WireEvent> {
         self.events.pop_front()
     }
 
-    /// Time has passed: lines without answer are sent again or given up.
+    /// Processes the passing of time: repeats or gives up lines without answer.
     pub fn on_time(&mut self, now_us: i64) {
         let due = self
             .pending
             .as_ref()
-            .map_or(Due::Wait, |line| line.due(now_us - self.slack_us));
+            .map_or(Due::Wait, |line| line.due(now_us));
         self.follow(due, now_us);
     }
 
@@ -192,7 +186,7 @@ impl Machine {
         }
     }
 
-    /// Bytes have come.
+    /// Processes received bytes.
     pub fn on_bytes(&mut self, now_us: i64, bytes: &[u8]) {
         for &byte in bytes {
             match self.reader.push(now_us, byte) {
@@ -221,7 +215,7 @@ impl Machine {
         }
     }
 
-    /// A line without checksum where each should have one: its tail was lost, or the controller
+    /// Processes a line without checksum in a checked session: its end was lost, or the controller
     /// has restarted and left the session.
     fn on_unchecked(&mut self, line: &str) {
         self.counts.noise += 1;
@@ -245,11 +239,11 @@ impl Machine {
         match message {
             Message::Ok { seq } => self.on_answer(now_us, seq, None),
             Message::Error { code, seq } => self.on_answer(now_us, seq, Some(code)),
-            Message::Alarm(code) => self.events.push_back(Event::Alarm(code)),
+            Message::Alarm(code) => self.events.push_back(WireEvent::Alarm(code)),
             Message::Status(report) => {
                 self.counts.reports += 1;
                 let poll = self.polling.answered(report, first_us);
-                self.events.push_back(Event::Status(poll));
+                self.events.push_back(WireEvent::Status(poll));
             }
             Message::Banner(banner) => self.reset(banner.cause),
             other => {
@@ -266,8 +260,8 @@ impl Machine {
             return;
         };
         if awaited != seq {
-            // In a session an answer without number is a complaint of damage, and one with
-            // another number a repetition.
+            // In a session, an answer without number reports a damaged line, and one with another
+            // number is a repetition.
             match (awaited, seq) {
                 (Some(_), None) => self.on_damaged(now_us),
                 _ => self.counts.strays += 1,
@@ -278,7 +272,7 @@ impl Machine {
             None => self.accept(),
             Some(NO_SESSION) if seq.is_some() => self.reset(None),
             Some(OUT_OF_ORDER) if seq.is_some() => self.fail(LineFault::OutOfOrder),
-            Some(code) => self.answer(Outcome::Refused(code)),
+            Some(code) => self.answer(LineOutcome::Refused(code)),
         }
     }
 
@@ -293,16 +287,16 @@ impl Machine {
             .pending
             .as_mut()
             .map(|line| std::mem::take(&mut line.info));
-        self.answer(Outcome::Done(info.unwrap_or_default()));
+        self.answer(LineOutcome::Done(info.unwrap_or_default()));
     }
 
-    /// The controller has dealt with the line: the next one has the next number.
-    fn answer(&mut self, outcome: Outcome) {
+    /// Notes that the controller has processed the line: the next one gets the next number.
+    fn answer(&mut self, outcome: LineOutcome) {
         let Some(pending) = self.pending.take() else {
             return;
         };
         self.lines.clear();
-        let opened = matches!(outcome, Outcome::Done(_));
+        let opened = matches!(outcome, LineOutcome::Done(_));
         self.session = match (self.session, pending.seq) {
             (Session::Checked { .. }, Some(LAST_SEQ)) => Session::Plain,
             (Session::Checked { .. }, Some(seq)) => Session::Checked { next: seq + 1 },
@@ -311,25 +305,25 @@ impl Machine {
             (session, _) => session,
         };
         let id = pending.id;
-        self.events.push_back(Event::Answered { id, outcome });
+        self.events.push_back(WireEvent::Answered { id, outcome });
     }
 
     fn fail(&mut self, fault: LineFault) {
         if let Some(Pending { id, .. }) = self.pending.take() {
             self.unsure = true;
-            let outcome = Outcome::Failed(fault);
-            self.events.push_back(Event::Answered { id, outcome });
+            let outcome = LineOutcome::Failed(fault);
+            self.events.push_back(WireEvent::Answered { id, outcome });
         }
     }
 
-    /// The controller has restarted: nothing from before is answered, and it takes plain lines.
-    fn reset(&mut self, cause: Option<ResetCause>) {
+    /// Notes that the controller has restarted: it answers no earlier line and takes plain lines.
+    fn reset(&mut self, cause: Option<RestartCause>) {
         self.fail(LineFault::Restarted);
         self.lines.clear();
         self.session = Session::Plain;
         self.unsure = false;
         self.unchecked = 0;
         self.polling.forget();
-        self.events.push_back(Event::Reset(cause));
+        self.events.push_back(WireEvent::Reset(cause));
     }
 }

@@ -1,35 +1,35 @@
-//! What a controller says, a line at a time.
+//! The lines that a controller sends.
 
 use std::fmt;
 
 use super::number::{decimal, whole};
 use super::status::StatusReport;
 
-/// Why the controller started, where it says so.
+/// Why the controller started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ResetCause {
+pub enum RestartCause {
     /// Its power came on.
     PowerOn,
     /// Its reset pin, which an Uno's USB side pulls when the port is opened.
     External,
-    /// Its supply voltage sank.
+    /// Its supply voltage dropped.
     BrownOut,
     /// It hung, and its watchdog restarted it.
     Watchdog,
-    /// The host sent the reset byte.
+    /// The host sent the reset command.
     Host,
 }
 
-impl ResetCause {
-    const NAMES: [(ResetCause, &'static str); 5] = [
-        (ResetCause::PowerOn, "power-on"),
-        (ResetCause::External, "external"),
-        (ResetCause::BrownOut, "brown-out"),
-        (ResetCause::Watchdog, "watchdog"),
-        (ResetCause::Host, "host"),
+impl RestartCause {
+    const NAMES: [(RestartCause, &'static str); 5] = [
+        (RestartCause::PowerOn, "power-on"),
+        (RestartCause::External, "external"),
+        (RestartCause::BrownOut, "brown-out"),
+        (RestartCause::Watchdog, "watchdog"),
+        (RestartCause::Host, "host"),
     ];
 
-    fn parse(text: &str) -> Option<ResetCause> {
+    fn parse(text: &str) -> Option<RestartCause> {
         let mut names = Self::NAMES.iter();
         names
             .find(|(_, name)| *name == text)
@@ -37,7 +37,7 @@ impl ResetCause {
     }
 }
 
-impl fmt::Display for ResetCause {
+impl fmt::Display for RestartCause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut names = Self::NAMES.iter();
         let found = names.find(|(cause, _)| cause == self);
@@ -45,13 +45,13 @@ impl fmt::Display for ResetCause {
     }
 }
 
-/// The line a controller starts with.
+/// The line with which a controller starts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Banner {
     /// Grbl's version, such as `1.1h`.
     pub version: String,
-    /// Why it started, where it says so.
-    pub cause: Option<ResetCause>,
+    /// Why it started, if it reports that.
+    pub cause: Option<RestartCause>,
 }
 
 /// A line from the controller.
@@ -64,12 +64,12 @@ pub enum Message {
     },
     /// A line was refused.
     Error {
-        /// Why: Grbl's number.
+        /// Grbl's error number.
         code: u8,
         /// The checked line's number.
         seq: Option<u32>,
     },
-    /// Something stopped the table: Grbl's number.
+    /// An alarm, with Grbl's number.
     Alarm(u8),
     /// A status report.
     Status(StatusReport),
@@ -84,20 +84,20 @@ pub enum Message {
     },
     /// `[OPT:..]`: how the firmware was built.
     Build {
-        /// A letter an option.
+        /// One letter per option.
         letters: String,
-        /// Blocks its planner holds.
+        /// Size of the planner buffer, blocks.
         blocks: u32,
-        /// Bytes its receive buffer holds.
+        /// Size of the receive buffer, bytes.
         buffer: u32,
     },
-    /// `[MSG:..]`: words for a person.
+    /// `[MSG:..]`: a text for the user.
     Note(String),
     /// Any other line in brackets, such as `[GC:G0 G54 ..]`.
     Info {
-        /// What stands before the colon.
+        /// The text before the colon.
         tag: String,
-        /// What stands after it.
+        /// The text after it.
         text: String,
     },
     /// `$100=88.889`: a setting.
@@ -111,7 +111,7 @@ pub enum Message {
     Startup(String),
 }
 
-/// Reads one line without its end; `None` where it is nothing a Grbl 1.1 controller says.
+/// Parses one line without its line end; `None` if it is no line of a Grbl 1.1 controller.
 #[must_use]
 pub fn parse(line: &str) -> Option<Message> {
     match line.as_bytes().first()? {
@@ -152,7 +152,7 @@ fn banner(line: &str) -> Option<Message> {
         "" => None,
         _ => {
             let words = rest.strip_prefix(" [reset: ")?.strip_suffix(']')?;
-            Some(ResetCause::parse(words)?)
+            Some(RestartCause::parse(words)?)
         }
     };
     let version = version.to_owned();

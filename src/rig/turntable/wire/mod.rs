@@ -1,13 +1,13 @@
-//! The wire: bytes in, events out. A state machine without I/O, without threads and without a
-//! clock of its own; every call that time matters to is told the time.
+//! The serial protocol: bytes in, events out. A state machine without I/O, without threads and
+//! without a clock of its own; calls for which time matters take the time as an argument.
 //!
-//! It puts lines together, parses what a Grbl 1.1 controller says, keeps one line in flight and
-//! matches its answer one to one, asks for status reports and brackets them with the time of
-//! question and answer, and tells noise, merged and lost lines from success. Where the controller
+//! It assembles lines, parses the messages of a Grbl 1.1 controller, keeps one line in flight and
+//! matches its answer to it, requests status reports and brackets each with the times of request and
+//! arrival, and distinguishes noise, merged lines and lost lines from success. If the controller
 //! offers checked lines, each line carries a number and a checksum, and a lost one is sent again
 //! without ever being executed twice.
 //!
-//! It knows nothing of what the lines mean for the table.
+//! This module knows nothing of what the lines mean for the table.
 
 mod checksum;
 mod event;
@@ -24,19 +24,20 @@ mod properties;
 #[cfg(test)]
 mod tests;
 
-pub use event::{Counts, Event, LineFault, Outcome, SendError};
+pub use event::{Counts, LineFault, LineOutcome, SendError, WireEvent};
 pub use machine::Machine;
-pub use message::{Banner, Message, ResetCause, parse};
-pub use pending::Patience;
+pub use message::{Banner, Message, RestartCause, parse};
+pub use pending::ReplyTimeout;
 pub use polling::Poll;
-pub use status::{Pins, Position, State, StatusReport};
+pub use status::{ControllerState, Pins, Position, StatusReport};
 
-/// Real-time bytes: taken by the controller from anywhere in the stream, never part of a line.
+/// Real-time commands: single bytes that the controller takes out of the stream anywhere; never part
+/// of a line.
 pub mod realtime {
-    /// Asks for a status report.
+    /// Requests a status report.
     pub const STATUS: u8 = b'?';
-    /// Feed hold: the table ramps down, and a jog is dropped.
+    /// Feed hold: the table ramps down, and a jog is discarded.
     pub const HOLD: u8 = b'!';
-    /// Resets the controller: in motion the steps stop at once and the position is lost.
+    /// Resets the controller. In motion, the steps stop at once and the position is lost.
     pub const RESET: u8 = 0x18;
 }

@@ -1,6 +1,6 @@
 //! Numbers as Grbl writes them: digits, perhaps a sign and a point, no exponent.
 
-/// Longest number taken: more digits are noise.
+/// Longest accepted number: more digits are noise.
 const LONGEST: usize = 16;
 
 /// A decimal number such as `-12.345`.

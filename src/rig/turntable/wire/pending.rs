@@ -2,33 +2,33 @@
 
 use super::message::Message;
 
-/// How often a checked line is sent before it counts as lost for good.
+/// How many times a checked line is sent before it counts as lost.
 pub(super) const TRIES: u32 = 5;
-/// How long a line that is answered at once may stay without answer, microseconds.
+/// Time limit for the answer to a line that is answered at once, microseconds.
 const ANSWER_US: i64 = 500_000;
-/// How soon after it was sent a line may be sent again because it came damaged, microseconds: a
-/// complaint that comes sooner is about something before it.
+/// Shortest time after which an error for a damaged line can refer to the line in flight,
+/// microseconds: an earlier one refers to something sent before it.
 const TURNAROUND_US: i64 = 5_000;
-/// Most lines kept that stand in front of an answer.
+/// Limit of messages kept that stand before an answer.
 const MOST_INFO: usize = 128;
 
-/// How long a line's answer may take.
+/// The time limit for a line's answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Patience {
+pub enum ReplyTimeout {
     /// It is answered at once.
-    Short,
-    /// It is answered after something else has happened, within so many microseconds.
-    Long(i64),
+    AtOnce,
+    /// It is answered within so many microseconds, when what it asks for has happened.
+    Within(i64),
 }
 
-/// What has become of a line.
+/// What has to be done with a line.
 #[derive(Debug, PartialEq)]
 pub(super) enum Due {
-    /// Nothing is to be done yet.
+    /// Nothing yet.
     Wait,
-    /// It is to be sent again.
+    /// Send it again.
     Again,
-    /// It has failed for good.
+    /// It has failed.
     Lost,
 }
 
@@ -40,9 +40,9 @@ pub(super) struct Pending {
     /// The checked line's number; `None` for a plain line.
     pub(super) seq: Option<u32>,
     pub(super) tries: u32,
-    /// What came since it was sent and is no answer.
+    /// Messages since it was sent that are no answers.
     pub(super) info: Vec<Message>,
-    patience: Patience,
+    timeout: ReplyTimeout,
     first_us: i64,
     last_us: i64,
 }
@@ -52,7 +52,7 @@ impl Pending {
         id: u64,
         text: &str,
         seq: Option<u32>,
-        patience: Patience,
+        timeout: ReplyTimeout,
         now_us: i64,
     ) -> Self {
         Self {
@@ -61,26 +61,26 @@ impl Pending {
             seq,
             tries: 1,
             info: Vec::new(),
-            patience,
+            timeout,
             first_us: now_us,
             last_us: now_us,
         }
     }
 
-    /// What is to be done with a line that has no answer yet.
+    /// What has to be done with a line that has no answer yet.
     pub(super) fn due(&self, now_us: i64) -> Due {
         let waited_us = now_us - self.last_us;
-        let over = match self.patience {
-            Patience::Short => {
+        let over = match self.timeout {
+            ReplyTimeout::AtOnce => {
                 waited_us >= ANSWER_US && (self.seq.is_none() || self.tries >= TRIES)
             }
-            Patience::Long(limit_us) => now_us - self.first_us >= limit_us,
+            ReplyTimeout::Within(limit_us) => now_us - self.first_us >= limit_us,
         };
-        // A line whose answer takes long is asked after at growing distances: the controller may
-        // be unable to read it, and its buffer is small.
-        let again_us = match self.patience {
-            Patience::Short => ANSWER_US,
-            Patience::Long(_) => ANSWER_US << self.tries.min(TRIES),
+        // A line whose answer takes long is repeated at growing intervals: the controller may not
+        // read it for a while, and its buffer is small.
+        let again_us = match self.timeout {
+            ReplyTimeout::AtOnce => ANSWER_US,
+            ReplyTimeout::Within(_) => ANSWER_US << self.tries.min(TRIES),
         };
         if over {
             Due::Lost
@@ -91,7 +91,7 @@ impl Pending {
         }
     }
 
-    /// The controller complains of a damaged line: what that means for this one.
+    /// What has to be done with this line after the controller's error for a damaged line.
     pub(super) fn damaged(&self, now_us: i64) -> Due {
         if now_us - self.last_us < TURNAROUND_US || self.seq.is_none() {
             Due::Wait
@@ -102,7 +102,7 @@ impl Pending {
         }
     }
 
-    /// Counts one more sending.
+    /// Notes that it was sent again.
     pub(super) fn sent_again(&mut self, now_us: i64) {
         self.tries += 1;
         self.last_us = now_us;

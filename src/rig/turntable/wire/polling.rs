@@ -1,42 +1,42 @@
-//! Asking for status reports, and which report answers which question.
+//! Requests for status reports, and which report answers which request.
 
 use super::status::StatusReport;
 
-/// How long a question may stay without a report before it counts as lost, microseconds.
+/// Time after which an unanswered request counts as lost, microseconds.
 const LOST_US: i64 = 120_000;
-/// How long after a lost question a report may still be its answer, microseconds.
-const DOUBT_US: i64 = 500_000;
+/// How long after that a report may still answer the lost request, microseconds.
+const LATE_ANSWER_US: i64 = 500_000;
 
-/// A status report with its place in time.
+/// A status report with the times of its request and its arrival.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Poll {
-    /// What it says.
+    /// The report.
     pub report: StatusReport,
-    /// When the question for it went out, microseconds; `None` for a report nobody asked for.
+    /// When it was requested, microseconds; `None` for a report without request.
     pub asked_us: Option<i64>,
-    /// When its first byte came, microseconds.
+    /// When its first byte arrived, microseconds.
     pub came_us: i64,
-    /// Whether it is certain that it answers that question and no earlier one.
+    /// Whether it certainly answers that request and no earlier one.
     pub certain: bool,
 }
 
-/// When to ask, and what was asked.
+/// When to request a report, and which request is open.
 #[derive(Debug, Default)]
 pub(super) struct Polling {
     every_us: Option<i64>,
-    /// When the last question was put, asked or not yet on its way.
+    /// When the last request was sent.
     last_us: Option<i64>,
     asked_us: Option<i64>,
-    doubt_until_us: Option<i64>,
+    uncertain_until_us: Option<i64>,
 }
 
 impl Polling {
-    /// Asks every so many microseconds from now on, or no more.
+    /// Sets the interval of requests, microseconds; `None` for no requests.
     pub(super) fn set_every(&mut self, every_us: Option<i64>) {
         self.every_us = every_us;
     }
 
-    /// Whether a question is to go out now.
+    /// Whether a request is due.
     pub(super) fn is_due(&mut self, now_us: i64) -> bool {
         let Some(every_us) = self.every_us else {
             return false;
@@ -45,32 +45,33 @@ impl Polling {
             if now_us - asked_us < LOST_US {
                 return false;
             }
-            self.doubt_until_us = Some(now_us + DOUBT_US);
+            self.uncertain_until_us = Some(now_us + LATE_ANSWER_US);
             self.asked_us = None;
         }
         self.last_us
             .is_none_or(|last_us| now_us - last_us >= every_us)
     }
 
-    /// A question goes out now.
+    /// Notes that a request is sent now.
     pub(super) fn asked(&mut self, now_us: i64) {
         self.last_us = Some(now_us);
         self.asked_us = Some(now_us);
     }
 
-    /// A report has come whose first byte came at `came_us`.
+    /// Processes a report whose first byte arrived at `came_us`.
     pub(super) fn answered(&mut self, report: StatusReport, came_us: i64) -> Poll {
         let asked_us = self.asked_us.take_if(|asked_us| *asked_us <= came_us);
-        let doubtful = asked_us.is_none_or(|asked| self.doubt_until_us.is_some_and(|t| asked < t));
+        let uncertain =
+            asked_us.is_none_or(|asked| self.uncertain_until_us.is_some_and(|t| asked < t));
         Poll {
             report,
             asked_us,
             came_us,
-            certain: !doubtful,
+            certain: !uncertain,
         }
     }
 
-    /// The controller has restarted: questions before that are not answered any more.
+    /// Notes that the controller has restarted and answers no earlier request.
     pub(super) fn forget(&mut self) {
         self.asked_us = None;
     }

@@ -1,4 +1,4 @@
-//! Properties of parser and machine: on a harmed wire, and on any bytes at all.
+//! Properties of parser and state machine on a damaged wire and on arbitrary bytes.
 
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
@@ -7,11 +7,11 @@ use proptest::prelude::*;
 
 use super::tests::{checked, events, outcome};
 use super::*;
-use crate::turntable::peer::{Peer, seal};
+use crate::turntable::fake_grbl::{FakeGrbl, seal};
 
-/// What the wire does to a line.
+/// A fault of the wire that changes a line.
 #[derive(Debug, Clone, Copy)]
-enum Fault {
+enum WireFault {
     None,
     Drop(usize),
     Flip(usize),
@@ -20,49 +20,49 @@ enum Fault {
     Lose,
 }
 
-fn fault() -> impl Strategy<Value = Fault> {
+fn fault() -> impl Strategy<Value = WireFault> {
     prop_oneof![
-        6 => Just(Fault::None),
-        1 => any::<usize>().prop_map(Fault::Drop),
-        1 => any::<usize>().prop_map(Fault::Flip),
-        1 => Just(Fault::Twice),
-        1 => Just(Fault::Merge),
-        1 => Just(Fault::Lose),
+        6 => Just(WireFault::None),
+        1 => any::<usize>().prop_map(WireFault::Drop),
+        1 => any::<usize>().prop_map(WireFault::Flip),
+        1 => Just(WireFault::Twice),
+        1 => Just(WireFault::Merge),
+        1 => Just(WireFault::Lose),
     ]
 }
 
-fn harm(bytes: &[u8], fault: Fault) -> Vec<u8> {
-    let mut harmed = bytes.to_vec();
+fn damage(bytes: &[u8], fault: WireFault) -> Vec<u8> {
+    let mut damaged = bytes.to_vec();
     match fault {
-        Fault::None => {}
-        Fault::Drop(at) => drop(harmed.remove(at % bytes.len())),
-        Fault::Flip(at) => harmed[at / 8 % bytes.len()] ^= 1 << (at % 8),
-        Fault::Twice => harmed.extend(bytes),
-        Fault::Merge => harmed.retain(|byte| !matches!(byte, b'\r' | b'\n')),
-        Fault::Lose => harmed.clear(),
+        WireFault::None => {}
+        WireFault::Drop(at) => drop(damaged.remove(at % bytes.len())),
+        WireFault::Flip(at) => damaged[at / 8 % bytes.len()] ^= 1 << (at % 8),
+        WireFault::Twice => damaged.extend(bytes),
+        WireFault::Merge => damaged.retain(|byte| !matches!(byte, b'\r' | b'\n')),
+        WireFault::Lose => damaged.clear(),
     }
-    harmed
+    damaged
 }
 
-/// Sends one line through a harmed wire until it is done or has failed.
+/// Sends one line through a faulty wire until it is done or has failed.
 fn exchange(
     machine: &mut Machine,
-    peer: &mut Peer,
+    fake_grbl: &mut FakeGrbl,
     now_us: &mut i64,
     block: &str,
-    faults: &mut impl Iterator<Item = Fault>,
-) -> Outcome {
-    machine.send(*now_us, block, Patience::Short).unwrap();
+    faults: &mut impl Iterator<Item = WireFault>,
+) -> LineOutcome {
+    machine.send(*now_us, block, ReplyTimeout::AtOnce).unwrap();
     for _ in 0..2000 {
         *now_us += 5000;
         machine.on_time(*now_us);
         let output = machine.take_output(*now_us);
         if !output.is_empty() {
-            peer.take(&harm(&output, faults.next().unwrap()));
+            fake_grbl.take(&damage(&output, faults.next().unwrap()));
         }
-        peer.advance(*now_us);
-        for line in peer.give().split_inclusive(|byte| *byte == b'\n') {
-            machine.on_bytes(*now_us, &harm(line, faults.next().unwrap()));
+        fake_grbl.advance(*now_us);
+        for line in fake_grbl.give().split_inclusive(|byte| *byte == b'\n') {
+            machine.on_bytes(*now_us, &damage(line, faults.next().unwrap()));
         }
         if let Some(outcome) = outcome(machine) {
             return outcome;
@@ -75,26 +75,26 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
-    fn on_a_harmed_wire_a_checked_line_is_done_once_or_fails(faults in vec(fault(), 50)) {
-        let (mut peer, mut machine, mut now_us) = (Peer::new(true), checked(), 1);
-        peer.advance(1);
-        peer.take(format!("{}\n", seal("N0")).as_bytes());
-        peer.advance(10_000);
-        peer.give();
+    fn on_a_faulty_wire_a_checked_line_is_done_once_or_fails(faults in vec(fault(), 50)) {
+        let (mut fake_grbl, mut machine, mut now_us) = (FakeGrbl::new(true), checked(), 1);
+        fake_grbl.advance(1);
+        fake_grbl.take(format!("{}\n", seal("N0")).as_bytes());
+        fake_grbl.advance(10_000);
+        fake_grbl.give();
         let mut faults = faults.into_iter().cycle();
         for number in 0..40 {
-            // A flipped bit can make the reset byte of a digit.
+            // A flipped bit can turn a digit into the reset command.
             if !machine.is_checked() {
                 break;
             }
             let block = format!("G4P{number}");
-            let before = peer.executed.len();
-            let outcome = exchange(&mut machine, &mut peer, &mut now_us, &block, &mut faults);
-            let done = peer.executed[before..].to_vec();
+            let before = fake_grbl.executed.len();
+            let outcome = exchange(&mut machine, &mut fake_grbl, &mut now_us, &block, &mut faults);
+            let done = fake_grbl.executed[before..].to_vec();
             match outcome {
-                Outcome::Done(_) => prop_assert_eq!(done, [block]),
-                Outcome::Refused(code) => prop_assert!(false, "refused with {}", code),
-                Outcome::Failed(_) => {
+                LineOutcome::Done(_) => prop_assert_eq!(done, [block]),
+                LineOutcome::Refused(code) => prop_assert!(false, "refused with {}", code),
+                LineOutcome::Failed(_) => {
                     prop_assert!(done.is_empty() || done == [block.clone()], "{:?} for {}", done, block);
                     break;
                 }
@@ -103,15 +103,15 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_taken_without_harm(pieces in vec(vec(any::<u8>(), 0..40), 0..30)) {
+    fn any_bytes_are_processed_without_a_panic(pieces in vec(vec(any::<u8>(), 0..40), 0..30)) {
         for mut machine in [Machine::new(), checked()] {
-            machine.send(0, "$X", Patience::Short).unwrap();
+            machine.send(0, "$X", ReplyTimeout::AtOnce).unwrap();
             for (now_us, piece) in (0..).zip(&pieces) {
                 machine.on_bytes(now_us * 100_000, piece);
                 machine.on_time(now_us * 100_000);
             }
             let done = events(&mut machine).into_iter().any(|event| {
-                matches!(event, Event::Answered { outcome: Outcome::Done(_), .. })
+                matches!(event, WireEvent::Answered { outcome: LineOutcome::Done(_), .. })
             });
             prop_assert!(!done || !machine.is_checked());
         }
@@ -140,7 +140,7 @@ fn seq() -> impl Strategy<Value = Option<u32>> {
 }
 
 fn report() -> impl Strategy<Value = StatusReport> {
-    use State::*;
+    use ControllerState::*;
     let state = [
         Idle, Run, Held, Holding, Jog, Home, Alarm, Check, Door, Sleep,
     ];
@@ -173,11 +173,11 @@ fn report() -> impl Strategy<Value = StatusReport> {
 
 fn message() -> impl Strategy<Value = Message> {
     let cause = [
-        ResetCause::PowerOn,
-        ResetCause::External,
-        ResetCause::BrownOut,
-        ResetCause::Watchdog,
-        ResetCause::Host,
+        RestartCause::PowerOn,
+        RestartCause::External,
+        RestartCause::BrownOut,
+        RestartCause::Watchdog,
+        RestartCause::Host,
     ];
     let cause = proptest::option::of(proptest::sample::select(cause.to_vec()));
     prop_oneof![

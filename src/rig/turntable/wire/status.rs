@@ -4,81 +4,85 @@ use std::fmt;
 
 use super::number::{decimal, whole};
 
-/// What the controller is doing, in Grbl's words.
+/// The controller's state, as Grbl names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum State {
+pub enum ControllerState {
     /// At rest, ready.
     Idle,
-    /// Moving by G-code, or waiting within it.
+    /// Executing G-code.
     Run,
-    /// Held, and at rest.
+    /// Feed hold, at rest (`Hold:0`).
     Held,
-    /// Held, and still ramping down.
+    /// Feed hold, still ramping down (`Hold:1`).
     Holding,
     /// Jogging.
     Jog,
-    /// Looking for the index.
+    /// Searching for the index.
     Home,
     /// Locked after an alarm or at start-up.
     Alarm,
-    /// Reads G-code without moving.
+    /// Check mode: parses G-code without moving.
     Check,
-    /// The safety door is open, which tables have none of; stock boards can report it.
+    /// The safety door is open. A table has none, but a stock board can report it.
     Door,
     /// Asleep until a reset.
     Sleep,
 }
 
-impl State {
-    /// Whether the table may be moving, or will move on without being told.
+impl ControllerState {
+    /// Whether the table may be moving, or may start to move without a command.
     #[must_use]
     pub fn may_move(self) -> bool {
         matches!(
             self,
-            State::Run | State::Holding | State::Jog | State::Home | State::Door
+            ControllerState::Run
+                | ControllerState::Holding
+                | ControllerState::Jog
+                | ControllerState::Home
+                | ControllerState::Door
         )
     }
 
-    fn parse(text: &str) -> Option<State> {
+    fn parse(text: &str) -> Option<ControllerState> {
         let (name, sub) = match text.split_once(':') {
             Some((name, sub)) => (name, Some(whole(sub)?)),
             None => (text, None),
         };
         Some(match (name, sub) {
-            ("Idle", None) => State::Idle,
-            ("Run", None) => State::Run,
-            ("Hold", Some(0)) => State::Held,
-            ("Hold", Some(1)) => State::Holding,
-            ("Jog", None) => State::Jog,
-            ("Home", None) => State::Home,
-            ("Alarm", None) => State::Alarm,
-            ("Check", None) => State::Check,
-            ("Door", Some(0..=3)) => State::Door,
-            ("Sleep", None) => State::Sleep,
+            ("Idle", None) => ControllerState::Idle,
+            ("Run", None) => ControllerState::Run,
+            ("Hold", Some(0)) => ControllerState::Held,
+            ("Hold", Some(1)) => ControllerState::Holding,
+            ("Jog", None) => ControllerState::Jog,
+            ("Home", None) => ControllerState::Home,
+            ("Alarm", None) => ControllerState::Alarm,
+            ("Check", None) => ControllerState::Check,
+            ("Door", Some(0..=3)) => ControllerState::Door,
+            ("Sleep", None) => ControllerState::Sleep,
             _ => return None,
         })
     }
 }
 
-impl fmt::Display for State {
+impl fmt::Display for ControllerState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            State::Idle => "Idle",
-            State::Run => "Run",
-            State::Held => "Hold:0",
-            State::Holding => "Hold:1",
-            State::Jog => "Jog",
-            State::Home => "Home",
-            State::Alarm => "Alarm",
-            State::Check => "Check",
-            State::Door => "Door:0",
-            State::Sleep => "Sleep",
+            ControllerState::Idle => "Idle",
+            ControllerState::Run => "Run",
+            ControllerState::Held => "Hold:0",
+            ControllerState::Holding => "Hold:1",
+            ControllerState::Jog => "Jog",
+            ControllerState::Home => "Home",
+            ControllerState::Alarm => "Alarm",
+            ControllerState::Check => "Check",
+            ControllerState::Door => "Door:0",
+            ControllerState::Sleep => "Sleep",
         })
     }
 }
 
-/// Where the table is, in the controller's unit, by either of Grbl's two ways to say it.
+/// A position in the controller's unit, in either of Grbl's two forms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Position {
     /// From machine zero.
@@ -96,14 +100,14 @@ pub struct Pins {
     pub emergency_stop: bool,
 }
 
-/// A status report. Fields that are not known are skipped, as Grbl asks of its readers.
+/// A status report. Unknown fields are skipped, as Grbl's documentation demands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StatusReport {
-    /// What the controller is doing.
-    pub state: State,
-    /// Where the table is.
+    /// The controller's state.
+    pub state: ControllerState,
+    /// The table's position.
     pub position: Position,
-    /// Speed, the controller's unit a minute.
+    /// Speed, the controller's unit per minute.
     pub feed: Option<f64>,
     /// Microseconds of the chip's clock at the moment of the position; wraps.
     pub chip_us: Option<u32>,
@@ -122,7 +126,7 @@ impl StatusReport {
             return None;
         }
         let mut fields = inside.split('|');
-        let state = State::parse(fields.next()?)?;
+        let state = ControllerState::parse(fields.next()?)?;
         let mut read = Fields::default();
         for field in fields {
             let (name, value) = field.split_once(':')?;
@@ -151,7 +155,7 @@ struct Fields {
 }
 
 impl Fields {
-    /// Takes a field; `None` where a known one is damaged or comes twice.
+    /// Reads a field; `None` if a known one is damaged or repeated.
     fn take(&mut self, name: &str, value: &str) -> Option<()> {
         match name {
             "MPos" => once(&mut self.position, Position::Machine(first(value)?)),
@@ -176,7 +180,7 @@ fn once<T>(place: &mut Option<T>, value: T) -> Option<()> {
     place.replace(value).is_none().then_some(())
 }
 
-/// The first of a list of numbers, all of which have to be numbers.
+/// The first number of a list; `None` if one of them is not a number.
 fn first(list: &str) -> Option<f64> {
     let mut numbers = list.split(',').map(decimal);
     let first = numbers.next()??;

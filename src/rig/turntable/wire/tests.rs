@@ -1,17 +1,17 @@
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
 use super::*;
-use crate::turntable::peer::seal;
+use crate::turntable::fake_grbl::seal;
 
 const HALF_SECOND: i64 = 500_000;
 
-pub(super) fn events(machine: &mut Machine) -> Vec<Event> {
+pub(super) fn events(machine: &mut Machine) -> Vec<WireEvent> {
     std::iter::from_fn(|| machine.next_event()).collect()
 }
 
-pub(super) fn outcome(machine: &mut Machine) -> Option<Outcome> {
+pub(super) fn outcome(machine: &mut Machine) -> Option<LineOutcome> {
     events(machine).into_iter().find_map(|event| match event {
-        Event::Answered { outcome, .. } => Some(outcome),
+        WireEvent::Answered { outcome, .. } => Some(outcome),
         _ => None,
     })
 }
@@ -30,7 +30,7 @@ pub(super) fn checked() -> Machine {
     machine
 }
 
-/// A whole line comes, with its checksum.
+/// Receives a complete line with its checksum.
 fn hear(machine: &mut Machine, now_us: i64, line: &str) {
     machine.on_bytes(now_us, format!("{}\r\n", seal(line)).as_bytes());
 }
@@ -38,7 +38,7 @@ fn hear(machine: &mut Machine, now_us: i64, line: &str) {
 #[test]
 fn a_plain_line_is_done_by_its_ok_and_gives_what_stood_before_it() {
     let mut machine = Machine::new();
-    machine.send(0, "$$", Patience::Short).unwrap();
+    machine.send(0, "$$", ReplyTimeout::AtOnce).unwrap();
     assert_eq!(text(&mut machine, 0), "$$\n");
     machine.on_bytes(
         10,
@@ -49,44 +49,54 @@ fn a_plain_line_is_done_by_its_ok_and_gives_what_stood_before_it() {
         number,
         value: 88.889,
     };
-    assert_eq!(outcome(&mut machine), Some(Outcome::Done(vec![setting])));
+    assert_eq!(
+        outcome(&mut machine),
+        Some(LineOutcome::Done(vec![setting]))
+    );
 }
 
 #[test]
 fn a_plain_line_is_never_sent_twice_and_after_a_lost_answer_nothing_is_sent_until_a_reset() {
     let mut machine = Machine::new();
-    machine.send(0, "G1X1F10", Patience::Short).unwrap();
+    machine.send(0, "G1X1F10", ReplyTimeout::AtOnce).unwrap();
     text(&mut machine, 0);
     machine.on_time(HALF_SECOND);
-    let lost = Outcome::Failed(LineFault::NoAnswer { tries: 1 });
+    let lost = LineOutcome::Failed(LineFault::NoAnswer { tries: 1 });
     assert_eq!(outcome(&mut machine), Some(lost));
     assert_eq!(text(&mut machine, HALF_SECOND), "");
     assert_eq!(
-        machine.send(HALF_SECOND, "$X", Patience::Short),
+        machine.send(HALF_SECOND, "$X", ReplyTimeout::AtOnce),
         Err(SendError::Unsure)
     );
     machine.on_bytes(HALF_SECOND, b"ok\r\n");
     assert_eq!(
-        machine.send(HALF_SECOND, "$X", Patience::Short),
+        machine.send(HALF_SECOND, "$X", ReplyTimeout::AtOnce),
         Err(SendError::Unsure)
     );
     machine.on_bytes(HALF_SECOND, b"Grbl 1.1h ['$' for help]\r\n");
-    assert_eq!(events(&mut machine), [Event::Reset(None)]);
-    assert!(machine.send(HALF_SECOND, "$X", Patience::Short).is_ok());
+    assert_eq!(events(&mut machine), [WireEvent::Reset(None)]);
+    assert!(
+        machine
+            .send(HALF_SECOND, "$X", ReplyTimeout::AtOnce)
+            .is_ok()
+    );
 }
 
 #[test]
 fn only_one_line_is_in_flight() {
     let mut machine = checked();
-    machine.send(0, "$X", Patience::Short).unwrap();
-    assert_eq!(machine.send(0, "$X", Patience::Short), Err(SendError::Busy));
+    machine.send(0, "$X", ReplyTimeout::AtOnce).unwrap();
+    assert_eq!(
+        machine.send(0, "$X", ReplyTimeout::AtOnce),
+        Err(SendError::Busy)
+    );
 }
 
 #[test]
 fn what_would_not_be_one_line_is_not_sent() {
     let mut machine = Machine::new();
     for block in ["G1\nG1", "G1?", "!", "G1*3F", "\u{e4}", &"x".repeat(61)] {
-        let sent = machine.send(0, block, Patience::Short);
+        let sent = machine.send(0, block, ReplyTimeout::AtOnce);
         assert_eq!(sent, Err(SendError::Unsendable), "{block:?}");
     }
     assert_eq!(text(&mut machine, 0), "");
@@ -95,7 +105,7 @@ fn what_would_not_be_one_line_is_not_sent() {
 #[test]
 fn a_checked_line_is_repeated_with_its_number_until_the_fifth_time() {
     let mut machine = checked();
-    machine.send(0, "G1X1F10", Patience::Short).unwrap();
+    machine.send(0, "G1X1F10", ReplyTimeout::AtOnce).unwrap();
     let line = format!("{}\n", seal("N1 G1X1F10"));
     assert_eq!(text(&mut machine, 0), line);
     for again in 1..5 {
@@ -105,7 +115,7 @@ fn a_checked_line_is_repeated_with_its_number_until_the_fifth_time() {
         assert_eq!(text(&mut machine, 0), line);
     }
     machine.on_time(5 * HALF_SECOND);
-    let lost = Outcome::Failed(LineFault::NoAnswer { tries: 5 });
+    let lost = LineOutcome::Failed(LineFault::NoAnswer { tries: 5 });
     assert_eq!(outcome(&mut machine), Some(lost));
 }
 
@@ -113,46 +123,48 @@ fn a_checked_line_is_repeated_with_its_number_until_the_fifth_time() {
 fn a_line_that_takes_long_is_asked_after_without_filling_the_controllers_buffer() {
     let mut machine = checked();
     let mut sent = 0;
-    machine.send(0, "$H", Patience::Long(60_000_000)).unwrap();
+    machine
+        .send(0, "$H", ReplyTimeout::Within(60_000_000))
+        .unwrap();
     for now_us in (0..60_000_000).step_by(10_000) {
         machine.on_time(now_us);
         sent += machine.take_output(now_us).len();
     }
     assert!((2 * 11..100).contains(&sent), "{sent} bytes");
     hear(&mut machine, 59_999_999, "ok N1");
-    assert_eq!(outcome(&mut machine), Some(Outcome::Done(Vec::new())));
+    assert_eq!(outcome(&mut machine), Some(LineOutcome::Done(Vec::new())));
 }
 
 #[test]
 fn a_line_that_came_damaged_is_repeated_at_once() {
     let mut machine = checked();
-    machine.send(0, "$X", Patience::Short).unwrap();
+    machine.send(0, "$X", ReplyTimeout::AtOnce).unwrap();
     let line = text(&mut machine, 0);
     hear(&mut machine, 20_000, "error:70");
     assert_eq!(text(&mut machine, 20_000), line);
     hear(&mut machine, 40_000, "error:9 N1");
-    assert_eq!(outcome(&mut machine), Some(Outcome::Refused(9)));
+    assert_eq!(outcome(&mut machine), Some(LineOutcome::Refused(9)));
 }
 
 #[test]
 fn a_repeated_answer_is_not_taken_for_the_next_lines() {
     let mut machine = checked();
-    machine.send(0, "$X", Patience::Short).unwrap();
+    machine.send(0, "$X", ReplyTimeout::AtOnce).unwrap();
     hear(&mut machine, 1, "ok N1");
     hear(&mut machine, 2, "ok N1");
     events(&mut machine);
-    machine.send(3, "$X", Patience::Short).unwrap();
+    machine.send(3, "$X", ReplyTimeout::AtOnce).unwrap();
     hear(&mut machine, 4, "ok N1");
     assert_eq!(outcome(&mut machine), None);
     hear(&mut machine, 5, "ok N2");
-    assert_eq!(outcome(&mut machine), Some(Outcome::Done(Vec::new())));
+    assert_eq!(outcome(&mut machine), Some(LineOutcome::Done(Vec::new())));
     assert_eq!(machine.counts().strays, 2);
 }
 
 #[test]
 fn in_a_session_an_answer_without_or_with_a_wrong_checksum_is_noise() {
     let mut machine = checked();
-    machine.send(0, "$X", Patience::Short).unwrap();
+    machine.send(0, "$X", ReplyTimeout::AtOnce).unwrap();
     machine.on_bytes(1, b"ok N1\r\nok N1*0000\r\nok N1okN1\r\n");
     assert_eq!(outcome(&mut machine), None);
     assert_eq!(machine.counts().noise, 3);
@@ -161,21 +173,21 @@ fn in_a_session_an_answer_without_or_with_a_wrong_checksum_is_noise() {
 #[test]
 fn a_banner_in_the_middle_is_a_reset_and_fails_the_line() {
     let mut machine = checked();
-    machine.send(0, "G1X1F10", Patience::Short).unwrap();
+    machine.send(0, "G1X1F10", ReplyTimeout::AtOnce).unwrap();
     machine.on_bytes(1, b"\r\nGrbl 1.1h ['$' for help] [reset: brown-out]\r\n");
     let found = events(&mut machine);
-    let failed = Outcome::Failed(LineFault::Restarted);
-    assert!(matches!(&found[0], Event::Answered { outcome, .. } if *outcome == failed));
-    assert_eq!(found[1], Event::Reset(Some(ResetCause::BrownOut)));
+    let failed = LineOutcome::Failed(LineFault::Restarted);
+    assert!(matches!(&found[0], WireEvent::Answered { outcome, .. } if *outcome == failed));
+    assert_eq!(found[1], WireEvent::Reset(Some(RestartCause::BrownOut)));
     assert!(!machine.is_checked());
 }
 
 #[test]
 fn a_controller_that_has_left_the_session_unnoticed_has_restarted() {
     let mut machine = checked();
-    machine.send(0, "$X", Patience::Short).unwrap();
+    machine.send(0, "$X", ReplyTimeout::AtOnce).unwrap();
     machine.on_bytes(1, b"error:72 N1\r\n");
-    assert!(events(&mut machine).contains(&Event::Reset(None)));
+    assert!(events(&mut machine).contains(&WireEvent::Reset(None)));
 
     let mut machine = checked();
     let report = b"<Idle|MPos:0.000,0.000,0.000|FS:0,0>\r\n";
@@ -183,18 +195,18 @@ fn a_controller_that_has_left_the_session_unnoticed_has_restarted() {
     machine.on_bytes(2, report);
     assert_eq!(events(&mut machine), []);
     machine.on_bytes(3, report);
-    assert_eq!(events(&mut machine), [Event::Reset(None)]);
+    assert_eq!(events(&mut machine), [WireEvent::Reset(None)]);
 }
 
 #[test]
 fn a_line_given_up_leaves_it_unsure_what_was_done() {
     let mut machine = checked();
-    machine.send(0, "G1X1F10", Patience::Short).unwrap();
+    machine.send(0, "G1X1F10", ReplyTimeout::AtOnce).unwrap();
     machine.give_up();
     assert_eq!(text(&mut machine, 0), "");
     assert_eq!(
         outcome(&mut machine),
-        Some(Outcome::Failed(LineFault::GivenUp))
+        Some(LineOutcome::Failed(LineFault::GivenUp))
     );
     assert!(machine.is_open());
 }
@@ -206,7 +218,7 @@ fn a_report_is_bracketed_by_its_question_and_its_first_byte() {
     assert_eq!(text(&mut machine, 1000), "?");
     machine.on_bytes(3000, b"<Run|MPos:1.000,0");
     machine.on_bytes(4000, b".000,0.000>\r\n");
-    let [Event::Status(poll)] = events(&mut machine)[..] else {
+    let [WireEvent::Status(poll)] = events(&mut machine)[..] else {
         panic!("one report");
     };
     assert_eq!(
@@ -214,7 +226,7 @@ fn a_report_is_bracketed_by_its_question_and_its_first_byte() {
         (Some(1000), 3000, true)
     );
     machine.on_bytes(5000, b"<Run|MPos:1.000,0.000,0.000>\r\n");
-    let [Event::Status(poll)] = events(&mut machine)[..] else {
+    let [WireEvent::Status(poll)] = events(&mut machine)[..] else {
         panic!("one report");
     };
     assert_eq!((poll.asked_us, poll.certain), (None, false));
@@ -231,7 +243,7 @@ fn after_a_lost_report_the_next_ones_are_not_trusted_for_time() {
     assert_eq!(text(&mut machine, 120_000), "?");
     machine.on_bytes(122_000, b"<Run|MPos:1.000,0.000,0.000>\r\n");
     let certain = |machine: &mut Machine| match events(machine)[..] {
-        [Event::Status(poll)] => poll.certain,
+        [WireEvent::Status(poll)] => poll.certain,
         _ => panic!("one report"),
     };
     assert!(!certain(&mut machine));

@@ -26,7 +26,7 @@ const STREAMOFF: Request<i32> = Request::new(vidioc::VIDIOC_STREAMOFF);
 
 /// A filled buffer that the driver handed over.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::camera::v4l2) struct Filled {
+pub(in crate::camera::v4l2) struct FilledBuffer {
     pub(in crate::camera::v4l2) index: u32,
     pub(in crate::camera::v4l2) bytes_used: u32,
     /// `V4L2_BUF_FLAG_*`.
@@ -59,10 +59,27 @@ impl Node {
         Ok(buffers.count)
     }
 
+    /// A call about one buffer in mapped memory.
+    fn buffer_call(
+        &self,
+        request: &Request<sys::v4l2_buffer>,
+        index: u32,
+    ) -> io::Result<sys::v4l2_buffer> {
+        let mut buffer = sys::v4l2_buffer {
+            index,
+            type_: CAPTURE,
+            memory: MMAP,
+            ..zeroed()
+        };
+        // SAFETY: of a buffer in mapped memory, in a queue of single planes, the kernel follows no
+        // pointer: it keeps an offset in their place.
+        unsafe { self.call_with_pointers(request, &mut buffer) }?;
+        Ok(buffer)
+    }
+
     /// Maps a buffer into memory.
     pub(in crate::camera::v4l2) fn map(&self, index: u32) -> io::Result<Mapping> {
-        let mut buffer = buffer(index);
-        self.call(&QUERYBUF, &mut buffer)?;
+        let buffer = self.buffer_call(&QUERYBUF, index)?;
         // SAFETY: of a buffer in mapped memory, the call filled the offset.
         let offset = unsafe { buffer.m.offset };
         Mapping::new(&self.0, u64::from(offset), buffer.length as usize)
@@ -70,15 +87,14 @@ impl Node {
 
     /// Gives a buffer to the driver to be filled.
     pub(in crate::camera::v4l2) fn queue(&self, index: u32) -> io::Result<()> {
-        self.call(&QBUF, &mut buffer(index))
+        self.buffer_call(&QBUF, index).map(|_| ())
     }
 
     /// Takes the next filled buffer; [`io::ErrorKind::WouldBlock`] where there is none.
-    pub(in crate::camera::v4l2) fn dequeue(&self) -> io::Result<Filled> {
-        let mut filled = buffer(0);
-        self.call(&DQBUF, &mut filled)?;
+    pub(in crate::camera::v4l2) fn dequeue(&self) -> io::Result<FilledBuffer> {
+        let filled = self.buffer_call(&DQBUF, 0)?;
         let time = filled.timestamp;
-        Ok(Filled {
+        Ok(FilledBuffer {
             index: filled.index,
             bytes_used: filled.bytesused,
             flags: filled.flags,
@@ -113,15 +129,6 @@ impl Node {
         } else {
             Ready::Yes
         })
-    }
-}
-
-fn buffer(index: u32) -> sys::v4l2_buffer {
-    sys::v4l2_buffer {
-        index,
-        type_: CAPTURE,
-        memory: MMAP,
-        ..zeroed()
     }
 }
 

@@ -94,18 +94,20 @@ impl Node {
         self.with_control(&S_EXT_CTRLS, &mut control)
     }
 
-    /// A call about one control without payload: `size` is 0, so that the kernel follows no pointer
-    /// in it.
+    /// A call about one control of one number.
     fn with_control(
         &self,
         request: &Request<sys::v4l2_ext_controls>,
         control: &mut sys::v4l2_ext_control,
     ) -> io::Result<()> {
+        // Of a control without size, the kernel follows no pointer.
+        control.size = 0;
         let mut controls = sys::v4l2_ext_controls {
             count: 1,
             controls: control,
             ..zeroed()
         };
-        self.call(request, &mut controls)
+        // SAFETY: the list is the one control, which is borrowed for the call and has no size.
+        unsafe { self.call_with_pointers(request, &mut controls) }
     }
 }

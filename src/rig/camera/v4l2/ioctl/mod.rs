@@ -1,4 +1,4 @@
-//! The kernel's V4L2 calls as safe functions: the one place of this room with unsafe code.
+//! The kernel's V4L2 calls as safe functions: the one place of this module with unsafe code.
 //!
 //! The crate `v4l` gives the structures and call numbers. Its devices and streams are not used:
 //! dropping a stream panics on every error but one, frames come without the number of bytes used,
@@ -23,7 +23,7 @@ use v4l::v4l_sys as sys;
 use v4l::v4l2;
 use v4l::v4l2::vidioc;
 
-pub(super) use buffers::{Filled, Mapping, Ready};
+pub(super) use buffers::{FilledBuffer, Mapping, Ready};
 
 /// The single-planar capture queue.
 const CAPTURE: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -59,21 +59,28 @@ const S_PARM: Request<sys::v4l2_streamparm> = Request::new(vidioc::VIDIOC_S_PARM
 ///
 /// # Safety
 /// The type must be made of numbers, pointers, and arrays and unions of them.
-unsafe trait Plain {}
+unsafe trait Zeroable {}
 
-macro_rules! plain {
-    ($($name:ident),*) => { $(
-        // SAFETY: a structure of the kernel's C interface, of numbers, pointers and their unions.
-        unsafe impl Plain for sys::$name {}
+/// Structures in which the kernel finds no pointer to follow.
+///
+/// # Safety
+/// The type must be made of numbers, and arrays and unions of them.
+unsafe trait PointerFree {}
+
+macro_rules! structures {
+    ($trait:ident: $($name:ident),*) => { $(
+        // SAFETY: a structure of the kernel's C interface, of what the trait asks for.
+        unsafe impl $trait for sys::$name {}
     )* };
 }
 
-plain!(
-    v4l2_capability,
+structures!(
+    Zeroable: v4l2_capability,
     v4l2_fmtdesc,
     v4l2_frmsizeenum,
     v4l2_frmivalenum,
     v4l2_format,
+    v4l2_pix_format,
     v4l2_streamparm,
     v4l2_query_ext_ctrl,
     v4l2_querymenu,
@@ -83,8 +90,22 @@ plain!(
     v4l2_buffer
 );
 
-fn zeroed<T: Plain>() -> T {
-    // SAFETY: `Plain` promises that all zeros is a value.
+structures!(
+    PointerFree: v4l2_capability,
+    v4l2_fmtdesc,
+    v4l2_frmsizeenum,
+    v4l2_frmivalenum,
+    v4l2_streamparm,
+    v4l2_query_ext_ctrl,
+    v4l2_querymenu,
+    v4l2_requestbuffers
+);
+
+// SAFETY: a number.
+unsafe impl PointerFree for i32 {}
+
+fn zeroed<T: Zeroable>() -> T {
+    // SAFETY: `Zeroable` promises that all zeros is a value.
     unsafe { mem::zeroed() }
 }
 
@@ -128,13 +149,27 @@ impl Node {
         options.open(path).map(Self)
     }
 
-    /// One call, repeated where a signal interrupts it.
-    fn call<T>(&self, request: &Request<T>, argument: &mut T) -> io::Result<()> {
+    /// A call whose structure holds no pointers.
+    fn call<T: PointerFree>(&self, request: &Request<T>, argument: &mut T) -> io::Result<()> {
+        // SAFETY: there is no pointer that the kernel could follow.
+        unsafe { self.call_with_pointers(request, argument) }
+    }
+
+    /// A call whose structure can hold pointers; repeated where a signal interrupts it.
+    ///
+    /// # Safety
+    /// Where the kernel follows a pointer of `argument` in this call, it must be valid for all that
+    /// the call reads and writes there.
+    unsafe fn call_with_pointers<T>(
+        &self,
+        request: &Request<T>,
+        argument: &mut T,
+    ) -> io::Result<()> {
         loop {
             let pointer = ptr::from_mut(argument).cast::<c_void>();
             // SAFETY: the request's number was made for a structure of T's size, so that the
-            // kernel reads and writes inside `argument`, which is borrowed for the call. Of the
-            // calls whose structures hold pointers, the callers set the pointers.
+            // kernel reads and writes inside `argument`, which is borrowed for the call; the caller
+            // promises the same of what lies behind its pointers.
             match unsafe { v4l2::ioctl(self.0.as_raw_fd(), request.code, pointer) } {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 answer => return answer,
@@ -252,10 +287,11 @@ impl Node {
             height,
             pixelformat: fourcc,
             field: sys::v4l2_field_V4L2_FIELD_NONE,
-            // SAFETY: plain numbers and a union of them.
-            ..unsafe { mem::zeroed() }
+            ..zeroed()
         };
-        self.call(&S_FMT, &mut format)?;
+        // SAFETY: a format for a queue of this type has numbers only; those with pointers are for
+        // overlays.
+        unsafe { self.call_with_pointers(&S_FMT, &mut format) }?;
         // SAFETY: the field for this type of queue, which the call filled; plain numbers.
         let pix = unsafe { format.fmt.pix };
         Ok(PixelLayout {

@@ -1,0 +1,513 @@
+//! Statistics of the pixels of an image, all of them or those under a mask: saturation, mean colour,
+//! sharpness. Knows images and nothing of files.
+//!
+//! Everything is summed in integers, so the figures are exact and do not depend on the machine or on
+//! the order of the work: they can be compared for equality when a data set is read back.
+
+use image::{GrayImage, RgbImage};
+
+/// The channel value from which a pixel counts as saturated, where nobody asks for another.
+pub const SATURATION_LEVEL: u8 = 250;
+
+/// An image of another size than the mask that it is measured under.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the image is {}x{} pixels, but {}x{} were expected", size[0], size[1], expected[0], expected[1])]
+pub struct SizeMismatch {
+    /// Width and height of the image, pixels.
+    pub size: [u32; 2],
+    /// Width and height of the mask, pixels.
+    pub expected: [u32; 2],
+}
+
+/// Luma of a pixel in thousandths of a grey level, 0..=255 000.
+fn luma(r: u8, g: u8, b: u8) -> i32 {
+    299 * i32::from(r) + 587 * i32::from(g) + 114 * i32::from(b)
+}
+
+/// Statistics of one image under one mask.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measures {
+    /// Pixels under the mask.
+    pub mask_px: u64,
+    /// Pixels under the mask with all three channels at or above the level.
+    pub saturated_px: u64,
+    /// Pixels under the mask with any channel at or above the level.
+    pub saturated_any_px: u64,
+    /// Mean red, green and blue under the mask, 0..=255; 0 if the mask is empty.
+    pub mean_rgb: [f64; 3],
+    /// Population variance of the Laplacian (4 neighbours) of luma, over the pixels that are under
+    /// the mask together with their four neighbours; luma = 0.299 R + 0.587 G + 0.114 B, 0..=255.
+    /// 0 if there is no such pixel.
+    pub sharpness: f64,
+}
+
+impl Measures {
+    /// `saturated_px / mask_px`, 0..=1; 0 if the mask is empty.
+    #[must_use]
+    pub fn saturated_fraction(&self) -> f64 {
+        fraction(self.saturated_px, self.mask_px)
+    }
+}
+
+/// `part / whole`, or 0 if `whole` is 0.
+#[must_use]
+pub fn fraction(part: u64, whole: u64) -> f64 {
+    if whole == 0 {
+        0.0
+    } else {
+        part as f64 / whole as f64
+    }
+}
+
+/// Measures all pixels of `image`; `level` is the saturation level, 0..=255.
+#[must_use]
+pub fn measure_whole(image: &RgbImage, level: u8) -> Measures {
+    MaskSpans::whole(image.width(), image.height()).sum(image, level)
+}
+
+/// Part of a row: columns `start..end`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Span {
+    start: usize,
+    end: usize,
+}
+
+/// A mask prepared for measuring many images, as runs of pixels in each row.
+#[derive(Debug, Clone)]
+pub struct MaskSpans {
+    width: u32,
+    height: u32,
+    /// Runs under the mask, row by row.
+    rows: Vec<Vec<Span>>,
+    /// Runs of pixels that are under the mask with all four neighbours, row by row.
+    inner: Vec<Vec<Span>>,
+    pixels: u64,
+}
+
+impl MaskSpans {
+    /// All pixels of an image of this size.
+    fn whole(width: u32, height: u32) -> Self {
+        let (w, h) = (width as usize, height as usize);
+        let is_inner = |y: usize| w > 2 && y > 0 && y + 1 < h;
+        let inner = |y| {
+            is_inner(y).then_some(Span {
+                start: 1,
+                end: w - 1,
+            })
+        };
+        Self {
+            width,
+            height,
+            rows: vec![vec![Span { start: 0, end: w }]; h],
+            inner: (0..h).map(|y| inner(y).into_iter().collect()).collect(),
+            pixels: u64::from(width) * u64::from(height),
+        }
+    }
+
+    /// The runs of `mask`, in which values of 128 and above are the object.
+    #[must_use]
+    pub fn of(mask: &GrayImage) -> Self {
+        let (width, height) = mask.dimensions();
+        let under: Vec<Vec<bool>> = mask
+            .rows()
+            .map(|row| row.map(|pixel| pixel.0[0] >= 128).collect())
+            .collect();
+        let rows: Vec<Vec<Span>> = under.iter().map(|row| runs(row)).collect();
+        let inner = (0..under.len())
+            .map(|y| runs(&inner_row(&under, y)))
+            .collect();
+        let pixels = rows
+            .iter()
+            .flatten()
+            .map(|span| (span.end - span.start) as u64)
+            .sum();
+        Self {
+            width,
+            height,
+            rows,
+            inner,
+            pixels,
+        }
+    }
+
+    /// Width and height of the mask, pixels.
+    #[must_use]
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
+    /// Number of pixels under the mask.
+    #[must_use]
+    pub fn pixels(&self) -> u64 {
+        self.pixels
+    }
+
+    /// Measures `image`; `level` is the saturation level, 0..=255 (250 by default in the tools).
+    /// Pixels outside the mask have no influence.
+    ///
+    /// # Errors
+    /// [`SizeMismatch`] if image and mask differ in size.
+    pub fn measure(&self, image: &RgbImage, level: u8) -> Result<Measures, SizeMismatch> {
+        self.check_size(image)?;
+        Ok(self.sum(image, level))
+    }
+
+    fn sum(&self, image: &RgbImage, level: u8) -> Measures {
+        let row_bytes = self.width as usize * 3;
+        let mut sums = [0_u64; 3];
+        let (mut all, mut any) = (0_u64, 0_u64);
+        let mut laplacian = Laplacian::new(self.width as usize);
+        let rows = image.as_raw().chunks_exact(row_bytes.max(3));
+        for ((row, spans), y) in rows.zip(&self.rows).zip(0_usize..) {
+            for span in spans {
+                let Some(pixels) = row.get(span.start * 3..span.end * 3) else {
+                    continue;
+                };
+                let found = count(pixels, level);
+                all += found.all;
+                any += found.any;
+                for (sum, part) in sums.iter_mut().zip(found.sums) {
+                    *sum += part;
+                }
+            }
+            laplacian.add_row(row, y, &self.inner);
+        }
+        Measures {
+            mask_px: self.pixels,
+            saturated_px: all,
+            saturated_any_px: any,
+            mean_rgb: sums.map(|sum| fraction(sum, self.pixels)),
+            sharpness: laplacian.variance(),
+        }
+    }
+
+    /// The first pixel (x, y) outside the mask that is not black, if there is one.
+    ///
+    /// # Errors
+    /// [`SizeMismatch`] if image and mask differ in size.
+    pub fn first_lit_outside(&self, image: &RgbImage) -> Result<Option<(u32, u32)>, SizeMismatch> {
+        self.check_size(image)?;
+        let row_bytes = self.width as usize * 3;
+        let rows = image.as_raw().chunks_exact(row_bytes.max(3));
+        for ((row, spans), y) in rows.zip(&self.rows).zip(0_u32..) {
+            let ends = spans.iter().map(|span| span.end);
+            let starts = spans.iter().map(|span| span.start);
+            let outside = std::iter::once(0)
+                .chain(ends)
+                .zip(starts.chain([self.width as usize]));
+            for (start, end) in outside {
+                let pixels = row.get(start * 3..end * 3).unwrap_or_default();
+                if let Some(at) = pixels.iter().position(|&value| value != 0) {
+                    let x = u32::try_from(start + at / 3).unwrap_or(u32::MAX);
+                    return Ok(Some((x, y)));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    fn check_size(&self, image: &RgbImage) -> Result<(), SizeMismatch> {
+        let size = [image.width(), image.height()];
+        if size == self.size() {
+            Ok(())
+        } else {
+            Err(SizeMismatch {
+                size,
+                expected: self.size(),
+            })
+        }
+    }
+}
+
+/// The runs of true values in a row.
+fn runs(row: &[bool]) -> Vec<Span> {
+    let mut spans = Vec::new();
+    let mut start = None;
+    for (x, &under) in row.iter().chain([&false]).enumerate() {
+        match (start, under) {
+            (None, true) => start = Some(x),
+            (Some(from), false) => {
+                spans.push(Span {
+                    start: from,
+                    end: x,
+                });
+                start = None;
+            }
+            _ => {}
+        }
+    }
+    spans
+}
+
+/// For each pixel of row `y`, whether it is under the mask with all four neighbours.
+fn inner_row(under: &[Vec<bool>], y: usize) -> Vec<bool> {
+    let at = |x: usize, y: usize| under.get(y).and_then(|row| row.get(x)).is_some_and(|&u| u);
+    let width = under.get(y).map_or(0, Vec::len);
+    (0..width)
+        .map(|x| {
+            at(x, y)
+                && at(x + 1, y)
+                && at(x, y + 1)
+                && x.checked_sub(1).is_some_and(|left| at(left, y))
+                && y.checked_sub(1).is_some_and(|above| at(x, above))
+        })
+        .collect()
+}
+
+/// Sums over one run of pixels.
+struct Counts {
+    sums: [u64; 3],
+    all: u64,
+    any: u64,
+}
+
+/// Sums a run of RGB pixels, in short pieces so that the inner loop needs 32 bits only and can be
+/// vectorised.
+fn count(pixels: &[u8], level: u8) -> Counts {
+    let mut total = Counts {
+        sums: [0; 3],
+        all: 0,
+        any: 0,
+    };
+    for piece in pixels.chunks(3 * 4096) {
+        let mut sums = [0_u32; 3];
+        let (mut all, mut any) = (0_u32, 0_u32);
+        for pixel in piece.chunks_exact(3) {
+            let (r, g, b) = (pixel[0], pixel[1], pixel[2]);
+            sums[0] += u32::from(r);
+            sums[1] += u32::from(g);
+            sums[2] += u32::from(b);
+            all += u32::from(r.min(g).min(b) >= level);
+            any += u32::from(r.max(g).max(b) >= level);
+        }
+        for (sum, part) in total.sums.iter_mut().zip(sums) {
+            *sum += u64::from(part);
+        }
+        total.all += u64::from(all);
+        total.any += u64::from(any);
+    }
+    total
+}
+
+/// Sums of the Laplacian over an image that is added row by row; holds three rows of luma.
+struct Laplacian {
+    above: Vec<i32>,
+    here: Vec<i32>,
+    below: Vec<i32>,
+    count: u64,
+    sum: i64,
+    squares: u128,
+}
+
+impl Laplacian {
+    fn new(width: usize) -> Self {
+        let row = vec![0; width];
+        Self {
+            above: row.clone(),
+            here: row.clone(),
+            below: row,
+            count: 0,
+            sum: 0,
+            squares: 0,
+        }
+    }
+
+    /// Adds row `y`. The Laplacian of the row above is then complete, and is summed over that row's
+    /// runs in `inner`.
+    fn add_row(&mut self, row: &[u8], y: usize, inner: &[Vec<Span>]) {
+        std::mem::swap(&mut self.above, &mut self.here);
+        std::mem::swap(&mut self.here, &mut self.below);
+        for (value, pixel) in self.below.iter_mut().zip(row.chunks_exact(3)) {
+            *value = luma(pixel[0], pixel[1], pixel[2]);
+        }
+        let spans = y.checked_sub(1).and_then(|above| inner.get(above));
+        for &span in spans.into_iter().flatten() {
+            self.add_span(span);
+        }
+    }
+
+    fn add_span(&mut self, Span { start, end }: Span) {
+        // An inner pixel has a left and a right neighbour, so the slices exist.
+        let (Some(above), Some(left), Some(here), Some(right), Some(below)) = (
+            self.above.get(start..end),
+            start
+                .checked_sub(1)
+                .and_then(|left| self.here.get(left..end - 1)),
+            self.here.get(start..end),
+            self.here.get(start + 1..end + 1),
+            self.below.get(start..end),
+        ) else {
+            return;
+        };
+        let (mut sum, mut squares) = (0_i64, 0_u64);
+        for ((((a, l), h), r), b) in above.iter().zip(left).zip(here).zip(right).zip(below) {
+            let value = 4 * h - a - l - r - b;
+            let magnitude = u64::from(value.unsigned_abs());
+            sum += i64::from(value);
+            squares += magnitude * magnitude;
+        }
+        self.count += (end - start) as u64;
+        self.sum += sum;
+        self.squares += u128::from(squares);
+    }
+
+    /// Population variance in squared grey levels (the sums are in thousandths of a level).
+    fn variance(&self) -> f64 {
+        if self.count == 0 {
+            return 0.0;
+        }
+        let count = u128::from(self.count);
+        let sum = u128::from(self.sum.unsigned_abs());
+        let scaled = (count * self.squares).saturating_sub(sum * sum);
+        scaled as f64 / (count * count) as f64 / 1e6
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{Luma, Rgb};
+    use proptest::prelude::*;
+
+    /// The definition, pixel by pixel.
+    fn by_definition(image: &RgbImage, mask: &GrayImage, level: u8) -> Measures {
+        let (w, h) = image.dimensions();
+        let under = |x: i64, y: i64| {
+            (0..i64::from(w)).contains(&x)
+                && (0..i64::from(h)).contains(&y)
+                && mask.get_pixel(x as u32, y as u32).0[0] >= 128
+        };
+        let luma_at = |x: i64, y: i64| {
+            let [r, g, b] = image.get_pixel(x as u32, y as u32).0;
+            i128::from(299 * u32::from(r) + 587 * u32::from(g) + 114 * u32::from(b))
+        };
+        let (mut px, mut all, mut any, mut sums) = (0, 0, 0, [0_u64; 3]);
+        let mut laplacians = Vec::new();
+        for y in 0..i64::from(h) {
+            for x in 0..i64::from(w) {
+                if !under(x, y) {
+                    continue;
+                }
+                let rgb = image.get_pixel(x as u32, y as u32).0;
+                px += 1;
+                all += u64::from(rgb.iter().all(|&v| v >= level));
+                any += u64::from(rgb.iter().any(|&v| v >= level));
+                for (sum, v) in sums.iter_mut().zip(rgb) {
+                    *sum += u64::from(v);
+                }
+                let around = [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)];
+                if around.iter().all(|&(x, y)| under(x, y)) {
+                    let sides: i128 = around.iter().map(|&(x, y)| luma_at(x, y)).sum();
+                    laplacians.push(4 * luma_at(x, y) - sides);
+                }
+            }
+        }
+        let n = laplacians.len() as i128;
+        let sum: i128 = laplacians.iter().sum();
+        let squares: i128 = laplacians.iter().map(|v| v * v).sum();
+        let sharpness = if n == 0 {
+            0.0
+        } else {
+            (n * squares - sum * sum) as f64 / (n * n) as f64 / 1e6
+        };
+        Measures {
+            mask_px: px,
+            saturated_px: all,
+            saturated_any_px: any,
+            mean_rgb: sums.map(|s| fraction(s, px)),
+            sharpness,
+        }
+    }
+
+    fn images() -> impl Strategy<Value = (RgbImage, GrayImage)> {
+        (1_u32..14, 1_u32..14).prop_flat_map(|(w, h)| {
+            let n = (w * h) as usize;
+            let pixels = prop::collection::vec(any::<u8>(), 3 * n);
+            let mask = prop::collection::vec(prop::sample::select(vec![0, 255, 255, 255_u8]), n);
+            (pixels, mask).prop_map(move |(pixels, mask)| {
+                let image = RgbImage::from_raw(w, h, pixels).unwrap();
+                (image, GrayImage::from_raw(w, h, mask).unwrap())
+            })
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn the_figures_are_those_of_the_definition((image, mask) in images(), level in 100_u8..) {
+            let measured = MaskSpans::of(&mask).measure(&image, level).unwrap();
+            prop_assert_eq!(measured, by_definition(&image, &mask, level));
+        }
+
+        #[test]
+        fn a_whole_image_is_measured_as_under_a_mask_of_everything((image, _) in images()) {
+            let everything = GrayImage::from_pixel(image.width(), image.height(), Luma([255]));
+            prop_assert_eq!(measure_whole(&image, 250), by_definition(&image, &everything, 250));
+        }
+
+        #[test]
+        fn pixels_outside_the_mask_have_no_influence((image, mask) in images()) {
+            let spans = MaskSpans::of(&mask);
+            let mut masked = image.clone();
+            for (pixel, m) in masked.pixels_mut().zip(mask.pixels()) {
+                if m.0[0] == 0 {
+                    *pixel = Rgb([0; 3]);
+                }
+            }
+            prop_assert_eq!(spans.measure(&image, 250).unwrap(), spans.measure(&masked, 250).unwrap());
+            prop_assert_eq!(spans.first_lit_outside(&masked).unwrap(), None);
+        }
+    }
+
+    #[test]
+    fn a_lit_pixel_outside_the_mask_is_found_at_its_position() {
+        let mask = GrayImage::from_fn(6, 4, |x, _| Luma([if x == 2 { 255 } else { 0 }]));
+        for at in [(0, 0), (1, 2), (3, 3), (5, 1)] {
+            let mut image = RgbImage::new(6, 4);
+            image.put_pixel(2, 1, Rgb([9; 3]));
+            image.put_pixel(at.0, at.1, Rgb([0, 0, 1]));
+            let found = MaskSpans::of(&mask).first_lit_outside(&image).unwrap();
+            assert_eq!(found, Some(at));
+        }
+    }
+
+    #[test]
+    fn a_flat_image_has_no_sharpness_and_an_empty_mask_no_figures() {
+        let image = RgbImage::from_pixel(9, 9, Rgb([250, 251, 10]));
+        let full = MaskSpans::of(&GrayImage::from_pixel(9, 9, Luma([255])));
+        let measures = full.measure(&image, 250).unwrap();
+        assert_eq!(measures.sharpness, 0.0);
+        assert_eq!((measures.saturated_px, measures.saturated_any_px), (0, 81));
+        assert_eq!(measures.mean_rgb, [250.0, 251.0, 10.0]);
+        let empty = MaskSpans::of(&GrayImage::new(9, 9))
+            .measure(&image, 250)
+            .unwrap();
+        assert_eq!((empty.mask_px, empty.saturated_fraction()), (0, 0.0));
+    }
+
+    #[test]
+    fn a_sharp_edge_has_a_greater_figure_than_a_soft_one() {
+        let sharpness = |period: u32| {
+            let stripes = RgbImage::from_fn(16, 16, |x, _| {
+                let distance = (x % (2 * period)).abs_diff(period) * 255 / period;
+                Rgb([distance as u8; 3])
+            });
+            measure_whole(&stripes, 250).sharpness
+        };
+        assert!(sharpness(1) > 4.0 * sharpness(4));
+        assert_eq!(
+            measure_whole(&RgbImage::new(0, 0), 250).saturated_fraction(),
+            0.0
+        );
+    }
+
+    #[test]
+    fn an_image_of_another_size_is_refused() {
+        let spans = MaskSpans::of(&GrayImage::new(4, 4));
+        assert!(spans.measure(&RgbImage::new(4, 5), 250).is_err());
+        assert!(
+            MaskSpans::of(&GrayImage::new(0, 0))
+                .measure(&RgbImage::new(0, 0), 0)
+                .is_ok()
+        );
+    }
+}

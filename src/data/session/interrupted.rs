@@ -1,0 +1,137 @@
+//! Salvaging a session whose recorder died.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::writer::{close, keep_as_found, write_index};
+use super::{
+    FrameIndex, INDEX_FILE, IndexFault, MANIFEST_FILE, Manifest, SessionError, SessionLock, Status,
+};
+
+/// A session that is marked as recording although its recorder has died. It stays locked while this
+/// value lives.
+#[derive(Debug)]
+pub struct InterruptedSession {
+    folder: PathBuf,
+    manifest: Manifest,
+    index: FrameIndex,
+    fault: Option<IndexFault>,
+    lock: SessionLock,
+}
+
+impl InterruptedSession {
+    /// Locks a session and reads it, the index up to its first fault.
+    ///
+    /// # Errors
+    /// [`SessionError::InUse`] if its recorder is still running, [`SessionError::Ended`] if it has ended,
+    /// [`SessionError::Manifest`], or [`SessionError::Io`].
+    pub fn open(folder: &Path) -> Result<Self, SessionError> {
+        let lock = SessionLock::acquire(folder)?;
+        let path = folder.join(MANIFEST_FILE);
+        let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
+        let manifest =
+            Manifest::from_json(&bytes).map_err(|fault| SessionError::Manifest { path, fault })?;
+        if manifest.status != Status::Recording {
+            lock.remove()?;
+            return Err(SessionError::Ended(folder.to_owned()));
+        }
+        lock.release_reserve()?;
+        let path = folder.join(INDEX_FILE);
+        let lines = match fs::read(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+            read => read.map_err(SessionError::io(path, "read"))?,
+        };
+        let (index, fault) = FrameIndex::parse_until_fault(&lines);
+        Ok(Self {
+            folder: folder.to_owned(),
+            manifest,
+            index,
+            fault,
+            lock,
+        })
+    }
+
+    /// The video's path.
+    #[must_use]
+    pub fn video_path(&self) -> PathBuf {
+        self.folder.join(&self.manifest.video.file)
+    }
+
+    /// The index up to its first fault.
+    #[must_use]
+    pub fn index(&self) -> &FrameIndex {
+        &self.index
+    }
+
+    /// The first fault in the index, if there is one.
+    #[must_use]
+    pub fn index_fault(&self) -> Option<&IndexFault> {
+        self.fault.as_ref()
+    }
+
+    /// Marks the session as aborted for this reason, with the first `frames` lines of the index. If
+    /// lines are removed, the index is kept as it was found in `frames.interrupted.jsonl`.
+    ///
+    /// # Errors
+    /// [`SessionError::Io`]; the status then stays "recording".
+    pub fn abort(mut self, frames: usize, reason: &str) -> Result<Manifest, SessionError> {
+        if self.fault.is_some() || frames < self.index.entries().len() {
+            keep_as_found(&self.folder)?;
+            self.index.truncate(frames);
+            write_index(&self.folder, &self.index)?;
+        }
+        let frames = self.index.entries().len() as u64;
+        let status = Status::Aborted(reason.to_owned());
+        let manifest = close(&self.folder, self.manifest, frames, status)?;
+        self.lock.remove()?;
+        Ok(manifest)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::super::writer::INDEX_AS_FOUND;
+    use super::super::writer::tests::{entry, writer};
+    use super::*;
+
+    #[test]
+    fn a_session_is_locked_while_its_writer_lives_and_no_longer() {
+        let root = tempfile::tempdir().unwrap();
+        let live = writer(root.path());
+        let folder = live.folder().to_owned();
+        let open = || InterruptedSession::open(&folder);
+        assert!(matches!(open(), Err(SessionError::InUse(_))));
+        drop(live);
+        let manifest = open().unwrap().abort(0, "interrupted").unwrap();
+        assert_eq!(manifest.status, Status::Aborted("interrupted".to_owned()));
+        assert!(matches!(open(), Err(SessionError::Ended(_))));
+        let names = fs::read_dir(&folder).unwrap();
+        let mut names: Vec<_> = names.map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, [INDEX_FILE, MANIFEST_FILE]);
+    }
+
+    #[test]
+    fn an_index_that_is_truncated_is_kept_as_it_was_found_under_another_name() {
+        let root = tempfile::tempdir().unwrap();
+        let mut live = writer(root.path());
+        (0..5).for_each(|n| live.push(entry(n)).unwrap());
+        let folder = live.folder().to_owned();
+        let mut lines = fs::OpenOptions::new();
+        let mut lines = lines.append(true).open(folder.join(INDEX_FILE)).unwrap();
+        lines.write_all(&[0; 30]).unwrap();
+        drop(live);
+        let found = fs::read(folder.join(INDEX_FILE)).unwrap();
+        let session = InterruptedSession::open(&folder).unwrap();
+        assert_eq!(session.index().entries().len(), 5);
+        assert!(session.index_fault().is_some());
+        let manifest = session.abort(3, "interrupted").unwrap();
+        assert_eq!(manifest.video.frames, Some(3));
+        let cut = FrameIndex::parse(&fs::read(folder.join(INDEX_FILE)).unwrap()).unwrap();
+        assert_eq!(cut.entries(), [0, 1, 2].map(entry));
+        assert_eq!(fs::read(folder.join(INDEX_AS_FOUND)).unwrap(), found);
+    }
+}

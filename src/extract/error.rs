@@ -1,0 +1,156 @@
+//! The errors of an extraction.
+
+use std::path::PathBuf;
+
+use relit_data::geometry::Rect;
+use relit_data::{report, session, shard};
+use relit_video as video;
+
+/// Why a recording, or all of them, could not be extracted.
+#[derive(Debug, thiserror::Error)]
+pub enum ExtractError {
+    /// An option is out of range.
+    #[error("{name} is {value}: give {allowed}")]
+    Option {
+        /// The option.
+        name: &'static str,
+        /// What was given.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// The output folder holds a data set with other settings.
+    #[error(
+        "{out} holds a data set with other settings ({differ}): give the same ones, or another folder"
+    )]
+    OtherSettings {
+        /// The output folder.
+        out: PathBuf,
+        /// The settings that differ.
+        differ: String,
+    },
+    /// Two recordings have the same name.
+    #[error(
+        "another recording of this call is also named {0}: extract them into different folders, or rename one"
+    )]
+    SameName(String),
+    /// There is no mask.
+    #[error("{0} has no mask: make one with relit-mask, or name one with --mask")]
+    NoMask(PathBuf),
+    /// The given mask does not exist.
+    #[error("there is no mask {0}: make one with relit-mask, or correct the name given to --mask")]
+    MaskNotThere(PathBuf),
+    /// The frame index and the video do not belong together.
+    #[error(
+        "frames.jsonl has {lines} lines and the video has {frames} frames, and their time stamps do not match: give the video file itself to go on without angles"
+    )]
+    IndexMismatch {
+        /// Lines of the index.
+        lines: u64,
+        /// Frames of the video.
+        frames: u64,
+    },
+    /// The mask cannot be read.
+    #[error("the mask {path} cannot be read as an image ({source}): give a PNG")]
+    Mask {
+        /// The mask's path.
+        path: PathBuf,
+        /// The decoder's error.
+        source: image::ImageError,
+    },
+    /// Mask and frames differ in size.
+    #[error(
+        "the mask {path} is {} x {} pixels and the frames are {} x {}: make the mask on a frame of this video",
+        mask.0, mask.1, frame.0, frame.1
+    )]
+    MaskSize {
+        /// The mask's path.
+        path: PathBuf,
+        /// The mask's width and height.
+        mask: (u32, u32),
+        /// The frames' width and height.
+        frame: (u32, u32),
+    },
+    /// The mask marks no pixel.
+    #[error(
+        "the mask {0} is empty: none of its pixels is opaque and 128 or brighter; make it again with relit-mask, or paint the object white"
+    )]
+    EmptyMask(PathBuf),
+    /// The scaled mask marks no pixel.
+    #[error(
+        "the object is too small: at {side} pixels it covers half of no pixel of the output; give a larger --size or a smaller --margin"
+    )]
+    ObjectTooSmall {
+        /// The output's side, pixels.
+        side: u32,
+    },
+    /// The crop would need too much memory.
+    #[error("a crop of {} x {} pixels is too large: give a smaller --margin", .0.w, .0.h)]
+    CropTooLarge(Rect),
+    /// Scaling failed.
+    #[error("a frame could not be scaled: {0}")]
+    Scaling(String),
+    /// No frame can be decoded.
+    #[error("no frame of the video can be decoded: record it again, or give another file")]
+    NoFrameLeft,
+    /// The video has a single frame.
+    #[error("the video has one usable frame only: give a recording of a turn")]
+    OneFrame,
+    /// The data set holds a session of this name from another video.
+    #[error(
+        "{out} holds a session {id} from another video: extract into another folder, rename the input, or give --replace"
+    )]
+    NameTaken {
+        /// The output folder.
+        out: PathBuf,
+        /// The session's id.
+        id: String,
+    },
+    /// The output folder is a session folder.
+    #[error("{0} is a session folder: give another one for the data set")]
+    IntoSession(PathBuf),
+    /// The table did not turn.
+    #[error(
+        "the table turned by only {degrees:.2} degrees: to spread the frames over time, give the video file itself"
+    )]
+    TableStands {
+        /// Angle from the first frame to the last, degrees.
+        degrees: f64,
+    },
+    /// With `strict`: a frame is used twice or something is lost.
+    #[error("refused by --strict: {0}")]
+    Strict(String),
+    /// The recording cannot be used.
+    #[error(transparent)]
+    Session(#[from] session::SessionError),
+    /// The video cannot be used.
+    #[error(transparent)]
+    Video(#[from] video::VideoError),
+    /// A frame cannot be converted.
+    #[error(
+        "frame {number}: {fault}; convert the video to another pixel format, for example with ffmpeg"
+    )]
+    Frame {
+        /// The frame.
+        number: u64,
+        /// What is wrong with it.
+        fault: video::DecodeFault,
+    },
+    /// The data set cannot be written.
+    #[error(transparent)]
+    Shard(#[from] shard::ShardError),
+    /// The report cannot be made.
+    #[error(transparent)]
+    Report(#[from] report::ReportError),
+    /// The worker threads cannot be started.
+    #[error("the worker threads could not be started: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// A file cannot be read.
+    #[error("{path} could not be read: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's error.
+        source: std::io::Error,
+    },
+}

@@ -1,0 +1,34 @@
+//! What is reported while recordings are extracted.
+
+use std::path::Path;
+
+use relit_data::shard::SessionEntry;
+
+use super::ExtractError;
+
+/// Receives the progress of an extraction, from several threads. `()` ignores it.
+pub trait Observer: Sync {
+    /// Work on a recording starts; it will have `samples` samples.
+    fn started(&self, recording: &Path, samples: u32);
+    /// One more sample was written.
+    fn advanced(&self);
+    /// Work on a recording ended.
+    fn ended(&self, recording: &Path, outcome: &RecordingOutcome);
+}
+
+impl Observer for () {
+    fn started(&self, _recording: &Path, _samples: u32) {}
+    fn advanced(&self) {}
+    fn ended(&self, _recording: &Path, _outcome: &RecordingOutcome) {}
+}
+
+/// The outcome of one recording.
+#[derive(Debug)]
+pub enum RecordingOutcome {
+    /// It is in the data set; the entry's warnings say what to know about it.
+    Extracted(Box<SessionEntry>),
+    /// It was in the data set already, intact and with the same settings, video, index and mask.
+    Skipped(Box<SessionEntry>),
+    /// It is not in the data set.
+    Failed(ExtractError),
+}

@@ -1,0 +1,109 @@
+//! How recordings are extracted.
+
+use std::path::PathBuf;
+use std::thread::available_parallelism;
+
+use relit_data::image_stats::SATURATION_LEVEL;
+use relit_data::shard::{Align, ExtractionSettings, ImageSize, Layout};
+
+use super::{ExtractError, scale};
+
+/// Largest side of a scaled image, pixels.
+pub const MAX_SIDE: u32 = 8192;
+/// Largest margin, as a fraction of the object's longer side.
+pub const MAX_MARGIN: f64 = 4.0;
+
+/// How to extract. The default is that of the program `relit-extract`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtractOptions {
+    /// Samples per session, at least 1; 1500 is each frame of the rig's turn once.
+    pub frames: u32,
+    /// Size of images and masks: a square of 1..=[`MAX_SIDE`] pixels, or the source's pixels.
+    pub size: ImageSize,
+    /// Margin around the object on each side, as a fraction of its longer side,
+    /// 0..=[`MAX_MARGIN`].
+    pub margin: f64,
+    /// The 8-bit value from which a channel is saturated.
+    pub saturation_level: u8,
+    /// The saturated fraction above which `spec_net` is set, 0..=1 (the paper: 5 %, section on
+    /// Spec-Net).
+    pub gate: f64,
+    /// How samples are stored.
+    pub layout: Layout,
+    /// The mask for all recordings; `None` uses the `mask.png` in each session folder.
+    pub mask: Option<PathBuf>,
+    /// Refuse recordings in which a frame would be used twice or something is lost.
+    pub strict: bool,
+    /// Skip sessions that the data set already holds, intact and made from the same input.
+    pub resume: bool,
+    /// Replace sessions of the same name that were made from another video.
+    pub replace: bool,
+    /// Number of worker threads, at least 1.
+    pub threads: usize,
+}
+
+impl Default for ExtractOptions {
+    fn default() -> Self {
+        Self {
+            frames: 1500,
+            size: ImageSize::Pixels(256),
+            margin: 0.05,
+            saturation_level: SATURATION_LEVEL,
+            gate: 0.05,
+            layout: Layout::Webdataset,
+            mask: None,
+            strict: false,
+            resume: false,
+            replace: false,
+            threads: available_parallelism().map_or(1, std::num::NonZero::get),
+        }
+    }
+}
+
+impl ExtractOptions {
+    /// The settings as the data set records them.
+    pub(super) fn settings(&self) -> ExtractionSettings {
+        ExtractionSettings {
+            frames: self.frames,
+            size: self.size,
+            margin: self.margin,
+            saturation_level: self.saturation_level,
+            gate: self.gate,
+            align: Align::Off,
+            layout: self.layout,
+            scaling: match self.size {
+                ImageSize::Pixels(_) => scale::METHOD,
+                ImageSize::Native(_) => scale::NO_METHOD,
+            }
+            .to_owned(),
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<(), ExtractError> {
+        let wrong = |name, value: f64, allowed| {
+            Err(ExtractError::Option {
+                name,
+                value,
+                allowed,
+            })
+        };
+        if self.frames == 0 {
+            return wrong("frames", 0.0, "at least 1");
+        }
+        if let ImageSize::Pixels(side) = self.size
+            && !(1..=MAX_SIDE).contains(&side)
+        {
+            return wrong("size", f64::from(side), "1 to 8192 pixels, or native");
+        }
+        if !(0.0..=MAX_MARGIN).contains(&self.margin) {
+            return wrong("margin", self.margin, "0 to 4");
+        }
+        if !(0.0..=1.0).contains(&self.gate) {
+            return wrong("gate", self.gate, "0 to 1");
+        }
+        if self.threads == 0 {
+            return wrong("threads", 0.0, "at least 1");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,468 @@
+//! Making a camera hold still: which controls to set to manual, in which order, and what lacks.
+//!
+//! During a turn only the light may change. [`ManualPlan`] is made of the
+//! list of controls alone and touches no camera; [`ManualPlan::apply`] sets it and reads back. The
+//! names are those that `v4l2-ctl` prints; the kernel renamed several in 5.17, and both are known.
+
+use std::fmt;
+
+use relit_data::causes::with_causes;
+
+use super::{Camera, CameraError, Control, ControlId, ControlKind};
+
+/// What is to stand still.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Aspect {
+    /// The exposure time.
+    Exposure,
+    /// The sensor's gain.
+    Gain,
+    /// The white balance.
+    WhiteBalance,
+    /// The focus.
+    Focus,
+    /// The filter against flicker of lamps.
+    PowerLine,
+    /// The frame rate, which some cameras lower in the dark.
+    FrameRate,
+    /// The correction for light from behind.
+    Backlight,
+}
+
+impl Aspect {
+    /// All of them, in the order in which they are set.
+    pub const ALL: [Self; 7] = [
+        Self::FrameRate,
+        Self::Exposure,
+        Self::Gain,
+        Self::WhiteBalance,
+        Self::Focus,
+        Self::PowerLine,
+        Self::Backlight,
+    ];
+
+    /// Controls that switch its automatic, with the value for manual.
+    fn switches(self) -> &'static [(&'static str, Manual)] {
+        match self {
+            Self::Exposure => &[
+                ("auto_exposure", Manual::MenuItem(1, "manual")),
+                ("exposure_auto", Manual::MenuItem(1, "manual")),
+                ("exposure_mode", Manual::Locked),
+            ],
+            Self::Gain => &[
+                ("gain_automatic", Manual::Off),
+                ("gain_auto", Manual::Off),
+                ("autogain", Manual::Off),
+            ],
+            Self::WhiteBalance => &[
+                ("white_balance_automatic", Manual::Off),
+                ("white_balance_temperature_auto", Manual::Off),
+                ("auto_white_balance", Manual::Off),
+                ("white_balance_mode", Manual::Locked),
+            ],
+            Self::Focus => &[
+                ("focus_automatic_continuous", Manual::Off),
+                ("focus_auto", Manual::Off),
+                ("focus_mode", Manual::Locked),
+            ],
+            Self::FrameRate => &[
+                ("exposure_dynamic_framerate", Manual::Off),
+                ("exposure_auto_priority", Manual::Off),
+            ],
+            Self::PowerLine | Self::Backlight => &[],
+        }
+    }
+
+    /// Controls that hold its value; where several of one line are there, the first counts.
+    fn values(self) -> &'static [&'static [&'static str]] {
+        match self {
+            Self::Exposure => &[&["exposure_time_absolute", "exposure_absolute", "exposure"]],
+            Self::Gain => &[&["gain", "analogue_gain"]],
+            Self::WhiteBalance => &[
+                &["white_balance_temperature"],
+                &["red_balance"],
+                &["blue_balance"],
+            ],
+            Self::Focus => &[&["focus_absolute"]],
+            Self::PowerLine => &[&["power_line_frequency"]],
+            Self::Backlight => &[&["backlight_compensation"]],
+            Self::FrameRate => &[],
+        }
+    }
+}
+
+impl fmt::Display for Aspect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Exposure => "exposure",
+            Self::Gain => "gain",
+            Self::WhiteBalance => "white balance",
+            Self::Focus => "focus",
+            Self::PowerLine => "power-line filter",
+            Self::FrameRate => "frame rate",
+            Self::Backlight => "backlight compensation",
+        })
+    }
+}
+
+/// How a switch is set to manual.
+#[derive(Debug, Clone, Copy)]
+enum Manual {
+    Off,
+    /// A menu's item: its index in the kernel's interface, which must be offered, or a word in
+    /// its label.
+    MenuItem(i64, &'static str),
+    /// A menu's first item, which keeps the value that the automatic has found.
+    Locked,
+}
+
+/// Values to hold in place of those that the camera has now; in the control's own units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ManualValues {
+    /// Exposure time; of `exposure_time_absolute`, units of 100 us.
+    pub exposure: Option<i64>,
+    /// Gain.
+    pub gain: Option<i64>,
+    /// White balance, kelvin.
+    pub white_balance: Option<i64>,
+    /// Focus.
+    pub focus: Option<i64>,
+    /// Power-line filter: 0 off, 1 for 50 Hz, 2 for 60 Hz. Off when not given: with a fixed
+    /// exposure it can only interfere.
+    pub power_line: Option<i64>,
+}
+
+impl ManualValues {
+    fn of(&self, name: &str, aspect: Aspect) -> Option<i64> {
+        match aspect {
+            Aspect::Exposure => self.exposure,
+            Aspect::Gain => self.gain,
+            Aspect::WhiteBalance if name == "white_balance_temperature" => self.white_balance,
+            Aspect::Focus => self.focus,
+            Aspect::PowerLine => Some(self.power_line.unwrap_or(0)),
+            Aspect::WhiteBalance | Aspect::Backlight | Aspect::FrameRate => None,
+        }
+    }
+}
+
+/// One control to set.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ControlSetting {
+    /// What for.
+    pub aspect: Aspect,
+    /// The control.
+    pub id: ControlId,
+    /// Its name.
+    pub name: String,
+    /// The value.
+    pub value: i64,
+}
+
+/// Something that cannot be made to stand still by a control.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum MissingControl {
+    /// The camera has no control for it: fixed, or ruled by the camera alone.
+    #[error("the camera has no control of its {0}")]
+    NoControl(Aspect),
+    /// The automatic can be switched off, but there is no value to hold.
+    #[error("the camera's {0} can be switched to manual, but not set")]
+    NoValue(Aspect),
+    /// The automatic has no manual setting, or is read-only.
+    #[error("the camera's {aspect} cannot be switched to manual: {control} does not allow it")]
+    NoManual {
+        /// What for.
+        aspect: Aspect,
+        /// The switch's name.
+        control: String,
+    },
+    /// The value is read-only, or held by the stream or another program.
+    #[error("the camera's {aspect} cannot be set: {control} may not be written now")]
+    NotSettable {
+        /// What for.
+        aspect: Aspect,
+        /// The control's name.
+        control: String,
+    },
+}
+
+/// Which controls to set so that all of [`Aspect`] stand still, and what lacks.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct ManualPlan {
+    /// In this order: all automatics off first, then the values, which automatics would refuse.
+    pub steps: Vec<ControlSetting>,
+    /// What cannot be made to stand still.
+    pub missing: Vec<MissingControl>,
+}
+
+/// A control whose value is not what it should be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{name} is {} where {should} was set", value_words(*.is))]
+pub struct ControlDrift {
+    /// The control's name.
+    pub name: String,
+    /// What was set, or read before.
+    pub should: i64,
+    /// What was read; `None` where it can no longer be read.
+    pub is: Option<i64>,
+}
+
+/// What the controls show when they are read after a take.
+#[derive(Debug)]
+pub enum ReadBack {
+    /// They stand as they stood before.
+    Unchanged,
+    /// These do not.
+    Drifted(Vec<ControlDrift>),
+    /// They could not be read, so that nobody knows.
+    Unreadable(CameraError),
+}
+
+impl ReadBack {
+    /// What speaks against the take, a sentence each.
+    pub fn faults(&self) -> Vec<String> {
+        match self {
+            Self::Unchanged => Vec::new(),
+            Self::Drifted(drifts) => drifts
+                .iter()
+                .map(|drift| format!("the camera's settings changed during the turn: {drift}"))
+                .collect(),
+            Self::Unreadable(error) => vec![format!(
+                "the camera's settings could not be read back after the turn: {}",
+                with_causes(error)
+            )],
+        }
+    }
+}
+
+fn value_words(value: Option<i64>) -> String {
+    value.map_or_else(|| "unreadable".to_owned(), |value| value.to_string())
+}
+
+impl ManualPlan {
+    /// Makes the plan. Values are the wanted ones, else those that the camera has now, which an
+    /// automatic may have found; brought into the control's range and onto its steps.
+    pub fn new(controls: &[Control], wanted: &ManualValues) -> Self {
+        let mut plan = Self::default();
+        let mut values = Vec::new();
+        for aspect in Aspect::ALL {
+            let before = plan.missing.len();
+            let switched = plan.switch_off(controls, aspect);
+            let locked = matches!(switched, Some(Manual::Locked));
+            let held = plan.hold(controls, wanted, aspect, &mut values) || locked;
+            if aspect == Aspect::FrameRate || aspect == Aspect::Backlight {
+                // A camera without these has a fixed rate and no correction: nothing lacks.
+                continue;
+            }
+            if plan.missing.len() == before && !held {
+                let missing = if switched.is_some() {
+                    MissingControl::NoValue
+                } else {
+                    MissingControl::NoControl
+                };
+                plan.missing.push(missing(aspect));
+            }
+        }
+        plan.steps.extend(values);
+        plan
+    }
+
+    /// What was asked for and is not planned, because the camera has no control for it: aspect and
+    /// value of each, in words.
+    pub fn without(&self, wanted: &ManualValues) -> Vec<String> {
+        let asked = [
+            (Aspect::Exposure, wanted.exposure),
+            (Aspect::Gain, wanted.gain),
+            (Aspect::WhiteBalance, wanted.white_balance),
+            (Aspect::Focus, wanted.focus),
+            (Aspect::PowerLine, wanted.power_line),
+        ];
+        let planned = |aspect, value| {
+            let mut steps = self.steps.iter();
+            steps.any(|step| step.aspect == aspect && step.value == value)
+        };
+        asked
+            .into_iter()
+            .filter_map(|(aspect, value)| Some((aspect, value?)))
+            .filter(|(aspect, value)| !planned(*aspect, *value))
+            .map(|(aspect, value)| format!("{aspect} {value}"))
+            .collect()
+    }
+
+    /// Plans the switches of an aspect; answers the last one that can be set.
+    fn switch_off(&mut self, controls: &[Control], aspect: Aspect) -> Option<Manual> {
+        let mut switched = None;
+        for &(name, manual) in aspect.switches() {
+            let Some(control) = find(controls, name) else {
+                continue;
+            };
+            match manual.value(control) {
+                Some(value) if may_be_set(control) => {
+                    self.steps.push(step(aspect, control, value));
+                    switched = Some(manual);
+                }
+                _ => self.missing.push(MissingControl::NoManual {
+                    aspect,
+                    control: control.name.clone(),
+                }),
+            }
+        }
+        switched
+    }
+
+    /// Plans the values of an aspect; true where there is one that can be set.
+    fn hold(
+        &mut self,
+        controls: &[Control],
+        wanted: &ManualValues,
+        aspect: Aspect,
+        steps: &mut Vec<ControlSetting>,
+    ) -> bool {
+        let mut held = false;
+        for names in aspect.values() {
+            let Some(control) = names.iter().find_map(|name| find(controls, name)) else {
+                continue;
+            };
+            if !may_be_set(control) {
+                self.missing.push(MissingControl::NotSettable {
+                    aspect,
+                    control: control.name.clone(),
+                });
+                continue;
+            }
+            let value = match (aspect, wanted.of(&control.name, aspect)) {
+                (_, Some(value)) => value,
+                (Aspect::Backlight, None) => control.minimum,
+                (_, None) => control.value.unwrap_or(control.default),
+            };
+            steps.push(step(aspect, control, nearest(control, value)));
+            held = true;
+        }
+        held
+    }
+
+    /// Sets every step in order, reads everything back at the end, and answers what is not as it
+    /// was set. Controls move each other: only the last reading counts.
+    ///
+    /// # Errors
+    /// What [`Camera::set_control`] and [`Camera::controls`] answer.
+    pub fn apply(&self, camera: &mut dyn Camera) -> Result<Vec<ControlDrift>, CameraError> {
+        for step in &self.steps {
+            camera.set_control(step.id, step.value)?;
+        }
+        Ok(self.check(&camera.controls()?))
+    }
+
+    /// Reads the controls after a take and compares them with the plan, and with how they stood
+    /// `before` the take.
+    pub fn read_back(&self, before: &[Control], camera: &mut dyn Camera) -> ReadBack {
+        let after = match camera.controls() {
+            Ok(after) => after,
+            Err(error) => return ReadBack::Unreadable(error),
+        };
+        let mut drifts = self.check(&after);
+        for drift in drift_between(before, &after) {
+            if drifts.iter().all(|known| known.name != drift.name) {
+                drifts.push(drift);
+            }
+        }
+        match drifts.is_empty() {
+            true => ReadBack::Unchanged,
+            false => ReadBack::Drifted(drifts),
+        }
+    }
+
+    /// What is not as the plan sets it.
+    pub fn check(&self, controls: &[Control]) -> Vec<ControlDrift> {
+        let steps = self.steps.iter();
+        steps
+            .filter_map(|step| moved(&step.name, step.id, step.value, controls))
+            .collect()
+    }
+}
+
+/// Controls whose values differ between two readings, by name. Those that the hardware changes by
+/// itself count only where they had been set: [`ManualPlan::check`]. Those that nobody can set are
+/// readings, not settings: they do not count.
+fn drift_between(before: &[Control], after: &[Control]) -> Vec<ControlDrift> {
+    let settings = |control: &&Control| !control.flags.volatile && !control.flags.read_only;
+    let held = before.iter().filter(settings);
+    held.filter_map(|control| moved(&control.name, control.id, control.value?, after))
+        .collect()
+}
+
+fn moved(name: &str, id: ControlId, should: i64, controls: &[Control]) -> Option<ControlDrift> {
+    let control = controls.iter().find(|control| control.id == id);
+    let is = control.and_then(|control| control.value);
+    (is != Some(should)).then(|| ControlDrift {
+        name: name.to_owned(),
+        should,
+        is,
+    })
+}
+
+impl Manual {
+    /// The value that this control takes for manual, where it offers one.
+    fn value(self, control: &Control) -> Option<i64> {
+        match (self, &control.kind) {
+            (Self::MenuItem(index, word), ControlKind::Menu(items)) => items
+                .iter()
+                .find(|item| item.label.to_ascii_lowercase().contains(word))
+                .or_else(|| items.iter().find(|item| item.index == index))
+                .map(|item| item.index),
+            (Self::MenuItem(index, _), _) => in_range(control, index),
+            // Some switches are menus whose first item is manual.
+            (Self::Off | Self::Locked, ControlKind::Menu(items)) => items
+                .iter()
+                .find(|item| item.index == 0)
+                .map(|item| item.index),
+            (Self::Off | Self::Locked, _) => in_range(control, 0),
+        }
+    }
+}
+
+fn in_range(control: &Control, value: i64) -> Option<i64> {
+    (control.minimum..=control.maximum)
+        .contains(&value)
+        .then_some(value)
+}
+
+fn find<'a>(controls: &'a [Control], name: &str) -> Option<&'a Control> {
+    controls.iter().find(|control| control.name == name)
+}
+
+/// An inactive control may be set once its automatic is off.
+fn may_be_set(control: &Control) -> bool {
+    !control.flags.read_only && !control.flags.grabbed
+}
+
+fn step(aspect: Aspect, control: &Control, value: i64) -> ControlSetting {
+    ControlSetting {
+        aspect,
+        id: control.id,
+        name: control.name.clone(),
+        value,
+    }
+}
+
+/// The value of the control's range and steps, or of its menu, that is nearest.
+fn nearest(control: &Control, value: i64) -> i64 {
+    if let ControlKind::Menu(items) = &control.kind {
+        let indices = items.iter().map(|item| item.index);
+        return indices
+            .min_by_key(|index| index.abs_diff(value))
+            .unwrap_or(control.default);
+    }
+    if control.minimum >= control.maximum {
+        return control.minimum;
+    }
+    let value = value.clamp(control.minimum, control.maximum);
+    let step = i128::from(control.step.max(1));
+    let above = i128::from(value) - i128::from(control.minimum);
+    let steps = (above + step / 2) / step;
+    let most = (i128::from(control.maximum) - i128::from(control.minimum)) / step;
+    let nearest = i128::from(control.minimum) + steps.min(most) * step;
+    i64::try_from(nearest).unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,67 @@
+//! What can go wrong when a turn is recorded or salvaged.
+
+use std::io;
+use std::path::PathBuf;
+
+use relit_data::session;
+use relit_video::VideoError;
+
+/// Why a recording could not begin, be finished, or be salvaged. What ends a recording early is no
+/// such error: see [`super::End`].
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// The system refused a thread.
+    #[error("a thread for the {what} could not be started: close other programs")]
+    Thread {
+        /// What it was for.
+        what: &'static str,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// A thread panicked.
+    #[error(
+        "the {0} thread failed, which is an error in this program; the session is salvaged at the next start"
+    )]
+    Panicked(&'static str),
+    /// The session folder could not be made, written or read.
+    #[error(transparent)]
+    Session(#[from] session::SessionError),
+    /// The video could not be made, written or read.
+    #[error(transparent)]
+    Video(#[from] VideoError),
+    /// A folder of sessions could not be listed.
+    #[error("{path} could not be listed: check that it is there and may be read")]
+    List {
+        /// The folder.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// A salvaged session does not read back.
+    #[error(
+        "{folder} was salvaged to {wanted} frames and {found} read back: look at its video with `ffprobe`"
+    )]
+    NotMended {
+        /// The session folder.
+        folder: PathBuf,
+        /// Frames that it should have.
+        wanted: usize,
+        /// Frames that it has.
+        found: usize,
+    },
+}
+
+impl RecordingError {
+    /// True where a disk, quota or file size limit is exhausted.
+    #[must_use]
+    pub fn is_out_of_space(&self) -> bool {
+        use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+        match self {
+            Self::Video(VideoError::NoRoom { .. }) => true,
+            Self::Session(session::SessionError::Io { source, .. }) => {
+                matches!(source.kind(), StorageFull | QuotaExceeded | FileTooLarge)
+            }
+            _ => false,
+        }
+    }
+}

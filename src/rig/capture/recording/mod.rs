@@ -1,0 +1,35 @@
+//! Recording one turn of a started camera into a session folder.
+//!
+//! A [`Recorder`] reads the camera in a thread of its own, so that nothing that happens elsewhere
+//! costs a frame: the disk has a queue and a thread before it, and the preview never
+//! holds it up. The time of the turn may be announced after it began ([`Window`]). What is on the
+//! disk is never older than a second, and [`salvage`] closes a session whose recorder died.
+//!
+//! ```text
+//! camera thread -> cutter -> queue -> writer thread      CameraOutcome, WriterOutcome
+//!                                                    ->  Recorded -> TakeSummary, session.json
+//! ```
+//!
+//! It knows cameras, videos and sessions, and nothing of turntables: the time of a turn and the
+//! angle at a time are given to it.
+
+mod camera_thread;
+mod cutter;
+mod error;
+mod finding;
+mod outcome;
+mod progress;
+mod recorder;
+mod salvage;
+mod timing;
+mod verdict;
+mod window;
+mod writer_thread;
+
+pub use error::RecordingError;
+pub use outcome::End;
+pub use progress::Progress;
+pub use recorder::{Plan, Recorder};
+pub use salvage::{Salvaged, Saved, salvage, salvage_session};
+pub use verdict::Recorded;
+pub use window::Window;

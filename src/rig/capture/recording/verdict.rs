@@ -1,0 +1,254 @@
+//! What a take is worth, and closing its session.
+
+use super::cutter::TurnCount;
+use super::error::RecordingError;
+use super::finding::{Finding, frames};
+use super::outcome::{CameraOutcome, End, WriterOutcome};
+use super::salvage::whole_frames;
+use super::timing::TimingAnomaly;
+use crate::state::{TakeSummary, Verdict};
+use relit_data::causes::with_causes;
+use relit_data::session::{Fault, FrameEntry};
+
+/// Largest angle that can be right, degrees.
+const MOST_DEGREES: f64 = 1e6;
+/// Most faults of one kind that the manifest lists.
+const MOST_LISTED: usize = 40;
+
+/// A recording that has ended, and whose session is not closed yet.
+pub struct Recorded {
+    pub(super) camera: CameraOutcome,
+    pub(super) writer: WriterOutcome,
+    pub(super) max_dropped: u64,
+}
+
+impl Recorded {
+    /// Why it ended.
+    #[must_use]
+    pub fn end(&self) -> &End {
+        &self.camera.end
+    }
+
+    /// Notes that something other than the recorder ended the take, which is unusable then, for
+    /// this reason.
+    pub fn interrupted(&mut self, reason: String) {
+        self.camera.end = End::Interrupted(reason);
+    }
+
+    /// Judges the take and closes its session. Each frame gets the angle (degrees) that `angle`
+    /// returns for its time stamp (microseconds). `control_faults`: what is no longer as it was set
+    /// on the camera, a sentence each.
+    ///
+    /// # Errors
+    /// What closing the session answers; its status stays "recording" then, and it can be salvaged.
+    pub fn finish(
+        mut self,
+        angle: &dyn Fn(i64) -> Option<f64>,
+        control_faults: &[String],
+    ) -> Result<TakeSummary, RecordingError> {
+        if self.writer.failure.is_some() {
+            // The video could not be closed: what the disk has of it decides.
+            let session = &mut self.writer.session;
+            session.truncate(whole_frames(&session.video_path()));
+            let frames = session.index().entries().len();
+            self.writer.delivered.truncate(frames);
+        }
+        let findings = self.findings(control_faults);
+        let mut faults = self.faults(&findings);
+        let first = faults.first().map(|fault| fault.what.clone());
+        let (verdict, reason) = match (self.rejection(&findings), first) {
+            (Some(reason), _) => (Verdict::Aborted, Some(reason)),
+            (None, Some(first)) => (Verdict::Tolerated, Some(first)),
+            (None, None) => (Verdict::Clean, None),
+        };
+        faults.splice(0..0, self.lead_note());
+        let (frames, count) = (self.recorded(), &self.camera.count);
+        let (mut session, delivered) = (self.writer.session, self.writer.delivered);
+        session.amend(|entry| amended(entry, count, &delivered, angle))?;
+        session.manifest_mut().faults.extend(faults);
+        let manifest = match (verdict, &reason) {
+            (Verdict::Aborted, Some(reason)) => session.abort(reason)?,
+            _ => session.finish()?,
+        };
+        Ok(TakeSummary {
+            session: manifest.id,
+            verdict,
+            frames,
+            dropped: lost(&findings),
+            reason,
+        })
+    }
+
+    /// Frames of the turn in the video.
+    fn recorded(&self) -> u64 {
+        self.writer.delivered.iter().flatten().count() as u64
+    }
+
+    /// What is wrong with the take, by kind and then by frame. Frames that came after the turn's
+    /// last exposure do not count.
+    fn findings(&self, control_faults: &[String]) -> Vec<Finding> {
+        let TurnCount {
+            exposures,
+            missing,
+            anomalies,
+            ..
+        } = &self.camera.count;
+        let of_turn = |finding: &&Finding| finding.place().1 < Some(exposures.len());
+        let of_frames = self.camera.findings.iter().chain(&self.writer.findings);
+        let mut findings: Vec<Finding> = of_frames.filter(of_turn).cloned().collect();
+        findings.extend(missing.iter().copied().map(Finding::Missing));
+        findings.extend(anomalies.iter().copied().map(Finding::Anomaly));
+        findings.extend(control_faults.iter().cloned().map(Finding::Settings));
+        findings.sort_by_key(Finding::place);
+        findings
+    }
+
+    /// Why the take cannot be used; `None` where it can.
+    fn rejection(&self, findings: &[Finding]) -> Option<String> {
+        if let Some(failure) = &self.writer.failure {
+            return Some(self.disk_failure(failure));
+        }
+        let TurnCount {
+            expected, missing, ..
+        } = &self.camera.count;
+        // A recording that ended early, but after the turn's last frame, is whole.
+        let last = missing.last().map(|last| last.exposure + last.count);
+        let whole = *expected > 0 && last.is_none_or(|end| end < *expected);
+        let early = match self.camera.end {
+            End::Over => false,
+            End::Interrupted(_) => true,
+            _ => !whole,
+        };
+        if early {
+            let end = with_causes(&self.camera.end);
+            return Some(match expected {
+                0 => format!("{end}; the turn had not begun"),
+                all => format!("{end}; {} of {all} frames are there", self.recorded()),
+            });
+        }
+        let decisive = findings.iter().find(|finding| {
+            matches!(
+                finding,
+                Finding::Settings(_) | Finding::Anomaly(TimingAnomaly::Rate { .. })
+            )
+        });
+        decisive
+            .map(|finding| finding.text(0))
+            .or_else(|| self.too_many(findings))
+    }
+
+    /// Which frames are lost or damaged, where they are more than allowed.
+    fn too_many(&self, findings: &[Finding]) -> Option<String> {
+        let count = |is: fn(&Finding) -> bool| findings.iter().filter(|it| is(it)).count() as u64;
+        let lost = lost(findings);
+        let damaged = count(|finding| matches!(finding, Finding::Damaged(..)));
+        let slow = count(|finding| matches!(finding, Finding::QueueFull(_)));
+        let mut found = String::new();
+        if lost > 0 {
+            found = format!("{} lost", frames(lost));
+        }
+        if let Some(first) = self.camera.count.missing.first() {
+            found += &format!(" (the camera dropped exposure {} first)", first.exposure);
+        }
+        if slow > 0 {
+            found += &format!(", {} of them because the disk was too slow", frames(slow));
+        }
+        if damaged > 0 {
+            let and = if lost > 0 { " and " } else { "" };
+            found += &format!("{and}{} damaged", frames(damaged));
+        }
+        let most = self.max_dropped;
+        (lost + damaged > most).then(|| format!("{found}, where {most} are allowed"))
+    }
+
+    /// Why the disk took no more, and how much more the turn would have needed.
+    fn disk_failure(&self, failure: &RecordingError) -> String {
+        if !failure.is_out_of_space() {
+            return with_causes(failure);
+        }
+        let pending = match failure {
+            RecordingError::Video(relit_video::VideoError::NoRoom { missing, .. }) => *missing,
+            _ => 0,
+        };
+        let recorded = self.recorded();
+        let left = self.camera.count.expected.saturating_sub(recorded);
+        let mean_bytes = self.writer.bytes / recorded.max(1);
+        let missing = pending.saturating_add(left.saturating_mul(mean_bytes));
+        format!(
+            "the disk is full: in {} about {missing} bytes are missing for the rest of the turn ({})",
+            self.writer.session.folder().display(),
+            frames(left)
+        )
+    }
+
+    /// Frames before the turn, which are no fault.
+    fn lead_note(&self) -> Option<Fault> {
+        let first = self.writer.session.index().entries().first()?;
+        let lead = lead_of(&self.writer.delivered);
+        let frames = frames(lead);
+        (lead > 0).then(|| Fault {
+            t_us: first.t_us,
+            what: format!("{frames} before the turn are in the video, as its frames build on them"),
+        })
+    }
+
+    /// The findings as the manifest lists them: only the first of a kind, if they are many.
+    fn faults(&self, findings: &[Finding]) -> Vec<Fault> {
+        let entries = self.writer.session.index().entries();
+        let last_us = entries.last().map_or(0, |entry| entry.t_us);
+        let fault = |finding: &Finding| {
+            let (_, place) = finding.place();
+            let mut delivered = self.writer.delivered.iter();
+            let n = place.and_then(|_| delivered.position(|&at| at >= place));
+            let n = n.unwrap_or(entries.len());
+            Fault {
+                t_us: entries.get(n).map_or(last_us, |entry| entry.t_us),
+                what: finding.text(n),
+            }
+        };
+        let mut faults = Vec::new();
+        for kind in findings.chunk_by(|one, other| one.place().0 == other.place().0) {
+            faults.extend(kind.iter().take(MOST_LISTED).map(fault));
+            if kind.len() > MOST_LISTED {
+                let what = format!("and {} more of this kind", kind.len() - MOST_LISTED);
+                faults.push(Fault {
+                    t_us: last_us,
+                    what,
+                });
+            }
+        }
+        faults
+    }
+}
+
+fn lost(findings: &[Finding]) -> u64 {
+    findings.iter().map(Finding::lost).sum()
+}
+
+/// A frame's entry with its angle, and with the number of its exposure where the driver's counter
+/// does not count.
+fn amended(
+    entry: &FrameEntry,
+    count: &TurnCount,
+    delivered: &[Option<usize>],
+    angle: &dyn Fn(i64) -> Option<f64>,
+) -> FrameEntry {
+    let place = usize::try_from(entry.n).ok();
+    let place = place.and_then(|n| *delivered.get(n)?);
+    let sequence = match place.and_then(|place| count.exposures.get(place)) {
+        _ if count.counts => entry.sequence,
+        Some(exposure) => lead_of(delivered) + exposure,
+        None => entry.n,
+    };
+    let possible = |angle: &f64| (-MOST_DEGREES..=MOST_DEGREES).contains(angle);
+    FrameEntry {
+        sequence,
+        angle_deg: angle(entry.t_us).filter(possible),
+        ..*entry
+    }
+}
+
+/// Frames of the video before the turn.
+fn lead_of(delivered: &[Option<usize>]) -> u64 {
+    delivered.iter().take_while(|at| at.is_none()).count() as u64
+}

@@ -1,0 +1,127 @@
+//! The turn of a take: the table turns, the recorder gets the time of the turn, and both are
+//! watched.
+
+use std::time::Duration;
+
+use super::context::CaptureContext;
+use super::error::CaptureError;
+use super::preflight;
+use super::recording::{Recorder, Window};
+use crate::clock::Clock;
+use crate::state::{Monitor, Phase, TableState};
+use crate::turntable::{ControllerState, Table, Track, TurnPlan, TurntableError};
+
+/// How often table and state are looked at while frames are recorded.
+const LOOK: Duration = Duration::from_millis(100);
+/// Time between the announcement of a turn without table and its beginning, microseconds.
+const LEAD_US: i64 = 200_000;
+/// How long after the turn's last frame was due the recording may take to end.
+const END_WAIT: Duration = Duration::from_secs(10);
+
+/// The recording of one turn.
+pub(super) struct TurnRecording<'a> {
+    pub(super) recorder: &'a Recorder,
+    pub(super) clock: Clock,
+    /// The time of 360 degrees, microseconds.
+    pub(super) turn_us: i64,
+    pub(super) context: CaptureContext<'a>,
+}
+
+impl TurnRecording<'_> {
+    /// Turns the table and records its turn; returns the angles. The table is back where it stood,
+    /// or, where something failed, stands where it was stopped.
+    pub(super) fn with_table(&self, table: &Table, plan: TurnPlan) -> Result<Track, CaptureError> {
+        let stop = self.context.stop;
+        stop.explain(stop.over(table, || self.turn(table, plan)))
+    }
+
+    /// Records as long as a turn takes, from now on.
+    pub(super) fn without_table(&self) -> Result<(), CaptureError> {
+        self.record_from(self.clock.now_us().saturating_add(LEAD_US), || Ok(()))
+    }
+
+    fn turn(&self, table: &Table, plan: TurnPlan) -> Result<Track, CaptureError> {
+        self.enter_without_reports(Phase::MovingBack);
+        let margin_us = preflight::margin_us(&plan);
+        let mut turn = table.start_turn(plan)?;
+        self.context.enter(Phase::Starting);
+        let part = turn.wait_constant()?;
+        let from_us = part.from_us.saturating_add(margin_us);
+        let recorded = self.record_from(from_us, || {
+            turn.state()?;
+            // A table that does not answer ends the turn, as its state shows the next time.
+            let _shown = show_table(self.context.monitor, table);
+            Ok(())
+        });
+        match recorded {
+            Ok(()) => {
+                self.enter_without_reports(Phase::Unwinding);
+                Ok(turn.wait_end()?)
+            }
+            Err(error @ CaptureError::NotWithTheTurn) => {
+                turn.abort()?;
+                Err(error)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Records a turn that begins at `from_us`; `check` looks at the table now and then.
+    fn record_from(
+        &self,
+        from_us: i64,
+        mut check: impl FnMut() -> Result<(), CaptureError>,
+    ) -> Result<(), CaptureError> {
+        let window = Window::lasting(from_us, self.turn_us);
+        self.recorder.announce(window);
+        self.context.enter(Phase::Recording);
+        loop {
+            self.context.stop.check()?;
+            check()?;
+            let ended = self.recorder.wait_ended(LOOK);
+            self.show_progress();
+            let late_us = self.clock.now_us().saturating_sub(window.to_us());
+            let late = Duration::from_micros(u64::try_from(late_us).unwrap_or(0));
+            match ended {
+                true if late_us >= 0 => return Ok(()),
+                false if late <= END_WAIT => {}
+                _ => return Err(CaptureError::NotWithTheTurn),
+            }
+        }
+    }
+
+    fn show_progress(&self) {
+        let progress = self.recorder.progress();
+        self.context.monitor.update(|state| {
+            state.frames = progress.frames;
+            state.dropped = progress.overrun;
+        });
+    }
+
+    /// Enters a phase in which the table moves, and its reports are not shown until it is there.
+    fn enter_without_reports(&self, phase: Phase) {
+        self.context.monitor.update(|state| {
+            state.phase = phase;
+            state.table.state = ControllerState::Run.to_string();
+            state.table.angle_deg = None;
+            state.table.degrees_per_second = None;
+        });
+    }
+}
+
+/// Asks the table and shows its answer.
+pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), TurntableError> {
+    let status = table.status()?;
+    monitor.update(|state| {
+        state.table = TableState {
+            present: true,
+            state: status.state.to_string(),
+            angle_deg: Some(status.angle_deg),
+            degrees_per_second: Some(status.degrees_per_second),
+            homed: status.homed,
+            battery_v: status.battery_v,
+            fault: status.alarm.map(|alarm| alarm.to_string()),
+        };
+    });
+    Ok(())
+}

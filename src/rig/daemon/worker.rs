@@ -1,0 +1,173 @@
+//! The thread of a daemon that has camera and table: does one job after the other, and keeps pictures
+//! and state fresh in between.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use relit_data::causes::with_causes;
+
+use super::Dispatcher;
+use super::idle::Idle;
+use super::schedule::{Job, Next};
+use crate::camera::Camera;
+use crate::camera::hold::{ManualPlan, ManualValues};
+use crate::capture::CaptureError;
+use crate::capture::Equipment;
+use crate::capture::StopRequest;
+use crate::capture::turn::show_table;
+use crate::capture::{CaptureContext, CaptureRequest, capture};
+use crate::preview::Preview;
+use crate::state::Verdict;
+use crate::turntable::{Table, TurntableError};
+
+/// Time between two looks at a motion.
+const PERIOD: Duration = Duration::from_millis(20);
+
+/// The thread that has camera and table.
+pub(super) struct Worker {
+    // The table is stopped with the equipment, before anything else ends.
+    equipment: Equipment,
+    dispatcher: Arc<Dispatcher>,
+    preview: Preview,
+    idle: Idle,
+}
+
+impl Worker {
+    pub(super) fn new(equipment: Equipment, dispatcher: Arc<Dispatcher>, preview: Preview) -> Self {
+        Self {
+            idle: Idle::new(
+                dispatcher.monitor.clone(),
+                preview.clone(),
+                equipment.clock(),
+            ),
+            equipment,
+            dispatcher,
+            preview,
+        }
+    }
+
+    /// Does jobs until the program is to end.
+    pub(super) fn run(&mut self) {
+        loop {
+            match self.dispatcher.begin() {
+                (Next::Job(job), stop) => self.work(job, &stop),
+                (Next::Idle, _) => self.idle.poll(&mut self.equipment),
+                (Next::End, _) => return,
+            }
+        }
+    }
+
+    fn work(&mut self, job: Job, stop: &StopRequest) {
+        let done = self.do_job(job, stop);
+        if let Err(error) = &done {
+            self.report(with_causes(error));
+        }
+        self.idle.restart();
+        let succeeded = done.unwrap_or(false);
+        self.dispatcher
+            .change(|schedule| schedule.finish(succeeded));
+    }
+
+    /// Does it; false where it is as good as not done.
+    fn do_job(&mut self, job: Job, stop: &StopRequest) -> Result<bool, CaptureError> {
+        match job {
+            Job::Capture { object, meter } => {
+                return self.capture(&CaptureRequest { object, meter }, stop);
+            }
+            Job::StopTable if !self.equipment.wants_table() => {}
+            Job::StopTable => self.with_table(stop, |table| table.stop().map(|_| ()))?,
+            Job::Home => self.with_table(stop, |table| table.home().map(|_| ()))?,
+            Job::Jog(degrees) => {
+                self.with_table(stop, |table| table.jog(degrees, None).map(|_| ()))?;
+            }
+            Job::Unlock => self.with_table(stop, |table| table.unlock().map(|_| ()))?,
+            Job::SetControl { name, value } => self.set_control(&name, value)?,
+        }
+        Ok(true)
+    }
+
+    fn capture(
+        &mut self,
+        request: &CaptureRequest,
+        stop: &StopRequest,
+    ) -> Result<bool, CaptureError> {
+        let monitor = &self.dispatcher.monitor;
+        let context = CaptureContext {
+            monitor,
+            preview: Some(&self.preview),
+            stop,
+        };
+        let captured = capture(&mut self.equipment, request, context);
+        monitor.update(|state| state.session = None);
+        let summary = captured?.take;
+        if let Some(reason) = summary.reason {
+            self.report(format!("{}: {reason}", summary.session));
+        }
+        Ok(summary.verdict != Verdict::Aborted)
+    }
+
+    fn report(&self, fault: String) {
+        let now_us = self.equipment.clock().now_us();
+        self.dispatcher.monitor.fault(now_us, fault);
+    }
+
+    /// Lets the table do something, while pictures and its angle go on being shown.
+    fn with_table(
+        &mut self,
+        stop: &StopRequest,
+        motion: impl FnOnce(&Table) -> Result<(), TurntableError> + Send,
+    ) -> Result<(), CaptureError> {
+        let Some(table) = self.equipment.table.as_ref() else {
+            return Err(CaptureError::NoTable);
+        };
+        let clock = self.equipment.clock();
+        let (camera, idle) = (&mut self.equipment.camera, &mut self.idle);
+        let monitor = &self.dispatcher.monitor;
+        stop.over(table, || {
+            clock.scope(|scope| {
+                let moving = scope.spawn("relit-motion", || motion(table));
+                let moving = moving.map_err(CaptureError::system("a thread", "started"))?;
+                while !moving.is_finished() {
+                    // What is wrong with either shows when the motion is over.
+                    let _ = show_table(monitor, table);
+                    if let Some(camera) = camera.as_mut() {
+                        let _ = idle.take_frame(camera.as_mut());
+                    }
+                    clock.sleep(PERIOD);
+                }
+                // A motion that panicked was stopped by what it left behind, and nobody saw it.
+                let moved = moving.join();
+                Ok::<_, CaptureError>(moved.unwrap_or(Err(TurntableError::NotStopped))?)
+            })
+        })
+    }
+
+    fn set_control(&mut self, name: &str, value: i64) -> Result<(), CaptureError> {
+        let camera = self
+            .equipment
+            .camera
+            .as_mut()
+            .ok_or(CaptureError::NoCamera)?;
+        let camera = camera.as_mut();
+        let set = set_by_name(camera, name, value);
+        let set = match set {
+            // An automatic may rule it: that is switched off, as it is for every capture.
+            Err(CaptureError::Camera(_)) => {
+                let controls = camera.controls()?;
+                ManualPlan::new(&controls, &ManualValues::default()).apply(camera)?;
+                set_by_name(camera, name, value)
+            }
+            set => set,
+        };
+        self.idle.show_controls(camera);
+        set
+    }
+}
+
+fn set_by_name(camera: &mut dyn Camera, name: &str, value: i64) -> Result<(), CaptureError> {
+    let controls = camera.controls()?;
+    let found = controls.iter().find(|control| control.name == name);
+    let control = found.ok_or_else(|| CaptureError::NoControl(name.to_owned()))?;
+    camera.set_control(control.id, value)?;
+    Ok(())
+}

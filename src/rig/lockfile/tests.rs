@@ -1,0 +1,131 @@
+#![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
+
+use std::os::unix::fs::{chown, symlink};
+
+use super::accounts::{OPERATOR, SERVICE, STRANGER, as_user, share};
+use super::*;
+
+fn own_pid() -> Option<Holder> {
+    let pid = Some(std::process::id());
+    Some(Holder { pid })
+}
+
+#[test]
+fn a_lock_is_taken_once_and_the_refusal_names_the_holder() {
+    let root = tempfile::tempdir().unwrap();
+    let held = LockFile::of_root(root.path()).unwrap();
+    let path = root.path().join(ROOT_LOCK);
+    assert_eq!(LockFile::holder(&path).unwrap(), own_pid());
+    let error = LockFile::of_root(root.path()).unwrap_err();
+    let pid = std::process::id();
+    assert!(
+        error.to_string().contains(&format!("process {pid}")),
+        "{error}"
+    );
+    drop(held);
+    assert_eq!(LockFile::holder(&path).unwrap(), None);
+    LockFile::of_root(root.path()).unwrap();
+}
+
+#[test]
+fn every_name_of_a_device_leads_to_one_lock() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("camera");
+    symlink("/dev/null", &link).unwrap();
+    let _held = LockFile::of_device(Path::new("/dev/null"), folder.path()).unwrap();
+    let again = LockFile::of_device(&link, folder.path());
+    assert!(matches!(again, Err(LockError::Held { .. })), "{again:?}");
+}
+
+#[test]
+fn a_lock_that_is_a_link_or_no_plain_file_is_refused_and_what_it_leads_to_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let (target, path) = (folder.path().join("target"), folder.path().join("lock"));
+    fs::write(&target, "precious").unwrap();
+    symlink(&target, &path).unwrap();
+    assert!(matches!(
+        LockFile::take(&path, "x"),
+        Err(LockError::System { .. })
+    ));
+    assert!(LockFile::holder(&path).is_err());
+    assert_eq!(fs::read_to_string(&target).unwrap(), "precious");
+    fs::remove_file(&path).unwrap();
+    rustix::fs::mknodat(
+        rustix::fs::CWD,
+        &path,
+        rustix::fs::FileType::Fifo,
+        rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR,
+        0,
+    )
+    .unwrap();
+    assert!(LockFile::take(&path, "x").is_err());
+    assert!(LockFile::holder(&path).is_err());
+}
+
+#[test]
+fn a_folder_that_everybody_can_write_in_or_that_is_a_link_is_not_used() {
+    let base = tempfile::tempdir().unwrap();
+    let folder = base.path().join("locks");
+    use_folder(&folder).unwrap();
+    assert_eq!(fs::metadata(&folder).unwrap().mode() & 0o777, 0o700);
+    fs::set_permissions(&folder, PermissionsExt::from_mode(0o777)).unwrap();
+    assert!(use_folder(&folder).is_err());
+    fs::set_permissions(&folder, PermissionsExt::from_mode(0o700)).unwrap();
+    let link = base.path().join("link");
+    symlink(&folder, &link).unwrap();
+    assert!(use_folder(&link).is_err());
+}
+
+#[test]
+fn accounts_of_one_group_see_and_take_each_others_locks_and_no_other_account_does() {
+    let folder = tempfile::tempdir().unwrap();
+    if !share(folder.path()) {
+        return;
+    }
+    let path = folder.path().join("lock");
+    let take = || {
+        use_folder(folder.path()).unwrap();
+        LockFile::take(&path, "x")
+    };
+    let of_service = as_user(SERVICE, take).unwrap();
+    as_user(OPERATOR, || {
+        assert_eq!(LockFile::holder(&path).unwrap(), own_pid());
+        assert!(matches!(take(), Err(LockError::Held { .. })));
+    });
+    drop(of_service);
+    drop(as_user(OPERATOR, take).unwrap());
+    drop(as_user(SERVICE, take).unwrap());
+    as_user(STRANGER, || {
+        let refused = use_folder(folder.path()).unwrap_err();
+        let text = relit_data::causes::with_causes(&refused);
+        assert!(text.contains("not in the group"), "{text}");
+        assert!(
+            LockFile::holder(&path).is_err(),
+            "nobody knows, so nobody may go on"
+        );
+    });
+}
+
+#[test]
+fn a_lock_is_seen_without_permission_to_write() {
+    let folder = tempfile::tempdir().unwrap();
+    if !share(folder.path()) {
+        return;
+    }
+    let path = folder.path().join("lock");
+    let _held = LockFile::take(&path, "x").unwrap();
+    fs::set_permissions(&path, PermissionsExt::from_mode(0o640)).unwrap();
+    as_user(OPERATOR, || {
+        assert_eq!(LockFile::holder(&path).unwrap(), own_pid());
+    });
+}
+
+#[test]
+fn another_accounts_folder_is_not_used() {
+    let folder = tempfile::tempdir().unwrap();
+    if !share(folder.path()) {
+        return;
+    }
+    chown(folder.path(), Some(SERVICE), None).unwrap();
+    assert!(as_user(OPERATOR, || use_folder(folder.path())).is_err());
+}

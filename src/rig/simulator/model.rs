@@ -1,0 +1,156 @@
+//! The simulation of chip, wire and motor, advanced to a given time on demand.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use rig_firmware::board::ResetCause;
+
+use super::chip::{Chip, IndexPlace, Pins};
+use super::truth::{STEPS_PER_TURN, StepEdge, Truth};
+use super::wire::{Timed, Wire};
+use super::{SimulatorCounts, SimulatorOptions};
+
+/// Ticks of the chip's timer per microsecond.
+const TICKS_PER_US: f64 = 2.0;
+/// Largest number of bytes in transit to the chip.
+const UNDERWAY: usize = 4096;
+
+/// Converts between chip ticks and microseconds of the clock.
+#[derive(Debug, Clone, Copy)]
+struct Timebase {
+    start_us: i64,
+    ticks_per_us: f64,
+}
+
+impl Timebase {
+    fn ticks(&self, us: i64) -> u64 {
+        (us.saturating_sub(self.start_us) as f64 * self.ticks_per_us) as u64
+    }
+
+    fn us(&self, ticks: u64) -> i64 {
+        self.start_us + (ticks as f64 / self.ticks_per_us).round() as i64
+    }
+}
+
+/// A simulated table at some time. Every method that takes a time advances it to that time first.
+pub(super) struct Model {
+    timebase: Timebase,
+    chip: Chip,
+    pins: Pins,
+    to_chip: Wire,
+    from_chip: Wire,
+    outbox: VecDeque<Timed>,
+    reset_on_open: bool,
+    /// Times of restarts by faults, the next one last.
+    resets: Vec<u64>,
+    stall: Option<u64>,
+    truth: Truth,
+    counts: SimulatorCounts,
+}
+
+impl Model {
+    /// A table whose power comes on at `start_us`.
+    pub(super) fn new(options: &SimulatorOptions, pins: Pins, start_us: i64) -> Model {
+        let timebase = Timebase {
+            start_us,
+            ticks_per_us: TICKS_PER_US * (1.0 + options.drift_ppm / 1e6),
+        };
+        let steps = |degrees: f64| degrees / 360.0 * STEPS_PER_TURN;
+        let index = IndexPlace {
+            at: steps(options.index_at - options.start_angle),
+            width: steps(options.index_width),
+        };
+        let at = |time: &Duration| timebase.ticks(start_us + time.as_micros() as i64);
+        let mut resets: Vec<u64> = options.faults.resets.iter().map(at).collect();
+        resets.sort_by(|one, other| other.cmp(one));
+        Model {
+            timebase,
+            chip: Chip::new(pins, index),
+            pins,
+            to_chip: Wire::new(options.faults.to_chip, options.seed, true),
+            from_chip: Wire::new(options.faults.from_chip, options.seed, false),
+            outbox: VecDeque::new(),
+            reset_on_open: options.reset_on_open,
+            resets,
+            stall: options.faults.stall.as_ref().map(at),
+            truth: Truth::new(options.start_angle, start_us),
+            counts: SimulatorCounts::default(),
+        }
+    }
+
+    /// Simulates the time until `now_us`.
+    pub(super) fn advance(&mut self, now_us: i64) {
+        let now = self.timebase.ticks(now_us);
+        while let Some(at) = self.resets.pop_if(|at| *at <= now) {
+            self.chip.run_until(at);
+            self.chip.restart(ResetCause::Watchdog);
+            self.counts.resets += 1;
+        }
+        if let Some(at) = self.stall.take_if(|at| *at <= now) {
+            self.chip.run_until(at);
+            self.chip.stall();
+            self.counts.stalled = true;
+        }
+        self.chip.run_until(now);
+        for (at, byte) in self.chip.take_sent() {
+            self.from_chip.carry(at, byte, &mut self.outbox);
+        }
+        let timebase = self.timebase;
+        let edges = self.chip.take_edges().map(|(at, steps)| StepEdge {
+            t_us: timebase.us(at),
+            steps,
+        });
+        self.truth.extend(edges);
+    }
+
+    /// A host opens the port.
+    pub(super) fn open(&mut self, now_us: i64) {
+        self.advance(now_us);
+        self.counts.opened += 1;
+        if self.reset_on_open {
+            self.chip.restart(ResetCause::External);
+        }
+    }
+
+    /// How many bytes the wire to the chip can take now.
+    pub(super) fn room(&mut self) -> usize {
+        UNDERWAY.saturating_sub(self.chip.inbox().len())
+    }
+
+    /// Takes bytes that the host sends now.
+    pub(super) fn receive(&mut self, now_us: i64, bytes: &[u8]) {
+        self.advance(now_us);
+        let now = self.timebase.ticks(now_us);
+        for &byte in bytes {
+            self.to_chip.carry(now, byte, self.chip.inbox());
+        }
+    }
+
+    /// The bytes that have arrived at the host, at most `limit`.
+    pub(super) fn take_output(&mut self, now_us: i64, limit: usize) -> Vec<u8> {
+        self.advance(now_us);
+        let now = self.timebase.ticks(now_us);
+        let due = self.outbox.iter().take_while(|(at, _)| *at <= now).count();
+        let bytes = self.outbox.drain(..due.min(limit));
+        bytes.map(|(_, byte)| byte).collect()
+    }
+
+    /// Changes the chip's input pins.
+    pub(super) fn change_pins(&mut self, now_us: i64, change: impl FnOnce(&mut Pins)) {
+        self.advance(now_us);
+        change(&mut self.pins);
+        self.chip.set_pins(self.pins);
+    }
+
+    pub(super) fn truth(&self) -> &Truth {
+        &self.truth
+    }
+
+    pub(super) fn counts(&self) -> SimulatorCounts {
+        SimulatorCounts {
+            to_chip: self.to_chip.counts,
+            from_chip: self.from_chip.counts,
+            ..self.counts
+        }
+    }
+}

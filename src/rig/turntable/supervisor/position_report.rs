@@ -1,0 +1,69 @@
+//! Status reports converted to degrees.
+
+use std::time::Duration;
+
+use crate::turntable::wire::{ControllerState, Pins, Poll, Position};
+
+/// A status report in degrees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PositionReport {
+    pub(crate) state: ControllerState,
+    /// Degrees from machine zero.
+    pub(crate) machine_deg: f64,
+    /// Degrees/s.
+    pub(crate) speed: f64,
+    pub(crate) chip_us: Option<u32>,
+    pub(crate) battery_v: Option<f64>,
+    pub(crate) pins: Pins,
+    pub(crate) asked_us: Option<i64>,
+    pub(crate) came_us: i64,
+    /// Whether the report certainly answers the request at `asked_us`.
+    pub(crate) certain: bool,
+}
+
+impl PositionReport {
+    /// Converts a report; `None` if its position is relative to a zero that is not known yet.
+    pub(super) fn of(
+        poll: &Poll,
+        work_zero: Option<f64>,
+        traits: &ControllerTraits,
+    ) -> Option<PositionReport> {
+        let report = poll.report;
+        let units = match report.position {
+            Position::Machine(at) => at,
+            Position::Work(at) => at + work_zero?,
+        };
+        Some(PositionReport {
+            state: report.state,
+            machine_deg: units * traits.degrees_per_unit,
+            speed: report.feed.unwrap_or(0.0) * traits.degrees_per_unit / 60.0,
+            chip_us: report.chip_us.filter(|_| traits.stamps),
+            battery_v: report.battery_v,
+            pins: report.pins,
+            asked_us: poll.asked_us,
+            came_us: poll.came_us,
+            certain: poll.certain,
+        })
+    }
+
+    /// Whether the next report agrees with this one. In motion, positions differ.
+    pub(super) fn confirms(&self, next: &PositionReport) -> bool {
+        let same = self.machine_deg == next.machine_deg || next.state.may_move();
+        self.state == next.state && same
+    }
+}
+
+/// What has to be known of a controller to read its reports.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ControllerTraits {
+    /// Degrees in one unit of its reports.
+    pub(crate) degrees_per_unit: f64,
+    /// Interval of reports in motion.
+    pub(crate) poll: Duration,
+    /// Whether its reports carry the chip's time.
+    pub(crate) stamps: bool,
+    /// Whether it answers `?` while it searches for the index.
+    pub(crate) reports_homing: bool,
+    /// One step, degrees: how far it may stand from its target.
+    pub(crate) step_deg: f64,
+}
