@@ -1,10 +1,16 @@
 //! Pictures of objects together with the truth that they were made of.
 
 mod error;
+mod geometry;
 mod mesh;
 mod noise;
 mod random;
+mod shape;
+mod view;
 
 pub use error::Error;
+pub use geometry::{GBuffer, Occluder};
 pub use mesh::{Mesh, MeshFault};
 pub use random::stream;
+pub use shape::ShapeKind;
+pub use view::{Pose, Projection};

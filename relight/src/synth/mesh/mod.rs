@@ -213,41 +213,61 @@ fn drop_flat(raw: &mut Raw) {
     raw.texture.retain(|_| keep.next().copied().unwrap_or(true));
 }
 
-/// For each corner, the normals of the faces around its vertex, weighted by their area, of those
-/// that meet the corner's own face at less than `crease` radians.
+/// For each corner, the mean normal of the faces around its vertex, each weighted by its angle there,
+/// of those that meet the corner's own face at less than `crease` radians.
 fn corner_normals(positions: &[Vec3], triangles: &[[u32; 3]], crease: f32) -> Vec<[Vec3; 3]> {
-    let areas: Vec<Vec3> = triangles
+    let faces: Vec<Face> = triangles
         .iter()
-        .map(|corners| {
-            let [a, b, c] = corners.map(|v| positions[v as usize]);
-            (b - a).cross(c - a)
-        })
+        .map(|corners| Face::of(corners.map(|v| positions[v as usize])))
         .collect();
-    let faces = FacesAround::of(positions.len(), triangles);
+    let around = CornersAround::of(positions.len(), triangles);
     let least_cosine = crease.cos();
     triangles
         .iter()
-        .zip(&areas)
-        .map(|(corners, area)| {
-            let own = area.normalize_or_zero();
+        .zip(&faces)
+        .map(|(corners, own)| {
             corners.map(|vertex| {
-                let near = faces.around(vertex).map(|face| areas[face as usize]);
+                let near = around
+                    .vertex(vertex)
+                    .map(|(face, corner)| (&faces[face], corner));
                 let blended: Vec3 = near
-                    .filter(|other| own.dot(other.normalize_or_zero()) > least_cosine)
+                    .filter(|(other, _)| own.normal.dot(other.normal) > least_cosine)
+                    .map(|(other, corner)| other.normal * other.angles[corner])
                     .sum();
-                blended.try_normalize().unwrap_or(own)
+                blended.try_normalize().unwrap_or(own.normal)
             })
         })
         .collect()
 }
 
-/// Which faces meet at each vertex.
-struct FacesAround {
-    starts: Vec<u32>,
-    faces: Vec<u32>,
+struct Face {
+    normal: Vec3,
+    /// At each corner, radians.
+    angles: [f32; 3],
 }
 
-impl FacesAround {
+impl Face {
+    fn of(corners: [Vec3; 3]) -> Self {
+        let [a, b, c] = corners;
+        let angles = [0, 1, 2].map(|k| {
+            let [here, next, last] = [k, (k + 1) % 3, (k + 2) % 3].map(|i| corners[i]);
+            (next - here).angle_between(last - here)
+        });
+        Self {
+            normal: (b - a).cross(c - a).normalize_or_zero(),
+            angles,
+        }
+    }
+}
+
+/// Which corners of which faces meet at each vertex.
+struct CornersAround {
+    starts: Vec<u32>,
+    /// Three times the face, plus the corner.
+    corners: Vec<u32>,
+}
+
+impl CornersAround {
     fn of(vertices: usize, triangles: &[[u32; 3]]) -> Self {
         let mut starts = vec![0_u32; vertices + 1];
         for vertex in triangles.iter().flatten() {
@@ -257,20 +277,20 @@ impl FacesAround {
             starts[vertex + 1] += starts[vertex];
         }
         let mut next = starts.clone();
-        let mut faces = vec![0; triangles.len() * 3];
-        for (face, corners) in (0_u32..).zip(triangles) {
-            for vertex in corners {
-                let place = &mut next[*vertex as usize];
-                faces[*place as usize] = face;
-                *place += 1;
-            }
+        let mut corners = vec![0; triangles.len() * 3];
+        for (corner, vertex) in (0_u32..).zip(triangles.iter().flatten()) {
+            let place = &mut next[*vertex as usize];
+            corners[*place as usize] = corner;
+            *place += 1;
         }
-        Self { starts, faces }
+        Self { starts, corners }
     }
 
-    fn around(&self, vertex: u32) -> impl Iterator<Item = u32> {
+    /// Face and corner.
+    fn vertex(&self, vertex: u32) -> impl Iterator<Item = (usize, usize)> {
         let [start, end] = [vertex, vertex + 1].map(|v| self.starts[v as usize] as usize);
-        self.faces[start..end].iter().copied()
+        let corners = self.corners[start..end].iter();
+        corners.map(|&corner| (corner as usize / 3, corner as usize % 3))
     }
 }
 

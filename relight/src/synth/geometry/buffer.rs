@@ -1,0 +1,327 @@
+//! The geometry buffer: what is known of the surface at each pixel before there is light.
+
+use glam::{Affine3A, Mat3A, Vec2, Vec3};
+
+use super::raster::{NOTHING, Projected, Triangle, Weights, foremost};
+use crate::synth::mesh::Mesh;
+use crate::synth::view::Projection;
+
+/// How far above the surface rays of light start: the object is about 1 large.
+const LIFT: f32 = 1e-3;
+
+/// What is seen of an object, pixel by pixel: made once, it can be given any albedo and any light.
+/// Only covered pixels are kept, row by row from the upper left; all lists run along them.
+#[derive(Debug, Clone)]
+pub struct GBuffer {
+    size: u32,
+    pixels: Vec<u32>,
+    surface: Surface,
+}
+
+/// The surface at the covered pixels, in the viewer's frame unless told otherwise.
+#[derive(Debug, Clone, Default)]
+struct Surface {
+    points: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    towards_eye: Vec<Vec3>,
+    ray_starts: Vec<Vec3>,
+    object_points: Vec<Vec3>,
+    texture: Option<Vec<Vec2>>,
+}
+
+impl GBuffer {
+    /// Looks at a mesh that `placement` moves into the viewer's frame, in a square picture of `size`
+    /// pixels.
+    pub(in crate::synth) fn render(
+        mesh: &Mesh,
+        placement: Affine3A,
+        projection: Projection,
+        size: u32,
+    ) -> Self {
+        let posed = Posed::new(mesh, placement, projection, size);
+        let seen = foremost(size, &posed.projected, mesh.triangles());
+        let covered = (0_u32..)
+            .zip(&seen)
+            .filter(|(_, triangle)| **triangle != NOTHING);
+        let count = covered.clone().count();
+        let mut buffer = Self {
+            size,
+            pixels: Vec::with_capacity(count),
+            surface: Surface::with_capacity(count, mesh.texture().is_some()),
+        };
+        for (pixel, &triangle) in covered {
+            let (column, row) = (pixel % size, pixel / size);
+            if posed.resolve(triangle, column, row, &mut buffer.surface) {
+                buffer.pixels.push(pixel);
+            }
+        }
+        buffer
+    }
+
+    /// Width and height of the picture, pixels.
+    #[must_use]
+    pub fn size(&self) -> u32 {
+        self.size
+    }
+
+    /// The covered pixels, ascending: row times size plus column.
+    #[must_use]
+    pub fn pixels(&self) -> &[u32] {
+        &self.pixels
+    }
+
+    /// Number of covered pixels.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.pixels.len()
+    }
+
+    /// Whether nothing is seen.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.pixels.is_empty()
+    }
+
+    /// Where the surface is.
+    #[must_use]
+    pub fn points(&self) -> &[Vec3] {
+        &self.surface.points
+    }
+
+    /// Unit normals; they never face away from the eye.
+    #[must_use]
+    pub fn normals(&self) -> &[Vec3] {
+        &self.surface.normals
+    }
+
+    /// Unit vectors to the eye.
+    #[must_use]
+    pub fn towards_eye(&self) -> &[Vec3] {
+        &self.surface.towards_eye
+    }
+
+    /// Where the surface is in the mesh's own frame, within the unit sphere: patterns stick to it.
+    #[must_use]
+    pub fn object_points(&self) -> &[Vec3] {
+        &self.surface.object_points
+    }
+
+    /// Texture coordinates, where the mesh has them.
+    #[must_use]
+    pub fn texture(&self) -> Option<&[Vec2]> {
+        self.surface.texture.as_deref()
+    }
+
+    /// Where rays of light start: a little above the surface, and lifted where facets are flatter
+    /// than the normals say (Hanika, "Hacking the Shadow Terminator", 2021).
+    #[must_use]
+    pub fn ray_starts(&self) -> &[Vec3] {
+        &self.surface.ray_starts
+    }
+
+    /// A full picture with these values at the covered pixels and `empty` elsewhere.
+    pub(in crate::synth) fn spread<T: Copy>(&self, values: &[T], empty: T) -> Vec<T> {
+        let mut picture = vec![empty; self.size as usize * self.size as usize];
+        for (&pixel, &value) in self.pixels.iter().zip(values) {
+            picture[pixel as usize] = value;
+        }
+        picture
+    }
+}
+
+impl Surface {
+    fn with_capacity(count: usize, is_textured: bool) -> Self {
+        Self {
+            points: Vec::with_capacity(count),
+            normals: Vec::with_capacity(count),
+            towards_eye: Vec::with_capacity(count),
+            ray_starts: Vec::with_capacity(count),
+            object_points: Vec::with_capacity(count),
+            texture: is_textured.then(|| Vec::with_capacity(count)),
+        }
+    }
+}
+
+/// A mesh in its place before the camera.
+struct Posed<'a> {
+    mesh: &'a Mesh,
+    positions: Vec<Vec3>,
+    projected: Vec<Projected>,
+    normal_map: Mat3A,
+    projection: Projection,
+}
+
+impl<'a> Posed<'a> {
+    fn new(mesh: &'a Mesh, placement: Affine3A, projection: Projection, size: u32) -> Self {
+        let moved = mesh
+            .positions()
+            .iter()
+            .map(|&p| placement.transform_point3(p));
+        let positions: Vec<Vec3> = moved.collect();
+        let half = size as f32 / 2.0;
+        let project = |&point: &Vec3| {
+            let (place, magnification) = projection.project(point);
+            let nearness = match projection {
+                Projection::Orthographic => point.z,
+                Projection::Perspective { .. } => magnification,
+            };
+            let place = Vec2::new(place.x + 1.0, 1.0 - place.y) * half;
+            Projected { place, nearness }
+        };
+        let projected = positions.iter().map(project).collect();
+        Self {
+            mesh,
+            positions,
+            projected,
+            normal_map: placement.matrix3.inverse().transpose(),
+            projection,
+        }
+    }
+
+    /// Adds what is seen of a triangle at a pixel; false where, by rounding, the pixel is missed.
+    fn resolve(&self, number: u32, column: u32, row: u32, surface: &mut Surface) -> bool {
+        let corners = self.mesh.triangles()[number as usize];
+        let inside = Triangle::of(corners, &self.projected)
+            .and_then(|triangle| triangle.weights(column as usize, row as usize));
+        let Some(inside) = inside else { return false };
+        let weights = self.in_space(corners, inside);
+        let places = corners.map(|vertex| self.positions[vertex as usize]);
+        let point = blend(weights, places);
+        let towards_eye = self.projection.towards_eye(point);
+        let facet = (places[1] - places[0]).cross(places[2] - places[0]);
+        let facet = facet.normalize_or(towards_eye);
+        // A sheet seen from behind shows its back.
+        let side = if facet.dot(towards_eye) < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
+        let normals = self.mesh.normals()[number as usize]
+            .map(|normal| (self.normal_map * normal).normalize_or(facet * side) * side);
+        let normal = blend(weights, normals).normalize_or(facet * side);
+        surface.points.push(point);
+        surface.normals.push(turned_to(normal, towards_eye));
+        surface.towards_eye.push(towards_eye);
+        let lifted = lift(point, weights, places, normals);
+        surface.ray_starts.push(lifted + facet * side * LIFT);
+        let own = corners.map(|vertex| self.mesh.positions()[vertex as usize]);
+        surface.object_points.push(blend(weights, own));
+        if let (Some(list), Some(coordinates)) = (&mut surface.texture, self.mesh.texture()) {
+            let [a, b, c] = coordinates[number as usize];
+            list.push(a * weights[0] + b * weights[1] + c * weights[2]);
+        }
+        true
+    }
+
+    /// Weights in space for weights in the picture.
+    fn in_space(&self, corners: [u32; 3], weights: Weights) -> Weights {
+        if self.projection == Projection::Orthographic {
+            return weights;
+        }
+        let scaled = [0, 1, 2].map(|k| weights[k] * self.projected[corners[k] as usize].nearness);
+        let sum = scaled.iter().sum::<f32>();
+        scaled.map(|part| part / sum)
+    }
+}
+
+fn blend(weights: Weights, values: [Vec3; 3]) -> Vec3 {
+    values[0] * weights[0] + values[1] * weights[1] + values[2] * weights[2]
+}
+
+/// The normal, or where it faces away from the eye, the nearest one that does not.
+pub(in crate::synth) fn turned_to(normal: Vec3, towards_eye: Vec3) -> Vec3 {
+    let facing = normal.dot(towards_eye);
+    if facing >= 0.0 {
+        return normal;
+    }
+    (normal - towards_eye * facing).normalize_or(towards_eye)
+}
+
+/// The point, moved out of the dents that flat facets make in a round surface.
+fn lift(point: Vec3, weights: Weights, places: [Vec3; 3], normals: [Vec3; 3]) -> Vec3 {
+    let lifted = [0, 1, 2].map(|k| {
+        let below = (point - places[k]).dot(normals[k]).min(0.0);
+        point - normals[k] * below
+    });
+    blend(weights, lifted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::shape::ShapeKind;
+    use crate::synth::view::Pose;
+
+    fn ball(projection: Projection, size: u32) -> GBuffer {
+        let mesh = ShapeKind::Sphere.build(0);
+        let placement = Pose::upright(0.3, 0.4, 0.8).place(&mesh, projection);
+        GBuffer::render(&mesh, placement, projection, size)
+    }
+
+    #[test]
+    fn a_ball_covers_its_disc_and_has_the_normals_of_a_sphere() {
+        let size = 128;
+        let buffer = ball(Projection::Orthographic, size);
+        let area = buffer.len() as f32 / (size * size) as f32 * 4.0;
+        assert!(
+            (area / (std::f32::consts::PI * 0.64) - 1.0).abs() < 0.01,
+            "{area}"
+        );
+        for (&pixel, normal) in buffer.pixels().iter().zip(buffer.normals()) {
+            let x = ((pixel % size) as f32 + 0.5) / 64.0 - 1.0;
+            let y = 1.0 - ((pixel / size) as f32 + 0.5) / 64.0;
+            let truth = Vec3::new(x, y, (0.64 - x * x - y * y).max(0.0).sqrt()) / 0.8;
+            assert!(normal.distance(truth) < 0.06, "{normal} at {x}, {y}");
+            if truth.z > 0.3 {
+                assert!(normal.distance(truth) < 0.004, "{normal} for {truth}");
+            }
+        }
+    }
+
+    #[test]
+    fn perspective_sees_points_along_rays_through_the_eye() {
+        let distance = 3.0;
+        let buffer = ball(Projection::Perspective { distance }, 64);
+        for ((&pixel, point), to_eye) in buffer
+            .pixels()
+            .iter()
+            .zip(buffer.points())
+            .zip(buffer.towards_eye())
+        {
+            let x = ((pixel % 64) as f32 + 0.5) / 32.0 - 1.0;
+            let y = 1.0 - ((pixel / 64) as f32 + 0.5) / 32.0;
+            let ray = Vec3::new(x, y, -distance).normalize();
+            assert!(ray.dot(-*to_eye) > 0.99999);
+            let along = (*point - Vec3::Z * distance).normalize();
+            assert!(along.dot(ray) > 0.99999, "{point}");
+        }
+    }
+
+    #[test]
+    fn the_object_s_own_points_turn_with_it() {
+        let buffer = ball(Projection::Orthographic, 32);
+        let turn = Pose::upright(0.3, 0.4, 0.8).turn;
+        for (point, own) in buffer.points().iter().zip(buffer.object_points()) {
+            assert!((turn * *own * 0.8).distance(*point) < 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_sheet_from_behind_shows_normals_that_face_the_viewer() {
+        let mesh = ShapeKind::Plane.build(0);
+        let placement = Pose::upright(0.0, 2.5, 0.9).place(&mesh, Projection::Orthographic);
+        let buffer = GBuffer::render(&mesh, placement, Projection::Orthographic, 32);
+        assert!(!buffer.is_empty());
+        assert!(buffer.normals().iter().all(|normal| normal.z > 0.5));
+        let lifts = buffer.ray_starts().iter().zip(buffer.points());
+        assert!(lifts.clone().all(|(start, point)| start.z > point.z));
+    }
+
+    #[test]
+    fn values_are_spread_over_the_picture_where_the_object_is() {
+        let buffer = ball(Projection::Orthographic, 16);
+        let picture = buffer.spread(&vec![7_u8; buffer.len()], 1);
+        assert_eq!(picture.len(), 256);
+        assert_eq!((picture[0], picture[8 * 16 + 8]), (1, 7));
+    }
+}
