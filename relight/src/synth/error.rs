@@ -36,6 +36,14 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
+    /// A texture cannot be read.
+    #[error("{path} cannot be read as a picture: give PNG or JPEG")]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// The decoder's word.
+        source: image::ImageError,
+    },
 }
 
 impl Error {

@@ -1,6 +1,6 @@
 //! The geometry buffer: what is known of the surface at each pixel before there is light.
 
-use glam::{Affine3A, Mat3A, Vec2, Vec3};
+use glam::{Affine3A, Mat3, Vec2, Vec3};
 
 use super::raster::{NOTHING, Projected, Triangle, Weights, foremost};
 use crate::synth::mesh::Mesh;
@@ -16,6 +16,7 @@ pub struct GBuffer {
     size: u32,
     pixels: Vec<u32>,
     surface: Surface,
+    gradient_map: Mat3,
 }
 
 /// The surface at the covered pixels, in the viewer's frame unless told otherwise.
@@ -48,6 +49,7 @@ impl GBuffer {
             size,
             pixels: Vec::with_capacity(count),
             surface: Surface::with_capacity(count, mesh.texture().is_some()),
+            gradient_map: without_scale(posed.normal_map),
         };
         for (pixel, &triangle) in covered {
             let (column, row) = (pixel % size, pixel / size);
@@ -119,6 +121,12 @@ impl GBuffer {
         &self.surface.ray_starts
     }
 
+    /// Takes the gradient of a height, in the mesh's own frame and unit, into the viewer's frame.
+    #[must_use]
+    pub fn gradient_map(&self) -> Mat3 {
+        self.gradient_map
+    }
+
     /// A full picture with these values at the covered pixels and `empty` elsewhere.
     pub(in crate::synth) fn spread<T: Copy>(&self, values: &[T], empty: T) -> Vec<T> {
         let mut picture = vec![empty; self.size as usize * self.size as usize];
@@ -147,7 +155,7 @@ struct Posed<'a> {
     mesh: &'a Mesh,
     positions: Vec<Vec3>,
     projected: Vec<Projected>,
-    normal_map: Mat3A,
+    normal_map: Mat3,
     projection: Projection,
 }
 
@@ -173,7 +181,7 @@ impl<'a> Posed<'a> {
             mesh,
             positions,
             projected,
-            normal_map: placement.matrix3.inverse().transpose(),
+            normal_map: Mat3::from(placement.matrix3).inverse().transpose(),
             projection,
         }
     }
@@ -226,6 +234,16 @@ impl<'a> Posed<'a> {
 
 fn blend(weights: Weights, values: [Vec3; 3]) -> Vec3 {
     values[0] * weights[0] + values[1] * weights[1] + values[2] * weights[2]
+}
+
+/// A linear map without the factor by which it enlarges.
+fn without_scale(map: Mat3) -> Mat3 {
+    let scale = map.determinant().abs().cbrt();
+    if scale > 0.0 {
+        map * scale.recip()
+    } else {
+        map
+    }
 }
 
 /// The normal, or where it faces away from the eye, the nearest one that does not.

@@ -6,4 +6,6 @@ mod occluder;
 mod raster;
 
 pub use buffer::GBuffer;
+pub(super) use buffer::turned_to;
+pub(super) use occluder::Disc;
 pub use occluder::Occluder;
