@@ -1,6 +1,6 @@
 //! The geometry buffer: what is known of the surface at each pixel before there is light.
 
-use glam::{Affine3A, Mat3, Vec2, Vec3};
+use glam::{Affine3A, DVec4, Mat3, Vec2, Vec3, Vec4};
 
 use super::raster::{NOTHING, Projected, Triangle, Weights, foremost};
 use crate::synth::mesh::Mesh;
@@ -135,6 +135,45 @@ impl GBuffer {
         }
         picture
     }
+
+    /// For each covered pixel, the mean of `values` over the covered pixels around it: a square of
+    /// `radius` pixels to each side, twice over.
+    pub(in crate::synth) fn blurred(&self, values: &[Vec3], radius: u32) -> Vec<Vec3> {
+        let weighted: Vec<Vec4> = values.iter().map(|value| value.extend(1.0)).collect();
+        let mut picture = self.spread(&weighted, Vec4::ZERO);
+        let (side, radius) = (self.size as usize, radius as usize);
+        for _ in 0..2 {
+            picture = transposed_means(&picture, side, radius);
+            picture = transposed_means(&picture, side, radius);
+        }
+        let at = |&pixel: &u32| {
+            let sum = picture[pixel as usize];
+            sum.truncate() / sum.w.max(f32::MIN_POSITIVE)
+        };
+        self.pixels.iter().map(at).collect()
+    }
+}
+
+/// The running means along the rows of a square picture, as the columns of the result.
+fn transposed_means(picture: &[Vec4], side: usize, radius: usize) -> Vec<Vec4> {
+    let mut result = vec![Vec4::ZERO; picture.len()];
+    for (row, values) in picture.chunks_exact(side.max(1)).enumerate() {
+        // Sums in f64: what is taken away again leaves nothing behind.
+        let mut sum = DVec4::ZERO;
+        for entering in 0..side + radius {
+            if let Some(value) = values.get(entering) {
+                sum += value.as_dvec4();
+            }
+            if entering > 2 * radius {
+                sum -= values[entering - 2 * radius - 1].as_dvec4();
+            }
+            if entering >= radius {
+                let mean = sum / (2 * radius + 1) as f64;
+                result[(entering - radius) * side + row] = mean.as_vec4();
+            }
+        }
+    }
+    result
 }
 
 impl Surface {
@@ -341,5 +380,22 @@ mod tests {
         let picture = buffer.spread(&vec![7_u8; buffer.len()], 1);
         assert_eq!(picture.len(), 256);
         assert_eq!((picture[0], picture[8 * 16 + 8]), (1, 7));
+    }
+
+    #[test]
+    fn a_blur_takes_the_mean_of_what_is_covered() {
+        let buffer = ball(Projection::Orthographic, 32);
+        let even = buffer.blurred(&vec![Vec3::new(3.0, 0.5, 0.0); buffer.len()], 3);
+        for value in &even {
+            assert!(value.distance(Vec3::new(3.0, 0.5, 0.0)) < 1e-5, "{value}");
+        }
+        let mut point = vec![Vec3::ZERO; buffer.len()];
+        let middle = buffer.pixels().iter().position(|&p| p == 16 * 32 + 16).unwrap();
+        point[middle] = Vec3::ONE;
+        let blurred = buffer.blurred(&point, 2);
+        let sum: f32 = blurred.iter().map(|value| value.x).sum();
+        assert!((sum - 1.0).abs() < 1e-4, "{sum}");
+        // Two squares of five: a pyramid of 25 / 625 at its top.
+        assert!((blurred[middle].x - 0.04).abs() < 1e-5, "{}", blurred[middle].x);
     }
 }

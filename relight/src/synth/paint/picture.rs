@@ -4,7 +4,8 @@ use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
-use super::super::Error;
+use crate::image::{Extent, Linear, Rgb, Transfer};
+use crate::synth::Error;
 
 /// A picture in linear light, which repeats itself in all directions.
 #[derive(Debug, Clone)]
@@ -35,23 +36,22 @@ impl Picture {
     /// Reads a PNG or JPEG, whose values are sRGB.
     ///
     /// # Errors
-    /// [`Error::Picture`] where it is no such picture, [`Error::Read`] where it cannot be read.
+    /// [`Error::Image`] where it cannot be read or is no picture.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let bytes = std::fs::read(path).map_err(Error::read(path))?;
-        let image = image::load_from_memory(&bytes).map_err(|source| Error::Picture {
-            path: path.to_owned(),
-            source,
-        })?;
-        let image = image.into_rgb32f();
-        let (width, height) = image.dimensions();
-        Ok(Self::from_fn(width as usize, height as usize, |x, y| {
-            let [r, g, b] = image.get_pixel(x as u32, y as u32).0;
-            Vec3::new(r, g, b).map(linear)
+        let image = Rgb::<Linear>::read(path, Transfer::Srgb)?;
+        let planes = image.planes();
+        let Extent { width, height } = planes.extent();
+        Ok(Self::from_fn(width, height, |x, y| {
+            Vec3::from_array(planes.pixel(x, y))
         }))
     }
 
-    /// The colour at a place; the picture is 1 wide and high, v runs upwards. Bilinear.
+    /// The colour at a place; the picture is 1 wide and high, v runs upwards. Bilinear. A picture
+    /// without pixels is black.
     pub(super) fn at(&self, place: Vec2) -> Vec3 {
+        if self.texels.is_empty() {
+            return Vec3::ZERO;
+        }
         let x = (place.x - place.x.floor()) * self.width as f32 - 0.5;
         let y = (1.0 - (place.y - place.y.floor())) * self.height as f32 - 0.5;
         let (left, above) = (x.floor(), y.floor());
@@ -66,11 +66,17 @@ impl Picture {
     }
 }
 
-/// The light of an sRGB value (IEC 61966-2-1).
-fn linear(value: f32) -> f32 {
-    if value <= 0.040_45 {
-        value / 12.92
-    } else {
-        ((value + 0.055) / 1.055).powf(2.4)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_is_looked_up_between_its_texels_and_repeats_itself() {
+        let picture = Picture::from_fn(2, 2, |x, y| Vec3::new(x as f32, y as f32, 0.0));
+        assert_eq!(picture.at(Vec2::new(0.25, 0.75)), Vec3::ZERO);
+        assert_eq!(picture.at(Vec2::new(0.75, 0.25)), Vec3::new(1.0, 1.0, 0.0));
+        assert_eq!(picture.at(Vec2::new(0.5, 0.75)), Vec3::new(0.5, 0.0, 0.0));
+        assert_eq!(picture.at(Vec2::new(-0.25, 5.25)), picture.at(Vec2::new(0.75, 0.25)));
+        assert_eq!(Picture::from_fn(0, 3, |_, _| Vec3::ONE).at(Vec2::ZERO), Vec3::ZERO);
     }
 }
