@@ -11,4 +11,5 @@
 //! | [`synth`] | pictures of objects with the truth that they were made of |
 pub mod image;
 pub mod light;
+pub mod render;
 pub mod synth;

@@ -42,6 +42,8 @@ impl Order {
     pub const MAX: usize = 64;
     /// Nine coefficients.
     pub const TWO: Self = Self(2);
+    /// The order that ends at [`Order::MAX`].
+    pub const HIGHEST: Self = Self(Self::MAX as u8);
 
     /// The order with `highest` as its last band.
     ///

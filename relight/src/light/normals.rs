@@ -153,6 +153,23 @@ impl<Y: YAxis> Normals<Y> {
     }
 }
 
+impl Normals<YUp> {
+    /// The front of a sphere that fills a square image of `side` pixels, seen from far away.
+    #[must_use]
+    pub fn sphere(side: usize) -> Self {
+        let place = |at: usize| (2.0 * (at as f32 + 0.5)) / side as f32 - 1.0;
+        Self::new(Planes::from_fn(Extent::new(side, side), |x, y| {
+            let [x, y] = [place(x), -place(y)];
+            let rest = 1.0 - x * x - y * y;
+            if rest >= 0.0 {
+                [x, y, rest.sqrt()]
+            } else {
+                [0.0; 3]
+            }
+        }))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -66,7 +66,13 @@ impl CameraModel {
     pub(super) fn draw(random: &mut Random) -> Self {
         let balance = Vec3::from_array([(); 3].map(|()| (random.normal() * 0.08).exp()));
         let is_noisy = random.chance(0.6);
-        let mut noise = |most: f32| if is_noisy { random.uniform(0.0..most) } else { 0.0 };
+        let mut noise = |most: f32| {
+            if is_noisy {
+                random.uniform(0.0..most)
+            } else {
+                0.0
+            }
+        };
         let (read_noise, shot_noise) = (noise(0.002), noise(0.006));
         Self {
             gain: balance * 3.0 / balance.element_sum(),
@@ -123,9 +129,8 @@ impl CameraModel {
         };
         let mut bytes = Vec::new();
         let encoded = JpegEncoder::new_with_quality(&mut bytes, quality).encode_image(&picture);
-        let decoded = encoded.and_then(|()| {
-            image::load_from_memory_with_format(&bytes, ImageFormat::Jpeg)
-        });
+        let decoded =
+            encoded.and_then(|()| image::load_from_memory_with_format(&bytes, ImageFormat::Jpeg));
         // What the encoder writes the decoder reads; if ever not, the picture stays uncompressed.
         decoded.map_or(picture, |decoded| decoded.into_rgb8())
     }
@@ -182,7 +187,10 @@ mod tests {
             };
             for (grey, value) in greys.iter().zip(camera.values(&greys, 0)) {
                 let exact = response.encode(grey.x) * 255.0;
-                assert!((f32::from(value[0]) - exact).abs() < 0.52, "{exact} {value:?}");
+                assert!(
+                    (f32::from(value[0]) - exact).abs() < 0.52,
+                    "{exact} {value:?}"
+                );
             }
         }
     }
@@ -203,7 +211,10 @@ mod tests {
         };
         let values = camera.values(&vec![Vec3::splat(0.5); 20_000], 9);
         let mean = values.iter().map(|v| f32::from(v[0])).sum::<f32>() / 20_000.0;
-        let square = values.iter().map(|v| (f32::from(v[0]) - mean).powi(2)).sum::<f32>();
+        let square = values
+            .iter()
+            .map(|v| (f32::from(v[0]) - mean).powi(2))
+            .sum::<f32>();
         assert!((mean - 127.5).abs() < 0.2, "{mean}");
         assert!(((square / 20_000.0).sqrt() - 5.1).abs() < 0.15);
         assert_ne!(values, camera.values(&vec![Vec3::splat(0.5); 20_000], 10));
@@ -214,7 +225,9 @@ mod tests {
         let mut camera = CameraModel::draw(&mut Random::new(4));
         let image: Vec<Vec3> = (0..1000).map(|k| Vec3::splat(k as f32)).collect();
         camera.expose(&image, 0.8);
-        let above = image.iter().filter(|c| (**c * camera.gain).max_element() > 0.8);
+        let above = image
+            .iter()
+            .filter(|c| (**c * camera.gain).max_element() > 0.8);
         assert_eq!(above.count(), 9);
         camera.expose(&[], 0.8);
     }

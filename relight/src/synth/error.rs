@@ -77,13 +77,17 @@ pub enum Error {
     #[error("a picture could not be encoded as PNG")]
     Png(#[from] png::EncodingError),
     /// The folder was made with other settings.
-    #[error("{path} holds samples that were made with other settings: give the same ones, or another folder")]
+    #[error(
+        "{path} holds samples that were made with other settings: give the same ones, or another folder"
+    )]
     OtherSettings {
         /// The folder.
         path: PathBuf,
     },
     /// The folder holds something else.
-    #[error("{path} is not empty and has no {file}: give an empty folder, or one of `relight synth`")]
+    #[error(
+        "{path} is not empty and has no {file}: give an empty folder, or one of `relight synth`"
+    )]
     Foreign {
         /// The folder.
         path: PathBuf,

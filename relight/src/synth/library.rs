@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
+use super::Error;
 use super::lighting::Panoramas;
 use super::mesh::Mesh;
 use super::paint::Picture;
 use super::studio::Surroundings;
-use super::Error;
 use crate::image::Extent;
 use crate::light::Panorama;
 
@@ -53,9 +53,7 @@ impl Library {
             None => Vec::new(),
         };
         let textures = match &folders.textures {
-            Some(folder) => {
-                read_all(folder, "textures", &["png", "jpg", "jpeg"], Picture::read)?
-            }
+            Some(folder) => read_all(folder, "textures", &["png", "jpg", "jpeg"], Picture::read)?,
             None => Vec::new(),
         };
         let panoramas = match &folders.panoramas {
@@ -85,7 +83,11 @@ impl Library {
 pub fn made_panoramas() -> Result<Vec<(String, Panorama)>, Error> {
     let mut made = Vec::new();
     for kind in Surroundings::ALL {
-        let variants = if kind == Surroundings::Even { 1 } else { VARIANTS };
+        let variants = if kind == Surroundings::Even {
+            1
+        } else {
+            VARIANTS
+        };
         for seed in 0..variants {
             let panorama = kind.panorama(seed, PANORAMA_EXTENT).map_err(Error::Light)?;
             made.push((format!("{}-{seed}", kind.name()), panorama));
@@ -160,7 +162,10 @@ mod tests {
             ..Folders::default()
         };
         let error = Library::read(&folders).unwrap_err().to_string();
-        assert!(error.contains("no panoramas") && error.contains("exr"), "{error}");
+        assert!(
+            error.contains("no panoramas") && error.contains("exr"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -27,7 +27,10 @@ impl Sixteen {
 
     /// Colours of 0 to the largest among them.
     pub(super) fn up_to_largest(colours: &[Vec3]) -> Self {
-        let largest = colours.iter().map(|colour| colour.max_element()).fold(0.0, f32::max);
+        let largest = colours
+            .iter()
+            .map(|colour| colour.max_element())
+            .fold(0.0, f32::max);
         let white = if largest.is_normal() { largest } else { 1.0 };
         Self::up_to(colours, white)
     }

@@ -96,10 +96,23 @@ impl Recipe {
     pub fn check(&self) -> Result<(), Error> {
         let checks = [
             ("the size", self.size, 16..=2048, "16 to 2048 pixels"),
-            ("the number of views", self.views, 1..=u32::MAX, "at least 1"),
-            ("the number of lightings", self.lightings, 1..=u32::MAX, "at least 1"),
+            (
+                "the number of views",
+                self.views,
+                1..=u32::MAX,
+                "at least 1",
+            ),
+            (
+                "the number of lightings",
+                self.lightings,
+                1..=u32::MAX,
+                "at least 1",
+            ),
         ];
-        match checks.into_iter().find(|(_, value, range, _)| !range.contains(value)) {
+        match checks
+            .into_iter()
+            .find(|(_, value, range, _)| !range.contains(value))
+        {
             None => Ok(()),
             Some((name, value, _, allowed)) => Err(Error::Setting {
                 name,
@@ -122,11 +135,17 @@ impl Recipe {
         if random.chance(MESHES)
             && let Some((file, mesh)) = library.meshes.get(random.index(library.meshes.len()))
         {
-            return (ObjectSource::Mesh { file: file.clone() }, Cow::Borrowed(mesh));
+            return (
+                ObjectSource::Mesh { file: file.clone() },
+                Cow::Borrowed(mesh),
+            );
         }
         let kind = random.weighted(ShapeKind::WEIGHTS);
         let seed = random.seed();
-        (ObjectSource::Shape { kind, seed }, Cow::Owned(kind.build(seed)))
+        (
+            ObjectSource::Shape { kind, seed },
+            Cow::Owned(kind.build(seed)),
+        )
     }
 
     /// A view of an object: of several draws the first that covers enough of the picture.
@@ -145,7 +164,10 @@ impl Recipe {
             let placement = pose.place(mesh, projection);
             let buffer = GBuffer::render(mesh, placement, projection, self.size);
             let covers = buffer.len();
-            if best.as_ref().is_none_or(|(_, _, other)| covers > other.len()) {
+            if best
+                .as_ref()
+                .is_none_or(|(_, _, other)| covers > other.len())
+            {
                 best = Some((pose, projection, buffer));
             }
             if covers >= least {
@@ -155,7 +177,11 @@ impl Recipe {
         let (pose, projection, buffer) = best.unwrap_or_else(|| {
             let (pose, projection) = (Pose::upright(0.3, 0.0, 0.9), Projection::Orthographic);
             let placement = pose.place(mesh, projection);
-            (pose, projection, GBuffer::render(mesh, placement, projection, self.size))
+            (
+                pose,
+                projection,
+                GBuffer::render(mesh, placement, projection, self.size),
+            )
         });
         let scene = if self.shadows {
             let occluder = Occluder::new(mesh, pose.place(mesh, projection));
@@ -179,7 +205,9 @@ impl Recipe {
         let buffer = view.scene.buffer();
         let paint = Paint::draw(&mut random, buffer.object_points(), library.pictures.len());
         let relief = random.chance(0.35).then(|| Relief::draw(&mut random));
-        let gloss = random.chance(0.35).then(|| BlinnPhong::draw(&mut random, &paint));
+        let gloss = random
+            .chance(0.35)
+            .then(|| BlinnPhong::draw(&mut random, &paint));
         let material = Material::new(buffer, &paint, &library.pictures, relief.as_ref(), gloss);
         let lighting = Lighting::draw(&mut random, self.light, buffer, &library.panoramas);
         let lighting = Lighting {
@@ -195,7 +223,9 @@ impl Recipe {
             true if self.random_camera => random.uniform(1.1..1.8),
             _ => random.uniform(0.6..1.1),
         };
-        let shaded = view.scene.light(&material, &lighting, &library.panoramas, random.seed());
+        let shaded = view
+            .scene
+            .light(&material, &lighting, &library.panoramas, random.seed());
         camera.expose(&shaded.image(&material.albedo), level);
         let environment = lighting.environment.as_ref();
         let panorama = environment.and_then(|around| library.panoramas.name(around.panorama));
@@ -307,7 +337,10 @@ mod tests {
             let (object, mesh) = small().object(&library, number);
             let view = small().view(&object, &mesh, number);
             let sample = small().sample(&library, &view, number);
-            let bright = sample.image().pixels().filter(|p| p.0.iter().any(|&v| v > 120));
+            let bright = sample
+                .image()
+                .pixels()
+                .filter(|p| p.0.iter().any(|&v| v > 120));
             assert!(bright.count() > 8, "{number}");
             let sum: u64 = sample.image().as_raw().iter().map(|&v| u64::from(v)).sum();
             means.push(sum);

@@ -4,6 +4,7 @@ use glam::Vec3;
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 
+use super::Error;
 use super::camera::CameraModel;
 use super::geometry::GBuffer;
 use super::lighting::{BlinnPhong, Lighting, Material, Panoramas, Shaded};
@@ -11,7 +12,6 @@ use super::paint::{Paint, Relief};
 use super::png::{Sixteen, encode_sixteen};
 use super::recipe::{ObjectSource, View};
 use super::view::{Pose, Projection};
-use super::Error;
 use crate::light::ShLight;
 
 /// All that a sample was made of.
@@ -47,7 +47,9 @@ pub struct Description {
 impl Lighting {
     /// The coefficients as a camera of this gain sees them.
     pub(super) fn seen_coefficients(&self, panoramas: &Panoramas, gain: Vec3) -> [[f64; 3]; 9] {
-        let light = self.coefficients(panoramas).tinted(gain.to_array().map(f64::from));
+        let light = self
+            .coefficients(panoramas)
+            .tinted(gain.to_array().map(f64::from));
         let mut coefficients = [[0.0; 3]; 9];
         for (to, from) in coefficients.iter_mut().zip(light.coefficients()) {
             *to = *from;
@@ -144,8 +146,14 @@ impl<'a> SynthSample<'a> {
         Ok(Files(vec![
             ("image.png", relit_data::shard::encode_rgb(&self.image)?),
             ("mask.png", relit_data::shard::encode_mask(&mask(buffer))?),
-            ("normal.png", encode_sixteen(buffer, &Sixteen::normals(&self.material.normals))?),
-            ("albedo.png", encode_sixteen(buffer, &Sixteen::up_to(&self.material.albedo, 1.0))?),
+            (
+                "normal.png",
+                encode_sixteen(buffer, &Sixteen::normals(&self.material.normals))?,
+            ),
+            (
+                "albedo.png",
+                encode_sixteen(buffer, &Sixteen::up_to(&self.material.albedo, 1.0))?,
+            ),
             ("shading.png", encode_sixteen(buffer, &shading)?),
             ("highlight.png", encode_sixteen(buffer, &highlight)?),
             ("light.txt", light.to_string().into_bytes()),
@@ -193,7 +201,10 @@ pub(super) fn photograph(
     }
     let compressed = camera.compressed(picture);
     let size = buffer.size();
-    let inside = buffer.pixels().iter().map(|&pixel| compressed.get_pixel(pixel % size, pixel / size).0);
+    let inside = buffer
+        .pixels()
+        .iter()
+        .map(|&pixel| compressed.get_pixel(pixel % size, pixel / size).0);
     picture_of(buffer, &inside.collect::<Vec<_>>())
 }
 

@@ -55,9 +55,8 @@ impl Surroundings {
         let radiance = |x: usize, y: usize| {
             // Four places a pixel: edges of windows and soft boxes are not jagged.
             let places = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)];
-            let colours = places.map(|(dx, dy)| {
-                place(vector(frame.direction(x as f64 + dx, y as f64 + dy)))
-            });
+            let colours =
+                places.map(|(dx, dy)| place(vector(frame.direction(x as f64 + dx, y as f64 + dy))));
             (colours.iter().sum::<Vec3>() / 4.0).to_array()
         };
         Panorama::new(Rgb::new(Planes::from_fn(extent, radiance)))
@@ -75,11 +74,15 @@ fn white(warmth: f32) -> Vec3 {
 
 fn studio(random: &mut Random) -> impl Fn(Vec3) -> Vec3 + use<> {
     let (walls, floor) = (random.uniform(0.02..0.12), random.uniform(0.05..0.25));
-    let boxes: Vec<SoftBox> = (0..random.count(2..5)).map(|_| SoftBox::draw(random)).collect();
+    let boxes: Vec<SoftBox> = (0..random.count(2..5))
+        .map(|_| SoftBox::draw(random))
+        .collect();
     move |towards| {
         let ground = if towards.y < 0.0 { floor } else { walls };
         let dark = Vec3::splat(ground * (0.7 + 0.3 * towards.y.abs()));
-        boxes.iter().fold(dark, |sum, soft_box| sum + soft_box.radiance(towards))
+        boxes
+            .iter()
+            .fold(dark, |sum, soft_box| sum + soft_box.radiance(towards))
     }
 }
 
@@ -129,7 +132,12 @@ fn room(random: &mut Random) -> impl Fn(Vec3) -> Vec3 + use<> {
     let (centre, width) = (random.uniform(-0.4..0.4), random.uniform(0.25..0.55));
     let outside = white(random.uniform(-0.8..-0.1)) * random.log_uniform(6.0..25.0);
     let lamp = Vec3::new(random.uniform(-1.0..1.0), 1.1, random.uniform(-1.0..1.0)).normalize();
-    let lamp_light = white(0.8) * if random.chance(0.5) { random.uniform(8.0..30.0) } else { 0.0 };
+    let lamp_light = white(0.8)
+        * if random.chance(0.5) {
+            random.uniform(8.0..30.0)
+        } else {
+            0.0
+        };
     move |towards| {
         if towards.dot(lamp) > 0.992 && lamp_light != Vec3::ZERO {
             return lamp_light;
@@ -174,14 +182,19 @@ fn sky(random: &mut Random) -> impl Fn(Vec3) -> Vec3 + use<> {
         if towards.y < 0.0 {
             return ground * (1.0 + 0.4 * towards.y);
         }
-        let blue = Vec3::new(0.25, 0.5, 1.0).lerp(Vec3::new(0.9, 1.0, 1.1), (1.0 - towards.y).powi(4));
+        let blue =
+            Vec3::new(0.25, 0.5, 1.0).lerp(Vec3::new(0.9, 1.0, 1.1), (1.0 - towards.y).powi(4));
         let glow = towards.dot(sun).max(0.0).powi(40) * 3.0;
         // Clouds lie in a layer: nearer to the horizon they are smaller.
         let layer = towards / (towards.y + 0.15);
         let cloud = ((clouds.at(layer * Vec3::new(1.0, 0.0, 1.0)) + cover) * 3.0).clamp(0.0, 1.0);
         let clear = blue + Vec3::new(1.0, 0.95, 0.85) * glow;
         // The sun's disc is drawn as large as a few pixels, with as much less radiance.
-        let disc = if towards.dot(sun) > 0.9985 { sun_light } else { Vec3::ZERO };
+        let disc = if towards.dot(sun) > 0.9985 {
+            sun_light
+        } else {
+            Vec3::ZERO
+        };
         let veil = 1.0 - cloud;
         clear.lerp(Vec3::splat(1.4 * (0.5 + 0.5 * height)), cloud * 0.9) + disc * veil * veil * veil
     }
@@ -212,7 +225,10 @@ mod tests {
             assert_eq!(a, b, "{kind:?}");
             assert_ne!(a, c, "{kind:?}");
             let planes = a.image().planes().planes();
-            assert!(planes.into_iter().flatten().all(|&value| value >= 0.0), "{kind:?}");
+            assert!(
+                planes.into_iter().flatten().all(|&value| value >= 0.0),
+                "{kind:?}"
+            );
             assert!(a.project(Order::TWO).coefficients()[0][1] > 0.0, "{kind:?}");
         }
     }
@@ -223,7 +239,10 @@ mod tests {
             let even = Surroundings::Even.panorama(seed, EXTENT).unwrap();
             assert!(brightest(&even) < 1.6);
             for kind in [Surroundings::Studio, Surroundings::Room] {
-                assert!(brightest(&kind.panorama(seed, EXTENT).unwrap()) > 3.0, "{kind:?} {seed}");
+                assert!(
+                    brightest(&kind.panorama(seed, EXTENT).unwrap()) > 3.0,
+                    "{kind:?} {seed}"
+                );
             }
         }
     }
@@ -231,13 +250,19 @@ mod tests {
     #[test]
     fn the_sky_is_above() {
         for seed in 0..5 {
-            let light = Surroundings::Sky.panorama(seed, EXTENT).unwrap().project(Order::TWO);
+            let light = Surroundings::Sky
+                .panorama(seed, EXTENT)
+                .unwrap()
+                .project(Order::TWO);
             assert!(light.coefficients()[1][2] > 0.0, "{seed}");
         }
     }
 
     #[test]
     fn a_panorama_without_pixels_is_refused() {
-        assert_eq!(Surroundings::Sky.panorama(0, Extent::new(0, 5)), Err(LightError::Empty));
+        assert_eq!(
+            Surroundings::Sky.panorama(0, Extent::new(0, 5)),
+            Err(LightError::Empty)
+        );
     }
 }

@@ -390,12 +390,20 @@ mod tests {
             assert!(value.distance(Vec3::new(3.0, 0.5, 0.0)) < 1e-5, "{value}");
         }
         let mut point = vec![Vec3::ZERO; buffer.len()];
-        let middle = buffer.pixels().iter().position(|&p| p == 16 * 32 + 16).unwrap();
+        let middle = buffer
+            .pixels()
+            .iter()
+            .position(|&p| p == 16 * 32 + 16)
+            .unwrap();
         point[middle] = Vec3::ONE;
         let blurred = buffer.blurred(&point, 2);
         let sum: f32 = blurred.iter().map(|value| value.x).sum();
         assert!((sum - 1.0).abs() < 1e-4, "{sum}");
         // Two squares of five: a pyramid of 25 / 625 at its top.
-        assert!((blurred[middle].x - 0.04).abs() < 1e-5, "{}", blurred[middle].x);
+        assert!(
+            (blurred[middle].x - 0.04).abs() < 1e-5,
+            "{}",
+            blurred[middle].x
+        );
     }
 }

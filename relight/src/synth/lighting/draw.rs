@@ -48,7 +48,9 @@ impl Lighting {
                 ..lighting
             },
             LightKind::Lamps => lighting.with_lamps(random, buffer, panoramas),
-            LightKind::Mixed if random.chance(0.8) => lighting.with_lamps(random, buffer, panoramas),
+            LightKind::Mixed if random.chance(0.8) => {
+                lighting.with_lamps(random, buffer, panoramas)
+            }
             LightKind::Mixed => {
                 let tint = tint(random, 0.1);
                 let mut sky = Self {
@@ -65,10 +67,15 @@ impl Lighting {
     }
 
     fn with_lamps(mut self, random: &mut Random, buffer: &GBuffer, panoramas: &Panoramas) -> Self {
-        let (count, most_ambient) = random.weighted([((1, 0.25), 0.75), ((2, 0.3), 0.15), ((3, 0.3), 0.1)]);
+        let (count, most_ambient) =
+            random.weighted([((1, 0.25), 0.75), ((2, 0.3), 0.15), ((3, 0.3), 0.1)]);
         self.lamps = (0..count)
             .map(|_| {
-                let strength = if count == 1 { 1.0 } else { random.uniform(0.2..1.0) };
+                let strength = if count == 1 {
+                    1.0
+                } else {
+                    random.uniform(0.2..1.0)
+                };
                 Lamp::draw(random, buffer, strength)
             })
             .collect();
@@ -101,7 +108,13 @@ impl Lamp {
         } else {
             let half_angle = random.pick([0.0, 0.03, 0.1]);
             let rays = if half_angle == 0.0 { 1 } else { 6 };
-            (Emitter::Distant { towards, half_angle }, rays)
+            (
+                Emitter::Distant {
+                    towards,
+                    half_angle,
+                },
+                rays,
+            )
         };
         Self {
             emitter,

@@ -5,7 +5,7 @@ use std::f32::consts::{PI, TAU};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::shaded::{BlinnPhong, Shaded, Material};
+use super::shaded::{BlinnPhong, Material, Shaded};
 use super::{direction, vector};
 use crate::light::{LightSampler, Order, Panorama, Rotation, ShLight};
 use crate::synth::geometry::{GBuffer, Occluder};
@@ -155,7 +155,11 @@ struct SkyRay {
 
 impl<'a> Sky<'a> {
     /// None where there is no such panorama.
-    pub(super) fn new(environment: &Environment, panoramas: &'a Panoramas, seed: u64) -> Option<Self> {
+    pub(super) fn new(
+        environment: &Environment,
+        panoramas: &'a Panoramas,
+        seed: u64,
+    ) -> Option<Self> {
         let entry = panoramas.entries.get(environment.panorama)?;
         let turn = environment.turn();
         let mut sky = Self {
@@ -168,9 +172,10 @@ impl<'a> Sky<'a> {
         for stratum in 0..STRATA * STRATA {
             for choice in 0..CHOICES {
                 let number = (stratum * CHOICES + choice) as u64;
-                sky.rays.push(sky.draw(stratum, [0, 1].map(|k| {
-                    f64::from(unit_of(mix(stream(seed, 2 * number + k))))
-                })));
+                sky.rays.push(sky.draw(
+                    stratum,
+                    [0, 1].map(|k| f64::from(unit_of(mix(stream(seed, 2 * number + k))))),
+                ));
             }
         }
         Some(sky)
@@ -235,9 +240,12 @@ impl<'a> Sky<'a> {
                 }
             }
             shaded.shading[k] += diffuse / count;
-            let Some(gloss) = &material.gloss else { continue };
+            let Some(gloss) = &material.gloss else {
+                continue;
+            };
             for number in 0..LOBE_RAYS {
-                let Some(towards) = lobe_direction(gloss, normal, eye, stream(own, 1000 + number), number)
+                let Some(towards) =
+                    lobe_direction(gloss, normal, eye, stream(own, 1000 + number), number)
                 else {
                     continue;
                 };
@@ -281,6 +289,7 @@ fn lobe_density(gloss: &BlinnPhong, normal: Vec3, towards: Vec3, towards_eye: Ve
     if along <= 1e-4 {
         return 0.0;
     }
-    let of_half = (gloss.exponent + 1.0) / (2.0 * PI) * normal.dot(half).max(0.0).powf(gloss.exponent);
+    let of_half =
+        (gloss.exponent + 1.0) / (2.0 * PI) * normal.dot(half).max(0.0).powf(gloss.exponent);
     of_half / (4.0 * along)
 }

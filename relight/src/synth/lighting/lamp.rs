@@ -65,7 +65,11 @@ pub struct LampShadows {
 impl Lamp {
     /// The rays from a point; `turn`, 0..1, shifts them from pixel to pixel so that shadows have no
     /// steps.
-    pub(super) fn rays_from(&self, point: Vec3, turn: f32) -> impl Iterator<Item = LampRay> + use<> {
+    pub(super) fn rays_from(
+        &self,
+        point: Vec3,
+        turn: f32,
+    ) -> impl Iterator<Item = LampRay> + use<> {
         let (emitter, count) = (self.emitter, self.rays.clamp(1, MOST_RAYS));
         let aim = self.emitter.towards();
         let (right, up) = aim.any_orthonormal_pair();

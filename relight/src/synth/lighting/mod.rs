@@ -15,8 +15,10 @@
 mod draw;
 mod environment;
 mod lamp;
-mod shaded;
 mod scene;
+mod shaded;
+#[cfg(test)]
+mod tests;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -24,8 +26,8 @@ use serde::{Deserialize, Serialize};
 pub use draw::LightKind;
 pub use environment::{Environment, Method, Panoramas};
 pub use lamp::{Emitter, Lamp, LampShadows};
-pub use shaded::{BlinnPhong, Material, Shaded};
 pub use scene::Scene;
+pub use shaded::{BlinnPhong, Material, Shaded};
 
 use crate::light::{Direction, Order, ShLight};
 
@@ -49,7 +51,10 @@ impl Lighting {
     /// diffuse layer is the shading, smoothed where lamps are.
     #[must_use]
     pub fn coefficients(&self, panoramas: &Panoramas) -> ShLight {
-        let even = self.ambient.to_array().map(|e| f64::from(e) / std::f64::consts::PI);
+        let even = self
+            .ambient
+            .to_array()
+            .map(|e| f64::from(e) / std::f64::consts::PI);
         let mut sum = ShLight::even(Order::TWO, even);
         for lamp in &self.lamps {
             add(&mut sum, &lamp.coefficients());

@@ -1,7 +1,7 @@
 //! A buffer together with what blocks its light, under whole lightings.
 
 use super::environment::Sky;
-use super::{Shaded, Lighting, Method, Panoramas, Material};
+use super::{Lighting, Material, Method, Panoramas, Shaded};
 use crate::synth::geometry::{GBuffer, Occluder};
 use crate::synth::random::stream;
 

@@ -76,7 +76,13 @@ mod tests {
         assert_eq!(picture.at(Vec2::new(0.25, 0.75)), Vec3::ZERO);
         assert_eq!(picture.at(Vec2::new(0.75, 0.25)), Vec3::new(1.0, 1.0, 0.0));
         assert_eq!(picture.at(Vec2::new(0.5, 0.75)), Vec3::new(0.5, 0.0, 0.0));
-        assert_eq!(picture.at(Vec2::new(-0.25, 5.25)), picture.at(Vec2::new(0.75, 0.25)));
-        assert_eq!(Picture::from_fn(0, 3, |_, _| Vec3::ONE).at(Vec2::ZERO), Vec3::ZERO);
+        assert_eq!(
+            picture.at(Vec2::new(-0.25, 5.25)),
+            picture.at(Vec2::new(0.75, 0.25))
+        );
+        assert_eq!(
+            Picture::from_fn(0, 3, |_, _| Vec3::ONE).at(Vec2::ZERO),
+            Vec3::ZERO
+        );
     }
 }

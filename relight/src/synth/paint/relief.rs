@@ -143,8 +143,17 @@ mod tests {
             right += usize::from(is_right);
         }
         // At the ridges differences do not tell the slope.
-        assert!(right * 100 > buffer.len() * 95, "{right} of {}", buffer.len());
-        assert!(leaned.iter().zip(buffer.normals()).any(|(a, b)| a.dot(*b) < 0.98));
+        assert!(
+            right * 100 > buffer.len() * 95,
+            "{right} of {}",
+            buffer.len()
+        );
+        assert!(
+            leaned
+                .iter()
+                .zip(buffer.normals())
+                .any(|(a, b)| a.dot(*b) < 0.98)
+        );
     }
 
     #[test]
