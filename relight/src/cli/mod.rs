@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use commands::render;
+use commands::{render, synth};
 use console::Console;
 
 /// Single-view relighting: light, rendering, data with truth, and the measures of the results.
@@ -30,6 +30,9 @@ enum Verb {
     /// Light an object that is given by its maps: an image, a turn, or a sweep of materials.
     #[command(after_help = render::EXAMPLES)]
     Render(render::Arguments),
+    /// Make pictures of objects together with their truth: samples, whole turns, panoramas.
+    #[command(after_help = synth::EXAMPLES)]
+    Synth(synth::Arguments),
 }
 
 /// Runs the verb that the command line names; its exit code.
@@ -38,5 +41,6 @@ pub(crate) fn run() -> ExitCode {
     let console = Console::new(line.json);
     console.finish(match line.verb {
         Verb::Render(arguments) => render::run(&arguments, console),
+        Verb::Synth(arguments) => synth::run(&arguments, console),
     })
 }

@@ -5,12 +5,13 @@
 //! | --- | --- |
 //! | `mesh`, `shape` | triangles from files, and out of nothing but a seed |
 //! | `view`, `geometry` | what a camera sees of them, which light is blocked |
-//! | `paint` | albedo and relief |
+//! | `paint`, `finish` | albedo, relief and gloss |
 //! | `lighting` | lamps and panoramas on what is seen |
 //! | `studio` | panoramas out of nothing but a seed |
 //! | `camera` | from light to 8-bit values |
 //! | `library`, `recipe` | what there is to draw from, and what is drawn |
-//! | `sample`, `folder` | one sample, and a folder of them |
+//! | `sample`, `folder`, `preview` | one sample; a folder, a sheet of them |
+//! | `turn` | whole turns as shards |
 //!
 //! All of it follows from a seed: the same seed gives the same bytes on any number of threads. What is
 //! slow is kept apart from what is cheap: a [`Scene`] is made once for an object in a pose, and then
@@ -30,6 +31,8 @@
 
 mod camera;
 mod error;
+mod finish;
+mod folder;
 mod geometry;
 mod library;
 mod lighting;
@@ -37,15 +40,19 @@ mod mesh;
 mod noise;
 mod paint;
 mod png;
+mod preview;
 mod random;
 mod recipe;
 mod sample;
 mod shape;
 mod studio;
+mod turn;
 mod view;
 
 pub use camera::{CameraModel, Response};
 pub use error::Error;
+pub use finish::Finish;
+pub use folder::{Written, write_samples};
 pub use geometry::{GBuffer, Occluder};
 pub use library::{Folders, Library, PANORAMA_EXTENT, made_panoramas};
 pub use lighting::{
@@ -54,9 +61,11 @@ pub use lighting::{
 };
 pub use mesh::{Mesh, MeshFault};
 pub use paint::{AlbedoKind, Paint, Picture, Relief};
+pub use preview::write_preview;
 pub use random::stream;
 pub use recipe::{ObjectSource, Recipe, View};
 pub use sample::{Description, SynthSample, Whites};
 pub use shape::ShapeKind;
 pub use studio::Surroundings;
+pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};
 pub use view::{Pose, Projection};

@@ -1,5 +1,5 @@
-//! Smooth noise in space (Perlin's gradient noise) with its gradient. Knows nothing of what it is
-//! used for.
+//! Smooth noise in space (Perlin, *Improving Noise*, 2002) with its gradient. Knows nothing of what it
+//! is used for.
 
 use glam::Vec3;
 
@@ -8,7 +8,7 @@ use super::random::mix;
 /// Noise with features about `1 / frequency` across, of mean 0, within about -1..1.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Noise {
-    seed: u64,
+    seed: u32,
     frequency: f32,
 }
 
@@ -19,61 +19,119 @@ pub(super) struct Sloped {
     pub(super) gradient: Vec3,
 }
 
+/// From a cube's centre to the middles of its edges; four of them twice.
+const DIRECTIONS: [Vec3; 16] = [
+    Vec3::new(1.0, 1.0, 0.0),
+    Vec3::new(-1.0, 1.0, 0.0),
+    Vec3::new(1.0, -1.0, 0.0),
+    Vec3::new(-1.0, -1.0, 0.0),
+    Vec3::new(1.0, 0.0, 1.0),
+    Vec3::new(-1.0, 0.0, 1.0),
+    Vec3::new(1.0, 0.0, -1.0),
+    Vec3::new(-1.0, 0.0, -1.0),
+    Vec3::new(0.0, 1.0, 1.0),
+    Vec3::new(0.0, -1.0, 1.0),
+    Vec3::new(0.0, 1.0, -1.0),
+    Vec3::new(0.0, -1.0, -1.0),
+    Vec3::new(1.0, 1.0, 0.0),
+    Vec3::new(-1.0, 1.0, 0.0),
+    Vec3::new(0.0, -1.0, 1.0),
+    Vec3::new(0.0, -1.0, -1.0),
+];
+
 impl Noise {
     pub(super) fn new(seed: u64, frequency: f32) -> Self {
-        Self { seed, frequency }
+        Self {
+            seed: (mix(seed) >> 32) as u32,
+            frequency,
+        }
     }
 
     /// The noise at a point.
     pub(super) fn at(&self, point: Vec3) -> f32 {
-        self.sloped(point).value
+        let Cell { inside, directions } = self.cell(point);
+        let [a, b, c, d, e, f, g, h] = ramps(inside, &directions);
+        let [u, v, w] = blend(inside).to_array();
+        let lerp = |from: f32, to: f32, part: f32| from + (to - from) * part;
+        let below = lerp(lerp(a, b, u), lerp(c, d, u), v);
+        let above = lerp(lerp(e, f, u), lerp(g, h, u), v);
+        lerp(below, above, w)
     }
 
     /// The noise and its gradient at a point.
     pub(super) fn sloped(&self, point: Vec3) -> Sloped {
-        let scaled = point * self.frequency;
-        let cell = scaled.floor();
-        let inside = scaled - cell;
-        let corner = [cell.x as i64, cell.y as i64, cell.z as i64];
-        // Quintic blend: the gradient is continuous too.
-        let blend = inside * inside * inside * (inside * (inside * 6.0 - 15.0) + 10.0);
+        let Cell { inside, directions } = self.cell(point);
+        let [a, b, c, d, e, f, g, h] = ramps(inside, &directions);
+        let [u, v, w] = blend(inside).to_array();
         let slope = inside * inside * (inside * (inside * 30.0 - 60.0) + 30.0);
-        let mut sum = Sloped::default();
-        for k in 0..8_i64 {
-            let offset = [k & 1, (k >> 1) & 1, k >> 2];
-            let towards = Vec3::from_array(offset.map(|o| o as f32));
-            let direction = self.direction([0, 1, 2].map(|i| corner[i] + offset[i]));
-            let ramp = direction.dot(inside - towards);
-            let weights = Vec3::ONE - towards + (towards * 2.0 - 1.0) * blend;
-            let slopes = (towards * 2.0 - 1.0) * slope;
-            let weight = weights.x * weights.y * weights.z;
-            sum.value += weight * ramp;
-            sum.gradient += direction * weight
-                + ramp
-                    * Vec3::new(
-                        slopes.x * weights.y * weights.z,
-                        weights.x * slopes.y * weights.z,
-                        weights.x * weights.y * slopes.z,
-                    );
+        let lerp = |from: f32, to: f32, part: f32| from + (to - from) * part;
+        let mixed = |from: Vec3, to: Vec3, part: f32| from + (to - from) * part;
+        let [da, db, dc, dd, de, df, dg, dh] = directions;
+        let low = mixed(mixed(da, db, u), mixed(dc, dd, u), v);
+        let high = mixed(mixed(de, df, u), mixed(dg, dh, u), v);
+        // Along each axis: how the weights of the two sides change.
+        let along = Vec3::new(
+            lerp(lerp(b - a, d - c, v), lerp(f - e, h - g, v), w),
+            lerp(lerp(c - a, d - b, u), lerp(g - e, h - f, u), w),
+            lerp(lerp(e - a, f - b, u), lerp(g - c, h - d, u), v),
+        );
+        let below = lerp(lerp(a, b, u), lerp(c, d, u), v);
+        let above = lerp(lerp(e, f, u), lerp(g, h, u), v);
+        Sloped {
+            value: lerp(below, above, w),
+            gradient: (mixed(low, high, w) + along * slope) * self.frequency,
         }
-        sum.gradient *= self.frequency;
-        sum
     }
 
-    /// One of the twelve directions from a cube's centre to its edges, by a hash of the corner.
-    fn direction(&self, [x, y, z]: [i64; 3]) -> Vec3 {
-        let place = (x as u64).wrapping_mul(0x8da6_b343)
-            ^ (y as u64).wrapping_mul(0xd816_3841_0000)
-            ^ (z as u64).wrapping_mul(0xcb1a_b31f_0000_0001);
-        let hash = mix(place ^ self.seed);
-        let sign = |bit: u64| if hash & bit == 0 { 1.0 } else { -1.0 };
-        let (a, b) = (sign(1), sign(2));
-        match (hash >> 2) % 3 {
-            0 => Vec3::new(a, b, 0.0),
-            1 => Vec3::new(a, 0.0, b),
-            _ => Vec3::new(0.0, a, b),
+    /// The cell of the lattice in which a point lies.
+    fn cell(&self, point: Vec3) -> Cell {
+        let scaled = point * self.frequency;
+        let [x, y, z] = scaled.to_array().map(floor);
+        let steps = |at: i32, odd: u32| {
+            let first = (at as u32).wrapping_mul(odd);
+            [first, first.wrapping_add(odd)]
+        };
+        let (xs, ys, zs) = (
+            steps(x, 0x8da6_b343),
+            steps(y, 0xd816_3841),
+            steps(z, 0xcb1a_b31f),
+        );
+        Cell {
+            inside: scaled - Vec3::new(x as f32, y as f32, z as f32),
+            directions: std::array::from_fn(|k| {
+                let place = xs[k & 1] ^ ys[k >> 1 & 1] ^ zs[k >> 2] ^ self.seed;
+                let mixed = (place ^ place >> 16).wrapping_mul(0x7feb_352d);
+                DIRECTIONS[((mixed ^ mixed >> 15).wrapping_mul(0x846c_a68b) >> 28) as usize]
+            }),
         }
     }
+}
+
+/// A cell of the lattice.
+struct Cell {
+    /// Where the point lies in it, 0..1.
+    inside: Vec3,
+    /// The directions at its corners: x changes first, then y, then z.
+    directions: [Vec3; 8],
+}
+
+/// How far the point lies along each corner's direction from that corner.
+fn ramps(inside: Vec3, directions: &[Vec3; 8]) -> [f32; 8] {
+    std::array::from_fn(|k| {
+        let corner = Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32);
+        directions[k].dot(inside - corner)
+    })
+}
+
+/// Quintic: the gradient is continuous too.
+fn blend(inside: Vec3) -> Vec3 {
+    inside * inside * inside * (inside * (inside * 6.0 - 15.0) + 10.0)
+}
+
+/// The largest whole number that is not above `value`; a function call on older processors otherwise.
+fn floor(value: f32) -> i32 {
+    let towards_zero = value as i32;
+    towards_zero - i32::from(value < towards_zero as f32)
 }
 
 #[cfg(test)]

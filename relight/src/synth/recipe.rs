@@ -3,23 +3,22 @@
 
 use std::borrow::Cow;
 
-use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::Error;
 use super::camera::CameraModel;
+use super::finish::Finish;
 use super::geometry::{GBuffer, Occluder};
 use super::library::Library;
-use super::lighting::{BlinnPhong, LightKind, Lighting, Material, Scene};
+use super::lighting::{LightKind, Lighting, Material, Scene};
 use super::mesh::Mesh;
-use super::paint::{Paint, Relief};
 use super::random::{Random, stream};
 use super::sample::{Description, SynthSample};
 use super::shape::ShapeKind;
 use super::view::{Pose, Projection};
 
 /// Rays a pixel by which a scene learns how much of the sky it sees.
-const AMBIENT_RAYS: u32 = 16;
+pub(super) const AMBIENT_RAYS: u32 = 16;
 /// Part of the objects that are meshes, where there are any.
 const MESHES: f32 = 0.25;
 /// Least part of the picture that an object covers, where another view of it covers more.
@@ -74,6 +73,20 @@ pub enum ObjectSource {
         /// Its seed.
         seed: u64,
     },
+}
+
+impl ObjectSource {
+    /// The file's name without its extension, or the shape's kind.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self {
+            Self::Mesh { file } => match file.rsplit_once('.') {
+                Some((stem, _)) => stem.to_owned(),
+                None => file.clone(),
+            },
+            Self::Shape { kind, .. } => kind.name().to_owned(),
+        }
+    }
 }
 
 /// An object in its pose before the camera, ready to be lit.
@@ -148,10 +161,10 @@ impl Recipe {
         )
     }
 
-    /// A view of an object: of several draws the first that covers enough of the picture.
+    /// The view of a number of an object: of several draws the first that covers enough of the picture.
     #[must_use]
-    pub fn view(&self, object: &ObjectSource, mesh: &Mesh, seed: u64) -> View {
-        let mut random = Random::new(seed);
+    pub fn view(&self, object: &ObjectSource, mesh: &Mesh, number: u64) -> View {
+        let mut random = Random::new(stream(stream(self.seed, 3), number));
         let kind = match object {
             ObjectSource::Mesh { .. } => None,
             ObjectSource::Shape { kind, .. } => Some(*kind),
@@ -197,53 +210,59 @@ impl Recipe {
         }
     }
 
+    /// The material of a number on what a view shows: paint, relief on a third, gloss on a third.
+    #[must_use]
+    pub fn material(&self, library: &Library, view: &View, number: u64) -> (Finish, Material) {
+        let mut random = Random::new(stream(stream(self.seed, 5), number));
+        let finish = Finish::draw(&mut random, view.scene.buffer(), library, 0.35);
+        let material = finish.apply(view.scene.buffer(), library);
+        (finish, material)
+    }
+
     /// The sample of a number: a view in a random material, under a random light, by a random camera.
     #[must_use]
     pub fn sample<'a>(&self, library: &Library, view: &'a View, number: u64) -> SynthSample<'a> {
         let seed = stream(stream(self.seed, 2), number);
         let mut random = Random::new(seed);
+        let (finish, material) = self.material(library, view, number);
         let buffer = view.scene.buffer();
-        let paint = Paint::draw(&mut random, buffer.object_points(), library.pictures.len());
-        let relief = random.chance(0.35).then(|| Relief::draw(&mut random));
-        let gloss = random
-            .chance(0.35)
-            .then(|| BlinnPhong::draw(&mut random, &paint));
-        let material = Material::new(buffer, &paint, &library.pictures, relief.as_ref(), gloss);
-        let lighting = Lighting::draw(&mut random, self.light, buffer, &library.panoramas);
         let lighting = Lighting {
             has_shadows: self.shadows,
-            ..lighting
-        };
-        let mut camera = if self.random_camera {
-            CameraModel::draw(&mut random)
-        } else {
-            CameraModel::plain()
-        };
-        let level = match random.chance(0.15) {
-            true if self.random_camera => random.uniform(1.1..1.8),
-            _ => random.uniform(0.6..1.1),
+            ..Lighting::draw(&mut random, self.light, buffer, &library.panoramas)
         };
         let shaded = view
             .scene
             .light(&material, &lighting, &library.panoramas, random.seed());
-        camera.expose(&shaded.image(&material.albedo), level);
-        let environment = lighting.environment.as_ref();
-        let panorama = environment.and_then(|around| library.panoramas.name(around.panorama));
+        let (camera, level) = self.camera(&mut random);
+        let camera = camera.exposed(&shaded.image(&material.albedo), level);
         let description = Description {
             number,
             seed,
             object: view.object.clone(),
             pose: view.pose,
             projection: view.projection,
-            paint,
-            relief,
-            gloss,
-            panorama: panorama.map(str::to_owned),
+            finish,
+            panorama: lighting.panorama_name(&library.panoramas),
             coefficients: lighting.seen_coefficients(&library.panoramas, camera.gain),
             lighting,
             camera,
         };
         SynthSample::new(view, material, shaded, description, random.seed())
+    }
+
+    /// A camera without its exposure, and the level to which bright pixels are to be exposed: some
+    /// pictures clip.
+    fn camera(&self, random: &mut Random) -> (CameraModel, f32) {
+        let level = random.uniform(0.6..1.1);
+        if !self.random_camera {
+            return (CameraModel::plain(), level);
+        }
+        let level = if random.chance(0.15) {
+            random.uniform(1.1..1.8)
+        } else {
+            level
+        };
+        (CameraModel::draw(random), level)
     }
 }
 
@@ -255,24 +274,6 @@ impl Projection {
             Self::Perspective {
                 distance: random.log_uniform(3.0..12.0),
             }
-        }
-    }
-}
-
-impl BlinnPhong {
-    /// White highlights mostly, as of plastic and varnish; some in the object's own colour, as of metal.
-    fn draw(random: &mut Random, paint: &Paint) -> Self {
-        let exponent = random.log_uniform(4.0..150.0);
-        // A sharper highlight is brighter, as it gathers the same light.
-        let strength = random.uniform(0.03..0.6) * ((exponent + 8.0) / 16.0).min(4.0);
-        let colour = if random.chance(0.2) {
-            paint.ground / paint.ground.max_element().max(1e-3)
-        } else {
-            Vec3::ONE
-        };
-        Self {
-            reflectance: colour * strength,
-            exponent,
         }
     }
 }

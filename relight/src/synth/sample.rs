@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::Error;
 use super::camera::CameraModel;
+use super::finish::Finish;
 use super::geometry::GBuffer;
-use super::lighting::{BlinnPhong, Lighting, Material, Panoramas, Shaded};
-use super::paint::{Paint, Relief};
+use super::lighting::{Lighting, Material, Panoramas, Shaded};
 use super::png::{Sixteen, encode_sixteen};
 use super::recipe::{ObjectSource, View};
 use super::view::{Pose, Projection};
@@ -27,12 +27,8 @@ pub struct Description {
     pub pose: Pose,
     /// How it is seen.
     pub projection: Projection,
-    /// Its albedo.
-    pub paint: Paint,
-    /// Its relief.
-    pub relief: Option<Relief>,
-    /// Its highlights.
-    pub gloss: Option<BlinnPhong>,
+    /// What it is made of.
+    pub finish: Finish,
     /// The name of the panorama that the lighting has.
     pub panorama: Option<String>,
     /// All light but what bounces, as nine coefficients in the viewer's frame, times the camera's gain:
@@ -45,6 +41,12 @@ pub struct Description {
 }
 
 impl Lighting {
+    /// The name of its panorama.
+    pub(super) fn panorama_name(&self, panoramas: &Panoramas) -> Option<String> {
+        let environment = self.environment.as_ref()?;
+        panoramas.name(environment.panorama).map(str::to_owned)
+    }
+
     /// The coefficients as a camera of this gain sees them.
     pub(super) fn seen_coefficients(&self, panoramas: &Panoramas, gain: Vec3) -> [[f64; 3]; 9] {
         let light = self

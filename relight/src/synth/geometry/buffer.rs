@@ -3,6 +3,8 @@
 use glam::{Affine3A, DVec4, Mat3, Vec2, Vec3, Vec4};
 
 use super::raster::{NOTHING, Projected, Triangle, Weights, foremost};
+use crate::image::{Extent, Planes};
+use crate::light::{Normals, YUp};
 use crate::synth::mesh::Mesh;
 use crate::synth::view::Projection;
 
@@ -134,6 +136,41 @@ impl GBuffer {
             picture[pixel as usize] = value;
         }
         picture
+    }
+
+    /// A picture with these colours at the covered pixels and 0 elsewhere.
+    ///
+    /// # Panics
+    /// Where there are fewer values than covered pixels.
+    #[must_use]
+    pub fn planes(&self, values: &[Vec3]) -> Planes<3> {
+        let side = self.size as usize;
+        let mut planes = Planes::zeros(Extent::new(side, side));
+        for (&pixel, value) in self.pixels.iter().zip(&values[..self.len()]) {
+            let (column, row) = (pixel as usize % side, pixel as usize / side);
+            planes.set_pixel(column, row, value.to_array());
+        }
+        planes
+    }
+
+    /// 1 at the covered pixels, 0 elsewhere.
+    #[must_use]
+    pub fn mask(&self) -> Planes<1> {
+        let side = self.size as usize;
+        let mut planes = Planes::zeros(Extent::new(side, side));
+        for &pixel in &self.pixels {
+            planes.set_pixel(pixel as usize % side, pixel as usize / side, [1.0]);
+        }
+        planes
+    }
+
+    /// These normals as a map.
+    ///
+    /// # Panics
+    /// Where there are fewer values than covered pixels.
+    #[must_use]
+    pub fn normal_map(&self, normals: &[Vec3]) -> Normals<YUp> {
+        Normals::new(self.planes(normals))
     }
 
     /// For each covered pixel, the mean of `values` over the covered pixels around it: a square of
@@ -380,6 +417,11 @@ mod tests {
         let picture = buffer.spread(&vec![7_u8; buffer.len()], 1);
         assert_eq!(picture.len(), 256);
         assert_eq!((picture[0], picture[8 * 16 + 8]), (1, 7));
+        let normals = buffer.normal_map(buffer.normals());
+        let mask = buffer.mask();
+        assert_eq!((mask.pixel(0, 0), mask.pixel(8, 8)), ([0.0], [1.0]));
+        assert_eq!(normals.planes().pixel(0, 0), [0.0; 3]);
+        assert!(normals.planes().pixel(8, 8)[2] > 0.9);
     }
 
     #[test]

@@ -15,8 +15,14 @@ use crate::synth::random::{mix, stream, unit_of};
 const STRATA: usize = 8;
 /// Choices within a stratum, from pixel to pixel.
 const CHOICES: usize = 64;
+/// Rays a pixel in proportion to the panorama's light.
+const LIGHT_RAYS: f32 = (STRATA * STRATA) as f32;
+/// Rays a pixel in proportion to the cosine.
+const COSINE_RAYS: u32 = 32;
 /// Rays a pixel along the lobe of a highlight.
-const LOBE_RAYS: u64 = 16;
+const LOBE_RAYS: u32 = 16;
+/// Half vectors at right angles to the eye belong to no light.
+const LEAST_COSINE: f32 = 1e-4;
 
 /// The panoramas that there are, each with its coefficients.
 #[derive(Debug, Clone, Default)]
@@ -200,6 +206,7 @@ impl<'a> Sky<'a> {
         })
     }
 
+    /// The light from a direction that was drawn otherwise.
     fn along(&self, towards: Vec3) -> SkyRay {
         let from = self.back.apply(direction(towards));
         let radiance = self.sampler.panorama().radiance(from).map(|r| r as f32);
@@ -219,77 +226,86 @@ impl<'a> Sky<'a> {
         seed: u64,
         shaded: &mut Shaded,
     ) {
-        let count = (STRATA * STRATA) as f32;
         for k in 0..buffer.len() {
-            let own = stream(seed, u64::from(buffer.pixels()[k]));
-            let (normal, eye) = (material.normals[k], buffer.towards_eye()[k]);
+            let point = Point {
+                normal: material.normals[k],
+                towards_eye: buffer.towards_eye()[k],
+                gloss: material.gloss.as_ref(),
+            };
             let arrives = |towards: Vec3| {
-                normal.dot(towards) > 0.0
+                point.normal.dot(towards) > 0.0
                     && occluder.is_none_or(|occluder| {
                         buffer.normals()[k].dot(towards) > 0.0
                             && !occluder.blocks(buffer.ray_starts()[k], towards, f32::INFINITY)
                     })
             };
-            let (mut diffuse, mut shine) = (Vec3::ZERO, Vec3::ZERO);
-            for ray in self.rays_of(own).filter(|ray| arrives(ray.towards)) {
-                diffuse += ray.radiance * (normal.dot(ray.towards) / ray.density);
-                if let Some(gloss) = &material.gloss {
-                    let lobe = gloss.lobe(normal, ray.towards, eye);
-                    let other = lobe_density(gloss, normal, ray.towards, eye);
-                    shine += ray.radiance * lobe / (count * ray.density + LOBE_RAYS as f32 * other);
+            let own = stream(seed, u64::from(buffer.pixels()[k]));
+            let drawn = point.drawn(own).map(|towards| self.along(towards));
+            let rays = self.rays_of(own).copied().chain(drawn);
+            for ray in rays.filter(|ray| arrives(ray.towards)) {
+                // Veach's balance heuristic: whichever way drew the ray, all ways count.
+                let light = ray.radiance / (LIGHT_RAYS * ray.density + point.density(ray.towards));
+                shaded.shading[k] += light * point.normal.dot(ray.towards);
+                if let Some(gloss) = point.gloss {
+                    let lobe = gloss.lobe(point.normal, ray.towards, point.towards_eye);
+                    shaded.highlight[k] += light * lobe * gloss.reflectance;
                 }
             }
-            shaded.shading[k] += diffuse / count;
-            let Some(gloss) = &material.gloss else {
-                continue;
-            };
-            for number in 0..LOBE_RAYS {
-                let Some(towards) =
-                    lobe_direction(gloss, normal, eye, stream(own, 1000 + number), number)
-                else {
-                    continue;
-                };
-                if arrives(towards) {
-                    let ray = self.along(towards);
-                    let lobe = gloss.lobe(normal, towards, eye);
-                    let own_density = lobe_density(gloss, normal, towards, eye);
-                    // Veach's balance heuristic between the two ways to draw a direction.
-                    let density = count * ray.density + LOBE_RAYS as f32 * own_density;
-                    shine += ray.radiance * lobe / density;
-                }
-            }
-            shaded.highlight[k] += shine * gloss.reflectance;
         }
     }
 }
 
-/// A direction along the lobe: the half vector is drawn in proportion to its power of the cosine.
-fn lobe_direction(
-    gloss: &BlinnPhong,
+/// A point of a surface, which knows from where light matters to it.
+struct Point<'a> {
     normal: Vec3,
     towards_eye: Vec3,
-    seed: u64,
-    number: u64,
-) -> Option<Vec3> {
-    let [first, second] = [0, 1].map(|k| unit_of(mix(stream(seed, k))));
-    let height = (number as f32 + first) / LOBE_RAYS as f32;
-    let cosine = height.powf(1.0 / (gloss.exponent + 1.0));
-    let radius = (1.0 - cosine * cosine).max(0.0).sqrt();
-    let (right, up) = normal.any_orthonormal_pair();
-    let (sin, cos) = (TAU * (number as f32 * 0.618_034 + second)).sin_cos();
-    let half = (right * cos + up * sin) * radius + normal * cosine;
-    let along = half.dot(towards_eye);
-    (along > 1e-4).then(|| (half * (2.0 * along) - towards_eye).normalize_or(normal))
+    gloss: Option<&'a BlinnPhong>,
 }
 
-/// The density with which [`lobe_direction`] draws a direction, per steradian.
-fn lobe_density(gloss: &BlinnPhong, normal: Vec3, towards: Vec3, towards_eye: Vec3) -> f32 {
-    let half = (towards + towards_eye).normalize_or_zero();
-    let along = half.dot(towards_eye);
-    if along <= 1e-4 {
-        return 0.0;
+impl Point<'_> {
+    /// Directions along the cosine, and along the lobe of a highlight.
+    fn drawn(&self, seed: u64) -> impl Iterator<Item = Vec3> {
+        let (right, up) = self.normal.any_orthonormal_pair();
+        let around = move |cosine: f32, turn: f32| {
+            let radius = (1.0 - cosine * cosine).max(0.0).sqrt();
+            let (sin, cos) = (TAU * turn).sin_cos();
+            (right * cos + up * sin) * radius + self.normal * cosine
+        };
+        let place = move |number: u32, count: u32, salt: u64| {
+            let [first, second] =
+                [0, 1].map(|k| unit_of(mix(stream(seed, salt + 2 * u64::from(number) + k))));
+            let turn = number as f32 * 0.618_034 + second;
+            ((number as f32 + first) / count as f32, turn)
+        };
+        let matt = (0..COSINE_RAYS).map(move |number| {
+            let (part, turn) = place(number, COSINE_RAYS, 1_000);
+            around(part.sqrt(), turn)
+        });
+        let glossy = self.gloss.into_iter().flat_map(move |gloss| {
+            (0..LOBE_RAYS).filter_map(move |number| {
+                let (part, turn) = place(number, LOBE_RAYS, 2_000);
+                // The half vector is drawn in proportion to its power of the cosine.
+                let half = around(part.powf(1.0 / (gloss.exponent + 1.0)), turn);
+                let along = half.dot(self.towards_eye);
+                let mirrored = half * (2.0 * along) - self.towards_eye;
+                (along > LEAST_COSINE).then(|| mirrored.normalize_or(self.normal))
+            })
+        });
+        matt.chain(glossy)
     }
-    let of_half =
-        (gloss.exponent + 1.0) / (2.0 * PI) * normal.dot(half).max(0.0).powf(gloss.exponent);
-    of_half / (4.0 * along)
+
+    /// How many of the directions that are drawn lie around this one, per steradian.
+    fn density(&self, towards: Vec3) -> f32 {
+        let matt = COSINE_RAYS as f32 * self.normal.dot(towards).max(0.0) / PI;
+        let Some(gloss) = self.gloss else { return matt };
+        let half = (towards + self.towards_eye).normalize_or_zero();
+        let along = half.dot(self.towards_eye);
+        if along <= LEAST_COSINE {
+            return matt;
+        }
+        let lobe = gloss.lobe(self.normal, towards, self.towards_eye);
+        // A step of the half vector is a quarter of the light's, over the cosine to the eye.
+        let of_half = (gloss.exponent + 1.0) / (2.0 * PI) * lobe;
+        matt + LOBE_RAYS as f32 * of_half / (4.0 * along)
+    }
 }

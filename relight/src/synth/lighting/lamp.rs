@@ -139,6 +139,30 @@ impl Emitter {
         }
     }
 
+    /// The same, at least as high as 9 degrees over the horizon of this vertical.
+    pub(super) fn above(self, vertical: Vec3) -> Self {
+        let raised = |place: Vec3| {
+            let length = place.length();
+            let height = place.dot(vertical);
+            let level = place - vertical * height;
+            let least = 0.16 * level.length();
+            (level + vertical * height.abs().max(least)).normalize_or(vertical) * length
+        };
+        match self {
+            Self::Distant {
+                towards,
+                half_angle,
+            } => Self::Distant {
+                towards: raised(towards),
+                half_angle,
+            },
+            Self::Disc { centre, radius } => Self::Disc {
+                centre: raised(centre),
+                radius,
+            },
+        }
+    }
+
     /// The ray to the place `offset` (of length 0..=1) of the lamp, at right angles to `aim`.
     fn ray(self, point: Vec3, aim: Vec3, offset: Vec3) -> LampRay {
         match self {

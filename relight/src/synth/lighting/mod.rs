@@ -29,7 +29,7 @@ pub use lamp::{Emitter, Lamp, LampShadows};
 pub use scene::Scene;
 pub use shaded::{BlinnPhong, Material, Shaded};
 
-use crate::light::{Direction, Order, ShLight};
+use crate::light::{Direction, Order, Rotation, ShLight};
 
 /// All light on an object. Colours are linear red, green and blue.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -63,6 +63,24 @@ impl Lighting {
             add(&mut sum, &environment.coefficients(panoramas));
         }
         sum
+    }
+
+    /// All light, turned about the origin.
+    #[must_use]
+    pub fn turned(&self, turn: &Rotation) -> Self {
+        Self {
+            lamps: self.lamps.iter().map(|lamp| lamp.turned(turn)).collect(),
+            environment: self.environment.as_ref().map(|around| around.turned(turn)),
+            ..self.clone()
+        }
+    }
+
+    /// The same light with every lamp above the horizon of this vertical: lamps below are mirrored.
+    pub(super) fn above(mut self, vertical: Vec3) -> Self {
+        for lamp in &mut self.lamps {
+            lamp.emitter = lamp.emitter.above(vertical);
+        }
+        self
     }
 }
 

@@ -8,7 +8,6 @@ use crate::image::{Extent, Planes};
 use crate::light::{Normals, ShLight, YUp};
 use crate::render::{DiffuseForm, DiffuseLayer};
 use crate::synth::geometry::GBuffer;
-use crate::synth::paint::{Paint, Picture, Relief};
 
 /// The material at the covered pixels of a buffer.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,28 +35,6 @@ impl BlinnPhong {
     pub(super) fn lobe(&self, normal: Vec3, towards: Vec3, towards_eye: Vec3) -> f32 {
         let half = (towards + towards_eye).normalize_or_zero();
         normal.dot(half).max(0.0).powf(self.exponent)
-    }
-}
-
-impl Material {
-    /// A paint and a relief on what a buffer shows.
-    #[must_use]
-    pub fn new(
-        buffer: &GBuffer,
-        paint: &Paint,
-        pictures: &[Picture],
-        relief: Option<&Relief>,
-        gloss: Option<BlinnPhong>,
-    ) -> Self {
-        let normals = match relief {
-            Some(relief) => relief.apply(buffer),
-            None => buffer.normals().to_vec(),
-        };
-        Self {
-            albedo: paint.apply(buffer.object_points(), buffer.texture(), pictures),
-            normals,
-            gloss,
-        }
     }
 }
 

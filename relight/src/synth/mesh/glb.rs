@@ -107,7 +107,7 @@ impl Reader<'_> {
             return Err("its nodes go in a circle, or there are too many".to_owned());
         }
         let placed = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
-        for mesh in node.mesh() {
+        if let Some(mesh) = node.mesh() {
             for primitive in mesh.primitives() {
                 self.primitive(&primitive, placed)?;
             }

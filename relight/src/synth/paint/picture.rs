@@ -22,7 +22,6 @@ impl Picture {
         height: usize,
         at: impl Fn(usize, usize) -> Vec3,
     ) -> Self {
-        let (width, height) = (width.max(1), height.max(1));
         let texels = (0..width * height)
             .map(|k| at(k % width, k / width))
             .collect();

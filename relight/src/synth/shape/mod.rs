@@ -39,6 +39,19 @@ impl ShapeKind {
         (Self::Sheet, 0.13),
     ];
 
+    /// The kind's name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Blend => "blend",
+            Self::Lathe => "lathe",
+            Self::Boxes => "boxes",
+            Self::Sheet => "sheet",
+            Self::Sphere => "sphere",
+            Self::Plane => "plane",
+        }
+    }
+
     /// Whether the object is seen from one side only.
     pub(super) fn is_open(self) -> bool {
         matches!(self, Self::Sheet | Self::Plane)
