@@ -19,7 +19,7 @@ mod wigner;
 
 pub use basis::basis;
 pub(crate) use basis::{basis_into, legendre_step, polar_functions};
-pub use coefficients::{LightError, Order, ShLight};
+pub use coefficients::{LightError, LightFileError, Order, ShLight};
 pub use direction::Direction;
 pub use normals::{Normals, YAxis, YDown, YUp};
 pub use panorama::{DrawnLight, LightSampler, Panorama, PanoramaError};

@@ -9,15 +9,19 @@ mod diffuse;
 mod lanes;
 mod layers;
 mod lobe;
+mod maps;
 mod power;
 mod reference;
+mod shots;
 mod surface;
 
 pub use diffuse::{DiffuseForm, DiffuseLayer};
 pub use layers::{EXPOSURE, Gradients, Layers, Rendering, SpecularForm};
 pub use lobe::LobeLayer;
+pub use maps::{Map, MapFiles, NormalsFrame};
 pub use power::PowerLayer;
 pub use reference::{Estimate, Horizon, MonteCarlo};
+pub use shots::{Look, exposure_for};
 pub use surface::{Gloss, Surface};
 
 use crate::image::{ImageError, Linear, Planes, Rgb};

@@ -88,6 +88,14 @@ impl Surface {
         })
     }
 
+    /// The same object with another gloss.
+    ///
+    /// # Errors
+    /// Where the gloss has another size.
+    pub fn with_gloss(self, gloss: Option<Gloss>) -> Result<Self, ImageError> {
+        Self::new(self.normals, self.albedo, gloss)
+    }
+
     /// The normals.
     #[must_use]
     pub const fn normals(&self) -> &Normals<YUp> {

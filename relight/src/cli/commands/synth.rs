@@ -19,22 +19,22 @@ type ModeResult = Result<(), Box<dyn Error + Send + Sync>>;
 
 pub(in crate::cli) const EXAMPLES: &str = "\
 Examples:
-  relight synth warmup --count 50000
+  relight synth --count 50000 -o warmup
       procedural objects under random light, each with its truth
-  relight synth warmup --count 50000 --meshes meshes --panoramas hdri --textures photos
+  relight synth --count 50000 --meshes meshes --panoramas hdri --textures photos -o warmup
       with files of one's own
-  relight synth turns --turn --count 20 --panoramas hdri
+  relight synth --turn --count 20 --panoramas hdri -o turns
       whole turns as shards, with their truth beside them
-  relight synth look --preview
+  relight synth --preview -o look
       look/preview.png: a sheet of pictures beside their truth
-  relight synth panoramas --write-panoramas
+  relight synth --write-panoramas -o panoramas
       the panoramas that are used where none are given, as EXR";
 
 #[derive(Args)]
 pub(in crate::cli) struct Arguments {
     /// The folder to write into; made where it is missing.
-    #[arg(value_name = "OUT")]
-    out: PathBuf,
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
     /// How many samples, turns or objects [default: 1000; with --turn 1, with --preview 24].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     count: Option<u64>,
@@ -115,7 +115,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     }
     let pool = builder.build()?;
     if arguments.write_panoramas {
-        return panoramas(&arguments.out, console);
+        return panoramas(&arguments.output, console);
     }
     let library = Library::read(&Folders {
         meshes: arguments.meshes.clone(),
@@ -153,7 +153,7 @@ fn samples(arguments: &Arguments, library: &Library, console: Console) -> ModeRe
     let count = arguments.count.unwrap_or(1000);
     let bar = console.progress(count, "samples");
     let recipe = recipe(arguments, 256);
-    let written = write_samples(&recipe, library, count, &arguments.out, &|| bar.inc(1));
+    let written = write_samples(&recipe, library, count, &arguments.output, &|| bar.inc(1));
     bar.finish_and_clear();
     tell(arguments, console, "samples", written?);
     Ok(())
@@ -166,7 +166,7 @@ fn turns(arguments: &Arguments, library: &Library, console: Console) -> ModeResu
         recipe: recipe(arguments, 256),
         frames: arguments.frames,
     };
-    let written = write_turns(&turns, library, count, &arguments.out, &|| bar.inc(1));
+    let written = write_turns(&turns, library, count, &arguments.output, &|| bar.inc(1));
     bar.finish_and_clear();
     tell(arguments, console, "turns", written?);
     Ok(())
@@ -174,7 +174,7 @@ fn turns(arguments: &Arguments, library: &Library, console: Console) -> ModeResu
 
 fn tell(arguments: &Arguments, console: Console, what: &str, written: Written) {
     let Written { new, kept } = written;
-    let out = &arguments.out;
+    let out = &arguments.output;
     console.say(
         &format!("{}: {new} {what} written, {kept} were there", out.display()),
         &json!({ "event": what, "out": out, "new": new, "kept": kept }),
@@ -183,8 +183,8 @@ fn tell(arguments: &Arguments, console: Console, what: &str, written: Written) {
 
 fn preview(arguments: &Arguments, library: &Library, console: Console) -> ModeResult {
     let count = u32::try_from(arguments.count.unwrap_or(24))?;
-    std::fs::create_dir_all(&arguments.out)?;
-    let path = arguments.out.join("preview.png");
+    std::fs::create_dir_all(&arguments.output)?;
+    let path = arguments.output.join("preview.png");
     write_preview(&recipe(arguments, 128), library, count, &path)?;
     console.say(
         &format!(
