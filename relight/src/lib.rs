@@ -10,7 +10,9 @@
 //! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
 //! | [`movie`] | frames into MP4 and WebM, by the `ffmpeg` program |
 //! | [`render`] | diffuse and specular layers on normals, their derivatives, the truth by Monte Carlo |
+//! | [`synth`] | pictures of objects with the truth that they were made of |
 pub mod image;
 pub mod light;
 pub mod movie;
 pub mod render;
+pub mod synth;
