@@ -53,7 +53,7 @@ pub use request::{GrantedMode, ModeRequest};
 
 use crate::clock::Clock;
 
-/// Opens a camera. A replay goes by the clock given; see [`CameraAddress::clock`].
+/// Opens a camera. A replay goes by the clock given.
 ///
 /// # Errors
 /// [`CameraError::NotThere`], [`CameraError::NotPermitted`], [`CameraError::NotACamera`],
