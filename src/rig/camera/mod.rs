@@ -53,7 +53,7 @@ pub use request::{GrantedMode, ModeRequest};
 
 use crate::clock::Clock;
 
-/// Opens a camera. A replay uses the given clock; see [`CameraAddress::clock`].
+/// Opens a camera. A replay uses the given clock.
 ///
 /// # Errors
 /// [`CameraError::NotThere`], [`CameraError::NotPermitted`], [`CameraError::NotACamera`],

@@ -5,9 +5,7 @@ use std::path::PathBuf;
 
 use jiff::Timestamp;
 
-use super::mode_preference::ModePreference;
 use super::recording::RecordingError;
-use super::stop::Stopped;
 use crate::camera::hold::ControlDrift;
 use crate::camera::{CameraError, FrameFault};
 use crate::lockfile::LockError;
@@ -79,6 +77,17 @@ impl CaptureError {
     }
 }
 
+/// Who asked for the stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+pub enum Stopped {
+    /// A person.
+    #[error("somebody asked for it")]
+    Person,
+    /// The program is to end.
+    #[error("the program was told to end")]
+    Shutdown,
+}
+
 /// What preflight found wrong; nothing has turned yet.
 #[derive(Debug, thiserror::Error)]
 pub enum Refusal {
@@ -90,8 +99,8 @@ pub enum Refusal {
     /// No mode is as preferred.
     #[error("the camera does not offer {preferred}; it offers {}", first_of(.offered))]
     NoMode {
-        /// What was asked for.
-        preferred: ModePreference,
+        /// What was asked for, in words.
+        preferred: String,
         /// The modes that there are.
         offered: Vec<String>,
     },

@@ -9,6 +9,7 @@
 //! turntables. What is under way shows in a [`Monitor`](crate::state::Monitor); who looks at that,
 //! and from where, the capture does not know.
 
+mod context;
 mod equipment;
 mod error;
 mod locked_camera;
@@ -22,16 +23,17 @@ mod stop;
 mod take;
 pub(crate) mod turn;
 
+pub use context::{CaptureContext, CaptureRequest};
 pub use equipment::Equipment;
-pub use error::{CaptureError, MeterFault, Refusal};
+pub use error::{CaptureError, MeterFault, Refusal, Stopped};
 pub use mode_preference::ModePreference;
 pub use recording::{
     End, Plan, Progress, Recorded, Recorder, RecordingError, Salvaged, Saved, Window, salvage,
     salvage_session,
 };
 pub use settings::Settings;
-pub use stop::{StopRequest, Stopped};
-pub use take::{CaptureContext, CaptureRequest, Captured, capture};
+pub use stop::StopRequest;
+pub use take::{Captured, capture};
 
 #[cfg(test)]
 pub(crate) mod tests;

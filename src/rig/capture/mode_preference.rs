@@ -67,7 +67,7 @@ impl ModePreference {
                 (std::cmp::Reverse(pixels), rank)
             })
             .ok_or_else(|| Refusal::NoMode {
-                preferred: *self,
+                preferred: self.to_string(),
                 offered: modes.iter().map(Mode::to_string).collect(),
             })
     }

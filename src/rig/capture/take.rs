@@ -2,13 +2,14 @@
 //! verdict; and all of it again where the take is not usable.
 //!
 //! Whatever ends a take, the table stands when it is over: a [`crate::turntable::Turn`] that is
-//! dropped stops it, a [`StopRequest`] reaches it while something waits for it, and the table
+//! dropped stops it, a [`super::StopRequest`] reaches it while something waits for it, and the table
 //! itself stops when the program ends.
 
 use std::time::Duration;
 
 use relit_data::causes::with_causes;
 
+use super::context::{CaptureContext, CaptureRequest};
 use super::equipment::Equipment;
 use super::error::{CaptureError, Refusal};
 use super::locked_camera::{LockedCamera, NEXT_FRAME};
@@ -16,56 +17,13 @@ use super::manifest::manifest;
 use super::metering::meter;
 use super::preflight;
 use super::recording::{End, Plan, Recorder};
-use super::stop::StopRequest;
 use super::turn::TurnRecording;
 use crate::camera::CameraAddress;
-use crate::preview::Preview;
-use crate::state::{Check, Monitor, Phase, TakeSummary, Verdict};
+use crate::state::{Check, Phase, TakeSummary, Verdict};
 use crate::turntable::TurnPlan;
 
 /// How long a replayed camera waits for the disk, so that a rehearsal on a slow disk loses nothing.
 const REPLAY_WAIT: Duration = Duration::from_secs(60);
-
-/// What is to be captured.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct CaptureRequest {
-    /// The object's name.
-    pub object: String,
-    /// Whether a metering turn comes first.
-    pub meter: bool,
-}
-
-/// Who follows a capture, and who may stop it.
-#[derive(Debug, Clone, Copy)]
-pub struct CaptureContext<'a> {
-    /// Gets the state.
-    pub monitor: &'a Monitor,
-    /// Gets the frames.
-    pub preview: Option<&'a Preview>,
-    /// May be asked for at any time.
-    pub stop: &'a StopRequest,
-}
-
-impl CaptureContext<'_> {
-    pub(super) fn enter(&self, phase: Phase) {
-        self.monitor.update(|state| state.phase = phase);
-    }
-
-    fn note(&self, checks: impl IntoIterator<Item = Check>) {
-        self.monitor.update(|state| state.checks.extend(checks));
-    }
-
-    /// Shows that a take of `object` begins.
-    fn begin_take(&self, object: &str) {
-        self.monitor.update(|state| {
-            state.phase = Phase::Preflight;
-            state.object = Some(object.to_owned());
-            (state.frames, state.frames_wanted, state.dropped) = (0, 0, 0);
-            state.checks.clear();
-            state.session = None;
-        });
-    }
-}
 
 /// What a capture left.
 #[derive(Debug, Clone, PartialEq)]

@@ -47,7 +47,7 @@ pub(crate) enum Evidence {
 /// Frames that were exposed and not delivered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct MissingFrames {
-    /// The first missing exposure, counted from that of the first delivered frame, which is 0.
+    /// The first missing exposure.
     pub exposure: u64,
     /// How many in a row.
     pub count: u64,
@@ -79,8 +79,8 @@ pub(crate) struct FrameTiming {
     pub counter: Counter,
     /// For each delivered frame the number of its exposure; the first is 0, and they grow.
     pub exposures: Vec<u64>,
-    /// What is missing between delivered frames, in order.
-    pub missing: Vec<MissingFrames>,
+    /// For each delivered frame what shows that frames are missing before it.
+    pub evidence: Vec<Evidence>,
     /// What does not fit.
     pub anomalies: Vec<TimingAnomaly>,
 }
@@ -108,7 +108,9 @@ impl FrameTiming {
             period_us: found.line.period,
             start_us: first as f64 + found.line.start,
             counter,
-            missing: missing(&found, counter),
+            evidence: (0..stamps.len())
+                .map(|at| evidence(&found, counter, at))
+                .collect(),
             exposures: found.exposures,
             anomalies: found.anomalies,
         }
@@ -154,25 +156,37 @@ fn wrong_rates(found: &Numbering, agreed: f64) -> Vec<TimingAnomaly> {
         .collect()
 }
 
-fn missing(found: &Numbering, counter: Counter) -> Vec<MissingFrames> {
-    let steps = found.exposures.windows(2).zip(1_usize..);
-    steps
-        .filter_map(|(pair, before)| {
-            let count = pair[1].saturating_sub(pair[0]).saturating_sub(1);
-            let evidence = match (counter, found.by_time, found.agreed.get(before)) {
-                (Counter::Still | Counter::Absent, ..) => Evidence::Time,
-                (Counter::Counts, false, _) => Evidence::Counter,
-                (Counter::Counts, true, Some(false)) => Evidence::TimeAgainstCounter,
-                (Counter::Counts, true, _) => Evidence::Both,
-            };
-            (count > 0).then_some(MissingFrames {
-                exposure: pair[0] + 1,
-                count,
+/// What shows gaps before frame `at`.
+fn evidence(found: &Numbering, counter: Counter, at: usize) -> Evidence {
+    match (counter, found.by_time, found.agreed.get(at)) {
+        _ if at == 0 => Evidence::Time,
+        (Counter::Still | Counter::Absent, ..) => Evidence::Time,
+        (Counter::Counts, false, _) => Evidence::Counter,
+        (Counter::Counts, true, Some(false)) => Evidence::TimeAgainstCounter,
+        (Counter::Counts, true, _) => Evidence::Both,
+    }
+}
+
+/// The exposures up to, but not with, `end` that are none of the delivered frames', in order.
+/// `evidence`: for each frame what shows a gap before it; the time stamps show one behind the last.
+pub(crate) fn gaps(exposures: &[u64], end: u64, evidence: &[Evidence]) -> Vec<MissingFrames> {
+    let mut due = 0;
+    let mut missing = Vec::new();
+    let end = (exposures.len(), end, Evidence::Time);
+    let frames = exposures.iter().zip(evidence).enumerate();
+    let frames = frames.map(|(before, (&exposure, &evidence))| (before, exposure, evidence));
+    for (before, exposure, evidence) in frames.chain([end]) {
+        if exposure > due {
+            missing.push(MissingFrames {
+                exposure: due,
+                count: exposure - due,
                 before,
                 evidence,
-            })
-        })
-        .collect()
+            });
+        }
+        due = exposure.saturating_add(1);
+    }
+    missing
 }
 
 #[cfg(test)]
