@@ -1,4 +1,4 @@
-//! H.264 from a file's form to the byte stream of a camera.
+//! Converting H.264 from a file's form to a camera's byte stream.
 //!
 //! Files hold each unit behind its length, and the parameter sets apart (ISO/IEC 14496-15,
 //! `avcC`). A camera sends start codes between units, and the parameter sets in the stream
@@ -77,7 +77,7 @@ fn take_sets<'a>(mut rest: &'a [u8], count: u8, sets: &mut Vec<u8>) -> Option<&'
     Some(rest)
 }
 
-/// What stands behind a big-endian length of so many bytes, and the rest.
+/// The data after a big-endian length of so many bytes, and the rest.
 fn split_length(data: &[u8], length_bytes: usize) -> Option<(&[u8], &[u8])> {
     let (length, rest) = data.split_at_checked(length_bytes)?;
     let length = length

@@ -11,7 +11,7 @@ use super::DecodeFault;
 
 pub(super) use ffmpeg_next::codec::decoder::Video as VideoDecoder;
 
-/// True where every packet is a whole picture that needs no other.
+/// True if every packet is a picture that needs no other.
 pub(super) fn frames_stand_alone(codec: codec::Id) -> bool {
     matches!(codec, codec::Id::MJPEG | codec::Id::RAWVIDEO)
 }
@@ -32,7 +32,7 @@ pub(super) fn open(
     }
     let mut decoder = context.decoder();
     if frames_stand_alone(codec) {
-        // Half a JPEG is then an error, not a picture whose lower part is grey.
+        // Half a JPEG is then an error instead of a picture with a grey lower part.
         decoder.check(Check::EXPLODE | Check::CRC);
     } else {
         decoder.check(Check::CRC);
@@ -40,7 +40,7 @@ pub(super) fn open(
     decoder.video()
 }
 
-/// Decoders for frames that stand alone: each thread takes one and brings it back.
+/// Decoders for frames that are coded on their own: each thread takes one and returns it.
 pub(super) struct Pool {
     parameters: Mutex<Parameters>,
     idle: Mutex<Vec<decoder::Video>>,
@@ -54,7 +54,7 @@ impl Pool {
         }
     }
 
-    /// Decodes one packet that is a whole picture.
+    /// Decodes one packet, which is a picture on its own.
     pub(super) fn decode(&self, packet: &Packet) -> Result<frame::Video, DecodeFault> {
         let idle = self
             .idle
@@ -67,7 +67,7 @@ impl Pool {
         };
         let mut picture = frame::Video::empty();
         decoder.send_packet(packet).map_err(DecodeFault::Damaged)?;
-        // A decoder that failed is not brought back: it may hold on to what broke it.
+        // A decoder that failed is not reused: it may keep state from the damaged packet.
         decoder
             .receive_frame(&mut picture)
             .map_err(DecodeFault::Damaged)?;

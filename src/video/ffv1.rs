@@ -1,13 +1,15 @@
-//! The checksums of FFV1. FFmpeg covers a slice whose checksum is wrong up with the one of the
-//! frame before, and says so in its log only.
+//! The checksums of FFV1. FFmpeg replaces a slice whose checksum is wrong by that of the previous
+//! frame, and reports it in its log only.
 //!
 //! RFC 9043, sections 4.8 and 4.9: a packet is a row of slices, each followed by its size (3 bytes)
 //! and, where the stream has error checking, a status byte and a CRC (4 bytes) over all of it.
 
+use crc::{Algorithm, Crc};
+
 /// Size, status and CRC.
 const FOOTER: usize = 8;
 
-/// Whether all slices of a packet have the checksum that stands behind them; `None` where the
+/// Whether the checksums of all slices of a packet are right; `None` where the
 /// packet is not a row of slices with checksums.
 pub(super) fn slices_are_whole(packet: &[u8]) -> Option<bool> {
     let mut rest = packet;
@@ -18,38 +20,23 @@ pub(super) fn slices_are_whole(packet: &[u8]) -> Option<bool> {
             .iter()
             .fold(0, |size, &byte| size << 8 | usize::from(byte));
         let begin = footer.checked_sub(size)?;
-        whole &= crc(&rest[begin..]) == 0;
+        whole &= CRC.checksum(&rest[begin..]) == 0;
         rest = &rest[..begin];
     }
     (!packet.is_empty()).then_some(whole)
 }
 
-/// Polynomial 0x04C11DB7, the highest bit first, from 0: it comes to 0 over data and their own CRC.
-fn crc(bytes: &[u8]) -> u32 {
-    bytes.iter().fold(0, |crc, &byte| {
-        (crc << 8) ^ TABLE[((crc >> 24) as u8 ^ byte) as usize]
-    })
-}
-
-const TABLE: [u32; 256] = {
-    let mut table = [0; 256];
-    let mut at = 0;
-    while at < 256 {
-        let mut value = (at as u32) << 24;
-        let mut bit = 0;
-        while bit < 8 {
-            value = if value & 0x8000_0000 == 0 {
-                value << 1
-            } else {
-                value << 1 ^ 0x04C1_1DB7
-            };
-            bit += 1;
-        }
-        table[at] = value;
-        at += 1;
-    }
-    table
-};
+/// The CRC of RFC 9043, 4.9.3: it is 0 over data followed by their own CRC.
+const CRC: Crc<u32> = Crc::<u32>::new(&Algorithm {
+    width: 32,
+    poly: 0x04C1_1DB7,
+    init: 0,
+    refin: false,
+    refout: false,
+    xorout: 0,
+    check: 0x89A1_897F,
+    residue: 0,
+});
 
 #[cfg(test)]
 mod tests {
@@ -59,8 +46,13 @@ mod tests {
 
     fn slice(data: &[u8]) -> Vec<u8> {
         let mut slice = [data, &(data.len() as u32).to_be_bytes()[1..], &[0]].concat();
-        slice.extend(crc(&slice).to_be_bytes());
+        slice.extend(CRC.checksum(&slice).to_be_bytes());
         slice
+    }
+
+    #[test]
+    fn the_checksum_is_that_of_the_standard() {
+        assert_eq!(CRC.checksum(b"123456789"), CRC.algorithm.check);
     }
 
     proptest! {

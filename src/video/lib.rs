@@ -1,15 +1,44 @@
-//! Videos by way of FFmpeg: a file becomes frames with numbers and time stamps, and frames become
-//! RGB pictures; and back: a [`Muxer`] writes what a camera delivers to a file.
+//! Reading and writing videos with FFmpeg: a file becomes frames with numbers and time stamps, and
+//! frames become RGB pictures; a [`Muxer`] writes a camera's stream to a file.
 //!
-//! A [`Video`] is opened by reading through the file once without decoding: which frames it has,
-//! in order of presentation, when each is due, and whether the file is whole. A [`Reader`] then
-//! hands out the wanted frames. Where each frame stands alone (Motion JPEG, raw video) it hands out
-//! compressed frames that any number of threads decode side by side; elsewhere FFmpeg's own threads
-//! decode ahead. Memory does not grow with the length of the video, but for some 30 bytes a frame.
+//! Opening a [`Video`] reads through the file once without decoding: which frames it has, in order of
+//! presentation, the time of each, and whether the file is complete. A [`Reader`] then returns the
+//! wanted frames. If each frame is coded on its own (Motion JPEG, raw video), it returns compressed
+//! frames, which any number of threads can decode in parallel; otherwise FFmpeg's own threads decode
+//! ahead. Memory does not grow with the length of the video, except for about 30 bytes a frame.
 //!
-//! Colour range (limited, full) and matrix are honoured, a display rotation is applied, variable
-//! frame rate and gaps in the time stamps are kept as they are. This room knows nothing of
-//! sessions, masks or angles.
+//! Colour range (limited, full) and matrix are respected, a display rotation is applied, variable
+//! frame rate and gaps in the time stamps are kept. [`PixelFormat`] is the one type for how a
+//! camera's frames are coded. This crate knows nothing of sessions, masks or angles.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).unwrap();
+//! use relit_video::{Muxer, PixelFormat, StreamFormat, Video};
+//!
+//! let video = Video::open(Path::new("fixtures/20261120T101500Z-cow-short/video.mkv"))?;
+//! assert_eq!((video.frames().len(), video.damage().len()), (150, 0));
+//! let picture = video.frame(7)?;
+//! assert_eq!(picture.dimensions(), (480, 360));
+//!
+//! // Its first frames again, as they are coded.
+//! # let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("copy.mkv");
+//! let stream = StreamFormat {
+//!     format: PixelFormat::Mjpeg,
+//!     width: 480,
+//!     height: 360,
+//!     fps: 30.0,
+//! };
+//! let mut muxer = Muxer::create(&path, stream)?;
+//! for (coded, frame) in video.packets()?.zip(video.frames()).take(10) {
+//!     muxer.write(&coded.data, frame.t_us)?;
+//! }
+//! muxer.finish()?;
+//! assert!(Video::open(&path)?.frame(7)? == picture);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod annexb;
 mod decoder;
@@ -49,14 +78,14 @@ pub use seek::first_picture;
 /// Why a video could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum VideoError {
-    /// FFmpeg cannot make anything of the file.
+    /// FFmpeg cannot read the file.
     #[error(
-        "{path} cannot be opened as a video ({why}): is it whole, and is it a video? `ffprobe` on it tells more"
+        "{path} cannot be opened as a video ({why}): is it complete, and is it a video? `ffprobe` shows more"
     )]
     Open {
         /// The file.
         path: PathBuf,
-        /// FFmpeg's word.
+        /// FFmpeg's answer.
         why: ffmpeg_next::Error,
     },
     /// A name that FFmpeg cannot take.
@@ -66,7 +95,7 @@ pub enum VideoError {
     #[error("{0} has no video stream: give a file with a picture")]
     NoVideo(PathBuf),
     /// A picture track without a single frame.
-    #[error("{0} has not one whole frame: it was cut off too early; record it again")]
+    #[error("{0} has no complete frame: it was truncated too early; record it again")]
     NoFrames(PathBuf),
     /// The codec is not supported by this FFmpeg, or refuses the stream.
     #[error("{path}: no decoder for its codec {codec} can be opened ({why})")]
@@ -75,7 +104,7 @@ pub enum VideoError {
         path: PathBuf,
         /// The codec's name.
         codec: String,
-        /// FFmpeg's word.
+        /// FFmpeg's answer.
         why: ffmpeg_next::Error,
     },
     /// A frame beyond the end.
@@ -88,7 +117,7 @@ pub enum VideoError {
         /// The last one.
         last: u64,
     },
-    /// A frame that is there and cannot be decoded.
+    /// A frame of the file that cannot be decoded.
     #[error("frame {number} of {path} cannot be decoded: {fault}; take another frame")]
     Frame {
         /// The file.
@@ -100,7 +129,7 @@ pub enum VideoError {
     },
     /// The disk is full.
     #[error(
-        "no room to write {path}: {missing} bytes of what was recorded are missing there; make room in {folder}, or record elsewhere",
+        "the disk is full: {missing} bytes of what was recorded could not be written to {path}; free some space in {folder}, or record elsewhere",
         folder = folder_of(path).display()
     )]
     NoRoom {
@@ -109,7 +138,7 @@ pub enum VideoError {
         /// Bytes that were taken and did not fit.
         missing: u64,
     },
-    /// The file system refused otherwise.
+    /// Another error of the file system.
     #[error(
         "{path} could not be written ({source}): check the folder's rights and that the disk is in order"
     )]
@@ -119,44 +148,42 @@ pub enum VideoError {
         /// The system's answer.
         source: io::Error,
     },
-    /// FFmpeg refused to make the file.
-    #[error("{path} could not be made ({why}): does this FFmpeg write Matroska and FFV1?")]
+    /// FFmpeg cannot create the file.
+    #[error("{path} could not be created ({why}): does this FFmpeg write Matroska and FFV1?")]
     Mux {
         /// The file.
         path: PathBuf,
-        /// FFmpeg's word.
+        /// FFmpeg's answer.
         why: ffmpeg_next::Error,
     },
     /// An uncompressed format that cannot have this size.
-    #[error(
-        "a picture of {width} x {height} pixels cannot be kept in this pixel format: choose another mode"
-    )]
+    #[error("{width} x {height} pixels are not possible in this pixel format: choose another mode")]
     PictureSize {
         /// Width, pixels.
         width: u32,
         /// Height, pixels.
         height: u32,
     },
-    /// An uncompressed picture that is not one.
+    /// An uncompressed picture with the wrong number of bytes.
     #[error(
-        "a picture of {width} x {height} pixels came with {found} bytes instead of {wanted}: the camera sends another size than agreed, or half a picture"
+        "a picture of {width} x {height} pixels has {found} bytes instead of {wanted}: the camera sends another size than agreed, or half a picture"
     )]
     PictureBytes {
-        /// Bytes that came.
+        /// Bytes that it has.
         found: usize,
-        /// Bytes of a whole picture.
+        /// Bytes that it should have.
         wanted: usize,
         /// Width, pixels.
         width: u32,
         /// Height, pixels.
         height: u32,
     },
-    /// H.264 in another form than cameras give it.
-    #[error("the stream for {0} is no H.264 with start codes: choose another mode of the camera")]
+    /// H.264 in another form than cameras deliver it.
+    #[error("the stream for {0} is not H.264 with start codes: choose another mode of the camera")]
     NotAnnexB(PathBuf),
 }
 
-/// The folder in which a file stands.
+/// The folder of a file.
 fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if folder != Path::new("") => folder,
@@ -164,22 +191,22 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Why one frame yields no picture.
+/// Why a frame cannot be decoded to a picture.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeFault {
     /// The decoder refused its data.
     #[error("its data are damaged ({0})")]
     Damaged(ffmpeg_next::Error),
-    /// The container or a checksum says that its data are not whole.
+    /// According to the container or a checksum, its data are incomplete.
     #[error("its data are not whole")]
     NotWhole,
-    /// The decoder covered up missing parts.
+    /// The decoder concealed missing parts.
     #[error("parts of it are missing and were covered up by the decoder")]
     Concealed,
-    /// It is predicted from a frame that is damaged.
+    /// It is predicted from a damaged frame.
     #[error("it builds on the damaged frame {0}")]
     BuildsOnDamaged(u64),
-    /// The decoder gave nothing for it.
+    /// The decoder returned nothing for it.
     #[error("the decoder gave no picture for it")]
     NoPicture,
     /// The picture's size changes in the middle of the video.
@@ -199,7 +226,7 @@ pub enum DecodeFault {
     PixelFormat(String),
 }
 
-/// Opens a file, and nothing but a file: FFmpeg would take a name with a colon for an address.
+/// Opens a file, and only a file: FFmpeg takes a name with a colon for a URL.
 fn open_input(path: &Path) -> Result<Input, VideoError> {
     initialise();
     let name = path.to_str().filter(|name| !name.contains('\0'));
@@ -211,11 +238,11 @@ fn open_input(path: &Path) -> Result<Input, VideoError> {
     ffmpeg_next::format::input(&format!("file:{name}")).map_err(failed)
 }
 
-/// FFmpeg's one-time set-up. It would print its own messages to standard error otherwise.
+/// FFmpeg's one-time set-up. Without it FFmpeg prints messages to standard error.
 fn initialise() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        // Registers nothing in any FFmpeg of these years; a failure shows when a file is opened.
+        // Current versions of FFmpeg have nothing to register; a failure shows when a file is opened.
         let _ = ffmpeg_next::init();
         ffmpeg_next::log::set_level(ffmpeg_next::log::Level::Quiet);
     });

@@ -1,4 +1,4 @@
-//! Decoding a camera's frames as they come, for people and exposure meters: nothing is kept.
+//! Decoding a camera's frames as they arrive, for previews and metering; nothing is kept.
 
 use ffmpeg_next::codec::{self, decoder};
 use ffmpeg_next::{Packet, frame};
@@ -32,7 +32,7 @@ impl LiveDecoder {
     /// For frames of this format and size.
     ///
     /// # Errors
-    /// [`DecodeFault::Damaged`] where this FFmpeg lacks the codec.
+    /// [`DecodeFault::Damaged`] if this FFmpeg lacks the codec.
     pub fn new(format: PixelFormat, width: u32, height: u32) -> Result<Self, DecodeFault> {
         initialise();
         let decoder = match format {
@@ -49,11 +49,10 @@ impl LiveDecoder {
         })
     }
 
-    /// Decodes the next frame. `None` where its codec shows nothing yet: H.264 begins with a key
-    /// frame.
+    /// Decodes the next frame. `None` if there is no picture yet: H.264 begins with a key frame.
     ///
     /// # Errors
-    /// [`DecodeFault`] where the data are damaged; the next frame may be whole again.
+    /// [`DecodeFault`] if the data are damaged; the next frame may be fine.
     pub fn decode(&mut self, data: &[u8]) -> Result<Option<Picture>, DecodeFault> {
         let frame = match &mut self.decoder {
             Some(decoder) => match compressed(decoder, data)? {
@@ -75,7 +74,7 @@ fn open(id: codec::Id) -> Result<VideoDecoder, DecodeFault> {
     let found = decoder::find(id).ok_or(ffmpeg_next::Error::DecoderNotFound);
     let context = codec::Context::new_with_codec(found.map_err(DecodeFault::Damaged)?);
     let mut decoder = context.decoder();
-    // A picture is wanted for each frame, without waiting for those that follow.
+    // Each frame is returned without waiting for those that follow.
     decoder.set_flags(codec::Flags::LOW_DELAY);
     decoder.video().map_err(DecodeFault::Damaged)
 }

@@ -1,7 +1,7 @@
-//! Uncompressed pictures as cameras deliver them, and their way into FFV1 without loss.
+//! Coding a camera's uncompressed pictures as FFV1, without loss.
 //!
-//! FFV1 keeps planes. What comes packed or interleaved is taken apart, byte for byte; no value is
-//! converted, so that the decoded planes hold exactly the bytes of the camera.
+//! FFV1 stores planes. Packed and interleaved formats are split into planes byte by byte; no value is
+//! converted, so that the decoded planes hold exactly the camera's bytes.
 
 use ffmpeg_next::codec::{self, encoder, threading};
 use ffmpeg_next::format::Pixel;
@@ -12,8 +12,8 @@ use super::PixelFormat;
 /// Threads of an encoder: as many as it has slices.
 const SLICES: usize = 4;
 
-/// The bytes of a picture that FFV1 can keep; `None` where the format is compressed or cannot have
-/// this size without sharing colour between a picture's edge and nothing.
+/// The bytes of a picture that FFV1 can store; `None` if the format is compressed, or if this size
+/// is odd where the format shares colour between two pixels.
 pub(super) fn picture_bytes(format: PixelFormat, width: u32, height: u32) -> Option<usize> {
     let (even_width, even_height) = (width.is_multiple_of(2), height.is_multiple_of(2));
     let possible = match format {
@@ -26,7 +26,7 @@ pub(super) fn picture_bytes(format: PixelFormat, width: u32, height: u32) -> Opt
         .filter(|&bytes| possible && bytes > 0)
 }
 
-/// The planes in which FFV1 keeps a format.
+/// FFV1's planes for a format.
 fn planes(format: PixelFormat) -> Pixel {
     match format {
         PixelFormat::Yuyv => Pixel::YUV422P,
@@ -37,7 +37,7 @@ fn planes(format: PixelFormat) -> Pixel {
     }
 }
 
-/// An FFV1 encoder whose frames stand alone, are checked by checksums and come at once.
+/// An FFV1 encoder whose frames are coded on their own, with checksums and without delay.
 pub(super) fn encoder(
     format: PixelFormat,
     width: u32,
@@ -45,7 +45,7 @@ pub(super) fn encoder(
 ) -> Result<encoder::video::Encoder, ffmpeg_next::Error> {
     let codec = encoder::find(codec::Id::FFV1).ok_or(ffmpeg_next::Error::EncoderNotFound)?;
     let mut context = codec::Context::new_with_codec(codec);
-    // Threads that share a frame add no delay, as those with a frame each would.
+    // Threads that share a frame add no delay; threads with a frame each would.
     context.set_threading(threading::Config {
         kind: threading::Type::Slice,
         count: SLICES,
@@ -58,7 +58,7 @@ pub(super) fn encoder(
     video.set_time_base(Rational::new(1, 1_000_000));
     video.set_gop(1);
     match format {
-        // What Video4Linux means where a driver states nothing: limited range, BT.601.
+        // Video4Linux's default if a driver states nothing: limited range, BT.601.
         PixelFormat::Yuyv | PixelFormat::Nv12 => {
             video.set_color_range(color::Range::MPEG);
             video.set_colorspace(color::Space::SMPTE170M);
@@ -74,7 +74,7 @@ pub(super) fn encoder(
     video.open_as_with(codec, options)
 }
 
-/// The picture as a frame for the encoder; `None` where `bytes` is not one picture.
+/// The picture as a frame for the encoder; `None` if `bytes` is not exactly one picture.
 pub(super) fn frame(
     format: PixelFormat,
     bytes: &[u8],

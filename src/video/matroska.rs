@@ -1,5 +1,5 @@
-//! Whether a Matroska file was cut off. FFmpeg reads a cut file to its last whole block and then
-//! says "end of file", as of a whole one; the sizes in the file tell the truth.
+//! Whether a Matroska file is truncated. FFmpeg reads a truncated file to its last complete block and
+//! then reports a normal end; the sizes in the file show what is missing.
 //!
 //! Element ids and the coding of sizes are RFC 8794 (EBML) and RFC 9559 (Matroska).
 
@@ -9,26 +9,27 @@ const EBML: u32 = 0x1A45_DFA3;
 const SEGMENT: u32 = 0x1853_8067;
 const CLUSTER: u32 = 0x1F43_B675;
 
-/// Where a file ends too early, or an element does not fit where it stands.
+/// Where a file ends too early, or an element does not fit into its parent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Truncation {
-    /// Where the element begins that is not whole, bytes from the file's start.
+    /// Where the incomplete element begins, bytes from the file's start.
     pub element_at: u64,
-    /// How many bytes of it are missing, where the file says how large it was to be.
+    /// How many bytes of it are missing; `None` if the file does not state its size.
     pub missing: Option<u64>,
 }
 
-/// Looks for a cut in `file`; `None` where all elements end inside it, or where it is no Matroska.
+/// Looks for a truncated element in `file`; `None` if all elements are complete, or if it is not
+/// Matroska.
 ///
 /// # Errors
-/// What reading answers.
+/// Errors of reading `file`.
 pub fn find_truncation(file: &mut (impl Read + Seek)) -> io::Result<Option<Truncation>> {
     let length = file.seek(SeekFrom::End(0))?;
     file.seek(SeekFrom::Start(0))?;
     let mut at = 0;
-    // Where the cluster ends in which the walk is.
+    // Where the current cluster ends.
     let mut cluster_end = length;
-    // A segment or cluster that was to end after the file's end.
+    // A segment or cluster that should end after the file's end.
     let mut open = None;
     while at < length {
         if at >= cluster_end {
@@ -49,8 +50,8 @@ pub fn find_truncation(file: &mut (impl Read + Seek)) -> io::Result<Option<Trunc
                 missing,
             }))
         };
-        // The segment and clusters of unknown size hold elements up to the next of their rank, so
-        // going through their children in one row comes to the same.
+        // A segment or cluster of unknown size extends to the next element of its level, so that its
+        // children can be visited like those of one long list.
         let enters = header.id == SEGMENT || header.id == CLUSTER;
         at = match header.size.map(|size| header.body_at.saturating_add(size)) {
             Some(end) if end > length && !enters => return broken(Some(end - length)),
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_whole_file_has_no_cut() {
+    fn a_complete_file_is_not_truncated() {
         for known in [false, true] {
             assert_eq!(
                 find_truncation(&mut Cursor::new(file(known))).unwrap(),
@@ -179,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_is_found_with_its_place_and_what_is_missing() {
+    fn a_truncation_is_found_with_its_place_and_the_missing_bytes() {
         let whole = file(false);
         let cut = find_truncation(&mut Cursor::new(&whole[..whole.len() - 3])).unwrap();
         assert_eq!(
@@ -218,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn every_cut_inside_a_block_is_found() {
+    fn every_truncation_inside_a_block_is_found() {
         let whole = file(true);
         let cluster_body = whole.len() - 18;
         for length in cluster_body..whole.len() {

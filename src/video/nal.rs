@@ -5,18 +5,18 @@ const IDR_SLICE: u8 = 5;
 const SEQUENCE_PARAMETERS: u8 = 7;
 const PICTURE_PARAMETERS: u8 = 8;
 
-/// True where the packet begins with a start code.
+/// True if the packet begins with a start code.
 pub(super) fn is_annex_b(packet: &[u8]) -> bool {
     packet.starts_with(&[0, 0, 1]) || packet.starts_with(&[0, 0, 0, 1])
 }
 
-/// True where decoding of an H.264 stream with start codes can begin with this packet.
+/// True if decoding of an H.264 stream with start codes can begin with this packet.
 #[must_use]
 pub fn is_key(packet: &[u8]) -> bool {
     units(packet).any(|unit| kind(unit) == Some(IDR_SLICE))
 }
 
-/// The parameter sets seen so far: what a decoder has to know before the first picture.
+/// The parameter sets seen so far, which a decoder needs before the first picture.
 #[derive(Debug, Default)]
 pub(super) struct ParameterSets {
     sequence: Vec<u8>,
@@ -24,7 +24,7 @@ pub(super) struct ParameterSets {
 }
 
 impl ParameterSets {
-    /// Takes over what the packet has of them.
+    /// Collects those of the packet.
     pub(super) fn gather(&mut self, packet: &[u8]) {
         for unit in units(packet) {
             match kind(unit) {

@@ -7,7 +7,7 @@ use ffmpeg_next::{Packet, Rational, ffi};
 use super::FrameInfo;
 use super::ffv1::slices_are_whole;
 
-/// What a packet says of its frame. Time stamps are in units of the stream's time base.
+/// What a packet states about its frame. Time stamps are in units of the stream's time base.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stamp {
     /// When it is shown.
@@ -15,12 +15,12 @@ pub(super) struct Stamp {
     /// When it is decoded.
     dts: Option<i64>,
     damaged: bool,
-    /// True where its picture needs no other.
+    /// True if it can be decoded without any other frame.
     key: bool,
     /// For FFV1: whether its checksums are right; `None` where it has none.
     checked: Option<bool>,
-    /// False where the file wants it decoded for others' sake and not shown: what lies before the
-    /// cut of a clip that was trimmed without encoding it again.
+    /// False if it is only decoded because others depend on it: the frames before the start of a
+    /// clip that was trimmed without encoding it again.
     shown: bool,
 }
 
@@ -38,8 +38,8 @@ impl Stamp {
     }
 }
 
-/// Marks what the checksums of FFV1 tell, if the file has any: a damaged packet, and those up to the
-/// next key frame, whose decoding goes on from its state.
+/// Marks packets with wrong FFV1 checksums, if the file has checksums, and those after them up to the
+/// next key frame, which are decoded from the damaged state.
 pub(super) fn mark_wrong_checksums(stamps: &mut [Stamp]) {
     if !stamps.iter().any(|stamp| stamp.checked == Some(true)) {
         return;
@@ -58,15 +58,14 @@ fn raw_flags(packet: &Packet) -> i32 {
     unsafe { (*packet.as_ptr()).flags }
 }
 
-/// Frames in order of presentation, and the way to them from packets and decoded pictures.
+/// Frames in order of presentation, and their numbers by packet and by time stamp.
 #[derive(Debug)]
 pub(super) struct Ordered {
     pub(super) frames: Vec<FrameInfo>,
-    /// The frame's number of each packet, in the order in which packets stand in the file; `None`
-    /// where it is not shown.
+    /// The frame number of each packet, in the order of the file; `None` if it is not shown.
     pub(super) number_of_packet: Vec<Option<u64>>,
-    /// Time stamps and numbers, sorted; empty where frames have none or share them, and the order
-    /// in which the decoder gives frames is the only guide.
+    /// Time stamps and numbers, sorted; empty if frames have none or share them. Frames are then
+    /// numbered in the order in which the decoder returns them.
     pub(super) number_at: Vec<(i64, u64)>,
     /// What had to be assumed, for the user.
     pub(super) note: Option<String>,

@@ -1,18 +1,18 @@
-//! How a coded picture is to be turned for display: the display matrix of MP4 and Matroska.
+//! Rotation and mirroring for display: the display matrix of MP4 and Matroska.
 
 use image::RgbImage;
 use image::imageops::{flip_horizontal_in_place, flip_vertical_in_place};
 
 use relit_data::geometry::Rect;
 
-/// One of the eight ways to lay a picture: first transposed, then flipped.
+/// One of the eight orientations of a picture: first transposed, then flipped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Orientation {
     /// Rows become columns.
     transpose: bool,
-    /// Left and right change places after that.
+    /// Then left and right are swapped.
     flip_x: bool,
-    /// Top and bottom change places after that.
+    /// Then top and bottom are swapped.
     flip_y: bool,
 }
 
@@ -73,7 +73,7 @@ impl Orientation {
         }
     }
 
-    /// Turns a piece of a coded picture as it is to be displayed.
+    /// Turns a region of a coded picture for display.
     pub(super) fn apply(self, coded: RgbImage) -> RgbImage {
         let mut shown = if self.transpose {
             RgbImage::from_fn(coded.height(), coded.width(), |x, y| *coded.get_pixel(y, x))

@@ -1,4 +1,4 @@
-//! Handing out a video's frames as they are coded, without decoding.
+//! Reading a video's frames as they are coded, without decoding.
 
 use ffmpeg_next::Packet;
 use ffmpeg_next::codec::Id;
@@ -16,13 +16,13 @@ pub struct CodedFrame {
     pub number: u64,
     /// The data: a JPEG, a raw picture, or H.264 with start codes and parameter sets.
     pub data: Vec<u8>,
-    /// True where its picture needs no other.
+    /// True if it can be decoded without any other frame.
     pub key: bool,
-    /// True where the container says that its data are not whole.
+    /// True if, according to the container, its data are incomplete.
     pub damaged: bool,
 }
 
-/// Hands out the coded frames of a [`Video`] in the order in which they stand in the file.
+/// Returns the coded frames of a [`Video`] in the order of the file.
 pub struct Packets {
     input: Input,
     stream: usize,
@@ -37,7 +37,7 @@ impl std::fmt::Debug for Packets {
 }
 
 impl Video {
-    /// Opens the file again to hand out its coded frames.
+    /// Opens the file again to read its coded frames.
     ///
     /// # Errors
     /// What opening the file answers; [`VideoError::NoVideo`] where the stream is gone or its
@@ -58,8 +58,7 @@ impl Video {
         })
     }
 
-    /// True where the frames stand in the file in order of presentation, as they come from a
-    /// camera.
+    /// True if the file has the frames in order of presentation, as a camera delivers them.
     #[must_use]
     pub fn is_in_order(&self) -> bool {
         self.track.number_of_packet.iter().flatten().is_sorted()
@@ -98,7 +97,7 @@ impl Iterator for Packets {
     }
 }
 
-/// What the container keeps for the decoder, which the crate has no access to.
+/// The container's data for the decoder, which `ffmpeg-next` does not expose.
 #[allow(unsafe_code)]
 fn extra_data(stream: &Stream<'_>) -> Vec<u8> {
     let parameters = stream.parameters();

@@ -1,4 +1,4 @@
-//! A decoded frame, and its way to RGB.
+//! A decoded frame, and its conversion to RGB.
 
 use ffmpeg_next::color;
 use ffmpeg_next::format::Pixel;
@@ -60,7 +60,7 @@ impl Colour {
             color::Space::Unspecified | color::Space::Reserved => MatrixFrom::Size,
             _ => MatrixFrom::SizeForUnknown,
         };
-        // Grey pictures have no headroom unless somebody says so.
+        // Grey pictures are full-range unless the file states otherwise.
         let full_grey = is_grey(format) && range != color::Range::MPEG;
         Self {
             full_range: jpeg || full_grey || range == color::Range::JPEG,
@@ -71,7 +71,7 @@ impl Colour {
 }
 
 impl Colour {
-    /// What had to be assumed, for the user.
+    /// What had to be assumed, as a remark for the user.
     pub(super) fn note(self) -> Option<String> {
         let why = match self.matrix_from {
             MatrixFrom::File => return None,
@@ -174,7 +174,7 @@ impl Picture {
         }
         let mut whole = RgbImage::new(region.w, region.h);
         let (left, top) = (inside.x - region.x, inside.y - region.y);
-        // The piece fits by how `inside` was made.
+        // `inside` lies within `region`, so that the copy fits.
         let _ = whole.copy_from(&piece, left as u32, top as u32);
         Ok(whole)
     }
@@ -196,7 +196,7 @@ fn unconvertible(format: Pixel) -> DecodeFault {
     DecodeFault::PixelFormat(name_of(format).to_owned())
 }
 
-/// Formats that go to RGB without a step between.
+/// Formats that are converted to RGB in one step.
 fn is_direct(format: Pixel) -> bool {
     use Pixel::{GRAY8, RGB24, YUV420P, YUV422P, YUV444P, YUVJ420P, YUVJ422P, YUVJ444P};
     matches!(
@@ -278,9 +278,9 @@ fn planes_to_rgb(
         YUV422P | YUVJ422P => (1, 0),
         _ => (0, 0),
     };
-    // The converter works in blocks and rounds what does not fill one in another way. Blocks are
-    // laid from the frame's edge on, so that a pixel's value does not depend on the piece; this
-    // also begins the piece on a chroma sample.
+    // The converter works in blocks, and rounds differently in a block that is not full. The blocks
+    // start at the frame's edge, so that a pixel's value does not depend on the region; the region
+    // then also starts at a chroma sample.
     let (x, y) = (usize::try_from(rect.x).ok()?, usize::try_from(rect.y).ok()?);
     let (surplus_x, surplus_y) = (x % BLOCK, y & shift_y);
     let (x, y) = (x - surplus_x, y - surplus_y);

@@ -1,4 +1,4 @@
-//! A decoded frame as the raw picture of a camera.
+//! A decoded frame in a camera's raw format.
 
 use ffmpeg_next::format::Pixel;
 
@@ -8,9 +8,8 @@ use super::{DecodeFault, PixelFormat};
 use relit_data::geometry::Rect;
 
 impl Picture {
-    /// The picture in the raw layout that holds the same samples, where there is one; else, and
-    /// where the picture is to be turned or its YUV is full-range, as RGB. Its size is
-    /// [`Self::size`].
+    /// The picture in the raw format with the same samples, if there is one; otherwise, and if the
+    /// picture is rotated or its YUV is full-range, as RGB. Its size is [`Self::size`].
     ///
     /// # Errors
     /// [`DecodeFault::PixelFormat`] where the format cannot be converted.

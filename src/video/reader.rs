@@ -1,4 +1,4 @@
-//! Handing out the wanted frames of a video, in order, with as little work as the codec allows.
+//! Reading the wanted frames of a video, in order, with as little work as the codec allows.
 
 use std::collections::VecDeque;
 
@@ -76,15 +76,15 @@ impl Track {
     }
 }
 
-/// Hands out the wanted frames of a [`Video`]. Every wanted frame comes exactly once, in order of
-/// presentation but for lost ones, which may come last.
+/// Returns the wanted frames of a [`Video`]. Every wanted frame comes exactly once, in order of
+/// presentation; lost ones may come last.
 pub struct Reader<'a> {
     video: &'a Video,
     input: Input,
     /// Packets of the track read so far.
     packets: usize,
     wanted: Wanted,
-    /// The decoder, where frames do not stand alone.
+    /// The decoder, if frames depend on each other.
     chain: Option<Chain>,
     ready: VecDeque<Pending>,
     ended: bool,
@@ -122,7 +122,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Reads on by one packet, or notes the file's end.
+    /// Reads the next packet, or notes the end of the file.
     fn advance(&mut self) {
         // A packet that is read into again would keep the memory of what it held.
         let mut packet = Packet::empty();
@@ -176,7 +176,7 @@ impl Iterator for Reader<'_> {
                 return None;
             }
             self.advance();
-            // Nothing more is wanted: the rest of the file need not be read.
+            // Nothing more is wanted: the rest of the file is not read.
             if self.wanted.is_empty() && !self.ended {
                 self.ended = true;
             }
@@ -184,7 +184,7 @@ impl Iterator for Reader<'_> {
     }
 }
 
-/// The numbers still to be handed out.
+/// The numbers that are still wanted.
 struct Wanted {
     sorted: Vec<u64>,
     taken: Vec<bool>,
@@ -235,9 +235,9 @@ impl Wanted {
 /// A decoder of frames that build on each other.
 struct Chain {
     decoder: decoder::Video,
-    /// The number after that of the frame that the decoder gave last.
+    /// One more than the number of the last frame that the decoder returned.
     given: u64,
-    /// The damaged frame on which those up to the next key frame may build.
+    /// The damaged frame on which those up to the next key frame may depend.
     broken_by: Option<u64>,
 }
 
@@ -251,8 +251,8 @@ impl Chain {
         })
     }
 
-    /// Whatever goes wrong with a packet shows in the frames that come, or do not come: an error
-    /// here may belong to a packet that another thread is still at.
+    /// An error here may belong to a packet that another thread is still decoding. Which frames are
+    /// damaged shows in what the decoder returns.
     fn feed(
         &mut self,
         packet: &Packet,
@@ -276,8 +276,8 @@ impl Chain {
             let mut picture = frame::Video::empty();
             match self.decoder.receive_frame(&mut picture) {
                 Ok(()) => self.accept(picture, track, wanted, ready),
-                // Decoding with threads tells of a damaged packet here; the frames after it come.
-                // No decoder holds back more packets than this, so it cannot go on for ever.
+                // With threads, a damaged packet is reported here, and the frames after it follow.
+                // The limit ends the loop: no decoder holds back more packets than this.
                 Err(ffmpeg_next::Error::InvalidData) if errors < 64 => errors += 1,
                 Err(_) => return,
             }
@@ -295,7 +295,7 @@ impl Chain {
         let number = stamped
             .and_then(|pts| track.number_at(pts))
             .unwrap_or(self.given);
-        // Frames come in order of presentation: what is passed over was lost.
+        // Frames come in order of presentation: skipped numbers were lost.
         if number > self.given {
             self.broken_by = self.broken_by.or(Some(self.given));
         }

@@ -23,11 +23,11 @@ pub struct FrameInfo {
     pub number: u64,
     /// When it is shown, microseconds from the zero of the file's clock.
     pub t_us: i64,
-    /// True where the container says that its data are not whole.
+    /// True if, according to the container, its data are incomplete.
     pub damaged: bool,
 }
 
-/// What is known of a video as a whole.
+/// Codec, size and colour of a video.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Facts {
     /// The codec's name, such as `mjpeg`.
@@ -42,12 +42,15 @@ pub struct Facts {
     pub full_range: bool,
 }
 
-/// A sign that a video is not whole.
+/// A sign that a video is incomplete or damaged.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Damage {
-    /// The file ends inside an element, or an element does not fit where it stands.
-    #[error("the file {what} at byte {at}", what = cut_words(.0), at = .0.element_at)]
-    CutOff(Truncation),
+    /// The file ends inside an element, or an element does not fit into its parent.
+    #[error(
+        "truncated: {what} the element at byte {at}",
+        what = missing_words(.0), at = .0.element_at
+    )]
+    Truncated(Truncation),
     /// The container promises more frames than there are.
     #[error("the file promises {promised} frames and holds {found}")]
     FewerFrames {
@@ -80,16 +83,16 @@ pub enum Damage {
     ReadError {
         /// Frames found up to there.
         found: u64,
-        /// FFmpeg's word.
+        /// FFmpeg's answer.
         why: ffmpeg_next::Error,
     },
 }
 
-fn cut_words(cut: &Truncation) -> String {
-    match cut.missing {
-        Some(1) => "is cut off: 1 byte is missing of what begins".to_owned(),
-        Some(n) => format!("is cut off: {n} bytes are missing of what begins"),
-        None => "is damaged or cut off in what begins".to_owned(),
+fn missing_words(truncation: &Truncation) -> String {
+    match truncation.missing {
+        Some(1) => "1 byte is missing in".to_owned(),
+        Some(n) => format!("{n} bytes are missing in"),
+        None => "a part is missing or damaged in".to_owned(),
     }
 }
 
@@ -131,7 +134,7 @@ impl Video {
     ///
     /// # Errors
     /// [`VideoError::Open`], [`VideoError::NoVideo`], [`VideoError::NoFrames`] or [`VideoError::Decoder`]. A file that
-    /// is damaged but has frames is opened; [`Self::damage`] tells.
+    /// is damaged but has frames is opened; see [`Self::damage`].
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         let mut input = open_input(path)?;
         let stream = input
@@ -141,7 +144,7 @@ impl Video {
         let index = stream.index();
         let (time_base, rate) = (stream.time_base(), stream.avg_frame_rate());
         let promised = Promised {
-            // AVI counts chunks, also empty ones.
+            // AVI counts empty chunks too.
             frames: match input.format().name() {
                 "avi" => 0,
                 _ => u64::try_from(stream.frames()).unwrap_or(0),
@@ -210,7 +213,7 @@ impl Video {
         &self.frames
     }
 
-    /// Signs that the file is not whole; empty where there are none.
+    /// Signs that the file is incomplete or damaged; empty if there are none.
     #[must_use]
     pub fn damage(&self) -> &[Damage] {
         &self.damage
@@ -293,7 +296,7 @@ fn facts(decoder: &VideoDecoder, colour: Colour, orientation: Orientation) -> Fa
     }
 }
 
-/// How the stream is to be turned, and what to say of it.
+/// The rotation that the stream asks for, and remarks about it.
 pub(super) fn orientation(stream: &format::stream::Stream<'_>) -> (Orientation, Vec<String>) {
     let mut side_data = stream.side_data();
     let matrix = side_data.find(|data| data.kind() == side_data::Type::DisplayMatrix);
@@ -327,7 +330,7 @@ fn read_through(
     }
 }
 
-/// What the container says of its own length; 0 where it says nothing.
+/// The length that the container states; 0 if it states none.
 struct Promised {
     frames: u64,
     duration_us: i64,
@@ -344,12 +347,12 @@ fn find_damage(
     let mut damage = Vec::new();
     let cut = File::open(path).and_then(|file| find_truncation(&mut BufReader::new(file)));
     if let Ok(Some(cut)) = cut {
-        damage.push(Damage::CutOff(cut));
+        damage.push(Damage::Truncated(cut));
     }
     if let Some(why) = read_error {
         damage.push(Damage::ReadError { found, why });
     }
-    // What a trimmed clip does not show counts for the container.
+    // The container also counts what a trimmed clip does not show.
     let packets = packets as u64;
     if promised.frames > packets {
         damage.push(Damage::FewerFrames {
@@ -370,7 +373,8 @@ fn find_damage(
         let step = last.t_us.saturating_sub(first.t_us) / (frames.len() as i64 - 1);
         let promised_us = promised.duration_us;
         let found_us = last.t_us.saturating_add(step);
-        // Sound that outlasts the picture, or a slow last frame, is no damage: a tenth is.
+        // Sound that is longer than the picture, or a slow last frame, is no damage; a tenth of the
+        // length is.
         if promised_us
             > found_us
                 .saturating_add(promised_us / 10)

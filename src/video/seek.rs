@@ -1,4 +1,4 @@
-//! One frame out of a video without reading all that comes before it.
+//! Reading one frame of a video without everything before it.
 
 use std::cmp::Ordering;
 use std::path::Path;
@@ -60,8 +60,8 @@ pub fn first_picture(path: &Path) -> Result<RgbImage, VideoError> {
 }
 
 impl Video {
-    /// The picture of a frame, by way of the container's own index. `None` where it is not found so, or
-    /// where anything about it is doubtful: reading from the start tells then.
+    /// The picture of a frame, found by the container's own index. `None` if that fails or the result
+    /// is doubtful; the caller then reads from the start.
     pub(super) fn sought(&self, number: u64) -> Option<Picture> {
         let info = *self.frames().get(usize::try_from(number).ok()?)?;
         let mut stamps = self.track.number_at.iter();
@@ -88,7 +88,7 @@ fn is_whole(frame: &frame::Video) -> bool {
     !frame.is_corrupt() && !frame.has_decode_errors()
 }
 
-/// What a decoded frame is to a search.
+/// What a search does with a decoded frame.
 enum Found {
     This,
     Earlier,

@@ -1,4 +1,4 @@
-//! The video room from outside, on files that the `ffmpeg` program makes.
+//! Decoding from outside, on files that the `ffmpeg` program makes.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::fs;
@@ -364,15 +364,11 @@ fn a_cut_is_told_with_its_place() {
     fs::write(&cut, &bytes[..bytes.len() * 2 / 3]).unwrap();
     let video = Video::open(&cut).unwrap();
     assert!(
-        matches!(video.damage()[0], Damage::CutOff(_)),
+        matches!(video.damage()[0], Damage::Truncated(_)),
         "{:?}",
         video.damage()
     );
-    assert!(
-        video.damage()[0]
-            .to_string()
-            .starts_with("the file is cut off: ")
-    );
+    assert!(video.damage()[0].to_string().starts_with("truncated: "));
 }
 
 #[test]

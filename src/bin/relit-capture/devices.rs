@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use relit_data::causes::with_causes;
 use relit_rig::camera::{self, Control, ControlKind, DeviceInfo};
 use relit_rig::clock::Clock;
 use relit_rig::turntable::{TurntableError, find_serial};
@@ -17,18 +18,18 @@ pub(crate) fn run(console: Console) -> ExitCode {
         );
     }
     for camera in &cameras {
-        tell_camera(console, camera);
+        report_camera(console, camera);
     }
-    tell_turntable(console);
+    report_turntable(console);
     Outcome::Whole.into()
 }
 
-fn tell_camera(console: Console, info: &DeviceInfo) {
+fn report_camera(console: Console, info: &DeviceInfo) {
     let opened = camera::open(&info.address, Clock::monotonic());
     let controls = opened.and_then(|mut camera| camera.controls());
     let (controls, problem) = match controls {
         Ok(controls) => (controls, None),
-        Err(error) => (Vec::new(), Some(error.to_string())),
+        Err(error) => (Vec::new(), Some(with_causes(&error))),
     };
     let problems: Vec<&String> = info.problems.iter().chain(&problem).collect();
     let mut text = format!(
@@ -81,7 +82,7 @@ fn described(control: &Control) -> String {
         ),
     };
     let note = if control.flags.inactive {
-        ", an automatic rules it"
+        ", an automatic controls it"
     } else {
         ""
     };
@@ -101,7 +102,7 @@ fn as_json(control: &Control) -> Value {
     })
 }
 
-fn tell_turntable(console: Console) {
+fn report_turntable(console: Console) {
     match find_serial() {
         Ok(path) => {
             let address = format!("serial:{}", path.display());
@@ -119,6 +120,6 @@ fn tell_turntable(console: Console) {
                 &json!({ "event": "turntable", "addresses": addresses }),
             );
         }
-        Err(error) => console.warn(&error.to_string()),
+        Err(error) => console.warn(&with_causes(&error)),
     }
 }

@@ -7,9 +7,9 @@ use std::str::FromStr;
 
 use super::{AddressFault, CameraError};
 
-/// Fastest replay that may be asked for, times real time.
+/// Fastest possible replay, times real time.
 const FASTEST: f64 = 1000.0;
-/// Most frames that one fault may name.
+/// Most frames in a list.
 const MOST_FRAMES: usize = 10_000;
 
 /// Which camera is meant: `v4l2:/dev/video0`, `nokhwa:0`, or `replay:PATH` with options as
@@ -20,12 +20,12 @@ const MOST_FRAMES: usize = 10_000;
 /// | option | meaning |
 /// | --- | --- |
 /// | `speed=1` | real time (the default); `K` is K times as fast, `0` as fast as it is read |
-/// | `loop=1` | begins again at its end, counter and time stamps going on |
+/// | `loop=1` | starts again at its end; counter and time stamps continue |
 /// | `drop=7,8` | these frames are dropped: a gap in the counter |
 /// | `damage=5` | the data of these frames are cut in half, unmarked |
 /// | `flag=6` | the driver marks these frames as damaged |
-/// | `unplug=100` | the camera is unplugged in place of this frame |
-/// | `stall=20` | from this frame on, no frame comes |
+/// | `unplug=100` | the camera is unplugged instead of this frame |
+/// | `stall=20` | from this frame on, no frame is delivered |
 /// | `resize=9` | from this frame on, frames have half the width and height (not for H.264) |
 ///
 /// Frames are named by their position in the recording, 0-based, counted on where it loops.
@@ -41,9 +41,9 @@ pub enum CameraAddress {
         path: PathBuf,
         /// How fast.
         speed: ReplaySpeed,
-        /// Whether it begins again at its end.
+        /// Whether it starts again at its end.
         repeat: bool,
-        /// What is to go wrong.
+        /// Faults to inject.
         faults: ReplayFaults,
     },
 }
@@ -57,7 +57,7 @@ pub enum ReplaySpeed {
     Times(f64),
 }
 
-/// What is to go wrong in a replay, for tests and rehearsals; positions in the recording.
+/// Faults that a replay injects, for tests and rehearsals, at positions in the recording.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ReplayFaults {
     /// Frames that are dropped.
@@ -66,9 +66,9 @@ pub struct ReplayFaults {
     pub damage: BTreeSet<u64>,
     /// Frames that the driver marks as damaged.
     pub flag: BTreeSet<u64>,
-    /// The frame in whose place the camera is unplugged.
+    /// The frame instead of which the camera is unplugged.
     pub unplug: Option<u64>,
-    /// The frame from which on none comes.
+    /// The frame from which on none is delivered.
     pub stall: Option<u64>,
     /// The frame from which on frames have half the width and height.
     pub resize: Option<u64>,
@@ -303,7 +303,7 @@ mod tests {
         }
 
         #[test]
-        fn no_text_upsets_the_parser(text in ".{0,60}", options in "[a-z0-9=&,?.-]{0,40}") {
+        fn no_text_makes_the_parser_panic(text in ".{0,60}", options in "[a-z0-9=&,?.-]{0,40}") {
             let _ = text.parse::<CameraAddress>();
             let _ = format!("replay:{text}?{options}").parse::<CameraAddress>();
         }
@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_address_says_what_is_wrong() {
+    fn a_wrong_address_names_the_mistake() {
         for (text, fault) in [
             ("/dev/video0", AddressFault::Scheme),
             ("usb:0", AddressFault::Scheme),

@@ -12,7 +12,7 @@ impl fmt::Display for ControlId {
     }
 }
 
-/// One control, as it stood when it was read.
+/// One control, with its value when it was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Control {
     /// Its number.
@@ -64,7 +64,7 @@ pub struct MenuItem {
 /// What may be done with a control at the moment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ControlFlags {
-    /// It has no effect now: an automatic rules.
+    /// It has no effect now, because an automatic is on.
     pub inactive: bool,
     /// It cannot be set.
     pub read_only: bool,

@@ -15,12 +15,12 @@ const PERMITTING: &str = match cfg!(target_os = "linux") {
     false => "let this program use the camera in the system's privacy settings",
 };
 
-/// Why a camera could not be found, set, or read. What the system said is the `source`:
-/// [`relit_data::causes::with_causes`] puts both into one sentence.
+/// Why a camera could not be found, set, or read. The system's error is the `source`:
+/// [`relit_data::causes::with_causes`] writes both as one sentence.
 #[derive(Debug, thiserror::Error)]
 pub enum CameraError {
-    /// A text that is no address or mode.
-    #[error("{text:?} is no camera's address: {fault}")]
+    /// A text that is neither an address nor a mode.
+    #[error("{text:?} is not a camera's address: {fault}")]
     Address {
         /// The text.
         text: String,
@@ -43,7 +43,7 @@ pub enum CameraError {
         /// The system's answer, where there is one.
         source: Option<io::Error>,
     },
-    /// A device that gives no frames, or not in a way that can be used here.
+    /// A device that delivers no frames, or not in a supported way.
     #[error("{device} cannot be used as a camera ({why}): give another device")]
     NotACamera {
         /// The device.
@@ -63,7 +63,7 @@ pub enum CameraError {
         /// The system's answer.
         source: io::Error,
     },
-    /// The stream does not fit onto the bus beside those that run there.
+    /// The bus has no bandwidth left for the stream.
     #[error(
         "the USB bus of {device} is full: no bandwidth is left for this mode; ask for a smaller size, a lower rate or MJPG, or plug it in at another controller"
     )]
@@ -73,8 +73,8 @@ pub enum CameraError {
         /// The system's answer.
         source: io::Error,
     },
-    /// The device went away.
-    #[error("{device} was unplugged: plug it in again and start anew")]
+    /// The device is gone.
+    #[error("{device} was unplugged: plug it in again and start again")]
     Unplugged {
         /// The device.
         device: String,
@@ -118,7 +118,7 @@ pub enum CameraError {
         /// The system's answer.
         source: io::Error,
     },
-    /// A pixel format that is not taken here.
+    /// A pixel format that cannot be recorded.
     #[error(
         "{fourcc} frames cannot be recorded: ask {device} for MJPG, H264, YUYV, NV12, RGB3, GREY or 8-bit Bayer"
     )]
@@ -189,32 +189,32 @@ pub enum CameraError {
 /// What is wrong in an address or mode.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AddressFault {
-    /// None of the known beginnings.
+    /// No known scheme.
     #[error("write v4l2:/dev/video0, nokhwa:0 or replay:PATH")]
     Scheme,
-    /// Nothing behind the colon.
-    #[error("nothing stands behind the colon")]
+    /// Nothing after the colon.
+    #[error("nothing follows the colon")]
     Empty,
-    /// A device name that cannot be one.
+    /// Not a device's path.
     #[error("a device is named by its path, such as /dev/video0")]
     Path,
     /// Not a camera's number.
-    #[error("a number from 0 stands behind nokhwa:")]
+    #[error("nokhwa: is followed by a number from 0")]
     Number,
-    /// An option that is not known.
+    /// An unknown option.
     #[error(
-        "the option {0:?} is not known; there are speed, loop, drop, damage, flag, unplug, resize and stall"
+        "the option {0:?} is unknown; the options are speed, loop, drop, damage, flag, unplug, resize and stall"
     )]
     Option(String),
-    /// An option that stands there twice.
-    #[error("the option {0:?} stands there twice")]
+    /// An option that is given twice.
+    #[error("the option {0:?} is given twice")]
     Twice(String),
-    /// An option's value that cannot be one.
-    #[error("{value:?} cannot be the value of {option}")]
+    /// A value that the option does not take.
+    #[error("{option} does not take the value {value:?}")]
     Value {
         /// The option.
         option: String,
-        /// What stands there.
+        /// Its value.
         value: String,
     },
     /// Not a mode.
@@ -239,8 +239,8 @@ pub enum ControlFault {
         /// Largest value.
         maximum: i64,
     },
-    /// An automatic rules it, or it is read-only.
-    #[error("it is read-only, or an automatic rules it: switch that off first")]
+    /// An automatic controls it, or it is read-only.
+    #[error("it is read-only, or an automatic controls it: switch that off first")]
     Locked,
     /// The stream or another program holds it.
     #[error("it is held while the camera streams, or by another program: stop that first")]

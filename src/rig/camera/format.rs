@@ -97,7 +97,7 @@ pub enum Sizes {
 }
 
 impl Sizes {
-    /// True where this size is among them.
+    /// True if this size is among them.
     pub fn contains(self, width: u32, height: u32) -> bool {
         let within = |value: u32, min: u32, max: u32, step: u32| {
             (min..=max).contains(&value) && (value - min).is_multiple_of(step.max(1))
@@ -144,12 +144,12 @@ pub enum Rates {
         /// The highest.
         fastest: Rate,
     },
-    /// The camera does not say.
+    /// The camera does not state them.
     Unknown,
 }
 
 impl Rates {
-    /// The highest rate, where the camera says.
+    /// The highest rate, if the camera states any.
     pub fn fastest(&self) -> Option<Rate> {
         match self {
             Self::List(rates) => rates
@@ -175,7 +175,7 @@ impl fmt::Display for Rates {
     }
 }
 
-/// One thing that a camera offers: a pixel format with sizes and rates.
+/// A mode that a camera offers: a pixel format with sizes and rates.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mode {
     /// The pixel format.

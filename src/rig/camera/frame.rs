@@ -14,36 +14,36 @@ pub struct Frame {
     pub width: u32,
     /// The height that was agreed, pixels.
     pub height: u32,
-    /// The bytes that the driver says are used; raw rows without padding.
+    /// The bytes that the driver reports as used; raw rows without padding.
     pub data: Vec<u8>,
     /// The driver's counter; `None` where the camera has none.
     pub sequence: Option<Sequence>,
-    /// When the frame was taken, microseconds of the monotonic clock (of the clock given, for a
-    /// replay).
+    /// When the frame was taken, microseconds of the monotonic clock (for a replay, of the
+    /// given clock).
     pub t_us: i64,
-    /// What the time stamp stands for.
+    /// What the time stamp means.
     pub stamp: StampSource,
-    /// True where the driver marked the frame's data as damaged.
+    /// True if the driver marked the frame's data as damaged.
     pub flagged: bool,
 }
 
 /// The driver's frame counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sequence {
-    /// As delivered.
+    /// The driver's value.
     pub raw: u32,
     /// Without the wrap at 2^32, counted from the stream's first frame on.
     pub unwrapped: u64,
 }
 
-/// What a frame's time stamp stands for.
+/// What a frame's time stamp means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StampSource {
-    /// The driver's, when the frame's last data came.
+    /// The driver's: when the frame's last data arrived.
     EndOfFrame,
-    /// The driver's, when the exposure began.
+    /// The driver's: when the exposure began.
     StartOfExposure,
-    /// The driver has no monotonic time stamps: when this program got the frame.
+    /// This program's, if the driver has no monotonic time stamps: when it got the frame.
     Arrival,
 }
 
@@ -57,15 +57,15 @@ impl StampSource {
     }
 }
 
-/// Takes the wraps out of a driver's 32-bit frame counter.
+/// Counts a driver's 32-bit frame counter on where it wraps.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SequenceUnwrapper {
     last: Option<Sequence>,
 }
 
 impl SequenceUnwrapper {
-    /// The next counter. Less than half the range ahead is forward, all else is back: some drivers
-    /// repeat a number, or deliver one late.
+    /// The next value. A step of less than half the range is forward, any other is backward: some
+    /// drivers repeat a number, or deliver one late.
     pub fn next(&mut self, raw: u32) -> Sequence {
         let unwrapped = match self.last {
             None => u64::from(raw),
@@ -80,10 +80,10 @@ impl SequenceUnwrapper {
     }
 }
 
-/// What is wrong with a frame's data, as far as can be told without decoding.
+/// What is wrong with a frame's data, as far as it shows without decoding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FrameFault {
-    /// The driver says so.
+    /// The driver marked it.
     #[error("the driver marked it as damaged")]
     Flagged,
     /// No data at all.
@@ -138,7 +138,7 @@ fn jpeg_fault(data: &[u8], width: u32, height: u32) -> Option<FrameFault> {
     if !data.starts_with(&[0xff, 0xd8]) {
         return Some(FrameFault::NoStart);
     }
-    // Cameras pad behind the end. Compressed data cannot hold these two bytes: 0xff is stuffed.
+    // Cameras pad after the end. Compressed data do not contain these two bytes: 0xff is stuffed.
     if !data.windows(2).rev().any(|pair| pair == [0xff, 0xd9]) {
         return Some(FrameFault::NoEnd);
     }
@@ -179,8 +179,8 @@ pub fn jpeg_size(data: &[u8]) -> Option<(u32, u32)> {
     }
 }
 
-/// Takes the padding out of a raw frame's rows: `stride` bytes apart, `row` bytes used. The data
-/// stay as they are where nothing is padded, or where they do not hold all rows.
+/// Removes the padding of a raw frame's rows, which are `stride` bytes apart and have `row` bytes
+/// each. The data stay as they are if there is no padding, or if they do not have all rows.
 pub(super) fn without_padding(data: Vec<u8>, stride: usize, row: usize, rows: usize) -> Vec<u8> {
     let needed = rows
         .checked_sub(1)
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_of_a_jpeg_is_told() {
+    fn damage_of_a_jpeg_is_found() {
         assert_eq!(jpeg(&JPEG).fault(), None);
         assert_eq!(
             jpeg(&[&JPEG[..], &[0; 40]].concat()).fault(),
@@ -304,13 +304,13 @@ mod tests {
         assert_eq!(
             without_padding(padded.clone(), 0, 2, 3),
             padded,
-            "stride not told"
+            "unknown stride"
         );
     }
 
     proptest! {
         #[test]
-        fn no_bytes_upset_the_look_at_a_jpeg(data in vec(any::<u8>(), 0..80), cut in 0..25_usize) {
+        fn no_bytes_make_the_check_of_a_jpeg_panic(data in vec(any::<u8>(), 0..80), cut in 0..25_usize) {
             let _ = jpeg(&data).fault();
             let _ = jpeg(&[&JPEG[..cut], &data].concat()).fault();
         }

@@ -6,10 +6,10 @@
 //! recorded session or video that behaves as the camera it was recorded with, at its own pace or
 //! faster, with faults on demand; a whole capture runs on it without hardware.
 //!
-//! Frames are handed out as they came: this module counts nothing, judges nothing, and knows nothing
-//! of turntables, captures or masks. [`hold::ManualPlan`] says which controls to set so that
-//! exposure, gain, white balance and focus stand still; it is a pure function over the list of
-//! controls.
+//! Frames are returned as the camera delivered them: this module neither counts nor judges them, and
+//! knows nothing of turntables, captures or masks. [`hold::ManualPlan`] decides which controls to set
+//! so that exposure, gain, white balance and focus do not change; it is a pure function of the list
+//! of controls.
 //!
 //! ```
 //! use std::time::Duration;
@@ -53,11 +53,11 @@ pub use request::{GrantedMode, ModeRequest};
 
 use crate::clock::Clock;
 
-/// Opens a camera. A replay goes by the clock given.
+/// Opens a camera. A replay uses the given clock.
 ///
 /// # Errors
 /// [`CameraError::NotThere`], [`CameraError::NotPermitted`], [`CameraError::NotACamera`],
-/// [`CameraError::InUse`], what a recording's session or video answers, or what the device does.
+/// [`CameraError::InUse`], an error of a recording's session or video, or another error of the device.
 pub fn open(address: &CameraAddress, clock: Clock) -> Result<Box<dyn Camera>, CameraError> {
     Ok(match address {
         CameraAddress::V4l2(path) => open_v4l2(path)?,
@@ -105,8 +105,8 @@ fn open_nokhwa(number: u32) -> Result<Box<dyn Camera>, CameraError> {
     })
 }
 
-/// All cameras of this system, with what they offer and what of them could not be read: V4L2's
-/// under Linux, else those that nokhwa finds.
+/// All cameras of this system, with what they offer and what could not be read: those of V4L2 under
+/// Linux, otherwise those that nokhwa finds.
 pub fn list() -> Vec<DeviceInfo> {
     #[cfg(target_os = "linux")]
     return v4l2::list();
@@ -118,34 +118,34 @@ pub fn list() -> Vec<DeviceInfo> {
 
 /// A camera that may be started and stopped any number of times.
 pub trait Camera: Send {
-    /// What the camera said of itself when it was opened.
+    /// The camera's description when it was opened.
     fn info(&self) -> &DeviceInfo;
 
-    /// What it offers, of formats that are taken here.
+    /// The modes it offers, in formats that can be recorded.
     ///
     /// # Errors
-    /// [`CameraError::Unplugged`], or what the device answers.
+    /// [`CameraError::Unplugged`], or another error of the device.
     fn modes(&mut self) -> Result<Vec<Mode>, CameraError>;
 
-    /// All controls with one number as value, as they stand now.
+    /// All controls with one number as value, and their current values.
     ///
     /// # Errors
-    /// [`CameraError::Unplugged`], or what the device answers.
+    /// [`CameraError::Unplugged`], or another error of the device.
     fn controls(&mut self) -> Result<Vec<Control>, CameraError>;
 
-    /// Sets a control, and answers the value read back, which drivers round and clamp. A button
-    /// answers the value given.
+    /// Sets a control, and returns the value read back, which drivers round and clamp. For a button
+    /// it returns the given value.
     ///
     /// # Errors
     /// [`CameraError::Control`], [`CameraError::Unplugged`], or [`CameraError::Unsupported`].
     fn set_control(&mut self, id: ControlId, value: i64) -> Result<i64, CameraError>;
 
-    /// Starts the stream and answers what was granted, which need not be what was asked:
+    /// Starts the stream and returns what was granted, which may differ from the request:
     /// [`GrantedMode::differences`]. A running stream is stopped first.
     ///
     /// # Errors
-    /// [`CameraError::InUse`], [`CameraError::Format`], [`CameraError::Unplugged`], or what the
-    /// device answers; the camera is then stopped and may be started again.
+    /// [`CameraError::InUse`], [`CameraError::Format`], [`CameraError::Unplugged`], or another
+    /// error of the device; the camera is then stopped and may be started again.
     fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError>;
 
     /// The next frame, in order. Waits for at most `timeout`, of real time or, for a replay, of its
@@ -159,11 +159,11 @@ pub trait Camera: Send {
     /// Stops the stream; a stopped camera stays as it is.
     ///
     /// # Errors
-    /// [`CameraError::Unplugged`] or what the device answers; the camera counts as stopped.
+    /// [`CameraError::Unplugged`] or another error of the device; the camera counts as stopped.
     fn stop(&mut self) -> Result<(), CameraError>;
 }
 
-/// What a camera says of itself.
+/// The description of a camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeviceInfo {
     /// How to open it again.
@@ -174,9 +174,9 @@ pub struct DeviceInfo {
     pub driver: String,
     /// Where it is plugged in, such as `usb-0000:00:14.0-2`.
     pub bus: String,
-    /// What it offers, of formats that are taken here.
+    /// The modes it offers, in formats that can be recorded.
     pub modes: Vec<Mode>,
-    /// What else it offers.
+    /// Other formats it offers.
     pub other_formats: Vec<Fourcc>,
     /// What could not be read, and why.
     pub problems: Vec<String>,

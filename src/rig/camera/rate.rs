@@ -40,14 +40,14 @@ impl Rate {
         i64::try_from(rounded).unwrap_or(i64::MAX)
     }
 
-    /// True where both mean the same number.
+    /// True if both are the same number.
     pub fn equals(self, other: Self) -> bool {
         u64::from(self.numerator) * u64::from(other.denominator)
             == u64::from(other.numerator) * u64::from(self.denominator)
     }
 
     /// The nearest fraction in thousandths of a frame a second, whole where it is whole;
-    /// `None` for what is no rate between a thousandth and a million a second.
+    /// `None` outside of a thousandth to a million frames a second.
     pub fn from_per_second(per_second: f64) -> Option<Self> {
         if !(0.001..=1e6).contains(&per_second) {
             return None;
@@ -56,7 +56,7 @@ impl Rate {
         if thousandths.is_multiple_of(1000) {
             return Self::new(thousandths / 1000, 1);
         }
-        // 29.97 and its kin are meant as n * 1000 / 1001.
+        // 29.97 and similar rates mean n * 1000 / 1001.
         let whole = per_second.ceil();
         if (whole * 1000.0 / 1001.0 - per_second).abs() < 0.001 {
             return Self::new(whole as u32 * 1000, 1001);

@@ -1,11 +1,11 @@
-//! What is asked of a camera, and what it grants.
+//! The mode requested of a camera, and the mode granted.
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::{AddressFault, CameraError, Fourcc, Rate};
 
-/// What is asked of a camera, written `MJPG:1920x1080@30`.
+/// The mode requested of a camera, written `MJPG:1920x1080@30`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ModeRequest {
     /// The pixel format.
@@ -54,7 +54,7 @@ fn parse_request(text: &str) -> Option<ModeRequest> {
     })
 }
 
-/// What a camera agreed to deliver. Drivers put the nearest they have in place of what was asked.
+/// The mode that a camera granted. Drivers replace a requested mode by the nearest that they have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GrantedMode {
     /// The pixel format.
@@ -63,12 +63,12 @@ pub struct GrantedMode {
     pub width: u32,
     /// Frame height, pixels.
     pub height: u32,
-    /// Frames per second; `None` where the camera does not say.
+    /// Frames per second; `None` if the camera does not state it.
     pub rate: Option<Rate>,
 }
 
 impl GrantedMode {
-    /// In what this differs from what was asked, in words; empty where it is the same.
+    /// The differences from the request, in words; empty if there are none.
     pub fn differences(&self, asked: &ModeRequest) -> Vec<String> {
         let mut found = Vec::new();
         if self.fourcc != asked.fourcc {
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_granted_is_told() {
+    fn differences_from_the_request_are_listed() {
         let asked = request("MJPG:1280x720@30");
         let granted = GrantedMode {
             fourcc: Fourcc::MJPG,
@@ -161,7 +161,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_text_upsets_the_parser(text in "[A-Z0-9:x@.-]{0,30}", size in any::<u64>()) {
+        fn no_text_makes_the_parser_panic(text in "[A-Z0-9:x@.-]{0,30}", size in any::<u64>()) {
             let _ = text.parse::<ModeRequest>();
             let _ = format!("MJPG:{size}x{size}@{size}").parse::<ModeRequest>();
         }

@@ -7,8 +7,6 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use rustix::rand::{GetRandomFlags, getrandom};
-
 /// Bytes of a random token: 128 bits.
 const BYTES: usize = 16;
 /// Shortest and longest token that somebody may choose, characters.
@@ -66,10 +64,7 @@ impl Token {
     /// Where the system has no random numbers.
     pub fn random() -> io::Result<Self> {
         let mut bytes = [0_u8; BYTES];
-        let got = getrandom(&mut bytes, GetRandomFlags::empty())?;
-        if got != BYTES {
-            return Err(io::Error::other("too few random bytes"));
-        }
+        getrandom::fill(&mut bytes)?;
         Ok(Self(
             bytes.iter().map(|byte| format!("{byte:02x}")).collect(),
         ))

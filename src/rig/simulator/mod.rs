@@ -33,6 +33,7 @@
 mod chip;
 mod faults;
 mod model;
+mod openings;
 mod table;
 mod terminal;
 mod truth;

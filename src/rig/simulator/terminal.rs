@@ -1,23 +1,21 @@
 //! The pseudoterminal in place of the serial port.
 
-use std::mem::MaybeUninit;
 use std::os::fd::OwnedFd;
 use std::os::unix::ffi::OsStringExt;
 use std::path::{Path, PathBuf};
 
-use rustix::fs::inotify;
 use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
 use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use super::SimulatorError;
+use super::openings::Openings;
 
 /// The chip's end of the serial line.
 pub(super) struct Terminal {
     line: OwnedFd,
-    /// Reports openings of the port.
-    watch: OwnedFd,
+    openings: Openings,
     path: PathBuf,
     /// No process has the port open.
     closed: bool,
@@ -43,12 +41,10 @@ impl Terminal {
         modes.make_raw();
         tcsetattr(&port, OptionalActions::Now, &modes).map_err(failed("set up"))?;
         drop(port);
-        let flags = inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC;
-        let watch = inotify::init(flags).map_err(failed("watch"))?;
-        inotify::add_watch(&watch, &path, inotify::WatchFlags::OPEN).map_err(failed("watch"))?;
+        let openings = Openings::watch(&path).map_err(failed("watch"))?;
         Ok(Terminal {
             line,
-            watch,
+            openings,
             path,
             closed: true,
         })
@@ -60,14 +56,8 @@ impl Terminal {
     }
 
     /// How many times the port was opened since the last call.
-    pub(super) fn opened(&self) -> u64 {
-        let mut buffer = [MaybeUninit::uninit(); 1024];
-        let mut reader = inotify::Reader::new(&self.watch, &mut buffer);
-        let mut times = 0;
-        while reader.next().is_ok() {
-            times += 1;
-        }
-        times
+    pub(super) fn opened(&mut self) -> u64 {
+        self.openings.count(self.closed)
     }
 
     /// Reads what the host has written, up to the size of the buffer.

@@ -7,11 +7,11 @@ use ffmpeg_next::{Dictionary, Rational, ffi, format, media};
 use super::StreamFormat;
 use crate::PixelFormat;
 
-/// Longest stretch of video that is held back for one cluster, milliseconds.
+/// Longest duration of a cluster, milliseconds.
 const CLUSTER_MS: &str = "400";
-/// Most bytes of a cluster: a fast camera's are not gathered for long.
+/// Most bytes of a cluster, which a fast camera reaches first.
 const CLUSTER_BYTES: &str = "16000000";
-/// The muxer's unit of time, a second's parts.
+/// The muxer's time base: parts of a second.
 const MILLISECONDS: i32 = 1000;
 
 /// Starts a Matroska file with one track.
@@ -43,7 +43,7 @@ pub(super) fn open(
     Ok(output)
 }
 
-/// The track of a stream that is kept as it comes.
+/// The track of a stream that is stored as the camera delivers it.
 fn copied(stream: &StreamFormat) -> Result<Parameters, ffmpeg_next::Error> {
     let mut parameters = Parameters::new();
     parameters.set_medium(media::Type::Video);
@@ -77,7 +77,7 @@ fn set_extradata(parameters: &mut Parameters, bytes: &[u8]) -> Result<(), ffmpeg
     Ok(())
 }
 
-/// Ends the cluster under way and hands all to the sink.
+/// Ends the current cluster and writes everything to the sink.
 #[allow(unsafe_code)]
 pub(super) fn end_cluster(output: &mut Output) -> Result<(), ffmpeg_next::Error> {
     // SAFETY: the context is alive and its header was written; a null packet asks the muxer to

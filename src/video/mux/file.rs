@@ -1,16 +1,16 @@
-//! The file under a muxer, and what the system answered to it.
+//! The file that a muxer writes to, and the system's first error.
 
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Where FFmpeg writes to. FFmpeg keeps of an error at most its number: the first one is kept aside.
+/// What FFmpeg writes to. FFmpeg keeps only the number of an error, so that the first one is kept here.
 pub(super) struct Sink {
     pub(super) file: File,
     pub(super) refusal: Refusal,
 }
 
-/// The first error that the system answered to a sink.
+/// The first error of a sink.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Refusal(Arc<Mutex<Option<io::Error>>>);
 
@@ -19,15 +19,15 @@ impl Refusal {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Keeps the error and answers one of the same number for FFmpeg.
+    /// Keeps the error, and returns one of the same number for FFmpeg.
     fn keep(&self, error: io::Error) -> io::Error {
-        let told = match error.raw_os_error() {
+        let copy = match error.raw_os_error() {
             Some(number) => io::Error::from_raw_os_error(number),
             None => io::Error::from(error.kind()),
         };
         let mut first = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         first.get_or_insert(error);
-        told
+        copy
     }
 }
 

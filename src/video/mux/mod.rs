@@ -1,10 +1,10 @@
-//! Writing a camera's stream to a Matroska file, so that what is on the disk is readable at any
-//! moment: clusters are short, [`Muxer::sync`] brings all that was taken to the disk, and no reader
-//! needs the index that [`Muxer::finish`] adds.
+//! Writing a camera's stream to a Matroska file that can be read at any moment: clusters are short,
+//! [`Muxer::sync`] writes everything to the disk, and no reader needs the index that
+//! [`Muxer::finish`] adds.
 //!
-//! Motion JPEG and H.264 are kept as they come. Uncompressed pictures are coded as FFV1, without
-//! loss. Matroska as FFmpeg writes it counts in milliseconds: each frame's time is rounded to the
-//! nearest one, relative to the first frame. The exact time stamps belong into a frame index.
+//! Motion JPEG and H.264 are stored as the camera delivers them, uncompressed pictures as FFV1,
+//! without loss. FFmpeg writes Matroska's time stamps in milliseconds: each frame's time is rounded
+//! to the nearest one, relative to the first frame. The caller keeps the exact time stamps.
 
 mod container;
 mod file;
@@ -23,7 +23,7 @@ use self::file::{Refusal, Sink};
 use super::nal::{self, ParameterSets};
 use super::{PixelFormat, VideoError, initialise, lossless};
 
-/// Bytes that are gathered before they are handed to the system.
+/// Bytes that are buffered before they are written.
 const BUFFER: usize = 1 << 15;
 
 /// What a camera was set to deliver.
@@ -44,7 +44,7 @@ pub struct StreamFormat {
 pub enum Written {
     /// It is in the file, or on its way there.
     Kept,
-    /// It was left out: it builds on frames before the recording, and no key frame came yet.
+    /// It was left out: it depends on frames before the recording, and there was no key frame yet.
     BeforeKeyFrame,
 }
 
@@ -64,9 +64,9 @@ pub struct Muxer {
     taken: u64,
 }
 
-/// How far the file has come.
+/// The state of the file.
 enum State {
-    /// The header is not written: H.264 has to tell its parameters first.
+    /// The header is not written: the parameters of H.264 are in the stream.
     Waiting(StreamIo),
     Running(Output),
     /// Something failed, and nothing more can be written.
@@ -80,11 +80,11 @@ impl std::fmt::Debug for Muxer {
 }
 
 impl Muxer {
-    /// Makes a new file at `path`.
+    /// Creates a new file at `path`.
     ///
     /// # Errors
-    /// [`VideoError::PictureSize`] where the format cannot have this size, [`VideoError::Write`] where the
-    /// file cannot be made or is there already, [`VideoError::Mux`] where this FFmpeg lacks the codec.
+    /// [`VideoError::PictureSize`] if the format cannot have this size, [`VideoError::Write`] if the
+    /// file cannot be created or exists, [`VideoError::Mux`] if this FFmpeg lacks the codec.
     pub fn create(path: &Path, stream: StreamFormat) -> Result<Self, VideoError> {
         initialise();
         let refused = |source| VideoError::Write {
@@ -162,7 +162,7 @@ impl Muxer {
             self.begin()?;
         }
         let first = *self.first_us.get_or_insert(t_us);
-        // Matroska's reader puts frames in order of time: one that does not grow would swap them.
+        // Readers sort Matroska's frames by time: without growing times they would be swapped.
         let ms = (t_us.saturating_sub(first).saturating_add(500)) / 1000;
         let ms = if self.frames == 0 {
             0
@@ -186,8 +186,7 @@ impl Muxer {
         Ok(Written::Kept)
     }
 
-    /// Hands everything that was taken to the system: after this, a killed process loses none of
-    /// it.
+    /// Writes all frames to the system: a process that is killed after this loses none of them.
     ///
     /// # Errors
     /// As [`Self::write`].
@@ -198,7 +197,7 @@ impl Muxer {
         self.run(end_cluster)
     }
 
-    /// [`Self::flush`], and brings it to the disk: after this, a power cut loses none of it.
+    /// [`Self::flush`], and syncs the file: a power cut after this loses none of them.
     ///
     /// # Errors
     /// As [`Self::write`].
@@ -208,15 +207,15 @@ impl Muxer {
         synced.map_err(|source| self.refused(source))
     }
 
-    /// Ends the file: adds the index by which players jump, and brings all to the disk. The file is
-    /// readable also where this fails.
+    /// Ends the file: adds the index that players use to seek, and syncs it. The file can be read
+    /// even if this fails.
     ///
     /// # Errors
     /// As [`Self::write`].
     pub fn finish(mut self) -> Result<(), VideoError> {
         if matches!(self.state, State::Running(_)) {
             self.run(|output| output.write_trailer())?;
-            // What FFmpeg still holds is written when its side is closed.
+            // FFmpeg writes its last bytes when the output is dropped.
             self.state = State::Broken;
             self.check()?;
         }
@@ -262,7 +261,7 @@ impl Muxer {
         Ok(packet)
     }
 
-    /// Does something with the output, and finds out whether the system took it.
+    /// Calls FFmpeg, and checks whether the system accepted what it wrote.
     fn run(
         &mut self,
         work: impl FnOnce(&mut Output) -> Result<(), ffmpeg_next::Error>,
@@ -290,7 +289,7 @@ impl Muxer {
         VideoError::Mux { path, why }
     }
 
-    /// What the system's refusal to write is called.
+    /// The error for a write that the system refused.
     fn refused(&self, source: io::Error) -> VideoError {
         let path = self.path.clone();
         if is_no_room(&source) {
@@ -302,7 +301,7 @@ impl Muxer {
     }
 }
 
-/// True where a write failed because the disk, a quota or a limit on file sizes is exhausted.
+/// True if a write failed because the disk, a quota or a limit on file sizes is exhausted.
 fn is_no_room(error: &io::Error) -> bool {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)

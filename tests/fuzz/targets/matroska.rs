@@ -1,6 +1,6 @@
-//! The search for a cut in a Matroska file: it looks at no byte twice, and what it finds lies
-//! inside the file with something missing; up to there nothing is wrong but that what holds the
-//! element is not ended. A whole file that loses its last byte has a cut, and of that one byte.
+//! The search for a truncation in a Matroska file: it reads no byte twice, and what it finds lies
+//! inside the file with something missing; up to there only the parent of the element is incomplete.
+//! A complete file without its last byte is truncated by that one byte.
 
 #![no_main]
 #![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]

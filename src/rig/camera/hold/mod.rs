@@ -1,8 +1,9 @@
-//! Making a camera hold still: which controls to set to manual, in which order, and what lacks.
+//! Holding a camera's settings during a turn, when only the light may change: which controls to set
+//! to manual, in which order, and which are missing.
 //!
-//! During a turn only the light may change. [`ManualPlan`] is made of the
-//! list of controls alone and touches no camera; [`ManualPlan::apply`] sets it and reads back. The
-//! names are those that `v4l2-ctl` prints; the kernel renamed several in 5.17, and both are known.
+//! [`ManualPlan::new`] uses only the list of controls and no camera; [`ManualPlan::apply`] sets the
+//! controls and reads them back. The names are those that `v4l2-ctl` prints; the kernel renamed
+//! several in 5.17, and both names are known.
 
 use std::fmt;
 
@@ -10,7 +11,7 @@ use relit_data::causes::with_causes;
 
 use super::{Camera, CameraError, Control, ControlId, ControlKind};
 
-/// What is to stand still.
+/// A property of the picture that must not change during a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Aspect {
     /// The exposure time.
@@ -41,7 +42,7 @@ impl Aspect {
         Self::Backlight,
     ];
 
-    /// Controls that switch its automatic, with the value for manual.
+    /// Controls that switch its automatic, and how each is set to manual.
     fn switches(self) -> &'static [(&'static str, Manual)] {
         match self {
             Self::Exposure => &[
@@ -73,7 +74,7 @@ impl Aspect {
         }
     }
 
-    /// Controls that hold its value; where several of one line are there, the first counts.
+    /// Controls that hold its value; of the names in one group, the first that exists is used.
     fn values(self) -> &'static [&'static [&'static str]] {
         match self {
             Self::Exposure => &[&["exposure_time_absolute", "exposure_absolute", "exposure"]],
@@ -112,11 +113,11 @@ enum Manual {
     /// A menu's item: its index in the kernel's interface, which must be offered, or a word in
     /// its label.
     MenuItem(i64, &'static str),
-    /// A menu's first item, which keeps the value that the automatic has found.
+    /// A menu's first item, which holds the value that the automatic has found.
     Locked,
 }
 
-/// Values to hold in place of those that the camera has now; in the control's own units.
+/// Values to hold instead of the camera's current ones, in the controls' own units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ManualValues {
     /// Exposure time; of `exposure_time_absolute`, units of 100 us.
@@ -148,7 +149,7 @@ impl ManualValues {
 /// One control to set.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ControlSetting {
-    /// What for.
+    /// The property that it holds.
     pub aspect: Aspect,
     /// The control.
     pub id: ControlId,
@@ -158,10 +159,10 @@ pub struct ControlSetting {
     pub value: i64,
 }
 
-/// Something that cannot be made to stand still by a control.
+/// A property that cannot be held, because a control is missing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum MissingControl {
-    /// The camera has no control for it: fixed, or ruled by the camera alone.
+    /// The camera has no control for it: it is fixed, or the camera alone decides.
     #[error("the camera has no control of its {0}")]
     NoControl(Aspect),
     /// The automatic can be switched off, but there is no value to hold.
@@ -170,7 +171,7 @@ pub enum MissingControl {
     /// The automatic has no manual setting, or is read-only.
     #[error("the camera's {aspect} cannot be switched to manual: {control} does not allow it")]
     NoManual {
-        /// What for.
+        /// The property that it holds.
         aspect: Aspect,
         /// The switch's name.
         control: String,
@@ -178,19 +179,19 @@ pub enum MissingControl {
     /// The value is read-only, or held by the stream or another program.
     #[error("the camera's {aspect} cannot be set: {control} may not be written now")]
     NotSettable {
-        /// What for.
+        /// The property that it holds.
         aspect: Aspect,
         /// The control's name.
         control: String,
     },
 }
 
-/// Which controls to set so that all of [`Aspect`] stand still, and what lacks.
+/// Which controls to set so that every [`Aspect`] is held, and which are missing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ManualPlan {
-    /// In this order: all automatics off first, then the values, which automatics would refuse.
+    /// In this order: first all automatics off, then the values, which automatics would refuse.
     pub steps: Vec<ControlSetting>,
-    /// What cannot be made to stand still.
+    /// What cannot be held.
     pub missing: Vec<MissingControl>,
 }
 
@@ -206,19 +207,19 @@ pub struct ControlDrift {
     pub is: Option<i64>,
 }
 
-/// What the controls show when they are read after a take.
+/// The result of reading the controls after a take.
 #[derive(Debug)]
 pub enum ReadBack {
-    /// They stand as they stood before.
+    /// All have the values from before the take.
     Unchanged,
-    /// These do not.
+    /// These have other values.
     Drifted(Vec<ControlDrift>),
-    /// They could not be read, so that nobody knows.
+    /// They could not be read, so that it is unknown.
     Unreadable(CameraError),
 }
 
 impl ReadBack {
-    /// What speaks against the take, a sentence each.
+    /// The faults of the take that this means, a sentence each.
     pub fn faults(&self) -> Vec<String> {
         match self {
             Self::Unchanged => Vec::new(),
@@ -239,8 +240,8 @@ fn value_words(value: Option<i64>) -> String {
 }
 
 impl ManualPlan {
-    /// Makes the plan. Values are the wanted ones, else those that the camera has now, which an
-    /// automatic may have found; brought into the control's range and onto its steps.
+    /// Makes the plan. Values are the wanted ones, otherwise the camera's current ones, which an
+    /// automatic may have found; rounded to the control's range and steps.
     pub fn new(controls: &[Control], wanted: &ManualValues) -> Self {
         let mut plan = Self::default();
         let mut values = Vec::new();
@@ -250,7 +251,7 @@ impl ManualPlan {
             let locked = matches!(switched, Some(Manual::Locked));
             let held = plan.hold(controls, wanted, aspect, &mut values) || locked;
             if aspect == Aspect::FrameRate || aspect == Aspect::Backlight {
-                // A camera without these has a fixed rate and no correction: nothing lacks.
+                // A camera without these has a fixed rate and no correction: none is missing.
                 continue;
             }
             if plan.missing.len() == before && !held {
@@ -266,8 +267,8 @@ impl ManualPlan {
         plan
     }
 
-    /// What was asked for and is not planned, because the camera has no control for it: aspect and
-    /// value of each, in words.
+    /// Wanted values that are not in the plan, because the camera has no control for them: aspect
+    /// and value of each, as text.
     pub fn without(&self, wanted: &ManualValues) -> Vec<String> {
         let asked = [
             (Aspect::Exposure, wanted.exposure),
@@ -288,7 +289,7 @@ impl ManualPlan {
             .collect()
     }
 
-    /// Plans the switches of an aspect; answers the last one that can be set.
+    /// Plans the switches of an aspect; returns the last one that can be set.
     fn switch_off(&mut self, controls: &[Control], aspect: Aspect) -> Option<Manual> {
         let mut switched = None;
         for &(name, manual) in aspect.switches() {
@@ -309,7 +310,7 @@ impl ManualPlan {
         switched
     }
 
-    /// Plans the values of an aspect; true where there is one that can be set.
+    /// Plans the values of an aspect; true if there is one that can be set.
     fn hold(
         &mut self,
         controls: &[Control],
@@ -340,11 +341,11 @@ impl ManualPlan {
         held
     }
 
-    /// Sets every step in order, reads everything back at the end, and answers what is not as it
-    /// was set. Controls move each other: only the last reading counts.
+    /// Sets all controls in order, reads them back at the end, and returns those that have other
+    /// values. Controls affect each other: only the last reading counts.
     ///
     /// # Errors
-    /// What [`Camera::set_control`] and [`Camera::controls`] answer.
+    /// Those of [`Camera::set_control`] and [`Camera::controls`].
     pub fn apply(&self, camera: &mut dyn Camera) -> Result<Vec<ControlDrift>, CameraError> {
         for step in &self.steps {
             camera.set_control(step.id, step.value)?;
@@ -352,7 +353,7 @@ impl ManualPlan {
         Ok(self.check(&camera.controls()?))
     }
 
-    /// Reads the controls after a take and compares them with the plan, and with how they stood
+    /// Reads the controls after a take and compares them with the plan, and with their values
     /// `before` the take.
     pub fn read_back(&self, before: &[Control], camera: &mut dyn Camera) -> ReadBack {
         let after = match camera.controls() {
@@ -371,7 +372,7 @@ impl ManualPlan {
         }
     }
 
-    /// What is not as the plan sets it.
+    /// Controls whose values are not those of the plan.
     pub fn check(&self, controls: &[Control]) -> Vec<ControlDrift> {
         let steps = self.steps.iter();
         steps
@@ -380,9 +381,9 @@ impl ManualPlan {
     }
 }
 
-/// Controls whose values differ between two readings, by name. Those that the hardware changes by
-/// itself count only where they had been set: [`ManualPlan::check`]. Those that nobody can set are
-/// readings, not settings: they do not count.
+/// Controls whose values differ between two readings. Those that the hardware changes by itself are
+/// only compared if the plan sets them: [`ManualPlan::check`]. Read-only ones are measurements, not
+/// settings, and are not compared.
 fn drift_between(before: &[Control], after: &[Control]) -> Vec<ControlDrift> {
     let settings = |control: &&Control| !control.flags.volatile && !control.flags.read_only;
     let held = before.iter().filter(settings);
@@ -401,7 +402,7 @@ fn moved(name: &str, id: ControlId, should: i64, controls: &[Control]) -> Option
 }
 
 impl Manual {
-    /// The value that this control takes for manual, where it offers one.
+    /// The control's value for manual, if it offers one.
     fn value(self, control: &Control) -> Option<i64> {
         match (self, &control.kind) {
             (Self::MenuItem(index, word), ControlKind::Menu(items)) => items
@@ -444,7 +445,7 @@ fn step(aspect: Aspect, control: &Control, value: i64) -> ControlSetting {
     }
 }
 
-/// The value of the control's range and steps, or of its menu, that is nearest.
+/// The nearest value within the control's range and steps, or in its menu.
 fn nearest(control: &Control, value: i64) -> i64 {
     if let ControlKind::Menu(items) = &control.kind {
         let indices = items.iter().map(|item| item.index);

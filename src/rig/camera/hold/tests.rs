@@ -143,7 +143,7 @@ fn names_from_before_linux_5_17_are_known_too() {
 }
 
 #[test]
-fn what_a_camera_lacks_is_named() {
+fn missing_controls_are_named() {
     let plan = ManualPlan::new(&laptop(), &ManualValues::default());
     assert_eq!(
         plan.missing,
@@ -157,7 +157,7 @@ fn what_a_camera_lacks_is_named() {
     assert_eq!(
         none.missing.len(),
         5,
-        "frame rate and backlight lack nothing: {:?}",
+        "frame rate and backlight are not missed: {:?}",
         none.missing
     );
 }
@@ -341,7 +341,7 @@ fn reading_back_tells_unchanged_drifted_and_unreadable_apart() {
 }
 
 #[test]
-fn odd_ranges_upset_nothing() {
+fn no_range_makes_the_plan_panic() {
     for (minimum, maximum, step) in [(5, 5, 0), (9, 2, 3), (i64::MIN, i64::MAX, u64::MAX)] {
         let mut odd = number("gain", (minimum, maximum), 7);
         odd.step = step;

@@ -1,4 +1,4 @@
-//! The library's controls as those of a camera: those with one whole number as value.
+//! The library's controls that have one whole number as value.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -94,7 +94,7 @@ fn items(possible: &[i64]) -> Vec<MenuItem> {
     items.collect()
 }
 
-/// The driver's name where there is a driver's; the modes of macOS have names of their own here.
+/// The driver's name of a control; the modes of macOS have names of their own here.
 fn name(listed: &CameraControl) -> String {
     let is_mode = matches!(listed.description(), ControlValueDescription::Enum { .. });
     match listed.control() {
@@ -124,7 +124,7 @@ pub(super) fn list(library: &Library) -> Result<Vec<CameraControl>, NokhwaError>
     })
 }
 
-/// Sets a control, and answers the value read back.
+/// Sets a control, and returns the value read back.
 pub(super) fn set(
     library: &mut Library,
     known: KnownCameraControl,

@@ -1,9 +1,9 @@
 //! Cameras by the portable library nokhwa: the recording path where there is no V4L2, which is macOS.
 //! It is tried out under Linux, where the library uses V4L2 itself.
 //!
-//! The library counts no frames and hands out no time stamps of the monotonic clock: frames carry
-//! the time at which this program got them. Controls are those that the library can set; on macOS
-//! most cameras have few or none.
+//! The library has neither frame counters nor time stamps of the monotonic clock: frames carry the
+//! time at which this program got them. Controls are those that the library can set; on macOS most
+//! cameras have few or none.
 
 mod controls;
 mod worker;
@@ -26,9 +26,9 @@ use super::{
     Frame, GrantedMode, Mode, ModeRequest, Rate, Rates, Sizes,
 };
 
-/// Longest wait for the person who is asked whether this program may use the camera.
+/// Longest wait for the user's permission to use the camera.
 const PERMITTING: Duration = Duration::from_secs(60);
-/// Frames that may wait to be fetched: at 30 frames/s, a quarter of a second.
+/// Frames in the queue: at 30 frames/s, a quarter of a second.
 const WAITING: usize = 8;
 
 /// A camera by its number in the library's list.
@@ -36,7 +36,7 @@ pub(super) struct NokhwaCamera {
     info: DeviceInfo,
     worker: Worker,
     frames: Option<Receiver<FrameResult>>,
-    /// `None` where the library cannot list them.
+    /// `None` if the library cannot list them.
     controls: Option<ControlNumbers>,
 }
 
@@ -85,7 +85,7 @@ impl NokhwaCamera {
         let worker = Worker::start(CameraAddress::Nokhwa(number).to_string(), open)?;
         let (name, formats) = worker.ask("its modes were read", |owner| {
             let mut formats = owner.library.compatible_camera_formats()?;
-            // Some systems leave out the one that is set.
+            // Some systems leave out the current one.
             formats.push(owner.library.camera_format());
             Ok((owner.library.info().human_name(), formats))
         })?;
@@ -109,14 +109,14 @@ impl NokhwaCamera {
     }
 }
 
-/// Whether the system lets this program use cameras; on macOS it asks the person in front of it.
+/// Whether the system lets this program use cameras; macOS asks the user.
 fn permitted() -> bool {
     if nokhwa_check() {
         return true;
     }
     let (sender, answer) = sync_channel(1);
     nokhwa_initialize(move |granted| {
-        // Nobody waits any more where the answer came late.
+        // The receiver is gone if the answer is late.
         let _ = sender.try_send(granted);
     });
     answer.recv_timeout(PERMITTING).unwrap_or(false)

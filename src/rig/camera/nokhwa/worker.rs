@@ -1,9 +1,9 @@
 //! The thread that owns the library's camera.
 //!
-//! The library waits for a frame without limit, and parts of it panic where a device goes away. So
-//! its camera lives on a thread of its own, which takes one job after the other and, while it
-//! streams, frames in between. Whoever asks waits as long as allowed; a thread that hangs in the
-//! library is left behind.
+//! The library waits for a frame without a time limit, and parts of it panic when a device is
+//! unplugged. So its camera is owned by a separate thread, which executes jobs and, while it streams,
+//! reads frames in between. Callers wait with a time limit; a thread that hangs in the library is
+//! abandoned.
 
 use std::sync::mpsc::{
     Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, sync_channel,
@@ -17,21 +17,21 @@ use ::nokhwa::{Camera as Library, NokhwaError};
 use super::super::{CameraError, Frame, StampSource};
 use crate::clock::Clock;
 
-/// Longest wait for an answer of the library.
+/// Longest wait for a job.
 const ANSWERING: Duration = Duration::from_secs(10);
-/// Longest wait for the library to let go of a camera.
+/// Longest wait for the library to close a camera.
 const CLOSING: Duration = Duration::from_secs(2);
 
-/// What a stream hands out.
+/// A frame, or why there is none.
 pub(super) type FrameResult = Result<Frame, NokhwaError>;
 
 type Job = Box<dyn FnOnce(&mut Owner) + Send>;
 
-/// The asking side.
+/// The caller's side.
 pub(super) struct Worker {
     device: String,
     jobs: Option<SyncSender<Job>>,
-    /// Is closed when the thread has let go of the camera.
+    /// Is closed when the thread has closed the camera.
     ended: Receiver<()>,
 }
 
@@ -65,7 +65,7 @@ impl Worker {
                     let stream = None;
                     Owner { library, stream }.run(&queue);
                 }
-                // Nobody waits any more where opening took too long.
+                // The receiver is gone if opening took too long.
                 Err(error) => drop(opened.send(Err(error))),
             }
         };
@@ -81,7 +81,7 @@ impl Worker {
         Ok(worker)
     }
 
-    /// Has the thread do something with the camera, and waits for what comes of it.
+    /// Executes a job on the thread, and waits for its result.
     pub(super) fn ask<T: Send + 'static>(
         &self,
         doing: &'static str,
@@ -92,7 +92,7 @@ impl Worker {
         let sent = self.jobs.as_ref().map(|jobs| jobs.try_send(job));
         match sent {
             Some(Ok(())) => self.wait(doing, &answer),
-            // The job before this one was never done.
+            // The job before this one never ended.
             Some(Err(TrySendError::Full(_))) => Err(failed(&self.device, doing, "it hangs")),
             Some(Err(TrySendError::Disconnected(_))) | None => Err(self.gone()),
         }
@@ -146,7 +146,7 @@ fn failed(
 }
 
 impl Owner {
-    /// Does jobs, and takes frames in between, until nobody asks any more.
+    /// Executes jobs, and reads frames in between, until the caller's side is dropped.
     fn run(mut self, queue: &Receiver<Job>) {
         loop {
             let job = match &self.stream {
@@ -191,8 +191,8 @@ impl Owner {
         }
     }
 
-    /// Takes the next frame. One for which there is no place is dropped: frames that wait here
-    /// would be stamped when the driver's buffers are fetched, not when they were filled.
+    /// Reads the next frame. It is dropped if the queue is full: waiting for a place would delay the
+    /// next frames' time stamps.
     fn take_frame(&mut self) {
         let Some(stream) = &self.stream else {
             return;
@@ -204,7 +204,7 @@ impl Owner {
         let broken = frame.is_err();
         let sent = stream.frames.try_send(frame);
         if broken || matches!(sent, Err(TrySendError::Disconnected(_))) {
-            // What stopping answers shows again at the next start.
+            // An error of stopping shows again at the next start.
             let _ = self.stop();
         }
     }
@@ -212,8 +212,7 @@ impl Owner {
 
 impl Stream {
     fn frame(&self, data: &[u8], t_us: i64) -> Frame {
-        // By way of V4L2, the library hands out the whole buffer: behind a JPEG stands what was in
-        // it before.
+        // With V4L2, the library returns the whole buffer: after a JPEG follow older data.
         let used = match self.format.format() {
             FrameFormat::MJPEG => jpeg_length(data).unwrap_or(data.len()),
             _ => data.len(),
@@ -231,7 +230,7 @@ impl Stream {
     }
 }
 
-/// How many bytes of `data` are the JPEG with which it begins; `None` where its end is missing.
+/// The length in bytes of the JPEG at the start of `data`; `None` if its end is missing.
 pub(super) fn jpeg_length(data: &[u8]) -> Option<usize> {
     let mut at = 2;
     loop {

@@ -1,4 +1,4 @@
-//! What a recording tells of the camera it was recorded with.
+//! The camera of a recording, from its session.
 
 use serde_json::Value;
 
@@ -16,7 +16,7 @@ pub(super) fn rate(manifest: Option<&Manifest>, timeline: &Timeline) -> Option<R
     stated.or_else(|| Rate::from_per_second(1e6 / timeline.period_us() as f64))
 }
 
-/// What a recording says of itself as a camera.
+/// The description of a recording as a camera.
 pub(super) fn describe(
     address: CameraAddress,
     recording: &Recording,
@@ -48,7 +48,7 @@ pub(super) fn describe(
     }
 }
 
-/// What the recorded time stamps stand for.
+/// What the recorded time stamps mean.
 pub(super) fn stamp(manifest: &Manifest) -> StampSource {
     match manifest.camera.clock {
         FrameClock::Driver => StampSource::EndOfFrame,
@@ -56,7 +56,7 @@ pub(super) fn stamp(manifest: &Manifest) -> StampSource {
     }
 }
 
-/// The controls as they were recorded; they cannot be set.
+/// The recorded controls, which cannot be set.
 pub(super) fn controls(manifest: &Manifest) -> Vec<Control> {
     let recorded = manifest.camera.controls.iter().zip(1..);
     recorded

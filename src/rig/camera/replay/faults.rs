@@ -32,7 +32,7 @@ impl FaultInjector {
         Ok(Self { other_size })
     }
 
-    /// The frame at this position as the faults have it.
+    /// The frame at this position with its faults.
     pub(super) fn inject(&self, mut frame: Frame, position: u64, faults: &ReplayFaults) -> Frame {
         if faults.resize.is_some_and(|from| from <= position) {
             frame.data.clone_from(&self.other_size);
@@ -45,7 +45,7 @@ impl FaultInjector {
     }
 }
 
-/// A grey picture of half the width and height; `None` where frames cannot be that.
+/// A grey picture of half the width and height; `None` if the format or size has none.
 fn half_size(mode: &GrantedMode) -> Option<Vec<u8>> {
     let (width, height) = (mode.width / 2, mode.height / 2);
     if width == 0 || height == 0 {

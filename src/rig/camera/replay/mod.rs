@@ -1,9 +1,9 @@
 //! A recording as a camera: a session folder or a video file, with the counter and the time stamps
 //! that were recorded.
 //!
-//! Motion JPEG, raw video and H.264 come as they are in the file (H.264 as a byte stream). Other
-//! codecs, and H.264 whose frames stand out of order, as no camera sends them, are decoded and come
-//! in the raw format that holds the same samples.
+//! Motion JPEG, raw video and H.264 are delivered as they are in the file (H.264 as a byte stream).
+//! Other codecs, and H.264 with frames out of order, which no camera sends, are decoded and delivered
+//! in the raw format with the same samples.
 //!
 //! Time stamps are those recorded, moved so that the first frame is due when the stream starts. A
 //! frame comes when the clock shows its time stamp. At a speed other than 1, time stamps are as much

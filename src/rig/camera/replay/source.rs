@@ -1,4 +1,4 @@
-//! Where a replay's frames come from: the file's own packets, or a thread that decodes.
+//! The source of a replay's frames: the file's own packets, or a thread that decodes.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -16,7 +16,7 @@ const DECODING_THREADS: usize = 2;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Delivery {
     pub(super) format: PixelFormat,
-    /// False where frames come as they are coded in the file.
+    /// False if frames are delivered as they are coded in the file.
     decoded: bool,
 }
 
@@ -26,7 +26,7 @@ pub(super) struct Taken {
     /// Position in the recording.
     pub(super) number: u64,
     pub(super) data: Vec<u8>,
-    /// True where the container says that its data are not whole.
+    /// True if, according to the container, its data are incomplete.
     pub(super) damaged: bool,
 }
 
@@ -37,7 +37,7 @@ pub(super) enum Source {
 }
 
 impl Delivery {
-    /// As the file has the frames, where a camera could have sent them so; else decoded.
+    /// As the file has the frames, if a camera could send them so; otherwise decoded.
     pub(super) fn of(video: &Video) -> Result<Self, CameraError> {
         let facts = video.facts();
         let coded = match (facts.codec.as_str(), facts.pixel_format.as_str()) {
@@ -61,7 +61,7 @@ impl Delivery {
         })
     }
 
-    /// Width and height of the frames delivered: a rotation is applied where they are decoded.
+    /// Width and height of the delivered frames; decoded frames are rotated for display.
     pub(super) fn size(self, video: &Video) -> (u32, u32) {
         match self.decoded {
             false => video.coded_size(),
@@ -77,7 +77,7 @@ impl Delivery {
         let (sender, receiver) = sync_channel(AHEAD);
         let owned = Arc::clone(video);
         let decoder = thread::Builder::new().name("replay".to_owned());
-        // The thread ends by itself: at the end of the video, or when nobody receives any more.
+        // The thread ends at the end of the video, or when the receiver is dropped.
         let started = decoder.spawn(move || decode(&owned, self.format, &sender));
         started.map_err(|error| CameraError::Replay {
             path: video.path().to_owned(),
@@ -101,8 +101,8 @@ impl Source {
     }
 }
 
-/// Decodes all frames in order. One that cannot be decoded is left out, as a camera that dropped it
-/// would: its counter is missing then.
+/// Decodes all frames in order. One that cannot be decoded is left out, like a frame that a camera
+/// dropped: its counter is then missing.
 fn decode(video: &Video, format: PixelFormat, sender: &SyncSender<Taken>) {
     let wanted: Vec<u64> = (0..video.frames().len() as u64).collect();
     let Ok(reader) = video.read(&wanted, DECODING_THREADS) else {

@@ -93,7 +93,7 @@ fn a_cut_session_ends_after_its_last_whole_frame_and_says_so() {
     let mut camera = started(CUT, "speed=0");
     let problems = camera.info().problems.join("\n");
     assert!(
-        problems.contains("aborted") && problems.contains("cut off"),
+        problems.contains("aborted") && problems.contains("truncated"),
         "{problems}"
     );
     let (frames, end) = play(&mut *camera);

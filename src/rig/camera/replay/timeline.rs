@@ -1,4 +1,4 @@
-//! When the frames of a recording were taken, and how they were counted.
+//! Times and counters of a recording's frames.
 
 use relit_data::session::FrameIndex;
 use relit_video::FrameInfo;
@@ -6,21 +6,21 @@ use relit_video::FrameInfo;
 /// Counter and time of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Moment {
-    /// The driver's counter, counted on where the recording repeats.
+    /// The driver's counter, which continues if the recording repeats.
     pub(super) sequence: u64,
     /// Time since the recording's first frame, microseconds.
     pub(super) since_first_us: i64,
 }
 
-/// Counters and times of all frames of a video; not empty, both grow.
+/// Counters and times of all frames of a video; not empty, both increase.
 #[derive(Debug)]
 pub(super) struct Timeline {
     moments: Vec<Moment>,
 }
 
 impl Timeline {
-    /// From the frame index where it reaches, which has the camera's own; after that, and without
-    /// one, frames are counted on and have the video's times.
+    /// From the frame index, which has the camera's own; frames after its end, and all frames without
+    /// an index, are counted on and have the video's times.
     pub(super) fn new(index: Option<&FrameIndex>, frames: &[FrameInfo]) -> Self {
         let entries = index.map(FrameIndex::entries).unwrap_or_default();
         let mut moments: Vec<Moment> = Vec::with_capacity(frames.len());
@@ -36,7 +36,7 @@ impl Timeline {
                     since_first_us: 0,
                 },
                 (None, Some(last)) => {
-                    // Frames without times of their own, or with shared ones, still come in turn.
+                    // Frames without times, or with equal ones, still have increasing times here.
                     let step = frame.t_us.saturating_sub(frames[at - 1].t_us).max(1);
                     Moment {
                         sequence: last.sequence.saturating_add(1),
@@ -53,8 +53,8 @@ impl Timeline {
         self.moments.len()
     }
 
-    /// The mean time from one frame to the next, microseconds, at least 1; a 30th of a second
-    /// where there is one frame only.
+    /// The mean time from one frame to the next, microseconds, at least 1; a 30th of a second if
+    /// there is only one frame.
     pub(super) fn period_us(&self) -> i64 {
         match self.moments.as_slice() {
             [first, .., last] => {

@@ -10,8 +10,8 @@ use crate::camera::{
     Control, ControlFault, ControlFlags, ControlId, ControlKind, MenuItem, snake_case,
 };
 
-/// Most controls that are read of a device, and most items of a menu: a faulty driver must not
-/// list for ever.
+/// Most controls that are read of a device, and most items of a menu, in case a faulty driver's list
+/// does not end.
 const MOST_CONTROLS: usize = 1024;
 const MOST_ITEMS: i64 = 256;
 
@@ -23,7 +23,7 @@ impl Device {
             let Some(raw) = self.node.control_after(id).map_err(failed)? else {
                 break;
             };
-            // A driver that does not count up would be asked for ever.
+            // A driver that does not count up has no end.
             if raw.id <= id {
                 break;
             }
@@ -33,7 +33,7 @@ impl Device {
         Ok(found)
     }
 
-    /// A control of one number; `None` for classes, texts, arrays, and what is switched off.
+    /// A control of one number; `None` for classes, texts, arrays, and disabled ones.
     fn control_of(&self, raw: &sys::v4l2_query_ext_ctrl) -> io::Result<Option<Control>> {
         let Some(kind) = self.kind_of(raw)? else {
             return Ok(None);
@@ -50,7 +50,7 @@ impl Device {
                 Err(error) if Errno::from_io_error(&error) == Some(Errno::NODEV) => {
                     return Err(error);
                 }
-                // Some cameras list controls that they cannot read at the moment.
+                // Some cameras list controls that cannot be read at the moment.
                 answer => answer.ok(),
             }
         };
@@ -131,7 +131,7 @@ impl Device {
         read.map_err(|error| self.control_error(id, "read back".to_owned(), None, error))
     }
 
-    /// A control of one number, whatever its flags; `None` where there is none.
+    /// A control of one number, with any flags; `None` if there is none.
     fn look_up(
         &self,
         id: ControlId,
@@ -142,7 +142,7 @@ impl Device {
         Ok(self.kind_of(&raw)?.map(|kind| (raw, kind)))
     }
 
-    /// `taken`: the fault where the value itself is what the driver minds.
+    /// `taken`: the fault if the driver rejects the value itself.
     fn control_error(
         &self,
         control: ControlId,
@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_of_controls_are_told_apart() {
+    fn errors_of_controls_are_distinguished() {
         let device = Device {
             node: Node::open(Path::new("/dev/null")).unwrap(),
             path: "/dev/video9".into(),

@@ -9,11 +9,11 @@ use super::ioctl::{Listed, Node};
 use super::{Camera as _, CameraError, V4l2Camera};
 use crate::camera::{CameraAddress, DeviceInfo, Fourcc, Mode, Rate, Rates, Sizes};
 
-/// Most entries that are read of a driver's list: a faulty driver must not list for ever.
+/// Most entries that are read of a driver's list, in case a faulty driver's list does not end.
 const MOST_ENTRIES: u32 = 256;
 
-/// All video devices that deliver pictures, by number. A device that cannot be looked at is listed
-/// with the reason; nodes of other kinds, such as those for metadata, are not listed.
+/// All video devices that deliver pictures, by number. A device that cannot be opened is listed with
+/// the reason; nodes of other kinds, such as those for metadata, are not listed.
 pub(in crate::camera) fn list() -> Vec<DeviceInfo> {
     let mut nodes = nodes(Path::new("/dev"));
     nodes.sort_unstable();
@@ -51,7 +51,7 @@ fn unreadable(path: PathBuf, error: &CameraError) -> DeviceInfo {
     }
 }
 
-/// Formats that are taken here, with sizes and rates, and the others.
+/// Formats that can be recorded, with sizes and rates, and the others.
 pub(super) fn modes(node: &Node) -> io::Result<(Vec<Mode>, Vec<Fourcc>)> {
     let (mut modes, mut others) = (Vec::new(), Vec::new());
     for code in entries(|index| node.pixel_format(index))? {
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_cannot_be_looked_at_is_listed_with_the_reason() {
+    fn a_device_that_cannot_be_opened_is_listed_with_the_reason() {
         let error = CameraError::NotPermitted {
             device: "/dev/video3".to_owned(),
             source: Some(io::ErrorKind::PermissionDenied.into()),

@@ -76,8 +76,8 @@ impl Camera for V4l2Camera {
     }
 
     fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
-        // The driver takes no new format while it has buffers. What stopping answers shows again in
-        // the next call.
+        // The driver takes no new format while it has buffers. An error of stopping shows again in the
+        // next call.
         let _ = self.stop();
         let (stream, granted) = Stream::start(&self.device, want)?;
         self.stream = Some(stream);
@@ -103,7 +103,7 @@ impl Camera for V4l2Camera {
 
 impl Drop for V4l2Camera {
     fn drop(&mut self) {
-        // Whatever the driver answers: closing the node stops the stream as well.
+        // An error does not matter: closing the node stops the stream as well.
         let _ = self.stop();
     }
 }
@@ -152,7 +152,7 @@ impl Device {
         })
     }
 
-    /// What an error of a call means that is not about a control or a running stream.
+    /// The meaning of an error, except for controls and a running stream.
     fn error(&self, doing: &'static str, source: io::Error) -> CameraError {
         let device = self.name();
         match Errno::from_io_error(&source) {
@@ -167,8 +167,8 @@ impl Device {
         }
     }
 
-    /// What an error of a running stream means. An unplugged device can answer with any error, and
-    /// only then with its absence.
+    /// The meaning of an error of a running stream. An unplugged device can return any error first,
+    /// and that it is gone only with the next call.
     fn stream_error(&self, doing: &'static str, source: io::Error) -> CameraError {
         let device = self.name();
         if Errno::from_io_error(&source) == Some(Errno::NODEV) || self.absence().is_some() {
@@ -181,13 +181,13 @@ impl Device {
         }
     }
 
-    /// The answer of a device that went away.
+    /// The error of a device that is gone.
     fn absence(&self) -> Option<io::Error> {
         let answer = self.node.identity().err();
         answer.filter(|error| Errno::from_io_error(error) == Some(Errno::NODEV))
     }
 
-    /// An error of the first call: a node of another kind does not know it.
+    /// The meaning of an error of the first call, which nodes of other kinds do not know.
     fn no_camera(&self, error: io::Error) -> CameraError {
         match Errno::from_io_error(&error) {
             Some(Errno::NOTTY | Errno::INVAL) => CameraError::NotACamera {
@@ -199,7 +199,7 @@ impl Device {
         }
     }
 
-    /// What it offers: formats that are taken here, with sizes and rates, and the others.
+    /// What it offers: formats that can be recorded, with sizes and rates, and the others.
     fn modes(&self) -> Result<(Vec<Mode>, Vec<Fourcc>), CameraError> {
         listing::modes(&self.node).map_err(|error| self.error("its modes were read", error))
     }
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn what_opening_answers_is_told_apart() {
+    fn errors_of_opening_are_distinguished() {
         let open = |path: &str| V4l2Camera::open(Path::new(path)).unwrap_err();
         let missing = open("/dev/there-is-no-such-camera");
         assert!(matches!(missing, CameraError::NotThere { .. }), "{missing}");
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_of_calls_are_told_apart() {
+    fn errors_of_calls_are_distinguished() {
         let error = |errno: Errno| null().error("its modes were read", errno.into());
         assert!(matches!(error(Errno::NODEV), CameraError::Unplugged { .. }));
         assert!(matches!(error(Errno::BUSY), CameraError::InUse { .. }));
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_system_said_is_part_of_every_sentence() {
+    fn the_systems_error_is_part_of_every_message() {
         let device = null();
         for (errno, words) in [
             (Errno::NODEV, "was unplugged"),
@@ -300,13 +300,13 @@ mod tests {
             (Errno::NOSPC, "USB bus of /dev/video9 is full"),
             (Errno::IO, "refused when its stream was started"),
         ] {
-            let told = with_causes(&device.error("its stream was started", errno.into()));
+            let text = with_causes(&device.error("its stream was started", errno.into()));
             let answer = io::Error::from(errno).to_string();
-            assert!(told.contains(words) && told.ends_with(&answer), "{told}");
-            let told = with_causes(&device.stream_error("read", errno.into()));
-            assert!(told.ends_with(&answer), "{told}");
-            let told = with_causes(&open_error(Path::new("/dev/video9"), errno.into()));
-            assert!(told.ends_with(&answer), "{told}");
+            assert!(text.contains(words) && text.ends_with(&answer), "{text}");
+            let text = with_causes(&device.stream_error("read", errno.into()));
+            assert!(text.ends_with(&answer), "{text}");
+            let text = with_causes(&open_error(Path::new("/dev/video9"), errno.into()));
+            assert!(text.ends_with(&answer), "{text}");
         }
     }
 

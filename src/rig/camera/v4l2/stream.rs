@@ -14,8 +14,8 @@ use crate::camera::{
 use crate::clock::Clock;
 use relit_video::PixelFormat;
 
-/// Buffers asked of the driver: at 30 frames/s, a quarter of a second in which nobody has to fetch
-/// a frame.
+/// Buffers requested of the driver: at 30 frames/s they last for a quarter of a second without
+/// anybody reading a frame.
 const BUFFERS: u32 = 8;
 /// Fewest with which a driver can fill one while others wait.
 const FEWEST_BUFFERS: usize = 2;
@@ -28,7 +28,7 @@ pub(super) struct Stream {
     layout: PixelLayout,
     format: PixelFormat,
     buffers: Vec<Mapping>,
-    /// Buffers that the driver did not take back; they are offered again.
+    /// Buffers that the driver did not accept; they are queued again later.
     idle: Vec<u32>,
     counter: SequenceUnwrapper,
 }
@@ -72,7 +72,7 @@ impl Stream {
         Ok((stream, granted))
     }
 
-    /// Gets buffers, gives them to the driver, and lets it run.
+    /// Requests, maps and queues buffers, and starts the stream.
     fn run(&mut self, device: &Device) -> io::Result<()> {
         let count = device.node.request_buffers(BUFFERS)?;
         for index in 0..count {
@@ -85,7 +85,7 @@ impl Stream {
         device.node.stream_on()
     }
 
-    /// Stops and gives back what can be given back, whatever the driver answers.
+    /// Stops the stream and frees the buffers, also after errors of the driver.
     fn release(&mut self, device: &Device) {
         let _ = device.node.stream_off();
         self.buffers.clear();
@@ -134,16 +134,16 @@ impl Stream {
         }
     }
 
-    /// Copies a filled buffer's frame out and gives the buffer back at once.
+    /// Copies a filled buffer's frame and queues the buffer again at once.
     fn take(&mut self, device: &Device, filled: FilledBuffer) -> Frame {
         let arrived_us = Clock::monotonic().now_us();
-        // An index that was never given out would be a driver's fault; the frame is then empty.
+        // An unknown index is a fault of the driver; the frame is then empty.
         let data = usize::try_from(filled.index)
             .ok()
             .and_then(|index| self.buffers.get(index))
             .map(|buffer| buffer.copy(filled.bytes_used as usize))
             .unwrap_or_default();
-        // A frame in hand is delivered even if its buffer is not taken back now.
+        // The frame is delivered even if the driver does not accept its buffer now.
         if device.node.queue(filled.index).is_err() {
             self.idle.push(filled.index);
         }
@@ -170,7 +170,7 @@ impl Stream {
         }
     }
 
-    /// Gives the driver the buffers that it did not take before.
+    /// Queues the buffers that the driver did not accept before.
     fn offer_idle(&mut self, device: &Device) -> Result<(), CameraError> {
         let mut last = None;
         self.idle.retain(|&index| {
@@ -181,7 +181,7 @@ impl Stream {
                 .is_err()
         });
         match last {
-            // With none left to fill, no frame would ever come.
+            // Without a single queued buffer, there would never be a frame.
             Some(error) if self.idle.len() >= self.buffers.len() => {
                 Err(device.stream_error("given its buffers", error))
             }
@@ -190,7 +190,7 @@ impl Stream {
     }
 }
 
-/// A frame's time stamp: the driver's where it goes by the monotonic clock, else the arrival.
+/// A frame's time stamp: the driver's if it uses the monotonic clock, otherwise the arrival.
 fn stamp(filled: FilledBuffer, arrived_us: i64) -> (i64, StampSource) {
     if filled.flags & sys::V4L2_BUF_FLAG_TIMESTAMP_MASK != sys::V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC {
         return (arrived_us, StampSource::Arrival);
@@ -207,7 +207,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_time_stamp_of_another_clock_is_replaced_and_told() {
+    fn a_time_stamp_of_another_clock_is_replaced_and_marked() {
         let filled = |flags| FilledBuffer {
             index: 0,
             bytes_used: 0,

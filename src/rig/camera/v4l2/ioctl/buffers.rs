@@ -24,7 +24,7 @@ const DQBUF: Request<sys::v4l2_buffer> = Request::new(vidioc::VIDIOC_DQBUF);
 const STREAMON: Request<i32> = Request::new(vidioc::VIDIOC_STREAMON);
 const STREAMOFF: Request<i32> = Request::new(vidioc::VIDIOC_STREAMOFF);
 
-/// A filled buffer that the driver handed over.
+/// A filled buffer that was taken from the driver.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::camera::v4l2) struct FilledBuffer {
     pub(in crate::camera::v4l2) index: u32,
@@ -38,16 +38,16 @@ pub(in crate::camera::v4l2) struct FilledBuffer {
 /// How waiting for a frame ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::camera::v4l2) enum Ready {
-    /// A frame, or an error that dequeuing will tell.
+    /// A frame, or an error that dequeuing will return.
     Yes,
     /// The time ran out.
     No,
-    /// The device reports an error, or that it went away.
+    /// The device reports an error, or is gone.
     Broken,
 }
 
 impl Node {
-    /// Asks for this many buffers, 0 to give all back; answers how many there are.
+    /// Requests this many buffers, 0 to free all; returns how many there are.
     pub(in crate::camera::v4l2) fn request_buffers(&self, count: u32) -> io::Result<u32> {
         let mut buffers = sys::v4l2_requestbuffers {
             count,
@@ -85,12 +85,12 @@ impl Node {
         Mapping::new(&self.0, u64::from(offset), buffer.length as usize)
     }
 
-    /// Gives a buffer to the driver to be filled.
+    /// Queues a buffer for the driver to fill.
     pub(in crate::camera::v4l2) fn queue(&self, index: u32) -> io::Result<()> {
         self.buffer_call(&QBUF, index).map(|_| ())
     }
 
-    /// Takes the next filled buffer; [`io::ErrorKind::WouldBlock`] where there is none.
+    /// Takes the next filled buffer; [`io::ErrorKind::WouldBlock`] if there is none.
     pub(in crate::camera::v4l2) fn dequeue(&self) -> io::Result<FilledBuffer> {
         let filled = self.buffer_call(&DQBUF, 0)?;
         let time = filled.timestamp;
@@ -153,8 +153,8 @@ impl Mapping {
         Ok(Self { start, length })
     }
 
-    /// A copy of the first `bytes`, or of all where there are fewer. To be called between taking
-    /// the buffer and giving it back, while the driver leaves it alone.
+    /// A copy of the first `bytes`, or of all if there are fewer. To be called while the buffer is not
+    /// queued, so that the driver does not write to it.
     pub(in crate::camera::v4l2) fn copy(&self, bytes: usize) -> Vec<u8> {
         let bytes = bytes.min(self.length);
         // SAFETY: the mapping is `length` bytes, readable, and lives as long as `self`; a device

@@ -26,7 +26,7 @@ impl Node {
         Ok(listed(self.call(&QUERY_EXT_CTRL, &mut found))?.map(|()| found))
     }
 
-    /// The control with this number; `None` where there is none.
+    /// The control with this number; `None` if there is none.
     pub(in crate::camera::v4l2) fn control(
         &self,
         id: u32,
@@ -35,8 +35,8 @@ impl Node {
         Ok(listed(self.call(&QUERY_EXT_CTRL, &mut found))?.map(|()| found))
     }
 
-    /// The words of a menu's item, or the number of an integer menu's; `None` where there is no
-    /// such item.
+    /// The text of a menu's item, or the number of an integer menu's; `None` if there is no such
+    /// item.
     pub(in crate::camera::v4l2) fn menu_item(
         &self,
         id: u32,
@@ -100,7 +100,7 @@ impl Node {
         request: &Request<sys::v4l2_ext_controls>,
         control: &mut sys::v4l2_ext_control,
     ) -> io::Result<()> {
-        // Of a control without size, the kernel follows no pointer.
+        // With size 0, the kernel follows no pointer of the control.
         control.size = 0;
         let mut controls = sys::v4l2_ext_controls {
             count: 1,

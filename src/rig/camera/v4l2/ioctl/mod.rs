@@ -1,8 +1,8 @@
 //! The kernel's V4L2 calls as safe functions: the one place of this module with unsafe code.
 //!
-//! The crate `v4l` gives the structures and call numbers. Its devices and streams are not used:
-//! dropping a stream panics on every error but one, frames come without the number of bytes used,
-//! waiting does not tell a broken stream from a frame, and reading controls panics on unknown kinds.
+//! The crate `v4l` has the structures and call numbers. Its devices and streams are not used: dropping
+//! a stream panics on every error but one, frames lack the number of bytes used, waiting does not
+//! distinguish a broken stream from a frame, and reading controls panics on unknown kinds.
 #![allow(unsafe_code)]
 
 mod buffers;
@@ -35,7 +35,7 @@ struct Request<T> {
 }
 
 impl<T> Request<T> {
-    /// Does not compile where the number was made for a structure of another size.
+    /// Does not compile if the number was made for a structure of another size.
     const fn new(code: vidioc::_IOC_TYPE) -> Self {
         assert!((code as usize >> 16) & 0x3fff == size_of::<T>());
         Self {
@@ -55,7 +55,7 @@ const S_FMT: Request<sys::v4l2_format> = Request::new(vidioc::VIDIOC_S_FMT);
 const G_PARM: Request<sys::v4l2_streamparm> = Request::new(vidioc::VIDIOC_G_PARM);
 const S_PARM: Request<sys::v4l2_streamparm> = Request::new(vidioc::VIDIOC_S_PARM);
 
-/// Structures of the kernel's interface for which all zeros is a value.
+/// Structures of the kernel's interface for which all zeros is a valid value.
 ///
 /// # Safety
 /// The type must be made of numbers, pointers, and arrays and unions of them.
@@ -68,37 +68,20 @@ unsafe trait Zeroable {}
 unsafe trait PointerFree {}
 
 macro_rules! structures {
-    ($trait:ident: $($name:ident),*) => { $(
-        // SAFETY: a structure of the kernel's C interface, of what the trait asks for.
-        unsafe impl $trait for sys::$name {}
-    )* };
+    (pointer_free: $($plain:ident)*; with_pointers: $($pointing:ident)*) => {
+        // SAFETY: structures of the kernel's C interface, of numbers, pointers and their unions.
+        $(unsafe impl Zeroable for sys::$plain {})*
+        // SAFETY: as above.
+        $(unsafe impl Zeroable for sys::$pointing {})*
+        // SAFETY: structures of the kernel's C interface, of numbers and their unions.
+        $(unsafe impl PointerFree for sys::$plain {})*
+    };
 }
 
 structures!(
-    Zeroable: v4l2_capability,
-    v4l2_fmtdesc,
-    v4l2_frmsizeenum,
-    v4l2_frmivalenum,
-    v4l2_format,
-    v4l2_pix_format,
-    v4l2_streamparm,
-    v4l2_query_ext_ctrl,
-    v4l2_querymenu,
-    v4l2_ext_control,
-    v4l2_ext_controls,
-    v4l2_requestbuffers,
-    v4l2_buffer
-);
-
-structures!(
-    PointerFree: v4l2_capability,
-    v4l2_fmtdesc,
-    v4l2_frmsizeenum,
-    v4l2_frmivalenum,
-    v4l2_streamparm,
-    v4l2_query_ext_ctrl,
-    v4l2_querymenu,
-    v4l2_requestbuffers
+    pointer_free: v4l2_capability v4l2_fmtdesc v4l2_frmsizeenum v4l2_frmivalenum v4l2_pix_format
+        v4l2_streamparm v4l2_query_ext_ctrl v4l2_querymenu v4l2_requestbuffers;
+    with_pointers: v4l2_format v4l2_buffer v4l2_ext_control v4l2_ext_controls
 );
 
 // SAFETY: a number.
@@ -142,7 +125,7 @@ pub(super) struct PixelLayout {
 
 impl Node {
     pub(super) fn open(path: &Path) -> io::Result<Self> {
-        // Non-blocking, so that dequeuing never waits longer than poll did.
+        // Non-blocking, so that only poll waits, which has a time limit.
         let flags = OFlags::NONBLOCK.bits().cast_signed();
         let mut options = OpenOptions::new();
         options.read(true).write(true).custom_flags(flags);
@@ -155,7 +138,7 @@ impl Node {
         unsafe { self.call_with_pointers(request, argument) }
     }
 
-    /// A call whose structure can hold pointers; repeated where a signal interrupts it.
+    /// A call whose structure can hold pointers; repeated if a signal interrupts it.
     ///
     /// # Safety
     /// Where the kernel follows a pointer of `argument` in this call, it must be valid for all that
@@ -180,7 +163,7 @@ impl Node {
     pub(super) fn identity(&self) -> io::Result<Identity> {
         let mut found: sys::v4l2_capability = zeroed();
         self.call(&QUERYCAP, &mut found)?;
-        // The node's own capabilities, where the driver tells them apart from the device's.
+        // The node's own capabilities, if the driver distinguishes them from the device's.
         let own = found.capabilities & sys::V4L2_CAP_DEVICE_CAPS != 0;
         Ok(Identity {
             driver: text(&found.driver),
@@ -273,7 +256,7 @@ impl Node {
         ))
     }
 
-    /// Asks for a format; the driver puts the nearest that it has in its place.
+    /// Requests a format; the driver replaces it by the nearest that it has.
     pub(super) fn set_format(
         &self,
         fourcc: u32,
@@ -302,8 +285,8 @@ impl Node {
         })
     }
 
-    /// Asks for a frame interval, seconds as numerator and denominator, and answers the granted
-    /// one; `None` where the driver has no notion of it.
+    /// Requests a frame interval, seconds as numerator and denominator, and returns the granted one;
+    /// `None` if the driver does not support it.
     pub(super) fn set_interval(
         &self,
         numerator: u32,
@@ -328,7 +311,7 @@ impl Node {
     }
 }
 
-/// `None` for the answers with which drivers end a list, or say that they have none.
+/// `None` for the errors with which drivers end a list, or report that they have none.
 fn listed(answer: io::Result<()>) -> io::Result<Option<()>> {
     use rustix::io::Errno;
     match answer {
@@ -340,7 +323,7 @@ fn listed(answer: io::Result<()>) -> io::Result<Option<()>> {
     }
 }
 
-/// The text in a field that the kernel ends with a zero byte, or fills.
+/// The text in a field, up to a zero byte or the field's end.
 pub(super) fn text(field: &[u8]) -> String {
     let end = field
         .iter()
