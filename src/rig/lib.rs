@@ -7,12 +7,15 @@
 //! | [`turntable`] | a client of Grbl 1.1 over a serial line |
 //! | [`simulator`] | a turntable without hardware: the firmware's core on a simulated serial line |
 //! | [`capture`] | one recorded turn, from the checks before it to the session folder |
+//! | [`preview`] | the newest frame as a picture, for viewers |
 //! | [`daemon`] | the rig between captures: it owns camera and turntable, and runs captures on request |
-//! | [`state`] | what the daemon publishes about itself |
+//! | [`state`] | what a rig is doing, as viewers see it |
 //! | [`serve`] | HTTP: the API and the page for the phone |
+//! | [`lockfile`] | one process per port, camera and folder, across accounts |
 //!
-//! `capture` knows `camera` and `turntable`, which do not know each other; `daemon` knows `capture`;
-//! `serve` knows `daemon` and `state`, and nobody knows `serve`. Sessions are written by
+//! `capture` knows `camera` and `turntable`, which do not know each other. `serve` knows `state` and the
+//! trait [`serve::rig::Rig`]; `daemon` implements that trait on `capture`, and the two do not know each
+//! other otherwise. Sessions are written by
 //! [`relit_data::session`], videos by [`relit_video`]. Nothing here knows masks or data sets.
 
 pub mod camera;

@@ -42,7 +42,7 @@ pub struct Daemon {
 
 impl Daemon {
     /// Takes folder and camera for this process, salvages sessions whose recorder died, and starts
-    /// the worker, which looks for camera and table, and keeps looking where they are not there.
+    /// the worker, which opens camera and table, and keeps trying while they are not there.
     ///
     /// # Errors
     /// [`CaptureError::Lock`] where another daemon has them, [`crate::capture::Refusal::Pace`], or what

@@ -20,7 +20,7 @@ use crate::preview::Preview;
 use crate::state::Verdict;
 use crate::turntable::{Table, TurntableError};
 
-/// Time between two looks at a motion.
+/// Time between two checks of a motion.
 const PERIOD: Duration = Duration::from_millis(20);
 
 /// The thread that has camera and table.

@@ -18,7 +18,10 @@ fn tick(serving: &Serving, answers: &AtomicU64) -> u64 {
         serving.rig.monitor.update(|state| state.frames += 1);
         serving.rig.monitor.show(0, picture.clone());
         ticks += 1;
-        assert!(began.elapsed() < 10 * LONG, "{answers:?} answers in {ticks} ticks");
+        assert!(
+            began.elapsed() < 10 * LONG,
+            "{answers:?} answers in {ticks} ticks"
+        );
         thread::sleep(Duration::from_millis(10));
     }
     ticks
