@@ -7,13 +7,13 @@ SHELL := /bin/bash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
-# The recorded session of a whole turn, which the demonstration plays to the camera's side, and the
-# rectangle around its object; its folder holds seeds that somebody painted.
+# The recorded session of a whole turn, which the demonstration replays as a camera, and the rectangle
+# around its object; its folder also holds painted seeds.
 SESSION := 20261120T093015Z-cow
 RECT := 170,20,325,390
 DEMO := $(TARGET)/demo
 
-# The input of the benchmark, and how often each program runs.
+# The input of the benchmark, and the number of runs of each program.
 BENCH_VIDEO ?= fixtures/$(SESSION)/video.mkv
 BENCH_MASK ?= $(DEMO)/mask.png
 BENCH_RUNS ?= 5
@@ -28,7 +28,7 @@ PORT ?= /dev/ttyACM0
 FLASH_BAUD ?= 115200
 
 FUZZ_SECONDS ?= 60
-# A shard can claim sizes that nothing bears out: reading one takes no piece of so many MiB.
+# A shard can claim sizes that it does not have: reading one must not allocate this many MiB at once.
 FUZZ_SHARD_PIECE := 16
 
 help: ## List the targets
@@ -41,7 +41,7 @@ test: setup ## Run all tests
 	@if rig-firmware/build --can && [[ -e /usr/include/simavr/sim_avr.h ]]; then \
 	    $(MAKE) --no-print-directory firmware emulator; \
 	else \
-	    echo "the firmware's tests on the emulated chip are skipped: 'make setup' told why"; \
+	    echo "the firmware's tests on the emulated chip are skipped: 'make setup' printed why"; \
 	fi
 	cargo test --locked
 
@@ -64,7 +64,7 @@ flash: firmware ## Flash the firmware to the Arduino at PORT (/dev/ttyACM0)
 	avrdude -p atmega328p -c arduino -P $(PORT) -b $(FLASH_BAUD) -D \
 	    -U flash:w:$(FIRMWARE)/rig-firmware-uno.hex:i
 
-demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of it, say where to look
+demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of it, list the results
 	cargo build --locked --release --bins
 	rm -rf $(DEMO)
 	$(TARGET)/release/relit-capture record --yes --object cow --root $(DEMO)/sessions \

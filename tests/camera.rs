@@ -1,13 +1,11 @@
 //! Bare videos as cameras, on files that the `ffmpeg` program makes.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
 use std::time::Duration;
 
 use relit_rig::camera::{self, Camera, CameraError, Frame};
 use relit_rig::clock::Clock;
-use support::ffmpeg;
+use relit_test_support::ffmpeg;
 use tempfile::TempDir;
 
 const PATTERN: &str = "testsrc2=size=70x50:rate=25:duration=0.4";

@@ -1,14 +1,12 @@
 //! The program `relit-extract`: command lines, results and failures.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use relit_data::shard::{Dataset, FrameRecord, ShardReader};
-use support::ffmpeg;
+use relit_test_support::{ffmpeg, packets};
 use tempfile::TempDir;
 
 /// Thirty frames in which the pattern moves; the object is a disc in the middle.
@@ -300,7 +298,7 @@ fn damaged_h264_gives_the_same_shard_for_any_number_of_threads() {
         "-pix_fmt yuv420p -c:v libx264 -g 6 -bf 2 -sc_threshold 0",
     );
     let mut bytes = fs::read(bench.path("film.mkv")).unwrap();
-    let packet = support::packets(bench.folder.path(), "film.mkv")[14];
+    let packet = packets(bench.folder.path(), "film.mkv")[14];
     bytes[packet.at + 8..packet.at + packet.size].fill(0);
     fs::write(bench.path("film.mkv"), bytes).unwrap();
     let mut shards = Vec::new();

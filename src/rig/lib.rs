@@ -2,21 +2,20 @@
 //!
 //! | module | purpose |
 //! | --- | --- |
-//! | [`clock`] | the time that everything else uses |
+//! | [`clock`] | the time and all waits, real or virtual |
+//! | [`lockfile`] | locks on ports, cameras and folders, shared between accounts |
 //! | [`camera`] | cameras as sources of frames: V4L2, nokhwa, and recordings that are replayed |
 //! | [`turntable`] | a client of Grbl 1.1 over a serial line |
-//! | [`simulator`] | a turntable without hardware: the firmware's core on a simulated serial line |
+//! | [`simulator`] | a turntable without hardware: the firmware's core, simulated over time |
+//! | [`state`] | what the rig is doing, for everybody who watches it |
+//! | [`preview`] | the camera's newest frame as a JPEG |
 //! | [`capture`] | one recorded turn, from the checks before it to the session folder |
-//! | [`preview`] | the newest frame as a picture, for viewers |
+//! | [`serve`] | HTTP: the API and the page for the phone, for any [`serve::rig::Rig`] |
 //! | [`daemon`] | the rig between captures: it owns camera and turntable, and runs captures on request |
-//! | [`state`] | what a rig is doing, as viewers see it |
-//! | [`serve`] | HTTP: the API and the page for the phone |
-//! | [`lockfile`] | one process per port, camera and folder, across accounts |
 //!
-//! `capture` knows `camera` and `turntable`, which do not know each other. `serve` knows `state` and the
-//! trait [`serve::rig::Rig`]; `daemon` implements that trait on `capture`, and the two do not know each
-//! other otherwise. Sessions are written by
-//! [`relit_data::session`], videos by [`relit_video`]. Nothing here knows masks or data sets.
+//! `capture` brings `camera` and `turntable` together, which do not know each other. `serve` knows
+//! `state` only; `daemon` knows `capture` and is the `Rig` that `serve` controls. Sessions are written
+//! by [`relit_data::session`], videos by [`relit_video`]. Nothing here knows masks or data sets.
 
 pub mod camera;
 pub mod capture;

@@ -47,7 +47,7 @@ fn turn(frames: u32) -> Vec<FrameRecord> {
     (0..frames).map(|index| record(index, frames)).collect()
 }
 
-/// A ball lit from where the light stands, black around it.
+/// A ball lit from the light's direction, on black.
 fn thumbnail(record: &FrameRecord) -> Thumbnail {
     let light = record.angle_deg.unwrap_or(0.0).to_radians();
     let image = RgbImage::from_fn(256, 256, |x, y| {
@@ -343,13 +343,13 @@ fn what_cannot_be_shown_is_refused_with_the_place() {
     };
     assert!(matches!(render(&nan_gate), Err(ReportError::Gate(_))));
 
-    let stray = Thumbnail {
+    let unknown = Thumbnail {
         index: 3,
         image: RgbImage::new(4, 4),
     };
     assert!(matches!(
-        render(&page(&records, &[stray])),
-        Err(ReportError::Stray(3))
+        render(&page(&records, &[unknown])),
+        Err(ReportError::UnknownSample(3))
     ));
     for (width, height) in [(0, 0), (257, 4)] {
         let image = RgbImage::new(width, height);

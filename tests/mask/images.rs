@@ -1,19 +1,37 @@
 //! Masks of images.
 #![allow(
-    dead_code,
     clippy::unwrap_used,
-    clippy::panic,
-    reason = "helpers of tests may fail loudly, and the scene serves the program's tests too"
+    reason = "a test fails by a panic, in its helpers too"
 )]
 
 mod scene;
 
-use image::{GrayImage, Luma, Rgb, RgbImage};
+use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage};
 use proptest::prelude::*;
 use relit_data::geometry::Rect;
 use relit_mask::{Feather, Hints, Iterations, MaskError, Seeds, SegmentSettings, Warning, segment};
 
-use scene::{AROUND, HEIGHT, WIDTH, around, disc, disc_share, seeds, strokes};
+use scene::{AROUND, HEIGHT, WIDTH, disc_share, in_disc, seeds_image, strokes};
+
+/// A bright disc of radius 18 around (48, 32) on a dark ground, both with some texture.
+fn disc() -> RgbImage {
+    RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        let noise = ((x * 7 + y * 13) % 11) as u8;
+        if in_disc(x, y) {
+            Rgb([200 + noise, 150 + noise, 60])
+        } else {
+            Rgb([20 + noise, 30, 40 + noise])
+        }
+    })
+}
+
+fn around() -> Hints {
+    Hints::Rect(AROUND.parse().unwrap())
+}
+
+fn seeds(marks: impl Fn(u32, u32) -> u8) -> Seeds {
+    Seeds::from_image(&DynamicImage::from(seeds_image(marks))).unwrap()
+}
 
 #[test]
 fn a_rectangle_finds_the_object_in_it() {

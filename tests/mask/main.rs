@@ -1,9 +1,8 @@
-//! Masks from outside: on images, and by the program on recordings.
+//! The program `relit-mask`. Masks of images alone are tested in `images.rs`, by the crate relit-mask.
 #![allow(
-    dead_code,
     clippy::unwrap_used,
     clippy::panic,
-    reason = "helpers of tests may fail loudly, and the scene serves the library's tests too"
+    reason = "a test fails by a panic, in its helpers too"
 )]
 
 mod program;

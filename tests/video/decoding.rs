@@ -1,16 +1,13 @@
 //! The video room from outside, on files that the `ffmpeg` program makes.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[path = "../support/mod.rs"]
-mod support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
 use relit_data::geometry::Rect;
+use relit_test_support::{ffmpeg, packets};
 use relit_video::{CodedFrame, Damage, DecodeFault, PixelFormat, Video, VideoError};
-use support::{ffmpeg, packets};
 use tempfile::TempDir;
 
 const PATTERN: &str = "testsrc2=size=70x50:rate=25:duration=0.4";

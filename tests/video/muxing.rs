@@ -1,18 +1,15 @@
 //! Recording a stream to a file: what comes back is what went in, also where the recorder dies.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[path = "../support/mod.rs"]
-mod support;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
 use proptest::prelude::*;
+use relit_test_support::{ffmpeg, packets};
 use relit_video::{
     BayerPattern, Damage, Muxer, PixelFormat, StreamFormat, Video, VideoError, Written,
 };
-use support::ffmpeg;
 
 fn stream(format: PixelFormat, width: u32, height: u32) -> StreamFormat {
     StreamFormat {
@@ -28,7 +25,7 @@ fn jpegs() -> Vec<Vec<u8>> {
     let folder =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/20261120T101500Z-cow-short");
     let bytes = fs::read(folder.join("video.mkv")).unwrap();
-    let places = support::packets(&folder, "video.mkv");
+    let places = packets(&folder, "video.mkv");
     let found = places.iter().map(|place| {
         let from = (place.at..).find(|&at| bytes[at..].starts_with(&[0xFF, 0xD8]));
         bytes[from.unwrap()..][..place.size].to_vec()
@@ -266,7 +263,7 @@ fn every_slice_of_ffv1_is_checked_by_its_checksum() {
     }
     muxer.finish().unwrap();
     let mut bytes = fs::read(&path).unwrap();
-    let places = support::packets(folder.path(), "video.mkv");
+    let places = packets(folder.path(), "video.mkv");
     bytes[places[2].at + places[2].size / 3] ^= 0x10;
     fs::write(&path, bytes).unwrap();
     let video = Video::open(&path).unwrap();

@@ -21,7 +21,7 @@ fn main() -> ExitCode {
         Err(error) => return console.finish(Err(error)),
     };
     if let Err(usage) = arguments.check_output(paths.len()) {
-        // If standard error is closed, nobody can be told.
+        // Nothing can be done if standard error is closed.
         let _ = usage.print();
         return ExitCode::from(2);
     }

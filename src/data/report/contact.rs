@@ -28,11 +28,11 @@ fn figure(
     turn: &Turn,
     thumbnail: &Thumbnail,
 ) -> Result<String, ReportError> {
-    let stray = || ReportError::Stray(thumbnail.index);
+    let unknown = || ReportError::UnknownSample(thumbnail.index);
     let position = records
         .binary_search_by_key(&thumbnail.index, |r| r.index)
-        .map_err(|_| stray())?;
-    let record = records.get(position).ok_or_else(stray)?;
+        .map_err(|_| unknown())?;
+    let record = records.get(position).ok_or_else(unknown)?;
     let angle = turn
         .degrees
         .get(position)

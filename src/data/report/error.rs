@@ -52,7 +52,7 @@ pub enum ReportError {
     Gate(f64),
     /// A thumbnail of a sample that has no record.
     #[error("the report's thumbnail {0} has no record: give thumbnails of samples that exist")]
-    Stray(u32),
+    UnknownSample(u32),
     /// A thumbnail has no pixels or too many.
     #[error(
         "the report's thumbnail {index} is {width} x {height} pixels: \

@@ -38,7 +38,7 @@ const MAX_ANGLE: f64 = 1e9;
 ///
 /// [`ReportError::Empty`], [`ReportError::Order`] and [`ReportError::Session`] if the records are not those of one
 /// session in order; [`ReportError::Value`] and [`ReportError::Gate`] if a number is not finite or out of range;
-/// [`ReportError::Stray`], [`ReportError::Size`] and [`ReportError::Encode`] if a thumbnail does not fit.
+/// [`ReportError::UnknownSample`], [`ReportError::Size`] and [`ReportError::Encode`] if a thumbnail does not fit.
 pub fn render(page: &Page<'_>) -> Result<String, ReportError> {
     check(page)?;
     let turn = Turn::of(page.records);

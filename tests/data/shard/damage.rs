@@ -238,7 +238,7 @@ fn missing_and_unlisted_files_are_named() {
     fs::create_dir(dir.path().join("imgs")).unwrap();
     let unknown = "dataset.json does not list it";
     let left = "left behind by an interrupted writer";
-    for (stray, says) in [
+    for (name, says) in [
         ("b.tar", unknown),
         ("b.parquet", unknown),
         ("x.png", unknown),
@@ -246,8 +246,8 @@ fn missing_and_unlisted_files_are_named() {
         (".b.spool", left),
         (".b.tar.7.0.partial", left),
     ] {
-        fs::write(dir.path().join(stray), b"").unwrap();
-        assert_names(dir.path(), stray, None, says);
+        fs::write(dir.path().join(name), b"").unwrap();
+        assert_names(dir.path(), name, None, says);
     }
     fs::write(dir.path().join("notes.txt"), b"").unwrap();
     assert_eq!(verified(dir.path()).problems.len(), 6);

@@ -1,11 +1,11 @@
-//! Hardly any mutation of a JSON file keeps every field that has to be there. A target that reads
-//! one twice, as it is and completed, gets past the first missing field.
+//! Hardly any mutation of a JSON file keeps all required fields. A target that reads it twice, as it
+//! is and with the missing fields added, gets past the first missing field.
 
 use serde_json::Value;
 use serde_json::map::Entry;
 
-/// The JSON object `bytes` with what it lacks taken from `whole`, at any depth; `None` where it is
-/// no JSON.
+/// The JSON object `bytes` with missing fields added from `whole`, at any depth; `None` if it is not
+/// JSON.
 pub(crate) fn completed(bytes: &[u8], whole: &[u8]) -> Option<Vec<u8>> {
     let mut value = serde_json::from_slice(bytes).ok()?;
     fill(&mut value, serde_json::from_slice(whole).ok()?);

@@ -1,11 +1,11 @@
-//! The turntable's firmware: whatever comes over the line, it answers, and nothing moves before a
-//! line was accepted.
+//! The turntable's firmware: it survives any input, and nothing moves before a line was accepted or
+//! while the emergency stop is pressed.
 
 #![no_main]
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a panic is how a target tells"
+    reason = "a fuzz target reports by a panic"
 )]
 
 #[allow(dead_code, reason = "the firmware's own tests use the rest")]

@@ -1,9 +1,9 @@
-//! `frames.jsonl`: in an index that is read positions count up from 0, sequence and time grow,
-//! angles are finite, and the gaps are what the sequence lacks. Pushed or written again it is the
-//! same index, and cut off anywhere it is the index of the lines before.
+//! `frames.jsonl`: in an index that can be read, positions count up from 0, sequence and time grow,
+//! angles are finite, and the gaps equal the jumps of the sequence. The index is unchanged after
+//! pushing or writing its entries again, and truncated anywhere it holds the lines before.
 
 #![no_main]
-#![allow(clippy::expect_used, reason = "a panic is how a target tells")]
+#![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]
 
 use libfuzzer_sys::fuzz_target;
 use relit_data::session::FrameIndex;
@@ -46,7 +46,7 @@ fn comes_back(index: &FrameIndex) {
     assert_eq!(FrameIndex::parse(&text), Ok(pushed));
 }
 
-/// What a power cut leaves of a whole index is an index, short by the lines that are gone.
+/// A truncated index can be read and lacks only the lines that are gone.
 fn survives_a_cut(whole: &FrameIndex, bytes: &[u8]) {
     let left = FrameIndex::parse(bytes).expect("a cut file can be read");
     let ended = bytes.iter().filter(|&&byte| byte == b'\n').count();

@@ -1,9 +1,8 @@
-//! `session.json`: a manifest that is read can be written, and is read back equal; what is
-//! written of it is written the same the second time. Its name and its video's are safe to join to
-//! a folder.
+//! `session.json`: a manifest that can be read is unchanged after writing and reading it again, and
+//! is written the same a second time. Its id and its video's file name are safe to join to a path.
 
 #![no_main]
-#![allow(clippy::expect_used, reason = "a panic is how a target tells")]
+#![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]
 
 mod completed;
 

@@ -1,8 +1,8 @@
-//! `mask.json`: a record that is read is read back equal after it was written. Where its hints can
-//! be followed, they are the same after they were recorded again.
+//! `mask.json`: a record that can be read is unchanged after writing and reading it again, and so are
+//! its hints if they are valid.
 
 #![no_main]
-#![allow(clippy::expect_used, reason = "a panic is how a target tells")]
+#![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]
 
 mod completed;
 

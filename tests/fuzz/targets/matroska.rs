@@ -3,7 +3,7 @@
 //! element is not ended. A whole file that loses its last byte has a cut, and of that one byte.
 
 #![no_main]
-#![allow(clippy::expect_used, reason = "a panic is how a target tells")]
+#![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]
 
 use std::io::{self, Cursor, Read, Seek, SeekFrom};
 

@@ -1,9 +1,9 @@
-//! A shard: reading ends, after an error at once; keys, suffixes and data together are no more
-//! than the file, nor is memory taken for more; the members of a sample differ in their suffixes;
-//! and it does not matter in what pieces the file comes.
+//! A shard: reading ends, and ends after the first error; keys, suffixes and data together are not
+//! larger than the file, and neither is the memory for them; the members of a sample differ in their
+//! suffixes; and the sizes of the reads do not matter.
 //!
-//! Hardly any mutation of a tar has right checksums. So each input is read twice: as it is, and
-//! with the checksum mended in every block that could be a header.
+//! Hardly any mutation of a tar has correct checksums. So each input is read twice: as it is, and
+//! with the checksum corrected in every block that could be a header.
 
 #![no_main]
 

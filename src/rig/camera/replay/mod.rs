@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use self::description::{controls, describe, rate};
+use self::description::{controls, describe, rate, stamp};
 use self::faults::FaultInjector;
 use self::source::{Delivery, Source, Taken};
 use self::timeline::{Moment, Timeline};
@@ -39,6 +39,7 @@ pub(super) struct ReplayCamera {
     delivery: Delivery,
     mode: GrantedMode,
     timeline: Timeline,
+    stamp: StampSource,
     controls: Vec<Control>,
     pace: Pace,
     repeat: bool,
@@ -112,6 +113,7 @@ impl ReplayCamera {
             delivery,
             mode,
             timeline,
+            stamp: manifest.map_or(StampSource::EndOfFrame, stamp),
             controls: manifest.map(controls).unwrap_or_default(),
             pace: Pace::new(speed, clock),
             repeat,
@@ -278,7 +280,7 @@ impl ReplayCamera {
                 unwrapped: moment.sequence,
             }),
             t_us,
-            stamp: StampSource::EndOfFrame,
+            stamp: self.stamp,
             flagged: taken.damaged,
         }
     }

@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::timing::{Counter, Evidence, FrameStamp, FrameTiming, MissingFrames, TimingAnomaly};
+use super::timing::{Counter, FrameStamp, FrameTiming, MissingFrames, TimingAnomaly, gaps};
 use super::window::Window;
 use crate::camera::Frame;
 
@@ -47,16 +47,11 @@ pub(super) struct TurnCount {
 }
 
 impl TurnCount {
-    /// How many exposures the camera did not deliver.
-    pub(super) fn missing_count(&self) -> u64 {
-        self.missing.iter().map(|missing| missing.count).sum()
-    }
-
     fn without_frames(expected: u64) -> Self {
         Self {
             expected,
             exposures: Vec::new(),
-            missing: gap(0, expected, 0, Evidence::Time).into_iter().collect(),
+            missing: gaps(&[], expected, &[]),
             anomalies: Vec::new(),
             counts: false,
         }
@@ -211,7 +206,7 @@ impl Cutter {
             .collect();
         let anomalies = timing.anomalies.iter();
         TurnCount {
-            missing: missing_in(&timing, &exposures, lead, expected),
+            missing: gaps(&exposures, expected, &timing.evidence[lead..]),
             anomalies: anomalies
                 .filter_map(|anomaly| anomaly.counted_from(lead, exposures.len()))
                 .collect(),
@@ -253,38 +248,6 @@ impl PreRoll {
             self.frames.pop_front();
         }
     }
-}
-
-/// The gaps of the turn: before, between and behind the delivered frames.
-fn missing_in(
-    timing: &FrameTiming,
-    exposures: &[u64],
-    lead: usize,
-    expected: u64,
-) -> Vec<MissingFrames> {
-    let evidence = |before: usize| {
-        let mut gaps = timing.missing.iter();
-        let found = gaps.find(|missing| missing.before == before + lead);
-        found.map_or(Evidence::Time, |missing| missing.evidence)
-    };
-    let mut due = 0;
-    let mut missing = Vec::new();
-    for (before, &exposure) in exposures.iter().enumerate() {
-        missing.extend(gap(due, exposure, before, evidence(before)));
-        due = exposure + 1;
-    }
-    missing.extend(gap(due, expected, exposures.len(), Evidence::Time));
-    missing
-}
-
-/// The missing exposures from one number up to another, if there are any.
-fn gap(from: u64, to: u64, before: usize, evidence: Evidence) -> Option<MissingFrames> {
-    (to > from).then_some(MissingFrames {
-        exposure: from,
-        count: to - from,
-        before,
-        evidence,
-    })
 }
 
 fn stamp_of(frame: &Frame) -> FrameStamp {

@@ -14,7 +14,7 @@ mod line;
 mod numbering;
 mod period_fit;
 
-pub use anomaly::TimingAnomaly;
+pub(crate) use anomaly::TimingAnomaly;
 use line::FARTHEST;
 use numbering::Numbering;
 
@@ -23,7 +23,7 @@ const RATE_TOLERANCE: f64 = 0.02;
 
 /// Counter and time stamp of one delivered frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FrameStamp {
+pub(crate) struct FrameStamp {
     /// The driver's counter without its wraps; `None` where the camera has none. It may stand still
     /// or go back.
     pub sequence: Option<u64>,
@@ -33,7 +33,7 @@ pub struct FrameStamp {
 
 /// What shows that frames are missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Evidence {
+pub(crate) enum Evidence {
     /// Counter and time stamps.
     Both,
     /// The counter; the time stamps are too irregular.
@@ -46,8 +46,8 @@ pub enum Evidence {
 
 /// Frames that were exposed and not delivered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MissingFrames {
-    /// The first missing exposure, counted from that of the first delivered frame, which is 0.
+pub(crate) struct MissingFrames {
+    /// The first missing exposure.
     pub exposure: u64,
     /// How many in a row.
     pub count: u64,
@@ -59,7 +59,7 @@ pub struct MissingFrames {
 
 /// What the driver's counter does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Counter {
+pub(crate) enum Counter {
     /// It counts exposures.
     Counts,
     /// It stands still.
@@ -70,7 +70,7 @@ pub enum Counter {
 
 /// What the stamps of a row of frames show.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FrameTiming {
+pub(crate) struct FrameTiming {
     /// The time between exposures, microseconds.
     pub period_us: f64,
     /// When exposure 0 is due by the straight line through all stamps, microseconds.
@@ -79,8 +79,8 @@ pub struct FrameTiming {
     pub counter: Counter,
     /// For each delivered frame the number of its exposure; the first is 0, and they grow.
     pub exposures: Vec<u64>,
-    /// What is missing between delivered frames, in order.
-    pub missing: Vec<MissingFrames>,
+    /// For each delivered frame what shows that frames are missing before it.
+    pub evidence: Vec<Evidence>,
     /// What does not fit.
     pub anomalies: Vec<TimingAnomaly>,
 }
@@ -88,8 +88,7 @@ pub struct FrameTiming {
 impl FrameTiming {
     /// Analyses the stamps of frames in the order of their delivery. `fps`: the agreed rate,
     /// frames a second; one that is not positive counts as 30.
-    #[must_use]
-    pub fn of(stamps: &[FrameStamp], fps: f64) -> Self {
+    pub(crate) fn of(stamps: &[FrameStamp], fps: f64) -> Self {
         let usable = fps.is_finite() && fps > 0.0;
         let fps = if usable { fps } else { 30.0 };
         let nominal = 1e6 / fps;
@@ -109,16 +108,12 @@ impl FrameTiming {
             period_us: found.line.period,
             start_us: first as f64 + found.line.start,
             counter,
-            missing: missing(&found, counter),
+            evidence: (0..stamps.len())
+                .map(|at| evidence(&found, counter, at))
+                .collect(),
             exposures: found.exposures,
             anomalies: found.anomalies,
         }
-    }
-
-    /// How many exposures were not delivered between the first and the last delivered frame.
-    #[must_use]
-    pub fn missing_count(&self) -> u64 {
-        self.missing.iter().map(|missing| missing.count).sum()
     }
 }
 
@@ -161,25 +156,37 @@ fn wrong_rates(found: &Numbering, agreed: f64) -> Vec<TimingAnomaly> {
         .collect()
 }
 
-fn missing(found: &Numbering, counter: Counter) -> Vec<MissingFrames> {
-    let steps = found.exposures.windows(2).zip(1_usize..);
-    steps
-        .filter_map(|(pair, before)| {
-            let count = pair[1].saturating_sub(pair[0]).saturating_sub(1);
-            let evidence = match (counter, found.by_time, found.agreed.get(before)) {
-                (Counter::Still | Counter::Absent, ..) => Evidence::Time,
-                (Counter::Counts, false, _) => Evidence::Counter,
-                (Counter::Counts, true, Some(false)) => Evidence::TimeAgainstCounter,
-                (Counter::Counts, true, _) => Evidence::Both,
-            };
-            (count > 0).then_some(MissingFrames {
-                exposure: pair[0] + 1,
-                count,
+/// What shows gaps before frame `at`.
+fn evidence(found: &Numbering, counter: Counter, at: usize) -> Evidence {
+    match (counter, found.by_time, found.agreed.get(at)) {
+        _ if at == 0 => Evidence::Time,
+        (Counter::Still | Counter::Absent, ..) => Evidence::Time,
+        (Counter::Counts, false, _) => Evidence::Counter,
+        (Counter::Counts, true, Some(false)) => Evidence::TimeAgainstCounter,
+        (Counter::Counts, true, _) => Evidence::Both,
+    }
+}
+
+/// The exposures up to, but not with, `end` that are none of the delivered frames', in order.
+/// `evidence`: for each frame what shows a gap before it; the time stamps show one behind the last.
+pub(crate) fn gaps(exposures: &[u64], end: u64, evidence: &[Evidence]) -> Vec<MissingFrames> {
+    let mut due = 0;
+    let mut missing = Vec::new();
+    let end = (exposures.len(), end, Evidence::Time);
+    let frames = exposures.iter().zip(evidence).enumerate();
+    let frames = frames.map(|(before, (&exposure, &evidence))| (before, exposure, evidence));
+    for (before, exposure, evidence) in frames.chain([end]) {
+        if exposure > due {
+            missing.push(MissingFrames {
+                exposure: due,
+                count: exposure - due,
                 before,
                 evidence,
-            })
-        })
-        .collect()
+            });
+        }
+        due = exposure.saturating_add(1);
+    }
+    missing
 }
 
 #[cfg(test)]

@@ -1,17 +1,19 @@
-//! What the tests share: making videos with the `ffmpeg` program, which `make setup` installs.
+//! What the tests of several crates share: making videos with the `ffmpeg` program, which `make setup`
+//! installs.
 #![allow(
-    dead_code,
-    missing_docs,
     clippy::unwrap_used,
     clippy::expect_used,
-    clippy::panic
+    reason = "a test fails by a panic, in its helpers too"
 )]
 
 use std::path::Path;
 use std::process::Command;
 
-/// Runs `ffmpeg` with these arguments and answers what it wrote to standard output.
-pub(crate) fn ffmpeg(folder: &Path, arguments: &[&str]) -> Vec<u8> {
+/// Runs `ffmpeg` in `folder` with these arguments and returns what it wrote to standard output.
+///
+/// # Panics
+/// If it cannot be run or fails.
+pub fn ffmpeg(folder: &Path, arguments: &[&str]) -> Vec<u8> {
     let output = Command::new("ffmpeg")
         .args(["-nostdin", "-loglevel", "error", "-y"])
         .args(arguments)
@@ -23,25 +25,24 @@ pub(crate) fn ffmpeg(folder: &Path, arguments: &[&str]) -> Vec<u8> {
     output.stdout
 }
 
-/// Where a packet's data stand in a file.
+/// The part of a file that holds a packet's data.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place {
-    pub(crate) at: usize,
-    pub(crate) size: usize,
+pub struct PacketExtent {
+    /// Offset in the file, bytes.
+    pub at: usize,
+    /// Length, bytes.
+    pub size: usize,
 }
 
-/// The packets of a file's first stream, as `ffprobe` finds them.
-pub(crate) fn packets(folder: &Path, name: &str) -> Vec<Place> {
+/// The packets of the first stream of the file `name` in `folder`, as `ffprobe` finds them.
+///
+/// # Panics
+/// If `ffprobe` cannot be run or prints something else.
+#[must_use]
+pub fn packets(folder: &Path, name: &str) -> Vec<PacketExtent> {
     let output = Command::new("ffprobe")
-        .args([
-            "-v",
-            "error",
-            "-show_entries",
-            "packet=pos,size",
-            "-of",
-            "csv=p=0",
-            name,
-        ])
+        .args(["-v", "error", "-show_entries", "packet=pos,size"])
+        .args(["-of", "csv=p=0", name])
         .current_dir(folder)
         .output()
         .expect("ffprobe comes with the ffmpeg program: run `make setup`");
@@ -50,7 +51,7 @@ pub(crate) fn packets(folder: &Path, name: &str) -> Vec<Place> {
     text.lines()
         .map(|line| {
             let mut fields = line.split(',');
-            Place {
+            PacketExtent {
                 size: number(fields.next()),
                 at: number(fields.next()),
             }

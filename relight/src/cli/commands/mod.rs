@@ -1,0 +1,4 @@
+//! One file a verb: its arguments and its `run`.
+
+pub(super) mod render;
+pub(super) mod synth;
