@@ -8,10 +8,9 @@ use relit_data::causes::with_causes;
 
 use crate::camera::hold::{ManualPlan, ManualValues};
 use crate::camera::{Camera, CameraError};
-use crate::capture::CaptureError;
-use crate::capture::Equipment;
 use crate::capture::preflight::free_bytes;
 use crate::capture::turn::show_table;
+use crate::capture::{CaptureError, Equipment};
 use crate::clock::Clock;
 use crate::preview::Preview;
 use crate::state::{CameraState, Monitor, RigState, TableState};
@@ -42,7 +41,8 @@ pub(super) struct Idle {
 }
 
 impl Idle {
-    pub(super) fn new(monitor: Monitor, preview: Preview, clock: Clock) -> Self {
+    pub(super) fn new(equipment: &Equipment, monitor: Monitor, preview: Preview) -> Self {
+        let clock = equipment.clock();
         let now_us = clock.now_us();
         Self {
             monitor,

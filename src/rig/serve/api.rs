@@ -12,9 +12,9 @@ use futures_util::{Stream, StreamExt, stream};
 use tokio::sync::{OwnedSemaphorePermit, watch};
 use tokio::time::{Instant, sleep_until, timeout};
 
-use super::Shutdown;
 use super::extract::JsonBody;
 use super::failure::{Failure, Problem};
+use super::options::Shutdown;
 use super::permits::{Permits, Work, permit};
 use super::rig::{Command, Rig};
 use super::snapshots::{PERIOD, Snapshot, Snapshots};
