@@ -4,7 +4,7 @@
 //! holder's process number, for those who are refused. The files lie in a folder that the accounts of
 //! a machine share through a group, [`SHARED_FOLDER`], so that a service and a person who logs in find
 //! each other. Where nobody set that up, each account has a folder of its own. Links are never
-//! followed, and looking who has a lock needs no permission to write.
+//! followed, and checking who has a lock needs no permission to write.
 //!
 //! Knows nothing of devices.
 
@@ -23,14 +23,14 @@ pub const SHARED_FOLDER: &str = "/run/relit";
 const ROOT_LOCK: &str = ".relit-capture.lock";
 /// Where each account has a folder of its own; the second where there is no first.
 const PRIVATE_BASES: [&str; 2] = ["/run/lock", "/tmp"];
-/// Somebody who only looks holds the lock for a moment: how often it is tried again, and how long is
-/// waited between.
+/// A process that only checks who has a lock holds it for a moment: how often a lock is tried, and the
+/// pause between.
 const TRIES: u32 = 5;
 const PAUSE: Duration = Duration::from_millis(40);
 /// Longest content that is read, bytes.
 const LONGEST: u64 = 20;
 
-/// Why a lock was not taken or could not be looked at.
+/// Why a lock was not taken or could not be checked.
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
     /// Another process has it.
@@ -181,7 +181,7 @@ impl LockFile {
         match file.try_lock_shared() {
             Ok(()) => Ok(None),
             Err(TryLockError::WouldBlock) => Ok(Some(Holder { pid: pid_in(&file) })),
-            Err(TryLockError::Error(error)) => Err(LockError::system(path, "looked at")(error)),
+            Err(TryLockError::Error(error)) => Err(LockError::system(path, "checked")(error)),
         }
     }
 }

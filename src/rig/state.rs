@@ -23,7 +23,7 @@ pub enum Phase {
     Idle,
     /// Camera, table and disk are being checked and the camera's settings locked.
     Preflight,
-    /// A slow turn that looks for the exposure.
+    /// A slow turn that finds the exposure.
     Metering,
     /// The table goes back by its ramp.
     MovingBack,
@@ -79,7 +79,7 @@ pub struct TableState {
     pub degrees_per_second: Option<f64>,
     /// Whether zero is known.
     pub homed: bool,
-    /// Volts of its battery, where it tells.
+    /// Volts of its battery, where it is measured.
     pub battery_v: Option<f64>,
     /// What is wrong with it, in a sentence.
     pub fault: Option<String>,
@@ -115,10 +115,10 @@ pub struct FaultLine {
     pub what: String,
 }
 
-/// Something that was looked at before the table turned.
+/// Something that was checked before the table turned.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Check {
-    /// What was looked at.
+    /// What was checked.
     pub what: String,
     /// False where it is not as it should be, and the capture goes on all the same.
     pub good: bool,

@@ -155,6 +155,23 @@ fn a_camera_that_was_unplugged_comes_back_without_a_restart() {
 }
 
 #[test]
+fn a_fault_is_shown_with_its_cause() {
+    let root = tempfile::tempdir().unwrap();
+    let mut settings = settings(root.path(), "", "serial:/dev/null");
+    settings.runtime_folder = root.path().join("no-folder");
+    std::fs::write(&settings.runtime_folder, "").unwrap();
+    let daemon = Daemon::start(settings).unwrap();
+    let state = once(&daemon, |state| state.table.fault.is_some());
+    let fault = state.table.fault.unwrap();
+    assert!(fault.contains("no-folder could not be used"), "{fault}");
+    assert!(
+        fault.contains("has to be a folder of this account"),
+        "{fault}"
+    );
+    assert!(state.faults.iter().any(|line| line.what == fault));
+}
+
+#[test]
 fn a_second_daemon_is_refused_with_the_process_that_has_the_folder() {
     let root = tempfile::tempdir().unwrap();
     let _first = Daemon::start(settings(root.path(), "", "none")).unwrap();

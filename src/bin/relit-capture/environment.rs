@@ -9,7 +9,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use signal_hook::low_level::emulate_default_handler;
 
-/// Signals within this time are one wish to end: `timeout` and a closing terminal send several.
+/// Signals within this time count as one: `timeout` and a closing terminal send several.
 const TOGETHER: Duration = Duration::from_secs(1);
 
 /// What the service manager that started the program wants to hear all the time, where one does.
@@ -26,7 +26,7 @@ pub(crate) fn notify_service(states: &[NotifyState<'_>]) {
     let _ = sd_notify::notify(states);
 }
 
-/// Calls `end` when the program is told to end, also by a terminal that is closed. Another signal
+/// Calls `end` when a signal asks the program to end, as a closed terminal does. Another signal
 /// a second or more later ends it at once; those that come together count as one.
 pub(crate) fn at_end(end: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
     let mut signals = Signals::new([SIGTERM, SIGINT, SIGHUP])?;
@@ -34,12 +34,12 @@ pub(crate) fn at_end(end: impl FnOnce() + Send + 'static) -> std::io::Result<()>
         .name("relit-signals".to_owned())
         .spawn(move || {
             let mut end = Some(end);
-            let mut told: Option<Instant> = None;
+            let mut ended: Option<Instant> = None;
             for signal in signals.forever() {
                 if let Some(end) = end.take() {
-                    told = Some(Instant::now());
+                    ended = Some(Instant::now());
                     thread::spawn(end);
-                } else if told.is_some_and(|told| told.elapsed() >= TOGETHER) {
+                } else if ended.is_some_and(|at| at.elapsed() >= TOGETHER) {
                     // What cannot be done by the signal's default is left to the end under way.
                     let _ended = emulate_default_handler(signal);
                 }

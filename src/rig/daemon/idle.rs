@@ -8,10 +8,9 @@ use relit_data::causes::with_causes;
 
 use crate::camera::hold::{ManualPlan, ManualValues};
 use crate::camera::{Camera, CameraError};
-use crate::capture::CaptureError;
-use crate::capture::Equipment;
 use crate::capture::preflight::free_bytes;
 use crate::capture::turn::show_table;
+use crate::capture::{CaptureError, Equipment};
 use crate::clock::Clock;
 use crate::preview::Preview;
 use crate::state::{CameraState, Monitor, RigState, TableState};
@@ -20,9 +19,9 @@ use crate::state::{CameraState, Monitor, RigState, TableState};
 const FRAME_WAIT: Duration = Duration::from_millis(50);
 /// Without a frame for so long the camera is opened anew.
 const SILENCE: Duration = Duration::from_secs(2);
-/// Time between two questions to the table.
+/// Time between two requests for the table's status.
 const TABLE_PERIOD: Duration = Duration::from_millis(250);
-/// Time between two searches for what is gone, and between two looks at the free space.
+/// Time between two searches for missing devices, and two checks of the free space.
 const SEARCH_PERIOD: Duration = Duration::from_secs(1);
 /// Time over which the frame rate is measured.
 const RATE_PERIOD: Duration = Duration::from_secs(1);
@@ -42,7 +41,8 @@ pub(super) struct Idle {
 }
 
 impl Idle {
-    pub(super) fn new(monitor: Monitor, preview: Preview, clock: Clock) -> Self {
+    pub(super) fn new(equipment: &Equipment, monitor: Monitor, preview: Preview) -> Self {
+        let clock = equipment.clock();
         let now_us = clock.now_us();
         Self {
             monitor,
@@ -56,7 +56,7 @@ impl Idle {
         }
     }
 
-    /// After something else used camera and table: looks at everything anew.
+    /// Checks everything anew, after something else used camera and table.
     pub(super) fn restart(&mut self) {
         let now_us = self.clock.now_us();
         (self.last_frame_us, self.counted) = (now_us, (now_us, 0));

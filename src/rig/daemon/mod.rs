@@ -5,26 +5,24 @@
 //! are given. When the daemon is dropped, a take under way is aborted and closed, the table stands, and
 //! the thread has ended.
 
+mod dispatcher;
 mod idle;
 mod schedule;
 mod worker;
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use relit_data::causes::with_causes;
 
-use crate::capture::CaptureError;
-use crate::capture::Equipment;
-use crate::capture::Settings;
-use crate::capture::{StopRequest, Stopped};
-use crate::capture::{preflight, salvage};
+use crate::capture::{CaptureError, Equipment, Settings, preflight, salvage};
 use crate::clock::{Clock, JoinHandle};
 use crate::lockfile::LockFile;
 use crate::preview::Preview;
 use crate::serve::rig::{Command, Refused, Rig};
-use crate::state::{Monitor, Phase};
-use schedule::{Job, Next, Schedule, StopTarget};
+use crate::state::Monitor;
+use dispatcher::Dispatcher;
+use schedule::Job;
 use worker::Worker;
 
 /// Farthest that a table is turned by one command, degrees.
@@ -42,7 +40,7 @@ pub struct Daemon {
 
 impl Daemon {
     /// Takes folder and camera for this process, salvages sessions whose recorder died, and starts
-    /// the worker, which looks for camera and table, and keeps looking where they are not there.
+    /// the worker, which opens camera and table, and keeps trying while they are not there.
     ///
     /// # Errors
     /// [`CaptureError::Lock`] where another daemon has them, [`crate::capture::Refusal::Pace`], or what
@@ -52,10 +50,10 @@ impl Daemon {
         let root = settings.root.clone();
         let equipment = Equipment::for_viewers(settings)?;
         let dispatcher = Arc::new(Dispatcher::new(equipment.clock()));
-        report_salvaged(&root, &dispatcher.monitor)?;
+        report_salvaged(&root, dispatcher.monitor())?;
         let wants_table = equipment.wants_table();
         let thread = |source| CaptureError::system("a thread", "started")(source);
-        let preview = Preview::start(dispatcher.monitor.clone()).map_err(thread)?;
+        let preview = Preview::start(dispatcher.monitor().clone()).map_err(thread)?;
         let clock = equipment.clock();
         let mut worker = Worker::new(equipment, Arc::clone(&dispatcher), preview);
         let worker = clock
@@ -74,14 +72,15 @@ impl Daemon {
     /// the second time.
     pub fn end(&self) {
         self.dispatcher.end();
-        if let Some(worker) = lock(&self.worker).take() {
+        let mut worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(worker) = worker.take() {
             // A panic in there was reported by the thread itself, and its table was stopped.
             let _ = worker.join();
         }
     }
 
     fn check_camera(&self) -> Result<(), Refused> {
-        let camera = self.dispatcher.monitor.state().camera;
+        let camera = self.dispatcher.monitor().state().camera;
         if camera.present {
             return Ok(());
         }
@@ -148,7 +147,7 @@ impl Rig for Daemon {
     }
 
     fn monitor(&self) -> &Monitor {
-        &self.dispatcher.monitor
+        self.dispatcher.monitor()
     }
 
     fn root(&self) -> &Path {
@@ -160,82 +159,6 @@ impl Drop for Daemon {
     fn drop(&mut self) {
         self.end();
     }
-}
-
-/// What those who give commands and the worker share: the schedule, and where its state is shown.
-#[derive(Debug)]
-struct Dispatcher {
-    clock: Clock,
-    monitor: Monitor,
-    plan: Mutex<Plan>,
-}
-
-#[derive(Debug)]
-struct Plan {
-    schedule: Schedule,
-    /// The stop of the job under way: each job has its own.
-    stop: StopRequest,
-}
-
-impl Dispatcher {
-    fn new(clock: Clock) -> Self {
-        let plan = Plan {
-            schedule: Schedule::default(),
-            stop: StopRequest::new(&clock),
-        };
-        Self {
-            clock,
-            monitor: Monitor::default(),
-            plan: Mutex::new(plan),
-        }
-    }
-
-    /// Changes the schedule, and shows what came of it.
-    fn change<T>(&self, change: impl FnOnce(&mut Schedule) -> T) -> T {
-        let mut plan = lock(&self.plan);
-        let done = change(&mut plan.schedule);
-        self.show(&plan.schedule);
-        done
-    }
-
-    fn show(&self, schedule: &Schedule) {
-        self.monitor.update(|state| {
-            state.queue = schedule.queue();
-            if schedule.is_free() {
-                state.phase = match state.queue.is_empty() {
-                    true => Phase::Idle,
-                    false => Phase::WaitingForObject,
-                };
-            }
-        });
-    }
-
-    fn stop(&self) {
-        let mut plan = lock(&self.plan);
-        if plan.schedule.stop() == StopTarget::Running {
-            plan.stop.ask(Stopped::Person);
-        }
-    }
-
-    fn end(&self) {
-        let mut plan = lock(&self.plan);
-        plan.schedule.end();
-        plan.stop.ask(Stopped::Shutdown);
-    }
-
-    /// What the worker does now, and how it is stopped.
-    fn begin(&self) -> (Next, StopRequest) {
-        let mut plan = lock(&self.plan);
-        let next = plan.schedule.begin();
-        if matches!(next, Next::Job(_)) {
-            plan.stop = StopRequest::new(&self.clock);
-        }
-        (next, plan.stop.clone())
-    }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn check_object(object: &str) -> Result<(), Refused> {

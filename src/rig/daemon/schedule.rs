@@ -1,5 +1,5 @@
-//! What the rig does, and what comes next: the queue of objects, the job under way and the wish to
-//! stop it, as one state machine.
+//! What the rig does, and what comes next: the queue of objects, the job under way and its stop, as
+//! one state machine.
 //!
 //! It has no threads, no clock and no devices. Commands change it in any order; one worker asks for
 //! the [next](Schedule::begin) job and reports how it [ended](Schedule::finish).
@@ -19,10 +19,10 @@ use crate::serve::rig::Refused;
 /// Objects that can wait for their turn.
 const LONGEST_QUEUE: usize = 100;
 
-/// What the rig is told to do.
+/// Something for the rig to do.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Job {
-    /// One turn of an object, after a metering turn where that is wished.
+    /// One turn of an object, after a metering turn if `meter`.
     Capture {
         object: String,
         meter: bool,
@@ -59,7 +59,7 @@ pub(super) enum StopTarget {
     Settled,
 }
 
-/// An object in the queue. Its number tells it from others of the same name.
+/// An object in the queue. Its number distinguishes it from others of the same name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Entry {
     number: u64,
@@ -203,7 +203,7 @@ impl Schedule {
 fn check_expected(entry: &Entry, expected: Option<&str>) -> Result<(), Refused> {
     match expected {
         Some(expected) if expected != entry.object => Err(Refused::Busy(format!(
-            "the queue has changed: {} is there now, not {expected}; look at it and try again",
+            "the queue has changed: {} is there now, not {expected}; check the queue and try again",
             entry.object
         ))),
         _ => Ok(()),

@@ -6,21 +6,20 @@ use std::time::Duration;
 
 use relit_data::causes::with_causes;
 
-use super::Dispatcher;
+use super::dispatcher::Dispatcher;
 use super::idle::Idle;
 use super::schedule::{Job, Next};
 use crate::camera::Camera;
 use crate::camera::hold::{ManualPlan, ManualValues};
-use crate::capture::CaptureError;
-use crate::capture::Equipment;
-use crate::capture::StopRequest;
 use crate::capture::turn::show_table;
-use crate::capture::{CaptureContext, CaptureRequest, capture};
+use crate::capture::{
+    CaptureContext, CaptureError, CaptureRequest, Equipment, StopRequest, capture,
+};
 use crate::preview::Preview;
 use crate::state::Verdict;
 use crate::turntable::{Table, TurntableError};
 
-/// Time between two looks at a motion.
+/// Time between two checks of a motion.
 const PERIOD: Duration = Duration::from_millis(20);
 
 /// The thread that has camera and table.
@@ -35,11 +34,7 @@ pub(super) struct Worker {
 impl Worker {
     pub(super) fn new(equipment: Equipment, dispatcher: Arc<Dispatcher>, preview: Preview) -> Self {
         Self {
-            idle: Idle::new(
-                dispatcher.monitor.clone(),
-                preview.clone(),
-                equipment.clock(),
-            ),
+            idle: Idle::new(&equipment, dispatcher.monitor().clone(), preview.clone()),
             equipment,
             dispatcher,
             preview,
@@ -75,12 +70,13 @@ impl Worker {
                 return self.capture(&CaptureRequest { object, meter }, stop);
             }
             Job::StopTable if !self.equipment.wants_table() => {}
-            Job::StopTable => self.with_table(stop, |table| table.stop().map(|_| ()))?,
-            Job::Home => self.with_table(stop, |table| table.home().map(|_| ()))?,
+            Job::StopTable => self.with_table(stop, Table::stop).map(drop)?,
+            Job::Home => self.with_table(stop, Table::home).map(drop)?,
             Job::Jog(degrees) => {
-                self.with_table(stop, |table| table.jog(degrees, None).map(|_| ()))?;
+                let jog = |table: &Table| table.jog(degrees, None);
+                self.with_table(stop, jog).map(drop)?;
             }
-            Job::Unlock => self.with_table(stop, |table| table.unlock().map(|_| ()))?,
+            Job::Unlock => self.with_table(stop, Table::unlock).map(drop)?,
             Job::SetControl { name, value } => self.set_control(&name, value)?,
         }
         Ok(true)
@@ -91,7 +87,7 @@ impl Worker {
         request: &CaptureRequest,
         stop: &StopRequest,
     ) -> Result<bool, CaptureError> {
-        let monitor = &self.dispatcher.monitor;
+        let monitor = self.dispatcher.monitor();
         let context = CaptureContext {
             monitor,
             preview: Some(&self.preview),
@@ -108,21 +104,21 @@ impl Worker {
 
     fn report(&self, fault: String) {
         let now_us = self.equipment.clock().now_us();
-        self.dispatcher.monitor.fault(now_us, fault);
+        self.dispatcher.monitor().fault(now_us, fault);
     }
 
     /// Lets the table do something, while pictures and its angle go on being shown.
-    fn with_table(
+    fn with_table<T: Send>(
         &mut self,
         stop: &StopRequest,
-        motion: impl FnOnce(&Table) -> Result<(), TurntableError> + Send,
-    ) -> Result<(), CaptureError> {
+        motion: impl FnOnce(&Table) -> Result<T, TurntableError> + Send,
+    ) -> Result<T, CaptureError> {
         let Some(table) = self.equipment.table.as_ref() else {
             return Err(CaptureError::NoTable);
         };
         let clock = self.equipment.clock();
         let (camera, idle) = (&mut self.equipment.camera, &mut self.idle);
-        let monitor = &self.dispatcher.monitor;
+        let monitor = self.dispatcher.monitor();
         stop.over(table, || {
             clock.scope(|scope| {
                 let moving = scope.spawn("relit-motion", || motion(table));
@@ -143,14 +139,9 @@ impl Worker {
     }
 
     fn set_control(&mut self, name: &str, value: i64) -> Result<(), CaptureError> {
-        let camera = self
-            .equipment
-            .camera
-            .as_mut()
-            .ok_or(CaptureError::NoCamera)?;
-        let camera = camera.as_mut();
-        let set = set_by_name(camera, name, value);
-        let set = match set {
+        let camera = self.equipment.camera.as_mut();
+        let camera = camera.ok_or(CaptureError::NoCamera)?.as_mut();
+        let set = match set_by_name(camera, name, value) {
             // An automatic may rule it: that is switched off, as it is for every capture.
             Err(CaptureError::Camera(_)) => {
                 let controls = camera.controls()?;

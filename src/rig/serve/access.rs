@@ -1,5 +1,5 @@
 //! Who gets in: the name under which the server is addressed, the page from which a request comes, the
-//! token; and the headers that tell a browser what the answers may be used for.
+//! token; and the headers that limit what a browser may use the answers for.
 
 use std::net::IpAddr;
 use std::sync::Arc;

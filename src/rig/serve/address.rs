@@ -7,7 +7,7 @@ use qrcode::render::unicode::Dense1x2;
 
 use super::token::Token;
 
-/// What to tell the person who started the server.
+/// How clients reach the server, for the person who started it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Announcement {
     /// The address that is listened on, with its real port.

@@ -12,9 +12,9 @@ use futures_util::{Stream, StreamExt, stream};
 use tokio::sync::{OwnedSemaphorePermit, watch};
 use tokio::time::{Instant, sleep_until, timeout};
 
-use super::Shutdown;
 use super::extract::JsonBody;
 use super::failure::{Failure, Problem};
+use super::options::Shutdown;
 use super::permits::{Permits, Work, permit};
 use super::rig::{Command, Rig};
 use super::snapshots::{PERIOD, Snapshot, Snapshots};
@@ -27,7 +27,7 @@ const COMMAND: Duration = Duration::from_secs(15);
 
 /// The rig's state
 ///
-/// Phase, progress, table, camera, room on the disk, queue, faults and the last take.
+/// Phase, progress, table, camera, disk space, queue, faults and the last take.
 #[utoipa::path(
     get, path = "/api/v1/state", tag = "rig",
     responses((status = 200, body = RigState), (status = 401, body = Problem))
@@ -123,7 +123,7 @@ pub(super) async fn command(
     let given = permits.run(Work::Command, move || Ok(rig.command(command)?));
     let answered = timeout(COMMAND, given).await;
     answered.map_err(|_| {
-        let error = "the rig did not answer: look at it, and see its state before you try again";
+        let error = "the rig did not answer: check it, and its state, before you try again";
         Failure::new(StatusCode::GATEWAY_TIMEOUT, error)
     })??;
     snapshots.refresh();

@@ -6,8 +6,8 @@ use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
 use tokio::time::timeout;
 
-use super::ClientLimits;
 use super::failure::Failure;
+use super::options::ClientLimits;
 
 /// Largest body, bytes.
 const LARGEST: usize = 16 * 1024;

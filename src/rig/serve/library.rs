@@ -60,7 +60,7 @@ pub(super) struct SessionDetail {
     /// The manifest, `session.json`.
     #[schema(value_type = Object)]
     pub(super) manifest: serde_json::Value,
-    /// Each frame's place in time, seconds from the first.
+    /// Each frame's time, seconds after the first.
     pub(super) times_s: Vec<f64>,
     /// Each frame's angle, degrees; `null` where there was no table.
     pub(super) angles_deg: Vec<Option<f64>>,
@@ -84,7 +84,7 @@ pub(super) struct VideoFile {
     version: FileVersion,
 }
 
-/// What tells one state of a file from another.
+/// What differs between one state of a file and another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct FileVersion {
     bytes: u64,

@@ -11,9 +11,11 @@ use tokio::time::{sleep, timeout};
 use tokio_io_timeout::TimeoutWriter;
 
 use super::access::Local;
+use super::options::{ClientLimits, Shutdown};
 use super::routes::{App, router};
-use super::{ClientLimits, GRACE, Shutdown};
 
+/// Time that running requests get when the server ends.
+pub(super) const GRACE: Duration = Duration::from_secs(1);
 /// Header lines of a request.
 const MOST_HEADERS: usize = 64;
 /// Bytes of a request's head, and of an answer that wait to be sent beyond the piece at hand.

@@ -9,8 +9,8 @@ use axum::http::header;
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use super::ClientLimits;
 use super::failure::Problem;
+use super::options::ClientLimits;
 use super::permits::Permits;
 use super::snapshots::Snapshots;
 use crate::state::{Phase, RigState};

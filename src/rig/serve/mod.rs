@@ -21,6 +21,7 @@ mod files;
 mod library;
 mod listen;
 mod metrics;
+mod options;
 mod page;
 mod permits;
 mod pictures;
@@ -37,13 +38,11 @@ mod tests;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
-use std::time::Duration;
 
 use tokio::time::{MissedTickBehavior, interval};
-/// Asks a server to end, from any thread. Copies ask the same server.
-pub use tokio_util::sync::CancellationToken as Shutdown;
 
 pub use self::address::Announcement;
+pub use self::options::{ClientLimits, Heartbeat, ServeOptions, Shutdown};
 pub use self::token::{InvalidToken, Token, TokenFileError};
 use crate::state::Monitor;
 use rig::Rig;
@@ -53,78 +52,6 @@ const THREADS: usize = 2;
 /// Threads for files, decoding and commands: more than all that may use them at once, so that a
 /// command to stop never waits for a thread.
 const BLOCKING_THREADS: usize = 24;
-/// Time that running requests get when the daemon stops.
-const GRACE: Duration = Duration::from_secs(1);
-
-/// Where and for whom the rig is served.
-#[derive(Debug, Clone)]
-pub struct ServeOptions {
-    /// The address to listen on; port 0 takes any free one.
-    pub address: SocketAddr,
-    /// What a client has to know. Where it is `None`, an address that other machines can reach gets a
-    /// random one, and a loopback address none.
-    pub token: Option<Token>,
-    /// Names, without port, under which clients reach this machine besides its addresses, such as
-    /// `rig.local`. The first one stands in the announced URL.
-    pub names: Vec<String>,
-    /// Called all the time while the server is alive.
-    pub heartbeat: Option<Heartbeat>,
-    /// What clients may take up.
-    pub limits: ClientLimits,
-}
-
-impl ServeOptions {
-    /// Options for an address, and nothing else asked for.
-    #[must_use]
-    pub fn at(address: SocketAddr) -> Self {
-        Self {
-            address,
-            token: None,
-            names: Vec::new(),
-            heartbeat: None,
-            limits: ClientLimits::default(),
-        }
-    }
-}
-
-/// How a supervisor, such as the service manager, learns that the server is alive.
-#[derive(Debug, Clone, Copy)]
-pub struct Heartbeat {
-    /// Time between two beats.
-    pub period: Duration,
-    /// Called while requests are worked on and the rig's state can be read.
-    pub beat: fn(),
-}
-
-/// What all clients together may take up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ClientLimits {
-    /// Connections at once; further ones wait to be accepted.
-    pub connections: usize,
-    /// Requests for the preview at once.
-    pub viewers: usize,
-    /// Subscribers to the events at once.
-    pub subscribers: usize,
-    /// Time in which a request's head has to come, and how long a connection may lie idle.
-    pub head: Duration,
-    /// Time in which a request's body has to come.
-    pub body: Duration,
-    /// Longest time in which a client takes not a single byte of an answer.
-    pub stall: Duration,
-}
-
-impl Default for ClientLimits {
-    fn default() -> Self {
-        Self {
-            connections: 256,
-            viewers: 16,
-            subscribers: 32,
-            head: Duration::from_secs(10),
-            body: Duration::from_secs(10),
-            stall: Duration::from_secs(20),
-        }
-    }
-}
 
 /// Why the rig could not be served.
 #[derive(Debug, thiserror::Error)]
@@ -193,7 +120,7 @@ pub fn serve(
         listen::run(listener, &app).await;
         Ok(())
     });
-    runtime.shutdown_timeout(GRACE);
+    runtime.shutdown_timeout(listen::GRACE);
     served
 }
 

@@ -77,6 +77,9 @@ fn encode(picture: &RgbImage, width: u32) -> Result<Bytes, Failure> {
     let mut jpeg = Vec::new();
     JpegEncoder::new_with_quality(&mut jpeg, QUALITY)
         .encode_image(picture)
-        .map_err(|error| Failure::broken(format!("the picture cannot be encoded: {error}")))?;
+        .map_err(|error| {
+            let why = with_causes(&error);
+            Failure::broken(format!("the picture cannot be encoded: {why}"))
+        })?;
     Ok(jpeg.into())
 }

@@ -13,9 +13,9 @@ use tokio::sync::{OwnedSemaphorePermit, watch};
 use tokio::time::{Instant, sleep_until, timeout};
 use utoipa::IntoParams;
 
-use super::Shutdown;
 use super::extract::QueryParams;
 use super::failure::{Failure, Problem};
+use super::options::Shutdown;
 use super::permits::{Permits, permit};
 use crate::state::{Monitor, PreviewFrame};
 

@@ -73,7 +73,7 @@ pub enum Refused {
     Unavailable(String),
 }
 
-/// A rig that takes commands and tells its state.
+/// A rig that takes commands and shows its state.
 pub trait Rig: Send + Sync {
     /// Takes a command; what comes of it shows in the monitor.
     ///

@@ -16,11 +16,12 @@ use super::access::{AccessPolicy, guard};
 use super::failure::Failure;
 use super::library::Library;
 use super::metrics::Responses;
+use super::options::{ClientLimits, Shutdown};
 use super::permits::Permits;
 use super::pictures::Pictures;
 use super::rig::Rig;
 use super::snapshots::Snapshots;
-use super::{ClientLimits, Shutdown, api, files, metrics, page, preview, sessions};
+use super::{api, files, metrics, page, preview, sessions};
 use crate::state::Monitor;
 
 /// What all requests share; each handler takes the parts that it needs.

@@ -60,7 +60,7 @@ impl Claim {
         let Files { lock, socket, .. } = &self.files;
         let server = Server::start(socket, link)?;
         let mode = fs::metadata(lock)
-            .map_err(LockError::system(lock, "looked at"))?
+            .map_err(LockError::system(lock, "checked"))?
             .mode();
         fs::set_permissions(socket, Permissions::from_mode(mode & 0o777))
             .map_err(LockError::system(socket, "shared"))?;
