@@ -22,15 +22,15 @@ use relit_data::session::{
 };
 use relit_data::shard::{Dataset, ImageSize};
 use relit_rig::camera::{
-    Camera, CameraAddress, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc,
-    Frame, GrantedMode, Mode, ModeRequest, Rate, Sequence, StampSource, open,
+    Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
+    Mode, ModeRequest, Sequence, StampSource, open,
 };
 use relit_rig::capture::{End, Plan, Recorder, Window, salvage, salvage_session};
 use relit_rig::clock::Clock;
 use relit_rig::preview::Preview;
 use relit_rig::state::{Monitor, TakeSummary, Verdict};
 use relit_test_support::{ffmpeg, packets};
-use relit_video::Video;
+use relit_video::{PixelFormat, StreamFormat, Video};
 
 /// What the camera of a test does next.
 enum Step {
@@ -58,11 +58,6 @@ impl Scripted {
                 bus: String::new(),
                 modes: Vec::new(),
                 other_formats: Vec::new(),
-                capabilities: Capabilities {
-                    sequence: true,
-                    driver_time: true,
-                    controls: false,
-                },
                 problems: Vec::new(),
             },
             steps: Box::new(steps),
@@ -129,6 +124,8 @@ impl Camera for Scripted {
     }
 }
 
+/// The session that a test records.
+const ID: &str = "20261120T093015Z-cow";
 const PERIOD_US: i64 = 33_333;
 /// How long a frame may wait for a disk that is busy with something else.
 const WAIT: Duration = Duration::from_secs(60);
@@ -174,9 +171,9 @@ fn turn(frames: i64, begun: i64) -> Window {
     Window::new(from, from + frames * PERIOD_US).unwrap()
 }
 
-fn manifest(id: &str) -> Manifest {
+fn manifest() -> Manifest {
     Manifest {
-        id: id.to_owned(),
+        id: ID.to_owned(),
         object: "cow".to_owned(),
         created: "2026-11-20T09:30:15Z".parse().unwrap(),
         status: Status::Recording,
@@ -184,9 +181,9 @@ fn manifest(id: &str) -> Manifest {
             backend: "replay".to_owned(),
             device: "script".to_owned(),
             name: "scripted".to_owned(),
-            fourcc: String::new(),
-            width: 0,
-            height: 0,
+            fourcc: "MJPG".to_owned(),
+            width: SIZE.0,
+            height: SIZE.1,
             fps: 30.0,
             clock: FrameClock::default(),
             controls: BTreeMap::new(),
@@ -215,14 +212,13 @@ fn manifest(id: &str) -> Manifest {
 fn plan(root: &Path, clock: &Clock, max_dropped: u64) -> Plan {
     Plan {
         root: root.to_owned(),
-        manifest: manifest("20261120T093015Z-cow"),
-        mode: GrantedMode {
-            fourcc: Fourcc::MJPG,
+        manifest: manifest(),
+        stream: StreamFormat {
+            format: PixelFormat::Mjpeg,
             width: SIZE.0,
             height: SIZE.1,
-            rate: Rate::new(30, 1),
+            fps: 30.0,
         },
-        fps: 30.0,
         window: None,
         max_dropped,
         queue_wait: Duration::ZERO,
@@ -334,8 +330,8 @@ fn a_whole_turn_is_a_clean_take_of_exactly_its_frames() {
     assert!(notices.is_empty(), "{notices:?}");
     assert!(take.video.damage().is_empty(), "{:?}", take.video.damage());
     assert_eq!(take.frames_in_video(), 120);
-    let camera = &take.manifest().camera;
-    assert_eq!((camera.fourcc.as_str(), camera.width), ("MJPG", 480));
+    let video = &take.manifest().video;
+    assert_eq!((video.codec.as_str(), video.frames), ("mjpeg", Some(120)));
     for (n, entry) in take.index().entries().iter().enumerate() {
         assert_eq!((entry.n, entry.sequence), (n as u64, n as u64 + 10));
         assert_eq!(entry.t_us, (n as i64 + 10) * PERIOD_US);
@@ -597,11 +593,16 @@ fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -
         rate,
     };
     let mut plan = plan(root, &clock, 0);
-    plan.fps = rate.per_second();
     plan.queue_wait = WAIT;
     // A frame's way from the start of the replay to its time stamp is less than half a period.
     let begun = clock.now_us() as f64;
-    plan.mode = camera.start(&request).unwrap();
+    let mode = camera.start(&request).unwrap();
+    plan.stream = StreamFormat {
+        format: mode.fourcc.pixel_format().unwrap(),
+        width,
+        height,
+        fps: rate.per_second(),
+    };
     let at = |frames: f64| (begun + frames * period_us) as i64;
     plan.window = Window::new(at(from), at(to));
     let recorder = Recorder::start(camera, plan).unwrap();
@@ -679,7 +680,7 @@ fn a_full_disk_ends_the_recording_and_says_how_much_is_missing() {
         .lines()
         .find_map(|line| line.strip_prefix("REASON "))
         .unwrap();
-    let folder = root.path().join("20261120T093015Z-cow");
+    let folder = root.path().join(ID);
     assert!(reason.contains("the disk is full"), "{reason}");
     assert!(reason.contains(folder.to_str().unwrap()), "{reason}");
     let missing: u64 = reason
@@ -769,7 +770,7 @@ fn kill_and_salvage(clock: &str, frames: u64) -> Lost {
         .unwrap();
     let lines = BufReader::new(child.stdout.take().unwrap()).lines();
     let mut written = lines.filter_map(|line| line.unwrap().strip_prefix("WROTE ")?.parse().ok());
-    let folder = root.path().join("20261120T093015Z-cow");
+    let folder = root.path().join(ID);
     assert!(written.any(|written: u64| written >= frames));
     // A session under way is left alone.
     assert!(salvage(root.path()).unwrap().is_empty());
@@ -842,7 +843,7 @@ fn a_recording_killed_before_its_first_frame_is_salvaged_as_such() {
     let clock = Clock::virtual_time();
     let camera = Scripted::new(&clock, script);
     let recorder = Recorder::start(camera, plan(root.path(), &clock, 0)).unwrap();
-    let folder = recorder.folder().to_owned();
+    let folder = root.path().join(ID);
     recorder.stop();
     drop(recorder.wait().unwrap());
     let saved = salvage_session(&folder).unwrap();
@@ -862,7 +863,7 @@ fn frames_whose_content_a_power_cut_took_are_cut_from_the_index() {
     plan.queue_wait = WAIT;
     plan.window = Some(turn(120, 0));
     let recorder = Recorder::start(Scripted::new(&clock, steps(stream(200, 0))), plan).unwrap();
-    let folder = recorder.folder().to_owned();
+    let folder = root.path().join(ID);
     drop(recorder.wait().unwrap());
     // The last bytes never reached the disk: the file has its length, and zeros there.
     let path = folder.join("video.mkv");

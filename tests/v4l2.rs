@@ -465,6 +465,7 @@ fn a_timeout_is_bounded_and_costs_no_frame() {
     assert!(counted.is_sorted());
 }
 
+#[cfg(feature = "nokhwa")]
 #[test]
 #[ignore = "needs the driver vivid"]
 fn the_portable_library_shows_the_same_camera() {

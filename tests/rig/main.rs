@@ -16,6 +16,8 @@
 mod camera;
 mod faults;
 mod loopback;
+#[cfg(feature = "nokhwa")]
+mod portable;
 mod program;
 mod table;
 mod turn;

@@ -157,6 +157,14 @@ impl Ended {
         told.unwrap_or("")
     }
 
+    /// What a check found that is not as it should be.
+    pub(crate) fn noted(&self, check: &str) -> String {
+        let noted = self.events.iter().map(|event| &event.what);
+        let noted = noted.filter(|what| what["what"] == check && what["good"] == false);
+        let found: Vec<&str> = noted.filter_map(|what| what["found"].as_str()).collect();
+        found.join("; ")
+    }
+
     /// Checks that it was refused: told on standard error, with no session left, and before the
     /// table was told to move. Gives the reason.
     pub(crate) fn refusal(&self) -> &str {

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use relit_rig::camera::hold::ManualValues;
 use relit_rig::camera::{CameraAddress, Fourcc};
-use relit_rig::capture::{FrameSize, ModePreference, Settings};
+use relit_rig::capture::{ModePreference, Settings};
 use relit_rig::serve::Token;
 use relit_rig::turntable;
 
@@ -149,8 +149,8 @@ struct RigArguments {
     #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
     fps: f64,
     /// Frame size, such as 1920x1080 [default: the largest at that rate].
-    #[arg(long, value_name = "WIDTHxHEIGHT")]
-    size: Option<FrameSize>,
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
+    size: Option<(u32, u32)>,
     /// Pixel format: MJPG, H264, YUYV, NV12, RGB3, GREY or 8-bit Bayer [default: compressed before raw].
     #[arg(long, value_name = "FORMAT", value_parser = fourcc)]
     fourcc: Option<Fourcc>,
@@ -241,6 +241,14 @@ fn fourcc(text: &str) -> Result<Fourcc, String> {
     }
 }
 
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let side = |text: &str| text.parse().ok().filter(|&pixels: &u32| pixels > 0);
+    let sides = text.split_once('x');
+    sides
+        .and_then(|(width, height)| Some((side(width)?, side(height)?)))
+        .ok_or_else(|| format!("{text:?} is no size: write it as 1920x1080"))
+}
+
 fn figure(text: &str, low: f64, high: f64, what: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(value) if (low..=high).contains(&value) => Ok(value),
@@ -262,4 +270,17 @@ fn percent(text: &str) -> Result<f64, String> {
 
 fn volts(text: &str) -> Result<f64, String> {
     figure(text, 0.0, 100.0, "volts")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_written_with_an_x() {
+        assert_eq!(size("1920x1080"), Ok((1920, 1080)));
+        for text in ["", "1920", "0x5", "axb", "1920x1080x3"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+    }
 }

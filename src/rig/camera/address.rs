@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use super::{AddressFault, CameraError};
-use crate::clock::Clock;
 
 /// Fastest replay that may be asked for, times real time.
 const FASTEST: f64 = 1000.0;
@@ -83,18 +82,6 @@ impl CameraAddress {
             speed: ReplaySpeed::Times(1.0),
             repeat: false,
             faults: ReplayFaults::default(),
-        }
-    }
-
-    /// The clock on which frames of this camera come as they were taken: the system's own, or a
-    /// faster one for a replay that runs faster. Everything of a capture goes by one such clock.
-    pub fn clock(&self) -> Clock {
-        match self {
-            Self::Replay {
-                speed: ReplaySpeed::Times(times),
-                ..
-            } if *times != 1.0 => Clock::scaled(*times),
-            _ => Clock::monotonic(),
         }
     }
 
@@ -379,20 +366,6 @@ mod tests {
         ] {
             let found = parse(&format!("replay:a?{option}"));
             assert!(matches!(found, Err(AddressFault::Value { .. })), "{option}");
-        }
-    }
-
-    #[test]
-    fn a_faster_replay_goes_by_a_faster_clock() {
-        let factor = |text: &str| text.parse::<CameraAddress>().unwrap().clock().factor();
-        assert_eq!(factor("replay:a?speed=8"), 8.0);
-        for text in [
-            "replay:a",
-            "replay:a?speed=0",
-            "nokhwa:0",
-            "v4l2:/dev/video0",
-        ] {
-            assert_eq!(factor(text), 1.0, "{text}");
         }
     }
 }

@@ -9,6 +9,12 @@ use super::format::Fourcc;
 use relit_data::session;
 use relit_video as video;
 
+/// How a user gets the right to use cameras.
+const PERMITTING: &str = match cfg!(target_os = "linux") {
+    true => "add the user to the group `video` and log in again",
+    false => "let this program use the camera in the system's privacy settings",
+};
+
 /// Why a camera could not be found, set, or read. What the system said is the `source`:
 /// [`relit_data::causes::with_causes`] puts both into one sentence.
 #[derive(Debug, thiserror::Error)]
@@ -30,9 +36,7 @@ pub enum CameraError {
         source: Option<io::Error>,
     },
     /// The device may not be opened.
-    #[error(
-        "{device} may not be opened by this user: add the user to the group `video` and log in again"
-    )]
+    #[error("{device} may not be opened by this user: {PERMITTING}")]
     NotPermitted {
         /// The device.
         device: String,

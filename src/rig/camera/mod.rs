@@ -1,15 +1,30 @@
 //! Cameras: which there are, what they offer, and their frames with counters and time stamps.
 //!
-//! A [`Camera`] is one of three. *V4L2* is the recording path: the kernel's own buffers, counters
-//! and monotonic time stamps. *nokhwa* lists and shows cameras on systems without V4L2; what it
-//! cannot give is named in [`Capabilities`]. A *replay* is a recorded session or video that behaves
-//! as the camera it was recorded with, at its own pace or faster, with faults on demand; a whole
-//! capture runs on it without hardware.
+//! A [`Camera`] is one of three. *V4L2* is the recording path under Linux: the kernel's own buffers,
+//! counters and monotonic time stamps. *nokhwa* (feature `nokhwa`) records on systems without V4L2:
+//! no counters, time stamps of the host's clock on arrival, and few controls. A *replay* is a
+//! recorded session or video that behaves as the camera it was recorded with, at its own pace or
+//! faster, with faults on demand; a whole capture runs on it without hardware.
 //!
-//! Frames are handed out as they came: this room counts nothing, judges nothing, and knows nothing
+//! Frames are handed out as they came: this module counts nothing, judges nothing, and knows nothing
 //! of turntables, captures or masks. [`hold::ManualPlan`] says which controls to set so that
 //! exposure, gain, white balance and focus stand still; it is a pure function over the list of
 //! controls.
+//!
+//! ```
+//! use std::time::Duration;
+//!
+//! use relit_rig::camera;
+//! use relit_rig::clock::Clock;
+//!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).unwrap();
+//! let address = "replay:fixtures/20261120T101500Z-cow-short?speed=0".parse()?;
+//! let mut camera = camera::open(&address, Clock::monotonic())?;
+//! camera.start(&"MJPG:480x360@30".parse()?)?;
+//! let frame = camera.next_frame(Duration::from_secs(5))?;
+//! assert_eq!((frame.width, frame.height, frame.fault()), (480, 360, None));
+//! # Ok::<(), camera::CameraError>(())
+//! ```
 
 mod address;
 mod control;
@@ -17,6 +32,7 @@ mod error;
 mod format;
 mod frame;
 pub mod hold;
+#[cfg(all(feature = "nokhwa", any(target_os = "linux", target_os = "macos")))]
 mod nokhwa;
 mod rate;
 mod replay;
@@ -37,7 +53,7 @@ pub use request::{GrantedMode, ModeRequest};
 
 use crate::clock::Clock;
 
-/// Opens a camera. A replay goes by the clock given; see [`CameraAddress::clock`].
+/// Opens a camera. A replay goes by the clock given.
 ///
 /// # Errors
 /// [`CameraError::NotThere`], [`CameraError::NotPermitted`], [`CameraError::NotACamera`],
@@ -45,7 +61,7 @@ use crate::clock::Clock;
 pub fn open(address: &CameraAddress, clock: Clock) -> Result<Box<dyn Camera>, CameraError> {
     Ok(match address {
         CameraAddress::V4l2(path) => open_v4l2(path)?,
-        CameraAddress::Nokhwa(number) => Box::new(nokhwa::NokhwaCamera::open(*number)?),
+        CameraAddress::Nokhwa(number) => open_nokhwa(*number)?,
         CameraAddress::Replay {
             path,
             speed,
@@ -71,13 +87,33 @@ fn open_v4l2(path: &Path) -> Result<Box<dyn Camera>, CameraError> {
     })
 }
 
+#[cfg(all(feature = "nokhwa", any(target_os = "linux", target_os = "macos")))]
+fn open_nokhwa(number: u32) -> Result<Box<dyn Camera>, CameraError> {
+    Ok(Box::new(nokhwa::NokhwaCamera::open(number)?))
+}
+
+#[cfg(not(all(feature = "nokhwa", any(target_os = "linux", target_os = "macos"))))]
+fn open_nokhwa(number: u32) -> Result<Box<dyn Camera>, CameraError> {
+    Err(CameraError::Unsupported {
+        device: CameraAddress::Nokhwa(number).to_string(),
+        what: match cfg!(feature = "nokhwa") {
+            true => "nokhwa has no cameras on this system; give a recording as replay:PATH",
+            false => {
+                "this program was built without it; build it with the feature `nokhwa`, or give v4l2:/dev/video0"
+            }
+        },
+    })
+}
+
 /// All cameras of this system, with what they offer and what of them could not be read: V4L2's
 /// under Linux, else those that nokhwa finds.
 pub fn list() -> Vec<DeviceInfo> {
     #[cfg(target_os = "linux")]
     return v4l2::list();
-    #[cfg(not(target_os = "linux"))]
+    #[cfg(all(feature = "nokhwa", target_os = "macos"))]
     return nokhwa::list();
+    #[cfg(not(any(target_os = "linux", all(feature = "nokhwa", target_os = "macos"))))]
+    return Vec::new();
 }
 
 /// A camera that may be started and stopped any number of times.
@@ -142,19 +178,6 @@ pub struct DeviceInfo {
     pub modes: Vec<Mode>,
     /// What else it offers.
     pub other_formats: Vec<Fourcc>,
-    /// What can be relied on.
-    pub capabilities: Capabilities,
     /// What could not be read, and why.
     pub problems: Vec<String>,
-}
-
-/// What can be relied on in a camera's frames.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Capabilities {
-    /// Frames are counted by the driver, so that a dropped one shows.
-    pub sequence: bool,
-    /// Frames carry the driver's own time stamps.
-    pub driver_time: bool,
-    /// Controls can be read and set.
-    pub controls: bool,
 }

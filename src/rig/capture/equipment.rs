@@ -4,13 +4,12 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 
+use super::error::CaptureError;
+use super::settings::Settings;
 use crate::camera::{self, Camera, CameraAddress, ReplaySpeed};
 use crate::clock::Clock;
-use crate::simulator::{self, SimulatedTable, SimulatorOptions};
+use crate::simulator::{SimulatedTable, SimulatorOptions};
 use crate::turntable::{Table, TableOptions, TurntableAddress, find_serial};
-
-use super::error::{CaptureError, Refusal};
-use super::settings::Settings;
 
 /// How many times faster than real time a rehearsal runs at most where people look at it.
 const FASTEST_SHOWN: f64 = 20.0;
@@ -20,9 +19,9 @@ const NAME_SPACING: Duration = Duration::from_secs(1);
 /// Camera and table of a rig.
 pub struct Equipment {
     // Dropped in this order: the table is stopped before its simulator is switched off.
-    /// The camera; `None` while it is gone.
+    /// The camera; `None` while it is gone, and before it is opened.
     pub camera: Option<Box<dyn Camera>>,
-    /// The table; `None` while it is gone, and where there is none.
+    /// The table; `None` while it is gone, before it is opened, and where there is none.
     pub table: Option<Table>,
     simulator: Option<SimulatedTable>,
     settings: Settings,
@@ -36,26 +35,26 @@ impl Equipment {
     /// [virtual time](Clock::virtual_time), at most as fast as their addresses say.
     ///
     /// # Errors
-    /// [`Refusal::Pace`].
-    pub fn new(settings: Settings) -> Result<Self, Refusal> {
+    /// [`super::Refusal::Pace`], or a fault that the simulated table cannot make.
+    pub fn new(settings: Settings) -> Result<Self, CaptureError> {
         let speed = settings.speed()?;
-        Ok(Self::at_speed(settings, speed))
+        Self::at_speed(settings, speed)
     }
 
-    /// The same for a rig that people look at, and that runs while nothing is captured: as fast as it
-    /// goes is 20 times real time.
+    /// The same for a rig that people look at, and that runs while nothing is captured: as fast as
+    /// it goes is 20 times real time.
     ///
     /// # Errors
-    /// [`Refusal::Pace`].
-    pub fn for_viewers(settings: Settings) -> Result<Self, Refusal> {
+    /// As [`Self::new`].
+    pub fn for_viewers(settings: Settings) -> Result<Self, CaptureError> {
         let speed = match settings.speed()? {
             0.0 => FASTEST_SHOWN,
             speed => speed,
         };
-        Ok(Self::at_speed(settings, speed))
+        Self::at_speed(settings, speed)
     }
 
-    fn at_speed(mut settings: Settings, speed: f64) -> Self {
+    fn at_speed(mut settings: Settings, speed: f64) -> Result<Self, CaptureError> {
         if let CameraAddress::Replay { speed, .. } = &mut settings.camera {
             // It goes as fast as the clock does.
             *speed = ReplaySpeed::Times(1.0);
@@ -65,14 +64,22 @@ impl Equipment {
             1.0 => Clock::monotonic(),
             times => Clock::paced(times),
         };
-        Self {
+        let simulator = match &settings.turntable {
+            TurntableAddress::Simulated(address) => Some(SimulatedTable::new(&SimulatorOptions {
+                clock: clock.clone(),
+                faults: address.fault.as_deref().unwrap_or_default().parse()?,
+                ..SimulatorOptions::default()
+            })),
+            _ => None,
+        };
+        Ok(Self {
             camera: None,
             table: None,
-            simulator: None,
+            simulator,
             settings,
             clock,
             named: None,
-        }
+        })
     }
 
     /// The settings, with the addresses as they are opened.
@@ -87,18 +94,7 @@ impl Equipment {
         self.clock.clone()
     }
 
-    /// The time of day for the next session's name, which has whole seconds: waits until it differs
-    /// from the one before.
-    pub(super) fn session_time(&mut self) -> Timestamp {
-        let passed = self
-            .named
-            .map(|named| Timestamp::now().duration_since(named));
-        let passed = passed.map_or(NAME_SPACING, |passed| passed.unsigned_abs());
-        std::thread::sleep(NAME_SPACING.saturating_sub(passed));
-        *self.named.insert(Timestamp::now())
-    }
-
-    /// The simulated table, where the table is one and was opened.
+    /// The simulated table, where the table is one.
     #[must_use]
     pub fn simulator(&self) -> Option<&SimulatedTable> {
         self.simulator.as_ref()
@@ -108,6 +104,16 @@ impl Equipment {
     #[must_use]
     pub fn wants_table(&self) -> bool {
         self.settings.turntable != TurntableAddress::None
+    }
+
+    /// The time of day for the next session's name: waits until it differs from the one before.
+    pub(super) fn session_time(&mut self) -> Timestamp {
+        let passed = self
+            .named
+            .map(|named| Timestamp::now().duration_since(named));
+        let passed = passed.map_or(NAME_SPACING, |passed| passed.unsigned_abs());
+        std::thread::sleep(NAME_SPACING.saturating_sub(passed));
+        *self.named.insert(Timestamp::now())
     }
 
     /// Opens the camera where it is not.
@@ -133,48 +139,20 @@ impl Equipment {
         Ok(self.table.as_ref())
     }
 
-    fn connect(&mut self) -> Result<Option<Table>, CaptureError> {
+    fn connect(&self) -> Result<Option<Table>, CaptureError> {
         let options = TableOptions {
             clock: self.clock.clone(),
             runtime_folder: self.settings.runtime_folder.clone(),
             ..TableOptions::default()
         };
+        if let Some(simulator) = &self.simulator {
+            return Ok(Some(Table::open(simulator.open(), &options)?));
+        }
         let path = match &self.settings.turntable {
-            TurntableAddress::None => return Ok(None),
             TurntableAddress::Serial(Some(path)) => path.clone(),
             TurntableAddress::Serial(None) => find_serial()?,
-            TurntableAddress::Simulated(address) => {
-                let fault = address.fault.clone();
-                let port = self.simulated(fault.as_deref())?.open();
-                return Ok(Some(Table::open(port, &options)?));
-            }
+            TurntableAddress::Simulated(_) | TurntableAddress::None => return Ok(None),
         };
         Ok(Some(Table::open_serial(&path, &options)?))
-    }
-
-    /// The simulated table, switched on the first time.
-    fn simulated(
-        &mut self,
-        fault: Option<&str>,
-    ) -> Result<&SimulatedTable, simulator::SimulatorError> {
-        let simulator = match self.simulator.take() {
-            Some(simulator) => simulator,
-            None => SimulatedTable::new(&SimulatorOptions {
-                clock: self.clock.clone(),
-                faults: fault.unwrap_or_default().parse()?,
-                ..SimulatorOptions::default()
-            }),
-        };
-        Ok(self.simulator.insert(simulator))
-    }
-
-    /// Forgets the camera, so that it is opened again.
-    pub fn drop_camera(&mut self) {
-        self.camera = None;
-    }
-
-    /// Forgets the table, so that it is opened again.
-    pub fn drop_table(&mut self) {
-        self.table = None;
     }
 }

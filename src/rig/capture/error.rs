@@ -3,15 +3,14 @@
 use std::io;
 use std::path::PathBuf;
 
+use jiff::Timestamp;
+
 use super::recording::RecordingError;
-use super::settings::ModePreference;
-use super::stop::Stopped;
 use crate::camera::hold::ControlDrift;
 use crate::camera::{CameraError, FrameFault};
 use crate::lockfile::LockError;
 use crate::simulator;
 use crate::turntable::TurntableError;
-use relit_data::session;
 
 /// Why there is no capture.
 #[derive(Debug, thiserror::Error)]
@@ -28,9 +27,6 @@ pub enum CaptureError {
     /// The table.
     #[error(transparent)]
     Turntable(#[from] TurntableError),
-    /// The session on disk.
-    #[error(transparent)]
-    Session(#[from] session::SessionError),
     /// Somebody asked for it.
     #[error("the capture was stopped")]
     Stopped(#[from] Stopped),
@@ -81,6 +77,17 @@ impl CaptureError {
     }
 }
 
+/// Who asked for the stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+pub enum Stopped {
+    /// A person.
+    #[error("somebody asked for it")]
+    Person,
+    /// The program is to end.
+    #[error("the program was told to end")]
+    Shutdown,
+}
+
 /// What preflight found wrong; nothing has turned yet.
 #[derive(Debug, thiserror::Error)]
 pub enum Refusal {
@@ -89,44 +96,29 @@ pub enum Refusal {
         "a real camera or turntable goes by real time: leave speed= out of the other one's address"
     )]
     Pace,
-    /// No mode is as wished.
-    #[error("the camera does not offer {wish}; it offers {}", listed(.offered))]
+    /// No mode is as preferred.
+    #[error("the camera does not offer {preferred}; it offers {}", first_of(.offered))]
     NoMode {
-        /// What was wished.
-        wish: ModePreference,
-        /// What there is.
+        /// What was asked for, in words.
+        preferred: String,
+        /// The modes that there are.
         offered: Vec<String>,
     },
-    /// The camera put another mode in place of the one asked for.
+    /// The camera grants another mode than the one asked for; in what it differs.
     #[error("the camera grants {}: ask for a mode that `relit-capture devices` lists", .0.join(", "))]
-    OtherMode(
-        /// In what it differs.
-        Vec<String>,
-    ),
-    /// All of the first frames were damaged.
+    OtherMode(Vec<String>),
+    /// All of the first frames, so many, were damaged; what is wrong with the last.
     #[error(
-        "the camera's first {frames} frames were damaged ({fault}): check its cable, or ask for another mode"
+        "the camera's first {0} frames were damaged ({1}): check its cable, or ask for another mode"
     )]
-    Damaged {
-        /// How many there were.
-        frames: usize,
-        /// What is wrong with the last.
-        #[source]
-        fault: FrameFault,
-    },
+    Damaged(usize, #[source] FrameFault),
     /// Controls do not stay as they are set.
     #[error("the camera does not keep its settings: {}; close other programs that use it, or give values that it takes", joined(.0))]
-    NotKept(
-        /// Which.
-        Vec<ControlDrift>,
-    ),
+    NotKept(Vec<ControlDrift>),
     /// Values that were asked for, and which the camera has no control to hold.
     #[error("the camera cannot be set to {}: leave that out, or set it at the camera", .0.join(", "))]
-    NotHeld(
-        /// Aspect and value of each.
-        Vec<String>,
-    ),
-    /// Too little room.
+    NotHeld(Vec<String>),
+    /// Too little space.
     #[error(
         "{folder} has {} MB free and the take needs {} MB (a fifth in reserve): make room, or give another --root",
         .free / 1_000_000, .needed.div_ceil(1_000_000)
@@ -152,12 +144,9 @@ pub enum Refusal {
     NoBattery,
     /// The time of day cannot be right.
     #[error(
-        "the system's clock says {now}, before this program was written: set it, or the session's name would be wrong"
+        "the system's clock says {0}, before this program was written: set it, or the session's name would be wrong"
     )]
-    Clock {
-        /// What the clock says.
-        now: String,
-    },
+    Clock(Timestamp),
     /// The object's name cannot be part of a session's.
     #[error(
         "{0:?} cannot be an object's name: use letters, digits, '-', '_' and '.', at most 80 bytes"
@@ -186,12 +175,9 @@ pub enum MeterFault {
     },
     /// The turns were over before all was seen.
     #[error(
-        "{degrees} degrees of the turn were not seen at an exposure that holds: the light changes, or frames are missing; meter again, or set the exposure"
+        "{0} degrees of the turn were not seen at an exposure that holds: the light changes, or frames are missing; meter again, or set the exposure"
     )]
-    Unseen {
-        /// Degrees not seen.
-        degrees: usize,
-    },
+    Unseen(usize),
     /// The camera's exposure cannot be set.
     #[error("the camera's exposure cannot be set: leave --meter out")]
     NoExposure,
@@ -208,20 +194,17 @@ pub enum MeterFault {
     NoPicture(#[source] relit_video::DecodeFault),
 }
 
-fn joined(moved: &[ControlDrift]) -> String {
-    moved
-        .iter()
-        .map(ControlDrift::to_string)
-        .collect::<Vec<_>>()
-        .join(", ")
+fn joined(drifts: &[ControlDrift]) -> String {
+    let drifts: Vec<String> = drifts.iter().map(ControlDrift::to_string).collect();
+    drifts.join(", ")
 }
 
 /// The first of a long list.
-fn listed(offered: &[String]) -> String {
-    const TOLD: usize = 12;
+fn first_of(offered: &[String]) -> String {
+    const MOST: usize = 12;
     match offered.len() {
         0 => "nothing that can be recorded".to_owned(),
-        n if n > TOLD => format!("{} and {} more", offered[..TOLD].join("; "), n - TOLD),
+        n if n > MOST => format!("{} and {} more", offered[..MOST].join("; "), n - MOST),
         _ => offered.join("; "),
     }
 }

@@ -7,9 +7,10 @@ use super::error::{CaptureError, Refusal};
 use super::settings::Settings;
 use super::stop::StopRequest;
 use crate::camera::hold::{ControlDrift, ManualPlan};
-use crate::camera::{Camera, Control, GrantedMode, ModeRequest};
+use crate::camera::{Camera, CameraError, Control, Fourcc, GrantedMode, ModeRequest};
 use crate::state::Check;
 use relit_data::session::FrameClock;
+use relit_video::StreamFormat;
 
 /// How long the first frame may take.
 const FIRST_FRAME: Duration = Duration::from_secs(5);
@@ -25,31 +26,26 @@ const INDEX_LINE: f64 = 90.0;
 const OVERHEAD: f64 = 1e6;
 
 /// What a camera was set to, and delivers.
-#[derive(Debug, Clone)]
-pub struct LockedCamera {
-    /// The mode that was asked for.
-    pub request: ModeRequest,
-    /// The mode that was granted.
-    pub mode: GrantedMode,
+pub(super) struct LockedCamera {
+    /// What it delivers: at the rate that was granted, or asked for where the camera does not say.
+    pub(super) stream: StreamFormat,
+    /// The same by its four-character code.
+    pub(super) fourcc: Fourcc,
     /// The settings that lock it.
-    pub plan: ManualPlan,
+    pub(super) plan: ManualPlan,
     /// All controls, as read back.
-    pub controls: Vec<Control>,
+    pub(super) controls: Vec<Control>,
     /// What stamps its frames.
-    pub clock: FrameClock,
+    pub(super) clock: FrameClock,
     /// Mean size of a frame, bytes.
-    pub frame_bytes: f64,
+    pub(super) frame_bytes: f64,
     /// What was found.
-    pub checks: Vec<Check>,
+    pub(super) checks: Vec<Check>,
 }
 
 impl LockedCamera {
     /// Starts the camera in the preferred mode, reads its first frames, and locks its settings.
-    ///
-    /// # Errors
-    /// [`Refusal::NoMode`], [`Refusal::OtherMode`], [`Refusal::Damaged`], [`Refusal::NotHeld`],
-    /// [`Refusal::NotKept`], a stop that was asked for, or what the camera answers.
-    pub fn lock(
+    pub(super) fn lock(
         camera: &mut dyn Camera,
         settings: &Settings,
         stop: &StopRequest,
@@ -75,9 +71,18 @@ impl LockedCamera {
         let missing = plan.missing.iter();
         let noted = missing.map(|missing| Check::noted("camera settings", missing.to_string()));
         checks.extend(noted);
+        let device = camera.info().address.to_string();
+        let fourcc = mode.fourcc;
+        let format = fourcc.pixel_format();
+        let stream = StreamFormat {
+            format: format.ok_or(CameraError::Format { device, fourcc })?,
+            width: mode.width,
+            height: mode.height,
+            fps: mode.rate.unwrap_or(request.rate).per_second(),
+        };
         Ok(Self {
-            request,
-            mode,
+            stream,
+            fourcc,
             plan,
             controls,
             clock,
@@ -88,9 +93,6 @@ impl LockedCamera {
 
     /// Sets step `at` of the plan to a value that the camera has been set to since, and reads all
     /// controls again.
-    ///
-    /// # Errors
-    /// [`Refusal::NotKept`], or what the camera answers.
     pub(super) fn relock(
         &mut self,
         camera: &mut dyn Camera,
@@ -104,15 +106,8 @@ impl LockedCamera {
         Ok(require_kept(self.plan.check(&self.controls))?)
     }
 
-    /// Frames a second: what was granted, or, where the camera does not say, what was asked for.
-    #[must_use]
-    pub fn fps(&self) -> f64 {
-        self.mode.rate.unwrap_or(self.request.rate).per_second()
-    }
-
     /// Bytes that so many frames are expected to take on disk.
-    #[must_use]
-    pub fn bytes_for(&self, frames: u64) -> u64 {
+    pub(super) fn bytes_for(&self, frames: u64) -> u64 {
         let each = self.frame_bytes + INDEX_LINE;
         (frames as f64 * each + OVERHEAD).ceil() as u64
     }
@@ -158,11 +153,7 @@ fn warm_up(camera: &mut dyn Camera, stop: &StopRequest) -> Result<f64, CaptureEr
         }
     }
     match last_fault.filter(|_| sizes.is_empty()) {
-        Some(fault) => Err(Refusal::Damaged {
-            frames: WARM_UP,
-            fault,
-        }
-        .into()),
+        Some(fault) => Err(Refusal::Damaged(WARM_UP, fault).into()),
         None => Ok(sizes.iter().sum::<f64>() / sizes.len() as f64),
     }
 }

@@ -5,32 +5,35 @@
 //! ```
 //!
 //! [`capture`] makes one session: it checks and locks everything, turns the table, and records
-//! exactly the frames of 360 degrees. [`recording`] is what it records with, and knows nothing of
+//! exactly the frames of 360 degrees. A [`Recorder`] is what it records with, and knows nothing of
 //! turntables. What is under way shows in a [`Monitor`](crate::state::Monitor); who looks at that,
 //! and from where, the capture does not know.
 
+mod context;
 mod equipment;
 mod error;
-pub mod locked_camera;
+mod locked_camera;
 mod manifest;
 mod metering;
-pub mod preflight;
-pub mod recording;
+mod mode_preference;
+pub(crate) mod preflight;
+mod recording;
 mod settings;
 mod stop;
 mod take;
 pub(crate) mod turn;
 
+pub use context::{CaptureContext, CaptureRequest};
 pub use equipment::Equipment;
-pub use error::{CaptureError, MeterFault, Refusal};
-pub use locked_camera::LockedCamera;
+pub use error::{CaptureError, MeterFault, Refusal, Stopped};
+pub use mode_preference::ModePreference;
 pub use recording::{
     End, Plan, Progress, Recorded, Recorder, RecordingError, Salvaged, Saved, Window, salvage,
     salvage_session,
 };
-pub use settings::{FrameSize, ModePreference, Settings};
-pub use stop::{StopRequest, Stopped};
-pub use take::{CaptureContext, CaptureRequest, Captured, capture};
+pub use settings::Settings;
+pub use stop::StopRequest;
+pub use take::{Captured, capture};
 
 #[cfg(test)]
 pub(crate) mod tests;

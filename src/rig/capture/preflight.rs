@@ -24,10 +24,7 @@ const LONGEST_OBJECT: usize = 80;
 const EARLIEST: i64 = 1_735_689_600;
 
 /// Checks that the disk has space for a take, and a fifth more.
-///
-/// # Errors
-/// [`Refusal::DiskFull`] with both numbers, or what the file system answers.
-pub fn check_disk(root: &Path, expected: u64) -> Result<Check, CaptureError> {
+pub(super) fn check_disk(root: &Path, expected: u64) -> Result<Check, CaptureError> {
     let free = free_bytes(root)?;
     let needed = (expected as f64 * (1.0 + RESERVE)).ceil() as u64;
     if free < needed {
@@ -45,32 +42,22 @@ pub fn check_disk(root: &Path, expected: u64) -> Result<Check, CaptureError> {
 }
 
 /// Bytes that this user may still write in a folder.
-///
-/// # Errors
-/// What the file system answers.
-pub fn free_bytes(root: &Path) -> Result<u64, CaptureError> {
+pub(crate) fn free_bytes(root: &Path) -> Result<u64, CaptureError> {
     let failed = CaptureError::system(root.display().to_string(), "asked for its free space");
     let space = rustix::fs::statvfs(root).map_err(|errno| failed(errno.into()))?;
     Ok(space.f_bavail.saturating_mul(space.f_frsize))
 }
 
 /// Checks that the time of day is one in which this program can run.
-///
-/// # Errors
-/// [`Refusal::Clock`].
-pub fn check_clock(now: Timestamp) -> Result<Check, Refusal> {
-    if now.as_second() < EARLIEST {
-        let now = now.to_string();
-        return Err(Refusal::Clock { now });
+pub(super) fn check_clock(now: Timestamp) -> Result<Check, Refusal> {
+    match now.as_second() < EARLIEST {
+        true => Err(Refusal::Clock(now)),
+        false => Ok(Check::passed("clock", format!("{now:.0}"))),
     }
-    Ok(Check::passed("clock", format!("{now:.0}")))
 }
 
 /// Checks that an object's name can be part of a session's.
-///
-/// # Errors
-/// [`Refusal::Object`].
-pub fn check_object(name: &str) -> Result<(), Refusal> {
+pub(crate) fn check_object(name: &str) -> Result<(), Refusal> {
     match is_session_name(name) && name.len() <= LONGEST_OBJECT {
         true => Ok(()),
         false => Err(Refusal::Object(name.to_owned())),
@@ -79,10 +66,7 @@ pub fn check_object(name: &str) -> Result<(), Refusal> {
 
 /// Makes sure that the table can turn: it answers, knows its zero (or is homed now), and its
 /// battery has the voltage demanded.
-///
-/// # Errors
-/// [`Refusal::Battery`], [`Refusal::NoBattery`], or what the table answers.
-pub fn ready_table(table: &Table, settings: &Settings) -> Result<Vec<Check>, CaptureError> {
+pub(super) fn ready_table(table: &Table, settings: &Settings) -> Result<Vec<Check>, CaptureError> {
     let status = table.status()?;
     let mut checks = Vec::new();
     if let Some(least) = settings.min_battery_v {
@@ -108,10 +92,10 @@ pub fn ready_table(table: &Table, settings: &Settings) -> Result<Vec<Check>, Cap
 }
 
 /// Plans the turn of a take from where the table stands.
-///
-/// # Errors
-/// A turn beyond the limits, or a speed that the table cannot reach.
-pub fn plan_turn(table: &Table, settings: &Settings) -> Result<(TurnPlan, Check), CaptureError> {
+pub(super) fn plan_turn(
+    table: &Table,
+    settings: &Settings,
+) -> Result<(TurnPlan, Check), CaptureError> {
     let request = TurnRequest {
         degrees_per_second: settings.degrees_per_second,
         turn_deg: 360.0,
@@ -126,7 +110,25 @@ pub fn plan_turn(table: &Table, settings: &Settings) -> Result<(TurnPlan, Check)
 }
 
 /// Time at constant speed before the turn's first frame, microseconds.
-#[must_use]
-pub fn margin_us(plan: &TurnPlan) -> i64 {
+pub(super) fn margin_us(plan: &TurnPlan) -> i64 {
     (MARGIN_DEG / plan.degrees_per_second() * 1e6).round() as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use relit_data::causes::with_causes;
+
+    use super::*;
+
+    #[test]
+    fn a_full_disk_is_refused_with_both_numbers() {
+        let root = tempfile::tempdir().unwrap();
+        let error = check_disk(root.path(), 1 << 60).unwrap_err();
+        assert!(matches!(
+            error,
+            CaptureError::Refused(Refusal::DiskFull { .. })
+        ));
+        let error = with_causes(&error);
+        assert!(error.contains("1383505805529 MB"), "{error}");
+    }
 }

@@ -2,20 +2,9 @@
 
 use std::sync::Arc;
 
-use super::error::CaptureError;
+use super::error::{CaptureError, Stopped};
 use crate::clock::{Clock, Waitable};
 use crate::turntable::Table;
-
-/// Who asked for the stop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
-pub enum Stopped {
-    /// A person.
-    #[error("somebody asked for it")]
-    Person,
-    /// The program is to end.
-    #[error("the program was told to end")]
-    Shutdown,
-}
 
 /// A stop that may be asked for at any time, from any thread; clones are the same request.
 #[derive(Debug, Clone)]

@@ -3,10 +3,10 @@
 
 use std::time::Duration;
 
+use super::context::CaptureContext;
 use super::error::CaptureError;
 use super::preflight;
 use super::recording::{Recorder, Window};
-use super::take::CaptureContext;
 use crate::clock::Clock;
 use crate::state::{Monitor, Phase, TableState};
 use crate::turntable::{ControllerState, Table, Track, TurnPlan, TurntableError};

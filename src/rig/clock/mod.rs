@@ -77,7 +77,6 @@ pub struct Clock {
 #[derive(Debug, Clone)]
 enum Kind {
     Monotonic,
-    Scaled { start_us: i64, factor: f64 },
     Virtual(Arc<Scheduler>),
 }
 
@@ -87,13 +86,6 @@ impl PartialEq for Clock {
         match (&self.kind, &other.kind) {
             (Kind::Monotonic, Kind::Monotonic) => true,
             (Kind::Virtual(one), Kind::Virtual(other)) => Arc::ptr_eq(one, other),
-            (
-                Kind::Scaled { start_us, factor },
-                Kind::Scaled {
-                    start_us: start,
-                    factor: times,
-                },
-            ) => start_us == start && factor == times,
             _ => false,
         }
     }
@@ -125,43 +117,12 @@ impl Clock {
         }
     }
 
-    /// A clock that agrees with the monotonic one now and runs `factor` times as fast from here,
-    /// whoever runs or waits.
-    ///
-    /// A factor that is not a positive number counts as 1.
-    pub fn scaled(factor: f64) -> Clock {
-        Clock {
-            kind: Kind::Scaled {
-                start_us: monotonic_us(),
-                factor: usable(factor),
-            },
-        }
-    }
-
-    /// How many times faster than real time this clock runs whoever waits: 1 but for a
-    /// [scaled](Clock::scaled) one.
-    pub fn factor(&self) -> f64 {
-        match self.kind {
-            Kind::Scaled { factor, .. } => factor,
-            Kind::Monotonic | Kind::Virtual(_) => 1.0,
-        }
-    }
-
-    /// Microseconds now.
+    /// The time now, microseconds.
     pub fn now_us(&self) -> i64 {
         match &self.kind {
             Kind::Monotonic => monotonic_us(),
-            Kind::Scaled { start_us, factor } => {
-                let since_start = monotonic_us().saturating_sub(*start_us) as f64;
-                start_us.saturating_add((since_start * factor) as i64)
-            }
             Kind::Virtual(scheduler) => scheduler.now_us(),
         }
-    }
-
-    /// How long to wait in real time until this clock has gone on by `own`.
-    pub fn real(&self, own: Duration) -> Duration {
-        own.div_f64(self.factor().max(f64::MIN_POSITIVE))
     }
 
     /// Waits for `duration` of this clock.
@@ -174,9 +135,9 @@ impl Clock {
     #[track_caller]
     pub fn sleep_until(&self, us: i64) {
         match &self.kind {
-            Kind::Monotonic | Kind::Scaled { .. } => {
+            Kind::Monotonic => {
                 let left = u64::try_from(us.saturating_sub(self.now_us())).unwrap_or(0);
-                std::thread::sleep(self.real(Duration::from_micros(left)));
+                std::thread::sleep(Duration::from_micros(left));
             }
             Kind::Virtual(scheduler) => {
                 let _participant = self.take_part();
@@ -196,7 +157,7 @@ impl Clock {
     fn scheduler(&self) -> Option<&Arc<Scheduler>> {
         match &self.kind {
             Kind::Virtual(scheduler) => Some(scheduler),
-            Kind::Monotonic | Kind::Scaled { .. } => None,
+            Kind::Monotonic => None,
         }
     }
 }

@@ -127,9 +127,7 @@ impl<T> Waitable<T> {
             return Some(woken.unwrap_or_else(PoisonError::into_inner));
         };
         let left = u64::try_from(deadline_us.saturating_sub(self.clock.now_us())).ok();
-        let left = self
-            .clock
-            .real(Duration::from_micros(left.filter(|left| *left > 0)?));
+        let left = Duration::from_micros(left.filter(|left| *left > 0)?);
         let woken = self.changed.wait_timeout(value, left);
         Some(woken.unwrap_or_else(PoisonError::into_inner).0)
     }

@@ -168,7 +168,7 @@ impl Idle {
         if matches!(error, CameraError::EndOfRecording { .. }) {
             return;
         }
-        equipment.drop_camera();
+        equipment.camera = None;
         self.show_no_camera(with_causes(error));
     }
 
@@ -178,7 +178,7 @@ impl Idle {
         };
         if let Err(error) = show_table(&self.monitor, table) {
             // Opening it again shows whether it has come back.
-            equipment.drop_table();
+            equipment.table = None;
             self.show_no_table(with_causes(&error));
         }
     }

@@ -1,7 +1,7 @@
 //! The rig as a daemon: it takes commands, and one thread that has camera and table carries them out.
 //!
-//! What is to be done, and what a stop means, is decided by the [`schedule`], a state machine; the
-//! [`worker`] does it, and keeps pictures and state fresh in between. Commands are checked where they
+//! What is to be done, and what a stop means, is decided by the `schedule`, a state machine; the
+//! `worker` does it, and keeps pictures and state fresh in between. Commands are checked where they
 //! are given. When the daemon is dropped, a take under way is aborted and closed, the table stands, and
 //! the thread has ended.
 

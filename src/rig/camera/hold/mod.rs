@@ -47,6 +47,7 @@ impl Aspect {
             Self::Exposure => &[
                 ("auto_exposure", Manual::MenuItem(1, "manual")),
                 ("exposure_auto", Manual::MenuItem(1, "manual")),
+                ("exposure_mode", Manual::Locked),
             ],
             Self::Gain => &[
                 ("gain_automatic", Manual::Off),
@@ -57,10 +58,12 @@ impl Aspect {
                 ("white_balance_automatic", Manual::Off),
                 ("white_balance_temperature_auto", Manual::Off),
                 ("auto_white_balance", Manual::Off),
+                ("white_balance_mode", Manual::Locked),
             ],
             Self::Focus => &[
                 ("focus_automatic_continuous", Manual::Off),
                 ("focus_auto", Manual::Off),
+                ("focus_mode", Manual::Locked),
             ],
             Self::FrameRate => &[
                 ("exposure_dynamic_framerate", Manual::Off),
@@ -109,6 +112,8 @@ enum Manual {
     /// A menu's item: its index in the kernel's interface, which must be offered, or a word in
     /// its label.
     MenuItem(i64, &'static str),
+    /// A menu's first item, which keeps the value that the automatic has found.
+    Locked,
 }
 
 /// Values to hold in place of those that the camera has now; in the control's own units.
@@ -242,18 +247,19 @@ impl ManualPlan {
         for aspect in Aspect::ALL {
             let before = plan.missing.len();
             let switched = plan.switch_off(controls, aspect);
-            let held = plan.hold(controls, wanted, aspect, &mut values);
+            let locked = matches!(switched, Some(Manual::Locked));
+            let held = plan.hold(controls, wanted, aspect, &mut values) || locked;
             if aspect == Aspect::FrameRate || aspect == Aspect::Backlight {
                 // A camera without these has a fixed rate and no correction: nothing lacks.
                 continue;
             }
             if plan.missing.len() == before && !held {
-                let lack = if switched {
+                let missing = if switched.is_some() {
                     MissingControl::NoValue
                 } else {
                     MissingControl::NoControl
                 };
-                plan.missing.push(lack(aspect));
+                plan.missing.push(missing(aspect));
             }
         }
         plan.steps.extend(values);
@@ -282,17 +288,17 @@ impl ManualPlan {
             .collect()
     }
 
-    /// Plans the switches of an aspect; true where there is one that can be set.
-    fn switch_off(&mut self, controls: &[Control], aspect: Aspect) -> bool {
-        let mut switched = false;
-        for (name, manual) in aspect.switches() {
+    /// Plans the switches of an aspect; answers the last one that can be set.
+    fn switch_off(&mut self, controls: &[Control], aspect: Aspect) -> Option<Manual> {
+        let mut switched = None;
+        for &(name, manual) in aspect.switches() {
             let Some(control) = find(controls, name) else {
                 continue;
             };
             match manual.value(control) {
                 Some(value) if may_be_set(control) => {
                     self.steps.push(step(aspect, control, value));
-                    switched = true;
+                    switched = Some(manual);
                 }
                 _ => self.missing.push(MissingControl::NoManual {
                     aspect,
@@ -405,11 +411,11 @@ impl Manual {
                 .map(|item| item.index),
             (Self::MenuItem(index, _), _) => in_range(control, index),
             // Some switches are menus whose first item is manual.
-            (Self::Off, ControlKind::Menu(items)) => items
+            (Self::Off | Self::Locked, ControlKind::Menu(items)) => items
                 .iter()
                 .find(|item| item.index == 0)
                 .map(|item| item.index),
-            (Self::Off, _) => in_range(control, 0),
+            (Self::Off | Self::Locked, _) => in_range(control, 0),
         }
     }
 }

@@ -4,10 +4,10 @@ use serde_json::Value;
 
 use super::timeline::Timeline;
 use crate::camera::{
-    CameraAddress, Capabilities, Control, ControlFlags, ControlId, ControlKind, DeviceInfo,
-    GrantedMode, MenuItem, Mode, Rate, Rates, Sizes,
+    CameraAddress, Control, ControlFlags, ControlId, ControlKind, DeviceInfo, GrantedMode,
+    MenuItem, Mode, Rate, Rates, Sizes, StampSource,
 };
-use relit_data::session::{Manifest, Recording};
+use relit_data::session::{FrameClock, Manifest, Recording};
 use relit_video::Video;
 
 /// The rate that was recorded, or the mean one.
@@ -44,12 +44,15 @@ pub(super) fn describe(
                 .map_or(Rates::Unknown, |rate| Rates::List(vec![rate])),
         }],
         other_formats: Vec::new(),
-        capabilities: Capabilities {
-            sequence: true,
-            driver_time: true,
-            controls: false,
-        },
         problems: notices.chain(damage).collect(),
+    }
+}
+
+/// What the recorded time stamps stand for.
+pub(super) fn stamp(manifest: &Manifest) -> StampSource {
+    match manifest.camera.clock {
+        FrameClock::Driver => StampSource::EndOfFrame,
+        FrameClock::Host => StampSource::Arrival,
     }
 }
 

@@ -6,10 +6,9 @@
 //! in the raw format that holds the same samples.
 //!
 //! Time stamps are those recorded, moved so that the first frame is due when the stream starts. A
-//! frame comes when the clock shows its time stamp, so that a replay at a multiple of real time
-//! wants a clock that runs as much faster ([`CameraAddress::clock`]); on another clock its time stamps
-//! are as much closer together. As fast as it is read, time stamps run ahead of the clock. No frame
-//! is lost where the reader is slow: a replay waits.
+//! frame comes when the clock shows its time stamp. At a speed other than 1, time stamps are as much
+//! closer together on the clock; as fast as it is read, they run ahead of it. No frame is lost if the
+//! reader is slow: a replay waits.
 
 mod description;
 mod faults;
@@ -20,7 +19,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use self::description::{controls, describe, rate};
+use self::description::{controls, describe, rate, stamp};
 use self::faults::FaultInjector;
 use self::source::{Delivery, Source, Taken};
 use self::timeline::{Moment, Timeline};
@@ -40,6 +39,7 @@ pub(super) struct ReplayCamera {
     delivery: Delivery,
     mode: GrantedMode,
     timeline: Timeline,
+    stamp: StampSource,
     controls: Vec<Control>,
     pace: Pace,
     repeat: bool,
@@ -113,6 +113,7 @@ impl ReplayCamera {
             delivery,
             mode,
             timeline,
+            stamp: manifest.map_or(StampSource::EndOfFrame, stamp),
             controls: manifest.map(controls).unwrap_or_default(),
             pace: Pace::new(speed, clock),
             repeat,
@@ -279,7 +280,7 @@ impl ReplayCamera {
                 unwrapped: moment.sequence,
             }),
             t_us,
-            stamp: StampSource::EndOfFrame,
+            stamp: self.stamp,
             flagged: taken.damaged,
         }
     }
@@ -294,8 +295,8 @@ impl Pace {
                 wait: false,
             },
             ReplaySpeed::Times(times) => Self {
-                stretch: clock.factor() / times,
                 clock,
+                stretch: times.recip(),
                 wait: true,
             },
         }

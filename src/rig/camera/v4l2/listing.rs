@@ -7,7 +7,7 @@ use relit_data::causes::with_causes;
 
 use super::ioctl::{Listed, Node};
 use super::{Camera as _, CameraError, V4l2Camera};
-use crate::camera::{CameraAddress, Capabilities, DeviceInfo, Fourcc, Mode, Rate, Rates, Sizes};
+use crate::camera::{CameraAddress, DeviceInfo, Fourcc, Mode, Rate, Rates, Sizes};
 
 /// Most entries that are read of a driver's list: a faulty driver must not list for ever.
 const MOST_ENTRIES: u32 = 256;
@@ -47,11 +47,6 @@ fn unreadable(path: PathBuf, error: &CameraError) -> DeviceInfo {
         bus: String::new(),
         modes: Vec::new(),
         other_formats: Vec::new(),
-        capabilities: Capabilities {
-            sequence: false,
-            driver_time: false,
-            controls: false,
-        },
         problems: vec![with_causes(error)],
     }
 }

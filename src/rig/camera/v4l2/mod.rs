@@ -17,8 +17,8 @@ use v4l::v4l_sys as sys;
 use self::ioctl::{Identity, Node};
 use self::stream::Stream;
 use super::{
-    Camera, CameraAddress, CameraError, Capabilities, Control, ControlId, DeviceInfo, Fourcc,
-    Frame, GrantedMode, Mode, ModeRequest,
+    Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
+    Mode, ModeRequest,
 };
 
 pub(super) use listing::list;
@@ -129,11 +129,6 @@ impl Device {
             bus: identity.bus,
             modes,
             other_formats,
-            capabilities: Capabilities {
-                sequence: true,
-                driver_time: true,
-                controls: true,
-            },
             problems,
         })
     }

@@ -6,7 +6,6 @@ mod tests;
 
 use super::error::{CaptureError, MeterFault};
 use super::locked_camera::{LockedCamera, NEXT_FRAME};
-use super::recording::RecordingError;
 use super::settings::Settings;
 use super::stop::StopRequest;
 use crate::camera::hold::{Aspect, ControlSetting};
@@ -47,14 +46,18 @@ pub(super) fn meter(
     let at = steps.iter().position(is_exposure);
     let at = at.ok_or(MeterFault::NoExposure)?;
     let step = steps[at].clone();
-    let fps = locked.fps();
+    let stream = locked.stream;
+    let (fps, decoder) = (
+        stream.fps,
+        LiveDecoder::new(stream.format, stream.width, stream.height),
+    );
     let range = exposure_range(&locked.controls, &step, fps).ok_or(MeterFault::NoExposure)?;
     let mut metering = MeteringLoop {
         camera: &mut *camera,
         stop,
         search: ExposureSearch::new(range, settings.meter_clip),
         step,
-        decoder: decoder_for(locked)?,
+        decoder: decoder.map_err(MeterFault::NoPicture)?,
         late: LATE_FRAMES,
     };
     metering.set_exposure()?;
@@ -83,13 +86,6 @@ fn exposure_range(controls: &[Control], step: &ControlSetting, fps: f64) -> Opti
         brightest: darkest.checked_add(steps.checked_mul(spacing)?)?,
         step: spacing,
     })
-}
-
-fn decoder_for(locked: &LockedCamera) -> Result<LiveDecoder, CaptureError> {
-    let mode = &locked.mode;
-    let format = mode.fourcc.pixel_format();
-    let format = format.ok_or(RecordingError::Format(mode.fourcc))?;
-    Ok(LiveDecoder::new(format, mode.width, mode.height).map_err(MeterFault::NoPicture)?)
 }
 
 /// Frames in, exposures out.
@@ -136,8 +132,7 @@ impl MeteringLoop<'_> {
             turn.state()?;
             let frame = self.camera.next_frame(NEXT_FRAME)?;
             if frame.t_us >= part.to_us {
-                let degrees = self.search.unseen();
-                return Err(MeterFault::Unseen { degrees }.into());
+                return Err(MeterFault::Unseen(self.search.unseen()).into());
             }
             let Some(clipped) = self.clipped(&frame) else {
                 continue;

@@ -151,9 +151,7 @@ mod tests {
             }
             angle += pace;
         }
-        Err(MeterFault::Unseen {
-            degrees: search.unseen(),
-        })
+        Err(MeterFault::Unseen(search.unseen()))
     }
 
     #[test]
@@ -187,7 +185,7 @@ mod tests {
     fn a_camera_with_few_frames_does_not_see_every_degree_and_is_reported() {
         assert!(matches!(
             meter(|_| 0.001, 7.0, 0),
-            Err(MeterFault::Unseen { degrees: 1.. })
+            Err(MeterFault::Unseen(1..))
         ));
     }
 

@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
+use relit_data::causes::with_causes;
+
 use super::*;
 use crate::camera::{
-    Capabilities, ControlFlags, ControlId, ControlKind, DeviceInfo, Fourcc, GrantedMode, MenuItem,
-    Mode, ModeRequest, Rate, Rates, Sequence, Sizes, StampSource,
+    ControlFlags, ControlId, ControlKind, DeviceInfo, Fourcc, GrantedMode, MenuItem, Mode,
+    ModeRequest, Rate, Rates, Sequence, Sizes, StampSource,
 };
 use crate::capture::preflight::ready_table;
 use crate::clock::Clock;
@@ -39,11 +41,6 @@ impl<'a> Scene<'a> {
             bus: String::new(),
             modes: Vec::new(),
             other_formats: Vec::new(),
-            capabilities: Capabilities {
-                sequence: true,
-                driver_time: true,
-                controls: true,
-            },
             problems: Vec::new(),
         };
         Self {
@@ -216,11 +213,7 @@ fn a_dark_scene_gets_the_brightest_exposure_that_a_frame_has_time_for() {
 #[test]
 fn a_scene_that_is_too_bright_at_the_darkest_exposure_is_reported() {
     let (found, ..) = metered(|_| 200.0);
-    let error = found.unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .contains("saturate at the darkest exposure (3)"),
-        "{error}"
-    );
+    let error = with_causes(&found.unwrap_err());
+    let words = "saturate at the darkest exposure (3)";
+    assert!(error.contains(words), "{error}");
 }

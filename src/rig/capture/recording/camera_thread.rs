@@ -5,11 +5,12 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{SendTimeoutError, Sender};
 
-use super::cutter::{Cutter, IsKey, TurnFrame};
-use super::outcome::{CameraOutcome, End, FrameIssue};
+use super::cutter::{Cutter, TurnFrame};
+use super::finding::Finding;
+use super::outcome::{CameraOutcome, End};
 use super::progress::Shared;
 use crate::camera::{Camera, CameraError, Frame, FrameFault};
-use relit_video::{PixelFormat, StreamFormat, is_key};
+use crate::preview::Preview;
 
 /// Longest wait for a frame in one go: how late a stop is noticed.
 const FRAME_WAIT: Duration = Duration::from_millis(100);
@@ -18,41 +19,23 @@ const LAST_WAIT: Duration = Duration::from_secs(4);
 
 /// A camera, and what has come of it so far.
 pub(super) struct CameraThread {
-    camera: Box<dyn Camera>,
+    pub(super) camera: Box<dyn Camera>,
+    /// Where every frame is shown.
+    pub(super) preview: Option<Preview>,
     /// Without a frame for so long the camera counts as failed.
-    stall: Duration,
+    pub(super) stall: Duration,
     /// How long a frame may wait for a place in the queue.
-    queue_wait: Duration,
-    queue: Sender<TurnFrame>,
-    shared: Arc<Shared>,
-    cutter: Cutter,
-    issues: Vec<(usize, FrameIssue)>,
+    pub(super) queue_wait: Duration,
+    pub(super) queue: Sender<TurnFrame>,
+    pub(super) shared: Arc<Shared>,
+    pub(super) cutter: Cutter,
+    pub(super) findings: Vec<Finding>,
 }
 
 impl CameraThread {
-    pub(super) fn new(
-        camera: Box<dyn Camera>,
-        stream: &StreamFormat,
-        stall: Duration,
-        queue_wait: Duration,
-        queue: Sender<TurnFrame>,
-        shared: Arc<Shared>,
-    ) -> Self {
-        let is_key = (stream.format == PixelFormat::H264).then_some(is_key as IsKey);
-        Self {
-            camera,
-            stall,
-            queue_wait,
-            queue,
-            shared,
-            cutter: Cutter::new(stream.fps, is_key),
-            issues: Vec::new(),
-        }
-    }
-
     /// Records until something ends it; gives the camera back, still started.
     pub(super) fn run(mut self) -> (Box<dyn Camera>, CameraOutcome) {
-        let mut last_us = self.shared.control.clock().now_us();
+        let mut last_us = self.shared.clock().now_us();
         let end = loop {
             if let Err(end) = self.step(&mut last_us) {
                 break end;
@@ -64,12 +47,11 @@ impl CameraThread {
             // A disk that refuses is the writer's to report.
             let _ = self.enqueue(frame, until);
         }
-        let control = &self.shared.control;
-        control.update(|control| control.progress.ended = true);
+        self.shared.update(|state| state.progress.ended = true);
         let outcome = CameraOutcome {
             end,
             count,
-            issues: self.issues,
+            findings: self.findings,
         };
         (self.camera, outcome)
     }
@@ -78,7 +60,7 @@ impl CameraThread {
     fn step(&mut self, last_us: &mut i64) -> Result<(), End> {
         self.obey()?;
         let frame = self.camera.next_frame(FRAME_WAIT.min(self.stall));
-        let now_us = self.shared.control.clock().now_us();
+        let now_us = self.shared.clock().now_us();
         match frame {
             Ok(frame) => {
                 *last_us = now_us;
@@ -99,8 +81,8 @@ impl CameraThread {
     /// Does what the owner wants.
     fn obey(&mut self) -> Result<(), End> {
         let (stop, window) = {
-            let control = self.shared.control.lock();
-            (control.stop, control.window)
+            let state = self.shared.lock();
+            (state.stop, state.window)
         };
         match window {
             _ if stop => Err(End::Stopped),
@@ -117,7 +99,7 @@ impl CameraThread {
             return Err(End::OtherSize(fault));
         }
         let frame = Arc::new(frame);
-        if let Some(preview) = &self.shared.preview {
+        if let Some(preview) = &self.preview {
             preview.publish(&frame);
         }
         let frames = self.cutter.push(frame);
@@ -137,19 +119,21 @@ impl CameraThread {
     /// Queues a frame as soon as there is a place before `until`, and notes what is wrong with it.
     fn enqueue(&mut self, frame: TurnFrame, until: Instant) -> Result<(), End> {
         let (delivered, fault) = (frame.delivered, frame.frame.fault());
-        let issue = if frame.frame.data.is_empty() {
-            Some(FrameIssue::Unusable)
+        let finding = if frame.frame.data.is_empty() {
+            delivered.map(Finding::Unusable)
         } else {
             match self.queue.send_deadline(frame, until) {
-                Ok(()) => fault.map(FrameIssue::Damaged),
+                Ok(()) => delivered
+                    .zip(fault)
+                    .map(|(at, fault)| Finding::Damaged(at, fault)),
                 Err(SendTimeoutError::Timeout(_)) => {
-                    self.shared.control.lock().progress.overrun += 1;
-                    Some(FrameIssue::QueueFull)
+                    self.shared.lock().progress.overrun += 1;
+                    delivered.map(Finding::QueueFull)
                 }
                 Err(SendTimeoutError::Disconnected(_)) => return Err(End::Disk),
             }
         };
-        self.issues.extend(delivered.zip(issue));
+        self.findings.extend(finding);
         Ok(())
     }
 }

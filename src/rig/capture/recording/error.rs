@@ -3,7 +3,6 @@
 use std::io;
 use std::path::PathBuf;
 
-use crate::camera::Fourcc;
 use relit_data::session;
 use relit_video::VideoError;
 
@@ -11,14 +10,6 @@ use relit_video::VideoError;
 /// such error: see [`super::End`].
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
-    /// The camera delivers a format that cannot be recorded.
-    #[error(
-        "{0} frames cannot be recorded: choose MJPG, H264, YUYV, NV12, RGB3, GREY or 8-bit Bayer"
-    )]
-    Format(Fourcc),
-    /// The camera's rate is not known, and none was given.
-    #[error("{0} frames/s is no rate to record at: give the camera's frame rate")]
-    Rate(f64),
     /// The system refused a thread.
     #[error("a thread for the {what} could not be started: close other programs")]
     Thread {

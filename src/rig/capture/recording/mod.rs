@@ -16,11 +16,12 @@
 mod camera_thread;
 mod cutter;
 mod error;
+mod finding;
 mod outcome;
 mod progress;
 mod recorder;
 mod salvage;
-pub mod timing;
+mod timing;
 mod verdict;
 mod window;
 mod writer_thread;

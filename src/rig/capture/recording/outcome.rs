@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::cutter::TurnCount;
 use super::error::RecordingError;
+use super::finding::Finding;
 use crate::camera::{CameraError, FrameFault};
 use relit_data::session::SessionWriter;
 
@@ -39,43 +40,12 @@ pub enum End {
     Interrupted(String),
 }
 
-/// Why a delivered frame of the turn is not in the video as it should be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum FrameIssue {
-    /// It was dropped, as the disk was too slow.
-    QueueFull,
-    /// It could not be recorded: empty, or before any key frame.
-    Unusable,
-    /// It was recorded as it came.
-    Damaged(FrameFault),
-}
-
-impl FrameIssue {
-    /// Whether the frame is not in the video.
-    pub(super) fn is_loss(self) -> bool {
-        !matches!(self, Self::Damaged(_))
-    }
-
-    /// In words; `n`: the frame of the video that it is about, or that comes next.
-    pub(super) fn at(self, n: usize) -> String {
-        match self {
-            Self::QueueFull => {
-                format!("the disk was too slow: a frame was dropped before frame {n}")
-            }
-            Self::Unusable => format!(
-                "a frame before frame {n} could not be recorded: it was empty, or no key frame came before it"
-            ),
-            Self::Damaged(fault) => format!("frame {n} is damaged: {fault}"),
-        }
-    }
-}
-
 /// What the camera's thread leaves.
 pub(super) struct CameraOutcome {
     pub(super) end: End,
     pub(super) count: TurnCount,
-    /// By index among the delivered frames of the turn.
-    pub(super) issues: Vec<(usize, FrameIssue)>,
+    /// What is wrong with delivered frames.
+    pub(super) findings: Vec<Finding>,
 }
 
 /// What the writer's thread leaves.
@@ -84,8 +54,8 @@ pub(super) struct WriterOutcome {
     /// For each frame of the video its index among the delivered frames of the turn; `None` before
     /// the turn.
     pub(super) delivered: Vec<Option<usize>>,
-    /// Delivered frames that were left out, as no key frame came before them.
-    pub(super) left_out: Vec<usize>,
+    /// What is wrong with delivered frames.
+    pub(super) findings: Vec<Finding>,
     /// Bytes of video.
     pub(super) bytes: u64,
     /// What the disk refused.

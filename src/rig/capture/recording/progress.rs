@@ -1,8 +1,7 @@
 //! What a recording's owner and its two threads share: wishes one way, figures the other.
 
 use super::window::Window;
-use crate::clock::{Clock, Waitable};
-use crate::preview::Preview;
+use crate::clock::Waitable;
 
 /// How far a recording has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -17,7 +16,7 @@ pub struct Progress {
 
 /// What the owner wants, and how far the threads are.
 #[derive(Debug, Default)]
-pub(super) struct Control {
+pub(super) struct State {
     /// When the turn is, once that is known.
     pub(super) window: Option<Window>,
     /// Whether the recording is to stop.
@@ -25,23 +24,5 @@ pub(super) struct Control {
     pub(super) progress: Progress,
 }
 
-/// Shared by the owner and the threads.
-#[derive(Debug)]
-pub(super) struct Shared {
-    pub(super) preview: Option<Preview>,
-    /// Locked for moments only: the camera's thread looks at it between two frames.
-    pub(super) control: Waitable<Control>,
-}
-
-impl Shared {
-    pub(super) fn new(clock: &Clock, preview: Option<Preview>, window: Option<Window>) -> Self {
-        let control = Control {
-            window,
-            ..Control::default()
-        };
-        Self {
-            preview,
-            control: Waitable::new(clock, control),
-        }
-    }
-}
+/// Locked for moments only: the camera's thread looks at it between two frames.
+pub(super) type Shared = Waitable<State>;

@@ -1,22 +1,23 @@
 //! Recording one turn: a thread that reads the camera, a bounded queue, and a thread that writes.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
 use super::camera_thread::CameraThread;
+use super::cutter::{Cutter, IsKey};
 use super::error::RecordingError;
 use super::outcome::{CameraOutcome, WriterOutcome};
-use super::progress::{Progress, Shared};
+use super::progress::{Progress, Shared, State};
 use super::verdict::Recorded;
 use super::window::Window;
 use super::writer_thread::WriterThread;
-use crate::camera::{Camera, GrantedMode};
+use crate::camera::Camera;
 use crate::clock::{Clock, JoinHandle};
 use crate::preview::Preview;
 use relit_data::session::{Fault, Manifest, SessionWriter};
-use relit_video::{PixelFormat, StreamFormat};
+use relit_video::{Muxer, PixelFormat, StreamFormat, is_key};
 
 /// Name of the video in a session folder.
 const VIDEO_FILE: &str = "video.mkv";
@@ -30,12 +31,10 @@ const QUEUE_FRAMES: (usize, usize) = (8, 256);
 pub struct Plan {
     /// The folder of sessions.
     pub root: PathBuf,
-    /// What is known of the session at its start. Format, size, rate and video are filled in.
+    /// What is known of the session at its start. The video's file and codec are filled in.
     pub manifest: Manifest,
     /// What the camera delivers since it was started.
-    pub mode: GrantedMode,
-    /// Frames a second; where the camera does not say, as asked for.
-    pub fps: f64,
+    pub stream: StreamFormat,
     /// When the turn is, where that is known in advance: see [`Recorder::announce`].
     pub window: Option<Window>,
     /// Dropped or damaged frames up to which a take is accepted.
@@ -57,7 +56,6 @@ type WriterHandle = thread::JoinHandle<WriterOutcome>;
 /// A recording under way. Dropped, it is asked to stop, and its session is left to be salvaged.
 pub struct Recorder {
     shared: Arc<Shared>,
-    folder: PathBuf,
     threads: Option<(CameraHandle, WriterHandle)>,
     max_dropped: u64,
 }
@@ -66,39 +64,47 @@ impl Recorder {
     /// Makes the session's folder and begins to take frames of a camera that was started.
     ///
     /// # Errors
-    /// [`RecordingError::Format`], [`RecordingError::Rate`], [`RecordingError::Thread`], or what
-    /// making the session's folder and video answers.
+    /// [`RecordingError::Thread`], or what making the session's folder and video answers.
     pub fn start(camera: Box<dyn Camera>, plan: Plan) -> Result<Self, RecordingError> {
-        if !(plan.fps.is_finite() && plan.fps > 0.0) {
-            return Err(RecordingError::Rate(plan.fps));
-        }
-        let fourcc = plan.mode.fourcc;
-        let format = fourcc.pixel_format();
-        let stream = StreamFormat {
-            format: format.ok_or(RecordingError::Format(fourcc))?,
-            width: plan.mode.width,
-            height: plan.mode.height,
-            fps: plan.fps,
-        };
-        let mut manifest = plan.manifest;
-        fill_in(&mut manifest, &stream, &plan.mode);
-        let session = SessionWriter::create(&plan.root, manifest)?;
-        let folder = session.folder().to_owned();
-        let shared = Arc::new(Shared::new(&plan.clock, plan.preview, plan.window));
+        let (clock, stream) = (plan.clock, plan.stream);
+        let session = SessionWriter::create(&plan.root, with_video(plan.manifest, &stream))?;
+        let shared = Arc::new(Shared::new(
+            &clock,
+            State {
+                window: plan.window,
+                ..State::default()
+            },
+        ));
         let (sender, queue) = crossbeam_channel::bounded(queue_places(&stream));
-        let writer = WriterThread::new(stream, session, queue, Arc::clone(&shared))?;
-        let (stall, wait) = (plan.stall, plan.queue_wait);
-        let camera = CameraThread::new(camera, &stream, stall, wait, sender, Arc::clone(&shared));
+        let writer = WriterThread {
+            stream,
+            muxer: Muxer::create(&session.video_path(), stream)?,
+            session,
+            delivered: Vec::new(),
+            findings: Vec::new(),
+            queue,
+            shared: Arc::clone(&shared),
+        };
+        let is_key = (stream.format == PixelFormat::H264).then_some(is_key as IsKey);
+        let camera = CameraThread {
+            camera,
+            preview: plan.preview,
+            stall: plan.stall,
+            queue_wait: plan.queue_wait,
+            queue: sender,
+            shared: Arc::clone(&shared),
+            cutter: Cutter::new(stream.fps, is_key),
+            findings: Vec::new(),
+        };
         // The disk goes by real time: only the camera's thread takes part in the clock.
         let refused = |what| move |source| RecordingError::Thread { what, source };
         let thread = thread::Builder::new().name("relit-writer".to_owned());
         let writer = thread.spawn(move || writer.run());
         let writer = writer.map_err(refused("writer"))?;
-        let camera = plan.clock.spawn("relit-camera", move || camera.run());
+        let camera = clock.spawn("relit-camera", move || camera.run());
         let camera = camera.map_err(refused("camera"))?;
         Ok(Self {
             shared,
-            folder,
             threads: Some((camera, writer)),
             max_dropped: plan.max_dropped,
         })
@@ -107,32 +113,25 @@ impl Recorder {
     /// Sets when the turn is. It may have begun up to four seconds ago: so long frames are kept.
     /// Only the first window counts.
     pub fn announce(&self, window: Window) {
-        self.shared.control.lock().window.get_or_insert(window);
+        self.shared.lock().window.get_or_insert(window);
     }
 
     /// Asks the recording to stop, and returns at once.
     pub fn stop(&self) {
-        self.shared.control.lock().stop = true;
-    }
-
-    /// The session folder.
-    #[must_use]
-    pub fn folder(&self) -> &Path {
-        &self.folder
+        self.shared.lock().stop = true;
     }
 
     /// Waits until nothing more is recorded, or `timeout` is over; true where it has ended.
     #[must_use]
     pub fn wait_ended(&self, timeout: Duration) -> bool {
-        let control = &self.shared.control;
-        let ended = control.wait_for(timeout, |control| control.progress.ended.then_some(()));
-        ended.is_some()
+        let ended = |state: &mut State| state.progress.ended.then_some(());
+        self.shared.wait_for(timeout, ended).is_some()
     }
 
     /// How far it has come.
     #[must_use]
     pub fn progress(&self) -> Progress {
-        self.shared.control.lock().progress
+        self.shared.lock().progress
     }
 
     /// Waits until the turn is over, something ends the recording, or it is stopped; gives the
@@ -145,7 +144,12 @@ impl Recorder {
         let (camera, writer) = self.threads.take().ok_or(panicked("recorder"))?;
         let (camera, filmed) = camera.join().map_err(|_| panicked("camera"))?;
         let written = writer.join().map_err(|_| panicked("writer"))?;
-        Ok((camera, Recorded::new(filmed, written, self.max_dropped)))
+        let recorded = Recorded {
+            camera: filmed,
+            writer: written,
+            max_dropped: self.max_dropped,
+        };
+        Ok((camera, recorded))
     }
 }
 
@@ -163,18 +167,13 @@ fn queue_places(stream: &StreamFormat) -> usize {
     (QUEUE_BYTES / uncompressed.unwrap_or(pixels).max(1)).clamp(fewest, most)
 }
 
-/// What the stream makes known of the session.
-fn fill_in(manifest: &mut Manifest, stream: &StreamFormat, mode: &GrantedMode) {
-    manifest.camera.fourcc = mode.fourcc.to_string();
-    manifest.camera.width = stream.width;
-    manifest.camera.height = stream.height;
-    manifest.camera.fps = stream.fps;
+/// The manifest with what the stream makes known of the video.
+fn with_video(mut manifest: Manifest, stream: &StreamFormat) -> Manifest {
     manifest.video.file = VIDEO_FILE.to_owned();
     manifest.video.codec = stream.format.codec().to_owned();
     if let PixelFormat::Bayer(colours) = stream.format {
-        manifest.faults.push(Fault {
-            t_us: 0,
-            what: format!("the sensor's mosaic ({colours}) is kept as a grey picture"),
-        });
+        let what = format!("the sensor's mosaic ({colours}) is kept as a grey picture");
+        manifest.faults.push(Fault { t_us: 0, what });
     }
+    manifest
 }

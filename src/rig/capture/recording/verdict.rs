@@ -1,12 +1,11 @@
 //! What a take is worth, and closing its session.
 
-use std::mem::discriminant;
-
 use super::cutter::TurnCount;
 use super::error::RecordingError;
-use super::outcome::{CameraOutcome, End, FrameIssue, WriterOutcome};
+use super::finding::{Finding, frames};
+use super::outcome::{CameraOutcome, End, WriterOutcome};
 use super::salvage::whole_frames;
-use super::timing::{Evidence, TimingAnomaly};
+use super::timing::TimingAnomaly;
 use crate::state::{TakeSummary, Verdict};
 use relit_data::causes::with_causes;
 use relit_data::session::{Fault, FrameEntry};
@@ -18,20 +17,12 @@ const MOST_LISTED: usize = 40;
 
 /// A recording that has ended, and whose session is not closed yet.
 pub struct Recorded {
-    camera: CameraOutcome,
-    writer: WriterOutcome,
-    max_dropped: u64,
+    pub(super) camera: CameraOutcome,
+    pub(super) writer: WriterOutcome,
+    pub(super) max_dropped: u64,
 }
 
 impl Recorded {
-    pub(super) fn new(camera: CameraOutcome, writer: WriterOutcome, max_dropped: u64) -> Self {
-        Self {
-            camera,
-            writer,
-            max_dropped,
-        }
-    }
-
     /// Why it ended.
     #[must_use]
     pub fn end(&self) -> &End {
@@ -62,31 +53,19 @@ impl Recorded {
             let frames = session.index().entries().len();
             self.writer.delivered.truncate(frames);
         }
-        let issues = self.issues();
-        let losses = issues.iter().filter(|(_, issue)| issue.is_loss()).count();
-        let lost = self.camera.count.missing_count() + losses as u64;
-        let damaged = (issues.len() - losses) as u64;
-        let faults = self.faults(&issues, control_faults);
-        let (verdict, reason) = match self.rejection(lost, damaged, &issues, control_faults) {
-            Some(reason) => (Verdict::Aborted, Some(reason)),
-            None if faults.is_empty() => (Verdict::Clean, None),
-            None => (
-                Verdict::Tolerated,
-                faults.first().map(|fault| fault.what.clone()),
-            ),
+        let findings = self.findings(control_faults);
+        let mut faults = self.faults(&findings);
+        let first = faults.first().map(|fault| fault.what.clone());
+        let (verdict, reason) = match (self.rejection(&findings), first) {
+            (Some(reason), _) => (Verdict::Aborted, Some(reason)),
+            (None, Some(first)) => (Verdict::Tolerated, Some(first)),
+            (None, None) => (Verdict::Clean, None),
         };
-        let note = self.lead_note();
+        faults.splice(0..0, self.lead_note());
         let (frames, count) = (self.recorded(), &self.camera.count);
-        let WriterOutcome {
-            mut session,
-            delivered,
-            ..
-        } = self.writer;
+        let (mut session, delivered) = (self.writer.session, self.writer.delivered);
         session.amend(|entry| amended(entry, count, &delivered, angle))?;
-        session
-            .manifest_mut()
-            .faults
-            .extend(note.into_iter().chain(faults));
+        session.manifest_mut().faults.extend(faults);
         let manifest = match (verdict, &reason) {
             (Verdict::Aborted, Some(reason)) => session.abort(reason)?,
             _ => session.finish()?,
@@ -95,7 +74,7 @@ impl Recorded {
             session: manifest.id,
             verdict,
             frames,
-            dropped: lost,
+            dropped: lost(&findings),
             reason,
         })
     }
@@ -105,90 +84,81 @@ impl Recorded {
         self.writer.delivered.iter().flatten().count() as u64
     }
 
-    /// What is wrong with delivered frames, by kind and then by frame. Frames that came after the
-    /// turn's last exposure do not count.
-    fn issues(&self) -> Vec<(usize, FrameIssue)> {
-        let left_out = self.writer.left_out.iter();
-        let left_out = left_out.map(|&delivered| (delivered, FrameIssue::Unusable));
-        let issues = self.camera.issues.iter().copied().chain(left_out);
-        let frames = self.camera.count.exposures.len();
-        let mut issues: Vec<_> = issues.filter(|&(at, _)| at < frames).collect();
-        let kind = |issue| match issue {
-            FrameIssue::QueueFull => 0,
-            FrameIssue::Unusable => 1,
-            FrameIssue::Damaged(_) => 2,
-        };
-        issues.sort_by_key(|&(at, issue)| (kind(issue), at));
-        issues
-    }
-
-    /// Why the take cannot be used; `None` where it can.
-    fn rejection(
-        &self,
-        lost: u64,
-        damaged: u64,
-        issues: &[(usize, FrameIssue)],
-        control_faults: &[String],
-    ) -> Option<String> {
+    /// What is wrong with the take, by kind and then by frame. Frames that came after the turn's
+    /// last exposure do not count.
+    fn findings(&self, control_faults: &[String]) -> Vec<Finding> {
         let TurnCount {
-            expected,
+            exposures,
             missing,
             anomalies,
             ..
         } = &self.camera.count;
+        let of_turn = |finding: &&Finding| finding.place().1 < Some(exposures.len());
+        let of_frames = self.camera.findings.iter().chain(&self.writer.findings);
+        let mut findings: Vec<Finding> = of_frames.filter(of_turn).cloned().collect();
+        findings.extend(missing.iter().copied().map(Finding::Missing));
+        findings.extend(anomalies.iter().copied().map(Finding::Anomaly));
+        findings.extend(control_faults.iter().cloned().map(Finding::Settings));
+        findings.sort_by_key(Finding::place);
+        findings
+    }
+
+    /// Why the take cannot be used; `None` where it can.
+    fn rejection(&self, findings: &[Finding]) -> Option<String> {
         if let Some(failure) = &self.writer.failure {
             return Some(self.disk_failure(failure));
         }
+        let TurnCount {
+            expected, missing, ..
+        } = &self.camera.count;
         // A recording that ended early, but after the turn's last frame, is whole.
         let last = missing.last().map(|last| last.exposure + last.count);
         let whole = *expected > 0 && last.is_none_or(|end| end < *expected);
-        let end = with_causes(&self.camera.end);
-        match self.camera.end {
-            End::Over => {}
-            End::Interrupted(_) => return Some(self.ended_early(&end)),
-            _ if !whole => return Some(self.ended_early(&end)),
-            _ => {}
+        let early = match self.camera.end {
+            End::Over => false,
+            End::Interrupted(_) => true,
+            _ => !whole,
+        };
+        if early {
+            let end = with_causes(&self.camera.end);
+            return Some(match expected {
+                0 => format!("{end}; the turn had not begun"),
+                all => format!("{end}; {} of {all} frames are there", self.recorded()),
+            });
         }
-        if let Some(fault) = control_faults.first() {
-            return Some(fault.clone());
-        }
-        let is_rate = |anomaly: &&TimingAnomaly| matches!(anomaly, TimingAnomaly::Rate { .. });
-        if let Some(rate) = anomalies.iter().find(is_rate) {
-            return Some(rate.to_string());
-        }
-        (lost + damaged > self.max_dropped).then(|| self.too_many(lost, damaged, issues))
+        let decisive = findings.iter().find(|finding| {
+            matches!(
+                finding,
+                Finding::Settings(_) | Finding::Anomaly(TimingAnomaly::Rate { .. })
+            )
+        });
+        decisive
+            .map(|finding| finding.text(0))
+            .or_else(|| self.too_many(findings))
     }
 
-    fn ended_early(&self, end: &str) -> String {
-        match self.camera.count.expected {
-            0 => format!("{end}; the turn had not begun"),
-            all => format!("{end}; {} of {all} frames are there", self.recorded()),
-        }
-    }
-
-    fn too_many(&self, lost: u64, damaged: u64, issues: &[(usize, FrameIssue)]) -> String {
-        let mut parts = Vec::new();
+    /// Which frames are lost or damaged, where they are more than allowed.
+    fn too_many(&self, findings: &[Finding]) -> Option<String> {
+        let count = |is: fn(&Finding) -> bool| findings.iter().filter(|it| is(it)).count() as u64;
+        let lost = lost(findings);
+        let damaged = count(|finding| matches!(finding, Finding::Damaged(..)));
+        let slow = count(|finding| matches!(finding, Finding::QueueFull(_)));
+        let mut found = String::new();
         if lost > 0 {
-            let mut part = format!("{} lost", frames(lost));
-            if let Some(first) = self.camera.count.missing.first() {
-                part += &format!(" (the camera dropped exposure {} first)", first.exposure);
-            }
-            let slow = issues
-                .iter()
-                .filter(|(_, issue)| *issue == FrameIssue::QueueFull);
-            match slow.count() as u64 {
-                0 => {}
-                slow => {
-                    part += &format!(", {} of them because the disk was too slow", frames(slow))
-                }
-            }
-            parts.push(part);
+            found = format!("{} lost", frames(lost));
+        }
+        if let Some(first) = self.camera.count.missing.first() {
+            found += &format!(" (the camera dropped exposure {} first)", first.exposure);
+        }
+        if slow > 0 {
+            found += &format!(", {} of them because the disk was too slow", frames(slow));
         }
         if damaged > 0 {
-            parts.push(format!("{} damaged", frames(damaged)));
+            let and = if lost > 0 { " and " } else { "" };
+            found += &format!("{and}{} damaged", frames(damaged));
         }
-        let found = parts.join(" and ");
-        format!("{found}, where {} are allowed", self.max_dropped)
+        let most = self.max_dropped;
+        (lost + damaged > most).then(|| format!("{found}, where {most} are allowed"))
     }
 
     /// Why the disk took no more, and how much more the turn would have needed.
@@ -215,57 +185,44 @@ impl Recorded {
     fn lead_note(&self) -> Option<Fault> {
         let first = self.writer.session.index().entries().first()?;
         let lead = lead_of(&self.writer.delivered);
+        let frames = frames(lead);
         (lead > 0).then(|| Fault {
             t_us: first.t_us,
-            what: format!(
-                "{} before the turn are in the video, as its frames build on them",
-                frames(lead)
-            ),
+            what: format!("{frames} before the turn are in the video, as its frames build on them"),
         })
     }
 
-    /// What is wrong with the take, in order of kind and place.
-    fn faults(&self, issues: &[(usize, FrameIssue)], control_faults: &[String]) -> Vec<Fault> {
+    /// The findings as the manifest lists them: only the first of a kind, if they are many.
+    fn faults(&self, findings: &[Finding]) -> Vec<Fault> {
         let entries = self.writer.session.index().entries();
         let last_us = entries.last().map_or(0, |entry| entry.t_us);
-        let fault = |t_us, what| Fault { t_us, what };
-        // The frame of the video that is the delivered one, or comes after it.
-        let frame_at = |delivered: usize| {
-            let mut frames = self.writer.delivered.iter();
-            let found = frames.position(|&at| at >= Some(delivered));
-            found.unwrap_or(entries.len())
+        let fault = |finding: &Finding| {
+            let (_, place) = finding.place();
+            let mut delivered = self.writer.delivered.iter();
+            let n = place.and_then(|_| delivered.position(|&at| at >= place));
+            let n = n.unwrap_or(entries.len());
+            Fault {
+                t_us: entries.get(n).map_or(last_us, |entry| entry.t_us),
+                what: finding.text(n),
+            }
         };
-        let time_of = |n: usize| entries.get(n).map_or(last_us, |entry| entry.t_us);
-        let count = &self.camera.count;
-        let missing = count.missing.iter().map(|missing| {
-            let (n, frames) = (frame_at(missing.before), frames(missing.count));
-            let evidence = in_words(missing.evidence);
-            fault(
-                time_of(n),
-                format!("{frames} missing before frame {n}, {evidence}"),
-            )
-        });
-        let mut faults = first_of(missing, last_us);
-        for issues in
-            issues.chunk_by(|(_, one), (_, other)| discriminant(one) == discriminant(other))
-        {
-            let of_kind = issues.iter().map(|&(delivered, issue)| {
-                let n = frame_at(delivered);
-                fault(time_of(n), issue.at(n))
-            });
-            faults.extend(first_of(of_kind, last_us));
+        let mut faults = Vec::new();
+        for kind in findings.chunk_by(|one, other| one.place().0 == other.place().0) {
+            faults.extend(kind.iter().take(MOST_LISTED).map(fault));
+            if kind.len() > MOST_LISTED {
+                let what = format!("and {} more of this kind", kind.len() - MOST_LISTED);
+                faults.push(Fault {
+                    t_us: last_us,
+                    what,
+                });
+            }
         }
-        let anomalies = count
-            .anomalies
-            .iter()
-            .map(|anomaly| fault(last_us, anomaly.to_string()));
-        faults.extend(first_of(anomalies, last_us));
-        let controls = control_faults
-            .iter()
-            .map(|what| fault(last_us, what.clone()));
-        faults.extend(first_of(controls, last_us));
         faults
     }
+}
+
+fn lost(findings: &[Finding]) -> u64 {
+    findings.iter().map(Finding::lost).sum()
 }
 
 /// A frame's entry with its angle, and with the number of its exposure where the driver's counter
@@ -294,34 +251,4 @@ fn amended(
 /// Frames of the video before the turn.
 fn lead_of(delivered: &[Option<usize>]) -> u64 {
     delivered.iter().take_while(|at| at.is_none()).count() as u64
-}
-
-/// Faults of one kind; only the first of them if they are many.
-fn first_of(kind: impl ExactSizeIterator<Item = Fault>, last_us: i64) -> Vec<Fault> {
-    let more = kind.len().saturating_sub(MOST_LISTED);
-    let mut faults: Vec<Fault> = kind.take(MOST_LISTED).collect();
-    if more > 0 {
-        let what = format!("and {more} more of this kind");
-        faults.push(Fault {
-            t_us: last_us,
-            what,
-        });
-    }
-    faults
-}
-
-fn in_words(evidence: Evidence) -> &'static str {
-    match evidence {
-        Evidence::Both => "by the driver's counter and the time stamps",
-        Evidence::Counter => "by the driver's counter",
-        Evidence::Time => "by the time stamps",
-        Evidence::TimeAgainstCounter => "by the time stamps, though the driver did not count them",
-    }
-}
-
-fn frames(count: u64) -> String {
-    match count {
-        1 => "1 frame".to_owned(),
-        _ => format!("{count} frames"),
-    }
 }

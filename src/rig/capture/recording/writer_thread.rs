@@ -8,6 +8,7 @@ use crossbeam_channel::{Receiver, RecvTimeoutError};
 
 use super::cutter::TurnFrame;
 use super::error::RecordingError;
+use super::finding::Finding;
 use super::outcome::WriterOutcome;
 use super::progress::Shared;
 use relit_data::session::{FrameEntry, SessionWriter};
@@ -19,33 +20,16 @@ const SYNC_EVERY: Duration = Duration::from_millis(400);
 
 /// Video and session being written.
 pub(super) struct WriterThread {
-    stream: StreamFormat,
-    muxer: Muxer,
-    session: SessionWriter,
-    delivered: Vec<Option<usize>>,
-    left_out: Vec<usize>,
-    queue: Receiver<TurnFrame>,
-    shared: Arc<Shared>,
+    pub(super) stream: StreamFormat,
+    pub(super) muxer: Muxer,
+    pub(super) session: SessionWriter,
+    pub(super) delivered: Vec<Option<usize>>,
+    pub(super) findings: Vec<Finding>,
+    pub(super) queue: Receiver<TurnFrame>,
+    pub(super) shared: Arc<Shared>,
 }
 
 impl WriterThread {
-    pub(super) fn new(
-        stream: StreamFormat,
-        session: SessionWriter,
-        queue: Receiver<TurnFrame>,
-        shared: Arc<Shared>,
-    ) -> Result<Self, RecordingError> {
-        Ok(Self {
-            stream,
-            muxer: Muxer::create(&session.video_path(), stream)?,
-            session,
-            delivered: Vec::new(),
-            left_out: Vec::new(),
-            queue,
-            shared,
-        })
-    }
-
     /// Writes what is queued until no more comes, or the disk refuses.
     pub(super) fn run(mut self) -> WriterOutcome {
         let written = self.write_all();
@@ -54,7 +38,7 @@ impl WriterThread {
         WriterOutcome {
             session: self.session,
             delivered: self.delivered,
-            left_out: self.left_out,
+            findings: self.findings,
             bytes,
             failure: written.and(finished.map_err(RecordingError::from)).err(),
         }
@@ -68,7 +52,7 @@ impl WriterThread {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
-            self.shared.control.lock().progress.frames = self.muxer.frames();
+            self.shared.lock().progress.frames = self.muxer.frames();
             if Instant::now() >= due {
                 self.muxer.sync()?;
                 self.session.sync()?;
@@ -84,7 +68,8 @@ impl WriterThread {
             None => self.muxer.write(&frame.data, frame.t_us)?,
         };
         if written == Written::BeforeKeyFrame {
-            self.left_out.extend(turn_frame.delivered);
+            let left_out = turn_frame.delivered.map(Finding::Unusable);
+            self.findings.extend(left_out);
             return Ok(());
         }
         // The index has to grow, whatever the driver's counter and time stamps do.

@@ -47,11 +47,6 @@ pub(super) struct TurnCount {
 }
 
 impl TurnCount {
-    /// How many exposures the camera did not deliver.
-    pub(super) fn missing_count(&self) -> u64 {
-        self.missing.iter().map(|missing| missing.count).sum()
-    }
-
     fn without_frames(expected: u64) -> Self {
         Self {
             expected,

@@ -20,6 +20,11 @@ fn cut(frames: impl Iterator<Item = Frame>, window: Window, at: usize) -> (Vec<i
     (selected.iter().map(number).collect(), count)
 }
 
+/// How many exposures were not delivered.
+fn missing(count: &TurnCount) -> u64 {
+    count.missing.iter().map(|missing| missing.count).sum()
+}
+
 fn frames(numbers: impl Iterator<Item = u64>) -> impl Iterator<Item = Frame> {
     numbers.map(|n| {
         let mut frame = frame(n);
@@ -37,7 +42,7 @@ fn fifty_seconds_at_thirty_frames_a_second_are_1500_frames() {
     for at in [0, 40] {
         let (selected, count) = cut(frames(0..1600), seconds(1.01, 51.01), at);
         assert_eq!(selected, (31..1531).collect::<Vec<_>>());
-        assert_eq!((count.expected, count.missing_count()), (1500, 0));
+        assert_eq!((count.expected, missing(&count)), (1500, 0));
         assert!(count.anomalies.is_empty());
     }
 }
@@ -46,7 +51,7 @@ fn fifty_seconds_at_thirty_frames_a_second_are_1500_frames() {
 fn a_stream_that_ends_with_the_turn_is_whole() {
     let (selected, count) = cut(frames(0..1500), seconds(0.0, 50.0), 0);
     assert_eq!(selected.len(), 1500);
-    assert_eq!((count.expected, count.missing_count()), (1500, 0));
+    assert_eq!((count.expected, missing(&count)), (1500, 0));
 }
 
 #[test]
@@ -68,15 +73,15 @@ fn a_turn_that_is_announced_too_late_lacks_its_begin() {
     assert_eq!(count.expected, 300);
     assert_eq!(count.exposures.len(), selected.len());
     assert_eq!(count.missing[0].before, 0);
-    assert_eq!(count.missing_count(), 300 - selected.len() as u64);
-    assert!(count.missing_count() > 40);
+    assert_eq!(missing(&count), 300 - selected.len() as u64);
+    assert!(missing(&count) > 40);
 }
 
 #[test]
 fn a_stream_that_breaks_off_lacks_the_rest() {
     let (selected, count) = cut(frames(0..130), seconds(0.99, 10.99), 0);
     assert_eq!(selected.len(), 100);
-    assert_eq!(count.missing_count(), 200);
+    assert_eq!(missing(&count), 200);
     assert_eq!(count.missing.last().unwrap().before, 100);
 }
 
@@ -84,7 +89,7 @@ fn a_stream_that_breaks_off_lacks_the_rest() {
 fn without_any_frame_all_of_the_turn_is_missing() {
     let (selected, count) = cut(frames(0..3), seconds(5.0, 15.0), 0);
     assert!(selected.is_empty());
-    assert_eq!((count.expected, count.missing_count()), (300, 300));
+    assert_eq!((count.expected, missing(&count)), (300, 300));
 }
 
 #[test]
@@ -122,7 +127,7 @@ fn a_chain_is_kept_from_its_key_frame_on_however_long_ago_that_was() {
     }
     let (rest, count) = cutter.end();
     selected.extend(rest);
-    assert_eq!((count.expected, count.missing_count()), (60, 0));
+    assert_eq!((count.expected, missing(&count)), (60, 0));
     assert_eq!(selected[0].frame.data, [1]);
     // From frame 250 on, before frame 451.
     assert_eq!(selected.len(), 201 + 60);
@@ -146,7 +151,7 @@ proptest! {
             frame
         });
         let (selected, count) = cut(stream, window, 0);
-        prop_assert_eq!((count.expected, count.missing_count()), (600, 0), "{:?}", count.missing);
+        prop_assert_eq!((count.expected, missing(&count)), (600, 0), "{:?}", count.missing);
         prop_assert_eq!(selected.len(), 600);
     }
 }

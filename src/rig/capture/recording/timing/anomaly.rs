@@ -2,7 +2,7 @@
 
 /// An inconsistency in a stream's counter or time stamps.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum TimingAnomaly {
+pub(crate) enum TimingAnomaly {
     /// Counter and time stamps disagree on what lies between two frames.
     #[error(
         "before frame {before} the driver's counter grows by {counted} and the time stamps by {timed} frames"

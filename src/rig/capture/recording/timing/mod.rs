@@ -14,7 +14,7 @@ mod line;
 mod numbering;
 mod period_fit;
 
-pub use anomaly::TimingAnomaly;
+pub(crate) use anomaly::TimingAnomaly;
 use line::FARTHEST;
 use numbering::Numbering;
 
@@ -23,7 +23,7 @@ const RATE_TOLERANCE: f64 = 0.02;
 
 /// Counter and time stamp of one delivered frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FrameStamp {
+pub(crate) struct FrameStamp {
     /// The driver's counter without its wraps; `None` where the camera has none. It may stand still
     /// or go back.
     pub sequence: Option<u64>,
@@ -33,7 +33,7 @@ pub struct FrameStamp {
 
 /// What shows that frames are missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Evidence {
+pub(crate) enum Evidence {
     /// Counter and time stamps.
     Both,
     /// The counter; the time stamps are too irregular.
@@ -46,7 +46,7 @@ pub enum Evidence {
 
 /// Frames that were exposed and not delivered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MissingFrames {
+pub(crate) struct MissingFrames {
     /// The first missing exposure, counted from that of the first delivered frame, which is 0.
     pub exposure: u64,
     /// How many in a row.
@@ -59,7 +59,7 @@ pub struct MissingFrames {
 
 /// What the driver's counter does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Counter {
+pub(crate) enum Counter {
     /// It counts exposures.
     Counts,
     /// It stands still.
@@ -70,7 +70,7 @@ pub enum Counter {
 
 /// What the stamps of a row of frames show.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FrameTiming {
+pub(crate) struct FrameTiming {
     /// The time between exposures, microseconds.
     pub period_us: f64,
     /// When exposure 0 is due by the straight line through all stamps, microseconds.
@@ -88,8 +88,7 @@ pub struct FrameTiming {
 impl FrameTiming {
     /// Analyses the stamps of frames in the order of their delivery. `fps`: the agreed rate,
     /// frames a second; one that is not positive counts as 30.
-    #[must_use]
-    pub fn of(stamps: &[FrameStamp], fps: f64) -> Self {
+    pub(crate) fn of(stamps: &[FrameStamp], fps: f64) -> Self {
         let usable = fps.is_finite() && fps > 0.0;
         let fps = if usable { fps } else { 30.0 };
         let nominal = 1e6 / fps;
@@ -113,12 +112,6 @@ impl FrameTiming {
             exposures: found.exposures,
             anomalies: found.anomalies,
         }
-    }
-
-    /// How many exposures were not delivered between the first and the last delivered frame.
-    #[must_use]
-    pub fn missing_count(&self) -> u64 {
-        self.missing.iter().map(|missing| missing.count).sum()
     }
 }
 

@@ -72,6 +72,11 @@ fn found(timing: &FrameTiming) -> Vec<(u64, u64, usize)> {
         .collect()
 }
 
+/// How many exposures are missing.
+fn missing(timing: &FrameTiming) -> u64 {
+    timing.missing.iter().map(|missing| missing.count).sum()
+}
+
 fn every_gap_is_found(seeds: std::ops::Range<u64>) {
     for seed in seeds {
         let made = made(seed);
@@ -175,10 +180,7 @@ fn a_counter_that_repeats_a_number_and_catches_up_loses_nothing() {
     let mut stamps = regular(300);
     stamps[100].sequence = stamps[99].sequence;
     let timing = FrameTiming::of(&stamps, 30.0);
-    assert_eq!(
-        (timing.counter, timing.missing_count()),
-        (Counter::Counts, 0)
-    );
+    assert_eq!((timing.counter, missing(&timing)), (Counter::Counts, 0));
     assert_eq!(timing.exposures, (0..300).collect::<Vec<_>>());
     assert!(!timing.anomalies.is_empty());
 }
@@ -190,7 +192,7 @@ fn a_counter_that_starts_anew_is_reported_and_loses_nothing() {
         stamp.sequence = Some(n as u64);
     }
     let timing = FrameTiming::of(&stamps, 30.0);
-    assert_eq!(timing.missing_count(), 0);
+    assert_eq!(missing(&timing), 0);
     assert!(matches!(
         timing.anomalies[..],
         [TimingAnomaly::Contradiction {
@@ -206,7 +208,7 @@ fn a_single_late_stamp_is_reported_and_is_no_gap() {
     let mut stamps = regular(300);
     stamps[150].t_us += 36_000;
     let timing = FrameTiming::of(&stamps, 30.0);
-    assert_eq!(timing.missing_count(), 0);
+    assert_eq!(missing(&timing), 0);
     assert_eq!(
         timing.anomalies,
         [TimingAnomaly::OddTime { frame: 150, off: 1 }]

@@ -1,0 +1,254 @@
+//! Cameras by the portable library nokhwa: the recording path where there is no V4L2, which is macOS.
+//! It is tried out under Linux, where the library uses V4L2 itself.
+//!
+//! The library counts no frames and hands out no time stamps of the monotonic clock: frames carry
+//! the time at which this program got them. Controls are those that the library can set; on macOS
+//! most cameras have few or none.
+
+mod controls;
+mod worker;
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::time::Duration;
+
+use ::nokhwa::pixel_format::RgbFormat;
+use ::nokhwa::utils::{
+    CameraFormat, CameraIndex, FrameFormat, RequestedFormat, RequestedFormatType, Resolution,
+};
+use ::nokhwa::{Camera as Library, NokhwaError, nokhwa_check, nokhwa_initialize};
+use relit_data::causes::with_causes;
+use relit_video::PixelFormat;
+
+use self::controls::ControlNumbers;
+use self::worker::{FrameResult, Worker};
+use super::{
+    Camera, CameraAddress, CameraError, Control, ControlFault, ControlId, DeviceInfo, Fourcc,
+    Frame, GrantedMode, Mode, ModeRequest, Rate, Rates, Sizes,
+};
+
+/// Longest wait for the person who is asked whether this program may use the camera.
+const PERMITTING: Duration = Duration::from_secs(60);
+/// Frames that may wait to be fetched: at 30 frames/s, a quarter of a second.
+const WAITING: usize = 8;
+
+/// A camera by its number in the library's list.
+pub(super) struct NokhwaCamera {
+    info: DeviceInfo,
+    worker: Worker,
+    frames: Option<Receiver<FrameResult>>,
+    /// `None` where the library cannot list them.
+    controls: Option<ControlNumbers>,
+}
+
+/// Cameras that the library finds; what one of them offers shows when it is opened.
+#[cfg(target_os = "macos")]
+pub(super) fn list() -> Vec<DeviceInfo> {
+    use ::nokhwa::{query, utils::ApiBackend};
+    let found = query(ApiBackend::Auto).unwrap_or_default();
+    let numbered = found.iter().filter_map(|camera| {
+        let number = camera.index().as_index().ok()?;
+        Some(describe(number, camera.human_name()))
+    });
+    numbered.collect()
+}
+
+fn describe(number: u32, name: String) -> DeviceInfo {
+    DeviceInfo {
+        address: CameraAddress::Nokhwa(number),
+        name,
+        driver: "nokhwa".to_owned(),
+        bus: String::new(),
+        modes: Vec::new(),
+        other_formats: Vec::new(),
+        problems: Vec::new(),
+    }
+}
+
+impl NokhwaCamera {
+    pub(super) fn open(number: u32) -> Result<Self, CameraError> {
+        if !permitted() {
+            return Err(CameraError::NotPermitted {
+                device: CameraAddress::Nokhwa(number).to_string(),
+                source: None,
+            });
+        }
+        Self::with_library(number, move || {
+            let first = RequestedFormat::new::<RgbFormat>(RequestedFormatType::None);
+            Library::new(CameraIndex::Index(number), first)
+        })
+    }
+
+    fn with_library(
+        number: u32,
+        open: impl FnOnce() -> Result<Library, NokhwaError> + Send + 'static,
+    ) -> Result<Self, CameraError> {
+        let worker = Worker::start(CameraAddress::Nokhwa(number).to_string(), open)?;
+        let (name, formats) = worker.ask("its modes were read", |owner| {
+            let mut formats = owner.library.compatible_camera_formats()?;
+            // Some systems leave out the one that is set.
+            formats.push(owner.library.camera_format());
+            Ok((owner.library.info().human_name(), formats))
+        })?;
+        let mut info = describe(number, name);
+        info.modes = gathered(&formats);
+        let mut camera = Self {
+            info,
+            worker,
+            frames: None,
+            controls: Some(ControlNumbers::default()),
+        };
+        if let Err(error) = camera.controls() {
+            camera.info.problems.push(with_causes(&error));
+            camera.controls = None;
+        }
+        Ok(camera)
+    }
+
+    fn device(&self) -> String {
+        self.info.address.to_string()
+    }
+}
+
+/// Whether the system lets this program use cameras; on macOS it asks the person in front of it.
+fn permitted() -> bool {
+    if nokhwa_check() {
+        return true;
+    }
+    let (sender, answer) = sync_channel(1);
+    nokhwa_initialize(move |granted| {
+        // Nobody waits any more where the answer came late.
+        let _ = sender.try_send(granted);
+    });
+    answer.recv_timeout(PERMITTING).unwrap_or(false)
+}
+
+impl Camera for NokhwaCamera {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn modes(&mut self) -> Result<Vec<Mode>, CameraError> {
+        Ok(self.info.modes.clone())
+    }
+
+    fn controls(&mut self) -> Result<Vec<Control>, CameraError> {
+        let Some(numbers) = &mut self.controls else {
+            return Ok(Vec::new());
+        };
+        let doing = "its controls were read";
+        let listed = self
+            .worker
+            .ask(doing, |owner| controls::list(&owner.library));
+        Ok(numbers.controls(&listed?))
+    }
+
+    fn set_control(&mut self, id: ControlId, value: i64) -> Result<i64, CameraError> {
+        let known = self.controls.as_ref().and_then(|numbers| numbers.known(id));
+        let known = known.ok_or_else(|| CameraError::Control {
+            device: self.device(),
+            control: id,
+            doing: format!("set to {value}"),
+            fault: ControlFault::Unknown,
+            source: None,
+        })?;
+        let doing = "a control was set";
+        let set = self.worker.ask(doing, move |owner| {
+            controls::set(&mut owner.library, known, value)
+        });
+        Ok(set?.unwrap_or(value))
+    }
+
+    fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
+        self.stop()?;
+        let format = want.fourcc.pixel_format().and_then(library_format);
+        let format = format.ok_or_else(|| CameraError::Format {
+            device: self.device(),
+            fourcc: want.fourcc,
+        })?;
+        let rate = want.rate.per_second().round() as u32;
+        let wanted = CameraFormat::new(Resolution::new(want.width, want.height), format, rate);
+        let (sender, frames) = sync_channel(WAITING);
+        let found = self.worker.ask("its stream was started", move |owner| {
+            owner.start(wanted, sender)
+        })?;
+        self.frames = Some(frames);
+        Ok(GrantedMode {
+            // The stream is of a format that has one.
+            fourcc: fourcc(found.format()).unwrap_or(want.fourcc),
+            width: found.width(),
+            height: found.height(),
+            rate: Rate::new(found.frame_rate(), 1),
+        })
+    }
+
+    fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError> {
+        let device = self.device();
+        let Some(frames) = &self.frames else {
+            return Err(CameraError::NotStarted { device });
+        };
+        match frames.recv_timeout(timeout) {
+            Ok(frame) => frame.map_err(|error| self.worker.failed("a frame was read", error)),
+            Err(RecvTimeoutError::Timeout) => Err(CameraError::Timeout {
+                device,
+                waited: timeout,
+            }),
+            Err(RecvTimeoutError::Disconnected) => Err(self.worker.gone()),
+        }
+    }
+
+    fn stop(&mut self) -> Result<(), CameraError> {
+        match self.frames.take() {
+            Some(_) => self
+                .worker
+                .ask("its stream was stopped", worker::Owner::stop),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Formats of one size, joined to modes with all their rates.
+fn gathered(formats: &[CameraFormat]) -> Vec<Mode> {
+    let mut modes: Vec<Mode> = Vec::new();
+    for format in formats {
+        let (Some(fourcc), Some(rate)) =
+            (fourcc(format.format()), Rate::new(format.frame_rate(), 1))
+        else {
+            continue;
+        };
+        let sizes = Sizes::One(format.width(), format.height());
+        let same = modes
+            .iter_mut()
+            .find(|mode| (mode.fourcc, mode.sizes) == (fourcc, sizes));
+        match same.map(|mode| &mut mode.rates) {
+            Some(Rates::List(rates)) if !rates.contains(&rate) => rates.push(rate),
+            Some(_) => {}
+            None => modes.push(Mode {
+                fourcc,
+                sizes,
+                rates: Rates::List(vec![rate]),
+            }),
+        }
+    }
+    modes
+}
+
+/// The code of what the library calls a format.
+fn fourcc(format: FrameFormat) -> Option<Fourcc> {
+    let mut formats = PixelFormat::ALL.into_iter();
+    let found = formats.find(|&known| library_format(known) == Some(format))?;
+    Some(Fourcc::of(found))
+}
+
+fn library_format(wanted: PixelFormat) -> Option<FrameFormat> {
+    match wanted {
+        PixelFormat::Mjpeg => Some(FrameFormat::MJPEG),
+        PixelFormat::Yuyv => Some(FrameFormat::YUYV),
+        PixelFormat::Nv12 => Some(FrameFormat::NV12),
+        PixelFormat::Grey => Some(FrameFormat::GRAY),
+        PixelFormat::Rgb24 => Some(FrameFormat::RAWRGB),
+        PixelFormat::H264 | PixelFormat::Bayer(_) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests;

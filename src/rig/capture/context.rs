@@ -1,0 +1,46 @@
+//! What a capture is asked to do, and who follows it.
+
+use super::stop::StopRequest;
+use crate::preview::Preview;
+use crate::state::{Check, Monitor, Phase};
+
+/// What is to be captured.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CaptureRequest {
+    /// The object's name.
+    pub object: String,
+    /// Whether a metering turn comes first.
+    pub meter: bool,
+}
+
+/// Who follows a capture, and who may stop it.
+#[derive(Debug, Clone, Copy)]
+pub struct CaptureContext<'a> {
+    /// Gets the state.
+    pub monitor: &'a Monitor,
+    /// Gets the frames.
+    pub preview: Option<&'a Preview>,
+    /// May be asked for at any time.
+    pub stop: &'a StopRequest,
+}
+
+impl CaptureContext<'_> {
+    pub(super) fn enter(&self, phase: Phase) {
+        self.monitor.update(|state| state.phase = phase);
+    }
+
+    pub(super) fn note(&self, checks: impl IntoIterator<Item = Check>) {
+        self.monitor.update(|state| state.checks.extend(checks));
+    }
+
+    /// Shows that a take of `object` begins.
+    pub(super) fn begin_take(&self, object: &str) {
+        self.monitor.update(|state| {
+            state.phase = Phase::Preflight;
+            state.object = Some(object.to_owned());
+            (state.frames, state.frames_wanted, state.dropped) = (0, 0, 0);
+            state.checks.clear();
+            state.session = None;
+        });
+    }
+}

@@ -1,0 +1,82 @@
+//! What can be wrong with a take, frame by frame and as a whole.
+
+use super::timing::{Evidence, MissingFrames, TimingAnomaly};
+use crate::camera::FrameFault;
+
+/// Something wrong with a take. Frames are given by their index among the delivered frames of the
+/// turn.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Finding {
+    /// Frames were exposed and not delivered.
+    Missing(MissingFrames),
+    /// A frame was dropped, as the disk was too slow.
+    QueueFull(usize),
+    /// A frame could not be recorded: it was empty, or no key frame came before it.
+    Unusable(usize),
+    /// A frame was damaged, and recorded as it came.
+    Damaged(usize, FrameFault),
+    /// Counter and time stamps do not fit.
+    Anomaly(TimingAnomaly),
+    /// The camera's settings are no longer as they were set.
+    Settings(String),
+}
+
+impl Finding {
+    /// A number for its kind, in the order in which kinds are listed, and the frame that it is
+    /// about, or that comes next.
+    pub(super) fn place(&self) -> (u8, Option<usize>) {
+        match self {
+            Self::Missing(missing) => (0, Some(missing.before)),
+            Self::QueueFull(at) => (1, Some(*at)),
+            Self::Unusable(at) => (2, Some(*at)),
+            Self::Damaged(at, _) => (3, Some(*at)),
+            Self::Anomaly(_) => (4, None),
+            Self::Settings(_) => (5, None),
+        }
+    }
+
+    /// How many frames are not in the video because of it.
+    pub(super) fn lost(&self) -> u64 {
+        match self {
+            Self::Missing(missing) => missing.count,
+            Self::QueueFull(_) | Self::Unusable(_) => 1,
+            Self::Damaged(..) | Self::Anomaly(_) | Self::Settings(_) => 0,
+        }
+    }
+
+    /// In words; `n`: the frame of the video that it is about, or that comes next.
+    pub(super) fn text(&self, n: usize) -> String {
+        match self {
+            Self::Missing(missing) => {
+                let (frames, evidence) = (frames(missing.count), in_words(missing.evidence));
+                format!("{frames} missing before frame {n}, {evidence}")
+            }
+            Self::QueueFull(_) => {
+                format!("the disk was too slow: a frame was dropped before frame {n}")
+            }
+            Self::Unusable(_) => format!(
+                "a frame before frame {n} could not be recorded: it was empty, or no key frame came before it"
+            ),
+            Self::Damaged(_, fault) => format!("frame {n} is damaged: {fault}"),
+            Self::Anomaly(anomaly) => anomaly.to_string(),
+            Self::Settings(what) => what.clone(),
+        }
+    }
+}
+
+fn in_words(evidence: Evidence) -> &'static str {
+    match evidence {
+        Evidence::Both => "by the driver's counter and the time stamps",
+        Evidence::Counter => "by the driver's counter",
+        Evidence::Time => "by the time stamps",
+        Evidence::TimeAgainstCounter => "by the time stamps, though the driver did not count them",
+    }
+}
+
+/// A number of frames, in words.
+pub(super) fn frames(count: u64) -> String {
+    match count {
+        1 => "1 frame".to_owned(),
+        _ => format!("{count} frames"),
+    }
+}
