@@ -15,8 +15,9 @@
 //! | [`durable`] | files that appear whole or not at all |
 //! | [`causes`] | errors as text, with their causes |
 //!
-//! `report` and `shard` know `geometry`, `image_stats`, `durable` and `naming`; `report` knows the records of `shard`;
-//! `session` and `shard` do not know each other. `docs/formats.md` describes every file and field.
+//! `shard` knows `geometry`, `image_stats`, `naming` and `durable`; `report` knows the records of `shard`
+//! and `image_stats`; `session` and `shard` do not know each other. `docs/formats.md` describes every
+//! file and field.
 //!
 //! # Read a session
 //!

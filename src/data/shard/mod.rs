@@ -16,8 +16,9 @@
 //! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tarball`) |
 //! | [`verify`](verify()) | reads everything back and reports what is wrong |
 //!
-//! This module knows pixel rectangles, images and their statistics ([`image_stats`](crate::image_stats)). It knows nothing of videos, of how a mask was made,
-//! of the rig or of session folders: here a session is a name and its samples.
+//! This module knows pixel rectangles, images and their statistics
+//! ([`image_stats`](crate::image_stats)). It knows nothing of videos, of how a mask was made, of the rig
+//! or of session folders: here a session is a name and its samples.
 
 mod codec;
 mod dataset;
