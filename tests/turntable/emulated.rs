@@ -132,7 +132,7 @@ fn angle_of(steps: &[(i64, f64)], t_us: i64) -> f64 {
     a0 + (a1 - a0) * (t_us - t0) as f64 / (t1 - t0) as f64
 }
 
-fn tell(name: &str, track: &Track, steps: &[(i64, f64)]) -> f64 {
+fn report(name: &str, track: &Track, steps: &[(i64, f64)]) -> f64 {
     let (from, _) = track.constant_us();
     let errors = (0..1500).map(|frame| {
         let t = from + frame * FRAME_US;
@@ -152,11 +152,11 @@ fn tell(name: &str, track: &Track, steps: &[(i64, f64)]) -> f64 {
 fn angle_error_against_the_step_edges() {
     println!("| host | median | p99 | largest, degrees | |");
     let (track, steps) = turn();
-    let quiet = tell("quiet", &track, &steps);
+    let quiet = report("quiet", &track, &steps);
     let load = Load::on_all_cores();
     let (track, steps) = turn();
     drop(load);
-    let loaded = tell("loaded", &track, &steps);
+    let loaded = report("loaded", &track, &steps);
     assert!(quiet <= 0.05, "quiet: p99 {quiet}");
     assert!(loaded <= 0.05, "loaded: p99 {loaded}");
 }

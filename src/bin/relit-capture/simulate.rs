@@ -1,4 +1,4 @@
-//! `relit-capture simulate`: a turntable without hardware, on a port that any program can open.
+//! `relit-capture simulate`: a turntable without hardware, at a port that any program can open.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,7 +15,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use crate::table_arguments::SimulateArguments;
 use relit::console::{Console, Outcome};
 
-/// How often a look is taken at whether to end.
+/// Interval at which the end conditions are checked.
 const LOOK: Duration = Duration::from_millis(50);
 
 pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome, SimulatorError> {
@@ -47,7 +47,7 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
     Ok(Outcome::Whole)
 }
 
-/// Waits for the end of the time given, or for a signal.
+/// Waits until the given time is over or a signal arrives.
 fn wait(console: Console, for_seconds: Option<f64>) {
     let ended = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM, SIGHUP] {

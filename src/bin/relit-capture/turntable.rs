@@ -1,4 +1,4 @@
-//! `relit-capture turntable`: one look at the table, or one motion.
+//! `relit-capture turntable`: the table's status, or one motion.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -27,30 +27,30 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
         Action::Home => home(console, open_to_move(console, &port, &options)?.as_ref()),
         Action::Jog { degrees, speed } => {
             let table = open_to_move(console, &port, &options)?;
-            tell(console, "jogged", &table.jog(degrees, speed)?);
+            report(console, "jogged", &table.jog(degrees, speed)?);
             Ok(Outcome::Whole)
         }
         Action::Unlock => {
             let table = Table::open_serial(&port, &options)?;
-            tell(console, "unlocked", &table.unlock()?);
+            report(console, "unlocked", &table.unlock()?);
             Ok(Outcome::Whole)
         }
     }
 }
 
-/// A table that is stopped when the program is told to end.
+/// Opens a table that is stopped if the program gets a signal to end.
 fn open_to_move(
     console: Console,
     port: &Path,
     options: &TableOptions,
 ) -> Result<Arc<Table>, TurntableError> {
     let table = Arc::new(Table::open_serial(port, options)?);
-    // Held weakly, so that the table is let go, and its port, when the motion has ended.
+    // A weak reference, so that table and port are closed when the motion has ended.
     let moving = Arc::downgrade(&table);
     let listening = at_end(move || {
         if let Some(table) = moving.upgrade() {
-            // Its answer comes to the motion, which ends with it.
-            let _told_there = table.stop();
+            // The motion ends with an error then and reports it.
+            let _reported = table.stop();
         }
     });
     if let Err(error) = listening {
@@ -79,7 +79,7 @@ fn status(
         Some(owner) => owner.status()?,
         None => Table::open_serial(port, options)?.status()?,
     };
-    tell(console, "status", &status);
+    report(console, "status", &status);
     Ok(Outcome::Whole)
 }
 
@@ -88,7 +88,7 @@ fn stop(console: Console, port: &Path, options: &TableOptions) -> Result<Outcome
         Some(owner) => owner.stop()?,
         None => Table::open_serial(port, options)?.stop()?,
     };
-    tell(console, "stopped", &status);
+    report(console, "stopped", &status);
     Ok(Outcome::Whole)
 }
 
@@ -101,11 +101,11 @@ fn home(console: Console, table: &Table) -> Result<Outcome, TurntableError> {
              stands, for as long as it is not switched off or reset",
         );
     }
-    tell(console, "homed", &status);
+    report(console, "homed", &status);
     Ok(Outcome::Whole)
 }
 
-fn tell(console: Console, event: &str, status: &TableStatus) {
+fn report(console: Console, event: &str, status: &TableStatus) {
     let mut value = json!({ "event": event });
     if let (Some(map), Ok(facts)) = (value.as_object_mut(), serde_json::to_value(status))
         && let Some(facts) = facts.as_object()

@@ -235,8 +235,8 @@ fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &A
         for _ in 0..terminal.opened() {
             model.open(now_us);
         }
-        let room = model.room().min(LARGEST);
-        let received = terminal.read(buffer.get_mut(..room).unwrap_or_default());
+        let capacity = model.capacity().min(LARGEST);
+        let received = terminal.read(buffer.get_mut(..capacity).unwrap_or_default());
         model.receive(now_us, received);
         let output = model.take_output(now_us, usize::MAX);
         drop(model);

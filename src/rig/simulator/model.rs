@@ -113,7 +113,7 @@ impl Model {
     }
 
     /// How many bytes the wire to the chip can take now.
-    pub(super) fn room(&mut self) -> usize {
+    pub(super) fn capacity(&mut self) -> usize {
         UNDERWAY.saturating_sub(self.chip.inbox().len())
     }
 

@@ -134,7 +134,7 @@ impl Port for SimulatedPort {
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         let mut model = self.table.model();
-        if bytes.len() > model.room() {
+        if bytes.len() > model.capacity() {
             return Err(io::Error::from(io::ErrorKind::TimedOut));
         }
         model.receive(self.table.clock.now_us(), bytes);
