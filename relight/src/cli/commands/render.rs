@@ -97,8 +97,9 @@ struct LightArguments {
     /// The light: coefficients of spherical harmonics, one line each of red, green, blue (nine for order 2).
     #[arg(long, value_name = "FILE")]
     light: Option<PathBuf>,
-    /// The order of spherical harmonics to which a panorama is brought; the paper's is 2.
-    #[arg(long, value_name = "0-64", default_value_t = 24, value_parser = clap::value_parser!(u8).range(0..=64))]
+    /// The order of spherical harmonics to which a panorama is brought; the paper's is 2. Highlights need
+    /// more, the smoother the surface is.
+    #[arg(long, value_name = "0-64", default_value_t = 48, value_parser = clap::value_parser!(u8).range(0..=64))]
     order: u8,
     /// Turn the light about the vertical first, from the viewer to the right.
     #[arg(
