@@ -16,6 +16,7 @@
 //! | [`SessionWriter`] | samples in any order in, files out; `spool` and `folder` are its layouts |
 //! | [`Dataset`], [`Settings`] | `dataset.json`; `vouch` compares files with it |
 //! | [`ShardReader`] | any WebDataset shard as a stream of samples; `tarball` is the tar below it |
+//! | [`SampleSpans`] | where the samples of a shard stand, for who reads at random |
 //! | [`verify`](verify()) | reads everything back and names what is wrong |
 //!
 //! This room knows pixel rectangles and images. It knows nothing of videos, of how a mask was
@@ -26,6 +27,7 @@ mod dataset;
 mod digest;
 mod error;
 mod folder;
+mod index;
 pub mod measure;
 mod names;
 mod order;
@@ -46,6 +48,7 @@ pub use dataset::{
 };
 pub use digest::{Digest, NotADigest};
 pub use error::Error;
+pub use index::{SampleSpan, SampleSpans};
 pub use measure::{MaskSpans, Measures};
 pub use names::{check_session, sample_key};
 pub use order::order;

@@ -7,7 +7,7 @@ use super::Error;
 use super::tarball::{Member, TarReader};
 
 /// Largest sum of the members of a sample, bytes.
-const MOST_BYTES: u64 = 256 << 20;
+pub(super) const MOST_BYTES: u64 = 256 << 20;
 /// Largest number of members of a sample.
 const MOST_MEMBERS: usize = 64;
 
@@ -129,7 +129,7 @@ impl<R: Read> Iterator for ShardReader<R> {
 }
 
 /// Key and suffix of a member's name; none where its last part has no dot, or starts with it.
-fn split(path: &str) -> Option<(String, String)> {
+pub(super) fn split(path: &str) -> Option<(String, String)> {
     let base = path.rfind('/').map_or(0, |slash| slash + 1);
     let dot = base + path.get(base..)?.find('.')?;
     if dot == base {
