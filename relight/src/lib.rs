@@ -8,5 +8,7 @@
 //! | --- | --- |
 //! | [`image`] | planes of `f32`, colours that know their space, files |
 //! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
+//! | [`metrics`] | how far an estimate is from the truth |
 pub mod image;
 pub mod light;
+pub mod metrics;
