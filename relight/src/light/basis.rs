@@ -1,6 +1,6 @@
 //! The real spherical harmonics.
 
-use std::f64::consts::{FRAC_1_SQRT_2, PI};
+use std::f64::consts::{PI, SQRT_2};
 
 use super::{Direction, Order};
 
@@ -34,12 +34,9 @@ pub(crate) fn basis_into(order: Order, [x, y, z]: [f64; 3], values: &mut [f64]) 
     let (mut cos, mut sin) = (1.0, 0.0);
     for m in 0..=top {
         if m > 0 {
-            let m = m as f64;
-            diagonal *= ((2.0 * m + 1.0) / (2.0 * m)).sqrt();
-            (cos, sin) = (cos * x - sin * y, cos * y + sin * x);
-            if m == 1.0 {
-                (cos, sin) = (cos / FRAC_1_SQRT_2, sin / FRAC_1_SQRT_2);
-            }
+            diagonal *= (1.0 + 0.5 / m as f64).sqrt();
+            let root = if m == 1 { SQRT_2 } else { 1.0 };
+            (cos, sin) = (root * (cos * x - sin * y), root * (cos * y + sin * x));
         }
         let (mut before, mut now) = (0.0, diagonal);
         for l in m..=top {
@@ -48,6 +45,24 @@ pub(crate) fn basis_into(order: Order, [x, y, z]: [f64; 3], values: &mut [f64]) 
             if m > 0 {
                 values[middle - m] = now * sin;
             }
+            let [a, b] = legendre_step(l + 1, m);
+            (before, now) = (now, a * z * now - b * before);
+        }
+    }
+}
+
+/// The parts of the spherical harmonics that depend on the polar angle alone, for m >= 0, at
+/// `l (l + 1) / 2 + m`; without the √2 of m > 0, which belongs to the azimuth.
+pub(crate) fn polar_functions(order: Order, polar: f64, values: &mut [f64]) {
+    let (sin, z) = polar.sin_cos();
+    let mut diagonal = (1.0 / (4.0 * PI)).sqrt();
+    for m in 0..=order.get() {
+        if m > 0 {
+            diagonal *= sin * (1.0 + 0.5 / m as f64).sqrt();
+        }
+        let (mut before, mut now) = (0.0, diagonal);
+        for l in m..=order.get() {
+            values[l * (l + 1) / 2 + m] = now;
             let [a, b] = legendre_step(l + 1, m);
             (before, now) = (now, a * z * now - b * before);
         }
@@ -91,6 +106,26 @@ mod tests {
             let ours = basis(Order::TWO, d);
             for (a, b) in ours.iter().zip(as_written(d.components())) {
                 assert!((a - b).abs() < 2e-6, "{ours:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_polar_parts_are_those_of_the_whole() {
+        let order = Order::new(7).unwrap();
+        let (polar, azimuth) = (2.2_f64, 0.7_f64);
+        let whole = basis(order, Direction::from_angles(polar, azimuth));
+        let mut parts = vec![0.0; 36];
+        polar_functions(order, polar, &mut parts);
+        for l in 0..=7 {
+            assert!((whole[l * (l + 1)] - parts[l * (l + 1) / 2]).abs() < 1e-13);
+            for m in 1..=l {
+                let wave = SQRT_2 * (m as f64 * azimuth).cos();
+                let part = parts[l * (l + 1) / 2 + m];
+                assert!(
+                    (whole[l * (l + 1) + m] - wave * part).abs() < 1e-13,
+                    "{l} {m}"
+                );
             }
         }
     }

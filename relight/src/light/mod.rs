@@ -13,7 +13,9 @@ mod coefficients;
 mod direction;
 mod normals;
 mod panorama;
+mod quadrature;
 mod rotation;
+mod wigner;
 
 pub use basis::basis;
 pub use coefficients::{LightError, Order, ShLight};
@@ -21,3 +23,4 @@ pub use direction::Direction;
 pub use normals::{Normals, YAxis, YDown, YUp};
 pub use panorama::{Panorama, PanoramaError};
 pub use rotation::Rotation;
+pub use wigner::ShRotation;

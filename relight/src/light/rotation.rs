@@ -47,6 +47,11 @@ impl Rotation {
         (is_identity && determinant(&matrix) > 0.0).then_some(rotation)
     }
 
+    /// A matrix that is known to be a rotation.
+    pub(super) const fn from_known(matrix: [[f64; 3]; 3]) -> Self {
+        Self(matrix)
+    }
+
     /// The matrix, row by row: it is multiplied with a column.
     #[must_use]
     pub const fn matrix(&self) -> &[[f64; 3]; 3] {

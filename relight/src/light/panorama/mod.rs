@@ -1,5 +1,8 @@
 //! Panoramas: light as an image of everything around.
 
+mod projection;
+mod resample;
+
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
