@@ -6,9 +6,11 @@
 //!
 //! | module | concern |
 //! | --- | --- |
+//! | [`data`] | shards and folders as streams of arrays |
 //! | [`image`] | planes of `f32`, colours that know their space, files |
 //! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
 //! | [`metrics`] | how far an estimate is from the truth |
+pub mod data;
 pub mod image;
 pub mod light;
 pub mod metrics;
