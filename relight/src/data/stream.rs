@@ -1,8 +1,8 @@
 //! Batches, decoded in threads ahead of whoever trains on them. Knows nothing of files.
 
 use std::num::NonZeroUsize;
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
 use super::plan::Job;
@@ -17,8 +17,10 @@ pub trait Source: Send + Sync + 'static {
     fn turns(&self) -> Vec<u32>;
 
     /// The batch of these samples, and those of them that are damaged and not in it. May be called
-    /// from many threads at a time.
-    fn batch(&self, samples: &[SampleId]) -> (Self::Batch, Vec<Damage>);
+    /// from many threads at a time. `spare` is a batch that is no longer needed, whose memory can be
+    /// used again.
+    fn batch(&self, samples: &[SampleId], spare: Option<Self::Batch>)
+    -> (Self::Batch, Vec<Damage>);
 }
 
 /// What is drawn, from where to where, and by how many threads.
@@ -55,7 +57,7 @@ pub struct Drawn<B> {
 /// ```no_run
 /// use std::num::NonZeroUsize;
 /// use std::path::Path;
-/// use std::sync::Arc;
+/// use std::sync::{Arc, Mutex};
 /// use relight::data::{Encoding, Place, Plan, Stream, Streaming, Turns};
 ///
 /// let turns = Arc::new(Turns::open(Path::new("data"), Encoding::Srgb)?);
@@ -66,12 +68,14 @@ pub struct Drawn<B> {
 ///     threads: NonZeroUsize::MIN,
 ///     ahead: 4,
 /// };
-/// for drawn in Stream::start(&turns, streaming)? {
+/// let mut stream = Stream::start(&turns, streaming)?;
+/// while let Some(drawn) = stream.next() {
 ///     let drawn = drawn.unwrap_or_else(|damaged| {
 ///         eprintln!("{damaged}");
 ///         damaged.rest
 ///     });
-///     let (_images, _checkpoint) = (drawn.batch.images, drawn.next);
+///     let (_images, _checkpoint) = (&drawn.batch.images, drawn.next);
+///     stream.give_back(drawn.batch);
 /// }
 /// # Ok::<(), relight::data::OpenError>(())
 /// ```
@@ -80,7 +84,11 @@ pub struct Stream<S: Source> {
     queues: Vec<Receiver<Item<S>>>,
     threads: Vec<JoinHandle<()>>,
     turn: usize,
+    spares: Arc<Spares<S::Batch>>,
 }
+
+/// Batches that are no longer needed.
+type Spares<B> = Mutex<Vec<B>>;
 
 type Item<S> = Result<Drawn<<S as Source>::Batch>, DamagedBatch<Drawn<<S as Source>::Batch>>>;
 
@@ -95,11 +103,12 @@ impl<S: Source> Stream<S> {
             queues: Vec::with_capacity(count),
             threads: Vec::with_capacity(count),
             turn: 0,
+            spares: Arc::default(),
         };
         for index in 0..count {
             let (sender, receiver) = sync_channel(streaming.ahead.max(1));
-            let source = Arc::clone(source);
-            let work = move || decode(&*source, streaming, index, &sender);
+            let (source, spares) = (Arc::clone(source), Arc::clone(&stream.spares));
+            let work = move || decode(&*source, streaming, index, (&sender, &spares));
             let thread = thread::Builder::new()
                 .name(format!("decode-{index}"))
                 .spawn(work)
@@ -108,6 +117,16 @@ impl<S: Source> Stream<S> {
             stream.threads.push(thread);
         }
         Ok(stream)
+    }
+
+    /// Takes a batch back whose values were copied elsewhere. The next one is decoded into its
+    /// memory; without this a third of the reader's time goes into fresh memory.
+    pub fn give_back(&self, batch: S::Batch) {
+        if let Ok(mut spares) = self.spares.lock()
+            && spares.len() < self.queues.len()
+        {
+            spares.push(batch);
+        }
     }
 
     /// Waits for the threads, which have nothing more to do. One that panicked makes this one
@@ -147,7 +166,12 @@ impl<S: Source> Drop for Stream<S> {
 }
 
 /// Makes every `threads`-th batch, from `index` on, until nobody wants more.
-fn decode<S: Source>(source: &S, streaming: Streaming, index: usize, queue: &SyncSender<Item<S>>) {
+fn decode<S: Source>(
+    source: &S,
+    streaming: Streaming,
+    index: usize,
+    (queue, spares): (&SyncSender<Item<S>>, &Spares<S::Batch>),
+) {
     let Streaming {
         plan,
         from,
@@ -157,7 +181,8 @@ fn decode<S: Source>(source: &S, streaming: Streaming, index: usize, queue: &Syn
     } = streaming;
     let jobs = plan.jobs(&source.turns(), from, until_epoch);
     for Job { samples, next } in jobs.skip(index).step_by(threads.get()) {
-        let (batch, damage) = source.batch(&samples);
+        let spare = spares.lock().ok().and_then(|mut spares| spares.pop());
+        let (batch, damage) = source.batch(&samples, spare);
         let drawn = Drawn { batch, next };
         let item = if damage.is_empty() {
             Ok(drawn)
@@ -186,7 +211,11 @@ mod tests {
             vec![50, 40]
         }
 
-        fn batch(&self, samples: &[SampleId]) -> (Vec<SampleId>, Vec<Damage>) {
+        fn batch(
+            &self,
+            samples: &[SampleId],
+            _: Option<Vec<SampleId>>,
+        ) -> (Vec<SampleId>, Vec<Damage>) {
             let broken = SampleId {
                 turn: 1,
                 position: 7,
@@ -269,7 +298,7 @@ mod tests {
             fn turns(&self) -> Vec<u32> {
                 vec![0, 0]
             }
-            fn batch(&self, _: &[SampleId]) -> ((), Vec<Damage>) {
+            fn batch(&self, _: &[SampleId], _: Option<()>) -> ((), Vec<Damage>) {
                 ((), Vec::new())
             }
         }

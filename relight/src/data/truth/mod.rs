@@ -112,8 +112,13 @@ impl Source for TruthSet {
         vec![u32::try_from(self.entries.len()).unwrap_or(u32::MAX)]
     }
 
-    fn batch(&self, samples: &[SampleId]) -> (Self::Batch, Vec<Damage>) {
-        let mut batch = Vec::with_capacity(samples.len());
+    fn batch(
+        &self,
+        samples: &[SampleId],
+        spare: Option<Self::Batch>,
+    ) -> (Self::Batch, Vec<Damage>) {
+        let mut batch = spare.unwrap_or_default();
+        batch.clear();
         let mut damage = Vec::new();
         for id in samples {
             match self.load(id.position as usize) {

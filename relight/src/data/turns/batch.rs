@@ -74,19 +74,27 @@ pub(super) struct BatchBuilder {
     expected: usize,
     batch: TurnBatch,
     /// The mask of the frame before.
-    last_mask: Option<(MaskBytes, Extent)>,
+    last_mask: Option<MaskBytes>,
 }
 
 impl BatchBuilder {
-    pub(super) fn new(encoding: Encoding, expected: usize) -> Self {
+    /// A batch of `expected` frames in the memory of `spare`.
+    pub(super) fn new(encoding: Encoding, expected: usize, spare: Option<TurnBatch>) -> Self {
+        let (mut frames, mut images, mut masks) = match spare {
+            Some(spare) => (spare.frames, spare.images, spare.masks),
+            None => (Vec::new(), Vec::new(), Vec::new()),
+        };
+        frames.clear();
+        images.clear();
+        masks.clear();
         Self {
             levels: encoding.levels(),
             expected,
             batch: TurnBatch {
                 extent: Extent::new(0, 0),
-                frames: Vec::with_capacity(expected),
-                images: Vec::new(),
-                masks: Vec::new(),
+                frames,
+                images,
+                masks,
             },
             last_mask: None,
         }
@@ -118,11 +126,7 @@ impl BatchBuilder {
 
     fn add_mask(&mut self, mask: MaskBytes) -> Result<(), SampleFault> {
         let pixels = self.batch.extent.pixels();
-        let same = self
-            .last_mask
-            .as_ref()
-            .is_some_and(|(last, _)| *last == mask);
-        if same && self.batch.masks.len() >= pixels {
+        if self.last_mask.as_ref() == Some(&mask) && self.batch.masks.len() >= pixels {
             let last = self.batch.masks.len() - pixels..;
             self.batch.masks.extend_from_within(last);
             return Ok(());
@@ -137,7 +141,7 @@ impl BatchBuilder {
                 self.batch.masks.extend(levels.iter().map(one_or_zero));
             }
         }
-        self.last_mask = Some((mask, self.batch.extent));
+        self.last_mask = Some(mask);
         Ok(())
     }
 
@@ -145,10 +149,12 @@ impl BatchBuilder {
     fn add_image(&mut self, pixels: &[u8]) {
         let count = self.batch.extent.pixels();
         let mask = &self.batch.masks[self.batch.masks.len() - count..];
+        let (pixels, _) = pixels.as_chunks::<3>();
         for channel in 0..3 {
-            let values = pixels.iter().skip(channel).step_by(3).zip(mask);
-            let value = |(&level, inside): (&u8, &f32)| self.levels[usize::from(level)] * inside;
-            self.batch.images.extend(values.map(value));
+            let value = |(pixel, inside): (&[u8; 3], &f32)| {
+                self.levels[usize::from(pixel[channel])] * inside
+            };
+            self.batch.images.extend(pixels.iter().zip(mask).map(value));
         }
     }
 }

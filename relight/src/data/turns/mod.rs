@@ -95,8 +95,8 @@ impl Source for Turns {
         self.turns.iter().map(Turn::samples).collect()
     }
 
-    fn batch(&self, samples: &[SampleId]) -> (TurnBatch, Vec<Damage>) {
-        let mut batch = BatchBuilder::new(self.encoding, samples.len());
+    fn batch(&self, samples: &[SampleId], spare: Option<TurnBatch>) -> (TurnBatch, Vec<Damage>) {
+        let mut batch = BatchBuilder::new(self.encoding, samples.len(), spare);
         let mut damage = Vec::new();
         for id in samples {
             let Some(turn) = self.turns.get(id.turn as usize) else {
