@@ -19,15 +19,12 @@ use serde_json::{Value, json};
 pub(crate) enum Outcome {
     /// All was done: exit code 0.
     Whole,
-    /// Finished, but something was left out or lost: exit code 3.
-    Lossy,
 }
 
 impl From<Outcome> for ExitCode {
     fn from(outcome: Outcome) -> Self {
         match outcome {
             Outcome::Whole => Self::SUCCESS,
-            Outcome::Lossy => Self::from(3),
         }
     }
 }

@@ -5,7 +5,8 @@ mod console;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
 
 use commands::render;
 use console::Console;
@@ -32,9 +33,23 @@ enum Verb {
     Render(render::Arguments),
 }
 
+impl Verb {
+    /// What is wrong with the arguments together: wrong usage, exit code 2.
+    fn fault(&self) -> Option<String> {
+        match self {
+            Self::Render(arguments) => arguments.fault(),
+        }
+    }
+}
+
 /// Runs the verb that the command line names; its exit code.
 pub(crate) fn run() -> ExitCode {
     let line = CommandLine::parse();
+    if let Some(fault) = line.verb.fault() {
+        CommandLine::command()
+            .error(ErrorKind::ValueValidation, fault)
+            .exit();
+    }
     let console = Console::new(line.json);
     console.finish(match line.verb {
         Verb::Render(arguments) => render::run(&arguments, console),

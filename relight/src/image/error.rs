@@ -26,6 +26,12 @@ pub enum ImageError {
         /// The size that it should have.
         expected: Extent,
     },
+    /// A map of normals is empty.
+    #[error("{} shows no surface: it has no normals, or none inside the mask", path.display())]
+    NoSurface {
+        /// The map of normals.
+        path: PathBuf,
+    },
     /// The file cannot be read.
     #[error("{} cannot be read", path.display())]
     Open {

@@ -42,10 +42,7 @@ pub fn write_png(path: &Path, planes: &Planes<3>, depth: Depth) -> Result<(), Im
     let encoder =
         PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
     let (pixels, colour) = match depth {
-        Depth::Eight => (
-            interleaved(planes, |v| [to_integer(v, 255.0) as u8]),
-            image::ExtendedColorType::Rgb8,
-        ),
+        Depth::Eight => (planes.to_bytes(), image::ExtendedColorType::Rgb8),
         Depth::Sixteen => (
             interleaved(planes, |v| (to_integer(v, 65535.0) as u16).to_ne_bytes()),
             image::ExtendedColorType::Rgb16,
@@ -75,6 +72,14 @@ pub fn write_exr(path: &Path, planes: &Planes<3>) -> Result<(), ImageError> {
             source,
         })?;
     write(path, bytes.get_ref())
+}
+
+impl Planes<3> {
+    /// The pixels as 8-bit integers, red, green and blue in turn; values beyond 0 to 1 are clipped.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        interleaved(self, |v| [to_integer(v, 255.0) as u8])
+    }
 }
 
 /// Reads an image without any conversion of colour, and says what its numbers were: integers come

@@ -87,6 +87,34 @@ impl<const C: usize> Planes<C> {
         image
     }
 
+    /// Images of one size side by side, `columns` in a row; places beyond the last are 0.
+    ///
+    /// # Errors
+    /// Where an image has another size than the first.
+    pub fn sheet(tiles: &[Self], columns: usize) -> Result<Self, ImageError> {
+        let tile = tiles.first().map_or(Extent::new(0, 0), Self::extent);
+        let columns = columns.max(1);
+        let rows = tiles.len().div_ceil(columns);
+        let mut sheet = Self::zeros(Extent::new(tile.width * columns, tile.height * rows));
+        let width = sheet.extent.width;
+        for (at, image) in tiles.iter().enumerate() {
+            if image.extent != tile {
+                return Err(ImageError::Extent {
+                    what: "tile of the sheet",
+                    found: image.extent,
+                    expected: tile,
+                });
+            }
+            let start = at / columns * tile.height * width + at % columns * tile.width;
+            for (from, to) in image.planes.iter().zip(&mut sheet.planes) {
+                for (y, row) in from.chunks_exact(tile.width.max(1)).enumerate() {
+                    to[start + y * width..][..tile.width].copy_from_slice(row);
+                }
+            }
+        }
+        Ok(sheet)
+    }
+
     /// Width and height.
     #[must_use]
     pub const fn extent(&self) -> Extent {
@@ -192,6 +220,18 @@ mod tests {
         });
         let expected = Planes::from_fn(Extent::new(5, 7), |x, y| [y as f32, x as f32]);
         assert_eq!(image, expected);
+    }
+
+    #[test]
+    fn a_sheet_has_its_tiles_row_by_row() {
+        let tile = |value: f32| Planes::filled(Extent::new(2, 3), [value]);
+        let sheet = Planes::sheet(&[tile(1.0), tile(2.0), tile(3.0)], 2).unwrap();
+        assert_eq!(sheet.extent(), Extent::new(4, 6));
+        let corners = [(0, 0), (3, 2), (1, 3), (2, 5)].map(|(x, y)| sheet.pixel(x, y)[0]);
+        assert_eq!(corners, [1.0, 2.0, 3.0, 0.0]);
+        let other = Planes::filled(Extent::new(1, 3), [0.0]);
+        assert!(Planes::sheet(&[tile(1.0), other], 2).is_err());
+        assert_eq!(Planes::<1>::sheet(&[], 3).unwrap().extent().pixels(), 0);
     }
 
     #[test]

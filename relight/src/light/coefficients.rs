@@ -1,7 +1,10 @@
 //! Light as coefficients of spherical harmonics.
 
-use std::fmt;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::{fmt, fs, io};
+
+use relit_data::durable::write_whole;
 
 use super::Direction;
 use super::basis::basis;
@@ -42,6 +45,8 @@ impl Order {
     pub const MAX: usize = 64;
     /// Nine coefficients.
     pub const TWO: Self = Self(2);
+    /// The order that ends at [`Order::MAX`].
+    pub const HIGHEST: Self = Self(Self::MAX as u8);
 
     /// The order with `highest` as its last band.
     ///
@@ -184,6 +189,62 @@ impl ShLight {
             }
         }
         self
+    }
+}
+
+/// Why a file of coefficients is not read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum LightFileError {
+    /// It cannot be read.
+    #[error("{} cannot be read", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system answers.
+        source: io::Error,
+    },
+    /// It does not hold coefficients.
+    #[error("{} holds no light", path.display())]
+    Light {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: LightError,
+    },
+    /// It cannot be written.
+    #[error("{} cannot be written", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system answers.
+        source: io::Error,
+    },
+}
+
+impl ShLight {
+    /// Reads the text form.
+    ///
+    /// # Errors
+    /// Where the file cannot be read or holds something else.
+    pub fn read(path: &Path) -> Result<Self, LightFileError> {
+        let path = path.to_owned();
+        match fs::read_to_string(&path) {
+            Err(source) => Err(LightFileError::Read { path, source }),
+            Ok(text) => text
+                .parse()
+                .map_err(|source| LightFileError::Light { path, source }),
+        }
+    }
+
+    /// Writes the text form.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), LightFileError> {
+        write_whole(path, self.to_string().as_bytes()).map_err(|source| LightFileError::Write {
+            path: path.to_owned(),
+            source,
+        })
     }
 }
 

@@ -18,9 +18,11 @@ mod rotation;
 mod wigner;
 
 pub use basis::basis;
-pub use coefficients::{LightError, Order, ShLight};
+pub(crate) use basis::{basis_into, legendre_step, polar_functions};
+pub use coefficients::{LightError, LightFileError, Order, ShLight};
 pub use direction::Direction;
 pub use normals::{Normals, YAxis, YDown, YUp};
-pub use panorama::{Panorama, PanoramaError};
+pub use panorama::{DrawnLight, LightSampler, Panorama, PanoramaError};
+pub(crate) use quadrature::Quadrature;
 pub use rotation::Rotation;
 pub use wigner::ShRotation;

@@ -119,6 +119,36 @@ impl<Y: YAxis> Normals<Y> {
         }
     }
 
+    /// The same map with no surface where the mask is below one half.
+    ///
+    /// # Errors
+    /// Where the mask has another size.
+    pub fn masked(mut self, mask: &Planes<1>) -> Result<Self, ImageError> {
+        if mask.extent() != self.extent() {
+            return Err(ImageError::Extent {
+                what: "mask",
+                found: mask.extent(),
+                expected: self.extent(),
+            });
+        }
+        for plane in self.planes.planes_mut() {
+            for (value, mask) in plane.iter_mut().zip(mask.plane(0)) {
+                *value = if *mask < 0.5 { 0.0 } else { *value };
+            }
+        }
+        Ok(self)
+    }
+
+    /// Whether there is no surface anywhere.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.planes
+            .planes()
+            .into_iter()
+            .flatten()
+            .all(|&v| v == 0.0)
+    }
+
     /// x, y and z.
     #[must_use]
     pub const fn planes(&self) -> &Planes<3> {
@@ -150,6 +180,23 @@ impl<Y: YAxis> Normals<Y> {
     /// Where the file cannot be written.
     pub fn write_png(&self, path: &Path, depth: Depth) -> Result<(), ImageError> {
         write_png(path, &self.to_colours(), depth)
+    }
+}
+
+impl Normals<YUp> {
+    /// The front of a sphere that fills a square image of `side` pixels, seen from far away.
+    #[must_use]
+    pub fn sphere(side: usize) -> Self {
+        let place = |at: usize| (2.0 * (at as f32 + 0.5)) / side as f32 - 1.0;
+        Self::new(Planes::from_fn(Extent::new(side, side), |x, y| {
+            let [x, y] = [place(x), -place(y)];
+            let rest = 1.0 - x * x - y * y;
+            if rest >= 0.0 {
+                [x, y, rest.sqrt()]
+            } else {
+                [0.0; 3]
+            }
+        }))
     }
 }
 

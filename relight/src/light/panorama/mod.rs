@@ -2,11 +2,14 @@
 
 mod projection;
 mod resample;
+mod sampler;
 
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use super::{Direction, LightError, ShLight};
+pub use sampler::{DrawnLight, LightSampler};
+
 use crate::image::{Extent, ImageError, Linear, Planes, Rgb, Samples, read_planes};
 
 /// Linear radiance from all around, as an equirectangular image of which every pixel has one radiance.

@@ -1,0 +1,332 @@
+//! Frames into a video file, by the `ffmpeg` program. Knows nothing of what the frames show.
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStderr, Command, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::{self, JoinHandle};
+
+use relit_data::durable;
+
+use crate::image::{Extent, Rgb, Srgb};
+
+/// What a video file is encoded as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MovieFormat {
+    /// H.264 in MP4.
+    Mp4,
+    /// VP9 in WebM.
+    Webm,
+}
+
+/// Why a video is not written.
+#[derive(Debug, thiserror::Error)]
+pub enum MovieError {
+    /// The program is not there.
+    #[error(
+        "a video needs the program ffmpeg, which cannot be started; install it, or give a folder for PNG frames"
+    )]
+    NoProgram(#[source] io::Error),
+    /// The program failed.
+    #[error("ffmpeg could not write {}: {said}", path.display())]
+    Failed {
+        /// The video.
+        path: PathBuf,
+        /// The last line that it wrote.
+        said: String,
+    },
+    /// A frame has another size than the first.
+    #[error("a frame of {} x {} pixels was given for a video of {} x {}", found.width, found.height, expected.width, expected.height)]
+    Extent {
+        /// The frame's size.
+        found: Extent,
+        /// The video's size.
+        expected: Extent,
+    },
+    /// The file cannot be given its name.
+    #[error("{} cannot be written", path.display())]
+    Write {
+        /// The video.
+        path: PathBuf,
+        /// What the system answers.
+        source: io::Error,
+    },
+}
+
+impl MovieFormat {
+    /// The format that a file name's extension asks for.
+    #[must_use]
+    pub fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_str()?;
+        [("mp4", Self::Mp4), ("webm", Self::Webm)]
+            .into_iter()
+            .find(|(name, _)| extension.eq_ignore_ascii_case(name))
+            .map(|(_, format)| format)
+    }
+
+    fn arguments(self) -> &'static [&'static str] {
+        match self {
+            Self::Mp4 => &[
+                "-c:v",
+                "libx264",
+                "-crf",
+                "18",
+                "-movflags",
+                "+faststart",
+                "-f",
+                "mp4",
+            ],
+            Self::Webm => &[
+                "-c:v",
+                "libvpx-vp9",
+                "-crf",
+                "24",
+                "-b:v",
+                "0",
+                "-f",
+                "webm",
+            ],
+        }
+    }
+}
+
+/// A video that is being written. It appears under its name when it is finished, whole; dropped before, it
+/// leaves nothing.
+#[derive(Debug)]
+pub struct MovieWriter {
+    path: PathBuf,
+    partial: PathBuf,
+    extent: Extent,
+    program: Child,
+    errors: Option<JoinHandle<String>>,
+}
+
+impl MovieWriter {
+    /// Starts `ffmpeg` for frames of one size. An odd width or height is filled up with a black line, since
+    /// both formats halve the resolution of colours.
+    ///
+    /// # Errors
+    /// Where the program cannot be started.
+    pub fn create(
+        path: &Path,
+        format: MovieFormat,
+        extent: Extent,
+        frames_per_second: u32,
+    ) -> Result<Self, MovieError> {
+        let partial = partial_name(path);
+        let mut program = Command::new("ffmpeg")
+            .args(["-hide_banner", "-loglevel", "error", "-nostdin", "-y"])
+            .args(["-f", "rawvideo", "-pixel_format", "rgb24", "-video_size"])
+            .arg(format!("{}x{}", extent.width, extent.height))
+            .args(["-framerate", &frames_per_second.to_string(), "-i", "pipe:0"])
+            .args([
+                "-vf",
+                "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709",
+            ])
+            .args(["-pix_fmt", "yuv420p", "-colorspace", "bt709"])
+            .args(["-color_primaries", "bt709", "-color_trc", "iec61966-2-1"])
+            .args(format.arguments())
+            .arg(&partial)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(MovieError::NoProgram)?;
+        let errors = program
+            .stderr
+            .take()
+            .map(|pipe| thread::spawn(|| last_line(pipe)));
+        Ok(Self {
+            path: path.to_owned(),
+            partial,
+            extent,
+            program,
+            errors,
+        })
+    }
+
+    /// Adds a frame; values beyond 0 to 1 are clipped.
+    ///
+    /// # Errors
+    /// Where it has another size, or the program has ended.
+    pub fn push(&mut self, frame: &Rgb<Srgb>) -> Result<(), MovieError> {
+        let found = frame.planes().extent();
+        if found != self.extent {
+            return Err(MovieError::Extent {
+                found,
+                expected: self.extent,
+            });
+        }
+        let bytes = frame.planes().to_bytes();
+        let written = match &mut self.program.stdin {
+            Some(pipe) => pipe.write_all(&bytes),
+            None => Ok(()),
+        };
+        // What is wrong is said by the program, not by the broken pipe.
+        written.map_err(|_| self.failure())
+    }
+
+    /// Waits for the program and gives the file its name.
+    ///
+    /// # Errors
+    /// Where the program failed, or the file cannot be given its name.
+    pub fn finish(mut self) -> Result<(), MovieError> {
+        drop(self.program.stdin.take());
+        let is_done = self.program.wait().is_ok_and(|status| status.success());
+        if !is_done {
+            return Err(self.failure());
+        }
+        let published = File::open(&self.partial)
+            .and_then(|file| file.sync_all())
+            .and_then(|()| durable::publish(&self.partial, &self.path));
+        published.map_err(|source| MovieError::Write {
+            path: self.path.clone(),
+            source,
+        })
+    }
+
+    fn failure(&mut self) -> MovieError {
+        drop(self.program.stdin.take());
+        let said = self.errors.take().and_then(|thread| thread.join().ok());
+        MovieError::Failed {
+            path: self.path.clone(),
+            said: said.unwrap_or_default(),
+        }
+    }
+}
+
+impl Drop for MovieWriter {
+    fn drop(&mut self) {
+        // After `finish` there is neither a program nor a file.
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+        let _ = fs::remove_file(&self.partial);
+    }
+}
+
+/// The name under which a video is written, in the same folder.
+fn partial_name(path: &Path) -> PathBuf {
+    static COUNTER: AtomicU64 = AtomicU64::new(0);
+    let counter = COUNTER.fetch_add(1, Ordering::Relaxed);
+    let mut name = OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.{counter}.partial", std::process::id()));
+    path.with_file_name(name)
+}
+
+/// Reads all that a program writes, and keeps its last line.
+fn last_line(mut pipe: ChildStderr) -> String {
+    let mut bytes = Vec::new();
+    // What was read before an error is all there is to say.
+    let _ = pipe.read_to_end(&mut bytes);
+    let text = String::from_utf8_lossy(&bytes);
+    let last = text.lines().rfind(|line| !line.trim().is_empty());
+    last.unwrap_or("it ended without a word").trim().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Planes;
+
+    fn has_ffmpeg() -> bool {
+        let run = Command::new("ffmpeg")
+            .arg("-version")
+            .stdout(Stdio::null())
+            .status();
+        if run.is_err() {
+            eprintln!("skipped: the program ffmpeg is not installed");
+        }
+        run.is_ok()
+    }
+
+    fn grey(side: usize) -> Rgb<Srgb> {
+        Rgb::new(Planes::filled(Extent::new(side, side), [0.5; 3]))
+    }
+
+    fn names_in(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        entries
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect()
+    }
+
+    #[test]
+    fn frames_of_odd_size_become_a_video_of_as_many_frames() {
+        if !has_ffmpeg() {
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("turn.mp4");
+        let mut movie =
+            MovieWriter::create(&path, MovieFormat::Mp4, Extent::new(33, 33), 30).unwrap();
+        for _ in 0..7 {
+            movie.push(&grey(33)).unwrap();
+        }
+        movie.finish().unwrap();
+        assert_eq!(names_in(folder.path()), ["turn.mp4"]);
+        let probed = Command::new("ffprobe")
+            .args([
+                "-v",
+                "error",
+                "-count_frames",
+                "-of",
+                "csv=p=0",
+                "-show_entries",
+            ])
+            .arg("stream=width,height,nb_read_frames")
+            .arg(&path)
+            .output()
+            .unwrap();
+        assert_eq!(String::from_utf8_lossy(&probed.stdout).trim(), "34,34,7");
+    }
+
+    #[test]
+    fn a_video_that_cannot_be_written_is_told_with_the_program_s_words_and_leaves_nothing() {
+        if !has_ffmpeg() {
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("missing").join("turn.mp4");
+        let mut movie =
+            MovieWriter::create(&path, MovieFormat::Mp4, Extent::new(32, 32), 30).unwrap();
+        // The pipe may take some frames before it breaks.
+        let pushed = (0..50).try_for_each(|_| movie.push(&grey(32)));
+        let error = pushed.and_then(|()| movie.finish()).unwrap_err();
+        assert!(error.to_string().contains("No such file"), "{error}");
+        assert!(names_in(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn a_frame_of_another_size_is_refused_and_an_unfinished_video_leaves_nothing() {
+        if !has_ffmpeg() {
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("turn.webm");
+        let mut movie =
+            MovieWriter::create(&path, MovieFormat::Webm, Extent::new(32, 32), 30).unwrap();
+        movie.push(&grey(32)).unwrap();
+        assert!(matches!(
+            movie.push(&grey(16)),
+            Err(MovieError::Extent { .. })
+        ));
+        drop(movie);
+        assert!(names_in(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn the_extension_names_the_format() {
+        assert_eq!(
+            MovieFormat::of(Path::new("a/b.MP4")),
+            Some(MovieFormat::Mp4)
+        );
+        assert_eq!(
+            MovieFormat::of(Path::new("b.webm")),
+            Some(MovieFormat::Webm)
+        );
+        assert_eq!(MovieFormat::of(Path::new("mp4")), None);
+    }
+}
