@@ -1,7 +1,10 @@
 //! Rendering one image of 256 x 256 on one thread: the layers, and beside them the same formulas in plain
 //! loops over pixels.
 #![allow(missing_docs, reason = "criterion's macros make undocumented items")]
-#![allow(clippy::expect_used, reason = "a benchmark that cannot start has nothing to measure")]
+#![allow(
+    clippy::expect_used,
+    reason = "a benchmark that cannot start has nothing to measure"
+)]
 
 use std::f32::consts::PI;
 use std::hint::black_box;

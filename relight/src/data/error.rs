@@ -1,7 +1,7 @@
 //! Why a data set, or one sample of it, cannot be given.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use relit_data::causes::with_causes;
 
@@ -103,6 +103,26 @@ pub enum SampleFault {
         /// What is wrong, with its causes.
         why: String,
     },
+}
+
+impl SampleFault {
+    /// Puts the path to an operating system's reason.
+    pub(super) fn read(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        |source| Self::Read { path, source }
+    }
+
+    /// Puts the path to what is wrong with numbers in a file.
+    pub(super) fn numbers<E>(path: &Path) -> impl FnOnce(E) -> Self
+    where
+        E: std::error::Error + Send + Sync + 'static,
+    {
+        let path = path.to_owned();
+        |source| Self::Numbers {
+            path,
+            source: Box::new(source),
+        }
+    }
 }
 
 /// A sample that cannot be given, by its name.

@@ -1,3 +1,4 @@
 //! One file a verb: its arguments and its `run`.
 
+pub(super) mod eval;
 pub(super) mod render;

@@ -20,6 +20,10 @@ pub enum TruthLayout {
     /// category alone), 8 bits. Values are taken as linear, as their own loader multiplies albedo and
     /// shading as they stand. Their normals hold **y down in red and x in green**; blue is z.
     Janner,
+    /// What `relight synth` writes:
+    /// `<number>/{image,mask,normal,albedo,shading,highlight}.png`, `light.txt` and `sample.json`. The
+    /// image is taken as sRGB; the camera's own response is close to it.
+    Synth,
     /// The part of LIME (Meka et al. 2018) that the paper's warm-up reads: the files of
     /// `Input_Masked`, `Normal` and `Mask`, paired in the order of their names; also of `Albedo` and
     /// `Shading` where those folders are. Assumed, as no description is published: input and albedo
@@ -38,6 +42,9 @@ pub(super) enum Role {
     Shading,
     Highlight,
     Mask,
+    Light,
+    /// The largest values that `shading` and `highlight` stand for.
+    Whites,
 }
 
 /// A file of a sample.
@@ -87,6 +94,17 @@ const JANNER: [(Role, &str, bool); 6] = [
     (Role::Highlight, "specular.png", false),
 ];
 
+const SYNTH: [(Role, &str, bool); 8] = [
+    (Role::Mask, "mask.png", true),
+    (Role::Image, "image.png", true),
+    (Role::Normals, "normal.png", true),
+    (Role::Albedo, "albedo.png", true),
+    (Role::Shading, "shading.png", true),
+    (Role::Highlight, "highlight.png", true),
+    (Role::Light, "light.txt", true),
+    (Role::Whites, "sample.json", true),
+];
+
 const LIME: [(Role, &str, bool); 5] = [
     (Role::Mask, "Mask", true),
     (Role::Image, "Input_Masked", true),
@@ -97,12 +115,13 @@ const LIME: [(Role, &str, bool); 5] = [
 
 impl TruthLayout {
     /// All layouts.
-    pub const ALL: [Self; 3] = [Self::Mit, Self::Janner, Self::Lime];
+    pub const ALL: [Self; 4] = [Self::Synth, Self::Mit, Self::Janner, Self::Lime];
 
     /// The name on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Synth => "synth",
             Self::Mit => "mit",
             Self::Janner => "janner",
             Self::Lime => "lime",
@@ -111,7 +130,7 @@ impl TruthLayout {
 
     pub(super) const fn expected(self) -> &'static str {
         match self {
-            Self::Mit => "folders with a mask.png each",
+            Self::Synth | Self::Mit => "folders with a mask.png each",
             Self::Janner => "files <n>_mask.png, or folders of such",
             Self::Lime => "folders Input_Masked, Normal and Mask",
         }
@@ -120,14 +139,14 @@ impl TruthLayout {
     /// How the values of this file stand for light.
     pub(super) const fn transfer(self, role: Role) -> Transfer {
         match (self, role) {
-            (Self::Lime, Role::Image | Role::Albedo) => Transfer::Srgb,
+            (Self::Lime, Role::Image | Role::Albedo) | (Self::Synth, Role::Image) => Transfer::Srgb,
             _ => Transfer::Linear,
         }
     }
 
     pub(super) const fn normal_file(self) -> NormalFile {
         match self {
-            Self::Mit => NormalFile::YUp,
+            Self::Synth | Self::Mit => NormalFile::YUp,
             Self::Janner => NormalFile::RedDownGreenRight,
             Self::Lime => NormalFile::YDown,
         }
@@ -135,7 +154,8 @@ impl TruthLayout {
 
     pub(super) fn entries(self, root: &Path) -> Result<Vec<Entry>, OpenError> {
         match self {
-            Self::Mit => mit(root),
+            Self::Synth => folders(root, &SYNTH),
+            Self::Mit => folders(root, &MIT),
             Self::Janner => janner(root),
             Self::Lime => lime(root),
         }
@@ -158,13 +178,14 @@ impl FromStr for TruthLayout {
     }
 }
 
-fn mit(root: &Path) -> Result<Vec<Entry>, OpenError> {
-    let objects = listed(root, |path| path.join("mask.png").is_file())?;
-    Ok(objects
+/// Samples that have a folder each, known by their mask.
+fn folders(root: &Path, known: &[(Role, &str, bool)]) -> Result<Vec<Entry>, OpenError> {
+    let samples = listed(root, |path| path.join("mask.png").is_file())?;
+    Ok(samples
         .iter()
         .map(|folder| Entry {
             name: name_of(folder),
-            parts: parts(&MIT, |file| folder.join(file)),
+            parts: parts(known, |file| folder.join(file)),
         })
         .collect())
 }

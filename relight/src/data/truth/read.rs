@@ -1,14 +1,17 @@
 //! Reading the files of a sample.
 
+use std::fs;
 use std::io;
 use std::path::Path;
+
+use serde::Deserialize;
 
 use super::TruthSample;
 use super::layout::{Entry, NormalFile, Part, Role, TruthLayout};
 use crate::data::SampleFault;
 use crate::data::error::check_extent;
 use crate::image::{ImageError, Linear, Planes, Rgb, read_planes};
-use crate::light::{Normals, YDown, YUp};
+use crate::light::{Normals, ShLight, YDown, YUp};
 
 pub(super) fn sample(entry: &Entry, layout: TruthLayout) -> Result<TruthSample, SampleFault> {
     let parts = Parts { entry, layout };
@@ -16,19 +19,33 @@ pub(super) fn sample(entry: &Entry, layout: TruthLayout) -> Result<TruthSample, 
     let mask = mask.ok_or_else(|| SampleFault::Missing {
         part: "mask".to_owned(),
     })?;
+    let whites = parts.whites()?;
+    let albedo = parts.colour(Role::Albedo, 1.0)?;
+    let shading = parts.colour(Role::Shading, whites.shading)?;
+    let diffuse = match parts.colour(Role::Diffuse, 1.0)? {
+        Some(diffuse) => Some(diffuse),
+        None => product(albedo.as_ref(), shading.as_ref())?,
+    };
     let sample = TruthSample {
         name: entry.name.clone(),
-        image: parts.colour(Role::Image)?,
-        diffuse: parts.colour(Role::Diffuse)?,
+        image: parts.colour(Role::Image, 1.0)?,
+        diffuse,
         normals: parts.normals()?,
-        albedo: parts.colour(Role::Albedo)?,
-        shading: parts.colour(Role::Shading)?,
-        highlight: parts.colour(Role::Highlight)?,
-        light: None,
+        albedo,
+        shading,
+        highlight: parts.colour(Role::Highlight, whites.highlight)?,
+        light: parts.light()?,
         mask,
     };
     check_extents(&sample)?;
     Ok(sample)
+}
+
+/// What the largest values of files stand for.
+#[derive(Deserialize)]
+struct Whites {
+    shading: f32,
+    highlight: f32,
 }
 
 struct Parts<'a> {
@@ -37,9 +54,40 @@ struct Parts<'a> {
 }
 
 impl Parts<'_> {
-    fn colour(&self, role: Role) -> Result<Option<Rgb<Linear>>, SampleFault> {
+    /// The image in a file of which the largest value stands for `white`.
+    fn colour(&self, role: Role, white: f32) -> Result<Option<Rgb<Linear>>, SampleFault> {
         let transfer = self.layout.transfer(role);
-        self.read(role, |path| Rgb::read(path, transfer))
+        let image = self.read(role, |path| Rgb::<Linear>::read(path, transfer))?;
+        Ok(image.map(|image| Rgb::new(image.into_planes().map(|value| value * white))))
+    }
+
+    fn whites(&self) -> Result<Whites, SampleFault> {
+        #[derive(Deserialize)]
+        struct Description {
+            white: Whites,
+        }
+        let Some(path) = self.path(Role::Whites) else {
+            return Ok(Whites {
+                shading: 1.0,
+                highlight: 1.0,
+            });
+        };
+        let bytes = fs::read(path).map_err(SampleFault::read(path))?;
+        let parsed: Result<Description, _> = serde_json::from_slice(&bytes);
+        Ok(parsed.map_err(SampleFault::numbers(path))?.white)
+    }
+
+    fn light(&self) -> Result<Option<ShLight>, SampleFault> {
+        let Some(path) = self.path(Role::Light) else {
+            return Ok(None);
+        };
+        let text = fs::read_to_string(path).map_err(SampleFault::read(path))?;
+        text.parse().map(Some).map_err(SampleFault::numbers(path))
+    }
+
+    fn path(&self, role: Role) -> Option<&Path> {
+        let part = self.entry.parts.iter().find(|part| part.role == role);
+        part.map(|part| part.path.as_path())
     }
 
     fn normals(&self) -> Result<Option<Normals<YUp>>, SampleFault> {
@@ -83,6 +131,28 @@ impl Parts<'_> {
             Err(error) => Err(error.into()),
         }
     }
+}
+
+/// Albedo times shading.
+fn product(
+    albedo: Option<&Rgb<Linear>>,
+    shading: Option<&Rgb<Linear>>,
+) -> Result<Option<Rgb<Linear>>, SampleFault> {
+    let (Some(albedo), Some(shading)) = (albedo, shading) else {
+        return Ok(None);
+    };
+    let mut planes = albedo.planes().clone();
+    check_extent("shading", shading.planes().extent(), planes.extent())?;
+    for (plane, shading) in planes
+        .planes_mut()
+        .into_iter()
+        .zip(shading.planes().planes())
+    {
+        for (value, shading) in plane.iter_mut().zip(shading) {
+            *value *= shading;
+        }
+    }
+    Ok(Some(Rgb::new(planes)))
 }
 
 fn read_normals(path: &Path, file: NormalFile) -> Result<Normals<YUp>, ImageError> {

@@ -108,10 +108,7 @@ fn read_mask(path: &Path) -> Result<(Arc<Vec<u8>>, Extent), SampleFault> {
 }
 
 fn read_image(path: &Path) -> Result<::image::DynamicImage, SampleFault> {
-    let bytes = fs::read(path).map_err(|source| SampleFault::Read {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = fs::read(path).map_err(SampleFault::read(path))?;
     let decoded = ::image::load_from_memory(&bytes).map_err(|source| ImageError::Decode {
         path: path.to_owned(),
         source,

@@ -86,17 +86,14 @@ impl ShardTurn {
     }
 
     fn read(&self, place: &Range<u64>) -> Result<Vec<u8>, SampleFault> {
-        let failed = |source| SampleFault::Read {
-            path: self.path.clone(),
-            source,
+        let read = || {
+            let mut file = File::open(&self.path)?;
+            file.seek(SeekFrom::Start(place.start))?;
+            let mut bytes = Vec::new();
+            file.take(place.end - place.start).read_to_end(&mut bytes)?;
+            Ok(bytes)
         };
-        let mut file = File::open(&self.path).map_err(failed)?;
-        file.seek(SeekFrom::Start(place.start)).map_err(failed)?;
-        let mut bytes = Vec::new();
-        file.take(place.end - place.start)
-            .read_to_end(&mut bytes)
-            .map_err(failed)?;
-        Ok(bytes)
+        read().map_err(SampleFault::read(&self.path))
     }
 }
 
