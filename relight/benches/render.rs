@@ -1,4 +1,4 @@
-//! Rendering one image of 256 x 256 on one thread: the layers, and beside them the same formulas in plain
+//! Rendering one image of 256 x 256 on one thread, in processor time: the layers, and beside them the same formulas in plain
 //! loops over pixels.
 #![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 #![allow(
@@ -8,7 +8,9 @@
 
 use std::f32::consts::PI;
 use std::hint::black_box;
+use std::time::Duration;
 
+use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{Criterion, criterion_group, criterion_main};
 use rayon::ThreadPoolBuilder;
 use relight::image::{Extent, Planes, Rgb};
@@ -16,6 +18,39 @@ use relight::light::{Normals, Order, Panorama, ShLight};
 use relight::render::{DiffuseForm, Gloss, Layers, SpecularForm, Surface};
 
 const SIDE: usize = 256;
+
+/// The processor's time for this process: what other programs take on a busy machine does not count.
+struct ProcessorTime;
+
+impl Measurement for ProcessorTime {
+    type Intermediate = Duration;
+    type Value = Duration;
+
+    fn start(&self) -> Duration {
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        now.try_into().unwrap_or_default()
+    }
+
+    fn end(&self, start: Duration) -> Duration {
+        self.start() - start
+    }
+
+    fn add(&self, a: &Duration, b: &Duration) -> Duration {
+        *a + *b
+    }
+
+    fn zero(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    fn to_f64(&self, value: &Duration) -> f64 {
+        value.as_nanos() as f64
+    }
+
+    fn formatter(&self) -> &dyn ValueFormatter {
+        WallTime.formatter()
+    }
+}
 
 fn surface() -> Surface {
     let normals = Normals::sphere(SIDE);
@@ -89,7 +124,7 @@ fn plain_loop(surface: &Surface, light: &ShLight) -> Vec<[f32; 3]> {
     image
 }
 
-fn render(c: &mut Criterion) {
+fn render(c: &mut Criterion<ProcessorTime>) {
     let surface = surface();
     let one = ThreadPoolBuilder::new()
         .num_threads(1)
@@ -127,7 +162,7 @@ fn render(c: &mut Criterion) {
     group.finish();
 }
 
-fn project(c: &mut Criterion) {
+fn project(c: &mut Criterion<ProcessorTime>) {
     let panorama = Panorama::of_light(&light(6), Extent::new(512, 256));
     let one = ThreadPoolBuilder::new()
         .num_threads(1)
@@ -145,7 +180,7 @@ fn project(c: &mut Criterion) {
 
 criterion_group! {
     name = benches;
-    config = Criterion::default().sample_size(20);
+    config = Criterion::default().with_measurement(ProcessorTime).sample_size(20);
     targets = render, project
 }
 criterion_main!(benches);

@@ -13,6 +13,7 @@
 //! | [`metrics`] | how far an estimate is from the truth |
 //! | [`movie`] | frames into MP4 and WebM, by the `ffmpeg` program |
 //! | [`render`] | diffuse and specular layers on normals, their derivatives, the truth by Monte Carlo |
+//! | [`synth`] | pictures of objects with the truth that they were made of |
 pub mod data;
 pub mod eval;
 pub mod image;
@@ -20,3 +21,4 @@ pub mod light;
 pub mod metrics;
 pub mod movie;
 pub mod render;
+pub mod synth;

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 
-use commands::{eval, render};
+use commands::{eval, render, synth};
 use console::Console;
 
 /// Single-view relighting: light, rendering, data with truth, and the measures of the results.
@@ -34,6 +34,9 @@ enum Verb {
     /// Measure estimates, and baselines beside them, by the protocols of the paper's tables.
     #[command(after_help = eval::EXAMPLES)]
     Eval(eval::Arguments),
+    /// Make pictures of objects together with their truth: samples, whole turns, panoramas.
+    #[command(after_help = synth::EXAMPLES)]
+    Synth(synth::Arguments),
 }
 
 impl Verb {
@@ -42,6 +45,7 @@ impl Verb {
         match self {
             Self::Render(arguments) => arguments.fault(),
             Self::Eval(arguments) => arguments.fault(),
+            Self::Synth(_) => None,
         }
     }
 }
@@ -58,5 +62,6 @@ pub(crate) fn run() -> ExitCode {
     console.finish(match line.verb {
         Verb::Render(arguments) => render::run(&arguments, console),
         Verb::Eval(arguments) => eval::run(&arguments, console),
+        Verb::Synth(arguments) => synth::run(&arguments, console),
     })
 }

@@ -83,6 +83,9 @@ pub enum EvalError {
         /// What it should say.
         expected: &'static str,
     },
+    /// Objects cannot be made.
+    #[error(transparent)]
+    Synth(#[from] crate::synth::Error),
     /// Light is not in the form of coefficients.
     #[error("{} does not hold light", path.display())]
     Light {

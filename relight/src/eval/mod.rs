@@ -33,7 +33,9 @@ pub use light::{LightMethod, evaluate_light};
 pub use normals::{NormalMethod, evaluate_normals};
 pub use ordinal::{OrdinalMethod, evaluate_ordinal};
 pub use predictions::Predictions;
-pub use relighting::{RelightMethod, RelightingSet, evaluate_relighting};
+pub use relighting::{
+    RelightMethod, RelightingRecipe, RelightingSet, evaluate_relighting, make_relighting,
+};
 pub use retinex::{Decomposition, Retinex};
 pub use run::Progress;
 pub use table::{ImageScores, Line, MaskRule, Measured, Table, Terms};

@@ -56,7 +56,9 @@ pub fn evaluate_ordinal(
 ) -> Result<Table, EvalError> {
     let mut table = Table {
         protocol: "ordinal albedo".to_owned(),
-        notes: vec![format!("WHDR: weighted human disagreement rate, delta {DELTA}")],
+        notes: vec![format!(
+            "WHDR: weighted human disagreement rate, delta {DELTA}"
+        )],
         lines: Vec::new(),
         images: Vec::new(),
     };

@@ -177,13 +177,15 @@ impl Kernel<3, 3> for DiffuseLayer {
         let terms = terms(normal);
         let surface = Lanes::surface(normal);
         let ambient = Lanes::of(self.ambient());
-        [0, 1, 2].map(|channel| {
-            let mut sum = terms[0] * Lanes::of(self.coefficients[0][channel]);
-            for (term, c) in terms.iter().zip(&self.coefficients).skip(1) {
-                sum = sum + *term * Lanes::of(c[channel]);
+        let mut shading = [Lanes::all(0.0); 3];
+        for channel in 0..3 {
+            let mut sum = Lanes::all(0.0);
+            for at in 0..9 {
+                sum = sum + terms[at] * Lanes::of(self.coefficients[at][channel]);
             }
-            (sum.at_least_zero() + ambient) * surface
-        })
+            shading[channel] = (sum.at_least_zero() + ambient) * surface;
+        }
+        shading
     }
 }
 

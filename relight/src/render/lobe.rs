@@ -56,9 +56,9 @@ struct Term<F> {
 }
 
 impl LobeLayer {
-    /// How many bands G has beyond those of the light: with these, order 2 is rendered to 0.5 % of the
-    /// highlight for α up to 200.
-    const MORE_BANDS: usize = 10;
+    /// How many bands G has beyond those of the light: with these, light of order 2 is rendered to 1 % of
+    /// the highlight for α up to 200.
+    const MORE_BANDS: usize = 8;
 
     /// The layer for a light, with enough bands for what the light holds.
     #[must_use]
@@ -188,10 +188,13 @@ impl Kernel<7, 3> for LobeLayer {
         [x, y, z, red, green, blue, smoothness]: [Lanes; 7],
     ) -> [Lanes; 3] {
         zonal(smoothness, lobe);
-        let sums = sum(self.order, &self.fast, lobe, [x, y, z]);
+        let [r, g, b] = sum(self.order, &self.fast, lobe, [x, y, z]);
         let surface = Lanes::surface([x, y, z]);
-        let [r, g, b] = sums.map(|sum| sum.at_least_zero() * surface);
-        [r * red, g * green, b * blue]
+        [
+            r.at_least_zero() * red * surface,
+            g.at_least_zero() * green * surface,
+            b.at_least_zero() * blue * surface,
+        ]
     }
 }
 
@@ -233,7 +236,7 @@ fn sum_of_m<T: Number>(band: &[Term<T::Constant>], lobe: &[T], first: f64, z: T)
             plus[c] = plus[c] + weight * T::constant(term.plus[c]);
             minus[c] = minus[c] + weight * T::constant(term.minus[c]);
         }
-        let [a, b] = term.step.map(T::constant);
+        let (a, b) = (T::constant(term.step[0]), T::constant(term.step[1]));
         (before, now) = (now, a * z * now - b * before);
     }
     [plus, minus]

@@ -107,16 +107,17 @@ impl Kernel<7, 3> for PowerLayer {
 
     #[inline(always)]
     fn run(&self, (): &mut (), [x, y, z, red, green, blue, smoothness]: [Lanes; 7]) -> [Lanes; 3] {
-        let mut sums = [Lanes::all(0.0); 3];
-        for (term, c) in terms([x, y, z]).into_iter().zip(&self.coefficients) {
-            let power = term.signed_power(smoothness);
-            for (sum, c) in sums.iter_mut().zip(c) {
-                *sum = *sum + power * Lanes::of(*c);
-            }
+        let terms = terms([x, y, z]);
+        let [mut r, mut g, mut b] = [Lanes::all(0.0); 3];
+        for at in 0..9 {
+            let power = terms[at].signed_power(smoothness);
+            let c = self.coefficients[at];
+            r = r + power * Lanes::of(c[0]);
+            g = g + power * Lanes::of(c[1]);
+            b = b + power * Lanes::of(c[2]);
         }
         let surface = Lanes::surface([x, y, z]);
-        let [r, g, b] = sums.map(|sum| sum * surface);
-        [r * red, g * green, b * blue]
+        [r * red * surface, g * green * surface, b * blue * surface]
     }
 }
 

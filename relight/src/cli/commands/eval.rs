@@ -1,15 +1,19 @@
 //! `relight eval`: the protocols of the paper's tables.
 
+use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
-use relight::data::{TruthLayout, TruthSet};
+use relight::data::{JudgedImages, TruthLayout, TruthSet};
 use relight::eval::{
     HighlightMethod, IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, LightMethod, NormalMethod,
-    Predictions, Table, evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals,
+    OrdinalMethod, Predictions, RelightMethod, RelightingRecipe, RelightingSet, Table,
+    evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal,
+    evaluate_relighting, make_relighting,
 };
 use relight::image::Transfer;
-use relight::render::{DiffuseForm, NormalsFrame};
+use relight::render::{DiffuseForm, NormalsFrame, SpecularForm};
+use relight::synth::{Folders, Library};
 use relit_data::durable::write_whole;
 use serde_json::json;
 
@@ -22,7 +26,9 @@ Examples:
   relight eval mit --data MIT-intrinsic --predictions out/net -o mit.json
       the same beside the estimates out/net/<object>/{albedo,shading}.png
   relight eval normals --layout janner --data intrinsics --count 500 --predictions out/net
-      estimates out/net/<name>/normal.png on 500 images, spread over the set";
+      estimates out/net/<name>/normal.png on 500 images, spread over the set
+  relight eval relighting --data relighting --make
+      100 objects under 30 lights each, made by the renderer of `relight synth`";
 
 #[derive(Args)]
 pub(in crate::cli) struct Arguments {
@@ -58,19 +64,17 @@ enum Protocol {
         #[command(flatten)]
         set: SetArguments,
     },
+    /// Relighting: MSE and DSSIM of an object under many lights, from its image under one.
+    Relighting(RelightingArguments),
+    /// Albedo as people judge it: WHDR on the folder of Intrinsic Images in the Wild.
+    Whdr(CommonArguments),
 }
 
 #[derive(Args)]
-struct SetArguments {
-    /// The folder of images with their truth.
+struct CommonArguments {
+    /// The folder of the truth.
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
-    /// How that folder is laid out.
-    #[arg(long, value_name = "LAYOUT", default_value_t = TruthLayout::Mit)]
-    layout: TruthLayout,
-    /// Compare so many images only, spread evenly over the set.
-    #[arg(long, value_name = "N")]
-    count: Option<usize>,
     /// What the table calls these images [default: the folder's name].
     #[arg(long, value_name = "TEXT")]
     split: Option<String>,
@@ -86,6 +90,48 @@ struct SetArguments {
     /// Write the table as JSON, with the scores of each image, to this file.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct SetArguments {
+    #[command(flatten)]
+    common: CommonArguments,
+    /// How the folder of the truth is laid out.
+    #[arg(long, value_name = "LAYOUT", default_value_t = TruthLayout::Mit)]
+    layout: TruthLayout,
+    /// Compare so many images only, spread evenly over the set.
+    #[arg(long, value_name = "N")]
+    count: Option<usize>,
+}
+
+#[derive(Args)]
+struct RelightingArguments {
+    #[command(flatten)]
+    common: CommonArguments,
+    /// Make the set first, in the folder --data; objects that are there are kept.
+    #[arg(long)]
+    make: bool,
+    /// How many objects to make.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=999))]
+    objects: u16,
+    /// Under how many lights.
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u16).range(2..=99))]
+    lights: u16,
+    /// Width and height of the images.
+    #[arg(long, value_name = "PIXELS", default_value_t = 128, value_parser = clap::value_parser!(u32).range(16..=2048))]
+    size: u32,
+    /// What objects, materials and lights are drawn from.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Make objects that cast no shadows on themselves.
+    #[arg(long, requires = "make")]
+    no_shadows: bool,
+    /// Meshes to draw from besides procedural shapes (.obj, .gltf, .glb).
+    #[arg(long, value_name = "DIR", requires = "make")]
+    meshes: Option<PathBuf>,
+    /// Panoramas (.hdr, .exr) in place of those that are made.
+    #[arg(long, value_name = "DIR", requires = "make")]
+    panoramas: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -123,27 +169,35 @@ enum YName {
 impl Arguments {
     /// What is wrong with the arguments together.
     pub(in crate::cli) fn fault(&self) -> Option<String> {
-        let (Protocol::Mit { set, .. }
-        | Protocol::Normals { set }
-        | Protocol::Light { set, .. }
-        | Protocol::Highlight { set }) = &self.protocol;
-        (set.count == Some(0)).then(|| "--count 0 leaves no image to compare".to_owned())
+        match &self.protocol {
+            Protocol::Mit { set, .. }
+            | Protocol::Normals { set }
+            | Protocol::Light { set, .. }
+            | Protocol::Highlight { set } => {
+                (set.count == Some(0)).then(|| "--count 0 leaves no image to compare".to_owned())
+            }
+            Protocol::Relighting(_) | Protocol::Whdr(_) => None,
+        }
+    }
+
+    fn common(&self) -> &CommonArguments {
+        match &self.protocol {
+            Protocol::Mit { set, .. }
+            | Protocol::Normals { set }
+            | Protocol::Light { set, .. }
+            | Protocol::Highlight { set } => &set.common,
+            Protocol::Relighting(arguments) => &arguments.common,
+            Protocol::Whdr(common) => common,
+        }
     }
 }
 
-impl SetArguments {
-    fn open(&self) -> Result<(TruthSet, String), Box<dyn std::error::Error>> {
-        let set = TruthSet::open(&self.data, self.layout)?;
-        let all = set.names().len();
-        let set = set.spread(self.count.unwrap_or(all));
+impl CommonArguments {
+    /// What the table calls the images.
+    fn split(&self, which: &str) -> String {
         let name = self.data.file_name().unwrap_or(self.data.as_os_str());
-        let which = if set.names().len() == all {
-            "all of".to_owned()
-        } else {
-            format!("{} spread over", set.names().len())
-        };
         let named = || format!("{which} {}", name.to_string_lossy());
-        Ok((set, self.split.clone().unwrap_or_else(named)))
+        self.split.clone().unwrap_or_else(named)
     }
 
     fn predictions(&self) -> impl Iterator<Item = Predictions> {
@@ -160,17 +214,34 @@ impl SetArguments {
     }
 }
 
-pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let (table, output) = match &arguments.protocol {
-        Protocol::Mit { set, input } => (mit(set, *input, console)?, &set.output),
-        Protocol::Normals { set } => (normals(set, console)?, &set.output),
-        Protocol::Light { set, diffuse } => (light(set, *diffuse, console)?, &set.output),
-        Protocol::Highlight { set } => (highlight(set, console)?, &set.output),
-    };
-    tell(&table, output.as_deref(), console)
+impl SetArguments {
+    fn open(&self) -> Result<(TruthSet, String), Box<dyn Error>> {
+        let set = TruthSet::open(&self.common.data, self.layout)?;
+        let all = set.names().len();
+        let set = set.spread(self.count.unwrap_or(all));
+        let count = set.names().len();
+        let split = if count == all {
+            self.common.split("all of")
+        } else {
+            self.common.split(&format!("{count} spread over"))
+        };
+        Ok((set, split))
+    }
 }
 
-type Evaluated = Result<Table, Box<dyn std::error::Error>>;
+pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandResult {
+    let table = match &arguments.protocol {
+        Protocol::Mit { set, input } => mit(set, *input, console),
+        Protocol::Normals { set } => normals(set, console),
+        Protocol::Light { set, diffuse } => light(set, *diffuse, console),
+        Protocol::Highlight { set } => highlight(set, console),
+        Protocol::Relighting(arguments) => relighting(arguments, console),
+        Protocol::Whdr(common) => ordinal(common, console),
+    }?;
+    tell(&table, arguments.common().output.as_deref(), console)
+}
+
+type Evaluated = Result<Table, Box<dyn Error>>;
 
 fn mit(arguments: &SetArguments, input: InputName, console: Console) -> Evaluated {
     let (set, split) = arguments.open()?;
@@ -179,21 +250,19 @@ fn mit(arguments: &SetArguments, input: InputName, console: Console) -> Evaluate
         InputName::Original => IntrinsicInput::Original,
     };
     let baselines = IntrinsicBaseline::all().map(IntrinsicMethod::Baseline);
-    let predicted = arguments.predictions().map(IntrinsicMethod::Predictions);
-    let methods: Vec<_> = baselines.into_iter().chain(predicted).collect();
-    with_progress(&set, methods.len(), console, |progress| {
+    let methods = with_predictions(baselines, &arguments.common, IntrinsicMethod::Predictions);
+    let steps = set.names().len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
         evaluate_intrinsic(&set, &split, input, &methods, progress)
     })
 }
 
 fn normals(arguments: &SetArguments, console: Console) -> Evaluated {
     let (set, split) = arguments.open()?;
-    let predicted = arguments.predictions().map(NormalMethod::Predictions);
-    let methods: Vec<_> = [NormalMethod::Viewer]
-        .into_iter()
-        .chain(predicted)
-        .collect();
-    with_progress(&set, methods.len(), console, |progress| {
+    let baselines = [NormalMethod::Viewer];
+    let methods = with_predictions(baselines, &arguments.common, NormalMethod::Predictions);
+    let steps = set.names().len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
         evaluate_normals(&set, &split, &methods, progress)
     })
 }
@@ -204,37 +273,95 @@ fn light(arguments: &SetArguments, diffuse: DiffuseName, console: Console) -> Ev
         DiffuseName::Irradiance => DiffuseForm::Irradiance,
         DiffuseName::Released => DiffuseForm::Released,
     };
-    let predicted = arguments.predictions().map(LightMethod::Predictions);
     let baselines = [LightMethod::Even, LightMethod::Oracle];
-    let methods: Vec<_> = baselines.into_iter().chain(predicted).collect();
-    with_progress(&set, methods.len(), console, |progress| {
+    let methods = with_predictions(baselines, &arguments.common, LightMethod::Predictions);
+    let steps = set.names().len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
         evaluate_light(&set, &split, form, &methods, progress)
     })
 }
 
 fn highlight(arguments: &SetArguments, console: Console) -> Evaluated {
     let (set, split) = arguments.open()?;
-    let predicted = arguments.predictions().map(HighlightMethod::Predictions);
-    let methods: Vec<_> = [HighlightMethod::Nothing]
-        .into_iter()
-        .chain(predicted)
-        .collect();
-    with_progress(&set, methods.len(), console, |progress| {
+    let baselines = [HighlightMethod::Nothing];
+    let methods = with_predictions(baselines, &arguments.common, HighlightMethod::Predictions);
+    let steps = set.names().len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
         evaluate_highlights(&set, &split, &methods, progress)
     })
 }
 
-fn with_progress<E: std::error::Error + 'static>(
-    set: &TruthSet,
-    methods: usize,
+fn relighting(arguments: &RelightingArguments, console: Console) -> Evaluated {
+    if arguments.make {
+        make(arguments, console)?;
+    }
+    let common = &arguments.common;
+    let set = RelightingSet::open(&common.data)?;
+    let baselines = [
+        RelightMethod::Naive,
+        RelightMethod::Oracle(SpecularForm::Power),
+        RelightMethod::Oracle(SpecularForm::Lobe),
+    ];
+    let methods = with_predictions(baselines, common, |folder| {
+        RelightMethod::Predictions(folder, SpecularForm::Lobe)
+    });
+    let steps = set.objects() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
+        evaluate_relighting(&set, &common.split("all of"), &methods, progress)
+    })
+}
+
+fn make(arguments: &RelightingArguments, console: Console) -> Result<(), Box<dyn Error>> {
+    let recipe = RelightingRecipe {
+        objects: arguments.objects.into(),
+        lights: arguments.lights.into(),
+        size: arguments.size,
+        seed: arguments.seed,
+        shadows: !arguments.no_shadows,
+    };
+    let library = Library::read(&Folders {
+        meshes: arguments.meshes.clone(),
+        textures: None,
+        panoramas: arguments.panoramas.clone(),
+    })?;
+    with_progress(recipe.objects, "making objects", console, |progress| {
+        make_relighting(&recipe, &library, &arguments.common.data, progress)
+    })
+}
+
+fn ordinal(common: &CommonArguments, console: Console) -> Evaluated {
+    let images = JudgedImages::open(&common.data)?;
+    let baselines = [
+        OrdinalMethod::ConstantAlbedo,
+        OrdinalMethod::ConstantShading,
+    ];
+    let methods = with_predictions(baselines, common, OrdinalMethod::Predictions);
+    let steps = images.len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
+        evaluate_ordinal(&images, &common.split("all of"), &methods, progress)
+    })
+}
+
+/// The baselines, and the folders of predictions as methods.
+fn with_predictions<M, const N: usize>(
+    baselines: [M; N],
+    common: &CommonArguments,
+    method: impl Fn(Predictions) -> M,
+) -> Vec<M> {
+    let predicted = common.predictions().map(method);
+    baselines.into_iter().chain(predicted).collect()
+}
+
+fn with_progress<T, E: Error + 'static>(
+    steps: usize,
+    label: &'static str,
     console: Console,
-    evaluate: impl FnOnce(&(dyn Fn() + Sync)) -> Result<Table, E>,
-) -> Evaluated {
-    let steps = (set.names().len() * methods) as u64;
-    let bar = console.progress(steps, "evaluating");
-    let table = evaluate(&|| bar.inc(1));
+    work: impl FnOnce(&(dyn Fn() + Sync)) -> Result<T, E>,
+) -> Result<T, Box<dyn Error>> {
+    let bar = console.progress(steps as u64, label);
+    let result = work(&|| bar.inc(1));
     bar.finish_and_clear();
-    Ok(table?)
+    Ok(result?)
 }
 
 fn tell(table: &Table, output: Option<&Path>, console: Console) -> CommandResult {

@@ -2,3 +2,4 @@
 
 pub(super) mod eval;
 pub(super) mod render;
+pub(super) mod synth;

@@ -68,7 +68,8 @@ impl RelightingRecipe {
     /// The lights: the panoramas one after the other, each time at a random angle about the vertical.
     fn lightings(&self, library: &Library) -> Vec<(String, Lighting)> {
         let lighting = |number: usize| {
-            let mut random = Pcg64::seed_from_u64(stream(stream(self.seed, LIGHT_STREAM), number as u64));
+            let mut random =
+                Pcg64::seed_from_u64(stream(stream(self.seed, LIGHT_STREAM), number as u64));
             let panorama = number % library.panoramas.len();
             let turn = Rotation::about(Direction::UP, TAU * unit(&mut random));
             let environment = Environment {
@@ -181,7 +182,9 @@ fn make_object(
     write_truth(view.scene.buffer(), &material, &partial)?;
     for (light, (_, lighting)) in lightings.iter().enumerate() {
         let seed = stream(own, light as u64);
-        let shaded = view.scene.light(&material, lighting, &library.panoramas, seed);
+        let shaded = view
+            .scene
+            .light(&material, lighting, &library.panoramas, seed);
         write_images(view.scene.buffer(), &material, &shaded, light, &partial)?;
     }
     fs::rename(&partial, &place).map_err(EvalError::write(&place))?;
@@ -222,7 +225,9 @@ fn write_images(
 ) -> Result<(), EvalError> {
     let full = shaded.image(&material.albedo);
     let products = material.albedo.iter().zip(&shaded.shading);
-    let diffuse: Vec<Vec3> = products.map(|(albedo, shading)| *albedo * *shading).collect();
+    let diffuse: Vec<Vec3> = products
+        .map(|(albedo, shading)| *albedo * *shading)
+        .collect();
     for (part, values) in [(Part::Diffuse, diffuse), (Part::Full, full)] {
         let image = shown(Rgb::new(buffer.planes(&values)));
         write_png(&folder.join(part.file(light)), &image, Depth::Eight)?;

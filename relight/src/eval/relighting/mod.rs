@@ -2,13 +2,13 @@
 //! has 100 objects under 30 lights each: from the image under one light to the 29 others, matt and
 //! with highlights.
 
-// mod make;
+mod make;
 mod method;
 mod set;
 
 use rayon::prelude::*;
 
-// pub use make::{RelightingRecipe, make_relighting};
+pub use make::{RelightingRecipe, make_relighting};
 pub use method::RelightMethod;
 pub use set::RelightingSet;
 

@@ -1,0 +1,220 @@
+//! Albedo and relief out of nothing but a seed: patterns in space that stick to the surface. Knows
+//! points and normals, neither light nor cameras.
+//!
+//! | file | concern |
+//! | --- | --- |
+//! | `palette` | which colours stand together |
+//! | `pattern` | which points have which colour of the palette |
+//! | `writing` | lines of strokes that look like a script |
+//! | `picture` | image files and parts of panoramas as patterns |
+//! | `relief` | slopes that are finer than the mesh |
+
+mod palette;
+mod pattern;
+mod picture;
+mod relief;
+mod writing;
+
+use glam::{Vec2, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::noise::Noise;
+use super::random::{Random, stream};
+use palette::Palette;
+use pattern::{Canvas, Pattern};
+
+pub use palette::AlbedoKind;
+pub use picture::Picture;
+pub use relief::Relief;
+
+/// Least albedo of anything: soot reflects more.
+const DARKEST: f32 = 0.01;
+
+/// The albedo of a surface: a ground and patterns over it, one over the other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Paint {
+    /// What it was drawn as.
+    pub kind: AlbedoKind,
+    /// Linear red, green and blue of the ground, 0..=1.
+    pub ground: Vec3,
+    coats: Vec<Coat>,
+    warp: Option<Warp>,
+    mottle: Option<Mottle>,
+}
+
+/// A pattern in a colour.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Coat {
+    colour: Vec3,
+    pattern: Pattern,
+}
+
+/// Patterns are bent by noise.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Warp {
+    seed: u64,
+    frequency: f32,
+    distance: f32,
+}
+
+/// The albedo is a little lighter and darker from place to place.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Mottle {
+    seed: u64,
+    frequency: f32,
+    strength: f32,
+}
+
+impl Paint {
+    /// One colour everywhere.
+    #[must_use]
+    pub fn constant(albedo: [f32; 3]) -> Self {
+        Self {
+            kind: AlbedoKind::Constant,
+            ground: Vec3::from_array(albedo),
+            coats: Vec::new(),
+            warp: None,
+            mottle: None,
+        }
+    }
+
+    /// A random paint for an object on which `points` lie; `pictures` tells how many there are to
+    /// choose from.
+    pub(super) fn draw(random: &mut Random, points: &[Vec3], pictures: usize) -> Self {
+        let kind = AlbedoKind::draw(random);
+        let palette = Palette::draw(random, kind);
+        if kind == AlbedoKind::Constant {
+            return Self::constant(palette.colours[0].to_array());
+        }
+        let canvas = Canvas {
+            points,
+            palette: &palette,
+            pictures,
+        };
+        let mut coats = Vec::new();
+        if kind == AlbedoKind::Gradient || random.chance(0.25) {
+            coats.push(Coat {
+                colour: palette.colours[1],
+                pattern: Pattern::gradient(random),
+            });
+        }
+        let layers = match kind {
+            AlbedoKind::Gradient => 0,
+            _ => random.weighted([(1, 0.48), (2, 0.35), (3, 0.17)]),
+        };
+        for layer in 0..layers {
+            let colour = palette.colours[(layer + 1) % palette.colours.len()];
+            let pattern = Pattern::draw(random, &canvas);
+            coats.push(Coat { colour, pattern });
+        }
+        Self {
+            kind,
+            ground: palette.colours[0],
+            coats,
+            warp: random.chance(0.5).then(|| Warp {
+                seed: random.seed(),
+                frequency: random.uniform(2.0..6.0),
+                distance: random.uniform(0.01..0.1),
+            }),
+            mottle: random.chance(0.25).then(|| Mottle {
+                seed: random.seed(),
+                frequency: random.log_uniform(1.0..30.0),
+                strength: random.uniform(0.0..0.15),
+            }),
+        }
+    }
+
+    /// The albedo at these points of an object (in its own frame, within the unit sphere), linear,
+    /// 0.01..=1. `texture` are their texture coordinates, where there are any.
+    #[must_use]
+    pub fn apply(
+        &self,
+        points: &[Vec3],
+        texture: Option<&[Vec2]>,
+        pictures: &[Picture],
+    ) -> Vec<Vec3> {
+        let mut albedo = vec![self.ground; points.len()];
+        if !self.coats.is_empty() {
+            let bent: Vec<Vec3> = match self.warp {
+                Some(warp) => points.iter().map(|&point| warp.bend(point)).collect(),
+                None => points.to_vec(),
+            };
+            for coat in &self.coats {
+                coat.pattern
+                    .paint(coat.colour, &bent, texture, pictures, &mut albedo);
+            }
+        }
+        if let Some(mottle) = self.mottle {
+            let noise = Noise::new(mottle.seed, mottle.frequency);
+            for (value, &point) in albedo.iter_mut().zip(points) {
+                *value *= (noise.at(point) * mottle.strength).exp();
+            }
+        }
+        for value in &mut albedo {
+            *value = value.clamp(Vec3::splat(DARKEST), Vec3::ONE);
+        }
+        albedo
+    }
+}
+
+impl Warp {
+    fn bend(self, point: Vec3) -> Vec3 {
+        let noise = Noise::new(stream(self.seed, 1), self.frequency);
+        point + noise.sloped(point).gradient * (self.distance / self.frequency)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points() -> Vec<Vec3> {
+        let mut random = Random::new(8);
+        (0..2000).map(|_| random.direction()).collect()
+    }
+
+    #[test]
+    fn a_third_of_all_paints_is_constant_and_every_albedo_is_one_that_exists() {
+        let points = points();
+        let mut random = Random::new(1);
+        let pictures = [Picture::from_fn(4, 4, |x, y| {
+            Vec3::new(x as f32, y as f32, 1.0)
+        })];
+        let mut constant = 0;
+        for _ in 0..300 {
+            let paint = Paint::draw(&mut random, &points, pictures.len());
+            let albedo = paint.apply(&points, None, &pictures);
+            assert!(
+                albedo
+                    .iter()
+                    .all(|a| a.min_element() >= DARKEST && a.max_element() <= 1.0)
+            );
+            let is_constant = albedo.iter().all(|a| *a == albedo[0]);
+            assert!(is_constant || paint.kind != AlbedoKind::Constant);
+            constant += usize::from(paint.kind == AlbedoKind::Constant);
+        }
+        assert!((80..120).contains(&constant), "{constant}");
+    }
+
+    #[test]
+    fn two_tones_differ_strongly() {
+        let mut random = Random::new(2);
+        for _ in 0..50 {
+            let palette = Palette::draw(&mut random, AlbedoKind::TwoTone);
+            let [a, b] = [0, 1].map(|k| palette.colours[k].element_sum() / 3.0);
+            assert!(a.max(b) > 1.5 * a.min(b), "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn a_paint_comes_back_from_its_json() {
+        let points = points();
+        let mut random = Random::new(3);
+        for _ in 0..40 {
+            let paint = Paint::draw(&mut random, &points, 3);
+            let text = serde_json::to_string(&paint).unwrap();
+            let back: Paint = serde_json::from_str(&text).unwrap();
+            assert_eq!(back, paint);
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Maps of 16 bits a channel.
+
+use glam::Vec3;
+use png::{BitDepth, ColorType, Compression, Filter};
+
+use super::Error;
+use super::geometry::GBuffer;
+
+/// Colours as 16-bit values.
+pub(super) struct Sixteen {
+    /// One for each covered pixel.
+    values: Vec<[u16; 3]>,
+    /// What 65535 stands for.
+    pub(super) white: f32,
+}
+
+impl Sixteen {
+    /// Colours of 0..=`white`; others are clipped.
+    pub(super) fn up_to(colours: &[Vec3], white: f32) -> Self {
+        let scale = 65_535.0 / white;
+        let value = |colour: &Vec3| (*colour * scale).to_array().map(|v| (v + 0.5) as u16);
+        Self {
+            values: colours.iter().map(value).collect(),
+            white,
+        }
+    }
+
+    /// Colours of 0 to the largest among them.
+    pub(super) fn up_to_largest(colours: &[Vec3]) -> Self {
+        let largest = colours
+            .iter()
+            .map(|colour| colour.max_element())
+            .fold(0.0, f32::max);
+        let white = if largest.is_normal() { largest } else { 1.0 };
+        Self::up_to(colours, white)
+    }
+
+    /// Normals as colours `(n + 1) / 2`.
+    pub(super) fn normals(normals: &[Vec3]) -> Self {
+        let colours: Vec<Vec3> = normals.iter().map(|&normal| (normal + 1.0) / 2.0).collect();
+        Self::up_to(&colours, 1.0)
+    }
+}
+
+/// The map as PNG, 0 outside the object.
+pub(super) fn encode_sixteen(buffer: &GBuffer, map: &Sixteen) -> Result<Vec<u8>, Error> {
+    let side = buffer.size() as usize;
+    let mut pixels = vec![0; side * side * 6];
+    for (&pixel, value) in buffer.pixels().iter().zip(&map.values) {
+        let at = pixel as usize * 6;
+        for (channel, value) in value.iter().enumerate() {
+            pixels[at + 2 * channel..at + 2 * channel + 2].copy_from_slice(&value.to_be_bytes());
+        }
+    }
+    let mut bytes = Vec::with_capacity(pixels.len() / 2);
+    let mut encoder = png::Encoder::new(&mut bytes, buffer.size(), buffer.size());
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(BitDepth::Sixteen);
+    encoder.set_compression(Compression::Fastest);
+    encoder.set_filter(Filter::Up);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&pixels)?;
+    writer.finish()?;
+    Ok(bytes)
+}
