@@ -1,11 +1,11 @@
 """Images a second from shards: relight's reader beside the Python package `webdataset`.
 
     cargo build --release -p relight --example read_turns
-    python reader.py --reader target/release/examples/read_turns SHARD...
+    python reader.py --reader target/release/examples/read_turns FOLDER
 
 Both give the same: batches of 12 neighbours as 32-bit floating point arrays (channels first, 0 to
 1), a mask each, and the parsed record. With two workers webdataset runs in two processes, each over
-every second shard (give two, or it reads one twice over); relight uses two threads. The runs are
+every second shard (of a single one both read all); relight uses two threads. The runs are
 interleaved, so that a change of the machine's load meets both; the table gives medians.
 """
 
@@ -13,6 +13,7 @@ import argparse
 import io
 import json
 import multiprocessing
+import pathlib
 import statistics
 import subprocess
 import time
@@ -66,13 +67,13 @@ def main():
     parser.add_argument("--reader", required=True, help="the example read_turns")
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("folder", help="a folder of shards")
-    parser.add_argument("shards", nargs="+", help="the shards in it")
     arguments = parser.parse_args()
+    shards = sorted(str(path) for path in pathlib.Path(arguments.folder).glob("*.tar"))
     print(f"{'workers':>8} {'webdataset':>12} {'relight':>12} {'ratio':>7}")
     for workers in (1, 2):
         theirs, ours = [], []
         for _ in range(arguments.runs):
-            theirs.append(run_webdataset(arguments.shards, workers))
+            theirs.append(run_webdataset(shards, workers))
             ours.append(run_relight(arguments.reader, arguments.folder, workers))
         a, b = statistics.median(theirs), statistics.median(ours)
         print(f"{workers:>8} {a:>12.0f} {b:>12.0f} {b / a:>7.2f}")
