@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-rig lint demo bench docs fuzz firmware emulator flash
+.PHONY: help setup test test-rig lint demo bench bench-reader docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -84,6 +84,11 @@ bench: setup $(BENCH_MASK) $(BENCH_VENV)/ready ## Measure relit-extract against 
 	cargo build --locked --release --bins
 	$(BENCH_VENV)/bin/python tests/bench/bench.py --program $(TARGET)/release/relit-extract \
 	    --video $(BENCH_VIDEO) --mask $(BENCH_MASK) --runs $(BENCH_RUNS) --work $(TARGET)/bench
+
+bench-reader: setup $(BENCH_MASK) $(BENCH_VENV)/ready ## Measure relight's reader of shards against Python webdataset
+	cargo build --locked --release -p relight --example read_turns
+	$(BENCH_VENV)/bin/python tests/bench/reader.py --reader $(TARGET)/release/examples/read_turns \
+	    --runs $(BENCH_RUNS) $(DEMO)/out
 
 docs: setup ## Build the library's reference
 	cargo doc --locked --no-deps

@@ -6,13 +6,19 @@
 //!
 //! | module | concern |
 //! | --- | --- |
+//! | [`data`] | shards and folders as streams of arrays |
+//! | [`eval`] | the protocols of the paper's tables |
 //! | [`image`] | planes of `f32`, colours that know their space, files |
 //! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
+//! | [`metrics`] | how far an estimate is from the truth |
 //! | [`movie`] | frames into MP4 and WebM, by the `ffmpeg` program |
 //! | [`render`] | diffuse and specular layers on normals, their derivatives, the truth by Monte Carlo |
 //! | [`synth`] | pictures of objects with the truth that they were made of |
+pub mod data;
+pub mod eval;
 pub mod image;
 pub mod light;
+pub mod metrics;
 pub mod movie;
 pub mod render;
 pub mod synth;

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 
-use commands::{render, synth};
+use commands::{eval, render, synth};
 use console::Console;
 
 /// Single-view relighting: light, rendering, data with truth, and the measures of the results.
@@ -31,6 +31,9 @@ enum Verb {
     /// Light an object that is given by its maps: an image, a turn, or a sweep of materials.
     #[command(after_help = render::EXAMPLES)]
     Render(render::Arguments),
+    /// Measure estimates, and baselines beside them, by the protocols of the paper's tables.
+    #[command(after_help = eval::EXAMPLES)]
+    Eval(eval::Arguments),
     /// Make pictures of objects together with their truth: samples, whole turns, panoramas.
     #[command(after_help = synth::EXAMPLES)]
     Synth(synth::Arguments),
@@ -41,6 +44,7 @@ impl Verb {
     fn fault(&self) -> Option<String> {
         match self {
             Self::Render(arguments) => arguments.fault(),
+            Self::Eval(arguments) => arguments.fault(),
             Self::Synth(_) => None,
         }
     }
@@ -57,6 +61,7 @@ pub(crate) fn run() -> ExitCode {
     let console = Console::new(line.json);
     console.finish(match line.verb {
         Verb::Render(arguments) => render::run(&arguments, console),
+        Verb::Eval(arguments) => eval::run(&arguments, console),
         Verb::Synth(arguments) => synth::run(&arguments, console),
     })
 }

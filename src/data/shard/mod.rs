@@ -14,6 +14,7 @@
 //! | [`ShardWriter`] | writes one session (layouts: `spool` for the tar, `folder` for images) |
 //! | [`Dataset`], [`ExtractionSettings`] | `dataset.json`; `integrity` compares the files with it |
 //! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tarball`) |
+//! | [`SampleSpans`] | where the samples of a shard stand, for reading in any order (`index`) |
 //! | [`verify`](verify()) | reads everything back and reports what is wrong |
 //!
 //! This module knows pixel rectangles, images and their statistics
@@ -26,6 +27,7 @@ mod digest;
 mod error;
 mod file;
 mod folder;
+mod index;
 mod integrity;
 mod names;
 mod order;
@@ -46,6 +48,7 @@ pub use dataset::{
 pub use digest::{Digest, NotADigest};
 pub use error::ShardError;
 pub use file::FileEntry;
+pub use index::{SampleSpan, SampleSpans};
 pub use names::{check_session, sample_key};
 pub use order::order;
 pub use output::OutputFolder;

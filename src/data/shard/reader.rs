@@ -7,7 +7,7 @@ use super::ShardError;
 use super::tarball::{Member, TarReader};
 
 /// Largest total size of the members of a sample, bytes.
-const MAX_BYTES: u64 = 256 << 20;
+pub(super) const MAX_BYTES: u64 = 256 << 20;
 /// Largest number of members of a sample.
 const MAX_MEMBERS: usize = 64;
 
@@ -128,7 +128,7 @@ impl<R: Read> Iterator for ShardReader<R> {
 }
 
 /// Key and suffix of a member's name; none if its last part has no dot or starts with one.
-fn split(path: &str) -> Option<(String, String)> {
+pub(super) fn split(path: &str) -> Option<(String, String)> {
     let base = path.rfind('/').map_or(0, |slash| slash + 1);
     let dot = base + path.get(base..)?.find('.')?;
     if dot == base {

@@ -1,7 +1,7 @@
 //! The tar that a shard is: headers as they are written, and a reader for any tar, member by member,
 //! with bounded memory and without trusting the input.
 
-use std::io::{self, Read};
+use std::io::{self, Read, Seek};
 
 use tar::{EntryType, Header};
 
@@ -40,6 +40,16 @@ pub(super) struct Member {
     pub(super) canonical: bool,
 }
 
+/// Where a file stands in a tar.
+pub(super) struct MemberSpan {
+    /// Its name, as in [`Member`].
+    pub(super) path: String,
+    /// Where the first of its headers starts.
+    pub(super) start: u64,
+    /// Where the padding after its data ends.
+    pub(super) end: u64,
+}
+
 /// Reads the regular files of a tar as a stream. Folders, links and the like are skipped; long names
 /// of GNU tar and of pax are supported.
 pub(super) struct TarReader<R> {
@@ -50,6 +60,18 @@ pub(super) struct TarReader<R> {
     found: Option<Block>,
     limit: u64,
     ended: bool,
+}
+
+/// The header of a file whose data come next.
+struct Head {
+    /// Where the first of its headers starts: its own, or an extension header before it.
+    first: u64,
+    /// Where its own header starts.
+    offset: u64,
+    block: Block,
+    /// Length of the data.
+    bytes: u64,
+    named: Extensions,
 }
 
 impl<R: Read> TarReader<R> {
@@ -71,7 +93,16 @@ impl<R: Read> TarReader<R> {
 
     /// The next file; `None` after the two empty blocks that end a tar.
     pub(super) fn next(&mut self) -> Result<Option<Member>, ShardError> {
+        match self.next_head()? {
+            Some(head) => self.member(head).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// Goes to the data of the next file.
+    fn next_head(&mut self) -> Result<Option<Head>, ShardError> {
         let mut named = Extensions::default();
+        let mut first = None;
         while !self.ended {
             let start = self.offset
                 - if self.found.is_some() {
@@ -81,7 +112,8 @@ impl<R: Read> TarReader<R> {
                 };
             let block = self.header_block()?;
             if is_zero(&block) {
-                return self.end(start);
+                self.end(start)?;
+                continue;
             }
             let header = valid_header(&block).ok_or(ShardError::ShardHeader { offset: start })?;
             let claimed = header
@@ -90,9 +122,16 @@ impl<R: Read> TarReader<R> {
             let bytes = named.size.unwrap_or(claimed);
             match header.entry_type() {
                 EntryType::Regular | EntryType::Continuous => {
-                    return self.member(start, header, bytes, named).map(Some);
+                    return Ok(Some(Head {
+                        first: first.unwrap_or(start),
+                        offset: start,
+                        block,
+                        bytes,
+                        named,
+                    }));
                 }
                 EntryType::GNULongName | EntryType::XHeader => {
+                    first.get_or_insert(start);
                     let path = String::from("an extension header");
                     let data = self.data(start, &path, claimed, MAX_EXTENSION)?.0;
                     named.add(header.entry_type(), &data);
@@ -102,6 +141,7 @@ impl<R: Read> TarReader<R> {
                 _ => {
                     self.skip(bytes)?;
                     named = Extensions::default();
+                    first = None;
                 }
             }
         }
@@ -125,25 +165,25 @@ impl<R: Read> TarReader<R> {
         }
     }
 
-    fn end(&mut self, start: u64) -> Result<Option<Member>, ShardError> {
+    fn end(&mut self, start: u64) -> Result<(), ShardError> {
         if is_zero(&self.header_block()?) {
             self.ended = true;
-            Ok(None)
+            Ok(())
         } else {
             Err(ShardError::ShardHeader { offset: start })
         }
     }
 
-    fn member(
-        &mut self,
-        offset: u64,
-        own: &Header,
-        bytes: u64,
-        named: Extensions,
-    ) -> Result<Member, ShardError> {
-        let extended = named.path.is_some() || named.size.is_some();
-        let name = named.path.unwrap_or_else(|| own.path_bytes().into_owned());
-        let path = String::from_utf8(name).map_err(|_| ShardError::ShardName { offset });
+    fn member(&mut self, head: Head) -> Result<Member, ShardError> {
+        let Head {
+            offset,
+            block,
+            bytes,
+            ..
+        } = head;
+        let own = Header::from_byte_slice(&block);
+        let extended = head.named.path.is_some() || head.named.size.is_some();
+        let path = head.named.path_of(own, offset);
         let label = path.as_deref().unwrap_or("a member without a name");
         let (data, padding_is_zero) = self.data(offset, label, bytes, self.limit)?;
         let path = path?;
@@ -244,6 +284,47 @@ impl<R: Read> TarReader<R> {
     }
 }
 
+impl<R: Read + Seek> TarReader<R> {
+    /// The next file without its data, in a source of `length` bytes; `None` at the end.
+    pub(super) fn next_span(&mut self, length: u64) -> Result<Option<MemberSpan>, ShardError> {
+        let Some(head) = self.next_head()? else {
+            return Ok(None);
+        };
+        let path = head
+            .named
+            .path_of(Header::from_byte_slice(&head.block), head.offset)?;
+        if head.bytes > self.limit {
+            return Err(ShardError::ShardTooLarge {
+                path,
+                offset: head.offset,
+                limit: self.limit,
+            });
+        }
+        let end = self.offset + head.bytes.next_multiple_of(BLOCK as u64);
+        if end > length {
+            return Err(ShardError::ShardTruncated { offset: length });
+        }
+        self.jump(end)?;
+        Ok(Some(MemberSpan {
+            path,
+            start: head.first,
+            end,
+        }))
+    }
+
+    fn jump(&mut self, to: u64) -> Result<(), ShardError> {
+        let by = i64::try_from(to - self.offset).unwrap_or(i64::MAX);
+        self.source
+            .seek_relative(by)
+            .map_err(|source| ShardError::ShardRead {
+                offset: self.offset,
+                source,
+            })?;
+        self.offset = to;
+        Ok(())
+    }
+}
+
 /// Path and size that extension headers give for the member that follows them.
 #[derive(Default)]
 struct Extensions {
@@ -252,6 +333,12 @@ struct Extensions {
 }
 
 impl Extensions {
+    /// The member's name: from the extensions, else from its own header.
+    fn path_of(self, own: &Header, offset: u64) -> Result<String, ShardError> {
+        let name = self.path.unwrap_or_else(|| own.path_bytes().into_owned());
+        String::from_utf8(name).map_err(|_| ShardError::ShardName { offset })
+    }
+
     fn add(&mut self, kind: EntryType, data: &[u8]) {
         if kind == EntryType::GNULongName {
             let end = data

@@ -1,4 +1,5 @@
 //! One file a verb: its arguments and its `run`.
 
+pub(super) mod eval;
 pub(super) mod render;
 pub(super) mod synth;

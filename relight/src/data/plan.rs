@@ -1,0 +1,404 @@
+//! In which order samples are drawn. Knows how many there are and nothing of what they are.
+
+use std::ops::Range;
+
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+use serde::{Deserialize, Serialize};
+
+/// Where one sample is: the position in a turn, or in what else holds samples in an order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct SampleId {
+    /// Which turn, from 0.
+    pub turn: u32,
+    /// Which position of it, from 0.
+    pub position: u32,
+}
+
+/// Which samples make a batch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Draw {
+    /// Neighbours of one turn: in a shard of `relit-extract` any 12 cover the whole turn. Where a run
+    /// begins is drawn anew for each epoch; the last run of a turn goes on at the turn's start. It
+    /// is shorter where the turn is no multiple of the batch.
+    Neighbours,
+    /// Samples from anywhere.
+    Mixed,
+}
+
+/// How samples are drawn. The same plan over the same data always draws the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Plan {
+    /// Samples of a batch, at least 1.
+    pub batch: u32,
+    /// Which of them go together.
+    pub draw: Draw,
+    /// The seed of the shuffle; none draws in the order in which the samples stand.
+    pub seed: Option<u64>,
+    /// Which share of the batches is drawn here.
+    pub share: Share,
+}
+
+/// One of several equal shares, where many processes draw from one data set: process `index` takes
+/// every `of`-th batch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Share {
+    index: u32,
+    of: u32,
+}
+
+impl Share {
+    /// All of it.
+    pub const ALL: Self = Self { index: 0, of: 1 };
+
+    /// The share of process `index` of `of`; none where there is no such process.
+    #[must_use]
+    pub const fn new(index: u32, of: u32) -> Option<Self> {
+        if index < of {
+            Some(Self { index, of })
+        } else {
+            None
+        }
+    }
+}
+
+/// A place between two samples of a plan, to go on from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Place {
+    /// Which time all samples are drawn, from 0.
+    pub epoch: u64,
+    /// How many samples of this share were drawn in this epoch, damaged ones included.
+    pub sample: u64,
+}
+
+/// The samples of a batch, and the place behind it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Job {
+    pub(super) samples: Vec<SampleId>,
+    pub(super) next: Place,
+}
+
+impl Plan {
+    /// Batches of 12 neighbours in shuffled order, as the paper draws them.
+    #[must_use]
+    pub const fn of_turns(seed: u64) -> Self {
+        Self {
+            batch: 12,
+            draw: Draw::Neighbours,
+            seed: Some(seed),
+            share: Share::ALL,
+        }
+    }
+
+    /// The batches from a place on, up to the end of the epoch before `end`. `turns` are the numbers
+    /// of samples.
+    pub(super) fn jobs(
+        self,
+        turns: &[u32],
+        from: Place,
+        end: u64,
+    ) -> impl Iterator<Item = Job> + use<> {
+        let turns = turns.to_vec();
+        // Epochs of nothing would go by for ever.
+        let end = if self.is_empty(&turns) {
+            from.epoch
+        } else {
+            end
+        };
+        (from.epoch..end).flat_map(move |epoch| {
+            let skip = if epoch == from.epoch { from.sample } else { 0 };
+            self.epoch(&turns, epoch, skip)
+        })
+    }
+
+    /// Whether this share has no batch.
+    fn is_empty(self, turns: &[u32]) -> bool {
+        let batches = |samples: u64| samples.div_ceil(u64::from(self.batch.max(1)));
+        let samples = turns.iter().map(|&samples| u64::from(samples));
+        let count: u64 = match self.draw {
+            Draw::Neighbours => samples.map(batches).sum(),
+            Draw::Mixed => batches(samples.sum()),
+        };
+        u64::from(self.share.index) >= count
+    }
+
+    /// The batches of an epoch without its first `skip` samples.
+    fn epoch(self, turns: &[u32], epoch: u64, skip: u64) -> impl Iterator<Item = Job> + use<> {
+        let mut random = self.seed.map(|seed| {
+            // An odd factor keeps the seeds of different epochs apart.
+            let seed = seed.wrapping_add(epoch.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            Pcg64::seed_from_u64(seed)
+        });
+        let batch = self.batch.max(1);
+        let groups = match self.draw {
+            Draw::Neighbours => Groups::runs(turns, batch, random.as_mut()),
+            Draw::Mixed => Groups::mixed(turns, batch, random.as_mut()),
+        };
+        let (first, step) = (self.share.index as usize, self.share.of as usize);
+        let mut drawn = 0;
+        (first..groups.count())
+            .step_by(step)
+            .filter_map(move |group| {
+                let mut samples = groups.samples(group);
+                let start = drawn;
+                drawn += samples.len() as u64;
+                let over = skip.saturating_sub(start).min(samples.len() as u64);
+                samples.drain(..usize::try_from(over).unwrap_or(usize::MAX));
+                let next = Place {
+                    epoch,
+                    sample: drawn,
+                };
+                (!samples.is_empty()).then_some(Job { samples, next })
+            })
+    }
+}
+
+/// The batches of an epoch, kept small: a data set of 750 000 images has 62 500.
+enum Groups {
+    /// Neighbours: where each begins, how many samples it has, and how many its turn has.
+    Runs(Vec<Run>),
+    /// All samples, of which each batch takes the next.
+    Mixed { samples: Vec<SampleId>, batch: u32 },
+}
+
+struct Run {
+    start: SampleId,
+    length: u32,
+    turn_length: u32,
+}
+
+impl Groups {
+    fn runs(turns: &[u32], batch: u32, mut random: Option<&mut Pcg64>) -> Self {
+        let mut runs = Vec::new();
+        for (turn, &turn_length) in (0..).zip(turns) {
+            let offset = random
+                .as_deref_mut()
+                .map_or(0, |random| below(random, u64::from(turn_length)) as u32);
+            for begin in (0..turn_length).step_by(batch as usize) {
+                let position = (u64::from(begin) + u64::from(offset)) % u64::from(turn_length);
+                runs.push(Run {
+                    start: SampleId {
+                        turn,
+                        position: position as u32,
+                    },
+                    length: batch.min(turn_length - begin),
+                    turn_length,
+                });
+            }
+        }
+        if let Some(random) = random {
+            shuffle(&mut runs, random);
+        }
+        Self::Runs(runs)
+    }
+
+    fn mixed(turns: &[u32], batch: u32, random: Option<&mut Pcg64>) -> Self {
+        let all = (0..).zip(turns);
+        let mut samples: Vec<SampleId> = all
+            .flat_map(|(turn, &length)| {
+                (0..length).map(move |position| SampleId { turn, position })
+            })
+            .collect();
+        if let Some(random) = random {
+            shuffle(&mut samples, random);
+        }
+        Self::Mixed { samples, batch }
+    }
+
+    fn count(&self) -> usize {
+        match self {
+            Self::Runs(runs) => runs.len(),
+            Self::Mixed { samples, batch } => samples.len().div_ceil(*batch as usize),
+        }
+    }
+
+    fn samples(&self, group: usize) -> Vec<SampleId> {
+        match self {
+            Self::Runs(runs) => runs[group].samples(),
+            Self::Mixed { samples, batch } => {
+                let first = group * *batch as usize;
+                let all: Range<usize> = first..samples.len().min(first + *batch as usize);
+                samples[all].to_vec()
+            }
+        }
+    }
+}
+
+impl Run {
+    fn samples(&self) -> Vec<SampleId> {
+        let SampleId { turn, position } = self.start;
+        let at = |step| (u64::from(position) + u64::from(step)) % u64::from(self.turn_length);
+        (0..self.length)
+            .map(|step| SampleId {
+                turn,
+                position: at(step) as u32,
+            })
+            .collect()
+    }
+}
+
+/// Fisher and Yates.
+fn shuffle<T>(items: &mut [T], random: &mut Pcg64) {
+    for last in (1..items.len()).rev() {
+        let other = below(random, last as u64 + 1) as usize;
+        items.swap(last, other);
+    }
+}
+
+/// Uniform in `0..count`; 0 where `count` is 0.
+fn below(random: &mut Pcg64, count: u64) -> u64 {
+    ((u128::from(random.next_u64()) * u128::from(count)) >> 64) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::HashSet;
+
+    fn plan(batch: u32, draw: Draw, seed: Option<u64>) -> Plan {
+        Plan {
+            batch,
+            draw,
+            seed,
+            share: Share::ALL,
+        }
+    }
+
+    fn drawn(plan: Plan, turns: &[u32], from: Place, end: u64) -> Vec<SampleId> {
+        plan.jobs(turns, from, end)
+            .flat_map(|job| job.samples)
+            .collect()
+    }
+
+    fn draws() -> impl Strategy<Value = Draw> {
+        prop_oneof![Just(Draw::Neighbours), Just(Draw::Mixed)]
+    }
+
+    proptest! {
+        #[test]
+        fn each_epoch_draws_each_sample_once(
+            turns in prop::collection::vec(0_u32..40, 0..6),
+            batch in 1_u32..15,
+            draw in draws(),
+            seed in prop::option::of(any::<u64>()),
+        ) {
+            let all = drawn(plan(batch, draw, seed), &turns, Place::default(), 1);
+            let different: HashSet<SampleId> = all.iter().copied().collect();
+            prop_assert_eq!(all.len(), turns.iter().sum::<u32>() as usize);
+            prop_assert_eq!(different.len(), all.len());
+            prop_assert!(all.iter().all(|id| id.position < turns[id.turn as usize]));
+        }
+
+        #[test]
+        fn from_any_place_on_the_rest_is_drawn(
+            turns in prop::collection::vec(0_u32..30, 1..5),
+            draw in draws(),
+            cut in any::<prop::sample::Index>(),
+            seed in prop::option::of(any::<u64>()),
+        ) {
+            let plan = plan(12, draw, seed);
+            let both = drawn(plan, &turns, Place::default(), 2);
+            let epoch = both.len() / 2;
+            let cut = cut.index(epoch + 1);
+            let rest = drawn(plan, &turns, Place { epoch: 0, sample: cut as u64 }, 2);
+            prop_assert_eq!(&both[cut..], rest);
+        }
+
+        #[test]
+        fn shares_draw_everything_between_them(
+            turns in prop::collection::vec(0_u32..60, 1..5),
+            of in 1_u32..5,
+            draw in draws(),
+        ) {
+            let whole = plan(12, draw, Some(7));
+            let mut all: Vec<SampleId> = (0..of)
+                .flat_map(|index| {
+                    let share = Share::new(index, of).unwrap();
+                    drawn(Plan { share, ..whole }, &turns, Place::default(), 1)
+                })
+                .collect();
+            let mut expected = drawn(whole, &turns, Place::default(), 1);
+            all.sort_unstable();
+            expected.sort_unstable();
+            prop_assert_eq!(all, expected);
+        }
+    }
+
+    #[test]
+    fn a_batch_of_neighbours_is_a_run_of_one_turn_around_its_end() {
+        let turns = [1500, 30];
+        for job in Plan::of_turns(3).jobs(&turns, Place::default(), 1) {
+            let turn = job.samples[0].turn;
+            assert!(job.samples.len() == 12 || turn == 1 && job.samples.len() == 6);
+            for pair in job.samples.windows(2) {
+                let next = (pair[0].position + 1) % turns[turn as usize];
+                assert_eq!((pair[1].turn, pair[1].position), (turn, next));
+            }
+        }
+    }
+
+    #[test]
+    fn batches_are_shuffled_over_turns_and_otherwise_in_each_epoch() {
+        let epoch = |epoch| {
+            drawn(
+                Plan::of_turns(3),
+                &[120; 8],
+                Place { epoch, sample: 0 },
+                epoch + 1,
+            )
+        };
+        let turns: HashSet<u32> = epoch(0)[..96].iter().map(|id| id.turn).collect();
+        assert!(turns.len() > 3, "{turns:?}");
+        assert_ne!(epoch(0), epoch(1));
+        assert_eq!(epoch(1), epoch(1));
+    }
+
+    #[test]
+    fn without_a_seed_samples_come_as_they_stand() {
+        let all = drawn(
+            plan(4, Draw::Neighbours, None),
+            &[5, 3],
+            Place::default(),
+            1,
+        );
+        let mut sorted = all.clone();
+        sorted.sort_unstable();
+        assert_eq!(all, sorted);
+    }
+
+    #[test]
+    fn epochs_without_a_batch_end_at_once() {
+        let endless = |share, turns: &[u32]| {
+            let plan = Plan {
+                share,
+                ..Plan::of_turns(1)
+            };
+            plan.jobs(turns, Place::default(), u64::MAX).next()
+        };
+        assert_eq!(endless(Share::ALL, &[0, 0]), None);
+        assert_eq!(endless(Share::new(2, 3).unwrap(), &[24]), None);
+        assert_eq!(Share::new(3, 3), None);
+    }
+
+    #[test]
+    fn the_place_behind_a_batch_counts_the_samples_before_it() {
+        let plan = plan(12, Draw::Neighbours, Some(1));
+        let places: Vec<u64> = plan
+            .jobs(&[30], Place::default(), 1)
+            .map(|job| job.next.sample)
+            .collect();
+        assert_eq!(places.last(), Some(&30));
+        let first = plan
+            .jobs(
+                &[30],
+                Place {
+                    epoch: 0,
+                    sample: 5,
+                },
+                1,
+            )
+            .next();
+        assert_eq!(first.unwrap().next.sample, places[0]);
+    }
+}

@@ -1,0 +1,188 @@
+//! The light of order 2 that explains a shading best: what the paper's representation can hold.
+
+use crate::image::{Linear, Planes, Rgb};
+use crate::light::{Direction, LightError, Normals, Order, ShLight, YUp, basis};
+
+const COUNT: usize = Order::TWO.coefficients();
+/// The integrals of the cosine lobe over the bands 0, 1 and 2.
+const LOBE: [f64; 3] = {
+    let pi = std::f64::consts::PI;
+    [pi, 2.0 * pi / 3.0, pi / 4.0]
+};
+/// Added to the diagonal, relative to its mean, so that few or equal normals have a solution too.
+const RIDGE: f64 = 1e-9;
+
+/// The light whose irradiance on the normals is nearest to the shading, by least squares over the
+/// pixels where `mask` is true and a normal is known.
+pub(super) fn fit_light(
+    normals: &Normals<YUp>,
+    shading: &Rgb<Linear>,
+    mask: &[bool],
+) -> Result<ShLight, LightError> {
+    let mut matrix = [[0.0; COUNT]; COUNT];
+    let mut right = [[0.0; 3]; COUNT];
+    let [x, y, z] = normals.planes().planes();
+    let colours = shading.planes().planes();
+    for (at, _) in mask.iter().enumerate().filter(|(_, inside)| **inside) {
+        let [x, y, z] = [x, y, z].map(|plane| f64::from(plane[at]));
+        let Some(normal) = Direction::new(x, y, z) else {
+            continue;
+        };
+        let terms = terms(normal);
+        for (row, a) in terms.iter().enumerate() {
+            for (cell, b) in matrix[row].iter_mut().zip(terms) {
+                *cell += a * b;
+            }
+            for (cell, colour) in right[row].iter_mut().zip(colours) {
+                *cell += a * f64::from(colour[at]);
+            }
+        }
+    }
+    let trace: f64 = (0..COUNT).map(|at| matrix[at][at]).sum();
+    for (at, row) in matrix.iter_mut().enumerate() {
+        row[at] += (trace / COUNT as f64 * RIDGE).max(f64::MIN_POSITIVE);
+    }
+    ShLight::new(solve(matrix, right).to_vec())
+}
+
+/// The irradiance on a normal of light with each coefficient alone.
+fn terms(normal: Direction) -> [f64; COUNT] {
+    let values = basis(Order::TWO, normal);
+    std::array::from_fn(|at| LOBE[at.isqrt()] * values[at])
+}
+
+/// The solution of a system with a positive definite matrix, by Cholesky's factors.
+fn solve(mut matrix: [[f64; COUNT]; COUNT], mut right: [[f64; 3]; COUNT]) -> [[f64; 3]; COUNT] {
+    for row in 0..COUNT {
+        for column in 0..=row {
+            let products: f64 = (0..column)
+                .map(|k| matrix[row][k] * matrix[column][k])
+                .sum();
+            let left = matrix[row][column] - products;
+            matrix[row][column] = if row == column {
+                left.max(f64::MIN_POSITIVE).sqrt()
+            } else {
+                left / matrix[column][column]
+            };
+        }
+    }
+    for channel in 0..3 {
+        for row in 0..COUNT {
+            let known: f64 = (0..row).map(|k| matrix[row][k] * right[k][channel]).sum();
+            right[row][channel] = (right[row][channel] - known) / matrix[row][row];
+        }
+        for row in (0..COUNT).rev() {
+            let known: f64 = (row + 1..COUNT)
+                .map(|k| matrix[k][row] * right[k][channel])
+                .sum();
+            right[row][channel] = (right[row][channel] - known) / matrix[row][row];
+        }
+    }
+    right
+}
+
+/// The normals, with those of the nearest known pixel where the mask is true and none is known.
+pub(super) fn completed(normals: &Normals<YUp>, mask: &[bool]) -> Normals<YUp> {
+    let extent = normals.extent();
+    let (width, height) = (extent.width, extent.height);
+    let mut planes: Planes<3> = normals.planes().clone();
+    let mut known: Vec<bool> = (0..extent.pixels())
+        .map(|at| {
+            normals
+                .planes()
+                .planes()
+                .iter()
+                .any(|plane| plane[at] != 0.0)
+        })
+        .collect();
+    let mut front: Vec<usize> = (0..known.len()).filter(|&at| known[at]).collect();
+    while !front.is_empty() {
+        let mut next = Vec::new();
+        for at in front {
+            let (x, y) = (at % width, at / width);
+            let beside = [
+                (x > 0).then(|| at - 1),
+                (x + 1 < width).then_some(at + 1),
+                (y > 0).then(|| at - width),
+                (y + 1 < height).then_some(at + width),
+            ];
+            for other in beside.into_iter().flatten() {
+                if !known[other] && mask[other] {
+                    known[other] = true;
+                    planes.set_pixel(other % width, other / width, planes.pixel(x, y));
+                    next.push(other);
+                }
+            }
+        }
+        front = next;
+    }
+    Normals::new(planes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Extent;
+    use crate::render::{DiffuseForm, DiffuseLayer};
+
+    #[test]
+    fn the_light_of_a_rendered_shading_is_found() {
+        let light = ShLight::new(
+            (0..9)
+                .map(|at| {
+                    [
+                        2.0 - 0.2 * f64::from(at),
+                        1.5,
+                        0.3 * f64::from(at % 3) + 2.0,
+                    ]
+                })
+                .map(|[r, g, b]| [r, g * 0.1, b])
+                .enumerate()
+                .map(|(at, rgb)| {
+                    if at == 0 {
+                        [9.0; 3]
+                    } else {
+                        rgb.map(|v| v * 0.3)
+                    }
+                })
+                .collect(),
+        )
+        .unwrap();
+        let normals = Normals::sphere(41);
+        let shading = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&normals);
+        let found = fit_light(&normals, &shading, &vec![true; 41 * 41]).unwrap();
+        for (a, b) in found.coefficients().iter().zip(light.coefficients()) {
+            for (a, b) in a.iter().zip(b) {
+                assert!((a - b).abs() < 1e-3, "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_flat_surface_has_a_light_too() {
+        let extent = Extent::new(4, 4);
+        let normals = Normals::new(Planes::filled(extent, [0.0, 0.0, 1.0]));
+        let shading = Rgb::new(Planes::filled(extent, [0.5, 0.25, 1.0]));
+        let light = fit_light(&normals, &shading, &[true; 16]).unwrap();
+        let again = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&normals);
+        let [r, g, b] = again.planes().pixel(2, 2);
+        assert!((r - 0.5).abs() < 1e-4 && (g - 0.25).abs() < 1e-4 && (b - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn unknown_normals_are_those_of_the_nearest_neighbour_under_the_mask() {
+        let vectors = [
+            [0.0; 3],
+            [1.0, 0.0, 0.0],
+            [0.0; 3],
+            [0.0; 3],
+            [0.0, 1.0, 0.0],
+        ];
+        let normals = Normals::new(Planes::from_fn(Extent::new(5, 1), |x, _| vectors[x]));
+        let full = completed(&normals, &[false, true, true, true, true]);
+        let planes = full.planes();
+        assert_eq!(planes.pixel(0, 0), [0.0; 3]);
+        assert_eq!(planes.pixel(2, 0), [1.0, 0.0, 0.0]);
+        assert_eq!(planes.pixel(3, 0), [0.0, 1.0, 0.0]);
+    }
+}
