@@ -1,0 +1,86 @@
+//! Lines on the terminal, JSON lines, progress and exit codes. The one place that prints.
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "this is where printing belongs"
+)]
+
+use std::error::Error;
+use std::io::{self, Write};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use relit_data::causes::with_causes;
+use serde_json::{Value, json};
+
+/// How a command that ran to its end came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// All was done: exit code 0.
+    Whole,
+    /// Finished, but something was left out or lost: exit code 3.
+    Lossy,
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> Self {
+        match outcome {
+            Outcome::Whole => Self::SUCCESS,
+            Outcome::Lossy => Self::from(3),
+        }
+    }
+}
+
+/// What a command returns: an outcome, or the error that ends the program with exit code 1.
+pub(crate) type CommandResult = Result<Outcome, Box<dyn Error>>;
+
+/// Speaks for the program, to a person or, with `--json`, to a machine.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Console {
+    json: bool,
+}
+
+impl Console {
+    /// A console that prints JSON lines (`json`) or text on standard output.
+    pub(crate) fn new(json: bool) -> Self {
+        Self { json }
+    }
+
+    /// A result: `text` for a person, `event` as one JSON line for a machine.
+    pub(crate) fn say(self, text: &str, event: &Value) {
+        let json = event.to_string();
+        // Where nobody reads any more, the work goes on.
+        let _ = writeln!(io::stdout(), "{}", if self.json { &json } else { text });
+    }
+
+    /// The exit code of a command, after its error, if any, was told.
+    pub(crate) fn finish(self, result: CommandResult) -> ExitCode {
+        match result {
+            Ok(outcome) => outcome.into(),
+            Err(error) => {
+                let text = with_causes(error.as_ref());
+                if self.json {
+                    self.say("", &json!({ "event": "error", "message": text }));
+                }
+                let _ = writeln!(io::stderr(), "error: {text}");
+                ExitCode::FAILURE
+            }
+        }
+    }
+
+    /// A progress bar over `length` steps; hidden with `--json` or where standard error is not a
+    /// terminal.
+    pub(crate) fn progress(self, length: u64, label: &'static str) -> ProgressBar {
+        if self.json {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(length).with_message(label);
+        let template = "{msg:.bold} {wide_bar} {pos}/{len} {per_sec} {eta}";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(200));
+        bar
+    }
+}

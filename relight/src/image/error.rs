@@ -1,0 +1,61 @@
+//! What can be wrong with an image or its file.
+
+use std::io;
+use std::path::PathBuf;
+
+use super::Extent;
+
+/// What is wrong with an image or its file.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// A plane has not one value a pixel.
+    #[error("a plane of {found} values was given for {} x {} pixels", extent.width, extent.height)]
+    Length {
+        /// The size of the image.
+        extent: Extent,
+        /// The values that the plane has.
+        found: usize,
+    },
+    /// Images that belong together differ in size.
+    #[error("the {what} has {} x {} pixels where {} x {} are needed", found.width, found.height, expected.width, expected.height)]
+    Extent {
+        /// The image that differs.
+        what: &'static str,
+        /// Its size.
+        found: Extent,
+        /// The size that it should have.
+        expected: Extent,
+    },
+    /// The file cannot be read.
+    #[error("{} cannot be read", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// What the system answers.
+        source: io::Error,
+    },
+    /// The file is not an image of a known format.
+    #[error("{} is not a readable PNG, JPEG, EXR or HDR image", path.display())]
+    Decode {
+        /// The file.
+        path: PathBuf,
+        /// What the decoder found.
+        source: image::ImageError,
+    },
+    /// The image cannot be encoded.
+    #[error("{} cannot be encoded", path.display())]
+    Encode {
+        /// The file.
+        path: PathBuf,
+        /// What the encoder answers.
+        source: image::ImageError,
+    },
+    /// The file cannot be written.
+    #[error("{} cannot be written", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system answers.
+        source: io::Error,
+    },
+}

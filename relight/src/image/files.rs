@@ -1,0 +1,207 @@
+//! Images on disk: PNG, JPEG, EXR and HDR in, PNG and EXR out.
+
+use std::fs::File;
+use std::io::{BufReader, Cursor};
+use std::path::Path;
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{DynamicImage, ImageBuffer, ImageEncoder, ImageFormat, ImageReader, Rgb};
+use relit_data::durable::write_whole;
+
+use super::{Extent, ImageError, Planes};
+
+/// How exactly a PNG holds values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Depth {
+    /// 8 bits a channel.
+    Eight,
+    /// 16 bits a channel.
+    Sixteen,
+}
+
+/// What the numbers in a file were.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Samples {
+    /// Integers, scaled to 0 to 1.
+    Integer,
+    /// Floating point values, as they stood.
+    Float,
+}
+
+/// Writes values of 0 to 1 as integers; others are clipped.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn write_png(path: &Path, planes: &Planes<3>, depth: Depth) -> Result<(), ImageError> {
+    let encode = |source| ImageError::Encode {
+        path: path.to_owned(),
+        source,
+    };
+    let mut bytes = Vec::new();
+    // The default level takes twenty times as long, and files are no smaller.
+    let encoder =
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
+    let (pixels, colour) = match depth {
+        Depth::Eight => (
+            interleaved(planes, |v| [to_integer(v, 255.0) as u8]),
+            image::ExtendedColorType::Rgb8,
+        ),
+        Depth::Sixteen => (
+            interleaved(planes, |v| (to_integer(v, 65535.0) as u16).to_ne_bytes()),
+            image::ExtendedColorType::Rgb16,
+        ),
+    };
+    let [width, height] = sides(planes.extent());
+    encoder
+        .write_image(&pixels, width, height, colour)
+        .map_err(encode)?;
+    write(path, &bytes)
+}
+
+/// Writes the values as they are, 32-bit floating point.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn write_exr(path: &Path, planes: &Planes<3>) -> Result<(), ImageError> {
+    let [width, height] = sides(planes.extent());
+    let values: Vec<f32> = interleaved(planes, |v| [v]);
+    let mut bytes = Cursor::new(Vec::new());
+    // An image of no pixels makes no buffer; it is refused by the encoder.
+    let buffer = ImageBuffer::<Rgb<f32>, _>::from_raw(width, height, values).unwrap_or_default();
+    DynamicImage::ImageRgb32F(buffer)
+        .write_to(&mut bytes, ImageFormat::OpenExr)
+        .map_err(|source| ImageError::Encode {
+            path: path.to_owned(),
+            source,
+        })?;
+    write(path, bytes.get_ref())
+}
+
+/// Reads an image without any conversion of colour, and says what its numbers were: integers come
+/// scaled to 0 to 1, floating point values as they are. Alpha is left out; grey becomes three equal
+/// channels.
+///
+/// # Errors
+/// Where the file cannot be read or is no image of a known format.
+pub fn read_planes(path: &Path) -> Result<(Planes<3>, Samples), ImageError> {
+    let open = |source| ImageError::Open {
+        path: path.to_owned(),
+        source,
+    };
+    let decode = |source| ImageError::Decode {
+        path: path.to_owned(),
+        source,
+    };
+    let file = BufReader::new(File::open(path).map_err(open)?);
+    let image = ImageReader::new(file)
+        .with_guessed_format()
+        .map_err(open)?
+        .decode()
+        .map_err(decode)?;
+    let samples = match image {
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => Samples::Float,
+        _ => Samples::Integer,
+    };
+    Ok((split(&image.into_rgb32f()), samples))
+}
+
+fn split(image: &ImageBuffer<Rgb<f32>, Vec<f32>>) -> Planes<3> {
+    let extent = Extent::new(image.width() as usize, image.height() as usize);
+    let mut planes = Planes::zeros(extent);
+    for (channel, plane) in planes.planes_mut().into_iter().enumerate() {
+        for (value, pixel) in plane.iter_mut().zip(image.as_raw().chunks_exact(3)) {
+            *value = pixel[channel];
+        }
+    }
+    planes
+}
+
+fn interleaved<T: Copy, const N: usize>(
+    planes: &Planes<3>,
+    pack: impl Fn(f32) -> [T; N],
+) -> Vec<T> {
+    let [red, green, blue] = planes.planes();
+    red.iter()
+        .zip(green)
+        .zip(blue)
+        .flat_map(|((&r, &g), &b)| [r, g, b])
+        .flat_map(pack)
+        .collect()
+}
+
+/// The nearest integer of 0 to `most`; what is not a number becomes 0.
+fn to_integer(value: f32, most: f32) -> f32 {
+    (value.clamp(0.0, 1.0) * most).round()
+}
+
+fn sides(extent: Extent) -> [u32; 2] {
+    let side = |pixels| u32::try_from(pixels).unwrap_or(u32::MAX);
+    [side(extent.width), side(extent.height)]
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
+    write_whole(path, bytes).map_err(|source| ImageError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ramp() -> Planes<3> {
+        Planes::from_fn(Extent::new(7, 3), |x, y| {
+            [x as f32 / 6.0, y as f32 / 2.0, (x * y) as f32 / 12.0]
+        })
+    }
+
+    fn largest_difference(a: &Planes<3>, b: &Planes<3>) -> f32 {
+        let pairs = a.planes().into_iter().zip(b.planes());
+        pairs
+            .flat_map(|(a, b)| a.iter().zip(b))
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn a_png_comes_back_within_its_depth() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ramp.png");
+        for (depth, step) in [(Depth::Eight, 255.0), (Depth::Sixteen, 65535.0)] {
+            write_png(&path, &ramp(), depth).unwrap();
+            let (back, samples) = read_planes(&path).unwrap();
+            assert_eq!(samples, Samples::Integer);
+            assert!(
+                largest_difference(&back, &ramp()) <= 0.51 / step,
+                "{depth:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_exr_comes_back_bit_for_bit_and_is_known_to_be_linear() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ramp.exr");
+        let bright = ramp().map(|v| v * 1000.0 - 1.0);
+        write_exr(&path, &bright).unwrap();
+        assert_eq!(read_planes(&path).unwrap(), (bright, Samples::Float));
+    }
+
+    #[test]
+    fn a_file_that_is_no_image_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("notes.png");
+        std::fs::write(&path, "not an image").unwrap();
+        let error = read_planes(&path).unwrap_err();
+        assert!(error.to_string().contains("notes.png"), "{error}");
+    }
+
+    #[test]
+    fn an_image_without_pixels_is_not_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("empty.exr");
+        assert!(write_exr(&path, &Planes::zeros(Extent::new(0, 0))).is_err());
+        assert!(!path.exists());
+    }
+}

@@ -1,0 +1,11 @@
+//! Images as plain planes of `f32`, and the files that hold them. Knows nothing of light.
+
+mod colour;
+mod error;
+mod files;
+mod planes;
+
+pub use colour::{ColourSpace, Gamma22, Linear, Rgb, Srgb, Transfer};
+pub use error::ImageError;
+pub use files::{Depth, Samples, read_planes, write_exr, write_png};
+pub use planes::{Extent, Planes};
