@@ -12,3 +12,5 @@
 pub mod image;
 pub mod light;
 pub mod nets;
+#[cfg(feature = "train")]
+pub mod train;
