@@ -12,6 +12,7 @@
 //! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
 //! | [`metrics`] | how far an estimate is from the truth |
 //! | [`movie`] | frames into MP4 and WebM, by the `ffmpeg` program |
+//! | [`nets`] | the networks as data, their weights in files, inference |
 //! | [`render`] | diffuse and specular layers on normals, their derivatives, the truth by Monte Carlo |
 //! | [`synth`] | pictures of objects with the truth that they were made of |
 pub mod data;
@@ -20,5 +21,8 @@ pub mod image;
 pub mod light;
 pub mod metrics;
 pub mod movie;
+pub mod nets;
 pub mod render;
 pub mod synth;
+#[cfg(feature = "train")]
+pub mod train;

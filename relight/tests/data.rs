@@ -13,8 +13,9 @@ use relight::data::{
 use relight::image::{Extent, Planes};
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
+use relit_data::image_stats::MaskSpans;
 use relit_data::shard::{
-    Align, Dataset, FrameRecord, Layout, MaskSpans, Sample, SessionWriter, Settings, Size,
+    Align, Dataset, ExtractionSettings, FrameRecord, ImageSize, Layout, Sample, ShardWriter,
 };
 
 const WIDTH: u32 = 9;
@@ -64,7 +65,7 @@ fn sample(session: &str, index: u32) -> Sample {
 
 /// Writes a session's shard, or folder of images.
 fn write(out: &Path, layout: Layout, session: &str, samples: u32) {
-    let mut writer = SessionWriter::create(out, layout, session, samples, &mask()).unwrap();
+    let mut writer = ShardWriter::create(out, layout, session, samples, &mask()).unwrap();
     for index in 0..samples {
         writer.push(sample(session, index)).unwrap();
     }
@@ -259,13 +260,13 @@ fn samples_that_a_cut_or_a_damaged_header_took_are_told() {
 fn samples_that_the_description_tells_of_and_no_shard_holds_are_told() {
     let dir = tempfile::tempdir().unwrap();
     let mut writer =
-        SessionWriter::create(dir.path(), Layout::Webdataset, "turn", 20, &mask()).unwrap();
+        ShardWriter::create(dir.path(), Layout::Webdataset, "turn", 20, &mask()).unwrap();
     for index in 0..20 {
         writer.push(sample("turn", index)).unwrap();
     }
-    let mut dataset = Dataset::new(Settings {
+    let mut dataset = Dataset::new(ExtractionSettings {
         frames: 20,
-        size: Size::NATIVE,
+        size: ImageSize::NATIVE,
         margin: 0.0,
         saturation_level: 250,
         gate: 0.05,

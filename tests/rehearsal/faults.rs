@@ -155,7 +155,8 @@ fn dropped_and_damaged_frames_within_the_limit_are_listed_and_kept() {
         .map(|fault| fault.what.as_str())
         .collect();
     assert!(
-        faults.iter()
+        faults
+            .iter()
             .any(|what| what.contains("missing before frame")),
         "{faults:?}"
     );

@@ -25,7 +25,7 @@ pub enum OpenError {
         /// The file or folder.
         path: PathBuf,
         /// What is wrong.
-        source: relit_data::shard::Error,
+        source: relit_data::shard::ShardError,
     },
     /// There is nothing in it.
     #[error("{} holds no samples: {expected} were expected in it", path.display())]
@@ -66,7 +66,7 @@ pub enum SampleFault {
     },
     /// The shard is damaged there, or the image does not decode.
     #[error(transparent)]
-    Shard(#[from] relit_data::shard::Error),
+    Shard(#[from] relit_data::shard::ShardError),
     /// The sample lacks a part.
     #[error("its {part} is missing")]
     Missing {

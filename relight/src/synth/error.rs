@@ -110,10 +110,13 @@ pub enum Error {
     },
     /// A shard could not be written.
     #[error(transparent)]
-    Shard(#[from] shard::Error),
+    Shard(#[from] shard::ShardError),
     /// The page of a turn could not be made.
     #[error(transparent)]
-    Report(#[from] report::Error),
+    Report(#[from] report::ReportError),
+    /// An image and its mask differ in size.
+    #[error(transparent)]
+    Size(#[from] relit_data::image_stats::SizeMismatch),
 }
 
 impl Error {

@@ -19,9 +19,10 @@ use glam::Vec3;
 use image::{GrayImage, RgbImage};
 use rayon::prelude::*;
 use relit_data::geometry::Rect;
+use relit_data::image_stats::MaskSpans;
 use relit_data::shard::{
-    self, Align, Dataset, Digest, FrameRecord, Input, Layout, MaskInfo, MaskSpans, OutputFolder,
-    Sample, Selection, SessionEntry, SessionWriter, Settings, ShardEntry, Size,
+    self, Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
+    OutputFolder, Sample, SamplingBasis, SessionEntry, ShardEntry, ShardWriter, SourceVideo,
 };
 use serde::{Deserialize, Serialize};
 
@@ -139,10 +140,10 @@ pub fn write_turns(
 }
 
 impl TurnRecipe {
-    fn settings(&self) -> Settings {
-        Settings {
+    fn settings(&self) -> ExtractionSettings {
+        ExtractionSettings {
             frames: self.frames,
-            size: Size::NATIVE,
+            size: ImageSize::NATIVE,
             margin: 0.0,
             saturation_level: SATURATION_LEVEL,
             gate: GATE,
@@ -153,13 +154,13 @@ impl TurnRecipe {
     }
 }
 
-fn open_dataset(out: &Path, settings: &Settings) -> Result<Dataset, Error> {
+fn open_dataset(out: &Path, settings: &ExtractionSettings) -> Result<Dataset, Error> {
     match Dataset::read(out) {
         Ok(there) if there.settings == *settings => Ok(there),
         Ok(_) => Err(Error::OtherSettings {
             path: out.to_owned(),
         }),
-        Err(shard::Error::NoDataset { .. }) => Ok(Dataset::new(settings.clone())),
+        Err(shard::ShardError::NoDataset { .. }) => Ok(Dataset::new(settings.clone())),
         Err(error) => Err(error.into()),
     }
 }
@@ -276,13 +277,13 @@ impl<'a> Turn<'a> {
             });
         }
         Ok(truth::place(out, &self.session).is_dir()
-            && dataset.vouches_for(out, &self.session).is_ok())
+            && dataset.check_integrity(out, &self.session).is_ok())
     }
 
     /// The description stands where the video of a recorded session does.
-    fn input(&self) -> Input {
+    fn input(&self) -> SourceVideo {
         let bytes = self.json();
-        Input {
+        SourceVideo {
             video: "turn.json".to_owned(),
             codec: "synthetic".to_owned(),
             frames: u64::from(self.description.frames),
@@ -309,8 +310,7 @@ impl<'a> Turn<'a> {
         let spans = MaskSpans::of(&mask);
         let frames = self.description.frames;
         let layout = Layout::Webdataset;
-        let mut writer =
-            SessionWriter::create(folder.path(), layout, &self.session, frames, &mask)?;
+        let mut writer = ShardWriter::create(folder.path(), layout, &self.session, frames, &mask)?;
         let truth = TruthFolder::create(folder.path(), &self.session)?;
         truth.write_object(self)?;
         let mut page = TurnPage::new(frames);
@@ -347,7 +347,7 @@ impl<'a> Turn<'a> {
                 px: spans.pixels(),
                 bounding_box: bounding_box(&mask),
             },
-            selection: Selection::Angle,
+            selection: SamplingBasis::Angle,
             samples: frames,
             duplicates: 0,
             spec_net: spec_net as u32,

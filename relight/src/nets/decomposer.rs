@@ -1,0 +1,100 @@
+//! Our network, the default of `relight decompose`: shading, albedo, normals and highlight of a
+//! picture from one encoder, each by a head of its own.
+//!
+//! Shading is answered directly and not only through normals and light: light of order 2 on normals
+//! holds no cast shadow, no bounce and no fine relief. Normals are a free vector, so that every slope
+//! can be told.
+//!
+//! Input, [`INPUTS`] channels: red, green, blue of the linear picture over its 99th percentile, to the
+//! power 1 / 2.2; the mask; log luminance; two chroma differences. All are 0 outside the mask.
+//! Output `maps`, [`OUTPUTS`] channels: normal (3, before its length is made 1), albedo (3, logit),
+//! highlight (1, before softplus), and log shading as two: an offset, and the share of the picture's
+//! own log luminance (logit).
+
+use super::graph::{Graph, Value};
+
+/// Channels of the input.
+pub const INPUTS: usize = 7;
+/// Channels of the maps.
+pub const OUTPUTS: usize = 9;
+
+/// Side of the blocks in which pixels enter and leave.
+const BLOCK: usize = 2;
+/// Channels of the encoder's steps.
+const ENCODER: [usize; 5] = [32, 64, 128, 256, 256];
+/// Channels in a group of a normalisation.
+const GROUP: usize = 16;
+/// Residual blocks between encoder and decoder.
+const MIDDLE: usize = 2;
+
+/// The network; width and height of its input are multiples of 32.
+#[must_use]
+pub fn decomposer() -> Graph {
+    let (mut net, input) = Graph::new("decomposer", INPUTS);
+    let blocks = net.pixel_unshuffle(input, BLOCK);
+    let features = encode(&mut net, blocks);
+    let mut value = features[ENCODER.len() - 1];
+    for step in 0..MIDDLE {
+        value = residual(&mut net, &format!("middle.{step}"), value);
+    }
+    let skips = features.iter().rev();
+    let outputs = ENCODER.iter().rev().skip(1);
+    for (step, (&outputs, &skip)) in outputs.zip(skips).enumerate() {
+        value = net.concatenate(value, skip);
+        value = layer(&mut net, &format!("decoder.{step}"), value, outputs, 1);
+        value = net.upsample(value, false);
+    }
+    value = net.concatenate(value, features[0]);
+    value = layer(&mut net, "head.0", value, ENCODER[0], 1);
+    value = net.convolution("head.1".to_owned(), value, OUTPUTS * BLOCK * BLOCK, 1);
+    value = net.pixel_shuffle(value, BLOCK);
+    net.output("maps", value);
+    net
+}
+
+/// The features of each step, the finest first.
+fn encode(net: &mut Graph, input: Value) -> Vec<Value> {
+    let mut value = input;
+    let mut features = Vec::with_capacity(ENCODER.len());
+    for (step, &outputs) in ENCODER.iter().enumerate() {
+        let stride = if step == 0 { 1 } else { 2 };
+        value = layer(net, &format!("encoder.{step}"), value, outputs, stride);
+        if step >= 2 {
+            value = residual(net, &format!("encoder.{step}.residual"), value);
+        }
+        features.push(value);
+    }
+    features
+}
+
+/// Convolution, normalisation of groups, ReLU.
+fn layer(net: &mut Graph, name: &str, of: Value, outputs: usize, stride: usize) -> Value {
+    let value = net.convolution(format!("{name}.conv"), of, outputs, stride);
+    let value = net.group_norm(format!("{name}.norm"), value, GROUP);
+    net.relu(value)
+}
+
+/// Two layers whose result is added to what went in.
+fn residual(net: &mut Graph, name: &str, of: Value) -> Value {
+    let channels = net.node(of).channels;
+    let value = layer(net, &format!("{name}.0"), of, channels, 1);
+    let value = net.convolution(format!("{name}.1.conv"), value, channels, 1);
+    let value = net.group_norm(format!("{name}.1.norm"), value, GROUP);
+    let sum = net.add(of, value);
+    net.relu(sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_answers_as_many_pixels_as_it_is_given_and_fits_in_40_megabytes_at_half_precision() {
+        let net = decomposer();
+        let maps = net.node(net.outputs()[0].value);
+        assert_eq!((maps.channels, maps.scale), (OUTPUTS, Some(1)));
+        assert_eq!(net.multiple(), 32);
+        let count: usize = net.parameters().iter().map(|p| p.count()).sum();
+        assert!(2 * count < 40_000_000, "{count}");
+    }
+}

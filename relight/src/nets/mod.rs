@@ -1,0 +1,36 @@
+//! Networks described once as data, from which the model that is trained, the ONNX file and the list
+//! of parameters are made; their weights in files; and their inference.
+//!
+//! [`paper`] has the paper's four networks with the released shapes and parameter names, and
+//! [`decomposer`] ours. [`Weights`] reads safetensors and PyTorch's state dicts (a reader that
+//! executes nothing), [`to_onnx`] writes what any engine runs, and [`Inference`] runs it here.
+//! Knows nothing of pictures, colour or light: tensors go in and come out.
+//!
+//! ```
+//! use relight::nets::{Inference, Weights, decomposer};
+//!
+//! let graph = decomposer();
+//! let weights = Weights::initial(&graph, 1);
+//! let net = Inference::new(&graph, &weights, (32, 32))?;
+//! let maps = net.run(&vec![0.5; 7 * 32 * 32])?;
+//! assert_eq!(maps[0].shape(), [1, 9, 32, 32]);
+//! # Ok::<(), relight::nets::Error>(())
+//! ```
+
+mod decomposer;
+mod error;
+mod files;
+mod graph;
+mod inference;
+mod onnx;
+pub mod paper;
+mod parameters;
+mod pickle;
+
+pub use decomposer::{INPUTS, OUTPUTS, decomposer};
+pub use error::Error;
+pub use files::Precision;
+pub use graph::{EPSILON, Graph, Node, Operation, Output, Value};
+pub use inference::Inference;
+pub use onnx::{INPUT, check_size, to_onnx};
+pub use parameters::{Parameter, Role, Tensor, Weights};

@@ -1,0 +1,178 @@
+//! The paper's networks, with the shapes and the parameter names of its released code.
+//!
+//! Convolutions are 3 x 3 with padding 1, normalisation is instance normalisation without parameters,
+//! upsampling is bilinear with aligned corners.
+
+use super::graph::{Graph, Value};
+
+/// Width and height of a picture for which the released Light-Net's first layer is made.
+pub const RELEASED_SIDE: usize = 256;
+/// Coefficients and light colour that Light-Net answers: 9 + 3.
+pub const LIGHT_OUTPUTS: usize = 12;
+/// What the reflectance net answers: specular reflectance (red, green, blue) and smoothness.
+pub const REFLECTANCE_OUTPUTS: usize = 4;
+
+/// Output channels of the encoder's steps; all but the first halve the picture.
+const ENCODER: [usize; 6] = [16, 32, 64, 128, 256, 256];
+/// Output channels of the decoder's steps, each of which doubles the picture.
+const DECODER: [usize; 5] = [256, 128, 64, 32, 16];
+/// Convolutions between encoder and decoder.
+const MIDDLE: usize = 4;
+/// Width of the hidden layer of the light head.
+const HEAD_WIDTH: usize = 256;
+
+/// How Light-Net, and the reflectance net like it, get from features to numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Head {
+    /// Mean and maximum over the picture, then two small layers: 0.3 million parameters, any size.
+    Pooled,
+    /// As released: all 32,768 features into a layer of 4096, 138 million parameters, 256 x 256
+    /// pixels only.
+    Released,
+}
+
+/// Spec-Net: the highlight of a picture, before `(tanh + 1) / 2` becomes `[0, 1]`.
+///
+/// Input: 3 channels, `(x - 0.5) / 0.5` of the sRGB picture times the mask. Output `specular`: 3
+/// channels, -1..=1.
+#[must_use]
+pub fn spec_net() -> Graph {
+    u_net("spec-net", "specular", 3)
+}
+
+/// Normal-Net: the slopes (p, q) of a picture's surface, whose normal is (p, q, 1) over its length.
+///
+/// Input as [`spec_net`]'s. Output `slopes`: 2 channels, -1..=1, so that no slope beyond 45 degrees
+/// a direction can be told.
+#[must_use]
+pub fn normal_net() -> Graph {
+    u_net("normal-net", "slopes", 2)
+}
+
+/// Light-Net: nine coefficients of order-2 spherical harmonics, and the light's colour.
+///
+/// Input as [`spec_net`]'s. Output `light`: a vector of [`LIGHT_OUTPUTS`].
+#[must_use]
+pub fn light_net(head: Head) -> Graph {
+    numbers_net("light-net", "light", LIGHT_OUTPUTS, head)
+}
+
+/// The net for specular reflectance s_p and smoothness alpha, with Light-Net's structure.
+///
+/// Input as [`spec_net`]'s. Output `reflectance`: a vector of [`REFLECTANCE_OUTPUTS`].
+#[must_use]
+pub fn reflectance_net(head: Head) -> Graph {
+    numbers_net("reflectance-net", "reflectance", REFLECTANCE_OUTPUTS, head)
+}
+
+fn u_net(name: &'static str, output: &'static str, channels: usize) -> Graph {
+    let (mut net, input) = Graph::new(name, 3);
+    let features = encode(&mut net, input);
+    let mut value = join_middle(&mut net, &features);
+    let skips = features.iter().rev().skip(1);
+    for (step, (&outputs, &skip)) in DECODER.iter().zip(skips).enumerate() {
+        value = block(&mut net, format!("deconv{step}.0"), value, outputs, 1);
+        value = net.upsample(value, true);
+        value = net.concatenate(value, skip);
+    }
+    value = block(&mut net, "output.0".to_owned(), value, ENCODER[0], 1);
+    value = net.convolution("output.3".to_owned(), value, channels, 1);
+    value = net.instance_norm(value);
+    value = net.tanh(value);
+    net.output(output, value);
+    net
+}
+
+fn numbers_net(name: &'static str, output: &'static str, numbers: usize, head: Head) -> Graph {
+    let (mut net, input) = Graph::new(name, 3);
+    let features = encode(&mut net, input);
+    let joined = join_middle(&mut net, &features);
+    let value = match head {
+        Head::Pooled => {
+            let mean = net.mean_pool(joined);
+            let most = net.max_pool(joined);
+            let pooled = net.concatenate(mean, most);
+            let hidden = net.linear("head.0".to_owned(), pooled, HEAD_WIDTH);
+            let hidden = net.relu(hidden);
+            net.linear("head.2".to_owned(), hidden, numbers)
+        }
+        Head::Released => {
+            let mut value = net.flatten(joined, RELEASED_SIDE / 32);
+            for (at, width) in [(0, 4096), (2, 1024)] {
+                value = net.linear(format!("L_SHcoeffs.{at}"), value, width);
+                value = net.relu(value);
+            }
+            net.linear("L_SHcoeffs.4".to_owned(), value, numbers)
+        }
+    };
+    net.output(output, value);
+    net
+}
+
+/// The features of each step of the encoder, the finest first.
+fn encode(net: &mut Graph, input: Value) -> Vec<Value> {
+    let mut value = input;
+    let mut features = Vec::with_capacity(ENCODER.len());
+    for (step, &outputs) in ENCODER.iter().enumerate() {
+        let stride = if step == 0 { 1 } else { 2 };
+        value = block(net, format!("conv{step}.0"), value, outputs, stride);
+        features.push(value);
+    }
+    features
+}
+
+/// The middle of the network beside the coarsest features.
+fn join_middle(net: &mut Graph, features: &[Value]) -> Value {
+    let coarsest = features[ENCODER.len() - 1];
+    let mut value = coarsest;
+    for step in 0..MIDDLE {
+        let channels = net.node(coarsest).channels;
+        value = block(net, format!("mid.{}", 3 * step), value, channels, 1);
+    }
+    net.concatenate(value, coarsest)
+}
+
+/// Convolution, instance normalisation, ReLU.
+fn block(net: &mut Graph, name: String, of: Value, outputs: usize, stride: usize) -> Value {
+    let value = net.convolution(name, of, outputs, stride);
+    let value = net.instance_norm(value);
+    net.relu(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_released_light_net_has_138_million_parameters_and_the_pooled_one_4() {
+        let count = |net: Graph| net.parameters().iter().map(|p| p.count()).sum::<usize>();
+        let released = count(light_net(Head::Released));
+        assert!((138_000_000..144_000_000).contains(&released), "{released}");
+        assert!(count(light_net(Head::Pooled)) < 4_500_000);
+        assert!((5_200_000..5_500_000).contains(&count(normal_net())));
+    }
+
+    #[test]
+    fn parameters_have_the_released_names() {
+        let names: Vec<String> = normal_net()
+            .parameters()
+            .into_iter()
+            .map(|p| p.name)
+            .collect();
+        for name in [
+            "conv0.0.weight",
+            "mid.9.bias",
+            "deconv4.0.weight",
+            "output.3.weight",
+        ] {
+            assert!(names.iter().any(|known| known == name), "{name}");
+        }
+    }
+
+    #[test]
+    fn the_released_head_fixes_the_size_and_the_pooled_does_not() {
+        assert_eq!(light_net(Head::Released).fixed_side(), Some(RELEASED_SIDE));
+        assert_eq!(light_net(Head::Pooled).fixed_side(), None);
+        assert_eq!(normal_net().multiple(), 32);
+    }
+}

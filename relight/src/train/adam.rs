@@ -1,0 +1,187 @@
+//! Adam (Kingma and Ba, 2015), with weight decay apart from the gradient (Loshchilov and Hutter,
+//! 2019).
+//!
+//! libtorch's own optimiser keeps its moments to itself; a run that is to be resumed to the same
+//! losses has to save them.
+
+use std::collections::BTreeMap;
+
+use tch::{Tensor, no_grad};
+
+use super::error::Error;
+use super::model::to_weights;
+use crate::nets::Weights;
+
+/// Keeps the root of the second moment from being zero.
+const EPSILON: f64 = 1e-8;
+
+/// How fast it learns and forgets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdamSettings {
+    /// Part of the first moment that is kept at each step, 0..1.
+    pub beta1: f64,
+    /// Part of the second moment that is kept at each step, 0..1.
+    pub beta2: f64,
+    /// Part of each parameter that is taken off at each step, times the learning rate, 0 and above.
+    pub decay: f64,
+}
+
+impl Default for AdamSettings {
+    fn default() -> Self {
+        Self {
+            beta1: 0.9,
+            beta2: 0.99,
+            decay: 1e-3,
+        }
+    }
+}
+
+/// The optimiser with its memory.
+#[derive(Debug)]
+pub struct Adam {
+    settings: AdamSettings,
+    steps: u64,
+    first: BTreeMap<String, Tensor>,
+    second: BTreeMap<String, Tensor>,
+}
+
+impl Adam {
+    /// An optimiser that has made no step.
+    ///
+    /// # Errors
+    /// [`Error::Torch`].
+    pub fn new(
+        settings: AdamSettings,
+        parameters: &BTreeMap<String, Tensor>,
+    ) -> Result<Self, Error> {
+        let zeros = || {
+            parameters
+                .iter()
+                .map(|(name, parameter)| Ok((name.clone(), parameter.f_detach()?.f_zeros_like()?)))
+                .collect::<Result<BTreeMap<_, _>, Error>>()
+        };
+        Ok(Self {
+            settings,
+            steps: 0,
+            first: zeros()?,
+            second: zeros()?,
+        })
+    }
+
+    /// Steps made so far.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Both moments, `first.<name>` and `second.<name>`, to be saved.
+    ///
+    /// # Errors
+    /// [`Error::Torch`].
+    pub fn memory(&self) -> Result<Weights, Error> {
+        let first = to_weights(&self.first)?;
+        let second = to_weights(&self.second)?;
+        let named = |prefix: &'static str, weights: &Weights| -> Vec<_> {
+            let named = weights
+                .iter()
+                .map(|(name, tensor)| (format!("{prefix}.{name}"), tensor.clone()));
+            named.collect()
+        };
+        let mut all = named("first", &first);
+        all.extend(named("second", &second));
+        Ok(all.into_iter().collect())
+    }
+
+    /// Goes on from a memory that was saved after so many steps.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] where it is another network's.
+    pub fn recall(&mut self, memory: &Weights, steps: u64) -> Result<(), Error> {
+        for (prefix, moments) in [("first.", &mut self.first), ("second.", &mut self.second)] {
+            for (name, moment) in moments.iter_mut() {
+                let name = format!("{prefix}{name}");
+                let saved = memory
+                    .get(&name)
+                    .ok_or_else(|| Error::Memory(name.clone()))?;
+                let shape: Vec<i64> = saved.shape().iter().map(|&side| side as i64).collect();
+                if shape != moment.size() {
+                    return Err(Error::Memory(name));
+                }
+                let saved = Tensor::f_from_slice(saved.values())?.f_reshape(shape)?;
+                moment.f_copy_(&saved)?;
+            }
+        }
+        self.steps = steps;
+        Ok(())
+    }
+
+    /// One step along the gradients of the parameters, which are forgotten then. Where together they
+    /// are longer than `longest`, they are shortened to it first. Answers how long they were.
+    ///
+    /// # Errors
+    /// [`Error::Torch`].
+    pub fn step(
+        &mut self,
+        parameters: &BTreeMap<String, Tensor>,
+        rate: f64,
+        longest: f64,
+    ) -> Result<f64, Error> {
+        no_grad(|| self.step_without_gradient(parameters, rate, longest))
+    }
+
+    fn step_without_gradient(
+        &mut self,
+        parameters: &BTreeMap<String, Tensor>,
+        rate: f64,
+        longest: f64,
+    ) -> Result<f64, Error> {
+        let mut square = 0.0;
+        for parameter in parameters.values() {
+            let gradient = parameter.f_grad()?;
+            if gradient.defined() {
+                square += f64::try_from(gradient.f_square()?.f_sum(None)?)?;
+            }
+        }
+        let length = square.sqrt();
+        let shrink = if length > longest {
+            longest / length
+        } else {
+            1.0
+        };
+        self.steps += 1;
+        let AdamSettings {
+            beta1,
+            beta2,
+            decay,
+        } = self.settings;
+        let steps = self.steps.min(i32::MAX as u64) as i32;
+        let (bias1, bias2) = (1.0 - beta1.powi(steps), 1.0 - beta2.powi(steps));
+        for (name, parameter) in parameters {
+            let mut gradient = parameter.f_grad()?;
+            let (Some(first), Some(second)) = (self.first.get_mut(name), self.second.get_mut(name))
+            else {
+                return Err(Error::Memory(name.clone()));
+            };
+            if !gradient.defined() {
+                continue;
+            }
+            let scaled = gradient.f_mul_scalar(shrink)?;
+            let _ = first
+                .f_mul_scalar_(beta1)?
+                .f_add_(&scaled.f_mul_scalar(1.0 - beta1)?)?;
+            let scaled_square = scaled.f_square()?.f_mul_scalar(1.0 - beta2)?;
+            let _ = second.f_mul_scalar_(beta2)?.f_add_(&scaled_square)?;
+            let root = second
+                .f_div_scalar(bias2)?
+                .f_sqrt()?
+                .f_add_scalar(EPSILON)?;
+            let change = first.f_div(&root)?.f_mul_scalar(-rate / bias1)?;
+            let mut parameter = parameter.shallow_clone();
+            let _ = parameter
+                .f_mul_scalar_(1.0 - rate * decay)?
+                .f_add_(&change)?;
+            let _ = gradient.f_zero_()?;
+        }
+        Ok(length)
+    }
+}

@@ -1,0 +1,106 @@
+//! Losses between maps, on tensors: how far albedo, shading and normals are from the truth.
+//!
+//! Pictures are `batch x channels x height x width`, weights `batch x 1 x height x width`, 0 outside
+//! the mask. Every loss is the mean over the batch.
+
+use tch::Tensor;
+
+use super::error::Error;
+
+/// Keeps a division by nothing from being one.
+const TINY: f64 = 1e-6;
+
+/// Error that a factor of each picture cannot mend, as a part of the truth's energy: 0 for a multiple
+/// of the truth, 1 for nothing of it. (The scale-invariant error of Grosse et al. 2009, relative.)
+///
+/// # Errors
+/// [`Error::Torch`].
+pub fn scale_invariant(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tensor, Error> {
+    let sum = |a: &Tensor, b: &Tensor| {
+        a.f_mul(b)?
+            .f_mul(weight)?
+            .f_flatten(1, -1)?
+            .f_sum_dim_intlist([1_i64].as_slice(), false, None)
+    };
+    let factor = sum(truth, found)?.f_div(&sum(found, found)?.f_add_scalar(TINY)?)?;
+    let scaled = found.f_mul(&factor.f_view([-1, 1, 1, 1])?)?;
+    let rest = truth.f_sub(&scaled)?;
+    let part = sum(&rest, &rest)?.f_div(&sum(truth, truth)?.f_add_scalar(TINY)?)?;
+    Ok(part.f_mean(None)?)
+}
+
+/// The same in windows of `side` pixels at half their side, each with a factor of its own; energies
+/// are added up before they are divided. (The local error of Grosse et al. 2009, made
+/// differentiable.) One channel.
+///
+/// # Errors
+/// [`Error::Torch`].
+pub fn windowed(
+    found: &Tensor,
+    truth: &Tensor,
+    weight: &Tensor,
+    side: i64,
+) -> Result<Tensor, Error> {
+    let step = (side / 2).max(1);
+    let pool = |a: &Tensor, b: &Tensor| {
+        a.f_mul(b)?
+            .f_mul(weight)?
+            .f_avg_pool2d([side; 2], [step; 2], [0; 2], false, true, None)
+    };
+    let (tt, tf, ff) = (
+        pool(truth, truth)?,
+        pool(truth, found)?,
+        pool(found, found)?,
+    );
+    let mean = ff.f_mean_dim([1_i64, 2, 3].as_slice(), true, None)?;
+    // A window in which nothing is found has no factor.
+    let floor = mean.f_mul_scalar(1e-5)?.f_add_scalar(1e-8)?;
+    let explained = tf.f_square()?.f_div(&ff.f_add(&floor)?)?;
+    let over = [1_i64, 2, 3];
+    let rest = tt.f_sub(&explained)?.f_clamp_min(0.0)?;
+    let rest = rest.f_sum_dim_intlist(over.as_slice(), false, None)?;
+    let all = tt.f_sum_dim_intlist(over.as_slice(), false, None)?;
+    Ok(rest.f_div(&all.f_add_scalar(TINY)?)?.f_mean(None)?)
+}
+
+/// Mean difference of the steps from pixel to pixel, for logarithms of pictures: what sharpens edges
+/// and leaves flat parts flat.
+///
+/// # Errors
+/// [`Error::Torch`].
+pub fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tensor, Error> {
+    let along = |dimension: i64| -> Result<Tensor, tch::TchError> {
+        let step = |of: &Tensor| {
+            let length = of.size()[dimension as usize] - 1;
+            Ok::<_, tch::TchError>((
+                of.f_narrow(dimension, 1, length)?,
+                of.f_narrow(dimension, 0, length)?,
+            ))
+        };
+        let (found, truth, weight) = (step(found)?, step(truth)?, step(weight)?);
+        let both = weight.0.f_mul(&weight.1)?;
+        let error = found.0.f_sub(&found.1)?.f_sub(&truth.0.f_sub(&truth.1)?)?;
+        let channels = error.size()[1] as f64;
+        let sum = error.f_abs()?.f_mul(&both)?.f_sum(None)?;
+        sum.f_div(
+            &both
+                .f_sum(None)?
+                .f_mul_scalar(channels)?
+                .f_add_scalar(TINY)?,
+        )
+    };
+    Ok(along(2)?.f_add(&along(3)?)?)
+}
+
+/// `1 - cos` of the angle between unit normals, mean under the weight.
+///
+/// # Errors
+/// [`Error::Torch`].
+pub fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tensor, Error> {
+    let cosine = found
+        .f_mul(truth)?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
+    let error = cosine.f_neg()?.f_add_scalar(1.0)?.f_mul(weight)?;
+    let weights = weight.f_sum(None)?.f_add_scalar(TINY)?;
+    Ok(error.f_sum(None)?.f_div(&weights)?)
+}

@@ -1,0 +1,211 @@
+//! A network on tensors: its graph, computed node by node, with gradients.
+
+use std::collections::BTreeMap;
+
+use tch::{Device, Kind, Tensor};
+
+use super::error::Error;
+use crate::nets::{self, EPSILON, Graph, Node, Operation, Weights, check_size};
+
+/// In which precision layers are computed; parameters are always kept in 32 bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// 32 bits.
+    Single,
+    /// bfloat16 inside convolutions, normalisations and layers; results come out in 32 bits.
+    Mixed,
+}
+
+/// A network that can be trained.
+#[derive(Debug)]
+pub struct Model {
+    graph: Graph,
+    parameters: BTreeMap<String, Tensor>,
+    device: Device,
+    precision: Precision,
+}
+
+impl Model {
+    /// A network with these weights on a device.
+    ///
+    /// # Errors
+    /// What [`Weights::fitted_to`] answers, or [`Error::Torch`].
+    pub fn new(
+        graph: Graph,
+        weights: &Weights,
+        device: Device,
+        precision: Precision,
+    ) -> Result<Self, Error> {
+        let mut parameters = BTreeMap::new();
+        for (name, tensor) in weights.fitted_to(&graph)?.iter() {
+            let shape: Vec<i64> = tensor.shape().iter().map(|&side| side as i64).collect();
+            let tensor = Tensor::f_from_slice(tensor.values())?
+                .f_reshape(shape)?
+                .f_to_device(device)?
+                .f_set_requires_grad(true)?;
+            parameters.insert(name.to_owned(), tensor);
+        }
+        Ok(Self {
+            graph,
+            parameters,
+            device,
+            precision,
+        })
+    }
+
+    /// What it computes.
+    #[must_use]
+    pub fn graph(&self) -> &Graph {
+        &self.graph
+    }
+
+    /// Its parameters by name, sorted. They share their numbers with the network's.
+    #[must_use]
+    pub fn parameters(&self) -> &BTreeMap<String, Tensor> {
+        &self.parameters
+    }
+
+    /// Whether gradients are wanted of its parameters: no for a network that another is trained on.
+    ///
+    /// # Errors
+    /// [`Error::Torch`].
+    pub fn set_trainable(&mut self, trainable: bool) -> Result<(), Error> {
+        for parameter in self.parameters.values_mut() {
+            *parameter = parameter.f_set_requires_grad(trainable)?;
+        }
+        Ok(())
+    }
+
+    /// A copy of its weights.
+    ///
+    /// # Errors
+    /// [`Error::Torch`].
+    pub fn weights(&self) -> Result<Weights, Error> {
+        to_weights(&self.parameters)
+    }
+
+    /// The outputs for a batch of pictures (`batch x channels x height x width`), in the graph's order,
+    /// 32-bit.
+    ///
+    /// # Errors
+    /// [`nets::Error::PictureSize`] or [`Error::Torch`].
+    pub fn forward(&self, input: &Tensor) -> Result<Vec<Tensor>, Error> {
+        let size = input.size();
+        if let &[_, _, height, width] = size.as_slice() {
+            check_size(&self.graph, (width as usize, height as usize))?;
+        }
+        let mut values: Vec<Tensor> = Vec::with_capacity(self.graph.nodes().len());
+        for node in self.graph.nodes() {
+            let value = match node.operation {
+                Operation::Input => self.begin(input)?,
+                _ => {
+                    let inputs = node.inputs.iter().map(|value| &values[value.index()]);
+                    self.compute(node, &inputs.collect::<Vec<_>>())?
+                }
+            };
+            values.push(value);
+        }
+        let outputs = self.graph.outputs().iter();
+        outputs
+            .map(|output| Ok(values[output.value.index()].f_to_kind(Kind::Float)?))
+            .collect()
+    }
+
+    fn begin(&self, input: &Tensor) -> Result<Tensor, Error> {
+        let input = input.f_to_device(self.device)?;
+        Ok(self.cast(&input)?)
+    }
+
+    fn cast(&self, tensor: &Tensor) -> Result<Tensor, tch::TchError> {
+        tensor.f_to_kind(match self.precision {
+            Precision::Single => Kind::Float,
+            Precision::Mixed => Kind::BFloat16,
+        })
+    }
+
+    /// The parameters `<name>.weight` and `<name>.bias`, in the precision of layers.
+    fn layer(&self, name: &str) -> Result<(Tensor, Tensor), Error> {
+        let part = |part: &str| {
+            let name = format!("{name}.{part}");
+            let parameter = self.parameters.get(&name);
+            let missing = || nets::Error::Missing {
+                net: self.graph.name(),
+                name,
+            };
+            Ok::<_, Error>(self.cast(parameter.ok_or_else(missing)?)?)
+        };
+        Ok((part("weight")?, part("bias")?))
+    }
+
+    fn compute(&self, node: &Node, inputs: &[&Tensor]) -> Result<Tensor, Error> {
+        let of = inputs[0];
+        Ok(match &node.operation {
+            Operation::Input => of.shallow_clone(),
+            Operation::Convolution {
+                name,
+                kernel,
+                stride,
+            } => {
+                let (weight, bias) = self.layer(name)?;
+                let (padding, stride) = (*kernel as i64 / 2, *stride as i64);
+                of.f_conv2d(&weight, Some(&bias), [stride; 2], [padding; 2], [1; 2], 1)?
+            }
+            Operation::GroupNorm { name, groups } => {
+                let layer = name.as_ref().map(|name| self.layer(name)).transpose()?;
+                let (weight, bias) = match &layer {
+                    Some((weight, bias)) => (Some(weight), Some(bias)),
+                    None => (None, None),
+                };
+                of.f_group_norm(*groups as i64, weight, bias, f64::from(EPSILON), false)?
+            }
+            Operation::Relu => of.f_relu()?,
+            Operation::Tanh => of.f_tanh()?,
+            Operation::Add => of.f_add(inputs[1])?,
+            Operation::Concatenate => Tensor::f_cat(inputs, 1)?,
+            Operation::Upsample { align_corners } => {
+                let size = of.size();
+                let twice = [2 * size[2], 2 * size[3]];
+                of.f_upsample_bilinear2d(twice, *align_corners, None, None)?
+            }
+            Operation::PixelUnshuffle { factor } => of.f_pixel_unshuffle(*factor as i64)?,
+            Operation::PixelShuffle { factor } => of.f_pixel_shuffle(*factor as i64)?,
+            Operation::MeanPool => of.f_mean_dim([2_i64, 3].as_slice(), false, None)?,
+            Operation::MaxPool => of.f_amax([2_i64, 3], false)?,
+            Operation::Flatten { .. } => of.f_flatten(1, -1)?,
+            Operation::Linear { name } => {
+                let (weight, bias) = self.layer(name)?;
+                of.f_linear(&weight, Some(&bias))?
+            }
+        })
+    }
+}
+
+/// Tensors of any device as weights.
+///
+/// # Errors
+/// [`Error::Torch`].
+pub(super) fn to_weights(tensors: &BTreeMap<String, Tensor>) -> Result<Weights, Error> {
+    let weights = tensors.iter().filter_map(|(name, tensor)| {
+        let flat = tensor.f_detach().and_then(|tensor| {
+            tensor
+                .f_to_device(Device::Cpu)?
+                .f_contiguous()?
+                .f_reshape([-1])
+        });
+        let values = flat.and_then(|flat| {
+            let mut values = vec![0.0_f32; flat.numel()];
+            let count = values.len();
+            flat.f_copy_data(&mut values, count)?;
+            Ok(values)
+        });
+        match values {
+            Ok(values) => {
+                let shape = tensor.size().iter().map(|&side| side as usize).collect();
+                let tensor = nets::Tensor::new(shape, values)?;
+                Some(Ok((name.clone(), tensor)))
+            }
+            Err(error) => Some(Err(Error::from(error))),
+        }
+    });
+    weights.collect()
+}
