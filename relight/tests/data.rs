@@ -1,5 +1,12 @@
 //! Data sets on disk as streams of arrays: what was written is given, and damage is told.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
 use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;

@@ -1,5 +1,12 @@
 //! The protocols, on small sets of which the outcome is known.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
 use std::fs;
 use std::path::Path;
 use std::process::Command;

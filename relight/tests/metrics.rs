@@ -1,6 +1,13 @@
 //! The measures against published implementations on the same arrays (`fixtures/metrics`), and what
 //! must hold for any arrays.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
 use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;

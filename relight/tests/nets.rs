@@ -1,6 +1,11 @@
 //! The networks held against PyTorch: the same weights and input give the same output, and what
 //! PyTorch saved is read. `fixtures/nets/make.py` made the fixtures.
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
 
 use std::path::{Path, PathBuf};
 
@@ -59,7 +64,9 @@ fn answers_as_pytorch(graph: &Graph) {
     let wanted = all.get(graph.name()).unwrap();
     let found: Vec<f32> = match outputs[0].shape() {
         [_, _, height, width] => {
-            let kept = |at: &usize| at % width % EVERY == 0 && at / width % height % EVERY == 0;
+            let kept = |at: &usize| {
+                (at % width).is_multiple_of(EVERY) && (at / width % height).is_multiple_of(EVERY)
+            };
             let all = 0..outputs[0].values().len();
             all.filter(kept).map(|at| outputs[0].values()[at]).collect()
         }

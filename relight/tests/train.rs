@@ -1,6 +1,11 @@
 //! Training held against inference, and the optimiser against itself.
 #![cfg(feature = "train")]
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
 
 use relight::nets::paper::{Head, light_net, normal_net};
 use relight::nets::{Graph, Inference, Weights, decomposer};

@@ -1,5 +1,7 @@
 //! The light of order 2 that explains a shading best: what the paper's representation can hold.
 
+use std::array::from_fn;
+
 use crate::image::{Linear, Planes, Rgb};
 use crate::light::{Direction, LightError, Normals, Order, ShLight, YUp, basis};
 
@@ -66,19 +68,22 @@ fn solve(mut matrix: [[f64; COUNT]; COUNT], mut right: [[f64; 3]; COUNT]) -> [[f
             };
         }
     }
-    for channel in 0..3 {
-        for row in 0..COUNT {
-            let known: f64 = (0..row).map(|k| matrix[row][k] * right[k][channel]).sum();
-            right[row][channel] = (right[row][channel] - known) / matrix[row][row];
-        }
-        for row in (0..COUNT).rev() {
-            let known: f64 = (row + 1..COUNT)
-                .map(|k| matrix[k][row] * right[k][channel])
-                .sum();
-            right[row][channel] = (right[row][channel] - known) / matrix[row][row];
-        }
+    for row in 0..COUNT {
+        let known = weighted_sum(&right, (0..row).map(|k| (k, matrix[row][k])));
+        right[row] = from_fn(|c| (right[row][c] - known[c]) / matrix[row][row]);
+    }
+    for row in (0..COUNT).rev() {
+        let known = weighted_sum(&right, (row + 1..COUNT).map(|k| (k, matrix[k][row])));
+        right[row] = from_fn(|c| (right[row][c] - known[c]) / matrix[row][row]);
     }
     right
+}
+
+/// The sum of some rows, each times its weight.
+fn weighted_sum(rows: &[[f64; 3]; COUNT], weights: impl Iterator<Item = (usize, f64)>) -> [f64; 3] {
+    weights.fold([0.0; 3], |sum, (row, weight)| {
+        from_fn(|c| sum[c] + weight * rows[row][c])
+    })
 }
 
 /// The normals, with those of the nearest known pixel where the mask is true and none is known.

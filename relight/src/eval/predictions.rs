@@ -1,6 +1,6 @@
 //! Folders of predictions.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::EvalError;
 use crate::image::{Extent, Linear, Planes, Rgb, Samples, Transfer, read_planes};
@@ -114,12 +114,11 @@ impl Predictions {
 
     fn existing(&self, name: &str, part: &str) -> Option<PathBuf> {
         let file = |extension| self.file(name, &format!("{part}.{extension}"));
-        ["exr", "png"].map(file).into_iter().find(is_file)
+        ["exr", "png"]
+            .map(file)
+            .into_iter()
+            .find(|path| path.is_file())
     }
-}
-
-fn is_file(path: &PathBuf) -> bool {
-    Path::is_file(path)
 }
 
 fn check_size(path: PathBuf, found: Extent, expected: Extent) -> Result<(), EvalError> {

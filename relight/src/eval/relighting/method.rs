@@ -46,7 +46,7 @@ impl RelightMethod {
             Ok(Relight::Rendered {
                 set,
                 object,
-                surface,
+                surface: Box::new(surface),
                 form,
             })
         };
@@ -75,7 +75,7 @@ pub(super) enum Relight<'a> {
     Rendered {
         set: &'a RelightingSet,
         object: &'a Object,
-        surface: Surface,
+        surface: Box<Surface>,
         form: SpecularForm,
     },
     /// Images that were predicted.

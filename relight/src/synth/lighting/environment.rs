@@ -209,7 +209,7 @@ impl<'a> Sky<'a> {
     /// The light from a direction that was drawn otherwise.
     fn along(&self, towards: Vec3) -> SkyRay {
         let from = self.back.apply(direction(towards));
-        let radiance = self.sampler.panorama().radiance(from).map(|r| r as f32);
+        let radiance = self.sampler.panorama().radiance(from);
         SkyRay {
             towards,
             radiance: Vec3::from_array(radiance) * self.colour,
