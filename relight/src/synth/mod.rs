@@ -26,7 +26,7 @@
 //! let view = recipe.view(&object, &mesh, 1);
 //! let sample = recipe.sample(&library, &view, 2);
 //! assert_eq!(sample.image().width(), 32);
-//! # Ok::<(), relight::synth::Error>(())
+//! # Ok::<(), relight::synth::SynthError>(())
 //! ```
 
 mod camera;
@@ -50,9 +50,9 @@ mod turn;
 mod view;
 
 pub use camera::{CameraModel, Response};
-pub use error::Error;
+pub use error::SynthError;
 pub use finish::Finish;
-pub use folder::{Written, write_samples};
+pub use folder::{SynthTally, write_samples};
 pub use geometry::{GBuffer, Occluder};
 pub use library::{Folders, Library, PANORAMA_EXTENT, made_panoramas};
 pub use lighting::{
@@ -60,7 +60,7 @@ pub use lighting::{
     Panoramas, Scene, Shaded,
 };
 pub use mesh::{Mesh, MeshFault};
-pub use paint::{AlbedoKind, Paint, Picture, Relief};
+pub use paint::{AlbedoKind, Paint, Relief, TextureImage};
 pub use preview::write_preview;
 pub use random::stream;
 pub use recipe::{ObjectSource, Recipe, View};

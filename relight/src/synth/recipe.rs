@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
 
-use super::Error;
+use super::SynthError;
 use super::camera::CameraModel;
 use super::finish::Finish;
 use super::geometry::{GBuffer, Occluder};
@@ -105,8 +105,8 @@ impl Recipe {
     /// Whether all numbers are in range.
     ///
     /// # Errors
-    /// [`Error::Setting`] names the first that is not.
-    pub fn check(&self) -> Result<(), Error> {
+    /// [`SynthError::Setting`] names the first that is not.
+    pub fn check(&self) -> Result<(), SynthError> {
         let checks = [
             ("the size", self.size, 16..=2048, "16 to 2048 pixels"),
             (
@@ -127,7 +127,7 @@ impl Recipe {
             .find(|(_, value, range, _)| !range.contains(value))
         {
             None => Ok(()),
-            Some((name, value, _, allowed)) => Err(Error::Setting {
+            Some((name, value, _, allowed)) => Err(SynthError::Setting {
                 name,
                 value: u64::from(value),
                 allowed,

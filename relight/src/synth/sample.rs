@@ -4,7 +4,7 @@ use glam::Vec3;
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 
-use super::Error;
+use super::SynthError;
 use super::camera::CameraModel;
 use super::finish::Finish;
 use super::geometry::GBuffer;
@@ -136,7 +136,7 @@ impl<'a> SynthSample<'a> {
     }
 
     /// The sample as files.
-    pub(super) fn files(&self) -> Result<Files, Error> {
+    pub(super) fn files(&self) -> Result<Files, SynthError> {
         let buffer = self.view.scene.buffer();
         let shading = Sixteen::up_to_largest(&self.shaded.shading);
         let highlight = Sixteen::up_to_largest(&self.shaded.highlight);

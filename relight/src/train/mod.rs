@@ -10,5 +10,5 @@ pub mod low_rank;
 mod model;
 
 pub use adam::{Adam, AdamSettings};
-pub use error::Error;
-pub use model::{Model, Precision};
+pub use error::TrainError;
+pub use model::{ComputePrecision, Model};

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use tch::{Device, Kind, Tensor};
 
-use super::error::Error;
+use super::error::TrainError;
 use crate::nets::{self, EPSILON, Graph, Node, Operation, Weights, check_size};
 
 /// In which precision layers are computed; parameters are always kept in 32 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Precision {
+pub enum ComputePrecision {
     /// 32 bits.
     Single,
     /// bfloat16 inside convolutions, normalisations and layers; results come out in 32 bits.
@@ -22,20 +22,20 @@ pub struct Model {
     graph: Graph,
     parameters: BTreeMap<String, Tensor>,
     device: Device,
-    precision: Precision,
+    precision: ComputePrecision,
 }
 
 impl Model {
     /// A network with these weights on a device.
     ///
     /// # Errors
-    /// What [`Weights::fitted_to`] answers, or [`Error::Torch`].
+    /// What [`Weights::fitted_to`] answers, or [`TrainError::Torch`].
     pub fn new(
         graph: Graph,
         weights: &Weights,
         device: Device,
-        precision: Precision,
-    ) -> Result<Self, Error> {
+        precision: ComputePrecision,
+    ) -> Result<Self, TrainError> {
         let mut parameters = BTreeMap::new();
         for (name, tensor) in weights.fitted_to(&graph)?.iter() {
             let shape: Vec<i64> = tensor.shape().iter().map(|&side| side as i64).collect();
@@ -68,8 +68,8 @@ impl Model {
     /// Whether gradients are wanted of its parameters: no for a network that another is trained on.
     ///
     /// # Errors
-    /// [`Error::Torch`].
-    pub fn set_trainable(&mut self, trainable: bool) -> Result<(), Error> {
+    /// [`TrainError::Torch`].
+    pub fn set_trainable(&mut self, trainable: bool) -> Result<(), TrainError> {
         for parameter in self.parameters.values_mut() {
             *parameter = parameter.f_set_requires_grad(trainable)?;
         }
@@ -79,8 +79,8 @@ impl Model {
     /// A copy of its weights.
     ///
     /// # Errors
-    /// [`Error::Torch`].
-    pub fn weights(&self) -> Result<Weights, Error> {
+    /// [`TrainError::Torch`].
+    pub fn weights(&self) -> Result<Weights, TrainError> {
         to_weights(&self.parameters)
     }
 
@@ -88,8 +88,8 @@ impl Model {
     /// 32-bit.
     ///
     /// # Errors
-    /// [`nets::Error::PictureSize`] or [`Error::Torch`].
-    pub fn forward(&self, input: &Tensor) -> Result<Vec<Tensor>, Error> {
+    /// [`nets::NetError::PictureSize`] or [`TrainError::Torch`].
+    pub fn forward(&self, input: &Tensor) -> Result<Vec<Tensor>, TrainError> {
         let size = input.size();
         if let &[_, _, height, width] = size.as_slice() {
             check_size(&self.graph, (width as usize, height as usize))?;
@@ -111,33 +111,33 @@ impl Model {
             .collect()
     }
 
-    fn begin(&self, input: &Tensor) -> Result<Tensor, Error> {
+    fn begin(&self, input: &Tensor) -> Result<Tensor, TrainError> {
         let input = input.f_to_device(self.device)?;
         Ok(self.cast(&input)?)
     }
 
     fn cast(&self, tensor: &Tensor) -> Result<Tensor, tch::TchError> {
         tensor.f_to_kind(match self.precision {
-            Precision::Single => Kind::Float,
-            Precision::Mixed => Kind::BFloat16,
+            ComputePrecision::Single => Kind::Float,
+            ComputePrecision::Mixed => Kind::BFloat16,
         })
     }
 
     /// The parameters `<name>.weight` and `<name>.bias`, in the precision of layers.
-    fn layer(&self, name: &str) -> Result<(Tensor, Tensor), Error> {
+    fn layer(&self, name: &str) -> Result<(Tensor, Tensor), TrainError> {
         let part = |part: &str| {
             let name = format!("{name}.{part}");
             let parameter = self.parameters.get(&name);
-            let missing = || nets::Error::Missing {
+            let missing = || nets::NetError::Missing {
                 net: self.graph.name(),
                 name,
             };
-            Ok::<_, Error>(self.cast(parameter.ok_or_else(missing)?)?)
+            Ok::<_, TrainError>(self.cast(parameter.ok_or_else(missing)?)?)
         };
         Ok((part("weight")?, part("bias")?))
     }
 
-    fn compute(&self, node: &Node, inputs: &[&Tensor]) -> Result<Tensor, Error> {
+    fn compute(&self, node: &Node, inputs: &[&Tensor]) -> Result<Tensor, TrainError> {
         let of = inputs[0];
         Ok(match &node.operation {
             Operation::Input => of.shallow_clone(),
@@ -183,8 +183,8 @@ impl Model {
 /// Tensors of any device as weights.
 ///
 /// # Errors
-/// [`Error::Torch`].
-pub(super) fn to_weights(tensors: &BTreeMap<String, Tensor>) -> Result<Weights, Error> {
+/// [`TrainError::Torch`].
+pub(super) fn to_weights(tensors: &BTreeMap<String, Tensor>) -> Result<Weights, TrainError> {
     let weights = tensors.iter().filter_map(|(name, tensor)| {
         let flat = tensor.f_detach().and_then(|tensor| {
             tensor
@@ -204,7 +204,7 @@ pub(super) fn to_weights(tensors: &BTreeMap<String, Tensor>) -> Result<Weights, 
                 let tensor = nets::Tensor::new(shape, values)?;
                 Some(Ok((name.clone(), tensor)))
             }
-            Err(error) => Some(Err(Error::from(error))),
+            Err(error) => Some(Err(TrainError::from(error))),
         }
     });
     weights.collect()

@@ -24,7 +24,7 @@ use palette::Palette;
 use pattern::{Canvas, Pattern};
 
 pub use palette::AlbedoKind;
-pub use picture::Picture;
+pub use picture::TextureImage;
 pub use relief::Relief;
 
 /// Least albedo of anything: soot reflects more.
@@ -131,7 +131,7 @@ impl Paint {
         &self,
         points: &[Vec3],
         texture: Option<&[Vec2]>,
-        pictures: &[Picture],
+        pictures: &[TextureImage],
     ) -> Vec<Vec3> {
         let mut albedo = vec![self.ground; points.len()];
         if !self.coats.is_empty() {
@@ -177,7 +177,7 @@ mod tests {
     fn a_third_of_all_paints_is_constant_and_every_albedo_is_one_that_exists() {
         let points = points();
         let mut random = Random::new(1);
-        let pictures = [Picture::from_fn(4, 4, |x, y| {
+        let pictures = [TextureImage::from_fn(4, 4, |x, y| {
             Vec3::new(x as f32, y as f32, 1.0)
         })];
         let mut constant = 0;

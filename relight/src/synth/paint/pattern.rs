@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::super::noise::Noise;
 use super::super::random::Random;
 use super::palette::Palette;
-use super::picture::Picture;
+use super::picture::TextureImage;
 use super::writing::Writing;
 
 /// Where a coat of paint lies. Lengths are in the object's own frame, in which it is about 2 large.
@@ -44,7 +44,7 @@ pub(super) enum Pattern {
     /// Lines of a script.
     Writing(Writing),
     /// A picture, thrown onto the object along a direction or laid on by its texture coordinates.
-    Picture {
+    TextureImage {
         number: usize,
         frame: Frame,
         laid_on: bool,
@@ -208,7 +208,7 @@ impl Pattern {
     fn picture(random: &mut Random, canvas: &Canvas<'_>) -> Self {
         let origin = canvas.point(random);
         let scale = random.uniform(0.8..3.0);
-        Self::Picture {
+        Self::TextureImage {
             number: random.index(canvas.pictures),
             frame: Frame::draw(random, origin, scale),
             laid_on: random.chance(0.5),
@@ -222,10 +222,10 @@ impl Pattern {
         colour: Vec3,
         points: &[Vec3],
         texture: Option<&[Vec2]>,
-        pictures: &[Picture],
+        pictures: &[TextureImage],
         albedo: &mut [Vec3],
     ) {
-        if let Self::Picture {
+        if let Self::TextureImage {
             number,
             frame,
             laid_on,
@@ -282,7 +282,7 @@ impl Pattern {
             }
             Self::Half { normal, offset } => step(point.dot(*normal) - offset, 0.02),
             Self::Writing(writing) => writing.coverage(point),
-            Self::Voronoi { .. } | Self::Picture { .. } => 0.0,
+            Self::Voronoi { .. } | Self::TextureImage { .. } => 0.0,
         }
     }
 }
