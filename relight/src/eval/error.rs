@@ -16,7 +16,7 @@ pub enum EvalError {
     Open(#[from] OpenError),
     /// A sample of the truth cannot be read.
     #[error("the truth is damaged")]
-    DamagedSample(#[from] DamagedSample),
+    Damage(#[from] DamagedSample),
     /// The truth does not have a part that the protocol needs.
     #[error("the truth has no {part} of {sample}: this protocol cannot be run on it")]
     Lacks {

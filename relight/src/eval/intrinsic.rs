@@ -1,13 +1,13 @@
 //! Albedo and shading of single images: the table on MIT Intrinsic Images.
 
-use super::fit::{completed, fit_light};
+use super::completion::completed;
 use super::retinex::{Decomposition, Retinex, divided};
 use super::run::{Scored, add_method, grey, measured, need, object, of_grey};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use crate::data::{TruthSample, TruthSet};
 use crate::image::{Linear, Rgb};
 use crate::metrics::{Convention, IntrinsicError, Windows, intrinsic_error};
-use crate::render::{DiffuseForm, DiffuseLayer};
+use crate::render::{DiffuseForm, DiffuseLayer, fit_light};
 
 /// Which image is decomposed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

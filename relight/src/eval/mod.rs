@@ -13,8 +13,8 @@
 //! factor of two and more between conventions, and published tables rarely say which is theirs. What
 //! cannot be read or measured is an error that names the image; no image is left out.
 
+mod completion;
 mod error;
-mod fit;
 mod highlights;
 mod intrinsic;
 mod light;

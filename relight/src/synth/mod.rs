@@ -4,7 +4,7 @@
 //! | module | concern |
 //! | --- | --- |
 //! | `mesh`, `shape` | triangles from files, and out of nothing but a seed |
-//! | `view`, `geometry` | what a camera sees of them, which light is blocked |
+//! | `view`, `geometry`, `object` | what a camera sees of them, which light is blocked |
 //! | `paint`, `finish` | albedo, relief and gloss |
 //! | `lighting` | lamps and panoramas on what is seen |
 //! | `studio` | panoramas out of nothing but a seed |
@@ -38,6 +38,7 @@ mod library;
 mod lighting;
 mod mesh;
 mod noise;
+mod object;
 mod paint;
 mod png;
 mod preview;
@@ -60,10 +61,11 @@ pub use lighting::{
     Panoramas, Scene, Shaded,
 };
 pub use mesh::{Mesh, MeshFault};
+pub use object::{ObjectSource, View};
 pub use paint::{AlbedoKind, Paint, Relief, TextureImage};
 pub use preview::write_preview;
 pub use random::stream;
-pub use recipe::{ObjectSource, Recipe, View};
+pub use recipe::Recipe;
 pub use sample::{Description, SynthSample, Whites};
 pub use shape::ShapeKind;
 pub use studio::Surroundings;

@@ -12,6 +12,7 @@ use super::geometry::{GBuffer, Occluder};
 use super::library::Library;
 use super::lighting::{LightKind, Lighting, Material, Scene};
 use super::mesh::Mesh;
+use super::object::{ObjectSource, View};
 use super::random::{Random, stream};
 use super::sample::{Description, SynthSample};
 use super::shape::ShapeKind;
@@ -55,50 +56,6 @@ impl Default for Recipe {
             random_camera: true,
         }
     }
-}
-
-/// Where an object comes from.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ObjectSource {
-    /// A file of the library.
-    Mesh {
-        /// Its name.
-        file: String,
-    },
-    /// A procedural shape.
-    Shape {
-        /// Its kind.
-        kind: ShapeKind,
-        /// Its seed.
-        seed: u64,
-    },
-}
-
-impl ObjectSource {
-    /// The file's name without its extension, or the shape's kind.
-    #[must_use]
-    pub fn name(&self) -> String {
-        match self {
-            Self::Mesh { file } => match file.rsplit_once('.') {
-                Some((stem, _)) => stem.to_owned(),
-                None => file.clone(),
-            },
-            Self::Shape { kind, .. } => kind.name().to_owned(),
-        }
-    }
-}
-
-/// An object in its pose before the camera, ready to be lit.
-pub struct View {
-    /// Where it comes from.
-    pub object: ObjectSource,
-    /// How it stands.
-    pub pose: Pose,
-    /// How it is seen.
-    pub projection: Projection,
-    /// What is seen.
-    pub scene: Scene,
 }
 
 impl Recipe {

@@ -9,8 +9,8 @@ use super::camera::CameraModel;
 use super::finish::Finish;
 use super::geometry::GBuffer;
 use super::lighting::{Lighting, Material, Panoramas, Shaded};
+use super::object::{ObjectSource, View};
 use super::png::{Sixteen, encode_sixteen};
-use super::recipe::{ObjectSource, View};
 use super::view::{Pose, Projection};
 use crate::light::ShLight;
 

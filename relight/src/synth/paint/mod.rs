@@ -3,12 +3,14 @@
 //!
 //! | file | concern |
 //! | --- | --- |
+//! | `frame` | planes to draw on, soft edges |
 //! | `palette` | which colours stand together |
 //! | `pattern` | which points have which colour of the palette |
 //! | `writing` | lines of strokes that look like a script |
 //! | `picture` | image files and parts of panoramas as patterns |
 //! | `relief` | slopes that are finer than the mesh |
 
+mod frame;
 mod palette;
 mod pattern;
 mod picture;

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::noise::Noise;
 use super::super::random::Random;
+use super::frame::{Frame, step};
 use super::palette::Palette;
 use super::picture::TextureImage;
 use super::writing::Writing;
@@ -44,7 +45,7 @@ pub(super) enum Pattern {
     /// Lines of a script.
     Writing(Writing),
     /// A picture, thrown onto the object along a direction or laid on by its texture coordinates.
-    TextureImage {
+    Picture {
         number: usize,
         frame: Frame,
         laid_on: bool,
@@ -81,31 +82,6 @@ impl Canvas<'_> {
 pub(super) struct Waves {
     seed: u64,
     frequency: f32,
-}
-
-/// A plane with two axes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Frame {
-    origin: Vec3,
-    right: Vec3,
-    up: Vec3,
-}
-
-impl Frame {
-    /// Around a point of the surface, seen from anywhere; `scale` is the length of one unit.
-    pub(super) fn draw(random: &mut Random, origin: Vec3, scale: f32) -> Self {
-        let turn = random.rotation();
-        Self {
-            origin,
-            right: turn.x_axis / scale,
-            up: turn.y_axis / scale,
-        }
-    }
-
-    pub(super) fn place(&self, point: Vec3) -> Vec2 {
-        let from = point - self.origin;
-        Vec2::new(from.dot(self.right), from.dot(self.up))
-    }
 }
 
 impl Waves {
@@ -208,7 +184,7 @@ impl Pattern {
     fn picture(random: &mut Random, canvas: &Canvas<'_>) -> Self {
         let origin = canvas.point(random);
         let scale = random.uniform(0.8..3.0);
-        Self::TextureImage {
+        Self::Picture {
             number: random.index(canvas.pictures),
             frame: Frame::draw(random, origin, scale),
             laid_on: random.chance(0.5),
@@ -225,7 +201,7 @@ impl Pattern {
         pictures: &[TextureImage],
         albedo: &mut [Vec3],
     ) {
-        if let Self::TextureImage {
+        if let Self::Picture {
             number,
             frame,
             laid_on,
@@ -282,14 +258,9 @@ impl Pattern {
             }
             Self::Half { normal, offset } => step(point.dot(*normal) - offset, 0.02),
             Self::Writing(writing) => writing.coverage(point),
-            Self::Voronoi { .. } | Self::TextureImage { .. } => 0.0,
+            Self::Voronoi { .. } | Self::Picture { .. } => 0.0,
         }
     }
-}
-
-/// 0 below, 1 above, and a ramp of this width around 0.
-pub(super) fn step(value: f32, width: f32) -> f32 {
-    (value / width + 0.5).clamp(0.0, 1.0)
 }
 
 /// The nearest site, and the squared distances to it and to the second nearest.
