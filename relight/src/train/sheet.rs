@@ -14,7 +14,7 @@ type Sheet = (Vec<u8>, (usize, usize));
 ///
 /// # Errors
 /// [`TrainError::Torch`], [`TrainError::Sheet`].
-pub fn validation_sheet(
+pub(super) fn validation_sheet(
     batch: &TruthBatch,
     answer: &AnsweredTensors,
     rows: usize,
