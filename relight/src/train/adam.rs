@@ -127,7 +127,7 @@ impl Adam {
         for parameter in parameters.values() {
             let gradient = parameter.f_grad()?;
             if gradient.defined() {
-                square += f64::try_from(gradient.f_square()?.f_sum(None)?)?;
+                square += f64::try_from(gradient.f_norm()?)?.powi(2);
             }
         }
         let length = square.sqrt();
@@ -153,17 +153,14 @@ impl Adam {
             if !gradient.defined() {
                 continue;
             }
-            let scaled = gradient.f_mul_scalar(shrink)?;
-            let _ = first
-                .f_mul_scalar_(beta1)?
-                .f_add_(&scaled.f_mul_scalar(1.0 - beta1)?)?;
-            let scaled_square = scaled.f_square()?.f_mul_scalar(1.0 - beta2)?;
-            let _ = second.f_mul_scalar_(beta2)?.f_add_(&scaled_square)?;
-            let root = second
-                .f_div_scalar(bias2)?
-                .f_sqrt()?
-                .f_add_scalar(EPSILON)?;
-            let change = first.f_div(&root)?.f_mul_scalar(-rate / bias1)?;
+            let _ = gradient.f_mul_scalar_(shrink)?;
+            let _ = first.f_lerp_(&gradient, 1.0 - beta1)?;
+            let _ = second.f_lerp_(&gradient.f_square()?, 1.0 - beta2)?;
+            // first / bias1 over (sqrt(second / bias2) + epsilon), with one division.
+            let mut change = second.f_sqrt()?;
+            let _ = change.f_add_scalar_(EPSILON * bias2.sqrt())?;
+            let _ = change.f_reciprocal_()?.f_mul_(first)?;
+            let _ = change.f_mul_scalar_(-rate * bias2.sqrt() / bias1)?;
             let mut parameter = parameter.shallow_clone();
             let _ = parameter
                 .f_mul_scalar_(1.0 - rate * decay)?

@@ -50,9 +50,7 @@ impl Average {
         no_grad(|| {
             for (name, value) in &mut self.values {
                 if let Some(parameter) = parameters.get(name) {
-                    let _ = value
-                        .f_mul_scalar_(keep)?
-                        .f_add_(&parameter.f_mul_scalar(1.0 - keep)?)?;
+                    let _ = value.f_lerp_(parameter, 1.0 - keep)?;
                 }
             }
             Ok(())
