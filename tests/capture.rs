@@ -682,6 +682,10 @@ fn a_full_disk_ends_the_recording_and_says_how_much_is_missing() {
         .unwrap();
     let folder = root.path().join(ID);
     assert!(reason.contains("the disk is full"), "{reason}");
+    assert!(
+        reason.ends_with("(os error 27)"),
+        "the system's answer: {reason}"
+    );
     assert!(reason.contains(folder.to_str().unwrap()), "{reason}");
     let missing: u64 = reason
         .split("about ")
