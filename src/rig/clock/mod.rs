@@ -117,6 +117,16 @@ impl Clock {
         }
     }
 
+    /// The clock of a rig that runs `times` as fast as real time: virtual where that is 0 (as fast as
+    /// possible), monotonic where it is 1, paced otherwise.
+    pub fn at_speed(times: f64) -> Clock {
+        match times {
+            0.0 => Self::virtual_time(),
+            1.0 => Self::monotonic(),
+            times => Self::paced(times),
+        }
+    }
+
     /// The time now, microseconds.
     pub fn now_us(&self) -> i64 {
         match &self.kind {

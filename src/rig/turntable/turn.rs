@@ -55,13 +55,13 @@ impl Table {
             return Err(TurntableError::NotHomed);
         }
         let planned_deg = plan.start_deg();
-        if (status.angle_deg - planned_deg).abs() > 2.0 * self.identity.step_deg() {
+        if (status.angle_deg - planned_deg).abs() > 2.0 * self.identity().step_deg() {
             return Err(TurntableError::MovedSincePlan {
                 planned_deg,
                 at_deg: status.angle_deg,
             });
         }
-        if self.identity.lease_s == Some(0.0) {
+        if self.identity().lease_s == Some(0.0) {
             self.set_lease()?;
         }
         Turn::start(self, plan, status.machine_deg - status.angle_deg)

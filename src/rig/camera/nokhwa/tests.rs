@@ -16,9 +16,10 @@ use proptest::prelude::*;
 
 use super::worker::jpeg_length;
 use super::*;
+use crate::camera::Mode;
 use crate::camera::hold::{ManualPlan, ManualValues};
-use crate::camera::{Mode, StampSource};
 use crate::clock::Clock;
+use relit_data::session::FrameClock;
 
 const PATIENCE: Duration = Duration::from_secs(20);
 const LONGEST: Duration = Duration::from_millis(50);
@@ -202,7 +203,7 @@ fn frames_come_without_a_counter_and_with_the_time_of_their_arrival() {
     let frame = camera.next_frame(PATIENCE).unwrap();
     let after = Clock::monotonic().now_us();
     assert_eq!((frame.fault(), frame.data), (None, vec![1, 2]));
-    assert_eq!((frame.sequence, frame.stamp), (None, StampSource::Arrival));
+    assert_eq!((frame.sequence, frame.clock), (None, FrameClock::Host));
     assert!((before..=after).contains(&frame.t_us));
     let late = camera.next_frame(LONGEST).unwrap_err();
     assert!(matches!(late, CameraError::Timeout { .. }), "{late}");

@@ -35,8 +35,6 @@ pub struct Plan {
     pub manifest: Manifest,
     /// What the camera delivers since it was started.
     pub stream: StreamFormat,
-    /// When the turn is, where that is known in advance: see [`Recorder::announce`].
-    pub window: Option<Window>,
     /// Dropped or damaged frames up to which a take is accepted.
     pub max_dropped: u64,
     /// How long a frame may wait for a place in the queue before it is dropped. A camera does not
@@ -68,13 +66,7 @@ impl Recorder {
     pub fn start(camera: Box<dyn Camera>, plan: Plan) -> Result<Self, RecordingError> {
         let (clock, stream) = (plan.clock, plan.stream);
         let session = SessionWriter::create(&plan.root, with_video(plan.manifest, &stream))?;
-        let shared = Arc::new(Shared::new(
-            &clock,
-            State {
-                window: plan.window,
-                ..State::default()
-            },
-        ));
+        let shared = Arc::new(Shared::new(&clock, State::default()));
         let (sender, queue) = crossbeam_channel::bounded(queue_places(&stream));
         let writer = WriterThread {
             stream,
