@@ -25,7 +25,7 @@ use relit_rig::camera::{
     Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
     Mode, ModeRequest, Rates, open,
 };
-use relit_rig::capture::{End, Plan, Recorder, Window, salvage, salvage_session};
+use relit_rig::capture::{End, Recorder, RecordingPlan, Window, salvage, salvage_session};
 use relit_rig::clock::Clock;
 use relit_rig::preview::Preview;
 use relit_rig::state::{Monitor, TakeSummary, Verdict};
@@ -206,8 +206,8 @@ fn manifest() -> Manifest {
     }
 }
 
-fn plan(root: &Path, clock: &Clock, max_dropped: u64) -> Plan {
-    Plan {
+fn plan(root: &Path, clock: &Clock, max_dropped: u64) -> RecordingPlan {
+    RecordingPlan {
         root: root.to_owned(),
         manifest: manifest(),
         stream: StreamFormat {
@@ -225,7 +225,7 @@ fn plan(root: &Path, clock: &Clock, max_dropped: u64) -> Plan {
 }
 
 /// Begins to record; the time of the turn is known before the first frame comes.
-fn start(camera: Box<dyn Camera>, plan: Plan, window: Window) -> Recorder {
+fn start(camera: Box<dyn Camera>, plan: RecordingPlan, window: Window) -> Recorder {
     let _participant = plan.clock.clone().take_part();
     let recorder = Recorder::start(camera, plan).unwrap();
     recorder.announce(window);

@@ -28,7 +28,7 @@ const VIVID: &str = "v4l2:/dev/video0";
 const LOOPBACK: &str = "v4l2:/dev/video10";
 const DRIVER: &str = "/sys/bus/platform/drivers/vivid";
 /// Long enough for an emulated machine.
-const PATIENCE: Duration = Duration::from_secs(20);
+const TIMEOUT: Duration = Duration::from_secs(20);
 
 fn open(address: &str) -> Result<Box<dyn Camera>, CameraError> {
     camera::open(&address.parse().unwrap(), Clock::monotonic())
@@ -64,7 +64,7 @@ fn start(camera: &mut dyn Camera, mode: &str) -> GrantedMode {
 
 fn frames(camera: &mut dyn Camera, count: usize) -> Vec<Frame> {
     (0..count)
-        .map(|_| camera.next_frame(PATIENCE).unwrap())
+        .map(|_| camera.next_frame(TIMEOUT).unwrap())
         .collect()
 }
 
@@ -88,7 +88,7 @@ fn fastest(rates: &Rates) -> f64 {
 fn until_error(camera: &mut dyn Camera) -> (usize, CameraError, Duration) {
     for count in 0.. {
         let asked = Instant::now();
-        if let Err(error) = camera.next_frame(PATIENCE) {
+        if let Err(error) = camera.next_frame(TIMEOUT) {
             return (count, error, asked.elapsed());
         }
         assert!(count < 500, "the fault never came");
@@ -162,7 +162,7 @@ fn fifty_frames_come_whole_counted_and_stamped() {
     assert!(counted.is_sorted(), "{counted:?}");
     camera.stop().unwrap();
     camera.stop().unwrap();
-    let error = camera.next_frame(PATIENCE).unwrap_err();
+    let error = camera.next_frame(TIMEOUT).unwrap_err();
     assert!(matches!(error, CameraError::NotStarted { .. }), "{error}");
 }
 
@@ -297,7 +297,7 @@ fn a_broken_stream_is_told_and_starts_again() {
     let (count, error, took) = until_error(&mut *camera);
     println!("after {count} frames and {took:?}: {error}");
     assert!(matches!(error, CameraError::Stream { .. }), "{error}");
-    let again = camera.next_frame(PATIENCE).unwrap_err();
+    let again = camera.next_frame(TIMEOUT).unwrap_err();
     assert!(matches!(again, CameraError::Stream { .. }), "{again}");
     start(&mut *camera, "YUYV:320x180@30");
     frames(&mut *camera, 3);
@@ -406,7 +406,7 @@ fn an_error_at_the_start_leaves_a_camera_that_starts() {
             .unwrap_err();
         println!("{fault}: {error}");
         assert!(matches!(error, CameraError::Refused { .. }), "{error}");
-        let error = camera.next_frame(PATIENCE).unwrap_err();
+        let error = camera.next_frame(TIMEOUT).unwrap_err();
         assert!(matches!(error, CameraError::NotStarted { .. }), "{error}");
         start(&mut *camera, "YUYV:320x180@30");
         frames(&mut *camera, 3);
@@ -467,7 +467,7 @@ fn a_timeout_is_bounded_and_costs_no_frame() {
             Err(CameraError::Timeout { .. }) => timeouts += 1,
             Err(other) => panic!("{other}"),
         }
-        assert!(asked.elapsed() < PATIENCE);
+        assert!(asked.elapsed() < TIMEOUT);
     }
     println!("{timeouts} timeouts, counted {counted:?}");
     assert!(timeouts > 0);

@@ -16,7 +16,7 @@ use super::locked_camera::{LockedCamera, NEXT_FRAME};
 use super::manifest::manifest;
 use super::metering::meter;
 use super::preflight;
-use super::recording::{End, Plan, Recorder};
+use super::recording::{End, Recorder, RecordingPlan};
 use super::turn::TurnRecording;
 use crate::camera::CameraAddress;
 use crate::state::{Check, Phase, TakeSummary, Verdict};
@@ -82,7 +82,7 @@ fn run_take(
         state.session = Some(manifest.id.clone());
         state.frames_wanted = settings.frames(locked.stream.fps);
     });
-    let plan = Plan {
+    let plan = RecordingPlan {
         manifest,
         root: settings.root.clone(),
         stream: locked.stream,

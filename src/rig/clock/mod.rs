@@ -32,19 +32,19 @@
 //! let clock = Clock::virtual_time();
 //! // From here on, time passes only while this thread waits.
 //! let _participant = clock.take_part();
-//! let door = Arc::new(Waitable::new(&clock, false));
+//! let gate = Arc::new(Waitable::new(&clock, false));
 //! let opener = clock.spawn("opener", {
-//!     let (clock, door) = (clock.clone(), Arc::clone(&door));
+//!     let (clock, gate) = (clock.clone(), Arc::clone(&gate));
 //!     move || {
 //!         clock.sleep(Duration::from_secs(3600));
-//!         door.update(|open| *open = true);
+//!         gate.update(|open| *open = true);
 //!     }
 //! })?;
 //!
 //! let start_us = clock.now_us();
-//! let in_time = door.wait_for(Duration::from_secs(60), |open| open.then_some(()));
+//! let in_time = gate.wait_for(Duration::from_secs(60), |open| open.then_some(()));
 //! assert_eq!((in_time, clock.now_us() - start_us), (None, 60_000_000));
-//! door.wait(|open| open.then_some(()));
+//! gate.wait(|open| open.then_some(()));
 //! assert_eq!(clock.now_us() - start_us, 3_600_000_000);
 //! opener.join().ok();
 //! # Ok::<(), std::io::Error>(())

@@ -10,7 +10,7 @@ const SHORT: &str = "20261120T101500Z-cow-short";
 const DROPPED: &str = "20261120T103000Z-cow-dropped";
 const CUT: &str = "20261120T104500Z-cow-cut";
 const WHOLE: &str = "20261120T093015Z-cow";
-const PATIENCE: Duration = Duration::from_secs(20);
+const TIMEOUT: Duration = Duration::from_secs(20);
 
 fn fixture(name: &str) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -32,7 +32,7 @@ fn started(name: &str, options: &str) -> Box<dyn Camera> {
 fn play(camera: &mut dyn Camera) -> (Vec<Frame>, CameraError) {
     let mut frames = Vec::new();
     loop {
-        match camera.next_frame(PATIENCE) {
+        match camera.next_frame(TIMEOUT) {
             Ok(frame) => frames.push(frame),
             Err(end) => return (frames, end),
         }
@@ -107,7 +107,7 @@ fn h264_out_of_order_is_decoded_to_the_same_samples() {
     let mut camera = started(WHOLE, "");
     assert_eq!(camera.info().modes[0].fourcc, Fourcc::NV12);
     let frames: Vec<Frame> = (0..60)
-        .map(|_| camera.next_frame(PATIENCE).unwrap())
+        .map(|_| camera.next_frame(TIMEOUT).unwrap())
         .collect();
     assert!(frames.iter().all(|frame| frame.fault().is_none()));
     assert!(sequences(&frames).into_iter().eq(0..60));
@@ -120,7 +120,7 @@ fn h264_out_of_order_is_decoded_to_the_same_samples() {
     assert!((luma - wanted).abs() < 4.0, "{luma} {wanted}");
     // Ends the decoding thread in the middle.
     camera.stop().unwrap();
-    let error = camera.next_frame(PATIENCE).unwrap_err();
+    let error = camera.next_frame(TIMEOUT).unwrap_err();
     assert!(matches!(error, CameraError::NotStarted { .. }), "{error}");
 }
 
@@ -161,7 +161,7 @@ fn an_unplugged_camera_stays_away_until_it_is_started_again() {
         let (frames, end) = play(&mut *camera);
         assert_eq!(sequences(&frames), [0, 1, 2]);
         assert!(matches!(end, CameraError::Unplugged { .. }), "{end}");
-        let again = camera.next_frame(PATIENCE).unwrap_err();
+        let again = camera.next_frame(TIMEOUT).unwrap_err();
         assert!(matches!(again, CameraError::Unplugged { .. }), "{again}");
         camera.start(&request()).unwrap();
     }
@@ -173,10 +173,10 @@ fn a_stalled_camera_times_out_again_and_again() {
     let address = format!("replay:{}?stall=1", fixture(SHORT).display());
     let mut camera = open(&address.parse().unwrap(), clock.clone()).unwrap();
     camera.start(&request()).unwrap();
-    assert!(camera.next_frame(PATIENCE).is_ok());
+    assert!(camera.next_frame(TIMEOUT).is_ok());
     for _ in 0..2 {
         let start_us = clock.now_us();
-        let error = camera.next_frame(PATIENCE).unwrap_err();
+        let error = camera.next_frame(TIMEOUT).unwrap_err();
         assert!(matches!(error, CameraError::Timeout { .. }), "{error}");
         assert_eq!(clock.now_us() - start_us, 20_000_000);
     }
@@ -186,7 +186,7 @@ fn a_stalled_camera_times_out_again_and_again() {
 fn a_loop_counts_on_and_its_faults_too() {
     let mut camera = started(DROPPED, "loop=1&drop=147");
     let frames: Vec<Frame> = (0..200)
-        .map(|_| camera.next_frame(PATIENCE).unwrap())
+        .map(|_| camera.next_frame(TIMEOUT).unwrap())
         .collect();
     let counted = sequences(&frames);
     // 146 frames counted 0 to 149; the second one of the second round is dropped.
@@ -204,10 +204,10 @@ fn frames_come_when_the_clock_shows_their_time_stamp() {
     let address = format!("replay:{}", fixture(SHORT).display());
     let mut camera = open(&address.parse().unwrap(), clock.clone()).unwrap();
     camera.start(&request()).unwrap();
-    let first = camera.next_frame(PATIENCE).unwrap();
+    let first = camera.next_frame(TIMEOUT).unwrap();
     let mut last_us = first.t_us;
     for _ in 1..150 {
-        last_us = camera.next_frame(PATIENCE).unwrap().t_us;
+        last_us = camera.next_frame(TIMEOUT).unwrap().t_us;
         assert_eq!(clock.now_us(), last_us);
     }
     assert_eq!(last_us - first.t_us, recorded_us);
@@ -216,7 +216,7 @@ fn frames_come_when_the_clock_shows_their_time_stamp() {
 #[test]
 fn a_frame_that_is_not_due_yet_is_not_lost_by_a_timeout() {
     let mut camera = started(SHORT, "");
-    let first = camera.next_frame(PATIENCE).unwrap();
+    let first = camera.next_frame(TIMEOUT).unwrap();
     let mut timeouts = 0;
     let second = loop {
         match camera.next_frame(Duration::from_millis(1)) {

@@ -28,7 +28,7 @@ const QUEUE_FRAMES: (usize, usize) = (8, 256);
 
 /// What is to be recorded, and where.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub struct RecordingPlan {
     /// The folder of sessions.
     pub root: PathBuf,
     /// What is known of the session at its start. The video's file and codec are filled in.
@@ -63,7 +63,7 @@ impl Recorder {
     ///
     /// # Errors
     /// [`RecordingError::Thread`], or what making the session's folder and video answers.
-    pub fn start(camera: Box<dyn Camera>, plan: Plan) -> Result<Self, RecordingError> {
+    pub fn start(camera: Box<dyn Camera>, plan: RecordingPlan) -> Result<Self, RecordingError> {
         let (clock, stream) = (plan.clock, plan.stream);
         let session = SessionWriter::create(&plan.root, with_video(plan.manifest, &stream))?;
         let shared = Arc::new(Shared::new(&clock, State::default()));
@@ -134,10 +134,10 @@ impl Recorder {
     pub fn wait(mut self) -> Result<(Box<dyn Camera>, Recorded), RecordingError> {
         let panicked = RecordingError::Panicked;
         let (camera, writer) = self.threads.take().ok_or(panicked("recorder"))?;
-        let (camera, filmed) = camera.join().map_err(|_| panicked("camera"))?;
+        let (camera, delivered) = camera.join().map_err(|_| panicked("camera"))?;
         let written = writer.join().map_err(|_| panicked("writer"))?;
         let recorded = Recorded {
-            camera: filmed,
+            camera: delivered,
             writer: written,
             max_dropped: self.max_dropped,
         };
