@@ -48,7 +48,7 @@ impl Checkpoint {
         ]);
         let bytes = self
             .state
-            .to_safetensors(nets::Precision::Single, Some(facts))
+            .to_safetensors(nets::WeightPrecision::Single, Some(facts))
             .map_err(|fault| TrainError::Checkpoint {
                 path: path.clone(),
                 fault,
@@ -138,7 +138,7 @@ mod tests {
             assert!(error.to_string().contains("is no checkpoint"), "{error}");
         }
         let weights = Weights::initial(&decomposer(), 1);
-        weights.write(&path, nets::Precision::Half).unwrap();
+        weights.write(&path, nets::WeightPrecision::Half).unwrap();
         assert!(Checkpoint::read(folder.path()).is_err());
     }
 }

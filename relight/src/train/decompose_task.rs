@@ -11,7 +11,7 @@ use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
 use super::error::TrainError;
 use super::learner::{Learner, LearnerSettings};
 use super::losses::{angular_degrees, scale_invariant, windowed};
-use super::model::{Model, Precision};
+use super::model::{ComputePrecision, Model};
 use super::run::{StepLosses, Task, Validation};
 use super::sample::{TruthArrays, TruthBatch};
 use super::settings::{DecomposeSettings, PrecisionChoice};
@@ -65,8 +65,8 @@ impl DecomposeTask {
         let initial = || Weights::initial(&graph, settings.run.seed);
         let weights = weights.cloned().unwrap_or_else(initial);
         let precision = match settings.run.precision {
-            PrecisionChoice::Single => Precision::Single,
-            PrecisionChoice::Mixed => Precision::Mixed,
+            PrecisionChoice::Single => ComputePrecision::Single,
+            PrecisionChoice::Mixed => ComputePrecision::Mixed,
             PrecisionChoice::Fastest => fastest(&weights, &validation, resources.device)?,
         };
         let learner = Learner::new(
@@ -254,7 +254,7 @@ fn fastest(
     weights: &Weights,
     samples: &[TruthArrays],
     device: Device,
-) -> Result<Precision, TrainError> {
+) -> Result<ComputePrecision, TrainError> {
     let samples: Vec<&TruthArrays> = samples.iter().take(VALIDATION_BATCH).collect();
     let batch = TruthBatch::new(&samples, false, device)?;
     let seconds = |precision| -> Result<f64, TrainError> {
@@ -271,10 +271,10 @@ fn fastest(
         Ok(best)
     };
     Ok(
-        if seconds(Precision::Mixed)? < seconds(Precision::Single)? {
-            Precision::Mixed
+        if seconds(ComputePrecision::Mixed)? < seconds(ComputePrecision::Single)? {
+            ComputePrecision::Mixed
         } else {
-            Precision::Single
+            ComputePrecision::Single
         },
     )
 }

@@ -14,13 +14,13 @@ pub enum TrainError {
     Torch(#[from] tch::TchError),
     /// Weights do not fit, or cannot be read or written.
     #[error(transparent)]
-    Weights(#[from] nets::Error),
+    Weights(#[from] nets::NetError),
     /// An optimiser's memory that is another network's.
     #[error("the saved optimiser has no {0} of the right shape: it is another network's")]
     Memory(String),
     /// Samples could not be made.
     #[error(transparent)]
-    Synth(#[from] synth::Error),
+    Synth(#[from] synth::SynthError),
     /// Threads could not be started.
     #[error("threads that compose samples could not be started")]
     Threads(#[source] io::Error),

@@ -5,7 +5,7 @@ use tch::Device;
 use super::adam::{Adam, AdamSettings};
 use super::average::Average;
 use super::error::TrainError;
-use super::model::{Model, Precision};
+use super::model::{ComputePrecision, Model};
 use crate::nets::{Graph, Weights};
 
 /// A network in training.
@@ -25,8 +25,8 @@ pub struct LearnerSettings {
     pub adam: AdamSettings,
     /// Part of the average that is kept at each step, 0..1.
     pub average: f64,
-    /// Precision of its layers.
-    pub precision: Precision,
+    /// ComputePrecision of its layers.
+    pub precision: ComputePrecision,
     /// Where it is computed.
     pub device: Device,
 }

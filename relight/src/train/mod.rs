@@ -40,7 +40,7 @@ pub use error::TrainError;
 pub use guard::Guard;
 pub use journal::{Journal, TABLE};
 pub use learner::{Learner, LearnerSettings};
-pub use model::{Model, Precision};
+pub use model::{ComputePrecision, Model};
 pub use run::{Observer, Run, RunOutcome, StepLosses, Task, Validation};
 pub use sample::{Linearisation, TruthArrays, TruthBatch};
 pub use settings::{DataSettings, DecomposeSettings, PrecisionChoice, RunSettings, read_settings};

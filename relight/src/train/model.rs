@@ -9,7 +9,7 @@ use crate::nets::{self, EPSILON, Graph, Node, Operation, Weights, check_size};
 
 /// In which precision layers are computed; parameters are always kept in 32 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Precision {
+pub enum ComputePrecision {
     /// 32 bits.
     Single,
     /// bfloat16 inside convolutions, normalisations and layers; results come out in 32 bits.
@@ -22,7 +22,7 @@ pub struct Model {
     graph: Graph,
     parameters: BTreeMap<String, Tensor>,
     device: Device,
-    precision: Precision,
+    precision: ComputePrecision,
 }
 
 impl Model {
@@ -34,7 +34,7 @@ impl Model {
         graph: Graph,
         weights: &Weights,
         device: Device,
-        precision: Precision,
+        precision: ComputePrecision,
     ) -> Result<Self, TrainError> {
         let mut parameters = BTreeMap::new();
         for (name, tensor) in weights.fitted_to(&graph)?.iter() {
@@ -104,7 +104,7 @@ impl Model {
     /// 32-bit.
     ///
     /// # Errors
-    /// [`nets::Error::PictureSize`] or [`TrainError::Torch`].
+    /// [`nets::NetError::PictureSize`] or [`TrainError::Torch`].
     pub fn forward(&self, input: &Tensor) -> Result<Vec<Tensor>, TrainError> {
         let size = input.size();
         if let &[_, _, height, width] = size.as_slice() {
@@ -134,8 +134,8 @@ impl Model {
 
     fn cast(&self, tensor: &Tensor) -> Result<Tensor, tch::TchError> {
         tensor.f_to_kind(match self.precision {
-            Precision::Single => Kind::Float,
-            Precision::Mixed => Kind::BFloat16,
+            ComputePrecision::Single => Kind::Float,
+            ComputePrecision::Mixed => Kind::BFloat16,
         })
     }
 
@@ -144,7 +144,7 @@ impl Model {
         let part = |part: &str| {
             let name = format!("{name}.{part}");
             let parameter = self.parameters.get(&name);
-            let missing = || nets::Error::Missing {
+            let missing = || nets::NetError::Missing {
                 net: self.graph.name(),
                 name,
             };

@@ -17,7 +17,7 @@ use super::learner::Learner;
 use super::model::to_weights;
 use super::settings::RunSettings;
 use super::terms::Terms;
-use crate::nets::{Precision, Weights};
+use crate::nets::{WeightPrecision, Weights};
 
 /// What is trained.
 pub trait Task {
@@ -183,7 +183,7 @@ impl<'a> Run<'a> {
         let folder = self.folder;
         self.guard.check(self.step, &values, &losses.spreads, || {
             let path = folder.join(format!("bad-batch-{}.safetensors", self.step));
-            to_weights(&losses.batch)?.write(&path, Precision::Single)?;
+            to_weights(&losses.batch)?.write(&path, WeightPrecision::Single)?;
             Ok(path)
         })?;
         total.f_backward()?;
@@ -251,7 +251,7 @@ impl<'a> Run<'a> {
             .into_iter()
             .map(|learner| {
                 let path = folder.join(format!("{}.safetensors", learner.name()));
-                learner.averaged()?.write(&path, Precision::Half)?;
+                learner.averaged()?.write(&path, WeightPrecision::Half)?;
                 Ok(path)
             })
             .collect()
