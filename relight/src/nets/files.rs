@@ -1,5 +1,6 @@
 //! Weights in files: safetensors to read and write, PyTorch's `.pth` to read.
 
+use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
@@ -57,11 +58,15 @@ impl Weights {
         }
     }
 
-    /// The bytes of a safetensors file.
+    /// The bytes of a safetensors file, with facts about them in its header.
     ///
     /// # Errors
     /// What the format's writer answers, as text; it has no reason to.
-    pub fn to_safetensors(&self, precision: WeightPrecision) -> Result<Vec<u8>, String> {
+    pub fn to_safetensors(
+        &self,
+        precision: WeightPrecision,
+        facts: Option<HashMap<String, String>>,
+    ) -> Result<Vec<u8>, String> {
         let encoded: Vec<_> = self
             .iter()
             .map(|(name, tensor)| (name, tensor.shape().to_vec(), encode(tensor, precision)))
@@ -75,7 +80,7 @@ impl Weights {
             let view = TensorView::new(kind, shape.clone(), bytes);
             views.push((*name, view.map_err(|error| error.to_string())?));
         }
-        safetensors::serialize(views, None).map_err(|error| error.to_string())
+        safetensors::serialize(views, facts).map_err(|error| error.to_string())
     }
 
     /// Writes a safetensors file, whole or not at all.
@@ -84,7 +89,7 @@ impl Weights {
     /// [`NetError::Io`] or [`NetError::File`].
     pub fn write(&self, path: &Path, precision: WeightPrecision) -> Result<(), NetError> {
         let bytes = self
-            .to_safetensors(precision)
+            .to_safetensors(precision, None)
             .map_err(|fault| NetError::File {
                 path: path.to_owned(),
                 fault,

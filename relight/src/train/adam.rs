@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use tch::{Tensor, no_grad};
 
 use super::error::TrainError;
-use super::model::to_weights;
+use super::model::{copy_into, to_weights};
 use crate::nets::Weights;
 
 /// Keeps the root of the second moment from being zero.
@@ -97,20 +97,8 @@ impl Adam {
     /// # Errors
     /// [`TrainError::Memory`] where it is another network's.
     pub fn recall(&mut self, memory: &Weights, steps: u64) -> Result<(), TrainError> {
-        for (prefix, moments) in [("first.", &mut self.first), ("second.", &mut self.second)] {
-            for (name, moment) in moments.iter_mut() {
-                let name = format!("{prefix}{name}");
-                let saved = memory
-                    .get(&name)
-                    .ok_or_else(|| TrainError::Memory(name.clone()))?;
-                let shape: Vec<i64> = saved.shape().iter().map(|&side| side as i64).collect();
-                if shape != moment.size() {
-                    return Err(TrainError::Memory(name));
-                }
-                let saved = Tensor::f_from_slice(saved.values())?.f_reshape(shape)?;
-                moment.f_copy_(&saved)?;
-            }
-        }
+        copy_into(&mut self.first, &memory.under("first."))?;
+        copy_into(&mut self.second, &memory.under("second."))?;
         self.steps = steps;
         Ok(())
     }
@@ -139,7 +127,7 @@ impl Adam {
         for parameter in parameters.values() {
             let gradient = parameter.f_grad()?;
             if gradient.defined() {
-                square += f64::try_from(gradient.f_square()?.f_sum(None)?)?;
+                square += f64::try_from(gradient.f_norm()?)?.powi(2);
             }
         }
         let length = square.sqrt();
@@ -165,17 +153,14 @@ impl Adam {
             if !gradient.defined() {
                 continue;
             }
-            let scaled = gradient.f_mul_scalar(shrink)?;
-            let _ = first
-                .f_mul_scalar_(beta1)?
-                .f_add_(&scaled.f_mul_scalar(1.0 - beta1)?)?;
-            let scaled_square = scaled.f_square()?.f_mul_scalar(1.0 - beta2)?;
-            let _ = second.f_mul_scalar_(beta2)?.f_add_(&scaled_square)?;
-            let root = second
-                .f_div_scalar(bias2)?
-                .f_sqrt()?
-                .f_add_scalar(EPSILON)?;
-            let change = first.f_div(&root)?.f_mul_scalar(-rate / bias1)?;
+            let _ = gradient.f_mul_scalar_(shrink)?;
+            let _ = first.f_lerp_(&gradient, 1.0 - beta1)?;
+            let _ = second.f_lerp_(&gradient.f_square()?, 1.0 - beta2)?;
+            // first / bias1 over (sqrt(second / bias2) + epsilon), with one division.
+            let mut change = second.f_sqrt()?;
+            let _ = change.f_add_scalar_(EPSILON * bias2.sqrt())?;
+            let _ = change.f_reciprocal_()?.f_mul_(first)?;
+            let _ = change.f_mul_scalar_(-rate * bias2.sqrt() / bias1)?;
             let mut parameter = parameter.shallow_clone();
             let _ = parameter
                 .f_mul_scalar_(1.0 - rate * decay)?

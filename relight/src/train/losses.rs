@@ -108,3 +108,21 @@ pub fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tensor
     let weights = weight.f_sum(None)?.f_add_scalar(TINY)?;
     Ok(error.f_sum(None)?.f_div(&weights)?)
 }
+
+/// Mean angle between unit normals under the weight, degrees.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub fn angular_degrees(
+    found: &Tensor,
+    truth: &Tensor,
+    weight: &Tensor,
+) -> Result<Tensor, TrainError> {
+    let cosine = found
+        .f_mul(truth)?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
+        .f_clamp(-1.0, 1.0)?;
+    let angle = cosine.f_acos()?.f_rad2deg()?.f_mul(weight)?;
+    let weights = weight.f_sum(None)?.f_add_scalar(TINY)?;
+    Ok(angle.f_sum(None)?.f_div(&weights)?)
+}

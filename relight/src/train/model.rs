@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use tch::{Device, Kind, Tensor};
+use tch::{Device, Kind, Tensor, no_grad};
 
 use super::error::TrainError;
 use crate::nets::{self, EPSILON, Graph, Node, Operation, Weights, check_size};
@@ -53,6 +53,14 @@ impl Model {
         })
     }
 
+    /// The same network with other weights.
+    ///
+    /// # Errors
+    /// Those of [`Model::new`].
+    pub fn with_weights(&self, weights: &Weights) -> Result<Self, TrainError> {
+        Self::new(self.graph.clone(), weights, self.device, self.precision)
+    }
+
     /// What it computes.
     #[must_use]
     pub fn graph(&self) -> &Graph {
@@ -74,6 +82,14 @@ impl Model {
             *parameter = parameter.f_set_requires_grad(trainable)?;
         }
         Ok(())
+    }
+
+    /// Takes over weights.
+    ///
+    /// # Errors
+    /// [`TrainError::Memory`] where they are another network's.
+    pub fn recall(&mut self, weights: &Weights) -> Result<(), TrainError> {
+        copy_into(&mut self.parameters, weights)
     }
 
     /// A copy of its weights.
@@ -178,6 +194,29 @@ impl Model {
             }
         })
     }
+}
+
+/// Copies saved numbers into tensors of the same names and shapes.
+///
+/// # Errors
+/// [`TrainError::Memory`] where one is missing or has another shape.
+pub(super) fn copy_into(
+    tensors: &mut BTreeMap<String, Tensor>,
+    saved: &Weights,
+) -> Result<(), TrainError> {
+    no_grad(|| {
+        for (name, tensor) in tensors {
+            let missing = || TrainError::Memory(name.clone());
+            let saved = saved.get(name).ok_or_else(missing)?;
+            let shape: Vec<i64> = saved.shape().iter().map(|&side| side as i64).collect();
+            if shape != tensor.size() {
+                return Err(missing());
+            }
+            let saved = Tensor::f_from_slice(saved.values())?.f_reshape(shape)?;
+            tensor.f_copy_(&saved)?;
+        }
+        Ok(())
+    })
 }
 
 /// Tensors of any device as weights.

@@ -85,9 +85,6 @@ pub use table::Table;
 pub use turn::{ConstantPart, Turn, TurnPhase};
 pub use wire::{ControllerState, Counts, LineFault, RestartCause, SendError};
 
-/// The lease that a turn sets if the controller's is off, seconds.
-const LEASE_S: u32 = 3;
-
 /// How a table is opened.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableOptions {
