@@ -68,7 +68,7 @@ flash: firmware ## Flash the firmware to the Arduino at PORT (/dev/ttyACM0)
 	    -U flash:w:$(FIRMWARE)/rig-firmware-uno.hex:i
 
 demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of it, list the results
-	cargo build --locked --release --bins
+	cargo build --locked --release -p relit --bins
 	rm -rf $(DEMO)
 	$(TARGET)/release/relit-capture record --yes --object cow --root $(DEMO)/sessions \
 	    --camera 'replay:fixtures/$(SESSION)?loop=1' --turntable sim:
@@ -84,7 +84,7 @@ demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of 
 	echo "The shard of 1500 samples:        $$(echo $(DEMO)/out/*-cow.tar)"
 
 bench: setup $(BENCH_MASK) $(BENCH_VENV)/ready ## Measure relit-extract against ffmpeg and Python OpenCV
-	cargo build --locked --release --bins
+	cargo build --locked --release -p relit --bins
 	$(BENCH_VENV)/bin/python tests/bench/bench.py --program $(TARGET)/release/relit-extract \
 	    --video $(BENCH_VIDEO) --mask $(BENCH_MASK) --runs $(BENCH_RUNS) --work $(TARGET)/bench
 
