@@ -2,6 +2,7 @@
 
 mod commands;
 mod console;
+mod folder;
 
 use std::process::ExitCode;
 
@@ -51,7 +52,7 @@ impl Verb {
         match self {
             Self::Render(arguments) => arguments.fault(),
             Self::Eval(arguments) => arguments.fault(),
-            Self::Synth(_) => None,
+            Self::Synth(arguments) => arguments.fault(),
             #[cfg(feature = "train")]
             Self::Train(_) => None,
         }

@@ -38,4 +38,4 @@ pub use relighting::{
 };
 pub use retinex::{Decomposition, Retinex};
 pub use run::EvalProgress;
-pub use table::{ImageScores, MaskRule, Measured, ScoreLine, ScoreTable, Terms};
+pub use table::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};

@@ -93,9 +93,12 @@ pub fn read_planes(path: &Path) -> Result<(Planes<3>, Samples), ImageError> {
         path: path.to_owned(),
         source,
     };
-    let decode = |source| ImageError::Decode {
-        path: path.to_owned(),
-        source,
+    let decode = |source| {
+        let path = path.to_owned();
+        match source {
+            ::image::ImageError::Limits(_) => ImageError::TooLarge { path },
+            source => ImageError::Decode { path, source },
+        }
     };
     let file = BufReader::new(File::open(path).map_err(open)?);
     let image = ImageReader::new(file)
@@ -200,6 +203,22 @@ mod tests {
         std::fs::write(&path, "not an image").unwrap();
         let error = read_planes(&path).unwrap_err();
         assert!(error.to_string().contains("notes.png"), "{error}");
+    }
+
+    #[test]
+    fn an_image_that_claims_too_many_pixels_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("vast.png");
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 20_000, 20_000);
+        encoder.set_color(png::ColorType::Rgb);
+        // There is no pixel behind the header.
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_chunk(png::chunk::IDAT, &[]).unwrap();
+        drop(writer);
+        std::fs::write(&path, bytes).unwrap();
+        let error = read_planes(&path).unwrap_err();
+        assert!(matches!(error, ImageError::TooLarge { .. }), "{error}");
     }
 
     #[test]

@@ -368,7 +368,8 @@ fn tell(table: &ScoreTable, output: Option<&Path>, console: Console) -> CommandR
     if let Some(path) = output {
         let mut bytes = serde_json::to_vec_pretty(table)?;
         bytes.push(b'\n');
-        write_whole(path, &bytes).map_err(|error| format!("{}: {error}", path.display()))?;
+        write_whole(path, &bytes)
+            .map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
     }
     let event = json!({ "event": "table", "table": table });
     console.say(table.to_string().trim_end(), &event);

@@ -1,7 +1,6 @@
 //! `relight render`: from maps and light to an image, a turn, a sweep of materials.
 
 use std::error::Error;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -15,6 +14,7 @@ use relight::render::{
 use serde_json::json;
 
 use crate::cli::console::{CommandResult, Console, Outcome};
+use crate::cli::folder::make_empty_folder;
 
 pub(in crate::cli) const EXAMPLES: &str = "\
 Examples:
@@ -106,6 +106,7 @@ struct LightArguments {
         long,
         value_name = "DEGREES",
         default_value_t = 0.0,
+        value_parser = degrees,
         allow_hyphen_values = true
     )]
     turned: f64,
@@ -253,7 +254,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
         Target::Exr(path) => still(arguments, &look, &surface, &light)?.write_exr(path)?,
         Target::Folder(folder) => {
             let bar = console.progress(frames.into(), "frames");
-            fs::create_dir_all(folder)?;
+            make_empty_folder(folder)?;
             (0..frames).into_par_iter().try_for_each(|frame| {
                 let image = look.turned(&surface, &light, part(frame, frames))?;
                 let name = format!("{frame:0PLACES$}.png");
@@ -305,6 +306,13 @@ fn encoded(image: Rgb<Linear>) -> Rgb<Srgb> {
 /// How far the light has turned at a frame.
 fn part(frame: u32, frames: u32) -> f64 {
     f64::from(frame) / f64::from(frames)
+}
+
+fn degrees(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(degrees) if (-36_000.0..=36_000.0).contains(&degrees) => Ok(degrees),
+        _ => Err("give degrees from -36000 to 36000".to_owned()),
+    }
 }
 
 fn exposure(text: &str) -> Result<Exposure, String> {
