@@ -1,6 +1,5 @@
 //! Light of single images: the table on Light-Net.
 
-use super::fit::fit_light;
 use super::normals::known;
 use super::run::{Scored, add_method, largest, measured, need};
 use super::{EvalError, MaskRule, Predictions, Progress, Table};
@@ -8,7 +7,7 @@ use crate::data::{TruthSample, TruthSet};
 use crate::image::{Linear, Rgb};
 use crate::light::{Order, ShLight};
 use crate::metrics::{Comparison, ScaleFit, Ssim};
-use crate::render::{DiffuseForm, DiffuseLayer};
+use crate::render::{DiffuseForm, DiffuseLayer, fit_light};
 
 /// Where light comes from.
 #[derive(Debug, Clone)]
@@ -36,7 +35,7 @@ impl LightMethod {
             Self::Oracle => {
                 let normals = need(sample, "normals", &sample.normals)?;
                 let shading = need(sample, "shading", &sample.shading)?;
-                fit_light(normals, shading, known).map_err(|source| EvalError::Unlit {
+                fit_light(normals, shading, known, 0.0).map_err(|source| EvalError::Unlit {
                     sample: sample.name.clone(),
                     source,
                 })

@@ -14,7 +14,6 @@
 //! cannot be read or measured is an error that names the image; no image is left out.
 
 mod error;
-mod fit;
 mod highlights;
 mod intrinsic;
 mod light;
@@ -36,6 +35,6 @@ pub use predictions::Predictions;
 pub use relighting::{
     RelightMethod, RelightingRecipe, RelightingSet, evaluate_relighting, make_relighting,
 };
-pub use retinex::{Decomposition, Retinex};
+pub use retinex::{IntrinsicImages, Retinex};
 pub use run::Progress;
 pub use table::{ImageScores, Line, MaskRule, Measured, Table, Terms};

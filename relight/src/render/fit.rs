@@ -2,7 +2,7 @@
 
 use std::array::from_fn;
 
-use crate::image::{Linear, Planes, Rgb};
+use crate::image::{Linear, Rgb};
 use crate::light::{Direction, LightError, Normals, Order, ShLight, YUp, basis};
 
 const COUNT: usize = Order::TWO.coefficients();
@@ -14,12 +14,32 @@ const LOBE: [f64; 3] = {
 /// Added to the diagonal, relative to its mean, so that few or equal normals have a solution too.
 const RIDGE: f64 = 1e-9;
 
-/// The light whose irradiance on the normals is nearest to the shading, by least squares over the
-/// pixels where `mask` is true and a normal is known.
-pub(super) fn fit_light(
+/// The light of order 2 whose irradiance on the normals is nearest to the shading, by least squares
+/// over the pixels where `mask` is true and a normal is known.
+///
+/// `stiffness`, 0 or more, draws the bands 1 and 2 towards none: it is added to the diagonal of the
+/// normal equations, relative to its mean. 0 gives the best fit; 1e-3 keeps light that the normals hardly
+/// tell, such as that from behind, small.
+///
+/// ```
+/// use relight::light::{Normals, Order, ShLight};
+/// use relight::render::{DiffuseForm, DiffuseLayer, fit_light};
+///
+/// let sky = ShLight::even(Order::TWO, [1.0; 3]);
+/// let normals = Normals::sphere(9);
+/// let shading = DiffuseLayer::new(&sky, DiffuseForm::Irradiance).shading(&normals);
+/// let found = fit_light(&normals, &shading, &[true; 81], 0.0)?;
+/// assert!((found.coefficients()[0][1] - sky.coefficients()[0][1]).abs() < 1e-5);
+/// # Ok::<(), relight::light::LightError>(())
+/// ```
+///
+/// # Errors
+/// [`LightError::NotFinite`] where the shading holds values that are not finite.
+pub fn fit_light(
     normals: &Normals<YUp>,
     shading: &Rgb<Linear>,
     mask: &[bool],
+    stiffness: f64,
 ) -> Result<ShLight, LightError> {
     let mut matrix = [[0.0; COUNT]; COUNT];
     let mut right = [[0.0; 3]; COUNT];
@@ -42,7 +62,8 @@ pub(super) fn fit_light(
     }
     let trace: f64 = (0..COUNT).map(|at| matrix[at][at]).sum();
     for (at, row) in matrix.iter_mut().enumerate() {
-        row[at] += (trace / COUNT as f64 * RIDGE).max(f64::MIN_POSITIVE);
+        let stiffness = if at == 0 { 0.0 } else { stiffness };
+        row[at] += (trace / COUNT as f64 * (RIDGE + stiffness)).max(f64::MIN_POSITIVE);
     }
     ShLight::new(solve(matrix, right).to_vec())
 }
@@ -86,48 +107,10 @@ fn weighted_sum(rows: &[[f64; 3]; COUNT], weights: impl Iterator<Item = (usize, 
     })
 }
 
-/// The normals, with those of the nearest known pixel where the mask is true and none is known.
-pub(super) fn completed(normals: &Normals<YUp>, mask: &[bool]) -> Normals<YUp> {
-    let extent = normals.extent();
-    let (width, height) = (extent.width, extent.height);
-    let mut planes: Planes<3> = normals.planes().clone();
-    let mut known: Vec<bool> = (0..extent.pixels())
-        .map(|at| {
-            normals
-                .planes()
-                .planes()
-                .iter()
-                .any(|plane| plane[at] != 0.0)
-        })
-        .collect();
-    let mut front: Vec<usize> = (0..known.len()).filter(|&at| known[at]).collect();
-    while !front.is_empty() {
-        let mut next = Vec::new();
-        for at in front {
-            let (x, y) = (at % width, at / width);
-            let beside = [
-                (x > 0).then(|| at - 1),
-                (x + 1 < width).then_some(at + 1),
-                (y > 0).then(|| at - width),
-                (y + 1 < height).then_some(at + width),
-            ];
-            for other in beside.into_iter().flatten() {
-                if !known[other] && mask[other] {
-                    known[other] = true;
-                    planes.set_pixel(other % width, other / width, planes.pixel(x, y));
-                    next.push(other);
-                }
-            }
-        }
-        front = next;
-    }
-    Normals::new(planes)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::Extent;
+    use crate::image::{Extent, Planes};
     use crate::render::{DiffuseForm, DiffuseLayer};
 
     #[test]
@@ -155,7 +138,7 @@ mod tests {
         .unwrap();
         let normals = Normals::sphere(41);
         let shading = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&normals);
-        let found = fit_light(&normals, &shading, &vec![true; 41 * 41]).unwrap();
+        let found = fit_light(&normals, &shading, &vec![true; 41 * 41], 0.0).unwrap();
         for (a, b) in found.coefficients().iter().zip(light.coefficients()) {
             for (a, b) in a.iter().zip(b) {
                 assert!((a - b).abs() < 1e-3, "{a} {b}");
@@ -168,26 +151,9 @@ mod tests {
         let extent = Extent::new(4, 4);
         let normals = Normals::new(Planes::filled(extent, [0.0, 0.0, 1.0]));
         let shading = Rgb::new(Planes::filled(extent, [0.5, 0.25, 1.0]));
-        let light = fit_light(&normals, &shading, &[true; 16]).unwrap();
+        let light = fit_light(&normals, &shading, &[true; 16], 0.0).unwrap();
         let again = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&normals);
         let [r, g, b] = again.planes().pixel(2, 2);
         assert!((r - 0.5).abs() < 1e-4 && (g - 0.25).abs() < 1e-4 && (b - 1.0).abs() < 1e-4);
-    }
-
-    #[test]
-    fn unknown_normals_are_those_of_the_nearest_neighbour_under_the_mask() {
-        let vectors = [
-            [0.0; 3],
-            [1.0, 0.0, 0.0],
-            [0.0; 3],
-            [0.0; 3],
-            [0.0, 1.0, 0.0],
-        ];
-        let normals = Normals::new(Planes::from_fn(Extent::new(5, 1), |x, _| vectors[x]));
-        let full = completed(&normals, &[false, true, true, true, true]);
-        let planes = full.planes();
-        assert_eq!(planes.pixel(0, 0), [0.0; 3]);
-        assert_eq!(planes.pixel(2, 0), [1.0, 0.0, 0.0]);
-        assert_eq!(planes.pixel(3, 0), [0.0, 1.0, 0.0]);
     }
 }
