@@ -19,12 +19,15 @@ use serde_json::{Value, json};
 pub(crate) enum Outcome {
     /// All was done: exit code 0.
     Whole,
+    /// Something was left out, and was told: exit code 3.
+    Partial,
 }
 
 impl From<Outcome> for ExitCode {
     fn from(outcome: Outcome) -> Self {
         match outcome {
             Outcome::Whole => Self::SUCCESS,
+            Outcome::Partial => Self::from(3),
         }
     }
 }
@@ -49,6 +52,14 @@ impl Console {
         let json = event.to_string();
         // Where nobody reads any more, the work goes on.
         let _ = writeln!(io::stdout(), "{}", if self.json { &json } else { text });
+    }
+
+    /// Something that was left out, while the rest goes on.
+    pub(crate) fn warn(self, text: &str, event: &Value) {
+        if self.json {
+            self.say("", event);
+        }
+        let _ = writeln!(io::stderr(), "warning: {text}");
     }
 
     /// The exit code of a command, after its error, if any, was told.

@@ -2,16 +2,17 @@
 
 mod commands;
 mod console;
+mod values;
 
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 
-use commands::{eval, render, synth};
+use commands::{decompose, eval, render, synth, weights};
 use console::Console;
 
-/// Single-view relighting: light, rendering, data with truth, and the measures of the results.
+/// Single-view relighting: photographs taken apart, light, rendering, data with truth, measures of the results.
 #[derive(Parser)]
 #[command(
     name = "relight",
@@ -28,6 +29,9 @@ struct CommandLine {
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Take photographs apart: normals, albedo, shading, highlight and light.
+    #[command(after_help = decompose::EXAMPLES)]
+    Decompose(decompose::Arguments),
     /// Light an object that is given by its maps: an image, a turn, or a sweep of materials.
     #[command(after_help = render::EXAMPLES)]
     Render(render::Arguments),
@@ -37,15 +41,20 @@ enum Verb {
     /// Make pictures of objects together with their truth: samples, whole turns, panoramas.
     #[command(after_help = synth::EXAMPLES)]
     Synth(synth::Arguments),
+    /// Convert weights of networks.
+    #[command(after_help = weights::EXAMPLES)]
+    Weights(weights::Arguments),
 }
 
 impl Verb {
     /// What is wrong with the arguments together: wrong usage, exit code 2.
     fn fault(&self) -> Option<String> {
         match self {
+            Self::Decompose(arguments) => arguments.fault(),
             Self::Render(arguments) => arguments.fault(),
             Self::Eval(arguments) => arguments.fault(),
             Self::Synth(_) => None,
+            Self::Weights(arguments) => arguments.fault(),
         }
     }
 }
@@ -60,8 +69,10 @@ pub(crate) fn run() -> ExitCode {
     }
     let console = Console::new(line.json);
     console.finish(match line.verb {
+        Verb::Decompose(arguments) => decompose::run(&arguments, console),
         Verb::Render(arguments) => render::run(&arguments, console),
         Verb::Eval(arguments) => eval::run(&arguments, console),
         Verb::Synth(arguments) => synth::run(&arguments, console),
+        Verb::Weights(arguments) => weights::run(&arguments, console),
     })
 }

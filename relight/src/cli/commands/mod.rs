@@ -1,5 +1,7 @@
 //! One file a verb: its arguments and its `run`.
 
+pub(super) mod decompose;
 pub(super) mod eval;
 pub(super) mod render;
 pub(super) mod synth;
+pub(super) mod weights;
