@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use super::decomposer::{DecomposeOptions, SATURATED_VALUE};
@@ -317,6 +317,15 @@ fn stated_transfer(path: &Path) -> Result<Transfer, DecomposeError> {
     }
 }
 
+/// A frame's key as a path that leads nowhere else.
+fn within(key: &str) -> String {
+    let parts = Path::new(key).components().filter_map(|part| match part {
+        Component::Normal(name) => Some(name.to_string_lossy()),
+        _ => None,
+    });
+    parts.collect::<Vec<_>>().join("/")
+}
+
 fn read_frame(turns: &Turns, id: SampleId) -> Result<Photo, DecomposeError> {
     let (batch, mut damage) = turns.batch(&[id], None);
     if let Some(damage) = damage.pop() {
@@ -328,7 +337,7 @@ fn read_frame(turns: &Turns, id: SampleId) -> Result<Photo, DecomposeError> {
     let frame = batch.frames.first();
     let record = frame.and_then(|frame| frame.record.as_ref());
     let photo = Photo {
-        name: frame.map(|frame| frame.key.clone()).unwrap_or_default(),
+        name: frame.map(|frame| within(&frame.key)).unwrap_or_default(),
         picture: Rgb::new(Planes::from_planes(batch.extent, [red, green, blue])?),
         mask: Planes::from_planes(batch.extent, [batch.masks])?,
         mask_source: MaskSource::Shard,
@@ -337,4 +346,19 @@ fn read_frame(turns: &Turns, id: SampleId) -> Result<Photo, DecomposeError> {
     };
     check_mask(&photo.mask, None)?;
     Ok(photo)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_key_of_a_frame_leads_nowhere_but_into_the_folder_for_results() {
+        assert_eq!(
+            within("20261120T093015Z-mug/0007"),
+            "20261120T093015Z-mug/0007"
+        );
+        assert_eq!(within("../../etc/./passwd"), "etc/passwd");
+        assert_eq!(within("/tmp/x"), "tmp/x");
+    }
 }
