@@ -9,9 +9,9 @@ use serde::Serialize;
 
 use super::decomposer::{DecomposeOptions, Decomposition, SpecularGate, WorkingSize, grey};
 use super::error::DecomposeError;
-use super::gloss::FittedGloss;
 use super::mask::MaskSource;
 use super::photo::Photo;
+use super::region::Region;
 use crate::image::{ColourSpace, Depth, Extent, Linear, Planes, Rgb, Srgb, write_png};
 use crate::light::{Normals, Panorama};
 use crate::render::{DiffuseForm, DiffuseLayer, exposure_for};
@@ -37,7 +37,7 @@ pub struct DecompositionFigures {
     photo: String,
     weights: String,
     size: [usize; 2],
-    region: FigureRegion,
+    region: Region,
     working_size: &'static str,
     mirrored: bool,
     mask: FigureMask,
@@ -45,13 +45,6 @@ pub struct DecompositionFigures {
     white: FigureWhites,
     light: FigureLight,
     residual: f64,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct FigureRegion {
-    x: i64,
-    y: i64,
-    side: usize,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -176,11 +169,7 @@ impl DecompositionFiles<'_> {
             photo: photo.name.clone(),
             weights: weights.to_owned(),
             size: [width, height],
-            region: FigureRegion {
-                x: found.region.x,
-                y: found.region.y,
-                side: found.region.side,
-            },
+            region: found.region,
             working_size: match options.size {
                 WorkingSize::Network => "network",
                 WorkingSize::Native => "native",
@@ -198,7 +187,7 @@ impl DecompositionFiles<'_> {
                 },
                 saturated_fraction: found.saturated_fraction,
                 separated: found.is_glossy,
-                reflectance: gloss.map(|gloss: FittedGloss| gloss.reflectance),
+                reflectance: gloss.map(|gloss| gloss.reflectance),
                 smoothness: gloss.map(|gloss| gloss.smoothness),
                 residual: gloss.map(|gloss| gloss.residual),
             },

@@ -6,7 +6,7 @@ use crate::image::{Extent, Planes};
 const MARGIN: f64 = 0.04;
 
 /// A square of a photograph; it may reach beyond the photograph's edges.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Region {
     /// Column of its left edge, pixels; negative where it begins left of the photograph.
     pub x: i64,

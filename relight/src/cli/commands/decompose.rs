@@ -99,6 +99,13 @@ impl Arguments {
         })
     }
 
+    /// Whether one of the inputs is a folder or a shard.
+    fn has_set(&self) -> bool {
+        self.photos
+            .iter()
+            .any(|path| path.is_dir() || path.extension().is_some_and(|e| e == "tar"))
+    }
+
     fn options(&self) -> DecomposeOptions {
         DecomposeOptions {
             size: match self.size {
@@ -169,15 +176,6 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     }
 }
 
-impl Arguments {
-    /// Whether one of the inputs is a folder or a shard.
-    fn has_set(&self) -> bool {
-        self.photos
-            .iter()
-            .any(|path| path.is_dir() || path.extension().is_some_and(|e| e == "tar"))
-    }
-}
-
 /// All that is the same for every photograph.
 struct Run {
     decomposer: Decomposer,
@@ -209,9 +207,10 @@ impl Run {
             .decomposer
             .decompose(&photo.picture, &photo.mask, &options)?;
         let seconds = start.elapsed().as_secs_f64();
-        let out = match self.own_folders {
-            true => self.output.join(&photo.name),
-            false => self.output.clone(),
+        let out = if self.own_folders {
+            self.output.join(&photo.name)
+        } else {
+            self.output.clone()
         };
         let files = DecompositionFiles {
             photo: &photo,
