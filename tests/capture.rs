@@ -23,9 +23,9 @@ use relit_data::session::{
 use relit_data::shard::{Dataset, ImageSize};
 use relit_rig::camera::{
     Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
-    Mode, ModeRequest, Sequence, StampSource, open,
+    Mode, ModeRequest, Rates, open,
 };
-use relit_rig::capture::{End, Plan, Recorder, Window, salvage, salvage_session};
+use relit_rig::capture::{End, Recorder, RecordingPlan, Window, salvage, salvage_session};
 use relit_rig::clock::Clock;
 use relit_rig::preview::Preview;
 use relit_rig::state::{Monitor, TakeSummary, Verdict};
@@ -151,12 +151,9 @@ fn stream(frames: u64, begun: i64) -> impl Iterator<Item = Frame> + Send {
         width: SIZE.0,
         height: SIZE.1,
         data: jpegs[n as usize % jpegs.len()].clone(),
-        sequence: Some(Sequence {
-            raw: n as u32,
-            unwrapped: n,
-        }),
+        sequence: Some(n),
         t_us: begun + n as i64 * PERIOD_US,
-        stamp: StampSource::EndOfFrame,
+        clock: FrameClock::Driver,
         flagged: false,
     })
 }
@@ -168,7 +165,7 @@ fn steps(frames: impl Iterator<Item = Frame> + Send) -> impl Iterator<Item = Ste
 /// From frame 10 on, for this many frames.
 fn turn(frames: i64, begun: i64) -> Window {
     let from = begun + 10 * PERIOD_US - PERIOD_US / 2;
-    Window::new(from, from + frames * PERIOD_US).unwrap()
+    Window::lasting(from, frames * PERIOD_US)
 }
 
 fn manifest() -> Manifest {
@@ -209,8 +206,8 @@ fn manifest() -> Manifest {
     }
 }
 
-fn plan(root: &Path, clock: &Clock, max_dropped: u64) -> Plan {
-    Plan {
+fn plan(root: &Path, clock: &Clock, max_dropped: u64) -> RecordingPlan {
+    RecordingPlan {
         root: root.to_owned(),
         manifest: manifest(),
         stream: StreamFormat {
@@ -219,13 +216,20 @@ fn plan(root: &Path, clock: &Clock, max_dropped: u64) -> Plan {
             height: SIZE.1,
             fps: 30.0,
         },
-        window: None,
         max_dropped,
         queue_wait: Duration::ZERO,
         stall: Duration::from_secs(2),
         clock: clock.clone(),
         preview: None,
     }
+}
+
+/// Begins to record; the time of the turn is known before the first frame comes.
+fn start(camera: Box<dyn Camera>, plan: RecordingPlan, window: Window) -> Recorder {
+    let _participant = plan.clock.clone().take_part();
+    let recorder = Recorder::start(camera, plan).unwrap();
+    recorder.announce(window);
+    recorder
 }
 
 /// Records a turn of 120 frames; angle 3 degrees a frame.
@@ -246,8 +250,7 @@ fn record_with(
     let clock = Clock::virtual_time();
     let mut plan = plan(root, &clock, max_dropped);
     plan.queue_wait = WAIT;
-    plan.window = Some(turn(120, 0));
-    let recorder = Recorder::start(Scripted::new(&clock, steps), plan).unwrap();
+    let recorder = start(Scripted::new(&clock, steps), plan, turn(120, 0));
     let (_camera, recorded) = recorder.wait().unwrap();
     let angle = |t_us: i64| Some((t_us - 10 * PERIOD_US) as f64 / PERIOD_US as f64 * 3.0);
     let summary = recorded.finish(&angle, control_faults).unwrap();
@@ -387,10 +390,7 @@ fn dropped_frames_are_listed_at_their_index_and_make_a_take_unusable_beyond_what
 fn drops_are_found_by_time_where_the_driver_never_counts() {
     let root = tempfile::tempdir().unwrap();
     let not_counted = |mut frame: Frame| {
-        frame.sequence = Some(Sequence {
-            raw: 0,
-            unwrapped: 0,
-        });
+        frame.sequence = Some(0);
         frame
     };
     let stream = stream(200, 0).filter(|frame| frame.t_us / PERIOD_US != 70);
@@ -559,10 +559,10 @@ fn a_viewer_that_never_gives_the_picture_back_costs_no_frame() {
     let pictures = monitor.pictures();
     let held = pictures.borrow();
     let mut plan = plan(root.path(), &clock, 0);
-    plan.window = Some(turn(120, 0));
     plan.queue_wait = WAIT;
     plan.preview = Some(Preview::start(monitor.clone()).unwrap());
-    let recorder = Recorder::start(Scripted::new(&clock, steps(stream(200, 0))), plan).unwrap();
+    let camera = Scripted::new(&clock, steps(stream(200, 0)));
+    let recorder = start(camera, plan, turn(120, 0));
     let (_camera, recorded) = recorder.wait().unwrap();
     drop(held);
     let take = Take::read(root.path(), recorded.finish(&|_| None, &[]).unwrap());
@@ -575,17 +575,18 @@ fn a_viewer_that_never_gives_the_picture_back_costs_no_frame() {
     }
 }
 
-/// Replays a recording as fast as it is read, and records the time from `from` to `to`, in frames
+/// Replays a recording, and records the time from `from` to `to`, in frames
 /// of `period_us`, again.
 fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -> Take {
-    let address: CameraAddress = format!("replay:{}?speed=0", path.display())
-        .parse()
-        .unwrap();
+    let address: CameraAddress = format!("replay:{}", path.display()).parse().unwrap();
     let clock = Clock::virtual_time();
     let mut camera = open(&address, clock.clone()).unwrap();
     let mode = camera.modes().unwrap().remove(0);
     let (width, height) = mode.sizes.largest();
-    let rate = mode.rates.fastest().unwrap();
+    let Rates::List(rates) = mode.rates else {
+        panic!("a recording has one rate");
+    };
+    let rate = rates[0];
     let request = ModeRequest {
         fourcc: mode.fourcc,
         width,
@@ -604,8 +605,8 @@ fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -
         fps: rate.per_second(),
     };
     let at = |frames: f64| (begun + frames * period_us) as i64;
-    plan.window = Window::new(at(from), at(to));
-    let recorder = Recorder::start(camera, plan).unwrap();
+    let window = Window::lasting(at(from), at(to) - at(from));
+    let recorder = start(camera, plan, window);
     let (_camera, recorded) = recorder.wait().unwrap();
     Take::read(root, recorded.finish(&|_| None, &[]).unwrap())
 }
@@ -682,6 +683,10 @@ fn a_full_disk_ends_the_recording_and_says_how_much_is_missing() {
         .unwrap();
     let folder = root.path().join(ID);
     assert!(reason.contains("the disk is full"), "{reason}");
+    assert!(
+        reason.ends_with("(os error 27)"),
+        "the system's answer: {reason}"
+    );
     assert!(reason.contains(folder.to_str().unwrap()), "{reason}");
     let missing: u64 = reason
         .split("about ")
@@ -861,8 +866,8 @@ fn frames_whose_content_a_power_cut_took_are_cut_from_the_index() {
     let clock = Clock::virtual_time();
     let mut plan = plan(root.path(), &clock, 0);
     plan.queue_wait = WAIT;
-    plan.window = Some(turn(120, 0));
-    let recorder = Recorder::start(Scripted::new(&clock, steps(stream(200, 0))), plan).unwrap();
+    let camera = Scripted::new(&clock, steps(stream(200, 0)));
+    let recorder = start(camera, plan, turn(120, 0));
     let folder = root.path().join(ID);
     drop(recorder.wait().unwrap());
     // The last bytes never reached the disk: the file has its length, and zeros there.

@@ -141,13 +141,12 @@ impl PreviewEncoder {
 
     /// Whether a frame of a chain can be decoded after those that were.
     fn continues_chain(&mut self, frame: &Frame) -> bool {
-        let number = frame.sequence.map(|sequence| sequence.unwrapped);
-        let follows = match (self.chain, number) {
+        let follows = match (self.chain, frame.sequence) {
             (Some(last), Some(number)) => number == last + 1,
             _ => false,
         };
         if follows || is_key(&frame.data) {
-            self.chain = number;
+            self.chain = frame.sequence;
             return true;
         }
         self.chain = None;

@@ -132,11 +132,13 @@ pub enum VideoError {
         "the disk is full: {missing} bytes of what was recorded could not be written to {path}; free some space in {folder}, or record elsewhere",
         folder = folder_of(path).display()
     )]
-    NoRoom {
+    DiskFull {
         /// The file.
         path: PathBuf,
         /// Bytes that were taken and did not fit.
         missing: u64,
+        /// The system's answer: the disk, a quota or a limit on file sizes is exhausted.
+        source: io::Error,
     },
     /// Another error of the file system.
     #[error(

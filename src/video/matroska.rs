@@ -106,7 +106,7 @@ impl Header {
     }
 }
 
-/// A number whose first byte's leading zeros tell its length: (value, bytes, all value bits set).
+/// A number whose first byte's leading zeros give its length: (value, bytes, all value bits set).
 fn variable_integer(
     file: &mut impl Read,
     longest: u32,

@@ -19,15 +19,15 @@ use serde_json::{Value, json};
 pub(crate) enum Outcome {
     /// All was done: exit code 0.
     Whole,
-    /// Something was left out, and was told: exit code 3.
-    Partial,
+    /// Something was left out or lost, which was told: exit code 3.
+    Incomplete,
 }
 
 impl From<Outcome> for ExitCode {
     fn from(outcome: Outcome) -> Self {
         match outcome {
             Outcome::Whole => Self::SUCCESS,
-            Outcome::Partial => Self::from(3),
+            Outcome::Incomplete => Self::from(3),
         }
     }
 }
@@ -45,6 +45,12 @@ impl Console {
     /// A console that prints JSON lines (`json`) or text on standard output.
     pub(crate) fn new(json: bool) -> Self {
         Self { json }
+    }
+
+    /// Whether lines are for a machine.
+    #[cfg(feature = "train")]
+    pub(crate) fn is_json(self) -> bool {
+        self.json
     }
 
     /// A result: `text` for a person, `event` as one JSON line for a machine.

@@ -9,6 +9,8 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 
+#[cfg(feature = "train")]
+use commands::train;
 use commands::{decompose, eval, render, synth, weights};
 use console::Console;
 
@@ -41,6 +43,10 @@ enum Verb {
     /// Make pictures of objects together with their truth: samples, whole turns, panoramas.
     #[command(after_help = synth::EXAMPLES)]
     Synth(synth::Arguments),
+    /// Train networks (built with the feature `train`).
+    #[cfg(feature = "train")]
+    #[command(after_help = train::EXAMPLES)]
+    Train(train::Arguments),
     /// Convert weights of networks.
     #[command(after_help = weights::EXAMPLES)]
     Weights(weights::Arguments),
@@ -54,6 +60,8 @@ impl Verb {
             Self::Render(arguments) => arguments.fault(),
             Self::Eval(arguments) => arguments.fault(),
             Self::Synth(_) => None,
+            #[cfg(feature = "train")]
+            Self::Train(_) => None,
             Self::Weights(arguments) => arguments.fault(),
         }
     }
@@ -73,6 +81,8 @@ pub(crate) fn run() -> ExitCode {
         Verb::Render(arguments) => render::run(&arguments, console),
         Verb::Eval(arguments) => eval::run(&arguments, console),
         Verb::Synth(arguments) => synth::run(&arguments, console),
+        #[cfg(feature = "train")]
+        Verb::Train(arguments) => train::run(&arguments, console),
         Verb::Weights(arguments) => weights::run(&arguments, console),
     })
 }

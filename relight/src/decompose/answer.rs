@@ -6,7 +6,7 @@ use super::encoding::{AnsweredMaps, EncodedPicture};
 use super::region::{self, Region, enlarged, inside, reduced};
 use crate::image::{Extent, Planes};
 use crate::light::Normals;
-use crate::nets::{Error as NetError, Inference};
+use crate::nets::{Inference, NetError};
 
 /// What answers an encoded picture of `side` x `side` pixels with the planes that
 /// [`EncodedPicture::decode`] takes.

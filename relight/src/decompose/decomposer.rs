@@ -11,7 +11,7 @@ use super::other::OtherNormals;
 use super::region::{Region, cut_out, enlarged, inside};
 use crate::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use crate::light::{Normals, ShLight, YUp};
-use crate::nets::{Error as NetError, Inference, Weights, decomposer};
+use crate::nets::{Inference, NetError, Weights, decomposer};
 use crate::render::{DiffuseForm, DiffuseLayer, NormalsFrame, fit_light};
 
 /// Width and height of the picture that the network sees.

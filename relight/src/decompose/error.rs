@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::data::{Damage, OpenError};
 use crate::image::{Extent, ImageError};
 use crate::light::{LightError, LightFileError};
-use crate::nets::Error as NetError;
+use crate::nets::NetError;
 
 /// Why a photograph cannot be decomposed.
 #[derive(Debug, thiserror::Error)]

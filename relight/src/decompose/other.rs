@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::image::{ColourSpace, Extent, Planes, Srgb};
 use crate::light::{Normals, YDown, YUp};
-use crate::nets::{Error as NetError, Inference};
+use crate::nets::{Inference, NetError};
 use crate::render::NormalsFrame;
 
 /// A network for normals.

@@ -3,7 +3,7 @@
 use super::answer::{Fields, MapsNet, details, fields, to_maps};
 use super::*;
 use crate::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
-use crate::nets::{Error as NetError, INPUTS, OUTPUTS, Weights, decomposer};
+use crate::nets::{INPUTS, NetError, OUTPUTS, Weights, decomposer};
 
 /// Answers pixel by pixel, from the encoded values of the pixel and the mean of all log luminances.
 struct PixelNet<F> {

@@ -2,7 +2,7 @@
 
 use super::retinex::{IntrinsicImages, Retinex, divided};
 use super::run::{Scored, add_method, grey, measured, need, object, of_grey};
-use super::{EvalError, MaskRule, Predictions, Progress, Table};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use crate::data::{TruthSample, TruthSet};
 use crate::image::{Linear, Rgb};
 use crate::metrics::{Convention, IntrinsicError, Windows, intrinsic_error};
@@ -172,9 +172,9 @@ pub fn evaluate_intrinsic(
     split: &str,
     input: IntrinsicInput,
     methods: &[IntrinsicMethod],
-    progress: Progress<'_>,
-) -> Result<Table, EvalError> {
-    let mut table = Table {
+    progress: EvalProgress<'_>,
+) -> Result<ScoreTable, EvalError> {
+    let mut table = ScoreTable {
         protocol: "intrinsic images".to_owned(),
         notes: notes(input),
         lines: Vec::new(),

@@ -39,7 +39,7 @@ pub(crate) struct TurntableArguments {
 
 #[derive(Subcommand)]
 pub(crate) enum Action {
-    /// Tell what the table is doing.
+    /// Show what the table is doing.
     Status,
     /// Find the index; without an index sensor, count from where the table stands.
     Home,

@@ -36,25 +36,21 @@ pub enum CameraAddress {
     /// The portable library's number of a camera.
     Nokhwa(u32),
     /// A recording.
-    Replay {
-        /// A session folder or a video file.
-        path: PathBuf,
-        /// How fast.
-        speed: ReplaySpeed,
-        /// Whether it starts again at its end.
-        repeat: bool,
-        /// Faults to inject.
-        faults: ReplayFaults,
-    },
+    Replay(ReplayAddress),
 }
 
-/// How fast a recording is replayed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ReplaySpeed {
-    /// As fast as it is read.
-    AsRead,
-    /// This many times real time; positive, at most 1000.
-    Times(f64),
+/// A recording, and how it is replayed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReplayAddress {
+    /// A session folder or a video file.
+    pub path: PathBuf,
+    /// How many times as fast as real time the rehearsal runs, at most 1000; 0: as fast as possible.
+    /// Frames come by the clock: it has to be one [of this speed](crate::clock::Clock::at_speed).
+    pub speed: f64,
+    /// Whether it starts again at its end.
+    pub repeat: bool,
+    /// Faults to inject.
+    pub faults: ReplayFaults,
 }
 
 /// Faults that a replay injects, for tests and rehearsals, at positions in the recording.
@@ -75,29 +71,21 @@ pub struct ReplayFaults {
 }
 
 impl CameraAddress {
-    /// A replay in real time without faults.
-    pub fn replay(path: impl Into<PathBuf>) -> Self {
-        Self::Replay {
-            path: path.into(),
-            speed: ReplaySpeed::Times(1.0),
-            repeat: false,
-            faults: ReplayFaults::default(),
-        }
-    }
-
     /// `v4l2`, `nokhwa` or `replay`.
     pub fn backend(&self) -> &'static str {
         match self {
             Self::V4l2(_) => "v4l2",
             Self::Nokhwa(_) => "nokhwa",
-            Self::Replay { .. } => "replay",
+            Self::Replay(_) => "replay",
         }
     }
 
     /// The device's path or number, or the recording's path, without options.
     pub fn device(&self) -> String {
         match self {
-            Self::V4l2(path) | Self::Replay { path, .. } => path.display().to_string(),
+            Self::V4l2(path) | Self::Replay(ReplayAddress { path, .. }) => {
+                path.display().to_string()
+            }
             Self::Nokhwa(number) => number.to_string(),
         }
     }
@@ -124,12 +112,12 @@ fn parse(text: &str) -> Result<CameraAddress, AddressFault> {
             .parse()
             .map(CameraAddress::Nokhwa)
             .map_err(|_| AddressFault::Number),
-        "replay" => parse_replay(rest),
+        "replay" => parse_replay(rest).map(CameraAddress::Replay),
         _ => Err(AddressFault::Scheme),
     }
 }
 
-fn parse_replay(text: &str) -> Result<CameraAddress, AddressFault> {
+fn parse_replay(text: &str) -> Result<ReplayAddress, AddressFault> {
     let (path, options) = text.rsplit_once('?').unwrap_or((text, ""));
     if path.is_empty() {
         return Err(AddressFault::Empty);
@@ -137,8 +125,13 @@ fn parse_replay(text: &str) -> Result<CameraAddress, AddressFault> {
     if path.contains('\0') {
         return Err(AddressFault::Path);
     }
-    let (mut speed, mut repeat, mut faults) =
-        (ReplaySpeed::Times(1.0), false, ReplayFaults::default());
+    let mut replay = ReplayAddress {
+        path: path.into(),
+        speed: 1.0,
+        repeat: false,
+        faults: ReplayFaults::default(),
+    };
+    let faults = &mut replay.faults;
     let mut seen = BTreeSet::new();
     for option in options.split('&').filter(|option| !option.is_empty()) {
         let (name, value) = option.split_once('=').unwrap_or((option, ""));
@@ -151,8 +144,8 @@ fn parse_replay(text: &str) -> Result<CameraAddress, AddressFault> {
         };
         let number = || value.parse().map(Some).map_err(|_| wrong());
         match name {
-            "speed" => speed = parse_speed(value).ok_or_else(wrong)?,
-            "loop" => repeat = parse_switch(value).ok_or_else(wrong)?,
+            "speed" => replay.speed = parse_speed(value).ok_or_else(wrong)?,
+            "loop" => replay.repeat = parse_switch(value).ok_or_else(wrong)?,
             "drop" => faults.drop = parse_frames(value).ok_or_else(wrong)?,
             "damage" => faults.damage = parse_frames(value).ok_or_else(wrong)?,
             "flag" => faults.flag = parse_frames(value).ok_or_else(wrong)?,
@@ -162,22 +155,13 @@ fn parse_replay(text: &str) -> Result<CameraAddress, AddressFault> {
             _ => return Err(AddressFault::Option(name.to_owned())),
         }
     }
-    Ok(CameraAddress::Replay {
-        path: path.into(),
-        speed,
-        repeat,
-        faults,
-    })
+    Ok(replay)
 }
 
-fn parse_speed(text: &str) -> Option<ReplaySpeed> {
-    match text.parse::<f64>().ok()? {
-        0.0 => Some(ReplaySpeed::AsRead),
-        times if times.is_normal() && times > 0.0 && times <= FASTEST => {
-            Some(ReplaySpeed::Times(times))
-        }
-        _ => None,
-    }
+fn parse_speed(text: &str) -> Option<f64> {
+    let usable =
+        |times: &f64| *times == 0.0 || (times.is_normal() && (0.0..=FASTEST).contains(times));
+    text.parse().ok().filter(usable)
 }
 
 fn parse_switch(text: &str) -> Option<bool> {
@@ -199,33 +183,23 @@ fn parse_frames(text: &str) -> Option<BTreeSet<u64>> {
 
 impl fmt::Display for CameraAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self::Replay {
-            speed,
-            repeat,
-            faults,
-            ..
-        } = self
-        else {
-            return write!(f, "{}:{}", self.backend(), self.device());
-        };
         let device = self.device();
-        let mut options = faults.options();
-        if *repeat {
+        write!(f, "{}:{device}", self.backend())?;
+        let Self::Replay(replay) = self else {
+            return Ok(());
+        };
+        let mut options = replay.faults.options();
+        if replay.repeat {
             options.insert(0, "loop=1".to_owned());
         }
-        match speed {
-            ReplaySpeed::AsRead => options.insert(0, "speed=0".to_owned()),
-            // A question mark in the path would otherwise begin the options.
-            ReplaySpeed::Times(times) if *times != 1.0 || device.contains('?') => {
-                options.insert(0, format!("speed={times}"));
-            }
-            ReplaySpeed::Times(_) => {}
+        // A question mark in the path would otherwise begin the options.
+        if replay.speed != 1.0 || device.contains('?') {
+            options.insert(0, format!("speed={}", replay.speed));
         }
-        write!(f, "replay:{device}")?;
-        if !options.is_empty() {
-            write!(f, "?{}", options.join("&"))?;
+        match options.is_empty() {
+            true => Ok(()),
+            false => write!(f, "?{}", options.join("&")),
         }
-        Ok(())
     }
 }
 
@@ -277,21 +251,17 @@ mod tests {
 
     fn address() -> impl Strategy<Value = CameraAddress> {
         let path = || "[ -~]{1,20}".prop_map(PathBuf::from);
-        let speed = prop_oneof![
-            Just(ReplaySpeed::AsRead),
-            (0.01..FASTEST).prop_map(ReplaySpeed::Times),
-            Just(ReplaySpeed::Times(1.0))
-        ];
+        let speed = prop_oneof![Just(0.0), 0.01..FASTEST, Just(1.0)];
         prop_oneof![
             path().prop_map(CameraAddress::V4l2),
             any::<u32>().prop_map(CameraAddress::Nokhwa),
             (path(), speed, any::<bool>(), faults()).prop_map(|(path, speed, repeat, faults)| {
-                CameraAddress::Replay {
+                CameraAddress::Replay(ReplayAddress {
                     path,
                     speed,
                     repeat,
                     faults,
-                }
+                })
             }),
         ]
     }
@@ -317,20 +287,21 @@ mod tests {
             CameraAddress::V4l2("/dev/video0".into())
         );
         assert_eq!(read("nokhwa:3"), CameraAddress::Nokhwa(3));
-        assert_eq!(read("replay:clip.mp4"), CameraAddress::replay("clip.mp4"));
+        let plain = ReplayAddress {
+            path: "clip.mp4".into(),
+            speed: 1.0,
+            repeat: false,
+            faults: ReplayFaults::default(),
+        };
+        assert_eq!(read("replay:clip.mp4"), CameraAddress::Replay(plain));
         let all = "replay:a b?speed=0&loop=1&drop=7,8&damage=5&flag=6&unplug=100&stall=20&resize=9";
-        let CameraAddress::Replay {
-            path,
-            speed,
-            repeat,
-            faults,
-        } = read(all)
-        else {
+        let CameraAddress::Replay(replay) = read(all) else {
             panic!("{all} is a replay");
         };
+        let faults = &replay.faults;
         assert_eq!(
-            (path, speed, repeat),
-            ("a b".into(), ReplaySpeed::AsRead, true)
+            (replay.path, replay.speed, replay.repeat),
+            ("a b".into(), 0.0, true)
         );
         assert_eq!(faults.drop, BTreeSet::from([7, 8]));
         assert_eq!(

@@ -68,8 +68,6 @@ pub struct ControlFlags {
     pub inactive: bool,
     /// It cannot be set.
     pub read_only: bool,
-    /// It cannot be read.
-    pub write_only: bool,
     /// It cannot be set while the camera streams, or another program holds it.
     pub grabbed: bool,
     /// The hardware changes it by itself.

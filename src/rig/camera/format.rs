@@ -148,20 +148,6 @@ pub enum Rates {
     Unknown,
 }
 
-impl Rates {
-    /// The highest rate, if the camera states any.
-    pub fn fastest(&self) -> Option<Rate> {
-        match self {
-            Self::List(rates) => rates
-                .iter()
-                .copied()
-                .max_by(|a, b| a.per_second().total_cmp(&b.per_second())),
-            Self::Range { fastest, .. } => Some(*fastest),
-            Self::Unknown => None,
-        }
-    }
-}
-
 impl fmt::Display for Rates {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -16,67 +16,38 @@ pub struct Frame {
     pub height: u32,
     /// The bytes that the driver reports as used; raw rows without padding.
     pub data: Vec<u8>,
-    /// The driver's counter; `None` where the camera has none.
-    pub sequence: Option<Sequence>,
+    /// The driver's counter without its wraps at 2^32; `None` where the camera has none.
+    pub sequence: Option<u64>,
     /// When the frame was taken, microseconds of the monotonic clock (for a replay, of the
     /// given clock).
     pub t_us: i64,
-    /// What the time stamp means.
-    pub stamp: StampSource,
+    /// What made the time stamp: the driver (at the frame's end, or where its exposure began), or this
+    /// program when it got the frame.
+    pub clock: FrameClock,
     /// True if the driver marked the frame's data as damaged.
     pub flagged: bool,
-}
-
-/// The driver's frame counter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sequence {
-    /// The driver's value.
-    pub raw: u32,
-    /// Without the wrap at 2^32, counted from the stream's first frame on.
-    pub unwrapped: u64,
-}
-
-/// What a frame's time stamp means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StampSource {
-    /// The driver's: when the frame's last data arrived.
-    EndOfFrame,
-    /// The driver's: when the exposure began.
-    StartOfExposure,
-    /// This program's, if the driver has no monotonic time stamps: when it got the frame.
-    Arrival,
-}
-
-impl StampSource {
-    /// Whose clock it is.
-    pub fn clock(self) -> FrameClock {
-        match self {
-            Self::EndOfFrame | Self::StartOfExposure => FrameClock::Driver,
-            Self::Arrival => FrameClock::Host,
-        }
-    }
 }
 
 /// Counts a driver's 32-bit frame counter on where it wraps.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SequenceUnwrapper {
-    last: Option<Sequence>,
+    /// The driver's last value, and the same without wraps.
+    last: Option<(u32, u64)>,
 }
 
 impl SequenceUnwrapper {
     /// The next value. A step of less than half the range is forward, any other is backward: some
     /// drivers repeat a number, or deliver one late.
-    pub fn next(&mut self, raw: u32) -> Sequence {
+    pub fn next(&mut self, raw: u32) -> u64 {
         let unwrapped = match self.last {
             None => u64::from(raw),
-            Some(last) => {
-                let step = raw.wrapping_sub(last.raw).cast_signed();
-                last.unwrapped.saturating_add_signed(i64::from(step))
+            Some((last_raw, last)) => {
+                let step = raw.wrapping_sub(last_raw).cast_signed();
+                last.saturating_add_signed(i64::from(step))
             }
         };
-        let sequence = Sequence { raw, unwrapped };
-        self.last = Some(sequence);
-        sequence
+        self.last = Some((raw, unwrapped));
+        unwrapped
     }
 }
 
@@ -151,7 +122,7 @@ fn jpeg_fault(data: &[u8], width: u32, height: u32) -> Option<FrameFault> {
 
 /// Width and height that a JPEG's frame header states (ITU-T T.81, B.2.2); `None` where there is
 /// no frame header before the first scan.
-pub fn jpeg_size(data: &[u8]) -> Option<(u32, u32)> {
+fn jpeg_size(data: &[u8]) -> Option<(u32, u32)> {
     let mut at = 2;
     loop {
         let &[marker, code] = data.get(at..)?.first_chunk()?;
@@ -204,7 +175,7 @@ mod tests {
 
     fn unwrapped(raw: &[u32]) -> Vec<u64> {
         let mut counter = SequenceUnwrapper::default();
-        raw.iter().map(|&raw| counter.next(raw).unwrapped).collect()
+        raw.iter().map(|&raw| counter.next(raw)).collect()
     }
 
     #[test]
@@ -236,7 +207,7 @@ mod tests {
             data: data.to_vec(),
             sequence: None,
             t_us: 0,
-            stamp: StampSource::Arrival,
+            clock: FrameClock::Host,
             flagged: false,
         }
     }

@@ -18,8 +18,8 @@
 //! use relit_rig::clock::Clock;
 //!
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).unwrap();
-//! let address = "replay:fixtures/20261120T101500Z-cow-short?speed=0".parse()?;
-//! let mut camera = camera::open(&address, Clock::monotonic())?;
+//! let address = "replay:fixtures/20261120T101500Z-cow-short".parse()?;
+//! let mut camera = camera::open(&address, Clock::virtual_time())?;
 //! camera.start(&"MJPG:480x360@30".parse()?)?;
 //! let frame = camera.next_frame(Duration::from_secs(5))?;
 //! assert_eq!((frame.width, frame.height, frame.fault()), (480, 360, None));
@@ -43,17 +43,17 @@ mod v4l2;
 use std::path::Path;
 use std::time::Duration;
 
-pub use address::{CameraAddress, ReplayFaults, ReplaySpeed};
+pub use address::{CameraAddress, ReplayAddress, ReplayFaults};
 pub use control::{Control, ControlFlags, ControlId, ControlKind, MenuItem, snake_case};
 pub use error::{AddressFault, CameraError, ControlFault};
 pub use format::{Fourcc, Mode, Rates, Sizes};
-pub use frame::{Frame, FrameFault, Sequence, SequenceUnwrapper, StampSource, jpeg_size};
+pub use frame::{Frame, FrameFault, SequenceUnwrapper};
 pub use rate::Rate;
 pub use request::{GrantedMode, ModeRequest};
 
 use crate::clock::Clock;
 
-/// Opens a camera. A replay uses the given clock.
+/// Opens a camera. A replay goes by the given clock, and as fast as that.
 ///
 /// # Errors
 /// [`CameraError::NotThere`], [`CameraError::NotPermitted`], [`CameraError::NotACamera`],
@@ -62,15 +62,7 @@ pub fn open(address: &CameraAddress, clock: Clock) -> Result<Box<dyn Camera>, Ca
     Ok(match address {
         CameraAddress::V4l2(path) => open_v4l2(path)?,
         CameraAddress::Nokhwa(number) => open_nokhwa(*number)?,
-        CameraAddress::Replay {
-            path,
-            speed,
-            repeat,
-            faults,
-        } => {
-            let replay = replay::ReplayCamera::open(path, *speed, *repeat, faults, clock)?;
-            Box::new(replay)
-        }
+        CameraAddress::Replay(replay) => Box::new(replay::ReplayCamera::open(replay, clock)?),
     })
 }
 

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::error::CaptureError;
 use super::settings::Settings;
-use crate::camera::{self, Camera, CameraAddress, ReplaySpeed};
+use crate::camera::{self, Camera};
 use crate::clock::Clock;
 use crate::simulator::{SimulatedTable, SimulatorOptions};
 use crate::turntable::{Table, TableOptions, TurntableAddress, find_serial};
@@ -54,16 +54,8 @@ impl Equipment {
         Self::at_speed(settings, speed)
     }
 
-    fn at_speed(mut settings: Settings, speed: f64) -> Result<Self, CaptureError> {
-        if let CameraAddress::Replay { speed, .. } = &mut settings.camera {
-            // It goes as fast as the clock does.
-            *speed = ReplaySpeed::Times(1.0);
-        }
-        let clock = match speed {
-            0.0 => Clock::virtual_time(),
-            1.0 => Clock::monotonic(),
-            times => Clock::paced(times),
-        };
+    fn at_speed(settings: Settings, speed: f64) -> Result<Self, CaptureError> {
+        let clock = Clock::at_speed(speed);
         let simulator = match &settings.turntable {
             TurntableAddress::Simulated(address) => Some(SimulatedTable::new(&SimulatorOptions {
                 clock: clock.clone(),
@@ -82,7 +74,7 @@ impl Equipment {
         })
     }
 
-    /// The settings, with the addresses as they are opened.
+    /// The settings.
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings

@@ -63,7 +63,7 @@ impl LockedCamera {
         let mut clock = FrameClock::default();
         for _ in 0..SETTLING {
             stop.check()?;
-            clock = camera.next_frame(NEXT_FRAME)?.stamp.clock();
+            clock = camera.next_frame(NEXT_FRAME)?.clock;
         }
         let controls = camera.controls()?;
         require_kept(plan.check(&controls))?;

@@ -28,8 +28,8 @@ pub use equipment::Equipment;
 pub use error::{CaptureError, MeterFault, Refusal, Stopped};
 pub use mode_preference::ModePreference;
 pub use recording::{
-    End, Plan, Progress, Recorded, Recorder, RecordingError, Salvaged, Saved, Window, salvage,
-    salvage_session,
+    End, Progress, Recorded, Recorder, RecordingError, RecordingPlan, Salvaged, Saved, Window,
+    salvage, salvage_session,
 };
 pub use settings::Settings;
 pub use stop::StopRequest;

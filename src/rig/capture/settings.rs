@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use super::error::Refusal;
 use super::mode_preference::ModePreference;
+use crate::camera::CameraAddress;
 use crate::camera::hold::ManualValues;
-use crate::camera::{CameraAddress, ReplaySpeed};
 use crate::lockfile::{self, LockError, LockFile};
 use crate::turntable::TurntableAddress;
 
@@ -78,10 +78,7 @@ impl Settings {
     /// [`Refusal::Pace`] where one side is real and the other is to run faster.
     pub fn speed(&self) -> Result<f64, Refusal> {
         let replayed = match &self.camera {
-            CameraAddress::Replay { speed, .. } => Some(match speed {
-                ReplaySpeed::AsRead => 0.0,
-                ReplaySpeed::Times(times) => *times,
-            }),
+            CameraAddress::Replay(replay) => Some(replay.speed),
             _ => None,
         };
         let simulated = match &self.turntable {

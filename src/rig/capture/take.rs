@@ -16,7 +16,7 @@ use super::locked_camera::{LockedCamera, NEXT_FRAME};
 use super::manifest::manifest;
 use super::metering::meter;
 use super::preflight;
-use super::recording::{End, Plan, Recorder};
+use super::recording::{End, Recorder, RecordingPlan};
 use super::turn::TurnRecording;
 use crate::camera::CameraAddress;
 use crate::state::{Check, Phase, TakeSummary, Verdict};
@@ -82,14 +82,13 @@ fn run_take(
         state.session = Some(manifest.id.clone());
         state.frames_wanted = settings.frames(locked.stream.fps);
     });
-    let plan = Plan {
+    let plan = RecordingPlan {
         manifest,
         root: settings.root.clone(),
         stream: locked.stream,
-        window: None,
         max_dropped: settings.max_dropped,
         queue_wait: match settings.camera {
-            CameraAddress::Replay { .. } => REPLAY_WAIT,
+            CameraAddress::Replay(_) => REPLAY_WAIT,
             _ => Duration::ZERO,
         },
         stall: NEXT_FRAME,
@@ -110,7 +109,7 @@ fn run_take(
     recorder.stop();
     context.enter(Phase::Checking);
     let (mut camera, mut recorded) = recorder.wait()?;
-    let read_back = locked.plan.read_back(&locked.controls, camera.as_mut());
+    let control_faults = locked.plan.faults_after(&locked.controls, camera.as_mut());
     equipment.camera = Some(camera);
     let track = turned.unwrap_or_else(|error| {
         // A camera that failed by itself explains the take better than the table that was stopped
@@ -122,7 +121,7 @@ fn run_take(
     });
     let repeatable = matches!(recorded.end(), End::Over);
     let angle = |t_us| track.as_ref().and_then(|track| track.angle_at(t_us));
-    Ok((recorded.finish(&angle, &read_back.faults())?, repeatable))
+    Ok((recorded.finish(&angle, &control_faults)?, repeatable))
 }
 
 /// Opens, checks and locks what a take needs, before the table turns for it.

@@ -1,6 +1,8 @@
 //! What the tests of this module share.
 
-use crate::camera::{Fourcc, Frame, Sequence, StampSource};
+use relit_data::session::FrameClock;
+
+use crate::camera::{Fourcc, Frame};
 
 /// Frame `n` of a camera of 30 frames/s.
 pub(crate) fn frame(n: u64) -> Frame {
@@ -9,12 +11,9 @@ pub(crate) fn frame(n: u64) -> Frame {
         width: 2,
         height: 2,
         data: vec![n as u8; 4],
-        sequence: Some(Sequence {
-            raw: n as u32,
-            unwrapped: n,
-        }),
+        sequence: Some(n),
         t_us: 33_333 * n as i64,
-        stamp: StampSource::EndOfFrame,
+        clock: FrameClock::Driver,
         flagged: false,
     }
 }

@@ -32,19 +32,19 @@
 //! let clock = Clock::virtual_time();
 //! // From here on, time passes only while this thread waits.
 //! let _participant = clock.take_part();
-//! let door = Arc::new(Waitable::new(&clock, false));
+//! let gate = Arc::new(Waitable::new(&clock, false));
 //! let opener = clock.spawn("opener", {
-//!     let (clock, door) = (clock.clone(), Arc::clone(&door));
+//!     let (clock, gate) = (clock.clone(), Arc::clone(&gate));
 //!     move || {
 //!         clock.sleep(Duration::from_secs(3600));
-//!         door.update(|open| *open = true);
+//!         gate.update(|open| *open = true);
 //!     }
 //! })?;
 //!
 //! let start_us = clock.now_us();
-//! let in_time = door.wait_for(Duration::from_secs(60), |open| open.then_some(()));
+//! let in_time = gate.wait_for(Duration::from_secs(60), |open| open.then_some(()));
 //! assert_eq!((in_time, clock.now_us() - start_us), (None, 60_000_000));
-//! door.wait(|open| open.then_some(()));
+//! gate.wait(|open| open.then_some(()));
 //! assert_eq!(clock.now_us() - start_us, 3_600_000_000);
 //! opener.join().ok();
 //! # Ok::<(), std::io::Error>(())
@@ -114,6 +114,16 @@ impl Clock {
     pub fn paced(factor: f64) -> Clock {
         Clock {
             kind: Kind::Virtual(Arc::new(Scheduler::new(Some(usable(factor))))),
+        }
+    }
+
+    /// The clock of a rig that runs `times` as fast as real time: virtual where that is 0 (as fast as
+    /// possible), monotonic where it is 1, paced otherwise.
+    pub fn at_speed(times: f64) -> Clock {
+        match times {
+            0.0 => Self::virtual_time(),
+            1.0 => Self::monotonic(),
+            times => Self::paced(times),
         }
     }
 

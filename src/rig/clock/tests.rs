@@ -272,7 +272,7 @@ proptest! {
     #[test]
     fn what_is_handed_over_comes_without_delay(
         gaps in proptest::collection::vec(0..3000_u64, 1..30),
-        patience in 1..2000_u64,
+        timeout_us in 1..2000_u64,
     ) {
         let clock = Clock::virtual_time();
         let participant = clock.take_part();
@@ -282,7 +282,7 @@ proptest! {
                 let mut late = 0;
                 for _ in &gaps {
                     let given_us: i64 = loop {
-                        let taken = slot.wait_for(Duration::from_micros(patience), Option::take);
+                        let taken = slot.wait_for(Duration::from_micros(timeout_us), Option::take);
                         if let Some(given_us) = taken {
                             break given_us;
                         }

@@ -53,7 +53,7 @@ pub(super) enum Next {
 /// Where a stop goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum StopTarget {
-    /// To the job under way, which has to be told.
+    /// To the job under way: its stop has to be asked for.
     Running,
     /// Nowhere else: it is the next job, or nothing is left to stop.
     Settled,
@@ -174,7 +174,7 @@ impl Schedule {
         }
     }
 
-    /// Takes no more jobs; one under way has to be told.
+    /// Takes no more jobs; one under way goes on until its stop is asked for.
     pub(super) fn end(&mut self) {
         self.is_ending = true;
     }

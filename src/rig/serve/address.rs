@@ -69,19 +69,22 @@ mod tests {
     #[test]
     fn the_announced_url_can_be_opened_and_holds_the_token() {
         let token: Token = "0123456789abcdef".parse().unwrap();
-        let told = Announcement::new("192.0.2.7:8420".parse().unwrap(), &[], Some(&token));
-        assert_eq!(told.url, "http://192.0.2.7:8420/?token=0123456789abcdef");
-        assert!(told.qr.unwrap().lines().count() > 10);
+        let announced = Announcement::new("192.0.2.7:8420".parse().unwrap(), &[], Some(&token));
+        assert_eq!(
+            announced.url,
+            "http://192.0.2.7:8420/?token=0123456789abcdef"
+        );
+        assert!(announced.qr.unwrap().lines().count() > 10);
         let names = ["rig.local".to_owned()];
-        let told = Announcement::new("[::1]:80".parse().unwrap(), &names, None);
-        assert_eq!(told.url, "http://rig.local:80/");
-        let told = Announcement::new("[::1]:80".parse().unwrap(), &[], None);
-        assert_eq!(told.url, "http://[::1]:80/");
+        let announced = Announcement::new("[::1]:80".parse().unwrap(), &names, None);
+        assert_eq!(announced.url, "http://rig.local:80/");
+        let announced = Announcement::new("[::1]:80".parse().unwrap(), &[], None);
+        assert_eq!(announced.url, "http://[::1]:80/");
     }
 
     #[test]
     fn an_address_for_all_is_announced_as_one_that_can_be_reached() {
-        let told = Announcement::new("0.0.0.0:8420".parse().unwrap(), &[], None);
-        assert!(!told.url.contains("0.0.0.0"), "{}", told.url);
+        let announced = Announcement::new("0.0.0.0:8420".parse().unwrap(), &[], None);
+        assert!(!announced.url.contains("0.0.0.0"), "{}", announced.url);
     }
 }

@@ -6,18 +6,18 @@ use std::time::Duration;
 
 use axum::extract::State;
 use axum::http::{StatusCode, header};
-use axum::response::sse::{Event, Sse};
+use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
-use futures_util::{Stream, StreamExt, stream};
-use tokio::sync::{OwnedSemaphorePermit, watch};
-use tokio::time::{Instant, sleep_until, timeout};
+use futures_util::{Stream, StreamExt};
+use tokio::time::timeout;
+use tokio_stream::wrappers::WatchStream;
 
 use super::extract::JsonBody;
 use super::failure::{Failure, Problem};
 use super::options::Shutdown;
 use super::permits::{Permits, Work, permit};
 use super::rig::{Command, Rig};
-use super::snapshots::{PERIOD, Snapshot, Snapshots};
+use super::snapshots::{PERIOD, Snapshots};
 use crate::state::RigState;
 
 /// A subscriber hears something at least so often: silence means a lost connection.
@@ -59,39 +59,15 @@ pub(super) async fn events(
     State(permits): State<Arc<Permits>>,
     State(shutdown): State<Shutdown>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Failure> {
-    let mut states = snapshots.subscribe();
-    states.mark_changed();
-    let subscription = Subscription {
-        states,
-        next: Instant::now(),
-        _permit: permit(&permits.subscribers, "pages that watch the rig")?,
-    };
-    let events = stream::unfold(subscription, |mut subscription| async {
-        let event = subscription.event().await;
-        Some((Ok(event), subscription))
+    let permit = permit(&permits.subscribers, "pages that watch the rig")?;
+    let events = WatchStream::new(snapshots.subscribe());
+    let events = tokio_stream::StreamExt::throttle(events, PERIOD).map(move |snapshot| {
+        let _held = &permit;
+        Ok(Event::default().event("state").data(&snapshot.json))
     });
-    Ok(Sse::new(events.take_until(shutdown.cancelled_owned())))
-}
-
-struct Subscription {
-    states: watch::Receiver<Arc<Snapshot>>,
-    /// When the next state may be sent.
-    next: Instant,
-    _permit: OwnedSemaphorePermit,
-}
-
-impl Subscription {
-    async fn event(&mut self) -> Event {
-        sleep_until(self.next).await;
-        // The sender outlives all requests: only the time can run out.
-        let changed = timeout(BEAT, self.states.changed()).await;
-        if changed.is_err() {
-            return Event::default().event("beat").data("");
-        }
-        self.next = Instant::now() + PERIOD;
-        let snapshot = self.states.borrow_and_update().clone();
-        Event::default().event("state").data(&snapshot.json)
-    }
+    let beat = KeepAlive::new().interval(BEAT);
+    let beat = beat.event(Event::default().event("beat").data(""));
+    Ok(Sse::new(events.take_until(shutdown.cancelled_owned())).keep_alive(beat))
 }
 
 /// Give the rig a command

@@ -7,10 +7,11 @@ use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::{HeaderName, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use futures_util::future::ready;
 use futures_util::{StreamExt, stream};
 use serde::Deserialize;
-use tokio::sync::{OwnedSemaphorePermit, watch};
-use tokio::time::{Instant, sleep_until, timeout};
+use tokio::time::timeout;
+use tokio_stream::wrappers::WatchStream;
 use utoipa::IntoParams;
 
 use super::extract::QueryParams;
@@ -94,49 +95,25 @@ pub(super) async fn stream(
     State(permits): State<Arc<Permits>>,
     State(shutdown): State<Shutdown>,
 ) -> Result<Response, Failure> {
-    let mut pictures = monitor.pictures();
-    pictures.mark_changed();
-    let viewer = Viewer {
-        pictures,
-        next: Instant::now(),
-        _permit: permit(&permits.viewers, VIEWERS)?,
-    };
+    let permit = permit(&permits.viewers, VIEWERS)?;
+    let pictures = WatchStream::new(monitor.pictures());
+    let pictures = tokio_stream::StreamExt::throttle(pictures, PERIOD);
+    let parts = pictures.filter_map(move |picture| {
+        let _held = &permit;
+        ready(picture.map(|picture| Ok(part(&picture.jpeg))))
+    });
     // The boundary that ends a part is sent with it, so that the browser shows it at once.
     let opening = stream::iter([Ok::<_, axum::Error>(Bytes::from_static(b"--picture\r\n"))]);
-    let parts = stream::unfold(viewer, |mut viewer| async {
-        let part = viewer.part().await?;
-        Some((Ok(part), viewer))
-    });
     let body = opening.chain(parts).take_until(shutdown.cancelled_owned());
     let kind = "multipart/x-mixed-replace; boundary=picture";
     Ok(([(header::CONTENT_TYPE, kind)], Body::from_stream(body)).into_response())
 }
 
-struct Viewer {
-    pictures: watch::Receiver<Option<PreviewFrame>>,
-    /// When the next picture may be sent.
-    next: Instant,
-    _permit: OwnedSemaphorePermit,
-}
-
-impl Viewer {
-    /// The next part. It is asked for when the one before is on its way, and takes what is newest then.
-    async fn part(&mut self) -> Option<Bytes> {
-        loop {
-            sleep_until(self.next).await;
-            self.pictures.changed().await.ok()?;
-            self.next = Instant::now() + PERIOD;
-            if let Some(picture) = self.pictures.borrow_and_update().clone() {
-                let jpeg = &picture.jpeg;
-                let mut part = format!(
-                    "Content-Type: image/jpeg\r\nContent-Length: {}\r\n\r\n",
-                    jpeg.len()
-                )
-                .into_bytes();
-                part.extend_from_slice(jpeg);
-                part.extend_from_slice(b"\r\n--picture\r\n");
-                return Some(part.into());
-            }
-        }
-    }
+/// A part of the stream, with the boundary that ends it.
+fn part(jpeg: &[u8]) -> Bytes {
+    let length = jpeg.len();
+    let head = format!("Content-Type: image/jpeg\r\nContent-Length: {length}\r\n\r\n");
+    [head.as_bytes(), jpeg, b"\r\n--picture\r\n"]
+        .concat()
+        .into()
 }

@@ -77,16 +77,13 @@ pub use error::{MotionFault, TurntableError};
 pub use homing::Homed;
 pub use identity::{Extras, Identity, TravelLimits};
 pub use owner::Owner;
-pub use plan::{Direction, TurnPlan, TurnRequest};
+pub use plan::{TurnDirection, TurnPlan, TurnRequest};
 pub use port::{Port, SerialPort};
 pub use status::TableStatus;
 pub use sync::{Residuals, Track, TrackError};
 pub use table::Table;
 pub use turn::{ConstantPart, Turn, TurnPhase};
 pub use wire::{ControllerState, Counts, LineFault, RestartCause, SendError};
-
-/// The lease that a turn sets if the controller's is off, seconds.
-const LEASE_S: u32 = 3;
 
 /// How a table is opened.
 #[derive(Debug, Clone, PartialEq)]

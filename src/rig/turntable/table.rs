@@ -3,18 +3,16 @@
 use std::path::Path;
 use std::time::Duration;
 
+use super::TableOptions;
 use super::error::TurntableError;
 use super::greeting;
 use super::identity::Identity;
 use super::link::{IoThread, Link};
 use super::owner::{Claim, Server};
-use super::plan::TurnPlan;
 use super::port::{Port, SerialPort};
 use super::status::TableStatus;
 use super::supervisor::MotionGoal;
-use super::turn::Turn;
 use super::wire::{ControllerState, Counts, LineOutcome, Message, ReplyTimeout};
-use super::{LEASE_S, TableOptions};
 use crate::clock::{Clock, Waitable};
 
 /// Added to the computed time of a motion.
@@ -270,46 +268,8 @@ impl Table {
         self.status()
     }
 
-    /// Moves back by the ramp and starts the turn. From then on the table moves by itself and is
-    /// monitored until the [`Turn`] ends or is dropped.
-    ///
-    /// If the controller offers a lease (`$60`) and it is off, it is set to 3 s first, so that the
-    /// table stops when this computer fails. The controller stores the setting.
-    ///
-    /// # Errors
-    /// [`TurntableError::NotHomed`], [`TurntableError::MovedSincePlan`], or what stops a motion.
-    pub fn start_turn(&self, plan: TurnPlan) -> Result<Turn<'_>, TurntableError> {
-        self.secure()?;
-        let status = self.ready()?;
-        if !status.homed {
-            return Err(TurntableError::NotHomed);
-        }
-        let planned_deg = plan.start_deg();
-        if (status.angle_deg - planned_deg).abs() > 2.0 * self.identity.step_deg() {
-            return Err(TurntableError::MovedSincePlan {
-                planned_deg,
-                at_deg: status.angle_deg,
-            });
-        }
-        if self.identity.lease_s == Some(0.0) {
-            self.set_lease()?;
-        }
-        Turn::start(self, plan, status.machine_deg - status.angle_deg)
-    }
-
-    fn set_lease(&self) -> Result<(), TurntableError> {
-        let set = |messages: &[Message]| {
-            let lease = |message: &Message| matches!(message, Message::Setting { number: 60, value } if *value > 0.0);
-            messages.iter().any(lease)
-        };
-        if !set(&self.command("$$")?) {
-            self.command(&format!("$60={LEASE_S}"))?;
-        }
-        Ok(())
-    }
-
     /// Opens a checked session if the controller offers one and none is open.
-    fn secure(&self) -> Result<(), TurntableError> {
+    pub(super) fn secure(&self) -> Result<(), TurntableError> {
         let _turn = LineTurn::take(&self.line_open);
         greeting::secure(&self.link, &self.identity.extras)
     }
@@ -325,7 +285,7 @@ impl Table {
     }
 
     /// Sends a line and waits for its `ok`; returns the messages before it.
-    fn command(&self, block: &str) -> Result<Vec<Message>, TurntableError> {
+    pub(super) fn command(&self, block: &str) -> Result<Vec<Message>, TurntableError> {
         match self.outcome(block, ReplyTimeout::AtOnce)? {
             LineOutcome::Done(messages) => Ok(messages),
             LineOutcome::Refused(code) => Err(refused(block, code)),

@@ -8,12 +8,14 @@ use super::status::TableStatus;
 use super::supervisor::PositionReport;
 use super::sync::{self, Track};
 use super::table::{Table, straight};
-use super::wire::ControllerState;
+use super::wire::{ControllerState, Message};
 
 /// Rest before the start, until the table has stopped swinging.
 const SETTLE: Duration = Duration::from_millis(300);
 /// Added to the computed time of the ramp.
 const RAMP_SLACK: Duration = Duration::from_secs(3);
+/// The lease that a turn sets if the controller's is off, seconds.
+const LEASE_S: u32 = 3;
 
 /// When the table moves at constant speed, extrapolated from its first reports there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +39,46 @@ pub enum TurnPhase {
     AtEnd,
 }
 
+impl Table {
+    /// Moves back by the ramp and starts the turn. From then on the table moves by itself and is
+    /// monitored until the [`Turn`] ends or is dropped.
+    ///
+    /// If the controller offers a lease (`$60`) and it is off, it is set to 3 s first, so that the
+    /// table stops when this computer fails. The controller stores the setting.
+    ///
+    /// # Errors
+    /// [`TurntableError::NotHomed`], [`TurntableError::MovedSincePlan`], or what stops a motion.
+    pub fn start_turn(&self, plan: TurnPlan) -> Result<Turn<'_>, TurntableError> {
+        self.secure()?;
+        let status = self.ready()?;
+        if !status.homed {
+            return Err(TurntableError::NotHomed);
+        }
+        let planned_deg = plan.start_deg();
+        if (status.angle_deg - planned_deg).abs() > 2.0 * self.identity().step_deg() {
+            return Err(TurntableError::MovedSincePlan {
+                planned_deg,
+                at_deg: status.angle_deg,
+            });
+        }
+        if self.identity().lease_s == Some(0.0) {
+            self.set_lease()?;
+        }
+        Turn::start(self, plan, status.machine_deg - status.angle_deg)
+    }
+
+    fn set_lease(&self) -> Result<(), TurntableError> {
+        let set = |messages: &[Message]| {
+            let lease = |message: &Message| matches!(message, Message::Setting { number: 60, value } if *value > 0.0);
+            messages.iter().any(lease)
+        };
+        if !set(&self.command("$$")?) {
+            self.command(&format!("$60={LEASE_S}"))?;
+        }
+        Ok(())
+    }
+}
+
 /// A turn in progress. Dropping it before its end stops the table.
 pub struct Turn<'table> {
     table: &'table Table,
@@ -46,11 +88,7 @@ pub struct Turn<'table> {
 }
 
 impl<'table> Turn<'table> {
-    pub(super) fn start(
-        table: &'table Table,
-        plan: TurnPlan,
-        zero_deg: f64,
-    ) -> Result<Self, TurntableError> {
+    fn start(table: &'table Table, plan: TurnPlan, zero_deg: f64) -> Result<Self, TurntableError> {
         let speed = plan.degrees_per_second();
         table.go(zero_deg + plan.back_deg(), speed)?;
         table.clock().sleep(SETTLE);

@@ -143,7 +143,7 @@ impl Muxer {
     /// Adds a frame that was taken at `t_us` microseconds of the camera's clock.
     ///
     /// # Errors
-    /// [`VideoError::NoRoom`] where the disk is full, [`VideoError::Write`] where it fails otherwise,
+    /// [`VideoError::DiskFull`] where the disk is full, [`VideoError::Write`] where it fails otherwise,
     /// [`VideoError::PictureBytes`] where an uncompressed picture has not the bytes of one (nothing was
     /// written then, and the next may follow), [`VideoError::NotAnnexB`], or [`VideoError::Mux`].
     pub fn write(&mut self, data: &[u8], t_us: i64) -> Result<Written, VideoError> {
@@ -295,7 +295,11 @@ impl Muxer {
         if is_no_room(&source) {
             let kept = self.file.metadata().map_or(0, |data| data.len());
             let missing = self.taken.saturating_sub(kept).max(1);
-            return VideoError::NoRoom { path, missing };
+            return VideoError::DiskFull {
+                path,
+                missing,
+                source,
+            };
         }
         VideoError::Write { path, source }
     }

@@ -172,7 +172,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     match lost {
         0 => Ok(Outcome::Whole),
         _ if lost == inputs.len() => Err("no photograph could be decomposed".into()),
-        _ => Ok(Outcome::Partial),
+        _ => Ok(Outcome::Incomplete),
     }
 }
 

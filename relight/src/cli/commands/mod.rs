@@ -4,4 +4,6 @@ pub(super) mod decompose;
 pub(super) mod eval;
 pub(super) mod render;
 pub(super) mod synth;
+#[cfg(feature = "train")]
+pub(super) mod train;
 pub(super) mod weights;

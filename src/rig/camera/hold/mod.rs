@@ -207,34 +207,6 @@ pub struct ControlDrift {
     pub is: Option<i64>,
 }
 
-/// The result of reading the controls after a take.
-#[derive(Debug)]
-pub enum ReadBack {
-    /// All have the values from before the take.
-    Unchanged,
-    /// These have other values.
-    Drifted(Vec<ControlDrift>),
-    /// They could not be read, so that it is unknown.
-    Unreadable(CameraError),
-}
-
-impl ReadBack {
-    /// The faults of the take that this means, a sentence each.
-    pub fn faults(&self) -> Vec<String> {
-        match self {
-            Self::Unchanged => Vec::new(),
-            Self::Drifted(drifts) => drifts
-                .iter()
-                .map(|drift| format!("the camera's settings changed during the turn: {drift}"))
-                .collect(),
-            Self::Unreadable(error) => vec![format!(
-                "the camera's settings could not be read back after the turn: {}",
-                with_causes(error)
-            )],
-        }
-    }
-}
-
 fn value_words(value: Option<i64>) -> String {
     value.map_or_else(|| "unreadable".to_owned(), |value| value.to_string())
 }
@@ -354,11 +326,17 @@ impl ManualPlan {
     }
 
     /// Reads the controls after a take and compares them with the plan, and with their values
-    /// `before` the take.
-    pub fn read_back(&self, before: &[Control], camera: &mut dyn Camera) -> ReadBack {
+    /// `before` the take: the faults of the take that this shows, a sentence each. That they cannot be
+    /// read is one.
+    pub fn faults_after(&self, before: &[Control], camera: &mut dyn Camera) -> Vec<String> {
         let after = match camera.controls() {
             Ok(after) => after,
-            Err(error) => return ReadBack::Unreadable(error),
+            Err(error) => {
+                let error = with_causes(&error);
+                return vec![format!(
+                    "the camera's settings could not be read back after the turn: {error}"
+                )];
+            }
         };
         let mut drifts = self.check(&after);
         for drift in drift_between(before, &after) {
@@ -366,10 +344,10 @@ impl ManualPlan {
                 drifts.push(drift);
             }
         }
-        match drifts.is_empty() {
-            true => ReadBack::Unchanged,
-            false => ReadBack::Drifted(drifts),
-        }
+        let drifts = drifts.iter();
+        drifts
+            .map(|drift| format!("the camera's settings changed during the turn: {drift}"))
+            .collect()
     }
 
     /// Controls whose values are not those of the plan.

@@ -77,7 +77,6 @@ impl ControlNumbers {
             flags: ControlFlags {
                 inactive: flag(KnownCameraControlFlag::Disabled),
                 read_only: flag(KnownCameraControlFlag::ReadOnly),
-                write_only: flag(KnownCameraControlFlag::WriteOnly),
                 grabbed: false,
                 volatile: flag(KnownCameraControlFlag::Volatile),
             },

@@ -16,11 +16,12 @@ use proptest::prelude::*;
 
 use super::worker::jpeg_length;
 use super::*;
+use crate::camera::Mode;
 use crate::camera::hold::{ManualPlan, ManualValues};
-use crate::camera::{Mode, StampSource};
 use crate::clock::Clock;
+use relit_data::session::FrameClock;
 
-const PATIENCE: Duration = Duration::from_secs(20);
+const TIMEOUT: Duration = Duration::from_secs(20);
 const LONGEST: Duration = Duration::from_millis(50);
 
 /// What the library does when a frame is asked for.
@@ -199,10 +200,10 @@ fn frames_come_without_a_counter_and_with_the_time_of_their_arrival() {
     let (mut camera, script) = started();
     let before = Clock::monotonic().now_us();
     script.send(Step::Frame(vec![1, 2])).unwrap();
-    let frame = camera.next_frame(PATIENCE).unwrap();
+    let frame = camera.next_frame(TIMEOUT).unwrap();
     let after = Clock::monotonic().now_us();
     assert_eq!((frame.fault(), frame.data), (None, vec![1, 2]));
-    assert_eq!((frame.sequence, frame.stamp), (None, StampSource::Arrival));
+    assert_eq!((frame.sequence, frame.clock), (None, FrameClock::Host));
     assert!((before..=after).contains(&frame.t_us));
     let late = camera.next_frame(LONGEST).unwrap_err();
     assert!(matches!(late, CameraError::Timeout { .. }), "{late}");
@@ -216,7 +217,7 @@ fn of_a_whole_buffer_only_the_jpeg_is_taken() {
     let before = [4, 0xff, 0xd9, 0, 0];
     let buffer = [&jpeg[..], &before].concat();
     script.send(Step::Frame(buffer)).unwrap();
-    assert_eq!(camera.next_frame(PATIENCE).unwrap().data, jpeg);
+    assert_eq!(camera.next_frame(TIMEOUT).unwrap().data, jpeg);
 }
 
 #[test]
@@ -227,14 +228,14 @@ fn a_reader_that_is_slow_loses_the_newest_frames_and_no_stamp_is_late() {
         script.send(Step::Frame(vec![n, n])).unwrap();
     }
     let read: Vec<u8> = (0..count)
-        .map(|_| camera.next_frame(PATIENCE).unwrap().data[0])
+        .map(|_| camera.next_frame(TIMEOUT).unwrap().data[0])
         .collect();
     assert!(read.into_iter().eq(0..count));
     // The last of those above may have come when there was a place again.
     for _ in 0..2 {
         script.send(Step::Frame(vec![99, 99])).unwrap();
     }
-    let next = camera.next_frame(PATIENCE).unwrap();
+    let next = camera.next_frame(TIMEOUT).unwrap();
     assert!([count + 3, 99].contains(&next.data[0]), "{next:?}");
 }
 
@@ -242,7 +243,7 @@ fn a_reader_that_is_slow_loses_the_newest_frames_and_no_stamp_is_late() {
 fn a_stream_is_stopped_and_started_again() {
     let (mut camera, script) = started();
     script.send(Step::Frame(vec![1, 2])).unwrap();
-    camera.next_frame(PATIENCE).unwrap();
+    camera.next_frame(TIMEOUT).unwrap();
     // The library is inside a call that waits for the next frame.
     let last = std::thread::spawn(move || {
         script.send(Step::Frame(vec![3, 4])).unwrap();
@@ -254,22 +255,22 @@ fn a_stream_is_stopped_and_started_again() {
     let script = last.join().unwrap();
     camera.start(&"GREY:2x1@30".parse().unwrap()).unwrap();
     script.send(Step::Frame(vec![5, 6])).unwrap();
-    assert_eq!(camera.next_frame(PATIENCE).unwrap().data, [5, 6]);
+    assert_eq!(camera.next_frame(TIMEOUT).unwrap().data, [5, 6]);
 }
 
 #[test]
 fn an_error_of_the_library_keeps_its_words_and_the_camera_starts_again() {
     let (mut camera, script) = started();
     script.send(Step::Fail).unwrap();
-    let error = camera.next_frame(PATIENCE).unwrap_err();
-    let told = with_causes(&error);
+    let error = camera.next_frame(TIMEOUT).unwrap_err();
+    let text = with_causes(&error);
     assert!(
-        told.contains("nokhwa:3") && told.contains("the cable is loose"),
-        "{told}"
+        text.contains("nokhwa:3") && text.contains("the cable is loose"),
+        "{text}"
     );
     camera.start(&"GREY:2x1@30".parse().unwrap()).unwrap();
     script.send(Step::Frame(vec![1, 2])).unwrap();
-    assert!(camera.next_frame(PATIENCE).is_ok());
+    assert!(camera.next_frame(TIMEOUT).is_ok());
 }
 
 #[test]
@@ -277,7 +278,7 @@ fn a_library_that_panics_is_an_unplugged_camera() {
     let (mut camera, script) = started();
     script.send(Step::Panic).unwrap();
     for _ in 0..2 {
-        let error = camera.next_frame(PATIENCE).unwrap_err();
+        let error = camera.next_frame(TIMEOUT).unwrap_err();
         assert!(matches!(error, CameraError::Unplugged { .. }), "{error}");
     }
     let error = camera.controls().unwrap_err();
@@ -348,12 +349,12 @@ fn rates_of_one_size_are_one_mode() {
 #[test]
 fn a_number_that_is_no_camera_is_told() {
     let error = NokhwaCamera::open(4_000_000).err().unwrap();
-    let told = with_causes(&error);
+    let text = with_causes(&error);
     assert!(
-        told.starts_with("nokhwa:4000000 failed when it was opened"),
-        "{told}"
+        text.starts_with("nokhwa:4000000 failed when it was opened"),
+        "{text}"
     );
-    assert!(told.contains("No such file"), "{told}");
+    assert!(text.contains("No such file"), "{text}");
 }
 
 #[test]

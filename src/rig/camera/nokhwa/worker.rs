@@ -14,8 +14,9 @@ use std::time::Duration;
 use ::nokhwa::utils::{CameraFormat, FrameFormat, RequestedFormat, RequestedFormatType};
 use ::nokhwa::{Camera as Library, NokhwaError};
 
-use super::super::{CameraError, Frame, StampSource};
+use super::super::{CameraError, Frame};
 use crate::clock::Clock;
+use relit_data::session::FrameClock;
 
 /// Longest wait for a job.
 const ANSWERING: Duration = Duration::from_secs(10);
@@ -224,7 +225,7 @@ impl Stream {
             data: data[..used].to_vec(),
             sequence: None,
             t_us,
-            stamp: StampSource::Arrival,
+            clock: FrameClock::Host,
             flagged: false,
         }
     }

@@ -5,9 +5,9 @@ use serde_json::Value;
 use super::timeline::Timeline;
 use crate::camera::{
     CameraAddress, Control, ControlFlags, ControlId, ControlKind, DeviceInfo, GrantedMode,
-    MenuItem, Mode, Rate, Rates, Sizes, StampSource,
+    MenuItem, Mode, Rate, Rates, Sizes,
 };
-use relit_data::session::{FrameClock, Manifest, Recording};
+use relit_data::session::{Manifest, Recording};
 use relit_video::Video;
 
 /// The rate that was recorded, or the mean one.
@@ -45,14 +45,6 @@ pub(super) fn describe(
         }],
         other_formats: Vec::new(),
         problems: notices.chain(damage).collect(),
-    }
-}
-
-/// What the recorded time stamps mean.
-pub(super) fn stamp(manifest: &Manifest) -> StampSource {
-    match manifest.camera.clock {
-        FrameClock::Driver => StampSource::EndOfFrame,
-        FrameClock::Host => StampSource::Arrival,
     }
 }
 

@@ -1,39 +1,36 @@
 //! Injecting faults into a replay's frames.
 
-use std::path::Path;
-
 use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
 use super::CameraError;
-use crate::camera::{Frame, GrantedMode, ReplayFaults};
+use crate::camera::{Frame, GrantedMode, ReplayAddress, ReplayFaults};
 use relit_video::PixelFormat;
 
 /// Makes damaged frames and frames of another size.
 #[derive(Debug)]
 pub(super) struct FaultInjector {
+    faults: ReplayFaults,
     /// The data of a frame of half the width and height.
     other_size: Vec<u8>,
 }
 
 impl FaultInjector {
-    pub(super) fn new(
-        path: &Path,
-        faults: &ReplayFaults,
-        mode: &GrantedMode,
-    ) -> Result<Self, CameraError> {
+    pub(super) fn new(address: &ReplayAddress, mode: &GrantedMode) -> Result<Self, CameraError> {
+        let faults = address.faults.clone();
         let other_size = match faults.resize {
             None => Vec::new(),
             Some(_) => half_size(mode).ok_or_else(|| CameraError::Replay {
-                path: path.to_owned(),
+                path: address.path.clone(),
                 why: format!("frames of {mode} cannot change their size; leave out `resize`"),
             })?,
         };
-        Ok(Self { other_size })
+        Ok(Self { faults, other_size })
     }
 
     /// The frame at this position with its faults.
-    pub(super) fn inject(&self, mut frame: Frame, position: u64, faults: &ReplayFaults) -> Frame {
+    pub(super) fn inject(&self, mut frame: Frame, position: u64) -> Frame {
+        let faults = &self.faults;
         if faults.resize.is_some_and(|from| from <= position) {
             frame.data.clone_from(&self.other_size);
         }

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use super::CameraError;
-use relit_video::{DecodeFault, Packets, Pending, PixelFormat, Video};
+use relit_video::{CodedFrame, DecodeFault, Packets, Pending, PixelFormat, Video};
 
 /// Decoded frames that may wait to be fetched.
 const AHEAD: usize = 4;
@@ -20,20 +20,10 @@ pub(super) struct Delivery {
     decoded: bool,
 }
 
-/// A frame of the recording.
-#[derive(Debug)]
-pub(super) struct Taken {
-    /// Position in the recording.
-    pub(super) number: u64,
-    pub(super) data: Vec<u8>,
-    /// True if, according to the container, its data are incomplete.
-    pub(super) damaged: bool,
-}
-
 #[derive(Debug)]
 pub(super) enum Source {
     Coded(Packets),
-    Decoded(Receiver<Taken>),
+    Decoded(Receiver<CodedFrame>),
 }
 
 impl Delivery {
@@ -89,13 +79,9 @@ impl Delivery {
 
 impl Source {
     /// The next frame; `None` at the end.
-    pub(super) fn next(&mut self) -> Option<Taken> {
+    pub(super) fn next(&mut self) -> Option<CodedFrame> {
         match self {
-            Self::Coded(packets) => packets.next().map(|frame| Taken {
-                number: frame.number,
-                data: frame.data,
-                damaged: frame.damaged,
-            }),
+            Self::Coded(packets) => packets.next(),
             Self::Decoded(frames) => frames.recv().ok(),
         }
     }
@@ -103,7 +89,7 @@ impl Source {
 
 /// Decodes all frames in order. One that cannot be decoded is left out, like a frame that a camera
 /// dropped: its counter is then missing.
-fn decode(video: &Video, format: PixelFormat, sender: &SyncSender<Taken>) {
+fn decode(video: &Video, format: PixelFormat, sender: &SyncSender<CodedFrame>) {
     let wanted: Vec<u64> = (0..video.frames().len() as u64).collect();
     let Ok(reader) = video.read(&wanted, DECODING_THREADS) else {
         return;
@@ -115,13 +101,13 @@ fn decode(video: &Video, format: PixelFormat, sender: &SyncSender<Taken>) {
             // Lost frames may come late.
             Ok((found, data)) if found == format && number >= due => {
                 due = number + 1;
-                let damaged = false;
-                let taken = Taken {
+                let frame = CodedFrame {
                     number,
                     data,
-                    damaged,
+                    key: true,
+                    damaged: false,
                 };
-                if sender.send(taken).is_err() {
+                if sender.send(frame).is_err() {
                     return;
                 }
             }

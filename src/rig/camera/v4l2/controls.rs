@@ -42,8 +42,7 @@ impl Device {
         if flag(sys::V4L2_CTRL_FLAG_DISABLED) {
             return Ok(None);
         }
-        let write_only = flag(sys::V4L2_CTRL_FLAG_WRITE_ONLY);
-        let value = if write_only || kind == ControlKind::Button {
+        let value = if flag(sys::V4L2_CTRL_FLAG_WRITE_ONLY) || kind == ControlKind::Button {
             None
         } else {
             match self.node.value(raw.id, kind == ControlKind::Integer64) {
@@ -67,7 +66,6 @@ impl Device {
             flags: ControlFlags {
                 inactive: flag(sys::V4L2_CTRL_FLAG_INACTIVE),
                 read_only: flag(sys::V4L2_CTRL_FLAG_READ_ONLY),
-                write_only,
                 grabbed: flag(sys::V4L2_CTRL_FLAG_GRABBED),
                 volatile: flag(sys::V4L2_CTRL_FLAG_VOLATILE),
             },

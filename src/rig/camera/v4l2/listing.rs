@@ -4,10 +4,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use relit_data::causes::with_causes;
+use v4l::v4l_sys as sys;
 
-use super::ioctl::{Listed, Node};
+use super::ioctl::Node;
 use super::{Camera as _, CameraError, V4l2Camera};
-use crate::camera::{CameraAddress, DeviceInfo, Fourcc, Mode, Rate, Rates, Sizes};
+use crate::camera::{CameraAddress, DeviceInfo, Fourcc, Mode, Rate, Rates};
 
 /// Most entries that are read of a driver's list, in case a faulty driver's list does not end.
 const MOST_ENTRIES: u32 = 256;
@@ -60,8 +61,7 @@ pub(super) fn modes(node: &Node) -> io::Result<(Vec<Mode>, Vec<Fourcc>)> {
             others.push(fourcc);
             continue;
         }
-        for size in entries(|index| node.frame_size(code, index))? {
-            let sizes = sizes(size);
+        for sizes in entries(|index| node.frame_size(code, index))? {
             let largest = sizes.largest();
             let intervals = entries(|index| node.frame_interval(code, largest, index))?;
             modes.push(Mode {
@@ -86,29 +86,15 @@ fn entries<T>(entry: impl Fn(u32) -> io::Result<Option<T>>) -> io::Result<Vec<T>
     Ok(found)
 }
 
-fn sizes(size: Listed<(u32, u32)>) -> Sizes {
-    match size {
-        Listed::One((width, height)) => Sizes::One(width, height),
-        Listed::Range { min, max, step } => Sizes::Range {
-            min,
-            max,
-            step: (step.0.max(1), step.1.max(1)),
-        },
-    }
-}
-
 /// Intervals are seconds; the shortest is the fastest rate.
-fn rates(intervals: &[Listed<(u32, u32)>]) -> Rates {
-    let rate = |(numerator, denominator): (u32, u32)| Rate::new(denominator, numerator);
+fn rates(intervals: &[(sys::v4l2_fract, sys::v4l2_fract)]) -> Rates {
+    let rate = |of: sys::v4l2_fract| Rate::new(of.denominator, of.numerator);
     let mut list = Vec::new();
-    for interval in intervals {
-        match *interval {
-            Listed::One(seconds) => list.extend(rate(seconds)),
-            Listed::Range { min, max, .. } => {
-                if let (Some(fastest), Some(slowest)) = (rate(min), rate(max)) {
-                    return Rates::Range { slowest, fastest };
-                }
-            }
+    for &(shortest, longest) in intervals {
+        match (rate(shortest), rate(longest)) {
+            (Some(fastest), Some(slowest)) if fastest == slowest => list.push(fastest),
+            (Some(fastest), Some(slowest)) => return Rates::Range { slowest, fastest },
+            _ => {}
         }
     }
     if list.is_empty() {
@@ -123,15 +109,18 @@ mod tests {
 
     #[test]
     fn intervals_become_rates() {
-        let one = |pair| Listed::One(pair);
-        let list = rates(&[one((1, 30)), one((1001, 30000)), one((0, 5))]);
+        let interval = |numerator, denominator| sys::v4l2_fract {
+            numerator,
+            denominator,
+        };
+        let one = |numerator, denominator| {
+            let one = interval(numerator, denominator);
+            (one, one)
+        };
+        let list = rates(&[one(1, 30), one(1001, 30000), one(0, 5)]);
         let wanted = [Rate::new(30, 1), Rate::new(30000, 1001)];
         assert_eq!(list, Rates::List(wanted.into_iter().flatten().collect()));
-        let range = Listed::Range {
-            min: (1, 60),
-            max: (1, 5),
-            step: (1, 1),
-        };
+        let range = (interval(1, 60), interval(1, 5));
         let (slowest, fastest) = (Rate::new(5, 1).unwrap(), Rate::new(60, 1).unwrap());
         assert_eq!(rates(&[range]), Rates::Range { slowest, fastest });
         assert_eq!(rates(&[]), Rates::Unknown);

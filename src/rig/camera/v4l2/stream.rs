@@ -5,13 +5,12 @@ use std::time::{Duration, Instant};
 
 use v4l::v4l_sys as sys;
 
-use super::ioctl::{FilledBuffer, Mapping, PixelLayout, Ready};
+use super::ioctl::Mapping;
 use super::{CameraError, Device, unplugged};
 use crate::camera::frame::without_padding;
-use crate::camera::{
-    Fourcc, Frame, GrantedMode, ModeRequest, Rate, SequenceUnwrapper, StampSource,
-};
+use crate::camera::{Fourcc, Frame, GrantedMode, ModeRequest, Rate, SequenceUnwrapper};
 use crate::clock::Clock;
+use relit_data::session::FrameClock;
 use relit_video::PixelFormat;
 
 /// Buffers requested of the driver: at 30 frames/s they last for a quarter of a second without
@@ -23,9 +22,8 @@ const FEWEST_BUFFERS: usize = 2;
 /// Longest wait in one call; a longer one is made of several.
 const LONGEST_WAIT: Duration = Duration::from_secs(60);
 
-#[derive(Debug)]
 pub(super) struct Stream {
-    layout: PixelLayout,
+    layout: sys::v4l2_pix_format,
     format: PixelFormat,
     buffers: Vec<Mapping>,
     /// Buffers that the driver did not accept; they are queued again later.
@@ -42,16 +40,19 @@ impl Stream {
             .node
             .set_format(want.fourcc.code(), want.width, want.height)
             .map_err(|error| device.error("its format was set", error))?;
-        let fourcc = Fourcc::from_code(layout.fourcc);
+        let fourcc = Fourcc::from_code(layout.pixelformat);
         let format = fourcc.pixel_format().ok_or_else(|| CameraError::Format {
             device: device.name(),
             fourcc,
         })?;
         let interval = device
             .node
-            .set_interval(want.rate.denominator(), want.rate.numerator())
+            .set_interval(sys::v4l2_fract {
+                numerator: want.rate.denominator(),
+                denominator: want.rate.numerator(),
+            })
             .map_err(|error| device.error("its frame rate was set", error))?;
-        let rate = interval.and_then(|(numerator, denominator)| Rate::new(denominator, numerator));
+        let rate = interval.and_then(|seconds| Rate::new(seconds.denominator, seconds.numerator));
         let mut stream = Self {
             layout,
             format,
@@ -107,12 +108,12 @@ impl Stream {
         self.offer_idle(device)?;
         loop {
             let left = timeout.saturating_sub(start.elapsed()).min(LONGEST_WAIT);
-            let ready = device.node.wait(left);
-            let ready = ready.map_err(|error| device.stream_error("waited for", error))?;
+            let broken = device.node.wait(left);
+            let broken = broken.map_err(|error| device.stream_error("waited for", error))?;
             match device.node.dequeue() {
                 Ok(filled) => return Ok(self.take(device, filled)),
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
-                    if ready == Ready::Broken {
+                    if broken {
                         return Err(device.stream_error("waited for", error));
                     }
                 }
@@ -135,37 +136,33 @@ impl Stream {
     }
 
     /// Copies a filled buffer's frame and queues the buffer again at once.
-    fn take(&mut self, device: &Device, filled: FilledBuffer) -> Frame {
+    fn take(&mut self, device: &Device, filled: sys::v4l2_buffer) -> Frame {
         let arrived_us = Clock::monotonic().now_us();
         // An unknown index is a fault of the driver; the frame is then empty.
         let data = usize::try_from(filled.index)
             .ok()
             .and_then(|index| self.buffers.get(index))
-            .map(|buffer| buffer.copy(filled.bytes_used as usize))
+            .map(|buffer| buffer.copy(filled.bytesused as usize))
             .unwrap_or_default();
         // The frame is delivered even if the driver does not accept its buffer now.
         if device.node.queue(filled.index).is_err() {
             self.idle.push(filled.index);
         }
-        let (t_us, stamp) = stamp(filled, arrived_us);
-        let PixelLayout {
-            fourcc,
-            width,
-            height,
-            stride,
-        } = self.layout;
+        let (t_us, clock) = stamp(filled.flags, filled.timestamp, arrived_us);
+        let sys::v4l2_pix_format { width, height, .. } = self.layout;
+        let stride = self.layout.bytesperline as usize;
         let data = match self.format.rows(width, height) {
-            Some((row, rows)) => without_padding(data, stride as usize, row, rows),
+            Some((row, rows)) => without_padding(data, stride, row, rows),
             None => data,
         };
         Frame {
-            fourcc: Fourcc::from_code(fourcc),
+            fourcc: Fourcc::from_code(self.layout.pixelformat),
             width,
             height,
             data,
             sequence: Some(self.counter.next(filled.sequence)),
             t_us,
-            stamp,
+            clock,
             flagged: filled.flags & sys::V4L2_BUF_FLAG_ERROR != 0,
         }
     }
@@ -191,15 +188,14 @@ impl Stream {
 }
 
 /// A frame's time stamp: the driver's if it uses the monotonic clock, otherwise the arrival.
-fn stamp(filled: FilledBuffer, arrived_us: i64) -> (i64, StampSource) {
-    if filled.flags & sys::V4L2_BUF_FLAG_TIMESTAMP_MASK != sys::V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC {
-        return (arrived_us, StampSource::Arrival);
+fn stamp(flags: u32, time: sys::timeval, arrived_us: i64) -> (i64, FrameClock) {
+    let t_us = time.tv_sec.saturating_mul(1_000_000);
+    match flags & sys::V4L2_BUF_FLAG_TIMESTAMP_MASK {
+        sys::V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC => {
+            (t_us.saturating_add(time.tv_usec), FrameClock::Driver)
+        }
+        _ => (arrived_us, FrameClock::Host),
     }
-    let source = match filled.flags & sys::V4L2_BUF_FLAG_TSTAMP_SRC_MASK {
-        sys::V4L2_BUF_FLAG_TSTAMP_SRC_SOE => StampSource::StartOfExposure,
-        _ => StampSource::EndOfFrame,
-    };
-    (filled.t_us, source)
 }
 
 #[cfg(test)]
@@ -208,20 +204,17 @@ mod tests {
 
     #[test]
     fn a_time_stamp_of_another_clock_is_replaced_and_marked() {
-        let filled = |flags| FilledBuffer {
-            index: 0,
-            bytes_used: 0,
-            flags,
-            sequence: 0,
-            t_us: 5,
+        let time = sys::timeval {
+            tv_sec: 2,
+            tv_usec: 5,
         };
         let monotonic = sys::V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
-        let at = |flags| stamp(filled(flags), 9);
-        assert_eq!(at(monotonic), (5, StampSource::EndOfFrame));
+        let at = |flags| stamp(flags, time, 9);
+        assert_eq!(at(monotonic), (2_000_005, FrameClock::Driver));
         let exposure = monotonic | sys::V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
-        assert_eq!(at(exposure), (5, StampSource::StartOfExposure));
+        assert_eq!(at(exposure), (2_000_005, FrameClock::Driver));
         for other in [0, sys::V4L2_BUF_FLAG_TIMESTAMP_COPY] {
-            assert_eq!(at(other), (9, StampSource::Arrival));
+            assert_eq!(at(other), (9, FrameClock::Host));
         }
     }
 }

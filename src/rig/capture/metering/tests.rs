@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use relit_data::causes::with_causes;
+use relit_data::session::FrameClock;
 
 use super::*;
 use crate::camera::{
     ControlFlags, ControlId, ControlKind, DeviceInfo, Fourcc, GrantedMode, MenuItem, Mode,
-    ModeRequest, Rate, Rates, Sequence, Sizes, StampSource,
+    ModeRequest, Rate, Rates, Sizes,
 };
 use crate::capture::preflight::ready_table;
 use crate::clock::Clock;
@@ -141,12 +142,9 @@ impl Camera for Scene<'_> {
             width: 8,
             height: 8,
             data: vec![grey; 64],
-            sequence: Some(Sequence {
-                raw: 0,
-                unwrapped: self.frames,
-            }),
+            sequence: Some(self.frames),
             t_us: self.due_us,
-            stamp: StampSource::EndOfFrame,
+            clock: FrameClock::Driver,
             flagged: false,
         })
     }

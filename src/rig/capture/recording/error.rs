@@ -57,7 +57,7 @@ impl RecordingError {
     pub fn is_out_of_space(&self) -> bool {
         use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
         match self {
-            Self::Video(VideoError::NoRoom { .. }) => true,
+            Self::Video(VideoError::DiskFull { .. }) => true,
             Self::Session(session::SessionError::Io { source, .. }) => {
                 matches!(source.kind(), StorageFull | QuotaExceeded | FileTooLarge)
             }

@@ -29,7 +29,7 @@ mod writer_thread;
 pub use error::RecordingError;
 pub use outcome::End;
 pub use progress::Progress;
-pub use recorder::{Plan, Recorder};
+pub use recorder::{Recorder, RecordingPlan};
 pub use salvage::{Salvaged, Saved, salvage, salvage_session};
 pub use verdict::Recorded;
 pub use window::Window;

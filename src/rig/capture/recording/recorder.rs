@@ -28,15 +28,13 @@ const QUEUE_FRAMES: (usize, usize) = (8, 256);
 
 /// What is to be recorded, and where.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub struct RecordingPlan {
     /// The folder of sessions.
     pub root: PathBuf,
     /// What is known of the session at its start. The video's file and codec are filled in.
     pub manifest: Manifest,
     /// What the camera delivers since it was started.
     pub stream: StreamFormat,
-    /// When the turn is, where that is known in advance: see [`Recorder::announce`].
-    pub window: Option<Window>,
     /// Dropped or damaged frames up to which a take is accepted.
     pub max_dropped: u64,
     /// How long a frame may wait for a place in the queue before it is dropped. A camera does not
@@ -65,16 +63,10 @@ impl Recorder {
     ///
     /// # Errors
     /// [`RecordingError::Thread`], or what making the session's folder and video answers.
-    pub fn start(camera: Box<dyn Camera>, plan: Plan) -> Result<Self, RecordingError> {
+    pub fn start(camera: Box<dyn Camera>, plan: RecordingPlan) -> Result<Self, RecordingError> {
         let (clock, stream) = (plan.clock, plan.stream);
         let session = SessionWriter::create(&plan.root, with_video(plan.manifest, &stream))?;
-        let shared = Arc::new(Shared::new(
-            &clock,
-            State {
-                window: plan.window,
-                ..State::default()
-            },
-        ));
+        let shared = Arc::new(Shared::new(&clock, State::default()));
         let (sender, queue) = crossbeam_channel::bounded(queue_places(&stream));
         let writer = WriterThread {
             stream,
@@ -142,10 +134,10 @@ impl Recorder {
     pub fn wait(mut self) -> Result<(Box<dyn Camera>, Recorded), RecordingError> {
         let panicked = RecordingError::Panicked;
         let (camera, writer) = self.threads.take().ok_or(panicked("recorder"))?;
-        let (camera, filmed) = camera.join().map_err(|_| panicked("camera"))?;
+        let (camera, delivered) = camera.join().map_err(|_| panicked("camera"))?;
         let written = writer.join().map_err(|_| panicked("writer"))?;
         let recorded = Recorded {
-            camera: filmed,
+            camera: delivered,
             writer: written,
             max_dropped: self.max_dropped,
         };

@@ -1,5 +1,7 @@
 //! What a take is worth, and closing its session.
 
+use std::error::Error;
+
 use super::cutter::TurnCount;
 use super::error::RecordingError;
 use super::finding::{Finding, frames};
@@ -167,7 +169,7 @@ impl Recorded {
             return with_causes(failure);
         }
         let pending = match failure {
-            RecordingError::Video(relit_video::VideoError::NoRoom { missing, .. }) => *missing,
+            RecordingError::Video(relit_video::VideoError::DiskFull { missing, .. }) => *missing,
             _ => 0,
         };
         let recorded = self.recorded();
@@ -175,9 +177,10 @@ impl Recorded {
         let mean_bytes = self.writer.bytes / recorded.max(1);
         let missing = pending.saturating_add(left.saturating_mul(mean_bytes));
         format!(
-            "the disk is full: in {} about {missing} bytes are missing for the rest of the turn ({})",
+            "the disk is full: in {} about {missing} bytes are missing for the rest of the turn ({}): {}",
             self.writer.session.folder().display(),
-            frames(left)
+            frames(left),
+            first_cause(failure)
         )
     }
 
@@ -219,6 +222,15 @@ impl Recorded {
         }
         faults
     }
+}
+
+/// The error that caused all others: for one of the disk, the system's answer.
+fn first_cause<'a>(error: &'a (dyn Error + 'static)) -> &'a (dyn Error + 'static) {
+    let mut first = error;
+    while let Some(cause) = first.source() {
+        first = cause;
+    }
+    first
 }
 
 fn lost(findings: &[Finding]) -> u64 {

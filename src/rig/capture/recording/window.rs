@@ -9,12 +9,6 @@ pub struct Window {
 }
 
 impl Window {
-    /// `None` where it does not end after it begins.
-    #[must_use]
-    pub fn new(from_us: i64, to_us: i64) -> Option<Self> {
-        (from_us < to_us).then_some(Self { from_us, to_us })
-    }
-
     /// A window of `us` microseconds, at least one, from `from_us` on.
     #[must_use]
     pub fn lasting(from_us: i64, us: i64) -> Self {

@@ -74,7 +74,7 @@ impl WriterThread {
         }
         // The index has to grow, whatever the driver's counter and time stamps do.
         let last = self.session.index().entries().last();
-        let sequence = frame.sequence.map_or(0, |sequence| sequence.unwrapped);
+        let sequence = frame.sequence.unwrap_or(0);
         let entry = FrameEntry {
             n: self.delivered.len() as u64,
             sequence: sequence.max(last.map_or(0, |last| last.sequence.saturating_add(1))),

@@ -192,7 +192,7 @@ function showDisk() {
   const size = (bytes) => (bytes < 1e9 ? `${(bytes / 1e6).toFixed(0)} MB` : `${(bytes / 1e9).toFixed(1)} GB`);
   const short = needed > 0 && free < needed * RESERVE;
   const takes = needed > 0 ? `, a take needs ${size(needed)}` : "";
-  $("disk").textContent = `${size(free)} free${takes}${short ? ": too little room for a take" : ""}`;
+  $("disk").textContent = `${size(free)} free${takes}${short ? ": too little space for a take" : ""}`;
   $("disk").className = short ? "bad" : "quiet";
   $("disk").hidden = !resting() && !short;
 }

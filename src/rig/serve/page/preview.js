@@ -76,7 +76,7 @@ async function run() {
       await pause(PACE);
     } catch (problem) {
       if (problem.status === 401) return;
-      // The state's own line tells of a lost connection; a damaged picture is followed by a better one.
+      // The state's own line shows a lost connection; a damaged picture is followed by a better one.
       await pause(AGAIN);
     }
   }

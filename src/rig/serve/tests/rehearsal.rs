@@ -1,5 +1,5 @@
 //! A rig that goes through its phases by itself, to look at the page with a browser:
-//! `cargo test --lib rehearsal -- --ignored --nocapture`, then open the address it tells.
+//! `cargo test --lib rehearsal -- --ignored --nocapture`, then open the address that it prints.
 
 use std::fs;
 use std::sync::Arc;

@@ -24,28 +24,6 @@ const DQBUF: Request<sys::v4l2_buffer> = Request::new(vidioc::VIDIOC_DQBUF);
 const STREAMON: Request<i32> = Request::new(vidioc::VIDIOC_STREAMON);
 const STREAMOFF: Request<i32> = Request::new(vidioc::VIDIOC_STREAMOFF);
 
-/// A filled buffer that was taken from the driver.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::camera::v4l2) struct FilledBuffer {
-    pub(in crate::camera::v4l2) index: u32,
-    pub(in crate::camera::v4l2) bytes_used: u32,
-    /// `V4L2_BUF_FLAG_*`.
-    pub(in crate::camera::v4l2) flags: u32,
-    pub(in crate::camera::v4l2) sequence: u32,
-    pub(in crate::camera::v4l2) t_us: i64,
-}
-
-/// How waiting for a frame ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::camera::v4l2) enum Ready {
-    /// A frame, or an error that dequeuing will return.
-    Yes,
-    /// The time ran out.
-    No,
-    /// The device reports an error, or is gone.
-    Broken,
-}
-
 impl Node {
     /// Requests this many buffers, 0 to free all; returns how many there are.
     pub(in crate::camera::v4l2) fn request_buffers(&self, count: u32) -> io::Result<u32> {
@@ -91,19 +69,8 @@ impl Node {
     }
 
     /// Takes the next filled buffer; [`io::ErrorKind::WouldBlock`] if there is none.
-    pub(in crate::camera::v4l2) fn dequeue(&self) -> io::Result<FilledBuffer> {
-        let filled = self.buffer_call(&DQBUF, 0)?;
-        let time = filled.timestamp;
-        Ok(FilledBuffer {
-            index: filled.index,
-            bytes_used: filled.bytesused,
-            flags: filled.flags,
-            sequence: filled.sequence,
-            t_us: time
-                .tv_sec
-                .saturating_mul(1_000_000)
-                .saturating_add(time.tv_usec),
-        })
+    pub(in crate::camera::v4l2) fn dequeue(&self) -> io::Result<sys::v4l2_buffer> {
+        self.buffer_call(&DQBUF, 0)
     }
 
     pub(in crate::camera::v4l2) fn stream_on(&self) -> io::Result<()> {
@@ -114,21 +81,17 @@ impl Node {
         self.call(&STREAMOFF, &mut CAPTURE.cast_signed())
     }
 
-    /// Waits until a frame can be taken.
-    pub(in crate::camera::v4l2) fn wait(&self, timeout: Duration) -> io::Result<Ready> {
+    /// Waits until a frame can be taken; true if the device reports an error instead, or is gone.
+    pub(in crate::camera::v4l2) fn wait(&self, timeout: Duration) -> io::Result<bool> {
         let timeout = Timespec::try_from(timeout).map_err(|_| io::ErrorKind::InvalidInput)?;
         let mut watched = [PollFd::from_borrowed_fd(self.0.as_fd(), PollFlags::IN)];
         match poll(&mut watched, Some(&timeout)) {
-            Ok(0) | Err(rustix::io::Errno::INTR) => return Ok(Ready::No),
+            Ok(0) | Err(rustix::io::Errno::INTR) => return Ok(false),
             Ok(_) => {}
             Err(error) => return Err(error.into()),
         }
         let broken = PollFlags::ERR | PollFlags::HUP | PollFlags::NVAL;
-        Ok(if watched[0].revents().intersects(broken) {
-            Ready::Broken
-        } else {
-            Ready::Yes
-        })
+        Ok(watched[0].revents().intersects(broken))
     }
 }
 

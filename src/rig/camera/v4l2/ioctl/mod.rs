@@ -23,7 +23,9 @@ use v4l::v4l_sys as sys;
 use v4l::v4l2;
 use v4l::v4l2::vidioc;
 
-pub(super) use buffers::{FilledBuffer, Mapping, Ready};
+use crate::camera::Sizes;
+
+pub(super) use buffers::Mapping;
 
 /// The single-planar capture queue.
 const CAPTURE: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -106,23 +108,6 @@ pub(super) struct Identity {
     pub(super) capabilities: u32,
 }
 
-/// Sizes or intervals as the kernel lists them.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Listed<T> {
-    One(T),
-    Range { min: T, max: T, step: T },
-}
-
-/// What S_FMT granted.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PixelLayout {
-    pub(super) fourcc: u32,
-    pub(super) width: u32,
-    pub(super) height: u32,
-    /// Bytes from one row to the next; 0 for compressed formats.
-    pub(super) stride: u32,
-}
-
 impl Node {
     pub(super) fn open(path: &Path) -> io::Result<Self> {
         // Non-blocking, so that only poll waits, which has a time limit.
@@ -188,11 +173,7 @@ impl Node {
     }
 
     /// The frame size with this index; `None` after the last.
-    pub(super) fn frame_size(
-        &self,
-        fourcc: u32,
-        index: u32,
-    ) -> io::Result<Option<Listed<(u32, u32)>>> {
+    pub(super) fn frame_size(&self, fourcc: u32, index: u32) -> io::Result<Option<Sizes>> {
         let mut found = sys::v4l2_frmsizeenum {
             index,
             pixel_format: fourcc,
@@ -208,25 +189,25 @@ impl Node {
         };
         Ok(Some(
             if found.type_ == sys::v4l2_frmsizetypes_V4L2_FRMSIZE_TYPE_DISCRETE {
-                Listed::One((one.width, one.height))
+                Sizes::One(one.width, one.height)
             } else {
-                Listed::Range {
+                Sizes::Range {
                     min: (range.min_width, range.min_height),
                     max: (range.max_width, range.max_height),
-                    step: (range.step_width, range.step_height),
+                    step: (range.step_width.max(1), range.step_height.max(1)),
                 }
             },
         ))
     }
 
-    /// The frame interval with this index, seconds as numerator and denominator; `None` after the
-    /// last.
+    /// The shortest and the longest of the frame intervals with this index, seconds; both are the same
+    /// where there is one. `None` after the last.
     pub(super) fn frame_interval(
         &self,
         fourcc: u32,
         (width, height): (u32, u32),
         index: u32,
-    ) -> io::Result<Option<Listed<(u32, u32)>>> {
+    ) -> io::Result<Option<(sys::v4l2_fract, sys::v4l2_fract)>> {
         let mut found = sys::v4l2_frmivalenum {
             index,
             pixel_format: fourcc,
@@ -237,7 +218,6 @@ impl Node {
         if listed(self.call(&ENUM_FRAMEINTERVALS, &mut found))?.is_none() {
             return Ok(None);
         }
-        let pair = |of: sys::v4l2_fract| (of.numerator, of.denominator);
         // SAFETY: all fields of the union are plain numbers, and the call filled or zeroed them.
         let (one, range) = unsafe {
             let intervals = found.__bindgen_anon_1;
@@ -245,13 +225,9 @@ impl Node {
         };
         Ok(Some(
             if found.type_ == sys::v4l2_frmivaltypes_V4L2_FRMIVAL_TYPE_DISCRETE {
-                Listed::One(pair(one))
+                (one, one)
             } else {
-                Listed::Range {
-                    min: pair(range.min),
-                    max: pair(range.max),
-                    step: pair(range.step),
-                }
+                (range.min, range.max)
             },
         ))
     }
@@ -262,7 +238,7 @@ impl Node {
         fourcc: u32,
         width: u32,
         height: u32,
-    ) -> io::Result<PixelLayout> {
+    ) -> io::Result<sys::v4l2_pix_format> {
         let mut format: sys::v4l2_format = zeroed();
         format.type_ = CAPTURE;
         format.fmt.pix = sys::v4l2_pix_format {
@@ -276,22 +252,15 @@ impl Node {
         // overlays.
         unsafe { self.call_with_pointers(&S_FMT, &mut format) }?;
         // SAFETY: the field for this type of queue, which the call filled; plain numbers.
-        let pix = unsafe { format.fmt.pix };
-        Ok(PixelLayout {
-            fourcc: pix.pixelformat,
-            width: pix.width,
-            height: pix.height,
-            stride: pix.bytesperline,
-        })
+        Ok(unsafe { format.fmt.pix })
     }
 
-    /// Requests a frame interval, seconds as numerator and denominator, and returns the granted one;
-    /// `None` if the driver does not support it.
+    /// Requests a frame interval, seconds, and returns the granted one; `None` if the driver does not
+    /// support it.
     pub(super) fn set_interval(
         &self,
-        numerator: u32,
-        denominator: u32,
-    ) -> io::Result<Option<(u32, u32)>> {
+        interval: sys::v4l2_fract,
+    ) -> io::Result<Option<sys::v4l2_fract>> {
         let mut parameters: sys::v4l2_streamparm = zeroed();
         parameters.type_ = CAPTURE;
         if listed(self.call(&G_PARM, &mut parameters))?.is_none() {
@@ -299,15 +268,11 @@ impl Node {
         }
         // SAFETY: the field for this type of queue; plain numbers.
         if unsafe { parameters.parm.capture.capability } & sys::V4L2_CAP_TIMEPERFRAME != 0 {
-            parameters.parm.capture.timeperframe = sys::v4l2_fract {
-                numerator,
-                denominator,
-            };
+            parameters.parm.capture.timeperframe = interval;
             self.call(&S_PARM, &mut parameters)?;
         }
         // SAFETY: as above.
-        let granted = unsafe { parameters.parm.capture.timeperframe };
-        Ok(Some((granted.numerator, granted.denominator)))
+        Ok(Some(unsafe { parameters.parm.capture.timeperframe }))
     }
 }
 

@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::timing::{Counter, FrameStamp, FrameTiming, MissingFrames, TimingAnomaly, gaps};
+use super::timing::{FrameStamp, FrameTiming, MissingFrames, TimingAnomaly, gaps};
 use super::window::Window;
 use crate::camera::Frame;
 
@@ -210,7 +210,7 @@ impl Cutter {
             anomalies: anomalies
                 .filter_map(|anomaly| anomaly.counted_from(lead, exposures.len()))
                 .collect(),
-            counts: timing.counter == Counter::Counts,
+            counts: timing.counts,
             expected,
             exposures,
         }
@@ -252,7 +252,7 @@ impl PreRoll {
 
 fn stamp_of(frame: &Frame) -> FrameStamp {
     FrameStamp {
-        sequence: frame.sequence.map(|sequence| sequence.unwrapped),
+        sequence: frame.sequence,
         t_us: frame.t_us,
     }
 }

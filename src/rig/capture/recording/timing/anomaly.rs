@@ -23,7 +23,7 @@ pub(crate) enum TimingAnomaly {
         /// By how many periods; positive where it is late.
         off: i64,
     },
-    /// Two frames in one period, without a counter that tells them apart.
+    /// Two frames in one period, without a counter that distinguishes them.
     #[error("frame {frame} comes within the same period as the one before")]
     SamePeriod {
         /// The second of both.

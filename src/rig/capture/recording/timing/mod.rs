@@ -57,17 +57,6 @@ pub(crate) struct MissingFrames {
     pub evidence: Evidence,
 }
 
-/// What the driver's counter does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Counter {
-    /// It counts exposures.
-    Counts,
-    /// It stands still.
-    Still,
-    /// The camera has none.
-    Absent,
-}
-
 /// What the stamps of a row of frames show.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FrameTiming {
@@ -75,8 +64,8 @@ pub(crate) struct FrameTiming {
     pub period_us: f64,
     /// When exposure 0 is due by the straight line through all stamps, microseconds.
     pub start_us: f64,
-    /// What the counter does.
-    pub counter: Counter,
+    /// Whether the driver's counter numbers the exposures: there is one, and it does not stand still.
+    pub counts: bool,
     /// For each delivered frame the number of its exposure; the first is 0, and they grow.
     pub exposures: Vec<u64>,
     /// For each delivered frame what shows that frames are missing before it.
@@ -98,18 +87,18 @@ impl FrameTiming {
             .iter()
             .map(|stamp| stamp.t_us.saturating_sub(first) as f64)
             .collect();
-        let counter = counter_of(stamps);
-        let mut found = match counter {
-            Counter::Counts => Numbering::by_both(&counted(stamps), &times, nominal),
-            Counter::Still | Counter::Absent => Numbering::by_time(&times, nominal),
+        let counts = counts(stamps);
+        let mut found = match counts {
+            true => Numbering::by_both(&counted(stamps), &times, nominal),
+            false => Numbering::by_time(&times, nominal),
         };
         found.anomalies.extend(wrong_rates(&found, fps));
         Self {
             period_us: found.line.period,
             start_us: first as f64 + found.line.start,
-            counter,
+            counts,
             evidence: (0..stamps.len())
-                .map(|at| evidence(&found, counter, at))
+                .map(|at| evidence(&found, counts, at))
                 .collect(),
             exposures: found.exposures,
             anomalies: found.anomalies,
@@ -118,16 +107,11 @@ impl FrameTiming {
 }
 
 /// Whether the counter counts. One that repeats a number now and then still does.
-fn counter_of(stamps: &[FrameStamp]) -> Counter {
-    if stamps.iter().any(|stamp| stamp.sequence.is_none()) {
-        return Counter::Absent;
-    }
+fn counts(stamps: &[FrameStamp]) -> bool {
     let steps = stamps.windows(2);
     let grown = steps.filter(|pair| pair[1].sequence > pair[0].sequence);
-    match grown.count() * 2 < stamps.len().saturating_sub(1) {
-        true => Counter::Still,
-        false => Counter::Counts,
-    }
+    stamps.iter().all(|stamp| stamp.sequence.is_some())
+        && grown.count() * 2 >= stamps.len().saturating_sub(1)
 }
 
 /// The counter from the first frame on; it may go back below 0.
@@ -157,13 +141,12 @@ fn wrong_rates(found: &Numbering, agreed: f64) -> Vec<TimingAnomaly> {
 }
 
 /// What shows gaps before frame `at`.
-fn evidence(found: &Numbering, counter: Counter, at: usize) -> Evidence {
-    match (counter, found.by_time, found.agreed.get(at)) {
-        _ if at == 0 => Evidence::Time,
-        (Counter::Still | Counter::Absent, ..) => Evidence::Time,
-        (Counter::Counts, false, _) => Evidence::Counter,
-        (Counter::Counts, true, Some(false)) => Evidence::TimeAgainstCounter,
-        (Counter::Counts, true, _) => Evidence::Both,
+fn evidence(found: &Numbering, counts: bool, at: usize) -> Evidence {
+    match (found.by_time, found.agreed.get(at)) {
+        _ if at == 0 || !counts => Evidence::Time,
+        (false, _) => Evidence::Counter,
+        (true, Some(false)) => Evidence::TimeAgainstCounter,
+        (true, _) => Evidence::Both,
     }
 }
 

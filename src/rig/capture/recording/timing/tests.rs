@@ -97,7 +97,7 @@ fn every_gap_is_found(seeds: std::ops::Range<u64>) {
                 .iter()
                 .all(|missing| missing.evidence == Evidence::Both)
         );
-        assert_eq!(timing.counter, Counter::Counts);
+        assert!(timing.counts);
     }
 }
 
@@ -183,7 +183,7 @@ fn a_counter_that_repeats_a_number_and_catches_up_loses_nothing() {
     let mut stamps = regular(300);
     stamps[100].sequence = stamps[99].sequence;
     let timing = FrameTiming::of(&stamps, 30.0);
-    assert_eq!((timing.counter, missing(&timing)), (Counter::Counts, 0));
+    assert_eq!((timing.counts, missing(&timing)), (true, 0));
     assert_eq!(timing.exposures, (0..300).collect::<Vec<_>>());
     assert!(!timing.anomalies.is_empty());
 }
