@@ -20,7 +20,7 @@ use relight::decompose::{
 use relight::image::{Extent, Rgb, Transfer, read_planes};
 use relight::light::{Normals, Panorama, ShLight, YUp};
 use relight::nets::paper::{Head, light_net, normal_net};
-use relight::nets::{Precision, Weights, decomposer, to_onnx};
+use relight::nets::{WeightPrecision, Weights, decomposer, to_onnx};
 use relight::render::NormalsFrame;
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
@@ -480,7 +480,7 @@ fn the_program_decomposes_what_it_can_and_tells_what_it_left_out() {
     let folder = Folder::new();
     let weights = Weights::initial(&decomposer(), 3);
     weights
-        .write(&folder.path("w.safetensors"), Precision::Half)
+        .write(&folder.path("w.safetensors"), WeightPrecision::Half)
         .unwrap();
     fs::create_dir(folder.path("photos")).unwrap();
     object(0).save(folder.path("photos/black.png")).unwrap();

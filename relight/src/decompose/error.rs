@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::data::{Damage, OpenError};
+use crate::data::{DamagedSample, OpenError};
 use crate::image::{Extent, ImageError};
 use crate::light::{LightError, LightFileError};
 use crate::nets::NetError;
@@ -94,7 +94,7 @@ pub enum DecomposeError {
     Open(#[from] OpenError),
     /// A sample of a shard is damaged.
     #[error("a sample is damaged")]
-    Damage(#[from] Damage),
+    Damage(#[from] DamagedSample),
     /// No light can be fitted.
     #[error("no light can be fitted")]
     Light(#[from] LightError),

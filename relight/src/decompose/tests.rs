@@ -109,7 +109,8 @@ fn everything_is_as_large_as_the_picture_finite_and_nothing_outside_the_mask() {
 #[test]
 fn with_the_mirrored_pass_a_mirrored_picture_has_mirrored_layers() {
     let extent = Extent::new(64, 64);
-    let (picture, mask) = (smooth(extent), disc(extent, 30.0));
+    // Of an even width, so that the square around it lies in the middle.
+    let (picture, mask) = (smooth(extent), disc(extent, 25.0));
     let options = DecomposeOptions::default();
     let net = untrained();
     let found = net
@@ -133,7 +134,7 @@ fn the_gate_opens_where_more_than_five_percent_are_saturated() {
         side: 32,
         pixel: |input: [f32; INPUTS], _: f32| {
             let mut answer = by_colour(input, 0.0);
-            answer[6] = 3.0;
+            answer[6] = 9.0;
             answer
         },
     }));
@@ -197,7 +198,8 @@ fn tiles_add_what_the_whole_is_too_coarse_for_and_show_no_seams() {
         net.decompose(&picture, &mask, &options).unwrap()
     };
     let whole = Decomposer::of(Box::new(PixelNet {
-        side: 300,
+        // As large as the square around the object, so that nothing is resized.
+        side: 312,
         pixel: by_colour,
     }));
     let options = DecomposeOptions::default();

@@ -55,13 +55,13 @@ impl Inference {
     /// `width` x `height` pixels.
     ///
     /// # Errors
-    /// [`Error::Io`], or [`Error::Onnx`] where it is no network or cannot take such a picture.
+    /// [`NetError::Io`], or [`NetError::Onnx`] where it is no network or cannot take such a picture.
     pub fn read_onnx(
         path: &Path,
         channels: usize,
         (width, height): (usize, usize),
-    ) -> Result<Self, Error> {
-        let bytes = std::fs::read(path).map_err(|source| Error::Io {
+    ) -> Result<Self, NetError> {
+        let bytes = std::fs::read(path).map_err(|source| NetError::Io {
             path: path.to_owned(),
             doing: "read",
             source,
@@ -74,7 +74,7 @@ impl Inference {
         Ok(Self {
             name: "the network of the ONNX file",
             shape,
-            plan: plan.map_err(|fault| Error::Onnx {
+            plan: plan.map_err(|fault| NetError::Onnx {
                 path: path.to_owned(),
                 fault: format!("{fault:#}"),
             })?,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use relight::nets::paper::{self, Head};
-use relight::nets::{Graph, Precision, Weights, decomposer, to_onnx};
+use relight::nets::{Graph, WeightPrecision, Weights, decomposer, to_onnx};
 use relit_data::durable::write_whole;
 use serde_json::json;
 
@@ -113,9 +113,9 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
             .map_err(|error| format!("{}: {error}", export.output.display()))?;
     } else {
         let precision = if export.half {
-            Precision::Half
+            WeightPrecision::Half
         } else {
-            Precision::Single
+            WeightPrecision::Single
         };
         weights.write(&export.output, precision)?;
     }
