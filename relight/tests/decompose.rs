@@ -389,7 +389,7 @@ fn frames_of_a_shard_have_its_mask_and_the_saturation_that_was_counted_on_the_vi
     }
     writer.finish().unwrap();
     let shard = folder.path(&format!("{name}.tar"));
-    let inputs = PhotoInput::find(&[shard.clone()], None).unwrap();
+    let inputs = PhotoInput::find(std::slice::from_ref(&shard), None).unwrap();
     assert_eq!(inputs.len(), 3);
     assert_eq!(PhotoInput::find(&[shard], Some(2)).unwrap().len(), 2);
     let photos = inputs

@@ -61,11 +61,11 @@ impl OtherNormals {
             return Ok(None);
         };
         let pixels = self.side * self.side;
-        let z = match answer.shape() {
-            &[1, 3, height, width] if [height, width] == [self.side; 2] => {
+        let z = match *answer.shape() {
+            [1, 3, height, width] if [height, width] == [self.side; 2] => {
                 answer.values()[2 * pixels..].to_vec()
             }
-            &[1, 2, height, width] if [height, width] == [self.side; 2] => vec![1.0; pixels],
+            [1, 2, height, width] if [height, width] == [self.side; 2] => vec![1.0; pixels],
             _ => return Ok(None),
         };
         let [x, y] = [0, 1].map(|channel| &answer.values()[channel * pixels..][..pixels]);
