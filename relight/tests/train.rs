@@ -22,7 +22,7 @@ use relight::train::{
     Adam, AdamSettings, AnsweredTensors, Composer, Composition, ComputePrecision, DataSettings,
     DecomposeSettings, DecomposeTask, Model, Observer, PaperInputs, PaperPhase, PaperSettings,
     PaperTask, PrecisionChoice, Resources, Run, RunOutcome, RunSettings, TABLE, Task, TrainError,
-    TruthArrays,
+    TruthArrays, read_settings,
 };
 use tch::{Device, Kind, Tensor};
 
@@ -394,4 +394,14 @@ fn a_damaged_sample_of_a_turn_is_told_and_the_run_goes_on() {
         .unwrap();
     assert_eq!(outcome.steps, 6);
     assert!(!observer.damage.is_empty());
+}
+
+#[test]
+fn the_settings_that_come_with_relight_can_be_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights");
+    let paper: PaperSettings = read_settings(&folder.join("paper.toml")).unwrap();
+    paper.check().unwrap();
+    assert_eq!((paper.run.rate, paper.run.batch), (1e-6, 12));
+    let ours: DecomposeSettings = read_settings(&folder.join("decompose.toml")).unwrap();
+    ours.check().unwrap();
 }
