@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use relight::data::{Encoding, Place, Plan, Stream, Streaming, Turns};
+use relight::data::{DrawPlan, Encoding, Place, Stream, Streaming, Turns};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let opened = start.elapsed().as_secs_f64();
 
     let streaming = Streaming {
-        plan: Plan::of_turns(1),
+        plan: DrawPlan::of_turns(1),
         from: Place::default(),
         until_epoch: rounds,
         threads,

@@ -7,6 +7,7 @@
 //! | module | concern |
 //! | --- | --- |
 //! | [`data`] | shards and folders as streams of arrays |
+//! | [`decompose`] | a photograph into normals, albedo, shading, highlight and light |
 //! | [`eval`] | the protocols of the paper's tables |
 //! | [`image`] | planes of `f32`, colours that know their space, files |
 //! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
@@ -16,6 +17,7 @@
 //! | [`render`] | diffuse and specular layers on normals, their derivatives, the truth by Monte Carlo |
 //! | [`synth`] | pictures of objects with the truth that they were made of |
 pub mod data;
+pub mod decompose;
 pub mod eval;
 pub mod image;
 pub mod light;

@@ -14,8 +14,8 @@ use std::sync::Arc;
 
 use image::{GrayImage, Luma, Rgb as Pixel, RgbImage};
 use relight::data::{
-    DamagedBatch, Drawn, Encoding, OpenError, Place, Plan, Source, Stream, Streaming, TruthLayout,
-    TruthSet, TurnBatch, Turns,
+    DamagedBatch, DrawPlan, Drawn, Encoding, OpenError, Place, Source, Stream, Streaming,
+    TruthLayout, TruthSet, TurnBatch, Turns,
 };
 use relight::image::{Extent, Planes};
 use relit_data::causes::with_causes;
@@ -87,7 +87,7 @@ type Item = Result<Drawn<TurnBatch>, DamagedBatch<Drawn<TurnBatch>>>;
 
 fn stream(turns: &Arc<Turns>, threads: usize, from: Place) -> Vec<Item> {
     let streaming = Streaming {
-        plan: Plan::of_turns(5),
+        plan: DrawPlan::of_turns(5),
         from,
         until_epoch: 1,
         threads: NonZeroUsize::new(threads).unwrap(),
@@ -185,7 +185,7 @@ fn memory_that_is_given_back_leaves_no_trace() {
     let turns = open(dir.path());
     let expected = whole(stream(&turns, 1, Place::default()));
     let streaming = Streaming {
-        plan: Plan::of_turns(5),
+        plan: DrawPlan::of_turns(5),
         from: Place::default(),
         until_epoch: 1,
         threads: NonZeroUsize::MIN,

@@ -14,7 +14,7 @@ use std::process::Command;
 use relight::data::{TruthLayout, TruthSet};
 use relight::eval::{
     EvalError, HighlightMethod, IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, LightMethod,
-    Line, MaskRule, NormalMethod, Predictions, RelightMethod, RelightingSet, Table,
+    MaskRule, NormalMethod, Predictions, RelightMethod, RelightingSet, ScoreLine, ScoreTable,
     evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_relighting,
 };
 use relight::image::{Depth, Extent, Linear, Planes, Rgb, Srgb, Transfer, write_exr, write_png};
@@ -107,19 +107,19 @@ fn predictions(root: &Path) -> Predictions {
     Predictions::new(root.to_owned(), Transfer::Linear, NormalsFrame::YUp)
 }
 
-fn value(line: &Line, name: &str) -> f64 {
+fn value(line: &ScoreLine, name: &str) -> f64 {
     let found = line.measures.iter().find(|one| one.name == name);
     found
         .unwrap_or_else(|| panic!("{name} is not in {line:?}"))
         .value
 }
 
-fn intrinsic(root: &Path, method: IntrinsicMethod) -> Result<Table, EvalError> {
+fn intrinsic(root: &Path, method: IntrinsicMethod) -> Result<ScoreTable, EvalError> {
     let input = IntrinsicInput::Diffuse;
     evaluate_intrinsic(&set(root), "both", input, &[method], &|| {})
 }
 
-fn said(result: Result<Table, EvalError>) -> String {
+fn said(result: Result<ScoreTable, EvalError>) -> String {
     with_causes(&result.unwrap_err())
 }
 

@@ -9,7 +9,7 @@
 
 use relight::nets::paper::{Head, light_net, normal_net};
 use relight::nets::{Graph, Inference, Weights, decomposer};
-use relight::train::{Adam, AdamSettings, Model, Precision};
+use relight::train::{Adam, AdamSettings, ComputePrecision, Model};
 use tch::{Device, Kind, Tensor};
 
 const SIDE: i64 = 64;
@@ -19,7 +19,7 @@ fn input(channels: usize) -> Tensor {
     Tensor::randn([1, channels as i64, SIDE, SIDE], (Kind::Float, Device::Cpu))
 }
 
-fn model(graph: Graph, precision: Precision) -> Model {
+fn model(graph: Graph, precision: ComputePrecision) -> Model {
     let weights = Weights::initial(&graph, 3);
     Model::new(graph, &weights, Device::Cpu, precision).unwrap()
 }
@@ -33,7 +33,7 @@ fn what_is_trained_answers_as_what_is_shipped() {
         let side = SIDE as usize;
         let shipped = Inference::new(&graph, &weights, (side, side)).unwrap();
         let shipped = shipped.run(&flat).unwrap();
-        let model = Model::new(graph, &weights, Device::Cpu, Precision::Single).unwrap();
+        let model = Model::new(graph, &weights, Device::Cpu, ComputePrecision::Single).unwrap();
         let trained = &model.forward(&picture).unwrap()[0];
         let trained = Vec::<f32>::try_from(trained.flatten(0, -1)).unwrap();
         let largest = trained
@@ -66,7 +66,7 @@ fn descend(model: &Model, adam: &mut Adam, steps: usize) -> Vec<f64> {
 
 #[test]
 fn steps_lower_the_loss_in_both_precisions() {
-    for precision in [Precision::Single, Precision::Mixed] {
+    for precision in [ComputePrecision::Single, ComputePrecision::Mixed] {
         let model = model(decomposer(), precision);
         let mut adam = Adam::new(AdamSettings::default(), model.parameters()).unwrap();
         let losses = descend(&model, &mut adam, 6);
@@ -77,14 +77,14 @@ fn steps_lower_the_loss_in_both_precisions() {
 #[test]
 fn a_run_that_was_saved_goes_on_to_the_same_losses() {
     tch::set_num_threads(1);
-    let first = model(light_net(Head::Pooled), Precision::Single);
+    let first = model(light_net(Head::Pooled), ComputePrecision::Single);
     let mut adam = Adam::new(AdamSettings::default(), first.parameters()).unwrap();
     descend(&first, &mut adam, 3);
     let (weights, memory) = (first.weights().unwrap(), adam.memory().unwrap());
     let undisturbed = descend(&first, &mut adam, 3);
 
     let graph = light_net(Head::Pooled);
-    let second = Model::new(graph, &weights, Device::Cpu, Precision::Single).unwrap();
+    let second = Model::new(graph, &weights, Device::Cpu, ComputePrecision::Single).unwrap();
     let mut adam = Adam::new(AdamSettings::default(), second.parameters()).unwrap();
     adam.recall(&memory, 3).unwrap();
     assert_eq!(descend(&second, &mut adam, 3), undisturbed);
@@ -92,12 +92,12 @@ fn a_run_that_was_saved_goes_on_to_the_same_losses() {
 
 #[test]
 fn the_memory_of_another_network_is_refused() {
-    let light = model(light_net(Head::Pooled), Precision::Single);
+    let light = model(light_net(Head::Pooled), ComputePrecision::Single);
     let memory = Adam::new(AdamSettings::default(), light.parameters())
         .unwrap()
         .memory()
         .unwrap();
-    let other = model(decomposer(), Precision::Single);
+    let other = model(decomposer(), ComputePrecision::Single);
     let mut adam = Adam::new(AdamSettings::default(), other.parameters()).unwrap();
     assert!(adam.recall(&memory, 3).is_err());
 }

@@ -19,12 +19,17 @@ use serde_json::{Value, json};
 pub(crate) enum Outcome {
     /// All was done: exit code 0.
     Whole,
+    /// Something was left out or lost, which was told: exit code 3.
+    #[cfg(feature = "train")]
+    Incomplete,
 }
 
 impl From<Outcome> for ExitCode {
     fn from(outcome: Outcome) -> Self {
         match outcome {
             Outcome::Whole => Self::SUCCESS,
+            #[cfg(feature = "train")]
+            Outcome::Incomplete => Self::from(3),
         }
     }
 }
@@ -42,6 +47,12 @@ impl Console {
     /// A console that prints JSON lines (`json`) or text on standard output.
     pub(crate) fn new(json: bool) -> Self {
         Self { json }
+    }
+
+    /// Whether lines are for a machine.
+    #[cfg(feature = "train")]
+    pub(crate) fn is_json(self) -> bool {
+        self.json
     }
 
     /// A result: `text` for a person, `event` as one JSON line for a machine.

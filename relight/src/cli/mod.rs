@@ -8,6 +8,8 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 
+#[cfg(feature = "train")]
+use commands::train;
 use commands::{eval, render, synth};
 use console::Console;
 
@@ -37,6 +39,10 @@ enum Verb {
     /// Make pictures of objects together with their truth: samples, whole turns, panoramas.
     #[command(after_help = synth::EXAMPLES)]
     Synth(synth::Arguments),
+    /// Train networks (built with the feature `train`).
+    #[cfg(feature = "train")]
+    #[command(after_help = train::EXAMPLES)]
+    Train(train::Arguments),
 }
 
 impl Verb {
@@ -46,6 +52,8 @@ impl Verb {
             Self::Render(arguments) => arguments.fault(),
             Self::Eval(arguments) => arguments.fault(),
             Self::Synth(_) => None,
+            #[cfg(feature = "train")]
+            Self::Train(_) => None,
         }
     }
 }
@@ -63,5 +71,7 @@ pub(crate) fn run() -> ExitCode {
         Verb::Render(arguments) => render::run(&arguments, console),
         Verb::Eval(arguments) => eval::run(&arguments, console),
         Verb::Synth(arguments) => synth::run(&arguments, console),
+        #[cfg(feature = "train")]
+        Verb::Train(arguments) => train::run(&arguments, console),
     })
 }

@@ -128,7 +128,7 @@ impl SampleFault {
 /// A sample that cannot be given, by its name.
 #[derive(Debug, thiserror::Error)]
 #[error("{sample}")]
-pub struct Damage {
+pub struct DamagedSample {
     /// Which sample: file and place in it.
     pub sample: String,
     /// Why.
@@ -144,10 +144,10 @@ pub struct DamagedBatch<B> {
     /// The batch with the samples that are whole.
     pub rest: B,
     /// The samples that are not, at least one.
-    pub damage: Vec<Damage>,
+    pub damage: Vec<DamagedSample>,
 }
 
-fn listed(damage: &[Damage]) -> String {
+fn listed(damage: &[DamagedSample]) -> String {
     let texts: Vec<String> = damage.iter().map(|one| with_causes(one)).collect();
     texts.join("; ")
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::turns::listed;
-use super::{Damage, OpenError, SampleFault};
+use super::{DamagedSample, OpenError, SampleFault};
 use crate::metrics::{Darker, Judgement};
 
 /// The images of a folder in the layout of Intrinsic Images in the Wild (Bell et al. 2014):
@@ -67,18 +67,18 @@ impl JudgedImages {
     /// What people judged of an image: of points on opaque surfaces, where they agreed.
     ///
     /// # Errors
-    /// [`Damage`], which names the file.
+    /// [`DamagedSample`], which names the file.
     ///
     /// # Panics
     /// Where there are not so many.
-    pub fn judgements(&self, index: usize) -> Result<Vec<Judgement>, Damage> {
+    pub fn judgements(&self, index: usize) -> Result<Vec<Judgement>, DamagedSample> {
         let path = &self.files[index];
         let read = || -> Result<Vec<Judgement>, SampleFault> {
             let bytes = fs::read(path).map_err(SampleFault::read(path))?;
             let file: File = serde_json::from_slice(&bytes).map_err(SampleFault::numbers(path))?;
             Ok(file.judgements())
         };
-        read().map_err(|fault| Damage {
+        read().map_err(|fault| DamagedSample {
             sample: self.name(index),
             fault,
         })

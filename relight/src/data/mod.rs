@@ -6,7 +6,7 @@
 //! | whole turns: shards of `relit-extract`, and folders in the layout of the paper's released data set | [`Turns`] |
 //! | images with their truth, in folders: of `relight synth` (the warm-up set), MIT Intrinsic Images, Janner et al., LIME | [`TruthSet`] |
 //! | photographs with what people judged of them: Intrinsic Images in the Wild | [`JudgedImages`] |
-//! | the order in which samples are drawn: batches of neighbours, shuffled, restartable | [`Plan`] |
+//! | the order in which samples are drawn: batches of neighbours, shuffled, restartable | [`DrawPlan`] |
 //! | batches decoded by threads ahead of their consumer | [`Stream`] |
 //!
 //! A sample that is damaged is never left out in silence: [`DamagedBatch`].
@@ -18,9 +18,9 @@ mod stream;
 mod truth;
 mod turns;
 
-pub use error::{Damage, DamagedBatch, OpenError, SampleFault};
+pub use error::{DamagedBatch, DamagedSample, OpenError, SampleFault};
 pub use judgements::JudgedImages;
-pub use plan::{Draw, Place, Plan, SampleId, Share};
+pub use plan::{Draw, DrawPlan, Place, SampleId, Share};
 pub use stream::{Drawn, Source, Stream, Streaming};
 pub use truth::{TruthLayout, TruthSample, TruthSet};
 pub use turns::{Encoding, TurnBatch, TurnFrame, Turns};

@@ -28,7 +28,7 @@ pub enum Draw {
 
 /// How samples are drawn. The same plan over the same data always draws the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Plan {
+pub struct DrawPlan {
     /// Samples of a batch, at least 1.
     pub batch: u32,
     /// Which of them go together.
@@ -78,7 +78,7 @@ pub(super) struct Job {
     pub(super) next: Place,
 }
 
-impl Plan {
+impl DrawPlan {
     /// Batches of 12 neighbours in shuffled order, as the paper draws them.
     #[must_use]
     pub const fn of_turns(seed: u64) -> Self {
@@ -256,8 +256,8 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::HashSet;
 
-    fn plan(batch: u32, draw: Draw, seed: Option<u64>) -> Plan {
-        Plan {
+    fn plan(batch: u32, draw: Draw, seed: Option<u64>) -> DrawPlan {
+        DrawPlan {
             batch,
             draw,
             seed,
@@ -265,7 +265,7 @@ mod tests {
         }
     }
 
-    fn drawn(plan: Plan, turns: &[u32], from: Place, end: u64) -> Vec<SampleId> {
+    fn drawn(plan: DrawPlan, turns: &[u32], from: Place, end: u64) -> Vec<SampleId> {
         plan.jobs(turns, from, end)
             .flat_map(|job| job.samples)
             .collect()
@@ -315,7 +315,7 @@ mod tests {
             let mut all: Vec<SampleId> = (0..of)
                 .flat_map(|index| {
                     let share = Share::new(index, of).unwrap();
-                    drawn(Plan { share, ..whole }, &turns, Place::default(), 1)
+                    drawn(DrawPlan { share, ..whole }, &turns, Place::default(), 1)
                 })
                 .collect();
             let mut expected = drawn(whole, &turns, Place::default(), 1);
@@ -328,7 +328,7 @@ mod tests {
     #[test]
     fn a_batch_of_neighbours_is_a_run_of_one_turn_around_its_end() {
         let turns = [1500, 30];
-        for job in Plan::of_turns(3).jobs(&turns, Place::default(), 1) {
+        for job in DrawPlan::of_turns(3).jobs(&turns, Place::default(), 1) {
             let turn = job.samples[0].turn;
             assert!(job.samples.len() == 12 || turn == 1 && job.samples.len() == 6);
             for pair in job.samples.windows(2) {
@@ -342,7 +342,7 @@ mod tests {
     fn batches_are_shuffled_over_turns_and_otherwise_in_each_epoch() {
         let epoch = |epoch| {
             drawn(
-                Plan::of_turns(3),
+                DrawPlan::of_turns(3),
                 &[120; 8],
                 Place { epoch, sample: 0 },
                 epoch + 1,
@@ -370,9 +370,9 @@ mod tests {
     #[test]
     fn epochs_without_a_batch_end_at_once() {
         let endless = |share, turns: &[u32]| {
-            let plan = Plan {
+            let plan = DrawPlan {
                 share,
-                ..Plan::of_turns(1)
+                ..DrawPlan::of_turns(1)
             };
             plan.jobs(turns, Place::default(), u64::MAX).next()
         };

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
 use super::plan::Job;
-use super::{Damage, DamagedBatch, OpenError, Place, Plan, SampleId};
+use super::{DamagedBatch, DamagedSample, DrawPlan, OpenError, Place, SampleId};
 
 /// A set of samples that batches can be drawn from.
 pub trait Source: Send + Sync + 'static {
@@ -19,15 +19,18 @@ pub trait Source: Send + Sync + 'static {
     /// The batch of these samples, and those of them that are damaged and not in it. May be called
     /// from many threads at a time. `spare` is a batch that is no longer needed, whose memory can be
     /// used again.
-    fn batch(&self, samples: &[SampleId], spare: Option<Self::Batch>)
-    -> (Self::Batch, Vec<Damage>);
+    fn batch(
+        &self,
+        samples: &[SampleId],
+        spare: Option<Self::Batch>,
+    ) -> (Self::Batch, Vec<DamagedSample>);
 }
 
 /// What is drawn, from where to where, and by how many threads.
 #[derive(Debug, Clone, Copy)]
 pub struct Streaming {
     /// Which samples make which batch.
-    pub plan: Plan,
+    pub plan: DrawPlan,
     /// Where to begin.
     pub from: Place,
     /// The epoch before which the stream ends: 1 for one time through all samples, `u64::MAX` for
@@ -58,11 +61,11 @@ pub struct Drawn<B> {
 /// use std::num::NonZeroUsize;
 /// use std::path::Path;
 /// use std::sync::{Arc, Mutex};
-/// use relight::data::{Encoding, Place, Plan, Stream, Streaming, Turns};
+/// use relight::data::{DrawPlan, Encoding, Place, Stream, Streaming, Turns};
 ///
 /// let turns = Arc::new(Turns::open(Path::new("data"), Encoding::Srgb)?);
 /// let streaming = Streaming {
-///     plan: Plan::of_turns(1),
+///     plan: DrawPlan::of_turns(1),
 ///     from: Place::default(),
 ///     until_epoch: 3,
 ///     threads: NonZeroUsize::MIN,
@@ -215,13 +218,13 @@ mod tests {
             &self,
             samples: &[SampleId],
             _: Option<Vec<SampleId>>,
-        ) -> (Vec<SampleId>, Vec<Damage>) {
+        ) -> (Vec<SampleId>, Vec<DamagedSample>) {
             let broken = SampleId {
                 turn: 1,
                 position: 7,
             };
             let (bad, good): (Vec<_>, Vec<_>) = samples.iter().partition(|&&id| id == broken);
-            let damage = |_| Damage {
+            let damage = |_| DamagedSample {
                 sample: "seven".to_owned(),
                 fault: SampleFault::Lost {
                     why: "it is gone".to_owned(),
@@ -233,7 +236,7 @@ mod tests {
 
     fn streaming(threads: usize, from: Place, until_epoch: u64) -> Streaming {
         Streaming {
-            plan: Plan {
+            plan: DrawPlan {
                 batch: 12,
                 draw: Draw::Neighbours,
                 seed: Some(9),
@@ -298,7 +301,7 @@ mod tests {
             fn turns(&self) -> Vec<u32> {
                 vec![0, 0]
             }
-            fn batch(&self, _: &[SampleId], _: Option<()>) -> ((), Vec<Damage>) {
+            fn batch(&self, _: &[SampleId], _: Option<()>) -> ((), Vec<DamagedSample>) {
                 ((), Vec::new())
             }
         }

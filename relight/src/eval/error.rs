@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::data::{Damage, OpenError};
+use crate::data::{DamagedSample, OpenError};
 use crate::image::{Extent, ImageError};
 use crate::light::LightError;
 use crate::metrics::MetricError;
@@ -16,7 +16,7 @@ pub enum EvalError {
     Open(#[from] OpenError),
     /// A sample of the truth cannot be read.
     #[error("the truth is damaged")]
-    Damage(#[from] Damage),
+    Damage(#[from] DamagedSample),
     /// The truth does not have a part that the protocol needs.
     #[error("the truth has no {part} of {sample}: this protocol cannot be run on it")]
     Lacks {
@@ -85,7 +85,7 @@ pub enum EvalError {
     },
     /// Objects cannot be made.
     #[error(transparent)]
-    Synth(#[from] crate::synth::Error),
+    Synth(#[from] crate::synth::SynthError),
     /// Light is not in the form of coefficients.
     #[error("{} does not hold light", path.display())]
     Light {

@@ -1,7 +1,7 @@
 //! Highlights of single images: the table on highlight separation.
 
 use super::run::{Scored, add_method, cut_out, largest, measured, need, object};
-use super::{EvalError, MaskRule, Predictions, Progress, Table};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use crate::data::{TruthSample, TruthSet};
 use crate::image::{Linear, Planes, Rgb, Srgb};
 use crate::metrics::{Comparison, ScaleFit, Ssim, dssim};
@@ -41,9 +41,9 @@ pub fn evaluate_highlights(
     set: &TruthSet,
     split: &str,
     methods: &[HighlightMethod],
-    progress: Progress<'_>,
-) -> Result<Table, EvalError> {
-    let mut table = Table {
+    progress: EvalProgress<'_>,
+) -> Result<ScoreTable, EvalError> {
+    let mut table = ScoreTable {
         protocol: "highlights".to_owned(),
         notes: vec![
             "highlight: against the true one; diffuse: the image less the highlight, not below 0, \

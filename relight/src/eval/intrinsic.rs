@@ -1,13 +1,13 @@
 //! Albedo and shading of single images: the table on MIT Intrinsic Images.
 
-use super::fit::{completed, fit_light};
+use super::completion::completed;
 use super::retinex::{Decomposition, Retinex, divided};
 use super::run::{Scored, add_method, grey, measured, need, object, of_grey};
-use super::{EvalError, MaskRule, Predictions, Progress, Table};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use crate::data::{TruthSample, TruthSet};
 use crate::image::{Linear, Rgb};
 use crate::metrics::{Convention, IntrinsicError, Windows, intrinsic_error};
-use crate::render::{DiffuseForm, DiffuseLayer};
+use crate::render::{DiffuseForm, DiffuseLayer, fit_light};
 
 /// Which image is decomposed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -173,9 +173,9 @@ pub fn evaluate_intrinsic(
     split: &str,
     input: IntrinsicInput,
     methods: &[IntrinsicMethod],
-    progress: Progress<'_>,
-) -> Result<Table, EvalError> {
-    let mut table = Table {
+    progress: EvalProgress<'_>,
+) -> Result<ScoreTable, EvalError> {
+    let mut table = ScoreTable {
         protocol: "intrinsic images".to_owned(),
         notes: notes(input),
         lines: Vec::new(),

@@ -1,14 +1,13 @@
 //! Light of single images: the table on Light-Net.
 
-use super::fit::fit_light;
 use super::normals::known;
 use super::run::{Scored, add_method, largest, measured, need};
-use super::{EvalError, MaskRule, Predictions, Progress, Table};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use crate::data::{TruthSample, TruthSet};
 use crate::image::{Linear, Rgb};
 use crate::light::{Order, ShLight};
 use crate::metrics::{Comparison, ScaleFit, Ssim};
-use crate::render::{DiffuseForm, DiffuseLayer};
+use crate::render::{DiffuseForm, DiffuseLayer, fit_light};
 
 /// Where light comes from.
 #[derive(Debug, Clone)]
@@ -56,9 +55,9 @@ pub fn evaluate_light(
     split: &str,
     form: DiffuseForm,
     methods: &[LightMethod],
-    progress: Progress<'_>,
-) -> Result<Table, EvalError> {
-    let mut table = Table {
+    progress: EvalProgress<'_>,
+) -> Result<ScoreTable, EvalError> {
+    let mut table = ScoreTable {
         protocol: "light".to_owned(),
         notes: vec![
             "the shading that the light makes on the true normals, against the true shading"

@@ -9,12 +9,12 @@
 //! | [`evaluate_ordinal`] | what people judged of points | albedo | WHDR |
 //! | [`evaluate_relighting`] | an object's maps, images under many lights | maps, or images | MSE, DSSIM |
 //!
-//! Each line of a [`Table`] says what was compared and how: numbers under one name differ by a
+//! Each line of a [`ScoreTable`] says what was compared and how: numbers under one name differ by a
 //! factor of two and more between conventions, and published tables rarely say which is theirs. What
 //! cannot be read or measured is an error that names the image; no image is left out.
 
+mod completion;
 mod error;
-mod fit;
 mod highlights;
 mod intrinsic;
 mod light;
@@ -37,5 +37,5 @@ pub use relighting::{
     RelightMethod, RelightingRecipe, RelightingSet, evaluate_relighting, make_relighting,
 };
 pub use retinex::{Decomposition, Retinex};
-pub use run::Progress;
-pub use table::{ImageScores, Line, MaskRule, Measured, Table, Terms};
+pub use run::EvalProgress;
+pub use table::{ImageScores, MaskRule, Measured, ScoreLine, ScoreTable, Terms};

@@ -1,7 +1,7 @@
 //! Normals of single images: the table on the data of Janner et al.
 
 use super::run::{Scored, add_method, cut_out, measured, need, object};
-use super::{EvalError, MaskRule, Predictions, Progress, Table};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use crate::data::{TruthSample, TruthSet};
 use crate::image::Planes;
 use crate::light::{Normals, YUp};
@@ -41,9 +41,9 @@ pub fn evaluate_normals(
     set: &TruthSet,
     split: &str,
     methods: &[NormalMethod],
-    progress: Progress<'_>,
-) -> Result<Table, EvalError> {
-    let mut table = Table {
+    progress: EvalProgress<'_>,
+) -> Result<ScoreTable, EvalError> {
+    let mut table = ScoreTable {
         protocol: "normals".to_owned(),
         notes: vec![
             format!(

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::run::{Scored, add_lines};
-use super::{EvalError, MaskRule, Predictions, Progress, Table};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use crate::data::JudgedImages;
 use crate::image::{Linear, Planes, Rgb, Transfer};
 use crate::metrics::{ScaleFit, whdr};
@@ -52,9 +52,9 @@ pub fn evaluate_ordinal(
     images: &JudgedImages,
     split: &str,
     methods: &[OrdinalMethod],
-    progress: Progress<'_>,
-) -> Result<Table, EvalError> {
-    let mut table = Table {
+    progress: EvalProgress<'_>,
+) -> Result<ScoreTable, EvalError> {
+    let mut table = ScoreTable {
         protocol: "ordinal albedo".to_owned(),
         notes: vec![format!(
             "WHDR: weighted human disagreement rate, delta {DELTA}"

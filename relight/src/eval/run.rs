@@ -2,13 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::{EvalError, ImageScores, Line, MaskRule, Measured, Table, Terms};
+use super::{EvalError, ImageScores, MaskRule, Measured, ScoreLine, ScoreTable, Terms};
 use crate::data::{TruthSample, TruthSet};
 use crate::image::{Extent, Linear, Planes, Rgb};
 use crate::metrics::MetricError;
 
 /// Told after each image, from many threads.
-pub type Progress<'a> = &'a (dyn Fn() + Sync);
+pub type EvalProgress<'a> = &'a (dyn Fn() + Sync);
 
 /// A measure of one image that becomes part of a line.
 pub(super) struct Scored {
@@ -24,10 +24,10 @@ pub(super) struct Scored {
 /// Measures each image of the set with `score`, which gives the same lines for each, and adds the
 /// lines of means to the table.
 pub(super) fn add_method(
-    table: &mut Table,
+    table: &mut ScoreTable,
     (set, split): (&TruthSet, &str),
     method: &str,
-    progress: Progress<'_>,
+    progress: EvalProgress<'_>,
     score: impl Fn(&TruthSample) -> Result<Vec<Scored>, EvalError> + Sync,
 ) -> Result<(), EvalError> {
     let scored: Vec<(String, Vec<Scored>)> = (0..set.names().len())
@@ -45,7 +45,7 @@ pub(super) fn add_method(
 
 /// Adds the lines of means, and the scores of each sample, which are of `images` images each.
 pub(super) fn add_lines(
-    table: &mut Table,
+    table: &mut ScoreTable,
     method: &str,
     split: &str,
     images: usize,
@@ -61,7 +61,12 @@ pub(super) fn add_lines(
         }));
 }
 
-fn lines(method: &str, split: &str, each: usize, samples: &[(String, Vec<Scored>)]) -> Vec<Line> {
+fn lines(
+    method: &str,
+    split: &str,
+    each: usize,
+    samples: &[(String, Vec<Scored>)],
+) -> Vec<ScoreLine> {
     let Some((_, first)) = samples.first() else {
         return Vec::new();
     };
@@ -71,7 +76,7 @@ fn lines(method: &str, split: &str, each: usize, samples: &[(String, Vec<Scored>
             .map(|(_, scored)| scored[line].measures[measure].1);
         values.sum::<f64>() / samples.len() as f64
     };
-    let line = |(at, scored): (usize, &Scored)| Line {
+    let line = |(at, scored): (usize, &Scored)| ScoreLine {
         method: method.to_owned(),
         part: scored.part.to_owned(),
         measures: (0..scored.measures.len())

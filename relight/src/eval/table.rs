@@ -55,7 +55,7 @@ pub struct Measured {
 
 /// One line of a table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Line {
+pub struct ScoreLine {
     /// What made the estimate.
     pub method: String,
     /// What was compared: albedo, shading, their mean, ...
@@ -81,18 +81,18 @@ pub struct ImageScores {
 /// The result of a protocol. [`Display`](fmt::Display) writes it for a terminal; as JSON it holds the
 /// scores of each image as well.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Table {
+pub struct ScoreTable {
     /// The protocol's name.
     pub protocol: String,
     /// What a reader should know of all lines.
     pub notes: Vec<String>,
     /// The lines.
-    pub lines: Vec<Line>,
+    pub lines: Vec<ScoreLine>,
     /// The scores of each image.
     pub images: Vec<ImageScores>,
 }
 
-impl Table {
+impl ScoreTable {
     /// The columns of measures, in the order in which lines name them.
     fn measures(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
@@ -139,7 +139,7 @@ fn number(value: f64) -> String {
     }
 }
 
-impl fmt::Display for Table {
+impl fmt::Display for ScoreTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", self.protocol)?;
         for note in &self.notes {
@@ -168,8 +168,8 @@ impl fmt::Display for Table {
 mod tests {
     use super::*;
 
-    fn line(method: &str, name: &str, value: f64) -> Line {
-        Line {
+    fn line(method: &str, name: &str, value: f64) -> ScoreLine {
+        ScoreLine {
             method: method.to_owned(),
             part: "albedo".to_owned(),
             measures: vec![Measured {
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn a_table_says_of_each_line_how_it_was_measured() {
-        let table = Table {
+        let table = ScoreTable {
             protocol: "intrinsic images".to_owned(),
             notes: vec!["a note".to_owned()],
             lines: vec![

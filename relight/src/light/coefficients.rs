@@ -27,8 +27,8 @@ pub enum LightError {
     /// A value is infinite or not a number.
     #[error("the light has a value that is infinite or not a number")]
     NotFinite,
-    /// The panorama has too few pixels for a fit.
-    #[error("the panorama has too few pixels for a fit of so many coefficients")]
+    /// There are too few pixels for a fit.
+    #[error("there are too few pixels for a fit of so many coefficients")]
     TooFewPixels,
     /// The panorama has no pixels.
     #[error("the panorama has no pixels")]

@@ -11,6 +11,7 @@
 mod basis;
 mod coefficients;
 mod direction;
+mod least_squares;
 mod normals;
 mod panorama;
 mod quadrature;
@@ -21,6 +22,7 @@ pub use basis::basis;
 pub(crate) use basis::{basis_into, legendre_step, polar_functions};
 pub use coefficients::{LightError, LightFileError, Order, ShLight};
 pub use direction::Direction;
+pub(crate) use least_squares::NormalEquations;
 pub use normals::{Normals, YAxis, YDown, YUp};
 pub use panorama::{DrawnLight, LightSampler, Panorama, PanoramaError};
 pub(crate) use quadrature::Quadrature;

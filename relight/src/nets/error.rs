@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// Why weights could not be read, written or used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Error {
+pub enum NetError {
     /// A parameter is not there.
     #[error("the weights have no {name}, which {net} needs: are they another network's?")]
     Missing {

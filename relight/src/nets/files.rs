@@ -1,12 +1,13 @@
 //! Weights in files: safetensors to read and write, PyTorch's `.pth` to read.
 
+use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
 use relit_data::durable;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
-use super::error::Error;
+use super::error::NetError;
 use super::parameters::{Tensor, Weights};
 use super::pickle;
 
@@ -15,7 +16,7 @@ const MOST_BYTES: u64 = 2 << 30;
 
 /// How numbers are kept in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Precision {
+pub enum WeightPrecision {
     /// 32 bits.
     Single,
     /// 16 bits, IEEE half.
@@ -27,15 +28,15 @@ impl Weights {
     /// their first bytes. Half precision becomes single.
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::File`].
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let io = |source| Error::Io {
+    /// [`NetError::Io`] or [`NetError::File`].
+    pub fn read(path: &Path) -> Result<Self, NetError> {
+        let io = |source| NetError::Io {
             path: path.to_owned(),
             doing: "read",
             source,
         };
         let bytes = fs::metadata(path).map_err(io)?.len();
-        let wrong = |fault| Error::File {
+        let wrong = |fault| NetError::File {
             path: path.to_owned(),
             fault,
         };
@@ -57,39 +58,43 @@ impl Weights {
         }
     }
 
-    /// The bytes of a safetensors file.
+    /// The bytes of a safetensors file, with facts about them in its header.
     ///
     /// # Errors
     /// What the format's writer answers, as text; it has no reason to.
-    pub fn to_safetensors(&self, precision: Precision) -> Result<Vec<u8>, String> {
+    pub fn to_safetensors(
+        &self,
+        precision: WeightPrecision,
+        facts: Option<HashMap<String, String>>,
+    ) -> Result<Vec<u8>, String> {
         let encoded: Vec<_> = self
             .iter()
             .map(|(name, tensor)| (name, tensor.shape().to_vec(), encode(tensor, precision)))
             .collect();
         let kind = match precision {
-            Precision::Single => Dtype::F32,
-            Precision::Half => Dtype::F16,
+            WeightPrecision::Single => Dtype::F32,
+            WeightPrecision::Half => Dtype::F16,
         };
         let mut views = Vec::with_capacity(encoded.len());
         for (name, shape, bytes) in &encoded {
             let view = TensorView::new(kind, shape.clone(), bytes);
             views.push((*name, view.map_err(|error| error.to_string())?));
         }
-        safetensors::serialize(views, None).map_err(|error| error.to_string())
+        safetensors::serialize(views, facts).map_err(|error| error.to_string())
     }
 
     /// Writes a safetensors file, whole or not at all.
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::File`].
-    pub fn write(&self, path: &Path, precision: Precision) -> Result<(), Error> {
+    /// [`NetError::Io`] or [`NetError::File`].
+    pub fn write(&self, path: &Path, precision: WeightPrecision) -> Result<(), NetError> {
         let bytes = self
-            .to_safetensors(precision)
-            .map_err(|fault| Error::File {
+            .to_safetensors(precision, None)
+            .map_err(|fault| NetError::File {
                 path: path.to_owned(),
                 fault,
             })?;
-        durable::write_whole(path, &bytes).map_err(|source| Error::Io {
+        durable::write_whole(path, &bytes).map_err(|source| NetError::Io {
             path: path.to_owned(),
             doing: "written",
             source,
@@ -97,11 +102,11 @@ impl Weights {
     }
 }
 
-fn encode(tensor: &Tensor, precision: Precision) -> Vec<u8> {
+fn encode(tensor: &Tensor, precision: WeightPrecision) -> Vec<u8> {
     let values = tensor.values().iter();
     match precision {
-        Precision::Single => values.flat_map(|value| value.to_le_bytes()).collect(),
-        Precision::Half => values
+        WeightPrecision::Single => values.flat_map(|value| value.to_le_bytes()).collect(),
+        WeightPrecision::Half => values
             .flat_map(|&value| half::f16::from_f32(value).to_le_bytes())
             .collect(),
     }
@@ -149,9 +154,9 @@ mod tests {
         let weights = Weights::initial(&graph, 3);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("light.safetensors");
-        weights.write(&path, Precision::Single).unwrap();
+        weights.write(&path, WeightPrecision::Single).unwrap();
         assert_eq!(Weights::read(&path).unwrap(), weights);
-        weights.write(&path, Precision::Half).unwrap();
+        weights.write(&path, WeightPrecision::Half).unwrap();
         let halves = Weights::read(&path).unwrap();
         for (name, tensor) in weights.iter() {
             let read = halves.get(name).unwrap().values();

@@ -5,7 +5,7 @@ use tract_onnx::prelude::{
     tvec,
 };
 
-use super::error::Error;
+use super::error::NetError;
 use super::graph::Graph;
 use super::onnx::to_onnx;
 use super::parameters::{Tensor, Weights};
@@ -32,12 +32,12 @@ impl Inference {
     /// Makes a network ready for pictures of `width` x `height` pixels.
     ///
     /// # Errors
-    /// [`Error::PictureSize`], what [`Weights::fitted_to`] answers, or [`Error::Engine`].
+    /// [`NetError::PictureSize`], what [`Weights::fitted_to`] answers, or [`NetError::Engine`].
     pub fn new(
         graph: &Graph,
         weights: &Weights,
         (width, height): (usize, usize),
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, NetError> {
         let bytes = to_onnx(graph, weights, 1, (width, height))?;
         let plan = tract_onnx::onnx()
             .model_for_read(&mut bytes.as_slice())
@@ -52,11 +52,11 @@ impl Inference {
     /// Runs it on one picture: channel by channel, row by row. The outputs come in the graph's order.
     ///
     /// # Errors
-    /// [`Error::PictureSize`] where the input is not as long as its shape, or [`Error::Engine`].
-    pub fn run(&self, input: &[f32]) -> Result<Vec<Tensor>, Error> {
+    /// [`NetError::PictureSize`] where the input is not as long as its shape, or [`NetError::Engine`].
+    pub fn run(&self, input: &[f32]) -> Result<Vec<Tensor>, NetError> {
         let [_, channels, height, width] = self.shape;
         if input.len() != channels * height * width {
-            return Err(Error::PictureSize {
+            return Err(NetError::PictureSize {
                 net: self.name,
                 width,
                 height,
@@ -85,8 +85,8 @@ impl Inference {
     }
 }
 
-fn engine(net: &'static str, doing: &'static str, fault: &dyn std::fmt::Display) -> Error {
-    Error::Engine {
+fn engine(net: &'static str, doing: &'static str, fault: &dyn std::fmt::Display) -> NetError {
+    NetError::Engine {
         engine: ENGINE,
         doing,
         net,

@@ -14,7 +14,7 @@
 //! let net = Inference::new(&graph, &weights, (32, 32))?;
 //! let maps = net.run(&vec![0.5; 7 * 32 * 32])?;
 //! assert_eq!(maps[0].shape(), [1, 9, 32, 32]);
-//! # Ok::<(), relight::nets::Error>(())
+//! # Ok::<(), relight::nets::NetError>(())
 //! ```
 
 mod decomposer;
@@ -28,8 +28,8 @@ mod parameters;
 mod pickle;
 
 pub use decomposer::{INPUTS, OUTPUTS, decomposer};
-pub use error::Error;
-pub use files::Precision;
+pub use error::NetError;
+pub use files::WeightPrecision;
 pub use graph::{EPSILON, Graph, Node, Operation, Output, Value};
 pub use inference::Inference;
 pub use onnx::{INPUT, check_size, to_onnx};

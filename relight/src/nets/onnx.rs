@@ -7,7 +7,7 @@
 
 use prost::Message;
 
-use super::error::Error;
+use super::error::NetError;
 use super::graph::{EPSILON, Graph, Node, Operation};
 use super::parameters::Weights;
 
@@ -23,13 +23,13 @@ const INT64: i32 = 7;
 /// `width` x `height` pixels.
 ///
 /// # Errors
-/// [`Error::PictureSize`], or what [`Weights::fitted_to`] answers.
+/// [`NetError::PictureSize`], or what [`Weights::fitted_to`] answers.
 pub fn to_onnx(
     graph: &Graph,
     weights: &Weights,
     batch: usize,
     (width, height): (usize, usize),
-) -> Result<Vec<u8>, Error> {
+) -> Result<Vec<u8>, NetError> {
     check_size(graph, (width, height))?;
     let weights = weights.fitted_to(graph)?;
     let mut writer = Writer {
@@ -76,8 +76,8 @@ pub fn to_onnx(
 /// Whether the network can take pictures of this size.
 ///
 /// # Errors
-/// [`Error::PictureSize`].
-pub fn check_size(graph: &Graph, (width, height): (usize, usize)) -> Result<(), Error> {
+/// [`NetError::PictureSize`].
+pub fn check_size(graph: &Graph, (width, height): (usize, usize)) -> Result<(), NetError> {
     let multiple = graph.multiple();
     let divides = width.is_multiple_of(multiple) && height.is_multiple_of(multiple);
     let needs = match graph.fixed_side() {
@@ -87,7 +87,7 @@ pub fn check_size(graph: &Graph, (width, height): (usize, usize)) -> Result<(), 
         }
         _ => return Ok(()),
     };
-    Err(Error::PictureSize {
+    Err(NetError::PictureSize {
         net: graph.name(),
         width,
         height,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::error::Error;
+use super::error::NetError;
 use super::graph::Graph;
 
 /// What a parameter is for, and so how it begins.
@@ -85,6 +85,21 @@ impl FromIterator<(String, Tensor)> for Weights {
     }
 }
 
+impl Extend<(String, Tensor)> for Weights {
+    fn extend<I: IntoIterator<Item = (String, Tensor)>>(&mut self, tensors: I) {
+        self.tensors.extend(tensors);
+    }
+}
+
+impl IntoIterator for Weights {
+    type Item = (String, Tensor);
+    type IntoIter = std::collections::btree_map::IntoIter<String, Tensor>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.tensors.into_iter()
+    }
+}
+
 impl Weights {
     /// The tensor of this name.
     #[must_use]
@@ -114,9 +129,9 @@ impl Weights {
     /// before every name of a network that ran on several devices.
     ///
     /// # Errors
-    /// [`Error::Missing`], [`Error::Shape`], [`Error::Unknown`] or [`Error::NotFinite`], with the
+    /// [`NetError::Missing`], [`NetError::Shape`], [`NetError::Unknown`] or [`NetError::NotFinite`], with the
     /// parameter's name.
-    pub fn fitted_to(&self, graph: &Graph) -> Result<Self, Error> {
+    pub fn fitted_to(&self, graph: &Graph) -> Result<Self, NetError> {
         let all_wrapped = self.tensors.keys().all(|name| name.starts_with("module."));
         let mut given = if all_wrapped {
             self.under("module.").tensors
@@ -126,12 +141,12 @@ impl Weights {
         let mut tensors = BTreeMap::new();
         for parameter in graph.parameters() {
             let name = parameter.name;
-            let tensor = given.remove(&name).ok_or_else(|| Error::Missing {
+            let tensor = given.remove(&name).ok_or_else(|| NetError::Missing {
                 net: graph.name(),
                 name: name.clone(),
             })?;
             if tensor.shape != parameter.shape {
-                return Err(Error::Shape {
+                return Err(NetError::Shape {
                     net: graph.name(),
                     name,
                     found: tensor.shape,
@@ -139,12 +154,12 @@ impl Weights {
                 });
             }
             if !tensor.values.iter().all(|value| value.is_finite()) {
-                return Err(Error::NotFinite { name });
+                return Err(NetError::NotFinite { name });
             }
             tensors.insert(name, tensor);
         }
         match given.into_keys().next() {
-            Some(name) => Err(Error::Unknown {
+            Some(name) => Err(NetError::Unknown {
                 net: graph.name(),
                 name,
             }),
@@ -237,26 +252,26 @@ mod tests {
         let mut weights = Weights::initial(&graph, 7);
         weights.tensors.remove("mid.0.bias");
         let missing = weights.fitted_to(&graph);
-        assert!(matches!(missing, Err(Error::Missing { name, .. }) if name == "mid.0.bias"));
+        assert!(matches!(missing, Err(NetError::Missing { name, .. }) if name == "mid.0.bias"));
         let short = Tensor::new(vec![1], vec![0.0]).unwrap();
         weights.tensors.insert("mid.0.bias".to_owned(), short);
         assert!(matches!(
             weights.fitted_to(&graph),
-            Err(Error::Shape { .. })
+            Err(NetError::Shape { .. })
         ));
         let mut weights = Weights::initial(&graph, 7);
         let nan = Tensor::new(vec![256], vec![f32::NAN; 256]).unwrap();
         weights.tensors.insert("mid.0.bias".to_owned(), nan);
         assert!(matches!(
             weights.fitted_to(&graph),
-            Err(Error::NotFinite { .. })
+            Err(NetError::NotFinite { .. })
         ));
         let mut weights = Weights::initial(&graph, 7);
         let more = Tensor::new(vec![0], vec![]).unwrap();
         weights.tensors.insert("fc.weight".to_owned(), more);
         assert!(matches!(
             weights.fitted_to(&graph),
-            Err(Error::Unknown { .. })
+            Err(NetError::Unknown { .. })
         ));
     }
 }

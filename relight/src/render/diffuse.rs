@@ -135,7 +135,7 @@ impl DiffuseLayer {
 
 /// What each of the nine coefficients is multiplied with: Â_l Y_lm(n).
 #[inline(always)]
-fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
+pub(super) fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
     let [c1, c2, c3, c4, c5] = C.map(T::of);
     let two = T::of(2.0);
     [

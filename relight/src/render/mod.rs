@@ -6,6 +6,7 @@
 //! surface is π; [`EXPOSURE`] brings it to 1.
 
 mod diffuse;
+mod fit;
 mod lanes;
 mod layers;
 mod lobe;
@@ -16,6 +17,7 @@ mod shots;
 mod surface;
 
 pub use diffuse::{DiffuseForm, DiffuseLayer};
+pub use fit::fit_light;
 pub use layers::{EXPOSURE, Gradients, Layers, Rendering, SpecularForm};
 pub use lobe::LobeLayer;
 pub use maps::{Map, MapFiles, NormalsFrame};

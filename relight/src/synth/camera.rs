@@ -47,6 +47,16 @@ impl Response {
             Self::Power { gamma } => light.powf(1.0 / gamma),
         }
     }
+
+    /// The light, 0..=1, for a value; both are clipped to 0..=1.
+    #[must_use]
+    pub fn decode(self, value: f32) -> f32 {
+        let value = value.clamp(0.0, 1.0);
+        match self {
+            Self::Srgb => Srgb::to_linear(value),
+            Self::Power { gamma } => value.powf(gamma),
+        }
+    }
 }
 
 impl CameraModel {
@@ -192,6 +202,15 @@ mod tests {
                     (f32::from(value[0]) - exact).abs() < 0.56,
                     "{exact} {value:?}"
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn a_value_is_decoded_to_its_light() {
+        for response in [Response::Srgb, Response::Power { gamma: 2.1 }] {
+            for light in [0.0, 0.001, 0.2, 0.7, 1.0] {
+                assert!((response.decode(response.encode(light)) - light).abs() < 1e-5);
             }
         }
     }

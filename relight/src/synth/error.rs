@@ -10,7 +10,7 @@ use crate::light::{LightError, PanoramaError};
 
 /// Why data could not be made.
 #[derive(Debug, thiserror::Error)]
-pub enum Error {
+pub enum SynthError {
     /// A file or folder could not be read.
     #[error("{path} could not be read")]
     Read {
@@ -119,7 +119,7 @@ pub enum Error {
     Size(#[from] relit_data::image_stats::SizeMismatch),
 }
 
-impl Error {
+impl SynthError {
     /// For `map_err` on what reads `path`.
     pub(super) fn read(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();

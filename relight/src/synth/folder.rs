@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use relit_data::durable::write_whole;
 use serde::{Deserialize, Serialize};
 
-use super::Error;
+use super::SynthError;
 use super::library::Library;
 use super::recipe::Recipe;
 use super::sample::SynthSample;
@@ -51,7 +51,7 @@ impl Origin {
 
 /// How many samples were written, and how many were there already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Written {
+pub struct SynthTally {
     /// Made by this call.
     pub new: u64,
     /// Whole already, by an earlier call with the same recipe.
@@ -71,7 +71,7 @@ pub fn write_samples(
     count: u64,
     out: &Path,
     progress: &(dyn Fn() + Sync),
-) -> Result<Written, Error> {
+) -> Result<SynthTally, SynthError> {
     recipe.check()?;
     let folder = SampleFolder::open(out, &Origin::of(recipe, library))?;
     let each = recipe.samples_an_object();
@@ -82,8 +82,8 @@ pub fn write_samples(
             let numbers = object * each..count.min((object + 1) * each);
             folder.write_object(recipe, library, numbers, progress)
         })
-        .try_reduce(Written::default, |a, b| {
-            Ok(Written {
+        .try_reduce(SynthTally::default, |a, b| {
+            Ok(SynthTally {
                 new: a.new + b.new,
                 kept: a.kept + b.kept,
             })
@@ -98,14 +98,14 @@ struct SampleFolder {
 }
 
 impl SampleFolder {
-    fn open(path: &Path, origin: &Origin) -> Result<Self, Error> {
-        fs::create_dir_all(path).map_err(Error::write(path))?;
-        let handle = File::open(path).map_err(Error::read(path))?;
+    fn open(path: &Path, origin: &Origin) -> Result<Self, SynthError> {
+        fs::create_dir_all(path).map_err(SynthError::write(path))?;
+        let handle = File::open(path).map_err(SynthError::read(path))?;
         handle.try_lock().map_err(|reason| match reason {
-            TryLockError::WouldBlock => Error::Locked {
+            TryLockError::WouldBlock => SynthError::Locked {
                 path: path.to_owned(),
             },
-            TryLockError::Error(source) => Error::Write {
+            TryLockError::Error(source) => SynthError::Write {
                 path: path.to_owned(),
                 source,
             },
@@ -125,8 +125,8 @@ impl SampleFolder {
         library: &Library,
         numbers: std::ops::Range<u64>,
         progress: &(dyn Fn() + Sync),
-    ) -> Result<Written, Error> {
-        let mut written = Written::default();
+    ) -> Result<SynthTally, SynthError> {
+        let mut written = SynthTally::default();
         let missing: Vec<u64> = numbers
             .filter(|&number| {
                 !self.place(number).is_dir() || {
@@ -152,19 +152,19 @@ impl SampleFolder {
         Ok(written)
     }
 
-    fn write(&self, sample: &SynthSample<'_>, number: u64) -> Result<(), Error> {
+    fn write(&self, sample: &SynthSample<'_>, number: u64) -> Result<(), SynthError> {
         let files = sample.files()?;
         let partial = self
             .path
             .join(format!(".{number:06}.{}.partial", process::id()));
-        let write = || -> Result<(), Error> {
-            fs::create_dir(&partial).map_err(Error::write(&partial))?;
+        let write = || -> Result<(), SynthError> {
+            fs::create_dir(&partial).map_err(SynthError::write(&partial))?;
             for (name, bytes) in &files.0 {
                 let path = partial.join(name);
-                fs::write(&path, bytes).map_err(Error::write(&path))?;
+                fs::write(&path, bytes).map_err(SynthError::write(&path))?;
             }
             let place = self.place(number);
-            fs::rename(&partial, &place).map_err(Error::write(&place))
+            fs::rename(&partial, &place).map_err(SynthError::write(&place))
         };
         write().inspect_err(|_| {
             // The first error is the one that counts.
@@ -178,45 +178,45 @@ impl SampleFolder {
 }
 
 /// Writes the description, or compares it with the one that is there.
-fn describe(folder: &Path, origin: &Origin) -> Result<(), Error> {
+fn describe(folder: &Path, origin: &Origin) -> Result<(), SynthError> {
     let path = folder.join(FILE);
     let there = match fs::read(&path) {
         Ok(bytes) => {
-            serde_json::from_slice::<Origin>(&bytes).map_err(|source| Error::Description {
+            serde_json::from_slice::<Origin>(&bytes).map_err(|source| SynthError::Description {
                 path: path.clone(),
                 source,
             })?
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            let mut entries = fs::read_dir(folder).map_err(Error::read(folder))?;
+            let mut entries = fs::read_dir(folder).map_err(SynthError::read(folder))?;
             if entries.next().is_some() {
-                return Err(Error::Foreign {
+                return Err(SynthError::Foreign {
                     path: folder.to_owned(),
                     file: FILE,
                 });
             }
             let mut bytes = serde_json::to_vec_pretty(origin).unwrap_or_default();
             bytes.push(b'\n');
-            return write_whole(&path, &bytes).map_err(Error::write(&path));
+            return write_whole(&path, &bytes).map_err(SynthError::write(&path));
         }
-        Err(source) => return Err(Error::Read { path, source }),
+        Err(source) => return Err(SynthError::Read { path, source }),
     };
     if there == *origin {
         Ok(())
     } else {
-        Err(Error::OtherSettings {
+        Err(SynthError::OtherSettings {
             path: folder.to_owned(),
         })
     }
 }
 
 /// Removes what an interrupted call left.
-fn clear_leftovers(folder: &Path) -> Result<(), Error> {
-    for entry in fs::read_dir(folder).map_err(Error::read(folder))? {
-        let path = entry.map_err(Error::read(folder))?.path();
+fn clear_leftovers(folder: &Path) -> Result<(), SynthError> {
+    for entry in fs::read_dir(folder).map_err(SynthError::read(folder))? {
+        let path = entry.map_err(SynthError::read(folder))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         if name.starts_with('.') && name.ends_with(".partial") && path.is_dir() {
-            fs::remove_dir_all(&path).map_err(Error::write(&path))?;
+            fs::remove_dir_all(&path).map_err(SynthError::write(&path))?;
         }
     }
     Ok(())
@@ -277,7 +277,7 @@ mod tests {
             pool.install(|| write_samples(&recipe(), &library, count, folder.path(), &|| {}));
         assert_eq!(
             result.unwrap(),
-            Written {
+            SynthTally {
                 new: count,
                 kept: 0
             }
@@ -337,7 +337,7 @@ mod tests {
         fs::create_dir(folder.path().join(".000005.1.partial")).unwrap();
         fs::remove_dir_all(folder.path().join("000002")).unwrap();
         let again = write_samples(&recipe(), &library, 8, folder.path(), &|| {}).unwrap();
-        assert_eq!(again, Written { new: 4, kept: 4 });
+        assert_eq!(again, SynthTally { new: 4, kept: 4 });
         assert!(contents(folder.path()) == written(1, 8));
     }
 
@@ -347,7 +347,7 @@ mod tests {
         fs::write(folder.path().join("thesis.tex"), "").unwrap();
         let library = library();
         let error = write_samples(&recipe(), &library, 1, folder.path(), &|| {}).unwrap_err();
-        assert!(matches!(error, Error::Foreign { .. }), "{error}");
+        assert!(matches!(error, SynthError::Foreign { .. }), "{error}");
         let folder = tempfile::tempdir().unwrap();
         write_samples(&recipe(), &library, 1, folder.path(), &|| {}).unwrap();
         let other = Recipe {
@@ -355,7 +355,7 @@ mod tests {
             ..recipe()
         };
         let error = write_samples(&other, &library, 1, folder.path(), &|| {}).unwrap_err();
-        assert!(matches!(error, Error::OtherSettings { .. }), "{error}");
+        assert!(matches!(error, SynthError::OtherSettings { .. }), "{error}");
     }
 
     #[test]

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::Error;
+use super::SynthError;
 use super::lighting::Panoramas;
 use super::mesh::Mesh;
-use super::paint::Picture;
+use super::paint::TextureImage;
 use super::studio::Surroundings;
 use crate::image::Extent;
 use crate::light::Panorama;
@@ -25,7 +25,7 @@ pub struct Library {
     /// By file name; none: all objects are procedural.
     pub meshes: Vec<(String, Mesh)>,
     /// Textures, and panoramas as textures.
-    pub pictures: Vec<Picture>,
+    pub pictures: Vec<TextureImage>,
     /// The panoramas, never none.
     pub panoramas: Panoramas,
 }
@@ -46,27 +46,33 @@ impl Library {
     /// panoramas is given, 13 are made.
     ///
     /// # Errors
-    /// [`Error::Nothing`] where a folder holds no file of its kind; whatever is wrong with a file.
-    pub fn read(folders: &Folders) -> Result<Self, Error> {
+    /// [`SynthError::Nothing`] where a folder holds no file of its kind; whatever is wrong with a file.
+    pub fn read(folders: &Folders) -> Result<Self, SynthError> {
         let meshes = match &folders.meshes {
             Some(folder) => read_all(folder, "meshes", &["obj", "gltf", "glb"], Mesh::read)?,
             None => Vec::new(),
         };
         let textures = match &folders.textures {
-            Some(folder) => read_all(folder, "textures", &["png", "jpg", "jpeg"], Picture::read)?,
+            Some(folder) => read_all(
+                folder,
+                "textures",
+                &["png", "jpg", "jpeg"],
+                TextureImage::read,
+            )?,
             None => Vec::new(),
         };
         let panoramas = match &folders.panoramas {
             Some(folder) => read_all(folder, "panoramas", &["hdr", "exr"], |path| {
-                Panorama::read(path).map_err(Error::Panorama)
+                Panorama::read(path).map_err(SynthError::Panorama)
             })?,
             None => made_panoramas()?,
         };
-        let mut pictures: Vec<Picture> = textures.into_iter().map(|(_, picture)| picture).collect();
+        let mut pictures: Vec<TextureImage> =
+            textures.into_iter().map(|(_, picture)| picture).collect();
         pictures.extend(panoramas.iter().map(|(_, panorama)| picture_of(panorama)));
         let panoramas = Panoramas::new(panoramas);
         if panoramas.is_empty() {
-            return Err(Error::Dark);
+            return Err(SynthError::Dark);
         }
         Ok(Self {
             meshes,
@@ -79,8 +85,8 @@ impl Library {
 /// The panoramas that are made here, by name: four each of studio, room and sky, and one even light.
 ///
 /// # Errors
-/// None with panoramas of any size; [`Error::Light`] is passed on.
-pub fn made_panoramas() -> Result<Vec<(String, Panorama)>, Error> {
+/// None with panoramas of any size; [`SynthError::Light`] is passed on.
+pub fn made_panoramas() -> Result<Vec<(String, Panorama)>, SynthError> {
     let mut made = Vec::new();
     for kind in Surroundings::ALL {
         let variants = if kind == Surroundings::Even {
@@ -89,7 +95,9 @@ pub fn made_panoramas() -> Result<Vec<(String, Panorama)>, Error> {
             VARIANTS
         };
         for seed in 0..variants {
-            let panorama = kind.panorama(seed, PANORAMA_EXTENT).map_err(Error::Light)?;
+            let panorama = kind
+                .panorama(seed, PANORAMA_EXTENT)
+                .map_err(SynthError::Light)?;
             made.push((format!("{}-{seed}", kind.name()), panorama));
         }
     }
@@ -97,7 +105,7 @@ pub fn made_panoramas() -> Result<Vec<(String, Panorama)>, Error> {
 }
 
 /// A panorama as a picture: its light up to what one pixel in ten exceeds.
-fn picture_of(panorama: &Panorama) -> Picture {
+fn picture_of(panorama: &Panorama) -> TextureImage {
     let small = panorama.resized(PICTURE_EXTENT);
     let planes = small.image().planes();
     let mut levels: Vec<f32> = planes.planes().into_iter().flatten().copied().collect();
@@ -105,7 +113,7 @@ fn picture_of(panorama: &Panorama) -> Picture {
     let (_, &mut level, _) = levels.select_nth_unstable_by(place, f32::total_cmp);
     let scale = 1.0 / level.max(1e-6);
     let Extent { width, height } = PICTURE_EXTENT;
-    Picture::from_fn(width, height, |x, y| {
+    TextureImage::from_fn(width, height, |x, y| {
         (Vec3::from_array(planes.pixel(x, y)) * scale).clamp(Vec3::splat(0.02), Vec3::ONE)
     })
 }
@@ -115,12 +123,12 @@ fn read_all<T>(
     folder: &Path,
     what: &'static str,
     extensions: &'static [&'static str],
-    read: impl Fn(&Path) -> Result<T, Error>,
-) -> Result<Vec<(String, T)>, Error> {
-    let entries = std::fs::read_dir(folder).map_err(Error::read(folder))?;
+    read: impl Fn(&Path) -> Result<T, SynthError>,
+) -> Result<Vec<(String, T)>, SynthError> {
+    let entries = std::fs::read_dir(folder).map_err(SynthError::read(folder))?;
     let mut paths = Vec::new();
     for entry in entries {
-        let path = entry.map_err(Error::read(folder))?.path();
+        let path = entry.map_err(SynthError::read(folder))?.path();
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         if extensions.iter().any(|&wanted| extension == wanted) {
             paths.push(path);
@@ -128,7 +136,7 @@ fn read_all<T>(
     }
     paths.sort();
     if paths.is_empty() {
-        return Err(Error::Nothing {
+        return Err(SynthError::Nothing {
             path: folder.to_owned(),
             what,
             extensions,

@@ -4,7 +4,7 @@
 //! | module | concern |
 //! | --- | --- |
 //! | `mesh`, `shape` | triangles from files, and out of nothing but a seed |
-//! | `view`, `geometry` | what a camera sees of them, which light is blocked |
+//! | `view`, `geometry`, `object` | what a camera sees of them, which light is blocked |
 //! | `paint`, `finish` | albedo, relief and gloss |
 //! | `lighting` | lamps and panoramas on what is seen |
 //! | `studio` | panoramas out of nothing but a seed |
@@ -26,7 +26,7 @@
 //! let view = recipe.view(&object, &mesh, 1);
 //! let sample = recipe.sample(&library, &view, 2);
 //! assert_eq!(sample.image().width(), 32);
-//! # Ok::<(), relight::synth::Error>(())
+//! # Ok::<(), relight::synth::SynthError>(())
 //! ```
 
 mod camera;
@@ -38,6 +38,7 @@ mod library;
 mod lighting;
 mod mesh;
 mod noise;
+mod object;
 mod paint;
 mod png;
 mod preview;
@@ -50,9 +51,9 @@ mod turn;
 mod view;
 
 pub use camera::{CameraModel, Response};
-pub use error::Error;
+pub use error::SynthError;
 pub use finish::Finish;
-pub use folder::{Written, write_samples};
+pub use folder::{SynthTally, write_samples};
 pub use geometry::{GBuffer, Occluder};
 pub use library::{Folders, Library, PANORAMA_EXTENT, made_panoramas};
 pub use lighting::{
@@ -60,10 +61,11 @@ pub use lighting::{
     Panoramas, Scene, Shaded,
 };
 pub use mesh::{Mesh, MeshFault};
-pub use paint::{AlbedoKind, Paint, Picture, Relief};
+pub use object::{ObjectSource, View};
+pub use paint::{AlbedoKind, Paint, Relief, TextureImage};
 pub use preview::write_preview;
 pub use random::stream;
-pub use recipe::{ObjectSource, Recipe, View};
+pub use recipe::Recipe;
 pub use sample::{Description, SynthSample, Whites};
 pub use shape::ShapeKind;
 pub use studio::Surroundings;

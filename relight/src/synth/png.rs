@@ -3,7 +3,7 @@
 use glam::Vec3;
 use png::{BitDepth, ColorType, Compression, Filter};
 
-use super::Error;
+use super::SynthError;
 use super::geometry::GBuffer;
 
 /// Colours as 16-bit values.
@@ -43,7 +43,7 @@ impl Sixteen {
 }
 
 /// The map as PNG, 0 outside the object.
-pub(super) fn encode_sixteen(buffer: &GBuffer, map: &Sixteen) -> Result<Vec<u8>, Error> {
+pub(super) fn encode_sixteen(buffer: &GBuffer, map: &Sixteen) -> Result<Vec<u8>, SynthError> {
     let side = buffer.size() as usize;
     let mut pixels = vec![0; side * side * 6];
     for (&pixel, value) in buffer.pixels().iter().zip(&map.values) {

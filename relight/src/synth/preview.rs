@@ -7,7 +7,7 @@ use image::{Rgb, RgbImage};
 use rayon::prelude::*;
 use relit_data::durable::write_whole;
 
-use super::Error;
+use super::SynthError;
 use super::camera::Response;
 use super::geometry::GBuffer;
 use super::library::Library;
@@ -33,7 +33,7 @@ pub fn write_preview(
     library: &Library,
     count: u32,
     path: &Path,
-) -> Result<(), Error> {
+) -> Result<(), SynthError> {
     recipe.check()?;
     let strips: Vec<RgbImage> = (0..count)
         .into_par_iter()
@@ -47,7 +47,7 @@ pub fn write_preview(
         image::imageops::replace(&mut sheet, strip, place[0], place[1]);
     }
     let bytes = relit_data::shard::encode_rgb(&sheet)?;
-    write_whole(path, &bytes).map_err(Error::write(path))
+    write_whole(path, &bytes).map_err(SynthError::write(path))
 }
 
 fn strip(recipe: &Recipe, library: &Library, number: u32) -> RgbImage {

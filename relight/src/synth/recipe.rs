@@ -5,13 +5,14 @@ use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
 
-use super::Error;
+use super::SynthError;
 use super::camera::CameraModel;
 use super::finish::Finish;
 use super::geometry::{GBuffer, Occluder};
 use super::library::Library;
 use super::lighting::{LightKind, Lighting, Material, Scene};
 use super::mesh::Mesh;
+use super::object::{ObjectSource, View};
 use super::random::{Random, stream};
 use super::sample::{Description, SynthSample};
 use super::shape::ShapeKind;
@@ -57,56 +58,12 @@ impl Default for Recipe {
     }
 }
 
-/// Where an object comes from.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ObjectSource {
-    /// A file of the library.
-    Mesh {
-        /// Its name.
-        file: String,
-    },
-    /// A procedural shape.
-    Shape {
-        /// Its kind.
-        kind: ShapeKind,
-        /// Its seed.
-        seed: u64,
-    },
-}
-
-impl ObjectSource {
-    /// The file's name without its extension, or the shape's kind.
-    #[must_use]
-    pub fn name(&self) -> String {
-        match self {
-            Self::Mesh { file } => match file.rsplit_once('.') {
-                Some((stem, _)) => stem.to_owned(),
-                None => file.clone(),
-            },
-            Self::Shape { kind, .. } => kind.name().to_owned(),
-        }
-    }
-}
-
-/// An object in its pose before the camera, ready to be lit.
-pub struct View {
-    /// Where it comes from.
-    pub object: ObjectSource,
-    /// How it stands.
-    pub pose: Pose,
-    /// How it is seen.
-    pub projection: Projection,
-    /// What is seen.
-    pub scene: Scene,
-}
-
 impl Recipe {
     /// Whether all numbers are in range.
     ///
     /// # Errors
-    /// [`Error::Setting`] names the first that is not.
-    pub fn check(&self) -> Result<(), Error> {
+    /// [`SynthError::Setting`] names the first that is not.
+    pub fn check(&self) -> Result<(), SynthError> {
         let checks = [
             ("the size", self.size, 16..=2048, "16 to 2048 pixels"),
             (
@@ -127,7 +84,7 @@ impl Recipe {
             .find(|(_, value, range, _)| !range.contains(value))
         {
             None => Ok(()),
-            Some((name, value, _, allowed)) => Err(Error::Setting {
+            Some((name, value, _, allowed)) => Err(SynthError::Setting {
                 name,
                 value: u64::from(value),
                 allowed,

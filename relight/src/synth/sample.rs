@@ -4,13 +4,13 @@ use glam::Vec3;
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 
-use super::Error;
+use super::SynthError;
 use super::camera::CameraModel;
 use super::finish::Finish;
 use super::geometry::GBuffer;
 use super::lighting::{Lighting, Material, Panoramas, Shaded};
+use super::object::{ObjectSource, View};
 use super::png::{Sixteen, encode_sixteen};
-use super::recipe::{ObjectSource, View};
 use super::view::{Pose, Projection};
 use crate::light::ShLight;
 
@@ -136,7 +136,7 @@ impl<'a> SynthSample<'a> {
     }
 
     /// The sample as files.
-    pub(super) fn files(&self) -> Result<Files, Error> {
+    pub(super) fn files(&self) -> Result<Files, SynthError> {
         let buffer = self.view.scene.buffer();
         let shading = Sixteen::up_to_largest(&self.shaded.shading);
         let highlight = Sixteen::up_to_largest(&self.shaded.highlight);

@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 
 use tch::{Tensor, no_grad};
 
-use super::error::Error;
-use super::model::to_weights;
+use super::error::TrainError;
+use super::model::{copy_into, to_weights};
 use crate::nets::Weights;
 
 /// Keeps the root of the second moment from being zero.
@@ -49,16 +49,16 @@ impl Adam {
     /// An optimiser that has made no step.
     ///
     /// # Errors
-    /// [`Error::Torch`].
+    /// [`TrainError::Torch`].
     pub fn new(
         settings: AdamSettings,
         parameters: &BTreeMap<String, Tensor>,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, TrainError> {
         let zeros = || {
             parameters
                 .iter()
                 .map(|(name, parameter)| Ok((name.clone(), parameter.f_detach()?.f_zeros_like()?)))
-                .collect::<Result<BTreeMap<_, _>, Error>>()
+                .collect::<Result<BTreeMap<_, _>, TrainError>>()
         };
         Ok(Self {
             settings,
@@ -77,8 +77,8 @@ impl Adam {
     /// Both moments, `first.<name>` and `second.<name>`, to be saved.
     ///
     /// # Errors
-    /// [`Error::Torch`].
-    pub fn memory(&self) -> Result<Weights, Error> {
+    /// [`TrainError::Torch`].
+    pub fn memory(&self) -> Result<Weights, TrainError> {
         let first = to_weights(&self.first)?;
         let second = to_weights(&self.second)?;
         let named = |prefix: &'static str, weights: &Weights| -> Vec<_> {
@@ -95,22 +95,10 @@ impl Adam {
     /// Goes on from a memory that was saved after so many steps.
     ///
     /// # Errors
-    /// [`Error::Memory`] where it is another network's.
-    pub fn recall(&mut self, memory: &Weights, steps: u64) -> Result<(), Error> {
-        for (prefix, moments) in [("first.", &mut self.first), ("second.", &mut self.second)] {
-            for (name, moment) in moments.iter_mut() {
-                let name = format!("{prefix}{name}");
-                let saved = memory
-                    .get(&name)
-                    .ok_or_else(|| Error::Memory(name.clone()))?;
-                let shape: Vec<i64> = saved.shape().iter().map(|&side| side as i64).collect();
-                if shape != moment.size() {
-                    return Err(Error::Memory(name));
-                }
-                let saved = Tensor::f_from_slice(saved.values())?.f_reshape(shape)?;
-                moment.f_copy_(&saved)?;
-            }
-        }
+    /// [`TrainError::Memory`] where it is another network's.
+    pub fn recall(&mut self, memory: &Weights, steps: u64) -> Result<(), TrainError> {
+        copy_into(&mut self.first, &memory.under("first."))?;
+        copy_into(&mut self.second, &memory.under("second."))?;
         self.steps = steps;
         Ok(())
     }
@@ -119,13 +107,13 @@ impl Adam {
     /// are longer than `longest`, they are shortened to it first. Answers how long they were.
     ///
     /// # Errors
-    /// [`Error::Torch`].
+    /// [`TrainError::Torch`].
     pub fn step(
         &mut self,
         parameters: &BTreeMap<String, Tensor>,
         rate: f64,
         longest: f64,
-    ) -> Result<f64, Error> {
+    ) -> Result<f64, TrainError> {
         no_grad(|| self.step_without_gradient(parameters, rate, longest))
     }
 
@@ -134,12 +122,12 @@ impl Adam {
         parameters: &BTreeMap<String, Tensor>,
         rate: f64,
         longest: f64,
-    ) -> Result<f64, Error> {
+    ) -> Result<f64, TrainError> {
         let mut square = 0.0;
         for parameter in parameters.values() {
             let gradient = parameter.f_grad()?;
             if gradient.defined() {
-                square += f64::try_from(gradient.f_square()?.f_sum(None)?)?;
+                square += f64::try_from(gradient.f_norm()?)?.powi(2);
             }
         }
         let length = square.sqrt();
@@ -160,22 +148,19 @@ impl Adam {
             let mut gradient = parameter.f_grad()?;
             let (Some(first), Some(second)) = (self.first.get_mut(name), self.second.get_mut(name))
             else {
-                return Err(Error::Memory(name.clone()));
+                return Err(TrainError::Memory(name.clone()));
             };
             if !gradient.defined() {
                 continue;
             }
-            let scaled = gradient.f_mul_scalar(shrink)?;
-            let _ = first
-                .f_mul_scalar_(beta1)?
-                .f_add_(&scaled.f_mul_scalar(1.0 - beta1)?)?;
-            let scaled_square = scaled.f_square()?.f_mul_scalar(1.0 - beta2)?;
-            let _ = second.f_mul_scalar_(beta2)?.f_add_(&scaled_square)?;
-            let root = second
-                .f_div_scalar(bias2)?
-                .f_sqrt()?
-                .f_add_scalar(EPSILON)?;
-            let change = first.f_div(&root)?.f_mul_scalar(-rate / bias1)?;
+            let _ = gradient.f_mul_scalar_(shrink)?;
+            let _ = first.f_lerp_(&gradient, 1.0 - beta1)?;
+            let _ = second.f_lerp_(&gradient.f_square()?, 1.0 - beta2)?;
+            // first / bias1 over (sqrt(second / bias2) + epsilon), with one division.
+            let mut change = second.f_sqrt()?;
+            let _ = change.f_add_scalar_(EPSILON * bias2.sqrt())?;
+            let _ = change.f_reciprocal_()?.f_mul_(first)?;
+            let _ = change.f_mul_scalar_(-rate * bias2.sqrt() / bias1)?;
             let mut parameter = parameter.shallow_clone();
             let _ = parameter
                 .f_mul_scalar_(1.0 - rate * decay)?

@@ -5,7 +5,7 @@
 
 use tch::Tensor;
 
-use super::error::Error;
+use super::error::TrainError;
 
 /// Keeps a division by nothing from being one.
 const TINY: f64 = 1e-6;
@@ -14,8 +14,12 @@ const TINY: f64 = 1e-6;
 /// of the truth, 1 for nothing of it. (The scale-invariant error of Grosse et al. 2009, relative.)
 ///
 /// # Errors
-/// [`Error::Torch`].
-pub fn scale_invariant(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tensor, Error> {
+/// [`TrainError::Torch`].
+pub fn scale_invariant(
+    found: &Tensor,
+    truth: &Tensor,
+    weight: &Tensor,
+) -> Result<Tensor, TrainError> {
     let sum = |a: &Tensor, b: &Tensor| {
         a.f_mul(b)?
             .f_mul(weight)?
@@ -34,13 +38,13 @@ pub fn scale_invariant(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Resul
 /// differentiable.) One channel.
 ///
 /// # Errors
-/// [`Error::Torch`].
+/// [`TrainError::Torch`].
 pub fn windowed(
     found: &Tensor,
     truth: &Tensor,
     weight: &Tensor,
     side: i64,
-) -> Result<Tensor, Error> {
+) -> Result<Tensor, TrainError> {
     let step = (side / 2).max(1);
     let pool = |a: &Tensor, b: &Tensor| {
         a.f_mul(b)?
@@ -67,8 +71,8 @@ pub fn windowed(
 /// and leaves flat parts flat.
 ///
 /// # Errors
-/// [`Error::Torch`].
-pub fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tensor, Error> {
+/// [`TrainError::Torch`].
+pub fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tensor, TrainError> {
     let along = |dimension: i64| -> Result<Tensor, tch::TchError> {
         let step = |of: &Tensor| {
             let length = of.size()[dimension as usize] - 1;
@@ -95,12 +99,30 @@ pub fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tenso
 /// `1 - cos` of the angle between unit normals, mean under the weight.
 ///
 /// # Errors
-/// [`Error::Torch`].
-pub fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tensor, Error> {
+/// [`TrainError::Torch`].
+pub fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tensor, TrainError> {
     let cosine = found
         .f_mul(truth)?
         .f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
     let error = cosine.f_neg()?.f_add_scalar(1.0)?.f_mul(weight)?;
     let weights = weight.f_sum(None)?.f_add_scalar(TINY)?;
     Ok(error.f_sum(None)?.f_div(&weights)?)
+}
+
+/// Mean angle between unit normals under the weight, degrees.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub fn angular_degrees(
+    found: &Tensor,
+    truth: &Tensor,
+    weight: &Tensor,
+) -> Result<Tensor, TrainError> {
+    let cosine = found
+        .f_mul(truth)?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
+        .f_clamp(-1.0, 1.0)?;
+    let angle = cosine.f_acos()?.f_rad2deg()?.f_mul(weight)?;
+    let weights = weight.f_sum(None)?.f_add_scalar(TINY)?;
+    Ok(angle.f_sum(None)?.f_div(&weights)?)
 }

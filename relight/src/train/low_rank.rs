@@ -11,7 +11,7 @@
 
 use tch::{Kind, Tensor};
 
-use super::error::Error;
+use super::error::TrainError;
 
 /// How often the Gram matrix is squared: the second eigenvalue counts as its ratio to the first, to
 /// the power 256.
@@ -32,8 +32,8 @@ pub enum LowRankForm {
 /// gradient.
 ///
 /// # Errors
-/// [`Error::Torch`].
-pub fn first_singular_vector(rows: &Tensor) -> Result<Tensor, Error> {
+/// [`TrainError::Torch`].
+pub fn first_singular_vector(rows: &Tensor) -> Result<Tensor, TrainError> {
     let rows = rows.f_detach()?;
     let mut power = rows.f_matmul(&rows.f_transpose(1, 2)?)?;
     for squared in 0..=SQUARINGS {
@@ -61,8 +61,8 @@ pub fn first_singular_vector(rows: &Tensor) -> Result<Tensor, Error> {
 /// The best approximation of rank one of each matrix of `groups x N x d`, without gradient.
 ///
 /// # Errors
-/// [`Error::Torch`].
-pub fn rank_one(rows: &Tensor) -> Result<Tensor, Error> {
+/// [`TrainError::Torch`].
+pub fn rank_one(rows: &Tensor) -> Result<Tensor, TrainError> {
     let vector = first_singular_vector(rows)?;
     let shares = vector.f_transpose(1, 2)?.f_matmul(&rows.f_detach()?)?;
     Ok(vector.f_matmul(&shares)?)
@@ -72,8 +72,12 @@ pub fn rank_one(rows: &Tensor) -> Result<Tensor, Error> {
 /// each group's mask, for [`LowRankForm::Released`].
 ///
 /// # Errors
-/// [`Error::Torch`].
-pub fn low_rank_loss(rows: &Tensor, mask_px: &Tensor, form: LowRankForm) -> Result<Tensor, Error> {
+/// [`TrainError::Torch`].
+pub fn low_rank_loss(
+    rows: &Tensor,
+    mask_px: &Tensor,
+    form: LowRankForm,
+) -> Result<Tensor, TrainError> {
     let rest = rows.f_sub(&rank_one(rows)?)?;
     let square = rest
         .f_square()?
@@ -94,8 +98,8 @@ pub fn low_rank_loss(rows: &Tensor, mask_px: &Tensor, form: LowRankForm) -> Resu
 /// than the object.
 ///
 /// # Errors
-/// [`Error::Torch`].
-pub fn chromaticity(diffuse: &Tensor) -> Result<Tensor, Error> {
+/// [`TrainError::Torch`].
+pub fn chromaticity(diffuse: &Tensor) -> Result<Tensor, TrainError> {
     let sum = diffuse.f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
     Ok(diffuse.f_narrow(1, 0, 2)?.f_div(&sum.f_clamp_min(1e-5)?)?)
 }
@@ -104,8 +108,8 @@ pub fn chromaticity(diffuse: &Tensor) -> Result<Tensor, Error> {
 /// are made of them: `groups x 2`, with gradient.
 ///
 /// # Errors
-/// [`Error::Torch`].
-pub fn first_singular_values(rows: &Tensor) -> Result<Tensor, Error> {
+/// [`TrainError::Torch`].
+pub fn first_singular_values(rows: &Tensor) -> Result<Tensor, TrainError> {
     let gram = rows.f_matmul(&rows.f_transpose(1, 2)?)?;
     // Ascending.
     let values = gram.f_to_kind(Kind::Double)?.f_linalg_eigvalsh("L")?;

@@ -1,14 +1,48 @@
 //! Training, on libtorch (feature `train`). The one module that knows it.
 //!
-//! [`Model`] computes a [`crate::nets::Graph`] on tensors, so that what is trained is what the ONNX file
-//! holds. [`Adam`] keeps its memory where it can be saved.
+//! | module | concern |
+//! | --- | --- |
+//! | `model` | a [`crate::nets::Graph`] on tensors: what is trained is what the ONNX file holds |
+//! | `adam`, `average`, `learner` | how a network learns; all of it can be saved |
+//! | [`losses`], [`low_rank`], `terms` | what is descended |
+//! | `sample`, `composer`, `window` | samples composed while training |
+//! | `decompose`, `decompose_task` | the decomposing network: maps, losses, run |
+//! | `run`, `checkpoint`, `journal`, `guard` | a run: steps, what is saved, what is logged, what ends it |
+//! | `settings` | TOML |
 
 mod adam;
+mod average;
+mod checkpoint;
+mod composer;
+mod decompose;
+mod decompose_task;
 mod error;
+mod guard;
+mod journal;
+mod learner;
 pub mod losses;
 pub mod low_rank;
 mod model;
+mod run;
+mod sample;
+mod settings;
+mod sheet;
+mod terms;
+mod window;
 
 pub use adam::{Adam, AdamSettings};
-pub use error::Error;
-pub use model::{Model, Precision};
+pub use average::Average;
+pub use checkpoint::{CHECKPOINT, Checkpoint};
+pub use composer::{Composer, Composition};
+pub use decompose::{AnsweredTensors, DecomposeWeights, decompose_losses, head_spreads};
+pub use decompose_task::{DecomposeTask, Resources};
+pub use error::TrainError;
+pub use guard::Guard;
+pub use journal::{Journal, TABLE};
+pub use learner::{Learner, LearnerSettings};
+pub use model::{ComputePrecision, Model};
+pub use run::{Observer, Run, RunOutcome, StepLosses, Task, Validation};
+pub use sample::{Linearisation, TruthArrays, TruthBatch};
+pub use settings::{DataSettings, DecomposeSettings, PrecisionChoice, RunSettings, read_settings};
+pub use terms::Terms;
+pub use window::{Window, WindowSettings};

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use tch::{Device, Kind, Tensor};
+use tch::{Device, Kind, Tensor, no_grad};
 
-use super::error::Error;
+use super::error::TrainError;
 use crate::nets::{self, EPSILON, Graph, Node, Operation, Weights, check_size};
 
 /// In which precision layers are computed; parameters are always kept in 32 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Precision {
+pub enum ComputePrecision {
     /// 32 bits.
     Single,
     /// bfloat16 inside convolutions, normalisations and layers; results come out in 32 bits.
@@ -22,20 +22,20 @@ pub struct Model {
     graph: Graph,
     parameters: BTreeMap<String, Tensor>,
     device: Device,
-    precision: Precision,
+    precision: ComputePrecision,
 }
 
 impl Model {
     /// A network with these weights on a device.
     ///
     /// # Errors
-    /// What [`Weights::fitted_to`] answers, or [`Error::Torch`].
+    /// What [`Weights::fitted_to`] answers, or [`TrainError::Torch`].
     pub fn new(
         graph: Graph,
         weights: &Weights,
         device: Device,
-        precision: Precision,
-    ) -> Result<Self, Error> {
+        precision: ComputePrecision,
+    ) -> Result<Self, TrainError> {
         let mut parameters = BTreeMap::new();
         for (name, tensor) in weights.fitted_to(&graph)?.iter() {
             let shape: Vec<i64> = tensor.shape().iter().map(|&side| side as i64).collect();
@@ -53,6 +53,14 @@ impl Model {
         })
     }
 
+    /// The same network with other weights.
+    ///
+    /// # Errors
+    /// Those of [`Model::new`].
+    pub fn with_weights(&self, weights: &Weights) -> Result<Self, TrainError> {
+        Self::new(self.graph.clone(), weights, self.device, self.precision)
+    }
+
     /// What it computes.
     #[must_use]
     pub fn graph(&self) -> &Graph {
@@ -68,19 +76,27 @@ impl Model {
     /// Whether gradients are wanted of its parameters: no for a network that another is trained on.
     ///
     /// # Errors
-    /// [`Error::Torch`].
-    pub fn set_trainable(&mut self, trainable: bool) -> Result<(), Error> {
+    /// [`TrainError::Torch`].
+    pub fn set_trainable(&mut self, trainable: bool) -> Result<(), TrainError> {
         for parameter in self.parameters.values_mut() {
             *parameter = parameter.f_set_requires_grad(trainable)?;
         }
         Ok(())
     }
 
+    /// Takes over weights.
+    ///
+    /// # Errors
+    /// [`TrainError::Memory`] where they are another network's.
+    pub fn recall(&mut self, weights: &Weights) -> Result<(), TrainError> {
+        copy_into(&mut self.parameters, weights)
+    }
+
     /// A copy of its weights.
     ///
     /// # Errors
-    /// [`Error::Torch`].
-    pub fn weights(&self) -> Result<Weights, Error> {
+    /// [`TrainError::Torch`].
+    pub fn weights(&self) -> Result<Weights, TrainError> {
         to_weights(&self.parameters)
     }
 
@@ -88,8 +104,8 @@ impl Model {
     /// 32-bit.
     ///
     /// # Errors
-    /// [`nets::Error::PictureSize`] or [`Error::Torch`].
-    pub fn forward(&self, input: &Tensor) -> Result<Vec<Tensor>, Error> {
+    /// [`nets::NetError::PictureSize`] or [`TrainError::Torch`].
+    pub fn forward(&self, input: &Tensor) -> Result<Vec<Tensor>, TrainError> {
         let size = input.size();
         if let &[_, _, height, width] = size.as_slice() {
             check_size(&self.graph, (width as usize, height as usize))?;
@@ -111,33 +127,33 @@ impl Model {
             .collect()
     }
 
-    fn begin(&self, input: &Tensor) -> Result<Tensor, Error> {
+    fn begin(&self, input: &Tensor) -> Result<Tensor, TrainError> {
         let input = input.f_to_device(self.device)?;
         Ok(self.cast(&input)?)
     }
 
     fn cast(&self, tensor: &Tensor) -> Result<Tensor, tch::TchError> {
         tensor.f_to_kind(match self.precision {
-            Precision::Single => Kind::Float,
-            Precision::Mixed => Kind::BFloat16,
+            ComputePrecision::Single => Kind::Float,
+            ComputePrecision::Mixed => Kind::BFloat16,
         })
     }
 
     /// The parameters `<name>.weight` and `<name>.bias`, in the precision of layers.
-    fn layer(&self, name: &str) -> Result<(Tensor, Tensor), Error> {
+    fn layer(&self, name: &str) -> Result<(Tensor, Tensor), TrainError> {
         let part = |part: &str| {
             let name = format!("{name}.{part}");
             let parameter = self.parameters.get(&name);
-            let missing = || nets::Error::Missing {
+            let missing = || nets::NetError::Missing {
                 net: self.graph.name(),
                 name,
             };
-            Ok::<_, Error>(self.cast(parameter.ok_or_else(missing)?)?)
+            Ok::<_, TrainError>(self.cast(parameter.ok_or_else(missing)?)?)
         };
         Ok((part("weight")?, part("bias")?))
     }
 
-    fn compute(&self, node: &Node, inputs: &[&Tensor]) -> Result<Tensor, Error> {
+    fn compute(&self, node: &Node, inputs: &[&Tensor]) -> Result<Tensor, TrainError> {
         let of = inputs[0];
         Ok(match &node.operation {
             Operation::Input => of.shallow_clone(),
@@ -180,11 +196,34 @@ impl Model {
     }
 }
 
+/// Copies saved numbers into tensors of the same names and shapes.
+///
+/// # Errors
+/// [`TrainError::Memory`] where one is missing or has another shape.
+pub(super) fn copy_into(
+    tensors: &mut BTreeMap<String, Tensor>,
+    saved: &Weights,
+) -> Result<(), TrainError> {
+    no_grad(|| {
+        for (name, tensor) in tensors {
+            let missing = || TrainError::Memory(name.clone());
+            let saved = saved.get(name).ok_or_else(missing)?;
+            let shape: Vec<i64> = saved.shape().iter().map(|&side| side as i64).collect();
+            if shape != tensor.size() {
+                return Err(missing());
+            }
+            let saved = Tensor::f_from_slice(saved.values())?.f_reshape(shape)?;
+            tensor.f_copy_(&saved)?;
+        }
+        Ok(())
+    })
+}
+
 /// Tensors of any device as weights.
 ///
 /// # Errors
-/// [`Error::Torch`].
-pub(super) fn to_weights(tensors: &BTreeMap<String, Tensor>) -> Result<Weights, Error> {
+/// [`TrainError::Torch`].
+pub(super) fn to_weights(tensors: &BTreeMap<String, Tensor>) -> Result<Weights, TrainError> {
     let weights = tensors.iter().filter_map(|(name, tensor)| {
         let flat = tensor.f_detach().and_then(|tensor| {
             tensor
@@ -204,7 +243,7 @@ pub(super) fn to_weights(tensors: &BTreeMap<String, Tensor>) -> Result<Weights, 
                 let tensor = nets::Tensor::new(shape, values)?;
                 Some(Ok((name.clone(), tensor)))
             }
-            Err(error) => Some(Err(Error::from(error))),
+            Err(error) => Some(Err(TrainError::from(error))),
         }
     });
     weights.collect()

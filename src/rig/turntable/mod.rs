@@ -77,7 +77,7 @@ pub use error::{MotionFault, TurntableError};
 pub use homing::Homed;
 pub use identity::{Extras, Identity, TravelLimits};
 pub use owner::Owner;
-pub use plan::{Direction, TurnPlan, TurnRequest};
+pub use plan::{TurnDirection, TurnPlan, TurnRequest};
 pub use port::{Port, SerialPort};
 pub use status::TableStatus;
 pub use sync::{Residuals, Track, TrackError};

@@ -20,18 +20,18 @@ const PRINTED_DEG: f64 = 0.001;
 
 /// Which way a turn goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Direction {
+pub enum TurnDirection {
     /// Angles grow.
     Positive,
     /// Angles shrink.
     Negative,
 }
 
-impl Direction {
+impl TurnDirection {
     pub(super) fn sign(self) -> f64 {
         match self {
-            Direction::Positive => 1.0,
-            Direction::Negative => -1.0,
+            TurnDirection::Positive => 1.0,
+            TurnDirection::Negative => -1.0,
         }
     }
 }
@@ -46,7 +46,7 @@ pub struct TurnRequest {
     /// Added to it at either end, degrees, 0 or more.
     pub margin_deg: f64,
     /// The only direction allowed; with `None`, positive if it fits, else negative.
-    pub direction: Option<Direction>,
+    pub direction: Option<TurnDirection>,
     /// Whether the table turns back to its start afterwards, so that the cable does not wind up.
     pub unwind: bool,
 }
@@ -71,7 +71,7 @@ pub struct TurnPlan {
     constant_deg: f64,
     margin_deg: f64,
     ramp_deg: f64,
-    direction: Direction,
+    direction: TurnDirection,
     unwind: bool,
     start_deg: f64,
 }
@@ -101,7 +101,7 @@ impl TurnPlan {
         let (low, high) = identity.limits_from(status);
         let directions = match request.direction {
             Some(direction) => vec![direction],
-            None => vec![Direction::Positive, Direction::Negative],
+            None => vec![TurnDirection::Positive, TurnDirection::Negative],
         };
         let mut plans = directions.into_iter().map(plan);
         let first = plans.next();
@@ -129,7 +129,7 @@ impl TurnPlan {
 
     /// Its direction.
     #[must_use]
-    pub fn direction(&self) -> Direction {
+    pub fn direction(&self) -> TurnDirection {
         self.direction
     }
 
@@ -294,7 +294,7 @@ mod tests {
     #[test]
     fn a_turn_from_zero_has_its_ramps_outside_the_constant_part() {
         let plan = plan(0.0).unwrap();
-        assert_eq!(plan.direction(), Direction::Positive);
+        assert_eq!(plan.direction(), TurnDirection::Positive);
         // 7.2^2 / (2 * 36) = 0.72 degrees of ramp.
         assert!((plan.back_deg() + 2.0 + 0.72 + RAMP_SLACK_DEG).abs() < 1e-9);
         assert_eq!(plan.constant_from_deg(), -2.0);
@@ -305,14 +305,14 @@ mod tests {
     #[test]
     fn a_table_that_is_wound_up_turns_the_other_way() {
         let plan = plan(200.0).unwrap();
-        assert_eq!(plan.direction(), Direction::Negative);
+        assert_eq!(plan.direction(), TurnDirection::Negative);
         assert!(plan.end_deg() > -163.0 && plan.back_deg() > 200.0);
     }
 
     #[test]
     fn a_turn_without_room_is_refused_with_the_numbers_and_a_way_out() {
         let request = TurnRequest {
-            direction: Some(Direction::Positive),
+            direction: Some(TurnDirection::Positive),
             ..TurnRequest::default()
         };
         let here = status(100.0, 100.0);

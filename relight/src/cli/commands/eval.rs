@@ -7,7 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use relight::data::{JudgedImages, TruthLayout, TruthSet};
 use relight::eval::{
     HighlightMethod, IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, LightMethod, NormalMethod,
-    OrdinalMethod, Predictions, RelightMethod, RelightingRecipe, RelightingSet, Table,
+    OrdinalMethod, Predictions, RelightMethod, RelightingRecipe, RelightingSet, ScoreTable,
     evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal,
     evaluate_relighting, make_relighting,
 };
@@ -241,7 +241,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     tell(&table, arguments.common().output.as_deref(), console)
 }
 
-type Evaluated = Result<Table, Box<dyn Error>>;
+type Evaluated = Result<ScoreTable, Box<dyn Error>>;
 
 fn mit(arguments: &SetArguments, input: InputName, console: Console) -> Evaluated {
     let (set, split) = arguments.open()?;
@@ -364,7 +364,7 @@ fn with_progress<T, E: Error + 'static>(
     Ok(result?)
 }
 
-fn tell(table: &Table, output: Option<&Path>, console: Console) -> CommandResult {
+fn tell(table: &ScoreTable, output: Option<&Path>, console: Console) -> CommandResult {
     if let Some(path) = output {
         let mut bytes = serde_json::to_vec_pretty(table)?;
         bytes.push(b'\n');

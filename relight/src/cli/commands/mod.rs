@@ -3,3 +3,5 @@
 pub(super) mod eval;
 pub(super) mod render;
 pub(super) mod synth;
+#[cfg(feature = "train")]
+pub(super) mod train;

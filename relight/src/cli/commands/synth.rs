@@ -7,7 +7,7 @@ use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use rayon::ThreadPoolBuilder;
 use relight::synth::{
-    Folders, Library, LightKind, Recipe, TurnRecipe, Written, made_panoramas, write_preview,
+    Folders, Library, LightKind, Recipe, SynthTally, TurnRecipe, made_panoramas, write_preview,
     write_samples, write_turns,
 };
 use serde_json::json;
@@ -172,8 +172,8 @@ fn turns(arguments: &Arguments, library: &Library, console: Console) -> ModeResu
     Ok(())
 }
 
-fn tell(arguments: &Arguments, console: Console, what: &str, written: Written) {
-    let Written { new, kept } = written;
+fn tell(arguments: &Arguments, console: Console, what: &str, written: SynthTally) {
+    let SynthTally { new, kept } = written;
     let out = &arguments.output;
     console.say(
         &format!("{}: {new} {what} written, {kept} were there", out.display()),

@@ -5,7 +5,7 @@ mod read;
 
 use std::path::Path;
 
-use super::{Damage, OpenError, SampleId, Source};
+use super::{DamagedSample, OpenError, SampleId, Source};
 use crate::image::{Extent, Linear, Planes, Rgb};
 use crate::light::{Normals, ShLight, YUp};
 use layout::Entry;
@@ -88,16 +88,16 @@ impl TruthSet {
     /// Reads the sample at `index`, 0-based.
     ///
     /// # Errors
-    /// [`Damage`], which names the sample.
-    pub fn load(&self, index: usize) -> Result<TruthSample, Damage> {
+    /// [`DamagedSample`], which names the sample.
+    pub fn load(&self, index: usize) -> Result<TruthSample, DamagedSample> {
         let Some(entry) = self.entries.get(index) else {
             let why = format!("there are {} samples", self.entries.len());
-            return Err(Damage {
+            return Err(DamagedSample {
                 sample: format!("sample {index}"),
                 fault: super::SampleFault::Lost { why },
             });
         };
-        read::sample(entry, self.layout).map_err(|fault| Damage {
+        read::sample(entry, self.layout).map_err(|fault| DamagedSample {
             sample: entry.name.clone(),
             fault,
         })
@@ -116,7 +116,7 @@ impl Source for TruthSet {
         &self,
         samples: &[SampleId],
         spare: Option<Self::Batch>,
-    ) -> (Self::Batch, Vec<Damage>) {
+    ) -> (Self::Batch, Vec<DamagedSample>) {
         let mut batch = spare.unwrap_or_default();
         batch.clear();
         let mut damage = Vec::new();

@@ -3,7 +3,7 @@
 use relit_data::shard::FrameRecord;
 
 use crate::data::error::check_extent;
-use crate::data::{Damage, SampleFault};
+use crate::data::{DamagedSample, SampleFault};
 use crate::image::{ColourSpace, Extent, Srgb};
 
 /// What the values of a batch are.
@@ -101,9 +101,10 @@ impl BatchBuilder {
     }
 
     /// Takes a frame up.
-    pub(super) fn push(&mut self, frame: Frame) -> Result<(), Damage> {
+    pub(super) fn push(&mut self, frame: Frame) -> Result<(), DamagedSample> {
         let sample = frame.about.key.clone();
-        self.add(frame).map_err(|fault| Damage { sample, fault })
+        self.add(frame)
+            .map_err(|fault| DamagedSample { sample, fault })
     }
 
     pub(super) fn finish(self) -> TurnBatch {

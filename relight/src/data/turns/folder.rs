@@ -10,7 +10,7 @@ use relit_data::shard::{MAX_SAMPLES, order, sample_key};
 use super::batch::{Frame, MaskBytes, TurnFrame, extent_of};
 use super::listed;
 use crate::data::error::check_extent;
-use crate::data::{Damage, OpenError, SampleFault};
+use crate::data::{DamagedSample, OpenError, SampleFault};
 use crate::image::{Extent, ImageError};
 
 /// The images of a video, and its mask.
@@ -55,13 +55,13 @@ impl FolderTurn {
         u32::try_from(self.files.len()).unwrap_or(u32::MAX)
     }
 
-    pub(super) fn frame(&self, position: u32) -> Result<Frame, Damage> {
+    pub(super) fn frame(&self, position: u32) -> Result<Frame, DamagedSample> {
         let index = self
             .order
             .get(position as usize)
             .copied()
             .unwrap_or(position);
-        self.decode(index).map_err(|fault| Damage {
+        self.decode(index).map_err(|fault| DamagedSample {
             sample: format!("{}, frame {index}", self.folder.display()),
             fault,
         })

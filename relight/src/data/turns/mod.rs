@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use relit_data::shard::{Dataset, Layout};
 
-use super::{Damage, OpenError, SampleId, Source};
+use super::{DamagedSample, OpenError, SampleId, Source};
 use batch::{BatchBuilder, Frame};
 use folder::FolderTurn;
 use shard::ShardTurn;
@@ -20,7 +20,7 @@ pub use batch::{Encoding, TurnBatch, TurnFrame};
 /// their position, in an order in which any 12 neighbours cover the whole turn.
 ///
 /// Opening it finds out where samples stand and reads none of them. What is lost is told then as
-/// [`Damage`] of the batch that it belongs to, in each epoch.
+/// [`DamagedSample`] of the batch that it belongs to, in each epoch.
 pub struct Turns {
     turns: Vec<Turn>,
     encoding: Encoding,
@@ -80,7 +80,7 @@ impl Turn {
         }
     }
 
-    fn frame(&self, position: u32) -> Result<Frame, Damage> {
+    fn frame(&self, position: u32) -> Result<Frame, DamagedSample> {
         match self {
             Self::Shard(shard) => shard.frame(position),
             Self::Folder(folder) => folder.frame(position),
@@ -95,7 +95,11 @@ impl Source for Turns {
         self.turns.iter().map(Turn::samples).collect()
     }
 
-    fn batch(&self, samples: &[SampleId], spare: Option<TurnBatch>) -> (TurnBatch, Vec<Damage>) {
+    fn batch(
+        &self,
+        samples: &[SampleId],
+        spare: Option<TurnBatch>,
+    ) -> (TurnBatch, Vec<DamagedSample>) {
         let mut batch = BatchBuilder::new(self.encoding, samples.len(), spare);
         let mut damage = Vec::new();
         for id in samples {

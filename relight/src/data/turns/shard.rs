@@ -9,7 +9,7 @@ use relit_data::causes::with_causes;
 use relit_data::shard::{SampleSpan, SampleSpans, ShardReader, ShardSample, decode_rgb};
 
 use super::batch::{Frame, MaskBytes, TurnFrame, extent_of};
-use crate::data::{Damage, OpenError, SampleFault};
+use crate::data::{DamagedSample, OpenError, SampleFault};
 
 /// Bytes that are read at a time while looking for samples: a header and what follows it closely.
 const SCAN_BUFFER: usize = 1 << 10;
@@ -69,8 +69,8 @@ impl ShardTurn {
         u32::try_from(self.slots.len()).unwrap_or(u32::MAX)
     }
 
-    pub(super) fn frame(&self, position: u32) -> Result<Frame, Damage> {
-        let damage = |fault| Damage {
+    pub(super) fn frame(&self, position: u32) -> Result<Frame, DamagedSample> {
+        let damage = |fault| DamagedSample {
             sample: format!("{}, sample {position}", self.path.display()),
             fault,
         };

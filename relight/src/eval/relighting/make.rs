@@ -13,7 +13,7 @@ use relit_data::durable::write_whole;
 
 use super::method::shown;
 use super::set::{FILE, Index, ObjectEntry, Part, SCHEMA, light_file, object_folder};
-use crate::eval::{EvalError, Progress};
+use crate::eval::{EvalError, EvalProgress};
 use crate::image::{Depth, Rgb, write_png};
 use crate::light::{Direction, Rotation};
 use crate::synth::{
@@ -116,7 +116,7 @@ pub fn make_relighting(
     recipe: &RelightingRecipe,
     library: &Library,
     out: &Path,
-    progress: Progress<'_>,
+    progress: EvalProgress<'_>,
 ) -> Result<(), EvalError> {
     recipe.synth().check()?;
     let lightings = recipe.lightings(library);

@@ -13,7 +13,7 @@ pub use method::RelightMethod;
 pub use set::RelightingSet;
 
 use super::run::{Scored, add_lines};
-use super::{EvalError, MaskRule, Progress, Table};
+use super::{EvalError, EvalProgress, MaskRule, ScoreTable};
 use crate::image::Planes;
 use crate::metrics::{Comparison, ScaleFit, Ssim, dssim};
 use set::{Object, Part};
@@ -26,9 +26,9 @@ pub fn evaluate_relighting(
     set: &RelightingSet,
     split: &str,
     methods: &[RelightMethod],
-    progress: Progress<'_>,
-) -> Result<Table, EvalError> {
-    let mut table = Table {
+    progress: EvalProgress<'_>,
+) -> Result<ScoreTable, EvalError> {
+    let mut table = ScoreTable {
         protocol: "relighting".to_owned(),
         notes: vec![
             set.about(),

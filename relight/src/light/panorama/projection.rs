@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::Panorama;
 use crate::image::Extent;
 use crate::light::basis::{basis, polar_functions};
+use crate::light::least_squares::NormalEquations;
 use crate::light::quadrature::Quadrature;
 use crate::light::{LightError, Order, Rotation, ShLight};
 
@@ -59,7 +60,7 @@ impl Panorama {
     /// # Errors
     /// Where there are too few pixels to tell the coefficients from each other.
     pub fn fit(&self, order: Order) -> Result<ShLight, LightError> {
-        let mut equations = Equations::new(order.coefficients());
+        let mut equations = NormalEquations::new(order.coefficients());
         for y in 0..self.extent().height {
             for x in 0..self.extent().width {
                 let values = basis(order, self.direction(x as f64 + 0.5, y as f64 + 0.5));
@@ -140,91 +141,6 @@ fn spread(order: Order, sums: &[[f64; 3]], polar: &[f64]) -> Vec<[f64; 3]> {
             sums[(m + order) as usize].map(|sum| sum * factor)
         })
         .collect()
-}
-
-/// Normal equations of a least-squares problem with three right-hand sides.
-struct Equations {
-    unknowns: usize,
-    /// The lower triangle, row by row, in a square.
-    matrix: Vec<f64>,
-    right: Vec<[f64; 3]>,
-}
-
-impl Equations {
-    fn new(unknowns: usize) -> Self {
-        Self {
-            unknowns,
-            matrix: vec![0.0; unknowns * unknowns],
-            right: vec![[0.0; 3]; unknowns],
-        }
-    }
-
-    fn add(&mut self, factors: &[f64], value: [f64; 3]) {
-        for (i, a) in factors.iter().enumerate() {
-            let row = &mut self.matrix[i * self.unknowns..][..=i];
-            for (cell, b) in row.iter_mut().zip(factors) {
-                *cell += a * b;
-            }
-            for (right, v) in self.right[i].iter_mut().zip(value) {
-                *right += a * v;
-            }
-        }
-    }
-
-    /// The solution by Cholesky's decomposition; none where the matrix has no full rank.
-    fn solve(mut self) -> Option<Vec<[f64; 3]>> {
-        let n = self.unknowns;
-        let largest = (0..n).map(|i| self.matrix[i * n + i]).fold(0.0, f64::max);
-        for i in 0..n {
-            for j in 0..=i {
-                let dot: f64 = (0..j)
-                    .map(|k| self.matrix[i * n + k] * self.matrix[j * n + k])
-                    .sum();
-                let rest = self.matrix[i * n + j] - dot;
-                self.matrix[i * n + j] = if i > j {
-                    rest / self.matrix[j * n + j]
-                } else if rest > 1e-10 * largest {
-                    rest.sqrt()
-                } else {
-                    return None;
-                };
-            }
-        }
-        let mut x = self.right;
-        for i in 0..n {
-            x[i] = substitute(
-                &x,
-                x[i],
-                (0..i).map(|k| (k, self.matrix[i * n + k])),
-                self.matrix[i * n + i],
-            );
-        }
-        for i in (0..n).rev() {
-            x[i] = substitute(
-                &x,
-                x[i],
-                (i + 1..n).map(|k| (k, self.matrix[k * n + i])),
-                self.matrix[i * n + i],
-            );
-        }
-        Some(x)
-    }
-}
-
-/// `(value - sum of factor * x[k]) / diagonal`
-fn substitute(
-    x: &[[f64; 3]],
-    value: [f64; 3],
-    factors: impl Iterator<Item = (usize, f64)>,
-    diagonal: f64,
-) -> [f64; 3] {
-    let mut rest = value;
-    for (k, factor) in factors {
-        for (rest, v) in rest.iter_mut().zip(x[k]) {
-            *rest -= factor * v;
-        }
-    }
-    rest.map(|v| v / diagonal)
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use gltf::mesh::Mode;
 use gltf::{Accessor, Gltf, Node, Primitive, Semantic};
 
 use super::Raw;
-use crate::synth::Error;
+use crate::synth::SynthError;
 
 /// Deepest nesting of nodes that is followed.
 const DEEPEST: usize = 64;
@@ -20,9 +20,9 @@ const DEEPEST: usize = 64;
 const MOST_NODES: usize = 100_000;
 
 /// All triangles of the default scene as one surface.
-pub(super) fn read(path: &Path) -> Result<Raw, Error> {
-    let bytes = std::fs::read(path).map_err(Error::read(path))?;
-    let damaged = |reason: String| Error::Mesh {
+pub(super) fn read(path: &Path) -> Result<Raw, SynthError> {
+    let bytes = std::fs::read(path).map_err(SynthError::read(path))?;
+    let damaged = |reason: String| SynthError::Mesh {
         path: path.to_owned(),
         reason,
     };
@@ -45,8 +45,8 @@ pub(super) fn read(path: &Path) -> Result<Raw, Error> {
 }
 
 /// The bytes of each buffer.
-fn buffers<'a>(path: &Path, file: &'a Gltf) -> Result<Vec<Cow<'a, [u8]>>, Error> {
-    let damaged = |reason: String| Error::Mesh {
+fn buffers<'a>(path: &Path, file: &'a Gltf) -> Result<Vec<Cow<'a, [u8]>>, SynthError> {
+    let damaged = |reason: String| SynthError::Mesh {
         path: path.to_owned(),
         reason,
     };
@@ -71,8 +71,8 @@ fn buffers<'a>(path: &Path, file: &'a Gltf) -> Result<Vec<Cow<'a, [u8]>>, Error>
 }
 
 /// What a buffer's address stands for: data within it, or a file in the folder of the mesh.
-fn linked(path: &Path, uri: &str) -> Result<Vec<u8>, Error> {
-    let damaged = |reason: String| Error::Mesh {
+fn linked(path: &Path, uri: &str) -> Result<Vec<u8>, SynthError> {
+    let damaged = |reason: String| SynthError::Mesh {
         path: path.to_owned(),
         reason,
     };
@@ -90,7 +90,7 @@ fn linked(path: &Path, uri: &str) -> Result<Vec<u8>, Error> {
         return Err(damaged(reason));
     }
     let beside = path.with_file_name(uri.replace("%20", " "));
-    std::fs::read(&beside).map_err(Error::read(&beside))
+    std::fs::read(&beside).map_err(SynthError::read(&beside))
 }
 
 struct Reader<'a> {
@@ -308,7 +308,7 @@ mod tests {
         (document, bytes)
     }
 
-    fn read(document: &Value, binary: &[u8]) -> Result<Mesh, Error> {
+    fn read(document: &Value, binary: &[u8]) -> Result<Mesh, SynthError> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.bin"), binary).unwrap();
         let path = folder.path().join("a.gltf");

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
-use super::Error;
+use super::SynthError;
 
 /// Most triangles that a mesh may have.
 const MOST_TRIANGLES: usize = 20_000_000;
@@ -65,20 +65,20 @@ impl Mesh {
     /// surface; its own normals are not used, those of faces within 50 degrees are blended.
     ///
     /// # Errors
-    /// [`Error::Mesh`] where the file is damaged or holds no surface, [`Error::Read`] where it
-    /// cannot be read, [`Error::MeshKind`] where it is of another kind.
-    pub fn read(path: &Path) -> Result<Self, Error> {
+    /// [`SynthError::Mesh`] where the file is damaged or holds no surface, [`SynthError::Read`] where it
+    /// cannot be read, [`SynthError::MeshKind`] where it is of another kind.
+    pub fn read(path: &Path) -> Result<Self, SynthError> {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         let raw = match extension.to_str() {
             Some("obj") => obj::read(path)?,
             Some("gltf" | "glb") => glb::read(path)?,
             _ => {
-                return Err(Error::MeshKind {
+                return Err(SynthError::MeshKind {
                     path: path.to_owned(),
                 });
             }
         };
-        Self::new(raw, CREASE).map_err(|fault| Error::Mesh {
+        Self::new(raw, CREASE).map_err(|fault| SynthError::Mesh {
             path: path.to_owned(),
             reason: fault.to_string(),
         })

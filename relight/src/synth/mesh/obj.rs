@@ -7,11 +7,11 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::Raw;
-use crate::synth::Error;
+use crate::synth::SynthError;
 
 /// All models of the file as one surface. Materials are not read.
-pub(super) fn read(path: &Path) -> Result<Raw, Error> {
-    let file = File::open(path).map_err(Error::read(path))?;
+pub(super) fn read(path: &Path) -> Result<Raw, SynthError> {
+    let file = File::open(path).map_err(SynthError::read(path))?;
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
@@ -20,7 +20,7 @@ pub(super) fn read(path: &Path) -> Result<Raw, Error> {
     };
     let no_materials = |_: &Path| Ok(Default::default());
     let (models, _) = tobj::load_obj_buf(&mut BufReader::new(file), &options, no_materials)
-        .map_err(|fault| Error::Mesh {
+        .map_err(|fault| SynthError::Mesh {
             path: path.to_owned(),
             reason: fault.to_string(),
         })?;
@@ -62,9 +62,9 @@ fn append(raw: &mut Raw, mesh: &tobj::Mesh) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use crate::synth::{Error, Mesh};
+    use crate::synth::{Mesh, SynthError};
 
-    fn read(text: &str) -> Result<Mesh, Error> {
+    fn read(text: &str) -> Result<Mesh, SynthError> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.obj");
         std::fs::write(&path, text).unwrap();

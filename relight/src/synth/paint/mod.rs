@@ -3,12 +3,14 @@
 //!
 //! | file | concern |
 //! | --- | --- |
+//! | `frame` | planes to draw on, soft edges |
 //! | `palette` | which colours stand together |
 //! | `pattern` | which points have which colour of the palette |
 //! | `writing` | lines of strokes that look like a script |
 //! | `picture` | image files and parts of panoramas as patterns |
 //! | `relief` | slopes that are finer than the mesh |
 
+mod frame;
 mod palette;
 mod pattern;
 mod picture;
@@ -24,7 +26,7 @@ use palette::Palette;
 use pattern::{Canvas, Pattern};
 
 pub use palette::AlbedoKind;
-pub use picture::Picture;
+pub use picture::TextureImage;
 pub use relief::Relief;
 
 /// Least albedo of anything: soot reflects more.
@@ -131,7 +133,7 @@ impl Paint {
         &self,
         points: &[Vec3],
         texture: Option<&[Vec2]>,
-        pictures: &[Picture],
+        pictures: &[TextureImage],
     ) -> Vec<Vec3> {
         let mut albedo = vec![self.ground; points.len()];
         if !self.coats.is_empty() {
@@ -177,7 +179,7 @@ mod tests {
     fn a_third_of_all_paints_is_constant_and_every_albedo_is_one_that_exists() {
         let points = points();
         let mut random = Random::new(1);
-        let pictures = [Picture::from_fn(4, 4, |x, y| {
+        let pictures = [TextureImage::from_fn(4, 4, |x, y| {
             Vec3::new(x as f32, y as f32, 1.0)
         })];
         let mut constant = 0;

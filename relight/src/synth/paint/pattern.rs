@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::super::noise::Noise;
 use super::super::random::Random;
+use super::frame::{Frame, step};
 use super::palette::Palette;
-use super::picture::Picture;
+use super::picture::TextureImage;
 use super::writing::Writing;
 
 /// Where a coat of paint lies. Lengths are in the object's own frame, in which it is about 2 large.
@@ -81,31 +82,6 @@ impl Canvas<'_> {
 pub(super) struct Waves {
     seed: u64,
     frequency: f32,
-}
-
-/// A plane with two axes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Frame {
-    origin: Vec3,
-    right: Vec3,
-    up: Vec3,
-}
-
-impl Frame {
-    /// Around a point of the surface, seen from anywhere; `scale` is the length of one unit.
-    pub(super) fn draw(random: &mut Random, origin: Vec3, scale: f32) -> Self {
-        let turn = random.rotation();
-        Self {
-            origin,
-            right: turn.x_axis / scale,
-            up: turn.y_axis / scale,
-        }
-    }
-
-    pub(super) fn place(&self, point: Vec3) -> Vec2 {
-        let from = point - self.origin;
-        Vec2::new(from.dot(self.right), from.dot(self.up))
-    }
 }
 
 impl Waves {
@@ -222,7 +198,7 @@ impl Pattern {
         colour: Vec3,
         points: &[Vec3],
         texture: Option<&[Vec2]>,
-        pictures: &[Picture],
+        pictures: &[TextureImage],
         albedo: &mut [Vec3],
     ) {
         if let Self::Picture {
@@ -285,11 +261,6 @@ impl Pattern {
             Self::Voronoi { .. } | Self::Picture { .. } => 0.0,
         }
     }
-}
-
-/// 0 below, 1 above, and a ramp of this width around 0.
-pub(super) fn step(value: f32, width: f32) -> f32 {
-    (value / width + 0.5).clamp(0.0, 1.0)
 }
 
 /// The nearest site, and the squared distances to it and to the second nearest.

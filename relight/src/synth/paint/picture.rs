@@ -5,17 +5,17 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use crate::image::{Extent, Linear, Rgb, Transfer};
-use crate::synth::Error;
+use crate::synth::SynthError;
 
 /// A picture in linear light, which repeats itself in all directions.
 #[derive(Debug, Clone)]
-pub struct Picture {
+pub struct TextureImage {
     width: usize,
     height: usize,
     texels: Vec<Vec3>,
 }
 
-impl Picture {
+impl TextureImage {
     /// A picture of the colours that `at` gives for column and row.
     pub(in crate::synth) fn from_fn(
         width: usize,
@@ -35,8 +35,8 @@ impl Picture {
     /// Reads a PNG or JPEG, whose values are sRGB.
     ///
     /// # Errors
-    /// [`Error::Image`] where it cannot be read or is no picture.
-    pub fn read(path: &Path) -> Result<Self, Error> {
+    /// [`SynthError::Image`] where it cannot be read or is no picture.
+    pub fn read(path: &Path) -> Result<Self, SynthError> {
         let image = Rgb::<Linear>::read(path, Transfer::Srgb)?;
         let planes = image.planes();
         let Extent { width, height } = planes.extent();
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn a_picture_is_looked_up_between_its_texels_and_repeats_itself() {
-        let picture = Picture::from_fn(2, 2, |x, y| Vec3::new(x as f32, y as f32, 0.0));
+        let picture = TextureImage::from_fn(2, 2, |x, y| Vec3::new(x as f32, y as f32, 0.0));
         assert_eq!(picture.at(Vec2::new(0.25, 0.75)), Vec3::ZERO);
         assert_eq!(picture.at(Vec2::new(0.75, 0.25)), Vec3::new(1.0, 1.0, 0.0));
         assert_eq!(picture.at(Vec2::new(0.5, 0.75)), Vec3::new(0.5, 0.0, 0.0));
@@ -80,7 +80,7 @@ mod tests {
             picture.at(Vec2::new(0.75, 0.25))
         );
         assert_eq!(
-            Picture::from_fn(0, 3, |_, _| Vec3::ONE).at(Vec2::ZERO),
+            TextureImage::from_fn(0, 3, |_, _| Vec3::ONE).at(Vec2::ZERO),
             Vec3::ZERO
         );
     }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::super::geometry::{GBuffer, turned_to};
 use super::super::noise::Noise;
 use super::super::random::Random;
-use super::pattern::step;
+use super::frame::step;
 
 /// A height field on the surface.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::super::random::{Random, mix, unit_of};
-use super::pattern::{Frame, step};
+use super::frame::{Frame, step};
 
 /// Corners of strokes in a letter: columns and rows of a lattice.
 const LATTICE: [f32; 2] = [3.0, 5.0];

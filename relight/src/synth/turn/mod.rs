@@ -26,17 +26,18 @@ use relit_data::shard::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::Error;
+use super::SynthError;
 use super::camera::CameraModel;
 use super::finish::Finish;
-use super::folder::Written;
+use super::folder::SynthTally;
 use super::geometry::{GBuffer, Occluder};
 use super::library::Library;
 use super::lighting::{Lighting, Material, Scene, Shaded};
 use super::mesh::Mesh;
+use super::object::ObjectSource;
 use super::png::{Sixteen, encode_sixteen};
 use super::random::{Random, stream};
-use super::recipe::{AMBIENT_RAYS, ObjectSource, Recipe};
+use super::recipe::{AMBIENT_RAYS, Recipe};
 use super::sample::{Whites, mask, photograph};
 use super::view::{Pose, Projection};
 use crate::light::{Direction, Rotation};
@@ -112,10 +113,10 @@ pub fn write_turns(
     count: u64,
     out: &Path,
     progress: &(dyn Fn() + Sync),
-) -> Result<Written, Error> {
+) -> Result<SynthTally, SynthError> {
     turns.recipe.check()?;
     if !(1..=shard::MAX_SAMPLES).contains(&turns.frames) {
-        return Err(Error::Setting {
+        return Err(SynthError::Setting {
             name: "the number of frames",
             value: u64::from(turns.frames),
             allowed: "1 to 1000000",
@@ -123,7 +124,7 @@ pub fn write_turns(
     }
     let folder = OutputFolder::lock(out)?;
     let mut dataset = open_dataset(out, &turns.settings())?;
-    let mut written = Written::default();
+    let mut written = SynthTally::default();
     for number in 0..count {
         let turn = Turn::draw(turns, library, number);
         if turn.is_whole(&dataset, out)? {
@@ -154,10 +155,10 @@ impl TurnRecipe {
     }
 }
 
-fn open_dataset(out: &Path, settings: &ExtractionSettings) -> Result<Dataset, Error> {
+fn open_dataset(out: &Path, settings: &ExtractionSettings) -> Result<Dataset, SynthError> {
     match Dataset::read(out) {
         Ok(there) if there.settings == *settings => Ok(there),
-        Ok(_) => Err(Error::OtherSettings {
+        Ok(_) => Err(SynthError::OtherSettings {
             path: out.to_owned(),
         }),
         Err(shard::ShardError::NoDataset { .. }) => Ok(Dataset::new(settings.clone())),
@@ -267,12 +268,12 @@ impl<'a> Turn<'a> {
     }
 
     /// Whether the data set holds this very turn, whole.
-    fn is_whole(&self, dataset: &Dataset, out: &Path) -> Result<bool, Error> {
+    fn is_whole(&self, dataset: &Dataset, out: &Path) -> Result<bool, SynthError> {
         let Some(entry) = dataset.session(&self.session) else {
             return Ok(false);
         };
         if entry.input != self.input() {
-            return Err(Error::OtherSettings {
+            return Err(SynthError::OtherSettings {
                 path: out.to_owned(),
             });
         }
@@ -305,7 +306,7 @@ impl<'a> Turn<'a> {
         &self,
         folder: &OutputFolder,
         progress: &(dyn Fn() + Sync),
-    ) -> Result<(SessionEntry, Vec<ShardEntry>), Error> {
+    ) -> Result<(SessionEntry, Vec<ShardEntry>), SynthError> {
         let mask = mask(self.scene.buffer());
         let spans = MaskSpans::of(&mask);
         let frames = self.description.frames;
@@ -316,7 +317,7 @@ impl<'a> Turn<'a> {
         let mut page = TurnPage::new(frames);
         let mut lines = Vec::new();
         for first in (0..frames).step_by(BATCH as usize) {
-            let batch: Result<Vec<Frame>, Error> = (first..frames.min(first + BATCH))
+            let batch: Result<Vec<Frame>, SynthError> = (first..frames.min(first + BATCH))
                 .into_par_iter()
                 .map(|index| {
                     let frame = self.frame(index, &spans);
@@ -359,7 +360,7 @@ impl<'a> Turn<'a> {
         Ok((entry, files.shards))
     }
 
-    fn frame(&self, index: u32, spans: &MaskSpans) -> Result<Frame, Error> {
+    fn frame(&self, index: u32, spans: &MaskSpans) -> Result<Frame, SynthError> {
         let (mut shaded, lighting) = self.light(index);
         let camera = &self.description.camera;
         shaded.scale(camera.gain);
@@ -388,7 +389,7 @@ impl<'a> Turn<'a> {
         index: u32,
         image: &RgbImage,
         spans: &MaskSpans,
-    ) -> Result<FrameRecord, Error> {
+    ) -> Result<FrameRecord, SynthError> {
         let measures = spans.measure(image, SATURATION_LEVEL)?;
         let saturated_fraction = measures.saturated_fraction();
         let size = self.description.size;

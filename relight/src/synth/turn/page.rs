@@ -5,7 +5,7 @@ use relit_data::report::{self, Page, THUMBNAIL_SIDE, Thumbnail};
 use relit_data::shard::{FrameRecord, Sample};
 
 use super::{GATE, SATURATION_LEVEL, Turn};
-use crate::synth::Error;
+use crate::synth::SynthError;
 
 /// Thumbnails on a page.
 const THUMBNAILS: u32 = 24;
@@ -37,7 +37,7 @@ impl TurnPage {
         self.thumbnails.push(Thumbnail { index, image });
     }
 
-    pub(super) fn render(&self, turn: &Turn<'_>) -> Result<String, Error> {
+    pub(super) fn render(&self, turn: &Turn<'_>) -> Result<String, SynthError> {
         let pair = |name: &str, value: String| (name.to_owned(), value);
         let description = &turn.description;
         let facts = [

@@ -7,8 +7,9 @@ use glam::{Affine3A, Vec3};
 use crate::synth::geometry::Disc;
 use crate::synth::library::Library;
 use crate::synth::mesh::Mesh;
+use crate::synth::object::ObjectSource;
 use crate::synth::random::Random;
-use crate::synth::recipe::{ObjectSource, Recipe};
+use crate::synth::recipe::Recipe;
 use crate::synth::view::{Pose, Projection};
 
 /// The plate's radius, in halves of the picture's width.

@@ -141,11 +141,11 @@ fn turns_that_are_whole_are_kept_and_others_are_refused() {
         ..turns(4)
     };
     let error = write_turns(&other, &library, 1, folder.path(), &|| {}).unwrap_err();
-    assert!(matches!(error, Error::OtherSettings { .. }));
+    assert!(matches!(error, SynthError::OtherSettings { .. }));
     let mut other = turns(4);
     other.recipe.light = LightKind::Sh;
     let error = write_turns(&other, &library, 1, folder.path(), &|| {}).unwrap_err();
-    assert!(matches!(error, Error::OtherSettings { .. }));
+    assert!(matches!(error, SynthError::OtherSettings { .. }));
 }
 
 #[test]

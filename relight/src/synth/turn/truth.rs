@@ -8,7 +8,7 @@ use relit_data::durable::publish;
 use serde::{Deserialize, Serialize};
 
 use super::{Frame, Turn};
-use crate::synth::Error;
+use crate::synth::SynthError;
 use crate::synth::png::{Sixteen, encode_sixteen};
 use crate::synth::sample::Whites;
 
@@ -40,25 +40,25 @@ pub(super) struct TruthFolder {
 }
 
 impl TruthFolder {
-    pub(super) fn create(out: &Path, session: &str) -> Result<Self, Error> {
+    pub(super) fn create(out: &Path, session: &str) -> Result<Self, SynthError> {
         let place = place(out, session);
         let partial = place.with_file_name(format!(".{session}.{}.partial", process::id()));
         // What a killed process of this number left.
         let _ = fs::remove_dir_all(&partial);
         for folder in ["shading", "highlight"] {
             let path = partial.join(folder);
-            fs::create_dir_all(&path).map_err(Error::write(&path))?;
+            fs::create_dir_all(&path).map_err(SynthError::write(&path))?;
         }
         Ok(Self { partial, place })
     }
 
-    pub(super) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+    pub(super) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), SynthError> {
         let path = self.partial.join(name);
-        fs::write(&path, bytes).map_err(Error::write(&path))
+        fs::write(&path, bytes).map_err(SynthError::write(&path))
     }
 
     /// What all frames share.
-    pub(super) fn write_object(&self, turn: &Turn<'_>) -> Result<(), Error> {
+    pub(super) fn write_object(&self, turn: &Turn<'_>) -> Result<(), SynthError> {
         let (buffer, material) = (turn.scene.buffer(), &turn.material);
         self.write("turn.json", &turn.json())?;
         let albedo = encode_sixteen(buffer, &Sixteen::up_to(&material.albedo, 1.0))?;
@@ -67,21 +67,21 @@ impl TruthFolder {
         self.write("normal.png", &normals)
     }
 
-    pub(super) fn write_frame(&self, frame: &Frame) -> Result<(), Error> {
+    pub(super) fn write_frame(&self, frame: &Frame) -> Result<(), SynthError> {
         let index = frame.truth.index;
         self.write(&format!("shading/{index:04}.png"), &frame.shading)?;
         self.write(&format!("highlight/{index:04}.png"), &frame.highlight)
     }
 
     /// Gives the truth its name, in place of an older one.
-    pub(super) fn publish(&self) -> Result<(), Error> {
+    pub(super) fn publish(&self) -> Result<(), SynthError> {
         match fs::remove_dir_all(&self.place) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                return Err(Error::write(&self.place)(error));
+                return Err(SynthError::write(&self.place)(error));
             }
             _ => {}
         }
-        publish(&self.partial, &self.place).map_err(Error::write(&self.place))
+        publish(&self.partial, &self.place).map_err(SynthError::write(&self.place))
     }
 }
 

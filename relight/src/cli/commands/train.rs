@@ -1,0 +1,200 @@
+//! `relight train`.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use clap::builder::RangedU64ValueParser;
+use clap::{Args, Subcommand};
+use indicatif::ProgressBar;
+use relight::nets::Weights;
+use relight::train::{
+    DecomposeSettings, DecomposeTask, Observer, Resources, Run, RunOutcome, RunSettings, Task,
+    read_settings,
+};
+use serde_json::json;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use tch::Device;
+
+use crate::cli::console::{CommandResult, Console, Outcome};
+
+pub(in crate::cli) const EXAMPLES: &str = "\
+Examples:
+  relight train decompose -o run
+      the network of relight decompose, on samples that are made while it trains
+  relight train decompose --settings relight/weights/decompose.toml -o run
+      as the weights that come with relight were trained
+  relight train decompose --settings my.toml -o run --resume
+      goes on with a run that was stopped, to the same losses
+
+In the folder of a run: checkpoint.safetensors, losses.csv, event files for TensorBoard, validation.png, and at
+the end the averaged weights. Ctrl-C ends a run with a checkpoint (exit code 3).";
+
+#[derive(Args)]
+pub(in crate::cli) struct Arguments {
+    #[command(subcommand)]
+    task: TaskName,
+}
+
+#[derive(Subcommand)]
+enum TaskName {
+    /// The network of `relight decompose`: albedo, shading, normals and highlight of a photograph.
+    Decompose(RunArguments),
+}
+
+#[derive(Args)]
+struct RunArguments {
+    /// The folder of the run; made where it is missing.
+    #[arg(short, long, value_name = "RUN")]
+    output: PathBuf,
+    /// Settings, a TOML file; what it does not name has its default.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Go on with the run in the folder; where there is none, one begins.
+    #[arg(long)]
+    resume: bool,
+    /// Begin with these weights.
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// Threads of the network [default: one a core].
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
+    threads: Option<usize>,
+    /// Threads that compose samples.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
+    composers: usize,
+    /// Where the network is computed: cpu, or cuda:N.
+    #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
+    device: Device,
+    /// Print the settings with all defaults, and do nothing.
+    #[arg(long)]
+    print_settings: bool,
+}
+
+fn device(text: &str) -> Result<Device, String> {
+    let number = match text {
+        "cpu" => return Ok(Device::Cpu),
+        "cuda" => "0",
+        _ => text.strip_prefix("cuda:").unwrap_or_default(),
+    };
+    let number: usize = number
+        .parse()
+        .map_err(|_| "cpu, cuda or cuda:N".to_owned())?;
+    if (number as i64) < tch::Cuda::device_count() {
+        Ok(Device::Cuda(number))
+    } else {
+        Err("libtorch finds no such device here".to_owned())
+    }
+}
+
+pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandResult {
+    let TaskName::Decompose(arguments) = &arguments.task;
+    let settings: DecomposeSettings = match &arguments.settings {
+        Some(path) => read_settings(path)?,
+        None => DecomposeSettings::default(),
+    };
+    if arguments.print_settings {
+        console.say(
+            &toml::to_string(&settings)?,
+            &json!({ "event": "settings", "settings": settings }),
+        );
+        return Ok(Outcome::Whole);
+    }
+    if let Some(threads) = arguments.threads {
+        tch::set_num_threads(threads as i32);
+    }
+    let weights = arguments
+        .weights
+        .as_deref()
+        .map(Weights::read)
+        .transpose()?;
+    let resources = Resources {
+        device: arguments.device,
+        composers: arguments.composers,
+    };
+    let run = settings.run.clone();
+    let mut task = DecomposeTask::new(settings, resources, weights.as_ref())?;
+    train(&mut task, &run, arguments, console)
+}
+
+/// Makes the run, and tells how it came out.
+fn train(
+    task: &mut dyn Task,
+    settings: &RunSettings,
+    arguments: &RunArguments,
+    console: Console,
+) -> CommandResult {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    let run = Run::open(task, settings, &arguments.output, arguments.resume)?;
+    let made = run.steps_made();
+    let mut view = View {
+        console,
+        bar: console.progress(settings.steps, "train"),
+    };
+    view.bar.set_position(made);
+    view.bar.reset_eta();
+    let outcome = run.finish(&stop, &mut view)?;
+    view.bar.finish_and_clear();
+    Ok(tell(&outcome, console))
+}
+
+fn tell(outcome: &RunOutcome, console: Console) -> Outcome {
+    let files: Vec<String> = outcome
+        .weights
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
+    let end = if outcome.stopped {
+        "stopped; go on with --resume"
+    } else {
+        "done"
+    };
+    console.say(
+        &format!("{} steps, {end}: {}", outcome.steps, files.join(", ")),
+        &json!({
+            "event": "trained", "steps": outcome.steps, "stopped": outcome.stopped,
+            "validation": outcome.figures, "weights": files,
+        }),
+    );
+    if outcome.stopped {
+        Outcome::Incomplete
+    } else {
+        Outcome::Whole
+    }
+}
+
+/// Shows a run on the terminal.
+struct View {
+    console: Console,
+    bar: ProgressBar,
+}
+
+impl Observer for View {
+    fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>) {
+        if let Some(loss) = losses.get("loss") {
+            self.bar.set_message(format!("train, loss {loss:.3}"));
+        }
+        self.bar.set_position(step);
+    }
+
+    fn validated(&mut self, step: u64, figures: &BTreeMap<String, f64>) {
+        let text: Vec<String> = figures
+            .iter()
+            .map(|(name, value)| format!("{name} {value:.4}"))
+            .collect();
+        let event = json!({ "event": "validated", "step": step, "figures": figures });
+        let line = format!("step {step}: {}", text.join(", "));
+        self.bar.suspend(|| self.console.say(&line, &event));
+    }
+
+    fn saved(&mut self, step: u64, path: &Path) {
+        if self.console.is_json() {
+            let path = path.display().to_string();
+            let event = json!({ "event": "saved", "step": step, "path": path });
+            self.console.say("", &event);
+        }
+    }
+}

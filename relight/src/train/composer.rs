@@ -1,0 +1,151 @@
+//! Samples composed while a network trains: threads make them ahead of it, in the order of their numbers.
+//!
+//! Sample n is a pure function of the recipe, the library and n, whatever the number of threads: a run that
+//! is resumed sees the samples that it would have seen.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::{self, JoinHandle};
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+
+use super::error::TrainError;
+use super::sample::{Linearisation, TruthArrays};
+use crate::synth::{Library, Recipe, stream};
+
+/// Part of the pictures whose values are taken for sRGB, whatever the camera's response: the user of a photograph
+/// does not know it either.
+const TAKEN_AS_SRGB: f64 = 0.25;
+/// Views that wait to be taken, for each thread.
+const AHEAD: usize = 2;
+
+/// What samples are composed of.
+#[derive(Debug)]
+pub struct Composition {
+    /// How samples are made.
+    pub recipe: Recipe,
+    /// What they are made of.
+    pub library: Library,
+    /// Part of the pictures that a plain camera takes (sRGB, no noise, no compression), 0..=1; the others are taken as
+    /// the recipe says.
+    pub plain_share: f64,
+}
+
+/// The samples of one view, by the view's number.
+type Batch = (u64, Vec<TruthArrays>);
+
+/// Threads that compose samples.
+#[derive(Debug)]
+pub struct Composer {
+    views: Receiver<Batch>,
+    /// Views that came before their turn.
+    early: BTreeMap<u64, Vec<TruthArrays>>,
+    next_view: u64,
+    /// Of the view that is being handed out, last first.
+    current: Vec<TruthArrays>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Composer {
+    /// Threads that compose from the view `first_view` on.
+    ///
+    /// # Errors
+    /// [`TrainError::Synth`] where the recipe is out of range, [`TrainError::Threads`].
+    pub fn start(
+        composition: Arc<Composition>,
+        first_view: u64,
+        threads: usize,
+    ) -> Result<Self, TrainError> {
+        composition.recipe.check()?;
+        let threads = threads.max(1);
+        let (sender, views) = bounded(AHEAD * threads);
+        let next = Arc::new(AtomicU64::new(first_view));
+        let spawn = |number: usize| {
+            let (composition, next) = (Arc::clone(&composition), Arc::clone(&next));
+            let sender: Sender<Batch> = sender.clone();
+            thread::Builder::new()
+                .name(format!("compose-{number}"))
+                .spawn(move || {
+                    loop {
+                        let view = next.fetch_add(1, Ordering::Relaxed);
+                        // Nobody takes views any more once the composer is dropped.
+                        if sender.send((view, composition.samples_of(view))).is_err() {
+                            return;
+                        }
+                    }
+                })
+                .map_err(TrainError::Threads)
+        };
+        let threads = (0..threads).map(spawn).collect::<Result<_, _>>()?;
+        Ok(Self {
+            views,
+            early: BTreeMap::new(),
+            next_view: first_view,
+            current: Vec::new(),
+            threads,
+        })
+    }
+
+    /// The next sample.
+    ///
+    /// # Errors
+    /// [`TrainError::Composer`] where all threads have ended, which only a fault of theirs makes them do.
+    pub fn next_sample(&mut self) -> Result<TruthArrays, TrainError> {
+        loop {
+            if let Some(sample) = self.current.pop() {
+                return Ok(sample);
+            }
+            if let Some(samples) = self.early.remove(&self.next_view) {
+                self.current = samples;
+                self.current.reverse();
+                self.next_view += 1;
+                continue;
+            }
+            let (view, samples) = self.views.recv().map_err(|_| TrainError::Composer)?;
+            self.early.insert(view, samples);
+        }
+    }
+}
+
+impl Drop for Composer {
+    fn drop(&mut self) {
+        // Without a receiver, threads end after the view they are at.
+        self.views = bounded(0).1;
+        for thread in self.threads.drain(..) {
+            // A thread that panicked has been told by `next_sample`.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Composition {
+    /// The samples of a view, as many as [`Recipe::lightings`] says.
+    #[must_use]
+    pub fn samples_of(&self, view: u64) -> Vec<TruthArrays> {
+        let lightings = u64::from(self.recipe.lightings);
+        let object = view / u64::from(self.recipe.views);
+        let (object, mesh) = self.recipe.object(&self.library, object);
+        let seen = self.recipe.view(&object, &mesh, view);
+        (view * lightings..(view + 1) * lightings)
+            .map(|number| {
+                let draw = |which: u64| unit(stream(stream(self.recipe.seed, which), number));
+                let recipe = Recipe {
+                    random_camera: self.recipe.random_camera && draw(11) >= self.plain_share,
+                    ..self.recipe.clone()
+                };
+                let linearisation = if draw(12) < TAKEN_AS_SRGB {
+                    Linearisation::AsSrgb
+                } else {
+                    Linearisation::Exact
+                };
+                TruthArrays::new(&recipe.sample(&self.library, &seen, number), linearisation)
+            })
+            .collect()
+    }
+}
+
+/// A hash as a number in 0..1.
+pub(super) fn unit(hash: u64) -> f64 {
+    (hash >> 11) as f64 / (1_u64 << 53) as f64
+}

@@ -1,0 +1,280 @@
+//! The run that trains the decomposing network on composed samples.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use tch::{Device, Tensor, no_grad};
+
+use super::composer::Composition;
+use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
+use super::error::TrainError;
+use super::learner::{Learner, LearnerSettings};
+use super::losses::{angular_degrees, scale_invariant, windowed};
+use super::model::{ComputePrecision, Model};
+use super::run::{StepLosses, Task, Validation};
+use super::sample::{TruthArrays, TruthBatch};
+use super::settings::{DecomposeSettings, PrecisionChoice};
+use super::sheet::validation_sheet;
+use super::window::{Window, WindowSettings};
+use crate::nets::{Weights, decomposer};
+use crate::synth::{Folders, Library, Recipe, stream};
+
+/// Samples of a batch of the validation.
+const VALIDATION_BATCH: usize = 16;
+/// Samples that are shown.
+const SHOWN: usize = 10;
+
+/// Where and with how many threads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resources {
+    /// Where networks are computed.
+    pub device: Device,
+    /// Threads that compose samples.
+    pub composers: usize,
+}
+
+/// Training of the decomposing network.
+#[derive(Debug)]
+pub struct DecomposeTask {
+    settings: DecomposeSettings,
+    resources: Resources,
+    learner: Learner,
+    composition: Arc<Composition>,
+    /// Opened with the first step.
+    window: Option<Window>,
+    validation: Vec<TruthArrays>,
+}
+
+impl DecomposeTask {
+    /// Reads what samples are composed of, composes the validation, and begins with `weights`, or with random ones.
+    ///
+    /// # Errors
+    /// Settings out of range, files that cannot be read, weights that do not fit.
+    pub fn new(
+        settings: DecomposeSettings,
+        resources: Resources,
+        weights: Option<&Weights>,
+    ) -> Result<Self, TrainError> {
+        settings.run.check()?;
+        settings.data.check()?;
+        let composition = Arc::new(composition(&settings)?);
+        composition.recipe.check()?;
+        let validation = compose_validation(&settings, &composition);
+        let graph = decomposer();
+        let initial = || Weights::initial(&graph, settings.run.seed);
+        let weights = weights.cloned().unwrap_or_else(initial);
+        let precision = match settings.run.precision {
+            PrecisionChoice::Single => ComputePrecision::Single,
+            PrecisionChoice::Mixed => ComputePrecision::Mixed,
+            PrecisionChoice::Fastest => fastest(&weights, &validation, resources.device)?,
+        };
+        let learner = Learner::new(
+            graph,
+            &weights,
+            LearnerSettings {
+                adam: settings.run.adam(),
+                average: settings.run.average,
+                precision,
+                device: resources.device,
+            },
+        )?;
+        Ok(Self {
+            settings,
+            resources,
+            learner,
+            composition,
+            window: None,
+            validation,
+        })
+    }
+
+    fn window(&mut self, step: u64) -> Result<&mut Window, TrainError> {
+        let window = match self.window.take() {
+            Some(window) => window,
+            None => Window::open(
+                WindowSettings {
+                    capacity: self.settings.data.window,
+                    reuse: self.settings.data.reuse,
+                    batch: self.settings.run.batch,
+                    seed: stream(self.settings.run.seed, 22),
+                },
+                &self.composition,
+                self.resources.composers,
+                step,
+            )?,
+        };
+        Ok(self.window.insert(window))
+    }
+
+    /// A batch of the validation, and the averaged network's answers to it.
+    fn answered(
+        &self,
+        model: &Model,
+        samples: &[TruthArrays],
+    ) -> Result<(TruthBatch, AnsweredTensors), TrainError> {
+        let samples: Vec<&TruthArrays> = samples.iter().collect();
+        let batch = TruthBatch::new(&samples, false, self.resources.device)?;
+        let answer = model.forward(&batch.input)?;
+        let answer = AnsweredTensors::new(&batch.input, &answer[0])?;
+        Ok((batch, answer))
+    }
+}
+
+impl Task for DecomposeTask {
+    fn name(&self) -> &'static str {
+        "decompose"
+    }
+
+    fn settings(&self) -> String {
+        // Numbers, names and paths: all of them can be written.
+        toml::to_string(&self.settings).unwrap_or_default()
+    }
+
+    fn learners(&mut self) -> Vec<&mut Learner> {
+        vec![&mut self.learner]
+    }
+
+    fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
+        let device = self.resources.device;
+        let batch = TruthBatch::new(&self.window(step)?.batch(step)?, true, device)?;
+        let answer = self.learner.model.forward(&batch.input)?;
+        let answer = AnsweredTensors::new(&batch.input, &answer[0])?;
+        Ok(StepLosses {
+            terms: decompose_losses(&batch, &answer, &self.settings.loss)?,
+            spreads: head_spreads(&batch, &answer)?,
+            batch: batch.named(),
+        })
+    }
+
+    fn validate(&mut self) -> Result<Validation, TrainError> {
+        let model = self.learner.averaged_model()?;
+        no_grad(|| {
+            let mut sums: BTreeMap<String, f64> = BTreeMap::new();
+            let mut sheet = None;
+            for samples in self.validation.chunks(VALIDATION_BATCH) {
+                let (batch, answer) = self.answered(&model, samples)?;
+                let share = samples.len() as f64 / self.validation.len() as f64;
+                for (name, value) in figures(&batch, &answer)? {
+                    *sums.entry(name.to_owned()).or_default() += share * value;
+                }
+                if sheet.is_none() {
+                    sheet = Some(validation_sheet(&batch, &answer, SHOWN)?);
+                }
+            }
+            Ok(Validation {
+                figures: sums,
+                sheet,
+            })
+        })
+    }
+}
+
+fn composition(settings: &DecomposeSettings) -> Result<Composition, TrainError> {
+    let data = &settings.data;
+    let library = Library::read(&Folders {
+        meshes: data.meshes.clone(),
+        textures: data.textures.clone(),
+        panoramas: data.panoramas.clone(),
+    })?;
+    Ok(Composition {
+        recipe: Recipe {
+            seed: stream(settings.run.seed, 21),
+            size: data.size,
+            views: data.views,
+            lightings: data.lightings,
+            ..Recipe::default()
+        },
+        library,
+        plain_share: data.plain_share,
+    })
+}
+
+/// One sample each of objects that are never trained on: their seed does not depend on the run's, so that
+/// runs can be compared.
+fn compose_validation(settings: &DecomposeSettings, composition: &Composition) -> Vec<TruthArrays> {
+    let held_out = Composition {
+        recipe: Recipe {
+            seed: stream(0x76_61_6c, 23),
+            views: 1,
+            lightings: 1,
+            ..composition.recipe.clone()
+        },
+        library: composition.library.clone(),
+        plain_share: composition.plain_share,
+    };
+    (0..settings.data.validation)
+        .flat_map(|view| held_out.samples_of(view))
+        .collect()
+}
+
+/// How far the answers are from the truth, means over the batch.
+fn figures(
+    batch: &TruthBatch,
+    answer: &AnsweredTensors,
+) -> Result<Vec<(&'static str, f64)>, TrainError> {
+    let mask = &batch.mask;
+    let grey = |of: &Tensor| of.f_mean_dim([1_i64].as_slice(), true, None);
+    let diffuse = batch.picture.f_sub(&batch.highlight)?.f_clamp_min(0.0)?;
+    let quotient = grey(&diffuse)?.f_div(&answer.shading.f_clamp_min(0.03)?)?;
+    let albedo = grey(&batch.albedo)?;
+    let window = (mask.size()[2] / 16).max(4);
+    let highlight = answer.highlight.f_sub(&batch.highlight)?.f_mul(mask)?;
+    let energy = batch.highlight.f_square()?.f_sum(None)?.f_clamp_min(1e-9)?;
+    [
+        (
+            "shading",
+            scale_invariant(&answer.shading, &batch.shading, mask)?,
+        ),
+        ("albedo", scale_invariant(&quotient, &albedo, mask)?),
+        (
+            "shading_windows",
+            windowed(&answer.shading, &batch.shading, mask, window)?,
+        ),
+        (
+            "albedo_windows",
+            windowed(&quotient, &albedo, mask, window)?,
+        ),
+        (
+            "normals_deg",
+            angular_degrees(&answer.normals, &batch.normals, mask)?,
+        ),
+        (
+            "highlight",
+            highlight.f_square()?.f_sum(None)?.f_div(&energy)?,
+        ),
+    ]
+    .into_iter()
+    .map(|(name, value)| Ok((name, f64::try_from(value)?)))
+    .collect()
+}
+
+/// The precision in which a step takes less time here, by the better of two steps each.
+fn fastest(
+    weights: &Weights,
+    samples: &[TruthArrays],
+    device: Device,
+) -> Result<ComputePrecision, TrainError> {
+    let samples: Vec<&TruthArrays> = samples.iter().take(VALIDATION_BATCH).collect();
+    let batch = TruthBatch::new(&samples, false, device)?;
+    let seconds = |precision| -> Result<f64, TrainError> {
+        let model = Model::new(decomposer(), weights, device, precision)?;
+        let mut best = f64::INFINITY;
+        for _ in 0..3 {
+            let start = Instant::now();
+            model.forward(&batch.input)?[0]
+                .f_square()?
+                .f_mean(None)?
+                .f_backward()?;
+            best = best.min(start.elapsed().as_secs_f64());
+        }
+        Ok(best)
+    };
+    Ok(
+        if seconds(ComputePrecision::Mixed)? < seconds(ComputePrecision::Single)? {
+            ComputePrecision::Mixed
+        } else {
+            ComputePrecision::Single
+        },
+    )
+}
