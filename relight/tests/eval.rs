@@ -14,14 +14,16 @@ use std::process::Command;
 use relight::data::{TruthLayout, TruthSet};
 use relight::eval::{
     EvalError, HighlightMethod, IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, LightMethod,
-    MaskRule, NormalMethod, Predictions, RelightMethod, RelightingSet, ScoreLine, ScoreTable,
-    evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_relighting,
+    MaskRule, NormalMethod, Predictions, RelightMethod, RelightingRecipe, RelightingSet, ScoreLine,
+    ScoreTable, evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals,
+    evaluate_relighting, make_relighting,
 };
 use relight::image::{Depth, Extent, Linear, Planes, Rgb, Srgb, Transfer, write_exr, write_png};
 use relight::light::{Normals, ShLight, YDown, YUp};
 use relight::render::{
     DiffuseForm, DiffuseLayer, Gloss, Layers, NormalsFrame, SpecularForm, Surface,
 };
+use relight::synth::{Folders, Library};
 use relit_data::causes::with_causes;
 
 const SIDE: usize = 44;
@@ -446,6 +448,29 @@ fn a_set_of_another_version_is_refused() {
     fs::write(&path, text.replace("relighting/1", "relighting/9")).unwrap();
     let text = with_causes(&RelightingSet::open(dir.path()).unwrap_err());
     assert!(text.contains("relight.relighting/9"), "{text}");
+}
+
+#[test]
+fn a_made_set_goes_on_with_more_objects_but_not_with_other_settings() {
+    let dir = tempfile::tempdir().unwrap();
+    let library = Library::read(&Folders::default()).unwrap();
+    let recipe = RelightingRecipe {
+        objects: 1,
+        lights: 2,
+        size: 16,
+        ..RelightingRecipe::default()
+    };
+    let make = |recipe: &RelightingRecipe| make_relighting(recipe, &library, dir.path(), &|| {});
+    make(&recipe).unwrap();
+    let more = RelightingRecipe {
+        objects: 2,
+        ..recipe.clone()
+    };
+    make(&more).unwrap();
+    assert_eq!(RelightingSet::open(dir.path()).unwrap().objects(), 2);
+    let larger = RelightingRecipe { size: 24, ..recipe };
+    let error = make(&larger).unwrap_err();
+    assert!(matches!(error, EvalError::OtherSettings { .. }), "{error}");
 }
 
 fn relight(arguments: &[&str]) -> std::process::Output {

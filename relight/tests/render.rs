@@ -154,6 +154,14 @@ fn a_file_that_is_missing_or_wrong_is_named_in_one_line_and_the_code_is_1() {
             "--normals up.png --light light.txt -o none/a.png",
             "none/a.png cannot be written",
         ),
+        (
+            "--normals up.png --light light.txt --turn 2 -o light.txt",
+            "light.txt cannot be made",
+        ),
+        (
+            "--normals up.png --light light.txt --turn 2 -o .",
+            ". is not empty",
+        ),
     ];
     for (arguments, expected) in cases {
         let output = scene.render(arguments);
@@ -173,6 +181,7 @@ fn wrong_usage_is_told_with_code_2() {
         "--normals up.png --light light.txt --turn 5 -o a.png",
         "--normals up.png --light light.txt -o folder",
         "--normals up.png --light light.txt --albedo 1,2 -o a.png",
+        "--normals up.png --light light.txt --turned nan -o a.png",
         "--normals up.png --light light.txt --panorama a.hdr -o a.png",
         "--normals up.png --light light.txt --sweep --turn 4 -o a.mp4",
     ] {

@@ -83,6 +83,15 @@ pub enum EvalError {
         /// What it should say.
         expected: &'static str,
     },
+    /// A folder holds a set of another recipe.
+    #[error(
+        "{} holds objects that were made with other settings: give the same ones, or another folder",
+        path.display()
+    )]
+    OtherSettings {
+        /// The folder.
+        path: PathBuf,
+    },
     /// Objects cannot be made.
     #[error(transparent)]
     Synth(#[from] crate::synth::SynthError),

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{EvalError, ImageScores, MaskRule, Measured, ScoreLine, ScoreTable, Terms};
+use super::{EvalError, ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
 use crate::data::{TruthSample, TruthSet};
 use crate::image::{Extent, Linear, Planes, Rgb};
 use crate::metrics::MetricError;
@@ -85,7 +85,7 @@ fn lines(
                 value: mean(at, measure),
             })
             .collect(),
-        terms: Terms {
+        terms: MeasureTerms {
             colour: scored.colour.to_owned(),
             scale: scored.scale.to_owned(),
             mask: scored.mask,

@@ -31,7 +31,7 @@ impl fmt::Display for MaskRule {
 
 /// How the numbers of a line were taken.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Terms {
+pub struct MeasureTerms {
     /// Colour space and units of the values that were compared.
     pub colour: String,
     /// Which scales were fitted to the estimate.
@@ -64,7 +64,7 @@ pub struct ScoreLine {
     pub measures: Vec<Measured>,
     /// How they were taken.
     #[serde(flatten)]
-    pub terms: Terms,
+    pub terms: MeasureTerms,
 }
 
 /// What a method scored on one image.
@@ -115,7 +115,7 @@ impl ScoreTable {
                 let found = line.measures.iter().find(|one| one.name == *name);
                 found.map_or_else(String::new, |one| number(one.value))
             }));
-            let Terms {
+            let MeasureTerms {
                 colour,
                 scale,
                 mask,
@@ -176,7 +176,7 @@ mod tests {
                 name: name.to_owned(),
                 value,
             }],
-            terms: Terms {
+            terms: MeasureTerms {
                 colour: "linear grey".to_owned(),
                 scale: "one an image".to_owned(),
                 mask: MaskRule::Object,

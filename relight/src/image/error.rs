@@ -48,6 +48,20 @@ pub enum ImageError {
         /// What the decoder found.
         source: image::ImageError,
     },
+    /// The image has more pixels than are read.
+    #[error("{} is too large: its pixels would take more than 512 MiB of memory", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A map has a value that it cannot have.
+    #[error("{} is no map of {what}: it has a value that is negative, infinite or not a number", path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// What it should be a map of.
+        what: &'static str,
+    },
     /// The image cannot be encoded.
     #[error("{} cannot be encoded", path.display())]
     Encode {

@@ -5,7 +5,11 @@ use std::io::{BufReader, Cursor};
 use std::path::Path;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{DynamicImage, ImageBuffer, ImageEncoder, ImageFormat, ImageReader, Rgb};
+use image::metadata::Orientation;
+use image::{
+    DynamicImage, ImageBuffer, ImageDecoder, ImageEncoder, ImageFormat, ImageReader, Limits, Pixel,
+    Rgb,
+};
 use relit_data::durable::write_whole;
 
 use super::{Extent, ImageError, Planes};
@@ -82,39 +86,101 @@ impl Planes<3> {
     }
 }
 
-/// Reads an image without any conversion of colour, and says what its numbers were: integers come
-/// scaled to 0 to 1, floating point values as they are. Alpha is left out; grey becomes three equal
-/// channels.
+/// An image as it stands in a file, without any conversion of colour.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredImage {
+    /// The colours: integers scaled to 0 to 1, floating point values as they are. Grey is three equal
+    /// channels.
+    pub planes: Planes<3>,
+    /// Alpha, 0 to 1, where the file has it and it is not 1 everywhere.
+    pub alpha: Option<Planes<1>>,
+    /// What the numbers were.
+    pub samples: Samples,
+}
+
+impl StoredImage {
+    /// Reads an image, turned as its Exif orientation says. Colours of an EXR with alpha, which that format
+    /// holds multiplied with it, are divided by it.
+    ///
+    /// # Errors
+    /// Where the file cannot be read or is no image of a known format.
+    pub fn read(path: &Path) -> Result<Self, ImageError> {
+        let image = decode(path)?;
+        let samples = match image {
+            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => Samples::Float,
+            _ => Samples::Integer,
+        };
+        if !image.color().has_alpha() {
+            return Ok(Self {
+                planes: split(&image.into_rgb32f()),
+                alpha: None,
+                samples,
+            });
+        }
+        let with_alpha: Planes<4> = split(&image.into_rgba32f());
+        let extent = with_alpha.extent();
+        let [mut red, mut green, mut blue, alpha] = with_alpha.into_planes();
+        if samples == Samples::Float {
+            for plane in [&mut red, &mut green, &mut blue] {
+                for (value, &alpha) in plane.iter_mut().zip(&alpha) {
+                    *value /= if alpha > 0.0 { alpha } else { 1.0 };
+                }
+            }
+        }
+        let is_opaque = alpha.iter().all(|&alpha| alpha >= 1.0);
+        Ok(Self {
+            planes: Planes::from_planes(extent, [red, green, blue])?,
+            alpha: if is_opaque {
+                None
+            } else {
+                Some(Planes::from_planes(extent, [alpha])?)
+            },
+            samples,
+        })
+    }
+}
+
+/// Reads the colours of an image as [`StoredImage::read`], and says what its numbers were.
 ///
 /// # Errors
 /// Where the file cannot be read or is no image of a known format.
 pub fn read_planes(path: &Path) -> Result<(Planes<3>, Samples), ImageError> {
+    let image = StoredImage::read(path)?;
+    Ok((image.planes, image.samples))
+}
+
+fn decode(path: &Path) -> Result<DynamicImage, ImageError> {
     let open = |source| ImageError::Open {
         path: path.to_owned(),
         source,
     };
-    let decode = |source| ImageError::Decode {
-        path: path.to_owned(),
-        source,
+    let decode = |source| {
+        let path = path.to_owned();
+        match source {
+            ::image::ImageError::Limits(_) => ImageError::TooLarge { path },
+            source => ImageError::Decode { path, source },
+        }
     };
     let file = BufReader::new(File::open(path).map_err(open)?);
-    let image = ImageReader::new(file)
+    let mut decoder = ImageReader::new(file)
         .with_guessed_format()
         .map_err(open)?
-        .decode()
+        .into_decoder()
         .map_err(decode)?;
-    let samples = match image {
-        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => Samples::Float,
-        _ => Samples::Integer,
-    };
-    Ok((split(&image.into_rgb32f()), samples))
+    let mut limits = Limits::default();
+    limits.reserve(decoder.total_bytes()).map_err(decode)?;
+    // A file whose orientation cannot be read is shown as it is stored.
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let mut image = DynamicImage::from_decoder(decoder).map_err(decode)?;
+    image.apply_orientation(orientation);
+    Ok(image)
 }
 
-fn split(image: &ImageBuffer<Rgb<f32>, Vec<f32>>) -> Planes<3> {
+fn split<P: Pixel<Subpixel = f32>, const C: usize>(image: &ImageBuffer<P, Vec<f32>>) -> Planes<C> {
     let extent = Extent::new(image.width() as usize, image.height() as usize);
     let mut planes = Planes::zeros(extent);
     for (channel, plane) in planes.planes_mut().into_iter().enumerate() {
-        for (value, pixel) in plane.iter_mut().zip(image.as_raw().chunks_exact(3)) {
+        for (value, pixel) in plane.iter_mut().zip(image.as_raw().chunks_exact(C)) {
             *value = pixel[channel];
         }
     }
@@ -200,6 +266,22 @@ mod tests {
         std::fs::write(&path, "not an image").unwrap();
         let error = read_planes(&path).unwrap_err();
         assert!(error.to_string().contains("notes.png"), "{error}");
+    }
+
+    #[test]
+    fn an_image_that_claims_too_many_pixels_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("vast.png");
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 20_000, 20_000);
+        encoder.set_color(png::ColorType::Rgb);
+        // There is no pixel behind the header.
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_chunk(png::chunk::IDAT, &[]).unwrap();
+        drop(writer);
+        std::fs::write(&path, bytes).unwrap();
+        let error = read_planes(&path).unwrap_err();
+        assert!(matches!(error, ImageError::TooLarge { .. }), "{error}");
     }
 
     #[test]

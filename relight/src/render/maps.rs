@@ -1,6 +1,6 @@
 //! The files that hold an object's maps.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{Gloss, Surface};
 use crate::image::{Extent, ImageError, Linear, Planes, Rgb, Samples, Transfer, read_planes};
@@ -48,15 +48,16 @@ impl MapFiles {
     /// Reads the object.
     ///
     /// # Errors
-    /// Where a file cannot be read, the maps differ in size, or there is no surface.
+    /// Where a file cannot be read, the maps differ in size, a map has a value that is negative or not
+    /// finite, or there is no surface.
     pub fn read(&self) -> Result<Surface, ImageError> {
         let normals = self.read_normals()?;
         let extent = normals.extent();
-        let albedo = self.read_colour(&self.albedo, extent)?;
+        let albedo = self.read_colour("albedo", &self.albedo, extent)?;
         let gloss = match &self.reflectance {
             None => None,
             Some(map) => {
-                let reflectance = self.read_colour(map, extent)?.into_planes();
+                let reflectance = self.read_colour("reflectance", map, extent)?.into_planes();
                 Some(Gloss::new(reflectance, self.read_smoothness(extent)?)?)
             }
         };
@@ -83,9 +84,18 @@ impl MapFiles {
         Ok(normals)
     }
 
-    fn read_colour(&self, map: &Map, extent: Extent) -> Result<Rgb<Linear>, ImageError> {
+    fn read_colour(
+        &self,
+        what: &'static str,
+        map: &Map,
+        extent: Extent,
+    ) -> Result<Rgb<Linear>, ImageError> {
         match map {
-            Map::File(path) => Rgb::read(path, self.transfer),
+            Map::File(path) => {
+                let colours = Rgb::<Linear>::read(path, self.transfer)?;
+                check_values(path, what, colours.planes())?;
+                Ok(colours)
+            }
             Map::Even(value) => Ok(Rgb::new(Planes::filled(extent, *value))),
         }
     }
@@ -95,6 +105,7 @@ impl MapFiles {
             Map::Even([value, ..]) => Ok(Planes::filled(extent, [*value])),
             Map::File(path) => {
                 let (planes, samples) = read_planes(path)?;
+                check_values(path, "smoothness", &planes)?;
                 let scale = match samples {
                     Samples::Integer => 255.0,
                     Samples::Float => 1.0,
@@ -103,6 +114,18 @@ impl MapFiles {
             }
         }
     }
+}
+
+/// Whether no value is negative or not finite.
+fn check_values(path: &Path, what: &'static str, planes: &Planes<3>) -> Result<(), ImageError> {
+    let mut values = planes.planes().into_iter().flatten();
+    if values.all(|value| value.is_finite() && *value >= 0.0) {
+        return Ok(());
+    }
+    Err(ImageError::Value {
+        path: path.to_owned(),
+        what,
+    })
 }
 
 fn first_channel(planes: Planes<3>) -> Result<Planes<1>, ImageError> {
@@ -115,7 +138,6 @@ fn first_channel(planes: Planes<3>) -> Result<Planes<1>, ImageError> {
 mod tests {
     use super::*;
     use crate::image::{Depth, write_exr, write_png};
-    use std::path::Path;
 
     fn files(folder: &Path) -> MapFiles {
         let extent = Extent::new(4, 2);
@@ -159,6 +181,26 @@ mod tests {
         files.smoothness = Map::File(path);
         let surface = files.read().unwrap();
         assert_eq!(surface.gloss().unwrap().smoothness().pixel(1, 1), [333.0]);
+    }
+
+    #[test]
+    fn maps_with_values_that_cannot_be_are_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("strange.exr");
+        for value in [f32::NAN, f32::INFINITY, -0.5] {
+            write_exr(&path, &Planes::filled(Extent::new(4, 2), [0.5, value, 0.5])).unwrap();
+            for what in ["albedo", "reflectance", "smoothness"] {
+                let mut files = files(folder.path());
+                match what {
+                    "albedo" => files.albedo = Map::File(path.clone()),
+                    "reflectance" => files.reflectance = Some(Map::File(path.clone())),
+                    _ => files.smoothness = Map::File(path.clone()),
+                }
+                let error = files.read().unwrap_err().to_string();
+                let expected = format!("strange.exr is no map of {what}");
+                assert!(error.contains(&expected), "{error}");
+            }
+        }
     }
 
     #[test]

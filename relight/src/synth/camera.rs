@@ -115,6 +115,25 @@ impl CameraModel {
         self
     }
 
+    /// The same camera, exposed longer, at most `longest` times, so that `part` of the pixels of one of
+    /// these pictures clip in all channels, and of no other more.
+    pub(super) fn clipping(mut self, pictures: &[Vec<Vec3>], part: f32, longest: f32) -> Self {
+        let level = |picture: &Vec<Vec3>| {
+            let mut levels: Vec<f32> = picture
+                .iter()
+                .map(|colour| (*colour * self.gain).min_element())
+                .collect();
+            let place = (levels.len() as f32 * (1.0 - part)) as usize;
+            let is_inside = place < levels.len();
+            is_inside.then(|| *levels.select_nth_unstable_by(place, f32::total_cmp).1)
+        };
+        let brightest = pictures.iter().filter_map(level).fold(0.0, f32::max);
+        if brightest > 1e-9 {
+            self.gain *= (1.0 / brightest).clamp(1.0, longest);
+        }
+        self
+    }
+
     /// The values that the camera gives for light that already has its gain, with its noise. One value
     /// a channel for each colour; `seed` draws the noise.
     pub(super) fn values(&self, image: &[Vec3], seed: u64) -> Vec<[u8; 3]> {
@@ -220,6 +239,28 @@ mod tests {
         let strange = [Vec3::new(7.0, -3.0, f32::NAN), Vec3::splat(f32::INFINITY)];
         let values = CameraModel::plain().values(&strange, 0);
         assert_eq!(values, [[255, 0, 0], [255; 3]]);
+    }
+
+    #[test]
+    fn an_exposure_clips_the_wanted_part_of_the_brightest_picture_and_is_never_shorter() {
+        let picture = |most: f32| -> Vec<Vec3> {
+            (1..=100)
+                .map(|k| Vec3::splat(most * k as f32 / 100.0))
+                .collect()
+        };
+        let pictures = [picture(0.3), picture(0.6)];
+        let clipped = |camera: CameraModel| {
+            let inside = |colour: &&Vec3| (**colour * camera.gain).min_element() >= 0.9999;
+            pictures
+                .each_ref()
+                .map(|all| all.iter().filter(inside).count())
+        };
+        let camera = CameraModel::plain().clipping(&pictures, 0.1, 3.0);
+        assert_eq!(clipped(camera), [0, 10]);
+        let camera = CameraModel::plain().clipping(&pictures, 0.1, 1.2);
+        assert!((camera.gain - Vec3::splat(1.2)).length() < 1e-6);
+        let camera = CameraModel::plain().clipping(&[picture(5.0)], 0.1, 3.0);
+        assert_eq!(camera.gain, CameraModel::plain().gain);
     }
 
     #[test]

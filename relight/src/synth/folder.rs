@@ -177,6 +177,11 @@ impl SampleFolder {
     }
 }
 
+/// Whether a folder holds samples.
+pub(super) fn holds_samples(folder: &Path) -> bool {
+    folder.join(FILE).exists()
+}
+
 /// Writes the description, or compares it with the one that is there.
 fn describe(folder: &Path, origin: &Origin) -> Result<(), SynthError> {
     let path = folder.join(FILE);

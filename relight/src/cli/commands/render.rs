@@ -1,20 +1,19 @@
 //! `relight render`: from maps and light to an image, a turn, a sweep of materials.
 
 use std::error::Error;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
-use relight::image::{Linear, Rgb, Srgb, Transfer};
+use relight::image::{Linear, Rgb, Srgb};
 use relight::light::{Direction, Order, Panorama, Rotation, ShLight};
 use relight::movie::{MovieFormat, MovieWriter};
-use relight::render::{
-    DiffuseForm, Look, Map, MapFiles, NormalsFrame, SpecularForm, Surface, exposure_for,
-};
+use relight::render::{DiffuseForm, Look, Map, MapFiles, SpecularForm, Surface, exposure_for};
 use serde_json::json;
 
 use crate::cli::console::{CommandResult, Console, Outcome};
+use crate::cli::folder::make_empty_folder;
+use crate::cli::values::{TransferName, YName};
 
 pub(in crate::cli) const EXAMPLES: &str = "\
 Examples:
@@ -106,30 +105,13 @@ struct LightArguments {
         long,
         value_name = "DEGREES",
         default_value_t = 0.0,
+        value_parser = degrees,
         allow_hyphen_values = true
     )]
     turned: f64,
     /// Write the coefficients of the light to this file, too.
     #[arg(long, value_name = "FILE")]
     save_light: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum YName {
-    /// As relight writes them.
-    Up,
-    /// As the paper's figure and released data have them.
-    Down,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum TransferName {
-    /// The transfer function of sRGB.
-    Srgb,
-    /// The power 1 / 2.2.
-    Gamma22,
-    /// In proportion to light.
-    Linear,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -210,19 +192,12 @@ impl ObjectArguments {
     fn files(&self) -> MapFiles {
         MapFiles {
             normals: self.normals.clone(),
-            frame: match self.normals_y {
-                YName::Up => NormalsFrame::YUp,
-                YName::Down => NormalsFrame::YDown,
-            },
+            frame: self.normals_y.into(),
             mask: self.mask.clone(),
             albedo: self.albedo.clone(),
             reflectance: self.reflectance.clone(),
             smoothness: self.smoothness.clone(),
-            transfer: match self.transfer {
-                TransferName::Srgb => Transfer::Srgb,
-                TransferName::Gamma22 => Transfer::Gamma22,
-                TransferName::Linear => Transfer::Linear,
-            },
+            transfer: self.transfer.into(),
         }
     }
 }
@@ -253,7 +228,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
         Target::Exr(path) => still(arguments, &look, &surface, &light)?.write_exr(path)?,
         Target::Folder(folder) => {
             let bar = console.progress(frames.into(), "frames");
-            fs::create_dir_all(folder)?;
+            make_empty_folder(folder)?;
             (0..frames).into_par_iter().try_for_each(|frame| {
                 let image = look.turned(&surface, &light, part(frame, frames))?;
                 let name = format!("{frame:0PLACES$}.png");
@@ -305,6 +280,13 @@ fn encoded(image: Rgb<Linear>) -> Rgb<Srgb> {
 /// How far the light has turned at a frame.
 fn part(frame: u32, frames: u32) -> f64 {
     f64::from(frame) / f64::from(frames)
+}
+
+fn degrees(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(degrees) if (-36_000.0..=36_000.0).contains(&degrees) => Ok(degrees),
+        _ => Err("give degrees from -36000 to 36000".to_owned()),
+    }
 }
 
 fn exposure(text: &str) -> Result<Exposure, String> {

@@ -13,6 +13,10 @@ use relight::synth::{
 use serde_json::json;
 
 use crate::cli::console::{CommandResult, Console, Outcome};
+use crate::cli::folder::make_folder;
+
+/// Objects on one sheet, at most.
+const LARGEST_SHEET: u64 = 500;
 
 /// What a mode returns from rayon's threads.
 type ModeResult = Result<(), Box<dyn Error + Send + Sync>>;
@@ -108,6 +112,14 @@ impl From<LightName> for LightKind {
     }
 }
 
+impl Arguments {
+    /// What is wrong with the arguments together.
+    pub(in crate::cli) fn fault(&self) -> Option<String> {
+        let is_too_long = self.preview && self.count.is_some_and(|count| count > LARGEST_SHEET);
+        is_too_long.then(|| format!("--count: a sheet has at most {LARGEST_SHEET} objects"))
+    }
+}
+
 pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let mut builder = ThreadPoolBuilder::new();
     if let Some(threads) = arguments.threads {
@@ -183,7 +195,7 @@ fn tell(arguments: &Arguments, console: Console, what: &str, written: SynthTally
 
 fn preview(arguments: &Arguments, library: &Library, console: Console) -> ModeResult {
     let count = u32::try_from(arguments.count.unwrap_or(24))?;
-    std::fs::create_dir_all(&arguments.output)?;
+    make_folder(&arguments.output)?;
     let path = arguments.output.join("preview.png");
     write_preview(&recipe(arguments, 128), library, count, &path)?;
     console.say(
@@ -197,7 +209,7 @@ fn preview(arguments: &Arguments, library: &Library, console: Console) -> ModeRe
 }
 
 fn panoramas(out: &Path, console: Console) -> CommandResult {
-    std::fs::create_dir_all(out)?;
+    make_folder(out)?;
     let made = made_panoramas()?;
     for (name, panorama) in &made {
         panorama

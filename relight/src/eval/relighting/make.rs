@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 use std::fs;
+use std::io;
 use std::path::Path;
 use std::process;
 
@@ -10,6 +11,7 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use relit_data::durable::write_whole;
+use serde::{Deserialize, Serialize};
 
 use super::method::shown;
 use super::set::{FILE, Index, ObjectEntry, Part, SCHEMA, light_file, object_folder};
@@ -106,12 +108,64 @@ impl RelightingRecipe {
     }
 }
 
+/// What all objects of a folder were made of.
+#[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Origin {
+    lights: usize,
+    size: u32,
+    seed: u64,
+    shadows: bool,
+    meshes: Vec<String>,
+    panoramas: Vec<String>,
+}
+
+impl Origin {
+    /// The description of a set that is being made.
+    const FILE: &str = "recipe.json";
+
+    fn of(recipe: &RelightingRecipe, library: &Library) -> Self {
+        let panoramas = &library.panoramas;
+        let names = (0..panoramas.len()).filter_map(|number| panoramas.name(number));
+        Self {
+            lights: recipe.lights,
+            size: recipe.size,
+            seed: recipe.seed,
+            shadows: recipe.shadows,
+            meshes: library
+                .meshes
+                .iter()
+                .map(|(file, _)| file.clone())
+                .collect(),
+            panoramas: names.map(str::to_owned).collect(),
+        }
+    }
+
+    /// Writes itself into the folder, or compares itself with what is there.
+    fn describe(&self, out: &Path) -> Result<(), EvalError> {
+        let path = out.join(Self::FILE);
+        match fs::read(&path) {
+            Ok(bytes) if serde_json::from_slice(&bytes).is_ok_and(|there: Self| there == *self) => {
+                Ok(())
+            }
+            Err(error)
+                if error.kind() == io::ErrorKind::NotFound
+                    && !out.join(object_folder(0)).exists() =>
+            {
+                write_json(&path, self)
+            }
+            _ => Err(EvalError::OtherSettings {
+                path: out.to_owned(),
+            }),
+        }
+    }
+}
+
 /// Writes an evaluation set into the folder `out`, objects side by side on rayon's threads;
 /// `progress` is told each object. Objects that are there are kept: a call that was interrupted can be
-/// repeated. `relighting.json` is written last.
+/// repeated, also for more objects. `relighting.json` is written last.
 ///
 /// # Errors
-/// Where a setting is out of range or a file cannot be written.
+/// Where the folder holds objects of another recipe, a setting is out of range or a file cannot be written.
 pub fn make_relighting(
     recipe: &RelightingRecipe,
     library: &Library,
@@ -120,6 +174,8 @@ pub fn make_relighting(
 ) -> Result<(), EvalError> {
     recipe.synth().check()?;
     let lightings = recipe.lightings(library);
+    make_folder(out)?;
+    Origin::of(recipe, library).describe(out)?;
     make_folder(&out.join("lights"))?;
     for (number, (_, lighting)) in lightings.iter().enumerate() {
         let path = light_file(out, number);
@@ -140,12 +196,15 @@ pub fn make_relighting(
         lights: lightings.into_iter().map(|(name, _)| name).collect(),
         objects,
     };
-    let path = out.join(FILE);
-    let bytes = serde_json::to_vec_pretty(&index).map_err(|source| EvalError::Description {
-        path: path.clone(),
+    write_json(&out.join(FILE), &index)
+}
+
+fn write_json(path: &Path, content: &impl Serialize) -> Result<(), EvalError> {
+    let bytes = serde_json::to_vec_pretty(content).map_err(|source| EvalError::Description {
+        path: path.to_owned(),
         source,
     })?;
-    write_whole(&path, &bytes).map_err(EvalError::write(&path))
+    write_whole(path, &bytes).map_err(EvalError::write(path))
 }
 
 fn make_object(

@@ -29,7 +29,7 @@ use serde::{Deserialize, Serialize};
 use super::SynthError;
 use super::camera::CameraModel;
 use super::finish::Finish;
-use super::folder::SynthTally;
+use super::folder::{SynthTally, holds_samples};
 use super::geometry::{GBuffer, Occluder};
 use super::library::Library;
 use super::lighting::{Lighting, Material, Scene, Shaded};
@@ -55,6 +55,10 @@ const METERED: u32 = 12;
 const RATE: f64 = 30.0;
 /// Part of the turns whose objects are glossy.
 const GLOSSY: f32 = 0.7;
+/// Part of the glossy turns whose highlights clip.
+const CLIPPED: f32 = 0.5;
+/// How much brighter these become at most.
+const LONGEST_EXPOSURE: f32 = 3.0;
 /// From this value a channel is saturated, and above this fraction Spec-Net runs, as in `relit-extract`.
 const SATURATION_LEVEL: u8 = 250;
 const GATE: f64 = 0.05;
@@ -156,6 +160,11 @@ impl TurnRecipe {
 }
 
 fn open_dataset(out: &Path, settings: &ExtractionSettings) -> Result<Dataset, SynthError> {
+    if holds_samples(out) {
+        return Err(SynthError::OtherSettings {
+            path: out.to_owned(),
+        });
+    }
     match Dataset::read(out) {
         Ok(there) if there.settings == *settings => Ok(there),
         Ok(_) => Err(SynthError::OtherSettings {
@@ -209,6 +218,8 @@ impl<'a> Turn<'a> {
         let [x, y, z] = stand.axis().to_array().map(f64::from);
         let axis = Direction::new(x, y, z).unwrap_or(Direction::UP);
         let level = random.uniform(0.8..1.3);
+        let is_clipped = finish.gloss.is_some() && random.chance(CLIPPED);
+        let clipped = is_clipped.then(|| random.uniform(0.04..0.15));
         let description = TurnDescription {
             schema: "relight.turn/1".to_owned(),
             seed,
@@ -234,11 +245,12 @@ impl<'a> Turn<'a> {
             material,
             shadow_seed: random.seed(),
         }
-        .exposed(level)
+        .exposed(level, clipped)
     }
 
-    /// The turn with its exposure, one for all frames.
-    fn exposed(mut self, level: f32) -> Self {
+    /// The turn with its exposure, one for all frames; `clipped` is the part of the object that clips in
+    /// the frame in which most does.
+    fn exposed(mut self, level: f32, clipped: Option<f32>) -> Self {
         let metered = METERED.min(self.description.frames);
         let images: Vec<Vec<Vec3>> = (0..metered)
             .into_par_iter()
@@ -248,7 +260,11 @@ impl<'a> Turn<'a> {
                 shaded.image(&self.material.albedo)
             })
             .collect();
-        self.description.camera = CameraModel::plain().exposed(&images.concat(), level);
+        let camera = CameraModel::plain().exposed(&images.concat(), level);
+        self.description.camera = match clipped {
+            Some(part) => camera.clipping(&images, part, LONGEST_EXPOSURE),
+            None => camera,
+        };
         self
     }
 

@@ -11,6 +11,7 @@ use relit_data::shard::{ShardReader, decode_rgb, verify};
 use super::*;
 use crate::synth::library::Folders;
 use crate::synth::lighting::LightKind;
+use crate::synth::write_samples;
 
 fn turns(seed: u64) -> TurnRecipe {
     TurnRecipe {
@@ -141,6 +142,10 @@ fn turns_that_are_whole_are_kept_and_others_are_refused() {
         ..turns(4)
     };
     let error = write_turns(&other, &library, 1, folder.path(), &|| {}).unwrap_err();
+    assert!(matches!(error, SynthError::OtherSettings { .. }));
+    let samples = tempfile::tempdir().unwrap();
+    write_samples(&turns(4).recipe, &library, 1, samples.path(), &|| {}).unwrap();
+    let error = write_turns(&turns(4), &library, 1, samples.path(), &|| {}).unwrap_err();
     assert!(matches!(error, SynthError::OtherSettings { .. }));
     let mut other = turns(4);
     other.recipe.light = LightKind::Sh;
