@@ -424,13 +424,12 @@ fn normals_of_another_network_replace_ours() {
             .decompose(&photo.picture, &photo.mask, &options)
             .unwrap()
     };
-    let own = decompose(&untrained());
-    let up = decompose(&untrained().with_normals(&file, NormalsFrame::YUp).unwrap());
-    let down = decompose(
-        &untrained()
-            .with_normals(&file, NormalsFrame::YDown)
-            .unwrap(),
-    );
+    let mut net = untrained();
+    let own = decompose(&net);
+    net.set_normals(&file, NormalsFrame::YUp).unwrap();
+    let up = decompose(&net);
+    net.set_normals(&file, NormalsFrame::YDown).unwrap();
+    let down = decompose(&net);
     assert_eq!(own.albedo, up.albedo);
     assert_ne!(own.normals, up.normals);
     let apart = |a: &[f32], b: &[f32]| {
@@ -445,17 +444,13 @@ fn normals_of_another_network_replace_ours() {
     let graph = light_net(Head::Pooled);
     let weights = Weights::initial(&graph, 9);
     fs::write(&file, to_onnx(&graph, &weights, 1, (32, 32)).unwrap()).unwrap();
-    let error = untrained()
-        .with_normals(&file, NormalsFrame::YUp)
-        .unwrap_err();
+    let error = net.set_normals(&file, NormalsFrame::YUp).unwrap_err();
     assert!(
         error.to_string().contains("does not answer a picture"),
         "{error}"
     );
     fs::write(&file, "no network").unwrap();
-    let error = untrained()
-        .with_normals(&file, NormalsFrame::YUp)
-        .unwrap_err();
+    let error = net.set_normals(&file, NormalsFrame::YUp).unwrap_err();
     assert!(
         error.to_string().contains("normals.onnx cannot be run"),
         "{error}"

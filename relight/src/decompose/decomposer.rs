@@ -170,20 +170,16 @@ impl Decomposer {
         Self { net, normals: None }
     }
 
-    /// The same with the normals of another network, in an ONNX file. It takes one picture,
+    /// Takes the normals of another network from now on, in an ONNX file. It takes one picture,
     /// 1 x 3 x side x side, (x - 0.5) / 0.5 of the sRGB values x, 0 outside the mask; and answers with
     /// 1 x 3 x side x side, vectors of any length, or with 1 x 2 x side x side, slopes (p, q) of normals
     /// (p, q, 1).
     ///
     /// # Errors
-    /// Where the file cannot be read or run, or answers something else.
-    pub fn with_normals(
-        mut self,
-        path: &Path,
-        frame: NormalsFrame,
-    ) -> Result<Self, DecomposeError> {
+    /// Where the file cannot be read or run, or answers something else; then all stays as it was.
+    pub fn set_normals(&mut self, path: &Path, frame: NormalsFrame) -> Result<(), DecomposeError> {
         self.normals = Some(OtherNormals::read(path, self.net.side(), frame)?);
-        Ok(self)
+        Ok(())
     }
 
     /// Width and height of what the network sees, pixels.

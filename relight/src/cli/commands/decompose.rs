@@ -132,7 +132,7 @@ impl Arguments {
 
     /// The network, and how its weights are named.
     fn decomposer(&self) -> Result<(Decomposer, String), DecomposeError> {
-        let (decomposer, name) = match &self.weights {
+        let (mut decomposer, name) = match &self.weights {
             None => (Decomposer::shipped()?, "shipped".to_owned()),
             Some(path) => {
                 let decomposer = Decomposer::new(&Weights::read(path)?)?;
@@ -140,10 +140,9 @@ impl Arguments {
                 (decomposer, name.to_string_lossy().into_owned())
             }
         };
-        let decomposer = match &self.normals {
-            Some(path) => decomposer.with_normals(path, self.normals_y.into())?,
-            None => decomposer,
-        };
+        if let Some(path) = &self.normals {
+            decomposer.set_normals(path, self.normals_y.into())?;
+        }
         Ok((decomposer, name))
     }
 }
