@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-rig lint demo bench bench-reader docs fuzz firmware emulator flash
+.PHONY: help setup setup-train test test-rig lint demo bench bench-reader docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -32,10 +32,13 @@ FUZZ_SECONDS ?= 60
 FUZZ_SHARD_PIECE := 16
 
 help: ## List the targets
-	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 12
+	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 15
 
 setup: ## Install the system packages that are missing
 	@.ci/setup
+
+setup-train: ## Install libtorch, which relight's training is built with (544 MB, once)
+	@.ci/setup-train
 
 test: setup ## Run all tests
 	@if rig-firmware/build --can && [[ -e /usr/include/simavr/sim_avr.h ]]; then \
@@ -43,14 +46,15 @@ test: setup ## Run all tests
 	else \
 	    echo "the firmware's tests on the emulated chip are skipped: 'make setup' printed why"; \
 	fi
-	cargo test --locked
+	cargo test --locked $$(.ci/setup-train --features)
 
 test-rig: setup ## Capture with the kernel's camera drivers and a real tty, in a virtual machine
 	@tests/rig-vm/run
 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check
-	cargo clippy --locked --workspace --all-targets -- -D warnings
+	cargo clippy --locked --workspace --all-targets $$(.ci/setup-train --features) -- -D warnings
+	cargo clippy --locked -p relight -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps
 	@if cargo tree --locked -p relight -e normal --prefix none \
 	    | grep -E '^(ffmpeg|opencv|axum|hyper|tokio|relit-(video|mask|rig))'; then \
@@ -68,7 +72,7 @@ flash: firmware ## Flash the firmware to the Arduino at PORT (/dev/ttyACM0)
 	    -U flash:w:$(FIRMWARE)/rig-firmware-uno.hex:i
 
 demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of it, list the results
-	cargo build --locked --release --bins
+	cargo build --locked --release -p relit --bins
 	rm -rf $(DEMO)
 	$(TARGET)/release/relit-capture record --yes --object cow --root $(DEMO)/sessions \
 	    --camera 'replay:fixtures/$(SESSION)?loop=1' --turntable sim:
@@ -84,7 +88,7 @@ demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of 
 	echo "The shard of 1500 samples:        $$(echo $(DEMO)/out/*-cow.tar)"
 
 bench: setup $(BENCH_MASK) $(BENCH_VENV)/ready ## Measure relit-extract against ffmpeg and Python OpenCV
-	cargo build --locked --release --bins
+	cargo build --locked --release -p relit --bins
 	$(BENCH_VENV)/bin/python tests/bench/bench.py --program $(TARGET)/release/relit-extract \
 	    --video $(BENCH_VIDEO) --mask $(BENCH_MASK) --runs $(BENCH_RUNS) --work $(TARGET)/bench
 

@@ -460,9 +460,14 @@ fn a_timeout_is_bounded_and_costs_no_frame() {
     start(&mut *camera, "YUYV:1920x1080@5");
     let mut timeouts = 0;
     let mut counted = Vec::new();
-    while counted.len() < 3 {
+    // On a busy machine frames come so late that one is often there at once.
+    while counted.len() < 3 || timeouts == 0 {
+        assert!(
+            counted.len() < 500,
+            "no wait of 1 ms ever ended without a frame"
+        );
         let asked = Instant::now();
-        match camera.next_frame(Duration::from_millis(20)) {
+        match camera.next_frame(Duration::from_millis(1)) {
             Ok(frame) => counted.push(frame.sequence.unwrap()),
             Err(CameraError::Timeout { .. }) => timeouts += 1,
             Err(other) => panic!("{other}"),
@@ -470,7 +475,6 @@ fn a_timeout_is_bounded_and_costs_no_frame() {
         assert!(asked.elapsed() < TIMEOUT);
     }
     println!("{timeouts} timeouts, counted {counted:?}");
-    assert!(timeouts > 0);
     assert!(counted.is_sorted());
 }
 

@@ -7,9 +7,23 @@
     reason = "a test that cannot go on has failed"
 )]
 
-use relight::nets::paper::{Head, light_net, normal_net};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use relight::decompose::EncodedPicture;
+use relight::image::{Extent, Planes};
+use relight::nets::paper::{Head, light_net, normal_net, spec_net};
 use relight::nets::{Graph, Inference, Weights, decomposer};
-use relight::train::{Adam, AdamSettings, ComputePrecision, Model};
+use relight::synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
+use relight::train::{
+    Adam, AdamSettings, AnsweredTensors, Composer, Composition, ComputePrecision, DataSettings,
+    DecomposeSettings, DecomposeTask, Model, Observer, PaperInputs, PaperPhase, PaperSettings,
+    PaperTask, PrecisionChoice, Resources, Run, RunOutcome, RunSettings, TABLE, Task, TrainError,
+    TruthArrays, read_settings,
+};
 use tch::{Device, Kind, Tensor};
 
 const SIDE: i64 = 64;
@@ -100,4 +114,294 @@ fn the_memory_of_another_network_is_refused() {
     let other = model(decomposer(), ComputePrecision::Single);
     let mut adam = Adam::new(AdamSettings::default(), other.parameters()).unwrap();
     assert!(adam.recall(&memory, 3).is_err());
+}
+
+/// Small settings: a run of seconds.
+fn small_run(steps: u64) -> RunSettings {
+    RunSettings {
+        steps,
+        batch: 4,
+        precision: PrecisionChoice::Single,
+        log_every: 1,
+        validate_every: 3,
+        ..RunSettings::default()
+    }
+}
+
+fn small_data() -> DataSettings {
+    DataSettings {
+        size: 32,
+        views: 1,
+        lightings: 2,
+        window: 6,
+        reuse: 2.0,
+        validation: 2,
+        ..DataSettings::default()
+    }
+}
+
+fn decompose_task(steps: u64) -> (DecomposeTask, RunSettings) {
+    let settings = DecomposeSettings {
+        run: small_run(steps),
+        data: small_data(),
+        ..DecomposeSettings::default()
+    };
+    let run = settings.run.clone();
+    (DecomposeTask::new(settings, RESOURCES, None).unwrap(), run)
+}
+
+const RESOURCES: Resources = Resources {
+    device: Device::Cpu,
+    composers: 2,
+};
+
+/// Stops a run after so many steps.
+struct StopAfter<'a> {
+    steps: u64,
+    stop: &'a AtomicBool,
+    damage: Vec<String>,
+}
+
+impl Observer for StopAfter<'_> {
+    fn step(&mut self, step: u64, _: &BTreeMap<String, f64>) {
+        self.stop.store(step >= self.steps, Ordering::Relaxed);
+    }
+    fn damaged(&mut self, _: u64, what: &str) {
+        self.damage.push(what.to_owned());
+    }
+    fn validated(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
+    fn saved(&mut self, _: u64, _: &Path) {}
+}
+
+fn make_run(
+    task: &mut dyn Task,
+    settings: &RunSettings,
+    folder: &Path,
+    (resume, until): (bool, u64),
+) -> Result<RunOutcome, TrainError> {
+    let stop = AtomicBool::new(false);
+    let mut observer = StopAfter {
+        steps: until,
+        stop: &stop,
+        damage: Vec::new(),
+    };
+    Run::open(task, settings, folder, resume)?.finish(&stop, &mut observer)
+}
+
+/// The lines of a run's table, without the header.
+fn table(folder: &Path) -> Vec<String> {
+    let text = fs::read_to_string(folder.join(TABLE)).unwrap();
+    text.lines().skip(1).map(str::to_owned).collect()
+}
+
+#[test]
+fn a_run_that_was_stopped_goes_on_to_the_same_losses_and_weights() {
+    tch::set_num_threads(1);
+    let (whole, parted) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (mut task, settings) = decompose_task(4);
+    let undisturbed = make_run(&mut task, &settings, whole.path(), (false, u64::MAX)).unwrap();
+    assert!(!undisturbed.stopped);
+
+    let (mut task, settings) = decompose_task(4);
+    let stopped = make_run(&mut task, &settings, parted.path(), (false, 2)).unwrap();
+    assert!(stopped.stopped);
+    let (mut task, settings) = decompose_task(4);
+    make_run(&mut task, &settings, parted.path(), (true, u64::MAX)).unwrap();
+
+    assert_eq!(table(parted.path()), table(whole.path()));
+    let weights = |folder: &Path| Weights::read(&folder.join("decomposer.safetensors")).unwrap();
+    assert_eq!(weights(parted.path()), weights(whole.path()));
+    assert!(whole.path().join("validation.png").is_file());
+}
+
+#[test]
+fn a_folder_with_a_run_is_not_overwritten_and_another_runs_checkpoint_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut task, settings) = decompose_task(1);
+    make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap();
+    let again = make_run(&mut task, &settings, folder.path(), (false, u64::MAX));
+    assert!(
+        matches!(again, Err(TrainError::Occupied { .. })),
+        "{again:?}"
+    );
+    let (mut other, settings) = decompose_task(2);
+    let error = make_run(&mut other, &settings, folder.path(), (true, u64::MAX)).unwrap_err();
+    assert!(
+        error.to_string().contains("its settings are others"),
+        "{error}"
+    );
+}
+
+#[test]
+fn samples_are_the_same_on_any_number_of_threads() {
+    let composition = Arc::new(Composition {
+        recipe: Recipe {
+            size: 32,
+            views: 1,
+            lightings: 3,
+            ..Recipe::default()
+        },
+        library: Library::read(&Folders::default()).unwrap(),
+        plain_share: 0.5,
+    });
+    let first = |threads: usize| -> Vec<TruthArrays> {
+        let mut composer = Composer::start(Arc::clone(&composition), 1, threads).unwrap();
+        (0..9).map(|_| composer.next_sample().unwrap()).collect()
+    };
+    assert_eq!(first(1), first(3));
+}
+
+#[test]
+fn answers_mean_the_same_on_tensors_as_one_by_one() {
+    let side = SIDE as usize;
+    let picture = Planes::from_fn(Extent::new(side, side), |x, y| {
+        [x, y, x + y].map(|v| (v as f32 / 90.0).powi(2))
+    });
+    let mask = Planes::from_fn(Extent::new(side, side), |x, _| [f32::from(u8::from(x > 9))]);
+    let encoded = EncodedPicture::new(&picture, &mask);
+    tch::manual_seed(4);
+    let answer = Tensor::randn([1, 9, SIDE, SIDE], (Kind::Float, Device::Cpu)) * 2.0;
+    let flat = Vec::<f32>::try_from(answer.flatten(0, -1)).unwrap();
+    let plain = encoded.decode(&flat);
+    let input = Tensor::from_slice(encoded.values()).view([1, 7, SIDE, SIDE]);
+    let tensors = AnsweredTensors::new(&input, &answer).unwrap();
+    let inside = input.narrow(1, 3, 1);
+    let largest = |tensor: &Tensor, planes: Vec<&[f32]>, scale: f64| {
+        let values = Vec::<f32>::try_from((tensor * &inside * scale).flatten(0, -1)).unwrap();
+        let plain = planes.concat();
+        let pairs = values.iter().zip(&plain);
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    };
+    assert!(
+        largest(
+            &tensors.normals,
+            plain.normals.planes().planes().to_vec(),
+            1.0
+        ) < 1e-5
+    );
+    assert!(largest(&tensors.albedo, plain.albedo.planes().to_vec(), 1.0) < 1e-5);
+    assert!(largest(&tensors.shading, plain.shading.planes().to_vec(), 1.0) < 1e-4);
+    let white = f64::from(encoded.white());
+    assert!(largest(&tensors.highlight, plain.highlight.planes().to_vec(), white) < 1e-5);
+}
+
+fn turns() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let recipe = TurnRecipe {
+        recipe: Recipe {
+            size: 32,
+            ..Recipe::default()
+        },
+        frames: 24,
+    };
+    let library = Library::read(&Folders::default()).unwrap();
+    write_turns(&recipe, &library, 2, folder.path(), &|| {}).unwrap();
+    folder
+}
+
+fn paper_settings(steps: u64) -> PaperSettings {
+    PaperSettings {
+        run: RunSettings {
+            rate: 1e-4,
+            ..small_run(steps)
+        },
+        data: small_data(),
+        ..PaperSettings::default()
+    }
+}
+
+#[test]
+fn every_phase_of_the_paper_makes_its_steps_and_goes_on_where_it_was_stopped() {
+    tch::set_num_threads(1);
+    let turns = turns();
+    let inputs = PaperInputs {
+        turns: Some(turns.path().to_owned()),
+        spec: Some(Weights::initial(&spec_net(), 1)),
+        normal: Some(Weights::initial(&normal_net(), 2)),
+        light: Some(Weights::initial(&light_net(Head::Pooled), 3)),
+        ..PaperInputs::default()
+    };
+    for phase in [
+        PaperPhase::Spec,
+        PaperPhase::Normal,
+        PaperPhase::Light,
+        PaperPhase::Joint,
+        PaperPhase::Specular,
+    ] {
+        let task = || PaperTask::new(phase, paper_settings(3), RESOURCES, &inputs).unwrap();
+        let run = paper_settings(3).run;
+        let (whole, parted) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let outcome = make_run(&mut task(), &run, whole.path(), (false, u64::MAX)).unwrap();
+        assert_eq!((outcome.steps, outcome.weights.len()), (3, 1), "{phase:?}");
+        make_run(&mut task(), &run, parted.path(), (false, 1)).unwrap();
+        make_run(&mut task(), &run, parted.path(), (true, u64::MAX)).unwrap();
+        assert_eq!(table(parted.path()), table(whole.path()), "{phase:?}");
+    }
+}
+
+#[test]
+fn a_phase_says_what_it_needs() {
+    for (phase, option) in [
+        (PaperPhase::Light, "--turns"),
+        (PaperPhase::Joint, "--turns"),
+        (PaperPhase::Specular, "--turns"),
+    ] {
+        let inputs = PaperInputs::default();
+        let error = PaperTask::new(phase, paper_settings(1), RESOURCES, &inputs).unwrap_err();
+        assert!(error.to_string().contains(option), "{error}");
+    }
+    let turns = turns();
+    let inputs = PaperInputs {
+        turns: Some(turns.path().to_owned()),
+        ..PaperInputs::default()
+    };
+    for (phase, option) in [
+        (PaperPhase::Light, "--normal"),
+        (PaperPhase::Joint, "--light"),
+    ] {
+        let error = PaperTask::new(phase, paper_settings(1), RESOURCES, &inputs).unwrap_err();
+        assert!(error.to_string().contains(option), "{error}");
+    }
+}
+
+#[test]
+fn a_damaged_sample_of_a_turn_is_told_and_the_run_goes_on() {
+    let turns = turns();
+    let shard = fs::read_dir(turns.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .find(|path| path.extension().is_some_and(|e| e == "tar"))
+        .unwrap();
+    let mut bytes = fs::read(&shard).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle..middle + 3000].fill(0x5a);
+    fs::write(&shard, bytes).unwrap();
+    let inputs = PaperInputs {
+        turns: Some(turns.path().to_owned()),
+        ..PaperInputs::default()
+    };
+    let mut task = PaperTask::new(PaperPhase::Spec, paper_settings(6), RESOURCES, &inputs).unwrap();
+    let (folder, run) = (tempfile::tempdir().unwrap(), paper_settings(6).run);
+    let stop = AtomicBool::new(false);
+    let mut observer = StopAfter {
+        steps: u64::MAX,
+        stop: &stop,
+        damage: Vec::new(),
+    };
+    let outcome = Run::open(&mut task, &run, folder.path(), false)
+        .unwrap()
+        .finish(&stop, &mut observer)
+        .unwrap();
+    assert_eq!(outcome.steps, 6);
+    assert!(!observer.damage.is_empty());
+}
+
+#[test]
+fn the_settings_that_come_with_relight_can_be_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights");
+    let paper: PaperSettings = read_settings(&folder.join("paper.toml")).unwrap();
+    paper.check().unwrap();
+    assert_eq!((paper.run.rate, paper.run.batch), (1e-6, 12));
+    let ours: DecomposeSettings = read_settings(&folder.join("decompose.toml")).unwrap();
+    ours.check().unwrap();
 }

@@ -4,6 +4,8 @@ use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 
+use relit_rig::lockfile;
+use relit_rig::turntable::Owner;
 use tempfile::TempDir;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_relit-capture");
@@ -18,7 +20,7 @@ impl Simulated {
     fn start(more: &[&str]) -> Simulated {
         let folder = TempDir::new().unwrap();
         let mut process = Command::new(PROGRAM)
-            .args(["--json", "simulate", "--for", "60", "--link"])
+            .args(["--json", "simulate", "--for", "600", "--link"])
             .arg(folder.path().join("table"))
             .args(more)
             .stdout(Stdio::piped())
@@ -43,6 +45,23 @@ impl Simulated {
             .args(words)
             .output()
             .unwrap()
+    }
+
+    /// What `status` says once the table moves. The port is left alone until `owner` has it: whoever
+    /// comes first owns it.
+    fn status_in_motion(&self, owner: &Child) -> String {
+        let folder = lockfile::standard_folder();
+        for _ in 0..600 {
+            std::thread::sleep(std::time::Duration::from_millis(100));
+            let found = Owner::find(&self.port(), &folder).unwrap();
+            if found.is_some_and(|found| found.pid() == owner.id()) {
+                let status = out(&self.ask(&["status"]));
+                if status.starts_with("Jog") {
+                    return status;
+                }
+            }
+        }
+        panic!("the table never moved");
     }
 }
 
@@ -99,12 +118,7 @@ fn a_second_program_reaches_a_moving_table_through_its_owner() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let moving = (0..100).find_map(|_| {
-        std::thread::sleep(std::time::Duration::from_millis(100));
-        let text = out(&table.ask(&["status"]));
-        text.starts_with("Jog").then_some(text)
-    });
-    assert!(moving.is_some_and(|text| text.contains("degrees/s")));
+    assert!(table.status_in_motion(&jog).contains("degrees/s"));
     let refused = table.ask(&["jog", "5"]);
     assert_eq!(refused.status.code(), Some(1));
     assert!(
@@ -159,11 +173,7 @@ fn a_jog_that_is_interrupted_stops_the_table() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let moving = (0..100).any(|_| {
-        std::thread::sleep(std::time::Duration::from_millis(100));
-        out(&table.ask(&["status"])).starts_with("Jog")
-    });
-    assert!(moving);
+    table.status_in_motion(&jog);
     let interrupted = Command::new("kill")
         .args(["-INT", &jog.id().to_string()])
         .status()

@@ -20,7 +20,6 @@ pub(crate) enum Outcome {
     /// All was done: exit code 0.
     Whole,
     /// Something was left out or lost, which was told: exit code 3.
-    #[cfg(feature = "train")]
     Incomplete,
 }
 
@@ -28,7 +27,6 @@ impl From<Outcome> for ExitCode {
     fn from(outcome: Outcome) -> Self {
         match outcome {
             Outcome::Whole => Self::SUCCESS,
-            #[cfg(feature = "train")]
             Outcome::Incomplete => Self::from(3),
         }
     }
@@ -60,6 +58,14 @@ impl Console {
         let json = event.to_string();
         // Where nobody reads any more, the work goes on.
         let _ = writeln!(io::stdout(), "{}", if self.json { &json } else { text });
+    }
+
+    /// Something that was left out, while the rest goes on.
+    pub(crate) fn warn(self, text: &str, event: &Value) {
+        if self.json {
+            self.say("", event);
+        }
+        let _ = writeln!(io::stderr(), "warning: {text}");
     }
 
     /// The exit code of a command, after its error, if any, was told.

@@ -3,6 +3,7 @@
 mod commands;
 mod console;
 mod folder;
+mod values;
 
 use std::process::ExitCode;
 
@@ -11,10 +12,10 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 #[cfg(feature = "train")]
 use commands::train;
-use commands::{eval, render, synth};
+use commands::{decompose, eval, render, synth, weights};
 use console::Console;
 
-/// Single-view relighting: light, rendering, data with truth, and the measures of the results.
+/// Single-view relighting: photographs taken apart, light, rendering, data with truth, measures of the results.
 #[derive(Parser)]
 #[command(
     name = "relight",
@@ -31,6 +32,9 @@ struct CommandLine {
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Take photographs apart: normals, albedo, shading, highlight and light.
+    #[command(after_help = decompose::EXAMPLES)]
+    Decompose(decompose::Arguments),
     /// Light an object that is given by its maps: an image, a turn, or a sweep of materials.
     #[command(after_help = render::EXAMPLES)]
     Render(render::Arguments),
@@ -44,17 +48,22 @@ enum Verb {
     #[cfg(feature = "train")]
     #[command(after_help = train::EXAMPLES)]
     Train(train::Arguments),
+    /// Convert weights of networks.
+    #[command(after_help = weights::EXAMPLES)]
+    Weights(weights::Arguments),
 }
 
 impl Verb {
     /// What is wrong with the arguments together: wrong usage, exit code 2.
     fn fault(&self) -> Option<String> {
         match self {
+            Self::Decompose(arguments) => arguments.fault(),
             Self::Render(arguments) => arguments.fault(),
             Self::Eval(arguments) => arguments.fault(),
             Self::Synth(arguments) => arguments.fault(),
             #[cfg(feature = "train")]
             Self::Train(_) => None,
+            Self::Weights(arguments) => arguments.fault(),
         }
     }
 }
@@ -69,10 +78,12 @@ pub(crate) fn run() -> ExitCode {
     }
     let console = Console::new(line.json);
     console.finish(match line.verb {
+        Verb::Decompose(arguments) => decompose::run(&arguments, console),
         Verb::Render(arguments) => render::run(&arguments, console),
         Verb::Eval(arguments) => eval::run(&arguments, console),
         Verb::Synth(arguments) => synth::run(&arguments, console),
         #[cfg(feature = "train")]
         Verb::Train(arguments) => train::run(&arguments, console),
+        Verb::Weights(arguments) => weights::run(&arguments, console),
     })
 }

@@ -1,7 +1,6 @@
 //! Albedo and shading of single images: the table on MIT Intrinsic Images.
 
-use super::completion::completed;
-use super::retinex::{Decomposition, Retinex, divided};
+use super::retinex::{IntrinsicImages, Retinex, divided};
 use super::run::{Scored, add_method, grey, measured, need, object, of_grey};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use crate::data::{TruthSample, TruthSet};
@@ -68,21 +67,21 @@ impl IntrinsicBaseline {
         sample: &TruthSample,
         image: &Rgb<Linear>,
         mask: &[bool],
-    ) -> Result<Decomposition, EvalError> {
+    ) -> Result<IntrinsicImages, EvalError> {
         let extent = image.planes().extent();
         let ones = || of_grey(extent, vec![1.0; extent.pixels()]);
         let shaded_by = |shading: Vec<f32>| {
-            Ok(Decomposition {
+            Ok(IntrinsicImages {
                 albedo: divided(image, &shading),
                 shading: of_grey(extent, shading)?,
             })
         };
         match self {
-            Self::ConstantAlbedo => Ok(Decomposition {
+            Self::ConstantAlbedo => Ok(IntrinsicImages {
                 albedo: ones()?,
                 shading: of_grey(extent, grey(image))?,
             }),
-            Self::ConstantShading => Ok(Decomposition {
+            Self::ConstantShading => Ok(IntrinsicImages {
                 albedo: image.clone(),
                 shading: ones()?,
             }),
@@ -96,9 +95,9 @@ impl IntrinsicBaseline {
 
 /// The grey shading of the true normals under the light that fits the true shading best.
 fn fitted_shading(sample: &TruthSample, mask: &[bool]) -> Result<Vec<f32>, EvalError> {
-    let normals = completed(need(sample, "normals", &sample.normals)?, mask);
+    let normals = need(sample, "normals", &sample.normals)?.completed(mask);
     let shading = need(sample, "shading", &sample.shading)?;
-    let light = fit_light(&normals, shading, mask).map_err(|source| EvalError::Unlit {
+    let light = fit_light(&normals, shading, mask, 0.0).map_err(|source| EvalError::Unlit {
         sample: sample.name.clone(),
         source,
     })?;
@@ -142,7 +141,7 @@ impl IntrinsicMethod {
         sample: &TruthSample,
         input: IntrinsicInput,
         mask: &[bool],
-    ) -> Result<Decomposition, EvalError> {
+    ) -> Result<IntrinsicImages, EvalError> {
         match self {
             Self::Baseline(baseline) => {
                 let image = match input {
@@ -155,7 +154,7 @@ impl IntrinsicMethod {
             }
             Self::Predictions(predictions) => {
                 let read = |part| predictions.colour(&sample.name, part, sample.extent());
-                Ok(Decomposition {
+                Ok(IntrinsicImages {
                     albedo: read("albedo")?,
                     shading: read("shading")?,
                 })
@@ -212,7 +211,7 @@ fn notes(input: IntrinsicInput) -> Vec<String> {
 
 fn score(
     sample: &TruthSample,
-    found: &Decomposition,
+    found: &IntrinsicImages,
     mask: &[bool],
 ) -> Result<Vec<Scored>, EvalError> {
     let albedo = need(sample, "albedo", &sample.albedo)?;

@@ -35,7 +35,7 @@ impl LightMethod {
             Self::Oracle => {
                 let normals = need(sample, "normals", &sample.normals)?;
                 let shading = need(sample, "shading", &sample.shading)?;
-                fit_light(normals, shading, known).map_err(|source| EvalError::Unlit {
+                fit_light(normals, shading, known, 0.0).map_err(|source| EvalError::Unlit {
                     sample: sample.name.clone(),
                     source,
                 })

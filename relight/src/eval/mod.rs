@@ -13,7 +13,6 @@
 //! factor of two and more between conventions, and published tables rarely say which is theirs. What
 //! cannot be read or measured is an error that names the image; no image is left out.
 
-mod completion;
 mod error;
 mod highlights;
 mod intrinsic;
@@ -36,6 +35,6 @@ pub use predictions::Predictions;
 pub use relighting::{
     RelightMethod, RelightingRecipe, RelightingSet, evaluate_relighting, make_relighting,
 };
-pub use retinex::{Decomposition, Retinex};
+pub use retinex::{IntrinsicImages, Retinex};
 pub use run::EvalProgress;
 pub use table::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};

@@ -6,7 +6,7 @@ use crate::image::{Extent, Linear, Planes, Rgb};
 
 /// An image as albedo times shading.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Decomposition {
+pub struct IntrinsicImages {
     /// The albedo.
     pub albedo: Rgb<Linear>,
     /// The shading, without colour.
@@ -53,7 +53,7 @@ impl Retinex {
         self,
         image: &Rgb<Linear>,
         mask: &[bool],
-    ) -> Result<Decomposition, EvalError> {
+    ) -> Result<IntrinsicImages, EvalError> {
         let extent = image.planes().extent();
         let brightness = grey(image);
         let log_albedo = self.edges(image, &brightness, mask).solve();
@@ -63,7 +63,7 @@ impl Retinex {
         {
             shading[at] = brightness / (log_albedo.exp() as f32).max(f32::MIN_POSITIVE);
         }
-        Ok(Decomposition {
+        Ok(IntrinsicImages {
             albedo: divided(image, &shading),
             shading: of_grey(extent, shading)?,
         })

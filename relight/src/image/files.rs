@@ -5,7 +5,11 @@ use std::io::{BufReader, Cursor};
 use std::path::Path;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{DynamicImage, ImageBuffer, ImageEncoder, ImageFormat, ImageReader, Rgb};
+use image::metadata::Orientation;
+use image::{
+    DynamicImage, ImageBuffer, ImageDecoder, ImageEncoder, ImageFormat, ImageReader, Limits, Pixel,
+    Rgb,
+};
 use relit_data::durable::write_whole;
 
 use super::{Extent, ImageError, Planes};
@@ -82,13 +86,70 @@ impl Planes<3> {
     }
 }
 
-/// Reads an image without any conversion of colour, and says what its numbers were: integers come
-/// scaled to 0 to 1, floating point values as they are. Alpha is left out; grey becomes three equal
-/// channels.
+/// An image as it stands in a file, without any conversion of colour.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredImage {
+    /// The colours: integers scaled to 0 to 1, floating point values as they are. Grey is three equal
+    /// channels.
+    pub planes: Planes<3>,
+    /// Alpha, 0 to 1, where the file has it and it is not 1 everywhere.
+    pub alpha: Option<Planes<1>>,
+    /// What the numbers were.
+    pub samples: Samples,
+}
+
+impl StoredImage {
+    /// Reads an image, turned as its Exif orientation says. Colours of an EXR with alpha, which that format
+    /// holds multiplied with it, are divided by it.
+    ///
+    /// # Errors
+    /// Where the file cannot be read or is no image of a known format.
+    pub fn read(path: &Path) -> Result<Self, ImageError> {
+        let image = decode(path)?;
+        let samples = match image {
+            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => Samples::Float,
+            _ => Samples::Integer,
+        };
+        if !image.color().has_alpha() {
+            return Ok(Self {
+                planes: split(&image.into_rgb32f()),
+                alpha: None,
+                samples,
+            });
+        }
+        let with_alpha: Planes<4> = split(&image.into_rgba32f());
+        let extent = with_alpha.extent();
+        let [mut red, mut green, mut blue, alpha] = with_alpha.into_planes();
+        if samples == Samples::Float {
+            for plane in [&mut red, &mut green, &mut blue] {
+                for (value, &alpha) in plane.iter_mut().zip(&alpha) {
+                    *value /= if alpha > 0.0 { alpha } else { 1.0 };
+                }
+            }
+        }
+        let is_opaque = alpha.iter().all(|&alpha| alpha >= 1.0);
+        Ok(Self {
+            planes: Planes::from_planes(extent, [red, green, blue])?,
+            alpha: if is_opaque {
+                None
+            } else {
+                Some(Planes::from_planes(extent, [alpha])?)
+            },
+            samples,
+        })
+    }
+}
+
+/// Reads the colours of an image as [`StoredImage::read`], and says what its numbers were.
 ///
 /// # Errors
 /// Where the file cannot be read or is no image of a known format.
 pub fn read_planes(path: &Path) -> Result<(Planes<3>, Samples), ImageError> {
+    let image = StoredImage::read(path)?;
+    Ok((image.planes, image.samples))
+}
+
+fn decode(path: &Path) -> Result<DynamicImage, ImageError> {
     let open = |source| ImageError::Open {
         path: path.to_owned(),
         source,
@@ -101,23 +162,25 @@ pub fn read_planes(path: &Path) -> Result<(Planes<3>, Samples), ImageError> {
         }
     };
     let file = BufReader::new(File::open(path).map_err(open)?);
-    let image = ImageReader::new(file)
+    let mut decoder = ImageReader::new(file)
         .with_guessed_format()
         .map_err(open)?
-        .decode()
+        .into_decoder()
         .map_err(decode)?;
-    let samples = match image {
-        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => Samples::Float,
-        _ => Samples::Integer,
-    };
-    Ok((split(&image.into_rgb32f()), samples))
+    let mut limits = Limits::default();
+    limits.reserve(decoder.total_bytes()).map_err(decode)?;
+    // A file whose orientation cannot be read is shown as it is stored.
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let mut image = DynamicImage::from_decoder(decoder).map_err(decode)?;
+    image.apply_orientation(orientation);
+    Ok(image)
 }
 
-fn split(image: &ImageBuffer<Rgb<f32>, Vec<f32>>) -> Planes<3> {
+fn split<P: Pixel<Subpixel = f32>, const C: usize>(image: &ImageBuffer<P, Vec<f32>>) -> Planes<C> {
     let extent = Extent::new(image.width() as usize, image.height() as usize);
     let mut planes = Planes::zeros(extent);
     for (channel, plane) in planes.planes_mut().into_iter().enumerate() {
-        for (value, pixel) in plane.iter_mut().zip(image.as_raw().chunks_exact(3)) {
+        for (value, pixel) in plane.iter_mut().zip(image.as_raw().chunks_exact(C)) {
             *value = pixel[channel];
         }
     }

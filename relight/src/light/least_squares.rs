@@ -29,12 +29,12 @@ impl NormalEquations {
         }
     }
 
-    /// Draws the solution towards 0, by `part` of the mean of the diagonal: with it, few or equal
-    /// equations have a solution too.
-    pub(crate) fn add_ridge(&mut self, part: f64) {
+    /// Draws the unknowns from `first` on towards 0, by `part` of the mean of the diagonal: with it, few
+    /// or equal equations have a solution too.
+    pub(crate) fn add_ridge(&mut self, first: usize, part: f64) {
         let n = self.unknowns;
         let trace: f64 = (0..n).map(|i| self.matrix[i * n + i]).sum();
-        for i in 0..n {
+        for i in first..n {
             self.matrix[i * n + i] += trace / n as f64 * part;
         }
     }

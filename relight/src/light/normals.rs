@@ -139,6 +139,22 @@ impl<Y: YAxis> Normals<Y> {
         Ok(self)
     }
 
+    /// The same map with the normal of the nearest surface where the mask is true and there is none.
+    ///
+    /// # Panics
+    /// Where the mask is not as long as the map has pixels.
+    #[must_use]
+    pub fn completed(&self, mask: &[bool]) -> Self {
+        let [x, y, z] = self.planes.planes();
+        let known: Vec<bool> = (0..self.extent().pixels())
+            .map(|at| (x[at], y[at], z[at]) != (0.0, 0.0, 0.0))
+            .collect();
+        Self {
+            planes: self.planes.clone().extended(&known, mask),
+            axis: PhantomData,
+        }
+    }
+
     /// Whether there is no surface anywhere.
     #[must_use]
     pub fn is_empty(&self) -> bool {

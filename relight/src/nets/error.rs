@@ -61,6 +61,14 @@ pub enum NetError {
         /// What is wrong with it.
         fault: String,
     },
+    /// An ONNX file that cannot be run.
+    #[error("{path} cannot be run: {fault}", path = .path.display())]
+    Onnx {
+        /// The file.
+        path: PathBuf,
+        /// The engine's own words.
+        fault: String,
+    },
     /// A picture of a size that the network cannot take.
     #[error("{net} cannot take a picture of {width} x {height} pixels: {needs}")]
     PictureSize {

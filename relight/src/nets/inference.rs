@@ -1,8 +1,10 @@
 //! Running a network on the CPU, with nothing installed: the ONNX file, made in memory, by tract.
 
+use std::path::Path;
+
 use tract_onnx::prelude::{
-    Framework, InferenceModelExt, IntoRunnable, TValue, Tensor as TractTensor, TypedRunnableModel,
-    tvec,
+    DatumExt, Framework, InferenceModelExt, IntoRunnable, TValue, Tensor as TractTensor,
+    TypedRunnableModel, tvec,
 };
 
 use super::error::NetError;
@@ -46,6 +48,36 @@ impl Inference {
             name: graph.name(),
             shape: [1, graph.input_channels(), height, width],
             plan: plan.map_err(|fault| engine(graph.name(), "prepare", &fault))?,
+        })
+    }
+
+    /// Reads an ONNX file with one input, and makes it ready for one picture of `channels` channels,
+    /// `width` x `height` pixels.
+    ///
+    /// # Errors
+    /// [`NetError::Io`], or [`NetError::Onnx`] where it is no network or cannot take such a picture.
+    pub fn read_onnx(
+        path: &Path,
+        channels: usize,
+        (width, height): (usize, usize),
+    ) -> Result<Self, NetError> {
+        let bytes = std::fs::read(path).map_err(|source| NetError::Io {
+            path: path.to_owned(),
+            doing: "read",
+            source,
+        })?;
+        let shape = [1, channels, height, width];
+        let plan = tract_onnx::onnx()
+            .model_for_read(&mut bytes.as_slice())
+            .and_then(|model| model.with_input_fact(0, f32::fact(shape).into()))
+            .and_then(|model| model.into_optimized()?.into_runnable());
+        Ok(Self {
+            name: "the network of the ONNX file",
+            shape,
+            plan: plan.map_err(|fault| NetError::Onnx {
+                path: path.to_owned(),
+                fault: format!("{fault:#}"),
+            })?,
         })
     }
 

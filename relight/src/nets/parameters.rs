@@ -69,6 +69,12 @@ impl Tensor {
     pub fn values(&self) -> &[f32] {
         &self.values
     }
+
+    /// The values themselves.
+    #[must_use]
+    pub fn into_values(self) -> Vec<f32> {
+        self.values
+    }
 }
 
 /// Named tensors: a state dict.

@@ -30,6 +30,12 @@ const C: [f64; 5] = [
     0.247_707_956_100_375_71,
 ];
 
+/// c1 to c5 of the quadratic form.
+#[cfg(feature = "train")]
+pub(crate) fn diffuse_constants() -> [f64; 5] {
+    C
+}
+
 /// The diffuse layer for one light: irradiance on any normal.
 ///
 /// E(n) = Σ Â_l C_lm Y_lm(n) over l ≤ 2 (paper, section 4.2.1), written as the polynomial n^T M n of

@@ -16,12 +16,16 @@ mod reference;
 mod shots;
 mod surface;
 
+#[cfg(feature = "train")]
+pub(crate) use diffuse::diffuse_constants;
 pub use diffuse::{DiffuseForm, DiffuseLayer};
 pub use fit::fit_light;
 pub use layers::{EXPOSURE, Gradients, Layers, Rendering, SpecularForm};
 pub use lobe::LobeLayer;
 pub use maps::{Map, MapFiles, NormalsFrame};
 pub use power::PowerLayer;
+#[cfg(feature = "train")]
+pub(crate) use power::power_constants;
 pub use reference::{Estimate, Horizon, MonteCarlo};
 pub use shots::{Look, exposure_for, mirror_reflectance};
 pub use surface::{Gloss, Surface};

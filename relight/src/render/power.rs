@@ -128,6 +128,12 @@ const C: [f64; 5] = [
     0.546_274_215_296_039_6,
 ];
 
+/// The constants of the paper's polynomials, each times Â_l of its band.
+#[cfg(feature = "train")]
+pub(crate) fn power_constants() -> [f64; 5] {
+    constants()
+}
+
 /// Â_l Ŷ_lm(n): the paper's polynomials times the coefficients of the cosine lobe.
 #[inline(always)]
 fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {

@@ -23,6 +23,8 @@ pub struct Checkpoint {
     pub step: u64,
     /// The settings, as TOML: another run's are refused.
     pub settings: String,
+    /// Where the task stands in its data.
+    pub place: String,
     /// Networks, averages and optimisers.
     pub state: Weights,
 }
@@ -45,6 +47,7 @@ impl Checkpoint {
             ("task".to_owned(), self.task.clone()),
             ("step".to_owned(), self.step.to_string()),
             ("settings".to_owned(), self.settings.clone()),
+            ("place".to_owned(), self.place.clone()),
         ]);
         let bytes = self
             .state
@@ -99,6 +102,7 @@ impl Checkpoint {
             task: fact("task")?,
             step: fact("step")?.parse().map_err(|_| "its step is no number")?,
             settings: fact("settings")?,
+            place: fact("place")?,
             state: Weights::from_bytes(bytes)?,
         })
     }
@@ -114,6 +118,7 @@ mod tests {
             task: "decompose".to_owned(),
             step: 12,
             settings: "steps = 3".to_owned(),
+            place: String::new(),
             state: Weights::initial(&decomposer(), 1),
         }
     }

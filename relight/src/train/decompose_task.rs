@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use tch::{Device, Tensor, no_grad};
 
+use super::composed::{composition, window_settings};
 use super::composer::Composition;
 use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
 use super::error::TrainError;
@@ -16,9 +17,9 @@ use super::run::{StepLosses, Task, Validation};
 use super::sample::{TruthArrays, TruthBatch};
 use super::settings::{DecomposeSettings, PrecisionChoice};
 use super::sheet::validation_sheet;
-use super::window::{Window, WindowSettings};
+use super::window::Window;
 use crate::nets::{Weights, decomposer};
-use crate::synth::{Folders, Library, Recipe, stream};
+use crate::synth::{Recipe, stream};
 
 /// Samples of a batch of the validation.
 const VALIDATION_BATCH: usize = 16;
@@ -56,9 +57,8 @@ impl DecomposeTask {
         resources: Resources,
         weights: Option<&Weights>,
     ) -> Result<Self, TrainError> {
-        settings.run.check()?;
-        settings.data.check()?;
-        let composition = Arc::new(composition(&settings)?);
+        settings.check()?;
+        let composition = Arc::new(composition(&settings.data, settings.run.seed)?);
         composition.recipe.check()?;
         let validation = compose_validation(&settings, &composition);
         let graph = decomposer();
@@ -93,12 +93,7 @@ impl DecomposeTask {
         let window = match self.window.take() {
             Some(window) => window,
             None => Window::open(
-                WindowSettings {
-                    capacity: self.settings.data.window,
-                    reuse: self.settings.data.reuse,
-                    batch: self.settings.run.batch,
-                    seed: stream(self.settings.run.seed, 22),
-                },
+                window_settings(&self.settings.data, &self.settings.run),
                 &self.composition,
                 self.resources.composers,
                 step,
@@ -144,6 +139,7 @@ impl Task for DecomposeTask {
             terms: decompose_losses(&batch, &answer, &self.settings.loss)?,
             spreads: head_spreads(&batch, &answer)?,
             batch: batch.named(),
+            damage: None,
         })
     }
 
@@ -168,26 +164,6 @@ impl Task for DecomposeTask {
             })
         })
     }
-}
-
-fn composition(settings: &DecomposeSettings) -> Result<Composition, TrainError> {
-    let data = &settings.data;
-    let library = Library::read(&Folders {
-        meshes: data.meshes.clone(),
-        textures: data.textures.clone(),
-        panoramas: data.panoramas.clone(),
-    })?;
-    Ok(Composition {
-        recipe: Recipe {
-            seed: stream(settings.run.seed, 21),
-            size: data.size,
-            views: data.views,
-            lightings: data.lightings,
-            ..Recipe::default()
-        },
-        library,
-        plain_share: data.plain_share,
-    })
 }
 
 /// One sample each of objects that are never trained on: their seed does not depend on the run's, so that

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use crate::{nets, synth};
+use crate::{data, nets, synth};
 
 /// Why training could not begin or go on.
 #[derive(Debug, thiserror::Error)]
@@ -21,6 +21,20 @@ pub enum TrainError {
     /// Samples could not be made.
     #[error(transparent)]
     Synth(#[from] synth::SynthError),
+    /// A data set cannot be opened.
+    #[error(transparent)]
+    Data(#[from] data::OpenError),
+    /// A data set without two frames of one turn that can be read.
+    #[error("the turns have no batch of two frames that can be read")]
+    NoFrames,
+    /// A phase lacks a data set or a network.
+    #[error("relight train {phase} needs {option}")]
+    Needed {
+        /// The phase.
+        phase: &'static str,
+        /// The option that gives it.
+        option: &'static str,
+    },
     /// Threads could not be started.
     #[error("threads that compose samples could not be started")]
     Threads(#[source] io::Error),

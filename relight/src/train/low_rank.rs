@@ -9,6 +9,7 @@
 //! v is the first eigenvector of the N x N Gram matrix R R^T: squaring that matrix again and again
 //! leaves nothing else of it, and no decomposition of d columns is needed.
 
+use serde::{Deserialize, Serialize};
 use tch::{Kind, Tensor};
 
 use super::error::TrainError;
@@ -20,7 +21,8 @@ const SQUARINGS: usize = 8;
 const TINY: f64 = 1e-20;
 
 /// Which form of the loss.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum LowRankForm {
     /// The paper's: the squared distance.
     Squared,

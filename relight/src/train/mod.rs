@@ -8,11 +8,13 @@
 //! | `sample`, `composer`, `window` | samples composed while training |
 //! | `decompose`, `decompose_task` | the decomposing network: maps, losses, run |
 //! | `run`, `checkpoint`, `journal`, `guard` | a run: steps, what is saved, what is logged, what ends it |
+//! | `paper_layers`, `paper_phases`, `paper_task`, `turn_reader` | the paper's phases: layers on tensors, losses, runs; turns |
 //! | `settings` | TOML |
 
 mod adam;
 mod average;
 mod checkpoint;
+mod composed;
 mod composer;
 mod decompose;
 mod decompose_task;
@@ -23,11 +25,15 @@ mod learner;
 pub mod losses;
 pub mod low_rank;
 mod model;
+pub mod paper_layers;
+pub mod paper_phases;
+mod paper_task;
 mod run;
 mod sample;
 mod settings;
 mod sheet;
 mod terms;
+mod turn_reader;
 mod window;
 
 pub use adam::{Adam, AdamSettings};
@@ -41,8 +47,14 @@ pub use guard::Guard;
 pub use journal::{Journal, TABLE};
 pub use learner::{Learner, LearnerSettings};
 pub use model::{ComputePrecision, Model};
+pub use paper_phases::PaperPhase;
+pub use paper_task::{PaperInputs, PaperTask};
 pub use run::{Observer, Run, RunOutcome, StepLosses, Task, Validation};
 pub use sample::{Linearisation, TruthArrays, TruthBatch};
-pub use settings::{DataSettings, DecomposeSettings, PrecisionChoice, RunSettings, read_settings};
+pub use settings::{
+    DataSettings, DecomposeSettings, PaperLosses, PaperSettings, PrecisionChoice, RunSettings,
+    read_settings,
+};
 pub use terms::Terms;
+pub use turn_reader::{TurnReader, TurnTensors};
 pub use window::{Window, WindowSettings};

@@ -41,10 +41,23 @@ pub trait Task {
     /// # Errors
     /// Whatever keeps them from being computed.
     fn validate(&mut self) -> Result<Validation, TrainError>;
+
+    /// Where it stands in data that are read one after the other, to go on from; empty where there are none.
+    fn place(&self) -> String {
+        String::new()
+    }
+
+    /// Goes on from such a place.
+    ///
+    /// # Errors
+    /// A sentence that says why it cannot.
+    fn go_to(&mut self, _place: &str) -> Result<(), String> {
+        Ok(())
+    }
 }
 
 /// What a step gives.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct StepLosses {
     /// The losses.
     pub terms: Terms,
@@ -52,6 +65,8 @@ pub struct StepLosses {
     pub spreads: BTreeMap<&'static str, f64>,
     /// The batch, to be saved where something is wrong with it. They share their numbers.
     pub batch: BTreeMap<String, Tensor>,
+    /// What was damaged in the data, and is not in the batch.
+    pub damage: Option<String>,
 }
 
 /// What a validation gives.
@@ -67,6 +82,8 @@ pub struct Validation {
 pub trait Observer {
     /// A step was made. `losses` have their weights.
     fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>);
+    /// Something in the data of a step is damaged, and was left out.
+    fn damaged(&mut self, step: u64, what: &str);
     /// The networks were validated.
     fn validated(&mut self, step: u64, figures: &BTreeMap<String, f64>);
     /// The run was saved.
@@ -174,6 +191,14 @@ impl<'a> Run<'a> {
     fn make_step(&mut self, observer: &mut dyn Observer) -> Result<(), TrainError> {
         let rate = self.settings.rate_at(self.step);
         let losses = self.task.step(self.step)?;
+        if let Some(damage) = &losses.damage {
+            observer.damaged(self.step, damage);
+        }
+        if losses.terms.is_empty() {
+            // A batch on which nothing can be learned, as one for which the gate of saturation is closed.
+            self.step += 1;
+            return Ok(());
+        }
         let total = losses.terms.total()?;
         let mut values: BTreeMap<String, f64> = BTreeMap::new();
         for (name, value) in losses.terms.values()? {
@@ -236,6 +261,7 @@ impl<'a> Run<'a> {
             task: self.task.name().to_owned(),
             step: self.step,
             settings: self.task.settings(),
+            place: self.task.place(),
             state,
         }
         .write(self.folder)?;
@@ -274,6 +300,7 @@ fn recall(task: &mut dyn Task, checkpoint: &Checkpoint, folder: &Path) -> Result
     if checkpoint.settings != task.settings() {
         return Err(other("its settings are others".to_owned()));
     }
+    task.go_to(&checkpoint.place).map_err(other)?;
     for learner in task.learners() {
         learner.recall(&checkpoint.state, checkpoint.step)?;
     }

@@ -26,7 +26,7 @@ pub enum Linearisation {
 
 /// A picture as the decomposing network sees it, and its truth. Light is in parts of the picture's white; shading
 /// has the mean 1 under the mask. Half precision, as many are kept.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TruthArrays {
     extent: Extent,
     values: Vec<f16>,

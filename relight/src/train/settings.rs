@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::adam::AdamSettings;
 use super::decompose::DecomposeWeights;
 use super::error::TrainError;
+use super::low_rank::LowRankForm;
 
 /// How long and how fast a network learns: the table `[run]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -136,6 +137,62 @@ pub struct DecomposeSettings {
     pub data: DataSettings,
     /// What each loss counts.
     pub loss: DecomposeWeights,
+}
+
+/// What each loss of the paper's phases counts: the table `[loss]`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PaperLosses {
+    /// The loss on turns.
+    pub low_rank: f64,
+    /// The loss on composed samples beside turns; 0: none is composed.
+    pub anchor: f64,
+    /// Which low-rank loss.
+    pub form: LowRankForm,
+}
+
+impl Default for PaperLosses {
+    fn default() -> Self {
+        Self {
+            low_rank: 1.0,
+            anchor: 1.0,
+            form: LowRankForm::Squared,
+        }
+    }
+}
+
+/// The settings of `relight train spec`, `normal`, `light`, `joint` and `specular`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PaperSettings {
+    /// How long and how fast.
+    pub run: RunSettings,
+    /// On what.
+    pub data: DataSettings,
+    /// What each loss counts.
+    pub loss: PaperLosses,
+}
+
+impl PaperSettings {
+    /// Whether all numbers are in range.
+    ///
+    /// # Errors
+    /// [`TrainError::Setting`] names the first that is not.
+    pub fn check(&self) -> Result<(), TrainError> {
+        self.run.check()?;
+        self.data.check()
+    }
+}
+
+impl DecomposeSettings {
+    /// Whether all numbers are in range.
+    ///
+    /// # Errors
+    /// [`TrainError::Setting`] names the first that is not.
+    pub fn check(&self) -> Result<(), TrainError> {
+        self.run.check()?;
+        self.data.check()
+    }
 }
 
 /// Reads settings from a TOML file; what it does not name has its default, and a name that is none is an

@@ -14,6 +14,12 @@ impl Terms {
         self.0.push((name, weight, loss));
     }
 
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// The weighted sum.
     ///
     /// # Errors

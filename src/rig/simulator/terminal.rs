@@ -5,7 +5,7 @@ use std::os::unix::ffi::OsStringExt;
 use std::path::{Path, PathBuf};
 
 use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
-use rustix::io::Errno;
+use rustix::io::{Errno, FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
@@ -24,8 +24,8 @@ pub(super) struct Terminal {
 impl Terminal {
     pub(super) fn open() -> Result<Terminal, SimulatorError> {
         let failed = |step| move |errno: Errno| SimulatorError::Terminal { step, errno };
-        let line = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)
-            .map_err(failed("open"))?;
+        let line = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).map_err(failed("open"))?;
+        fcntl_setfd(&line, FdFlags::CLOEXEC).map_err(failed("set up"))?;
         grantpt(&line).map_err(failed("grant"))?;
         unlockpt(&line).map_err(failed("unlock"))?;
         let name = ptsname(&line, Vec::new()).map_err(failed("name"))?;

@@ -11,13 +11,13 @@ use relight::eval::{
     evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal,
     evaluate_relighting, make_relighting,
 };
-use relight::image::Transfer;
-use relight::render::{DiffuseForm, NormalsFrame, SpecularForm};
+use relight::render::{DiffuseForm, SpecularForm};
 use relight::synth::{Folders, Library};
 use relit_data::durable::write_whole;
 use serde_json::json;
 
 use crate::cli::console::{CommandResult, Console, Outcome};
+use crate::cli::values::{TransferName, YName};
 
 pub(in crate::cli) const EXAMPLES: &str = "\
 Examples:
@@ -150,22 +150,6 @@ enum DiffuseName {
     Released,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum TransferName {
-    /// In proportion to light.
-    Linear,
-    /// As sRGB.
-    Srgb,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum YName {
-    /// As relight writes them.
-    Up,
-    /// As in the paper's figures and released code.
-    Down,
-}
-
 impl Arguments {
     /// What is wrong with the arguments together.
     pub(in crate::cli) fn fault(&self) -> Option<String> {
@@ -201,15 +185,9 @@ impl CommonArguments {
     }
 
     fn predictions(&self) -> impl Iterator<Item = Predictions> {
-        let transfer = match self.transfer {
-            TransferName::Linear => Transfer::Linear,
-            TransferName::Srgb => Transfer::Srgb,
+        let folder = |path: &PathBuf| {
+            Predictions::new(path.clone(), self.transfer.into(), self.normals_y.into())
         };
-        let frame = match self.normals_y {
-            YName::Up => NormalsFrame::YUp,
-            YName::Down => NormalsFrame::YDown,
-        };
-        let folder = move |path: &PathBuf| Predictions::new(path.clone(), transfer, frame);
         self.predictions.iter().map(folder)
     }
 }

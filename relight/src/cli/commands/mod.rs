@@ -1,7 +1,9 @@
 //! One file a verb: its arguments and its `run`.
 
+pub(super) mod decompose;
 pub(super) mod eval;
 pub(super) mod render;
 pub(super) mod synth;
 #[cfg(feature = "train")]
 pub(super) mod train;
+pub(super) mod weights;

@@ -5,16 +5,15 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
-use relight::image::{Linear, Rgb, Srgb, Transfer};
+use relight::image::{Linear, Rgb, Srgb};
 use relight::light::{Direction, Order, Panorama, Rotation, ShLight};
 use relight::movie::{MovieFormat, MovieWriter};
-use relight::render::{
-    DiffuseForm, Look, Map, MapFiles, NormalsFrame, SpecularForm, Surface, exposure_for,
-};
+use relight::render::{DiffuseForm, Look, Map, MapFiles, SpecularForm, Surface, exposure_for};
 use serde_json::json;
 
 use crate::cli::console::{CommandResult, Console, Outcome};
 use crate::cli::folder::make_empty_folder;
+use crate::cli::values::{TransferName, YName};
 
 pub(in crate::cli) const EXAMPLES: &str = "\
 Examples:
@@ -116,24 +115,6 @@ struct LightArguments {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum YName {
-    /// As relight writes them.
-    Up,
-    /// As the paper's figure and released data have them.
-    Down,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum TransferName {
-    /// The transfer function of sRGB.
-    Srgb,
-    /// The power 1 / 2.2.
-    Gamma22,
-    /// In proportion to light.
-    Linear,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
 enum SpecularName {
     /// Blinn and Phong's lobe in zonal harmonics: close to the truth.
     Lobe,
@@ -211,19 +192,12 @@ impl ObjectArguments {
     fn files(&self) -> MapFiles {
         MapFiles {
             normals: self.normals.clone(),
-            frame: match self.normals_y {
-                YName::Up => NormalsFrame::YUp,
-                YName::Down => NormalsFrame::YDown,
-            },
+            frame: self.normals_y.into(),
             mask: self.mask.clone(),
             albedo: self.albedo.clone(),
             reflectance: self.reflectance.clone(),
             smoothness: self.smoothness.clone(),
-            transfer: match self.transfer {
-                TransferName::Srgb => Transfer::Srgb,
-                TransferName::Gamma22 => Transfer::Gamma22,
-                TransferName::Linear => Transfer::Linear,
-            },
+            transfer: self.transfer.into(),
         }
     }
 }

@@ -8,11 +8,13 @@ use std::sync::atomic::AtomicBool;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand};
 use indicatif::ProgressBar;
-use relight::nets::Weights;
+use relight::nets::{NetError, Weights};
 use relight::train::{
-    DecomposeSettings, DecomposeTask, Observer, Resources, Run, RunOutcome, RunSettings, Task,
-    read_settings,
+    DecomposeSettings, DecomposeTask, Observer, PaperInputs, PaperPhase, PaperSettings, PaperTask,
+    Resources, Run, RunOutcome, RunSettings, Task, TrainError, read_settings,
 };
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use serde_json::json;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use tch::Device;
@@ -27,6 +29,11 @@ Examples:
       as the weights that come with relight were trained
   relight train decompose --settings my.toml -o run --resume
       goes on with a run that was stopped, to the same losses
+  relight train normal -o normal
+  relight train light --turns shards --normal normal/normal-net.safetensors -o light
+  relight train joint --turns shards --light light/light-net.safetensors \
+      --weights normal/normal-net.safetensors -o joint
+      the paper's phases: a warm-up, and two rounds on turns
 
 In the folder of a run: checkpoint.safetensors, losses.csv, event files for TensorBoard, validation.png, and at
 the end the averaged weights. Ctrl-C ends a run with a checkpoint (exit code 3).";
@@ -41,6 +48,34 @@ pub(in crate::cli) struct Arguments {
 enum TaskName {
     /// The network of `relight decompose`: albedo, shading, normals and highlight of a photograph.
     Decompose(RunArguments),
+    /// Spec-Net: highlights, on composed samples and by chromaticity on turns.
+    Spec(PaperArguments),
+    /// Normal-Net's warm-up, on composed samples.
+    Normal(PaperArguments),
+    /// Light-Net from nothing, on turns; Normal-Net stays as it is.
+    Light(PaperArguments),
+    /// Normal-Net, on turns; Light-Net stays as it is.
+    Joint(PaperArguments),
+    /// The net for specular reflectance and smoothness, on the highlights of turns.
+    Specular(PaperArguments),
+}
+
+#[derive(Args)]
+struct PaperArguments {
+    #[command(flatten)]
+    run: RunArguments,
+    /// Turns: a shard, or a folder that relit-extract has written.
+    #[arg(long, value_name = "SHARDS")]
+    turns: Option<PathBuf>,
+    /// Spec-Net's weights, for light, joint and specular.
+    #[arg(long, value_name = "FILE")]
+    spec: Option<PathBuf>,
+    /// Normal-Net's weights, for light and specular.
+    #[arg(long, value_name = "FILE")]
+    normal: Option<PathBuf>,
+    /// Light-Net's weights, for joint and specular.
+    #[arg(long, value_name = "FILE")]
+    light: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -88,33 +123,71 @@ fn device(text: &str) -> Result<Device, String> {
 }
 
 pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let TaskName::Decompose(arguments) = &arguments.task;
-    let settings: DecomposeSettings = match &arguments.settings {
-        Some(path) => read_settings(path)?,
-        None => DecomposeSettings::default(),
-    };
+    match &arguments.task {
+        TaskName::Decompose(arguments) => decompose(arguments, console),
+        TaskName::Spec(arguments) => paper(PaperPhase::Spec, arguments, console),
+        TaskName::Normal(arguments) => paper(PaperPhase::Normal, arguments, console),
+        TaskName::Light(arguments) => paper(PaperPhase::Light, arguments, console),
+        TaskName::Joint(arguments) => paper(PaperPhase::Joint, arguments, console),
+        TaskName::Specular(arguments) => paper(PaperPhase::Specular, arguments, console),
+    }
+}
+
+fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
+    let settings: DecomposeSettings = arguments.settings()?;
     if arguments.print_settings {
-        console.say(
-            &toml::to_string(&settings)?,
-            &json!({ "event": "settings", "settings": settings }),
-        );
-        return Ok(Outcome::Whole);
+        return print_settings(&settings, console);
     }
-    if let Some(threads) = arguments.threads {
-        tch::set_num_threads(threads as i32);
-    }
-    let weights = arguments
-        .weights
-        .as_deref()
-        .map(Weights::read)
-        .transpose()?;
-    let resources = Resources {
-        device: arguments.device,
-        composers: arguments.composers,
-    };
     let run = settings.run.clone();
-    let mut task = DecomposeTask::new(settings, resources, weights.as_ref())?;
+    let weights = read_weights(arguments.weights.as_deref())?;
+    let mut task = DecomposeTask::new(settings, arguments.resources(), weights.as_ref())?;
     train(&mut task, &run, arguments, console)
+}
+
+fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> CommandResult {
+    let settings: PaperSettings = arguments.run.settings()?;
+    if arguments.run.print_settings {
+        return print_settings(&settings, console);
+    }
+    let run = settings.run.clone();
+    let inputs = PaperInputs {
+        turns: arguments.turns.clone(),
+        weights: read_weights(arguments.run.weights.as_deref())?,
+        spec: read_weights(arguments.spec.as_deref())?,
+        normal: read_weights(arguments.normal.as_deref())?,
+        light: read_weights(arguments.light.as_deref())?,
+    };
+    let mut task = PaperTask::new(phase, settings, arguments.run.resources(), &inputs)?;
+    train(&mut task, &run, &arguments.run, console)
+}
+
+impl RunArguments {
+    fn settings<S: DeserializeOwned + Default>(&self) -> Result<S, TrainError> {
+        self.settings
+            .as_deref()
+            .map_or_else(|| Ok(S::default()), read_settings)
+    }
+
+    /// Where the run is made; sets the number of the network's threads.
+    fn resources(&self) -> Resources {
+        if let Some(threads) = self.threads {
+            tch::set_num_threads(threads as i32);
+        }
+        Resources {
+            device: self.device,
+            composers: self.composers,
+        }
+    }
+}
+
+fn read_weights(path: Option<&Path>) -> Result<Option<Weights>, NetError> {
+    path.map(Weights::read).transpose()
+}
+
+fn print_settings(settings: &impl Serialize, console: Console) -> CommandResult {
+    let event = json!({ "event": "settings", "settings": settings });
+    console.say(toml::to_string(settings)?.trim_end(), &event);
+    Ok(Outcome::Whole)
 }
 
 /// Makes the run, and tells how it came out.
@@ -180,7 +253,16 @@ impl Observer for View {
         self.bar.set_position(step);
     }
 
+    fn damaged(&mut self, step: u64, what: &str) {
+        let event = json!({ "event": "damaged", "step": step, "message": what });
+        let line = format!("step {step}: left out: {what}");
+        self.bar.suspend(|| self.console.say(&line, &event));
+    }
+
     fn validated(&mut self, step: u64, figures: &BTreeMap<String, f64>) {
+        if figures.is_empty() {
+            return;
+        }
         let text: Vec<String> = figures
             .iter()
             .map(|(name, value)| format!("{name} {value:.4}"))

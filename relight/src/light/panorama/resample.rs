@@ -1,7 +1,7 @@
 //! Panoramas of another size or turned about the vertical.
 
 use super::Panorama;
-use crate::image::{Extent, Planes, Rgb};
+use crate::image::{Extent, Planes, Rgb, area_shares};
 
 impl Panorama {
     /// The panorama turned about the vertical axis (+y, right-hand rule) by `columns` of its width:
@@ -28,8 +28,8 @@ impl Panorama {
     pub fn resized(&self, extent: Extent) -> Self {
         assert!(extent.pixels() > 0, "a panorama has pixels");
         let from = self.extent();
-        let across = shares(from.width, extent.width);
-        let down = shares(from.height, extent.height);
+        let across = area_shares(from.width, extent.width);
+        let down = area_shares(from.height, extent.height);
         let mut resized = Planes::zeros(extent);
         let planes = self.image.planes().planes();
         resized.fill_rows(|y, row| {
@@ -52,20 +52,6 @@ impl Panorama {
             image: Rgb::new(resized),
         }
     }
-}
-
-/// For each of `to` equal parts of a line of `from` pixels: the pixels in it and their shares.
-fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
-    let part = |at: usize| {
-        // In units of 1 / to of a pixel, so that nothing is rounded.
-        let (start, end) = (at * from, (at + 1) * from);
-        let pixels = start / to..end.div_ceil(to);
-        let covered = move |pixel: usize| end.min((pixel + 1) * to) - start.max(pixel * to);
-        pixels
-            .map(move |pixel| (pixel, covered(pixel) as f64 / from as f64))
-            .collect()
-    };
-    (0..to).map(part).collect()
 }
 
 #[cfg(test)]
@@ -91,16 +77,6 @@ mod tests {
             .zip(panorama.project(order).rotated(&turn).coefficients())
         {
             assert!((a[0] - b[0]).abs() < 1e-11, "{a:?} {b:?}");
-        }
-    }
-
-    #[test]
-    fn the_shares_of_a_pixel_sum_up_to_one() {
-        for (from, to) in [(512, 200), (3, 7), (5, 5), (1, 4)] {
-            for part in shares(from, to) {
-                let sum: f64 = part.iter().map(|(_, share)| share).sum();
-                assert!((sum - 1.0).abs() < 1e-12, "{from} {to} {part:?}");
-            }
         }
     }
 

@@ -1,0 +1,326 @@
+//! What is written of a decomposition: a folder that appears when it is whole.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process;
+
+use relit_data::durable::{publish, write_whole};
+use serde::Serialize;
+
+use super::decomposer::{DecomposeOptions, Decomposition, SpecularGate, WorkingSize, grey};
+use super::error::DecomposeError;
+use super::mask::MaskSource;
+use super::photo::Photo;
+use super::region::Region;
+use crate::image::{ColourSpace, Depth, Extent, Linear, Planes, Rgb, Srgb, write_png};
+use crate::light::{Normals, Panorama};
+use crate::render::{DiffuseForm, DiffuseLayer, exposure_for};
+
+/// The file of figures.
+const FIGURES: &str = "decomposition.json";
+/// What it says it is.
+const SCHEMA: &str = "relight.decomposition/1";
+/// Width and height of the lit ball, and of the pictures of the sheet, pixels.
+const TILE: usize = 256;
+/// The panorama's size, pixels.
+const PANORAMA: Extent = Extent::new(256, 128);
+/// Pictures in a row of the sheet.
+const COLUMNS: usize = 4;
+/// On the sheet, the part of the values that is brighter than white.
+const BEYOND_WHITE: f64 = 0.005;
+
+/// The figures of a decomposition, as `decomposition.json` holds them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DecompositionFigures {
+    schema: &'static str,
+    software: String,
+    photo: String,
+    weights: String,
+    size: [usize; 2],
+    region: Region,
+    working_size: &'static str,
+    mirrored: bool,
+    mask: FigureMask,
+    specular: FigureSpecular,
+    white: FigureWhites,
+    light: FigureLight,
+    residual: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct FigureMask {
+    source: MaskSource,
+    pixels: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct FigureSpecular {
+    setting: &'static str,
+    saturated_fraction: f64,
+    separated: bool,
+    reflectance: Option<f32>,
+    smoothness: Option<f32>,
+    residual: Option<f64>,
+}
+
+/// The light that the largest value of a file stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct FigureWhites {
+    albedo: f32,
+    shading: f32,
+    diffuse: f32,
+    specular: f32,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct FigureLight {
+    order: usize,
+    coefficients: Vec<[f64; 3]>,
+    residual: f64,
+}
+
+/// A decomposition together with what it was made of, ready to be written.
+#[derive(Debug, Clone, Copy)]
+pub struct DecompositionFiles<'a> {
+    /// The photograph.
+    pub photo: &'a Photo,
+    /// What was found.
+    pub found: &'a Decomposition,
+    /// How.
+    pub options: &'a DecomposeOptions,
+    /// How the weights are named.
+    pub weights: &'a str,
+}
+
+impl DecompositionFiles<'_> {
+    /// Writes all files into the folder `out`, which appears when they are there. An earlier
+    /// decomposition in it is replaced.
+    ///
+    /// # Errors
+    /// Where the folder holds something else, or a file cannot be written: then the folder is as it was.
+    pub fn write(&self, out: &Path) -> Result<DecompositionFigures, DecomposeError> {
+        check_free(out)?;
+        let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty());
+        if let Some(parent) = parent {
+            fs::create_dir_all(parent).map_err(DecomposeError::write(parent))?;
+        }
+        let partial = hidden_beside(out, "partial")?;
+        let write = || {
+            remove_folder(&partial)?;
+            fs::create_dir(&partial).map_err(DecomposeError::write(&partial))?;
+            let figures = self.write_files(&partial)?;
+            replace(&partial, out)?;
+            Ok(figures)
+        };
+        write().inspect_err(|_| {
+            // The first error is the one that counts.
+            let _ = fs::remove_dir_all(&partial);
+        })
+    }
+
+    fn write_files(&self, folder: &Path) -> Result<DecompositionFigures, DecomposeError> {
+        let found = self.found;
+        let path = |name: &str| folder.join(name);
+        found
+            .normals
+            .write_png(&path("normal.png"), Depth::Sixteen)?;
+        let shading = grey(&found.shading);
+        let highlight = grey(&found.highlight);
+        let white = FigureWhites {
+            albedo: write_light(&path("albedo.png"), &found.albedo)?,
+            shading: write_light(&path("shading.png"), &shading)?,
+            diffuse: write_light(&path("diffuse.png"), &found.diffuse)?,
+            specular: write_light(&path("specular.png"), &highlight)?,
+        };
+        found.light.write(&path("light.txt"))?;
+        ball(found)
+            .encode::<Srgb>()
+            .write_png(&path("light-sphere.png"))?;
+        let panorama = Panorama::of_light(&found.light, PANORAMA);
+        let radiance = panorama
+            .image()
+            .planes()
+            .clone()
+            .map(|value| value.max(0.0));
+        Rgb::<Linear>::new(radiance).write_exr(&path("light-panorama.exr"))?;
+        let mask = grey(&self.photo.mask);
+        write_png(&path("mask.png"), mask.planes(), Depth::Eight)?;
+        write_png(&path("contact.png"), &self.sheet()?, Depth::Eight)?;
+        let figures = self.figures(white);
+        let mut json = serde_json::to_vec_pretty(&figures).unwrap_or_default();
+        json.push(b'\n');
+        let file = path(FIGURES);
+        write_whole(&file, &json).map_err(DecomposeError::write(&file))?;
+        Ok(figures)
+    }
+
+    fn figures(&self, white: FigureWhites) -> DecompositionFigures {
+        let Self {
+            photo,
+            found,
+            options,
+            weights,
+        } = *self;
+        let gloss = found.gloss;
+        let Extent { width, height } = found.normals.extent();
+        DecompositionFigures {
+            schema: SCHEMA,
+            software: format!("relight {}", env!("CARGO_PKG_VERSION")),
+            photo: photo.name.clone(),
+            weights: weights.to_owned(),
+            size: [width, height],
+            region: found.region,
+            working_size: match options.size {
+                WorkingSize::Network => "network",
+                WorkingSize::Native => "native",
+            },
+            mirrored: options.mirror,
+            mask: FigureMask {
+                source: photo.mask_source,
+                pixels: photo.mask.plane(0).iter().filter(|&&m| m >= 0.5).count(),
+            },
+            specular: FigureSpecular {
+                setting: match options.specular {
+                    SpecularGate::Auto => "auto",
+                    SpecularGate::On => "on",
+                    SpecularGate::Off => "off",
+                },
+                saturated_fraction: found.saturated_fraction,
+                separated: found.is_glossy,
+                reflectance: gloss.map(|gloss| gloss.reflectance),
+                smoothness: gloss.map(|gloss| gloss.smoothness),
+                residual: gloss.map(|gloss| gloss.residual),
+            },
+            white,
+            light: FigureLight {
+                order: found.light.order().get(),
+                coefficients: found.light.coefficients().to_vec(),
+                residual: found.light_residual,
+            },
+            residual: found.residual,
+        }
+    }
+
+    /// One sheet: the photograph, normals, albedo and shading; the diffuse part, the highlight, a ball in
+    /// the light, and the shading that this light makes on the normals.
+    fn sheet(&self) -> Result<Planes<3>, DecomposeError> {
+        let found = self.found;
+        let lit = DiffuseLayer::new(&found.light, DiffuseForm::Irradiance).shading(&found.normals);
+        let picture = self.photo.picture.planes();
+        let tile = |planes: &Planes<3>| self.found.region.cut(planes).resized(square());
+        // The layers are shown as bright as the photograph, whose values are light of a screen.
+        let own = bright(picture, &self.photo.mask).max(1.0);
+        let shown = |planes: &Planes<3>, white: f32| {
+            let scaled = tile(planes).map(|value| value / white);
+            scaled.map(|value| Srgb::from_linear(value.clamp(0.0, 1.0)))
+        };
+        let of = |planes: &Planes<3>| shown(planes, bright(planes, &self.photo.mask));
+        let shading = grey(&found.shading);
+        let white = bright(shading.planes(), &self.photo.mask);
+        let tiles = [
+            shown(picture, own),
+            tile(&found.normals.to_colours()),
+            of(found.albedo.planes()),
+            shown(shading.planes(), white),
+            shown(found.diffuse.planes(), own),
+            shown(grey(&found.highlight).planes(), own),
+            ball(found).encode::<Srgb>().into_planes(),
+            shown(lit.planes(), white),
+        ];
+        Ok(Planes::sheet(&tiles, COLUMNS)?)
+    }
+}
+
+fn square() -> Extent {
+    Extent::new(TILE, TILE)
+}
+
+/// A white ball in the light, as bright as the light allows.
+fn ball(found: &Decomposition) -> Rgb<Linear> {
+    let layer = DiffuseLayer::new(&found.light, DiffuseForm::Irradiance);
+    let exposure = exposure_for(&found.light);
+    let shading = layer.shading(&Normals::sphere(TILE)).into_planes();
+    Rgb::new(shading.map(|value| value * exposure))
+}
+
+/// Writes light as a PNG of 16 bits, sRGB; the light that its largest value stands for.
+fn write_light(path: &Path, light: &Rgb<Linear>) -> Result<f32, DecomposeError> {
+    let planes = light.planes();
+    let most = planes
+        .planes()
+        .into_iter()
+        .flatten()
+        .fold(0.0_f32, |a, &b| a.max(b));
+    // What fits in is written as it is, so that files can be compared.
+    let white = most.max(1.0);
+    let encoded = planes.clone().map(|value| Srgb::from_linear(value / white));
+    write_png(path, &encoded, Depth::Sixteen)?;
+    Ok(white)
+}
+
+/// The value that one in two hundred under the mask exceeds; 1 where all is dark.
+fn bright(planes: &Planes<3>, mask: &Planes<1>) -> f32 {
+    let [red, green, blue] = planes.planes();
+    let mut values: Vec<f32> = (0..mask.extent().pixels())
+        .filter(|&at| mask.plane(0)[at] >= 0.5)
+        .map(|at| red[at].max(green[at]).max(blue[at]))
+        .collect();
+    let place = (values.len() as f64 * (1.0 - BEYOND_WHITE)) as usize;
+    if place >= values.len() {
+        return 1.0;
+    }
+    let (_, &mut value, _) = values.select_nth_unstable_by(place, f32::total_cmp);
+    if value > 0.0 { value } else { 1.0 }
+}
+
+/// Whether a decomposition may be written to this folder.
+fn check_free(out: &Path) -> Result<(), DecomposeError> {
+    if !out.exists() || out.join(FIGURES).is_file() {
+        return Ok(());
+    }
+    let foreign = || DecomposeError::Foreign {
+        path: out.to_owned(),
+    };
+    if !out.is_dir() {
+        return Err(foreign());
+    }
+    match fs::read_dir(out).map_err(DecomposeError::read(out))?.next() {
+        None => Ok(()),
+        Some(_) => Err(foreign()),
+    }
+}
+
+/// Puts a finished folder in the place of another.
+fn replace(partial: &Path, out: &Path) -> Result<(), DecomposeError> {
+    let old = hidden_beside(out, "old")?;
+    remove_folder(&old)?;
+    let had_old = out.exists();
+    if had_old {
+        fs::rename(out, &old).map_err(DecomposeError::write(out))?;
+    }
+    publish(partial, out)
+        .map_err(DecomposeError::write(out))
+        .inspect_err(|_| {
+            if had_old {
+                // The first error is the one that counts.
+                let _ = fs::rename(&old, out);
+            }
+        })?;
+    remove_folder(&old)
+}
+
+/// A hidden name beside a folder that no other process uses.
+fn hidden_beside(out: &Path, ending: &str) -> Result<PathBuf, DecomposeError> {
+    let name = out.file_name().ok_or_else(|| DecomposeError::Foreign {
+        path: out.to_owned(),
+    })?;
+    let name = name.to_string_lossy();
+    Ok(out.with_file_name(format!(".{name}.{}.{ending}", process::id())))
+}
+
+fn remove_folder(folder: &Path) -> Result<(), DecomposeError> {
+    if folder.exists() {
+        fs::remove_dir_all(folder).map_err(DecomposeError::write(folder))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,7 @@
+//! The weights that come with the program.
+
+/// Where they stand in the repository.
+pub(super) const NAME: &str = "relight/weights/decompose.safetensors";
+
+/// The bytes of that file: `Some(include_bytes!("../../weights/decompose.safetensors"))`.
+pub(super) const WEIGHTS: Option<&[u8]> = None;

@@ -1,0 +1,297 @@
+//! The runs of the paper's phases.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::composed::{composition, window_settings};
+use super::composer::Composition;
+use super::decompose_task::Resources;
+use super::error::TrainError;
+use super::learner::{Learner, LearnerSettings};
+use super::model::{ComputePrecision, Model};
+use super::paper_phases::{
+    PaperPhase, light_on_truth, normal_on_truth, reflectance_on_turns, spec_on_truth,
+    spec_on_turns, specular_on_turns,
+};
+use super::run::{StepLosses, Task, Validation};
+use super::sample::TruthBatch;
+use super::settings::{PaperSettings, PrecisionChoice};
+use super::turn_reader::{TurnReader, TurnTensors};
+use super::window::Window;
+use crate::nets::paper::{Head, light_net, normal_net, reflectance_net, spec_net};
+use crate::nets::{Graph, Weights};
+use crate::synth::stream;
+
+/// What a run of a phase is given.
+#[derive(Debug, Clone, Default)]
+pub struct PaperInputs {
+    /// A data set of turns.
+    pub turns: Option<PathBuf>,
+    /// Weights to begin with.
+    pub weights: Option<Weights>,
+    /// Spec-Net's weights.
+    pub spec: Option<Weights>,
+    /// Normal-Net's weights.
+    pub normal: Option<Weights>,
+    /// Light-Net's weights.
+    pub light: Option<Weights>,
+}
+
+/// Training of one of the paper's networks.
+#[derive(Debug)]
+pub struct PaperTask {
+    phase: Phase,
+    name: &'static str,
+    settings: PaperSettings,
+    resources: Resources,
+    learner: Learner,
+    composition: Arc<Composition>,
+    /// Opened with the first step that needs it.
+    window: Option<Window>,
+    turns: Option<TurnReader>,
+}
+
+/// A phase, with the networks that it uses and does not change.
+#[derive(Debug)]
+enum Phase {
+    Spec,
+    Normal,
+    Light {
+        normal: Model,
+        spec: Option<Model>,
+    },
+    Joint {
+        light: Model,
+        spec: Option<Model>,
+    },
+    Specular {
+        spec: Model,
+        normal: Model,
+        light: Model,
+    },
+}
+
+impl PaperTask {
+    /// Reads what samples are composed of, opens the turns, and makes the networks.
+    ///
+    /// # Errors
+    /// Settings out of range, files that cannot be read, weights that do not fit, [`TrainError::Needed`] where the phase
+    /// needs what is not given.
+    pub fn new(
+        phase: PaperPhase,
+        settings: PaperSettings,
+        resources: Resources,
+        inputs: &PaperInputs,
+    ) -> Result<Self, TrainError> {
+        settings.check()?;
+        if phase.needs_turns() && inputs.turns.is_none() {
+            return Err(needed(phase, "--turns"));
+        }
+        let graph = learned(phase);
+        let initial = || Weights::initial(&graph, settings.run.seed);
+        let weights = inputs.weights.clone().unwrap_or_else(initial);
+        let learner = LearnerSettings {
+            adam: settings.run.adam(),
+            average: settings.run.average,
+            precision: precision(&settings),
+            device: resources.device,
+        };
+        let seed = stream(settings.run.seed, 31);
+        let open = |path: &PathBuf| TurnReader::open(path, seed);
+        Ok(Self {
+            phase: Phase::new(phase, &settings, resources, inputs)?,
+            name: phase.name(),
+            learner: Learner::new(graph, &weights, learner)?,
+            composition: Arc::new(composition(&settings.data, settings.run.seed)?),
+            turns: inputs.turns.as_ref().map(open).transpose()?,
+            settings,
+            resources,
+            window: None,
+        })
+    }
+
+    /// The batch of composed samples of a step.
+    fn truth(&mut self, step: u64) -> Result<TruthBatch, TrainError> {
+        let window = match self.window.take() {
+            Some(window) => window,
+            None => Window::open(
+                window_settings(&self.settings.data, &self.settings.run),
+                &self.composition,
+                self.resources.composers,
+                step,
+            )?,
+        };
+        let window = self.window.insert(window);
+        TruthBatch::new(&window.batch(step)?, true, self.resources.device)
+    }
+
+    /// What composed samples count: all, where there are no turns.
+    fn anchor(&self) -> f64 {
+        match (&self.phase, &self.turns) {
+            (Phase::Specular { .. }, _) => 0.0,
+            (Phase::Normal, _) | (_, None) => 1.0,
+            (_, Some(_)) => self.settings.loss.anchor,
+        }
+    }
+}
+
+impl Phase {
+    fn new(
+        phase: PaperPhase,
+        settings: &PaperSettings,
+        resources: Resources,
+        inputs: &PaperInputs,
+    ) -> Result<Self, TrainError> {
+        let optional = |graph: Graph, weights: &Option<Weights>| {
+            let model = weights.as_ref().map(|weights| {
+                let mut model = Model::new(graph, weights, resources.device, precision(settings))?;
+                model.set_trainable(false)?;
+                Ok::<_, TrainError>(model)
+            });
+            model.transpose()
+        };
+        let spec = || optional(spec_net(), &inputs.spec);
+        let normal =
+            || optional(normal_net(), &inputs.normal)?.ok_or_else(|| needed(phase, "--normal"));
+        let light = || {
+            let model = optional(light_net(Head::Pooled), &inputs.light)?;
+            model.ok_or_else(|| needed(phase, "--light"))
+        };
+        Ok(match phase {
+            PaperPhase::Spec => Self::Spec,
+            PaperPhase::Normal => Self::Normal,
+            PaperPhase::Light => Self::Light {
+                normal: normal()?,
+                spec: spec()?,
+            },
+            PaperPhase::Joint => Self::Joint {
+                light: light()?,
+                spec: spec()?,
+            },
+            PaperPhase::Specular => Self::Specular {
+                spec: spec()?.ok_or_else(|| needed(phase, "--spec"))?,
+                normal: normal()?,
+                light: light()?,
+            },
+        })
+    }
+
+    /// The loss on a batch of composed samples; none where the phase has none.
+    fn on_truth(&self, own: &Model, batch: &TruthBatch) -> Result<Option<tch::Tensor>, TrainError> {
+        match self {
+            Self::Spec => spec_on_truth(own, batch).map(Some),
+            Self::Normal | Self::Joint { .. } => normal_on_truth(own, batch).map(Some),
+            Self::Light { .. } => light_on_truth(own, batch).map(Some),
+            Self::Specular { .. } => Ok(None),
+        }
+    }
+
+    /// The loss on a batch of turns; none where the gate of saturation is closed.
+    fn on_turns(
+        &self,
+        own: &Model,
+        turns: &TurnTensors,
+        settings: &PaperSettings,
+    ) -> Result<Option<tch::Tensor>, TrainError> {
+        let form = settings.loss.form;
+        match self {
+            Self::Spec => spec_on_turns(own, turns, form),
+            Self::Normal => Ok(None),
+            Self::Light { normal, spec } => {
+                reflectance_on_turns(normal, own, spec.as_ref(), turns, form).map(Some)
+            }
+            Self::Joint { light, spec } => {
+                reflectance_on_turns(own, light, spec.as_ref(), turns, form).map(Some)
+            }
+            Self::Specular {
+                spec,
+                normal,
+                light,
+            } => specular_on_turns(own, (spec, normal, light), turns),
+        }
+    }
+}
+
+impl Task for PaperTask {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn settings(&self) -> String {
+        // Numbers, names and paths: all of them can be written.
+        toml::to_string(&self.settings).unwrap_or_default()
+    }
+
+    fn learners(&mut self) -> Vec<&mut Learner> {
+        vec![&mut self.learner]
+    }
+
+    fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
+        let mut losses = StepLosses::default();
+        let anchor = self.anchor();
+        if anchor > 0.0 {
+            let batch = self.truth(step)?;
+            if let Some(loss) = self.phase.on_truth(&self.learner.model, &batch)? {
+                losses.terms.add("truth", anchor, loss);
+            }
+            losses.batch.extend(batch.named());
+        }
+        if let Some(reader) = &mut self.turns {
+            let turns = reader.next_batch(self.resources.device)?;
+            let loss = self
+                .phase
+                .on_turns(&self.learner.model, &turns, &self.settings)?;
+            if let Some(loss) = loss {
+                losses.terms.add("turns", self.settings.loss.low_rank, loss);
+            }
+            losses.batch.insert("turns".to_owned(), turns.picture);
+            losses.damage = turns.damage;
+        }
+        Ok(losses)
+    }
+
+    fn validate(&mut self) -> Result<Validation, TrainError> {
+        Ok(Validation::default())
+    }
+
+    fn place(&self) -> String {
+        let place = self.turns.as_ref().map(TurnReader::place);
+        // Two numbers: they can be written.
+        serde_json::to_string(&place).unwrap_or_default()
+    }
+
+    fn go_to(&mut self, place: &str) -> Result<(), String> {
+        let place: Option<crate::data::Place> =
+            serde_json::from_str(place).map_err(|error| error.to_string())?;
+        match (&mut self.turns, place) {
+            (Some(reader), Some(place)) => reader.go_to(place).map_err(|error| error.to_string()),
+            (None, None) => Ok(()),
+            _ => Err("it was trained with turns, or without, and this run is not".to_owned()),
+        }
+    }
+}
+
+fn needed(phase: PaperPhase, option: &'static str) -> TrainError {
+    TrainError::Needed {
+        phase: phase.name(),
+        option,
+    }
+}
+
+/// The network that a phase trains.
+fn learned(phase: PaperPhase) -> Graph {
+    match phase {
+        PaperPhase::Spec => spec_net(),
+        PaperPhase::Normal | PaperPhase::Joint => normal_net(),
+        PaperPhase::Light => light_net(Head::Pooled),
+        PaperPhase::Specular => reflectance_net(Head::Pooled),
+    }
+}
+
+/// Single where nothing else was asked for: these networks are small.
+fn precision(settings: &PaperSettings) -> ComputePrecision {
+    match settings.run.precision {
+        PrecisionChoice::Mixed => ComputePrecision::Mixed,
+        PrecisionChoice::Single | PrecisionChoice::Fastest => ComputePrecision::Single,
+    }
+}
