@@ -20,9 +20,9 @@ use relight::nets::{Graph, Inference, Weights, decomposer};
 use relight::synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
 use relight::train::{
     Adam, AdamSettings, AnsweredTensors, Composer, Composition, ComputePrecision, DataSettings,
-    DecomposeSettings, DecomposeTask, Model, Observer, PaperInputs, PaperPhase, PaperSettings,
-    PaperTask, PrecisionChoice, Resources, Run, RunOutcome, RunSettings, TABLE, Task, TrainError,
-    TruthArrays, read_settings,
+    DecomposeSettings, DecomposeTask, Model, PaperInputs, PaperPhase, PaperSettings, PaperTask,
+    PrecisionChoice, Resources, Run, RunOutcome, RunSettings, TABLE, Task, TrainError,
+    TrainObserver, TruthArrays, read_settings,
 };
 use tch::{Device, Kind, Tensor};
 
@@ -162,7 +162,7 @@ struct StopAfter<'a> {
     damage: Vec<String>,
 }
 
-impl Observer for StopAfter<'_> {
+impl TrainObserver for StopAfter<'_> {
     fn step(&mut self, step: u64, _: &BTreeMap<String, f64>) {
         self.stop.store(step >= self.steps, Ordering::Relaxed);
     }

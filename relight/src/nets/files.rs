@@ -8,8 +8,8 @@ use relit_data::durable;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
 use super::error::NetError;
-use super::parameters::{Tensor, Weights};
 use super::pickle;
+use super::weights::{Tensor, Weights};
 
 /// Largest file of weights that is read, bytes: the released Light-Net has 554 MB.
 const MOST_BYTES: u64 = 2 << 30;

@@ -4,7 +4,7 @@
 //! [`Graph`], so they cannot differ. Values have a number of channels and, where they are pictures,
 //! a scale: the size of the input divided by their own.
 
-use super::parameters::{Parameter, Role};
+use super::parameter::{Parameter, Role};
 
 /// A value inside a graph: the output of one of its nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -10,7 +10,7 @@ use tract_onnx::prelude::{
 use super::error::NetError;
 use super::graph::Graph;
 use super::onnx::to_onnx;
-use super::parameters::{Tensor, Weights};
+use super::weights::{Tensor, Weights};
 
 const ENGINE: &str = "tract";
 

@@ -24,8 +24,9 @@ mod graph;
 mod inference;
 mod onnx;
 pub mod paper;
-mod parameters;
+mod parameter;
 mod pickle;
+mod weights;
 
 pub use decomposer::{INPUTS, OUTPUTS, decomposer};
 pub use error::NetError;
@@ -33,4 +34,5 @@ pub use files::WeightPrecision;
 pub use graph::{EPSILON, Graph, Node, Operation, Output, Value};
 pub use inference::Inference;
 pub use onnx::{INPUT, check_size, to_onnx};
-pub use parameters::{Parameter, Role, Tensor, Weights};
+pub use parameter::{Parameter, Role};
+pub use weights::{Tensor, Weights};

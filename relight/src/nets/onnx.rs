@@ -9,7 +9,7 @@ use prost::Message;
 
 use super::error::NetError;
 use super::graph::{EPSILON, Graph, Node, Operation};
-use super::parameters::Weights;
+use super::weights::Weights;
 
 /// Name of the network's input in a file.
 pub const INPUT: &str = "input";

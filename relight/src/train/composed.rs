@@ -3,7 +3,7 @@
 use super::composer::Composition;
 use super::error::TrainError;
 use super::settings::{DataSettings, RunSettings};
-use super::window::WindowSettings;
+use super::window::SampleWindowSettings;
 use crate::synth::{Folders, Library, Recipe, stream};
 
 /// What samples are composed of, with the files that are named read.
@@ -30,8 +30,8 @@ pub(super) fn composition(data: &DataSettings, seed: u64) -> Result<Composition,
 }
 
 /// How samples are drawn.
-pub(super) fn window_settings(data: &DataSettings, run: &RunSettings) -> WindowSettings {
-    WindowSettings {
+pub(super) fn window_settings(data: &DataSettings, run: &RunSettings) -> SampleWindowSettings {
+    SampleWindowSettings {
         capacity: data.window,
         reuse: data.reuse,
         batch: run.batch,

@@ -17,7 +17,7 @@ use super::run::{StepLosses, Task, Validation};
 use super::sample::{TruthArrays, TruthBatch};
 use super::settings::{DecomposeSettings, PrecisionChoice};
 use super::sheet::validation_sheet;
-use super::window::Window;
+use super::window::SampleWindow;
 use crate::nets::{Weights, decomposer};
 use crate::synth::{Recipe, stream};
 
@@ -43,7 +43,7 @@ pub struct DecomposeTask {
     learner: Learner,
     composition: Arc<Composition>,
     /// Opened with the first step.
-    window: Option<Window>,
+    window: Option<SampleWindow>,
     validation: Vec<TruthArrays>,
 }
 
@@ -89,10 +89,10 @@ impl DecomposeTask {
         })
     }
 
-    fn window(&mut self, step: u64) -> Result<&mut Window, TrainError> {
+    fn window(&mut self, step: u64) -> Result<&mut SampleWindow, TrainError> {
         let window = match self.window.take() {
             Some(window) => window,
-            None => Window::open(
+            None => SampleWindow::open(
                 window_settings(&self.settings.data, &self.settings.run),
                 &self.composition,
                 self.resources.composers,

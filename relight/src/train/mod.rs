@@ -49,7 +49,7 @@ pub use learner::{Learner, LearnerSettings};
 pub use model::{ComputePrecision, Model};
 pub use paper_phases::PaperPhase;
 pub use paper_task::{PaperInputs, PaperTask};
-pub use run::{Observer, Run, RunOutcome, StepLosses, Task, Validation};
+pub use run::{Run, RunOutcome, StepLosses, Task, TrainObserver, Validation};
 pub use sample::{Linearisation, TruthArrays, TruthBatch};
 pub use settings::{
     DataSettings, DecomposeSettings, PaperLosses, PaperSettings, PrecisionChoice, RunSettings,
@@ -57,4 +57,4 @@ pub use settings::{
 };
 pub use terms::Terms;
 pub use turn_reader::{TurnReader, TurnTensors};
-pub use window::{Window, WindowSettings};
+pub use window::{SampleWindow, SampleWindowSettings};

@@ -17,7 +17,7 @@ use super::run::{StepLosses, Task, Validation};
 use super::sample::TruthBatch;
 use super::settings::{PaperSettings, PrecisionChoice};
 use super::turn_reader::{TurnReader, TurnTensors};
-use super::window::Window;
+use super::window::SampleWindow;
 use crate::nets::paper::{Head, light_net, normal_net, reflectance_net, spec_net};
 use crate::nets::{Graph, Weights};
 use crate::synth::stream;
@@ -47,7 +47,7 @@ pub struct PaperTask {
     learner: Learner,
     composition: Arc<Composition>,
     /// Opened with the first step that needs it.
-    window: Option<Window>,
+    window: Option<SampleWindow>,
     turns: Option<TurnReader>,
 }
 
@@ -114,7 +114,7 @@ impl PaperTask {
     fn truth(&mut self, step: u64) -> Result<TruthBatch, TrainError> {
         let window = match self.window.take() {
             Some(window) => window,
-            None => Window::open(
+            None => SampleWindow::open(
                 window_settings(&self.settings.data, &self.settings.run),
                 &self.composition,
                 self.resources.composers,

@@ -79,7 +79,7 @@ pub struct Validation {
 }
 
 /// What a run says while it goes on.
-pub trait Observer {
+pub trait TrainObserver {
     /// A step was made. `losses` have their weights.
     fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>);
     /// Something in the data of a step is damaged, and was left out.
@@ -162,7 +162,7 @@ impl<'a> Run<'a> {
     pub fn finish(
         mut self,
         stop: &AtomicBool,
-        observer: &mut dyn Observer,
+        observer: &mut dyn TrainObserver,
     ) -> Result<RunOutcome, TrainError> {
         let between = Duration::from_secs_f64(60.0 * self.settings.checkpoint_minutes);
         let mut saved = Instant::now();
@@ -188,7 +188,7 @@ impl<'a> Run<'a> {
         })
     }
 
-    fn make_step(&mut self, observer: &mut dyn Observer) -> Result<(), TrainError> {
+    fn make_step(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
         let rate = self.settings.rate_at(self.step);
         let losses = self.task.step(self.step)?;
         if let Some(damage) = &losses.damage {
@@ -231,7 +231,7 @@ impl<'a> Run<'a> {
 
     fn validate(
         &mut self,
-        observer: &mut dyn Observer,
+        observer: &mut dyn TrainObserver,
     ) -> Result<BTreeMap<String, f64>, TrainError> {
         let Validation { figures, sheet } = self.task.validate()?;
         let named: BTreeMap<String, f64> = figures
@@ -252,7 +252,7 @@ impl<'a> Run<'a> {
         Ok(figures)
     }
 
-    fn save(&mut self, observer: &mut dyn Observer) -> Result<(), TrainError> {
+    fn save(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
         let mut state = Weights::default();
         for learner in self.task.learners() {
             state.extend(learner.state()?);

@@ -12,7 +12,7 @@ use crate::synth::stream;
 
 /// How samples are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WindowSettings {
+pub struct SampleWindowSettings {
     /// Samples that are kept.
     pub capacity: u64,
     /// How often each is seen, in the mean.
@@ -25,21 +25,21 @@ pub struct WindowSettings {
 
 /// The window.
 #[derive(Debug)]
-pub struct Window {
-    settings: WindowSettings,
+pub struct SampleWindow {
+    settings: SampleWindowSettings,
     composer: Composer,
     /// The number of the sample that will be taken in next; sample n lies at n modulo the capacity.
     next: u64,
     samples: Vec<TruthArrays>,
 }
 
-impl Window {
+impl SampleWindow {
     /// The window of the batch `step`: the samples before it are composed, which takes a while. `threads` compose.
     ///
     /// # Errors
     /// Those of the composer.
     pub fn open(
-        settings: WindowSettings,
+        settings: SampleWindowSettings,
         composition: &Arc<Composition>,
         threads: usize,
         step: u64,
@@ -68,7 +68,7 @@ impl Window {
     /// # Errors
     /// Those of the composer.
     pub fn batch(&mut self, step: u64) -> Result<Vec<&TruthArrays>, TrainError> {
-        let WindowSettings {
+        let SampleWindowSettings {
             capacity,
             batch,
             seed,
@@ -87,7 +87,7 @@ impl Window {
     }
 }
 
-impl WindowSettings {
+impl SampleWindowSettings {
     /// How many samples the window has moved on before a step.
     fn taken_before(self, step: u64) -> u64 {
         (step as f64 * self.batch as f64 / self.reuse) as u64

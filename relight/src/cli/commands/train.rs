@@ -10,8 +10,8 @@ use clap::{Args, Subcommand};
 use indicatif::ProgressBar;
 use relight::nets::{NetError, Weights};
 use relight::train::{
-    DecomposeSettings, DecomposeTask, Observer, PaperInputs, PaperPhase, PaperSettings, PaperTask,
-    Resources, Run, RunOutcome, RunSettings, Task, TrainError, read_settings,
+    DecomposeSettings, DecomposeTask, PaperInputs, PaperPhase, PaperSettings, PaperTask, Resources,
+    Run, RunOutcome, RunSettings, Task, TrainError, TrainObserver, read_settings,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -245,7 +245,7 @@ struct View {
     bar: ProgressBar,
 }
 
-impl Observer for View {
+impl TrainObserver for View {
     fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>) {
         if let Some(loss) = losses.get("loss") {
             self.bar.set_message(format!("train, loss {loss:.3}"));

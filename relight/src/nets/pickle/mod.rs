@@ -9,7 +9,7 @@ use std::io::{Cursor, Read};
 
 use zip::ZipArchive;
 
-use super::parameters::{Tensor, Weights};
+use super::weights::{Tensor, Weights};
 use machine::{Item, Machine, Storage, TensorParts};
 
 /// Largest pickle, bytes; a state dict of a thousand tensors has 100 kB.
