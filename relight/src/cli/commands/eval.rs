@@ -216,7 +216,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
         Protocol::Relighting(arguments) => relighting(arguments, console),
         Protocol::Whdr(common) => ordinal(common, console),
     }?;
-    tell(&table, arguments.common().output.as_deref(), console)
+    report(&table, arguments.common().output.as_deref(), console)
 }
 
 type Evaluated = Result<ScoreTable, Box<dyn Error>>;
@@ -342,7 +342,7 @@ fn with_progress<T, E: Error + 'static>(
     Ok(result?)
 }
 
-fn tell(table: &ScoreTable, output: Option<&Path>, console: Console) -> CommandResult {
+fn report(table: &ScoreTable, output: Option<&Path>, console: Console) -> CommandResult {
     if let Some(path) = output {
         let mut bytes = serde_json::to_vec_pretty(table)?;
         bytes.push(b'\n');

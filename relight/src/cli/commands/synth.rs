@@ -167,7 +167,7 @@ fn samples(arguments: &Arguments, library: &Library, console: Console) -> ModeRe
     let recipe = recipe(arguments, 256);
     let written = write_samples(&recipe, library, count, &arguments.output, &|| bar.inc(1));
     bar.finish_and_clear();
-    tell(arguments, console, "samples", written?);
+    report(arguments, console, "samples", written?);
     Ok(())
 }
 
@@ -180,11 +180,11 @@ fn turns(arguments: &Arguments, library: &Library, console: Console) -> ModeResu
     };
     let written = write_turns(&turns, library, count, &arguments.output, &|| bar.inc(1));
     bar.finish_and_clear();
-    tell(arguments, console, "turns", written?);
+    report(arguments, console, "turns", written?);
     Ok(())
 }
 
-fn tell(arguments: &Arguments, console: Console, what: &str, written: SynthTally) {
+fn report(arguments: &Arguments, console: Console, what: &str, written: SynthTally) {
     let SynthTally { new, kept } = written;
     let out = &arguments.output;
     console.say(

@@ -211,10 +211,10 @@ fn train(
     view.bar.reset_eta();
     let outcome = run.finish(&stop, &mut view)?;
     view.bar.finish_and_clear();
-    Ok(tell(&outcome, console))
+    Ok(report(&outcome, console))
 }
 
-fn tell(outcome: &RunOutcome, console: Console) -> Outcome {
+fn report(outcome: &RunOutcome, console: Console) -> Outcome {
     let files: Vec<String> = outcome
         .weights
         .iter()

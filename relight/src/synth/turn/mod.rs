@@ -106,7 +106,7 @@ pub struct TurnDescription {
 
 /// Writes the turns 0 to `count - 1` into the data set in the folder `out`: shards in the format of
 /// `relit-extract`, and beside them `truth/<session>/`. Frames are made side by side on rayon's threads.
-/// Turns that the data set already vouches for are kept. `progress` is told each frame that is done.
+/// Turns that the data set already describes are kept. `progress` is told each frame that is done.
 ///
 /// # Errors
 /// Where a setting is out of range, `out` holds another data set, or a file cannot be written: turns
