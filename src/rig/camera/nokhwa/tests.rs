@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
 
 use ::nokhwa::Buffer;
@@ -244,12 +246,19 @@ fn a_stream_is_stopped_and_started_again() {
     let (mut camera, script) = started();
     script.send(Step::Frame(vec![1, 2])).unwrap();
     camera.next_frame(TIMEOUT).unwrap();
-    // The library is inside a call that waits for the next frame.
+    // Where the library is inside a call already, the call ends by a frame.
+    let stopped = Arc::new(AtomicBool::new(false));
+    let is_stopped = Arc::clone(&stopped);
     let last = std::thread::spawn(move || {
-        script.send(Step::Frame(vec![3, 4])).unwrap();
+        while !is_stopped.load(Ordering::Relaxed)
+            && script.try_send(Step::Frame(vec![3, 4])).is_err()
+        {
+            std::thread::yield_now();
+        }
         script
     });
     camera.stop().unwrap();
+    stopped.store(true, Ordering::Relaxed);
     let error = camera.next_frame(LONGEST).unwrap_err();
     assert!(matches!(error, CameraError::NotStarted { .. }), "{error}");
     let script = last.join().unwrap();
