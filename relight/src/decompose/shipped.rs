@@ -3,5 +3,6 @@
 /// Where they stand in the repository.
 pub(super) const NAME: &str = "relight/weights/decompose.safetensors";
 
-/// The bytes of that file: `Some(include_bytes!("../../weights/decompose.safetensors"))`.
-pub(super) const WEIGHTS: Option<&[u8]> = None;
+/// The bytes of that file.
+pub(super) const WEIGHTS: Option<&[u8]> =
+    Some(include_bytes!("../../weights/decompose.safetensors"));
