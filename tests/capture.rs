@@ -664,6 +664,8 @@ fn again(name: &str, script: &str, root: &Path) -> Command {
 fn child_that_records_into_a_limit() {
     let root = PathBuf::from(std::env::var("RELIT_TEST_ROOT").unwrap());
     let take = record(&root, 0, steps(stream(200, 0)));
+    let (recorded, dropped) = take.counts();
+    assert_eq!(recorded + dropped, 120, "{:?}", take.faults());
     println!("REASON {}", take.rejection());
 }
 

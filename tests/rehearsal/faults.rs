@@ -148,6 +148,8 @@ fn dropped_and_damaged_frames_within_the_limit_are_listed_and_kept() {
         (Verdict::Tolerated, 1),
         "{take:?}"
     );
+    let state = rig.monitor.state();
+    assert_eq!((state.frames, state.dropped), (take.frames, take.dropped));
     let manifest = rig.session(&take).manifest.unwrap();
     let faults: Vec<_> = manifest
         .faults

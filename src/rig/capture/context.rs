@@ -2,7 +2,7 @@
 
 use super::stop::StopRequest;
 use crate::preview::Preview;
-use crate::state::{Check, Monitor, Phase};
+use crate::state::{Check, Monitor, Phase, TakeSummary};
 
 /// What is to be captured.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,6 +31,14 @@ impl CaptureContext<'_> {
 
     pub(super) fn note(&self, checks: impl IntoIterator<Item = Check>) {
         self.monitor.update(|state| state.checks.extend(checks));
+    }
+
+    /// Shows how a take came out.
+    pub(super) fn end_take(&self, take: &TakeSummary) {
+        self.monitor.update(|state| {
+            (state.frames, state.dropped) = (take.frames, take.dropped);
+            state.last_take = Some(take.clone());
+        });
     }
 
     /// Shows that a take of `object` begins.

@@ -55,7 +55,10 @@ impl Equipment {
     }
 
     fn at_speed(settings: Settings, speed: f64) -> Result<Self, CaptureError> {
-        let clock = Clock::at_speed(speed);
+        let clock = match settings.is_rehearsal() {
+            true => Clock::at_speed(speed),
+            false => Clock::monotonic(),
+        };
         let simulator = match &settings.turntable {
             TurntableAddress::Simulated(address) => Some(SimulatedTable::new(&SimulatorOptions {
                 clock: clock.clone(),
@@ -146,5 +149,38 @@ impl Equipment {
             TurntableAddress::Simulated(_) | TurntableAddress::None => return Ok(None),
         };
         Ok(Some(Table::open_serial(&path, &options)?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clock(camera: &str, table: &str) -> Clock {
+        let (camera, table) = (camera.parse().unwrap(), table.parse().unwrap());
+        let settings = Settings::new("/root".into(), camera, table);
+        Equipment::new(settings).unwrap().clock()
+    }
+
+    #[test]
+    fn a_rehearsal_goes_by_virtual_time_also_at_normal_speed() {
+        for (camera, table) in [
+            ("replay:a", "sim:"),
+            ("replay:a", "none"),
+            ("replay:a", "sim:?speed=0"),
+        ] {
+            assert_ne!(clock(camera, table), Clock::monotonic(), "{camera} {table}");
+        }
+    }
+
+    #[test]
+    fn real_devices_go_by_the_systems_clock() {
+        for (camera, table) in [
+            ("v4l2:/dev/video0", "sim:"),
+            ("replay:a", "serial:/dev/ttyUSB0"),
+            ("v4l2:/dev/video0", "none"),
+        ] {
+            assert_eq!(clock(camera, table), Clock::monotonic(), "{camera} {table}");
+        }
     }
 }

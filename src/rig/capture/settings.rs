@@ -70,6 +70,13 @@ impl Settings {
         }
     }
 
+    /// Whether neither camera nor table is real, so that the clock need not be either.
+    #[must_use]
+    pub fn is_rehearsal(&self) -> bool {
+        matches!(self.camera, CameraAddress::Replay(_))
+            && !matches!(self.turntable, TurntableAddress::Serial(_))
+    }
+
     /// How many times faster than real time the rig runs at most; 0 means as fast as the machine
     /// computes. A simulated table's speed counts, else the replay's; a real camera or table goes
     /// by real time.

@@ -52,8 +52,7 @@ pub fn capture(
     let mut repeated = 0;
     loop {
         let (take, repeatable) = run_take(equipment, &request, context)?;
-        let last_take = Some(take.clone());
-        context.monitor.update(|state| state.last_take = last_take);
+        context.end_take(&take);
         if take.verdict != Verdict::Aborted || !repeatable || repeated == retries {
             return Ok(Captured { take, repeated });
         }

@@ -117,12 +117,11 @@ impl Clock {
         }
     }
 
-    /// The clock of a rig that runs `times` as fast as real time: virtual where that is 0 (as fast as
-    /// possible), monotonic where it is 1, paced otherwise.
+    /// The clock of a rehearsal, in which no device is real: a new virtual one, at most `times` as
+    /// fast as real time, or where that is 0 as fast as possible.
     pub fn at_speed(times: f64) -> Clock {
         match times {
             0.0 => Self::virtual_time(),
-            1.0 => Self::monotonic(),
             times => Self::paced(times),
         }
     }

@@ -50,7 +50,7 @@ impl Daemon {
         let root = settings.root.clone();
         let equipment = Equipment::for_viewers(settings)?;
         let dispatcher = Arc::new(Dispatcher::new(equipment.clock()));
-        report_salvaged(&root, dispatcher.monitor())?;
+        report_salvaged(&root, &equipment.clock(), dispatcher.monitor())?;
         let wants_table = equipment.wants_table();
         let thread = |source| CaptureError::system("a thread", "started")(source);
         let preview = Preview::start(dispatcher.monitor().clone()).map_err(thread)?;
@@ -166,9 +166,9 @@ fn check_object(object: &str) -> Result<(), Refused> {
 }
 
 /// Salvages what an earlier run left, and shows what came of it.
-fn report_salvaged(root: &Path, monitor: &Monitor) -> Result<(), CaptureError> {
+fn report_salvaged(root: &Path, clock: &Clock, monitor: &Monitor) -> Result<(), CaptureError> {
     for found in salvage(root)? {
-        monitor.fault(Clock::monotonic().now_us(), found.to_string());
+        monitor.fault(clock.now_us(), found.to_string());
     }
     Ok(())
 }

@@ -13,6 +13,13 @@ pub(super) enum Finding {
     QueueFull(usize),
     /// A frame could not be recorded: it was empty, or no key frame came before it.
     Unusable(usize),
+    /// Frames from this one on did not reach the disk, which had refused.
+    Unwritten {
+        /// The first of them.
+        from: usize,
+        /// How many of the turn's delivered frames they are.
+        count: u64,
+    },
     /// A frame was damaged, and recorded as it came.
     Damaged(usize, FrameFault),
     /// Counter and time stamps do not fit.
@@ -29,9 +36,10 @@ impl Finding {
             Self::Missing(missing) => (0, Some(missing.before)),
             Self::QueueFull(at) => (1, Some(*at)),
             Self::Unusable(at) => (2, Some(*at)),
-            Self::Damaged(at, _) => (3, Some(*at)),
-            Self::Anomaly(_) => (4, None),
-            Self::Settings(_) => (5, None),
+            Self::Unwritten { from, .. } => (3, Some(*from)),
+            Self::Damaged(at, _) => (4, Some(*at)),
+            Self::Anomaly(_) => (5, None),
+            Self::Settings(_) => (6, None),
         }
     }
 
@@ -39,6 +47,7 @@ impl Finding {
     pub(super) fn lost(&self) -> u64 {
         match self {
             Self::Missing(missing) => missing.count,
+            Self::Unwritten { count, .. } => *count,
             Self::QueueFull(_) | Self::Unusable(_) => 1,
             Self::Damaged(..) | Self::Anomaly(_) | Self::Settings(_) => 0,
         }
@@ -56,6 +65,10 @@ impl Finding {
             }
             Self::Unusable(_) => format!(
                 "a frame before frame {n} could not be recorded: it was empty, or no key frame came before it"
+            ),
+            Self::Unwritten { count, .. } => format!(
+                "the disk took no more: {} from frame {n} on did not reach it",
+                frames(*count)
             ),
             Self::Damaged(_, fault) => format!("frame {n} is damaged: {fault}"),
             Self::Anomaly(anomaly) => anomaly.to_string(),

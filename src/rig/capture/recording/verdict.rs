@@ -98,11 +98,28 @@ impl Recorded {
         let of_turn = |finding: &&Finding| finding.place().1 < Some(exposures.len());
         let of_frames = self.camera.findings.iter().chain(&self.writer.findings);
         let mut findings: Vec<Finding> = of_frames.filter(of_turn).cloned().collect();
+        findings.extend(self.unwritten(&findings));
         findings.extend(missing.iter().copied().map(Finding::Missing));
         findings.extend(anomalies.iter().copied().map(Finding::Anomaly));
         findings.extend(control_faults.iter().cloned().map(Finding::Settings));
         findings.sort_by_key(Finding::place);
         findings
+    }
+
+    /// The turn's frames that the camera delivered and a failed writer does not have. `findings`: what
+    /// else is wrong with delivered frames, as those that are lost already count there.
+    fn unwritten(&self, findings: &[Finding]) -> Option<Finding> {
+        self.writer.failure.as_ref()?;
+        let last = self.writer.delivered.iter().flatten().max();
+        let from = last.map_or(0, |last| last + 1);
+        let lost_later = findings
+            .iter()
+            .filter(|finding| finding.place().1 >= Some(from))
+            .map(Finding::lost)
+            .sum();
+        let delivered_later = self.camera.count.exposures.len().saturating_sub(from) as u64;
+        let count = delivered_later.saturating_sub(lost_later);
+        (count > 0).then_some(Finding::Unwritten { from, count })
     }
 
     /// Why the take cannot be used; `None` where it can.
