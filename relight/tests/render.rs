@@ -184,6 +184,8 @@ fn wrong_usage_is_told_with_code_2() {
         "--normals up.png --light light.txt --turned nan -o a.png",
         "--normals up.png --light light.txt --panorama a.hdr -o a.png",
         "--normals up.png --light light.txt --sweep --turn 4 -o a.mp4",
+        "--normals up.png --light light.txt --turn 4 -o a.gif",
+        "--normals up.png --light light.txt --smoothness 5,6,7 -o a.png",
     ] {
         let output = scene.render(arguments);
         assert_eq!(code(&output), 2, "{arguments}: {}", errors(&output));

@@ -148,9 +148,17 @@ impl Arguments {
     /// What is wrong with the combination of arguments, if anything is.
     pub(in crate::cli) fn fault(&self) -> Option<String> {
         let is_turn = self.turn.is_some();
+        if let Map::Even([first, others @ ..]) = &self.object.smoothness
+            && others.iter().any(|value| value != first)
+        {
+            return Some("--smoothness: give one value or a file".to_owned());
+        }
         let wanted = match self.target() {
             Target::Png(_) | Target::Exr(_) if is_turn => "a folder, .mp4 or .webm for --turn",
             Target::Movie(..) | Target::Folder(_) if !is_turn => ".png or .exr",
+            Target::Folder(path) if path.extension().is_some() => {
+                "a folder without an extension, .mp4 or .webm for --turn"
+            }
             _ => return None,
         };
         Some(format!("--output {}: give {wanted}", self.output.display()))
