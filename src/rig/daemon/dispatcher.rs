@@ -74,6 +74,15 @@ impl Dispatcher {
         plan.stop.ask(Stopped::Shutdown);
     }
 
+    /// Shows that the worker has failed; nothing is carried out any more.
+    pub(super) fn fail(&self) {
+        self.end();
+        self.monitor.fault(
+            self.clock.now_us(),
+            "what drives camera and table failed, which is an error in this program: start it again",
+        );
+    }
+
     /// What the worker does now, and how it is stopped.
     pub(super) fn begin(&self) -> (Next, StopRequest) {
         let mut plan = self.lock();

@@ -10,8 +10,10 @@ mod idle;
 mod schedule;
 mod worker;
 
+use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
 
 use relit_data::causes::with_causes;
 
@@ -56,9 +58,7 @@ impl Daemon {
         let preview = Preview::start(dispatcher.monitor().clone()).map_err(thread)?;
         let clock = equipment.clock();
         let mut worker = Worker::new(equipment, Arc::clone(&dispatcher), preview);
-        let worker = clock
-            .spawn("relit-rig", move || worker.run())
-            .map_err(thread)?;
+        let worker = spawn(&clock, &dispatcher, move || worker.run()).map_err(thread)?;
         Ok(Self {
             dispatcher,
             root,
@@ -72,11 +72,15 @@ impl Daemon {
     /// the second time.
     pub fn end(&self) {
         self.dispatcher.end();
-        let mut worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(worker) = worker.take() {
+        let worker = self.lock_worker().take();
+        if let Some(worker) = worker {
             // A panic in there was reported by the thread itself, and its table was stopped.
             let _ = worker.join();
         }
+    }
+
+    fn lock_worker(&self) -> MutexGuard<'_, Option<JoinHandle<()>>> {
+        self.worker.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn check_camera(&self) -> Result<(), Refused> {
@@ -150,6 +154,11 @@ impl Rig for Daemon {
         self.dispatcher.monitor()
     }
 
+    fn is_running(&self) -> bool {
+        let worker = self.lock_worker();
+        worker.as_ref().is_some_and(|worker| !worker.is_finished())
+    }
+
     fn root(&self) -> &Path {
         &self.root
     }
@@ -158,6 +167,30 @@ impl Rig for Daemon {
 impl Drop for Daemon {
     fn drop(&mut self) {
         self.end();
+    }
+}
+
+/// Starts the worker's thread.
+fn spawn(
+    clock: &Clock,
+    dispatcher: &Arc<Dispatcher>,
+    work: impl FnOnce() + Send + 'static,
+) -> io::Result<JoinHandle<()>> {
+    let panic_report = PanicReport(Arc::clone(dispatcher));
+    clock.spawn("relit-rig", move || {
+        let _panic_report = panic_report;
+        work();
+    })
+}
+
+/// Shows that the worker failed, and refuses further commands, where its thread panicked.
+struct PanicReport(Arc<Dispatcher>);
+
+impl Drop for PanicReport {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            self.0.fail();
+        }
     }
 }
 
@@ -171,4 +204,23 @@ fn report_salvaged(root: &Path, clock: &Clock, monitor: &Monitor) -> Result<(), 
         monitor.fault(clock.now_us(), found.to_string());
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_worker_that_panics_leaves_a_fault_and_takes_no_more_commands() {
+        let clock = Clock::virtual_time();
+        let dispatcher = Arc::new(Dispatcher::new(clock.clone()));
+        let worker = spawn(&clock, &dispatcher, || {
+            std::panic::resume_unwind(Box::new(()));
+        });
+        assert!(worker.unwrap().join().is_err());
+        let faults = dispatcher.monitor().state().faults;
+        assert!(faults[0].what.contains("failed"), "{faults:?}");
+        let refused = dispatcher.change(|schedule| schedule.submit(Job::Home));
+        assert!(matches!(refused, Err(Refused::Unavailable(_))));
+    }
 }

@@ -44,7 +44,6 @@ use tokio::time::{MissedTickBehavior, interval};
 pub use self::address::Announcement;
 pub use self::options::{ClientLimits, Heartbeat, ServeOptions, Shutdown};
 pub use self::token::{InvalidToken, Token, TokenFileError};
-use crate::state::Monitor;
 use rig::Rig;
 
 /// Threads that carry requests; files and decoding have their own.
@@ -115,7 +114,7 @@ pub fn serve(
         announce(&announcement);
         tokio::spawn(app.snapshots.clone().follow());
         if let Some(heartbeat) = options.heartbeat {
-            tokio::spawn(beat(heartbeat, app.monitor.clone()));
+            tokio::spawn(beat(heartbeat, app.rig.clone()));
         }
         listen::run(listener, &app).await;
         Ok(())
@@ -124,14 +123,17 @@ pub fn serve(
     served
 }
 
-/// Beats for as long as the server runs: that this goes on means that threads run and the monitor's
+/// Beats for as long as server and rig run: that this goes on means that threads run and the monitor's
 /// locks come free.
-async fn beat(heartbeat: Heartbeat, monitor: Monitor) {
+async fn beat(heartbeat: Heartbeat, rig: Arc<dyn Rig>) {
     let mut ticks = interval(heartbeat.period);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         ticks.tick().await;
-        let _readable = monitor.state();
+        let _readable = rig.monitor().state();
+        if !rig.is_running() {
+            return;
+        }
         (heartbeat.beat)();
     }
 }

@@ -44,7 +44,8 @@ impl ServeOptions {
 pub struct Heartbeat {
     /// Time between two beats.
     pub period: Duration,
-    /// Called while requests are worked on and the rig's state can be read.
+    /// Called while requests are worked on, the rig's state can be read, and the
+    /// [rig runs](super::rig::Rig::is_running).
     pub beat: fn(),
 }
 

@@ -18,6 +18,7 @@ mod sessions;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -38,6 +39,7 @@ struct Fake {
     monitor: Monitor,
     root: PathBuf,
     told: Mutex<Vec<Command>>,
+    failed: AtomicBool,
 }
 
 impl Rig for Fake {
@@ -57,6 +59,10 @@ impl Rig for Fake {
 
     fn monitor(&self) -> &Monitor {
         &self.monitor
+    }
+
+    fn is_running(&self) -> bool {
+        !self.failed.load(Ordering::Relaxed)
     }
 
     fn root(&self) -> &Path {
@@ -99,6 +105,7 @@ impl Serving {
             monitor: Monitor::default(),
             root: root.path().to_owned(),
             told: Mutex::new(Vec::new()),
+            failed: AtomicBool::new(false),
         });
         let mut options = ServeOptions::at("127.0.0.1:0".parse().unwrap());
         change(&mut options);

@@ -120,3 +120,28 @@ fn a_supervisor_hears_that_the_server_is_alive_until_it_ends() {
     thread::sleep(Duration::from_millis(100));
     assert_eq!(BEATS.load(Ordering::Relaxed), beats);
 }
+
+#[test]
+fn a_supervisor_hears_nothing_more_once_the_rig_has_failed() {
+    static BEATS: AtomicU32 = AtomicU32::new(0);
+    let serving = Serving::with(|options| {
+        options.heartbeat = Some(Heartbeat {
+            period: Duration::from_millis(5),
+            beat: || {
+                BEATS.fetch_add(1, Ordering::Relaxed);
+            },
+        });
+    });
+    let beats = || BEATS.load(Ordering::Relaxed);
+    let began = Instant::now();
+    while beats() == 0 {
+        assert!(began.elapsed() < LONG);
+        thread::sleep(Duration::from_millis(5));
+    }
+    serving.rig.failed.store(true, Ordering::Relaxed);
+    // One beat may be under way.
+    thread::sleep(Duration::from_millis(100));
+    let last = beats();
+    thread::sleep(Duration::from_millis(200));
+    assert_eq!(beats(), last);
+}
