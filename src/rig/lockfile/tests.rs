@@ -2,7 +2,7 @@
 
 use std::os::unix::fs::{chown, symlink};
 
-use super::accounts::{OPERATOR, STRANGER, SERVICE, as_user, share};
+use super::accounts::{OPERATOR, OUTSIDER, SERVICE, as_user, share};
 use super::*;
 
 fn own_pid() -> Option<Holder> {
@@ -95,7 +95,7 @@ fn accounts_of_one_group_see_and_take_each_others_locks_and_no_other_account_doe
     drop(of_service);
     drop(as_user(OPERATOR, take).unwrap());
     drop(as_user(SERVICE, take).unwrap());
-    as_user(STRANGER, || {
+    as_user(OUTSIDER, || {
         let refused = use_folder(folder.path()).unwrap_err();
         let text = relit_data::causes::with_causes(&refused);
         assert!(text.contains("not in the group"), "{text}");
