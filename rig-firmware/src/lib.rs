@@ -6,7 +6,7 @@
 //! [`stepper::Stepper::fire`] from its step timer and [`controller::Controller::poll`] for ever.
 //! One millimetre of Grbl is one degree here; angles inside are whole thousandths of a degree.
 //!
-//! | room | what it is for | knows |
+//! | module | what it is for | knows |
 //! | --- | --- | --- |
 //! | [`crc`], [`number`], [`error`], [`realtime`] | checksum, decimals, error numbers, commands of one byte | nobody |
 //! | [`mod@line`] | bytes to lines | `crc` |

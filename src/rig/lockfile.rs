@@ -193,25 +193,33 @@ pub struct Holder {
     pub pid: Option<u32>,
 }
 
-/// Opens a lock file to take it. A new one gets the permissions of its folder.
+/// Opens a lock file to take it, and makes it where it does not exist.
 fn open_or_create(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
-    options.read(true).write(true).mode(0o600);
-    match open(options.create_new(true), path) {
-        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-            open(options.create_new(false), path)
-        }
-        created => {
-            let file = created?;
-            let folder = path
-                .parent()
-                .filter(|folder| !folder.as_os_str().is_empty());
-            let folder = fs::metadata(folder.unwrap_or(Path::new(".")))?;
-            let mode = 0o600 | (folder.mode() & 0o066);
-            file.set_permissions(PermissionsExt::from_mode(mode))?;
-            Ok(file)
-        }
+    options.read(true).write(true);
+    match open(&mut options, path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        opened => return opened,
     }
+    // Where the file system can neither link nor rename like this, the file is made in place, for this
+    // account alone.
+    let _ = create_shared(path);
+    open(options.create(true).mode(0o600), path)
+}
+
+/// Makes an empty lock file with the permissions of its folder. It gets its name last, so that no other
+/// account finds it before it may open it.
+fn create_shared(path: &Path) -> io::Result<()> {
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    let file = tempfile::NamedTempFile::new_in(folder)?;
+    let mode = 0o600 | (fs::metadata(folder)?.mode() & 0o066);
+    file.as_file()
+        .set_permissions(PermissionsExt::from_mode(mode))?;
+    file.persist_noclobber(path)?;
+    Ok(())
 }
 
 /// Opens a plain file; fails on a link, and neither waits for nor sets off anything else.

@@ -1,7 +1,7 @@
 //! What the rig is doing, as everybody beside it sees it: terminal, page, metrics.
 //!
 //! One [`Monitor`] a rig. The capture writes into it, any number of viewers read or subscribe; none of
-//! them can hold the capture up. Knows nobody.
+//! them can hold the capture up. This module knows no other module.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

@@ -63,9 +63,9 @@ pub(crate) struct Handed {
 }
 
 /// The kernel's record of the buffers that it hands out.
-pub(crate) struct Trace(());
+pub(crate) struct BufferTrace(());
 
-impl Trace {
+impl BufferTrace {
     /// Begins an empty record.
     pub(crate) fn begin() -> Self {
         if !Path::new(TRACING).join("trace").exists() {

@@ -13,7 +13,7 @@ use relit_data::session::{Manifest, Recording};
 use serde_json::Value;
 
 /// Long enough for an emulated machine whose host is busy.
-const PATIENCE: Duration = Duration::from_secs(240);
+const LONGEST_WAIT: Duration = Duration::from_secs(240);
 /// Where a capture's standard error goes, among its sessions.
 const STDERR: &str = "stderr.txt";
 /// More lines than a capture prints.
@@ -97,7 +97,7 @@ impl Running {
 
     /// Waits until the frames of the turn are being recorded, and then some.
     pub(crate) fn until_recording(&mut self) {
-        let until = Instant::now() + PATIENCE;
+        let until = Instant::now() + LONGEST_WAIT;
         while !self
             .seen
             .iter()
@@ -114,7 +114,7 @@ impl Running {
 
     /// Waits for the end.
     pub(crate) fn end(mut self) -> Ended {
-        let until = Instant::now() + PATIENCE;
+        let until = Instant::now() + LONGEST_WAIT;
         let status = loop {
             if let Some(status) = self.child.try_wait().unwrap() {
                 break status;

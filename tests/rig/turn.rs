@@ -5,7 +5,7 @@ use std::path::Path;
 use image::{GrayImage, Luma};
 use relit_data::session::{FrameEntry, Status};
 
-use crate::camera::{Handed, Trace, VIVID, Vivid};
+use crate::camera::{BufferTrace, Handed, VIVID, Vivid};
 use crate::program::{Running, extract, sessions};
 use crate::table;
 
@@ -27,7 +27,7 @@ pub(crate) fn turn<'a>(size: &'a str, more: &[&'a str]) -> Vec<&'a str> {
 fn every_frame_that_the_kernel_handed_out_during_the_turn_is_in_the_session() {
     drop(Vivid::open());
     let root = sessions("turn");
-    let trace = Trace::begin();
+    let trace = BufferTrace::begin();
     let ended = Running::start(&root, &turn("640x480", &TOLERANT)).end();
     let handed = trace.end();
     let state = table::stands();

@@ -150,7 +150,7 @@ impl Controller {
 
     fn execute_dollar<B: Board>(&mut self, board: &mut B, command: Dollar) -> Result<(), Error> {
         match command {
-            Dollar::Help | Dollar::Settings | Dollar::Version => self.tell(board, command),
+            Dollar::Help | Dollar::Settings | Dollar::Version => self.send_report(board, command),
             Dollar::Modal => self.tell_modal(board),
             Dollar::Offsets => self.tell_offsets(board),
             Dollar::Set(key, value) => return self.set(board, key, value),
@@ -165,7 +165,7 @@ impl Controller {
         Ok(())
     }
 
-    fn tell<B: Board>(&self, board: &mut B, command: Dollar) {
+    fn send_report<B: Board>(&self, board: &mut B, command: Dollar) {
         let checked = self.session.is_open();
         match command {
             Dollar::Settings => {

@@ -2,7 +2,7 @@
 //!
 //! The crate `rig-firmware` is the controller; this binary is the chip under it:
 //!
-//! | room | what it is for |
+//! | module | what it is for |
 //! | --- | --- |
 //! | `registers` | the chip's registers, by the data sheet's names |
 //! | `masked` | data shared with interrupts |

@@ -63,7 +63,7 @@ impl Worker {
             .change(|schedule| schedule.finish(succeeded));
     }
 
-    /// Does it; false where it is as good as not done.
+    /// Carries a job out; false where nothing usable came of it.
     fn do_job(&mut self, job: Job, stop: &StopRequest) -> Result<bool, CaptureError> {
         match job {
             Job::Capture { object, meter } => {

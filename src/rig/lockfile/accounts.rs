@@ -17,14 +17,14 @@ use rustix::thread::{set_thread_groups, set_thread_res_gid, set_thread_res_uid};
 pub(crate) const SERVICE: u32 = 64_001;
 pub(crate) const OPERATOR: u32 = 64_002;
 /// An account that is not in it.
-pub(crate) const STRANGER: u32 = 64_003;
+pub(crate) const OUTSIDER: u32 = 64_003;
 const GROUP: u32 = 64_010;
 
 /// Runs `work` as an account: Linux lets each thread of a process have its own.
 pub(crate) fn as_user<T: Send>(user: u32, work: impl FnOnce() -> T + Send) -> T {
     let become_user = move || {
         let groups = [Gid::from_raw(GROUP)];
-        set_thread_groups(if user == STRANGER { &[] } else { &groups })?;
+        set_thread_groups(if user == OUTSIDER { &[] } else { &groups })?;
         let group = Gid::from_raw(user);
         set_thread_res_gid(group, group, group)?;
         let user = Uid::from_raw(user);

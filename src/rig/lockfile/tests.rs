@@ -2,7 +2,7 @@
 
 use std::os::unix::fs::{chown, symlink};
 
-use super::accounts::{OPERATOR, SERVICE, STRANGER, as_user, share};
+use super::accounts::{OPERATOR, OUTSIDER, SERVICE, as_user, share};
 use super::*;
 
 fn own_pid() -> Option<Holder> {
@@ -95,7 +95,7 @@ fn accounts_of_one_group_see_and_take_each_others_locks_and_no_other_account_doe
     drop(of_service);
     drop(as_user(OPERATOR, take).unwrap());
     drop(as_user(SERVICE, take).unwrap());
-    as_user(STRANGER, || {
+    as_user(OUTSIDER, || {
         let refused = use_folder(folder.path()).unwrap_err();
         let text = relit_data::causes::with_causes(&refused);
         assert!(text.contains("not in the group"), "{text}");
@@ -128,4 +128,14 @@ fn another_accounts_folder_is_not_used() {
     }
     chown(folder.path(), Some(SERVICE), None).unwrap();
     assert!(as_user(OPERATOR, || use_folder(folder.path())).is_err());
+}
+
+#[test]
+fn a_new_lock_has_its_folders_permissions_and_nothing_else_stays_there() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::set_permissions(folder.path(), PermissionsExt::from_mode(0o770)).unwrap();
+    let path = folder.path().join("lock");
+    let _held = LockFile::take(&path, "x").unwrap();
+    assert_eq!(fs::metadata(&path).unwrap().mode() & 0o777, 0o660);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }

@@ -16,6 +16,8 @@ use crate::turntable::status::TableStatus;
 
 /// How long an owner that is opening its port may take until its socket exists.
 const OPENING: Duration = Duration::from_secs(15);
+/// How long a socket may refuse this account: its owner makes it first and shares it then.
+const SHARING: Duration = Duration::from_secs(1);
 const PAUSE: Duration = Duration::from_millis(100);
 /// How long an answer may take: a stop takes many seconds.
 const ANSWER: Duration = Duration::from_secs(25);
@@ -100,15 +102,21 @@ impl Owner {
     /// An owner that is still opening its port has no socket yet.
     fn connect(&self) -> std::io::Result<UnixStream> {
         let until = Instant::now() + OPENING;
+        let mut refused_until = None;
         loop {
-            match UnixStream::connect(&self.files.socket) {
-                Err(error)
-                    if error.kind() != ErrorKind::PermissionDenied && Instant::now() < until =>
-                {
-                    thread::sleep(PAUSE);
-                }
-                connected => return connected,
+            let error = match UnixStream::connect(&self.files.socket) {
+                Ok(stream) => return Ok(stream),
+                Err(error) => error,
+            };
+            let now = Instant::now();
+            let until = match error.kind() {
+                ErrorKind::PermissionDenied => *refused_until.get_or_insert(now + SHARING),
+                _ => until,
+            };
+            if now >= until {
+                return Err(error);
             }
+            thread::sleep(PAUSE);
         }
     }
 }

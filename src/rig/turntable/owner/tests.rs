@@ -13,7 +13,7 @@ use serialport::{SerialPort as _, TTYPort};
 use super::claim::Files;
 use super::*;
 use crate::clock::Clock;
-use crate::lockfile::accounts::{OPERATOR, SERVICE, STRANGER, as_user, share};
+use crate::lockfile::accounts::{OPERATOR, OUTSIDER, SERVICE, as_user, share};
 use crate::turntable::fake_grbl::FakeGrbl;
 use crate::turntable::{ControllerState, MotionFault, Table, TableOptions, TurntableError};
 
@@ -161,7 +161,7 @@ fn a_folder_that_others_can_write_in_is_not_used() {
 }
 
 #[test]
-fn an_operator_asks_and_stops_the_table_of_a_service_and_a_stranger_opens_nothing() {
+fn an_operator_asks_and_stops_the_table_of_a_service_and_an_outsider_opens_nothing() {
     let terminal = Terminal::new();
     if !share(terminal.runtime.path()) {
         return;
@@ -186,7 +186,7 @@ fn an_operator_asks_and_stops_the_table_of_a_service_and_a_stranger_opens_nothin
         matches!(error, TurntableError::Motion(MotionFault::Stopped)),
         "{error}"
     );
-    as_user(STRANGER, || {
+    as_user(OUTSIDER, || {
         let found = Owner::find(&terminal.path, terminal.runtime.path());
         assert!(matches!(found, Err(TurntableError::Lock(_))), "{found:?}");
         let opened = terminal.open().map(|_| ());

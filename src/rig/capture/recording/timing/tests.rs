@@ -242,7 +242,7 @@ fn a_camera_at_half_the_rate_is_reported_with_and_without_a_counter() {
             })
             .collect();
         let timing = FrameTiming::of(&stamps, 30.0);
-        let reported = timing.anomalies.iter().find_map(|doubt| match doubt {
+        let reported = timing.anomalies.iter().find_map(|anomaly| match anomaly {
             TimingAnomaly::Rate { measured, .. } => Some(*measured),
             _ => None,
         });
