@@ -1,7 +1,7 @@
 //! The rig over HTTP: a page for the phone beside the turntable, the same as JSON for scripts, and
 //! figures for Prometheus.
 //!
-//! It stands on [`rig::Rig`]: it hands commands on, shows what the [`Monitor`]
+//! It stands on [`rig::Rig`]: it hands commands on, shows what the [`Monitor`](crate::state::Monitor)
 //! holds and reads what lies in the session folder. It knows nothing of cameras, tables or how a
 //! capture goes. The capture is never held up by it: one task reads the state, at most ten times a
 //! second whatever the number of clients, its threads give way to all others of the process, and
