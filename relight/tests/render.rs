@@ -137,6 +137,7 @@ fn the_light_that_is_saved_gives_the_same_picture() {
 fn a_file_that_is_missing_or_wrong_is_named_in_one_line_and_the_code_is_1() {
     let scene = Scene::new();
     fs::write(scene.path("short.txt"), "1 2 3\n4 5\n").unwrap();
+    fs::write(scene.path("taken"), "a file").unwrap();
     let cases = [
         (
             "--normals none.png --light light.txt -o a.png",
@@ -155,8 +156,8 @@ fn a_file_that_is_missing_or_wrong_is_named_in_one_line_and_the_code_is_1() {
             "none/a.png cannot be written",
         ),
         (
-            "--normals up.png --light light.txt --turn 2 -o light.txt",
-            "light.txt cannot be made",
+            "--normals up.png --light light.txt --turn 2 -o taken",
+            "taken cannot be made",
         ),
         (
             "--normals up.png --light light.txt --turn 2 -o .",
