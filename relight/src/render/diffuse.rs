@@ -18,7 +18,7 @@ pub enum DiffuseForm {
 }
 
 /// What the released form adds to every shading.
-const RELEASED_AMBIENT: f64 = 0.1;
+pub(crate) const RELEASED_AMBIENT: f64 = 0.1;
 
 /// The constants c1 to c5 of the quadratic form: products of the cosine lobe's coefficients π, 2π/3
 /// and π/4 with those of the polynomials of [`basis`](crate::light::basis).

@@ -16,9 +16,9 @@ mod reference;
 mod shots;
 mod surface;
 
-#[cfg(feature = "train")]
-pub(crate) use diffuse::diffuse_constants;
 pub use diffuse::{DiffuseForm, DiffuseLayer};
+#[cfg(feature = "train")]
+pub(crate) use diffuse::{RELEASED_AMBIENT, diffuse_constants};
 pub use fit::fit_light;
 pub use layers::{EXPOSURE, Gradients, Layers, Rendering, SpecularForm};
 pub use lobe::LobeLayer;

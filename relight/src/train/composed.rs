@@ -1,9 +1,13 @@
 //! From settings to composed samples.
 
+use std::sync::Arc;
+
 use super::composer::Composition;
+use super::decompose_task::Resources;
 use super::error::TrainError;
+use super::sample::TruthBatch;
 use super::settings::{DataSettings, RunSettings};
-use super::window::SampleWindowSettings;
+use super::window::{SampleWindow, SampleWindowSettings};
 use crate::synth::{Folders, Library, Recipe, stream};
 
 /// What samples are composed of, with the files that are named read.
@@ -27,6 +31,47 @@ pub(super) fn composition(data: &DataSettings, seed: u64) -> Result<Composition,
         library,
         plain_share: data.plain_share,
     })
+}
+
+/// The batches of a run, composed while it trains.
+#[derive(Debug)]
+pub(super) struct ComposedBatches {
+    composition: Arc<Composition>,
+    settings: SampleWindowSettings,
+    resources: Resources,
+    /// Opened with the first batch, whose step says where.
+    window: Option<SampleWindow>,
+}
+
+impl ComposedBatches {
+    /// The batches of a composition.
+    pub(super) fn new(
+        composition: Arc<Composition>,
+        settings: SampleWindowSettings,
+        resources: Resources,
+    ) -> Self {
+        Self {
+            composition,
+            settings,
+            resources,
+            window: None,
+        }
+    }
+
+    /// The batch of a step; steps are asked for one after the other.
+    pub(super) fn batch(&mut self, step: u64) -> Result<TruthBatch, TrainError> {
+        let window = match self.window.take() {
+            Some(window) => window,
+            None => SampleWindow::open(
+                self.settings,
+                &self.composition,
+                self.resources.composers,
+                step,
+            )?,
+        };
+        let window = self.window.insert(window);
+        TruthBatch::new(&window.batch(step)?, true, self.resources.device)
+    }
 }
 
 /// How samples are drawn.

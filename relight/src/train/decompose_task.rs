@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use tch::{Device, Tensor, no_grad};
 
-use super::composed::{composition, window_settings};
+use super::composed::{ComposedBatches, composition, window_settings};
 use super::composer::Composition;
 use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
 use super::error::TrainError;
@@ -17,7 +17,6 @@ use super::run::{StepLosses, Task, Validation};
 use super::sample::{TruthArrays, TruthBatch};
 use super::settings::{DecomposeSettings, PrecisionChoice};
 use super::sheet::validation_sheet;
-use super::window::SampleWindow;
 use crate::nets::{Weights, decomposer};
 use crate::synth::{Recipe, stream};
 
@@ -41,9 +40,7 @@ pub struct DecomposeTask {
     settings: DecomposeSettings,
     resources: Resources,
     learner: Learner,
-    composition: Arc<Composition>,
-    /// Opened with the first step.
-    window: Option<SampleWindow>,
+    composed: ComposedBatches,
     validation: Vec<TruthArrays>,
 }
 
@@ -80,26 +77,16 @@ impl DecomposeTask {
             },
         )?;
         Ok(Self {
+            composed: ComposedBatches::new(
+                composition,
+                window_settings(&settings.data, &settings.run),
+                resources,
+            ),
             settings,
             resources,
             learner,
-            composition,
-            window: None,
             validation,
         })
-    }
-
-    fn window(&mut self, step: u64) -> Result<&mut SampleWindow, TrainError> {
-        let window = match self.window.take() {
-            Some(window) => window,
-            None => SampleWindow::open(
-                window_settings(&self.settings.data, &self.settings.run),
-                &self.composition,
-                self.resources.composers,
-                step,
-            )?,
-        };
-        Ok(self.window.insert(window))
     }
 
     /// A batch of the validation, and the averaged network's answers to it.
@@ -131,8 +118,7 @@ impl Task for DecomposeTask {
     }
 
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
-        let device = self.resources.device;
-        let batch = TruthBatch::new(&self.window(step)?.batch(step)?, true, device)?;
+        let batch = self.composed.batch(step)?;
         let answer = self.learner.model.forward(&batch.input)?;
         let answer = AnsweredTensors::new(&batch.input, &answer[0])?;
         Ok(StepLosses {

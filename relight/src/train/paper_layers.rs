@@ -4,12 +4,10 @@
 use tch::Tensor;
 
 use super::error::TrainError;
-use crate::render::{DiffuseForm, diffuse_constants, power_constants};
+use crate::render::{DiffuseForm, RELEASED_AMBIENT, diffuse_constants, power_constants};
 
 /// Keeps a division by nothing from being one.
 const TINY: f64 = 1e-6;
-/// What the released form adds to every shading.
-const RELEASED_AMBIENT: f64 = 0.1;
 
 /// A picture in sRGB, `3` channels of 0..=1, as the paper's networks are fed: `(x - 0.5) / 0.5` inside the mask.
 ///

@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::composed::{composition, window_settings};
-use super::composer::Composition;
+use super::composed::{ComposedBatches, composition, window_settings};
 use super::decompose_task::Resources;
 use super::error::TrainError;
 use super::learner::{Learner, LearnerSettings};
@@ -17,7 +16,6 @@ use super::run::{StepLosses, Task, Validation};
 use super::sample::TruthBatch;
 use super::settings::{PaperSettings, PrecisionChoice};
 use super::turn_reader::{TurnReader, TurnTensors};
-use super::window::SampleWindow;
 use crate::nets::paper::{Head, light_net, normal_net, reflectance_net, spec_net};
 use crate::nets::{Graph, Weights};
 use crate::synth::stream;
@@ -45,9 +43,7 @@ pub struct PaperTask {
     settings: PaperSettings,
     resources: Resources,
     learner: Learner,
-    composition: Arc<Composition>,
-    /// Opened with the first step that needs it.
-    window: Option<SampleWindow>,
+    composed: ComposedBatches,
     turns: Option<TurnReader>,
 }
 
@@ -102,27 +98,15 @@ impl PaperTask {
             phase: Phase::new(phase, &settings, resources, inputs)?,
             name: phase.name(),
             learner: Learner::new(graph, &weights, learner)?,
-            composition: Arc::new(composition(&settings.data, settings.run.seed)?),
+            composed: ComposedBatches::new(
+                Arc::new(composition(&settings.data, settings.run.seed)?),
+                window_settings(&settings.data, &settings.run),
+                resources,
+            ),
             turns: inputs.turns.as_ref().map(open).transpose()?,
             settings,
             resources,
-            window: None,
         })
-    }
-
-    /// The batch of composed samples of a step.
-    fn truth(&mut self, step: u64) -> Result<TruthBatch, TrainError> {
-        let window = match self.window.take() {
-            Some(window) => window,
-            None => SampleWindow::open(
-                window_settings(&self.settings.data, &self.settings.run),
-                &self.composition,
-                self.resources.composers,
-                step,
-            )?,
-        };
-        let window = self.window.insert(window);
-        TruthBatch::new(&window.batch(step)?, true, self.resources.device)
     }
 
     /// What composed samples count: all, where there are no turns.
@@ -230,7 +214,7 @@ impl Task for PaperTask {
         let mut losses = StepLosses::default();
         let anchor = self.anchor();
         if anchor > 0.0 {
-            let batch = self.truth(step)?;
+            let batch = self.composed.batch(step)?;
             if let Some(loss) = self.phase.on_truth(&self.learner.model, &batch)? {
                 losses.terms.add("truth", anchor, loss);
             }
