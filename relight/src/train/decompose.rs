@@ -20,6 +20,8 @@ const DIVISOR_FLOOR: f64 = 0.02;
 const FULL_HIGHLIGHT: f64 = 0.1;
 /// How much more a full highlight counts than none: most pixels have none, and an answer without any would do.
 const HIGHLIGHT_EMPHASIS: f64 = 8.0;
+/// Energy of a faint highlight, a pixel.
+const FAINT_ENERGY: f64 = 1e-4;
 
 /// The network's answers as maps on tensors, `batch x channels x height x width`: what
 /// [`crate::decompose::EncodedPicture::decode`] makes of them one by one.
@@ -82,8 +84,10 @@ pub struct DecomposeWeights {
     pub gradient: f64,
     /// Angle of the normals.
     pub normals: f64,
-    /// Highlights.
+    /// Mean error of the highlights.
     pub highlight: f64,
+    /// Energy of the highlights' error, as a part of their energy.
+    pub highlight_energy: f64,
 }
 
 impl Default for DecomposeWeights {
@@ -95,6 +99,7 @@ impl Default for DecomposeWeights {
             gradient: 0.2,
             normals: 1.5,
             highlight: 1.0,
+            highlight_energy: 0.2,
         }
     }
 }
@@ -155,6 +160,11 @@ pub fn decompose_losses(
         weights.highlight,
         highlight_error(batch, answer)?,
     );
+    terms.add(
+        "highlight_energy",
+        weights.highlight_energy,
+        highlight_energy_error(batch, answer)?,
+    );
     Ok(terms)
 }
 
@@ -169,6 +179,19 @@ fn highlight_error(batch: &TruthBatch, answer: &AnsweredTensors) -> Result<Tenso
     let error = answer.highlight.f_sub(truth)?.f_abs()?.f_mul(&emphasis)?;
     let pixels = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
     Ok(error.f_sum(None)?.f_div(&pixels)?)
+}
+
+/// Energy of the error as a part of the energy of the batch's highlights: 1 for an answer without any. A batch
+/// with hardly any highlight counts as if it had a faint one.
+fn highlight_energy_error(
+    batch: &TruthBatch,
+    answer: &AnsweredTensors,
+) -> Result<Tensor, TrainError> {
+    let energy = |of: &Tensor| of.f_square()?.f_mul(&batch.mask)?.f_sum(None);
+    let faint = batch.mask.f_sum(None)?.f_mul_scalar(FAINT_ENERGY)?;
+    let truth = energy(&batch.highlight)?.f_add(&faint)?;
+    let error = energy(&answer.highlight.f_sub(&batch.highlight)?)?;
+    Ok(error.f_div(&truth)?)
 }
 
 /// How much each head's answers vary from pixel to pixel under the mask, as a part of the truth's variation: a head that has

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use glam::Vec3;
 use half::f16;
 use rayon::prelude::*;
 use tch::{Device, Kind, Tensor};
@@ -47,7 +48,7 @@ pub struct TruthBatch {
     pub albedo: Tensor,
     /// Unit normals, y up.
     pub normals: Tensor,
-    /// Highlight, 1 channel, in whites.
+    /// Highlight, 1 channel, in whites: what of it the picture shows.
     pub highlight: Tensor,
 }
 
@@ -82,7 +83,7 @@ impl TruthArrays {
 
 /// The truth at the covered pixels.
 fn fill_truth(sample: &SynthSample<'_>, white: f32, values: &mut [f16], pixels: usize) {
-    let grey = |light: &glam::Vec3| light.element_sum() / 3.0;
+    let grey = |light: &Vec3| light.element_sum() / 3.0;
     let (shaded, material) = (sample.shaded(), sample.material());
     let buffer = sample.view().scene.buffer();
     let total: f32 = shaded.shading.iter().map(grey).sum();
@@ -98,12 +99,19 @@ fn fill_truth(sample: &SynthSample<'_>, white: f32, values: &mut [f16], pixels: 
             normal.x,
             normal.y,
             normal.z,
-            grey(&shaded.highlight[at]) / white,
+            visible_highlight(albedo * shaded.shading[at], shaded.highlight[at]) / white,
         ];
         for (plane, value) in truth.into_iter().enumerate() {
             values[plane * pixels + pixel as usize] = f16::from_f32(value);
         }
     }
+}
+
+/// What a highlight adds to a picture that is clipped at 1, mean over the channels: the picture less this is the
+/// diffuse light that it shows, also where it is clipped.
+fn visible_highlight(diffuse: Vec3, highlight: Vec3) -> f32 {
+    let shown = (diffuse + highlight).min(Vec3::ONE) - diffuse.min(Vec3::ONE);
+    shown.element_sum() / 3.0
 }
 
 /// The picture's light.
