@@ -13,8 +13,9 @@ use super::error::TrainError;
 use super::learner::{Learner, LearnerSettings};
 use super::losses::{angular_degrees, scale_invariant, windowed};
 use super::model::{ComputePrecision, Model};
+use super::process_group::ProcessGroup;
 use super::run::{StepLosses, Task, Validation};
-use super::sample::{TruthArrays, TruthBatch};
+use super::sample::{DrawnSample, TruthArrays, TruthBatch};
 use super::settings::{DecomposeSettings, PrecisionChoice};
 use super::sheet::validation_sheet;
 use crate::nets::{Weights, decomposer};
@@ -64,6 +65,7 @@ impl DecomposeTask {
         let precision = match settings.run.precision {
             PrecisionChoice::Single => ComputePrecision::Single,
             PrecisionChoice::Mixed => ComputePrecision::Mixed,
+            PrecisionChoice::Double => ComputePrecision::Double,
             PrecisionChoice::Fastest => fastest(&weights, &validation, resources.device)?,
         };
         let learner = Learner::new(
@@ -80,6 +82,7 @@ impl DecomposeTask {
             composed: ComposedBatches::new(
                 composition,
                 window_settings(&settings.data, &settings.run),
+                precision.kind(),
                 resources,
             ),
             settings,
@@ -89,14 +92,27 @@ impl DecomposeTask {
         })
     }
 
+    /// Takes the precision that was the faster one in most of the processes.
+    fn choose_precision(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
+        let is_mixed = self.learner.model.precision() == ComputePrecision::Mixed;
+        let mut votes = [f64::from(u8::from(is_mixed))];
+        group.sum(&mut votes)?;
+        let mixed = 2.0 * votes[0] > f64::from(group.share().of());
+        self.learner.model.set_precision(if mixed {
+            ComputePrecision::Mixed
+        } else {
+            ComputePrecision::Single
+        });
+        Ok(())
+    }
+
     /// A batch of the validation, and the averaged network's answers to it.
     fn answered(
         &self,
         model: &Model,
         samples: &[TruthArrays],
     ) -> Result<(TruthBatch, AnsweredTensors), TrainError> {
-        let samples: Vec<&TruthArrays> = samples.iter().collect();
-        let batch = TruthBatch::new(&samples, false, self.resources.device)?;
+        let batch = batch_of(samples, model.precision(), self.resources.device)?;
         let answer = model.forward(&batch.input)?;
         let answer = AnsweredTensors::new(&batch.input, &answer[0])?;
         Ok((batch, answer))
@@ -115,6 +131,14 @@ impl Task for DecomposeTask {
 
     fn learners(&mut self) -> Vec<&mut Learner> {
         vec![&mut self.learner]
+    }
+
+    fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
+        self.composed.take_share(group.share())?;
+        if self.settings.run.precision == PrecisionChoice::Fastest {
+            self.choose_precision(group)?;
+        }
+        Ok(())
     }
 
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
@@ -170,6 +194,20 @@ fn compose_validation(settings: &DecomposeSettings, composition: &Composition) -
         .collect()
 }
 
+/// A batch of samples as they are.
+fn batch_of(
+    samples: &[TruthArrays],
+    precision: ComputePrecision,
+    device: Device,
+) -> Result<TruthBatch, TrainError> {
+    let plain = |arrays| DrawnSample {
+        arrays,
+        mirrored: false,
+    };
+    let samples: Vec<DrawnSample<'_>> = samples.iter().map(plain).collect();
+    TruthBatch::new(&samples, precision.kind(), device)
+}
+
 /// How far the answers are from the truth, means over the batch.
 fn figures(
     batch: &TruthBatch,
@@ -217,8 +255,8 @@ fn fastest(
     samples: &[TruthArrays],
     device: Device,
 ) -> Result<ComputePrecision, TrainError> {
-    let samples: Vec<&TruthArrays> = samples.iter().take(VALIDATION_BATCH).collect();
-    let batch = TruthBatch::new(&samples, false, device)?;
+    let samples = &samples[..samples.len().min(VALIDATION_BATCH)];
+    let batch = batch_of(samples, ComputePrecision::Single, device)?;
     let seconds = |precision| -> Result<f64, TrainError> {
         let model = Model::new(decomposer(), weights, device, precision)?;
         let mut best = f64::INFINITY;
