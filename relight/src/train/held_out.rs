@@ -60,14 +60,16 @@ impl HeldOutTurns {
 pub(super) struct HeldOutSamples(Vec<TruthArrays>);
 
 impl HeldOutSamples {
-    /// One sample each of `count` objects. Their seed does not depend on the run's, so that runs can be compared.
+    /// One sample each of `count` objects. Neither their seed nor their light depends on the run's, so that runs can be
+    /// compared.
     pub(super) fn compose(composition: &Composition, count: u64) -> Self {
         let held_out = Composition {
             recipe: Recipe {
                 seed: stream(0x76_61_6c, 23),
+                size: composition.recipe.size,
                 views: 1,
                 lightings: 1,
-                ..composition.recipe.clone()
+                ..Recipe::default()
             },
             library: composition.library.clone(),
             plain_share: composition.plain_share,
