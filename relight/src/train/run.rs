@@ -244,7 +244,12 @@ impl<'a> Run<'a> {
     ) -> Result<BTreeMap<String, f64>, TrainError> {
         let between = Duration::from_secs_f64(60.0 * self.settings.checkpoint_minutes);
         let mut saved = Instant::now();
-        let mut figures = BTreeMap::new();
+        // Where training begins, so that it shows what it has changed.
+        let mut figures = if self.step == 0 {
+            self.validate(observer)?
+        } else {
+            BTreeMap::new()
+        };
         let mut stopped = false;
         while self.step < self.settings.steps && !stopped {
             let asked = stop.load(Ordering::Relaxed);
