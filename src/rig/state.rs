@@ -79,6 +79,10 @@ pub struct TableState {
     pub degrees_per_second: Option<f64>,
     /// Whether zero is known.
     pub homed: bool,
+    /// Whether the emergency stop is pressed.
+    pub emergency_stop: bool,
+    /// Whether an alarm has locked it: the command `reset` resets, unlocks and homes it.
+    pub locked: bool,
     /// Volts of its battery, where it is measured.
     pub battery_v: Option<f64>,
     /// What is wrong with it, in a sentence.

@@ -223,3 +223,59 @@ fn commands_that_make_no_sense_are_refused_where_they_are_given() {
         Refused::Invalid(_)
     ));
 }
+
+/// Turns the table to and fro until the emergency stop is pressed.
+fn move_until_emergency(daemon: &Daemon) -> RigState {
+    let mut degrees = 200.0;
+    once(daemon, |state| {
+        if !state.table.emergency_stop && daemon.command(Command::Jog { degrees }).is_ok() {
+            degrees = -degrees;
+        }
+        state.table.emergency_stop
+    })
+}
+
+#[test]
+fn after_an_emergency_stop_one_command_brings_the_table_back() {
+    let root = tempfile::tempdir().unwrap();
+    let table = "sim:?speed=3&fault=estop@9s:6s";
+    let daemon = Daemon::start(settings(root.path(), "", table)).unwrap();
+    once(&daemon, is_ready);
+    let state = move_until_emergency(&daemon);
+    let pressed = "the emergency stop is pressed: release it";
+    assert_eq!(state.table.fault.as_deref(), Some(pressed));
+    let start = || Command::Start {
+        object: "mug".to_owned(),
+        meter: false,
+    };
+    for command in [
+        start(),
+        Command::Home,
+        Command::Unlock,
+        Command::Reset,
+        Command::Jog { degrees: 5.0 },
+    ] {
+        let refused = daemon.command(command).unwrap_err();
+        assert_eq!(refused, Refused::Unavailable(pressed.to_owned()));
+    }
+    let state = once(&daemon, |state| !state.table.emergency_stop);
+    assert!(
+        state.table.locked && !state.table.homed,
+        "{:?}",
+        state.table
+    );
+    // Nothing moves before a person has looked at the table.
+    daemon.command(start()).unwrap();
+    once(&daemon, |state| {
+        let last = state.faults.back().map(|fault| fault.what.as_str());
+        last.is_some_and(|what| what.contains("reset and home"))
+    });
+    once(&daemon, |state| state.phase == Phase::Idle);
+    daemon.command(Command::Reset).unwrap();
+    once(&daemon, |state| {
+        state.table.homed && state.table.state == "Idle"
+    });
+    once(&daemon, |_| daemon.command(start()).is_ok());
+    let state = once(&daemon, |state| state.last_take.is_some());
+    assert_eq!(state.last_take.unwrap().verdict, Verdict::Clean);
+}

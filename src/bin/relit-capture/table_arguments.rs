@@ -26,7 +26,8 @@ Examples:
       a bad line, and a controller that restarts
 
 Faults: drop=SHARE flip=SHARE duplicate=SHARE merge=SHARE delay=SHARE:TIME of bytes or lines, with
-`to.` or `from.` before them for one direction; reset@TIME and stall@TIME.";
+`to.` or `from.` before them for one direction; reset@TIME and stall@TIME; estop@TIME
+or estop@TIME:TIME presses the emergency stop, for good or for so long.";
 
 #[derive(Args)]
 pub(crate) struct TurntableArguments {

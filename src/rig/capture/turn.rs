@@ -9,7 +9,7 @@ use super::preflight;
 use super::recording::{Recorder, Window};
 use crate::clock::Clock;
 use crate::state::{Monitor, Phase, TableState};
-use crate::turntable::{ControllerState, Table, Track, TurnPlan, TurntableError};
+use crate::turntable::{ControllerState, Table, TableStatus, Track, TurnPlan, TurntableError};
 
 /// How often table and state are looked at while frames are recorded.
 const LOOK: Duration = Duration::from_millis(100);
@@ -109,6 +109,17 @@ impl TurnRecording<'_> {
     }
 }
 
+/// What is said while the emergency stop is pressed.
+pub(crate) const EMERGENCY_STOP: &str = "the emergency stop is pressed: release it";
+
+/// What is wrong with the table, in a sentence.
+fn fault_of(status: &TableStatus) -> Option<String> {
+    match status.emergency_stop {
+        true => Some(EMERGENCY_STOP.to_owned()),
+        false => status.alarm.map(|alarm| alarm.to_string()),
+    }
+}
+
 /// Asks the table and shows its answer.
 pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), TurntableError> {
     let status = table.status()?;
@@ -120,7 +131,9 @@ pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), Turntab
             degrees_per_second: Some(status.degrees_per_second),
             homed: status.homed,
             battery_v: status.battery_v,
-            fault: status.alarm.map(|alarm| alarm.to_string()),
+            emergency_stop: status.emergency_stop,
+            locked: status.state == ControllerState::Alarm,
+            fault: fault_of(&status),
         };
     });
     Ok(())

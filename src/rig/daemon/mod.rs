@@ -17,6 +17,7 @@ use std::thread;
 
 use relit_data::causes::with_causes;
 
+use crate::capture::turn::EMERGENCY_STOP;
 use crate::capture::{CaptureError, Equipment, Settings, preflight, salvage};
 use crate::clock::{Clock, JoinHandle};
 use crate::lockfile::LockFile;
@@ -94,7 +95,16 @@ impl Daemon {
         ))
     }
 
+    /// Nothing moves while the emergency stop is pressed.
+    fn check_table(&self) -> Result<(), Refused> {
+        match self.dispatcher.monitor().state().table.emergency_stop {
+            true => Err(Refused::Unavailable(EMERGENCY_STOP.to_owned())),
+            false => Ok(()),
+        }
+    }
+
     fn move_table(&self, job: Job) -> Result<(), Refused> {
+        self.check_table()?;
         if !self.wants_table {
             return Err(Refused::Unavailable(
                 "there is no turntable: give --turntable".to_owned(),
@@ -118,6 +128,7 @@ impl Rig for Daemon {
         match command {
             Command::Start { object, meter } => {
                 check_object(&object)?;
+                self.check_table()?;
                 self.check_camera()?;
                 dispatcher.change(|schedule| schedule.submit(Job::Capture { object, meter }))
             }
@@ -133,10 +144,10 @@ impl Rig for Daemon {
                 dispatcher.change(|schedule| schedule.dequeue(place, object.as_deref()))
             }
             Command::Next { object } => {
-                let camera = self.check_camera();
+                let ready = self.check_table().and_then(|()| self.check_camera());
                 dispatcher.change(|schedule| {
                     if !schedule.queue().is_empty() {
-                        camera?;
+                        ready?;
                     }
                     schedule.submit_next(object.as_deref())
                 })
@@ -144,6 +155,7 @@ impl Rig for Daemon {
             Command::Home => self.move_table(Job::Home),
             Command::Jog { degrees } => self.jog(degrees),
             Command::Unlock => self.move_table(Job::Unlock),
+            Command::Reset => self.move_table(Job::ResetTable),
             Command::SetControl { name, value } => {
                 dispatcher.change(|schedule| schedule.submit(Job::SetControl { name, value }))
             }

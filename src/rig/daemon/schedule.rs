@@ -33,6 +33,8 @@ pub(super) enum Job {
     /// By degrees.
     Jog(f64),
     Unlock,
+    /// Resets, unlocks and homes the table.
+    ResetTable,
     SetControl {
         name: String,
         value: i64,

@@ -77,6 +77,7 @@ impl Worker {
                 self.with_table(stop, jog).map(drop)?;
             }
             Job::Unlock => self.with_table(stop, Table::unlock).map(drop)?,
+            Job::ResetTable => self.with_table(stop, Table::reset).map(drop)?,
             Job::SetControl { name, value } => self.set_control(&name, value)?,
         }
         Ok(true)

@@ -50,6 +50,9 @@ pub enum Command {
     },
     /// Releases the table's lock after an alarm.
     Unlock,
+    /// Brings the table back after an alarm of any kind, also after an emergency stop once it is
+    /// released: resets, unlocks and homes it.
+    Reset,
     /// Sets one of the camera's controls by its name.
     SetControl {
         /// The control's name, such as `exposure_time_absolute`.

@@ -4,8 +4,10 @@ use std::path::Path;
 use std::time::Duration;
 
 use super::TableOptions;
+use super::codes::Alarm;
 use super::error::TurntableError;
 use super::greeting;
+use super::homing::Homed;
 use super::identity::Identity;
 use super::link::{IoThread, Link};
 use super::owner::{Claim, Server};
@@ -238,6 +240,7 @@ impl Table {
     /// The status of a table that is ready for a motion.
     pub(super) fn ready(&self) -> Result<TableStatus, TurntableError> {
         let status = self.status()?;
+        require_released(&status)?;
         let supervisor = self.link.supervisor();
         if supervisor.is_stopping() || supervisor.motion().is_some() {
             return Err(TurntableError::Busy);
@@ -259,13 +262,37 @@ impl Table {
         self.link.stop()
     }
 
-    /// Unlocks the table after an alarm.
+    /// Unlocks the table after an alarm. After an emergency stop, this resets the controller first.
     ///
     /// # Errors
-    /// [`TurntableError::Refused`] while the emergency stop is pressed.
+    /// [`TurntableError::EmergencyStop`] while it is pressed.
     pub fn unlock(&self) -> Result<TableStatus, TurntableError> {
+        self.clear_emergency_stop()?;
         self.command("$X")?;
         self.status()
+    }
+
+    /// Brings the table back after an alarm of any kind: resets the controller, unlocks and homes it.
+    ///
+    /// # Errors
+    /// [`TurntableError::EmergencyStop`] while the emergency stop is pressed, and the errors of
+    /// [`Table::stop`] and [`Table::home`].
+    pub fn reset(&self) -> Result<Homed, TurntableError> {
+        require_released(&self.status()?)?;
+        self.link.reset()?;
+        self.unlock()?;
+        self.home()
+    }
+
+    /// Resets a controller that is locked since an emergency stop: it takes neither `$X` nor `$H`
+    /// before.
+    pub(super) fn clear_emergency_stop(&self) -> Result<(), TurntableError> {
+        let status = self.status()?;
+        require_released(&status)?;
+        if status.alarm == Some(Alarm::EMERGENCY_STOP) {
+            self.link.reset()?;
+        }
+        Ok(())
     }
 
     /// Opens a checked session if the controller offers one and none is open.
@@ -332,6 +359,14 @@ impl Drop for Table {
             // Nobody is left to receive an error. The lease, if there is one, also stops the table.
             let _ = self.link.wait_stopped();
         }
+    }
+}
+
+/// An error while the emergency stop is pressed.
+pub(super) fn require_released(status: &TableStatus) -> Result<(), TurntableError> {
+    match status.emergency_stop {
+        true => Err(TurntableError::EmergencyStop),
+        false => Ok(()),
     }
 }
 

@@ -38,6 +38,7 @@ fn a_command_reaches_the_rig_and_its_answer_is_the_state_after_it() {
         r#"{"command":"dequeue","place":0}"#,
         r#"{"command":"next"}"#,
         r#"{"command":"unlock"}"#,
+        r#"{"command":"reset"}"#,
         r#"{"command":"set-control","name":"gain","value":-3}"#,
         r#"{"command":"stop"}"#,
     ] {
