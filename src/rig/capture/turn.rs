@@ -9,7 +9,10 @@ use super::preflight;
 use super::recording::{Recorder, Window};
 use crate::clock::Clock;
 use crate::state::{Monitor, Phase, TableState};
-use crate::turntable::{ControllerState, Table, TableStatus, Track, TurnPlan, TurntableError};
+use crate::turntable::{
+    ControllerState, FinishedTurn, Table, TableStatus, Track, TrackError, TurnPlan, TurntableError,
+};
+use relit_data::causes::with_causes;
 
 /// How often table and state are looked at while frames are recorded.
 const LOOK: Duration = Duration::from_millis(100);
@@ -28,9 +31,13 @@ pub(super) struct TurnRecording<'a> {
 }
 
 impl TurnRecording<'_> {
-    /// Turns the table and records its turn; returns the angles. The table is back where it stood,
-    /// or, where something failed, stands where it was stopped.
-    pub(super) fn with_table(&self, table: &Table, plan: TurnPlan) -> Result<Track, CaptureError> {
+    /// Turns the table and records its turn; returns the angles. The table rests then at the end of
+    /// the turn, or, where something failed, stands where it was stopped.
+    pub(super) fn with_table<'t>(
+        &self,
+        table: &'t Table,
+        plan: TurnPlan,
+    ) -> Result<(Result<Track, TrackError>, FinishedTurn<'t>), CaptureError> {
         let stop = self.context.stop;
         stop.explain(stop.over(table, || self.turn(table, plan)))
     }
@@ -40,8 +47,12 @@ impl TurnRecording<'_> {
         self.record_from(self.clock.now_us().saturating_add(LEAD_US), || Ok(()))
     }
 
-    fn turn(&self, table: &Table, plan: TurnPlan) -> Result<Track, CaptureError> {
-        self.enter_without_reports(Phase::MovingBack);
+    fn turn<'t>(
+        &self,
+        table: &'t Table,
+        plan: TurnPlan,
+    ) -> Result<(Result<Track, TrackError>, FinishedTurn<'t>), CaptureError> {
+        enter_without_reports(self.context, Phase::MovingBack);
         let margin_us = preflight::margin_us(&plan);
         let mut turn = table.start_turn(plan)?;
         self.context.enter(Phase::Starting);
@@ -54,10 +65,8 @@ impl TurnRecording<'_> {
             Ok(())
         });
         match recorded {
-            Ok(()) => {
-                self.enter_without_reports(Phase::Unwinding);
-                Ok(turn.wait_end()?)
-            }
+            // All frames are there: what becomes of the table from here on is no fault of the take.
+            Ok(()) => Ok(turn.wait_rest()),
             Err(error @ CaptureError::NotWithTheTurn) => {
                 turn.abort()?;
                 Err(error)
@@ -98,15 +107,34 @@ impl TurnRecording<'_> {
         });
     }
 
-    /// Enters a phase in which the table moves, and its reports are not shown until it is there.
-    fn enter_without_reports(&self, phase: Phase) {
-        self.context.monitor.update(|state| {
-            state.phase = phase;
-            state.table.state = ControllerState::Run.to_string();
-            state.table.angle_deg = None;
-            state.table.degrees_per_second = None;
-        });
+}
+
+/// Turns the table back after a turn. What goes wrong is a fault of the table: the take stands.
+pub(super) fn unwind(
+    table: &Table,
+    finished: FinishedTurn<'_>,
+    clock: &Clock,
+    context: CaptureContext<'_>,
+) -> Result<(), CaptureError> {
+    enter_without_reports(context, Phase::Unwinding);
+    let stop = context.stop;
+    let unwound = stop.explain(stop.over(table, || finished.unwind()));
+    if let Err(error) = &unwound {
+        let why = with_causes(error);
+        let fault = format!("the table did not turn back after the take, look at its cable: {why}");
+        context.monitor.fault(clock.now_us(), fault);
     }
+    unwound
+}
+
+/// Enters a phase in which the table moves, and its reports are not shown until it is there.
+fn enter_without_reports(context: CaptureContext<'_>, phase: Phase) {
+    context.monitor.update(|state| {
+        state.phase = phase;
+        state.table.state = ControllerState::Run.to_string();
+        state.table.angle_deg = None;
+        state.table.degrees_per_second = None;
+    });
 }
 
 /// What is said while the emergency stop is pressed.

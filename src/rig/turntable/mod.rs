@@ -82,7 +82,7 @@ pub use port::{Port, SerialPort};
 pub use status::TableStatus;
 pub use sync::{Residuals, Track, TrackError};
 pub use table::Table;
-pub use turn::{ConstantPart, Turn, TurnPhase};
+pub use turn::{ConstantPart, FinishedTurn, Turn, TurnPhase};
 pub use wire::{ControllerState, Counts, LineFault, RestartCause, SendError};
 
 /// How a table is opened.
