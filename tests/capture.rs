@@ -17,8 +17,7 @@ use std::time::{Duration, Instant};
 
 use relit::extract::{ExtractOptions, extract};
 use relit_data::session::{
-    CameraFacts, FrameClock, FrameIndex, Manifest, Recording, SoftwareFacts, Status,
-    TurntableFacts, VideoFacts,
+    CameraFacts, FrameClock, FrameIndex, Manifest, Recording, SoftwareFacts, Status, VideoFacts,
 };
 use relit_data::shard::{Dataset, ImageSize};
 use relit_rig::camera::{
@@ -185,12 +184,7 @@ fn manifest() -> Manifest {
             clock: FrameClock::default(),
             controls: BTreeMap::new(),
         },
-        turntable: Some(TurntableFacts {
-            port: "sim:".to_owned(),
-            firmware: "simulated".to_owned(),
-            degrees_per_second: 72.0,
-            steps_per_degree: 88.889,
-        }),
+        turntable: None,
         video: VideoFacts {
             file: String::new(),
             codec: String::new(),
@@ -860,6 +854,20 @@ fn a_recording_killed_before_its_first_frame_is_salvaged_as_such() {
         panic!("{manifest:?}");
     };
     assert!(reason.contains("before its first frame"), "{reason}");
+
+    // It is left out of a batch, with its reason, and is no failure.
+    let output = Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+        .arg(root.path())
+        .arg("-o")
+        .arg(root.path().join("out"))
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(3), "{output:?}");
+    assert!(
+        said.contains("0 frames: the capture ended before the first one"),
+        "{said}"
+    );
 }
 
 #[test]

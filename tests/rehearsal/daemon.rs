@@ -26,7 +26,7 @@ fn settings(root: &Path, camera: &str, table: &str) -> Settings {
 }
 
 /// The state once it is as `wanted`; fails after a minute.
-fn once(daemon: &Daemon, wanted: impl Fn(&RigState) -> bool) -> RigState {
+fn once(daemon: &Daemon, mut wanted: impl FnMut(&RigState) -> bool) -> RigState {
     let until = Instant::now() + Duration::from_secs(60);
     loop {
         let state = daemon.monitor().state();
@@ -265,11 +265,13 @@ fn after_an_emergency_stop_one_command_brings_the_table_back() {
         state.table
     );
     // Nothing moves before a person has looked at the table.
+    let faults = once(&daemon, |state| state.phase == Phase::Idle)
+        .faults
+        .len();
     daemon.command(start()).unwrap();
-    once(&daemon, |state| {
-        let last = state.faults.back().map(|fault| fault.what.as_str());
-        last.is_some_and(|what| what.contains("reset and home"))
-    });
+    let state = once(&daemon, |state| state.faults.len() > faults);
+    let fault = &state.faults.back().unwrap().what;
+    assert!(fault.contains("reset and home"), "{fault}");
     once(&daemon, |state| state.phase == Phase::Idle);
     daemon.command(Command::Reset).unwrap();
     once(&daemon, |state| {

@@ -16,6 +16,7 @@ use relit_data::causes::with_causes;
 use super::context::{CaptureContext, CaptureRequest};
 use super::equipment::Equipment;
 use super::error::{CaptureError, Refusal};
+use super::journal::track_of;
 use super::locked_camera::{LockedCamera, NEXT_FRAME};
 use super::manifest::manifest;
 use super::metering::meter;
@@ -109,7 +110,7 @@ fn run_take(
         if matches!(recorded.end(), End::Over | End::Stopped) {
             recorded.interrupted(with_causes(&error));
         }
-        None
+        recorded.journal().and_then(track_of)
     });
     let mut repeatable = matches!(recorded.end(), End::Over);
     let angle = |t_us| track.as_ref().and_then(|track| track.angle_at(t_us));

@@ -5,12 +5,14 @@ use std::time::Duration;
 
 use super::context::CaptureContext;
 use super::error::CaptureError;
+use super::journal::{journaled_report, journaled_turn};
 use super::preflight;
 use super::recording::{Recorder, Window};
 use crate::clock::Clock;
 use crate::state::{Monitor, Phase, TableState};
 use crate::turntable::{
-    ControllerState, FinishedTurn, Table, TableStatus, Track, TrackError, TurnPlan, TurntableError,
+    ControllerState, FinishedTurn, Table, TableStatus, Track, TrackError, Turn, TurnPlan,
+    TurntableError,
 };
 use relit_data::causes::with_causes;
 
@@ -58,21 +60,37 @@ impl TurnRecording<'_> {
         self.context.enter(Phase::Starting);
         let part = turn.wait_constant()?;
         let from_us = part.from_us.saturating_add(margin_us);
+        self.recorder
+            .begin_journal(journaled_turn(&turn.expected()));
+        let mut seen = 0;
         let recorded = self.record_from(from_us, || {
             turn.state()?;
+            seen = self.keep_journal(&turn, seen);
             // A table that does not answer ends the turn, as its state shows the next time.
             let _shown = show_table(self.context.monitor, table);
             Ok(())
         });
         match recorded {
             // All frames are there: what becomes of the table from here on is no fault of the take.
-            Ok(()) => Ok(turn.wait_rest()),
+            Ok(()) => {
+                self.keep_journal(&turn, seen);
+                Ok(turn.wait_rest())
+            }
             Err(error @ CaptureError::NotWithTheTurn) => {
                 turn.abort()?;
                 Err(error)
             }
             Err(error) => Err(error),
         }
+    }
+
+    /// Hands the reports after the first `seen` to the journal; returns how many there are now.
+    fn keep_journal(&self, turn: &Turn<'_>, seen: usize) -> usize {
+        let (reports, all) = turn.reports_after(seen);
+        for report in &reports {
+            self.recorder.add_report(journaled_report(report));
+        }
+        all
     }
 
     /// Records a turn that begins at `from_us`; `check` looks at the table now and then.
@@ -106,7 +124,6 @@ impl TurnRecording<'_> {
             state.dropped = progress.overrun;
         });
     }
-
 }
 
 /// Turns the table back after a turn. What goes wrong is a fault of the table: the take stands.

@@ -112,7 +112,9 @@ impl WireFaults {
                 return Ok(());
             }
             _ => {
-                return Err("there are drop, flip, duplicate, merge, delay, reset, stall and estop");
+                return Err(
+                    "there are drop, flip, duplicate, merge, delay, reset, stall and estop",
+                );
             }
         };
         *place = share(how)?;

@@ -6,7 +6,7 @@ use super::error::TurntableError;
 use super::plan::TurnPlan;
 use super::status::TableStatus;
 use super::supervisor::PositionReport;
-use super::sync::{self, Track, TrackError};
+use super::sync::{self, ExpectedTurn, TimedReport, Track, TrackError};
 use super::table::{Table, straight};
 use super::wire::{ControllerState, Message};
 
@@ -213,8 +213,22 @@ impl<'table> Turn<'table> {
         (track, finished)
     }
 
-    fn expected(&self) -> sync::ExpectedTurn {
-        sync::ExpectedTurn {
+    /// The reports of the part at constant speed that came after the first `seen` of the turn, and
+    /// how many of the turn there are now.
+    #[must_use]
+    pub fn reports_after(&self, seen: usize) -> (Vec<TimedReport>, usize) {
+        let expected = self.expected();
+        let supervisor = self.table.link().supervisor();
+        let recorded = supervisor.recorded();
+        let new = recorded.get(seen..).unwrap_or_default().iter();
+        let timed = new.filter_map(|report| TimedReport::of(report, &expected));
+        (timed.collect(), recorded.len())
+    }
+
+    /// The turn in machine positions.
+    #[must_use]
+    pub fn expected(&self) -> ExpectedTurn {
+        ExpectedTurn {
             from_deg: self.zero_deg + self.plan.constant_from_deg(),
             to_deg: self.zero_deg + self.plan.constant_to_deg(),
             degrees_per_second: self.plan.degrees_per_second(),

@@ -10,7 +10,7 @@ use super::salvage::whole_frames;
 use super::timing::TimingAnomaly;
 use crate::state::{TakeSummary, Verdict};
 use relit_data::causes::with_causes;
-use relit_data::session::{Fault, FrameEntry};
+use relit_data::session::{Fault, FrameEntry, TurnJournal};
 
 /// Largest angle that can be right, degrees.
 const MOST_DEGREES: f64 = 1e6;
@@ -35,6 +35,12 @@ impl Recorded {
     /// this reason.
     pub fn interrupted(&mut self, reason: String) {
         self.camera.end = End::Interrupted(reason);
+    }
+
+    /// What the table reported of the turn.
+    #[must_use]
+    pub fn journal(&self) -> Option<&TurnJournal> {
+        self.writer.session.journal()
     }
 
     /// Judges the take and closes its session. Each frame gets the angle (degrees) that `angle`

@@ -190,7 +190,13 @@ fn a_track_has_residuals_and_counts() {
 fn turns_without_a_track_are_distinguished_by_their_cause() {
     let reports = USUAL.reports(1);
     let few = fit(&reports[200..210], &EXPECTED);
-    assert_eq!(few, Err(TrackError::TooFew { polls: 10 }));
+    assert_eq!(
+        few,
+        Err(TrackError::TooFew {
+            polls: 10,
+            needed: 12
+        })
+    );
     assert!(matches!(
         fit(&reports[..400], &EXPECTED),
         Err(TrackError::Gaps { .. })
