@@ -463,6 +463,9 @@ fn an_unplugged_camera_leaves_what_was_recorded() {
     take.check_rejected("/dev/video0 was unplugged");
     take.check_rejected("45 of 120 frames");
     assert_eq!(take.frames_in_video(), 45);
+    // The frames after it were never due.
+    assert_eq!(take.counts(), (45, 0));
+    assert!(take.faults().is_empty(), "{:?}", take.faults());
     assert!(take.recording.notices[0].text().contains("unplugged"));
 }
 
@@ -660,6 +663,17 @@ fn child_that_records_into_a_limit() {
     let take = record(&root, 0, steps(stream(200, 0)));
     let (recorded, dropped) = take.counts();
     assert_eq!(recorded + dropped, 120, "{:?}", take.faults());
+    // One number, wherever it stands.
+    let same = [
+        format!("for the rest of the turn ({dropped} frames)"),
+        format!("took no more: {dropped} frames from frame {recorded} on"),
+    ];
+    assert!(take.rejection().contains(&same[0]), "{}", take.rejection());
+    assert!(
+        take.faults().iter().any(|fault| fault.contains(&same[1])),
+        "{:?}",
+        take.faults()
+    );
     println!("REASON {}", take.rejection());
 }
 
