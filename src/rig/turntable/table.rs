@@ -31,6 +31,7 @@ pub struct Table {
     _io_thread: IoThread,
     _claim: Option<Claim>,
     identity: Identity,
+    was_stopped: bool,
     /// Whether a line waits for its answer.
     line_open: Waitable<bool>,
 }
@@ -64,7 +65,7 @@ impl Table {
     ) -> Result<Table, TurntableError> {
         let resets = port.resets();
         let (link, io_thread) = Link::start(port, &options.clock, greeting::UNKNOWN_CONTROLLER)?;
-        let identity = greeting::greet(&link, resets, options)?;
+        let (identity, was_stopped) = greeting::greet(&link, resets, options)?;
         let server = claim.as_ref().map(|claim| claim.serve(link.clone()));
         Ok(Table {
             server: server.transpose()?,
@@ -72,6 +73,7 @@ impl Table {
             _io_thread: io_thread,
             _claim: claim,
             identity,
+            was_stopped,
             line_open: Waitable::new(&options.clock, false),
         })
     }
@@ -80,6 +82,12 @@ impl Table {
     #[must_use]
     pub fn identity(&self) -> &Identity {
         &self.identity
+    }
+
+    /// Whether the table was moving when it was opened, and had to be stopped: nobody had it.
+    #[must_use]
+    pub fn was_stopped(&self) -> bool {
+        self.was_stopped
     }
 
     /// Counters of lines, reports and wire errors since the table was opened.
