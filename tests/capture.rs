@@ -197,6 +197,8 @@ fn manifest() -> Manifest {
             version: "1".to_owned(),
             commit: String::new(),
         },
+        note: None,
+        rating: None,
     }
 }
 

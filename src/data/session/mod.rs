@@ -18,6 +18,7 @@ mod journal;
 mod lock;
 mod manifest;
 mod recording;
+mod remarks;
 mod writer;
 
 pub use crate::naming::is_session_name;
@@ -31,6 +32,7 @@ pub use manifest::{
     Status, TurntableFacts, VideoFacts, object_of,
 };
 pub use recording::{Notice, Recording, recordings};
+pub use remarks::remark;
 pub use writer::SessionWriter;
 
 /// Name of the manifest in a session folder.
