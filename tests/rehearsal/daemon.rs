@@ -281,3 +281,43 @@ fn after_an_emergency_stop_one_command_brings_the_table_back() {
     let state = once(&daemon, |state| state.last_take.is_some());
     assert_eq!(state.last_take.unwrap().verdict, Verdict::Clean);
 }
+
+#[test]
+fn settings_are_shown_and_changed_while_the_rig_rests() {
+    let root = tempfile::tempdir().unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "none")).unwrap();
+    let before = once(&daemon, |state| state.camera.present).settings;
+    assert_eq!((before.degrees_per_second, before.max_dropped), (36.0, 0));
+    let configure = |fps, max_dropped| Command::Configure {
+        size: None,
+        fps,
+        degrees_per_second: None,
+        max_dropped,
+        retries: None,
+    };
+    let refused = daemon.command(configure(Some(0.0), None)).unwrap_err();
+    assert!(matches!(refused, Refused::Invalid(_)), "{refused}");
+    daemon.command(configure(None, Some(7))).unwrap();
+    let after = once(&daemon, |state| state.settings.max_dropped == 7).settings;
+    assert_eq!((after.fps, after.degrees_per_second), (before.fps, 36.0));
+    // A rate that the camera does not have shows at the camera, and can be taken back.
+    once(&daemon, |_| {
+        daemon.command(configure(Some(60.0), None)).is_ok()
+    });
+    let state = once(&daemon, |state| {
+        !state.camera.present && state.camera.fault.is_some()
+    });
+    assert!(state.camera.fault.unwrap().contains("60"));
+    once(&daemon, |_| {
+        daemon.command(configure(Some(30.0), None)).is_ok()
+    });
+    once(&daemon, |state| state.camera.present);
+    assert!(
+        daemon
+            .monitor()
+            .state()
+            .log
+            .iter()
+            .any(|line| line.what.contains("60"))
+    );
+}

@@ -38,6 +38,7 @@ impl CaptureContext<'_> {
         self.monitor.update(|state| {
             (state.frames, state.dropped) = (take.frames, take.dropped);
             state.session = None;
+            state.note(format!("{}: {} frames", take.session, take.frames));
             state.last_take = Some(take.clone());
         });
     }

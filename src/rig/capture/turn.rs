@@ -168,6 +168,7 @@ fn fault_of(status: &TableStatus) -> Option<String> {
 /// Asks the table and shows its answer.
 pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), TurntableError> {
     let status = table.status()?;
+    let (low_deg, high_deg) = table.limits(&status);
     monitor.update(|state| {
         state.table = TableState {
             present: true,
@@ -176,6 +177,8 @@ pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), Turntab
             degrees_per_second: Some(status.degrees_per_second),
             homed: status.homed,
             battery_v: status.battery_v,
+            low_deg: Some(low_deg),
+            high_deg: Some(high_deg),
             emergency_stop: status.emergency_stop,
             locked: status.state == ControllerState::Alarm,
             fault: fault_of(&status),

@@ -23,7 +23,7 @@ use crate::clock::{Clock, JoinHandle};
 use crate::lockfile::LockFile;
 use crate::preview::Preview;
 use crate::serve::rig::{Command, Refused, Rig};
-use crate::state::Monitor;
+use crate::state::{CaptureSettings, Monitor, RigState};
 use dispatcher::Dispatcher;
 use schedule::Job;
 use worker::Worker;
@@ -51,8 +51,11 @@ impl Daemon {
     pub fn start(settings: Settings) -> Result<Self, CaptureError> {
         let locks = (LockFile::of_root(&settings.root)?, settings.lock_camera()?);
         let root = settings.root.clone();
+        let shown = settings.shown();
         let equipment = Equipment::for_viewers(settings)?;
         let dispatcher = Arc::new(Dispatcher::new(equipment.clock()));
+        let show = |state: &mut RigState| state.settings = shown;
+        dispatcher.monitor().update(show);
         report_salvaged(&root, &equipment.clock(), dispatcher.monitor())?;
         let wants_table = equipment.wants_table();
         let thread = |source| CaptureError::system("a thread", "started")(source);
@@ -156,6 +159,25 @@ impl Rig for Daemon {
             Command::Jog { degrees } => self.jog(degrees),
             Command::Unlock => self.move_table(Job::Unlock),
             Command::Reset => self.move_table(Job::ResetTable),
+            Command::Configure {
+                size,
+                fps,
+                degrees_per_second,
+                max_dropped,
+                retries,
+            } => {
+                let now = self.dispatcher.monitor().state().settings;
+                let settings = CaptureSettings {
+                    size: size.or(now.size),
+                    fps: fps.unwrap_or(now.fps),
+                    degrees_per_second: degrees_per_second.unwrap_or(now.degrees_per_second),
+                    max_dropped: max_dropped.unwrap_or(now.max_dropped),
+                    retries: retries.unwrap_or(now.retries),
+                    ..now
+                };
+                check_settings(&settings)?;
+                dispatcher.change(|schedule| schedule.submit(Job::Configure(settings)))
+            }
             Command::SetControl { name, value } => {
                 dispatcher.change(|schedule| schedule.submit(Job::SetControl { name, value }))
             }
@@ -203,6 +225,32 @@ impl Drop for PanicReport {
         if thread::panicking() {
             self.0.fail();
         }
+    }
+}
+
+/// The same bounds as on the command line.
+fn check_settings(settings: &CaptureSettings) -> Result<(), Refused> {
+    let size = settings
+        .size
+        .is_none_or(|(width, height)| width > 0 && height > 0);
+    let wrong = [
+        (!size, "a frame's size has two numbers above 0"),
+        (
+            !(1.0..=1000.0).contains(&settings.fps),
+            "the frame rate goes from 1 to 1000 frames/s",
+        ),
+        (
+            !(0.1..=360.0).contains(&settings.degrees_per_second),
+            "the speed goes from 0.1 to 360 degrees/s",
+        ),
+        (
+            settings.retries > 100,
+            "a take is repeated 100 times at most",
+        ),
+    ];
+    match wrong.iter().find(|(is_wrong, _)| *is_wrong) {
+        Some((_, why)) => Err(Refused::Invalid((*why).to_owned())),
+        None => Ok(()),
     }
 }
 

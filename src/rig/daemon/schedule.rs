@@ -15,6 +15,7 @@
 use std::collections::VecDeque;
 
 use crate::serve::rig::Refused;
+use crate::state::CaptureSettings;
 
 /// Objects that can wait for their turn.
 const LONGEST_QUEUE: usize = 100;
@@ -35,6 +36,7 @@ pub(super) enum Job {
     Unlock,
     /// Resets, unlocks and homes the table.
     ResetTable,
+    Configure(CaptureSettings),
     SetControl {
         name: String,
         value: i64,

@@ -106,9 +106,9 @@ async fn converse(socket: TcpStream, router: Router, limits: ClientLimits, shutd
     let Ok(local) = socket.local_addr() else {
         return;
     };
-    let began = timeout(limits.first_byte, socket.readable());
-    let began = shutdown.run_until_cancelled(began).await;
-    if !matches!(began, Some(Ok(Ok(())))) {
+    let mut first = [0];
+    let began = timeout(limits.first_byte, socket.peek(&mut first));
+    if !matches!(shutdown.run_until_cancelled(began).await, Some(Ok(Ok(1)))) {
         return;
     }
     // Events are small and wanted at once. A socket that refuses is slower, not wrong.

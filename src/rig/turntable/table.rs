@@ -112,6 +112,12 @@ impl Table {
         self.link.status()
     }
 
+    /// The range in which the table may turn, degrees from the angle 0.
+    #[must_use]
+    pub fn limits(&self, status: &TableStatus) -> (f64, f64) {
+        self.identity.limits_from(status)
+    }
+
     /// Turns by `degrees` and waits until the table has arrived. `speed` in degrees/s; without it,
     /// at most 30.
     ///
