@@ -34,7 +34,7 @@ impl fmt::Display for Alarm {
             7 => "a door opened while it looked for the index: close it and home again",
             8 => "the index sensor stayed active after it was left: check sensor and $27",
             9 => "no index was found within a turn: check the sensor, its wiring and $5",
-            10 => "the emergency stop was pressed, its position is lost: release it, then reset and home the table",
+            10 => "the emergency stop was pressed, its position is lost: once it is released, reset and home the table",
             20 => "the host was silent longer than its lease, the position is kept: unlock it",
             _ => "an alarm this program does not know: see the firmware's manual",
         })

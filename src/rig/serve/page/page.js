@@ -113,8 +113,7 @@ function showTake() {
   const { phase, object, frames, frames_wanted: wanted, dropped, table } = state;
   const part = wanted > 0 ? Math.min(frames / wanted, 1) : 0;
   const busy = !resting();
-  const rest = { true: "The table is locked", false: state.camera.present ? PHASES.idle : "No camera" }[alarmed()];
-  const ready = phase !== "idle" ? PHASES[phase] : moving() ? "The table moves" : rest;
+  const ready = phase !== "idle" ? PHASES[phase] : atRest();
   $("phase").textContent = ready ?? phase;
   const left = phase === "recording" && state.settings.degrees_per_second > 0 ? ` · ${Math.ceil(((1 - part) * 360) / state.settings.degrees_per_second)} s left` : "";
   $("what").textContent = object && busy ? `${object}${left}` : "";
@@ -127,12 +126,19 @@ function showTake() {
   const counts = busy ? [make("span", { text: `${frames} / ${wanted} · ` }), make("span", { text: `${dropped} dropped`, className: dropped > 0 ? "bad" : "" })] : [];
   $("counts").replaceChildren(...counts);
   const take = state.last_take;
-  $("last").hidden = !take;
+  $("last").hidden = !take || alarmed();
   $("again").hidden = !take || take.verdict === "clean" || !resting() || alarmed();
   if (!take) return;
   const words = make("b", { text: VERDICTS[take.verdict] ?? take.verdict, className: take.verdict === "clean" ? "good" : "bad" });
   const rest = `: ${take.frames} frames, ${take.dropped} dropped, ${take.session}.${take.reason ? ` ${take.reason}` : ""}`;
   $("last-text").replaceChildren(words, rest);
+}
+
+/** What is said while nothing is captured. */
+function atRest() {
+  if (alarmed()) return "The table is locked";
+  if (moving()) return "The table moves";
+  return state.camera.present ? PHASES.idle : "No camera";
 }
 
 /** What the big button does now. */
@@ -158,7 +164,9 @@ function showGo() {
 }
 
 function showFaults() {
-  const faults = state.faults.filter(({ t_us }) => t_us > seenFault).reverse();
+  // What is wrong now is said above.
+  const now = [state.camera.fault, state.table.fault];
+  const faults = state.faults.filter(({ t_us, what }) => t_us > seenFault && !now.includes(what)).reverse();
   $("faults").hidden = faults.length === 0;
   const lines = faults.slice(0, 10).map(({ what }) => what);
   const same = [...$("fault-list").children].map((line) => line.textContent);
@@ -268,7 +276,7 @@ function showLog() {
   const key = JSON.stringify(lines);
   if ($("log").dataset.key === key) return;
   $("log").dataset.key = key;
-  const time = (at) => new Date(at).toLocaleTimeString([], { timeStyle: "medium" });
+  const time = (at) => new Date(at).toLocaleTimeString([], { timeStyle: "medium", hour12: false });
   $("log").replaceChildren(...lines.map(({ at, what }) => make("li", {}, make("span", { text: time(at) }), make("span", { text: what }))));
 }
 
