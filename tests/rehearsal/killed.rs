@@ -160,6 +160,7 @@ fn kill_in_the_turn(frames: u64) -> f64 {
             killed = true;
         }
     }
+    child.wait().unwrap();
     assert!(killed);
     assert_eq!(salvage(root.path()).unwrap().len(), 1);
     let (recording, entries) = only_session(root.path());
