@@ -1,6 +1,8 @@
 //! The emergency stop, pressed and released while a host has the table.
 
-use relit_rig::turntable::{Alarm, ControllerState, Homed, Table, TurntableError};
+use std::time::Duration;
+
+use relit_rig::turntable::{Alarm, ControllerState, Homed, Port, Table, TurntableError};
 
 use crate::rig::{Rig, turn_by};
 
@@ -79,4 +81,28 @@ fn after_the_release_reset_and_also_unlock_and_home_bring_the_table_back() {
             .wait_end()
             .unwrap();
     }
+}
+
+#[test]
+fn a_table_with_an_index_is_reset_unlocked_and_homed_to_it() {
+    let rig = Rig::new("");
+    let mut port = rig.simulated.open();
+    rig.options.clock.sleep(Duration::from_secs(1));
+    port.write(b"$22=1\n").unwrap();
+    rig.options.clock.sleep(Duration::from_secs(1));
+    drop(port);
+    let table = rig.open();
+    assert_eq!(table.home().unwrap(), Homed::Index);
+    rig.simulated.press_emergency_stop(true);
+    rig.options.clock.sleep(Duration::from_millis(200));
+    assert!(table.status().unwrap().emergency_stop);
+    rig.simulated.press_emergency_stop(false);
+    assert_eq!(table.reset().unwrap(), Homed::Index);
+    let status = table.status().unwrap();
+    assert_eq!((status.state, status.homed), (ControllerState::Idle, true));
+    table
+        .start_turn(turn_by(&table, 90.0))
+        .unwrap()
+        .wait_end()
+        .unwrap();
 }

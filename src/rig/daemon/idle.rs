@@ -236,3 +236,23 @@ fn held_controls(camera: &mut dyn Camera) -> Vec<(String, i64)> {
     held.filter_map(|step| Some((step.name.clone(), value(&step.name)?)))
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::Settings;
+
+    #[test]
+    fn the_frame_rate_is_the_cameras_also_where_frames_have_waited() {
+        let (camera, table) = ("replay:a".parse().unwrap(), "none".parse().unwrap());
+        let settings = Settings::new("/root".into(), camera, table);
+        let monitor = Monitor::default();
+        let preview = Preview::start(monitor.clone()).unwrap();
+        let equipment = Equipment::new(settings).unwrap();
+        let mut idle = Idle::new(&equipment, monitor.clone(), preview);
+        // After a take they come all at once.
+        (0..40).for_each(|n| idle.count(33_333 * n));
+        let fps = monitor.state().camera.fps.unwrap();
+        assert!((fps - 30.0).abs() < 0.1, "{fps}");
+    }
+}

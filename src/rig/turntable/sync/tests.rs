@@ -274,3 +274,13 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn reports_that_lie_on_no_line_are_not_compared_with_others() {
+    let text = |outliers| {
+        let polls = 98;
+        TrackError::Uneven { outliers, polls }.to_string()
+    };
+    assert!(text(30).starts_with("30 of 98 reports lie off the line of the others"));
+    assert!(text(98).starts_with("the 98 reports lie on no straight line"));
+}
