@@ -265,6 +265,13 @@ impl Phase {
         own: &Model,
         turns: &TurnTensors,
     ) -> Result<Vec<(&'static str, f64)>, TrainError> {
+        let whole = |found| {
+            (
+                turns.picture.shallow_clone(),
+                found,
+                turns.mask.shallow_clone(),
+            )
+        };
         let (raw, found, mask) = match self {
             Self::Spec => {
                 let Some((picture, mask)) = saturated_frames(turns)? else {
@@ -273,22 +280,8 @@ impl Phase {
                 let found = diffuse_chromaticity(own, &picture, &mask)?;
                 (chromaticity(&picture)?, found, mask)
             }
-            Self::Light { normal, spec } => {
-                let found = reflectance(normal, own, spec.as_ref(), turns)?;
-                (
-                    turns.picture.shallow_clone(),
-                    found,
-                    turns.mask.shallow_clone(),
-                )
-            }
-            Self::Joint { light, spec } => {
-                let found = reflectance(own, light, spec.as_ref(), turns)?;
-                (
-                    turns.picture.shallow_clone(),
-                    found,
-                    turns.mask.shallow_clone(),
-                )
-            }
+            Self::Light { normal, spec } => whole(reflectance(normal, own, spec.as_ref(), turns)?),
+            Self::Joint { light, spec } => whole(reflectance(own, light, spec.as_ref(), turns)?),
             Self::Normal | Self::Specular { .. } => return Ok(Vec::new()),
         };
         let (raw, found) = (rank_figures(&raw, &mask)?, rank_figures(&found, &mask)?);
