@@ -17,7 +17,7 @@ pub(super) trait MapsNet: Send + Sync {
     fn answer(&self, encoded: &[f32]) -> Result<Vec<f32>, NetError>;
 }
 
-/// The network in its engine.
+/// The network in an engine.
 pub(super) struct Engine {
     pub(super) inference: Inference,
     pub(super) side: usize,

@@ -11,7 +11,7 @@ use super::other::OtherNormals;
 use super::region::{Region, cut_out, enlarged, inside};
 use crate::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use crate::light::{Normals, ShLight, YUp};
-use crate::nets::{Inference, NetError, Weights, decomposer};
+use crate::nets::{Inference, InferenceEngine, NetError, Weights, decomposer};
 use crate::render::{DiffuseForm, DiffuseLayer, NormalsFrame, fit_light};
 
 /// Width and height of the picture that the network sees.
@@ -125,6 +125,7 @@ pub struct Decomposition {
 pub struct Decomposer {
     looks: Looks,
     normals: Option<OtherNormals>,
+    engine: InferenceEngine,
 }
 
 impl std::fmt::Debug for Decomposer {
@@ -132,6 +133,7 @@ impl std::fmt::Debug for Decomposer {
         f.debug_struct("Decomposer")
             .field("side", &self.side())
             .field("normals", &self.normals)
+            .field("engine", &self.engine)
             .finish()
     }
 }
@@ -150,12 +152,20 @@ impl Decomposer {
     /// # Errors
     /// [`DecomposeError::NoWeights`] where it was built without.
     pub fn shipped() -> Result<Self, DecomposeError> {
+        Self::new(&Self::shipped_weights()?)
+    }
+
+    /// The weights that come with the program.
+    ///
+    /// # Errors
+    /// [`DecomposeError::NoWeights`] where it was built without.
+    pub fn shipped_weights() -> Result<Weights, DecomposeError> {
         let bytes = super::shipped::WEIGHTS.ok_or(DecomposeError::NoWeights)?;
         let weights = Weights::from_bytes(bytes).map_err(|fault| NetError::File {
             path: super::shipped::NAME.into(),
             fault,
         })?;
-        Self::new(&weights)
+        Ok(weights)
     }
 
     /// The network with these weights, for pictures of `side` x `side` pixels, a multiple of 32.
@@ -163,22 +173,42 @@ impl Decomposer {
     /// # Errors
     /// Where the weights are not this network's, or it cannot take such pictures.
     pub fn with_side(weights: &Weights, side: usize) -> Result<Self, DecomposeError> {
+        Self::with_engine(weights, side, InferenceEngine::default())
+    }
+
+    /// The same, computed by an engine; so is another network for normals.
+    ///
+    /// # Errors
+    /// Where the weights are not this network's, or it cannot take such pictures.
+    pub fn with_engine(
+        weights: &Weights,
+        side: usize,
+        engine: InferenceEngine,
+    ) -> Result<Self, DecomposeError> {
         let graph = decomposer();
         let look = |side: usize| -> Result<Box<dyn MapsNet>, NetError> {
-            let inference = Inference::new(&graph, weights, (side, side))?;
+            let inference = Inference::with_engine(&graph, weights, (side, side), &engine)?;
             Ok(Box::new(Engine { inference, side }))
         };
         let has_half = side.is_multiple_of(2 * graph.multiple());
         let half = || has_half.then(|| look(side / 2)).transpose();
         let (full, half) = rayon::join(|| look(side), half);
-        Ok(Self::of(full?, half?))
+        let found = Self::of(full?, half?);
+        Ok(Self { engine, ..found })
     }
 
     pub(super) fn of(full: Box<dyn MapsNet>, half: Option<Box<dyn MapsNet>>) -> Self {
         Self {
             looks: Looks { full, half },
             normals: None,
+            engine: InferenceEngine::default(),
         }
+    }
+
+    /// What computes its networks.
+    #[must_use]
+    pub fn engine(&self) -> &InferenceEngine {
+        &self.engine
     }
 
     /// Takes the normals of another network from now on, in an ONNX file. It takes one picture,
@@ -189,7 +219,8 @@ impl Decomposer {
     /// # Errors
     /// Where the file cannot be read or run, or answers something else; then all stays as it was.
     pub fn set_normals(&mut self, path: &Path, frame: NormalsFrame) -> Result<(), DecomposeError> {
-        self.normals = Some(OtherNormals::read(path, self.side(), frame)?);
+        let side = self.side();
+        self.normals = Some(OtherNormals::read(path, side, frame, &self.engine)?);
         Ok(())
     }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::image::{ColourSpace, Extent, Planes, Srgb};
 use crate::light::{Normals, YDown, YUp};
-use crate::nets::{Inference, NetError};
+use crate::nets::{Inference, InferenceEngine, NetError};
 use crate::render::NormalsFrame;
 
 /// A network for normals.
@@ -20,9 +20,14 @@ pub(super) struct OtherNormals {
 }
 
 impl OtherNormals {
-    pub(super) fn read(path: &Path, side: usize, frame: NormalsFrame) -> Result<Self, NetError> {
+    pub(super) fn read(
+        path: &Path,
+        side: usize,
+        frame: NormalsFrame,
+        engine: &InferenceEngine,
+    ) -> Result<Self, NetError> {
         let other = Self {
-            net: Inference::read_onnx(path, 3, (side, side))?,
+            net: Inference::read_onnx(path, 3, (side, side), engine)?,
             side,
             frame,
         };

@@ -81,6 +81,26 @@ pub enum NetError {
         /// What it needs.
         needs: String,
     },
+    /// A library of an engine that is not installed.
+    #[error(
+        "there is no ONNX Runtime at {path}: install it and set ORT_DYLIB_PATH to its library, or use --engine tract",
+        path = .path.display()
+    )]
+    NoLibrary {
+        /// Where it was looked for.
+        path: PathBuf,
+    },
+    /// A library of an engine that is there and cannot be used.
+    #[error(
+        "{path} cannot be used as ONNX Runtime: {fault}; set ORT_DYLIB_PATH to the library of version 1.17 or later, or use --engine tract",
+        path = .path.display()
+    )]
+    Library {
+        /// The library.
+        path: PathBuf,
+        /// What is wrong with it.
+        fault: String,
+    },
     /// The inference engine failed.
     #[error("{engine} could not {doing} {net}: {fault}")]
     Engine {

@@ -1,53 +1,65 @@
-//! Running a network on the CPU, with nothing installed: the ONNX file, made in memory, by tract.
+//! Running a network on the CPU: the ONNX file, made in memory, by an engine.
 
 use std::path::Path;
 
-use tract_onnx::prelude::{
-    DatumExt, Framework, InferenceModelExt, IntoRunnable, TValue, Tensor as TractTensor,
-    TypedRunnableModel, tvec,
-};
-
+use super::engine::{InferenceEngine, Plan};
 use super::error::NetError;
 use super::graph::Graph;
 use super::onnx::to_onnx;
 use super::weights::{Tensor, Weights};
 
-const ENGINE: &str = "tract";
-
 /// A network ready to be run on single pictures of one size.
 pub struct Inference {
     name: &'static str,
+    engine: &'static str,
     shape: [usize; 4],
-    plan: std::sync::Arc<TypedRunnableModel>,
+    plan: Box<dyn Plan>,
 }
 
 impl std::fmt::Debug for Inference {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Inference")
             .field("name", &self.name)
+            .field("engine", &self.engine)
             .field("shape", &self.shape)
             .finish_non_exhaustive()
     }
 }
 
 impl Inference {
+    /// Makes a network ready for pictures of `width` x `height` pixels, by tract.
+    ///
+    /// # Errors
+    /// [`NetError::PictureSize`], what [`Weights::fitted_to`] answers, or [`NetError::Engine`].
+    pub fn new(graph: &Graph, weights: &Weights, size: (usize, usize)) -> Result<Self, NetError> {
+        Self::with_engine(graph, weights, size, &InferenceEngine::default())
+    }
+
     /// Makes a network ready for pictures of `width` x `height` pixels.
     ///
     /// # Errors
     /// [`NetError::PictureSize`], what [`Weights::fitted_to`] answers, or [`NetError::Engine`].
-    pub fn new(
+    pub fn with_engine(
         graph: &Graph,
         weights: &Weights,
         (width, height): (usize, usize),
+        engine: &InferenceEngine,
     ) -> Result<Self, NetError> {
         let bytes = to_onnx(graph, weights, 1, (width, height))?;
-        let plan = tract_onnx::onnx()
-            .model_for_read(&mut bytes.as_slice())
-            .and_then(|model| model.into_optimized()?.into_runnable());
+        let shape = [1, graph.input_channels(), height, width];
+        let plan = engine
+            .prepare(&bytes, shape)
+            .map_err(|fault| NetError::Engine {
+                engine: engine.name(),
+                doing: "prepare",
+                net: graph.name(),
+                fault,
+            });
         Ok(Self {
             name: graph.name(),
-            shape: [1, graph.input_channels(), height, width],
-            plan: plan.map_err(|fault| engine(graph.name(), "prepare", &fault))?,
+            engine: engine.name(),
+            shape,
+            plan: plan?,
         })
     }
 
@@ -60,6 +72,7 @@ impl Inference {
         path: &Path,
         channels: usize,
         (width, height): (usize, usize),
+        engine: &InferenceEngine,
     ) -> Result<Self, NetError> {
         let bytes = std::fs::read(path).map_err(|source| NetError::Io {
             path: path.to_owned(),
@@ -67,17 +80,17 @@ impl Inference {
             source,
         })?;
         let shape = [1, channels, height, width];
-        let plan = tract_onnx::onnx()
-            .model_for_read(&mut bytes.as_slice())
-            .and_then(|model| model.with_input_fact(0, f32::fact(shape).into()))
-            .and_then(|model| model.into_optimized()?.into_runnable());
+        let plan = engine
+            .prepare(&bytes, shape)
+            .map_err(|fault| NetError::Onnx {
+                path: path.to_owned(),
+                fault,
+            });
         Ok(Self {
             name: "the network of the ONNX file",
+            engine: engine.name(),
             shape,
-            plan: plan.map_err(|fault| NetError::Onnx {
-                path: path.to_owned(),
-                fault: format!("{fault:#}"),
-            })?,
+            plan: plan?,
         })
     }
 
@@ -98,30 +111,11 @@ impl Inference {
                 ),
             });
         }
-        let failed = |fault: &dyn std::fmt::Display| engine(self.name, "run", fault);
-        let input = TractTensor::from_shape(&self.shape, input).map_err(|fault| failed(&fault))?;
-        let outputs = self
-            .plan
-            .run(tvec!(TValue::from(input)))
-            .map_err(|fault| failed(&fault))?;
-        outputs
-            .iter()
-            .map(|output| {
-                let view = output
-                    .to_plain_array_view::<f32>()
-                    .map_err(|fault| failed(&fault))?;
-                let tensor = Tensor::new(view.shape().to_vec(), view.iter().copied().collect());
-                tensor.ok_or_else(|| failed(&"an output has no shape"))
-            })
-            .collect()
-    }
-}
-
-fn engine(net: &'static str, doing: &'static str, fault: &dyn std::fmt::Display) -> NetError {
-    NetError::Engine {
-        engine: ENGINE,
-        doing,
-        net,
-        fault: format!("{fault:#}"),
+        self.plan.run(input).map_err(|fault| NetError::Engine {
+            engine: self.engine,
+            doing: "run",
+            net: self.name,
+            fault,
+        })
     }
 }

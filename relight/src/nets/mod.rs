@@ -3,7 +3,7 @@
 //!
 //! [`paper`] has the paper's four networks with the released shapes and parameter names, and
 //! [`decomposer`] ours. [`Weights`] reads safetensors and PyTorch's state dicts (a reader that
-//! executes nothing), [`to_onnx`] writes what any engine runs, and [`Inference`] runs it here.
+//! executes nothing), [`to_onnx`] writes what any engine runs, and [`Inference`] runs it here, by an [`InferenceEngine`].
 //! Knows nothing of pictures, colour or light: tensors go in and come out.
 //!
 //! ```
@@ -18,21 +18,26 @@
 //! ```
 
 mod decomposer;
+mod engine;
 mod error;
 mod files;
 mod graph;
 mod inference;
 mod onnx;
+mod onnxruntime;
 pub mod paper;
 mod parameter;
 mod pickle;
+mod tract;
 mod weights;
 
 pub use decomposer::{INPUTS, OUTPUTS, decomposer};
+pub use engine::InferenceEngine;
 pub use error::NetError;
 pub use files::WeightPrecision;
 pub use graph::{EPSILON, Graph, Node, Operation, Output, Value};
 pub use inference::Inference;
 pub use onnx::{INPUT, check_size, to_onnx};
+pub use onnxruntime::OnnxRuntime;
 pub use parameter::{Parameter, Role};
 pub use weights::{Tensor, Weights};

@@ -1,5 +1,6 @@
 //! `relight decompose`: photographs into normals, albedo, shading, highlight and light.
 
+use std::env;
 use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -7,9 +8,9 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use relight::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, DecompositionFigures, DecompositionFiles,
-    MaskSource, PhotoInput, PhotoReading, Rectangle, SpecularGate, WorkingSize,
+    MaskSource, PhotoInput, PhotoReading, Rectangle, SpecularGate, WORKING_SIDE, WorkingSize,
 };
-use relight::nets::Weights;
+use relight::nets::{InferenceEngine, NetError, OnnxRuntime, Weights};
 use relit_data::causes::with_causes;
 use serde_json::json;
 
@@ -61,6 +62,9 @@ pub(in crate::cli) struct Arguments {
     /// Which way y points in that network's normals.
     #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up, requires = "normals")]
     normals_y: YName,
+    /// What computes the network.
+    #[arg(long, value_enum, default_value_t = EngineName::Tract)]
+    engine: EngineName,
     /// How PNG and JPEG files are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
     #[arg(long, value_enum)]
     transfer: Option<TransferName>,
@@ -76,6 +80,16 @@ enum SizeName {
     S256,
     /// At 256 x 256 pixels, and finer by tiles of the photograph at its own size.
     Native,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum EngineName {
+    /// A part of this program.
+    Tract,
+    /// The library of ONNX Runtime at ORT_DYLIB_PATH, or where the system finds it: faster.
+    Onnxruntime,
+    /// ONNX Runtime where it is installed, else tract.
+    Auto,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -131,15 +145,16 @@ impl Arguments {
     }
 
     /// The network, and how its weights are named.
-    fn decomposer(&self) -> Result<(Decomposer, String), DecomposeError> {
-        let (mut decomposer, name) = match &self.weights {
-            None => (Decomposer::shipped()?, "shipped".to_owned()),
+    fn decomposer(&self, console: Console) -> Result<(Decomposer, String), DecomposeError> {
+        let (weights, name) = match &self.weights {
+            None => (Decomposer::shipped_weights()?, "shipped".to_owned()),
             Some(path) => {
-                let decomposer = Decomposer::new(&Weights::read(path)?)?;
                 let name = path.file_name().unwrap_or(path.as_os_str());
-                (decomposer, name.to_string_lossy().into_owned())
+                (Weights::read(path)?, name.to_string_lossy().into_owned())
             }
         };
+        let engine = self.engine.engine(console)?;
+        let mut decomposer = Decomposer::with_engine(&weights, WORKING_SIDE, engine)?;
         if let Some(path) = &self.normals {
             decomposer.set_normals(path, self.normals_y.into())?;
         }
@@ -147,9 +162,35 @@ impl Arguments {
     }
 }
 
+impl EngineName {
+    fn engine(self, console: Console) -> Result<InferenceEngine, NetError> {
+        let named = env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty());
+        let load = || {
+            let path = named
+                .clone()
+                .unwrap_or_else(|| OnnxRuntime::library().into());
+            OnnxRuntime::load(path.as_ref()).map(InferenceEngine::OnnxRuntime)
+        };
+        match self {
+            Self::Tract => Ok(InferenceEngine::Tract),
+            Self::Onnxruntime => load(),
+            Self::Auto => Ok(load().unwrap_or_else(|fault| {
+                // Nobody asked for a library that is not installed.
+                if named.is_some() || !matches!(fault, NetError::NoLibrary { .. }) {
+                    let text = with_causes(&fault);
+                    let event = json!({ "event": "engine", "message": text });
+                    console.warn(&format!("tract is used: {text}"), &event);
+                }
+                InferenceEngine::Tract
+            })),
+        }
+    }
+}
+
 pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let inputs = PhotoInput::find(&arguments.photos, arguments.count)?;
-    let run = Run::new(arguments, inputs.len() > 1 || arguments.has_set())?;
+    let own_folders = inputs.len() > 1 || arguments.has_set();
+    let run = Run::new(arguments, own_folders, console)?;
     if !run.own_folders
         && let [input] = inputs.as_slice()
     {
@@ -186,8 +227,12 @@ struct Run {
 }
 
 impl Run {
-    fn new(arguments: &Arguments, own_folders: bool) -> Result<Self, Box<dyn Error>> {
-        let (decomposer, weights) = arguments.decomposer()?;
+    fn new(
+        arguments: &Arguments,
+        own_folders: bool,
+        console: Console,
+    ) -> Result<Self, Box<dyn Error>> {
+        let (decomposer, weights) = arguments.decomposer(console)?;
         Ok(Self {
             decomposer,
             weights,
@@ -239,6 +284,7 @@ impl Run {
             "photo": input.place(),
             "output": out,
             "seconds": seconds,
+            "engine": self.decomposer.engine().name(),
             "figures": figures,
         });
         console.say(&text, &event);
