@@ -228,7 +228,9 @@ fn a_folder_with_a_run_is_not_overwritten_and_another_runs_checkpoint_is_refused
     let (mut other, settings) = decompose_task(2);
     let error = make_run(&mut other, &settings, folder.path(), (true, u64::MAX)).unwrap_err();
     assert!(
-        error.to_string().contains("its settings are others"),
+        error
+            .to_string()
+            .contains("its settings are others: run.seed"),
         "{error}"
     );
 }

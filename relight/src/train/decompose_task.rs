@@ -15,7 +15,7 @@ use super::model::{ComputePrecision, Model};
 use super::process_group::ProcessGroup;
 use super::run::{StepLosses, Task, Validation};
 use super::sample::TruthBatch;
-use super::settings::{DecomposeSettings, PrecisionChoice};
+use super::settings::{DecomposeSettings, PrecisionChoice, first_difference};
 use super::sheet::validation_sheet;
 use crate::nets::{Weights, decomposer};
 
@@ -115,6 +115,10 @@ impl Task for DecomposeTask {
     fn settings(&self) -> String {
         // Numbers, names and paths: all of them can be written.
         toml::to_string(&self.settings).unwrap_or_default()
+    }
+
+    fn differing_setting(&self, other: &str) -> Option<String> {
+        first_difference(&self.settings, other)
     }
 
     fn learners(&mut self) -> Vec<&mut Learner> {

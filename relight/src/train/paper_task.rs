@@ -21,7 +21,7 @@ use super::paper_phases::{
 use super::process_group::ProcessGroup;
 use super::run::{StepLosses, Task, Validation};
 use super::sample::TruthBatch;
-use super::settings::{PaperSettings, PrecisionChoice};
+use super::settings::{PaperSettings, PrecisionChoice, first_difference};
 use super::turn_reader::{TurnGroup, TurnReader, TurnTensors};
 use crate::data::Share;
 use crate::nets::paper::{Head, light_net, normal_net, reflectance_net, spec_net};
@@ -327,6 +327,10 @@ impl Task for PaperTask {
     fn settings(&self) -> String {
         // Numbers, names and paths: all of them can be written.
         toml::to_string(&self.settings).unwrap_or_default()
+    }
+
+    fn differing_setting(&self, other: &str) -> Option<String> {
+        first_difference(&self.settings, other)
     }
 
     fn learners(&mut self) -> Vec<&mut Learner> {

@@ -37,6 +37,9 @@ pub trait Task {
     /// The settings that make the run what it is, as TOML.
     fn settings(&self) -> String;
 
+    /// The first setting that another run's settings have otherwise.
+    fn differing_setting(&self, other: &str) -> Option<String>;
+
     /// What it was given beside its settings, as text that is the same where that is.
     fn inputs(&self) -> String {
         String::new()
@@ -483,8 +486,8 @@ fn recall(task: &mut dyn Task, checkpoint: &Checkpoint, folder: &Path) -> Result
             task.name()
         )));
     }
-    if checkpoint.settings != task.settings() {
-        return Err(other("its settings are others".to_owned()));
+    if let Some(setting) = task.differing_setting(&checkpoint.settings) {
+        return Err(other(format!("its settings are others: {setting}")));
     }
     task.go_to(&checkpoint.place).map_err(other)?;
     for learner in task.learners() {

@@ -245,6 +245,31 @@ pub fn read_settings<S: DeserializeOwned>(path: &Path) -> Result<S, TrainError> 
     })
 }
 
+/// The first setting, such as `run.seed`, that another run's settings have otherwise, or why they are none; `None` where
+/// all are the same. What their text does not name has its default, as in a file.
+pub(super) fn first_difference<S: Serialize + DeserializeOwned>(
+    own: &S,
+    other: &str,
+) -> Option<String> {
+    let table = |settings: &S| toml::Table::try_from(settings).unwrap_or_default();
+    match toml::from_str::<S>(other) {
+        Ok(other) => differing_name("", &table(own), &table(&other)),
+        Err(fault) => Some(fault.message().to_owned()),
+    }
+}
+
+fn differing_name(within: &str, one: &toml::Table, two: &toml::Table) -> Option<String> {
+    one.keys().chain(two.keys()).find_map(|key| {
+        let name = format!("{within}{key}");
+        match (one.get(key), two.get(key)) {
+            (Some(toml::Value::Table(one)), Some(toml::Value::Table(two))) => {
+                differing_name(&format!("{name}."), one, two)
+            }
+            (one, two) => (one != two).then_some(name),
+        }
+    })
+}
+
 impl RunSettings {
     /// Whether all numbers are in range.
     ///
@@ -435,6 +460,22 @@ mod tests {
             error.contains("step") && error.contains("line 2"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn the_setting_that_differs_is_named() {
+        let own = DecomposeSettings::default();
+        let whole = toml::to_string(&own).unwrap();
+        assert_eq!(first_difference(&own, &whole), None);
+        let older = whole.replace("validate_every = 250\n", "");
+        assert_ne!(older, whole);
+        assert_eq!(first_difference(&own, &older), None);
+        let other = whole.replace("seed = 1\n", "seed = 2\n");
+        assert_eq!(first_difference(&own, &other).unwrap(), "run.seed");
+        let meshes = format!("{}\nmeshes = \"m\"", "[data]");
+        assert_eq!(first_difference(&own, &meshes).unwrap(), "data.meshes");
+        let unknown = "[run]\nspeed = 3";
+        assert!(first_difference(&own, unknown).unwrap().contains("speed"));
     }
 
     #[test]
