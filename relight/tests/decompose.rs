@@ -180,12 +180,29 @@ fn an_earlier_decomposition_is_replaced_and_nothing_else() {
     write(&photo, &out).unwrap();
     assert!(fs::read(out.join("albedo.png")).unwrap().len() > 100);
 
+    fs::write(out.join("notes.txt"), "mine").unwrap();
+    fs::write(out.join("albedo.png"), "old").unwrap();
+    let text = write(&photo, &out).unwrap_err().to_string();
+    assert!(
+        text.contains("out holds notes.txt, which is no file of"),
+        "{text}"
+    );
+    assert_eq!(fs::read(out.join("notes.txt")).unwrap(), b"mine");
+    assert_eq!(fs::read(out.join("albedo.png")).unwrap(), b"old");
+    fs::remove_file(out.join("notes.txt")).unwrap();
+    fs::create_dir(out.join("mask.png.d")).unwrap();
+    assert!(write(&photo, &out).is_err());
+
     let foreign = folder.path("foreign");
     fs::create_dir(&foreign).unwrap();
-    fs::write(foreign.join("notes.txt"), "mine").unwrap();
+    fs::write(foreign.join("albedo.png"), "mine").unwrap();
     let text = write(&photo, &foreign).unwrap_err().to_string();
-    assert!(text.contains("holds other files"), "{text}");
-    assert_eq!(names_in(&foreign), ["notes.txt"]);
+    assert!(text.contains("foreign holds albedo.png"), "{text}");
+    assert_eq!(names_in(&foreign), ["albedo.png"]);
+    for path in [path.clone(), path.join("in")] {
+        let text = write(&photo, &path).unwrap_err().to_string();
+        assert!(text.contains("cup.png cannot be the folder"), "{text}");
+    }
     let empty = folder.path("empty");
     fs::create_dir(&empty).unwrap();
     write(&photo, &empty).unwrap();

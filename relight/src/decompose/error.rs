@@ -101,10 +101,22 @@ pub enum DecomposeError {
     /// The light cannot be written.
     #[error(transparent)]
     LightFile(#[from] LightFileError),
-    /// A folder for results holds something else.
-    #[error("{} holds other files: give a folder that is new, empty, or holds an earlier decomposition", path.display())]
+    /// A folder for results holds something that is no file of a decomposition.
+    #[error(
+        "{} holds {name}, which is no file of a decomposition: give a folder that is new, empty, or holds an earlier \
+         decomposition and nothing else",
+        path.display()
+    )]
     Foreign {
         /// The folder.
+        path: PathBuf,
+        /// What it holds.
+        name: String,
+    },
+    /// A path for results cannot be a folder.
+    #[error("{} cannot be the folder for the results: give the name of a folder, not of a file", path.display())]
+    NoFolder {
+        /// The path.
         path: PathBuf,
     },
     /// A file or folder cannot be read.
