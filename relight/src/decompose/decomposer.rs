@@ -150,7 +150,7 @@ impl Decomposer {
     /// The network with the weights that come with the program.
     ///
     /// # Errors
-    /// [`DecomposeError::NoWeights`] where it was built without.
+    /// As [`Decomposer::new`].
     pub fn shipped() -> Result<Self, DecomposeError> {
         Self::new(&Self::shipped_weights()?)
     }
@@ -158,14 +158,12 @@ impl Decomposer {
     /// The weights that come with the program.
     ///
     /// # Errors
-    /// [`DecomposeError::NoWeights`] where it was built without.
-    pub fn shipped_weights() -> Result<Weights, DecomposeError> {
-        let bytes = super::shipped::WEIGHTS.ok_or(DecomposeError::NoWeights)?;
-        let weights = Weights::from_bytes(bytes).map_err(|fault| NetError::File {
+    /// [`NetError::File`] where the program was built with a damaged file.
+    pub fn shipped_weights() -> Result<Weights, NetError> {
+        Weights::from_bytes(super::shipped::WEIGHTS).map_err(|fault| NetError::File {
             path: super::shipped::NAME.into(),
             fault,
-        })?;
-        Ok(weights)
+        })
     }
 
     /// The network with these weights, for pictures of `side` x `side` pixels, a multiple of 32.
@@ -234,7 +232,7 @@ impl Decomposer {
     /// of the picture that are negative or no numbers count as black.
     ///
     /// # Errors
-    /// Where the mask has another size or is empty, or the network fails.
+    /// Where the mask has another size or is empty, the picture is black under it, or the network fails.
     pub fn decompose(
         &self,
         picture: &Rgb<Linear>,
@@ -252,6 +250,9 @@ impl Decomposer {
         let mask = region.cut(mask).map(|m| f32::from(u8::from(m >= 0.5)));
         let picture = region.cut(picture.planes()).map(usable);
         let picture = cut_out(&picture, &mask);
+        if !picture.planes().into_iter().flatten().any(|&v| v > 0.0) {
+            return Err(DecomposeError::Unlit);
+        }
         let under = inside(&mask);
         let saturated_fraction = options
             .saturated_fraction
