@@ -180,12 +180,29 @@ fn an_earlier_decomposition_is_replaced_and_nothing_else() {
     write(&photo, &out).unwrap();
     assert!(fs::read(out.join("albedo.png")).unwrap().len() > 100);
 
+    fs::write(out.join("notes.txt"), "mine").unwrap();
+    fs::write(out.join("albedo.png"), "old").unwrap();
+    let text = write(&photo, &out).unwrap_err().to_string();
+    assert!(
+        text.contains("out holds notes.txt, which is no file of"),
+        "{text}"
+    );
+    assert_eq!(fs::read(out.join("notes.txt")).unwrap(), b"mine");
+    assert_eq!(fs::read(out.join("albedo.png")).unwrap(), b"old");
+    fs::remove_file(out.join("notes.txt")).unwrap();
+    fs::create_dir(out.join("mask.png.d")).unwrap();
+    assert!(write(&photo, &out).is_err());
+
     let foreign = folder.path("foreign");
     fs::create_dir(&foreign).unwrap();
-    fs::write(foreign.join("notes.txt"), "mine").unwrap();
+    fs::write(foreign.join("albedo.png"), "mine").unwrap();
     let text = write(&photo, &foreign).unwrap_err().to_string();
-    assert!(text.contains("holds other files"), "{text}");
-    assert_eq!(names_in(&foreign), ["notes.txt"]);
+    assert!(text.contains("foreign holds albedo.png"), "{text}");
+    assert_eq!(names_in(&foreign), ["albedo.png"]);
+    for path in [path.clone(), path.join("in")] {
+        let text = write(&photo, &path).unwrap_err().to_string();
+        assert!(text.contains("cup.png cannot be the folder"), "{text}");
+    }
     let empty = folder.path("empty");
     fs::create_dir(&empty).unwrap();
     write(&photo, &empty).unwrap();
@@ -266,6 +283,105 @@ fn a_file_says_itself_whether_it_is_linear() {
 }
 
 #[test]
+fn a_png_of_high_dynamic_range_is_not_taken_for_srgb() {
+    let folder = Folder::new();
+    let mask = folder.save("mask.png", |path| mask().save(path).unwrap());
+    let load = |function: u8, transfer: Option<Transfer>| {
+        let path = folder.save("photo.png", |path| {
+            let file = BufWriter::new(File::create(path).unwrap());
+            let mut encoder = png::Encoder::new(file, WIDTH, HEIGHT);
+            encoder.set_color(png::ColorType::Rgb);
+            let mut writer = encoder.write_header().unwrap();
+            let points = [9, function, 0, 1];
+            let cicp = png::chunk::ChunkType(*b"cICP");
+            writer.write_chunk(cicp, &points).unwrap();
+            writer.write_image_data(object(0).as_raw()).unwrap();
+        });
+        let reading = PhotoReading {
+            transfer,
+            ..with_mask(mask.clone())
+        };
+        load(&path, &reading).map(|photo| photo.picture.planes().pixel(30, 24)[0])
+    };
+    let srgb = load(13, None).unwrap();
+    assert!(load(8, None).unwrap() > 1.2 * srgb);
+    for (function, name) in [(16, "PQ"), (18, "HLG"), (9, "logarithm"), (77, "unknown")] {
+        let text = load(function, None).unwrap_err().to_string();
+        assert!(text.contains(name) && text.contains("--transfer"), "{text}");
+        assert_eq!(load(function, Some(Transfer::Srgb)).unwrap(), srgb);
+    }
+    for same in [1, 2] {
+        assert_eq!(load(same, None).unwrap(), srgb);
+    }
+}
+
+#[test]
+fn a_mask_is_a_files_brightest_channel_or_its_alpha() {
+    let folder = Folder::new();
+    let photo = folder.save("photo.png", |path| object(90).save(path).unwrap());
+    let plain = folder.save("plain.png", |path| mask().save(path).unwrap());
+    let wanted = load(&photo, &with_mask(plain)).unwrap().mask;
+    let level = |x, y, inside: u8, outside: u8| if is_inside(x, y) { inside } else { outside };
+    let blue = folder.save("blue.png", |path| {
+        let pixel = |x, y| Pixel([0, 0, level(x, y, 255, 0)]);
+        RgbImage::from_fn(WIDTH, HEIGHT, pixel).save(path).unwrap();
+    });
+    // A dark object that was cut out.
+    let cut = folder.save("cut.png", |path| {
+        let pixel = |x, y| Rgba([30, 20, 10, level(x, y, 255, 0)]);
+        ImageBuffer::from_fn(WIDTH, HEIGHT, pixel)
+            .save(path)
+            .unwrap();
+    });
+    let hardly_transparent = folder.save("hardly.png", |path| {
+        let pixel = |x, y| {
+            let white = level(x, y, 255, 0);
+            Rgba([white, white, white, level(x, y, 255, 250)])
+        };
+        ImageBuffer::from_fn(WIDTH, HEIGHT, pixel)
+            .save(path)
+            .unwrap();
+    });
+    for path in [blue, cut, hardly_transparent] {
+        let name = path.display().to_string();
+        let found = load(&photo, &with_mask(path)).unwrap();
+        assert_eq!(found.mask, wanted, "{name}");
+    }
+}
+
+#[test]
+fn an_object_without_light_is_not_decomposed() {
+    let folder = Folder::new();
+    let black = folder.save("black.png", |path| {
+        RgbImage::new(WIDTH, HEIGHT).save(path).unwrap();
+    });
+    let numberless = folder.save("nan.exr", |path| {
+        let nan = ImageBuffer::from_pixel(WIDTH, HEIGHT, Pixel([f32::NAN; 3]));
+        image::DynamicImage::ImageRgb32F(nan).save(path).unwrap();
+    });
+    let reading = PhotoReading {
+        rectangle: Some(Rectangle {
+            x: 5,
+            y: 5,
+            width: 30,
+            height: 30,
+        }),
+        ..PhotoReading::default()
+    };
+    for path in [black, numberless] {
+        let photo = load(&path, &reading).unwrap();
+        let found = untrained().decompose(
+            &photo.picture,
+            &photo.mask,
+            &photo.options(&DecomposeOptions::default()),
+        );
+        assert!(matches!(found, Err(DecomposeError::Unlit)));
+        let found = load(&path, &PhotoReading::default());
+        assert!(matches!(found, Err(DecomposeError::Black { .. })));
+    }
+}
+
+#[test]
 fn a_rectangle_is_the_mask_where_nothing_else_is() {
     let folder = Folder::new();
     let path = folder.save("grey.png", |path| object(90).save(path).unwrap());
@@ -298,6 +414,16 @@ fn what_is_wrong_with_a_photograph_is_said_in_a_sentence() {
     GrayImage::new(WIDTH, HEIGHT)
         .save(full.join("grey.png"))
         .unwrap();
+    let cup = folder.save("cup.png", |path| object(0).save(path).unwrap());
+    let in_corner = PhotoReading {
+        rectangle: Some(Rectangle {
+            x: 0,
+            y: 0,
+            width: 2,
+            height: 2,
+        }),
+        ..PhotoReading::default()
+    };
     let beside = PhotoReading {
         rectangle: Some(Rectangle {
             x: 100,
@@ -310,7 +436,12 @@ fn what_is_wrong_with_a_photograph_is_said_in_a_sentence() {
     let plain = PhotoReading::default();
     for (path, reading, expected) in [
         (&grey, plain.clone(), "Make a mask with `relit-mask`"),
-        (&black, plain.clone(), "does not say where the object is"),
+        (&black, plain.clone(), "black.png is black all over"),
+        (
+            &cup,
+            in_corner,
+            "in the rectangle 0,0,2,2 there is nothing of the object",
+        ),
         (
             &grey,
             with_mask(small),
@@ -349,6 +480,18 @@ fn what_is_wrong_with_a_photograph_is_said_in_a_sentence() {
     assert!(twice.to_string().contains("would both be written to grey"));
 }
 
+const SESSION: &str = "20261120T093015Z-mug";
+
+/// A shard of three frames, and its path.
+fn write_shard(folder: &Path) -> PathBuf {
+    let mut writer = ShardWriter::create(folder, Layout::Webdataset, SESSION, 3, &mask()).unwrap();
+    for (index, saturated) in [(0, 0.01), (1, 0.2), (2, 0.0)] {
+        writer.push(sample(index, saturated)).unwrap();
+    }
+    writer.finish().unwrap();
+    folder.join(format!("{SESSION}.tar"))
+}
+
 fn sample(index: u32, saturated: f64) -> Sample {
     let image = RgbImage::from_fn(WIDTH, HEIGHT, |x, y| match is_inside(x, y) {
         true => *object(0).get_pixel(x, y),
@@ -356,7 +499,7 @@ fn sample(index: u32, saturated: f64) -> Sample {
     });
     let measures = MaskSpans::of(&mask()).measure(&image, 250).unwrap();
     let record = FrameRecord {
-        session: "20261120T093015Z-mug".to_owned(),
+        session: SESSION.to_owned(),
         object: "mug".to_owned(),
         index,
         source_frame: u64::from(index),
@@ -381,14 +524,8 @@ fn sample(index: u32, saturated: f64) -> Sample {
 #[test]
 fn frames_of_a_shard_have_its_mask_and_the_saturation_that_was_counted_on_the_video() {
     let folder = Folder::new();
-    let name = "20261120T093015Z-mug";
-    let mut writer =
-        ShardWriter::create(folder.0.path(), Layout::Webdataset, name, 3, &mask()).unwrap();
-    for (index, saturated) in [(0, 0.01), (1, 0.2), (2, 0.0)] {
-        writer.push(sample(index, saturated)).unwrap();
-    }
-    writer.finish().unwrap();
-    let shard = folder.path(&format!("{name}.tar"));
+    let name = SESSION;
+    let shard = write_shard(folder.0.path());
     let inputs = PhotoInput::find(std::slice::from_ref(&shard), None).unwrap();
     assert_eq!(inputs.len(), 3);
     assert_eq!(PhotoInput::find(&[shard], Some(2)).unwrap().len(), 2);
@@ -406,6 +543,45 @@ fn frames_of_a_shard_have_its_mask_and_the_saturation_that_was_counted_on_the_vi
     let expected = [("0000", false), ("0001", true), ("0002", false)];
     let expected = expected.map(|(index, glossy)| (format!("{name}/{index}"), glossy));
     assert_eq!(found, expected);
+}
+
+#[test]
+fn shards_whose_frames_have_the_same_names_are_refused_together() {
+    let folder = Folder::new();
+    let [first, second] = ["first", "second"].map(|name| {
+        fs::create_dir(folder.path(name)).unwrap();
+        write_shard(&folder.path(name))
+    });
+    let find = |paths: &[&Path]| {
+        let paths: Vec<PathBuf> = paths.iter().map(|path| path.to_path_buf()).collect();
+        PhotoInput::find(&paths, None).map(|found| found.len())
+    };
+    assert_eq!(find(&[&first]).unwrap(), 3);
+    let renamed = folder.path("second/other.tar");
+    fs::rename(&second, &renamed).unwrap();
+    let text = find(&[&first, &renamed]).unwrap_err().to_string();
+    for part in ["first/", "second/other.tar", SESSION] {
+        assert!(text.contains(part), "{text}");
+    }
+    let photo = folder.path(&format!("{SESSION}.png"));
+    object(0).save(&photo).unwrap();
+    assert!(find(&[&photo, &first]).is_err());
+}
+
+#[test]
+fn a_folder_of_photographs_and_shards_gives_both() {
+    let folder = Folder::new();
+    write_shard(folder.0.path());
+    folder.save("cup.png", |path| object(0).save(path).unwrap());
+    let found = PhotoInput::find(&[folder.0.path().to_owned()], Some(2)).unwrap();
+    let names = found
+        .iter()
+        .map(|input| input.load(&PhotoReading::default()).unwrap().name);
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    assert_eq!(names.len(), 3);
+    assert_eq!(names[2], "cup");
+    assert!(names[..2].iter().all(|name| name.starts_with(SESSION)));
 }
 
 #[test]
@@ -471,7 +647,7 @@ fn code_and_errors(output: &Output) -> (i32, String) {
 }
 
 #[test]
-fn the_program_decomposes_what_it_can_and_tells_what_it_left_out() {
+fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
     let folder = Folder::new();
     let weights = Weights::initial(&decomposer(), 3);
     weights
@@ -495,7 +671,39 @@ fn the_program_decomposes_what_it_can_and_tells_what_it_left_out() {
     assert_eq!(events[0]["figures"]["weights"], "w.safetensors");
     assert_eq!(events[1]["event"], "failed");
 
+    fs::create_dir(folder.path("shards")).unwrap();
+    write_shard(&folder.path("shards"));
     for (command, code, expected) in [
+        (
+            "decompose shards --rect 1,2,3,4 -o o",
+            2,
+            "--rect is for photographs",
+        ),
+        (
+            "decompose shards/20261120T093015Z-mug.tar --transfer linear -o o",
+            2,
+            "--transfer is for photographs",
+        ),
+        (
+            "decompose photos shards --mask photos -o o",
+            2,
+            "Usage: relight decompose [OPTIONS]",
+        ),
+        (
+            "decompose photos --count 3 -o o",
+            2,
+            "--count is for shards",
+        ),
+        (
+            "weights export w.safetensors -o w.txt",
+            2,
+            "Usage: relight weights export [OPTIONS]",
+        ),
+        (
+            "decompose photos -o w.safetensors --weights w.safetensors",
+            1,
+            "w.safetensors cannot be the folder for the results",
+        ),
         (
             "decompose photos/black.png -o o --weights none.pth",
             1,

@@ -8,7 +8,7 @@ mod values;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{ArgMatches, CommandFactory, Error, FromArgMatches, Parser, Subcommand};
 
 #[cfg(feature = "train")]
 use commands::train;
@@ -70,11 +70,10 @@ impl Verb {
 
 /// Runs the verb that the command line names; its exit code.
 pub(crate) fn run() -> ExitCode {
-    let line = CommandLine::parse();
+    let matches = CommandLine::command().get_matches();
+    let line = CommandLine::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     if let Some(fault) = line.verb.fault() {
-        CommandLine::command()
-            .error(ErrorKind::ValueValidation, fault)
-            .exit();
+        wrong_usage(&matches, fault).exit();
     }
     let console = Console::new(line.json);
     console.finish(match line.verb {
@@ -86,4 +85,17 @@ pub(crate) fn run() -> ExitCode {
         Verb::Train(arguments) => train::run(&arguments, console),
         Verb::Weights(arguments) => weights::run(&arguments, console),
     })
+}
+
+/// What is wrong with the arguments of the verb that was given, with the verb's own usage.
+fn wrong_usage(matches: &ArgMatches, fault: String) -> Error {
+    let mut command = CommandLine::command();
+    command.build();
+    let mut matches = matches;
+    while let Some((name, inner)) = matches.subcommand()
+        && let Some(verb) = command.find_subcommand(name).cloned()
+    {
+        (command, matches) = (verb, inner);
+    }
+    command.error(ErrorKind::ValueValidation, fault)
 }

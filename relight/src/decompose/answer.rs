@@ -1,4 +1,4 @@
-//! Maps of a picture by a network: by looks at two sizes, with a mirrored second pass, and for large pictures by tiles.
+//! Maps of a picture by a network: at two scales, with the mirror image, and for large pictures by tiles.
 
 use std::ops::Range;
 
@@ -43,19 +43,19 @@ pub(super) type Fields = Planes<8>;
 
 /// The network for pictures of two sizes. An object that fills a smaller picture is nearer to those that it was trained on,
 /// and is seen as a whole; the larger picture shows what is finer.
-pub(super) struct Looks {
-    pub(super) full: Box<dyn MapsNet>,
+pub(super) struct Scales {
+    pub(super) fine: Box<dyn MapsNet>,
     /// For pictures of half the width and height.
-    pub(super) half: Option<Box<dyn MapsNet>>,
+    pub(super) coarse: Option<Box<dyn MapsNet>>,
 }
 
 /// The planes of fields that are normals.
 const NORMAL_PLANES: Range<usize> = 0..3;
-/// How much of what is coarse in the normals the smaller look tells. By measurement on photographs with truth: all of
-/// it is three degrees better than none.
+/// The share of the coarse scale in the low frequencies of the normals. Measured on photographs with truth: a share of 1
+/// is three degrees better than 0.
 const SHAPE_OF_NORMALS: f32 = 1.0;
-/// How much of what is coarse in albedo, shading and highlight the smaller look tells: between 0.3 and 0.5, the mean of both
-/// is better than either.
+/// The share of the coarse scale in the low frequencies of albedo, shading and highlight: a mean with a share of 0.3 to 0.5
+/// is better than either scale alone.
 const SHAPE_OF_LAYERS: f32 = 0.4;
 
 /// Keeps logarithms of dark values finite.
@@ -286,12 +286,12 @@ pub(super) struct Whole {
 
 impl Whole {
     pub(super) fn new(
-        looks: &Looks,
+        scales: &Scales,
         picture: &Planes<3>,
         mask: &Planes<1>,
         mirror: bool,
     ) -> Result<Self, NetError> {
-        let look = |net: &dyn MapsNet, mirror| {
+        let at_scale = |net: &dyn MapsNet, mirror| {
             let extent = Extent::new(net.side(), net.side());
             let (picture, mask) = reduced(picture, mask, extent);
             let fields = fields(net, &picture, &mask, mirror)?;
@@ -301,17 +301,17 @@ impl Whole {
                 fields,
             })
         };
-        let Some(half) = &looks.half else {
-            return look(looks.full.as_ref(), mirror);
+        let Some(coarse) = &scales.coarse else {
+            return at_scale(scales.fine.as_ref(), mirror);
         };
-        let (full, half) = rayon::join(
-            || look(looks.full.as_ref(), false),
-            || look(half.as_ref(), mirror),
+        let (fine, coarse) = rayon::join(
+            || at_scale(scales.fine.as_ref(), false),
+            || at_scale(coarse.as_ref(), mirror),
         );
-        Ok(full?.with_shape_of(&half?))
+        Ok(fine?.with_shape_of(&coarse?))
     }
 
-    /// Its own details on the shape of a smaller one.
+    /// Its own details on the shape of a coarser scale.
     fn with_shape_of(mut self, other: &Self) -> Self {
         let extent = self.mask.extent();
         let known = inside(&self.mask);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::answer::{Engine, Fields, Looks, MapsNet, Whole, details, to_maps};
+use super::answer::{Engine, Fields, MapsNet, Scales, Whole, details, to_maps};
 use super::compose::{ComposedLayers, normalised, possible_highlight};
 use super::encoding::AnsweredMaps;
 use super::error::DecomposeError;
@@ -16,9 +16,9 @@ use crate::render::{DiffuseForm, DiffuseLayer, NormalsFrame, fit_light};
 
 /// Width and height of the picture that the network sees.
 pub const WORKING_SIDE: usize = 256;
-/// A picture is looked at for highlights where a larger part of its pixels is saturated, as in the paper.
+/// Highlights are separated where a larger part of the object's pixels is saturated, as in the paper.
 const SATURATED_PART: f64 = 0.05;
-/// Keeps the light from behind, which normals hardly tell, small: see [`fit_light`].
+/// Keeps the light from behind, which normals hardly show, small: see [`fit_light`].
 const STIFFNESS: f64 = 1e-3;
 
 /// At which size a picture is decomposed.
@@ -48,7 +48,7 @@ pub enum SpecularGate {
 pub struct DecomposeOptions {
     /// At which size.
     pub size: WorkingSize,
-    /// Whether the mirror image is looked at too, and the mean of both answers taken: at half the network's size, and of
+    /// Whether the network sees the mirror image too, and the mean of both answers is taken: at the coarse scale, and of
     /// tiles.
     pub mirror: bool,
     /// Whether highlights are separated.
@@ -94,7 +94,7 @@ pub struct Decomposition {
     pub light: ShLight,
     /// The gloss of the whole object, where a highlight was separated and the light explains it.
     pub gloss: Option<FittedGloss>,
-    /// Where in the picture the network looked.
+    /// The square of the picture that the network saw.
     pub region: Region,
     /// Whether highlights were separated.
     pub is_glossy: bool,
@@ -123,7 +123,7 @@ pub struct Decomposition {
 /// # Ok::<(), relight::decompose::DecomposeError>(())
 /// ```
 pub struct Decomposer {
-    looks: Looks,
+    scales: Scales,
     normals: Option<OtherNormals>,
     engine: InferenceEngine,
 }
@@ -150,7 +150,7 @@ impl Decomposer {
     /// The network with the weights that come with the program.
     ///
     /// # Errors
-    /// [`DecomposeError::NoWeights`] where it was built without.
+    /// As [`Decomposer::new`].
     pub fn shipped() -> Result<Self, DecomposeError> {
         Self::new(&Self::shipped_weights()?)
     }
@@ -158,14 +158,12 @@ impl Decomposer {
     /// The weights that come with the program.
     ///
     /// # Errors
-    /// [`DecomposeError::NoWeights`] where it was built without.
-    pub fn shipped_weights() -> Result<Weights, DecomposeError> {
-        let bytes = super::shipped::WEIGHTS.ok_or(DecomposeError::NoWeights)?;
-        let weights = Weights::from_bytes(bytes).map_err(|fault| NetError::File {
+    /// [`NetError::File`] where the program was built with a damaged file.
+    pub fn shipped_weights() -> Result<Weights, NetError> {
+        Weights::from_bytes(super::shipped::WEIGHTS).map_err(|fault| NetError::File {
             path: super::shipped::NAME.into(),
             fault,
-        })?;
-        Ok(weights)
+        })
     }
 
     /// The network with these weights, for pictures of `side` x `side` pixels, a multiple of 32.
@@ -186,20 +184,20 @@ impl Decomposer {
         engine: InferenceEngine,
     ) -> Result<Self, DecomposeError> {
         let graph = decomposer();
-        let look = |side: usize| -> Result<Box<dyn MapsNet>, NetError> {
+        let net = |side: usize| -> Result<Box<dyn MapsNet>, NetError> {
             let inference = Inference::with_engine(&graph, weights, (side, side), &engine)?;
             Ok(Box::new(Engine { inference, side }))
         };
-        let has_half = side.is_multiple_of(2 * graph.multiple());
-        let half = || has_half.then(|| look(side / 2)).transpose();
-        let (full, half) = rayon::join(|| look(side), half);
-        let found = Self::of(full?, half?);
+        let has_coarse = side.is_multiple_of(2 * graph.multiple());
+        let coarse = || has_coarse.then(|| net(side / 2)).transpose();
+        let (fine, coarse) = rayon::join(|| net(side), coarse);
+        let found = Self::of(fine?, coarse?);
         Ok(Self { engine, ..found })
     }
 
-    pub(super) fn of(full: Box<dyn MapsNet>, half: Option<Box<dyn MapsNet>>) -> Self {
+    pub(super) fn of(fine: Box<dyn MapsNet>, coarse: Option<Box<dyn MapsNet>>) -> Self {
         Self {
-            looks: Looks { full, half },
+            scales: Scales { fine, coarse },
             normals: None,
             engine: InferenceEngine::default(),
         }
@@ -227,14 +225,14 @@ impl Decomposer {
     /// Width and height of what the network sees, pixels.
     #[must_use]
     pub fn side(&self) -> usize {
-        self.looks.full.side()
+        self.scales.fine.side()
     }
 
     /// Decomposes a picture under a mask, which is the object where it is at least one half. Values
     /// of the picture that are negative or no numbers count as black.
     ///
     /// # Errors
-    /// Where the mask has another size or is empty, or the network fails.
+    /// Where the mask has another size or is empty, the picture is black under it, or the network fails.
     pub fn decompose(
         &self,
         picture: &Rgb<Linear>,
@@ -252,6 +250,9 @@ impl Decomposer {
         let mask = region.cut(mask).map(|m| f32::from(u8::from(m >= 0.5)));
         let picture = region.cut(picture.planes()).map(usable);
         let picture = cut_out(&picture, &mask);
+        if !picture.planes().into_iter().flatten().any(|&v| v > 0.0) {
+            return Err(DecomposeError::Unlit);
+        }
         let under = inside(&mask);
         let saturated_fraction = options
             .saturated_fraction
@@ -261,7 +262,7 @@ impl Decomposer {
             SpecularGate::On => true,
             SpecularGate::Off => false,
         };
-        let whole = Whole::new(&self.looks, &picture, &mask, options.mirror)?;
+        let whole = Whole::new(&self.scales, &picture, &mask, options.mirror)?;
         let explained = self.explain(&whole, is_glossy)?;
         let mut maps = self.maps(&whole, &picture, &mask, options)?;
         if self.normals.is_some() {
@@ -301,13 +302,13 @@ impl Decomposer {
         if options.size == WorkingSize::Native && extent.width > self.side() {
             add(
                 &mut fields,
-                &details(self.looks.full.as_ref(), picture, mask, options.mirror)?,
+                &details(self.scales.fine.as_ref(), picture, mask, options.mirror)?,
             );
         }
         Ok(to_maps(&fields, &inside(mask)))
     }
 
-    /// Normals, light and gloss at the network's size.
+    /// Fits light and gloss to the maps at the network's size.
     fn explain(&self, whole: &Whole, is_glossy: bool) -> Result<Explained, DecomposeError> {
         let known = inside(&whole.mask);
         let maps = to_maps(&whole.fields, &known);
@@ -334,7 +335,7 @@ impl Decomposer {
     }
 }
 
-/// What is told of the object as a whole.
+/// Normals, light and gloss at the network's size.
 struct Explained {
     normals: Normals<YUp>,
     light: ShLight,

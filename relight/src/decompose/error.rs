@@ -12,9 +12,6 @@ use crate::nets::NetError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DecomposeError {
-    /// There are no weights.
-    #[error("this build holds no weights: give a file of them by --weights")]
-    NoWeights,
     /// The network cannot be used.
     #[error(transparent)]
     Net(#[from] NetError),
@@ -32,6 +29,24 @@ pub enum DecomposeError {
     /// There is nothing under the mask.
     #[error("the mask is empty: it is nowhere at least one half")]
     EmptyMask,
+    /// There is no light on the object.
+    #[error("the picture is black all over the object: nothing is lit")]
+    Unlit,
+    /// A rectangle has nothing of the object.
+    #[error(
+        "in the rectangle {x},{y},{width},{height} there is nothing of the object: by the photograph's alpha or black \
+         background it lies elsewhere"
+    )]
+    EmptyRectangle {
+        /// Column of its left edge.
+        x: u32,
+        /// Row of its upper edge.
+        y: u32,
+        /// Its width.
+        width: u32,
+        /// Its height.
+        height: u32,
+    },
     /// A rectangle lies beside the photograph.
     #[error("the rectangle {x},{y},{width},{height} does not touch the photograph of {} x {} pixels", photo.width, photo.height)]
     Rectangle {
@@ -46,7 +61,13 @@ pub enum DecomposeError {
         /// The photograph's size.
         photo: Extent,
     },
-    /// Nobody says where the object is.
+    /// A photograph without light.
+    #[error("{} is black all over: there is no object to be seen", path.display())]
+    Black {
+        /// The photograph.
+        path: PathBuf,
+    },
+    /// Nothing says where the object is.
     #[error(
         "{} does not say where the object is: it has no alpha, and its background is not black. \
          Make a mask with `relit-mask` and give it by --mask, or the rectangle around the object by --rect",
@@ -73,16 +94,30 @@ pub enum DecomposeError {
         /// The gamma of its file.
         gamma: f32,
     },
+    /// A file says that its values are encoded by a transfer function that is not read.
+    #[error(
+        "{} says that its values are encoded by {transfer}: convert it to sRGB or EXR, or say by --transfer how to read it",
+        path.display()
+    )]
+    UnknownTransfer {
+        /// The photograph.
+        path: PathBuf,
+        /// The transfer function's name.
+        transfer: String,
+    },
     /// There are no photographs.
     #[error("{} holds no photographs (.png, .jpg, .exr, .hdr) and no shards (.tar)", path.display())]
     NoPhotos {
         /// The folder.
         path: PathBuf,
     },
-    /// Two photographs would be written into one folder.
-    #[error("{} and {} would both be written to {}: decompose them one by one", first.display(), second.display(), name)]
+    /// Two photographs, or two turns, would be written into one folder.
+    #[error(
+        "{} and {} would both be written to {name}: decompose them into different folders, one after the other",
+        first.display(), second.display()
+    )]
     SameName {
-        /// One photograph.
+        /// One photograph or data set.
         first: PathBuf,
         /// Another.
         second: PathBuf,
@@ -101,10 +136,22 @@ pub enum DecomposeError {
     /// The light cannot be written.
     #[error(transparent)]
     LightFile(#[from] LightFileError),
-    /// A folder for results holds something else.
-    #[error("{} holds other files: give a folder that is new, empty, or holds an earlier decomposition", path.display())]
+    /// A folder for results holds something that is no file of a decomposition.
+    #[error(
+        "{} holds {name}, which is no file of a decomposition: give a folder that is new, empty, or holds an earlier \
+         decomposition and nothing else",
+        path.display()
+    )]
     Foreign {
         /// The folder.
+        path: PathBuf,
+        /// What it holds.
+        name: String,
+    },
+    /// A path for results cannot be a folder.
+    #[error("{} cannot be the folder for the results: give the name of a folder, not of a file", path.display())]
+    NoFolder {
+        /// The path.
         path: PathBuf,
     },
     /// A file or folder cannot be read.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::error::DecomposeError;
 use super::region::inside;
-use crate::image::{Extent, Planes, beside, read_planes};
+use crate::image::{Extent, Planes, StoredImage, beside};
 
 /// Encoded values up to this count as nearly black: 12 of 255.
 pub(super) const NEARLY_BLACK: f32 = 12.5 / 255.0;
@@ -41,6 +41,12 @@ pub struct Rectangle {
 }
 
 impl Rectangle {
+    /// Whether it has a pixel of a photograph of this size.
+    pub(super) fn touches(&self, extent: Extent) -> bool {
+        let within = |start: u32, length: u32, end: usize| length > 0 && (start as usize) < end;
+        within(self.x, self.width, extent.width) && within(self.y, self.height, extent.height)
+    }
+
     /// Whether a pixel lies in it.
     fn holds(&self, x: usize, y: usize) -> bool {
         let within = |at: usize, start: u32, length: u32| {
@@ -51,62 +57,85 @@ impl Rectangle {
     }
 }
 
-/// The mask in a file, 1 where it is at least one half, for a photograph of this size.
+/// The mask in a file, 1 where it is at least one half, for a photograph of this size: the file's alpha where that
+/// has both an inside and an outside, else the brightest channel.
 pub(super) fn read_mask(path: &Path, extent: Extent) -> Result<Planes<1>, DecomposeError> {
-    let (planes, _) = read_planes(path)?;
+    let StoredImage { planes, alpha, .. } = StoredImage::read(path)?;
     if planes.extent() != extent {
         return Err(DecomposeError::MaskSize {
             found: planes.extent(),
             expected: extent,
         });
     }
-    let [values, ..] = planes.into_planes();
-    Ok(binary(&Planes::from_planes(extent, [values])?))
+    let has_both = |alpha: &Planes<1>| {
+        let inside = inside(alpha);
+        inside.contains(&true) && inside.contains(&false)
+    };
+    if let Some(alpha) = alpha.filter(has_both) {
+        return Ok(binary(alpha));
+    }
+    let [mut brightest, green, blue] = planes.into_planes();
+    for ((value, green), blue) in brightest.iter_mut().zip(green).zip(blue) {
+        *value = value.max(green).max(blue);
+    }
+    Ok(binary(Planes::from_planes(extent, [brightest])?))
 }
 
-/// The mask that the photograph itself tells, cut by the rectangle if there is one: its alpha, or what is
+/// Why the colours of a photograph do not show where the object is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum NoObject {
+    /// There is something at the photograph's edge.
+    Background,
+    /// All is black.
+    Black,
+}
+
+/// The mask that the photograph itself shows, cut by the rectangle if there is one: its alpha, or what is
 /// not black where its edge is black, or else the rectangle. `encoded` are the values as the file has
 /// them.
 pub(super) fn find_mask(
     encoded: &Planes<3>,
-    alpha: Option<&Planes<1>>,
+    alpha: Option<Planes<1>>,
     rectangle: Option<Rectangle>,
-) -> Option<(Planes<1>, MaskSource)> {
+) -> Result<(Planes<1>, MaskSource), NoObject> {
     let extent = encoded.extent();
     let found = match alpha {
-        Some(alpha) => Some((binary(alpha), MaskSource::Alpha)),
+        Some(alpha) => Ok((binary(alpha), MaskSource::Alpha)),
         None => before_black(encoded).map(|mask| (mask, MaskSource::BlackBackground)),
     };
     let Some(rectangle) = rectangle else {
         return found;
     };
     let (mut mask, source) =
-        found.unwrap_or_else(|| (Planes::filled(extent, [1.0]), MaskSource::Rectangle));
+        found.unwrap_or_else(|_| (Planes::filled(extent, [1.0]), MaskSource::Rectangle));
     let Extent { width, .. } = extent;
     for (at, value) in mask.planes_mut()[0].iter_mut().enumerate() {
         if !rectangle.holds(at % width, at / width) {
             *value = 0.0;
         }
     }
-    Some((mask, source))
+    Ok((mask, source))
 }
 
-fn binary(mask: &Planes<1>) -> Planes<1> {
-    mask.clone().map(|value| f32::from(u8::from(value >= 0.5)))
+fn binary(mask: Planes<1>) -> Planes<1> {
+    mask.map(|value| f32::from(u8::from(value >= 0.5)))
 }
 
-/// The largest part of the photograph that is not black, with the dark places in it; none where its edge
-/// is not black, or all of it is.
-fn before_black(encoded: &Planes<3>) -> Option<Planes<1>> {
+/// The largest part of the photograph that is not black, with the dark places in it. Values that are no numbers
+/// are black.
+fn before_black(encoded: &Planes<3>) -> Result<Planes<1>, NoObject> {
     let extent = encoded.extent();
     let [red, green, blue] = encoded.planes();
-    let is_black = |at: usize| red[at].max(green[at]).max(blue[at]) <= NEARLY_BLACK;
+    let is_black = |at: usize| {
+        let brightest = red[at].max(green[at]).max(blue[at]);
+        brightest.is_nan() || brightest <= NEARLY_BLACK
+    };
     let edge: Vec<usize> = (0..extent.pixels())
         .filter(|&at| beside(extent, at).contains(&None))
         .collect();
     let black = edge.iter().filter(|&&at| is_black(at)).count();
     if (black as f64) < BLACK_EDGE * edge.len() as f64 {
-        return None;
+        return Err(NoObject::Background);
     }
     let mut seen = vec![false; extent.pixels()];
     for at in edge.into_iter().filter(|&at| is_black(at)) {
@@ -123,14 +152,14 @@ fn before_black(encoded: &Planes<3>) -> Option<Planes<1>> {
         }
     }
     if largest.is_empty() {
-        return None;
+        return Err(NoObject::Black);
     }
     let mut mask = Planes::zeros(extent);
     let [plane] = mask.planes_mut();
     for at in largest {
         plane[at] = 1.0;
     }
-    Some(mask)
+    Ok(mask)
 }
 
 /// The pixels that are reached from one over their sides, as far as they are `wanted` and were not seen;
@@ -196,7 +225,7 @@ mod tests {
     #[test]
     fn before_anything_else_only_a_rectangle_says_where_the_object_is() {
         let grey = ring(0.3);
-        assert_eq!(find_mask(&grey, None, None), None);
+        assert_eq!(find_mask(&grey, None, None), Err(NoObject::Background));
         let rectangle = Rectangle {
             x: 40,
             y: 10,
@@ -218,16 +247,23 @@ mod tests {
             width: 30,
             height: 40,
         };
-        let (mask, source) = find_mask(&ring(0.0), Some(&alpha), Some(rectangle)).unwrap();
+        let (mask, source) = find_mask(&ring(0.0), Some(alpha), Some(rectangle)).unwrap();
         assert_eq!(source, MaskSource::Alpha);
         assert_eq!(mask.plane(0).iter().sum::<f32>(), 6.0 * 40.0);
     }
 
     #[test]
     fn a_black_photograph_shows_no_object() {
-        assert_eq!(
-            find_mask(&Planes::zeros(Extent::new(8, 8)), None, None),
-            None
-        );
+        for value in [0.0, f32::NAN, -1.0] {
+            let black = Planes::filled(Extent::new(8, 8), [value; 3]);
+            assert_eq!(find_mask(&black, None, None), Err(NoObject::Black));
+        }
+    }
+
+    #[test]
+    fn a_background_that_is_no_number_is_black() {
+        let (mask, source) = find_mask(&ring(f32::NAN), None, None).unwrap();
+        assert_eq!(source, MaskSource::BlackBackground);
+        assert_eq!(mask, find_mask(&ring(0.0), None, None).unwrap().0);
     }
 }

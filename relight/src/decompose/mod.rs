@@ -14,6 +14,7 @@ mod mask;
 mod other;
 mod photo;
 mod region;
+mod replace;
 mod shipped;
 #[cfg(test)]
 mod tests;

@@ -31,7 +31,7 @@ impl OtherNormals {
             side,
             frame,
         };
-        // Its answer is looked at now, and not after the first photograph.
+        // Its answer is checked now, and not after the first photograph.
         let extent = Extent::new(side, side);
         let grey = Planes::filled(extent, [0.5; 3]);
         let fault = |fault| NetError::Onnx {

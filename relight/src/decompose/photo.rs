@@ -6,9 +6,11 @@ use std::io::BufReader;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
+use relit_data::shard::Dataset;
+
 use super::decomposer::{DecomposeOptions, SATURATED_VALUE};
 use super::error::DecomposeError;
-use super::mask::{MaskSource, Rectangle, find_mask, is_empty, read_mask};
+use super::mask::{MaskSource, NoObject, Rectangle, find_mask, is_empty, read_mask};
 use crate::data::{Encoding, SampleId, Source, Turns};
 use crate::image::{
     ColourSpace, Extent, Gamma22, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage,
@@ -17,6 +19,8 @@ use crate::image::{
 
 /// How the files of photographs end.
 const PHOTOS: [&str; 5] = ["png", "jpg", "jpeg", "exr", "hdr"];
+/// The transfer function of ITU-T H.273 that says nothing.
+const UNSPECIFIED: u8 = 2;
 /// How far a gamma may be from one that is known.
 const SAME_GAMMA: f32 = 0.02;
 
@@ -70,11 +74,23 @@ impl PhotoInput {
             } else if has_ending(path, &["tar"]) {
                 add_turns(&mut found, path, most)?;
             } else {
-                found.push(Self::File(path.clone()));
+                found.push((path.clone(), Self::File(path.clone())));
             }
         }
         check_names(&found)?;
-        Ok(found)
+        Ok(found.into_iter().map(|(_, input)| input).collect())
+    }
+
+    /// Whether a path is a shard, or a folder with shards or another data set of turns: their frames have
+    /// masks of their own.
+    #[must_use]
+    pub fn has_frames(path: &Path) -> bool {
+        if !path.is_dir() {
+            return has_ending(path, &["tar"]);
+        }
+        let is_shard = |path: PathBuf| is_visible(&path) && has_ending(&path, &["tar"]);
+        let entries = fs::read_dir(path).into_iter().flatten().flatten();
+        path.join(Dataset::FILE).is_file() || entries.map(|entry| entry.path()).any(is_shard)
     }
 
     /// How an error names it.
@@ -114,52 +130,49 @@ impl Photo {
     }
 }
 
-fn add_folder(
-    found: &mut Vec<PhotoInput>,
-    folder: &Path,
-    most: Option<u32>,
-) -> Result<(), DecomposeError> {
+/// Photographs, each with the path under which it was found: its own, or that of its data set.
+type Found = Vec<(PathBuf, PhotoInput)>;
+
+fn add_folder(found: &mut Found, folder: &Path, most: Option<u32>) -> Result<(), DecomposeError> {
     let mut photos = Vec::new();
-    let mut has_shards = folder.join(relit_data::shard::Dataset::FILE).is_file();
     for entry in fs::read_dir(folder).map_err(DecomposeError::read(folder))? {
         let path = entry.map_err(DecomposeError::read(folder))?.path();
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        if name.starts_with('.') || !path.is_file() {
-            continue;
-        }
-        has_shards |= has_ending(&path, &["tar"]);
-        if has_ending(&path, &PHOTOS) {
+        if is_visible(&path) && path.is_file() && has_ending(&path, &PHOTOS) {
             photos.push(path);
         }
     }
-    if has_shards {
-        return add_turns(found, folder, most);
-    }
-    if photos.is_empty() {
+    let has_frames = PhotoInput::has_frames(folder);
+    if photos.is_empty() && !has_frames {
         return Err(DecomposeError::NoPhotos {
             path: folder.to_owned(),
         });
     }
     photos.sort();
-    found.extend(photos.into_iter().map(PhotoInput::File));
+    found.extend(
+        photos
+            .into_iter()
+            .map(|path| (path.clone(), PhotoInput::File(path))),
+    );
+    if has_frames {
+        add_turns(found, folder, most)?;
+    }
     Ok(())
 }
 
-fn add_turns(
-    found: &mut Vec<PhotoInput>,
-    path: &Path,
-    most: Option<u32>,
-) -> Result<(), DecomposeError> {
+fn add_turns(found: &mut Found, path: &Path, most: Option<u32>) -> Result<(), DecomposeError> {
     let turns = Arc::new(Turns::open(path, Encoding::Linear)?);
     for (turn, samples) in (0..).zip(turns.turns()) {
         for position in 0..samples.min(most.unwrap_or(u32::MAX)) {
-            found.push(PhotoInput::Frame(
-                Arc::clone(&turns),
-                SampleId { turn, position },
-            ));
+            let id = SampleId { turn, position };
+            found.push((path.to_owned(), PhotoInput::Frame(Arc::clone(&turns), id)));
         }
     }
     Ok(())
+}
+
+fn is_visible(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default();
+    !name.as_encoded_bytes().starts_with(b".")
 }
 
 fn has_ending(path: &Path, endings: &[&str]) -> bool {
@@ -170,14 +183,22 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
     })
 }
 
-/// Whether every file has a name of its own.
-fn check_names(inputs: &[PhotoInput]) -> Result<(), DecomposeError> {
+/// Whether every file and every turn has a folder of its own for its results.
+fn check_names(inputs: &Found) -> Result<(), DecomposeError> {
     let mut names = BTreeMap::new();
-    for input in inputs {
-        let PhotoInput::File(path) = input else {
-            continue;
+    let mut last_turn = None;
+    for (path, input) in inputs {
+        let name = match input {
+            PhotoInput::File(path) => Some(name_of(path)),
+            PhotoInput::Frame(turns, id) => {
+                let turn = (Arc::as_ptr(turns), id.turn);
+                if last_turn.replace(turn) == Some(turn) {
+                    continue;
+                }
+                session_of(turns, id.turn)
+            }
         };
-        let name = name_of(path);
+        let Some(name) = name else { continue };
         if let Some(first) = names.insert(name.clone(), path) {
             return Err(DecomposeError::SameName {
                 first: first.clone(),
@@ -187,6 +208,17 @@ fn check_names(inputs: &[PhotoInput]) -> Result<(), DecomposeError> {
         }
     }
     Ok(())
+}
+
+/// The folder of a turn's results: the first part of its frames' keys, by the first frame that can be read.
+fn session_of(turns: &Turns, turn: u32) -> Option<String> {
+    let samples = *turns.turns().get(turn as usize)?;
+    let key = |position| {
+        let (batch, _) = turns.batch(&[SampleId { turn, position }], None);
+        batch.frames.first().map(|frame| within(&frame.key))
+    };
+    let key = (0..samples).find_map(key)?;
+    key.split('/').next().map(str::to_owned)
 }
 
 fn name_of(path: &Path) -> String {
@@ -210,9 +242,12 @@ fn read_photo(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeErr
         ),
         None => {
             let encoded = shown(&image.planes, transfer);
-            let found = find_mask(&encoded, image.alpha.as_ref(), reading.rectangle);
-            found.ok_or_else(|| DecomposeError::NoMask {
-                path: path.to_owned(),
+            find_mask(&encoded, image.alpha, reading.rectangle).map_err(|why| {
+                let path = path.to_owned();
+                match why {
+                    NoObject::Background => DecomposeError::NoMask { path },
+                    NoObject::Black => DecomposeError::Black { path },
+                }
             })?
         }
     };
@@ -247,6 +282,19 @@ fn check_mask(mask: &Planes<1>, rectangle: Option<Rectangle>) -> Result<(), Deco
     match rectangle {
         _ if !is_empty(mask) => Ok(()),
         None => Err(DecomposeError::EmptyMask),
+        Some(
+            rectangle @ Rectangle {
+                x,
+                y,
+                width,
+                height,
+            },
+        ) if rectangle.touches(mask.extent()) => Err(DecomposeError::EmptyRectangle {
+            x,
+            y,
+            width,
+            height,
+        }),
         Some(Rectangle {
             x,
             y,
@@ -271,7 +319,7 @@ fn to_linear(transfer: Option<Transfer>) -> fn(f32) -> f32 {
     }
 }
 
-/// The picture as a screen shows it, in which what looks black is dark.
+/// The picture's values as a screen takes them.
 fn shown(planes: &Planes<3>, transfer: Option<Transfer>) -> Planes<3> {
     match transfer {
         None | Some(Transfer::Linear) => planes.clone().map(Srgb::from_linear),
@@ -292,12 +340,14 @@ fn stated_transfer(path: &Path) -> Result<Transfer, DecomposeError> {
         return Ok(Transfer::Srgb);
     };
     let info = reader.info();
-    if let Some(points) = info.coding_independent_code_points {
-        // ITU-T H.273: 8 is linear, 4 is the power 2.2.
-        return Ok(match points.transfer_function {
-            8 => Transfer::Linear,
-            4 => Transfer::Gamma22,
-            _ => Transfer::Srgb,
+    if let Some(points) = info.coding_independent_code_points
+        && points.transfer_function != UNSPECIFIED
+    {
+        return transfer_of_points(points.transfer_function).map_err(|transfer| {
+            DecomposeError::UnknownTransfer {
+                path: path.to_owned(),
+                transfer,
+            }
         });
     }
     let gamma = match info.gama_chunk {
@@ -315,6 +365,23 @@ fn stated_transfer(path: &Path) -> Result<Transfer, DecomposeError> {
             gamma: 1.0 / gamma,
         })
     }
+}
+
+/// What a transfer function of ITU-T H.273 is read as, or its name where it is not read. Those of BT.709 and its like
+/// are shown as sRGB is.
+fn transfer_of_points(function: u8) -> Result<Transfer, String> {
+    let name = match function {
+        8 => return Ok(Transfer::Linear),
+        4 => return Ok(Transfer::Gamma22),
+        1 | 6 | 7 | 11..=15 => return Ok(Transfer::Srgb),
+        5 => "the power 1 / 2.8",
+        9 | 10 => "a logarithm",
+        16 => "PQ",
+        17 => "SMPTE ST 428-1",
+        18 => "HLG",
+        _ => "an unknown function",
+    };
+    Err(format!("{name} (transfer function {function} in cICP)"))
 }
 
 /// A frame's key as a path that leads nowhere else.

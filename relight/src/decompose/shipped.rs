@@ -4,5 +4,4 @@
 pub(super) const NAME: &str = "relight/weights/decompose.safetensors";
 
 /// The bytes of that file.
-pub(super) const WEIGHTS: Option<&[u8]> =
-    Some(include_bytes!("../../weights/decompose.safetensors"));
+pub(super) const WEIGHTS: &[u8] = include_bytes!("../../weights/decompose.safetensors");

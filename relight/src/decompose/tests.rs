@@ -113,7 +113,7 @@ fn with_the_mirrored_pass_a_mirrored_picture_has_mirrored_layers() {
     // Of an even width, so that the square around it lies in the middle.
     let (picture, mask) = (smooth(extent), disc(extent, 25.0));
     let options = DecomposeOptions::default();
-    // At one size: a second look is the only one that is mirrored.
+    // At one scale: of two, only the coarse one is mirrored.
     let net = Decomposer::with_side(&Weights::initial(&decomposer(), 5), 32).unwrap();
     let found = net
         .decompose(&Rgb::new(picture.clone()), &mask, &options)
@@ -129,22 +129,22 @@ fn with_the_mirrored_pass_a_mirrored_picture_has_mirrored_layers() {
 }
 
 #[test]
-fn the_smaller_look_tells_the_shape_and_the_larger_one_what_is_finer() {
+fn the_coarse_scale_decides_the_shape_and_the_fine_one_what_is_finer() {
     let extent = Extent::new(64, 64);
     let (picture, mask) = (smooth(extent), disc(extent, 30.0));
-    // Stripes of 2 pixels in all answers of the larger look; the smaller one leans to the left.
+    // Stripes of 2 pixels in all answers of the fine scale; the coarse one leans to the left.
     let striped = |input: [f32; INPUTS], _: f32| {
         let stripe = input[0].signum() * 0.3;
         [0.5 + stripe, 0.2, 1.0, 0.0, 0.0, 0.0, 0.0, stripe, -50.0]
     };
     let leaning = |_: [f32; INPUTS], _: f32| [-0.5, 0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -50.0];
-    let full = || {
+    let fine = || {
         Box::new(PixelNet {
             side: 64,
             pixel: striped,
         })
     };
-    let half = PixelNet {
+    let coarse = PixelNet {
         side: 32,
         pixel: leaning,
     };
@@ -157,8 +157,8 @@ fn the_smaller_look_tells_the_shape_and_the_larger_one_what_is_finer() {
         mirror: false,
         ..DecomposeOptions::default()
     };
-    let one = Decomposer::of(full(), None);
-    let both = Decomposer::of(full(), Some(Box::new(half)));
+    let one = Decomposer::of(fine(), None);
+    let both = Decomposer::of(fine(), Some(Box::new(coarse)));
     let normals = |net: &Decomposer| net.decompose(&lines, &mask, &options).unwrap().normals;
     let (one, both) = (normals(&one), normals(&both));
     let mean_x = |of: &Normals<YUp>| {

@@ -3,7 +3,7 @@
 //!
 //! Shading is answered directly and not only through normals and light: light of order 2 on normals
 //! holds no cast shadow, no bounce and no fine relief. Normals are a free vector, so that every slope
-//! can be told.
+//! can be expressed.
 //!
 //! Input, [`INPUTS`] channels: red, green, blue of the linear picture over its 99th percentile, to the
 //! power 1 / 2.2; the mask; log luminance; two chroma differences. All are 0 outside the mask.

@@ -43,6 +43,14 @@ pub enum NetError {
         /// The parameter.
         name: String,
     },
+    /// A weight that half precision cannot hold.
+    #[error("{name} holds {value}, and half precision ends at 65504: write it in single precision")]
+    TooLarge {
+        /// The parameter.
+        name: String,
+        /// Its value.
+        value: f32,
+    },
     /// A file that cannot be read or written.
     #[error("{path} could not be {doing}", path = .path.display())]
     Io {
@@ -87,7 +95,7 @@ pub enum NetError {
         path = .path.display()
     )]
     NoLibrary {
-        /// Where it was looked for.
+        /// Where it should be.
         path: PathBuf,
     },
     /// A library of an engine that is there and cannot be used.

@@ -24,8 +24,8 @@ pub enum WeightPrecision {
 }
 
 impl Weights {
-    /// Reads a safetensors file, or a state dict that PyTorch saved (`.pth`, `.pt`): told apart by
-    /// their first bytes. Half precision becomes single.
+    /// Reads a safetensors file, or a state dict that PyTorch saved (`.pth`, `.pt`); their first bytes show
+    /// which of them it is. Half precision becomes single.
     ///
     /// # Errors
     /// [`NetError::Io`] or [`NetError::File`].
@@ -61,12 +61,14 @@ impl Weights {
     /// The bytes of a safetensors file, with facts about them in its header.
     ///
     /// # Errors
-    /// What the format's writer answers, as text; it has no reason to.
+    /// A sentence: where a value is too large for the precision, or what the format's writer answers.
     pub fn to_safetensors(
         &self,
         precision: WeightPrecision,
         facts: Option<HashMap<String, String>>,
     ) -> Result<Vec<u8>, String> {
+        self.check_range(precision)
+            .map_err(|error| error.to_string())?;
         let encoded: Vec<_> = self
             .iter()
             .map(|(name, tensor)| (name, tensor.shape().to_vec(), encode(tensor, precision)))
@@ -86,8 +88,9 @@ impl Weights {
     /// Writes a safetensors file, whole or not at all.
     ///
     /// # Errors
-    /// [`NetError::Io`] or [`NetError::File`].
+    /// [`NetError::TooLarge`], [`NetError::Io`] or [`NetError::File`].
     pub fn write(&self, path: &Path, precision: WeightPrecision) -> Result<(), NetError> {
+        self.check_range(precision)?;
         let bytes = self
             .to_safetensors(precision, None)
             .map_err(|fault| NetError::File {
@@ -99,6 +102,23 @@ impl Weights {
             doing: "written",
             source,
         })
+    }
+
+    /// Whether every finite value stays finite at this precision.
+    fn check_range(&self, precision: WeightPrecision) -> Result<(), NetError> {
+        if precision == WeightPrecision::Single {
+            return Ok(());
+        }
+        let overflows = |value: &f32| value.is_finite() && !half::f16::from_f32(*value).is_finite();
+        for (name, tensor) in self.iter() {
+            if let Some(&value) = tensor.values().iter().find(|value| overflows(value)) {
+                return Err(NetError::TooLarge {
+                    name: name.to_owned(),
+                    value,
+                });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -166,7 +186,31 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_file_of_weights_is_told() {
+    fn a_value_beyond_half_precision_is_an_error_that_names_its_parameter() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("large.safetensors");
+        let weights = |value: f32| -> Weights {
+            let tensor = Tensor::new(vec![2], vec![0.5, value]).unwrap();
+            [("layer.bias".to_owned(), tensor)].into_iter().collect()
+        };
+        let error = weights(-1e5).write(&path, WeightPrecision::Half);
+        let error = error.unwrap_err();
+        assert!(
+            matches!(&error, NetError::TooLarge { name, .. } if name == "layer.bias"),
+            "{error}"
+        );
+        assert!(!path.exists());
+        let text = weights(1e5).to_safetensors(WeightPrecision::Half, None);
+        assert!(text.unwrap_err().contains("layer.bias"));
+        weights(65504.0)
+            .write(&path, WeightPrecision::Half)
+            .unwrap();
+        assert_eq!(Weights::read(&path).unwrap(), weights(65504.0));
+        weights(1e5).write(&path, WeightPrecision::Single).unwrap();
+    }
+
+    #[test]
+    fn what_is_no_file_of_weights_is_an_error() {
         for bytes in [&b""[..], b"hello", b"PK\x03\x04", &[0xff; 100]] {
             assert!(Weights::from_bytes(bytes).is_err());
         }

@@ -34,7 +34,7 @@ impl OnnxRuntime {
         format!("{prefix}onnxruntime{suffix}")
     }
 
-    /// Loads the library: a path, or a name that the system looks for. A program has one of them: where one is loaded
+    /// Loads the library: a path, or a name that the system finds. A program has one of them: where one is loaded
     /// already, it stays.
     ///
     /// # Errors

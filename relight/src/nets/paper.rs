@@ -43,7 +43,7 @@ pub fn spec_net() -> Graph {
 /// Normal-Net: the slopes (p, q) of a picture's surface, whose normal is (p, q, 1) over its length.
 ///
 /// Input as [`spec_net`]'s. Output `slopes`: 2 channels, -1..=1, so that no slope beyond 45 degrees
-/// a direction can be told.
+/// a direction can be expressed.
 #[must_use]
 pub fn normal_net() -> Graph {
     u_net("normal-net", "slopes", 2)

@@ -46,13 +46,13 @@ pub(in crate::cli) struct Arguments {
     /// The network's weights (.safetensors or .pth) [default: those that come with the program].
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// Look at the object at 256 x 256 pixels, or at what is finer too.
+    /// The size at which the object is decomposed.
     #[arg(long, value_enum, default_value_t = SizeName::S256)]
     size: SizeName,
     /// Separate highlights.
     #[arg(long, value_enum, default_value_t = GateName::Auto)]
     specular: GateName,
-    /// Do not look at the mirror image too: faster, and a little worse.
+    /// Leave out the mirror image: faster, and a little worse.
     #[arg(long)]
     no_mirror: bool,
     /// Another network's normals: 1 x 3 x 256 x 256 in, (x - 0.5) / 0.5 of sRGB values; 1 x 3 x 256 x 256
@@ -105,6 +105,27 @@ enum GateName {
 impl Arguments {
     /// What is wrong with the combination of arguments, if anything is.
     pub(in crate::cli) fn fault(&self) -> Option<String> {
+        self.frames_fault().or_else(|| self.mask_fault())
+    }
+
+    fn frames_fault(&self) -> Option<String> {
+        let Some(frames) = self.photos.iter().find(|path| PhotoInput::has_frames(path)) else {
+            let given = self.count.is_some();
+            return given.then(|| "--count is for shards, and there is none".to_owned());
+        };
+        let given = [
+            ("--mask", self.mask.is_some()),
+            ("--rect", self.rect.is_some()),
+            ("--transfer", self.transfer.is_some()),
+        ];
+        let (option, _) = given.into_iter().find(|(_, is_given)| *is_given)?;
+        let frames = frames.display();
+        Some(format!(
+            "{option} is for photographs: the frames of {frames} have masks of their own and are sRGB"
+        ))
+    }
+
+    fn mask_fault(&self) -> Option<String> {
         let mask = self.mask.as_ref().filter(|mask| !mask.is_dir())?;
         let is_one = matches!(self.photos.as_slice(), [photo] if !photo.is_dir());
         (!is_one).then(|| {
@@ -245,17 +266,18 @@ impl Run {
 
     fn decompose(&self, input: &PhotoInput, console: Console) -> Result<(), DecomposeError> {
         let photo = input.load(&self.reading)?;
+        let out = if self.own_folders {
+            self.output.join(&photo.name)
+        } else {
+            self.output.clone()
+        };
+        DecompositionFiles::check(&out)?;
         let options = photo.options(&self.options);
         let start = Instant::now();
         let found = self
             .decomposer
             .decompose(&photo.picture, &photo.mask, &options)?;
         let seconds = start.elapsed().as_secs_f64();
-        let out = if self.own_folders {
-            self.output.join(&photo.name)
-        } else {
-            self.output.clone()
-        };
         let files = DecompositionFiles {
             photo: &photo,
             found: &found,
@@ -271,7 +293,7 @@ impl Run {
         let highlights = if found.is_glossy {
             "separated"
         } else {
-            "not looked for"
+            "not separated"
         };
         let text = format!(
             "{}: {seconds:.2} s; {:.1} % saturated, highlights {highlights}; {:.1} % of the picture left over{source}",

@@ -18,6 +18,11 @@ const MOST_PICKLE: u64 = 64 << 20;
 const MOST_STORAGE: u64 = 2 << 30;
 /// Most tensors.
 const MOST_TENSORS: usize = 100_000;
+/// Most numbers of all tensors together: 2 GiB at single precision, four times the released Light-Net.
+const MOST_NUMBERS: usize = 1 << 29;
+/// Numbers that tensors may have beyond one for each byte of the file. A stored number takes two bytes at least, so
+/// each may belong to two tensors.
+const SHARED_NUMBERS: usize = 1 << 16;
 /// How deep a state dict may lie in other dicts.
 const DEEPEST: usize = 4;
 
@@ -48,6 +53,7 @@ pub(super) fn read_state_dict(bytes: &[u8]) -> Result<Weights, String> {
     if parts.len() > MOST_TENSORS {
         return Err(format!("{} tensors are too many", parts.len()));
     }
+    check_total(&parts, bytes.len())?;
     let mut weights = Vec::with_capacity(parts.len());
     for (name, parts) in parts {
         let entry = format!("{folder}data/{}", parts.storage.key);
@@ -106,6 +112,22 @@ fn find_tensors(
         .find_map(|&(_, value)| find_tensors(objects, value, depth + 1))
 }
 
+/// Whether tensors that describe the same storage again and again are few enough for a file of `bytes`.
+fn check_total(parts: &[(String, TensorParts)], bytes: usize) -> Result<(), String> {
+    let most = MOST_NUMBERS.min(bytes.saturating_add(SHARED_NUMBERS));
+    let counts = parts.iter().map(|(_, parts)| {
+        let sides = parts.shape.iter();
+        sides.fold(1_usize, |count, &side| count.saturating_mul(side))
+    });
+    let total = counts.fold(0_usize, usize::saturating_add);
+    if total > most {
+        return Err(format!(
+            "its tensors hold {total} numbers together, and a file of {bytes} bytes may hold {most}"
+        ));
+    }
+    Ok(())
+}
+
 /// A tensor's numbers in row-major order, wherever they lie in its storage.
 fn gather(parts: &TensorParts, data: &[u8]) -> Result<Tensor, String> {
     let TensorParts {
@@ -143,4 +165,64 @@ fn gather(parts: &TensorParts, data: &[u8]) -> Result<Tensor, String> {
         }
     }
     Tensor::new(shape.clone(), values).ok_or_else(|| "its shape is impossible".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use zip::ZipWriter;
+    use zip::write::SimpleFileOptions;
+
+    use super::*;
+
+    /// Numbers of the one storage.
+    const STORED: u32 = 50_000;
+
+    /// A state dict of so many tensors, each of which is the same storage.
+    fn sharing(tensors: u8) -> Vec<u8> {
+        let text = |text: &str| [&[0x8c, text.len() as u8], text.as_bytes()].concat();
+        let global = |path: &str| [b"c", path.as_bytes(), b"\n"].concat();
+        let count = [&b"J"[..], &STORED.to_le_bytes()].concat();
+        let mut pickle = b"\x80\x02}(".to_vec();
+        for at in 0..tensors {
+            let tensor: [&[u8]; 16] = [
+                &text(&format!("{at}.weight")),
+                &global("torch._utils\n_rebuild_tensor_v2"),
+                b"((",
+                &text("storage"),
+                &global("torch\nFloatStorage"),
+                &text("0"),
+                &text("cpu"),
+                &count,
+                // Storage, then offset 0.
+                b"tQ",
+                b"K\x00",
+                &count,
+                b"\x85",
+                b"K\x01",
+                b"\x85",
+                b"t",
+                b"R",
+            ];
+            pickle.extend(tensor.concat());
+        }
+        pickle.extend(b"u.");
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+        let stored =
+            SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+        archive.start_file("net/data.pkl", stored).unwrap();
+        archive.write_all(&pickle).unwrap();
+        archive.start_file("net/data/0", stored).unwrap();
+        archive.write_all(&vec![0; 4 * STORED as usize]).unwrap();
+        archive.finish().unwrap().into_inner()
+    }
+
+    #[test]
+    fn tensors_may_share_a_storage_but_not_multiply_the_file() {
+        let weights = read_state_dict(&sharing(2)).unwrap();
+        assert_eq!(weights.iter().count(), 2);
+        let text = read_state_dict(&sharing(24)).unwrap_err();
+        assert!(text.contains("its tensors hold 1200000 numbers"), "{text}");
+    }
 }
