@@ -31,7 +31,8 @@ Examples:
   relight train decompose -o run
       the network of relight decompose, on samples that are made while it trains
   relight train decompose --settings relight/weights/decompose.toml -o run
-      as the weights that come with relight were trained
+      as the weights that come with relight were trained, from the folders meshes and panoramas of what
+      relight/weights/README.md names
   relight train decompose --settings my.toml -o run --resume
       goes on with a run that was stopped, to the same losses
   relight train normal -o normal
