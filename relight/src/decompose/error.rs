@@ -7,6 +7,7 @@ use crate::data::{DamagedSample, OpenError};
 use crate::image::{Extent, ImageError};
 use crate::light::{LightError, LightFileError};
 use crate::nets::NetError;
+use crate::whole::FolderFault;
 
 /// Why a photograph cannot be decomposed.
 #[derive(Debug, thiserror::Error)]
@@ -136,5 +137,15 @@ impl DecomposeError {
     pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         |source| Self::Write { path, source }
+    }
+}
+
+impl From<FolderFault> for DecomposeError {
+    fn from(fault: FolderFault) -> Self {
+        match fault {
+            FolderFault::Foreign(path) => Self::Foreign { path },
+            FolderFault::Read(path, source) => Self::Read { path, source },
+            FolderFault::Write(path, source) => Self::Write { path, source },
+        }
     }
 }

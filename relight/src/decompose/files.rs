@@ -1,10 +1,8 @@
 //! What is written of a decomposition: a folder that appears when it is whole.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::process;
+use std::path::Path;
 
-use relit_data::durable::{publish, write_whole};
+use relit_data::durable::write_whole;
 use serde::Serialize;
 
 use super::decomposer::{DecomposeOptions, Decomposition, SpecularGate, WorkingSize, grey};
@@ -12,9 +10,10 @@ use super::error::DecomposeError;
 use super::mask::MaskSource;
 use super::photo::Photo;
 use super::region::Region;
-use crate::image::{ColourSpace, Depth, Extent, Linear, Planes, Rgb, Srgb, write_png};
+use crate::image::{ColourSpace, Depth, Extent, ImageError, Linear, Planes, Rgb, Srgb, write_png};
 use crate::light::{Normals, Panorama};
 use crate::render::{DiffuseForm, DiffuseLayer, exposure_for};
+use crate::whole::write_folder;
 
 /// The file of figures.
 const FIGURES: &str = "decomposition.json";
@@ -99,23 +98,7 @@ impl DecompositionFiles<'_> {
     /// # Errors
     /// Where the folder holds something else, or a file cannot be written: then the folder is as it was.
     pub fn write(&self, out: &Path) -> Result<DecompositionFigures, DecomposeError> {
-        check_free(out)?;
-        let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty());
-        if let Some(parent) = parent {
-            fs::create_dir_all(parent).map_err(DecomposeError::write(parent))?;
-        }
-        let partial = hidden_beside(out, "partial")?;
-        let write = || {
-            remove_folder(&partial)?;
-            fs::create_dir(&partial).map_err(DecomposeError::write(&partial))?;
-            let figures = self.write_files(&partial)?;
-            replace(&partial, out)?;
-            Ok(figures)
-        };
-        write().inspect_err(|_| {
-            // The first error is the one that counts.
-            let _ = fs::remove_dir_all(&partial);
-        })
+        write_folder(out, FIGURES, |folder| self.write_files(folder))
     }
 
     fn write_files(&self, folder: &Path) -> Result<DecompositionFigures, DecomposeError> {
@@ -244,7 +227,7 @@ fn ball(found: &Decomposition) -> Rgb<Linear> {
 }
 
 /// Writes light as a PNG of 16 bits, sRGB; the light that its largest value stands for.
-fn write_light(path: &Path, light: &Rgb<Linear>) -> Result<f32, DecomposeError> {
+pub(crate) fn write_light(path: &Path, light: &Rgb<Linear>) -> Result<f32, ImageError> {
     let planes = light.planes();
     let most = planes
         .planes()
@@ -259,7 +242,7 @@ fn write_light(path: &Path, light: &Rgb<Linear>) -> Result<f32, DecomposeError> 
 }
 
 /// The value that one in two hundred under the mask exceeds; 1 where all is dark.
-fn bright(planes: &Planes<3>, mask: &Planes<1>) -> f32 {
+pub(crate) fn bright(planes: &Planes<3>, mask: &Planes<1>) -> f32 {
     let [red, green, blue] = planes.planes();
     let mut values: Vec<f32> = (0..mask.extent().pixels())
         .filter(|&at| mask.plane(0)[at] >= 0.5)
@@ -271,56 +254,4 @@ fn bright(planes: &Planes<3>, mask: &Planes<1>) -> f32 {
     }
     let (_, &mut value, _) = values.select_nth_unstable_by(place, f32::total_cmp);
     if value > 0.0 { value } else { 1.0 }
-}
-
-/// Whether a decomposition may be written to this folder.
-fn check_free(out: &Path) -> Result<(), DecomposeError> {
-    if !out.exists() || out.join(FIGURES).is_file() {
-        return Ok(());
-    }
-    let foreign = || DecomposeError::Foreign {
-        path: out.to_owned(),
-    };
-    if !out.is_dir() {
-        return Err(foreign());
-    }
-    match fs::read_dir(out).map_err(DecomposeError::read(out))?.next() {
-        None => Ok(()),
-        Some(_) => Err(foreign()),
-    }
-}
-
-/// Puts a finished folder in the place of another.
-fn replace(partial: &Path, out: &Path) -> Result<(), DecomposeError> {
-    let old = hidden_beside(out, "old")?;
-    remove_folder(&old)?;
-    let had_old = out.exists();
-    if had_old {
-        fs::rename(out, &old).map_err(DecomposeError::write(out))?;
-    }
-    publish(partial, out)
-        .map_err(DecomposeError::write(out))
-        .inspect_err(|_| {
-            if had_old {
-                // The first error is the one that counts.
-                let _ = fs::rename(&old, out);
-            }
-        })?;
-    remove_folder(&old)
-}
-
-/// A hidden name beside a folder that no other process uses.
-fn hidden_beside(out: &Path, ending: &str) -> Result<PathBuf, DecomposeError> {
-    let name = out.file_name().ok_or_else(|| DecomposeError::Foreign {
-        path: out.to_owned(),
-    })?;
-    let name = name.to_string_lossy();
-    Ok(out.with_file_name(format!(".{name}.{}.{ending}", process::id())))
-}
-
-fn remove_folder(folder: &Path) -> Result<(), DecomposeError> {
-    if folder.exists() {
-        fs::remove_dir_all(folder).map_err(DecomposeError::write(folder))?;
-    }
-    Ok(())
 }

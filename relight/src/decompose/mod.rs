@@ -26,6 +26,7 @@ pub use encoding::{AnsweredMaps, EncodedPicture};
 pub(crate) use encoding::{HIGHLIGHT_OFFSET, LEAST_FACING, LOG_LUMINANCE, LOG_SHADING, MASK};
 pub use error::DecomposeError;
 pub use files::{DecompositionFigures, DecompositionFiles};
+pub(crate) use files::{bright, write_light};
 pub use gloss::FittedGloss;
 pub use mask::{MaskSource, Rectangle};
 pub use photo::{Photo, PhotoInput, PhotoReading};

@@ -1,0 +1,80 @@
+//! What the model leaves over: highlights and cast shadows.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::robust::{reference, rest};
+use super::{TurnCurves, TurnSolution};
+use crate::image::Planes;
+
+/// What exceeds the model and what falls short of it.
+#[derive(Debug, Clone)]
+pub struct TurnMaps {
+    /// The most that a pixel exceeds the model by anywhere in the turn, in units of light, the mean of the
+    /// channels; 0 outside the mask.
+    pub highlight: Planes<1>,
+    /// The part of the model's light over the whole turn that a pixel does not have, 0 to 1.
+    pub shadow: Planes<1>,
+    /// Both over the table's angle.
+    pub over_angle: Vec<AngleFigure>,
+}
+
+/// What is left over at an angle, as a part of the model's mean light, the mean over the pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AngleFigure {
+    /// The table's angle, degrees.
+    pub angle_deg: f64,
+    /// How far pixels exceed the model.
+    pub highlight: f64,
+    /// How far they fall short of it.
+    pub shadow: f64,
+}
+
+impl TurnMaps {
+    /// What a solution leaves over.
+    #[must_use]
+    pub fn new(curves: &TurnCurves, solution: &TurnSolution) -> Self {
+        let lit = (&solution.light, &solution.frame);
+        let rests: Vec<Vec<Option<f64>>> = (0..curves.pixels())
+            .into_par_iter()
+            .map(|pixel| rest(curves, pixel, &solution.fits[pixel], lit))
+            .collect();
+        let most = |pixel: usize| {
+            let unit = reference(curves, pixel, &solution.fits[pixel], lit);
+            let most = rests[pixel]
+                .iter()
+                .flatten()
+                .fold(0.0_f64, |a, &b| a.max(b));
+            [(most * unit) as f32]
+        };
+        let missing = |pixel: usize| {
+            let rests = &rests[pixel];
+            let sum: f64 = rests.iter().flatten().map(|rest| (-rest).max(0.0)).sum();
+            [(sum / rests.len().max(1) as f64).min(1.0) as f32]
+        };
+        Self {
+            highlight: curves.map(most),
+            shadow: curves.map(missing),
+            over_angle: over_angle(curves, &rests),
+        }
+    }
+}
+
+fn over_angle(curves: &TurnCurves, rests: &[Vec<Option<f64>>]) -> Vec<AngleFigure> {
+    let at = |(part, angle): (usize, &f64)| {
+        let seen = rests.iter().filter_map(|rests| rests[part]);
+        let (mut above, mut below, mut count) = (0.0, 0.0, 0.0);
+        for rest in seen {
+            above += rest.max(0.0);
+            below += (-rest).max(0.0);
+            count += 1.0;
+        }
+        let count = f64::max(count, 1.0);
+        AngleFigure {
+            angle_deg: angle.to_degrees(),
+            highlight: above / count,
+            shadow: below / count,
+        }
+    };
+    curves.angles().iter().enumerate().map(at).collect()
+}
