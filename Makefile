@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-train test test-rig lint demo bench bench-reader docs fuzz firmware emulator flash
+.PHONY: help setup setup-train test test-rig lint demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -97,6 +97,11 @@ bench-reader: setup $(BENCH_MASK) $(BENCH_VENV)/ready ## Measure relight's reade
 	$(BENCH_VENV)/bin/python tests/bench/reader.py --reader $(TARGET)/release/examples/read_turns \
 	    --runs $(BENCH_RUNS) $(DEMO)/out
 
+bench-network: setup-train $(BENCH_VENV)/torch-ready ## Measure relight's training against PyTorch's
+	cargo build --locked --release -p relight --features train --example network_speed
+	$(BENCH_VENV)/bin/python tests/bench/network.py --program $(TARGET)/release/examples/network_speed \
+	    --runs $(BENCH_RUNS)
+
 docs: setup ## Build the library's reference
 	cargo doc --locked --no-deps
 	@echo "$(TARGET)/doc/relit/index.html"
@@ -123,4 +128,8 @@ $(DEMO)/mask.png:
 $(BENCH_VENV)/ready: tests/bench/requirements.txt
 	python3 -m venv $(BENCH_VENV)
 	$(BENCH_VENV)/bin/pip install --quiet -r $<
+	touch $@
+
+$(BENCH_VENV)/torch-ready: $(BENCH_VENV)/ready tests/bench/requirements-network.txt
+	$(BENCH_VENV)/bin/pip install --quiet -r tests/bench/requirements-network.txt
 	touch $@

@@ -17,8 +17,7 @@ use std::time::{Duration, Instant};
 
 use relit::extract::{ExtractOptions, extract};
 use relit_data::session::{
-    CameraFacts, FrameClock, FrameIndex, Manifest, Recording, SoftwareFacts, Status,
-    TurntableFacts, VideoFacts,
+    CameraFacts, FrameClock, FrameIndex, Manifest, Recording, SoftwareFacts, Status, VideoFacts,
 };
 use relit_data::shard::{Dataset, ImageSize};
 use relit_rig::camera::{
@@ -185,12 +184,7 @@ fn manifest() -> Manifest {
             clock: FrameClock::default(),
             controls: BTreeMap::new(),
         },
-        turntable: Some(TurntableFacts {
-            port: "sim:".to_owned(),
-            firmware: "simulated".to_owned(),
-            degrees_per_second: 72.0,
-            steps_per_degree: 88.889,
-        }),
+        turntable: None,
         video: VideoFacts {
             file: String::new(),
             codec: String::new(),
@@ -203,6 +197,8 @@ fn manifest() -> Manifest {
             version: "1".to_owned(),
             commit: String::new(),
         },
+        note: None,
+        rating: None,
     }
 }
 
@@ -469,6 +465,9 @@ fn an_unplugged_camera_leaves_what_was_recorded() {
     take.check_rejected("/dev/video0 was unplugged");
     take.check_rejected("45 of 120 frames");
     assert_eq!(take.frames_in_video(), 45);
+    // The frames after it were never due.
+    assert_eq!(take.counts(), (45, 0));
+    assert!(take.faults().is_empty(), "{:?}", take.faults());
     assert!(take.recording.notices[0].text().contains("unplugged"));
 }
 
@@ -666,6 +665,17 @@ fn child_that_records_into_a_limit() {
     let take = record(&root, 0, steps(stream(200, 0)));
     let (recorded, dropped) = take.counts();
     assert_eq!(recorded + dropped, 120, "{:?}", take.faults());
+    // One number, wherever it stands.
+    let same = [
+        format!("for the rest of the turn ({dropped} frames)"),
+        format!("took no more: {dropped} frames from frame {recorded} on"),
+    ];
+    assert!(take.rejection().contains(&same[0]), "{}", take.rejection());
+    assert!(
+        take.faults().iter().any(|fault| fault.contains(&same[1])),
+        "{:?}",
+        take.faults()
+    );
     println!("REASON {}", take.rejection());
 }
 
@@ -860,6 +870,20 @@ fn a_recording_killed_before_its_first_frame_is_salvaged_as_such() {
         panic!("{manifest:?}");
     };
     assert!(reason.contains("before its first frame"), "{reason}");
+
+    // It is left out of a batch, with its reason, and is no failure.
+    let output = Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+        .arg(root.path())
+        .arg("-o")
+        .arg(root.path().join("out"))
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(3), "{output:?}");
+    assert!(
+        said.contains("0 frames: the capture ended before the first one"),
+        "{said}"
+    );
 }
 
 #[test]

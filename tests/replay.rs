@@ -13,6 +13,8 @@ use serde::Deserialize;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Expect {
+    /// Samples of a whole turn, where the fixture is part of one.
+    partial_of: Option<u32>,
     samples: u32,
     duplicates: u32,
     lossy: bool,
@@ -74,8 +76,8 @@ fn every_fixture_comes_out_as_it_says() {
         let out = folder.path().join("out");
         let (from, to) = (session.to_str().unwrap(), out.to_str().unwrap());
         let mask = session.join("mask_gt.png");
-        let samples = expect.samples.to_string();
-        let arguments = [
+        let samples = expect.partial_of.unwrap_or(expect.samples).to_string();
+        let mut arguments = vec![
             from,
             "-o",
             to,
@@ -86,6 +88,16 @@ fn every_fixture_comes_out_as_it_says() {
             "--size",
             "64",
         ];
+        if expect.partial_of.is_some() {
+            let refused = run(&arguments);
+            assert_eq!(refused.status.code(), Some(3), "{name}: {refused:?}");
+            let said = String::from_utf8_lossy(&refused.stdout).into_owned();
+            assert!(
+                said.contains("left out: the frames cover"),
+                "{name}: {said}"
+            );
+            arguments.push("--partial");
+        }
         let output = run(&arguments);
         let errors = String::from_utf8_lossy(&output.stderr);
         assert_eq!(

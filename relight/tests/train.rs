@@ -20,8 +20,8 @@ use relight::nets::{Graph, Inference, Weights, decomposer};
 use relight::synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
 use relight::train::{
     Adam, AdamSettings, AnsweredTensors, Composer, Composition, ComputePrecision, DataSettings,
-    DecomposeSettings, DecomposeTask, Model, PaperInputs, PaperPhase, PaperSettings, PaperTask,
-    PrecisionChoice, Resources, Run, RunOutcome, RunSettings, TABLE, Task, TrainError,
+    DecomposeSettings, DecomposeTask, Model, PaperInputs, PaperLosses, PaperPhase, PaperSettings,
+    PaperTask, PrecisionChoice, Resources, Run, RunOutcome, RunSettings, TABLE, Task, TrainError,
     TrainObserver, TruthArrays, read_settings,
 };
 use tch::{Device, Kind, Tensor};
@@ -337,6 +337,47 @@ fn every_phase_of_the_paper_makes_its_steps_and_goes_on_where_it_was_stopped() {
         make_run(&mut task(), &run, parted.path(), (true, u64::MAX)).unwrap();
         assert_eq!(table(parted.path()), table(whole.path()), "{phase:?}");
     }
+}
+
+#[test]
+fn turns_that_are_held_out_are_judged_at_the_start_and_at_the_end() {
+    tch::set_num_threads(1);
+    let turns = turns();
+    let inputs = PaperInputs {
+        turns: Some(turns.path().to_owned()),
+        held_out: Some(turns.path().to_owned()),
+        normal: Some(Weights::initial(&normal_net(), 2)),
+        ..PaperInputs::default()
+    };
+    let settings = PaperSettings {
+        run: RunSettings {
+            rate: 2e-5,
+            average: 0.0,
+            ..paper_settings(12).run
+        },
+        loss: PaperLosses {
+            anchor: 0.0,
+            ..PaperLosses::default()
+        },
+        ..paper_settings(12)
+    };
+    let run = settings.run.clone();
+    let mut task = PaperTask::new(PaperPhase::Light, settings, RESOURCES, &inputs).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    make_run(&mut task, &run, folder.path(), (false, u64::MAX)).unwrap();
+    let read = |step: &str, name: &str| -> f64 {
+        let start = format!("{step},validation/{name},");
+        let table = table(folder.path());
+        let line = table.iter().find_map(|line| line.strip_prefix(&start));
+        line.unwrap_or_else(|| panic!("{start}")).parse().unwrap()
+    };
+    assert_eq!(
+        read("0", "pictures_residual"),
+        read("12", "pictures_residual")
+    );
+    assert!(read("12", "residual") < read("0", "residual"));
+    assert!((0.0..1.0).contains(&read("12", "sigma_ratio")));
+    assert!(read("12", "shading") > 0.0);
 }
 
 #[test]

@@ -165,7 +165,8 @@ static void on_step(struct avr_irq_t *irq, uint32_t value, void *param)
 	chip->step_level = level;
 	if (!level)
 		return;
-	chip->steps += chip->direction ? 1 : -1;
+	/* DIR is low for a positive turn. */
+	chip->steps += chip->direction ? -1 : 1;
 	tell(chip, CHIP_STEP, chip->direction);
 	follow_steps(chip);
 }

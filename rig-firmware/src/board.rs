@@ -124,7 +124,7 @@ pub struct Outputs {
     pub pulse_us: u8,
     /// A step pulse is low instead of high.
     pub invert_step: bool,
-    /// The direction pin is low for a positive turn instead of high.
+    /// The direction pin is high for a positive turn instead of low.
     pub invert_direction: bool,
     /// The enable pin is high for a fed driver instead of low.
     pub invert_enable: bool,

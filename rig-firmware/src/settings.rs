@@ -22,7 +22,7 @@ pub enum Key {
     ReleaseDelay,
     /// `$2`: step pulses are low.
     InvertStep,
-    /// `$3`: the direction pin is inverted.
+    /// `$3`: the direction pin is high for a positive turn instead of low.
     InvertDirection,
     /// `$4`: the enable pin is inverted.
     InvertEnable,

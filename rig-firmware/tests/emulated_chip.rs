@@ -422,3 +422,49 @@ fn ten_thousand_checked_lines_at_full_speed_lose_no_byte() {
     println!("stack: {free} bytes were never used");
     assert!(free >= 128, "{free}");
 }
+
+/// The level of DIR at the first step that a line makes.
+fn first_direction(chip: &mut Chip, line: &str) -> u8 {
+    let before = chip.steps.len();
+    chip.write(format!("{line}\n").as_bytes());
+    while chip.steps.len() == before {
+        chip.run(10 * MS);
+    }
+    let level = u8::from(!chip.steps[before].forward);
+    chip.write(&[0x18]);
+    chip.run(500 * MS);
+    while chip.line(MS).is_some() {}
+    chip.accept("$X");
+    level
+}
+
+#[test]
+fn the_direction_pin_is_the_one_of_grbl() {
+    let mut chip = power_on!();
+    chip.command("index 1000 1050 32000");
+    // Grbl's documentation of 1.1: "By default, the axes move in a positive direction when the
+    // direction pin signal is low, and a negative direction when the pin is high" ($3); homing
+    // first moves in positive direction, and the other way with $23.
+    let table = [
+        ("G91G1X5F432", [0, 1], [0, 1]),
+        ("G91G1X-5F432", [1, 0], [1, 0]),
+        ("$J=G91X5F432", [0, 1], [0, 1]),
+        ("$J=G91X-5F432", [1, 0], [1, 0]),
+        ("$H", [0, 1], [1, 0]),
+    ];
+    chip.accept("$22=1");
+    for homing_inverted in [0, 1] {
+        chip.accept(&format!("$23={homing_inverted}"));
+        for inverted in [0, 1] {
+            chip.accept(&format!("$3={inverted}"));
+            for (line, usual, other) in &table {
+                let wanted = [usual, other][homing_inverted][inverted];
+                let found = first_direction(&mut chip, line);
+                assert_eq!(
+                    found, wanted,
+                    "{line} with $3={inverted} $23={homing_inverted}"
+                );
+            }
+        }
+    }
+}

@@ -125,6 +125,7 @@
 //!     },
 //!     selection: SamplingBasis::Angle,
 //!     samples: SAMPLES,
+//!     covered_deg: None,
 //!     duplicates: 0,
 //!     spec_net: 0,
 //!     lossy: false,

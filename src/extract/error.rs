@@ -117,6 +117,22 @@ pub enum ExtractError {
         /// Angle from the first frame to the last, degrees.
         degrees: f64,
     },
+    /// The recording is part of a turn.
+    #[error(
+        "the frames cover {covered_deg:.1} of 360 degrees: --partial makes the samples that are there, or record it again"
+    )]
+    PartOfATurn {
+        /// Degrees that are there.
+        covered_deg: f64,
+    },
+    /// The recording is part of a turn, and no angle is known.
+    #[error(
+        "the frames cover about {covered_deg:.0} of 360 degrees, and their angles are not known: record it again, or give the video file itself to spread the frames over time"
+    )]
+    NoAngles {
+        /// Degrees that are there, by the planned speed.
+        covered_deg: f64,
+    },
     /// With `strict`: a frame is used twice or something is lost.
     #[error("refused by --strict: {0}")]
     Strict(String),
@@ -153,4 +169,17 @@ pub enum ExtractError {
         /// The system's error.
         source: std::io::Error,
     },
+}
+
+impl ExtractError {
+    /// Whether the recording itself is the reason: it holds too little of a turn, and is left out.
+    #[must_use]
+    pub fn leaves_out(&self) -> bool {
+        matches!(
+            self,
+            Self::PartOfATurn { .. }
+                | Self::NoAngles { .. }
+                | Self::Session(session::SessionError::NoFrames(_))
+        )
+    }
 }

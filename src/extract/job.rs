@@ -6,7 +6,7 @@ use rayon::ThreadPool;
 
 use relit_data::image_stats::MaskSpans;
 use relit_data::report::{self, Page};
-use relit_data::session::{INDEX_FILE, Notice, Recording};
+use relit_data::session::{INDEX_FILE, Notice, Recording, Status};
 use relit_data::shard::{
     Dataset, Digest, FrameRecord, ImageSize, MaskInfo, OutputFolder, Sample, SessionEntry,
     ShardEntry, ShardWriter, SourceVideo,
@@ -17,6 +17,7 @@ use super::collected::Collected;
 use super::object::ObjectMask;
 use super::pipeline::{LostFrame, ProcessedFrame, Stage};
 use super::plan::{Assignment, Plan};
+use super::select::{TURN_DEG, TURN_TOLERANCE_DEG};
 use super::{ExtractError, ExtractOptions, Observer, Scaler, cut, square_around};
 
 /// Number of runs of damaged frames that are reported one by one.
@@ -80,7 +81,8 @@ impl Job {
     ) -> Option<&'a SessionEntry> {
         let entry = dataset.session(self.id())?;
         let same = entry.input == self.input && entry.mask.blake3 == self.mask.blake3;
-        let accepted = !options.strict || (!entry.lossy && entry.duplicates == 0);
+        let accepted = (options.partial || entry.covered_deg.is_none())
+            && (!options.strict || (!entry.lossy && entry.duplicates == 0));
         (same && accepted && dataset.check_integrity(out, self.id()).is_ok()).then_some(entry)
     }
 
@@ -100,8 +102,10 @@ impl Job {
         observer: &dyn Observer,
     ) -> Result<(SessionEntry, Vec<ShardEntry>), ExtractError> {
         let mut plan = Plan::new(&self.video, self.recording.frames.as_ref(), options.frames)?;
+        self.check_turn(&plan, options.partial)?;
+        let samples = u32::try_from(plan.selection.frames.len()).unwrap_or(options.frames);
         let mut notices = self.notices.clone();
-        notices.extend(self.notices_of_plan(&plan));
+        notices.extend(self.notices_of_plan(&plan, options.frames));
         if options.strict {
             check_strict(&plan, &notices)?;
         }
@@ -110,10 +114,10 @@ impl Job {
             folder.path(),
             options.layout,
             self.id(),
-            options.frames,
+            samples,
             stage.scaler.mask(),
         )?;
-        let mut collected = Collected::new(options.frames);
+        let mut collected = Collected::new(samples);
         let mut assignments = plan.assignments();
         let mut lost = Vec::new();
         while !assignments.is_empty() {
@@ -150,7 +154,8 @@ impl Job {
                 bounding_box: self.mask.bounding_box,
             },
             selection: plan.selection.basis(),
-            samples: options.frames,
+            samples,
+            covered_deg: part_of_turn(&plan),
             duplicates: collected.count(|r| r.duplicate),
             spec_net: collected.count(|r| r.spec_net),
             lossy: notices.iter().any(Notice::is_loss),
@@ -159,6 +164,26 @@ impl Job {
             report: Some(report),
         };
         Ok((entry, files.shards))
+    }
+
+    /// That the recording is a whole turn, or part of one where that is asked for.
+    fn check_turn(&self, plan: &Plan, partial: bool) -> Result<(), ExtractError> {
+        if let Some(covered_deg) = part_of_turn(plan).filter(|_| !partial) {
+            return Err(ExtractError::PartOfATurn { covered_deg });
+        }
+        let Some(manifest) = self.recording.manifest.as_ref() else {
+            return Ok(());
+        };
+        match &manifest.turntable {
+            Some(table) if !plan.has_angles() && manifest.status != Status::Complete => {
+                let covered_deg = plan.seconds() * table.degrees_per_second;
+                match covered_deg < TURN_DEG - TURN_TOLERANCE_DEG {
+                    true => Err(ExtractError::NoAngles { covered_deg }),
+                    false => Ok(()),
+                }
+            }
+            _ => Ok(()),
+        }
     }
 
     fn stage(&self, options: &ExtractOptions) -> Result<Stage<'_>, ExtractError> {
@@ -219,7 +244,7 @@ impl Job {
     }
 
     /// What the plan shows: repeated frames, an incomplete turn, gaps.
-    fn notices_of_plan(&self, plan: &Plan) -> Vec<Notice> {
+    fn notices_of_plan(&self, plan: &Plan, wanted: u32) -> Vec<Notice> {
         let mut notices = Vec::new();
         if self.recording.frames.is_none() {
             notices.extend(plan.gap_warnings().into_iter().map(Notice::Warning));
@@ -242,11 +267,10 @@ impl Job {
                 plan.usable(),
             )));
         }
-        if let Some(covered) = plan.selection.covered_deg()
-            && plan.selection.is_partial()
-        {
+        if let Some(covered) = part_of_turn(plan) {
             notices.push(Notice::Loss(format!(
-                "the frames cover {covered:.1} of 360 degrees: the samples are spread over these"
+                "the frames cover {covered:.1} of 360 degrees: {} of {wanted} samples are there",
+                plan.selection.frames.len(),
             )));
         }
         notices
@@ -287,6 +311,12 @@ impl Job {
             saturation_level: options.saturation_level,
         })?)
     }
+}
+
+/// The degrees that are there, where they are no whole turn.
+fn part_of_turn(plan: &Plan) -> Option<f64> {
+    let partial = plan.selection.is_partial();
+    plan.selection.covered_deg().filter(|_| partial)
 }
 
 fn texts(notices: &[Notice]) -> Vec<String> {

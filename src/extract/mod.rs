@@ -45,6 +45,8 @@ pub struct Tally {
     pub lossy: usize,
     /// Recordings that were in the data set already.
     pub skipped: usize,
+    /// Recordings that hold too little of a turn, and were left out.
+    pub left_out: usize,
     /// Recordings that failed.
     pub failed: usize,
 }
@@ -114,7 +116,10 @@ impl Run<'_> {
         outcome: Result<RecordingOutcome, ExtractError>,
         tally: &mut Tally,
     ) {
-        let outcome = outcome.unwrap_or_else(RecordingOutcome::Failed);
+        let outcome = outcome.unwrap_or_else(|error| match error.leaves_out() {
+            true => RecordingOutcome::LeftOut(error),
+            false => RecordingOutcome::Failed(error),
+        });
         match &outcome {
             RecordingOutcome::Extracted(entry) => {
                 tally.extracted += 1;
@@ -124,6 +129,7 @@ impl Run<'_> {
                 tally.skipped += 1;
                 tally.lossy += usize::from(entry.lossy);
             }
+            RecordingOutcome::LeftOut(_) => tally.left_out += 1,
             RecordingOutcome::Failed(_) => tally.failed += 1,
         }
         self.observer.ended(recording, &outcome);

@@ -29,6 +29,8 @@ pub enum RecordingOutcome {
     Extracted(Box<SessionEntry>),
     /// It was in the data set already, intact and with the same settings, video, index and mask.
     Skipped(Box<SessionEntry>),
+    /// It holds too little of a turn, and is not in the data set.
+    LeftOut(ExtractError),
     /// It is not in the data set.
     Failed(ExtractError),
 }

@@ -34,6 +34,8 @@ pub struct ExtractOptions {
     pub mask: Option<PathBuf>,
     /// Refuse recordings in which a frame would be used twice or something is lost.
     pub strict: bool,
+    /// Extract the part of a turn where a recording is no whole one; otherwise it is left out.
+    pub partial: bool,
     /// Skip sessions that the data set already holds, intact and made from the same input.
     pub resume: bool,
     /// Replace sessions of the same name that were made from another video.
@@ -53,6 +55,7 @@ impl Default for ExtractOptions {
             layout: Layout::Webdataset,
             mask: None,
             strict: false,
+            partial: false,
             resume: false,
             replace: false,
             threads: available_parallelism().map_or(1, std::num::NonZero::get),

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 
 use relit_data::session::FrameIndex;
+use relit_data::shard::SamplingBasis;
 use relit_video::Video;
 
 use super::select::{Candidate, Selection};
@@ -73,6 +74,19 @@ impl Plan {
             .binary_search_by_key(&frame, |c| c.frame)
             .ok()?;
         self.candidates.get(at)
+    }
+
+    /// Whether any frame has an angle.
+    pub(super) fn has_angles(&self) -> bool {
+        self.selection.basis() == SamplingBasis::Angle
+    }
+
+    /// From the first frame to the last, seconds.
+    pub(super) fn seconds(&self) -> f64 {
+        match self.candidates.as_slice() {
+            [first, .., last] => last.t_us.saturating_sub(first.t_us) as f64 / 1e6,
+            _ => 0.0,
+        }
     }
 
     /// Number of frames that may be chosen.

@@ -17,8 +17,8 @@ pub struct Candidate {
 
 /// A turn that lacks less than this counts as complete: its last samples repeat a frame, which is
 /// flagged.
-const TURN_TOLERANCE_DEG: f64 = 1.0;
-const TURN_DEG: f64 = 360.0;
+pub(super) const TURN_TOLERANCE_DEG: f64 = 1.0;
+pub(super) const TURN_DEG: f64 = 360.0;
 
 /// The range over which samples are spread: its start, direction and extent.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +30,8 @@ pub struct TurnSpan {
     direction: f64,
     /// Degrees or microseconds.
     extent: f64,
+    /// From sample 0 to where the last candidate is nearer than a further one would be.
+    reach: f64,
     covered_deg: Option<f64>,
 }
 
@@ -37,7 +39,7 @@ impl TurnSpan {
     /// The span of these candidates, which are in order of time.
     ///
     /// If every candidate has an angle: a full turn from the first frame's angle in the direction in
-    /// which the table turns, or as much of it as the candidates cover. Otherwise: the time from the
+    /// which the table turns, of which the candidates may cover a part. Otherwise: the time from the
     /// first frame to the end of the last.
     ///
     /// # Errors
@@ -64,15 +66,18 @@ impl TurnSpan {
             .map(|candidate| span.position(candidate))
             .collect();
         let to_last = span.position(last);
-        span.extent = to_last + median_step(&positions);
+        let step = median_step(&positions);
+        span.extent = to_last + step;
+        span.reach = f64::INFINITY;
         if span.basis == SamplingBasis::Angle {
             if to_last < TURN_TOLERANCE_DEG {
                 return Err(ExtractError::TableStands { degrees: to_last });
             }
             span.covered_deg = Some(span.extent.min(TURN_DEG));
-            if span.extent >= TURN_DEG - TURN_TOLERANCE_DEG {
-                span.extent = TURN_DEG;
+            if span.extent < TURN_DEG - TURN_TOLERANCE_DEG {
+                span.reach = to_last + step / 2.0;
             }
+            span.extent = TURN_DEG;
         }
         Ok(span)
     }
@@ -83,6 +88,7 @@ impl TurnSpan {
             origin,
             direction,
             extent: 0.0,
+            reach: 0.0,
             covered_deg: None,
         }
     }
@@ -97,7 +103,8 @@ impl TurnSpan {
     }
 
     /// For each of `samples` positions, evenly spread over the span, the nearest candidate (the
-    /// earlier one of two at the same distance) and its distance.
+    /// earlier one of two at the same distance) and its distance; of part of a turn, for the
+    /// positions that are there.
     fn nearest(&self, candidates: &[Candidate], samples: u32) -> (Vec<u64>, Vec<f64>) {
         let mut sorted: Vec<(f64, u64)> = candidates
             .iter()
@@ -106,8 +113,9 @@ impl TurnSpan {
         sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let first_from = |position: f64| sorted.partition_point(|candidate| candidate.0 < position);
         (0..samples)
-            .map(|k| {
-                let target = f64::from(k) * self.extent / f64::from(samples);
+            .map(|k| f64::from(k) * self.extent / f64::from(samples))
+            .take_while(|&target| target <= self.reach)
+            .map(|target| {
                 let distance = |at: usize| (sorted[at].0 - target).abs();
                 let after = first_from(target);
                 let before = after.checked_sub(1).map(|last| first_from(sorted[last].0));
@@ -137,7 +145,7 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Chooses `samples` frames, evenly spread over the turn that the candidates cover.
+    /// Chooses `samples` frames, evenly spread over a turn; fewer where the candidates cover a part of it.
     ///
     /// # Errors
     /// As [`TurnSpan::of`].
@@ -337,12 +345,12 @@ mod tests {
     }
 
     #[test]
-    fn half_a_turn_is_spread_over_all_samples_and_reported() {
+    fn half_a_turn_makes_the_samples_that_are_there_and_no_others() {
         let angles = (0..750).map(|n| f64::from(n) * 0.24);
         let selection = Selection::choose(&turned(angles), 1500).unwrap();
         assert!(selection.is_partial());
         assert!((selection.covered_deg().unwrap() - 180.0).abs() < 1e-6);
-        assert_eq!(selection.frames[1499], 749);
+        assert_eq!(selection.frames, (0..750).collect::<Vec<u64>>());
     }
 
     #[test]

@@ -4,15 +4,20 @@
 //! them can hold the capture up. This module knows no other module.
 
 use std::collections::VecDeque;
+use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use jiff::Timestamp;
 use serde::Serialize;
 use tokio::sync::watch;
 use utoipa::ToSchema;
 
 /// Faults kept for display; older ones are in the sessions' manifests.
 const FAULTS_KEPT: usize = 50;
+
+/// Lines of the log kept for display.
+const LOG_KEPT: usize = 40;
 
 /// Where a capture stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Default, ToSchema)]
@@ -37,6 +42,22 @@ pub enum Phase {
     Checking,
     /// A queue of objects waits for somebody to say that the next one stands on the table.
     WaitingForObject,
+}
+
+impl fmt::Display for Phase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Idle => "waiting",
+            Self::WaitingForObject => "waiting for the next object",
+            Self::Preflight => "checking camera, table and disk",
+            Self::Metering => "metering: the table turns slowly",
+            Self::MovingBack => "the table goes back by its ramp",
+            Self::Starting => "the table gathers speed",
+            Self::Recording => "recording",
+            Self::Unwinding => "the table goes back to where it began",
+            Self::Checking => "checking the take",
+        })
+    }
 }
 
 /// How a take came out.
@@ -79,6 +100,14 @@ pub struct TableState {
     pub degrees_per_second: Option<f64>,
     /// Whether zero is known.
     pub homed: bool,
+    /// Whether the emergency stop is pressed.
+    pub emergency_stop: bool,
+    /// Whether an alarm has locked it: the command `reset` resets, unlocks and homes it.
+    pub locked: bool,
+    /// How far it may turn back, degrees from the angle 0, where its cable hangs free.
+    pub low_deg: Option<f64>,
+    /// How far it may turn on, degrees from the angle 0.
+    pub high_deg: Option<f64>,
     /// Volts of its battery, where it is measured.
     pub battery_v: Option<f64>,
     /// What is wrong with it, in a sentence.
@@ -113,6 +142,36 @@ pub struct FaultLine {
     pub t_us: i64,
     /// What failed, on what, what to do.
     pub what: String,
+}
+
+/// Something that happened, with the time of day.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct LogLine {
+    /// When, RFC 3339, UTC.
+    pub at: String,
+    /// What.
+    pub what: String,
+}
+
+/// How takes are captured. All but the addresses can be changed by the command `configure`.
+#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
+pub struct CaptureSettings {
+    /// The folder of sessions.
+    pub root: String,
+    /// The camera's address.
+    pub camera: String,
+    /// The turntable's address.
+    pub turntable: String,
+    /// Frame width and height that are asked for, pixels; `null` takes the largest.
+    pub size: Option<(u32, u32)>,
+    /// Frames a second.
+    pub fps: f64,
+    /// Speed of the turn, degrees a second.
+    pub degrees_per_second: f64,
+    /// Frames that may be missing or damaged.
+    pub max_dropped: u64,
+    /// How often a take that is not usable is repeated.
+    pub retries: u32,
 }
 
 /// Something that was checked before the table turned.
@@ -179,6 +238,23 @@ pub struct RigState {
     pub faults: VecDeque<FaultLine>,
     /// The last finished take.
     pub last_take: Option<TakeSummary>,
+    /// How takes are captured.
+    pub settings: CaptureSettings,
+    /// What happened last, newest last.
+    #[schema(value_type = Vec<LogLine>)]
+    pub log: VecDeque<LogLine>,
+}
+
+impl RigState {
+    /// Adds a line to the log that is shown.
+    pub fn note(&mut self, what: impl Into<String>) {
+        let what = what.into();
+        if self.log.len() == LOG_KEPT {
+            self.log.pop_front();
+        }
+        let at = Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string();
+        self.log.push_back(LogLine { at, what });
+    }
 }
 
 /// A picture for viewers.
@@ -215,7 +291,12 @@ impl Monitor {
     /// Changes the state and wakes those who wait for a change.
     pub fn update(&self, change: impl FnOnce(&mut RigState)) {
         let mut state = lock(&self.shared.state);
+        let before = state.phase;
         change(&mut state);
+        if state.phase != before {
+            let phase = state.phase.to_string();
+            state.note(phase);
+        }
         state.version = state.version.wrapping_add(1);
         self.shared.changed.notify_all();
         self.shared.version.send_replace(state.version);
@@ -231,6 +312,7 @@ impl Monitor {
             if state.faults.len() == FAULTS_KEPT {
                 state.faults.pop_front();
             }
+            state.note(line.what.clone());
             state.faults.push_back(line);
         });
     }

@@ -49,6 +49,8 @@ fn manifest() -> Manifest {
             version: "1".to_owned(),
             commit: String::new(),
         },
+        note: None,
+        rating: None,
     }
 }
 

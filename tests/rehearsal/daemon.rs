@@ -26,7 +26,7 @@ fn settings(root: &Path, camera: &str, table: &str) -> Settings {
 }
 
 /// The state once it is as `wanted`; fails after a minute.
-fn once(daemon: &Daemon, wanted: impl Fn(&RigState) -> bool) -> RigState {
+fn once(daemon: &Daemon, mut wanted: impl FnMut(&RigState) -> bool) -> RigState {
     let until = Instant::now() + Duration::from_secs(60);
     loop {
         let state = daemon.monitor().state();
@@ -222,4 +222,102 @@ fn commands_that_make_no_sense_are_refused_where_they_are_given() {
         refused(Command::Jog { degrees: f64::NAN }),
         Refused::Invalid(_)
     ));
+}
+
+/// Turns the table to and fro until the emergency stop is pressed.
+fn move_until_emergency(daemon: &Daemon) -> RigState {
+    let mut degrees = 200.0;
+    once(daemon, |state| {
+        if !state.table.emergency_stop && daemon.command(Command::Jog { degrees }).is_ok() {
+            degrees = -degrees;
+        }
+        state.table.emergency_stop
+    })
+}
+
+#[test]
+fn after_an_emergency_stop_one_command_brings_the_table_back() {
+    let root = tempfile::tempdir().unwrap();
+    let table = "sim:?speed=3&fault=estop@9s:6s";
+    let daemon = Daemon::start(settings(root.path(), "", table)).unwrap();
+    once(&daemon, is_ready);
+    let state = move_until_emergency(&daemon);
+    let pressed = "the emergency stop is pressed: release it";
+    assert_eq!(state.table.fault.as_deref(), Some(pressed));
+    let start = || Command::Start {
+        object: "mug".to_owned(),
+        meter: false,
+    };
+    for command in [
+        start(),
+        Command::Home,
+        Command::Unlock,
+        Command::Reset,
+        Command::Jog { degrees: 5.0 },
+    ] {
+        let refused = daemon.command(command).unwrap_err();
+        assert_eq!(refused, Refused::Unavailable(pressed.to_owned()));
+    }
+    let state = once(&daemon, |state| !state.table.emergency_stop);
+    assert!(
+        state.table.locked && !state.table.homed,
+        "{:?}",
+        state.table
+    );
+    // Nothing moves before a person has looked at the table.
+    let faults = once(&daemon, |state| state.phase == Phase::Idle)
+        .faults
+        .len();
+    daemon.command(start()).unwrap();
+    let state = once(&daemon, |state| state.faults.len() > faults);
+    let fault = &state.faults.back().unwrap().what;
+    assert!(fault.contains("reset and home"), "{fault}");
+    once(&daemon, |state| state.phase == Phase::Idle);
+    daemon.command(Command::Reset).unwrap();
+    once(&daemon, |state| {
+        state.table.homed && state.table.state == "Idle"
+    });
+    once(&daemon, |_| daemon.command(start()).is_ok());
+    let state = once(&daemon, |state| state.last_take.is_some());
+    assert_eq!(state.last_take.unwrap().verdict, Verdict::Clean);
+}
+
+#[test]
+fn settings_are_shown_and_changed_while_the_rig_rests() {
+    let root = tempfile::tempdir().unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "none")).unwrap();
+    let before = once(&daemon, |state| state.camera.present).settings;
+    assert_eq!((before.degrees_per_second, before.max_dropped), (36.0, 0));
+    let configure = |fps, max_dropped| Command::Configure {
+        size: None,
+        fps,
+        degrees_per_second: None,
+        max_dropped,
+        retries: None,
+    };
+    let refused = daemon.command(configure(Some(0.0), None)).unwrap_err();
+    assert!(matches!(refused, Refused::Invalid(_)), "{refused}");
+    daemon.command(configure(None, Some(7))).unwrap();
+    let after = once(&daemon, |state| state.settings.max_dropped == 7).settings;
+    assert_eq!((after.fps, after.degrees_per_second), (before.fps, 36.0));
+    // A rate that the camera does not have shows at the camera, and can be taken back.
+    once(&daemon, |_| {
+        daemon.command(configure(Some(60.0), None)).is_ok()
+    });
+    let state = once(&daemon, |state| {
+        !state.camera.present && state.camera.fault.is_some()
+    });
+    assert!(state.camera.fault.unwrap().contains("60"));
+    once(&daemon, |_| {
+        daemon.command(configure(Some(30.0), None)).is_ok()
+    });
+    once(&daemon, |state| state.camera.present);
+    assert!(
+        daemon
+            .monitor()
+            .state()
+            .log
+            .iter()
+            .any(|line| line.what.contains("60"))
+    );
 }

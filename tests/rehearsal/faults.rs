@@ -188,8 +188,13 @@ fn a_table_that_stalls_ends_the_take() {
 
 /// Runs a capture, and `interfere` two seconds after its recording began.
 fn interfere_in_the_turn(rig: &mut Rehearsal, interfere: impl FnOnce() + Send) -> TakeSummary {
+    interfere_in(Phase::Recording, rig, interfere)
+}
+
+/// Runs a capture, and `interfere` two seconds after this phase began.
+fn interfere_in(phase: Phase, rig: &mut Rehearsal, interfere: impl FnOnce() + Send) -> TakeSummary {
     let (clock, monitor) = (rig.equipment.clock(), rig.monitor.clone());
-    let recording = || monitor.state().phase == Phase::Recording;
+    let recording = || monitor.state().phase == phase;
     clock.scope(|scope| {
         let interferes = scope.spawn("interferes", || {
             // Longer than a whole capture.
@@ -218,6 +223,71 @@ fn a_stop_ends_the_take_within_five_seconds_and_stops_the_table() {
     // Another capture while the program ends is refused.
     let error = rig.capture(false).unwrap_err();
     assert!(matches!(error, CaptureError::Stopped(Stopped::Shutdown)));
+}
+
+/// Checks that a take is whole although its table did not turn back.
+fn check_whole(rig: &Rehearsal, take: &TakeSummary, why: &str) {
+    assert_eq!(take.verdict, Verdict::Clean, "{take:?}");
+    let session = rig.session(take);
+    assert_eq!(session.manifest.unwrap().status, Status::Complete);
+    let frames = session.frames.unwrap();
+    assert_eq!(frames.entries().len(), 1500);
+    assert!(
+        frames
+            .entries()
+            .iter()
+            .all(|entry| entry.angle_deg.is_some())
+    );
+    let fault = rig.monitor.state().faults.back().unwrap().what.clone();
+    assert!(
+        fault.starts_with("the table did not turn back") && fault.contains(why),
+        "{fault}"
+    );
+    assert!(rig.table_stands());
+}
+
+#[test]
+fn a_stop_while_the_table_turns_back_stops_the_table_and_costs_no_take() {
+    let mut rig = Rehearsal::whole(SHORT, "");
+    let stop = rig.stop.clone();
+    let take = interfere_in(Phase::Unwinding, &mut rig, || stop.ask(Stopped::Shutdown));
+    check_whole(&rig, &take, "the program was told to end");
+    let at = rig.equipment.simulator().unwrap();
+    assert!(at.angle_at(rig.equipment.clock().now_us()) > 30.0);
+}
+
+#[test]
+fn an_emergency_stop_while_the_table_turns_back_costs_no_take() {
+    let mut rig = Rehearsal::whole(SHORT, "");
+    let table = rig.equipment.simulator().unwrap().clone();
+    let take = interfere_in(Phase::Unwinding, &mut rig, || {
+        table.press_emergency_stop(true)
+    });
+    check_whole(&rig, &take, "ALARM:10");
+    let error = with_causes(&rig.capture(false).unwrap_err());
+    assert!(
+        error.contains("the emergency stop is pressed: release it"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_take_that_was_stopped_in_its_turn_keeps_the_angles_it_had() {
+    let mut rig = Rehearsal::whole(SHORT, "");
+    let stop = rig.stop.clone();
+    let take = interfere_in_the_turn(&mut rig, || stop.ask(Stopped::Person));
+    check_aborted(&rig, &take, "somebody asked for it");
+    let session = rig.session(&take);
+    let entries = session.frames.as_ref().unwrap().entries();
+    let table = rig.equipment.simulator().unwrap();
+    let known = entries
+        .iter()
+        .filter_map(|entry| Some((entry.t_us, entry.angle_deg?)));
+    let errors: Vec<f64> = known
+        .map(|(t_us, angle)| (angle - table.angle_at(t_us)).abs())
+        .collect();
+    assert!(errors.len() >= 40, "{} of {}", errors.len(), entries.len());
+    assert!(errors.iter().all(|error| *error <= 0.05), "{errors:?}");
 }
 
 /// A table's port that can be unplugged.

@@ -75,6 +75,17 @@ impl Rehearsal {
         }
     }
 
+    /// The same, with its sessions in `root`.
+    pub(crate) fn in_folder(mut self, root: &Path) -> Self {
+        let mut settings = self.equipment.settings().clone();
+        settings.root = root.to_owned();
+        self.equipment = Equipment::new(settings).unwrap();
+        let clock = self.equipment.clock();
+        self.stop = StopRequest::new(&clock);
+        self._part = clock.take_part();
+        self
+    }
+
     /// Captures, and gives the take that counts.
     pub(crate) fn capture(&mut self, meter: bool) -> Result<TakeSummary, CaptureError> {
         Ok(self.capture_all(meter)?.take)

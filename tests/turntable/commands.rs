@@ -1,8 +1,9 @@
 //! `relit-capture turntable` and `relit-capture simulate`, as a person types them.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
 
 use relit_rig::lockfile;
 use relit_rig::turntable::Owner;
@@ -184,4 +185,77 @@ fn a_jog_that_is_interrupted_stops_the_table() {
     let second = out(&table.ask(&["status"]));
     assert!(first.starts_with("Idle"), "{first}");
     assert_eq!(first, second);
+}
+
+/// Sends a line to the controller behind a port, as any serial terminal would, and waits for its `ok`.
+fn type_in(port: &std::path::Path, line: &str) {
+    let settings = serialport::new(port.display().to_string(), 115_200);
+    let mut port = settings.timeout(Duration::from_secs(30)).open().unwrap();
+    let mut heard = String::new();
+    let mut until = |words: &str, port: &mut dyn Read| {
+        let mut byte = [0];
+        while !heard.ends_with(words) {
+            port.read_exact(&mut byte).unwrap();
+            heard.push(char::from(byte[0]));
+        }
+    };
+    // Opening the port has reset the controller.
+    until("[reset: external]\r\n", &mut port);
+    port.write_all(format!("{line}\n").as_bytes()).unwrap();
+    until("ok\r\n", &mut port);
+}
+
+#[test]
+fn where_each_opening_resets_and_locks_the_controller_a_jog_can_home_first() {
+    let table = Simulated::start(&["--index-at", "3"]);
+    type_in(&table.port(), "$22=1");
+    let home = table.ask(&["home"]);
+    assert!(home.status.success(), "{}", err(&home));
+    let locked = table.ask(&["jog", "5"]);
+    assert_eq!(locked.status.code(), Some(1));
+    assert!(err(&locked).contains("locked"), "{}", err(&locked));
+    let jogged = table.ask(&["jog", "--home", "5"]);
+    assert!(jogged.status.success(), "{}", err(&jogged));
+    let said = out(&jogged);
+    let last = said.lines().last().unwrap();
+    assert!(
+        last.starts_with("Idle, 5.00") || last.starts_with("Idle, 4.99"),
+        "{said}"
+    );
+    assert!(!last.contains("not homed"), "{said}");
+}
+
+#[test]
+fn a_moving_table_that_nobody_has_is_stopped_and_that_is_said() {
+    let table = Simulated::start(&["--no-reset"]);
+    let mut jog = Command::new(PROGRAM)
+        .args(["turntable", "--turntable"])
+        .arg(format!("serial:{}", table.port().display()))
+        .args(["jog", "390", "--speed", "5"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    table.status_in_motion(&jog);
+    jog.kill().unwrap();
+    jog.wait().unwrap();
+    let status = table.ask(&["status"]);
+    assert!(out(&status).starts_with("Idle"), "{}", out(&status));
+    assert!(err(&status).contains("it was stopped"), "{}", err(&status));
+    let again = table.ask(&["status"]);
+    assert_eq!(err(&again), "");
+}
+
+#[test]
+fn what_is_no_angle_is_refused_in_words() {
+    for words in [["jog", "abc"], ["jog", "inf"]] {
+        let refused = Command::new(PROGRAM)
+            .arg("turntable")
+            .args(words)
+            .output()
+            .unwrap();
+        assert_eq!(refused.status.code(), Some(2));
+        let said = err(&refused);
+        assert!(said.contains("give degrees as a number"), "{said}");
+    }
 }

@@ -71,7 +71,8 @@ impl Chip {
         text.lines()
             .map(|line| {
                 let mut words = line.split(' ').skip(1);
-                let forward = words.next() == Some("1");
+                // DIR is low for a positive turn.
+                let forward = words.next() == Some("0");
                 angle += if forward { STEP_DEG } else { -STEP_DEG };
                 (words.next().unwrap().parse().unwrap(), angle)
             })

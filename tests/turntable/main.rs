@@ -8,6 +8,7 @@
 )]
 
 mod commands;
+mod emergency;
 mod emulated;
 mod exchanges;
 mod rig;

@@ -1,8 +1,10 @@
-//! Maps of a picture by a network: with a mirrored second pass, and for large pictures by tiles.
+//! Maps of a picture by a network: by looks at two sizes, with a mirrored second pass, and for large pictures by tiles.
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::encoding::{AnsweredMaps, EncodedPicture};
+use super::encoding::{AnsweredMaps, EncodedPicture, LEAST_FACING};
 use super::region::{self, Region, enlarged, inside, reduced};
 use crate::image::{Extent, Planes};
 use crate::light::Normals;
@@ -38,6 +40,23 @@ impl MapsNet for Engine {
 /// All maps of a picture as one image, in values that can be averaged and blended: normals, log albedo,
 /// log shading, highlight.
 pub(super) type Fields = Planes<8>;
+
+/// The network for pictures of two sizes. An object that fills a smaller picture is nearer to those that it was trained on,
+/// and is seen as a whole; the larger picture shows what is finer.
+pub(super) struct Looks {
+    pub(super) full: Box<dyn MapsNet>,
+    /// For pictures of half the width and height.
+    pub(super) half: Option<Box<dyn MapsNet>>,
+}
+
+/// The planes of fields that are normals.
+const NORMAL_PLANES: Range<usize> = 0..3;
+/// How much of what is coarse in the normals the smaller look tells. By measurement on photographs with truth: all of
+/// it is three degrees better than none.
+const SHAPE_OF_NORMALS: f32 = 1.0;
+/// How much of what is coarse in albedo, shading and highlight the smaller look tells: between 0.3 and 0.5, the mean of both
+/// is better than either.
+const SHAPE_OF_LAYERS: f32 = 0.4;
 
 /// Keeps logarithms of dark values finite.
 const DARKEST: f32 = 1e-4;
@@ -110,7 +129,13 @@ pub(super) fn to_maps(fields: &Fields, mask: &[bool]) -> AnsweredMaps {
     let image = |planes: [Vec<f32>; 3]| of_planes(extent, planes);
     AnsweredMaps {
         // Where two answers cancel out, the neighbour's counts.
-        normals: Normals::new(image([plain(0), plain(1), plain(2)])).completed(mask),
+        // Details can turn a normal away: what is seen faces the viewer.
+        normals: Normals::new(image([
+            plain(0),
+            plain(1),
+            masked(2, |z| z.max(LEAST_FACING)),
+        ]))
+        .completed(mask),
         albedo: image([3, 4, 5].map(|channel| masked(channel, f32::exp))),
         shading: of_planes(extent, [masked(6, f32::exp)]),
         highlight: of_planes(extent, [masked(7, |value| value.max(0.0))]),
@@ -261,18 +286,48 @@ pub(super) struct Whole {
 
 impl Whole {
     pub(super) fn new(
-        net: &dyn MapsNet,
+        looks: &Looks,
         picture: &Planes<3>,
         mask: &Planes<1>,
         mirror: bool,
     ) -> Result<Self, NetError> {
-        let extent = Extent::new(net.side(), net.side());
-        let (picture, mask) = reduced(picture, mask, extent);
-        let fields = fields(net, &picture, &mask, mirror)?;
-        Ok(Self {
-            picture,
-            mask,
-            fields,
-        })
+        let look = |net: &dyn MapsNet, mirror| {
+            let extent = Extent::new(net.side(), net.side());
+            let (picture, mask) = reduced(picture, mask, extent);
+            let fields = fields(net, &picture, &mask, mirror)?;
+            Ok::<_, NetError>(Self {
+                picture,
+                mask,
+                fields,
+            })
+        };
+        let Some(half) = &looks.half else {
+            return look(looks.full.as_ref(), mirror);
+        };
+        let (full, half) = rayon::join(
+            || look(looks.full.as_ref(), false),
+            || look(half.as_ref(), mirror),
+        );
+        Ok(full?.with_shape_of(&half?))
+    }
+
+    /// Its own details on the shape of a smaller one.
+    fn with_shape_of(mut self, other: &Self) -> Self {
+        let extent = self.mask.extent();
+        let known = inside(&self.mask);
+        let low = enlarged(&self.fields, &known, other.mask.extent()).resized(extent);
+        let shape = enlarged(&other.fields, &inside(&other.mask), extent);
+        for (channel, plane) in self.fields.planes_mut().into_iter().enumerate() {
+            let share = if NORMAL_PLANES.contains(&channel) {
+                SHAPE_OF_NORMALS
+            } else {
+                SHAPE_OF_LAYERS
+            };
+            let (shape, low) = (shape.plane(channel), low.plane(channel));
+            for at in (0..plane.len()).filter(|&at| known[at]) {
+                plane[at] += share * (shape[at] - low[at]);
+            }
+        }
+        self
     }
 }

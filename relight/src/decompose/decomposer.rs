@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::answer::{Engine, Fields, MapsNet, Whole, details, to_maps};
+use super::answer::{Engine, Fields, Looks, MapsNet, Whole, details, to_maps};
 use super::compose::{ComposedLayers, normalised, possible_highlight};
 use super::encoding::AnsweredMaps;
 use super::error::DecomposeError;
@@ -48,7 +48,8 @@ pub enum SpecularGate {
 pub struct DecomposeOptions {
     /// At which size.
     pub size: WorkingSize,
-    /// Whether the mirror image is looked at too, and the mean of both answers taken.
+    /// Whether the mirror image is looked at too, and the mean of both answers taken: at half the network's size, and of
+    /// tiles.
     pub mirror: bool,
     /// Whether highlights are separated.
     pub specular: SpecularGate,
@@ -122,14 +123,14 @@ pub struct Decomposition {
 /// # Ok::<(), relight::decompose::DecomposeError>(())
 /// ```
 pub struct Decomposer {
-    net: Box<dyn MapsNet>,
+    looks: Looks,
     normals: Option<OtherNormals>,
 }
 
 impl std::fmt::Debug for Decomposer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Decomposer")
-            .field("side", &self.net.side())
+            .field("side", &self.side())
             .field("normals", &self.normals)
             .finish()
     }
@@ -162,12 +163,22 @@ impl Decomposer {
     /// # Errors
     /// Where the weights are not this network's, or it cannot take such pictures.
     pub fn with_side(weights: &Weights, side: usize) -> Result<Self, DecomposeError> {
-        let inference = Inference::new(&decomposer(), weights, (side, side))?;
-        Ok(Self::of(Box::new(Engine { inference, side })))
+        let graph = decomposer();
+        let look = |side: usize| -> Result<Box<dyn MapsNet>, NetError> {
+            let inference = Inference::new(&graph, weights, (side, side))?;
+            Ok(Box::new(Engine { inference, side }))
+        };
+        let has_half = side.is_multiple_of(2 * graph.multiple());
+        let half = || has_half.then(|| look(side / 2)).transpose();
+        let (full, half) = rayon::join(|| look(side), half);
+        Ok(Self::of(full?, half?))
     }
 
-    pub(super) fn of(net: Box<dyn MapsNet>) -> Self {
-        Self { net, normals: None }
+    pub(super) fn of(full: Box<dyn MapsNet>, half: Option<Box<dyn MapsNet>>) -> Self {
+        Self {
+            looks: Looks { full, half },
+            normals: None,
+        }
     }
 
     /// Takes the normals of another network from now on, in an ONNX file. It takes one picture,
@@ -178,14 +189,14 @@ impl Decomposer {
     /// # Errors
     /// Where the file cannot be read or run, or answers something else; then all stays as it was.
     pub fn set_normals(&mut self, path: &Path, frame: NormalsFrame) -> Result<(), DecomposeError> {
-        self.normals = Some(OtherNormals::read(path, self.net.side(), frame)?);
+        self.normals = Some(OtherNormals::read(path, self.side(), frame)?);
         Ok(())
     }
 
     /// Width and height of what the network sees, pixels.
     #[must_use]
     pub fn side(&self) -> usize {
-        self.net.side()
+        self.looks.full.side()
     }
 
     /// Decomposes a picture under a mask, which is the object where it is at least one half. Values
@@ -219,7 +230,7 @@ impl Decomposer {
             SpecularGate::On => true,
             SpecularGate::Off => false,
         };
-        let whole = Whole::new(self.net.as_ref(), &picture, &mask, options.mirror)?;
+        let whole = Whole::new(&self.looks, &picture, &mask, options.mirror)?;
         let explained = self.explain(&whole, is_glossy)?;
         let mut maps = self.maps(&whole, &picture, &mask, options)?;
         if self.normals.is_some() {
@@ -256,10 +267,10 @@ impl Decomposer {
     ) -> Result<AnsweredMaps, DecomposeError> {
         let extent = picture.extent();
         let mut fields = enlarged(&whole.fields, &inside(&whole.mask), extent);
-        if options.size == WorkingSize::Native && extent.width > self.net.side() {
+        if options.size == WorkingSize::Native && extent.width > self.side() {
             add(
                 &mut fields,
-                &details(self.net.as_ref(), picture, mask, options.mirror)?,
+                &details(self.looks.full.as_ref(), picture, mask, options.mirror)?,
             );
         }
         Ok(to_maps(&fields, &inside(mask)))

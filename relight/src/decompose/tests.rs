@@ -3,6 +3,7 @@
 use super::answer::{Fields, MapsNet, details, fields, to_maps};
 use super::*;
 use crate::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
+use crate::light::{Normals, YUp};
 use crate::nets::{INPUTS, NetError, OUTPUTS, Weights, decomposer};
 
 /// Answers pixel by pixel, from the encoded values of the pixel and the mean of all log luminances.
@@ -112,7 +113,8 @@ fn with_the_mirrored_pass_a_mirrored_picture_has_mirrored_layers() {
     // Of an even width, so that the square around it lies in the middle.
     let (picture, mask) = (smooth(extent), disc(extent, 25.0));
     let options = DecomposeOptions::default();
-    let net = untrained();
+    // At one size: a second look is the only one that is mirrored.
+    let net = Decomposer::with_side(&Weights::initial(&decomposer(), 5), 32).unwrap();
     let found = net
         .decompose(&Rgb::new(picture.clone()), &mask, &options)
         .unwrap();
@@ -127,17 +129,70 @@ fn with_the_mirrored_pass_a_mirrored_picture_has_mirrored_layers() {
 }
 
 #[test]
+fn the_smaller_look_tells_the_shape_and_the_larger_one_what_is_finer() {
+    let extent = Extent::new(64, 64);
+    let (picture, mask) = (smooth(extent), disc(extent, 30.0));
+    // Stripes of 2 pixels in all answers of the larger look; the smaller one leans to the left.
+    let striped = |input: [f32; INPUTS], _: f32| {
+        let stripe = input[0].signum() * 0.3;
+        [0.5 + stripe, 0.2, 1.0, 0.0, 0.0, 0.0, 0.0, stripe, -50.0]
+    };
+    let leaning = |_: [f32; INPUTS], _: f32| [-0.5, 0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -50.0];
+    let full = || {
+        Box::new(PixelNet {
+            side: 64,
+            pixel: striped,
+        })
+    };
+    let half = PixelNet {
+        side: 32,
+        pixel: leaning,
+    };
+    let lines = Planes::from_fn(extent, |x, y| {
+        let light = if (x / 2) % 2 == 0 { 0.9 } else { 0.05 };
+        [light, light, light + picture.pixel(x, y)[0] * 0.01]
+    });
+    let lines = Rgb::new(lines);
+    let options = DecomposeOptions {
+        mirror: false,
+        ..DecomposeOptions::default()
+    };
+    let one = Decomposer::of(full(), None);
+    let both = Decomposer::of(full(), Some(Box::new(half)));
+    let normals = |net: &Decomposer| net.decompose(&lines, &mask, &options).unwrap().normals;
+    let (one, both) = (normals(&one), normals(&both));
+    let mean_x = |of: &Normals<YUp>| {
+        let sum: f32 = of.planes().plane(0).iter().sum();
+        sum / mask.plane(0).iter().sum::<f32>()
+    };
+    assert!(mean_x(&one) > 0.3 && mean_x(&both) < -0.3, "the shape");
+    let step = |of: &Normals<YUp>| {
+        let x = |column| of.planes().pixel(column, 32)[0];
+        (30..34)
+            .map(|at| (x(at + 1) - x(at)).abs())
+            .fold(0.0, f32::max)
+    };
+    assert!(
+        step(&one) > 0.15 && step(&both) > 0.5 * step(&one),
+        "what is finer"
+    );
+}
+
+#[test]
 fn the_gate_opens_where_more_than_five_percent_are_saturated() {
     let extent = Extent::new(40, 40);
     let mask = Planes::filled(extent, [1.0]);
-    let net = Decomposer::of(Box::new(PixelNet {
-        side: 32,
-        pixel: |input: [f32; INPUTS], _: f32| {
-            let mut answer = by_colour(input, 0.0);
-            answer[6] = 9.0;
-            answer
-        },
-    }));
+    let net = Decomposer::of(
+        Box::new(PixelNet {
+            side: 32,
+            pixel: |input: [f32; INPUTS], _: f32| {
+                let mut answer = by_colour(input, 0.0);
+                answer[6] = 9.0;
+                answer
+            },
+        }),
+        None,
+    );
     let white = |count: usize| {
         let at = |x: usize, y: usize| {
             if 40 * y + x < count {
@@ -189,7 +244,7 @@ fn tiles_add_what_the_whole_is_too_coarse_for_and_show_no_seams() {
         smooth.pixel(x, y).map(|v| v * stripe)
     });
     let at = |size, pixel: fn([f32; INPUTS], f32) -> [f32; OUTPUTS]| {
-        let net = Decomposer::of(Box::new(PixelNet { side: 64, pixel }));
+        let net = Decomposer::of(Box::new(PixelNet { side: 64, pixel }), None);
         let options = DecomposeOptions {
             size,
             ..DecomposeOptions::default()
@@ -197,11 +252,14 @@ fn tiles_add_what_the_whole_is_too_coarse_for_and_show_no_seams() {
         let picture = Rgb::new(picture.clone());
         net.decompose(&picture, &mask, &options).unwrap()
     };
-    let whole = Decomposer::of(Box::new(PixelNet {
-        // As large as the square around the object, so that nothing is resized.
-        side: 312,
-        pixel: by_colour,
-    }));
+    let whole = Decomposer::of(
+        Box::new(PixelNet {
+            // As large as the square around the object, so that nothing is resized.
+            side: 312,
+            pixel: by_colour,
+        }),
+        None,
+    );
     let options = DecomposeOptions::default();
     let wanted = whole
         .decompose(&Rgb::new(picture.clone()), &mask, &options)
@@ -274,10 +332,13 @@ fn fields_and_maps_are_the_same_but_for_the_mask() {
 #[test]
 fn a_mask_that_is_empty_or_of_another_size_is_refused() {
     let extent = Extent::new(64, 64);
-    let net = Decomposer::of(Box::new(PixelNet {
-        side: 32,
-        pixel: by_colour,
-    }));
+    let net = Decomposer::of(
+        Box::new(PixelNet {
+            side: 32,
+            pixel: by_colour,
+        }),
+        None,
+    );
     let picture = Rgb::new(smooth(extent));
     let decompose = |mask: Planes<1>| {
         let found = net.decompose(&picture, &mask, &DecomposeOptions::default());

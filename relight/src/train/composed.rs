@@ -24,6 +24,8 @@ pub(super) fn composition(data: &DataSettings, seed: u64) -> Result<Composition,
         recipe: Recipe {
             seed: stream(seed, 21),
             size: data.size,
+            light: data.light,
+            shadows: data.shadows,
             views: data.views,
             lightings: data.lightings,
             ..Recipe::default()

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use tch::{Kind, Tensor};
+use tch::Tensor;
 
 use super::error::TrainError;
 use super::losses::{angular, gradient, scale_invariant, windowed};
@@ -223,12 +223,12 @@ pub fn head_spreads(
 
 /// Standard deviation under the mask, all channels together.
 fn deviation(of: &Tensor, mask: &Tensor) -> Result<f64, TrainError> {
-    let of = of.f_detach()?.f_to_kind(Kind::Double)?;
-    let mask = mask.f_to_kind(Kind::Double)?.f_expand_as(&of)?;
-    let count = mask.f_sum(None)?.f_clamp_min(1.0)?;
-    let mean = of.f_mul(&mask)?.f_sum(None)?.f_div(&count)?;
-    let square = of.f_sub(&mean)?.f_square()?.f_mul(&mask)?.f_sum(None)?;
-    Ok(f64::try_from(square.f_div(&count)?.f_sqrt()?)?)
+    let of = of.f_detach()?;
+    let sum = |of: &Tensor| f64::try_from(of.f_sum(None)?);
+    let count = (sum(mask)? * of.size()[1] as f64).max(1.0);
+    let mean = sum(&of.f_mul(mask)?)? / count;
+    let difference = of.f_sub_scalar(mean)?.f_mul(mask)?;
+    Ok((sum(&difference.f_square()?)? / count).sqrt())
 }
 
 fn grey(of: &Tensor) -> Result<Tensor, tch::TchError> {

@@ -1,27 +1,23 @@
 //! The run that trains the decomposing network on composed samples.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use tch::{Device, Tensor, no_grad};
+use tch::{Device, Tensor};
 
 use super::composed::{ComposedBatches, composition, window_settings};
-use super::composer::Composition;
 use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
 use super::error::TrainError;
+use super::held_out::{HeldOutSamples, highlight_figures};
 use super::learner::{Learner, LearnerSettings};
 use super::losses::{angular_degrees, scale_invariant, windowed};
 use super::model::{ComputePrecision, Model};
 use super::run::{StepLosses, Task, Validation};
-use super::sample::{TruthArrays, TruthBatch};
+use super::sample::TruthBatch;
 use super::settings::{DecomposeSettings, PrecisionChoice};
 use super::sheet::validation_sheet;
 use crate::nets::{Weights, decomposer};
-use crate::synth::{Recipe, stream};
 
-/// Samples of a batch of the validation.
-const VALIDATION_BATCH: usize = 16;
 /// Samples that are shown.
 const SHOWN: usize = 10;
 
@@ -41,7 +37,7 @@ pub struct DecomposeTask {
     resources: Resources,
     learner: Learner,
     composed: ComposedBatches,
-    validation: Vec<TruthArrays>,
+    validation: HeldOutSamples,
 }
 
 impl DecomposeTask {
@@ -57,14 +53,18 @@ impl DecomposeTask {
         settings.check()?;
         let composition = Arc::new(composition(&settings.data, settings.run.seed)?);
         composition.recipe.check()?;
-        let validation = compose_validation(&settings, &composition);
+        let validation = HeldOutSamples::compose(&composition, settings.data.validation);
         let graph = decomposer();
         let initial = || Weights::initial(&graph, settings.run.seed);
         let weights = weights.cloned().unwrap_or_else(initial);
         let precision = match settings.run.precision {
             PrecisionChoice::Single => ComputePrecision::Single,
             PrecisionChoice::Mixed => ComputePrecision::Mixed,
-            PrecisionChoice::Fastest => fastest(&weights, &validation, resources.device)?,
+            PrecisionChoice::Fastest => fastest(
+                &weights,
+                &validation.first(resources.device)?,
+                resources.device,
+            )?,
         };
         let learner = Learner::new(
             graph,
@@ -87,19 +87,6 @@ impl DecomposeTask {
             learner,
             validation,
         })
-    }
-
-    /// A batch of the validation, and the averaged network's answers to it.
-    fn answered(
-        &self,
-        model: &Model,
-        samples: &[TruthArrays],
-    ) -> Result<(TruthBatch, AnsweredTensors), TrainError> {
-        let samples: Vec<&TruthArrays> = samples.iter().collect();
-        let batch = TruthBatch::new(&samples, false, self.resources.device)?;
-        let answer = model.forward(&batch.input)?;
-        let answer = AnsweredTensors::new(&batch.input, &answer[0])?;
-        Ok((batch, answer))
     }
 }
 
@@ -130,44 +117,17 @@ impl Task for DecomposeTask {
     }
 
     fn validate(&mut self) -> Result<Validation, TrainError> {
-        let model = self.learner.averaged_model()?;
-        no_grad(|| {
-            let mut sums: BTreeMap<String, f64> = BTreeMap::new();
-            let mut sheet = None;
-            for samples in self.validation.chunks(VALIDATION_BATCH) {
-                let (batch, answer) = self.answered(&model, samples)?;
-                let share = samples.len() as f64 / self.validation.len() as f64;
-                for (name, value) in figures(&batch, &answer)? {
-                    *sums.entry(name.to_owned()).or_default() += share * value;
-                }
-                if sheet.is_none() {
-                    sheet = Some(validation_sheet(&batch, &answer, SHOWN)?);
-                }
+        let (model, device) = (self.learner.averaged_model()?, self.resources.device);
+        let mut sheet = None;
+        let figures = self.validation.figures(device, |batch| {
+            let answer = AnsweredTensors::new(&batch.input, &model.forward(&batch.input)?[0])?;
+            if sheet.is_none() {
+                sheet = Some(validation_sheet(batch, &answer, SHOWN)?);
             }
-            Ok(Validation {
-                figures: sums,
-                sheet,
-            })
-        })
+            figures(batch, &answer)
+        })?;
+        Ok(Validation { figures, sheet })
     }
-}
-
-/// One sample each of objects that are never trained on: their seed does not depend on the run's, so that
-/// runs can be compared.
-fn compose_validation(settings: &DecomposeSettings, composition: &Composition) -> Vec<TruthArrays> {
-    let held_out = Composition {
-        recipe: Recipe {
-            seed: stream(0x76_61_6c, 23),
-            views: 1,
-            lightings: 1,
-            ..composition.recipe.clone()
-        },
-        library: composition.library.clone(),
-        plain_share: composition.plain_share,
-    };
-    (0..settings.data.validation)
-        .flat_map(|view| held_out.samples_of(view))
-        .collect()
 }
 
 /// How far the answers are from the truth, means over the batch.
@@ -181,9 +141,8 @@ fn figures(
     let quotient = grey(&diffuse)?.f_div(&answer.shading.f_clamp_min(0.03)?)?;
     let albedo = grey(&batch.albedo)?;
     let window = (mask.size()[2] / 16).max(4);
-    let highlight = answer.highlight.f_sub(&batch.highlight)?.f_mul(mask)?;
-    let energy = batch.highlight.f_square()?.f_sum(None)?.f_clamp_min(1e-9)?;
-    [
+    let mut figures = highlight_figures(&answer.highlight, batch)?.to_vec();
+    let errors = [
         (
             "shading",
             scale_invariant(&answer.shading, &batch.shading, mask)?,
@@ -201,24 +160,19 @@ fn figures(
             "normals_deg",
             angular_degrees(&answer.normals, &batch.normals, mask)?,
         ),
-        (
-            "highlight",
-            highlight.f_square()?.f_sum(None)?.f_div(&energy)?,
-        ),
-    ]
-    .into_iter()
-    .map(|(name, value)| Ok((name, f64::try_from(value)?)))
-    .collect()
+    ];
+    for (name, error) in errors {
+        figures.push((name, f64::try_from(error)?));
+    }
+    Ok(figures)
 }
 
 /// The precision in which a step takes less time here, by the better of two steps each.
 fn fastest(
     weights: &Weights,
-    samples: &[TruthArrays],
+    batch: &TruthBatch,
     device: Device,
 ) -> Result<ComputePrecision, TrainError> {
-    let samples: Vec<&TruthArrays> = samples.iter().take(VALIDATION_BATCH).collect();
-    let batch = TruthBatch::new(&samples, false, device)?;
     let seconds = |precision| -> Result<f64, TrainError> {
         let model = Model::new(decomposer(), weights, device, precision)?;
         let mut best = f64::INFINITY;

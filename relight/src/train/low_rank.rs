@@ -28,6 +28,10 @@ pub enum LowRankForm {
     Squared,
     /// The released code's: the distance over the number of pixels in the mask, times 100.
     Released,
+    /// The second singular value, a loss of earlier work that the paper compares with.
+    Second,
+    /// The second singular value over the first, another one.
+    Ratio,
 }
 
 /// The first left singular vector of each matrix of `groups x N x d`: `groups x N x 1`, without
@@ -80,18 +84,30 @@ pub fn low_rank_loss(
     mask_px: &Tensor,
     form: LowRankForm,
 ) -> Result<Tensor, TrainError> {
-    let rest = rows.f_sub(&rank_one(rows)?)?;
-    let square = rest
-        .f_square()?
-        .f_sum_dim_intlist([1_i64, 2].as_slice(), false, None)?;
+    let square = || {
+        rows.f_sub(&rank_one(rows)?)?
+            .f_square()?
+            .f_sum_dim_intlist([1_i64, 2].as_slice(), false, None)
+            .map_err(TrainError::from)
+    };
     Ok(match form {
-        LowRankForm::Squared => square.f_mean(None)?,
-        LowRankForm::Released => square
+        LowRankForm::Squared => square()?.f_mean(None)?,
+        LowRankForm::Released => square()?
             .f_clamp_min(TINY)?
             .f_sqrt()?
             .f_div(&mask_px.f_clamp_min(1.0)?)?
             .f_mul_scalar(100.0)?
             .f_mean(None)?,
+        LowRankForm::Second => first_singular_values(rows)?
+            .f_narrow(1, 1, 1)?
+            .f_mean(None)?,
+        LowRankForm::Ratio => {
+            let values = first_singular_values(rows)?;
+            let ratio = values
+                .f_narrow(1, 1, 1)?
+                .f_div(&values.f_narrow(1, 0, 1)?)?;
+            ratio.f_mean(None)?
+        }
     })
 }
 
@@ -172,6 +188,20 @@ mod tests {
         }
         let far = descend(1.05);
         assert!(far.is_nan() || far > 1.0, "{far}");
+    }
+
+    #[test]
+    fn the_losses_of_singular_values_are_those_of_the_decomposition() {
+        let rows = random(&[3, 6, 50]);
+        let (_, values, _) = rows.svd(true, true);
+        let second = values.narrow(1, 1, 1);
+        let ratio = &second / values.narrow(1, 0, 1);
+        let ones = Tensor::ones([3], (Kind::Double, tch::Device::Cpu));
+        for (form, wanted) in [(LowRankForm::Second, second), (LowRankForm::Ratio, ratio)] {
+            let found = low_rank_loss(&rows, &ones, form).unwrap().double_value(&[]);
+            let wanted = wanted.mean(None).double_value(&[]);
+            assert!((found - wanted).abs() < 1e-5, "{found} {wanted}");
+        }
     }
 
     #[test]

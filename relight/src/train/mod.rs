@@ -7,6 +7,7 @@
 //! | [`losses`], [`low_rank`], `terms` | what is descended |
 //! | `sample`, `composer`, `window` | samples composed while training |
 //! | `decompose`, `decompose_task` | the decomposing network: maps, losses, run |
+//! | `held_out` | turns and samples that networks are judged by while they train |
 //! | `run`, `checkpoint`, `journal`, `guard` | a run: steps, what is saved, what is logged, what ends it |
 //! | `paper_layers`, `paper_phases`, `paper_task`, `turn_reader` | the paper's phases: layers on tensors, losses, runs; turns |
 //! | `settings` | TOML |
@@ -20,6 +21,7 @@ mod decompose;
 mod decompose_task;
 mod error;
 mod guard;
+mod held_out;
 mod journal;
 mod learner;
 pub mod losses;

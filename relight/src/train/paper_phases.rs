@@ -95,8 +95,8 @@ pub fn light_of(light: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor
     answered_light(&light.forward(&network_input(&to_srgb(picture)?, mask)?)?[0])
 }
 
-/// Rows of one turn's frames under their mask, for the low-rank loss: `1 x frames x values`, brought to one length so that
-/// a dark turn counts as much as a bright one.
+/// Rows of one turn's frames under their mask, for the low-rank loss: `1 x frames x values`, brought to a mean length of 1
+/// so that a dark turn counts as much as a bright one.
 fn rows(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
     let rows = of.f_mul(mask)?.f_flatten(1, -1)?;
     let frames = rows.size()[0] as f64;
@@ -105,9 +105,57 @@ fn rows(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
     Ok(rows.f_div(&scale)?.f_unsqueeze(0)?)
 }
 
+/// The same, each row brought to the length 1.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(super) fn equal_rows(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+    let rows = of.f_mul(mask)?.f_flatten(1, -1)?;
+    let square = rows
+        .f_square()?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
+    Ok(rows
+        .f_div(&square.f_clamp_min(TINY)?.f_sqrt()?)?
+        .f_unsqueeze(0)?)
+}
+
 fn low_rank(of: &Tensor, mask: &Tensor, form: LowRankForm) -> Result<Tensor, TrainError> {
     let pixels = mask.f_narrow(0, 0, 1)?.f_sum(None)?.f_view([1])?;
     low_rank_loss(&rows(of, mask)?, &pixels, form)
+}
+
+/// The frames for which the gate of saturation opens Spec-Net, and their masks; none where they are fewer than two.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(super) fn saturated_frames(
+    turns: &TurnTensors,
+) -> Result<Option<(Tensor, Tensor)>, TrainError> {
+    let open: Vec<i64> = (0_i64..)
+        .zip(&turns.spec_net)
+        .filter_map(|(at, &is_open)| is_open.then_some(at))
+        .collect();
+    if open.len() < 2 {
+        return Ok(None);
+    }
+    let index = Tensor::f_from_slice(&open)?.f_to_device(turns.picture.device())?;
+    Ok(Some((
+        turns.picture.f_index_select(0, &index)?,
+        turns.mask.f_index_select(0, &index)?,
+    )))
+}
+
+/// The chromaticity that is left of pictures when Spec-Net's highlight is taken off.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub fn diffuse_chromaticity(
+    spec: &Model,
+    picture: &Tensor,
+    mask: &Tensor,
+) -> Result<Tensor, TrainError> {
+    let highlight = highlight_of(spec, picture, mask)?;
+    chromaticity(&picture.f_sub(&highlight)?.f_clamp(DARKEST, 1.0)?)
 }
 
 /// Low-rank loss of the chromaticity that Spec-Net's diffuse pictures have; none where the gate opens for fewer than
@@ -120,19 +168,10 @@ pub fn spec_on_turns(
     turns: &TurnTensors,
     form: LowRankForm,
 ) -> Result<Option<Tensor>, TrainError> {
-    let open: Vec<i64> = (0_i64..)
-        .zip(&turns.spec_net)
-        .filter_map(|(at, &is_open)| is_open.then_some(at))
-        .collect();
-    if open.len() < 2 {
+    let Some((picture, mask)) = saturated_frames(turns)? else {
         return Ok(None);
-    }
-    let index = Tensor::f_from_slice(&open)?.f_to_device(turns.picture.device())?;
-    let picture = turns.picture.f_index_select(0, &index)?;
-    let mask = turns.mask.f_index_select(0, &index)?;
-    let highlight = highlight_of(spec, &picture, &mask)?;
-    let diffuse = picture.f_sub(&highlight)?.f_clamp(DARKEST, 1.0)?;
-    low_rank(&chromaticity(&diffuse)?, &mask, form).map(Some)
+    };
+    low_rank(&diffuse_chromaticity(spec, &picture, &mask)?, &mask, form).map(Some)
 }
 
 /// Mean error of Spec-Net's highlight on composed samples; highlights count more than their absence.
@@ -172,7 +211,7 @@ pub fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<Tensor, Train
     scale_invariant(&grey, &batch.shading, &batch.mask)
 }
 
-/// Low-rank loss of the reflectance: the diffuse picture over the shading of the networks' normals and light.
+/// Low-rank loss of the reflectance.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
@@ -182,6 +221,19 @@ pub fn reflectance_on_turns(
     spec: Option<&Model>,
     turns: &TurnTensors,
     form: LowRankForm,
+) -> Result<Tensor, TrainError> {
+    low_rank(&reflectance(normal, light, spec, turns)?, &turns.mask, form)
+}
+
+/// The reflectance of a turn's frames: their diffuse pictures over the shading of the networks' normals and light.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub fn reflectance(
+    normal: &Model,
+    light: &Model,
+    spec: Option<&Model>,
+    turns: &TurnTensors,
 ) -> Result<Tensor, TrainError> {
     let (picture, mask) = (&turns.picture, &turns.mask);
     let diffuse = match spec {
@@ -202,10 +254,9 @@ pub fn reflectance_on_turns(
     let normals = normals_of(normal, picture, mask)?;
     let coefficients = light_of(light, picture, mask)?;
     let shading = diffuse_shading(&normals, &coefficients, DiffuseForm::Released)?;
-    let reflectance = diffuse
+    Ok(diffuse
         .f_div(&shading.f_clamp_min(LEAST_SHADING)?)?
-        .f_clamp(0.0, 1.0)?;
-    low_rank(&reflectance, mask, form)
+        .f_clamp(0.0, 1.0)?)
 }
 
 /// Mean squared difference between Spec-Net's highlight and the one that the answered reflectance and smoothness

@@ -6,11 +6,15 @@ use std::sync::Arc;
 use super::composed::{ComposedBatches, composition, window_settings};
 use super::decompose_task::Resources;
 use super::error::TrainError;
+use super::held_out::{HeldOutSamples, HeldOutTurns, highlight_figures, rank_figures};
 use super::learner::{Learner, LearnerSettings};
+use super::losses::angular_degrees;
+use super::low_rank::chromaticity;
 use super::model::{ComputePrecision, Model};
 use super::paper_phases::{
-    PaperPhase, light_on_truth, normal_on_truth, reflectance_on_turns, spec_on_truth,
-    spec_on_turns, specular_on_turns,
+    PaperPhase, diffuse_chromaticity, highlight_of, light_on_truth, normal_on_truth, normals_of,
+    reflectance, reflectance_on_turns, saturated_frames, spec_on_truth, spec_on_turns,
+    specular_on_turns,
 };
 use super::run::{StepLosses, Task, Validation};
 use super::sample::TruthBatch;
@@ -25,6 +29,8 @@ use crate::synth::stream;
 pub struct PaperInputs {
     /// A data set of turns.
     pub turns: Option<PathBuf>,
+    /// A data set of turns that the networks are judged by, and that should not be among `turns`.
+    pub held_out: Option<PathBuf>,
     /// Weights to begin with.
     pub weights: Option<Weights>,
     /// Spec-Net's weights.
@@ -45,6 +51,8 @@ pub struct PaperTask {
     learner: Learner,
     composed: ComposedBatches,
     turns: Option<TurnReader>,
+    held_out_samples: HeldOutSamples,
+    held_out_turns: Option<HeldOutTurns>,
 }
 
 /// A phase, with the networks that it uses and does not change.
@@ -94,12 +102,21 @@ impl PaperTask {
         };
         let seed = stream(settings.run.seed, 31);
         let open = |path: &PathBuf| TurnReader::open(path, seed);
+        let held_out = |path: &PathBuf| HeldOutTurns::read(path, resources.device);
+        let composition = Arc::new(composition(&settings.data, settings.run.seed)?);
+        // On them, nothing is known of the paper's smoothness.
+        let samples = match phase {
+            PaperPhase::Specular => 0,
+            _ => settings.data.validation,
+        };
         Ok(Self {
+            held_out_samples: HeldOutSamples::compose(&composition, samples),
+            held_out_turns: inputs.held_out.as_ref().map(held_out).transpose()?,
             phase: Phase::new(phase, &settings, resources, inputs)?,
             name: phase.name(),
             learner: Learner::new(graph, &weights, learner)?,
             composed: ComposedBatches::new(
-                Arc::new(composition(&settings.data, settings.run.seed)?),
+                composition,
                 window_settings(&settings.data, &settings.run),
                 resources,
             ),
@@ -170,6 +187,73 @@ impl Phase {
         }
     }
 
+    /// How well the phase's network does on composed samples.
+    fn sample_figures(
+        &self,
+        own: &Model,
+        batch: &TruthBatch,
+    ) -> Result<Vec<(&'static str, f64)>, TrainError> {
+        let (picture, mask) = (&batch.picture, &batch.mask);
+        Ok(match self {
+            Self::Spec => {
+                let highlight = highlight_of(own, picture, mask)?;
+                let grey = highlight.f_mean_dim([1_i64].as_slice(), true, None)?;
+                highlight_figures(&grey, batch)?.to_vec()
+            }
+            Self::Normal | Self::Joint { .. } => {
+                let normals = normals_of(own, picture, mask)?;
+                let degrees = angular_degrees(&normals, &batch.normals, mask)?;
+                vec![("normals_deg", f64::try_from(degrees)?)]
+            }
+            Self::Light { .. } => {
+                vec![("shading", f64::try_from(light_on_truth(own, batch)?)?)]
+            }
+            Self::Specular { .. } => Vec::new(),
+        })
+    }
+
+    /// How near what a turn's frames have in common is to rank one: of the pictures as they are, and of what the
+    /// phase's networks make of them.
+    fn turn_figures(
+        &self,
+        own: &Model,
+        turns: &TurnTensors,
+    ) -> Result<Vec<(&'static str, f64)>, TrainError> {
+        let (raw, found, mask) = match self {
+            Self::Spec => {
+                let Some((picture, mask)) = saturated_frames(turns)? else {
+                    return Ok(Vec::new());
+                };
+                let found = diffuse_chromaticity(own, &picture, &mask)?;
+                (chromaticity(&picture)?, found, mask)
+            }
+            Self::Light { normal, spec } => {
+                let found = reflectance(normal, own, spec.as_ref(), turns)?;
+                (
+                    turns.picture.shallow_clone(),
+                    found,
+                    turns.mask.shallow_clone(),
+                )
+            }
+            Self::Joint { light, spec } => {
+                let found = reflectance(own, light, spec.as_ref(), turns)?;
+                (
+                    turns.picture.shallow_clone(),
+                    found,
+                    turns.mask.shallow_clone(),
+                )
+            }
+            Self::Normal | Self::Specular { .. } => return Ok(Vec::new()),
+        };
+        let (raw, found) = (rank_figures(&raw, &mask)?, rank_figures(&found, &mask)?);
+        Ok(vec![
+            ("pictures_residual", raw.0),
+            ("pictures_sigma_ratio", raw.1),
+            ("residual", found.0),
+            ("sigma_ratio", found.1),
+        ])
+    }
+
     /// The loss on a batch of turns; none where the gate of saturation is closed.
     fn on_turns(
         &self,
@@ -235,7 +319,18 @@ impl Task for PaperTask {
     }
 
     fn validate(&mut self) -> Result<Validation, TrainError> {
-        Ok(Validation::default())
+        let own = self.learner.averaged_model()?;
+        let device = self.resources.device;
+        let mut figures = self
+            .held_out_samples
+            .figures(device, |batch| self.phase.sample_figures(&own, batch))?;
+        if let Some(turns) = &self.held_out_turns {
+            figures.extend(turns.figures(|turns| self.phase.turn_figures(&own, turns))?);
+        }
+        Ok(Validation {
+            figures,
+            sheet: None,
+        })
     }
 
     fn place(&self) -> String {

@@ -166,7 +166,12 @@ impl<'a> Run<'a> {
     ) -> Result<RunOutcome, TrainError> {
         let between = Duration::from_secs_f64(60.0 * self.settings.checkpoint_minutes);
         let mut saved = Instant::now();
-        let mut figures = BTreeMap::new();
+        // Where training begins, so that it shows what it has changed.
+        let mut figures = if self.step == 0 {
+            self.validate(observer)?
+        } else {
+            BTreeMap::new()
+        };
         while self.step < self.settings.steps && !stop.load(Ordering::Relaxed) {
             self.make_step(observer)?;
             if self.step.is_multiple_of(self.settings.validate_every)

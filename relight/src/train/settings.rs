@@ -10,6 +10,7 @@ use super::adam::AdamSettings;
 use super::decompose::DecomposeWeights;
 use super::error::TrainError;
 use super::low_rank::LowRankForm;
+use crate::synth::LightKind;
 
 /// How long and how fast a network learns: the table `[run]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -91,6 +92,10 @@ pub struct DataSettings {
     pub views: u32,
     /// Materials and lightings of each view.
     pub lightings: u32,
+    /// What light there is.
+    pub light: LightKind,
+    /// Whether objects block light.
+    pub shadows: bool,
     /// Part of the pictures that a plain camera takes.
     pub plain_share: f64,
     /// Samples that are kept to draw from.
@@ -116,6 +121,8 @@ impl Default for DataSettings {
             size: 128,
             views: 2,
             lightings: 6,
+            light: LightKind::Mixed,
+            shadows: true,
             plain_share: 0.5,
             window: 768,
             reuse: 4.0,

@@ -19,7 +19,7 @@ pub(crate) const STEPS_PER_DEGREE: f64 = 88.889;
 pub(crate) struct Step {
     /// When.
     pub(crate) cycle: u64,
-    /// Whether DIR was high.
+    /// Whether DIR was low, as it is for a positive turn.
     pub(crate) forward: bool,
 }
 
@@ -156,7 +156,7 @@ impl Chip {
             }
             "step" => self.steps.push(Step {
                 cycle: at,
-                forward: value == Some("1"),
+                forward: value == Some("0"),
             }),
             "enable" => self.enables.push(Enable {
                 cycle: at,

@@ -82,9 +82,9 @@ pub(crate) fn set_step(active: bool, outputs: Outputs) {
     PORTD.change(STEP, active != outputs.invert_step);
 }
 
-/// Sets the direction of the next pulse.
+/// Sets the direction of the next pulse: low for a positive turn, as Grbl has it.
 pub(crate) fn set_direction(forward: bool, outputs: Outputs) {
-    PORTD.change(DIRECTION, forward != outputs.invert_direction);
+    PORTD.change(DIRECTION, forward == outputs.invert_direction);
 }
 
 /// Whether the index input is closed.

@@ -8,6 +8,7 @@ mod recording;
 mod serving;
 mod simulate;
 mod table_arguments;
+mod token;
 mod turntable;
 
 use std::process::ExitCode;
@@ -23,6 +24,7 @@ fn main() -> ExitCode {
         Command::Record(record) => console.finish(recording::run(console, *record)),
         Command::Serve(serve) => console.finish(serving::run(console, *serve)),
         Command::Turntable(asked) => console.finish(turntable::run(console, &asked)),
+        Command::Token { file } => console.finish(token::run(console, &file)),
         Command::Simulate(asked) => console.finish(simulate::run(console, &asked)),
     }
 }

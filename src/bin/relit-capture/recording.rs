@@ -165,22 +165,9 @@ impl Reporter {
             _ => indicatif::ProgressBar::hidden(),
         };
         self.console.say_phase(
-            words(state.phase),
+            &state.phase.to_string(),
             &json!({ "event": "phase", "phase": state.phase }),
         );
-    }
-}
-
-fn words(phase: Phase) -> &'static str {
-    match phase {
-        Phase::Idle | Phase::WaitingForObject => "waiting",
-        Phase::Preflight => "checking camera, table and disk",
-        Phase::Metering => "metering: the table turns slowly",
-        Phase::MovingBack => "the table goes back by its ramp",
-        Phase::Starting => "the table gathers speed",
-        Phase::Recording => "recording",
-        Phase::Unwinding => "the table goes back to where it began",
-        Phase::Checking => "checking the take",
     }
 }
 

@@ -39,7 +39,7 @@ pub(crate) fn run(console: Console, asked: Serve) -> Result<Outcome, Error> {
         }
     };
     let token = match &asked.token_file {
-        Some(path) => Some(Token::from_file(path)?),
+        Some(path) => Some(Token::from_file_or_new(path)?),
         None => asked.token,
     };
     fs::create_dir_all(root).map_err(failed(root.display().to_string(), "made"))?;

@@ -13,6 +13,8 @@ Examples:
       find the index, or make zero of where the table stands
   relit-capture turntable jog -90
       turn by 90 degrees, back
+  relit-capture turntable jog --home 45
+      find zero, then turn to 45 degrees
   relit-capture turntable stop
       stop it, also from beside a capture that runs
 
@@ -26,7 +28,8 @@ Examples:
       a bad line, and a controller that restarts
 
 Faults: drop=SHARE flip=SHARE duplicate=SHARE merge=SHARE delay=SHARE:TIME of bytes or lines, with
-`to.` or `from.` before them for one direction; reset@TIME and stall@TIME.";
+`to.` or `from.` before them for one direction; reset@TIME and stall@TIME; estop@TIME
+or estop@TIME:TIME presses the emergency stop, for good or for so long.";
 
 #[derive(Args)]
 pub(crate) struct TurntableArguments {
@@ -46,11 +49,15 @@ pub(crate) enum Action {
     /// Turn by so many degrees, negative for back, and wait until it is done.
     Jog {
         /// Degrees from here.
-        #[arg(value_name = "DEGREES", allow_negative_numbers = true)]
+        #[arg(value_name = "DEGREES", allow_negative_numbers = true, value_parser = degrees)]
         degrees: f64,
         /// Degrees a second; by default as fast as is gentle.
-        #[arg(long, value_name = "DEGREES_PER_SECOND")]
+        #[arg(long, value_name = "DEGREES_PER_SECOND", value_parser = degrees)]
         speed: Option<f64>,
+        /// Home the table first: where opening the port resets the controller, a table with an index
+        /// (`$22=1`) is locked each time.
+        #[arg(long)]
+        home: bool,
     },
     /// Slow the table down to a stop and drop what it had to do.
     Stop,
@@ -105,6 +112,14 @@ pub(crate) struct SimulateArguments {
     /// End by itself after so many seconds.
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
     pub(crate) for_seconds: Option<f64>,
+}
+
+fn degrees(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|degrees: &f64| degrees.is_finite());
+    number.ok_or_else(|| "give degrees as a number, such as 90 or -12.5".to_owned())
 }
 
 fn speed(text: &str) -> Result<f64, String> {

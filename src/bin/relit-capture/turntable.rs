@@ -25,17 +25,33 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
         Action::Status => status(console, &port, &options),
         Action::Stop => stop(console, &port, &options),
         Action::Home => home(console, open_to_move(console, &port, &options)?.as_ref()),
-        Action::Jog { degrees, speed } => {
+        Action::Jog {
+            degrees,
+            speed,
+            home: with_home,
+        } => {
             let table = open_to_move(console, &port, &options)?;
+            if with_home {
+                home(console, &table)?;
+            }
             report(console, "jogged", &table.jog(degrees, speed)?);
             Ok(Outcome::Whole)
         }
         Action::Unlock => {
-            let table = Table::open_serial(&port, &options)?;
+            let table = open(console, &port, &options)?;
             report(console, "unlocked", &table.unlock()?);
             Ok(Outcome::Whole)
         }
     }
+}
+
+/// Opens a table, and says if it was moving and nobody had it.
+fn open(console: Console, port: &Path, options: &TableOptions) -> Result<Table, TurntableError> {
+    let table = Table::open_serial(port, options)?;
+    if table.was_stopped() {
+        console.warn("the table was moving and no program had it: it was stopped");
+    }
+    Ok(table)
 }
 
 /// Opens a table that is stopped if the program gets a signal to end.
@@ -44,7 +60,7 @@ fn open_to_move(
     port: &Path,
     options: &TableOptions,
 ) -> Result<Arc<Table>, TurntableError> {
-    let table = Arc::new(Table::open_serial(port, options)?);
+    let table = Arc::new(open(console, port, options)?);
     // A weak reference, so that table and port are closed when the motion has ended.
     let moving = Arc::downgrade(&table);
     let listening = at_end(move || {
@@ -77,7 +93,7 @@ fn status(
 ) -> Result<Outcome, TurntableError> {
     let status = match Owner::find(port, &options.runtime_folder)? {
         Some(owner) => owner.status()?,
-        None => Table::open_serial(port, options)?.status()?,
+        None => open(console, port, options)?.status()?,
     };
     report(console, "status", &status);
     Ok(Outcome::Whole)

@@ -104,6 +104,9 @@ struct ExtractArguments {
     /// Refuse recordings in which a frame would be used twice or something is lost.
     #[arg(long)]
     strict: bool,
+    /// Extract also recordings that cover part of a turn: the samples that are there, and no others.
+    #[arg(long)]
+    partial: bool,
     /// Skip sessions that the data set already holds, intact and from the same video and mask.
     #[arg(long)]
     resume: bool,
@@ -172,6 +175,7 @@ impl From<ExtractArguments> for Arguments {
             layout: line.layout.into(),
             mask: line.mask,
             strict: line.strict,
+            partial: line.partial,
             resume: line.resume,
             replace: line.replace,
             threads: line.threads.unwrap_or(defaults.threads),

@@ -6,6 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use indicatif::ProgressBar;
 use relit::console::{Console, Outcome};
 use relit::extract::{ExtractError, ExtractOptions, Observer, RecordingOutcome, extract};
+use relit_data::causes::with_causes;
 use relit_data::shard::SessionEntry;
 use serde_json::json;
 
@@ -23,11 +24,12 @@ pub(crate) fn run(
     let tally = extract(inputs, out, options, &reporter)?;
     console.say(
         &format!(
-            "{}: {} extracted ({} with losses), {} skipped, {} failed",
+            "{}: {} extracted ({} with losses), {} skipped, {} left out, {} failed",
             out.display(),
             tally.extracted,
             tally.lossy,
             tally.skipped,
+            tally.left_out,
             tally.failed
         ),
         &json!({
@@ -36,11 +38,12 @@ pub(crate) fn run(
             "extracted": tally.extracted,
             "lossy": tally.lossy,
             "skipped": tally.skipped,
+            "left_out": tally.left_out,
             "failed": tally.failed,
         }),
     );
     let nothing_came_out = tally.extracted + tally.skipped == 0;
-    Ok(match (tally.failed, tally.lossy) {
+    Ok(match (tally.failed, tally.lossy + tally.left_out) {
         (0, 0) => Outcome::Whole,
         (1.., _) if nothing_came_out => Outcome::Wrong,
         _ => Outcome::Lossy,
@@ -68,6 +71,14 @@ impl Reporter<'_> {
         self.console.say(
             &format!("{}: already extracted, skipped{lossy}", entry.id),
             &json!({ "event": "skipped", "id": entry.id, "lossy": entry.lossy }),
+        );
+    }
+
+    fn left_out(&self, recording: &Path, error: &ExtractError) {
+        let (input, why) = (recording.to_string_lossy(), with_causes(error));
+        self.console.say(
+            &format!("{input}: left out: {why}"),
+            &json!({ "event": "left_out", "input": input, "message": why }),
         );
     }
 
@@ -108,6 +119,7 @@ impl Observer for Reporter<'_> {
         match outcome {
             RecordingOutcome::Extracted(entry) => self.extracted(entry),
             RecordingOutcome::Skipped(entry) => self.skipped(entry),
+            RecordingOutcome::LeftOut(error) => self.left_out(recording, error),
             RecordingOutcome::Failed(error) => self.console.error_in(recording, error),
         }
     }

@@ -65,6 +65,9 @@ pub enum SessionError {
     /// The video that the manifest names does not exist.
     #[error("{0} is missing, but the session's manifest names it: put it back")]
     VideoMissing(PathBuf),
+    /// The capture ended before its first frame.
+    #[error("{0} has 0 frames: the capture ended before the first one")]
+    NoFrames(PathBuf),
     /// A session of this name exists.
     #[error("{0} exists already: a session never replaces another one")]
     Exists(PathBuf),

@@ -150,6 +150,22 @@ impl FrameIndex {
         self.entries.truncate(frames);
     }
 
+    /// Gives frames without angle the one (degrees) that `angle` returns for their time stamp
+    /// (microseconds); returns whether any got one. Angles that no turntable reaches are left out.
+    pub fn add_angles(&mut self, angle: &dyn Fn(i64) -> Option<f64>) -> bool {
+        let mut any = false;
+        for entry in self
+            .entries
+            .iter_mut()
+            .filter(|entry| entry.angle_deg.is_none())
+        {
+            let found = angle(entry.t_us);
+            entry.angle_deg = found.filter(|angle| (-MOST_DEGREES..=MOST_DEGREES).contains(angle));
+            any |= entry.angle_deg.is_some();
+        }
+        any
+    }
+
     /// Adds the next frame.
     ///
     /// # Errors

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::writer::{close, keep_as_found, write_index};
 use super::{
     FrameIndex, INDEX_FILE, IndexFault, MANIFEST_FILE, Manifest, SessionError, SessionLock, Status,
+    TurnJournal,
 };
 
 /// A session that is marked as recording although its recorder has died. It stays locked while this
@@ -17,6 +18,7 @@ pub struct InterruptedSession {
     manifest: Manifest,
     index: FrameIndex,
     fault: Option<IndexFault>,
+    journal: Option<TurnJournal>,
     lock: SessionLock,
 }
 
@@ -48,6 +50,7 @@ impl InterruptedSession {
             manifest,
             index,
             fault,
+            journal: TurnJournal::read(folder),
             lock,
         })
     }
@@ -70,15 +73,31 @@ impl InterruptedSession {
         self.fault.as_ref()
     }
 
-    /// Marks the session as aborted for this reason, with the first `frames` lines of the index. If
-    /// lines are removed, the index is kept as it was found in `frames.interrupted.jsonl`.
+    /// What the turntable reported of the turn, if there was one.
+    #[must_use]
+    pub fn journal(&self) -> Option<&TurnJournal> {
+        self.journal.as_ref()
+    }
+
+    /// Marks the session as aborted for this reason, with the first `frames` lines of the index. A
+    /// frame without angle gets the one (degrees) that `angle` returns for its time stamp
+    /// (microseconds). If lines are removed, the index is kept as it was found in
+    /// `frames.interrupted.jsonl`.
     ///
     /// # Errors
     /// [`SessionError::Io`]; the status then stays "recording".
-    pub fn abort(mut self, frames: usize, reason: &str) -> Result<Manifest, SessionError> {
-        if self.fault.is_some() || frames < self.index.entries().len() {
+    pub fn abort(
+        mut self,
+        frames: usize,
+        angle: &dyn Fn(i64) -> Option<f64>,
+        reason: &str,
+    ) -> Result<Manifest, SessionError> {
+        let is_cut = self.fault.is_some() || frames < self.index.entries().len();
+        if is_cut {
             keep_as_found(&self.folder)?;
             self.index.truncate(frames);
+        }
+        if self.index.add_angles(angle) || is_cut {
             write_index(&self.folder, &self.index)?;
         }
         let frames = self.index.entries().len() as u64;
@@ -105,7 +124,7 @@ mod tests {
         let open = || InterruptedSession::open(&folder);
         assert!(matches!(open(), Err(SessionError::InUse(_))));
         drop(live);
-        let manifest = open().unwrap().abort(0, "interrupted").unwrap();
+        let manifest = open().unwrap().abort(0, &|_| None, "interrupted").unwrap();
         assert_eq!(manifest.status, Status::Aborted("interrupted".to_owned()));
         assert!(matches!(open(), Err(SessionError::Ended(_))));
         let names = fs::read_dir(&folder).unwrap();
@@ -128,7 +147,7 @@ mod tests {
         let session = InterruptedSession::open(&folder).unwrap();
         assert_eq!(session.index().entries().len(), 5);
         assert!(session.index_fault().is_some());
-        let manifest = session.abort(3, "interrupted").unwrap();
+        let manifest = session.abort(3, &|_| None, "interrupted").unwrap();
         assert_eq!(manifest.video.frames, Some(3));
         let cut = FrameIndex::parse(&fs::read(folder.join(INDEX_FILE)).unwrap()).unwrap();
         assert_eq!(cut.entries(), [0, 1, 2].map(entry));

@@ -32,6 +32,10 @@ pub struct Manifest {
     pub faults: Vec<Fault>,
     /// The program that recorded.
     pub software: SoftwareFacts,
+    /// What a person noted of the take.
+    pub note: Option<String>,
+    /// How a person rated the take, 1 to 5.
+    pub rating: Option<u8>,
 }
 
 /// The state of a capture.
@@ -169,6 +173,9 @@ pub enum ManifestFault {
     /// The hash is malformed.
     #[error("its video.blake3 {0:?} is not a hash of 64 hexadecimal digits")]
     Hash(String),
+    /// A rating that does not exist.
+    #[error("its rating is {0}, but must be 1 to 5")]
+    Rating(u8),
     /// A number is not positive and finite.
     #[error("its {field} is {value}, but must be positive")]
     Number {
@@ -210,6 +217,8 @@ impl Manifest {
             video: file.video,
             faults: file.faults,
             software: file.software,
+            note: file.note,
+            rating: file.rating,
         };
         manifest.check()?;
         Ok(manifest)
@@ -238,6 +247,8 @@ impl Manifest {
             video: self.video.clone(),
             faults: self.faults.clone(),
             software: self.software.clone(),
+            note: self.note.clone(),
+            rating: self.rating,
         };
         let mut bytes = serde_json::to_vec_pretty(&file)?;
         bytes.push(b'\n');
@@ -259,6 +270,11 @@ impl Manifest {
             && (hash.len() != 64 || !hash.bytes().all(|b| b.is_ascii_hexdigit()))
         {
             return Err(ManifestFault::Hash(hash.clone()));
+        }
+        if let Some(rating) = self.rating
+            && !(1..=5).contains(&rating)
+        {
+            return Err(ManifestFault::Rating(rating));
         }
         positive("camera.fps", self.camera.fps)?;
         if let Some(table) = &self.turntable {
@@ -326,4 +342,8 @@ struct ManifestFile {
     #[serde(default)]
     faults: Vec<Fault>,
     software: SoftwareFacts,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    note: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rating: Option<u8>,
 }

@@ -5,6 +5,7 @@
 //!   without a session folder is accepted too: it is a [`Recording`] without manifest and frame
 //!   index.
 //! - Writing: [`SessionWriter`], which holds the [`SessionLock`].
+//! - [`TurnJournal`]: what the turntable reported, until the index has the angles.
 //! - Salvaging what a killed recorder left behind: [`InterruptedSession`].
 //!
 //! This module knows the files and how they relate. It decodes no video and knows nothing of
@@ -13,21 +14,25 @@
 mod error;
 mod frames;
 mod interrupted;
+mod journal;
 mod lock;
 mod manifest;
 mod recording;
+mod remarks;
 mod writer;
 
 pub use crate::naming::is_session_name;
 pub use error::SessionError;
 pub use frames::{FrameEntry, FrameIndex, Gap, IndexFault};
 pub use interrupted::InterruptedSession;
+pub use journal::{JOURNAL_FILE, JournaledReport, JournaledTurn, TurnJournal};
 pub use lock::SessionLock;
 pub use manifest::{
     CameraFacts, Fault, FrameClock, MANIFEST_SCHEMA, Manifest, ManifestFault, SoftwareFacts,
     Status, TurntableFacts, VideoFacts, object_of,
 };
 pub use recording::{Notice, Recording, recordings};
+pub use remarks::remark;
 pub use writer::SessionWriter;
 
 /// Name of the manifest in a session folder.

@@ -90,6 +90,9 @@ impl Recording {
                 notices.push(Notice::Loss(format!("the capture was aborted: {reason}")));
             }
         }
+        if manifest.status != Status::Complete && manifest.video.frames == Some(0) {
+            return Err(SessionError::NoFrames(folder.to_owned()));
+        }
         let video = folder.join(&manifest.video.file);
         let found = match fs::metadata(&video) {
             Ok(data) if data.is_file() => data.len(),

@@ -4,9 +4,10 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use super::journal::JournalWriter;
 use super::{
-    FrameEntry, FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, SessionError, SessionLock, Status,
-    is_session_name,
+    FrameEntry, FrameIndex, INDEX_FILE, JournaledReport, JournaledTurn, MANIFEST_FILE, Manifest,
+    SessionError, SessionLock, Status, TurnJournal, is_session_name,
 };
 use crate::durable;
 
@@ -29,6 +30,7 @@ pub struct SessionWriter {
     rewrite: bool,
     /// True if frames were removed whose lines are in the file.
     truncated: bool,
+    journal: Option<JournalWriter>,
     lock: SessionLock,
 }
 
@@ -74,6 +76,7 @@ impl SessionWriter {
             length: 0,
             rewrite: false,
             truncated: false,
+            journal: None,
             lock,
         })
     }
@@ -142,6 +145,27 @@ impl SessionWriter {
             .truncate(self.index.entries().len().saturating_sub(1));
     }
 
+    /// Starts the journal of the turn. Without one, or where it cannot be written, an interrupted
+    /// session has no angles; nothing else depends on it.
+    pub fn begin_journal(&mut self, turn: JournaledTurn) {
+        self.journal = JournalWriter::create(&self.folder, turn).ok();
+    }
+
+    /// Adds a report of the table to the journal, if there is one.
+    pub fn add_report(&mut self, report: JournaledReport) {
+        if let Some(journal) = &mut self.journal
+            && journal.add(report).is_err()
+        {
+            self.journal = None;
+        }
+    }
+
+    /// The journal so far.
+    #[must_use]
+    pub fn journal(&self) -> Option<&TurnJournal> {
+        self.journal.as_ref().map(JournalWriter::journal)
+    }
+
     /// The index so far.
     #[must_use]
     pub fn index(&self) -> &FrameIndex {
@@ -180,11 +204,15 @@ impl SessionWriter {
         }
     }
 
-    /// Syncs the index to disk, up to the last frame pushed.
+    /// Syncs the index to disk, up to the last frame pushed, and the journal.
     ///
     /// # Errors
     /// [`SessionError::Io`].
     pub fn sync(&self) -> Result<(), SessionError> {
+        if let Some(journal) = &self.journal {
+            // The index is what a session cannot do without.
+            let _ = journal.sync();
+        }
         self.drop_partial_line()
             .and_then(|()| self.lines.sync_data())
             .map_err(SessionError::io(self.folder.join(INDEX_FILE), "synced"))
@@ -219,6 +247,10 @@ impl SessionWriter {
         }
         let frames = self.index.entries().len() as u64;
         let manifest = close(&self.folder, self.manifest, frames, status)?;
+        if let Some(journal) = self.journal.filter(|_| manifest.status == Status::Complete) {
+            // One that stays behind does no harm.
+            let _ = journal.remove();
+        }
         self.lock.remove()?;
         Ok(manifest)
     }

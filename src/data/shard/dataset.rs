@@ -101,6 +101,10 @@ pub struct SessionEntry {
     pub selection: SamplingBasis,
     /// Number of samples.
     pub samples: u32,
+    /// The part of a turn that the frames cover, degrees, where they cover no whole one: then
+    /// there are fewer samples than the settings say, the first ones of the turn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covered_deg: Option<f64>,
     /// Samples with `duplicate`.
     pub duplicates: u32,
     /// Samples with `spec_net`.

@@ -28,7 +28,9 @@ pub enum CameraError {
         fault: AddressFault,
     },
     /// No such device.
-    #[error("there is no camera at {device}: plug it in, or look at the list of devices")]
+    #[error(
+        "there is no camera at {device}: plug it in, or give another one; `relit-capture devices` lists those that are there"
+    )]
     NotThere {
         /// The device.
         device: String,

@@ -37,6 +37,8 @@ impl CaptureContext<'_> {
     pub(super) fn end_take(&self, take: &TakeSummary) {
         self.monitor.update(|state| {
             (state.frames, state.dropped) = (take.frames, take.dropped);
+            state.session = None;
+            state.note(format!("{}: {} frames", take.session, take.frames));
             state.last_take = Some(take.clone());
         });
     }

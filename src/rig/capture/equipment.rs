@@ -9,6 +9,7 @@ use super::settings::Settings;
 use crate::camera::{self, Camera};
 use crate::clock::Clock;
 use crate::simulator::{SimulatedTable, SimulatorOptions};
+use crate::state::CaptureSettings;
 use crate::turntable::{Table, TableOptions, TurntableAddress, find_serial};
 
 /// How many times faster than real time a rehearsal runs at most where people look at it.
@@ -81,6 +82,16 @@ impl Equipment {
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// Changes what may be changed of the settings. A camera that is to run in another mode is closed,
+    /// and opened again when it is needed.
+    pub fn change_settings(&mut self, changed: &CaptureSettings) {
+        let mode = self.settings.mode;
+        self.settings.change(changed);
+        if self.settings.mode != mode {
+            self.camera = None;
+        }
     }
 
     /// The clock that everything goes by.

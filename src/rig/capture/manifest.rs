@@ -59,6 +59,8 @@ pub(super) fn manifest(
             version: env!("CARGO_PKG_VERSION").to_owned(),
             commit: settings.commit.clone(),
         },
+        note: None,
+        rating: None,
     }
 }
 

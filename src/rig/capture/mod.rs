@@ -12,6 +12,7 @@
 mod context;
 mod equipment;
 mod error;
+mod journal;
 mod locked_camera;
 mod manifest;
 mod metering;

@@ -11,7 +11,7 @@ use jiff::Timestamp;
 use super::error::{CaptureError, Refusal};
 use super::settings::Settings;
 use crate::state::Check;
-use crate::turntable::{Homed, Table, TurnPlan, TurnRequest};
+use crate::turntable::{Alarm, Homed, Table, TurnPlan, TurnRequest, TurntableError};
 use relit_data::naming::is_session_name;
 
 /// What is added to the expected size of a take, as a fraction of it.
@@ -68,6 +68,14 @@ pub(crate) fn check_object(name: &str) -> Result<(), Refusal> {
 /// battery has the voltage demanded.
 pub(super) fn ready_table(table: &Table, settings: &Settings) -> Result<Vec<Check>, CaptureError> {
     let status = table.status()?;
+    if status.emergency_stop {
+        return Err(TurntableError::EmergencyStop.into());
+    }
+    // After an emergency stop a person decides when the table may move again.
+    if status.alarm == Some(Alarm::EMERGENCY_STOP) {
+        let (state, alarm) = (status.state, status.alarm);
+        return Err(TurntableError::NotReady { state, alarm }.into());
+    }
     let mut checks = Vec::new();
     if let Some(least) = settings.min_battery_v {
         let volts = status.battery_v.ok_or(Refusal::NoBattery)?;

@@ -7,6 +7,7 @@ use super::mode_preference::ModePreference;
 use crate::camera::CameraAddress;
 use crate::camera::hold::ManualValues;
 use crate::lockfile::{self, LockError, LockFile};
+use crate::state::CaptureSettings;
 use crate::turntable::TurntableAddress;
 
 /// Where a capture's parts are and what it is to be like.
@@ -57,6 +58,28 @@ impl Settings {
             runtime_folder: lockfile::standard_folder(),
             commit: String::new(),
         }
+    }
+
+    /// The same as everybody may see and some may change.
+    #[must_use]
+    pub fn shown(&self) -> CaptureSettings {
+        CaptureSettings {
+            root: self.root.display().to_string(),
+            camera: self.camera.to_string(),
+            turntable: self.turntable.to_string(),
+            size: self.mode.size,
+            fps: self.mode.fps,
+            degrees_per_second: self.degrees_per_second,
+            max_dropped: self.max_dropped,
+            retries: self.retries,
+        }
+    }
+
+    /// Takes over what may be changed of `shown`.
+    pub fn change(&mut self, shown: &CaptureSettings) {
+        (self.mode.size, self.mode.fps) = (shown.size, shown.fps);
+        self.degrees_per_second = shown.degrees_per_second;
+        (self.max_dropped, self.retries) = (shown.max_dropped, shown.retries);
     }
 
     /// Takes the camera for this process; `None` for one that any number of programs can have.

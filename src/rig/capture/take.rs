@@ -1,26 +1,31 @@
 //! One capture: preflight, metering where it is asked for, the turn with its recording, the
 //! verdict; and all of it again where the take is not usable.
 //!
+//! The session is closed before the table turns back: from then on the take stands, whatever happens
+//! to the table or the program.
+//!
 //! Whatever ends a take, the table stands when it is over: a [`crate::turntable::Turn`] that is
 //! dropped stops it, a [`super::StopRequest`] reaches it while something waits for it, and the table
 //! itself stops when the program ends.
 
 use std::time::Duration;
 
+use jiff::Timestamp;
 use relit_data::causes::with_causes;
 
 use super::context::{CaptureContext, CaptureRequest};
 use super::equipment::Equipment;
 use super::error::{CaptureError, Refusal};
+use super::journal::track_of;
 use super::locked_camera::{LockedCamera, NEXT_FRAME};
 use super::manifest::manifest;
 use super::metering::meter;
 use super::preflight;
 use super::recording::{End, Recorder, RecordingPlan};
-use super::turn::TurnRecording;
+use super::turn::{TurnRecording, unwind};
 use crate::camera::CameraAddress;
 use crate::state::{Check, Phase, TakeSummary, Verdict};
-use crate::turntable::TurnPlan;
+use crate::turntable::{TurnPlan, TurntableError};
 
 /// How long a replayed camera waits for the disk, so that a rehearsal on a slow disk loses nothing.
 const REPLAY_WAIT: Duration = Duration::from_secs(60);
@@ -52,7 +57,6 @@ pub fn capture(
     let mut repeated = 0;
     loop {
         let (take, repeatable) = run_take(equipment, &request, context)?;
-        context.end_take(&take);
         if take.verdict != Verdict::Aborted || !repeatable || repeated == retries {
             return Ok(Captured { take, repeated });
         }
@@ -74,14 +78,66 @@ fn run_take(
     context.begin_take(&request.object);
     context.note([preflight::check_clock(begun)?]);
     let (locked, turn) = prepare(equipment, request.meter, context)?;
-    let manifest = manifest(equipment, &request.object, begun, &locked);
+    let plan = plan_recording(equipment, request, begun, &locked, context);
+    let clock = equipment.clock();
+    let turn_us = equipment.settings().turn_us();
     let camera = equipment.camera.take().ok_or(CaptureError::NoCamera)?;
+    let recorder = Recorder::start(camera, plan)?;
+    let recording = TurnRecording {
+        recorder: &recorder,
+        clock: clock.clone(),
+        turn_us,
+        context,
+    };
+    let (track, finished) = match (equipment.table.as_ref(), turn) {
+        (Some(table), Some(turn)) => match recording.with_table(table, turn) {
+            Ok((track, finished)) => {
+                let track = track.map_err(TurntableError::from);
+                (track.map(Some).map_err(CaptureError::from), Some(finished))
+            }
+            Err(error) => (Err(error), None),
+        },
+        _ => (recording.without_table().map(|()| None), None),
+    };
+    recorder.stop();
+    context.enter(Phase::Checking);
+    let (mut camera, mut recorded) = recorder.wait()?;
+    let control_faults = locked.plan.faults_after(&locked.controls, camera.as_mut());
+    equipment.camera = Some(camera);
+    let track = track.unwrap_or_else(|error| {
+        // A camera that failed by itself explains the take better than the table that was stopped
+        // for it.
+        if matches!(recorded.end(), End::Over | End::Stopped) {
+            recorded.interrupted(with_causes(&error));
+        }
+        recorded.journal().and_then(track_of)
+    });
+    let mut repeatable = matches!(recorded.end(), End::Over);
+    let angle = |t_us| track.as_ref().and_then(|track| track.angle_at(t_us));
+    // The session is closed before the table turns back: nothing that happens on the way costs it.
+    let take = recorded.finish(&angle, &control_faults)?;
+    context.end_take(&take);
+    if let (Some(table), Some(finished)) = (equipment.table.as_ref(), finished) {
+        repeatable &= unwind(table, finished, &clock, context).is_ok();
+    }
+    Ok((take, repeatable))
+}
+
+/// What is recorded, and where; shows it.
+fn plan_recording(
+    equipment: &Equipment,
+    request: &CaptureRequest,
+    begun: Timestamp,
+    locked: &LockedCamera,
+    context: CaptureContext<'_>,
+) -> RecordingPlan {
     let settings = equipment.settings();
+    let manifest = manifest(equipment, &request.object, begun, locked);
     context.monitor.update(|state| {
         state.session = Some(manifest.id.clone());
         state.frames_wanted = settings.frames(locked.stream.fps);
     });
-    let plan = RecordingPlan {
+    RecordingPlan {
         manifest,
         root: settings.root.clone(),
         stream: locked.stream,
@@ -93,34 +149,7 @@ fn run_take(
         stall: NEXT_FRAME,
         clock: equipment.clock(),
         preview: context.preview.cloned(),
-    };
-    let recorder = Recorder::start(camera, plan)?;
-    let recording = TurnRecording {
-        recorder: &recorder,
-        clock: equipment.clock(),
-        turn_us: settings.turn_us(),
-        context,
-    };
-    let turned = match (equipment.table.as_ref(), turn) {
-        (Some(table), Some(turn)) => recording.with_table(table, turn).map(Some),
-        _ => recording.without_table().map(|()| None),
-    };
-    recorder.stop();
-    context.enter(Phase::Checking);
-    let (mut camera, mut recorded) = recorder.wait()?;
-    let control_faults = locked.plan.faults_after(&locked.controls, camera.as_mut());
-    equipment.camera = Some(camera);
-    let track = turned.unwrap_or_else(|error| {
-        // A camera that failed by itself explains the take better than the table that was stopped
-        // for it.
-        if matches!(recorded.end(), End::Over | End::Stopped) {
-            recorded.interrupted(with_causes(&error));
-        }
-        None
-    });
-    let repeatable = matches!(recorded.end(), End::Over);
-    let angle = |t_us| track.as_ref().and_then(|track| track.angle_at(t_us));
-    Ok((recorded.finish(&angle, &control_faults)?, repeatable))
+    }
 }
 
 /// Opens, checks and locks what a take needs, before the table turns for it.

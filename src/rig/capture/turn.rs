@@ -5,11 +5,16 @@ use std::time::Duration;
 
 use super::context::CaptureContext;
 use super::error::CaptureError;
+use super::journal::{journaled_report, journaled_turn};
 use super::preflight;
 use super::recording::{Recorder, Window};
 use crate::clock::Clock;
 use crate::state::{Monitor, Phase, TableState};
-use crate::turntable::{ControllerState, Table, Track, TurnPlan, TurntableError};
+use crate::turntable::{
+    ControllerState, FinishedTurn, Table, TableStatus, Track, TrackError, Turn, TurnPlan,
+    TurntableError,
+};
+use relit_data::causes::with_causes;
 
 /// How often table and state are looked at while frames are recorded.
 const LOOK: Duration = Duration::from_millis(100);
@@ -28,9 +33,13 @@ pub(super) struct TurnRecording<'a> {
 }
 
 impl TurnRecording<'_> {
-    /// Turns the table and records its turn; returns the angles. The table is back where it stood,
-    /// or, where something failed, stands where it was stopped.
-    pub(super) fn with_table(&self, table: &Table, plan: TurnPlan) -> Result<Track, CaptureError> {
+    /// Turns the table and records its turn; returns the angles. The table rests then at the end of
+    /// the turn, or, where something failed, stands where it was stopped.
+    pub(super) fn with_table<'t>(
+        &self,
+        table: &'t Table,
+        plan: TurnPlan,
+    ) -> Result<(Result<Track, TrackError>, FinishedTurn<'t>), CaptureError> {
         let stop = self.context.stop;
         stop.explain(stop.over(table, || self.turn(table, plan)))
     }
@@ -40,23 +49,32 @@ impl TurnRecording<'_> {
         self.record_from(self.clock.now_us().saturating_add(LEAD_US), || Ok(()))
     }
 
-    fn turn(&self, table: &Table, plan: TurnPlan) -> Result<Track, CaptureError> {
-        self.enter_without_reports(Phase::MovingBack);
+    fn turn<'t>(
+        &self,
+        table: &'t Table,
+        plan: TurnPlan,
+    ) -> Result<(Result<Track, TrackError>, FinishedTurn<'t>), CaptureError> {
+        enter_without_reports(self.context, Phase::MovingBack);
         let margin_us = preflight::margin_us(&plan);
         let mut turn = table.start_turn(plan)?;
         self.context.enter(Phase::Starting);
         let part = turn.wait_constant()?;
         let from_us = part.from_us.saturating_add(margin_us);
+        self.recorder
+            .begin_journal(journaled_turn(&turn.expected()));
+        let mut seen = 0;
         let recorded = self.record_from(from_us, || {
             turn.state()?;
+            seen = self.keep_journal(&turn, seen);
             // A table that does not answer ends the turn, as its state shows the next time.
             let _shown = show_table(self.context.monitor, table);
             Ok(())
         });
         match recorded {
+            // All frames are there: what becomes of the table from here on is no fault of the take.
             Ok(()) => {
-                self.enter_without_reports(Phase::Unwinding);
-                Ok(turn.wait_end()?)
+                self.keep_journal(&turn, seen);
+                Ok(turn.wait_rest())
             }
             Err(error @ CaptureError::NotWithTheTurn) => {
                 turn.abort()?;
@@ -64,6 +82,15 @@ impl TurnRecording<'_> {
             }
             Err(error) => Err(error),
         }
+    }
+
+    /// Hands the reports after the first `seen` to the journal; returns how many there are now.
+    fn keep_journal(&self, turn: &Turn<'_>, seen: usize) -> usize {
+        let (reports, all) = turn.reports_after(seen);
+        for report in &reports {
+            self.recorder.add_report(journaled_report(report));
+        }
+        all
     }
 
     /// Records a turn that begins at `from_us`; `check` looks at the table now and then.
@@ -97,21 +124,51 @@ impl TurnRecording<'_> {
             state.dropped = progress.overrun;
         });
     }
+}
 
-    /// Enters a phase in which the table moves, and its reports are not shown until it is there.
-    fn enter_without_reports(&self, phase: Phase) {
-        self.context.monitor.update(|state| {
-            state.phase = phase;
-            state.table.state = ControllerState::Run.to_string();
-            state.table.angle_deg = None;
-            state.table.degrees_per_second = None;
-        });
+/// Turns the table back after a turn. What goes wrong is a fault of the table: the take stands.
+pub(super) fn unwind(
+    table: &Table,
+    finished: FinishedTurn<'_>,
+    clock: &Clock,
+    context: CaptureContext<'_>,
+) -> Result<(), CaptureError> {
+    enter_without_reports(context, Phase::Unwinding);
+    let stop = context.stop;
+    let unwound = stop.explain(stop.over(table, || finished.unwind()));
+    if let Err(error) = &unwound {
+        let why = with_causes(error);
+        let fault = format!("the table did not turn back after the take, look at its cable: {why}");
+        context.monitor.fault(clock.now_us(), fault);
+    }
+    unwound
+}
+
+/// Enters a phase in which the table moves, and its reports are not shown until it is there.
+fn enter_without_reports(context: CaptureContext<'_>, phase: Phase) {
+    context.monitor.update(|state| {
+        state.phase = phase;
+        state.table.state = ControllerState::Run.to_string();
+        state.table.angle_deg = None;
+        state.table.degrees_per_second = None;
+    });
+}
+
+/// What is said while the emergency stop is pressed.
+pub(crate) const EMERGENCY_STOP: &str = "the emergency stop is pressed: release it";
+
+/// What is wrong with the table, in a sentence.
+fn fault_of(status: &TableStatus) -> Option<String> {
+    match status.emergency_stop {
+        true => Some(EMERGENCY_STOP.to_owned()),
+        false => status.alarm.map(|alarm| alarm.to_string()),
     }
 }
 
 /// Asks the table and shows its answer.
 pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), TurntableError> {
     let status = table.status()?;
+    let (low_deg, high_deg) = table.limits(&status);
     monitor.update(|state| {
         state.table = TableState {
             present: true,
@@ -120,7 +177,11 @@ pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), Turntab
             degrees_per_second: Some(status.degrees_per_second),
             homed: status.homed,
             battery_v: status.battery_v,
-            fault: status.alarm.map(|alarm| alarm.to_string()),
+            low_deg: Some(low_deg),
+            high_deg: Some(high_deg),
+            emergency_stop: status.emergency_stop,
+            locked: status.state == ControllerState::Alarm,
+            fault: fault_of(&status),
         };
     });
     Ok(())

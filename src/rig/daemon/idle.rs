@@ -34,8 +34,8 @@ pub(super) struct Idle {
     /// Whether the camera was started.
     streams: bool,
     last_frame_us: i64,
-    /// Since when frames are counted, and how many came.
-    counted: (i64, u32),
+    /// The time stamp since which frames are counted, and how many came.
+    counted: Option<(i64, u32)>,
     table_due_us: i64,
     search_due_us: i64,
 }
@@ -50,7 +50,7 @@ impl Idle {
             clock,
             streams: false,
             last_frame_us: now_us,
-            counted: (now_us, 0),
+            counted: None,
             table_due_us: now_us,
             search_due_us: now_us,
         }
@@ -59,7 +59,7 @@ impl Idle {
     /// Checks everything anew, after something else used camera and table.
     pub(super) fn restart(&mut self) {
         let now_us = self.clock.now_us();
-        (self.last_frame_us, self.counted) = (now_us, (now_us, 0));
+        (self.last_frame_us, self.counted) = (now_us, None);
         (self.table_due_us, self.search_due_us) = (now_us, now_us);
     }
 
@@ -92,9 +92,9 @@ impl Idle {
         let now_us = self.clock.now_us();
         match frame {
             Ok(frame) => {
+                self.count(frame.t_us);
                 self.preview.publish(&Arc::new(frame));
                 self.last_frame_us = now_us;
-                self.count(now_us);
                 Ok(())
             }
             Err(CameraError::Timeout { .. }) if since(self.last_frame_us, now_us) < SILENCE => {
@@ -104,13 +104,17 @@ impl Idle {
         }
     }
 
-    fn count(&mut self, now_us: i64) {
-        let (begun_us, frames) = &mut self.counted;
+    /// Measures the rate by the frames' own time stamps: those that waited come faster.
+    fn count(&mut self, t_us: i64) {
+        let Some((begun_us, frames)) = &mut self.counted else {
+            self.counted = Some((t_us, 0));
+            return;
+        };
         *frames += 1;
-        let passed = since(*begun_us, now_us);
+        let passed = since(*begun_us, t_us);
         if passed >= RATE_PERIOD {
             let fps = f64::from(*frames) / passed.as_secs_f64();
-            self.counted = (now_us, 0);
+            self.counted = Some((t_us, 0));
             self.monitor.update(|state| state.camera.fps = Some(fps));
         }
     }
@@ -231,4 +235,24 @@ fn held_controls(camera: &mut dyn Camera) -> Vec<(String, i64)> {
     let held = plan.steps.iter();
     held.filter_map(|step| Some((step.name.clone(), value(&step.name)?)))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::Settings;
+
+    #[test]
+    fn the_frame_rate_is_the_cameras_also_where_frames_have_waited() {
+        let (camera, table) = ("replay:a".parse().unwrap(), "none".parse().unwrap());
+        let settings = Settings::new("/root".into(), camera, table);
+        let monitor = Monitor::default();
+        let preview = Preview::start(monitor.clone()).unwrap();
+        let equipment = Equipment::new(settings).unwrap();
+        let mut idle = Idle::new(&equipment, monitor.clone(), preview);
+        // After a take they come all at once.
+        (0..40).for_each(|n| idle.count(33_333 * n));
+        let fps = monitor.state().camera.fps.unwrap();
+        assert!((fps - 30.0).abs() < 0.1, "{fps}");
+    }
 }

@@ -17,12 +17,13 @@ use std::thread;
 
 use relit_data::causes::with_causes;
 
+use crate::capture::turn::EMERGENCY_STOP;
 use crate::capture::{CaptureError, Equipment, Settings, preflight, salvage};
 use crate::clock::{Clock, JoinHandle};
 use crate::lockfile::LockFile;
 use crate::preview::Preview;
 use crate::serve::rig::{Command, Refused, Rig};
-use crate::state::Monitor;
+use crate::state::{CaptureSettings, Monitor, RigState};
 use dispatcher::Dispatcher;
 use schedule::Job;
 use worker::Worker;
@@ -50,8 +51,11 @@ impl Daemon {
     pub fn start(settings: Settings) -> Result<Self, CaptureError> {
         let locks = (LockFile::of_root(&settings.root)?, settings.lock_camera()?);
         let root = settings.root.clone();
+        let shown = settings.shown();
         let equipment = Equipment::for_viewers(settings)?;
         let dispatcher = Arc::new(Dispatcher::new(equipment.clock()));
+        let show = |state: &mut RigState| state.settings = shown;
+        dispatcher.monitor().update(show);
         report_salvaged(&root, &equipment.clock(), dispatcher.monitor())?;
         let wants_table = equipment.wants_table();
         let thread = |source| CaptureError::system("a thread", "started")(source);
@@ -94,7 +98,16 @@ impl Daemon {
         ))
     }
 
+    /// Nothing moves while the emergency stop is pressed.
+    fn check_table(&self) -> Result<(), Refused> {
+        match self.dispatcher.monitor().state().table.emergency_stop {
+            true => Err(Refused::Unavailable(EMERGENCY_STOP.to_owned())),
+            false => Ok(()),
+        }
+    }
+
     fn move_table(&self, job: Job) -> Result<(), Refused> {
+        self.check_table()?;
         if !self.wants_table {
             return Err(Refused::Unavailable(
                 "there is no turntable: give --turntable".to_owned(),
@@ -118,6 +131,7 @@ impl Rig for Daemon {
         match command {
             Command::Start { object, meter } => {
                 check_object(&object)?;
+                self.check_table()?;
                 self.check_camera()?;
                 dispatcher.change(|schedule| schedule.submit(Job::Capture { object, meter }))
             }
@@ -133,10 +147,10 @@ impl Rig for Daemon {
                 dispatcher.change(|schedule| schedule.dequeue(place, object.as_deref()))
             }
             Command::Next { object } => {
-                let camera = self.check_camera();
+                let ready = self.check_table().and_then(|()| self.check_camera());
                 dispatcher.change(|schedule| {
                     if !schedule.queue().is_empty() {
-                        camera?;
+                        ready?;
                     }
                     schedule.submit_next(object.as_deref())
                 })
@@ -144,6 +158,26 @@ impl Rig for Daemon {
             Command::Home => self.move_table(Job::Home),
             Command::Jog { degrees } => self.jog(degrees),
             Command::Unlock => self.move_table(Job::Unlock),
+            Command::Reset => self.move_table(Job::ResetTable),
+            Command::Configure {
+                size,
+                fps,
+                degrees_per_second,
+                max_dropped,
+                retries,
+            } => {
+                let now = self.dispatcher.monitor().state().settings;
+                let settings = CaptureSettings {
+                    size: size.or(now.size),
+                    fps: fps.unwrap_or(now.fps),
+                    degrees_per_second: degrees_per_second.unwrap_or(now.degrees_per_second),
+                    max_dropped: max_dropped.unwrap_or(now.max_dropped),
+                    retries: retries.unwrap_or(now.retries),
+                    ..now
+                };
+                check_settings(&settings)?;
+                dispatcher.change(|schedule| schedule.submit(Job::Configure(settings)))
+            }
             Command::SetControl { name, value } => {
                 dispatcher.change(|schedule| schedule.submit(Job::SetControl { name, value }))
             }
@@ -191,6 +225,32 @@ impl Drop for PanicReport {
         if thread::panicking() {
             self.0.fail();
         }
+    }
+}
+
+/// The same bounds as on the command line.
+fn check_settings(settings: &CaptureSettings) -> Result<(), Refused> {
+    let size = settings
+        .size
+        .is_none_or(|(width, height)| width > 0 && height > 0);
+    let wrong = [
+        (!size, "a frame's size has two numbers above 0"),
+        (
+            !(1.0..=1000.0).contains(&settings.fps),
+            "the frame rate goes from 1 to 1000 frames/s",
+        ),
+        (
+            !(0.1..=360.0).contains(&settings.degrees_per_second),
+            "the speed goes from 0.1 to 360 degrees/s",
+        ),
+        (
+            settings.retries > 100,
+            "a take is repeated 100 times at most",
+        ),
+    ];
+    match wrong.iter().find(|(is_wrong, _)| *is_wrong) {
+        Some((_, why)) => Err(Refused::Invalid((*why).to_owned())),
+        None => Ok(()),
     }
 }
 

@@ -15,6 +15,7 @@
 use std::collections::VecDeque;
 
 use crate::serve::rig::Refused;
+use crate::state::CaptureSettings;
 
 /// Objects that can wait for their turn.
 const LONGEST_QUEUE: usize = 100;
@@ -33,6 +34,9 @@ pub(super) enum Job {
     /// By degrees.
     Jog(f64),
     Unlock,
+    /// Resets, unlocks and homes the table.
+    ResetTable,
+    Configure(CaptureSettings),
     SetControl {
         name: String,
         value: i64,

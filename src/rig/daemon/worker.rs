@@ -16,7 +16,7 @@ use crate::capture::{
     CaptureContext, CaptureError, CaptureRequest, Equipment, StopRequest, capture,
 };
 use crate::preview::Preview;
-use crate::state::Verdict;
+use crate::state::{CaptureSettings, Verdict};
 use crate::turntable::{Table, TurntableError};
 
 /// Time between two checks of a motion.
@@ -77,6 +77,8 @@ impl Worker {
                 self.with_table(stop, jog).map(drop)?;
             }
             Job::Unlock => self.with_table(stop, Table::unlock).map(drop)?,
+            Job::ResetTable => self.with_table(stop, Table::reset).map(drop)?,
+            Job::Configure(settings) => self.configure(&settings),
             Job::SetControl { name, value } => self.set_control(&name, value)?,
         }
         Ok(true)
@@ -136,6 +138,13 @@ impl Worker {
                 Ok::<_, CaptureError>(moved.unwrap_or(Err(TurntableError::NotStopped))?)
             })
         })
+    }
+
+    fn configure(&mut self, settings: &CaptureSettings) {
+        self.equipment.change_settings(settings);
+        let shown = self.equipment.settings().shown();
+        let monitor = self.dispatcher.monitor();
+        monitor.update(|state| state.settings = shown);
     }
 
     fn set_control(&mut self, name: &str, value: i64) -> Result<(), CaptureError> {

@@ -1,15 +1,20 @@
-//! A session's video as a file, whole or a part of it.
+//! What was recorded as files, whole or a part of them: a session's video, a session, all sessions of
+//! a day.
 
-use std::path::Path as FilePath;
+use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 
 use axum::body::Body;
 use axum::extract::{Path, Request, State};
-use axum::http::{HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::StreamExt;
+use serde::Deserialize;
 use tower_http::services::ServeFile;
+use utoipa::IntoParams;
 
+use super::archive::Archive;
+use super::extract::QueryParams;
 use super::failure::{Failure, Problem};
 use super::library::Library;
 use super::permits::{Permits, Work, permit};
@@ -37,7 +42,7 @@ pub(super) async fn video(
     request: Request,
 ) -> Result<Response, Failure> {
     let permit = permit(&permits.downloads, "downloads")?;
-    let name = attachment(&id);
+    let name = attachment(&id, "mkv");
     let file = permits.run(Work::Listing, move || library.video_file(&id));
     let response = read(&file.await?.path, request).await?;
     let (mut parts, body) = response.into_parts();
@@ -54,6 +59,156 @@ pub(super) async fn video(
         let _held = &permit;
     });
     Ok(Response::from_parts(parts, Body::from_stream(pieces)))
+}
+
+/// A session
+///
+/// All its files as one tar file, under `<session>/`: unpacked it is a session that `relit-mask` and
+/// `relit-extract` take. Takes one `Range` of bytes, with `If-Range`. The length is sent before: a
+/// download that broke off is shorter.
+#[utoipa::path(
+    get, path = "/api/v1/sessions/{id}.tar", tag = "sessions",
+    params(("id" = String, Path, description = "The session's name")),
+    responses(
+        (status = 200, description = "The file", content_type = "application/x-tar"),
+        (status = 206, description = "A part of it", content_type = "application/x-tar"),
+        (status = 401, body = Problem),
+        (status = 404, description = "No such session", body = Problem),
+        (status = 409, description = "Still being recorded", body = Problem),
+        (status = 416, description = "The range lies beyond the end", body = Problem),
+        (status = 503, description = "Too many downloads", body = Problem),
+    )
+)]
+pub(super) async fn session_tar(
+    library: Arc<Library>,
+    permits: Arc<Permits>,
+    id: String,
+    headers: &HeaderMap,
+) -> Result<Response, Failure> {
+    let name = attachment(&id, "tar");
+    send_tar(&permits, &name, headers, move || {
+        let folder = library.ended(&id)?;
+        Ok(vec![(id, folder)])
+    })
+    .await
+}
+
+/// Which day.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct Day {
+    /// Its date, UTC, as session names begin.
+    #[param(example = "20261120")]
+    day: String,
+}
+
+/// All sessions of a day
+///
+/// As one tar file, without those that are being recorded. Takes one `Range` of bytes, with
+/// `If-Range`.
+#[utoipa::path(
+    get, path = "/api/v1/sessions.tar", tag = "sessions", params(Day),
+    responses(
+        (status = 200, description = "The file", content_type = "application/x-tar"),
+        (status = 206, description = "A part of it", content_type = "application/x-tar"),
+        (status = 400, description = "No day is given", body = Problem),
+        (status = 401, body = Problem),
+        (status = 404, description = "No session of that day", body = Problem),
+        (status = 416, description = "The range lies beyond the end", body = Problem),
+        (status = 503, description = "Too many downloads", body = Problem),
+    )
+)]
+pub(super) async fn day_tar(
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
+    QueryParams(Day { day }): QueryParams<Day>,
+    headers: HeaderMap,
+) -> Result<Response, Failure> {
+    let name = attachment(&day, "tar");
+    send_tar(&permits, &name, &headers, move || library.of_day(&day)).await
+}
+
+/// Sends what a client wants of the tar file of these sessions.
+async fn send_tar(
+    permits: &Permits,
+    name: &str,
+    headers: &HeaderMap,
+    sessions: impl FnOnce() -> Result<Vec<(String, PathBuf)>, Failure> + Send + 'static,
+) -> Result<Response, Failure> {
+    let permit = permit(&permits.downloads, "downloads")?;
+    let archive = permits.run(Work::Listing, move || {
+        let broken = |error| Failure::broken(format!("the session cannot be read: {error}"));
+        Archive::of(&sessions()?).map_err(broken)
+    });
+    let archive = archive.await?;
+    let (length, version) = (archive.len(), archive.version());
+    let (status, from, bytes) = part_of(headers, &version, length)?;
+    let pieces = archive.read(from, bytes).inspect(move |_| {
+        // The permit is given back with the last piece.
+        let _held = &permit;
+    });
+    let mut answer = Response::builder()
+        .status(status)
+        .header(header::CONTENT_TYPE, "application/x-tar")
+        .header(header::CONTENT_LENGTH, bytes)
+        .header(header::ACCEPT_RANGES, "bytes")
+        .header(header::ETAG, version)
+        .header(header::CONTENT_DISPOSITION, name);
+    if status == StatusCode::PARTIAL_CONTENT {
+        let range = format!("bytes {from}-{}/{length}", from + bytes - 1);
+        answer = answer.header(header::CONTENT_RANGE, range);
+    }
+    let answer = answer.body(Body::from_stream(pieces));
+    answer.map_err(|error| Failure::broken(format!("the answer cannot be made: {error}")))
+}
+
+/// Status, first byte and number of bytes of what a client wants.
+fn part_of(
+    headers: &HeaderMap,
+    version: &str,
+    length: u64,
+) -> Result<(StatusCode, u64, u64), Failure> {
+    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+    let is_same = text(header::IF_RANGE).is_none_or(|known| known == version);
+    let range = text(header::RANGE).filter(|_| is_same);
+    let Some((from, to)) = range.and_then(|range| range.strip_prefix("bytes=")?.split_once('-'))
+    else {
+        return Ok((StatusCode::OK, 0, length));
+    };
+    let beyond = || {
+        let error = "there is one range at a time, and it has to begin inside the file";
+        Failure::new(StatusCode::RANGE_NOT_SATISFIABLE, error)
+    };
+    let from: u64 = from.parse().map_err(|_| beyond())?;
+    let last = match to {
+        "" => length - 1,
+        to => to.parse::<u64>().map_err(|_| beyond())?.min(length - 1),
+    };
+    match from <= last {
+        true => Ok((StatusCode::PARTIAL_CONTENT, from, last - from + 1)),
+        false => Err(beyond()),
+    }
+}
+
+/// The mask
+#[utoipa::path(
+    get, path = "/api/v1/sessions/{id}/mask.png", tag = "sessions",
+    params(("id" = String, Path, description = "The session's name")),
+    responses(
+        (status = 200, description = "A PNG file", content_type = "image/png"),
+        (status = 401, body = Problem),
+        (status = 404, description = "No such session, or it has no mask", body = Problem),
+    )
+)]
+pub(super) async fn mask(
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
+    Path(id): Path<String>,
+) -> Result<Response, Failure> {
+    let png = permits
+        .run(Work::Listing, move || library.mask(&id))
+        .await?;
+    Ok(([(header::CONTENT_TYPE, "image/png")], png).into_response())
 }
 
 /// What a request wants of a file; all of it where the client has a part of an older one.
@@ -75,7 +230,7 @@ async fn try_read(path: &FilePath, request: Request) -> Result<Response, Failure
 }
 
 /// The name under which a browser saves the file (RFC 6266, RFC 8187).
-fn attachment(session: &str) -> String {
+fn attachment(session: &str, ending: &str) -> String {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_' | b'.');
     let name: String = session
         .bytes()
@@ -84,7 +239,7 @@ fn attachment(session: &str) -> String {
             false => format!("%{byte:02X}"),
         })
         .collect();
-    format!("attachment; filename*=UTF-8''{name}.mkv")
+    format!("attachment; filename*=UTF-8''{name}.{ending}")
 }
 
 #[cfg(test)]
@@ -93,7 +248,7 @@ mod tests {
 
     #[test]
     fn a_name_of_any_script_stays_one_header_value() {
-        let header = attachment("20261120T093015Z-Ölkanne");
+        let header = attachment("20261120T093015Z-Ölkanne", "mkv");
         assert!(
             header.ends_with("''20261120T093015Z-%C3%96lkanne.mkv"),
             "{header}"

@@ -5,15 +5,23 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 use std::{fs, io};
 
+use axum::http::StatusCode;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::cache::Cache;
 use super::failure::Failure;
 use relit_data::causes::with_causes;
+use relit_data::durable;
 use relit_data::naming::is_session_name;
-use relit_data::session::{FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, Status, object_of};
+use relit_data::session::{
+    self, FrameIndex, INDEX_FILE, MANIFEST_FILE, MASK_FILE, Manifest, Status, object_of,
+};
 
+/// Where sessions go that were put away. It begins with a dot: nobody takes it for a session.
+const TRASH: &str = ".trash";
+/// Longest note, characters.
+const LONGEST_NOTE: usize = 2000;
 /// Summaries that are kept.
 const SUMMARIES: usize = 4096;
 
@@ -50,6 +58,10 @@ pub(super) struct SessionSummary {
     pub(super) dropped: Option<u64>,
     /// From the first frame to the last, seconds.
     pub(super) duration_s: Option<f64>,
+    /// What a person noted.
+    pub(super) note: Option<String>,
+    /// How a person rated it, 1 to 5.
+    pub(super) rating: Option<u8>,
 }
 
 /// All that is known of a session.
@@ -60,6 +72,8 @@ pub(super) struct SessionDetail {
     /// The manifest, `session.json`.
     #[schema(value_type = Object)]
     pub(super) manifest: serde_json::Value,
+    /// Whether it has a mask.
+    pub(super) has_mask: bool,
     /// Each frame's time, seconds after the first.
     pub(super) times_s: Vec<f64>,
     /// Each frame's angle, degrees; `null` where there was no table.
@@ -207,6 +221,7 @@ impl Library {
         Ok(SessionDetail {
             summary,
             manifest: json.map_err(Failure::broken)?,
+            has_mask: folder.join(MASK_FILE).is_file(),
             times_s: entries
                 .iter()
                 .map(|entry| seconds(first, entry.t_us))
@@ -218,16 +233,92 @@ impl Library {
 
     /// The video of a session that is not being recorded.
     pub(super) fn video_file(&self, id: &str) -> Result<VideoFile, Failure> {
-        let folder = self.folder(id)?;
+        let folder = self.ended(id)?;
         let manifest = read_manifest(&folder).map_err(Failure::broken)?;
-        if manifest.status == Status::Recording {
-            let error = format!("{id} is still being recorded: wait for its end");
-            return Err(Failure::new(axum::http::StatusCode::CONFLICT, error));
-        }
         let path = folder.join(&manifest.video.file);
         let missing = || Failure::not_found(format!("the video of {id} is missing"));
         let version = FileVersion::of(&path).ok_or_else(missing)?;
         Ok(VideoFile { path, version })
+    }
+
+    /// Whether there is a session of that name.
+    pub(super) fn has(&self, id: &str) -> bool {
+        self.folder(id).is_ok()
+    }
+
+    /// The folder of a session that is not being recorded.
+    pub(super) fn ended(&self, id: &str) -> Result<PathBuf, Failure> {
+        let folder = self.folder(id)?;
+        match read_manifest(&folder) {
+            Ok(manifest) if manifest.status == Status::Recording => {
+                let error = format!("{id} is still being recorded: wait for its end");
+                Err(Failure::new(StatusCode::CONFLICT, error))
+            }
+            // One that cannot be read can still be had as it is.
+            _ => Ok(folder),
+        }
+    }
+
+    /// Names and folders of the sessions of a day (`20261120`) that are not being recorded.
+    pub(super) fn of_day(&self, day: &str) -> Result<Vec<(String, PathBuf)>, Failure> {
+        if day.len() != 8 || !day.bytes().all(|byte| byte.is_ascii_digit()) {
+            return Err(Failure::bad("give the day as 20261120"));
+        }
+        let names = self.names()?.into_iter().rev();
+        let of_day = names.filter(|name| name.starts_with(&format!("{day}T")));
+        let found: Vec<_> = of_day
+            .filter_map(|name| {
+                let folder = self.ended(&name).ok()?;
+                Some((name, folder))
+            })
+            .collect();
+        match found.is_empty() {
+            true => Err(Failure::not_found(format!("there is no session of {day}"))),
+            false => Ok(found),
+        }
+    }
+
+    /// A session's mask.
+    pub(super) fn mask(&self, id: &str) -> Result<Vec<u8>, Failure> {
+        let path = self.folder(id)?.join(MASK_FILE);
+        fs::read(path).map_err(|_| Failure::not_found(format!("{id} has no mask")))
+    }
+
+    /// Moves a session to the trash.
+    pub(super) fn put_away(&self, id: &str) -> Result<(), Failure> {
+        let folder = self.ended(id)?;
+        let trash = self.root.join(TRASH);
+        fs::create_dir_all(&trash).map_err(not_moved(id))?;
+        move_folder(id, &folder, &trash.join(id))
+    }
+
+    /// Moves a session back from the trash.
+    pub(super) fn restore(&self, id: &str) -> Result<(), Failure> {
+        let folder = self.root.join(TRASH).join(id);
+        if !is_session_name(id) || !folder.is_dir() {
+            let error = "no session of that name was put away";
+            return Err(Failure::not_found(error));
+        }
+        move_folder(id, &folder, &self.root.join(id))
+    }
+
+    /// Writes note and rating of a session to its manifest.
+    pub(super) fn remark(
+        &self,
+        id: &str,
+        note: Option<&str>,
+        rating: Option<u8>,
+    ) -> Result<(), Failure> {
+        if note.is_some_and(|note| note.chars().count() > LONGEST_NOTE) {
+            let error = format!("a note has at most {LONGEST_NOTE} characters");
+            return Err(Failure::bad(error));
+        }
+        if rating.is_some_and(|rating| !(1..=5).contains(&rating)) {
+            return Err(Failure::bad("a rating is a number from 1 to 5"));
+        }
+        let note = note.map(str::trim).filter(|note| !note.is_empty());
+        let written = session::remark(&self.ended(id)?, note, rating);
+        written.map_err(|error| Failure::broken(with_causes(&error)))
     }
 
     /// A session's folder. A name with which one could leave the root is nobody's.
@@ -239,6 +330,20 @@ impl Library {
             Err(Failure::not_found("there is no session of that name"))
         }
     }
+}
+
+/// Moves a session's folder to where no other one is.
+fn move_folder(id: &str, from: &Path, to: &Path) -> Result<(), Failure> {
+    if to.exists() {
+        let error =
+            format!("another session named {id} is there already: move one of them by hand");
+        return Err(Failure::new(StatusCode::CONFLICT, error));
+    }
+    durable::publish(from, to).map_err(not_moved(id))
+}
+
+fn not_moved(id: &str) -> impl FnOnce(io::Error) -> Failure {
+    move |error| Failure::broken(format!("{id} could not be moved: {error}"))
 }
 
 fn read_manifest(folder: &Path) -> Result<Manifest, String> {
@@ -279,6 +384,8 @@ fn summarise(id: &str, manifest: &Manifest, index: Option<&FrameIndex>) -> Sessi
         frames: manifest.video.frames.or(counted),
         dropped: index.map(missing),
         duration_s: ends.map(|(first, last)| seconds(first.t_us, last.t_us)),
+        note: manifest.note.clone(),
+        rating: manifest.rating,
     }
 }
 
@@ -292,6 +399,8 @@ fn unreadable(id: &str, reason: String) -> SessionSummary {
         frames: None,
         dropped: None,
         duration_s: None,
+        note: None,
+        rating: None,
     }
 }
 

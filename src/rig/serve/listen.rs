@@ -1,5 +1,9 @@
 //! Taking connections: so many at once, each with its time limits.
 
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::net::IpAddr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use axum::{Extension, Router};
@@ -32,21 +36,68 @@ pub(super) async fn run(listener: TcpListener, app: &App) {
     let _ = timeout(GRACE, app.permits.connections.acquire_many(all)).await;
 }
 
+/// Connections by address: one client cannot take all of them.
+#[derive(Debug, Default)]
+struct Guests(Mutex<HashMap<IpAddr, usize>>);
+
+/// One connection; ends with it.
+struct Guest {
+    guests: Arc<Guests>,
+    address: IpAddr,
+}
+
+impl Guests {
+    /// `None` where the address has so many connections already.
+    fn admit(guests: &Arc<Self>, address: IpAddr, most: usize) -> Option<Guest> {
+        let mut counts = guests.lock();
+        let count = counts.entry(address).or_default();
+        if *count >= most {
+            return None;
+        }
+        *count += 1;
+        drop(counts);
+        Some(Guest {
+            guests: Arc::clone(guests),
+            address,
+        })
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashMap<IpAddr, usize>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Guest {
+    fn drop(&mut self) {
+        if let Entry::Occupied(mut count) = self.guests.lock().entry(self.address) {
+            *count.get_mut() -= 1;
+            if *count.get() == 0 {
+                count.remove();
+            }
+        }
+    }
+}
+
 async fn accept(listener: TcpListener, app: &App) {
     let router = router(app);
+    let guests = Arc::new(Guests::default());
     loop {
         // Without a permit the next client waits in the system's queue.
         let Ok(permit) = app.permits.connections.clone().acquire_owned().await else {
             return;
         };
-        let Ok((socket, _)) = listener.accept().await else {
+        let Ok((socket, peer)) = listener.accept().await else {
             sleep(PAUSE).await;
+            continue;
+        };
+        let address = peer.ip().to_canonical();
+        let Some(guest) = Guests::admit(&guests, address, app.limits.per_address) else {
             continue;
         };
         let connection = converse(socket, router.clone(), app.limits, app.shutdown.clone());
         tokio::spawn(async move {
             connection.await;
-            drop(permit);
+            drop((guest, permit));
         });
     }
 }
@@ -55,6 +106,11 @@ async fn converse(socket: TcpStream, router: Router, limits: ClientLimits, shutd
     let Ok(local) = socket.local_addr() else {
         return;
     };
+    let mut first = [0];
+    let began = timeout(limits.first_byte, socket.peek(&mut first));
+    if !matches!(shutdown.run_until_cancelled(began).await, Some(Ok(Ok(1)))) {
+        return;
+    }
     // Events are small and wanted at once. A socket that refuses is slower, not wrong.
     let _ = socket.set_nodelay(true);
     // A phone that lost its network would keep its permits for many minutes otherwise.
@@ -79,5 +135,25 @@ async fn converse(socket: TcpStream, router: Router, limits: ClientLimits, shutd
     {
         connection.as_mut().graceful_shutdown();
         let _ = connection.await;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_address_has_so_many_connections_and_no_other_address_fewer_for_it() {
+        let guests = Arc::new(Guests::default());
+        let admit = |address: &str| Guests::admit(&guests, address.parse().unwrap(), 2);
+        let first = admit("192.0.2.7");
+        let second = admit("192.0.2.7");
+        assert!(first.is_some() && second.is_some());
+        assert!(admit("192.0.2.7").is_none());
+        assert!(admit("192.0.2.8").is_some());
+        drop(second);
+        assert!(admit("192.0.2.7").is_some());
+        drop(first);
+        assert!(guests.lock().is_empty());
     }
 }

@@ -14,6 +14,7 @@
 mod access;
 mod address;
 mod api;
+mod archive;
 mod cache;
 mod extract;
 mod failure;

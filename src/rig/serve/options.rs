@@ -54,10 +54,14 @@ pub struct Heartbeat {
 pub struct ClientLimits {
     /// Connections at once; further ones wait to be accepted.
     pub connections: usize,
+    /// Connections from one address at once; further ones are closed.
+    pub per_address: usize,
     /// Requests for the preview at once.
     pub viewers: usize,
     /// Subscribers to the events at once.
     pub subscribers: usize,
+    /// Time in which the first byte has to come after connecting.
+    pub first_byte: Duration,
     /// Time in which a request's head has to come, and how long a connection may lie idle.
     pub head: Duration,
     /// Time in which a request's body has to come.
@@ -70,8 +74,10 @@ impl Default for ClientLimits {
     fn default() -> Self {
         Self {
             connections: 256,
+            per_address: 128,
             viewers: 16,
             subscribers: 32,
+            first_byte: Duration::from_secs(2),
             head: Duration::from_secs(10),
             body: Duration::from_secs(10),
             stall: Duration::from_secs(20),

@@ -50,6 +50,27 @@ pub enum Command {
     },
     /// Releases the table's lock after an alarm.
     Unlock,
+    /// Brings the table back after an alarm of any kind, also after an emergency stop once it is
+    /// released: resets, unlocks and homes it.
+    Reset,
+    /// Changes how takes are captured, while the rig rests; what is left out stays.
+    Configure {
+        /// Frame width and height, pixels.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        size: Option<(u32, u32)>,
+        /// Frames a second, 1 to 1000.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        fps: Option<f64>,
+        /// Speed of the turn, 0.1 to 360 degrees a second.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        degrees_per_second: Option<f64>,
+        /// Frames that may be missing or damaged.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        max_dropped: Option<u64>,
+        /// How often a take that is not usable is repeated, up to 100.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        retries: Option<u32>,
+    },
     /// Sets one of the camera's controls by its name.
     SetControl {
         /// The control's name, such as `exposure_time_absolute`.

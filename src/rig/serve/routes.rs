@@ -7,6 +7,7 @@ use axum::http::StatusCode;
 use axum::middleware::from_fn_with_state;
 use axum::routing::get;
 use axum::{Json, Router};
+use utoipa::OpenApi as _;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
 use utoipa::openapi::{Components, InfoBuilder, OpenApi, OpenApiBuilder};
 use utoipa_axum::router::OpenApiRouter;
@@ -70,7 +71,11 @@ pub(super) fn interface() -> OpenApiRouter<App> {
         .routes(routes!(preview::picture))
         .routes(routes!(preview::stream))
         .routes(routes!(sessions::list))
-        .routes(routes!(sessions::detail))
+        .routes(routes!(sessions::detail, sessions::put_away))
+        .routes(routes!(sessions::restore))
+        .routes(routes!(sessions::remark))
+        .routes(routes!(files::day_tar))
+        .routes(routes!(files::mask))
         .routes(routes!(sessions::thumbnail))
         .routes(routes!(sessions::frame))
         .routes(routes!(sessions::objects))
@@ -109,8 +114,14 @@ fn description() -> OpenApi {
         )
         .components(Some(components))
         .security(Some([SecurityRequirement::new("token", none)]))
+        .paths(TarPath::openapi().paths)
         .build()
 }
+
+/// The path that the router has in common with that of a session.
+#[derive(utoipa::OpenApi)]
+#[openapi(paths(files::session_tar))]
+struct TarPath;
 
 /// Everything that is served.
 pub(super) fn router(app: &App) -> Router {

@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::{Path, State};
-use axum::http::header;
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
-use utoipa::IntoParams;
+use utoipa::{IntoParams, ToSchema};
 
-use super::extract::QueryParams;
+use super::extract::{JsonBody, QueryParams};
 use super::failure::{Failure, Problem};
+use super::files::session_tar;
 use super::library::{Library, SessionDetail, SessionSummary};
 use super::permits::{Permits, Work};
 use super::pictures::Pictures;
@@ -64,9 +65,95 @@ pub(super) async fn detail(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
-) -> Result<Json<SessionDetail>, Failure> {
+    headers: HeaderMap,
+) -> Result<Response, Failure> {
+    // One path for the router: a session's name may end in anything, also in `.tar`.
+    if let Some(session) = id.strip_suffix(".tar")
+        && library.has(session)
+    {
+        return session_tar(library, permits, session.to_owned(), &headers).await;
+    }
     let detail = permits.run(Work::Listing, move || library.detail(&id));
-    Ok(Json(detail.await?))
+    Ok(Json(detail.await?).into_response())
+}
+
+/// Put a session away
+///
+/// Into the folder `.trash` beside the sessions, which nobody empties but a person.
+#[utoipa::path(
+    delete, path = "/api/v1/sessions/{id}", tag = "sessions",
+    params(("id" = String, Path, description = "The session's name")),
+    responses(
+        (status = 204, description = "Done"),
+        (status = 401, body = Problem),
+        (status = 404, description = "No such session", body = Problem),
+        (status = 409, description = "Still being recorded, or one of that name is there", body = Problem),
+    )
+)]
+pub(super) async fn put_away(
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
+    Path(id): Path<String>,
+) -> Result<StatusCode, Failure> {
+    let done = permits.run(Work::Listing, move || library.put_away(&id));
+    done.await.map(|()| StatusCode::NO_CONTENT)
+}
+
+/// Take a session back out of `.trash`
+#[utoipa::path(
+    post, path = "/api/v1/sessions/{id}/restore", tag = "sessions",
+    params(("id" = String, Path, description = "The session's name")),
+    responses(
+        (status = 204, description = "Done"),
+        (status = 401, body = Problem),
+        (status = 404, description = "No such session was put away", body = Problem),
+        (status = 409, description = "One of that name is there", body = Problem),
+    )
+)]
+pub(super) async fn restore(
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
+    Path(id): Path<String>,
+) -> Result<StatusCode, Failure> {
+    let done = permits.run(Work::Listing, move || library.restore(&id));
+    done.await.map(|()| StatusCode::NO_CONTENT)
+}
+
+/// What a person says of a take; a field that is left out or `null` is removed.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Remarks {
+    /// A note of up to 2000 characters.
+    note: Option<String>,
+    /// 1 to 5.
+    rating: Option<u8>,
+}
+
+/// Note and rating of a session
+///
+/// Written to its manifest.
+#[utoipa::path(
+    put, path = "/api/v1/sessions/{id}/remarks", tag = "sessions", request_body = Remarks,
+    params(("id" = String, Path, description = "The session's name")),
+    responses(
+        (status = 204, description = "Done"),
+        (status = 400, description = "Not understood", body = Problem),
+        (status = 401, body = Problem),
+        (status = 404, description = "No such session", body = Problem),
+        (status = 409, description = "Still being recorded", body = Problem),
+        (status = 415, description = "Not JSON", body = Problem),
+    )
+)]
+pub(super) async fn remark(
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
+    Path(id): Path<String>,
+    JsonBody(Remarks { note, rating }): JsonBody<Remarks>,
+) -> Result<StatusCode, Failure> {
+    let done = permits.run(Work::Listing, move || {
+        library.remark(&id, note.as_deref(), rating)
+    });
+    done.await.map(|()| StatusCode::NO_CONTENT)
 }
 
 /// The first frame, small

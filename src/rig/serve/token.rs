@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -32,6 +32,14 @@ pub enum TokenFileError {
     /// It cannot be read.
     #[error("the token's file {path} could not be read")]
     Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// It was not there, and cannot be made.
+    #[error("the token's file {path} could not be made: make its folder, or give another file")]
+    Write {
         /// The file.
         path: PathBuf,
         /// The system's answer.
@@ -94,6 +102,40 @@ impl Token {
                 path: path.to_owned(),
                 source,
             })
+    }
+
+    /// The token that a file holds. Where there is no such file, it is made with a random token, for its
+    /// owner alone.
+    ///
+    /// # Errors
+    /// [`TokenFileError`].
+    pub fn from_file_or_new(path: &Path) -> Result<Self, TokenFileError> {
+        match Self::from_file(path) {
+            Err(TokenFileError::Read { source, .. })
+                if source.kind() == io::ErrorKind::NotFound => {}
+            read => return read,
+        }
+        let made = Self::random().and_then(|token| token.write(path));
+        made.map_err(|source| TokenFileError::Write {
+            path: path.to_owned(),
+            source,
+        })?;
+        // Another process may have been first: what lies there counts.
+        Self::from_file(path)
+    }
+
+    /// Writes the token to a file that appears whole, and replaces none.
+    fn write(&self, path: &Path) -> io::Result<()> {
+        let folder = path
+            .parent()
+            .filter(|folder| !folder.as_os_str().is_empty());
+        let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))?;
+        writeln!(file, "{}", self.0)?;
+        file.as_file().sync_all()?;
+        match file.persist_noclobber(path) {
+            Err(error) if error.error.kind() != io::ErrorKind::AlreadyExists => Err(error.error),
+            _ => Ok(()),
+        }
     }
 
     /// The secret itself.
@@ -197,6 +239,21 @@ mod tests {
         );
         let none = Token::from_file(&folder.path().join("none"));
         assert!(matches!(none, Err(TokenFileError::Read { .. })), "{none:?}");
+    }
+
+    #[test]
+    fn a_tokens_file_is_made_once_and_for_its_owner_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("token");
+        let token = Token::from_file_or_new(&path).unwrap();
+        let mode = std::fs::metadata(&path).unwrap().mode() & 0o777;
+        assert_eq!(mode, 0o600);
+        assert_eq!(Token::from_file_or_new(&path).unwrap(), token);
+        let nowhere = Token::from_file_or_new(&folder.path().join("none/token"));
+        assert!(
+            matches!(nowhere, Err(TokenFileError::Write { .. })),
+            "{nowhere:?}"
+        );
     }
 
     #[test]

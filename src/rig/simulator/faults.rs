@@ -12,8 +12,8 @@ use super::SimulatorError;
 /// end of that fraction of the lines, `delay=0.02:30ms` delays that fraction of the bytes, and what
 /// follows them, by that time. They apply to both directions, with the prefix `to.` only to bytes to
 /// the chip, with `from.` only to bytes from it. `reset@12.5s` restarts the chip at that time, as its
-/// watchdog does; `stall@20s` makes it stop answering and moving. Times count from the table's start
-/// on its clock.
+/// watchdog does; `stall@20s` makes it stop answering and moving; `estop@30s:8s` presses the emergency
+/// stop for eight seconds, and `estop@30s` for good. Times count from the table's start on its clock.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TableFaults {
     /// Faults of the wire to the chip.
@@ -24,6 +24,17 @@ pub struct TableFaults {
     pub resets: Vec<Duration>,
     /// Time at which the chip stops for good.
     pub stall: Option<Duration>,
+    /// When the emergency stop is pressed.
+    pub emergency_stops: Vec<EmergencyStop>,
+}
+
+/// The emergency stop, pressed for a while.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EmergencyStop {
+    /// Time at which it is pressed.
+    pub at: Duration,
+    /// How long it stays pressed; `None`: for good.
+    pub lasts: Option<Duration>,
 }
 
 /// Faults of one direction of the wire; fractions from 0 to 1.
@@ -65,11 +76,11 @@ impl FromStr for TableFaults {
 impl TableFaults {
     fn add(&mut self, item: &str) -> Result<(), &'static str> {
         if let Some((what, at)) = item.split_once('@') {
-            let at = duration(at)?;
             match what {
-                "reset" => self.resets.push(at),
-                "stall" => self.stall = Some(at),
-                _ => return Err("only reset and stall happen at a time"),
+                "reset" => self.resets.push(duration(at)?),
+                "stall" => self.stall = Some(duration(at)?),
+                "estop" => self.emergency_stops.push(emergency_stop(at)?),
+                _ => return Err("only reset, stall and estop happen at a time"),
             }
             return Ok(());
         }
@@ -100,7 +111,11 @@ impl WireFaults {
                 self.delay_by = duration(by)?;
                 return Ok(());
             }
-            _ => return Err("there are drop, flip, duplicate, merge, delay, reset and stall"),
+            _ => {
+                return Err(
+                    "there are drop, flip, duplicate, merge, delay, reset, stall and estop",
+                );
+            }
         };
         *place = share(how)?;
         Ok(())
@@ -113,6 +128,16 @@ fn share(text: &str) -> Result<f64, &'static str> {
         .ok()
         .filter(|share| (0.0..=1.0).contains(share));
     share.ok_or("a share is a number from 0 to 1")
+}
+
+/// `30s` or `30s:8s`.
+fn emergency_stop(text: &str) -> Result<EmergencyStop, &'static str> {
+    let (at, lasts) = match text.split_once(':') {
+        Some((at, lasts)) => (at, Some(duration(lasts)?)),
+        None => (text, None),
+    };
+    let at = duration(at)?;
+    Ok(EmergencyStop { at, lasts })
 }
 
 fn duration(text: &str) -> Result<Duration, &'static str> {
@@ -135,7 +160,8 @@ mod tests {
     #[test]
     fn all_faults_are_read() {
         let faults: TableFaults = "drop=0.01, to.flip=0.005,from.duplicate=1,merge=0,\
-                              delay=0.02:30ms,reset@12.5s,reset@20s,stall@30s"
+                              delay=0.02:30ms,reset@12.5s,reset@20s,stall@30s,\
+                              estop@5s:250ms,estop@9s"
             .parse()
             .unwrap();
         let both = WireFaults {
@@ -155,6 +181,16 @@ mod tests {
             },
             resets: vec![Duration::from_millis(12_500), Duration::from_secs(20)],
             stall: Some(Duration::from_secs(30)),
+            emergency_stops: vec![
+                EmergencyStop {
+                    at: Duration::from_secs(5),
+                    lasts: Some(Duration::from_millis(250)),
+                },
+                EmergencyStop {
+                    at: Duration::from_secs(9),
+                    lasts: None,
+                },
+            ],
         };
         assert_eq!(faults, expected);
         assert_eq!("".parse::<TableFaults>().unwrap(), TableFaults::default());
@@ -176,6 +212,8 @@ mod tests {
             "reset@-1s",
             "stall@1e9s",
             "flip@3s",
+            "estop@3s:",
+            "estop@3s:4",
             "to.reset=1",
         ] {
             let error = text.parse::<TableFaults>().unwrap_err().to_string();

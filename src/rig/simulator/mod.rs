@@ -50,7 +50,7 @@ use serde::Serialize;
 
 use crate::clock::{Clock, JoinHandle};
 
-pub use faults::{TableFaults, WireFaults};
+pub use faults::{EmergencyStop, TableFaults, WireFaults};
 pub use table::{SimulatedPort, SimulatedTable};
 pub use truth::{STEPS_PER_TURN, StepEdge};
 pub use wire::WireCounts;

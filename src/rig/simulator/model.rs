@@ -1,5 +1,6 @@
 //! The simulation of chip, wire and motor, advanced to a given time on demand.
 
+use std::cmp::Reverse;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -8,7 +9,7 @@ use rig_firmware::board::ResetCause;
 use super::chip::{Chip, IndexPlace, Pins};
 use super::truth::{STEPS_PER_TURN, StepEdge, Truth};
 use super::wire::{Timed, Wire};
-use super::{SimulatorCounts, SimulatorOptions};
+use super::{SimulatorCounts, SimulatorOptions, TableFaults};
 
 /// Ticks of the chip's timer per microsecond.
 const TICKS_PER_US: f64 = 2.0;
@@ -32,6 +33,15 @@ impl Timebase {
     }
 }
 
+/// What happens to the table by a fault.
+#[derive(Debug, Clone, Copy)]
+enum Event {
+    Restart,
+    Stall,
+    /// The emergency stop is pressed or released.
+    EmergencyStop(bool),
+}
+
 /// A simulated table at some time. Every method that takes a time advances it to that time first.
 pub(super) struct Model {
     timebase: Timebase,
@@ -41,9 +51,8 @@ pub(super) struct Model {
     from_chip: Wire,
     outbox: VecDeque<Timed>,
     reset_on_open: bool,
-    /// Times of restarts by faults, the next one last.
-    resets: Vec<u64>,
-    stall: Option<u64>,
+    /// What happens by itself, and when: the next one last.
+    events: Vec<(u64, Event)>,
     truth: Truth,
     counts: SimulatorCounts,
 }
@@ -60,9 +69,11 @@ impl Model {
             at: steps(options.index_at - options.start_angle),
             width: steps(options.index_width),
         };
-        let at = |time: &Duration| timebase.ticks(start_us + time.as_micros() as i64);
-        let mut resets: Vec<u64> = options.faults.resets.iter().map(at).collect();
-        resets.sort_by(|one, other| other.cmp(one));
+        let at = |time: Duration| timebase.ticks(start_us + time.as_micros() as i64);
+        let mut events: Vec<(u64, Event)> = events(&options.faults)
+            .map(|(time, event)| (at(time), event))
+            .collect();
+        events.sort_by_key(|(at, _)| Reverse(*at));
         Model {
             timebase,
             chip: Chip::new(pins, index),
@@ -71,8 +82,7 @@ impl Model {
             from_chip: Wire::new(options.faults.from_chip, options.seed, false),
             outbox: VecDeque::new(),
             reset_on_open: options.reset_on_open,
-            resets,
-            stall: options.faults.stall.as_ref().map(at),
+            events,
             truth: Truth::new(options.start_angle, start_us),
             counts: SimulatorCounts::default(),
         }
@@ -81,15 +91,9 @@ impl Model {
     /// Simulates the time until `now_us`.
     pub(super) fn advance(&mut self, now_us: i64) {
         let now = self.timebase.ticks(now_us);
-        while let Some(at) = self.resets.pop_if(|at| *at <= now) {
+        while let Some((at, event)) = self.events.pop_if(|(at, _)| *at <= now) {
             self.chip.run_until(at);
-            self.chip.restart(ResetCause::Watchdog);
-            self.counts.resets += 1;
-        }
-        if let Some(at) = self.stall.take_if(|at| *at <= now) {
-            self.chip.run_until(at);
-            self.chip.stall();
-            self.counts.stalled = true;
+            self.happen(event);
         }
         self.chip.run_until(now);
         for (at, byte) in self.chip.take_sent() {
@@ -101,6 +105,23 @@ impl Model {
             steps,
         });
         self.truth.extend(edges);
+    }
+
+    fn happen(&mut self, event: Event) {
+        match event {
+            Event::Restart => {
+                self.chip.restart(ResetCause::Watchdog);
+                self.counts.resets += 1;
+            }
+            Event::Stall => {
+                self.chip.stall();
+                self.counts.stalled = true;
+            }
+            Event::EmergencyStop(pressed) => {
+                self.pins.emergency = pressed;
+                self.chip.set_pins(self.pins);
+            }
+        }
     }
 
     /// A host opens the port.
@@ -153,4 +174,17 @@ impl Model {
             ..self.counts
         }
     }
+}
+
+/// The faults that happen at a time, counted from the start.
+fn events(faults: &TableFaults) -> impl Iterator<Item = (Duration, Event)> {
+    let restarts = faults.resets.iter().map(|at| (*at, Event::Restart));
+    let stall = faults.stall.iter().map(|at| (*at, Event::Stall));
+    let presses = faults.emergency_stops.iter().flat_map(|stop| {
+        let press = (stop.at, Event::EmergencyStop(true));
+        let release = stop.lasts.map(|lasts| stop.at.saturating_add(lasts));
+        let release = release.map(|at| (at, Event::EmergencyStop(false)));
+        std::iter::once(press).chain(release)
+    });
+    restarts.chain(stall).chain(presses)
 }

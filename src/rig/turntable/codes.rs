@@ -9,6 +9,9 @@ use std::fmt;
 pub struct Alarm(pub Option<u8>);
 
 impl Alarm {
+    /// The emergency stop was pressed. It stays locked until it is released and the controller reset.
+    pub const EMERGENCY_STOP: Self = Self(Some(10));
+
     /// Whether the counted position may be wrong after this alarm.
     #[must_use]
     pub fn loses_position(self) -> bool {
@@ -31,7 +34,7 @@ impl fmt::Display for Alarm {
             7 => "a door opened while it looked for the index: close it and home again",
             8 => "the index sensor stayed active after it was left: check sensor and $27",
             9 => "no index was found within a turn: check the sensor, its wiring and $5",
-            10 => "the emergency stop was pressed, its position is lost: release it, reset (stop), unlock and home",
+            10 => "the emergency stop was pressed, its position is lost: once it is released, reset and home the table",
             20 => "the host was silent longer than its lease, the position is kept: unlock it",
             _ => "an alarm this program does not know: see the firmware's manual",
         })

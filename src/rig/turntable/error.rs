@@ -133,6 +133,9 @@ pub enum TurntableError {
         /// The alarm that locked it.
         alarm: Option<Alarm>,
     },
+    /// The emergency stop is pressed.
+    #[error("the emergency stop is pressed: release it, then unlock and home the table")]
+    EmergencyStop,
     /// The position is not known.
     #[error("the table's position is not known: home it first")]
     NotHomed,

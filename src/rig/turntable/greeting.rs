@@ -35,13 +35,13 @@ pub(super) const UNKNOWN_CONTROLLER: ControllerTraits = ControllerTraits {
 };
 
 /// Identifies the controller, stops the table if it moves, and opens a checked session if the
-/// controller offers one.
+/// controller offers one. The second value tells whether it had to be stopped.
 pub(super) fn greet(
     link: &Link,
     resets: bool,
     options: &TableOptions,
-) -> Result<Identity, TurntableError> {
-    wake(link, resets)?;
+) -> Result<(Identity, bool), TurntableError> {
+    let moved = wake(link, resets)?;
     let about = about(link)?;
     let build = |message: &Message| match message {
         Message::Build { letters, .. } => Some(Extras::of(letters)),
@@ -65,7 +65,7 @@ pub(super) fn greet(
         reports_homing: !identity.is_stock(),
         step_deg: identity.step_deg(),
     });
-    Ok(identity)
+    Ok((identity, moved))
 }
 
 /// Opens a checked session if the controller offers one and none is open.
@@ -76,8 +76,9 @@ pub(super) fn secure(link: &Link, extras: &Extras) -> Result<(), TurntableError>
     done(link, "N0", link.open_session()?).map(|_| ())
 }
 
-/// Waits for the banner and for a first report; stops a table that moves or is held.
-fn wake(link: &Link, resets: bool) -> Result<(), TurntableError> {
+/// Waits for the banner and for a first report; stops a table that moves or is held, and tells
+/// whether it did.
+fn wake(link: &Link, resets: bool) -> Result<bool, TurntableError> {
     let limit = if resets { START_WAIT } else { SHORT_WAIT };
     link.wait(limit, |supervisor| {
         (supervisor.restarts() > 0).then_some(())
@@ -90,12 +91,18 @@ fn wake(link: &Link, resets: bool) -> Result<(), TurntableError> {
         }
         supervisor.last_report().map(|report| Some(report.state))
     });
-    match state {
-        Some(Some(ControllerState::Idle | ControllerState::Alarm | ControllerState::Check)) => {}
-        Some(Some(_)) => link.stop().map(|_| ())?,
+    let moves = match state {
+        Some(Some(ControllerState::Idle | ControllerState::Alarm | ControllerState::Check)) => {
+            false
+        }
+        Some(Some(_)) => true,
         Some(None) | None => return Err(no_controller(link)),
+    };
+    if moves {
+        link.stop()?;
     }
-    forget_echo(link)
+    forget_echo(link)?;
+    Ok(moves)
 }
 
 /// Discards the effects of an echo. Until a port is set up, the system echoes what the controller

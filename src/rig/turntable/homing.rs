@@ -25,8 +25,10 @@ impl Table {
     /// angle 0.
     ///
     /// # Errors
-    /// [`TurntableError::Homing`] if no index was found, or the fault that has ended the search.
+    /// [`TurntableError::Homing`] if no index was found, [`TurntableError::EmergencyStop`] while it is
+    /// pressed, or the fault that has ended the search.
     pub fn home(&self) -> Result<Homed, TurntableError> {
+        self.clear_emergency_stop()?;
         if !self.identity().homing {
             return self.home_where_it_stands();
         }

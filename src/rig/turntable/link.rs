@@ -158,6 +158,17 @@ impl Link {
         self.status()
     }
 
+    /// The same, and resets the controller as soon as the table stands.
+    pub(super) fn reset(&self) -> Result<TableStatus, TurntableError> {
+        if self.supervisor().is_stopping() {
+            self.wait_stopped()?;
+        }
+        let now_us = self.clock().now_us();
+        self.supervisor().request_reset(now_us);
+        self.wait_stopped()?;
+        self.status()
+    }
+
     /// Waits for the end of a stop.
     pub(super) fn wait_stopped(&self) -> Result<(), TurntableError> {
         let ended = self.wait(STOP_WAIT, |supervisor| match port_lost(supervisor) {

@@ -80,9 +80,9 @@ pub use owner::Owner;
 pub use plan::{TurnDirection, TurnPlan, TurnRequest};
 pub use port::{Port, SerialPort};
 pub use status::TableStatus;
-pub use sync::{Residuals, Track, TrackError};
+pub use sync::{ExpectedTurn, Residuals, TimedReport, Track, TrackError};
 pub use table::Table;
-pub use turn::{ConstantPart, Turn, TurnPhase};
+pub use turn::{ConstantPart, FinishedTurn, Turn, TurnPhase};
 pub use wire::{ControllerState, Counts, LineFault, RestartCause, SendError};
 
 /// How a table is opened.

@@ -4,8 +4,10 @@ use std::path::Path;
 use std::time::Duration;
 
 use super::TableOptions;
+use super::codes::Alarm;
 use super::error::TurntableError;
 use super::greeting;
+use super::homing::Homed;
 use super::identity::Identity;
 use super::link::{IoThread, Link};
 use super::owner::{Claim, Server};
@@ -29,6 +31,7 @@ pub struct Table {
     _io_thread: IoThread,
     _claim: Option<Claim>,
     identity: Identity,
+    was_stopped: bool,
     /// Whether a line waits for its answer.
     line_open: Waitable<bool>,
 }
@@ -62,7 +65,7 @@ impl Table {
     ) -> Result<Table, TurntableError> {
         let resets = port.resets();
         let (link, io_thread) = Link::start(port, &options.clock, greeting::UNKNOWN_CONTROLLER)?;
-        let identity = greeting::greet(&link, resets, options)?;
+        let (identity, was_stopped) = greeting::greet(&link, resets, options)?;
         let server = claim.as_ref().map(|claim| claim.serve(link.clone()));
         Ok(Table {
             server: server.transpose()?,
@@ -70,6 +73,7 @@ impl Table {
             _io_thread: io_thread,
             _claim: claim,
             identity,
+            was_stopped,
             line_open: Waitable::new(&options.clock, false),
         })
     }
@@ -78,6 +82,12 @@ impl Table {
     #[must_use]
     pub fn identity(&self) -> &Identity {
         &self.identity
+    }
+
+    /// Whether the table was moving when it was opened, and had to be stopped: nobody had it.
+    #[must_use]
+    pub fn was_stopped(&self) -> bool {
+        self.was_stopped
     }
 
     /// Counters of lines, reports and wire errors since the table was opened.
@@ -100,6 +110,12 @@ impl Table {
     /// [`TurntableError::Silent`].
     pub fn status(&self) -> Result<TableStatus, TurntableError> {
         self.link.status()
+    }
+
+    /// The range in which the table may turn, degrees from the angle 0.
+    #[must_use]
+    pub fn limits(&self, status: &TableStatus) -> (f64, f64) {
+        self.identity.limits_from(status)
     }
 
     /// Turns by `degrees` and waits until the table has arrived. `speed` in degrees/s; without it,
@@ -238,6 +254,7 @@ impl Table {
     /// The status of a table that is ready for a motion.
     pub(super) fn ready(&self) -> Result<TableStatus, TurntableError> {
         let status = self.status()?;
+        require_released(&status)?;
         let supervisor = self.link.supervisor();
         if supervisor.is_stopping() || supervisor.motion().is_some() {
             return Err(TurntableError::Busy);
@@ -259,13 +276,37 @@ impl Table {
         self.link.stop()
     }
 
-    /// Unlocks the table after an alarm.
+    /// Unlocks the table after an alarm. After an emergency stop, this resets the controller first.
     ///
     /// # Errors
-    /// [`TurntableError::Refused`] while the emergency stop is pressed.
+    /// [`TurntableError::EmergencyStop`] while it is pressed.
     pub fn unlock(&self) -> Result<TableStatus, TurntableError> {
+        self.clear_emergency_stop()?;
         self.command("$X")?;
         self.status()
+    }
+
+    /// Brings the table back after an alarm of any kind: resets the controller, unlocks and homes it.
+    ///
+    /// # Errors
+    /// [`TurntableError::EmergencyStop`] while the emergency stop is pressed, and the errors of
+    /// [`Table::stop`] and [`Table::home`].
+    pub fn reset(&self) -> Result<Homed, TurntableError> {
+        require_released(&self.status()?)?;
+        self.link.reset()?;
+        self.unlock()?;
+        self.home()
+    }
+
+    /// Resets a controller that is locked since an emergency stop: it takes neither `$X` nor `$H`
+    /// before.
+    pub(super) fn clear_emergency_stop(&self) -> Result<(), TurntableError> {
+        let status = self.status()?;
+        require_released(&status)?;
+        if status.alarm == Some(Alarm::EMERGENCY_STOP) {
+            self.link.reset()?;
+        }
+        Ok(())
     }
 
     /// Opens a checked session if the controller offers one and none is open.
@@ -332,6 +373,14 @@ impl Drop for Table {
             // Nobody is left to receive an error. The lease, if there is one, also stops the table.
             let _ = self.link.wait_stopped();
         }
+    }
+}
+
+/// An error while the emergency stop is pressed.
+pub(super) fn require_released(status: &TableStatus) -> Result<(), TurntableError> {
+    match status.emergency_stop {
+        true => Err(TurntableError::EmergencyStop),
+        false => Ok(()),
     }
 }
 

@@ -6,7 +6,7 @@ use super::error::TurntableError;
 use super::plan::TurnPlan;
 use super::status::TableStatus;
 use super::supervisor::PositionReport;
-use super::sync::{self, Track};
+use super::sync::{self, ExpectedTurn, TimedReport, Track, TrackError};
 use super::table::{Table, straight};
 use super::wire::{ControllerState, Message};
 
@@ -184,23 +184,51 @@ impl<'table> Turn<'table> {
     /// # Errors
     /// The fault that has ended the turn; the table has been stopped. [`TurntableError::Track`] if
     /// the turn is complete but its angles cannot be determined.
-    pub fn wait_end(mut self) -> Result<Track, TurntableError> {
+    pub fn wait_end(self) -> Result<Track, TurntableError> {
+        let (track, finished) = self.wait_rest();
+        finished.unwind()?;
+        Ok(track?)
+    }
+
+    /// Waits until the table rests at the turn's end, and returns its angles over time. They are
+    /// known from here on, whatever becomes of the table: also where a fault ended the turn after
+    /// its part at constant speed, which [`FinishedTurn::unwind`] reports.
+    ///
+    /// # Errors
+    /// [`TrackError`] in the first part of the result, if the angles cannot be determined.
+    pub fn wait_rest(mut self) -> (Result<Track, TrackError>, FinishedTurn<'table>) {
         let plan = &self.plan;
         let distance = (plan.end_deg() - plan.back_deg()).abs();
         let limit = self.table.travel_time(distance, plan.degrees_per_second());
         let arrived = self.table.wait_arrival(limit);
         let reports = self.leave();
-        arrived?;
         let track = sync::fit(&reports, &self.expected());
-        if self.plan.unwind() {
-            let start_deg = self.zero_deg + self.plan.start_deg();
-            self.table.go(start_deg, self.table.brisk())?;
-        }
-        Ok(track?)
+        let back_to = self.plan.unwind();
+        let back_to = back_to.then(|| self.zero_deg + self.plan.start_deg());
+        let finished = FinishedTurn {
+            table: self.table,
+            arrived,
+            back_to,
+        };
+        (track, finished)
     }
 
-    fn expected(&self) -> sync::ExpectedTurn {
-        sync::ExpectedTurn {
+    /// The reports of the part at constant speed that came after the first `seen` of the turn, and
+    /// how many of the turn there are now.
+    #[must_use]
+    pub fn reports_after(&self, seen: usize) -> (Vec<TimedReport>, usize) {
+        let expected = self.expected();
+        let supervisor = self.table.link().supervisor();
+        let recorded = supervisor.recorded();
+        let new = recorded.get(seen..).unwrap_or_default().iter();
+        let timed = new.filter_map(|report| TimedReport::of(report, &expected));
+        (timed.collect(), recorded.len())
+    }
+
+    /// The turn in machine positions.
+    #[must_use]
+    pub fn expected(&self) -> ExpectedTurn {
+        ExpectedTurn {
             from_deg: self.zero_deg + self.plan.constant_from_deg(),
             to_deg: self.zero_deg + self.plan.constant_to_deg(),
             degrees_per_second: self.plan.degrees_per_second(),
@@ -248,6 +276,29 @@ impl Drop for Turn<'_> {
         if !self.over {
             // A drop cannot return an error. Dropping the table stops it again.
             let _ = self.stop();
+        }
+    }
+}
+
+/// A turn that is over, whose table has not turned back yet.
+#[must_use = "the cable stays wound until the table turns back"]
+pub struct FinishedTurn<'table> {
+    table: &'table Table,
+    arrived: Result<(), TurntableError>,
+    /// Where the turn began, degrees from machine zero; `None` if it is not to be unwound.
+    back_to: Option<f64>,
+}
+
+impl FinishedTurn<'_> {
+    /// Turns the table back to where the turn began, if the plan says so.
+    ///
+    /// # Errors
+    /// The fault that has ended the turn or the way back; the table has been stopped.
+    pub fn unwind(self) -> Result<(), TurntableError> {
+        self.arrived?;
+        match self.back_to {
+            Some(machine_deg) => self.table.go(machine_deg, self.table.brisk()),
+            None => Ok(()),
         }
     }
 }

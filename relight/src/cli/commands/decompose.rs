@@ -51,7 +51,7 @@ pub(in crate::cli) struct Arguments {
     /// Separate highlights.
     #[arg(long, value_enum, default_value_t = GateName::Auto)]
     specular: GateName,
-    /// Do not look at the mirror image too: twice as fast, and a little worse.
+    /// Do not look at the mirror image too: faster, and a little worse.
     #[arg(long)]
     no_mirror: bool,
     /// Another network's normals: 1 x 3 x 256 x 256 in, (x - 0.5) / 0.5 of sRGB values; 1 x 3 x 256 x 256

@@ -67,6 +67,9 @@ struct PaperArguments {
     /// Turns: a shard, or a folder that relit-extract has written.
     #[arg(long, value_name = "SHARDS")]
     turns: Option<PathBuf>,
+    /// Turns that are not trained on: validations say how near to rank one their reflectance is.
+    #[arg(long, value_name = "SHARDS")]
+    held_out: Option<PathBuf>,
     /// Spec-Net's weights, for light, joint and specular.
     #[arg(long, value_name = "FILE")]
     spec: Option<PathBuf>,
@@ -152,6 +155,7 @@ fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> Com
     let run = settings.run.clone();
     let inputs = PaperInputs {
         turns: arguments.turns.clone(),
+        held_out: arguments.held_out.clone(),
         weights: read_weights(arguments.run.weights.as_deref())?,
         spec: read_weights(arguments.spec.as_deref())?,
         normal: read_weights(arguments.normal.as_deref())?,

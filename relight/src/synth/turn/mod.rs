@@ -366,6 +366,7 @@ impl<'a> Turn<'a> {
             },
             selection: SamplingBasis::Angle,
             samples: frames,
+            covered_deg: None,
             duplicates: 0,
             spec_net: spec_net as u32,
             lossy: false,

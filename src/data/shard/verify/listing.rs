@@ -82,7 +82,12 @@ fn session_entry(dataset: &Dataset, session: &SessionEntry) -> Vec<String> {
     if count != 1 {
         problems.push(format!("session {id:?} has {count} shards instead of 1"));
     }
-    if *samples != dataset.settings.frames || !(1..=MAX_SAMPLES).contains(samples) {
+    let most = dataset.settings.frames;
+    let is_right = match session.covered_deg {
+        Some(degrees) => (1..=most).contains(samples) && (0.0..360.0).contains(&degrees),
+        None => *samples == most,
+    };
+    if !is_right || !(1..=MAX_SAMPLES).contains(samples) {
         let frames = dataset.settings.frames;
         problems.push(format!(
             "session {id:?} has {samples} samples, the settings say {frames}"

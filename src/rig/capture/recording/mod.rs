@@ -10,8 +10,9 @@
 //!                                                    ->  Recorded -> TakeSummary, session.json
 //! ```
 //!
-//! It knows cameras, videos and sessions, and nothing of turntables: the time of a turn and the
-//! angle at a time are given to it.
+//! It knows cameras, videos and sessions, and nothing of turntables: the time of a turn, the reports
+//! for the journal and the angle at a time are given to it. Salvaging alone asks for the angles that
+//! follow from a journal.
 
 mod camera_thread;
 mod cutter;

@@ -5,6 +5,8 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
+use crossbeam_channel::Sender;
+
 use super::camera_thread::CameraThread;
 use super::cutter::{Cutter, IsKey};
 use super::error::RecordingError;
@@ -12,17 +14,19 @@ use super::outcome::{CameraOutcome, WriterOutcome};
 use super::progress::{Progress, Shared, State};
 use super::verdict::Recorded;
 use super::window::Window;
-use super::writer_thread::WriterThread;
+use super::writer_thread::{JournalLine, WriterThread};
 use crate::camera::Camera;
 use crate::clock::{Clock, JoinHandle};
 use crate::preview::Preview;
-use relit_data::session::{Fault, Manifest, SessionWriter};
+use relit_data::session::{Fault, JournaledReport, JournaledTurn, Manifest, SessionWriter};
 use relit_video::{Muxer, PixelFormat, StreamFormat, is_key};
 
 /// Name of the video in a session folder.
 const VIDEO_FILE: &str = "video.mkv";
 /// Most bytes that may wait for the disk.
 const QUEUE_BYTES: usize = 192 << 20;
+/// Lines of the journal that may wait for the disk: minutes of reports.
+const JOURNAL_LINES: usize = 4096;
 /// Fewest and most frames that may wait for the disk.
 const QUEUE_FRAMES: (usize, usize) = (8, 256);
 
@@ -54,6 +58,7 @@ type WriterHandle = thread::JoinHandle<WriterOutcome>;
 /// A recording under way. Dropped, it is asked to stop, and its session is left to be salvaged.
 pub struct Recorder {
     shared: Arc<Shared>,
+    journal: Sender<JournalLine>,
     threads: Option<(CameraHandle, WriterHandle)>,
     max_dropped: u64,
 }
@@ -68,8 +73,10 @@ impl Recorder {
         let session = SessionWriter::create(&plan.root, with_video(plan.manifest, &stream))?;
         let shared = Arc::new(Shared::new(&clock, State::default()));
         let (sender, queue) = crossbeam_channel::bounded(queue_places(&stream));
+        let (journal, journal_queue) = crossbeam_channel::bounded(JOURNAL_LINES);
         let writer = WriterThread {
             stream,
+            journal: journal_queue,
             muxer: Muxer::create(&session.video_path(), stream)?,
             session,
             delivered: Vec::new(),
@@ -97,6 +104,7 @@ impl Recorder {
         let camera = camera.map_err(refused("camera"))?;
         Ok(Self {
             shared,
+            journal,
             threads: Some((camera, writer)),
             max_dropped: plan.max_dropped,
         })
@@ -106,6 +114,21 @@ impl Recorder {
     /// Only the first window counts.
     pub fn announce(&self, window: Window) {
         self.shared.lock().window.get_or_insert(window);
+    }
+
+    /// Writes the turn into the session's journal, from which an interrupted session gets its angles.
+    pub fn begin_journal(&self, turn: JournaledTurn) {
+        self.note(JournalLine::Turn(turn));
+    }
+
+    /// Adds a report of the table to the journal.
+    pub fn add_report(&self, report: JournaledReport) {
+        self.note(JournalLine::Report(report));
+    }
+
+    fn note(&self, line: JournalLine) {
+        // The angles follow from the other reports where the disk is that late.
+        let _ = self.journal.try_send(line);
     }
 
     /// Asks the recording to stop, and returns at once.

@@ -2,12 +2,13 @@
 //!
 //! Nothing is deleted. The video stays as it is: readers ignore what follows its last whole frame.
 //! The index is cut to the frames that the video holds, and kept as it was found under another name.
-//! The manifest says what happened.
+//! The manifest says what happened. The frames get their angles from what the table had reported.
 
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::super::journal::track_of;
 use super::error::RecordingError;
 use relit_data::causes::with_causes;
 use relit_data::session::{
@@ -113,7 +114,9 @@ pub fn salvage_session(folder: &Path) -> Result<Saved, RecordingError> {
         0 => "recording was interrupted before its first frame was on the disk".to_owned(),
         _ => format!("recording was interrupted: {saved}"),
     };
-    session.abort(frames, &reason)?;
+    let track = session.journal().and_then(track_of);
+    let angle = |t_us| track.as_ref()?.angle_at(t_us);
+    session.abort(frames, &angle, &reason)?;
     verify(folder, frames)?;
     Ok(saved)
 }

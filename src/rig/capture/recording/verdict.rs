@@ -7,10 +7,10 @@ use super::error::RecordingError;
 use super::finding::{Finding, frames};
 use super::outcome::{CameraOutcome, End, WriterOutcome};
 use super::salvage::whole_frames;
-use super::timing::TimingAnomaly;
+use super::timing::{MissingFrames, TimingAnomaly};
 use crate::state::{TakeSummary, Verdict};
 use relit_data::causes::with_causes;
-use relit_data::session::{Fault, FrameEntry};
+use relit_data::session::{Fault, FrameEntry, TurnJournal};
 
 /// Largest angle that can be right, degrees.
 const MOST_DEGREES: f64 = 1e6;
@@ -35,6 +35,12 @@ impl Recorded {
     /// this reason.
     pub fn interrupted(&mut self, reason: String) {
         self.camera.end = End::Interrupted(reason);
+    }
+
+    /// What the table reported of the turn.
+    #[must_use]
+    pub fn journal(&self) -> Option<&TurnJournal> {
+        self.writer.session.journal()
     }
 
     /// Judges the take and closes its session. Each frame gets the angle (degrees) that `angle`
@@ -98,28 +104,46 @@ impl Recorded {
         let of_turn = |finding: &&Finding| finding.place().1 < Some(exposures.len());
         let of_frames = self.camera.findings.iter().chain(&self.writer.findings);
         let mut findings: Vec<Finding> = of_frames.filter(of_turn).cloned().collect();
+        // What was never due is not lost: a recording that ended early says so itself, and of a disk
+        // that is full the rest of the turn is counted as one.
+        let cut = self.writer.failure.is_some() || self.ended_early();
+        let due = |missing: &&MissingFrames| !cut || missing.before < exposures.len();
+        let missing = missing.iter().filter(due).copied().map(Finding::Missing);
+        findings.extend(missing);
         findings.extend(self.unwritten(&findings));
-        findings.extend(missing.iter().copied().map(Finding::Missing));
         findings.extend(anomalies.iter().copied().map(Finding::Anomaly));
         findings.extend(control_faults.iter().cloned().map(Finding::Settings));
         findings.sort_by_key(Finding::place);
         findings
     }
 
-    /// The turn's frames that the camera delivered and a failed writer does not have. `findings`: what
-    /// else is wrong with delivered frames, as those that are lost already count there.
+    /// The turn's frames that a failed writer does not have. `findings`: what else is lost of them.
     fn unwritten(&self, findings: &[Finding]) -> Option<Finding> {
         self.writer.failure.as_ref()?;
         let last = self.writer.delivered.iter().flatten().max();
         let from = last.map_or(0, |last| last + 1);
-        let lost_later = findings
-            .iter()
-            .filter(|finding| finding.place().1 >= Some(from))
-            .map(Finding::lost)
-            .sum();
-        let delivered_later = self.camera.count.exposures.len().saturating_sub(from) as u64;
-        let count = delivered_later.saturating_sub(lost_later);
+        let count = self.left().saturating_sub(lost(findings));
         (count > 0).then_some(Finding::Unwritten { from, count })
+    }
+
+    /// Frames of the turn that are not in the video.
+    fn left(&self) -> u64 {
+        self.camera.count.expected.saturating_sub(self.recorded())
+    }
+
+    /// Whether the recording ended before the turn's last frame.
+    fn ended_early(&self) -> bool {
+        let TurnCount {
+            expected, missing, ..
+        } = &self.camera.count;
+        // A recording that ended early, but after the turn's last frame, is whole.
+        let last = missing.last().map(|last| last.exposure + last.count);
+        let whole = *expected > 0 && last.is_none_or(|end| end < *expected);
+        match self.camera.end {
+            End::Over => false,
+            End::Interrupted(_) => true,
+            _ => !whole,
+        }
     }
 
     /// Why the take cannot be used; `None` where it can.
@@ -127,20 +151,9 @@ impl Recorded {
         if let Some(failure) = &self.writer.failure {
             return Some(self.disk_failure(failure));
         }
-        let TurnCount {
-            expected, missing, ..
-        } = &self.camera.count;
-        // A recording that ended early, but after the turn's last frame, is whole.
-        let last = missing.last().map(|last| last.exposure + last.count);
-        let whole = *expected > 0 && last.is_none_or(|end| end < *expected);
-        let early = match self.camera.end {
-            End::Over => false,
-            End::Interrupted(_) => true,
-            _ => !whole,
-        };
-        if early {
+        if self.ended_early() {
             let end = with_causes(&self.camera.end);
-            return Some(match expected {
+            return Some(match self.camera.count.expected {
                 0 => format!("{end}; the turn had not begun"),
                 all => format!("{end}; {} of {all} frames are there", self.recorded()),
             });
@@ -189,9 +202,8 @@ impl Recorded {
             RecordingError::Video(relit_video::VideoError::DiskFull { missing, .. }) => *missing,
             _ => 0,
         };
-        let recorded = self.recorded();
-        let left = self.camera.count.expected.saturating_sub(recorded);
-        let mean_bytes = self.writer.bytes / recorded.max(1);
+        let left = self.left();
+        let mean_bytes = self.writer.bytes / self.recorded().max(1);
         let missing = pending.saturating_add(left.saturating_mul(mean_bytes));
         format!(
             "the disk is full: in {} about {missing} bytes are missing for the rest of the turn ({}): {}",

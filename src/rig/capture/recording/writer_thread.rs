@@ -11,12 +11,18 @@ use super::error::RecordingError;
 use super::finding::Finding;
 use super::outcome::WriterOutcome;
 use super::progress::Shared;
-use relit_data::session::{FrameEntry, SessionWriter};
+use relit_data::session::{FrameEntry, JournaledReport, JournaledTurn, SessionWriter};
 use relit_video::{Muxer, StreamFormat, Written};
 
 /// How often everything is synced to the disk: with the time that the disk needs for it, nothing
 /// there is older than a second.
 const SYNC_EVERY: Duration = Duration::from_millis(400);
+
+/// A line of the session's journal.
+pub(super) enum JournalLine {
+    Turn(JournaledTurn),
+    Report(JournaledReport),
+}
 
 /// Video and session being written.
 pub(super) struct WriterThread {
@@ -26,6 +32,7 @@ pub(super) struct WriterThread {
     pub(super) delivered: Vec<Option<usize>>,
     pub(super) findings: Vec<Finding>,
     pub(super) queue: Receiver<TurnFrame>,
+    pub(super) journal: Receiver<JournalLine>,
     pub(super) shared: Arc<Shared>,
 }
 
@@ -50,13 +57,27 @@ impl WriterThread {
             match self.queue.recv_deadline(due) {
                 Ok(frame) => self.add(&frame)?,
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return Ok(()),
+                Err(RecvTimeoutError::Disconnected) => {
+                    self.keep_journal();
+                    return Ok(());
+                }
             }
+            self.keep_journal();
             self.shared.lock().progress.frames = self.muxer.frames();
             if Instant::now() >= due {
                 self.muxer.sync()?;
                 self.session.sync()?;
                 due = Instant::now() + SYNC_EVERY;
+            }
+        }
+    }
+
+    /// Writes what the table reported.
+    fn keep_journal(&mut self) {
+        for line in self.journal.try_iter() {
+            match line {
+                JournalLine::Turn(turn) => self.session.begin_journal(turn),
+                JournalLine::Report(report) => self.session.add_report(report),
             }
         }
     }

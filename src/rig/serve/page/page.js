@@ -2,7 +2,7 @@
 // rig goes in as text, never as markup.
 import { ask, follow, give } from "./link.js";
 import { startPreview } from "./preview.js";
-import { listSessions, make } from "./sessions.js";
+import { listSessions, make, showRoot } from "./sessions.js";
 
 const $ = (id) => document.getElementById(id);
 
@@ -56,6 +56,7 @@ function show(next) {
   if (state && next.version < state.version && state.version - next.version < 1e6) return;
   const before = state;
   state = next;
+  showAlarm();
   showTake();
   showGo();
   showFaults();
@@ -65,15 +66,57 @@ function show(next) {
   showDisk();
   const finished = before && JSON.stringify(before.last_take) !== JSON.stringify(state.last_take);
   if (!before || finished || before.session !== state.session) refresh();
+  if (before && finished) signal(state.last_take.verdict === "clean");
+  showSettings();
+  showLog();
+}
+
+/** The table is locked: this is said in one sentence, and there is one button. */
+const alarmed = () => state.table.emergency_stop || state.table.locked;
+const moving = () => /^(Run|Jog|Home|Hold)/.test(state.table.state);
+
+function showAlarm() {
+  const { emergency_stop: pressed, fault } = state.table;
+  const sentence = pressed ? "The emergency stop is pressed: release it." : (fault ?? "The table is locked.");
+  $("alarm").textContent = alarmed() ? sentence : "";
+  $("alarm").hidden = !alarmed();
+  if (alarmed()) {
+    say("");
+    // What led to it is in the log.
+    seenFault = Math.max(seenFault, ...state.faults.map(({ t_us }) => t_us));
+  }
+}
+
+let sound = null;
+
+/** A browser lets a page make sounds only after somebody has touched it. */
+function unmute() {
+  sound ??= new AudioContext();
+  if (sound.state === "suspended") sound.resume();
+}
+
+/** Says by sound and vibration that a take has ended: two rising tones for a clean one. */
+function signal(clean) {
+  navigator.vibrate?.(clean ? [150, 80, 150] : [600]);
+  if (!sound) return;
+  for (const [at, pitch] of clean ? [[0, 660], [0.18, 990]] : [[0, 330], [0.3, 220]]) {
+    const [tone, volume] = [sound.createOscillator(), sound.createGain()];
+    tone.frequency.value = pitch;
+    volume.gain.value = 0.2;
+    tone.connect(volume).connect(sound.destination);
+    tone.start(sound.currentTime + at);
+    tone.stop(sound.currentTime + at + 0.16);
+  }
 }
 
 function showTake() {
   const { phase, object, frames, frames_wanted: wanted, dropped, table } = state;
   const part = wanted > 0 ? Math.min(frames / wanted, 1) : 0;
   const busy = !resting();
-  const ready = phase === "idle" && !state.camera.present ? "No camera" : PHASES[phase];
+  const ready = phase !== "idle" ? PHASES[phase] : atRest();
   $("phase").textContent = ready ?? phase;
-  $("what").textContent = object && busy ? object : "";
+  const left = phase === "recording" && state.settings.degrees_per_second > 0 ? ` · ${Math.ceil(((1 - part) * 360) / state.settings.degrees_per_second)} s left` : "";
+  $("what").textContent = object && busy ? `${object}${left}` : "";
   $("progress").hidden = !busy;
   $("progress").value = part;
   $("arc").setAttribute("stroke-dasharray", `${busy ? part * 100 : 0} 100`);
@@ -83,19 +126,32 @@ function showTake() {
   const counts = busy ? [make("span", { text: `${frames} / ${wanted} · ` }), make("span", { text: `${dropped} dropped`, className: dropped > 0 ? "bad" : "" })] : [];
   $("counts").replaceChildren(...counts);
   const take = state.last_take;
-  $("last").hidden = !take;
+  $("last").hidden = !take || alarmed();
+  $("again").hidden = !take || take.verdict === "clean" || !resting() || alarmed();
   if (!take) return;
   const words = make("b", { text: VERDICTS[take.verdict] ?? take.verdict, className: take.verdict === "clean" ? "good" : "bad" });
   const rest = `: ${take.frames} frames, ${take.dropped} dropped, ${take.session}.${take.reason ? ` ${take.reason}` : ""}`;
   $("last-text").replaceChildren(words, rest);
 }
 
+/** What is said while nothing is captured. */
+function atRest() {
+  if (alarmed()) return "The table is locked";
+  if (moving()) return "The table moves";
+  return state.camera.present ? PHASES.idle : "No camera";
+}
+
 /** What the big button does now. */
 function action() {
   const object = $("object").value.trim();
   if (!state) return { text: "Start" };
+  const stop = { text: "Stop", stop: true, command: { command: "stop" } };
+  if (!resting()) return stop;
+  if (state.table.emergency_stop) return { text: "Release the emergency stop" };
+  if (state.table.locked) return { text: "Reset and home the table", command: { command: "reset" } };
+  if (moving()) return stop;
+  if (!state.camera.present) return { text: "No camera" };
   if (state.phase === "waiting-for-object") return { text: `Capture ${state.queue[0] ?? "the next object"}`, command: { command: "next", object: state.queue[0] } };
-  if (state.phase !== "idle") return { text: "Stop", stop: true, command: { command: "stop" } };
   if (!object) return { text: "Name the object" };
   return { text: `Start ${object}`, command: { command: "start", object, meter: $("meter").checked } };
 }
@@ -103,12 +159,14 @@ function action() {
 function showGo() {
   const { text, stop, command } = action();
   $("go").textContent = text;
-  $("go").disabled = !command;
+  $("go").disabled = !command || document.body.className !== "";
   $("go").classList.toggle("stop", Boolean(stop));
 }
 
 function showFaults() {
-  const faults = state.faults.filter(({ t_us }) => t_us > seenFault).reverse();
+  // What is wrong now is said above.
+  const now = [state.camera.fault, state.table.fault];
+  const faults = state.faults.filter(({ t_us, what }) => t_us > seenFault && !now.includes(what)).reverse();
   $("faults").hidden = faults.length === 0;
   const lines = faults.slice(0, 10).map(({ what }) => what);
   const same = [...$("fault-list").children].map((line) => line.textContent);
@@ -141,11 +199,12 @@ function showTable() {
     facts.push(["Angle", angle === null ? "unknown" : `${angle.toFixed(1)}°`], ["Zero", homed ? "known" : "unknown"]);
     if (speed) facts.push(["Speed", `${speed.toFixed(1)}°/s`]);
     if (battery !== null) facts.push(["Battery", `${battery.toFixed(1)} V`]);
+    const { low_deg: low, high_deg: high } = state.table;
+    if (homed && angle !== null && high !== null) facts.push(["Cable wound", `${Math.abs(angle).toFixed(0)}° of ${(angle < 0 ? -low : high).toFixed(0)}°`]);
   }
   $("table").replaceChildren(...facts.map(([name, value]) => make("div", {}, make("dd", { text: value }), make("dt", { text: name }))));
-  warn("table-fault", fault);
-  for (const button of document.querySelectorAll("[data-jog], #home")) button.disabled = !present || !resting();
-  $("unlock").hidden = !word.startsWith("Alarm");
+  warn("table-fault", alarmed() ? null : fault);
+  for (const button of document.querySelectorAll("[data-jog], #home")) button.disabled = !present || !resting() || alarmed();
 }
 
 function showCamera() {
@@ -197,6 +256,30 @@ function showDisk() {
   $("disk").hidden = !resting() && !short;
 }
 
+const SETTINGS = ["size", "fps", "degrees_per_second", "max_dropped", "retries"];
+
+function showSettings() {
+  const { settings } = state;
+  showRoot(settings.root);
+  $("devices").textContent = [settings.camera, settings.turntable, settings.root].filter(Boolean).join(" · ");
+  const form = $("settings");
+  $("settings-set").disabled = !resting();
+  if (form.contains(document.activeElement) || form.dataset.changed) return;
+  for (const name of SETTINGS) {
+    const value = name === "size" ? settings.size?.join("x") : settings[name];
+    form.elements[name].value = value ?? "";
+  }
+}
+
+function showLog() {
+  const lines = state.log.slice(-15).reverse();
+  const key = JSON.stringify(lines);
+  if ($("log").dataset.key === key) return;
+  $("log").dataset.key = key;
+  const time = (at) => new Date(at).toLocaleTimeString([], { timeStyle: "medium", hour12: false });
+  $("log").replaceChildren(...lines.map(({ at, what }) => make("li", {}, make("span", { text: time(at) }), make("span", { text: what }))));
+}
+
 function warn(id, fault) {
   $(id).textContent = fault ?? "";
   $(id).hidden = !fault;
@@ -238,7 +321,26 @@ $("enqueue").addEventListener("click", async () => {
 });
 $("next").addEventListener("click", () => order({ command: "next", object: state.queue[0] }));
 $("home").addEventListener("click", () => order({ command: "home" }));
-$("unlock").addEventListener("click", () => order({ command: "unlock" }));
+$("again").addEventListener("click", () => {
+  // The object is what follows the time in a session's name.
+  const object = state.last_take.session.replace(/^\d{8}T\d{6}Z-/, "");
+  order({ command: "start", object, meter: false });
+});
+$("settings").addEventListener("input", () => ($("settings").dataset.changed = "yes"));
+$("settings").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const { elements } = $("settings");
+  const command = { command: "configure" };
+  const size = elements.size.value.trim().split("x").map(Number);
+  if (size.length === 2) command.size = size;
+  for (const name of SETTINGS.slice(1)) {
+    if (elements[name].value !== "") command[name] = elements[name].valueAsNumber;
+  }
+  if (await order(command)) delete $("settings").dataset.changed;
+  document.activeElement?.blur();
+});
+document.addEventListener("pointerdown", unmute);
+document.addEventListener("sessions-changed", refresh);
 for (const button of document.querySelectorAll("[data-jog]")) {
   button.addEventListener("click", () => order({ command: "jog", degrees: Number(button.dataset.jog) }));
 }
@@ -262,10 +364,14 @@ follow({
     // A rig that was started anew counts its states from the beginning.
     if (state) state.version = -1;
     link("connection lost", "lost");
+    if (state) showGo();
   },
   locked: () => {
     link("locked", "locked");
     $("locked").hidden = false;
+    // The address still has the token that was refused.
+    $("wrong-token").hidden = !new URLSearchParams(location.search).has("token");
+    history.replaceState(null, "", "/");
     $("rig").hidden = true;
     $("bar").hidden = true;
   },

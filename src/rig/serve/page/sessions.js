@@ -30,6 +30,7 @@ function facts(session) {
   const parts = [];
   if (session.frames !== null) parts.push(`${session.frames} frames`);
   if (session.duration_s !== null) parts.push(`${session.duration_s.toFixed(1)} s`);
+  if (session.rating) parts.push("★".repeat(session.rating));
   return parts.join(" · ");
 }
 
@@ -75,6 +76,13 @@ async function play(session) {
   $("player-title").textContent = session.object;
   $("player-when").textContent = when(session);
   $("player-video").href = `${path(session.id)}/video`;
+  $("player-tar").href = `${path(session.id)}.tar`;
+  const day = /^\d{8}(?=T)/.exec(session.id)?.[0];
+  $("player-day").hidden = !day;
+  $("player-day").href = `/api/v1/sessions.tar?day=${day}`;
+  showRemarks(session);
+  outline.hidden = true;
+  $("player-outline").textContent = "";
   const [words, className] = verdict(session);
   Object.assign($("player-verdict"), { textContent: `${words} · ${facts(session)}`, className });
   $("player-notes").replaceChildren(...(session.reason ? [make("li", { text: session.reason })] : []));
@@ -94,9 +102,109 @@ async function play(session) {
     const faults = detail.manifest.faults.map(({ what }) => what);
     $("player-notes").append(...[...gaps, ...faults].map((text) => make("li", { text })));
     place();
+    showMask(mine, detail.has_mask);
   } catch (problem) {
     $("player-error").textContent = problem.message;
   }
+}
+
+const outline = $("player-mask");
+
+/** Draws the mask's outline over the frames, or says how to make a mask. */
+async function showMask(mine, has) {
+  if (!has) {
+    const folder = [root, mine.id].filter(Boolean).join("/");
+    $("player-outline").replaceChildren("No mask yet: ", make("code", { text: `relit-mask ${folder} --rect X,Y,W,H` }));
+    return;
+  }
+  const response = await request(`${path(mine.id)}/mask.png`);
+  const mask = await createImageBitmap(await response.blob());
+  if (shown !== mine) return mask.close();
+  const { width, height } = mask;
+  Object.assign(outline, { width, height });
+  const context = outline.getContext("2d", { willReadFrequently: true });
+  context.drawImage(mask, 0, 0);
+  mask.close();
+  const image = context.getImageData(0, 0, width, height);
+  const inside = Uint8Array.from({ length: width * height }, (_, at) => image.data[at * 4] > 127);
+  const pixels = new Uint32Array(image.data.buffer).fill(0);
+  // As wide as it can be seen in a picture of this size.
+  const wide = Math.max(1, Math.round(width / 320));
+  for (let y = 0, at = 0; y < height; y += 1) {
+    for (let x = 0; x < width; x += 1, at += 1) {
+      const out = (dx, dy) => x + dx < 0 || x + dx >= width || y + dy < 0 || y + dy >= height || !inside[at + dx + dy * width];
+      if (inside[at] && (out(wide, 0) || out(-wide, 0) || out(0, wide) || out(0, -wide))) pixels[at] = 0xff5aa6f2;
+    }
+  }
+  context.putImageData(image, 0, 0);
+  outline.hidden = false;
+  $("player-outline").textContent = "The line is the mask's outline.";
+}
+
+let root = "";
+
+/** The folder of sessions on the rig's computer, for the commands that are shown. */
+export function showRoot(folder) {
+  root = folder;
+}
+
+let remarks = { session: null, rating: null };
+
+function showRemarks(session) {
+  remarks = { session, rating: session.rating };
+  $("note").value = session.note ?? "";
+  showStars();
+}
+
+function showStars() {
+  const star = (n) => {
+    const on = n <= (remarks.rating ?? 0);
+    const button = make("button", { type: "button", text: on ? "★" : "☆", ariaLabel: `${n} of 5` });
+    button.addEventListener("click", () => {
+      remarks.rating = remarks.rating === n ? null : n;
+      showStars();
+    });
+    return button;
+  };
+  $("stars").replaceChildren(...[1, 2, 3, 4, 5].map(star));
+}
+
+const changed = () => document.dispatchEvent(new Event("sessions-changed"));
+
+async function saveRemarks() {
+  const body = JSON.stringify({ note: $("note").value.trim() || null, rating: remarks.rating });
+  const headers = { "Content-Type": "application/json" };
+  try {
+    await request(`${path(remarks.session.id)}/remarks`, { method: "PUT", headers, body });
+    player.close();
+    changed();
+  } catch (problem) {
+    $("player-error").textContent = problem.message;
+  }
+}
+
+/** Puts the session away; it can be had back until the page is left, and from the trash folder after that. */
+async function putAway() {
+  const { session } = remarks;
+  try {
+    await request(path(session.id), { method: "DELETE" });
+  } catch (problem) {
+    $("player-error").textContent = problem.message;
+    return;
+  }
+  player.close();
+  changed();
+  $("undo-text").textContent = `${session.object} is in the trash folder.`;
+  $("undo").hidden = false;
+  $("undo-button").onclick = async () => {
+    try {
+      await request(`${path(session.id)}/restore`, { method: "POST" });
+      $("undo").hidden = true;
+      changed();
+    } catch (problem) {
+      $("undo-text").textContent = problem.message;
+    }
+  };
 }
 
 function place() {
@@ -156,6 +264,11 @@ $("player-back").addEventListener("click", () => seek(Math.max(Number(slider.val
 $("player-on").addEventListener("click", () => seek(Number(slider.value) + 1));
 $("player-play").addEventListener("click", () => running(timer === null));
 $("player-close").addEventListener("click", () => player.close());
+$("remarks").addEventListener("submit", (event) => {
+  event.preventDefault();
+  saveRemarks();
+});
+$("put-away").addEventListener("click", putAway);
 player.addEventListener("close", () => {
   running(false);
   shown = null;

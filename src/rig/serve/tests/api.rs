@@ -38,6 +38,8 @@ fn a_command_reaches_the_rig_and_its_answer_is_the_state_after_it() {
         r#"{"command":"dequeue","place":0}"#,
         r#"{"command":"next"}"#,
         r#"{"command":"unlock"}"#,
+        r#"{"command":"reset"}"#,
+        r#"{"command":"configure","size":[1280,720],"fps":30,"max_dropped":2}"#,
         r#"{"command":"set-control","name":"gain","value":-3}"#,
         r#"{"command":"stop"}"#,
     ] {
@@ -53,7 +55,7 @@ fn a_command_reaches_the_rig_and_its_answer_is_the_state_after_it() {
         }
     );
     assert_eq!(
-        told[5],
+        told[7],
         Command::SetControl {
             name: "gain".to_owned(),
             value: -3

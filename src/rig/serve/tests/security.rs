@@ -12,13 +12,16 @@ fn guarded() -> Serving {
 }
 
 /// Everything that shows or changes something of the rig.
-const GUARDED: [&str; 9] = [
+const GUARDED: [&str; 12] = [
     "/api/v1/state",
     "/api/v1/events",
     "/api/v1/preview.jpg",
     "/api/v1/preview.mjpg",
     "/api/v1/sessions",
     "/api/v1/sessions/x/video",
+    "/api/v1/sessions/x.tar",
+    "/api/v1/sessions.tar?day=20261120",
+    "/api/v1/sessions/x/mask.png",
     "/api/v1/objects",
     "/api/v1/openapi.json",
     "/metrics",
@@ -304,4 +307,17 @@ fn garbage_on_the_wire_is_answered_or_closed_and_the_next_client_served() {
     }
     thread::sleep(Duration::from_millis(50));
     assert_eq!(serving.get("/api/v1/state").status, 200);
+}
+
+#[test]
+fn connections_that_say_nothing_keep_nobody_away() {
+    let serving = Serving::with(|options| {
+        options.limits.connections = 20;
+        options.limits.first_byte = Duration::from_millis(200);
+        // A request that has begun may take long.
+        options.limits.head = 10 * LONG;
+    });
+    let idle: Vec<_> = (0..20).map(|_| serving.connect()).collect();
+    assert_eq!(serving.get("/").status, 200);
+    drop(idle);
 }

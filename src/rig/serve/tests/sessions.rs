@@ -1,4 +1,7 @@
 use std::fs;
+use std::io::Read;
+
+use relit_data::session::{Recording, Status};
 
 use super::Serving;
 use relit_video::Video;
@@ -234,4 +237,160 @@ fn nothing_outside_the_folder_of_sessions_can_be_reached() {
     let text = fs::read_to_string(&manifest).unwrap();
     fs::write(&manifest, text.replace("video.mkv", "../../etc/passwd")).unwrap();
     assert_eq!(serving.get(&path(COW, "/video")).status, 500);
+}
+
+/// The names in a tar file, in order; unpacks it into `to`.
+fn unpack(tar: &[u8], to: &std::path::Path) -> Vec<String> {
+    let mut names = Vec::new();
+    for entry in tar::Archive::new(tar).entries().unwrap() {
+        let mut entry = entry.unwrap();
+        let name = entry.path().unwrap().to_str().unwrap().to_owned();
+        let mut bytes = Vec::new();
+        entry.read_to_end(&mut bytes).unwrap();
+        let path = to.join(&name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+        names.push(name);
+    }
+    names
+}
+
+#[test]
+fn a_session_comes_as_a_tar_file_that_unpacks_to_a_session() {
+    let serving = Serving::start();
+    serving.hold(&[COW]);
+    let folder = serving.root.path().join(COW);
+    fs::write(folder.join("mask.png"), b"a mask").unwrap();
+    fs::write(folder.join(".hidden"), b"").unwrap();
+    let answer = serving.get(&path(COW, ".tar"));
+    assert_eq!(answer.status, 200);
+    assert_eq!(answer.header("content-type"), Some("application/x-tar"));
+    let length = answer.body.len().to_string();
+    assert_eq!(answer.header("content-length"), Some(length.as_str()));
+    let to = tempfile::tempdir().unwrap();
+    let names = unpack(&answer.body, to.path());
+    let wanted = ["session.json", "frames.jsonl", "mask.png", "video.mkv"];
+    assert_eq!(names, wanted.map(|name| format!("{COW}/{name}")));
+    let recording = Recording::open(&to.path().join(COW)).unwrap();
+    assert_eq!(recording.manifest.unwrap().status, Status::Complete);
+    assert!(recording.notices.is_empty(), "{:?}", recording.notices);
+    for name in wanted {
+        let original = fs::read(folder.join(name)).unwrap();
+        assert!(
+            fs::read(to.path().join(COW).join(name)).unwrap() == original,
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn a_tar_file_that_broke_off_goes_on_where_it_ended() {
+    let serving = Serving::start();
+    serving.hold(&[COW]);
+    let ask = |headers: &[&str]| serving.ask("GET", &path(COW, ".tar"), headers, b"");
+    let whole = ask(&[]);
+    let etag = whole.header("etag").unwrap().to_owned();
+    // In a header, in a file, in its padding, at the end.
+    for from in [100, 512, 700, 100_000, whole.body.len() - 1] {
+        let rest = ask(&[
+            &format!("Range: bytes={from}-"),
+            &format!("If-Range: {etag}"),
+        ]);
+        assert_eq!(rest.status, 206);
+        let range = format!("bytes {from}-{}/{}", whole.body.len() - 1, whole.body.len());
+        assert_eq!(rest.header("content-range"), Some(range.as_str()));
+        assert!(rest.body == whole.body[from..], "{from}");
+    }
+    assert_eq!(ask(&["Range: bytes=5-8"]).body, whole.body[5..=8]);
+    assert_eq!(ask(&["Range: bytes=999999999999-"]).status, 416);
+    // What has changed since is sent from the start.
+    fs::write(serving.root.path().join(COW).join("mask.png"), b"a mask").unwrap();
+    let changed = ask(&["Range: bytes=100-", &format!("If-Range: {etag}")]);
+    assert_eq!(changed.status, 200);
+    assert!(changed.body.len() > whole.body.len());
+}
+
+#[test]
+fn all_sessions_of_a_day_come_as_one_tar_file() {
+    let serving = Serving::start();
+    serving.hold(&[COW, BUST, DROPPED]);
+    let manifest = serving.root.path().join(DROPPED).join("session.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace("\"complete\"", "\"recording\"")).unwrap();
+    assert_eq!(serving.get(&path(DROPPED, ".tar")).status, 409);
+    let answer = serving.get("/api/v1/sessions.tar?day=20261120");
+    assert_eq!(answer.status, 200);
+    let to = tempfile::tempdir().unwrap();
+    let names = unpack(&answer.body, to.path());
+    assert_eq!(names.len(), 6, "{names:?}");
+    assert!(names[0].starts_with(COW) && names[3].starts_with(BUST));
+    assert_eq!(serving.get("/api/v1/sessions.tar?day=20261121").status, 404);
+    assert_eq!(serving.get("/api/v1/sessions.tar?day=../2026").status, 400);
+    assert_eq!(serving.get("/api/v1/sessions/nothing.tar").status, 404);
+}
+
+#[test]
+fn a_session_is_put_away_and_taken_back() {
+    let serving = Serving::start();
+    serving.hold(&[COW]);
+    let ask = |method: &str, rest: &str| serving.ask(method, &path(COW, rest), &[], b"").status;
+    let listed = || {
+        serving
+            .get("/api/v1/sessions")
+            .json()
+            .as_array()
+            .unwrap()
+            .len()
+    };
+    assert_eq!(ask("DELETE", ""), 204);
+    assert_eq!((listed(), ask("DELETE", "")), (0, 404));
+    let trash = serving.root.path().join(".trash").join(COW);
+    assert!(trash.join("video.mkv").is_file());
+    assert_eq!(ask("POST", "/restore"), 204);
+    assert_eq!((listed(), ask("POST", "/restore")), (1, 404));
+    let outside = serving.ask("POST", "/api/v1/sessions/..%2Fx/restore", &[], b"");
+    assert_eq!(outside.status, 404);
+    let other_site = ["Origin: http://evil.example"];
+    let refused = serving.ask("DELETE", &path(COW, ""), &other_site, b"");
+    assert_eq!((refused.status, listed()), (403, 1));
+}
+
+#[test]
+fn note_and_rating_are_written_to_the_manifest() {
+    let serving = Serving::start();
+    serving.hold(&[COW]);
+    let put = |body: &str| {
+        let headers = ["Content-Type: application/json"];
+        let answer = serving.ask("PUT", &path(COW, "/remarks"), &headers, body.as_bytes());
+        answer.status
+    };
+    assert_eq!(put(r#"{"note": " a fly on it ", "rating": 2}"#), 204);
+    let list = serving.get("/api/v1/sessions").json();
+    assert_eq!(
+        (&list[0]["note"], &list[0]["rating"]),
+        (&"a fly on it".into(), &2.into())
+    );
+    assert_eq!(put(r#"{"rating": 6}"#), 400);
+    assert_eq!(put(r#"{"stars": 1}"#), 400);
+    assert_eq!(put("{}"), 204);
+    let manifest = serving.get(&path(COW, "")).json()["manifest"].clone();
+    assert!(manifest.get("note").is_none() && manifest.get("rating").is_none());
+    // Everything else is as it was.
+    let original = serving.root.path().join(COW).join("session.json");
+    assert!(Recording::open(original.parent().unwrap()).is_ok());
+}
+
+#[test]
+fn a_mask_is_served_where_there_is_one() {
+    let serving = Serving::start();
+    serving.hold(&[COW]);
+    assert_eq!(serving.get(&path(COW, "/mask.png")).status, 404);
+    assert_eq!(serving.get(&path(COW, "")).json()["has_mask"], false);
+    fs::write(serving.root.path().join(COW).join("mask.png"), b"a mask").unwrap();
+    let mask = serving.get(&path(COW, "/mask.png"));
+    assert_eq!(
+        (mask.header("content-type"), &mask.body[..]),
+        (Some("image/png"), &b"a mask"[..])
+    );
+    assert_eq!(serving.get(&path(COW, "")).json()["has_mask"], true);
 }

@@ -226,6 +226,14 @@ impl Supervisor {
         self.begin_stop(now_us);
     }
 
+    /// The same, and resets the controller as soon as the table stands.
+    pub(crate) fn request_reset(&mut self, now_us: i64) {
+        if self.motion.is_some() {
+            self.raise(MotionFault::Stopped);
+        }
+        self.halt(now_us, true);
+    }
+
     /// Brings the table to a standstill and the controller to its initial state, so that any other
     /// program can use it.
     pub(crate) fn release(&mut self, now_us: i64) {
@@ -336,6 +344,10 @@ impl Supervisor {
         self.last_report = Some(report);
         if report.state != ControllerState::Alarm {
             self.alarm = None;
+        } else if report.pins.emergency_stop {
+            // The controller says so once; a reset in the meantime does not make it say so again.
+            self.alarm = Alarm::EMERGENCY_STOP.0;
+            self.zero_deg = None;
         }
         if let Some(recorded) = &mut self.recorded
             && recorded.len() < MOST_RECORDED

@@ -63,6 +63,14 @@ pub(super) fn robust(points: &[(f64, f64)], floor: f64) -> Fit {
     Fit { line, kept }
 }
 
+/// The line of a given slope through the middle of `points`.
+pub(super) fn through(points: &[(f64, f64)], slope: f64) -> Line {
+    let x0 = median(points.iter().map(|point| point.0).collect());
+    let levels = points.iter().map(|(x, y)| y - (x - x0) * slope);
+    let y0 = median(levels.collect());
+    Line { x0, y0, slope }
+}
+
 fn guess(points: &[(f64, f64)]) -> Line {
     let half = points.len() / 2;
     let far = points.iter().skip(half);
@@ -70,11 +78,10 @@ fn guess(points: &[(f64, f64)]) -> Line {
         .iter()
         .zip(far)
         .map(|((x, y), (xx, yy))| (yy - y) / (xx - x));
-    let slope = median(slopes.filter(|slope| slope.is_finite()).collect());
-    let x0 = median(points.iter().map(|point| point.0).collect());
-    let levels = points.iter().map(|(x, y)| y - (x - x0) * slope);
-    let y0 = median(levels.collect());
-    Line { x0, y0, slope }
+    through(
+        points,
+        median(slopes.filter(|slope| slope.is_finite()).collect()),
+    )
 }
 
 fn least_squares(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Line> {

@@ -17,6 +17,10 @@ use line::{Fit, Line};
 
 /// Minimum number of reports.
 const LEAST_POLLS: usize = 12;
+/// Minimum number of reports of a turn that was interrupted.
+const LEAST_OF_PART: usize = 3;
+/// Over a shorter time, microseconds, the planned speed is nearer to the truth than a measured one.
+const SHORT_US: f64 = 2e6;
 /// Minimum fraction of the angle at constant speed that the reports cover.
 const LEAST_COVER: f64 = 0.8;
 /// Largest fraction of outliers.
@@ -38,11 +42,13 @@ const WRAP_US: f64 = 4_294_967_296.0;
 pub enum TrackError {
     /// Too few reports.
     #[error(
-        "only {polls} reports fall into the part at constant speed, and {LEAST_POLLS} are needed: check the serial line"
+        "only {polls} reports fall into the part at constant speed, and {needed} are needed: check the serial line"
     )]
     TooFew {
         /// Their number.
         polls: usize,
+        /// The number needed.
+        needed: usize,
     },
     /// The reports leave gaps.
     #[error(
@@ -53,9 +59,7 @@ pub enum TrackError {
         percent: f64,
     },
     /// The reports do not lie on a line.
-    #[error(
-        "{outliers} of {polls} reports lie off the line of the others: the table did not turn evenly, or the serial line is bad"
-    )]
+    #[error("{}: the table did not turn evenly, or the serial line is bad", uneven(*.outliers, *.polls))]
     Uneven {
         /// Number of reports off the line.
         outliers: usize,
@@ -80,6 +84,13 @@ pub enum TrackError {
         /// Planned, degrees/s.
         planned: f64,
     },
+}
+
+fn uneven(outliers: usize, polls: usize) -> String {
+    match outliers * 2 > polls {
+        true => format!("the {polls} reports lie on no straight line"),
+        false => format!("{outliers} of {polls} reports lie off the line of the others"),
+    }
 }
 
 /// Residuals of the reports from the track, degrees.
@@ -170,17 +181,71 @@ impl Track {
 
 /// The turn as it was planned, degrees from machine zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ExpectedTurn {
+pub struct ExpectedTurn {
     /// Where the part at constant speed starts.
-    pub(crate) from_deg: f64,
+    pub from_deg: f64,
     /// Where it ends.
-    pub(crate) to_deg: f64,
-    /// Speed, without sign.
-    pub(crate) degrees_per_second: f64,
+    pub to_deg: f64,
+    /// Speed, degrees/s, without sign.
+    pub degrees_per_second: f64,
     /// Machine position of the angle 0.
-    pub(crate) zero_deg: f64,
+    pub zero_deg: f64,
     /// One step.
-    pub(crate) step_deg: f64,
+    pub step_deg: f64,
+}
+
+/// A report from the part of a turn at constant speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimedReport {
+    /// When it was requested, microseconds of the host's clock.
+    pub asked_us: i64,
+    /// When it came, microseconds of the host's clock.
+    pub came_us: i64,
+    /// The chip's time of the position, microseconds; wraps. `None` from a stock board.
+    pub chip_us: Option<u32>,
+    /// Degrees from machine zero.
+    pub machine_deg: f64,
+}
+
+impl TimedReport {
+    /// `None` for a report that shows nothing of the part at constant speed.
+    pub(crate) fn of(report: &PositionReport, expected: &ExpectedTurn) -> Option<Self> {
+        let usable = report.certain
+            && report.state == ControllerState::Run
+            && expected.covers(report.machine_deg);
+        usable.then_some(Self {
+            asked_us: report.asked_us?,
+            came_us: report.came_us,
+            chip_us: report.chip_us,
+            machine_deg: report.machine_deg,
+        })
+    }
+}
+
+impl Track {
+    /// The track of a turn that was interrupted, up to its last report.
+    ///
+    /// # Errors
+    /// [`TrackError`] if there are too few reports, or they do not lie on a line of the planned speed.
+    pub fn of_part(reports: &[TimedReport], expected: &ExpectedTurn) -> Result<Self, TrackError> {
+        let points = points(reports, expected);
+        let (Some(first), Some(last)) = (points.first(), points.last()) else {
+            return Err(too_few(&points, LEAST_OF_PART));
+        };
+        if points.len() < LEAST_OF_PART {
+            return Err(too_few(&points, LEAST_OF_PART));
+        }
+        let until_us = last.asked_us;
+        let is_short = last.asked_us - first.asked_us < SHORT_US || points.len() < LEAST_POLLS;
+        let fitted = match is_short {
+            true => by_the_plan(&points, expected),
+            false => by_the_reports(&points, expected)?,
+        };
+        let mut track = checked_track(&points, expected, &fitted)?;
+        // What came after the last report is not known: the table may have been stopped.
+        track.to_us = track.to_us.min(until_us as i64);
+        Ok(track)
+    }
 }
 
 impl ExpectedTurn {
@@ -221,14 +286,26 @@ pub(crate) fn fit(
     reports: &[PositionReport],
     expected: &ExpectedTurn,
 ) -> Result<Track, TrackError> {
-    let points = points(reports, expected);
+    let timed = |report: &PositionReport| TimedReport::of(report, expected);
+    let reports: Vec<_> = reports.iter().filter_map(timed).collect();
+    let points = points(&reports, expected);
     enough(&points, expected)?;
-    let stamped = points.iter().all(|point| point.chip_us.is_some());
-    let fitted = if stamped {
-        by_the_chip(&points, expected)?
-    } else {
-        by_the_middle(&points, expected)
-    };
+    let fitted = by_the_reports(&points, expected)?;
+    checked_track(&points, expected, &fitted)
+}
+
+fn by_the_reports(points: &[Point], expected: &ExpectedTurn) -> Result<Fitted, TrackError> {
+    match points.iter().all(|point| point.chip_us.is_some()) {
+        true => by_the_chip(points, expected),
+        false => Ok(by_the_middle(points, expected)),
+    }
+}
+
+fn checked_track(
+    points: &[Point],
+    expected: &ExpectedTurn,
+    fitted: &Fitted,
+) -> Result<Track, TrackError> {
     if fitted.outliers as f64 > points.len() as f64 * MOST_OUTLIERS {
         return Err(TrackError::Uneven {
             outliers: fitted.outliers,
@@ -240,7 +317,7 @@ pub(crate) fn fit(
     if (measured / planned - 1.0).abs() > MOST_OFF {
         return Err(TrackError::Speed { measured, planned });
     }
-    Ok(track(&points, expected, &fitted))
+    Ok(track(points, expected, fitted))
 }
 
 /// The line of angles over the host's time.
@@ -250,27 +327,25 @@ struct Fitted {
     chip_rate: Option<f64>,
 }
 
-fn points(reports: &[PositionReport], expected: &ExpectedTurn) -> Vec<Point> {
+fn points(reports: &[TimedReport], expected: &ExpectedTurn) -> Vec<Point> {
     let half_step = expected.sign() * expected.step_deg / 2.0;
-    let point = |report: &PositionReport| {
-        let usable = report.certain
-            && report.state == ControllerState::Run
-            && expected.covers(report.machine_deg);
-        usable.then_some(Point {
-            asked_us: report.asked_us? as f64,
-            came_us: report.came_us as f64,
-            chip_us: report.chip_us,
-            angle_deg: report.machine_deg + half_step - expected.zero_deg,
-        })
+    let point = |report: &TimedReport| Point {
+        asked_us: report.asked_us as f64,
+        came_us: report.came_us as f64,
+        chip_us: report.chip_us,
+        angle_deg: report.machine_deg + half_step - expected.zero_deg,
     };
-    reports.iter().filter_map(point).collect()
+    reports.iter().map(point).collect()
+}
+
+fn too_few(points: &[Point], needed: usize) -> TrackError {
+    let polls = points.len();
+    TrackError::TooFew { polls, needed }
 }
 
 fn enough(points: &[Point], expected: &ExpectedTurn) -> Result<(), TrackError> {
     if points.len() < LEAST_POLLS {
-        return Err(TrackError::TooFew {
-            polls: points.len(),
-        });
+        return Err(too_few(points, LEAST_POLLS));
     }
     let angles = || points.iter().map(|point| point.angle_deg);
     let covered = angles().fold(f64::MIN, f64::max) - angles().fold(f64::MAX, f64::min);
@@ -287,6 +362,18 @@ fn by_the_middle(points: &[Point], expected: &ExpectedTurn) -> Fitted {
     let pair = |point: &Point| (point.middle_us(), point.angle_deg);
     let pairs: Vec<_> = fastest(points).iter().map(pair).collect();
     let Fit { line, .. } = line::robust(&pairs, expected.step_deg);
+    on_line(points, expected, line)
+}
+
+/// The line of the planned speed through the fastest answers.
+fn by_the_plan(points: &[Point], expected: &ExpectedTurn) -> Fitted {
+    let slope = expected.degrees_per_second * expected.sign() / 1e6;
+    let pair = |point: &Point| (point.middle_us(), point.angle_deg);
+    let pairs: Vec<_> = fastest(points).iter().map(pair).collect();
+    on_line(points, expected, line::through(&pairs, slope))
+}
+
+fn on_line(points: &[Point], expected: &ExpectedTurn, line: Line) -> Fitted {
     // A slow answer lies off the line by its delay; it does not show that the table turned unevenly.
     let allowed =
         |point: &Point| expected.step_deg * 2.0 + point.round_trip_us() / 2.0 * line.slope.abs();

@@ -190,7 +190,13 @@ fn a_track_has_residuals_and_counts() {
 fn turns_without_a_track_are_distinguished_by_their_cause() {
     let reports = USUAL.reports(1);
     let few = fit(&reports[200..210], &EXPECTED);
-    assert_eq!(few, Err(TrackError::TooFew { polls: 10 }));
+    assert_eq!(
+        few,
+        Err(TrackError::TooFew {
+            polls: 10,
+            needed: 12
+        })
+    );
     assert!(matches!(
         fit(&reports[..400], &EXPECTED),
         Err(TrackError::Gaps { .. })
@@ -267,4 +273,14 @@ proptest! {
             prop_assert!(from_us <= to_us && track.angle_at(from_us).unwrap().is_finite());
         }
     }
+}
+
+#[test]
+fn reports_that_lie_on_no_line_are_not_compared_with_others() {
+    let text = |outliers| {
+        let polls = 98;
+        TrackError::Uneven { outliers, polls }.to_string()
+    };
+    assert!(text(30).starts_with("30 of 98 reports lie off the line of the others"));
+    assert!(text(98).starts_with("the 98 reports lie on no straight line"));
 }
