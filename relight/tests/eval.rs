@@ -252,10 +252,11 @@ fn a_highlight_that_is_right_leaves_the_image_without_it() {
     let dir = tempfile::tempdir().unwrap();
     let (truth, found) = (dir.path().join("truth"), dir.path().join("net"));
     write_set(&truth);
-    for name in ["cup", "pear"] {
+    // Under either name: that of the protocol, and that of `relight decompose`.
+    for (name, file) in [("cup", "highlight.png"), ("pear", "specular.png")] {
         fs::create_dir_all(found.join(name)).unwrap();
         let from = truth.join(name).join("specular.png");
-        fs::copy(from, found.join(name).join("highlight.png")).unwrap();
+        fs::copy(from, found.join(name).join(file)).unwrap();
     }
     let methods = [
         HighlightMethod::Nothing,

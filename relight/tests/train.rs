@@ -13,6 +13,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use relight::data::Share;
 use relight::decompose::EncodedPicture;
 use relight::image::{Extent, Planes};
 use relight::nets::paper::{Head, light_net, normal_net, spec_net};
@@ -245,8 +246,16 @@ fn samples_are_the_same_on_any_number_of_threads() {
         plain_share: 0.5,
     });
     let first = |threads: usize| -> Vec<TruthArrays> {
-        let mut composer = Composer::start(Arc::clone(&composition), 1, threads).unwrap();
-        (0..9).map(|_| composer.next_sample().unwrap()).collect()
+        let composition = Arc::clone(&composition);
+        let mut composer = Composer::start(composition, Share::ALL, 1, threads).unwrap();
+        let mut next = || composer.next_sample().unwrap();
+        (3..12)
+            .map(|number| {
+                let (found, sample) = next();
+                assert_eq!(found, number);
+                sample
+            })
+            .collect()
     };
     assert_eq!(first(1), first(3));
 }

@@ -125,6 +125,14 @@ pub enum ExtractError {
         /// Degrees that are there.
         covered_deg: f64,
     },
+    /// The capture ended within the first degree of its turn.
+    #[error(
+        "the frames cover {covered_deg:.1} of 360 degrees, which is too little: record it again"
+    )]
+    TooLittleOfATurn {
+        /// Degrees that are there.
+        covered_deg: f64,
+    },
     /// The recording is part of a turn, and no angle is known.
     #[error(
         "the frames cover about {covered_deg:.0} of 360 degrees, and their angles are not known: record it again, or give the video file itself to spread the frames over time"
@@ -172,14 +180,43 @@ pub enum ExtractError {
 }
 
 impl ExtractError {
+    /// The error as it is for a capture that was aborted, whose table did turn.
+    pub(super) fn of_an_aborted_capture(self) -> Self {
+        match self {
+            Self::OneFrame => Self::TooLittleOfATurn { covered_deg: 0.0 },
+            Self::TableStands { degrees } => Self::TooLittleOfATurn {
+                covered_deg: degrees,
+            },
+            other => other,
+        }
+    }
+
     /// Whether the recording itself is the reason: it holds too little of a turn, and is left out.
     #[must_use]
     pub fn leaves_out(&self) -> bool {
         matches!(
             self,
             Self::PartOfATurn { .. }
+                | Self::TooLittleOfATurn { .. }
                 | Self::NoAngles { .. }
                 | Self::Session(session::SessionError::NoFrames(_))
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_capture_that_was_aborted_at_its_first_frames_is_left_out() {
+        for error in [
+            ExtractError::OneFrame,
+            ExtractError::TableStands { degrees: 0.5 },
+        ] {
+            assert!(!error.leaves_out(), "{error}");
+            let aborted = error.of_an_aborted_capture();
+            assert!(aborted.leaves_out(), "{aborted}");
+        }
     }
 }

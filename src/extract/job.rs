@@ -101,7 +101,11 @@ impl Job {
         pool: &ThreadPool,
         observer: &dyn Observer,
     ) -> Result<(SessionEntry, Vec<ShardEntry>), ExtractError> {
-        let mut plan = Plan::new(&self.video, self.recording.frames.as_ref(), options.frames)?;
+        let plan = Plan::new(&self.video, self.recording.frames.as_ref(), options.frames);
+        let mut plan = plan.map_err(|error| match self.is_aborted() {
+            true => error.of_an_aborted_capture(),
+            false => error,
+        })?;
         self.check_turn(&plan, options.partial)?;
         let samples = u32::try_from(plan.selection.frames.len()).unwrap_or(options.frames);
         let mut notices = self.notices.clone();
@@ -164,6 +168,11 @@ impl Job {
             report: Some(report),
         };
         Ok((entry, files.shards))
+    }
+
+    fn is_aborted(&self) -> bool {
+        let manifest = self.recording.manifest.as_ref();
+        manifest.is_some_and(|manifest| matches!(manifest.status, Status::Aborted(_)))
     }
 
     /// That the recording is a whole turn, or part of one where that is asked for.

@@ -19,6 +19,16 @@ fn pressed_in_a_turn() -> (Rig, Table) {
     (rig, table)
 }
 
+fn assert_turns_again(table: &Table) {
+    let status = table.status().unwrap();
+    assert_eq!((status.state, status.homed), (ControllerState::Idle, true));
+    table
+        .start_turn(turn_by(table, 90.0))
+        .unwrap()
+        .wait_end()
+        .unwrap();
+}
+
 #[test]
 fn while_the_emergency_stop_is_pressed_everything_says_so() {
     let (_rig, table) = pressed_in_a_turn();
@@ -73,13 +83,7 @@ fn after_the_release_reset_and_also_unlock_and_home_bring_the_table_back() {
         let status = table.status().unwrap();
         assert_eq!(status.alarm, Some(Alarm::EMERGENCY_STOP), "{status:?}");
         way_out(&table).unwrap();
-        let status = table.status().unwrap();
-        assert_eq!((status.state, status.homed), (ControllerState::Idle, true));
-        table
-            .start_turn(turn_by(&table, 90.0))
-            .unwrap()
-            .wait_end()
-            .unwrap();
+        assert_turns_again(&table);
     }
 }
 
@@ -98,11 +102,5 @@ fn a_table_with_an_index_is_reset_unlocked_and_homed_to_it() {
     assert!(table.status().unwrap().emergency_stop);
     rig.simulated.press_emergency_stop(false);
     assert_eq!(table.reset().unwrap(), Homed::Index);
-    let status = table.status().unwrap();
-    assert_eq!((status.state, status.homed), (ControllerState::Idle, true));
-    table
-        .start_turn(turn_by(&table, 90.0))
-        .unwrap()
-        .wait_end()
-        .unwrap();
+    assert_turns_again(&table);
 }

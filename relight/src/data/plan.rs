@@ -39,8 +39,9 @@ pub struct DrawPlan {
     pub share: Share,
 }
 
-/// One of several equal shares, where many processes draw from one data set: process `index` takes
-/// every `of`-th batch.
+/// One of several equal shares, where many processes draw from one data set: of each `of` batches that follow
+/// each other, process `index` takes the one at its number. Epochs go on into each other: whenever the last process has
+/// had a batch, all of them have had as many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Share {
     index: u32,
@@ -60,14 +61,26 @@ impl Share {
             None
         }
     }
+
+    /// Which process this is, from 0.
+    #[must_use]
+    pub const fn index(self) -> u32 {
+        self.index
+    }
+
+    /// How many processes there are, at least 1.
+    #[must_use]
+    pub const fn of(self) -> u32 {
+        self.of
+    }
 }
 
-/// A place between two samples of a plan, to go on from.
+/// A place between two samples of a plan, to go on from. It is the same for all shares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Place {
     /// Which time all samples are drawn, from 0.
     pub epoch: u64,
-    /// How many samples of this share were drawn in this epoch, damaged ones included.
+    /// How many samples were drawn in this epoch by all shares together, damaged ones included.
     pub sample: u64,
 }
 
@@ -90,8 +103,8 @@ impl DrawPlan {
         }
     }
 
-    /// The batches from a place on, up to the end of the epoch before `end`. `turns` are the numbers
-    /// of samples.
+    /// The batches of this share from a place on, up to the end of the epoch before `end`. `turns` are the numbers
+    /// of samples. The place behind a batch is behind those that the other shares take along with it.
     pub(super) fn jobs(
         self,
         turns: &[u32],
@@ -100,29 +113,22 @@ impl DrawPlan {
     ) -> impl Iterator<Item = Job> + use<> {
         let turns = turns.to_vec();
         // Epochs of nothing would go by for ever.
-        let end = if self.is_empty(&turns) {
-            from.epoch
-        } else {
-            end
-        };
-        (from.epoch..end).flat_map(move |epoch| {
+        let is_empty = turns.iter().all(|&samples| samples == 0);
+        let end = if is_empty { from.epoch } else { end };
+        let mut all = (from.epoch..end).flat_map(move |epoch| {
             let skip = if epoch == from.epoch { from.sample } else { 0 };
             self.epoch(&turns, epoch, skip)
+        });
+        let Share { index, of } = self.share;
+        std::iter::from_fn(move || {
+            let round: Vec<Job> = all.by_ref().take(of as usize).collect();
+            let next = round.last()?.next;
+            let samples = round.into_iter().nth(index as usize)?.samples;
+            Some(Job { samples, next })
         })
     }
 
-    /// Whether this share has no batch.
-    fn is_empty(self, turns: &[u32]) -> bool {
-        let batches = |samples: u64| samples.div_ceil(u64::from(self.batch.max(1)));
-        let samples = turns.iter().map(|&samples| u64::from(samples));
-        let count: u64 = match self.draw {
-            Draw::Neighbours => samples.map(batches).sum(),
-            Draw::Mixed => batches(samples.sum()),
-        };
-        u64::from(self.share.index) >= count
-    }
-
-    /// The batches of an epoch without its first `skip` samples.
+    /// The batches of an epoch, of all shares, without its first `skip` samples.
     fn epoch(self, turns: &[u32], epoch: u64, skip: u64) -> impl Iterator<Item = Job> + use<> {
         let mut random = self.seed.map(|seed| {
             // An odd factor keeps the seeds of different epochs apart.
@@ -134,22 +140,19 @@ impl DrawPlan {
             Draw::Neighbours => Groups::runs(turns, batch, random.as_mut()),
             Draw::Mixed => Groups::mixed(turns, batch, random.as_mut()),
         };
-        let (first, step) = (self.share.index as usize, self.share.of as usize);
         let mut drawn = 0;
-        (first..groups.count())
-            .step_by(step)
-            .filter_map(move |group| {
-                let mut samples = groups.samples(group);
-                let start = drawn;
-                drawn += samples.len() as u64;
-                let over = skip.saturating_sub(start).min(samples.len() as u64);
-                samples.drain(..usize::try_from(over).unwrap_or(usize::MAX));
-                let next = Place {
-                    epoch,
-                    sample: drawn,
-                };
-                (!samples.is_empty()).then_some(Job { samples, next })
-            })
+        (0..groups.count()).filter_map(move |group| {
+            let mut samples = groups.samples(group);
+            let start = drawn;
+            drawn += samples.len() as u64;
+            let over = skip.saturating_sub(start).min(samples.len() as u64);
+            samples.drain(..usize::try_from(over).unwrap_or(usize::MAX));
+            let next = Place {
+                epoch,
+                sample: drawn,
+            };
+            (!samples.is_empty()).then_some(Job { samples, next })
+        })
     }
 }
 
@@ -377,8 +380,28 @@ mod tests {
             plan.jobs(turns, Place::default(), u64::MAX).next()
         };
         assert_eq!(endless(Share::ALL, &[0, 0]), None);
-        assert_eq!(endless(Share::new(2, 3).unwrap(), &[24]), None);
+        assert!(endless(Share::new(2, 3).unwrap(), &[24]).is_some());
         assert_eq!(Share::new(3, 3), None);
+    }
+
+    #[test]
+    fn shares_go_on_together_over_epochs_and_from_each_others_places() {
+        let whole = DrawPlan::of_turns(5);
+        // Five batches an epoch: three processes do not come out even.
+        let turns = [30, 24];
+        let jobs = |share, from| {
+            let plan = DrawPlan { share, ..whole };
+            plan.jobs(&turns, from, 7).collect::<Vec<Job>>()
+        };
+        let alone = jobs(Share::ALL, Place::default());
+        let share = |index| Share::new(index, 3).unwrap();
+        let begun = jobs(share(0), Place::default());
+        for (round, job) in begun.iter().take(10).enumerate() {
+            assert_eq!(job.samples, alone[3 * round].samples);
+            assert_eq!(job.next, alone[3 * round + 2].next);
+            let resumed = &jobs(share(2), job.next)[0];
+            assert_eq!(resumed.samples, alone[3 * round + 5].samples);
+        }
     }
 
     #[test]

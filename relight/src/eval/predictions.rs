@@ -8,7 +8,7 @@ use crate::light::{Normals, ShLight, YDown, YUp};
 use crate::render::{Gloss, NormalsFrame, Surface};
 
 /// A folder with a folder for each image of the truth, of the same name, in which the estimates lie:
-/// `albedo`, `shading`, `highlight`, `normal` as `.exr` (linear, or vectors) or `.png` (8 or 16
+/// `albedo`, `shading`, `highlight` (or `specular`), `normal` as `.exr` (linear, or vectors) or `.png` (8 or 16
 /// bits), `light.txt` as lines of red, green and blue coefficients.
 #[derive(Debug, Clone)]
 pub struct Predictions {
@@ -108,7 +108,13 @@ impl Predictions {
 
     fn find(&self, name: &str, part: &'static str) -> Result<PathBuf, EvalError> {
         let folder = self.root.join(name);
-        let found = self.existing(name, part);
+        let found = match part {
+            // As `relight decompose` calls it.
+            "highlight" => self
+                .existing(name, part)
+                .or_else(|| self.existing(name, "specular")),
+            _ => self.existing(name, part),
+        };
         found.ok_or(EvalError::Unpredicted { folder, part })
     }
 

@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
+use tch::Kind;
+
 use super::composer::Composition;
 use super::decompose_task::Resources;
 use super::error::TrainError;
 use super::sample::TruthBatch;
 use super::settings::{DataSettings, RunSettings};
 use super::window::{SampleWindow, SampleWindowSettings};
+use crate::data::Share;
 use crate::synth::{Folders, Library, Recipe, stream};
 
 /// What samples are composed of, with the files that are named read.
@@ -40,24 +43,39 @@ pub(super) fn composition(data: &DataSettings, seed: u64) -> Result<Composition,
 pub(super) struct ComposedBatches {
     composition: Arc<Composition>,
     settings: SampleWindowSettings,
+    share: Share,
+    kind: Kind,
     resources: Resources,
     /// Opened with the first batch, whose step says where.
     window: Option<SampleWindow>,
 }
 
 impl ComposedBatches {
-    /// The batches of a composition.
+    /// The batches of a composition, in 32 or 64 bits.
     pub(super) fn new(
         composition: Arc<Composition>,
         settings: SampleWindowSettings,
+        kind: Kind,
         resources: Resources,
     ) -> Self {
         Self {
             composition,
             settings,
+            share: Share::ALL,
+            kind,
             resources,
             window: None,
         }
+    }
+
+    /// Leaves the rest of each batch to other processes. Called before the first batch.
+    ///
+    /// # Errors
+    /// [`TrainError::Indivisible`].
+    pub(super) fn take_share(&mut self, share: Share) -> Result<(), TrainError> {
+        self.settings.check(share)?;
+        self.share = share;
+        Ok(())
     }
 
     /// The batch of a step; steps are asked for one after the other.
@@ -66,13 +84,14 @@ impl ComposedBatches {
             Some(window) => window,
             None => SampleWindow::open(
                 self.settings,
+                self.share,
                 &self.composition,
                 self.resources.composers,
                 step,
             )?,
         };
         let window = self.window.insert(window);
-        TruthBatch::new(&window.batch(step)?, true, self.resources.device)
+        TruthBatch::new(&window.batch(step)?, self.kind, self.resources.device)
     }
 }
 
@@ -80,6 +99,7 @@ impl ComposedBatches {
 pub(super) fn window_settings(data: &DataSettings, run: &RunSettings) -> SampleWindowSettings {
     SampleWindowSettings {
         capacity: data.window,
+        lightings: u64::from(data.lightings).max(1),
         reuse: data.reuse,
         batch: run.batch,
         seed: stream(run.seed, 22),

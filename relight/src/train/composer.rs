@@ -12,6 +12,7 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 
 use super::error::TrainError;
 use super::sample::{Linearisation, TruthArrays};
+use crate::data::Share;
 use crate::synth::{Library, Recipe, stream};
 
 /// Part of the pictures whose values are taken for sRGB, whatever the camera's response: the user of a photograph
@@ -42,25 +43,31 @@ pub struct Composer {
     /// Views that came before their turn.
     early: BTreeMap<u64, Vec<TruthArrays>>,
     next_view: u64,
-    /// Of the view that is being handed out, last first.
-    current: Vec<TruthArrays>,
+    /// From one view of the share to the next.
+    stride: u64,
+    /// Of the view that is being handed out, with their numbers, last first.
+    current: Vec<(u64, TruthArrays)>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Composer {
-    /// Threads that compose from the view `first_view` on.
+    /// Threads that compose the views of a share, view n being that of process n modulo their number, from the view
+    /// `first_view` on.
     ///
     /// # Errors
     /// [`TrainError::Synth`] where the recipe is out of range, [`TrainError::Threads`].
     pub fn start(
         composition: Arc<Composition>,
+        share: Share,
         first_view: u64,
         threads: usize,
     ) -> Result<Self, TrainError> {
         composition.recipe.check()?;
         let threads = threads.max(1);
         let (sender, views) = bounded(AHEAD * threads);
-        let next = Arc::new(AtomicU64::new(first_view));
+        let (index, stride) = (u64::from(share.index()), u64::from(share.of()));
+        let next_view = first_view + (index + stride - first_view % stride) % stride;
+        let next = Arc::new(AtomicU64::new(next_view));
         let spawn = |number: usize| {
             let (composition, next) = (Arc::clone(&composition), Arc::clone(&next));
             let sender: Sender<Batch> = sender.clone();
@@ -68,7 +75,7 @@ impl Composer {
                 .name(format!("compose-{number}"))
                 .spawn(move || {
                     loop {
-                        let view = next.fetch_add(1, Ordering::Relaxed);
+                        let view = next.fetch_add(stride, Ordering::Relaxed);
                         // Nobody takes views any more once the composer is dropped.
                         if sender.send((view, composition.samples_of(view))).is_err() {
                             return;
@@ -81,25 +88,27 @@ impl Composer {
         Ok(Self {
             views,
             early: BTreeMap::new(),
-            next_view: first_view,
+            next_view,
+            stride,
             current: Vec::new(),
             threads,
         })
     }
 
-    /// The next sample.
+    /// The next sample, with its number.
     ///
     /// # Errors
     /// [`TrainError::Composer`] where all threads have ended, which only a fault of theirs makes them do.
-    pub fn next_sample(&mut self) -> Result<TruthArrays, TrainError> {
+    pub fn next_sample(&mut self) -> Result<(u64, TruthArrays), TrainError> {
         loop {
             if let Some(sample) = self.current.pop() {
                 return Ok(sample);
             }
             if let Some(samples) = self.early.remove(&self.next_view) {
-                self.current = samples;
+                let first = self.next_view * samples.len() as u64;
+                self.current = (first..).zip(samples).collect();
                 self.current.reverse();
-                self.next_view += 1;
+                self.next_view += self.stride;
                 continue;
             }
             let (view, samples) = self.views.recv().map_err(|_| TrainError::Composer)?;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tch::Tensor;
 
 use super::error::TrainError;
-use super::losses::{angular, gradient, scale_invariant, windowed};
+use super::losses::{Mean, angular, gradient, scale_invariant, windowed};
 use super::sample::TruthBatch;
 use super::terms::Terms;
 use crate::decompose::{HIGHLIGHT_OFFSET, LEAST_FACING, LOG_LUMINANCE, LOG_SHADING};
@@ -121,11 +121,11 @@ pub fn decompose_losses(
 
     let whole = weights.whole;
     let error = scale_invariant(&answer.shading, &batch.shading, mask)?;
-    terms.add("shading", whole, error);
+    terms.add("shading", whole, error)?;
     let error = scale_invariant(&answer.albedo, &batch.albedo, mask)?;
-    terms.add("albedo", whole, error);
+    terms.add("albedo", whole, error)?;
     let error = scale_invariant(&quotient, &albedo, mask)?;
-    terms.add("quotient", whole * weights.quotient, error);
+    terms.add("quotient", whole * weights.quotient, error)?;
 
     let height = mask.size()[2];
     let narrow = (height / 16).max(4);
@@ -137,7 +137,7 @@ pub fn decompose_losses(
         let weight = weights.windows * part;
         let near = windowed(found, truth, mask, narrow)?;
         let far = windowed(found, truth, mask, 3 * narrow)?;
-        terms.add(name, weight, near.f_add(&far.f_mul_scalar(0.5)?)?);
+        terms.add(name, weight, near.f_add(&far.f_mul_scalar(0.5)?)?)?;
     }
 
     let log = |of: &Tensor, floor: f64| of.f_add_scalar(floor)?.f_log();
@@ -146,30 +146,28 @@ pub fn decompose_losses(
         &log(&batch.shading, SHADING_FLOOR)?,
         mask,
     )?;
-    terms.add("shading_steps", weights.gradient, steps);
+    for mean in steps {
+        terms.add_mean("shading_steps", weights.gradient, mean);
+    }
     let steps = gradient(
         &log(&found_albedo, ALBEDO_FLOOR)?,
         &log(&albedo, ALBEDO_FLOOR)?,
         mask,
     )?;
-    terms.add("albedo_steps", weights.gradient * 0.5, steps);
+    for mean in steps {
+        terms.add_mean("albedo_steps", weights.gradient * 0.5, mean);
+    }
     let angle = angular(&answer.normals, &batch.normals, mask)?;
-    terms.add("normals", weights.normals, angle);
-    terms.add(
-        "highlight",
-        weights.highlight,
-        highlight_error(batch, answer)?,
-    );
-    terms.add(
-        "highlight_energy",
-        weights.highlight_energy,
-        highlight_energy_error(batch, answer)?,
-    );
+    terms.add_mean("normals", weights.normals, angle);
+    let highlight = highlight_error(batch, answer)?;
+    terms.add_mean("highlight", weights.highlight, highlight);
+    let energy = highlight_energy_error(batch, answer)?;
+    terms.add_mean("highlight_energy", weights.highlight_energy, energy);
     Ok(terms)
 }
 
 /// Mean absolute error, in which highlights count more than their absence.
-fn highlight_error(batch: &TruthBatch, answer: &AnsweredTensors) -> Result<Tensor, TrainError> {
+fn highlight_error(batch: &TruthBatch, answer: &AnsweredTensors) -> Result<Mean, TrainError> {
     let truth = &batch.highlight;
     let emphasis = truth
         .f_clamp(0.0, FULL_HIGHLIGHT)?
@@ -177,8 +175,9 @@ fn highlight_error(batch: &TruthBatch, answer: &AnsweredTensors) -> Result<Tenso
         .f_add_scalar(1.0)?
         .f_mul(&batch.mask)?;
     let error = answer.highlight.f_sub(truth)?.f_abs()?.f_mul(&emphasis)?;
-    let pixels = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
-    Ok(error.f_sum(None)?.f_div(&pixels)?)
+    let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
+    let value = error.f_sum(None)?.f_div(&over)?;
+    Ok(Mean { value, over })
 }
 
 /// Energy of the error as a part of the energy of the batch's highlights: 1 for an answer without any. A batch
@@ -186,12 +185,13 @@ fn highlight_error(batch: &TruthBatch, answer: &AnsweredTensors) -> Result<Tenso
 fn highlight_energy_error(
     batch: &TruthBatch,
     answer: &AnsweredTensors,
-) -> Result<Tensor, TrainError> {
+) -> Result<Mean, TrainError> {
     let energy = |of: &Tensor| of.f_square()?.f_mul(&batch.mask)?.f_sum(None);
     let faint = batch.mask.f_sum(None)?.f_mul_scalar(FAINT_ENERGY)?;
-    let truth = energy(&batch.highlight)?.f_add(&faint)?;
+    let over = energy(&batch.highlight)?.f_add(&faint)?;
     let error = energy(&answer.highlight.f_sub(&batch.highlight)?)?;
-    Ok(error.f_div(&truth)?)
+    let value = error.f_div(&over)?;
+    Ok(Mean { value, over })
 }
 
 /// How much each head's answers vary from pixel to pixel under the mask, as a part of the truth's variation: a head that has

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use tch::{Device, Tensor};
+use tch::{Device, Kind, Tensor};
 
 use super::composed::{ComposedBatches, composition, window_settings};
 use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
@@ -12,6 +12,7 @@ use super::held_out::{HeldOutSamples, highlight_figures};
 use super::learner::{Learner, LearnerSettings};
 use super::losses::{angular_degrees, scale_invariant, windowed};
 use super::model::{ComputePrecision, Model};
+use super::process_group::ProcessGroup;
 use super::run::{StepLosses, Task, Validation};
 use super::sample::TruthBatch;
 use super::settings::{DecomposeSettings, PrecisionChoice};
@@ -60,9 +61,10 @@ impl DecomposeTask {
         let precision = match settings.run.precision {
             PrecisionChoice::Single => ComputePrecision::Single,
             PrecisionChoice::Mixed => ComputePrecision::Mixed,
+            PrecisionChoice::Double => ComputePrecision::Double,
             PrecisionChoice::Fastest => fastest(
                 &weights,
-                &validation.first(resources.device)?,
+                &validation.first(Kind::Float, resources.device)?,
                 resources.device,
             )?,
         };
@@ -80,6 +82,7 @@ impl DecomposeTask {
             composed: ComposedBatches::new(
                 composition,
                 window_settings(&settings.data, &settings.run),
+                precision.kind(),
                 resources,
             ),
             settings,
@@ -87,6 +90,20 @@ impl DecomposeTask {
             learner,
             validation,
         })
+    }
+
+    /// Takes the precision that was the faster one in most of the processes.
+    fn choose_precision(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
+        let is_mixed = self.learner.model.precision() == ComputePrecision::Mixed;
+        let mut votes = [f64::from(u8::from(is_mixed))];
+        group.sum(&mut votes)?;
+        let mixed = 2.0 * votes[0] > f64::from(group.share().of());
+        self.learner.model.set_precision(if mixed {
+            ComputePrecision::Mixed
+        } else {
+            ComputePrecision::Single
+        });
+        Ok(())
     }
 }
 
@@ -104,6 +121,14 @@ impl Task for DecomposeTask {
         vec![&mut self.learner]
     }
 
+    fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
+        self.composed.take_share(group.share())?;
+        if self.settings.run.precision == PrecisionChoice::Fastest {
+            self.choose_precision(group)?;
+        }
+        Ok(())
+    }
+
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
         let batch = self.composed.batch(step)?;
         let answer = self.learner.model.forward(&batch.input)?;
@@ -118,8 +143,8 @@ impl Task for DecomposeTask {
 
     fn validate(&mut self) -> Result<Validation, TrainError> {
         let (model, device) = (self.learner.averaged_model()?, self.resources.device);
-        let mut sheet = None;
-        let figures = self.validation.figures(device, |batch| {
+        let (kind, mut sheet) = (model.precision().kind(), None);
+        let figures = self.validation.figures(kind, device, |batch| {
             let answer = AnsweredTensors::new(&batch.input, &model.forward(&batch.input)?[0])?;
             if sheet.is_none() {
                 sheet = Some(validation_sheet(batch, &answer, SHOWN)?);

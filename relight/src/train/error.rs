@@ -89,6 +89,82 @@ pub enum TrainError {
         /// The folder.
         path: PathBuf,
     },
+    /// An environment in which a variable is missing that a launcher sets.
+    #[error(
+        "{set} is set and {missing} is not: to train with several processes, set RANK, WORLD_SIZE, MASTER_ADDR and MASTER_PORT for each of \
+         them, as torchrun does; for one process, unset RANK and WORLD_SIZE"
+    )]
+    LaunchIncomplete {
+        /// One that is set.
+        set: &'static str,
+        /// The one that is missing.
+        missing: &'static str,
+    },
+    /// A variable of the launcher that has a wrong value.
+    #[error("the environment variable {name} is {value}: it has to be {allowed}")]
+    LaunchValue {
+        /// Its name.
+        name: &'static str,
+        /// Its value.
+        value: String,
+        /// What can be.
+        allowed: String,
+    },
+    /// The other processes of a run were not met.
+    #[error(
+        "process {process} of {of} did not meet the others at {address}:{port} (MASTER_ADDR, MASTER_PORT): {fault}"
+    )]
+    NotJoined {
+        /// This process.
+        process: u32,
+        /// How many there are.
+        of: u32,
+        /// Where they meet.
+        address: String,
+        /// Where they meet.
+        port: u16,
+        /// c10d's own words.
+        fault: String,
+    },
+    /// Processes that do not train the same thing.
+    #[error(
+        "{what} of process {process} are not those of process 0: start all processes with the same program, command and files, \
+         and a folder for the run that all of them see"
+    )]
+    Disagreement {
+        /// The first process that differs.
+        process: u32,
+        /// In what.
+        what: &'static str,
+    },
+    /// A number that cannot be divided among the processes.
+    #[error("{name} is {value}: {of} processes need {needed}")]
+    Indivisible {
+        /// Its name in the file of settings.
+        name: &'static str,
+        /// Its value.
+        value: u64,
+        /// How many processes there are.
+        of: u32,
+        /// What it would have to be.
+        needed: String,
+    },
+    /// Another process of the run has ended, or cannot be reached.
+    #[error("another process of this run has ended or cannot be reached any more ({fault})")]
+    ProcessLost {
+        /// c10d's own words.
+        fault: String,
+    },
+    /// A run that ended because another of its processes did.
+    #[error("{lost}; the run ends after {step} steps, and {saved}")]
+    EndedEarly {
+        /// What happened.
+        lost: Box<TrainError>,
+        /// Steps made.
+        step: u64,
+        /// What became of the checkpoint.
+        saved: String,
+    },
     /// A loss that is not a number, or has grown out of all proportion.
     #[error(
         "at step {step} the loss {loss} is {value}: the run ends before this step is made; the batch is in {batch}"

@@ -9,7 +9,7 @@ use super::composer::Composition;
 use super::error::TrainError;
 use super::low_rank::{first_singular_values, rank_one};
 use super::paper_phases::equal_rows;
-use super::sample::{TruthArrays, TruthBatch};
+use super::sample::{DrawnSample, TruthArrays, TruthBatch};
 use super::turn_reader::{TurnReader, TurnTensors};
 use crate::synth::{Recipe, stream};
 
@@ -29,11 +29,14 @@ pub(super) struct HeldOutTurns(Vec<TurnTensors>);
 
 impl HeldOutTurns {
     /// Reads the batches of a data set.
-    pub(super) fn read(path: &Path, device: Device) -> Result<Self, TrainError> {
+    pub(super) fn read(path: &Path, kind: Kind, device: Device) -> Result<Self, TrainError> {
         let mut reader = TurnReader::open(path, stream(0x74_75_72_6e, 23))?;
         let mut batches = Vec::with_capacity(TURN_BATCHES);
         while batches.len() < TURN_BATCHES && reader.place().epoch == 0 {
-            batches.push(reader.next_batch(device)?);
+            batches.extend(reader.next_group(kind, device)?.frames);
+        }
+        if batches.is_empty() {
+            return Err(TrainError::NoFrames);
         }
         Ok(Self(batches))
     }
@@ -82,28 +85,37 @@ impl HeldOutSamples {
     }
 
     /// A batch of the first of them, at most as many as are taken at once.
-    pub(super) fn first(&self, device: Device) -> Result<TruthBatch, TrainError> {
-        let samples: Vec<&TruthArrays> = self.0.iter().take(SAMPLE_BATCH).collect();
-        TruthBatch::new(&samples, false, device)
+    pub(super) fn first(&self, kind: Kind, device: Device) -> Result<TruthBatch, TrainError> {
+        batch_of(&self.0[..self.0.len().min(SAMPLE_BATCH)], kind, device)
     }
 
     /// The mean of each figure over the samples.
     pub(super) fn figures(
         &self,
+        kind: Kind,
         device: Device,
         mut of: impl FnMut(&TruthBatch) -> Result<Vec<(&'static str, f64)>, TrainError>,
     ) -> Result<Figures, TrainError> {
         let mut sums = Figures::new();
         for samples in self.0.chunks(SAMPLE_BATCH) {
             let share = samples.len() as f64 / self.0.len() as f64;
-            let samples: Vec<&TruthArrays> = samples.iter().collect();
-            let batch = TruthBatch::new(&samples, false, device)?;
+            let batch = batch_of(samples, kind, device)?;
             for (name, value) in no_grad(|| of(&batch))? {
                 *sums.entry(name.to_owned()).or_default() += share * value;
             }
         }
         Ok(sums)
     }
+}
+
+/// A batch of samples as they are.
+fn batch_of(samples: &[TruthArrays], kind: Kind, device: Device) -> Result<TruthBatch, TrainError> {
+    let plain = |arrays| DrawnSample {
+        arrays,
+        mirrored: false,
+    };
+    let samples: Vec<DrawnSample<'_>> = samples.iter().map(plain).collect();
+    TruthBatch::new(&samples, kind, device)
 }
 
 /// How far pictures of one reflectance, `frames x channels x height x width`, are from being multiples of one: the

@@ -4,7 +4,7 @@
 //! `Event` of tensorboard/compat/proto/event.proto, of which scalars and pictures are written.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -35,6 +35,8 @@ impl Journal {
     pub fn open(folder: &Path, from_step: u64) -> Result<Self, TrainError> {
         let table_path = folder.join(TABLE);
         let table = open_table(&table_path, from_step).map_err(written(&table_path))?;
+        // Only for `is_open`; some file systems have no locks.
+        let _ = table.try_lock();
         let seconds = now();
         let events_path = folder.join(format!(
             "events.out.tfevents.{:010}.{from_step}",
@@ -53,6 +55,13 @@ impl Journal {
             ..Event::default()
         })?;
         Ok(journal)
+    }
+
+    /// Whether a run in a folder has its journal open.
+    #[must_use]
+    pub fn is_open(folder: &Path) -> bool {
+        let table = OpenOptions::new().append(true).open(folder.join(TABLE));
+        table.is_ok_and(|table| matches!(table.try_lock(), Err(TryLockError::WouldBlock)))
     }
 
     /// Writes the values of a step.
@@ -239,5 +248,15 @@ mod tests {
         journal.scalars(3, &values(0.5)).unwrap();
         let table = std::fs::read_to_string(folder.path().join(TABLE)).unwrap();
         assert_eq!(table, "step,series,value\n1,loss,1\n2,loss,2\n3,loss,0.5\n");
+    }
+
+    #[test]
+    fn a_journal_is_open_until_it_is_dropped() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(!Journal::is_open(folder.path()));
+        let journal = Journal::open(folder.path(), 0).unwrap();
+        assert!(Journal::is_open(folder.path()));
+        drop(journal);
+        assert!(!Journal::is_open(folder.path()));
     }
 }

@@ -10,6 +10,15 @@ use super::error::TrainError;
 /// Keeps a division by nothing from being one.
 const TINY: f64 = 1e-6;
 
+/// A mean, and what it is a mean over: so that the mean over several parts of a batch can be made of theirs.
+#[derive(Debug)]
+pub struct Mean {
+    /// The mean.
+    pub value: Tensor,
+    /// How much it is taken over, one number without gradient; above 0 where there is a mean.
+    pub over: Tensor,
+}
+
 /// Error that a factor of each picture cannot mend, as a part of the truth's energy: 0 for a multiple
 /// of the truth, 1 for nothing of it. (The scale-invariant error of Grosse et al. 2009, relative.)
 ///
@@ -67,13 +76,13 @@ pub fn windowed(
     Ok(rest.f_div(&all.f_add_scalar(TINY)?)?.f_mean(None)?)
 }
 
-/// Mean difference of the steps from pixel to pixel, for logarithms of pictures: what sharpens edges
-/// and leaves flat parts flat.
+/// Mean differences of the steps from pixel to pixel, down and across, for logarithms of pictures: what sharpens
+/// edges and leaves flat parts flat. Their sum is the loss.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tensor, TrainError> {
-    let along = |dimension: i64| -> Result<Tensor, tch::TchError> {
+pub fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<[Mean; 2], TrainError> {
+    let along = |dimension: i64| -> Result<Mean, tch::TchError> {
         let step = |of: &Tensor| {
             let length = of.size()[dimension as usize] - 1;
             Ok::<_, tch::TchError>((
@@ -86,27 +95,28 @@ pub fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tenso
         let error = found.0.f_sub(&found.1)?.f_sub(&truth.0.f_sub(&truth.1)?)?;
         let channels = error.size()[1] as f64;
         let sum = error.f_abs()?.f_mul(&both)?.f_sum(None)?;
-        sum.f_div(
-            &both
-                .f_sum(None)?
-                .f_mul_scalar(channels)?
-                .f_add_scalar(TINY)?,
-        )
+        let over = both
+            .f_sum(None)?
+            .f_mul_scalar(channels)?
+            .f_add_scalar(TINY)?;
+        let value = sum.f_div(&over)?;
+        Ok(Mean { value, over })
     };
-    Ok(along(2)?.f_add(&along(3)?)?)
+    Ok([along(2)?, along(3)?])
 }
 
 /// `1 - cos` of the angle between unit normals, mean under the weight.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Tensor, TrainError> {
+pub fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, TrainError> {
     let cosine = found
         .f_mul(truth)?
         .f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
     let error = cosine.f_neg()?.f_add_scalar(1.0)?.f_mul(weight)?;
-    let weights = weight.f_sum(None)?.f_add_scalar(TINY)?;
-    Ok(error.f_sum(None)?.f_div(&weights)?)
+    let over = weight.f_sum(None)?.f_add_scalar(TINY)?;
+    let value = error.f_sum(None)?.f_div(&over)?;
+    Ok(Mean { value, over })
 }
 
 /// Mean angle between unit normals under the weight, degrees.

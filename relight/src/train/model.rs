@@ -7,13 +7,26 @@ use tch::{Device, Kind, Tensor, no_grad};
 use super::error::TrainError;
 use crate::nets::{self, EPSILON, Graph, Node, Operation, Weights, check_size};
 
-/// In which precision layers are computed; parameters are always kept in 32 bits.
+/// In which precision layers are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ComputePrecision {
     /// 32 bits.
     Single,
-    /// bfloat16 inside convolutions, normalisations and layers; results come out in 32 bits.
+    /// bfloat16 inside convolutions, normalisations and layers; parameters and results have 32 bits.
     Mixed,
+    /// 64 bits, parameters and results too: for comparisons, in which rounding must not hide anything.
+    Double,
+}
+
+impl ComputePrecision {
+    /// The type of parameters, of what goes in and of what comes out.
+    #[must_use]
+    pub fn kind(self) -> Kind {
+        match self {
+            Self::Single | Self::Mixed => Kind::Float,
+            Self::Double => Kind::Double,
+        }
+    }
 }
 
 /// A network that can be trained.
@@ -41,7 +54,8 @@ impl Model {
             let shape: Vec<i64> = tensor.shape().iter().map(|&side| side as i64).collect();
             let tensor = Tensor::f_from_slice(tensor.values())?
                 .f_reshape(shape)?
-                .f_to_device(device)?;
+                .f_to_device(device)?
+                .f_to_kind(precision.kind())?;
             let tensor = channels_last(&tensor)?.f_set_requires_grad(true)?;
             parameters.insert(name.to_owned(), tensor);
         }
@@ -73,6 +87,19 @@ impl Model {
         &self.parameters
     }
 
+    /// Computes its layers in another precision of the same [`ComputePrecision::kind`] from now on.
+    pub(super) fn set_precision(&mut self, precision: ComputePrecision) {
+        if precision.kind() == self.precision.kind() {
+            self.precision = precision;
+        }
+    }
+
+    /// In which precision its layers are computed.
+    #[must_use]
+    pub fn precision(&self) -> ComputePrecision {
+        self.precision
+    }
+
     /// Whether gradients are wanted of its parameters: no for a network that another is trained on.
     ///
     /// # Errors
@@ -80,6 +107,17 @@ impl Model {
     pub fn set_trainable(&mut self, trainable: bool) -> Result<(), TrainError> {
         for parameter in self.parameters.values_mut() {
             *parameter = parameter.f_set_requires_grad(trainable)?;
+        }
+        Ok(())
+    }
+
+    /// Adds 0 to the gradient of every parameter, so that all have one.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub(super) fn add_zero_gradients(&self) -> Result<(), TrainError> {
+        for parameter in self.parameters.values() {
+            parameter.f_sum(None)?.f_mul_scalar(0.0)?.f_backward()?;
         }
         Ok(())
     }
@@ -100,8 +138,8 @@ impl Model {
         to_weights(&self.parameters)
     }
 
-    /// The outputs for a batch of pictures (`batch x channels x height x width`), in the graph's order,
-    /// 32-bit.
+    /// The outputs for a batch of pictures (`batch x channels x height x width`), in the graph's order, of the
+    /// precision's [`ComputePrecision::kind`].
     ///
     /// # Errors
     /// [`nets::NetError::PictureSize`] or [`TrainError::Torch`].
@@ -123,7 +161,7 @@ impl Model {
         }
         let outputs = self.graph.outputs().iter();
         outputs
-            .map(|output| Ok(values[output.value.index()].f_to_kind(Kind::Float)?))
+            .map(|output| Ok(values[output.value.index()].f_to_kind(self.precision.kind())?))
             .collect()
     }
 
@@ -136,6 +174,7 @@ impl Model {
         tensor.f_to_kind(match self.precision {
             ComputePrecision::Single => Kind::Float,
             ComputePrecision::Mixed => Kind::BFloat16,
+            ComputePrecision::Double => Kind::Double,
         })
     }
 
@@ -232,7 +271,7 @@ pub(super) fn copy_into(
     })
 }
 
-/// Tensors of any device as weights.
+/// Tensors of any device as weights, which have 32 bits.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
@@ -241,6 +280,7 @@ pub(super) fn to_weights(tensors: &BTreeMap<String, Tensor>) -> Result<Weights, 
         let flat = tensor.f_detach().and_then(|tensor| {
             tensor
                 .f_to_device(Device::Cpu)?
+                .f_to_kind(Kind::Float)?
                 .f_contiguous()?
                 .f_reshape([-1])
         });

@@ -14,7 +14,7 @@
 use tch::Tensor;
 
 use super::error::TrainError;
-use super::losses::{angular, scale_invariant};
+use super::losses::{Mean, angular, scale_invariant};
 use super::low_rank::{LowRankForm, chromaticity, low_rank_loss};
 use super::model::Model;
 use super::paper_layers::{
@@ -178,7 +178,7 @@ pub fn spec_on_turns(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<Tensor, TrainError> {
+pub fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
     let found = highlight_of(spec, &batch.picture, &batch.mask)?;
     let truth = batch.highlight.f_clamp(0.0, 1.0)?;
     let emphasis = truth
@@ -187,15 +187,16 @@ pub fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<Tensor, TrainEr
         .f_add_scalar(1.0)?
         .f_mul(&batch.mask)?;
     let error = found.f_sub(&truth)?.f_abs()?.f_mul(&emphasis)?;
-    let pixels = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
-    Ok(error.f_sum(None)?.f_div(&pixels)?.f_mul_scalar(1.0 / 3.0)?)
+    let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
+    let value = error.f_sum(None)?.f_div(&over)?.f_mul_scalar(1.0 / 3.0)?;
+    Ok(Mean { value, over })
 }
 
 /// `1 - cos` of Normal-Net's normals on composed samples.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<Tensor, TrainError> {
+pub fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
     let found = normals_of(normal, &batch.picture, &batch.mask)?;
     angular(&found, &batch.normals, &batch.mask)
 }
@@ -204,11 +205,13 @@ pub fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<Tensor, Tra
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<Tensor, TrainError> {
+pub fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
     let coefficients = light_of(light, &batch.picture, &batch.mask)?;
     let shading = diffuse_shading(&batch.normals, &coefficients, DiffuseForm::Released)?;
     let grey = shading.f_mean_dim([1_i64].as_slice(), true, None)?;
-    scale_invariant(&grey, &batch.shading, &batch.mask)
+    let value = scale_invariant(&grey, &batch.shading, &batch.mask)?;
+    let over = Tensor::f_from_slice(&[batch.mask.size()[0]])?;
+    Ok(Mean { value, over })
 }
 
 /// Low-rank loss of the reflectance.

@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use tch::{Kind, Tensor};
+
 use super::composed::{ComposedBatches, composition, window_settings};
 use super::decompose_task::Resources;
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, HeldOutTurns, highlight_figures, rank_figures};
 use super::learner::{Learner, LearnerSettings};
-use super::losses::angular_degrees;
+use super::losses::{Mean, angular_degrees};
 use super::low_rank::chromaticity;
 use super::model::{ComputePrecision, Model};
 use super::paper_phases::{
@@ -16,10 +18,12 @@ use super::paper_phases::{
     reflectance, reflectance_on_turns, saturated_frames, spec_on_truth, spec_on_turns,
     specular_on_turns,
 };
+use super::process_group::ProcessGroup;
 use super::run::{StepLosses, Task, Validation};
 use super::sample::TruthBatch;
 use super::settings::{PaperSettings, PrecisionChoice};
-use super::turn_reader::{TurnReader, TurnTensors};
+use super::turn_reader::{TurnGroup, TurnReader, TurnTensors};
+use crate::data::Share;
 use crate::nets::paper::{Head, light_net, normal_net, reflectance_net, spec_net};
 use crate::nets::{Graph, Weights};
 use crate::synth::stream;
@@ -51,6 +55,7 @@ pub struct PaperTask {
     learner: Learner,
     composed: ComposedBatches,
     turns: Option<TurnReader>,
+    share: Share,
     held_out_samples: HeldOutSamples,
     held_out_turns: Option<HeldOutTurns>,
 }
@@ -102,7 +107,9 @@ impl PaperTask {
         };
         let seed = stream(settings.run.seed, 31);
         let open = |path: &PathBuf| TurnReader::open(path, seed);
-        let held_out = |path: &PathBuf| HeldOutTurns::read(path, resources.device);
+        let held_out = |path: &PathBuf| {
+            HeldOutTurns::read(path, precision(&settings).kind(), resources.device)
+        };
         let composition = Arc::new(composition(&settings.data, settings.run.seed)?);
         // On them, nothing is known of the paper's smoothness.
         let samples = match phase {
@@ -118,12 +125,51 @@ impl PaperTask {
             composed: ComposedBatches::new(
                 composition,
                 window_settings(&settings.data, &settings.run),
+                precision(&settings).kind(),
                 resources,
             ),
             turns: inputs.turns.as_ref().map(open).transpose()?,
+            share: Share::ALL,
             settings,
             resources,
         })
+    }
+
+    /// The type of what goes into the network.
+    fn kind(&self) -> Kind {
+        precision(&self.settings).kind()
+    }
+
+    /// The losses on this process's groups of a step.
+    fn on_turns(&mut self, losses: &mut StepLosses) -> Result<(), TrainError> {
+        let kind = self.kind();
+        let Some(reader) = &mut self.turns else {
+            return Ok(());
+        };
+        let (mut values, mut damage) = (Vec::new(), Vec::new());
+        for group in 0..self.settings.turns.groups / u64::from(self.share.of()) {
+            let TurnGroup {
+                frames,
+                damage: found,
+            } = reader.next_group(kind, self.resources.device)?;
+            damage.extend(found);
+            if let Some(turns) = frames {
+                let own = &self.learner.model;
+                values.extend(self.phase.on_turns(own, &turns, &self.settings)?);
+                let name = format!("turns.{group}");
+                losses.batch.insert(name, turns.picture);
+            }
+        }
+        losses.damage = (!damage.is_empty()).then(|| damage.join("; "));
+        let weight = self.settings.loss.low_rank;
+        if values.is_empty() {
+            losses.terms.add_nothing("turns", weight);
+        } else {
+            let over = Tensor::f_from_slice(&[values.len() as i64])?;
+            let value = Tensor::f_stack(&values, 0)?.f_mean(None)?;
+            losses.terms.add_mean("turns", weight, Mean { value, over });
+        }
+        Ok(())
     }
 
     /// What composed samples count: all, where there are no turns.
@@ -178,7 +224,7 @@ impl Phase {
     }
 
     /// The loss on a batch of composed samples; none where the phase has none.
-    fn on_truth(&self, own: &Model, batch: &TruthBatch) -> Result<Option<tch::Tensor>, TrainError> {
+    fn on_truth(&self, own: &Model, batch: &TruthBatch) -> Result<Option<Mean>, TrainError> {
         match self {
             Self::Spec => spec_on_truth(own, batch).map(Some),
             Self::Normal | Self::Joint { .. } => normal_on_truth(own, batch).map(Some),
@@ -206,7 +252,7 @@ impl Phase {
                 vec![("normals_deg", f64::try_from(degrees)?)]
             }
             Self::Light { .. } => {
-                vec![("shading", f64::try_from(light_on_truth(own, batch)?)?)]
+                vec![("shading", f64::try_from(light_on_truth(own, batch)?.value)?)]
             }
             Self::Specular { .. } => Vec::new(),
         })
@@ -219,6 +265,13 @@ impl Phase {
         own: &Model,
         turns: &TurnTensors,
     ) -> Result<Vec<(&'static str, f64)>, TrainError> {
+        let whole = |found| {
+            (
+                turns.picture.shallow_clone(),
+                found,
+                turns.mask.shallow_clone(),
+            )
+        };
         let (raw, found, mask) = match self {
             Self::Spec => {
                 let Some((picture, mask)) = saturated_frames(turns)? else {
@@ -227,22 +280,8 @@ impl Phase {
                 let found = diffuse_chromaticity(own, &picture, &mask)?;
                 (chromaticity(&picture)?, found, mask)
             }
-            Self::Light { normal, spec } => {
-                let found = reflectance(normal, own, spec.as_ref(), turns)?;
-                (
-                    turns.picture.shallow_clone(),
-                    found,
-                    turns.mask.shallow_clone(),
-                )
-            }
-            Self::Joint { light, spec } => {
-                let found = reflectance(own, light, spec.as_ref(), turns)?;
-                (
-                    turns.picture.shallow_clone(),
-                    found,
-                    turns.mask.shallow_clone(),
-                )
-            }
+            Self::Light { normal, spec } => whole(reflectance(normal, own, spec.as_ref(), turns)?),
+            Self::Joint { light, spec } => whole(reflectance(own, light, spec.as_ref(), turns)?),
             Self::Normal | Self::Specular { .. } => return Ok(Vec::new()),
         };
         let (raw, found) = (rank_figures(&raw, &mask)?, rank_figures(&found, &mask)?);
@@ -260,7 +299,7 @@ impl Phase {
         own: &Model,
         turns: &TurnTensors,
         settings: &PaperSettings,
-    ) -> Result<Option<tch::Tensor>, TrainError> {
+    ) -> Result<Option<Tensor>, TrainError> {
         let form = settings.loss.form;
         match self {
             Self::Spec => spec_on_turns(own, turns, form),
@@ -294,27 +333,42 @@ impl Task for PaperTask {
         vec![&mut self.learner]
     }
 
+    fn inputs(&self) -> String {
+        let turns = self.turns.as_ref().map(TurnReader::turns);
+        format!("{turns:?}")
+    }
+
+    fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
+        let (share, groups) = (group.share(), self.settings.turns.groups);
+        if self.anchor() > 0.0 {
+            self.composed.take_share(share)?;
+        }
+        if let Some(reader) = &mut self.turns {
+            if !groups.is_multiple_of(u64::from(share.of())) {
+                return Err(TrainError::Indivisible {
+                    name: "turns.groups",
+                    value: groups,
+                    of: share.of(),
+                    needed: format!("a multiple of {}", share.of()),
+                });
+            }
+            reader.take_share(share)?;
+        }
+        self.share = share;
+        Ok(())
+    }
+
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
         let mut losses = StepLosses::default();
         let anchor = self.anchor();
         if anchor > 0.0 {
             let batch = self.composed.batch(step)?;
             if let Some(loss) = self.phase.on_truth(&self.learner.model, &batch)? {
-                losses.terms.add("truth", anchor, loss);
+                losses.terms.add_mean("truth", anchor, loss);
             }
             losses.batch.extend(batch.named());
         }
-        if let Some(reader) = &mut self.turns {
-            let turns = reader.next_batch(self.resources.device)?;
-            let loss = self
-                .phase
-                .on_turns(&self.learner.model, &turns, &self.settings)?;
-            if let Some(loss) = loss {
-                losses.terms.add("turns", self.settings.loss.low_rank, loss);
-            }
-            losses.batch.insert("turns".to_owned(), turns.picture);
-            losses.damage = turns.damage;
-        }
+        self.on_turns(&mut losses)?;
         Ok(losses)
     }
 
@@ -323,7 +377,9 @@ impl Task for PaperTask {
         let device = self.resources.device;
         let mut figures = self
             .held_out_samples
-            .figures(device, |batch| self.phase.sample_figures(&own, batch))?;
+            .figures(self.kind(), device, |batch| {
+                self.phase.sample_figures(&own, batch)
+            })?;
         if let Some(turns) = &self.held_out_turns {
             figures.extend(turns.figures(|turns| self.phase.turn_figures(&own, turns))?);
         }
@@ -371,6 +427,7 @@ fn learned(phase: PaperPhase) -> Graph {
 fn precision(settings: &PaperSettings) -> ComputePrecision {
     match settings.run.precision {
         PrecisionChoice::Mixed => ComputePrecision::Mixed,
+        PrecisionChoice::Double => ComputePrecision::Double,
         PrecisionChoice::Single | PrecisionChoice::Fastest => ComputePrecision::Single,
     }
 }

@@ -1,5 +1,8 @@
 //! A run: steps, one after the other, with what is logged, validated and saved on the way. Knows nothing of
 //! what is trained.
+//!
+//! Several processes make a run together as one would: each computes its part of every batch, the gradients are
+//! summed, and all make the same step. Process 0 validates, and writes the run's files.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -7,17 +10,24 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use relit_data::causes::with_causes;
 use tch::Tensor;
 
+use super::agreement::{Fact, agree, fingerprint};
 use super::checkpoint::Checkpoint;
 use super::error::TrainError;
 use super::guard::Guard;
+use super::joint::JointLosses;
 use super::journal::Journal;
 use super::learner::Learner;
 use super::model::to_weights;
+use super::process_group::ProcessGroup;
 use super::settings::RunSettings;
 use super::terms::Terms;
 use crate::nets::{WeightPrecision, Weights};
+
+/// How long a process waits for process 0 to write its checkpoint and end, where the run ends early.
+const SUCCESSION: Duration = Duration::from_secs(60);
 
 /// What is trained.
 pub trait Task {
@@ -27,10 +37,22 @@ pub trait Task {
     /// The settings that make the run what it is, as TOML.
     fn settings(&self) -> String;
 
+    /// What it was given beside its settings, as text that is the same where that is.
+    fn inputs(&self) -> String {
+        String::new()
+    }
+
+    /// Takes this process's part of the work from now on. Called before the first step.
+    ///
+    /// # Errors
+    /// [`TrainError::Indivisible`] where the settings leave no equal parts.
+    fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError>;
+
     /// The networks that learn.
     fn learners(&mut self) -> Vec<&mut Learner>;
 
-    /// The losses of a step, from 0. Steps are asked for one after the other.
+    /// The losses of a step, from 0, on this process's part of its batch; always the same ones, in the same order. Steps
+    /// are asked for one after the other.
     ///
     /// # Errors
     /// Whatever keeps the step from being computed.
@@ -97,9 +119,9 @@ pub struct RunOutcome {
     pub steps: u64,
     /// Whether it was asked to stop before its last step.
     pub stopped: bool,
-    /// Figures of the last validation.
+    /// Figures of the last validation; none in other processes than the first.
     pub figures: BTreeMap<String, f64>,
-    /// The files of weights.
+    /// The files of weights, which the first process writes.
     pub weights: Vec<PathBuf>,
 }
 
@@ -108,9 +130,13 @@ pub struct Run<'a> {
     task: &'a mut dyn Task,
     settings: &'a RunSettings,
     folder: &'a Path,
-    journal: Journal,
+    group: Option<ProcessGroup>,
+    /// Of the first process.
+    journal: Option<Journal>,
     guard: Guard,
     step: u64,
+    /// Where the task stands after that step.
+    place: String,
 }
 
 impl<'a> Run<'a> {
@@ -123,6 +149,20 @@ impl<'a> Run<'a> {
         settings: &'a RunSettings,
         folder: &'a Path,
         resume: bool,
+    ) -> Result<Self, TrainError> {
+        Self::open_among(task, settings, folder, resume, None)
+    }
+
+    /// The same among the processes of a group, all of which open the run, with the same arguments.
+    ///
+    /// # Errors
+    /// Those of [`Self::open`]; [`TrainError::Disagreement`], [`TrainError::Indivisible`], [`TrainError::ProcessLost`].
+    pub fn open_among(
+        task: &'a mut dyn Task,
+        settings: &'a RunSettings,
+        folder: &'a Path,
+        resume: bool,
+        group: Option<ProcessGroup>,
     ) -> Result<Self, TrainError> {
         settings.check()?;
         fs::create_dir_all(folder).map_err(|source| TrainError::Io {
@@ -139,11 +179,18 @@ impl<'a> Run<'a> {
             }
             Some(checkpoint) => recall(task, &checkpoint, folder)?,
         };
+        if let Some(group) = &group {
+            agree(group, &facts(task, step)?)?;
+            task.join(group)?;
+        }
+        let is_first = group.as_ref().is_none_or(ProcessGroup::is_first);
         Ok(Self {
+            place: task.place(),
             task,
             settings,
             folder,
-            journal: Journal::open(folder, step)?,
+            group,
+            journal: is_first.then(|| Journal::open(folder, step)).transpose()?,
             guard: Guard::default(),
             step,
         })
@@ -155,15 +202,46 @@ impl<'a> Run<'a> {
         self.step
     }
 
-    /// Makes all steps that are left, or those until `stop` is set; saves the run and the averaged weights at the end.
+    /// Makes all steps that are left, or those until `stop` is set in one of the processes; saves the run and the averaged
+    /// weights at the end.
     ///
     /// # Errors
-    /// Whatever a step fails with: the last checkpoint stays.
+    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::EndedEarly`] where another process is lost: the
+    /// run is saved.
     pub fn finish(
         mut self,
         stop: &AtomicBool,
         observer: &mut dyn TrainObserver,
     ) -> Result<RunOutcome, TrainError> {
+        let figures = match self.make_steps(stop, observer) {
+            Ok(figures) => figures,
+            Err(lost @ TrainError::ProcessLost { .. }) => {
+                return Err(self.end_early(lost, observer));
+            }
+            Err(fault) => return Err(fault),
+        };
+        if let Some(group) = self.group.take() {
+            group.leave();
+        }
+        let mut weights = Vec::new();
+        if self.journal.is_some() {
+            self.save(observer)?;
+            weights = self.write_weights()?;
+        }
+        Ok(RunOutcome {
+            steps: self.step,
+            stopped: self.step < self.settings.steps,
+            figures,
+            weights,
+        })
+    }
+
+    /// Figures of the last validation.
+    fn make_steps(
+        &mut self,
+        stop: &AtomicBool,
+        observer: &mut dyn TrainObserver,
+    ) -> Result<BTreeMap<String, f64>, TrainError> {
         let between = Duration::from_secs_f64(60.0 * self.settings.checkpoint_minutes);
         let mut saved = Instant::now();
         // Where training begins, so that it shows what it has changed.
@@ -172,8 +250,17 @@ impl<'a> Run<'a> {
         } else {
             BTreeMap::new()
         };
-        while self.step < self.settings.steps && !stop.load(Ordering::Relaxed) {
-            self.make_step(observer)?;
+        let mut stopped = false;
+        while self.step < self.settings.steps && !stopped {
+            let asked = stop.load(Ordering::Relaxed);
+            if asked && self.group.is_none() {
+                break;
+            }
+            // Processes of a group stop after the same step, the one in which the first of them is asked to.
+            stopped = self.make_step(asked, observer)?;
+            if self.journal.is_none() {
+                continue;
+            }
             if self.step.is_multiple_of(self.settings.validate_every)
                 || self.step == self.settings.steps
             {
@@ -184,66 +271,144 @@ impl<'a> Run<'a> {
                 saved = Instant::now();
             }
         }
-        self.save(observer)?;
-        Ok(RunOutcome {
-            steps: self.step,
-            stopped: self.step < self.settings.steps,
-            figures,
-            weights: self.write_weights()?,
-        })
+        Ok(figures)
     }
 
-    fn make_step(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
+    /// Makes a step; whether one of the processes was asked to stop.
+    fn make_step(
+        &mut self,
+        stop: bool,
+        observer: &mut dyn TrainObserver,
+    ) -> Result<bool, TrainError> {
         let rate = self.settings.rate_at(self.step);
         let losses = self.task.step(self.step)?;
         if let Some(damage) = &losses.damage {
             observer.damaged(self.step, damage);
         }
-        if losses.terms.is_empty() {
-            // A batch on which nothing can be learned, as one for which the gate of saturation is closed.
-            self.step += 1;
-            return Ok(());
+        let joint = match &self.group {
+            Some(group) => JointLosses::of(&losses, stop, group)?,
+            None => JointLosses::alone(&losses)?,
+        };
+        // Of some batches nothing can be learned, as of those for which the gate of saturation is closed.
+        if !joint.values.is_empty() {
+            self.check(&losses, &joint)?;
+            let length = self.descend(&losses, &joint, rate)?;
+            self.log(&joint, rate, length, observer)?;
         }
-        let total = losses.terms.total()?;
-        let mut values: BTreeMap<String, f64> = BTreeMap::new();
-        for (name, value) in losses.terms.values()? {
-            values.insert(format!("loss/{name}"), value);
-        }
-        values.insert("loss".to_owned(), f64::try_from(&total)?);
-        let folder = self.folder;
-        self.guard.check(self.step, &values, &losses.spreads, || {
-            let path = folder.join(format!("bad-batch-{}.safetensors", self.step));
+        self.step += 1;
+        self.place = self.task.place();
+        Ok(joint.stop)
+    }
+
+    /// Ends the run where something is wrong with the losses of a step.
+    fn check(&mut self, losses: &StepLosses, joint: &JointLosses) -> Result<(), TrainError> {
+        let (step, folder) = (self.step, self.folder);
+        let process = match &self.group {
+            Some(group) => format!("-process-{}", group.share().index()),
+            None => String::new(),
+        };
+        self.guard.check(step, &joint.values, &joint.spreads, || {
+            let path = folder.join(format!("bad-batch-{step}{process}.safetensors"));
             to_weights(&losses.batch)?.write(&path, WeightPrecision::Single)?;
             Ok(path)
-        })?;
-        total.f_backward()?;
+        })
+    }
+
+    /// Goes down the joint loss; the length of its gradient.
+    fn descend(
+        &mut self,
+        losses: &StepLosses,
+        joint: &JointLosses,
+        rate: f64,
+    ) -> Result<f64, TrainError> {
+        match joint.part(losses)? {
+            Some(part) => part.f_backward()?,
+            None => {
+                for learner in self.task.learners() {
+                    learner.model.add_zero_gradients()?;
+                }
+            }
+        }
+        if let Some(group) = &self.group {
+            for learner in self.task.learners() {
+                group.sum_gradients(learner.model.parameters())?;
+            }
+        }
         let mut length = 0.0_f64;
         for learner in self.task.learners() {
             length = length.hypot(learner.learn(rate, self.settings.longest_gradient)?);
         }
-        self.step += 1;
-        observer.step(self.step, &values);
-        if self.step.is_multiple_of(self.settings.log_every) {
-            values.insert("rate".to_owned(), rate);
-            values.insert("gradient".to_owned(), length);
-            for (head, spread) in &losses.spreads {
-                values.insert(format!("spread/{head}"), *spread);
-            }
-            self.journal.scalars(self.step, &values)?;
+        Ok(length)
+    }
+
+    fn log(
+        &mut self,
+        joint: &JointLosses,
+        rate: f64,
+        gradient: f64,
+        observer: &mut dyn TrainObserver,
+    ) -> Result<(), TrainError> {
+        let step = self.step + 1;
+        observer.step(step, &joint.values);
+        let Some(journal) = &mut self.journal else {
+            return Ok(());
+        };
+        if !step.is_multiple_of(self.settings.log_every) {
+            return Ok(());
         }
-        Ok(())
+        let mut values = joint.values.clone();
+        values.insert("rate".to_owned(), rate);
+        values.insert("gradient".to_owned(), gradient);
+        for (head, spread) in &joint.spreads {
+            values.insert(format!("spread/{head}"), *spread);
+        }
+        journal.scalars(step, &values)
+    }
+
+    /// Ends the run of which another process is lost: the first of those that are left saves it.
+    fn end_early(&mut self, lost: TrainError, observer: &mut dyn TrainObserver) -> TrainError {
+        let path = Checkpoint::path(self.folder);
+        let path = path.display();
+        let saved = match self.save_as_successor(observer) {
+            Ok(()) => format!("its checkpoint is {path}: start all processes again with --resume"),
+            Err(fault) => format!("it could not be saved: {}", with_causes(&fault)),
+        };
+        TrainError::EndedEarly {
+            lost: Box::new(lost),
+            step: self.step,
+            saved,
+        }
+    }
+
+    /// Saves the run in process 0, and in others where that has ended and has not.
+    fn save_as_successor(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
+        if self.journal.is_none() {
+            let begun = Instant::now();
+            while Journal::is_open(self.folder) && begun.elapsed() < SUCCESSION {
+                std::thread::sleep(Duration::from_millis(200));
+            }
+            // A checkpoint that cannot be read is replaced.
+            let found = Checkpoint::read(self.folder).ok().flatten();
+            if found.is_some_and(|checkpoint| checkpoint.step >= self.step) {
+                return Ok(());
+            }
+        }
+        self.save(observer)
     }
 
     fn validate(
         &mut self,
         observer: &mut dyn TrainObserver,
     ) -> Result<BTreeMap<String, f64>, TrainError> {
+        let Some(journal) = &mut self.journal else {
+            return Ok(BTreeMap::new());
+        };
         let Validation { figures, sheet } = self.task.validate()?;
         let named: BTreeMap<String, f64> = figures
             .iter()
             .map(|(name, value)| (format!("validation/{name}"), *value))
             .collect();
-        self.journal.scalars(self.step, &named)?;
+        journal.scalars(self.step, &named)?;
         if let Some((png, size)) = sheet {
             let path = self.folder.join("validation.png");
             relit_data::durable::write_whole(&path, &png).map_err(|source| TrainError::Io {
@@ -251,7 +416,7 @@ impl<'a> Run<'a> {
                 doing: "written",
                 source,
             })?;
-            self.journal.picture(self.step, "validation", size, png)?;
+            journal.picture(self.step, "validation", size, png)?;
         }
         observer.validated(self.step, &figures);
         Ok(figures)
@@ -266,7 +431,7 @@ impl<'a> Run<'a> {
             task: self.task.name().to_owned(),
             step: self.step,
             settings: self.task.settings(),
-            place: self.task.place(),
+            place: self.place.clone(),
             state,
         }
         .write(self.folder)?;
@@ -287,6 +452,22 @@ impl<'a> Run<'a> {
             })
             .collect()
     }
+}
+
+/// What has to be the same in all processes.
+fn facts(task: &mut dyn Task, step: u64) -> Result<Vec<Fact>, TrainError> {
+    let version = format!("{} {}", env!("CARGO_PKG_VERSION"), task.name());
+    let mut weights = String::new();
+    for learner in task.learners() {
+        weights += &fingerprint(learner.model.parameters())?;
+    }
+    Ok(vec![
+        ("version and task", version),
+        ("the settings", task.settings()),
+        ("the turns", task.inputs()),
+        ("the steps made before", step.to_string()),
+        ("the weights", weights),
+    ])
 }
 
 /// Brings a task to a checkpoint; its step.

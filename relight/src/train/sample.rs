@@ -33,7 +33,16 @@ pub struct TruthArrays {
     values: Vec<f16>,
 }
 
-/// A batch of them on a device, 32 bits, `batch x channels x height x width`.
+/// A sample in a batch.
+#[derive(Debug, Clone, Copy)]
+pub struct DrawnSample<'a> {
+    /// The sample.
+    pub arrays: &'a TruthArrays,
+    /// Whether it is turned from right to left, normals and all.
+    pub mirrored: bool,
+}
+
+/// A batch of them on a device, `batch x channels x height x width`.
 #[derive(Debug)]
 pub struct TruthBatch {
     /// What the network sees.
@@ -136,29 +145,28 @@ fn linear(sample: &SynthSample<'_>, linearisation: Linearisation) -> Planes<3> {
 }
 
 impl TruthBatch {
-    /// A batch on a device; every second sample is mirrored, normals and all, where `mirror` is set. All samples have one size.
+    /// A batch of samples of one size, on a device, in 32 or 64 bits.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub fn new(samples: &[&TruthArrays], mirror: bool, device: Device) -> Result<Self, TrainError> {
+    pub fn new(
+        samples: &[DrawnSample<'_>],
+        kind: Kind,
+        device: Device,
+    ) -> Result<Self, TrainError> {
         let extent = samples
             .first()
-            .map_or(Extent::new(0, 0), |first| first.extent);
+            .map_or(Extent::new(0, 0), |first| first.arrays.extent);
         let each = PLANES * extent.pixels();
         let mut bytes = vec![0_u8; 2 * each * samples.len()];
         bytes
             .par_chunks_exact_mut(2 * each.max(1))
             .zip(samples)
-            .for_each(|(to, sample)| {
-                for (to, from) in to.chunks_exact_mut(2).zip(&sample.values) {
-                    to.copy_from_slice(&from.to_le_bytes());
-                }
-            });
+            .for_each(|(to, sample)| sample.write(to));
         let shape = [samples.len(), PLANES, extent.height, extent.width].map(|n| n as i64);
         let all = Tensor::f_from_data_size(&bytes, &shape, Kind::Half)?
             .f_to_device(device)?
-            .f_to_kind(Kind::Float)?;
-        let all = if mirror { mirrored(&all)? } else { all };
+            .f_to_kind(kind)?;
         let part = |from: usize, count: usize| all.f_narrow(1, from as i64, count as i64);
         Ok(Self {
             input: part(0, INPUTS)?,
@@ -189,12 +197,56 @@ impl TruthBatch {
     }
 }
 
-/// The second half of a batch from right to left; x of its normals changes sign.
-fn mirrored(all: &Tensor) -> Result<Tensor, tch::TchError> {
-    let count = all.size()[0];
-    let kept = all.f_narrow(0, 0, count / 2)?;
-    let turned = all.f_narrow(0, count / 2, count - count / 2)?.f_flip([3])?;
-    let mut x = turned.f_narrow(1, INPUTS as i64 + 7, 1)?;
-    let _ = x.f_neg_()?;
-    Tensor::f_cat(&[kept, turned], 0)
+/// The plane of the normals' x.
+const NORMAL_X: usize = INPUTS + 7;
+
+impl DrawnSample<'_> {
+    /// Writes the planes one after the other, two bytes a value.
+    fn write(&self, to: &mut [u8]) {
+        let Extent { width, .. } = self.arrays.extent;
+        let pixels = self.arrays.extent.pixels();
+        let rows = self.arrays.values.chunks_exact(width.max(1));
+        for (row, (to, from)) in to.chunks_exact_mut(2 * width.max(1)).zip(rows).enumerate() {
+            let (to, _) = to.as_chunks_mut::<2>();
+            let is_x = row * width / pixels == NORMAL_X;
+            match (self.mirrored, is_x) {
+                (false, _) => fill(to, from.iter().copied()),
+                (true, false) => fill(to, from.iter().rev().copied()),
+                (true, true) => fill(to, from.iter().rev().map(|&x| -x)),
+            }
+        }
+    }
+}
+
+fn fill(to: &mut [[u8; 2]], from: impl Iterator<Item = f16>) {
+    for (to, value) in to.iter_mut().zip(from) {
+        *to = value.to_le_bytes();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mirrored_sample_is_turned_from_right_to_left_and_x_of_its_normals_changes_sign() {
+        let extent = Extent::new(3, 2);
+        let values = (0..PLANES * 6).map(|value| f16::from_f32(value as f32));
+        let arrays = TruthArrays {
+            extent,
+            values: values.collect(),
+        };
+        let batch = |mirrored: bool| {
+            let arrays = &arrays;
+            let sample = DrawnSample { arrays, mirrored };
+            TruthBatch::new(&[sample], Kind::Float, Device::Cpu).unwrap()
+        };
+        let (plain, mirrored) = (batch(false), batch(true));
+        let flipped = |of: &Tensor| of.flip([3]);
+        assert_eq!(mirrored.input, flipped(&plain.input));
+        assert_eq!(mirrored.highlight, flipped(&plain.highlight));
+        let (normals, found) = (flipped(&plain.normals), mirrored.normals);
+        assert_eq!(found.narrow(1, 0, 1), -normals.narrow(1, 0, 1));
+        assert_eq!(found.narrow(1, 1, 2), normals.narrow(1, 1, 2));
+    }
 }

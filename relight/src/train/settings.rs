@@ -56,7 +56,9 @@ pub enum PrecisionChoice {
     Single,
     /// bfloat16.
     Mixed,
-    /// The faster of both, by a short measurement when the run begins; a resumed run measures again.
+    /// 64 bits, several times slower: to compare runs. Checkpoints keep 32 of them.
+    Double,
+    /// The faster of single and mixed, by a short measurement when the run begins; a resumed run measures again.
     Fastest,
 }
 
@@ -168,6 +170,20 @@ impl Default for PaperLosses {
     }
 }
 
+/// What a step takes from turns: the table `[turns]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TurnSettings {
+    /// Groups of a step, at least 1, each of 12 frames of one turn.
+    pub groups: u64,
+}
+
+impl Default for TurnSettings {
+    fn default() -> Self {
+        Self { groups: 1 }
+    }
+}
+
 /// The settings of `relight train spec`, `normal`, `light`, `joint` and `specular`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -176,6 +192,8 @@ pub struct PaperSettings {
     pub run: RunSettings,
     /// On what.
     pub data: DataSettings,
+    /// What a step takes from turns.
+    pub turns: TurnSettings,
     /// What each loss counts.
     pub loss: PaperLosses,
 }
@@ -187,7 +205,15 @@ impl PaperSettings {
     /// [`TrainError::Setting`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
         self.run.check()?;
-        self.data.check()
+        self.data.check()?;
+        if self.turns.groups == 0 {
+            return Err(TrainError::Setting {
+                name: "turns.groups",
+                value: "0".to_owned(),
+                allowed: "at least 1",
+            });
+        }
+        Ok(())
     }
 }
 

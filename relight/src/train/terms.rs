@@ -1,45 +1,100 @@
 //! The losses of a step, by name.
 
+use std::collections::BTreeMap;
+
 use tch::Tensor;
 
 use super::error::TrainError;
+use super::losses::Mean;
 
 /// Losses with their weights. Their weighted sum is what is descended.
 #[derive(Debug, Default)]
-pub struct Terms(Vec<(&'static str, f64, Tensor)>);
+pub struct Terms(Vec<Term>);
+
+#[derive(Debug)]
+struct Term {
+    name: &'static str,
+    weight: f64,
+    mean: Option<Mean>,
+}
 
 impl Terms {
-    /// Adds a loss.
-    pub fn add(&mut self, name: &'static str, weight: f64, loss: Tensor) {
-        self.0.push((name, weight, loss));
-    }
-
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
-    /// The weighted sum.
+    /// Adds a loss that is a mean over the samples of the batch. Where several processes share a batch, each has as many
+    /// of them.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub fn total(&self) -> Result<Tensor, TrainError> {
-        let mut total = Tensor::from(0.0_f32);
-        for (_, weight, loss) in &self.0 {
-            total = total.f_add(&loss.f_mul_scalar(*weight)?)?;
+    pub fn add(
+        &mut self,
+        name: &'static str,
+        weight: f64,
+        value: Tensor,
+    ) -> Result<(), TrainError> {
+        let over = Tensor::f_from_slice(&[1.0_f64])?;
+        self.add_mean(name, weight, Mean { value, over });
+        Ok(())
+    }
+
+    /// Adds a loss that is a mean over something else, as over pixels. Several of one name are parts of one loss.
+    pub fn add_mean(&mut self, name: &'static str, weight: f64, mean: Mean) {
+        let mean = Some(mean);
+        self.0.push(Term { name, weight, mean });
+    }
+
+    /// Says that there is nothing in the batch that this loss could be taken of.
+    pub fn add_nothing(&mut self, name: &'static str, weight: f64) {
+        let mean = None;
+        self.0.push(Term { name, weight, mean });
+    }
+
+    /// Whether there is nothing to descend.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.iter().all(|term| term.mean.is_none())
+    }
+
+    /// What each loss is a mean over, and its value; 0 and 0 where there is nothing.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub(super) fn means(&self) -> Result<Vec<(f64, f64)>, TrainError> {
+        let mean = |term: &Term| {
+            term.mean.as_ref().map_or(Ok((0.0, 0.0)), |mean| {
+                Ok((f64::try_from(&mean.over)?, f64::try_from(&mean.value)?))
+            })
+        };
+        self.0.iter().map(mean).collect()
+    }
+
+    /// The weighted sum, in which each loss counts the part that `parts` says: 1 for all of it. None where there is
+    /// nothing.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub(super) fn total(&self, parts: &[f64]) -> Result<Option<Tensor>, TrainError> {
+        let mut total: Option<Tensor> = None;
+        for (term, part) in self.0.iter().zip(parts) {
+            if let Some(mean) = &term.mean {
+                let loss = mean.value.f_mul_scalar(term.weight * part)?;
+                total = Some(match total {
+                    Some(total) => total.f_add(&loss)?,
+                    None => loss,
+                });
+            }
         }
         Ok(total)
     }
 
-    /// The values, each times its weight.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    pub fn values(&self) -> Result<Vec<(&'static str, f64)>, TrainError> {
-        self.0
-            .iter()
-            .map(|(name, weight, loss)| Ok((*name, weight * f64::try_from(loss)?)))
-            .collect()
+    /// Values in the order of [`Self::means`] by name, each times its weight, and their sum as `loss`.
+    pub(super) fn named(&self, values: &[Option<f64>]) -> BTreeMap<String, f64> {
+        let mut named = BTreeMap::new();
+        for (term, value) in self.0.iter().zip(values) {
+            if let Some(value) = value {
+                let weighted = term.weight * value;
+                *named.entry(format!("loss/{}", term.name)).or_default() += weighted;
+                *named.entry("loss".to_owned()).or_default() += weighted;
+            }
+        }
+        named
     }
 }

@@ -4,10 +4,10 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::Arc;
 
-use tch::{Device, Tensor};
+use tch::{Device, Kind, Tensor};
 
 use super::error::TrainError;
-use crate::data::{DrawPlan, Encoding, Place, Stream, Streaming, TurnBatch, Turns};
+use crate::data::{DrawPlan, Encoding, Place, Share, Source, Stream, Streaming, TurnBatch, Turns};
 
 /// Batches that are decoded ahead of the network.
 const AHEAD: usize = 3;
@@ -18,6 +18,8 @@ pub struct TurnReader {
     stream: Stream<Turns>,
     plan: DrawPlan,
     place: Place,
+    /// The epoch of the last group of which frames could be read.
+    readable: u64,
 }
 
 impl std::fmt::Debug for TurnReader {
@@ -38,7 +40,14 @@ pub struct TurnTensors {
     pub mask: Tensor,
     /// Which frames the gate of saturation opens Spec-Net for.
     pub spec_net: Vec<bool>,
-    /// What was damaged in this batch and is not in it.
+}
+
+/// What is left of a group of frames.
+#[derive(Debug)]
+pub struct TurnGroup {
+    /// Its frames; none where fewer than two can be read.
+    pub frames: Option<TurnTensors>,
+    /// What of it was damaged.
     pub damage: Option<String>,
 }
 
@@ -55,7 +64,23 @@ impl TurnReader {
             turns,
             plan,
             place,
+            readable: place.epoch,
         })
+    }
+
+    /// Leaves all but each so many groups to other processes, which go on from the same places.
+    ///
+    /// # Errors
+    /// [`TrainError::Data`].
+    pub fn take_share(&mut self, share: Share) -> Result<(), TrainError> {
+        self.plan.share = share;
+        self.go_to(self.place)
+    }
+
+    /// How many samples each of the turns has.
+    #[must_use]
+    pub fn turns(&self) -> Vec<u32> {
+        self.turns.turns()
     }
 
     /// Where the next batch stands.
@@ -71,33 +96,35 @@ impl TurnReader {
     pub fn go_to(&mut self, place: Place) -> Result<(), TrainError> {
         self.stream = start(&self.turns, self.plan, place)?;
         self.place = place;
+        self.readable = place.epoch;
         Ok(())
     }
 
-    /// The next batch that has at least two frames.
+    /// The next group of this process's share, in 32 or 64 bits.
     ///
     /// # Errors
-    /// [`TrainError::Torch`]; [`TrainError::NoFrames`] where a whole epoch has no such batch.
-    pub fn next_batch(&mut self, device: Device) -> Result<TurnTensors, TrainError> {
-        let begun = self.place.epoch;
-        let mut damage = Vec::new();
-        while self.place.epoch <= begun + 1 {
-            let drawn = match self.stream.next() {
-                Some(Ok(drawn)) => drawn,
-                Some(Err(damaged)) => {
-                    damage.push(relit_data::causes::with_causes(&damaged));
-                    damaged.rest
-                }
-                None => return Err(TrainError::NoFrames),
-            };
-            self.place = drawn.next;
-            if drawn.batch.frames.len() >= 2 {
-                let tensors = tensors(&drawn.batch, device, &damage)?;
-                self.stream.give_back(drawn.batch);
-                return Ok(tensors);
+    /// [`TrainError::Torch`]; [`TrainError::NoFrames`] where a whole epoch has no group with two frames.
+    pub fn next_group(&mut self, kind: Kind, device: Device) -> Result<TurnGroup, TrainError> {
+        let (drawn, damage) = match self.stream.next() {
+            Some(Ok(drawn)) => (drawn, None),
+            Some(Err(damaged)) => {
+                let damage = relit_data::causes::with_causes(&damaged);
+                (damaged.rest, Some(damage))
             }
+            None => return Err(TrainError::NoFrames),
+        };
+        self.place = drawn.next;
+        let frames = if drawn.batch.frames.len() >= 2 {
+            self.readable = self.place.epoch;
+            Some(tensors(&drawn.batch, kind, device)?)
+        } else {
+            None
+        };
+        self.stream.give_back(drawn.batch);
+        if self.place.epoch > self.readable + 1 {
+            return Err(TrainError::NoFrames);
         }
-        Err(TrainError::NoFrames)
+        Ok(TurnGroup { frames, damage })
     }
 }
 
@@ -112,23 +139,19 @@ fn start(turns: &Arc<Turns>, plan: DrawPlan, from: Place) -> Result<Stream<Turns
     Ok(Stream::start(turns, streaming)?)
 }
 
-fn tensors(
-    batch: &TurnBatch,
-    device: Device,
-    damage: &[String],
-) -> Result<TurnTensors, TrainError> {
+fn tensors(batch: &TurnBatch, kind: Kind, device: Device) -> Result<TurnTensors, TrainError> {
     let (frames, extent) = (batch.frames.len(), batch.extent);
     let shape = |channels: usize| [frames, channels, extent.height, extent.width].map(|n| n as i64);
     let tensor = |values: &[f32], channels: usize| {
         Tensor::f_from_slice(values)?
             .f_reshape(shape(channels))?
-            .f_to_device(device)
+            .f_to_device(device)?
+            .f_to_kind(kind)
     };
     let opens = |frame: &crate::data::TurnFrame| frame.record.as_ref().is_none_or(|r| r.spec_net);
     Ok(TurnTensors {
         picture: tensor(&batch.images, 3)?,
         mask: tensor(&batch.masks, 1)?,
         spec_net: batch.frames.iter().map(opens).collect(),
-        damage: (!damage.is_empty()).then(|| damage.join("; ")),
     })
 }

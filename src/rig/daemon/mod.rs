@@ -168,7 +168,7 @@ impl Rig for Daemon {
             } => {
                 let now = self.dispatcher.monitor().state().settings;
                 let settings = CaptureSettings {
-                    size: size.or(now.size),
+                    size: size.unwrap_or(now.size),
                     fps: fps.unwrap_or(now.fps),
                     degrees_per_second: degrees_per_second.unwrap_or(now.degrees_per_second),
                     max_dropped: max_dropped.unwrap_or(now.max_dropped),

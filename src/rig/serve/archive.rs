@@ -4,7 +4,7 @@
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use axum::body::Bytes;
 use futures_util::Stream;
@@ -23,14 +23,34 @@ const AHEAD: usize = 2;
 #[derive(Debug, Clone)]
 enum Piece {
     Bytes(Vec<u8>),
-    File { path: PathBuf, bytes: u64 },
+    File(Part),
+}
+
+/// A file as it was when the tar file's headers were made.
+#[derive(Debug, Clone)]
+struct Part {
+    path: PathBuf,
+    bytes: u64,
+    modified: SystemTime,
+}
+
+impl Part {
+    /// Opens it, if it is still the same.
+    fn open(&self) -> io::Result<File> {
+        let file = File::open(&self.path)?;
+        let data = file.metadata()?;
+        match data.len() == self.bytes && data.modified()? == self.modified {
+            true => Ok(file),
+            false => Err(io::Error::other("the file has changed since")),
+        }
+    }
 }
 
 impl Piece {
     fn len(&self) -> u64 {
         match self {
             Self::Bytes(bytes) => bytes.len() as u64,
-            Self::File { bytes, .. } => *bytes,
+            Self::File(part) => part.bytes,
         }
     }
 }
@@ -51,20 +71,24 @@ impl Archive {
         for (session, folder) in folders {
             for (name, path) in files_of(folder)? {
                 let data = fs::metadata(&path)?;
-                let modified = data.modified()?.duration_since(UNIX_EPOCH);
-                let modified = modified.unwrap_or_default();
+                let modified = data.modified()?;
+                let since_epoch = modified.duration_since(UNIX_EPOCH).unwrap_or_default();
                 let mut header = tar::Header::new_ustar();
                 header.set_path(format!("{session}/{name}"))?;
                 header.set_entry_type(tar::EntryType::Regular);
                 header.set_mode(0o644);
-                header.set_mtime(modified.as_secs());
+                header.set_mtime(since_epoch.as_secs());
                 header.set_size(data.len());
                 header.set_cksum();
                 version.update(header.as_bytes());
-                version.update(&modified.subsec_nanos().to_le_bytes());
+                version.update(&since_epoch.subsec_nanos().to_le_bytes());
                 pieces.push(Piece::Bytes(header.as_bytes().to_vec()));
                 let bytes = data.len();
-                pieces.push(Piece::File { path, bytes });
+                pieces.push(Piece::File(Part {
+                    path,
+                    bytes,
+                    modified,
+                }));
                 let padding = bytes.next_multiple_of(BLOCK) - bytes;
                 pieces.push(Piece::Bytes(vec![0; padding as usize]));
             }
@@ -86,8 +110,8 @@ impl Archive {
         format!("\"{}\"", &self.version.to_hex()[..32])
     }
 
-    /// Its bytes from `from` on, so many. A file that was cut meanwhile ends them with an error, and
-    /// the connection with it.
+    /// Its bytes from `from` on, so many. A file that is another one by the time it is sent ends them
+    /// with an error, and the connection with it.
     pub(super) fn read(self, from: u64, bytes: u64) -> impl Stream<Item = io::Result<Bytes>> {
         let (sender, receiver) = channel(AHEAD);
         spawn_blocking(move || {
@@ -119,7 +143,7 @@ fn send(pieces: &[Piece], from: u64, bytes: u64, to: &Chunks) -> io::Result<()> 
                 let part = bytes.get(range).unwrap_or_default();
                 give(to, Bytes::copy_from_slice(part))?;
             }
-            Piece::File { path, .. } => send_file(path, skip, wanted, to)?,
+            Piece::File(part) => send_file(part, skip, wanted, to)?,
         }
         skip = 0;
         left -= wanted;
@@ -130,8 +154,8 @@ fn send(pieces: &[Piece], from: u64, bytes: u64, to: &Chunks) -> io::Result<()> 
     Ok(())
 }
 
-fn send_file(path: &Path, from: u64, mut left: u64, to: &Chunks) -> io::Result<()> {
-    let mut file = File::open(path)?;
+fn send_file(part: &Part, from: u64, mut left: u64, to: &Chunks) -> io::Result<()> {
+    let mut file = part.open()?;
     file.seek(SeekFrom::Start(from))?;
     while left > 0 {
         let mut chunk = vec![0; CHUNK.min(usize::try_from(left).unwrap_or(CHUNK))];
@@ -167,4 +191,26 @@ fn files_of(folder: &Path) -> io::Result<Vec<(String, PathBuf)>> {
     };
     files.sort_by_key(|(name, _)| (rank(name).unwrap_or(usize::MAX), name.clone()));
     Ok(files)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_was_replaced_meanwhile_ends_the_tar_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let manifest = folder.path().join(MANIFEST_FILE);
+        fs::write(&manifest, "{}").unwrap();
+        let session = ("20261120T093015Z-mug".to_owned(), folder.path().to_owned());
+        let archive = Archive::of(&[session]).unwrap();
+        let sent = || {
+            let (sender, _receiver) = channel(8);
+            send(&archive.pieces, 0, archive.len(), &sender)
+        };
+        assert!(sent().is_ok());
+        // A longer one would be sent in part, as if it were whole.
+        fs::write(&manifest, r#"{"note": "a fly"}"#).unwrap();
+        assert!(sent().is_err());
+    }
 }

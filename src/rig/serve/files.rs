@@ -9,6 +9,7 @@ use axum::extract::{Path, Request, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::StreamExt;
+use http_range_header::parse_range_header;
 use serde::Deserialize;
 use tower_http::services::ServeFile;
 use utoipa::IntoParams;
@@ -18,6 +19,8 @@ use super::extract::QueryParams;
 use super::failure::{Failure, Problem};
 use super::library::Library;
 use super::permits::{Permits, Work, permit};
+
+const NO_RANGE: &str = "there is one range at a time, and it has to begin inside the file";
 
 /// The video file
 ///
@@ -47,9 +50,8 @@ pub(super) async fn video(
     let response = read(&file.await?.path, request).await?;
     let (mut parts, body) = response.into_parts();
     if parts.status == StatusCode::RANGE_NOT_SATISFIABLE {
-        let error = "there is one range at a time, and it has to begin inside the file";
         parts.headers.remove(header::CONTENT_LENGTH);
-        return Ok((parts.headers, Failure::new(parts.status, error)).into_response());
+        return Ok((parts.headers, Failure::new(parts.status, NO_RANGE)).into_response());
     }
     if let Ok(name) = HeaderValue::from_str(&name) {
         parts.headers.insert(header::CONTENT_DISPOSITION, name);
@@ -171,22 +173,16 @@ fn part_of(
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
     let is_same = text(header::IF_RANGE).is_none_or(|known| known == version);
     let range = text(header::RANGE).filter(|_| is_same);
-    let Some((from, to)) = range.and_then(|range| range.strip_prefix("bytes=")?.split_once('-'))
-    else {
+    let Some(range) = range else {
         return Ok((StatusCode::OK, 0, length));
     };
-    let beyond = || {
-        let error = "there is one range at a time, and it has to begin inside the file";
-        Failure::new(StatusCode::RANGE_NOT_SATISFIABLE, error)
-    };
-    let from: u64 = from.parse().map_err(|_| beyond())?;
-    let last = match to {
-        "" => length - 1,
-        to => to.parse::<u64>().map_err(|_| beyond())?.min(length - 1),
-    };
-    match from <= last {
-        true => Ok((StatusCode::PARTIAL_CONTENT, from, last - from + 1)),
-        false => Err(beyond()),
+    let ranges = parse_range_header(range).and_then(|ranges| ranges.validate(length));
+    match ranges.as_deref() {
+        Ok([range]) => {
+            let (from, last) = range.clone().into_inner();
+            Ok((StatusCode::PARTIAL_CONTENT, from, last - from + 1))
+        }
+        _ => Err(Failure::new(StatusCode::RANGE_NOT_SATISFIABLE, NO_RANGE)),
     }
 }
 

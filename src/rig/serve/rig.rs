@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
 use crate::state::Monitor;
@@ -55,9 +55,14 @@ pub enum Command {
     Reset,
     /// Changes how takes are captured, while the rig rests; what is left out stays.
     Configure {
-        /// Frame width and height, pixels.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        size: Option<(u32, u32)>,
+        /// Frame width and height, pixels; `null` takes the largest.
+        #[serde(
+            default,
+            deserialize_with = "given",
+            skip_serializing_if = "Option::is_none"
+        )]
+        #[schema(value_type = Option<(u32, u32)>)]
+        size: Option<Option<(u32, u32)>>,
         /// Frames a second, 1 to 1000.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         fps: Option<f64>,
@@ -92,6 +97,11 @@ pub enum Refused {
     /// What is needed is not there: camera, table, disk.
     #[error("{0}")]
     Unavailable(String),
+}
+
+/// Reads a field that may be `null`, which differs from one that is left out.
+fn given<'de, T: Deserialize<'de>, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
+    T::deserialize(from).map(Some)
 }
 
 /// A rig that takes commands and shows its state.

@@ -1,6 +1,8 @@
 //! `relight train`.
 
 use std::collections::BTreeMap;
+use std::env;
+use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -10,8 +12,9 @@ use clap::{Args, Subcommand};
 use indicatif::ProgressBar;
 use relight::nets::{NetError, Weights};
 use relight::train::{
-    DecomposeSettings, DecomposeTask, PaperInputs, PaperPhase, PaperSettings, PaperTask, Resources,
-    Run, RunOutcome, RunSettings, Task, TrainError, TrainObserver, read_settings,
+    DecomposeSettings, DecomposeTask, Launch, PaperInputs, PaperPhase, PaperSettings, PaperTask,
+    ProcessGroup, Resources, Run, RunOutcome, RunSettings, Task, TrainError, TrainObserver,
+    read_settings,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -34,6 +37,9 @@ Examples:
   relight train joint --turns shards --light light/light-net.safetensors \
       --weights normal/normal-net.safetensors -o joint
       the paper's phases: a warm-up, and two rounds on turns
+  torchrun --no-python --nproc-per-node 4 relight train decompose --threads 2 -o run
+      four processes of one machine, each with its part of every batch; also by RANK, WORLD_SIZE, MASTER_ADDR,
+      MASTER_PORT and LOCAL_RANK, as scripts of Slurm and operators of Kubernetes set them
 
 In the folder of a run: checkpoint.safetensors, losses.csv, event files for TensorBoard, validation.png, and at
 the end the averaged weights. Ctrl-C ends a run with a checkpoint (exit code 3).";
@@ -101,27 +107,47 @@ struct RunArguments {
     /// Threads that compose samples.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     composers: usize,
-    /// Where the network is computed: cpu, or cuda:N.
+    /// Where the network is computed: cpu, cuda:N, or cuda: of several processes on a machine, a GPU for each.
     #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
-    device: Device,
+    device: DeviceName,
     /// Print the settings with all defaults, and do nothing.
     #[arg(long)]
     print_settings: bool,
 }
 
-fn device(text: &str) -> Result<Device, String> {
-    let number = match text {
-        "cpu" => return Ok(Device::Cpu),
-        "cuda" => "0",
-        _ => text.strip_prefix("cuda:").unwrap_or_default(),
-    };
-    let number: usize = number
-        .parse()
-        .map_err(|_| "cpu, cuda or cuda:N".to_owned())?;
-    if (number as i64) < tch::Cuda::device_count() {
-        Ok(Device::Cuda(number))
-    } else {
-        Err("libtorch finds no such device here".to_owned())
+#[derive(Clone, Copy)]
+enum DeviceName {
+    Cpu,
+    /// The one of the process's number on its machine.
+    Cuda,
+    CudaNumber(usize),
+}
+
+fn device(text: &str) -> Result<DeviceName, String> {
+    match text {
+        "cpu" => return Ok(DeviceName::Cpu),
+        "cuda" => return Ok(DeviceName::Cuda),
+        _ => {}
+    }
+    let number = text.strip_prefix("cuda:").and_then(|n| n.parse().ok());
+    let number = number.ok_or_else(|| "cpu, cuda or cuda:N".to_owned())?;
+    Ok(DeviceName::CudaNumber(number))
+}
+
+impl DeviceName {
+    fn device(self, launch: Option<&Launch>) -> Result<Device, String> {
+        let number = match self {
+            Self::Cpu => return Ok(Device::Cpu),
+            Self::Cuda => launch.and_then(|launch| launch.local).unwrap_or(0),
+            Self::CudaNumber(number) => number,
+        };
+        if (number as i64) < tch::Cuda::device_count() {
+            Ok(Device::Cuda(number))
+        } else {
+            Err(format!(
+                "--device cuda:{number}: libtorch finds no such device here"
+            ))
+        }
     }
 }
 
@@ -142,9 +168,10 @@ fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
         return print_settings(&settings, console);
     }
     let run = settings.run.clone();
+    let processes = arguments.join()?;
     let weights = read_weights(arguments.weights.as_deref())?;
-    let mut task = DecomposeTask::new(settings, arguments.resources(), weights.as_ref())?;
-    train(&mut task, &run, arguments, console)
+    let mut task = DecomposeTask::new(settings, processes.resources, weights.as_ref())?;
+    train(&mut task, &run, (arguments, processes), console)
 }
 
 fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> CommandResult {
@@ -153,6 +180,7 @@ fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> Com
         return print_settings(&settings, console);
     }
     let run = settings.run.clone();
+    let processes = arguments.run.join()?;
     let inputs = PaperInputs {
         turns: arguments.turns.clone(),
         held_out: arguments.held_out.clone(),
@@ -161,8 +189,14 @@ fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> Com
         normal: read_weights(arguments.normal.as_deref())?,
         light: read_weights(arguments.light.as_deref())?,
     };
-    let mut task = PaperTask::new(phase, settings, arguments.run.resources(), &inputs)?;
-    train(&mut task, &run, &arguments.run, console)
+    let mut task = PaperTask::new(phase, settings, processes.resources, &inputs)?;
+    train(&mut task, &run, (&arguments.run, processes), console)
+}
+
+/// The processes of the run, and what this one has.
+struct Processes {
+    resources: Resources,
+    group: Option<ProcessGroup>,
 }
 
 impl RunArguments {
@@ -172,15 +206,18 @@ impl RunArguments {
             .map_or_else(|| Ok(S::default()), read_settings)
     }
 
-    /// Where the run is made; sets the number of the network's threads.
-    fn resources(&self) -> Resources {
+    /// Meets the other processes that a launcher has started, if it has; sets the number of the network's threads.
+    fn join(&self) -> Result<Processes, Box<dyn Error>> {
+        let launch = Launch::from_variables(|name| env::var(name).ok())?;
         if let Some(threads) = self.threads {
             tch::set_num_threads(threads as i32);
         }
-        Resources {
-            device: self.device,
+        let resources = Resources {
+            device: self.device.device(launch.as_ref())?,
             composers: self.composers,
-        }
+        };
+        let group = launch.as_ref().map(ProcessGroup::join).transpose()?;
+        Ok(Processes { resources, group })
     }
 }
 
@@ -198,14 +235,20 @@ fn print_settings(settings: &impl Serialize, console: Console) -> CommandResult 
 fn train(
     task: &mut dyn Task,
     settings: &RunSettings,
-    arguments: &RunArguments,
+    (arguments, processes): (&RunArguments, Processes),
     console: Console,
 ) -> CommandResult {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
-    let run = Run::open(task, settings, &arguments.output, arguments.resume)?;
+    let group = processes.group;
+    let process = group.as_ref().map_or(0, |group| group.share().index());
+    let run = Run::open_among(task, settings, &arguments.output, arguments.resume, group)?;
+    if process > 0 {
+        let outcome = run.finish(&stop, &mut OtherProcess { console, process })?;
+        return Ok(outcome_of(&outcome));
+    }
     let made = run.steps_made();
     let mut view = View {
         console,
@@ -215,10 +258,19 @@ fn train(
     view.bar.reset_eta();
     let outcome = run.finish(&stop, &mut view)?;
     view.bar.finish_and_clear();
-    Ok(report(&outcome, console))
+    report(&outcome, console);
+    Ok(outcome_of(&outcome))
 }
 
-fn report(outcome: &RunOutcome, console: Console) -> Outcome {
+fn outcome_of(outcome: &RunOutcome) -> Outcome {
+    if outcome.stopped {
+        Outcome::Incomplete
+    } else {
+        Outcome::Whole
+    }
+}
+
+fn report(outcome: &RunOutcome, console: Console) {
     let files: Vec<String> = outcome
         .weights
         .iter()
@@ -236,11 +288,28 @@ fn report(outcome: &RunOutcome, console: Console) -> Outcome {
             "validation": outcome.figures, "weights": files,
         }),
     );
-    if outcome.stopped {
-        Outcome::Incomplete
-    } else {
-        Outcome::Whole
+}
+
+/// Any process but the first says only what it alone knows.
+struct OtherProcess {
+    console: Console,
+    process: u32,
+}
+
+impl TrainObserver for OtherProcess {
+    fn step(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
+
+    fn damaged(&mut self, step: u64, what: &str) {
+        let process = self.process;
+        let event =
+            json!({ "event": "damaged", "step": step, "process": process, "message": what });
+        let line = format!("step {step}, process {process}: left out: {what}");
+        self.console.say(&line, &event);
     }
+
+    fn validated(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
+
+    fn saved(&mut self, _: u64, _: &Path) {}
 }
 
 /// Shows a run on the terminal.

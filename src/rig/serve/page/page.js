@@ -331,8 +331,8 @@ $("settings").addEventListener("submit", async (event) => {
   event.preventDefault();
   const { elements } = $("settings");
   const command = { command: "configure" };
-  const size = elements.size.value.trim().split("x").map(Number);
-  if (size.length === 2) command.size = size;
+  const size = elements.size.value.trim();
+  command.size = size ? size.split("x").map(Number) : null;
   for (const name of SETTINGS.slice(1)) {
     if (elements[name].value !== "") command[name] = elements[name].valueAsNumber;
   }

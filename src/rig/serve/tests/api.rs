@@ -65,6 +65,24 @@ fn a_command_reaches_the_rig_and_its_answer_is_the_state_after_it() {
 }
 
 #[test]
+fn a_frame_size_is_set_taken_back_by_null_and_kept_where_it_is_left_out() {
+    let serving = Serving::start();
+    for (field, wanted) in [
+        (r#","size":[640,480]"#, Some(Some((640, 480)))),
+        (r#","size":null"#, Some(None)),
+        ("", None),
+    ] {
+        let answer = serving.command(&format!(r#"{{"command":"configure"{field}}}"#));
+        assert_eq!(answer.status, 202);
+        let told = serving.rig.told.lock().unwrap();
+        let Some(Command::Configure { size, .. }) = told.last() else {
+            panic!("{told:?}");
+        };
+        assert_eq!(*size, wanted);
+    }
+}
+
+#[test]
 fn what_the_rig_refuses_is_told_in_its_words() {
     let serving = Serving::start();
     let refused = serving.command(r#"{"command":"home"}"#);

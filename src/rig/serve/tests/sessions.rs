@@ -302,7 +302,10 @@ fn a_tar_file_that_broke_off_goes_on_where_it_ended() {
         assert!(rest.body == whole.body[from..], "{from}");
     }
     assert_eq!(ask(&["Range: bytes=5-8"]).body, whole.body[5..=8]);
+    let end = ask(&["Range: bytes=-7"]);
+    assert_eq!(end.body, whole.body[whole.body.len() - 7..]);
     assert_eq!(ask(&["Range: bytes=999999999999-"]).status, 416);
+    assert_eq!(ask(&["Range: bytes=0-1,4-5"]).status, 416);
     // What has changed since is sent from the start.
     fs::write(serving.root.path().join(COW).join("mask.png"), b"a mask").unwrap();
     let changed = ask(&["Range: bytes=100-", &format!("If-Range: {etag}")]);
