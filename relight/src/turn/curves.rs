@@ -3,7 +3,7 @@
 use crate::image::{ColourSpace, Extent, Planes, Srgb};
 
 use super::TurnError;
-use super::light::WAVES;
+use super::light::{HARMONICS, WAVES};
 
 /// Into how many parts the turn is divided. A part is narrow beside the second harmonic, and its own mean of
 /// the harmonics is known, so that dividing loses nothing.
@@ -31,7 +31,7 @@ pub struct CurveBuilder {
 #[derive(Debug, Clone, Copy, Default)]
 struct Part {
     frames: u32,
-    waves: [f64; 4],
+    waves: [f64; WAVES - 1],
 }
 
 /// Light over the table's angle. The turn is divided into parts; of each part a pixel has the mean of its
@@ -41,7 +41,7 @@ pub struct TurnCurves {
     extent: Extent,
     places: Vec<usize>,
     frames: u32,
-    /// The mean of 1, cos t, -sin t, cos 2t, -sin 2t over each part's frames.
+    /// The mean of 1, cos t, -sin t, cos 2t, -sin 2t and so on over each part's frames.
     waves: Vec<[f64; WAVES]>,
     /// The middle of each part, radians.
     angles: Vec<f64>,
@@ -155,16 +155,19 @@ impl CurveBuilder {
 impl Part {
     fn add(&mut self, angle: f64) {
         self.frames += 1;
-        let (sin, cos) = angle.sin_cos();
-        let (sin2, cos2) = (2.0 * angle).sin_cos();
-        for (sum, value) in self.waves.iter_mut().zip([cos, -sin, cos2, -sin2]) {
-            *sum += value;
+        for harmonic in 1..=HARMONICS {
+            let (sin, cos) = (harmonic as f64 * angle).sin_cos();
+            self.waves[2 * harmonic - 2] += cos;
+            self.waves[2 * harmonic - 1] -= sin;
         }
     }
 
     fn waves(&self) -> [f64; WAVES] {
-        let [a, b, c, d] = self.waves.map(|sum| sum / f64::from(self.frames.max(1)));
-        [1.0, a, b, c, d]
+        let mut waves = [1.0; WAVES];
+        for (wave, sum) in waves[1..].iter_mut().zip(self.waves) {
+            *wave = sum / f64::from(self.frames.max(1));
+        }
+        waves
     }
 }
 
@@ -217,7 +220,7 @@ impl TurnCurves {
         mask
     }
 
-    /// The mean of 1, cos t, -sin t, cos 2t, -sin 2t over each part.
+    /// The mean of 1, cos t, -sin t, cos 2t, -sin 2t and so on over each part.
     pub(super) fn waves(&self) -> &[[f64; WAVES]] {
         &self.waves
     }

@@ -5,11 +5,18 @@ use std::f64::consts::PI;
 use crate::light::{LightError, Order, ShLight};
 
 use super::TableFrame;
+use super::gloss::GLOSS_ORDER;
 
 /// Terms of a channel's light.
 pub(super) const TERMS: usize = 9;
-/// Terms of a curve: a constant and two harmonics of the angle.
-pub(super) const WAVES: usize = 5;
+/// Harmonics of the table's angle in the curve of a matt pixel.
+const MATT_HARMONICS: usize = 2;
+/// Harmonics that are fitted to a curve: gloss has more than a matt surface.
+pub(super) const HARMONICS: usize = GLOSS_ORDER;
+/// Terms of a curve: a constant, and two of each harmonic.
+pub(super) const WAVES: usize = 2 * HARMONICS + 1;
+/// Terms of a matt pixel's curve, the first of them.
+pub(super) const MATT_WAVES: usize = 2 * MATT_HARMONICS + 1;
 
 /// What each term of [`TableLight`] is of a coefficient of the spherical harmonics: its index and factor.
 /// The factors are those of the cosine lobe, pi, 2 pi / 3 and pi / 4, times those of the polynomials.
@@ -98,7 +105,7 @@ impl TableLight {
     }
 
     /// The irradiance on a normal in the table's frame, as factors of 1, cos t, -sin t, cos 2t, -sin 2t.
-    pub(super) fn waves(&self, normal: [f64; 3]) -> [[f64; WAVES]; 3] {
+    pub(super) fn waves(&self, normal: [f64; 3]) -> [[f64; MATT_WAVES]; 3] {
         let [x, y, z] = normal;
         let (x2, y2) = (x * x - y * y, 2.0 * x * y);
         let square = 3.0 * z * z - 1.0;
@@ -117,19 +124,30 @@ impl TableLight {
     }
 }
 
+/// What a term of the light contributes to a curve: these values to two waves, the first of them `wave`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct WaveTerm {
+    pub(super) wave: usize,
+    pub(super) parts: [f64; 2],
+}
+
 /// What each term of the light contributes to the waves of a normal in the table's frame.
-pub(super) fn wave_terms([x, y, z]: [f64; 3]) -> [[f64; WAVES]; TERMS] {
+pub(super) fn wave_terms([x, y, z]: [f64; 3]) -> [WaveTerm; TERMS] {
     let (x2, y2) = (x * x - y * y, 2.0 * x * y);
+    let term = |wave, a, b| WaveTerm {
+        wave,
+        parts: [a, b],
+    };
     [
-        [1.0, 0.0, 0.0, 0.0, 0.0],
-        [z, 0.0, 0.0, 0.0, 0.0],
-        [3.0 * z * z - 1.0, 0.0, 0.0, 0.0, 0.0],
-        [0.0, x, y, 0.0, 0.0],
-        [0.0, -y, x, 0.0, 0.0],
-        [0.0, x * z, y * z, 0.0, 0.0],
-        [0.0, -y * z, x * z, 0.0, 0.0],
-        [0.0, 0.0, 0.0, x2, y2],
-        [0.0, 0.0, 0.0, -y2, x2],
+        term(0, 1.0, 0.0),
+        term(0, z, 0.0),
+        term(0, 3.0 * z * z - 1.0, 0.0),
+        term(1, x, y),
+        term(1, -y, x),
+        term(1, x * z, y * z),
+        term(1, -y * z, x * z),
+        term(3, x2, y2),
+        term(3, -y2, x2),
     ]
 }
 
@@ -186,6 +204,11 @@ mod tests {
         }
     }
 
+    fn part(term: WaveTerm, wave: usize) -> f64 {
+        let at = wave.checked_sub(term.wave);
+        at.and_then(|at| term.parts.get(at).copied()).unwrap_or(0.0)
+    }
+
     #[test]
     fn waves_are_the_sum_of_their_terms() {
         let table = TableLight::from_viewer(&light(), &TableFrame::new(Elevation::assumed()));
@@ -194,7 +217,7 @@ mod tests {
         for (channel, waves) in table.waves(normal).iter().enumerate() {
             for (wave, value) in waves.iter().enumerate() {
                 let parts = table.terms()[channel].iter().zip(terms);
-                let sum: f64 = parts.map(|(light, term)| light * term[wave]).sum();
+                let sum: f64 = parts.map(|(light, term)| light * part(term, wave)).sum();
                 assert!((sum - value).abs() < 1e-12);
             }
         }

@@ -34,7 +34,7 @@ impl TurnMaps {
     /// What a solution leaves over.
     #[must_use]
     pub fn new(curves: &TurnCurves, solution: &TurnSolution) -> Self {
-        let lit = (&solution.light, &solution.frame);
+        let lit = &solution.room;
         let rests: Vec<Vec<Option<f64>>> = (0..curves.pixels())
             .into_par_iter()
             .map(|pixel| rest(curves, pixel, &solution.fits[pixel], lit))

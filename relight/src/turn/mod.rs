@@ -10,8 +10,10 @@
 //! | `frame` | the camera over the table |
 //! | `curves`, `read` | light over the table's angle, from a shard |
 //! | `light` | light of order 2 in the table's frame |
+//! | `gloss` | what a shining surface shows of the room |
 //! | `moments`, `search`, `robust` | the normal and albedo of one pixel |
 //! | `start`, `prior` | normals to begin with |
+//! | `room` | the light that explains all pixels |
 //! | `solve` | light and normals of all pixels |
 //! | `maps`, `verdict` | what is left over, and whether the room is fit for this |
 //! | `files` | what is written |
@@ -20,12 +22,14 @@ mod curves;
 mod error;
 mod files;
 mod frame;
+mod gloss;
 mod light;
 mod maps;
 mod moments;
 mod prior;
 mod read;
 mod robust;
+mod room;
 mod search;
 mod solve;
 mod start;
@@ -42,5 +46,6 @@ pub use light::TableLight;
 pub use maps::TurnMaps;
 pub use prior::{NormalsSource, prior_normals};
 pub use read::{ReadTurn, TableSense, read_curves};
-pub use solve::{StartFigure, TurnOptions, TurnSolution, fit_turn_light, solve_turn};
+pub use room::fit_turn_light;
+pub use solve::{StartFigure, TurnOptions, TurnSolution, solve_turn};
 pub use verdict::{Conditioning, RoomVerdict};

@@ -1,10 +1,12 @@
-//! What a curve comes down to for a least-squares fit of five waves.
+//! What a curve comes down to for a least-squares fit of its waves.
 
 use super::TurnCurves;
-use super::light::WAVES;
+use super::light::{MATT_WAVES, WAVES, WaveTerm};
 
-/// Products of two of the five waves.
+/// Products of two waves.
 pub(super) const PAIRS: usize = WAVES * (WAVES + 1) / 2;
+/// Products of two waves of a matt pixel, the first of them.
+pub(super) const MATT_PAIRS: usize = MATT_WAVES * (MATT_WAVES + 1) / 2;
 /// How much the mean of a curve counts beside how it varies: shade in hollows and bounced light change the
 /// mean more than they change the harmonics.
 const MEAN_SHARE: f64 = 0.1;
@@ -22,22 +24,87 @@ pub(super) struct Moments {
     unit: f64,
 }
 
+/// The waves of a surface of albedo 1, and those that its gloss adds, for each channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PixelWaves {
+    pub(super) matt: [[f64; MATT_WAVES]; 3],
+    pub(super) gloss: [[f64; WAVES]; 3],
+}
+
+/// Products of [`PixelWaves`] with themselves and each other, as [`Moments`] take them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct WaveProducts {
+    matt: [[f64; MATT_PAIRS]; 3],
+    /// Of both, and of the gloss with itself; none for a matt surface.
+    gloss: Option<[[[f64; PAIRS]; 2]; 3]>,
+}
+
 /// The place of the product of waves `i` and `j`.
 const fn pair(i: usize, j: usize) -> usize {
     let (low, high) = if i < j { (i, j) } else { (j, i) };
-    low * WAVES - low * (low + 1) / 2 + high
+    high * (high + 1) / 2 + low
 }
 
-/// The products of five factors with each other, those of different ones twice.
-pub(super) fn squares(waves: &[f64; WAVES]) -> [f64; PAIRS] {
-    let mut products = [0.0; PAIRS];
-    for i in 0..WAVES {
-        for j in i..WAVES {
-            let twice = if i == j { 1.0 } else { 2.0 };
-            products[pair(i, j)] = twice * waves[i] * waves[j];
+impl WaveProducts {
+    pub(super) fn of(waves: &PixelWaves) -> Self {
+        let mut products = Self {
+            matt: [[0.0; MATT_PAIRS]; 3],
+            gloss: None,
+        };
+        for (products, waves) in products.matt.iter_mut().zip(&waves.matt) {
+            symmetric(products, waves, waves);
+        }
+        if waves.gloss != [[0.0; WAVES]; 3] {
+            products.gloss = Some([0, 1, 2].map(|channel| {
+                let gloss = &waves.gloss[channel];
+                let mut matt = [0.0; WAVES];
+                matt[..MATT_WAVES].copy_from_slice(&waves.matt[channel]);
+                let mut both = [[0.0; PAIRS]; 2];
+                symmetric(&mut both[0], &matt, gloss);
+                symmetric(&mut both[1], gloss, gloss);
+                both
+            }));
+        }
+        products
+    }
+}
+
+/// The factors of each pair in the product of two lists of waves.
+fn symmetric(products: &mut [f64], a: &[f64], b: &[f64]) {
+    let mut at = 0;
+    for j in 0..a.len() {
+        for i in 0..j {
+            products[at] = a[i] * b[j] + a[j] * b[i];
+            at += 1;
+        }
+        products[at] = a[j] * b[j];
+        at += 1;
+    }
+}
+
+/// What a channel's curve has to do with a pixel's waves: products of the matt waves with what the gloss leaves of the curve,
+/// of the matt waves with themselves, and the energy that the gloss leaves.
+#[derive(Debug, Clone, Copy)]
+struct Share {
+    along: f64,
+    own: f64,
+    rest: f64,
+}
+
+impl Share {
+    fn albedo(self) -> f64 {
+        if self.own > 1e-12 {
+            (self.along / self.own).max(0.0)
+        } else {
+            0.0
         }
     }
-    products
+
+    /// What the best albedo leaves.
+    fn left(self) -> f64 {
+        let albedo = self.albedo();
+        self.rest - albedo * (2.0 * self.along - albedo * self.own)
+    }
 }
 
 impl Moments {
@@ -66,10 +133,11 @@ impl Moments {
     fn add(&mut self, channel: usize, weight: f64, value: f64, waves: &[f64; WAVES]) {
         self.energy[channel] += weight * value * value;
         let mut at = 0;
-        for i in 0..WAVES {
-            self.right[channel][i] += weight * value * waves[i];
-            for wave in &waves[i..] {
-                self.products[channel][at] += weight * waves[i] * wave;
+        for j in 0..WAVES {
+            self.right[channel][j] += weight * value * waves[j];
+            let weighted = weight * waves[j];
+            for wave in &waves[..=j] {
+                self.products[channel][at] += weighted * wave;
                 at += 1;
             }
         }
@@ -90,10 +158,11 @@ impl Moments {
             let centred = self.energy[channel] - mean * right[0];
             variation += centred.max(0.0) + FLOOR * self.energy[channel];
             self.energy[channel] -= part * mean * right[0];
-            for i in 0..WAVES {
-                self.right[channel][i] -= part * products[i] * mean;
-                for j in i..WAVES {
-                    let shared = products[i] * products[j] / count;
+            for j in 0..WAVES {
+                let first = products[pair(0, j)];
+                self.right[channel][j] -= part * first * mean;
+                for i in 0..=j {
+                    let shared = products[pair(0, i)] * first / count;
                     self.products[channel][pair(i, j)] -= part * shared;
                 }
             }
@@ -111,44 +180,59 @@ impl Moments {
         self.unit == 0.0
     }
 
-    /// What the best albedo leaves of the curve under an irradiance of these waves, over the energy of its
-    /// variation. The squares are those of the waves.
-    pub(super) fn residual(&self, waves: &[[f64; WAVES]; 3], squares: &[[f64; PAIRS]; 3]) -> f64 {
-        let mut rest = 0.0;
-        for channel in 0..3 {
-            let along = dot(&self.right[channel], &waves[channel]).max(0.0);
-            let own = dot(&self.products[channel], &squares[channel]);
-            let explained = if own > 1e-12 {
-                along * along / own
-            } else {
-                0.0
-            };
-            rest += self.energy[channel] - explained;
+    /// One over the energy of the curve's variation.
+    pub(super) const fn unit(&self) -> f64 {
+        self.unit
+    }
+
+    fn share(&self, channel: usize, waves: &PixelWaves, products: &WaveProducts) -> Share {
+        let own = &self.products[channel];
+        let mut share = Share {
+            along: dot(&self.right[channel], &waves.matt[channel]),
+            own: dot(own, &products.matt[channel]),
+            rest: self.energy[channel],
+        };
+        if let Some(gloss) = &products.gloss {
+            let [both, gloss] = &gloss[channel];
+            share.along -= dot(own, both);
+            share.rest += dot(own, gloss) - 2.0 * dot(&self.right[channel], &waves.gloss[channel]);
         }
+        share
+    }
+
+    /// What the best albedo leaves of the curve, over the energy of its variation.
+    pub(super) fn residual(&self, waves: &PixelWaves, products: &WaveProducts) -> f64 {
+        let rest: f64 = (0..3)
+            .map(|channel| self.share(channel, waves, products).left())
+            .sum();
         (rest * self.unit).max(0.0)
     }
 
-    /// The albedo that explains the curve best under an irradiance of these waves.
-    pub(super) fn albedo(&self, waves: &[[f64; WAVES]; 3]) -> [f64; 3] {
-        [0, 1, 2].map(|channel| {
-            let along = dot(&self.right[channel], &waves[channel]).max(0.0);
-            let own = dot(&self.products[channel], &squares(&waves[channel]));
-            if own > 1e-12 { along / own } else { 0.0 }
-        })
+    /// The albedo that explains the curve best.
+    pub(super) fn albedo(&self, waves: &PixelWaves) -> [f64; 3] {
+        let products = WaveProducts::of(waves);
+        [0, 1, 2].map(|channel| self.share(channel, waves, &products).albedo())
     }
 
     /// The product of two lists of waves.
     pub(super) fn product(&self, channel: usize, a: &[f64; WAVES], b: &[f64; WAVES]) -> f64 {
-        let mut sum = 0.0;
-        for i in 0..WAVES {
-            if a[i] == 0.0 {
-                continue;
-            }
-            for j in 0..WAVES {
-                sum += a[i] * b[j] * self.products[channel][pair(i, j)];
-            }
-        }
-        sum
+        let mut products = [0.0; PAIRS];
+        symmetric(&mut products, a, b);
+        dot(&self.products[channel], &products)
+    }
+
+    /// The product of two terms of a light.
+    pub(super) fn term_product(&self, channel: usize, a: &WaveTerm, b: &WaveTerm) -> f64 {
+        let own = &self.products[channel];
+        let at = |i: usize, j: usize| own[pair(a.wave + i, b.wave + j)];
+        a.parts[0] * (b.parts[0] * at(0, 0) + b.parts[1] * at(0, 1))
+            + a.parts[1] * (b.parts[0] * at(1, 0) + b.parts[1] * at(1, 1))
+    }
+
+    /// The product of a term with the curve.
+    pub(super) fn term_along(&self, channel: usize, term: &WaveTerm) -> f64 {
+        let right = &self.right[channel][term.wave..];
+        term.parts[0] * right[0] + term.parts[1] * right[1]
     }
 
     /// The product of waves with the curve.
@@ -175,6 +259,7 @@ impl Moments {
     }
 }
 
-fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+/// The sum of products, as far as the shorter list goes.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -1,10 +1,10 @@
 //! Which parts of the turn a pixel's fit may believe: not those in which it is in another's shadow or shows
 //! a highlight.
 
-use super::light::WAVES;
-use super::moments::Moments;
-use super::search::PixelFit;
-use super::{TableFrame, TableLight, TurnCurves};
+use super::TurnCurves;
+use super::light::{MATT_WAVES, WAVES};
+use super::moments::{Moments, PixelWaves};
+use super::search::{PixelFit, Room};
 
 /// Residuals of so many deviations count a quarter.
 const WIDTH: f64 = 2.0;
@@ -20,9 +20,9 @@ pub(super) fn trust(
     curves: &TurnCurves,
     pixel: usize,
     fit: &PixelFit,
-    (light, frame): (&TableLight, &TableFrame),
+    room: &Room,
 ) -> Vec<f32> {
-    let rest = rest(curves, pixel, fit, (light, frame));
+    let rest = rest(curves, pixel, fit, room);
     let mut sizes: Vec<f64> = rest.iter().flatten().map(|rest| rest.abs()).collect();
     if sizes.is_empty() {
         return vec![1.0; rest.len()];
@@ -43,10 +43,10 @@ pub(super) fn reference(
     curves: &TurnCurves,
     pixel: usize,
     fit: &PixelFit,
-    (light, frame): (&TableLight, &TableFrame),
+    room: &Room,
 ) -> f64 {
-    let waves = light.waves(frame.to_table(fit.normal));
-    let model: f64 = (0..3).map(|c| fit.albedo[c] * waves[c][0]).sum();
+    let waves = room.waves(fit.normal);
+    let model: f64 = (0..3).map(|c| fit.albedo[c] * waves.matt[c][0]).sum();
     let seen: f64 = Moments::mean(curves, pixel).iter().sum();
     (model.max(LEAST_MODEL * seen) / 3.0).max(1e-6)
 }
@@ -57,17 +57,17 @@ pub(super) fn rest(
     curves: &TurnCurves,
     pixel: usize,
     fit: &PixelFit,
-    (light, frame): (&TableLight, &TableFrame),
+    room: &Room,
 ) -> Vec<Option<f64>> {
-    let waves = light.waves(frame.to_table(fit.normal));
-    let reference = reference(curves, pixel, fit, (light, frame));
+    let waves = room.waves(fit.normal);
+    let reference = reference(curves, pixel, fit, room);
     let parts = curves.values(pixel).iter().zip(curves.weights(pixel));
     parts
         .zip(curves.waves())
         .map(|((value, weight), basis)| {
             let (mut sum, mut count) = (0.0, 0.0);
             for channel in (0..3).filter(|&c| weight[c] > 0.0) {
-                let model = fit.albedo[channel] * wave_sum(&waves[channel], basis);
+                let model = model(&waves, fit.albedo[channel], channel, basis);
                 sum += f64::from(value[channel]) - model;
                 count += 1.0;
             }
@@ -76,7 +76,13 @@ pub(super) fn rest(
         .collect()
 }
 
-/// The value of waves where their basis has these values.
-pub(super) fn wave_sum(waves: &[f64; WAVES], basis: &[f64; WAVES]) -> f64 {
-    waves.iter().zip(basis).map(|(a, b)| a * b).sum()
+/// What a channel shows where the waves' basis has these values.
+fn model(waves: &PixelWaves, albedo: f64, channel: usize, basis: &[f64; WAVES]) -> f64 {
+    let matt: f64 = (0..MATT_WAVES)
+        .map(|i| waves.matt[channel][i] * basis[i])
+        .sum();
+    let gloss: f64 = (0..WAVES)
+        .map(|i| waves.gloss[channel][i] * basis[i])
+        .sum();
+    albedo * matt + gloss
 }

@@ -3,22 +3,25 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::light::{TERMS, wave_terms};
+use super::gloss::{GLOSS_ORDER, GlossLight};
 use super::moments::Moments;
 use super::robust::trust;
-use super::search::{Expected, PixelFit, Search, unit};
+use super::room::{KnownLight, RoomFit, fit_room};
+use super::search::{Expected, PixelFit, Room, Search, unit};
 use super::start::{blurred, inflated};
 use super::{Elevation, TableFrame, TableLight, TurnCurves, TurnError};
 use crate::image::{ImageError, Linear, Planes, Rgb};
-use crate::light::{NormalEquations, Normals, ShLight, YUp};
+use crate::light::{Normals, ShLight, YUp};
 use crate::render::Surface;
 
 /// Pixels on which an unknown light is looked for: more are averaged in blocks first.
 const COARSE_PIXELS: usize = 2500;
 /// Rounds of light and normals in turn.
 const ROUNDS: usize = 24;
-/// Rounds of albedo and light in each of them.
-const LIGHT_ROUNDS: usize = 3;
+/// How many of them, the first, take the object for matt.
+const MATT_ROUNDS: usize = 12;
+/// Bands of the room's light that gloss is fitted with, of order 0 and up.
+const GLOSS_BANDS: usize = GLOSS_ORDER + 1;
 /// How smooth the normals are that an unknown light is fitted to: the deviation in the first round, in parts of
 /// the frame's width, by how much it falls with each round, and the least, pixels.
 const FIRST_BLUR: f64 = 6.0 / 256.0;
@@ -32,8 +35,6 @@ const HEIGHTS: [(&str, f64); 3] = [
 ];
 /// Rounds in which what does not fit is left out.
 const ROBUST_ROUNDS: usize = 3;
-/// Keeps light that the normals hardly tell small.
-const STIFFNESS: f64 = 1e-5;
 /// Degrees of freedom of what is left of a curve: fitted to the angles that its looseness stands for.
 const FREEDOM: f64 = 6.0;
 /// How far normals are off as a whole in unknown light, radians: a bend that light makes up for, which no residual
@@ -48,8 +49,8 @@ const HALF_CONFIDENCE: f64 = 0.2;
 pub struct TurnOptions {
     /// The camera over the table.
     pub elevation: Elevation,
-    /// The light, in the viewer's frame at the table's angle 0, where it was measured; its first nine
-    /// coefficients count.
+    /// The light, in the viewer's frame at the table's angle 0, where it was measured; bands up to 4
+    /// count, those beyond 2 for gloss alone.
     pub light: Option<ShLight>,
     /// Normals to start from, where there are any.
     pub prior: Option<Normals<YUp>>,
@@ -87,8 +88,7 @@ pub struct TurnSolution {
     pub(super) fits: Vec<PixelFit>,
     /// The angle that each normal is expected to be off, radians.
     pub(super) expected_errors: Vec<f64>,
-    pub(super) light: TableLight,
-    pub(super) frame: TableFrame,
+    pub(super) room: Room,
     pub(super) elevation: Elevation,
     pub(super) starts: Vec<StartFigure>,
     pub(super) had_prior: bool,
@@ -110,16 +110,19 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         .as_ref()
         .map(|prior| expected(curves, prior, options.prior_weight))
         .transpose()?;
-    let (light, starts) = match &options.light {
-        Some(light) => (TableLight::from_viewer(light, &frame), Vec::new()),
+    let known = options
+        .light
+        .as_ref()
+        .map(|light| KnownLight::new(light, &frame));
+    let (room, starts) = match &known {
+        Some(known) => (find_gloss(curves, expected.as_deref(), &frame, known), Vec::new()),
         None => find_light(curves, expected.as_deref(), &frame)?,
     };
     let mut solver = Solver {
         curves,
         expected,
-        frame,
-        light,
-        is_light_known: options.light.is_some(),
+        room,
+        known,
         moments: all_moments(curves),
         fits: Vec::new(),
     };
@@ -134,15 +137,14 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
     };
     let common = common.hypot(options.elevation.uncertainty_deg().to_radians());
     let expected_errors = solver.expected_errors(common);
-    if !solver.is_light_known {
+    if solver.known.is_none() {
         solver.normalise();
     }
     Ok(TurnSolution {
         had_prior: options.prior.is_some(),
         fits: solver.fits,
         expected_errors,
-        light: solver.light,
-        frame,
+        room: solver.room,
         elevation: options.elevation,
         starts,
     })
@@ -166,10 +168,8 @@ impl TurnSolution {
     #[must_use]
     pub fn shading(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| {
-            let waves = self
-                .light
-                .waves(self.frame.to_table(self.fits[pixel].normal));
-            waves.map(|waves| waves[0].max(0.0) as f32)
+            let waves = self.room.waves(self.fits[pixel].normal);
+            waves.matt.map(|waves| waves[0].max(0.0) as f32)
         }))
     }
 
@@ -190,13 +190,13 @@ impl TurnSolution {
     /// The light.
     #[must_use]
     pub const fn light(&self) -> &TableLight {
-        &self.light
+        &self.room.light
     }
 
     /// The camera over the table.
     #[must_use]
     pub const fn frame(&self) -> &TableFrame {
-        &self.frame
+        &self.room.frame
     }
 
     /// How each start of an unknown light ended; none where it was known.
@@ -236,9 +236,8 @@ pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
 struct Solver<'a> {
     curves: &'a TurnCurves,
     expected: Option<Vec<Expected>>,
-    frame: TableFrame,
-    light: TableLight,
-    is_light_known: bool,
+    room: Room,
+    known: Option<KnownLight>,
     moments: Vec<Moments>,
     fits: Vec<PixelFit>,
 }
@@ -246,38 +245,35 @@ struct Solver<'a> {
 impl Solver<'_> {
     /// The best normals anywhere.
     fn search(&self) -> Vec<PixelFit> {
-        search_all(
-            &self.light,
-            &self.frame,
-            &self.moments,
-            self.expected.as_deref(),
-        )
+        search_all(&self.room, &self.moments, self.expected.as_deref())
     }
 
-    /// Leaves out what does not fit, and fits again.
+    /// Leaves out what does not fit, fits the room again, and then every pixel.
     fn refine(&mut self) {
-        let lit = (&self.light, &self.frame);
-        let curves = self.curves;
+        let (curves, room) = (self.curves, &self.room);
         self.moments = (0..curves.pixels())
             .into_par_iter()
             .map(|pixel| {
-                let trust = trust(curves, pixel, &self.fits[pixel], lit);
+                let trust = trust(curves, pixel, &self.fits[pixel], room);
                 Moments::new(curves, pixel, Some(&trust))
             })
             .collect();
-        if !self.is_light_known {
-            let normals: Vec<[f64; 3]> = self.fits.iter().map(|fit| fit.normal).collect();
-            let mut albedo: Vec<[f64; 3]> = self.fits.iter().map(|fit| fit.albedo).collect();
-            if let Some(light) = fit_light(&self.moments, &normals, &mut albedo, &self.frame) {
-                self.light = light;
-            }
+        let every = self.moments.len().div_ceil(COARSE_PIXELS).max(1);
+        let moments: Vec<Moments> = self.moments.iter().step_by(every).copied().collect();
+        let fits = || self.fits.iter().step_by(every);
+        let normals: Vec<[f64; 3]> = fits().map(|fit| fit.normal).collect();
+        let mut albedo: Vec<[f64; 3]> = fits().map(|fit| fit.albedo).collect();
+        let all = RoomFit::All { bands: GLOSS_BANDS };
+        let fit = self.known.as_ref().map_or(all, RoomFit::Gloss);
+        if let Some(room) = fit_room(&moments, &normals, &mut albedo, &self.room.frame, fit) {
+            self.room = room;
         }
         self.fits = self.search();
     }
 
     /// The error of each pixel by itself, and the one that all have in `common`.
     fn expected_errors(&self, common: f64) -> Vec<f64> {
-        let search = Search::new(&self.light, &self.frame);
+        let search = Search::new(&self.room);
         (0..self.fits.len())
             .into_par_iter()
             .map(|pixel| {
@@ -297,8 +293,8 @@ impl Solver<'_> {
     fn normalise(&mut self) {
         let mut sums = [0.0; 3];
         for fit in &self.fits {
-            let waves = self.light.waves(self.frame.to_table(fit.normal));
-            for (sum, waves) in sums.iter_mut().zip(waves) {
+            let waves = self.room.waves(fit.normal);
+            for (sum, waves) in sums.iter_mut().zip(waves.matt) {
                 *sum += waves[0];
             }
         }
@@ -306,7 +302,7 @@ impl Solver<'_> {
             let mean = sum / self.fits.len() as f64;
             if mean > 1e-12 { mean } else { 1.0 }
         });
-        self.light = self.light.times(factors.map(|factor| 1.0 / factor));
+        self.room.light = self.room.light.times(factors.map(|factor| 1.0 / factor));
         for fit in &mut self.fits {
             fit.albedo = [0, 1, 2].map(|c| fit.albedo[c] * factors[c]);
         }
@@ -321,12 +317,11 @@ fn all_moments(curves: &TurnCurves) -> Vec<Moments> {
 }
 
 fn search_all(
-    light: &TableLight,
-    frame: &TableFrame,
+    room: &Room,
     moments: &[Moments],
     expected: Option<&[Expected]>,
 ) -> Vec<PixelFit> {
-    let search = Search::new(light, frame);
+    let search = Search::new(room);
     moments
         .par_iter()
         .enumerate()
@@ -365,35 +360,80 @@ fn expected(
     Ok(curves.places().iter().map(at).collect())
 }
 
+/// The gloss in a known light.
+fn find_gloss(
+    curves: &TurnCurves,
+    expected: Option<&[Expected]>,
+    frame: &TableFrame,
+    known: &KnownLight,
+) -> Room {
+    let coarse = Coarse::new(curves, expected);
+    let matt = Room {
+        frame: *frame,
+        light: known.matt,
+        gloss: GlossLight::NONE,
+    };
+    let alternation = coarse.alternation(frame, Some(known));
+    let fits = search_all(&matt, &coarse.moments, alternation.expected);
+    let normals = alternation.smoothed(&fits, ROUNDS);
+    let found = alternation.run(normals);
+    found.map_or(matt, |(_, room)| room)
+}
+
+/// A turn on blocks of pixels.
+struct Coarse {
+    side: usize,
+    curves: TurnCurves,
+    moments: Vec<Moments>,
+    expected: Option<Vec<Expected>>,
+}
+
+impl Coarse {
+    fn new(curves: &TurnCurves, expected: Option<&[Expected]>) -> Self {
+        let pixels = curves.pixels() as f64 / COARSE_PIXELS as f64;
+        let side = (pixels.sqrt().ceil() as usize).max(1);
+        let coarse = curves.reduced(side);
+        Self {
+            side,
+            moments: all_moments(&coarse),
+            expected: expected.map(|fine| reduced(curves, fine, &coarse, side)),
+            curves: coarse,
+        }
+    }
+
+    fn alternation<'a>(
+        &'a self,
+        frame: &'a TableFrame,
+        known: Option<&'a KnownLight>,
+    ) -> Alternation<'a> {
+        Alternation {
+            curves: &self.curves,
+            moments: &self.moments,
+            expected: self.expected.as_deref(),
+            frame,
+            side: self.side,
+            known,
+        }
+    }
+}
+
 /// An unknown light, from all starts.
 fn find_light(
     curves: &TurnCurves,
     expected: Option<&[Expected]>,
     frame: &TableFrame,
-) -> Result<(TableLight, Vec<StartFigure>), TurnError> {
-    let side = ((curves.pixels() as f64 / COARSE_PIXELS as f64)
-        .sqrt()
-        .ceil() as usize)
-        .max(1);
-    let coarse = curves.reduced(side);
-    let moments = all_moments(&coarse);
-    let expected = expected.map(|fine| reduced(curves, fine, &coarse, side));
+) -> Result<(Room, Vec<StartFigure>), TurnError> {
+    let coarse = Coarse::new(curves, expected);
     let mut begun: Vec<(&str, Vec<[f64; 3]>)> = Vec::new();
-    if let Some(expected) = &expected {
+    if let Some(expected) = &coarse.expected {
         let normals = expected.iter().map(|expected| expected.normal).collect();
         begun.push(("prior", normals));
     }
     for (name, height) in HEIGHTS {
-        begun.push((name, inflated(&coarse, height)));
+        begun.push((name, inflated(&coarse.curves, height)));
     }
-    let alternation = Alternation {
-        curves: &coarse,
-        moments: &moments,
-        expected: expected.as_deref(),
-        frame,
-        side,
-    };
-    let ended: Vec<(String, Option<(f64, TableLight)>)> = begun
+    let alternation = coarse.alternation(frame, None);
+    let ended: Vec<(String, Option<(f64, Room)>)> = begun
         .into_iter()
         .map(|(name, normals)| (name.to_owned(), alternation.run(normals)))
         .collect();
@@ -401,7 +441,7 @@ fn find_light(
         .iter()
         .filter_map(|(_, ended)| *ended)
         .min_by(|a, b| a.0.total_cmp(&b.0));
-    let (least, light) = best.ok_or(TurnError::NoLight)?;
+    let (least, room) = best.ok_or(TurnError::NoLight)?;
     let figures = ended.into_iter().map(|(start, ended)| {
         let residual = ended.map_or(1.0, |(residual, _)| residual);
         StartFigure {
@@ -410,7 +450,7 @@ fn find_light(
             taken: residual <= least,
         }
     });
-    Ok((light, figures.collect()))
+    Ok((room, figures.collect()))
 }
 
 /// The prior on blocks of pixels.
@@ -443,18 +483,26 @@ struct Alternation<'a> {
     expected: Option<&'a [Expected]>,
     frame: &'a TableFrame,
     side: usize,
+    known: Option<&'a KnownLight>,
 }
 
 impl Alternation<'_> {
     /// What is left in the end, and the light.
-    fn run(&self, start: Vec<[f64; 3]>) -> Option<(f64, TableLight)> {
+    fn run(&self, start: Vec<[f64; 3]>) -> Option<(f64, Room)> {
         let mut normals = start;
         let mut albedo = self.first_albedo();
         let mut ended = None;
         for round in 0..ROUNDS {
-            let light = fit_light(self.moments, &normals, &mut albedo, self.frame)?;
-            let fits = search_all(&light, self.frame, self.moments, self.expected);
-            ended = Some((self.cost(&fits), light));
+            let all = RoomFit::All {
+                bands: bands(round),
+            };
+            let fit = self.known.map_or(all, RoomFit::Gloss);
+            let room = fit_room(self.moments, &normals, &mut albedo, self.frame, fit)?;
+            let fits = search_all(&room, self.moments, self.expected);
+            for (albedo, fit) in albedo.iter_mut().zip(&fits) {
+                *albedo = fit.albedo;
+            }
+            ended = Some((self.cost(&fits), room));
             normals = self.smoothed(&fits, round);
         }
         ended
@@ -484,7 +532,7 @@ impl Alternation<'_> {
 
     fn smoothed(&self, fits: &[PixelFit], round: usize) -> Vec<[f64; 3]> {
         let across = self.curves.extent().width as f64;
-        let first = if self.expected.is_some() {
+        let first = if self.expected.is_some() || self.known.is_some() {
             0.0
         } else {
             FIRST_BLUR * across
@@ -504,96 +552,11 @@ impl Alternation<'_> {
     }
 }
 
-/// The light that explains the curves of a known surface best: of a ball whose albedo is known, say, or of an object
-/// with its truth. Pixels without a normal do not count.
-///
-/// # Errors
-/// Where a map has another size, or no light explains the curves.
-pub fn fit_turn_light(
-    curves: &TurnCurves,
-    surface: &Surface,
-    frame: &TableFrame,
-) -> Result<TableLight, TurnError> {
-    if surface.extent() != curves.extent() {
-        return Err(TurnError::PriorSize {
-            found: surface.extent(),
-            expected: curves.extent(),
-        });
+/// The bands of gloss in a round of light and normals: the matt part comes first.
+fn bands(round: usize) -> usize {
+    if round < MATT_ROUNDS {
+        0
+    } else {
+        (round - MATT_ROUNDS + 1).min(GLOSS_BANDS)
     }
-    let (normals, albedo) = (surface.normals().planes(), surface.albedo().planes());
-    let width = curves.extent().width;
-    let mut known = Vec::new();
-    for (pixel, &place) in curves.places().iter().enumerate() {
-        let at = |planes: &Planes<3>| planes.pixel(place % width, place / width).map(f64::from);
-        if at(normals) != [0.0; 3] {
-            let moments = Moments::new(curves, pixel, None);
-            known.push((moments, frame.to_table(at(normals)), at(albedo)));
-        }
-    }
-    let pixels = || {
-        known
-            .iter()
-            .map(|(moments, normal, albedo)| (moments, *normal, *albedo))
-    };
-    light_of(pixels).ok_or(TurnError::NoLight)
-}
-
-/// The light that explains the curves best on these normals, in turns with the albedo, which is brought along.
-fn fit_light(
-    moments: &[Moments],
-    normals: &[[f64; 3]],
-    albedo: &mut [[f64; 3]],
-    frame: &TableFrame,
-) -> Option<TableLight> {
-    let table: Vec<[f64; 3]> = normals
-        .iter()
-        .map(|&normal| frame.to_table(normal))
-        .collect();
-    let mut found = None;
-    for _ in 0..LIGHT_ROUNDS {
-        let pixels = || {
-            let pairs = moments.iter().zip(&table).zip(albedo.iter());
-            pairs.map(|((moments, &normal), &albedo)| (moments, normal, albedo))
-        };
-        let light = light_of(pixels)?;
-        for ((moments, &normal), albedo) in moments.iter().zip(&table).zip(albedo.iter_mut()) {
-            *albedo = moments.albedo(&light.waves(normal));
-        }
-        found = Some(light);
-    }
-    found
-}
-
-/// The light by least squares, from pixels with their normals in the table's frame and their albedo.
-fn light_of<'a, P>(pixels: impl Fn() -> P) -> Option<TableLight>
-where
-    P: Iterator<Item = (&'a Moments, [f64; 3], [f64; 3])>,
-{
-    let mut terms = [[0.0; TERMS]; 3];
-    for (channel, terms) in terms.iter_mut().enumerate() {
-        let mut equations = NormalEquations::new(TERMS);
-        for (moments, normal, albedo) in pixels() {
-            add_pixel(&mut equations, moments, normal, albedo[channel], channel);
-        }
-        equations.add_ridge(1, STIFFNESS);
-        for (term, [value, ..]) in terms.iter_mut().zip(equations.solve()?) {
-            *term = value;
-        }
-    }
-    Some(TableLight::new(terms))
-}
-
-/// Adds what a pixel says of a channel's light; bright pixels, whose curves stand out of the noise, count more.
-fn add_pixel(
-    equations: &mut NormalEquations,
-    moments: &Moments,
-    normal: [f64; 3],
-    albedo: f64,
-    channel: usize,
-) {
-    let terms = wave_terms(normal);
-    let product =
-        |i: usize, j: usize| albedo * albedo * moments.product(channel, &terms[i], &terms[j]);
-    let right = |i: usize| [albedo * moments.along(channel, &terms[i]), 0.0, 0.0];
-    equations.add_sums(product, right);
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::TurnCurves;
-use super::light::WAVES;
+use super::light::MATT_WAVES;
 use super::solve::median;
 use crate::light::NormalEquations;
 
@@ -81,13 +81,13 @@ impl Conditioning {
 /// Modulation and part beyond the second harmonic of a pixel's light, all channels together; none where it is
 /// dark or mostly clipped.
 fn of_pixel(curves: &TurnCurves, pixel: usize) -> Option<[f64; 2]> {
-    let mut equations = NormalEquations::new(WAVES);
+    let mut equations = NormalEquations::new(MATT_WAVES);
     let mut seen = Vec::new();
     let parts = curves.values(pixel).iter().zip(curves.weights(pixel));
     for ((value, weight), waves) in parts.zip(curves.waves()) {
         if weight.iter().all(|&weight| weight > 0.5) {
             let grey = value.iter().map(|&v| f64::from(v)).sum::<f64>();
-            equations.add(waves, [grey, 0.0, 0.0]);
+            equations.add(&waves[..MATT_WAVES], [grey, 0.0, 0.0]);
             seen.push((grey, waves));
         }
     }
