@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     });
     let prior = prior_normals(&source, NormalsFrame::YUp, &turn.first, &turn.mask)?;
     truth.angles("prior alone", &prior)?;
-    let known = fit_turn_light(&turn.curves, &truth.surface, &frame)?.to_viewer(&frame)?;
+    let known = fit_turn_light(&turn.curves, &truth.surface, &frame)?;
     let options = |light, prior| TurnOptions {
         elevation: truth.elevation,
         light,

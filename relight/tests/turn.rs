@@ -107,7 +107,6 @@ fn a_turn_in_light_of_order_two_gives_normals_albedo_and_light_back() {
     assert!(relative < 0.01, "{relative}");
     let frame = TableFrame::new(Elevation::given(degrees).unwrap());
     let solved = fit_turn_light(&read.curves, &surface, &frame).unwrap();
-    let solved = solved.to_viewer(&frame).unwrap();
     let size = |light: &[[f64; 3]]| light.iter().flatten().map(|v| v * v).sum::<f64>().sqrt();
     let difference: Vec<[f64; 3]> = solved
         .coefficients()

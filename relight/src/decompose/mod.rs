@@ -28,6 +28,7 @@ pub use error::DecomposeError;
 pub use files::{DecompositionFigures, DecompositionFiles};
 pub(crate) use files::{bright, write_light};
 pub use gloss::FittedGloss;
+pub(crate) use gloss::fit_gloss;
 pub use mask::{MaskSource, Rectangle};
 pub use photo::{Photo, PhotoInput, PhotoReading};
 pub use region::Region;

@@ -208,6 +208,11 @@ impl TurnCurves {
         (1.0 - sum / (3 * self.weights.len()).max(1) as f64).max(0.0)
     }
 
+    /// The light from which a channel counts as clipped.
+    pub(super) fn clipped_value(&self) -> f64 {
+        f64::from(Srgb::to_linear(CLIPPED_VALUE))
+    }
+
     /// Where the pixels under the mask stand in the frame, row by row.
     pub(super) fn places(&self) -> &[usize] {
         &self.places

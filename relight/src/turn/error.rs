@@ -3,6 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::asset::AssetError;
 use crate::data::OpenError;
 use crate::decompose::DecomposeError;
 use crate::image::{Extent, ImageError};
@@ -73,6 +74,9 @@ pub enum TurnError {
     /// An image cannot be read or written.
     #[error(transparent)]
     Image(#[from] ImageError),
+    /// The object cannot be made a file.
+    #[error("the object cannot be written as a file that can be lit")]
+    Asset(#[source] Box<AssetError>),
     /// Light cannot be used.
     #[error(transparent)]
     Light(#[from] LightError),
@@ -111,6 +115,12 @@ impl TurnError {
     pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         |source| Self::Write { path, source }
+    }
+}
+
+impl From<AssetError> for TurnError {
+    fn from(error: AssetError) -> Self {
+        Self::Asset(Box::new(error))
     }
 }
 

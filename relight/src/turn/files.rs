@@ -72,10 +72,20 @@ pub struct TurnFigures {
     residual: f64,
     /// The angle that normals are expected to be off, degrees, the median.
     expected_error_deg: f64,
+    /// Specular reflectance and smoothness of the whole object, as `relight render` takes them; none for a matt one.
+    gloss: Option<FigureGloss>,
     /// Which ambiguity nothing broke.
     ambiguity: Option<&'static str>,
     white: FigureWhites,
     over_angle: Vec<AngleFigure>,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct FigureGloss {
+    reflectance: f32,
+    smoothness: f32,
+    /// What no such gloss explains of the one that was found, as a part of it, effective value.
+    residual: f64,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -149,7 +159,7 @@ impl TurnFiles<'_> {
         if self.has_movie {
             write_movie(&path("relit.mp4"), &surface)?;
         }
-        let figures = self.figures(white);
+        let figures = self.figures(white)?;
         write_json(&path(FIGURES), &figures)?;
         Ok(figures)
     }
@@ -166,11 +176,16 @@ impl TurnFiles<'_> {
         })
     }
 
-    fn figures(&self, white: FigureWhites) -> TurnFigures {
+    fn figures(&self, white: FigureWhites) -> Result<TurnFigures, TurnError> {
         let Self { turn, solution, .. } = *self;
         let Extent { width, height } = turn.curves.extent();
         let is_open = self.light_source.is_none() && !solution.had_prior;
-        TurnFigures {
+        let gloss = solution.gloss(&turn.curves)?.map(|gloss| FigureGloss {
+            reflectance: gloss.reflectance,
+            smoothness: gloss.smoothness,
+            residual: gloss.residual,
+        });
+        Ok(TurnFigures {
             schema: SCHEMA,
             software: format!("relight {}", env!("CARGO_PKG_VERSION")),
             turn: turn.name.clone(),
@@ -190,13 +205,14 @@ impl TurnFiles<'_> {
             },
             residual: solution.residual(),
             expected_error_deg: solution.expected_error_deg(),
+            gloss,
             ambiguity: is_open.then_some(
                 "light and shape are both unknown: the outline says that the object bulges, \
                  but how steep it is as a whole is open",
             ),
             white,
             over_angle: self.maps.over_angle.clone(),
-        }
+        })
     }
 
     /// One sheet: a frame, normals, albedo and shading; highlight, shadow, confidence, and a ball in the light.

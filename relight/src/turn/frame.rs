@@ -128,6 +128,12 @@ impl TableFrame {
         [x, self.sin * y - self.cos * z, self.cos * y + self.sin * z]
     }
 
+    /// The table's axis, upwards, in the viewer's frame.
+    #[must_use]
+    pub const fn axis(&self) -> [f64; 3] {
+        [0.0, self.cos, self.sin]
+    }
+
     /// The rotation that does the same.
     #[must_use]
     pub fn rotation(&self) -> Rotation {

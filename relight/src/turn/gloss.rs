@@ -64,6 +64,14 @@ impl GlossLight {
         ShLight::new(coefficients)
     }
 
+    /// The bands from `first` on.
+    pub(super) fn beyond(mut self, first: usize) -> Self {
+        for terms in &mut self.terms {
+            terms[..first * first].fill(0.0);
+        }
+        self
+    }
+
     /// The sum of others, each times a factor.
     pub(super) fn sum(parts: &[Self], factors: &[f64]) -> Self {
         let mut sum = Self::NONE;
@@ -83,7 +91,12 @@ impl GlossLight {
             let pairs = a.terms.iter().flatten().zip(b.terms.iter().flatten());
             pairs.map(|(a, b)| a * b).sum()
         };
-        dot(self, other) / dot(other, other).max(f64::MIN_POSITIVE)
+        let own = dot(other, other);
+        if own > 0.0 {
+            dot(self, other) / own
+        } else {
+            0.0
+        }
     }
 
     /// Whether it is that of a matt object.
@@ -163,17 +176,18 @@ pub(super) fn gloss_terms(facing: f64, [x, y, z]: [f64; 3]) -> [WaveTerm; GLOSS_
 /// (2 l + 1) (l - m)! / (l + m)!, twice that for m above 0.
 fn derivatives(z: f64) -> [[f64; GLOSS_ORDER + 1]; GLOSS_ORDER + 1] {
     let mut values = [[0.0; GLOSS_ORDER + 1]; GLOSS_ORDER + 1];
-    // P_mm = (2 m - 1)!!, and (l - m) P_lm = (2 l - 1) z P_(l-1)m - (l + m - 1) P_(l-2)m.
-    let mut first = 1.0;
-    for m in 0..=GLOSS_ORDER {
-        values[m][m] = first;
-        for l in m + 1..=GLOSS_ORDER {
-            let before = if l > m + 1 { values[l - 2][m] } else { 0.0 };
-            let (l_, m_) = (l as f64, m as f64);
-            values[l][m] = ((2.0 * l_ - 1.0) * z * values[l - 1][m] - (l_ + m_ - 1.0) * before)
-                / (l_ - m_);
+    // P_00 = 1, P_lm = (2 l - 1) P_(l-1)(m-1) + P_(l-2)m, and l P_l0 = (2 l - 1) z P_(l-1)0 - (l - 1) P_(l-2)0.
+    values[0][0] = 1.0;
+    for l in 1..=GLOSS_ORDER {
+        let odd = (2 * l - 1) as f64;
+        for m in 0..=l {
+            let two_before = if l > 1 { values[l - 2][m] } else { 0.0 };
+            values[l][m] = if m > 0 {
+                odd * values[l - 1][m - 1] + two_before
+            } else {
+                (odd * z * values[l - 1][0] - (l - 1) as f64 * two_before) / l as f64
+            };
         }
-        first *= 2.0 * m as f64 + 1.0;
     }
     for (l, row) in values.iter_mut().enumerate() {
         for (m, value) in row.iter_mut().enumerate().take(l + 1) {
@@ -213,7 +227,10 @@ mod tests {
 
     #[test]
     fn a_matt_object_shows_nothing_and_a_glancing_one_all() {
-        assert_eq!(GlossLight::NONE.waves(0.5, [0.0, 0.6, 0.8]), [[0.0; WAVES]; 3]);
+        assert_eq!(
+            GlossLight::NONE.waves(0.5, [0.0, 0.6, 0.8]),
+            [[0.0; WAVES]; 3]
+        );
         let mut terms = [[0.0; GLOSS_TERMS]; 3];
         terms[1][0] = 2.0;
         let gloss = GlossLight::new(terms);

@@ -9,6 +9,8 @@ use super::gloss::GLOSS_ORDER;
 
 /// Terms of a channel's light.
 pub(super) const TERMS: usize = 9;
+/// Bands of the light that a matt surface shows.
+pub(super) const MATT_BANDS: usize = 3;
 /// Harmonics of the table's angle in the curve of a matt pixel.
 const MATT_HARMONICS: usize = 2;
 /// Harmonics that are fitted to a curve: gloss has more than a matt surface.
@@ -39,6 +41,19 @@ const OF_COEFFICIENTS: [(usize, f64); TERMS] = {
         (8, A2 * Y22),
         (4, -A2 * Y22),
     ]
+};
+
+/// Which term of the gloss shows the same part of the room's light as each term of [`TableLight`], and how many times as
+/// large the latter is: the factor of its cosine lobe and polynomial.
+pub(super) const MATT_IN_GLOSS: [(usize, f64); TERMS] = {
+    const AT: [usize; TERMS] = [0, 1, 4, 2, 3, 5, 6, 7, 8];
+    let mut all = [(0, 0.0); TERMS];
+    let mut term = 0;
+    while term < TERMS {
+        all[term] = (AT[term], OF_COEFFICIENTS[term].1.abs());
+        term += 1;
+    }
+    all
 };
 
 /// The irradiance of the room's light on a normal, while the table turns: with the normal (x, y, z) in the
@@ -122,6 +137,17 @@ impl TableLight {
                 ]
             })
     }
+}
+
+/// The values of the waves at an angle of the table, radians.
+pub(super) fn basis_at(angle: f64) -> [f64; WAVES] {
+    let mut basis = [1.0; WAVES];
+    for harmonic in 1..=HARMONICS {
+        let (sin, cos) = (harmonic as f64 * angle).sin_cos();
+        basis[2 * harmonic - 1] = cos;
+        basis[2 * harmonic] = -sin;
+    }
+    basis
 }
 
 /// What a term of the light contributes to a curve: these values to two waves, the first of them `wave`.

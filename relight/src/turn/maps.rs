@@ -3,15 +3,15 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::robust::{reference, rest};
+use super::robust::{lit, reference, rest};
 use super::{TurnCurves, TurnSolution};
 use crate::image::Planes;
 
 /// What exceeds the model and what falls short of it.
 #[derive(Debug, Clone)]
 pub struct TurnMaps {
-    /// The most that a pixel exceeds the model by anywhere in the turn, in units of light, the mean of the
-    /// channels; 0 outside the mask.
+    /// The most that a pixel exceeds its matt part by anywhere in the turn, in units of light, the mean of the
+    /// channels; where it is clipped, as if it were just so bright. 0 outside the mask.
     pub highlight: Planes<1>,
     /// The part of the model's light over the whole turn that a pixel does not have, 0 to 1.
     pub shadow: Planes<1>,
@@ -34,18 +34,26 @@ impl TurnMaps {
     /// What a solution leaves over.
     #[must_use]
     pub fn new(curves: &TurnCurves, solution: &TurnSolution) -> Self {
-        let lit = &solution.room;
+        let room = &solution.room;
         let rests: Vec<Vec<Option<f64>>> = (0..curves.pixels())
             .into_par_iter()
-            .map(|pixel| rest(curves, pixel, &solution.fits[pixel], lit))
+            .map(|pixel| rest(curves, pixel, &solution.fits[pixel], room))
             .collect();
         let most = |pixel: usize| {
-            let unit = reference(curves, pixel, &solution.fits[pixel], lit);
-            let most = rests[pixel]
-                .iter()
-                .flatten()
-                .fold(0.0_f64, |a, &b| a.max(b));
-            [(most * unit) as f32]
+            let fit = &solution.fits[pixel];
+            let unit = reference(curves, pixel, fit, room);
+            let parts = rests[pixel].iter().zip(curves.waves());
+            let excess = parts.map(|(rest, basis)| {
+                let [matt, gloss] = lit(room, fit.normal, basis);
+                match rest {
+                    Some(rest) => rest * unit + gloss.iter().sum::<f64>() / 3.0,
+                    None => {
+                        let matt: f64 = (0..3).map(|c| fit.albedo[c] * matt[c]).sum();
+                        curves.clipped_value() - matt / 3.0
+                    }
+                }
+            });
+            [excess.fold(0.0_f64, f64::max) as f32]
         };
         let missing = |pixel: usize| {
             let rests = &rests[pixel];

@@ -16,13 +16,15 @@
 //! | `room` | the light that explains all pixels |
 //! | `solve` | light and normals of all pixels |
 //! | `maps`, `verdict` | what is left over, and whether the room is fit for this |
-//! | `files` | what is written |
+//! | `shine` | the gloss of the whole object; the object as a file |
+//! | `files`, `labels` | what is written |
 
 mod curves;
 mod error;
 mod files;
 mod frame;
 mod gloss;
+mod labels;
 mod light;
 mod maps;
 mod moments;
@@ -31,6 +33,7 @@ mod read;
 mod robust;
 mod room;
 mod search;
+mod shine;
 mod solve;
 mod start;
 mod verdict;
@@ -42,6 +45,7 @@ pub use curves::{CurveBuilder, TurnCurves};
 pub use error::TurnError;
 pub use files::{TurnFigures, TurnFiles};
 pub use frame::{Elevation, ElevationSource, TableFrame};
+pub use labels::TurnLabels;
 pub use light::TableLight;
 pub use maps::TurnMaps;
 pub use prior::{NormalsSource, prior_normals};

@@ -35,6 +35,8 @@ pub struct ReadTurn {
     pub curves: TurnCurves,
     /// Its first twelve frames, which cover the whole turn.
     pub first: Vec<Rgb<Linear>>,
+    /// Their angles of the table, degrees.
+    pub first_angles: Vec<f64>,
     /// 1 on the object, else 0.
     pub mask: Planes<1>,
     /// Whether frames told their angles; else they are taken for evenly spread over one turn.
@@ -79,6 +81,7 @@ pub fn read_curves(
         sense,
         builder: None,
         first: Vec::new(),
+        first_angles: Vec::new(),
         mask: None,
         has_angles: true,
         damage: Vec::new(),
@@ -105,6 +108,7 @@ struct Reader {
     sense: TableSense,
     builder: Option<CurveBuilder>,
     first: Vec<Rgb<Linear>>,
+    first_angles: Vec<f64>,
     mask: Option<Planes<1>>,
     has_angles: bool,
     damage: Vec<String>,
@@ -124,6 +128,7 @@ impl Reader {
             self.builder(extent, mask)?.push(angle, extent, planes)?;
             if self.first.len() < BATCH as usize {
                 let planes = planes.map(<[f32]>::to_vec);
+                self.first_angles.push(angle);
                 self.first
                     .push(Rgb::new(Planes::from_planes(extent, planes)?));
             }
@@ -158,6 +163,7 @@ impl Reader {
             name,
             curves: builder.finish()?,
             first: self.first,
+            first_angles: self.first_angles,
             mask: self.mask.ok_or(TurnError::Empty)?,
             has_angles: self.has_angles,
             damage: self.damage,

@@ -16,12 +16,7 @@ const LEAST_MODEL: f64 = 0.1;
 
 /// How far each part of the turn is to be believed for a pixel, 0 to 1: near 0 where the fit is far from what
 /// is seen, measured by the median of how far it is elsewhere.
-pub(super) fn trust(
-    curves: &TurnCurves,
-    pixel: usize,
-    fit: &PixelFit,
-    room: &Room,
-) -> Vec<f32> {
+pub(super) fn trust(curves: &TurnCurves, pixel: usize, fit: &PixelFit, room: &Room) -> Vec<f32> {
     let rest = rest(curves, pixel, fit, room);
     let mut sizes: Vec<f64> = rest.iter().flatten().map(|rest| rest.abs()).collect();
     if sizes.is_empty() {
@@ -39,12 +34,7 @@ pub(super) fn trust(
 
 /// The light by which what is left of a pixel is measured: the model's mean over the turn, or a tenth of what is
 /// seen where that is more.
-pub(super) fn reference(
-    curves: &TurnCurves,
-    pixel: usize,
-    fit: &PixelFit,
-    room: &Room,
-) -> f64 {
+pub(super) fn reference(curves: &TurnCurves, pixel: usize, fit: &PixelFit, room: &Room) -> f64 {
     let waves = room.waves(fit.normal);
     let model: f64 = (0..3).map(|c| fit.albedo[c] * waves.matt[c][0]).sum();
     let seen: f64 = Moments::mean(curves, pixel).iter().sum();
@@ -81,8 +71,18 @@ fn model(waves: &PixelWaves, albedo: f64, channel: usize, basis: &[f64; WAVES]) 
     let matt: f64 = (0..MATT_WAVES)
         .map(|i| waves.matt[channel][i] * basis[i])
         .sum();
-    let gloss: f64 = (0..WAVES)
-        .map(|i| waves.gloss[channel][i] * basis[i])
-        .sum();
+    let gloss: f64 = (0..WAVES).map(|i| waves.gloss[channel][i] * basis[i]).sum();
     albedo * matt + gloss
+}
+
+/// What the room's matt light and its gloss make of a pixel at an angle: its irradiance, and the gloss.
+pub(super) fn lit(room: &Room, normal: [f64; 3], basis: &[f64; WAVES]) -> [[f64; 3]; 2] {
+    let waves = room.waves(normal);
+    let dot = |waves: &[f64]| -> f64 { waves.iter().zip(basis).map(|(a, b)| a * b).sum() };
+    let (mut matt, mut gloss) = ([0.0; 3], [0.0; 3]);
+    for channel in 0..3 {
+        matt[channel] = dot(&waves.matt[channel]);
+        gloss[channel] = dot(&waves.gloss[channel]);
+    }
+    [matt, gloss]
 }

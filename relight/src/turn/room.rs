@@ -1,7 +1,9 @@
 //! The light of the room, matt and as gloss shows it, that explains the curves of all pixels best.
 
-use super::gloss::{GLOSS_ORDER, GLOSS_TERMS, GlossLight, gloss_terms};
-use super::light::{TERMS, WAVES, WaveTerm, wave_terms};
+use std::ops::Range;
+
+use super::gloss::{GLOSS_TERMS, GlossLight, gloss_terms};
+use super::light::{MATT_BANDS, MATT_IN_GLOSS, TERMS, WAVES, WaveTerm, wave_terms};
 use super::moments::Moments;
 use super::search::{Room, reflected};
 use super::{TableFrame, TableLight, TurnCurves, TurnError};
@@ -18,14 +20,14 @@ const GLOSS_STIFFNESS: f64 = 1e-4;
 /// The least part of the light that counts as shown by gloss.
 const LEAST_GLOSS: f64 = 0.05;
 
+/// How much gloss shows of the bands of a light that a matt surface shows too.
+pub(super) type Shares = [f64; MATT_BANDS];
+
 /// What is to be found of a room.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum RoomFit<'a> {
-    /// Light, and gloss that shows so many bands of it: 0 for a matt object.
-    All {
-        /// How many.
-        bands: usize,
-    },
+    /// Light, and gloss that shows so many bands of it, 0 for a matt object, and the first of them by these shares.
+    All { bands: usize, shares: Shares },
     /// How much gloss shows of the bands of a light that is known.
     Gloss(&'a KnownLight),
 }
@@ -76,8 +78,7 @@ pub fn fit_turn_light(
         }
     }
     let pixels = pixels(&moments, &known, frame);
-    let bands = GLOSS_ORDER + 1;
-    let (light, gloss) = fit_light(&pixels, &colours, bands).ok_or(TurnError::NoLight)?;
+    let (light, gloss) = fit_light(&pixels, &colours, Tie::Free).ok_or(TurnError::NoLight)?;
     let light = with_higher_bands(light.coefficients()?, &gloss)?;
     Ok(light.rotated(&frame.rotation().inverse()))
 }
@@ -108,7 +109,14 @@ pub(super) fn fit_room(
     let mut found = None;
     for _ in 0..ROUNDS {
         let (light, gloss) = match fit {
-            RoomFit::All { bands } => fit_light(&pixels, albedo, bands)?,
+            RoomFit::All { bands, shares } => {
+                let tie = if bands == 0 {
+                    Tie::Matt
+                } else {
+                    Tie::Shares(shares, bands)
+                };
+                fit_light(&pixels, albedo, tie)?
+            }
             RoomFit::Gloss(known) => (known.matt, fit_gloss(&pixels, albedo, known)?),
         };
         let room = Room {
@@ -144,29 +152,85 @@ fn pixels<'a>(
     moments.iter().zip(normals).map(pixel).collect()
 }
 
+/// What gloss has to do with the matt light.
+#[derive(Debug, Clone, Copy)]
+enum Tie {
+    /// There is no gloss.
+    Matt,
+    /// It shows these shares of the light's first bands, and any light in those from there to so many.
+    Shares(Shares, usize),
+    /// It shows any light.
+    Free,
+}
+
 /// Light and gloss by least squares, for pixels of known albedo.
 fn fit_light(
     pixels: &[LitPixel<'_>],
     albedo: &[[f64; 3]],
-    bands: usize,
+    tie: Tie,
 ) -> Option<(TableLight, GlossLight)> {
+    let (shares, free) = match tie {
+        Tie::Matt => ([0.0; MATT_BANDS], 0..0),
+        Tie::Shares(shares, bands) => (shares, TERMS..(bands * bands).max(TERMS)),
+        Tie::Free => ([0.0; MATT_BANDS], 0..GLOSS_TERMS),
+    };
     let mut light = [[0.0; TERMS]; 3];
     let mut gloss = [[0.0; GLOSS_TERMS]; 3];
-    let shown = bands * bands;
     for channel in 0..3 {
-        let mut equations = NormalEquations::new(TERMS + shown);
+        let mut equations = NormalEquations::new(TERMS + free.len());
         for (pixel, albedo) in pixels.iter().zip(albedo) {
-            pixel.add(&mut equations, channel, albedo[channel], shown);
+            let terms = pixel.terms(albedo[channel], &shares, free.clone());
+            pixel.add(&mut equations, channel, &terms);
         }
         equations.add_ridge(1, STIFFNESS);
         equations.add_ridge(TERMS, GLOSS_STIFFNESS);
         let found = equations.solve()?;
-        let all = light[channel].iter_mut().chain(&mut gloss[channel]);
+        let all = light[channel]
+            .iter_mut()
+            .chain(&mut gloss[channel][free.clone()]);
         for (term, [value, ..]) in all.zip(found) {
             *term = value;
         }
+        for (light, (at, factor)) in light[channel].into_iter().zip(MATT_IN_GLOSS) {
+            gloss[channel][at] += shares[band(at)] * light / factor;
+        }
     }
     Some((TableLight::new(light), GlossLight::new(gloss)))
+}
+
+/// The band of a term of gloss.
+const fn band(at: usize) -> usize {
+    at.isqrt()
+}
+
+/// How much gloss shows of the first bands of a light that was found, by the light of its other bands and these pixels.
+pub(super) fn next_shares(
+    room: &Room,
+    (moments, normals, albedo): (&[Moments], &[[f64; 3]], &[[f64; 3]]),
+) -> Shares {
+    let pixels = pixels(moments, normals, &room.frame);
+    let Ok(light) = room.light.coefficients() else {
+        return Shares::default();
+    };
+    let known = KnownLight {
+        matt: room.light,
+        bands: GlossLight::bands(&light)
+            .into_iter()
+            .chain([room.gloss.beyond(MATT_BANDS)])
+            .collect(),
+    };
+    let gloss = fit_gloss(&pixels, albedo, &known);
+    let found = gloss.map(|gloss| shares(&Room { gloss, ..*room }));
+    found.unwrap_or_default().map(|share| share.max(0.0))
+}
+
+/// How much gloss shows of the first bands of a light that was found.
+pub(super) fn shares(room: &Room) -> Shares {
+    let Ok(light) = room.light.coefficients() else {
+        return [0.0; MATT_BANDS];
+    };
+    let mut bands = GlossLight::bands(&light).into_iter();
+    [0; MATT_BANDS].map(|_| bands.next().map_or(0.0, |band| room.gloss.share_of(&band)))
 }
 
 /// How much gloss shows of each band of a known light, by least squares, for pixels of known albedo.
@@ -185,8 +249,9 @@ fn fit_gloss(
         for channel in 0..3 {
             let matt = pixel.matt_waves(known.matt.terms()[channel], albedo[channel]);
             let moments = pixel.moments;
-            let product =
-                |i: usize, j: usize| moments.product(channel, &bands[i][channel], &bands[j][channel]);
+            let product = |i: usize, j: usize| {
+                moments.product(channel, &bands[i][channel], &bands[j][channel])
+            };
             let right = |i: usize| {
                 let band = &bands[i][channel];
                 [
@@ -199,20 +264,36 @@ fn fit_gloss(
         }
     }
     equations.add_ridge(0, GLOSS_STIFFNESS);
-    let factors: Vec<f64> = equations.solve()?.iter().map(|[factor, ..]| *factor).collect();
+    let factors: Vec<f64> = equations
+        .solve()?
+        .iter()
+        .map(|[factor, ..]| *factor)
+        .collect();
     Some(GlossLight::sum(&known.bands, &factors))
 }
 
 impl LitPixel<'_> {
+    /// What each term of the light contributes where gloss shows shares of it, and what those terms of the gloss do that
+    /// are free.
+    fn terms(&self, albedo: f64, shares: &Shares, free: Range<usize>) -> Vec<WaveTerm> {
+        let tied = self
+            .matt
+            .iter()
+            .zip(MATT_IN_GLOSS)
+            .map(|(matt, (at, factor))| {
+                let share = shares[band(at)] / factor;
+                let gloss = self.gloss[at].parts;
+                WaveTerm {
+                    wave: matt.wave,
+                    parts: [0, 1].map(|i| albedo * matt.parts[i] + share * gloss[i]),
+                }
+            });
+        tied.chain(self.gloss[free].iter().copied()).collect()
+    }
+
     /// Adds what the pixel says of a channel's light and gloss; bright pixels, whose curves stand out of the noise,
     /// count more.
-    fn add(&self, equations: &mut NormalEquations, channel: usize, albedo: f64, shown: usize) {
-        let mut terms: Vec<WaveTerm> = Vec::with_capacity(TERMS + shown);
-        terms.extend(self.matt.iter().map(|term| WaveTerm {
-            wave: term.wave,
-            parts: term.parts.map(|part| albedo * part),
-        }));
-        terms.extend(&self.gloss[..shown]);
+    fn add(&self, equations: &mut NormalEquations, channel: usize, terms: &[WaveTerm]) {
         let product = |i: usize, j: usize| self.moments.term_product(channel, &terms[i], &terms[j]);
         let right = |i: usize| [self.moments.term_along(channel, &terms[i]), 0.0, 0.0];
         equations.add_sums(product, right);

@@ -7,10 +7,10 @@ use super::light::{MATT_WAVES, WAVES};
 use super::moments::{Moments, PixelWaves, WaveProducts};
 use super::{TableFrame, TableLight};
 
-/// How many normals are tried first, evenly over the half sphere that faces the viewer: about 6 degrees apart.
-const TRIED: usize = 600;
+/// How many normals are tried first, evenly over the half sphere that faces the viewer: about 7 degrees apart.
+const TRIED: usize = 400;
 /// How many of them are refined: the best ones.
-const STARTS: usize = 4;
+const STARTS: usize = 3;
 /// A surface that is seen faces the viewer by at least this.
 const LEAST_FACING: f64 = 0.02;
 /// Most steps of the refinement, the one at which it ends, radians, and the longest.
@@ -106,9 +106,12 @@ impl<'a> Search<'a> {
         }
         let fits = best.map(|(_, start)| self.near(moments, expected, start));
         let [first, rest @ ..] = fits;
-        let (fit, _) = rest.into_iter().fold(first, |best, other| {
-            if other.1 < best.1 { other } else { best }
-        });
+        let (fit, _) = rest.into_iter().fold(
+            first,
+            |best, other| {
+                if other.1 < best.1 { other } else { best }
+            },
+        );
         fit
     }
 
@@ -162,20 +165,16 @@ impl<'a> Search<'a> {
         let there = [[SLOPE_STEP, 0.0], [0.0, SLOPE_STEP]]
             .map(|step| self.room.waves(leant(normal, [u, v], step)));
         let mut slope = Slope::default();
-        for channel in 0..3 {
+        for (channel, albedo) in albedo.into_iter().enumerate() {
             let matt = padded(&here.matt[channel]);
-            let seen = sum(&matt, albedo[channel], &here.gloss[channel]);
+            let seen = sum(&matt, albedo, &here.gloss[channel]);
             let own = moments.product(channel, &matt, &matt);
             let ways = there.map(|there| {
-                let moved = sum(
-                    &padded(&there.matt[channel]),
-                    albedo[channel],
-                    &there.gloss[channel],
-                );
+                let moved = sum(&padded(&there.matt[channel]), albedo, &there.gloss[channel]);
                 let mut way: [f64; WAVES] =
                     std::array::from_fn(|i| (moved[i] - seen[i]) / SLOPE_STEP);
                 // The albedo follows the normal.
-                if own > 1e-12 && albedo[channel] > 0.0 {
+                if own > 1e-12 && albedo > 0.0 {
                     let share = moments.product(channel, &way, &matt) / own;
                     way.iter_mut()
                         .zip(&matt)
@@ -277,7 +276,10 @@ impl Slope {
         let (uu, vv) = (uu + more, vv + more);
         let determinant = uu * vv - uv * uv;
         let [a, b] = self.gradient;
-        let step = [(uv * b - vv * a) / determinant, (uv * a - uu * b) / determinant];
+        let step = [
+            (uv * b - vv * a) / determinant,
+            (uv * a - uu * b) / determinant,
+        ];
         let length = step[0].hypot(step[1]);
         if length > LONGEST_STEP {
             step.map(|value| value * LONGEST_STEP / length)

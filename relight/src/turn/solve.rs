@@ -6,20 +6,19 @@ use serde::Serialize;
 use super::gloss::{GLOSS_ORDER, GlossLight};
 use super::moments::Moments;
 use super::robust::trust;
-use super::room::{KnownLight, RoomFit, fit_room};
+use super::room::{KnownLight, RoomFit, Shares, fit_room, next_shares, shares};
 use super::search::{Expected, PixelFit, Room, Search, unit};
 use super::start::{blurred, inflated};
 use super::{Elevation, TableFrame, TableLight, TurnCurves, TurnError};
-use crate::image::{ImageError, Linear, Planes, Rgb};
+use crate::image::{Linear, Planes, Rgb};
 use crate::light::{Normals, ShLight, YUp};
-use crate::render::Surface;
 
 /// Pixels on which an unknown light is looked for: more are averaged in blocks first.
 const COARSE_PIXELS: usize = 2500;
 /// Rounds of light and normals in turn.
-const ROUNDS: usize = 24;
+const ROUNDS: usize = 18;
 /// How many of them, the first, take the object for matt.
-const MATT_ROUNDS: usize = 12;
+const MATT_ROUNDS: usize = 8;
 /// Bands of the room's light that gloss is fitted with, of order 0 and up.
 const GLOSS_BANDS: usize = GLOSS_ORDER + 1;
 /// How smooth the normals are that an unknown light is fitted to: the deviation in the first round, in parts of
@@ -33,8 +32,10 @@ const HEIGHTS: [(&str, f64); 3] = [
     ("outline, flatter", 0.6),
     ("outline, rounder", 1.6),
 ];
+/// How much the normals of such a body count where there is no prior.
+const OUTLINE_WEIGHT: f64 = 0.15;
 /// Rounds in which what does not fit is left out.
-const ROBUST_ROUNDS: usize = 3;
+const ROBUST_ROUNDS: usize = 2;
 /// Degrees of freedom of what is left of a curve: fitted to the angles that its looseness stands for.
 const FREEDOM: f64 = 6.0;
 /// How far normals are off as a whole in unknown light, radians: a bend that light makes up for, which no residual
@@ -65,7 +66,7 @@ impl Default for TurnOptions {
             elevation: Elevation::assumed(),
             light: None,
             prior: None,
-            prior_weight: 0.05,
+            prior_weight: 0.15,
         }
     }
 }
@@ -110,18 +111,28 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         .as_ref()
         .map(|prior| expected(curves, prior, options.prior_weight))
         .transpose()?;
+    let has_shape = expected.is_some();
+    let expected = match (expected, &options.light) {
+        (None, None) => Some(of_outline(curves)),
+        (expected, _) => expected,
+    };
     let known = options
         .light
         .as_ref()
         .map(|light| KnownLight::new(light, &frame));
     let (room, starts) = match &known {
-        Some(known) => (find_gloss(curves, expected.as_deref(), &frame, known), Vec::new()),
-        None => find_light(curves, expected.as_deref(), &frame)?,
+        Some(known) => (
+            find_gloss(curves, expected.as_deref(), &frame, known),
+            Vec::new(),
+        ),
+        None => find_light(curves, expected.as_deref(), has_shape, &frame)?,
     };
     let mut solver = Solver {
         curves,
         expected,
         room,
+        has_shape,
+        shares: shares(&room),
         known,
         moments: all_moments(curves),
         fits: Vec::new(),
@@ -179,14 +190,6 @@ impl TurnSolution {
         curves.map(|pixel| [confidence(self.expected_errors[pixel]) as f32])
     }
 
-    /// The object as the render layers take it.
-    ///
-    /// # Errors
-    /// None for maps of one size.
-    pub fn surface(&self, curves: &TurnCurves) -> Result<Surface, ImageError> {
-        Surface::new(self.normals(curves), self.albedo(curves), None)
-    }
-
     /// The light.
     #[must_use]
     pub const fn light(&self) -> &TableLight {
@@ -238,6 +241,8 @@ struct Solver<'a> {
     expected: Option<Vec<Expected>>,
     room: Room,
     known: Option<KnownLight>,
+    has_shape: bool,
+    shares: Shares,
     moments: Vec<Moments>,
     fits: Vec<PixelFit>,
 }
@@ -263,10 +268,17 @@ impl Solver<'_> {
         let fits = || self.fits.iter().step_by(every);
         let normals: Vec<[f64; 3]> = fits().map(|fit| fit.normal).collect();
         let mut albedo: Vec<[f64; 3]> = fits().map(|fit| fit.albedo).collect();
-        let all = RoomFit::All { bands: GLOSS_BANDS };
+        let all = RoomFit::All {
+            bands: if self.has_shape { GLOSS_BANDS } else { 0 },
+            shares: self.shares,
+        };
         let fit = self.known.as_ref().map_or(all, RoomFit::Gloss);
         if let Some(room) = fit_room(&moments, &normals, &mut albedo, &self.room.frame, fit) {
             self.room = room;
+        }
+        if self.known.is_none() {
+            let pixels = (&moments[..], &normals[..], &albedo[..]);
+            self.shares = next_shares(&self.room, pixels);
         }
         self.fits = self.search();
     }
@@ -316,11 +328,7 @@ fn all_moments(curves: &TurnCurves) -> Vec<Moments> {
         .collect()
 }
 
-fn search_all(
-    room: &Room,
-    moments: &[Moments],
-    expected: Option<&[Expected]>,
-) -> Vec<PixelFit> {
+fn search_all(room: &Room, moments: &[Moments], expected: Option<&[Expected]>) -> Vec<PixelFit> {
     let search = Search::new(room);
     moments
         .par_iter()
@@ -337,6 +345,15 @@ fn search_all(
             search.anywhere(moments, expected)
         })
         .collect()
+}
+
+/// The normals of the body in the outline, where nothing else is known of the shape.
+fn of_outline(curves: &TurnCurves) -> Vec<Expected> {
+    let normal = |normal| Expected {
+        normal,
+        weight: OUTLINE_WEIGHT,
+    };
+    inflated(curves, 1.0).into_iter().map(normal).collect()
 }
 
 /// The prior at each pixel under the mask.
@@ -373,7 +390,7 @@ fn find_gloss(
         light: known.matt,
         gloss: GlossLight::NONE,
     };
-    let alternation = coarse.alternation(frame, Some(known));
+    let alternation = coarse.alternation(frame, Some(known), true);
     let fits = search_all(&matt, &coarse.moments, alternation.expected);
     let normals = alternation.smoothed(&fits, ROUNDS);
     let found = alternation.run(normals);
@@ -405,6 +422,7 @@ impl Coarse {
         &'a self,
         frame: &'a TableFrame,
         known: Option<&'a KnownLight>,
+        has_shape: bool,
     ) -> Alternation<'a> {
         Alternation {
             curves: &self.curves,
@@ -413,6 +431,7 @@ impl Coarse {
             frame,
             side: self.side,
             known,
+            has_shape,
         }
     }
 }
@@ -421,18 +440,19 @@ impl Coarse {
 fn find_light(
     curves: &TurnCurves,
     expected: Option<&[Expected]>,
+    has_shape: bool,
     frame: &TableFrame,
 ) -> Result<(Room, Vec<StartFigure>), TurnError> {
     let coarse = Coarse::new(curves, expected);
     let mut begun: Vec<(&str, Vec<[f64; 3]>)> = Vec::new();
-    if let Some(expected) = &coarse.expected {
+    if let Some(expected) = coarse.expected.as_ref().filter(|_| has_shape) {
         let normals = expected.iter().map(|expected| expected.normal).collect();
         begun.push(("prior", normals));
     }
     for (name, height) in HEIGHTS {
         begun.push((name, inflated(&coarse.curves, height)));
     }
-    let alternation = coarse.alternation(frame, None);
+    let alternation = coarse.alternation(frame, None, has_shape);
     let ended: Vec<(String, Option<(f64, Room)>)> = begun
         .into_iter()
         .map(|(name, normals)| (name.to_owned(), alternation.run(normals)))
@@ -484,6 +504,8 @@ struct Alternation<'a> {
     frame: &'a TableFrame,
     side: usize,
     known: Option<&'a KnownLight>,
+    /// Whether more is known of the shape than its outline.
+    has_shape: bool,
 }
 
 impl Alternation<'_> {
@@ -492,12 +514,15 @@ impl Alternation<'_> {
         let mut normals = start;
         let mut albedo = self.first_albedo();
         let mut ended = None;
+        let mut shares = Shares::default();
         for round in 0..ROUNDS {
-            let all = RoomFit::All {
-                bands: bands(round),
-            };
+            let bands = self.bands(round);
+            let all = RoomFit::All { bands, shares };
             let fit = self.known.map_or(all, RoomFit::Gloss);
             let room = fit_room(self.moments, &normals, &mut albedo, self.frame, fit)?;
+            if self.known.is_none() && bands > 0 {
+                shares = next_shares(&room, (self.moments, &normals, &albedo));
+            }
             let fits = search_all(&room, self.moments, self.expected);
             for (albedo, fit) in albedo.iter_mut().zip(&fits) {
                 *albedo = fit.albedo;
@@ -506,6 +531,16 @@ impl Alternation<'_> {
             normals = self.smoothed(&fits, round);
         }
         ended
+    }
+
+    /// The bands of gloss in a round: the matt part comes first, and where nothing is known of the shape but its outline,
+    /// light and gloss together could explain any shape.
+    fn bands(&self, round: usize) -> usize {
+        if round < MATT_ROUNDS || !self.has_shape {
+            0
+        } else {
+            (round - MATT_ROUNDS + 1).min(GLOSS_BANDS)
+        }
     }
 
     /// As if the shading were even.
@@ -532,7 +567,7 @@ impl Alternation<'_> {
 
     fn smoothed(&self, fits: &[PixelFit], round: usize) -> Vec<[f64; 3]> {
         let across = self.curves.extent().width as f64;
-        let first = if self.expected.is_some() || self.known.is_some() {
+        let first = if self.has_shape {
             0.0
         } else {
             FIRST_BLUR * across
@@ -549,14 +584,5 @@ impl Alternation<'_> {
         let [x, y, z] = smooth.planes();
         let at = |&place: &usize| unit([x, y, z].map(|plane| f64::from(plane[place])));
         self.curves.places().iter().map(at).collect()
-    }
-}
-
-/// The bands of gloss in a round of light and normals: the matt part comes first.
-fn bands(round: usize) -> usize {
-    if round < MATT_ROUNDS {
-        0
-    } else {
-        (round - MATT_ROUNDS + 1).min(GLOSS_BANDS)
     }
 }

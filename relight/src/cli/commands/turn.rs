@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use relight::light::{Order, Panorama, ShLight};
 use relight::turn::{
     Conditioning, Elevation, ElevationSource, NormalsSource, ReadTurn, RoomVerdict, TableSense,
-    TurnFiles, TurnMaps, TurnOptions, prior_normals, read_curves, solve_turn,
+    TurnFiles, TurnLabels, TurnMaps, TurnOptions, prior_normals, read_curves, solve_turn,
 };
 use serde_json::json;
 
@@ -41,7 +41,7 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_name = "W,H", value_parser = rim)]
     rim: Option<Elevation>,
     /// The light where it is known, in the viewer's frame at the table's angle 0: coefficients of spherical harmonics
-    /// (nine lines of red, green and blue), or a panorama (.hdr, .exr).
+    /// (nine lines of red, green and blue, or 25), or a panorama (.hdr, .exr).
     #[arg(long, value_name = "FILE")]
     light: Option<PathBuf>,
     /// Normals to start from: "shipped" (the network that comes with the program), "none", a network (.onnx, or weights
@@ -58,6 +58,15 @@ pub(in crate::cli) struct Arguments {
     /// Which way the table turns as its angle grows, seen from above.
     #[arg(long, value_enum, default_value_t = SenseName::CounterClockwise)]
     sense: SenseName,
+    /// Write the object as one file that can be lit, object.relit.
+    #[arg(long, value_name = "FILE")]
+    asset: Option<PathBuf>,
+    /// Write twelve frames with what was found as their truth, in the layout of synth, for train to read.
+    #[arg(long, value_name = "DIR")]
+    labels: Option<PathBuf>,
+    /// The least confidence, 0 to 1, of pixels in the labels.
+    #[arg(long, value_name = "PART", default_value_t = 0.5, value_parser = part, requires = "labels")]
+    labels_confidence: f32,
     /// Do not write the video, which needs the program ffmpeg.
     #[arg(long)]
     no_video: bool,
@@ -132,6 +141,17 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
         has_movie: !arguments.no_video,
     }
     .write(&arguments.output)?;
+    if let Some(path) = &arguments.asset {
+        solution.asset(&turn)?.write(path)?;
+    }
+    if let Some(folder) = &arguments.labels {
+        let labels = TurnLabels {
+            turn: &turn,
+            solution: &solution,
+            least_confidence: arguments.labels_confidence,
+        };
+        labels.write(folder)?;
+    }
     let seconds = start.elapsed().as_secs_f64();
     let text = format!(
         "{}: {} frames in {read_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees (median), light {}",
@@ -186,12 +206,16 @@ fn warn(
     }
 }
 
+/// The order to which a panorama is taken up: gloss shows more of it than a matt surface.
+const KNOWN_ORDER: usize = 4;
+
 fn read_light(path: &Path) -> Result<ShLight, Box<dyn Error>> {
     let is_panorama = path.extension().is_some_and(|ending| {
         ending.eq_ignore_ascii_case("hdr") || ending.eq_ignore_ascii_case("exr")
     });
     if is_panorama {
-        return Ok(Panorama::read(path)?.project(Order::TWO));
+        let order = Order::new(KNOWN_ORDER).unwrap_or(Order::TWO);
+        return Ok(Panorama::read(path)?.project(order));
     }
     Ok(ShLight::read(path)?)
 }
@@ -213,5 +237,12 @@ fn weight(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(weight) if (0.0..=100.0).contains(&weight) => Ok(weight),
         _ => Err("give a number from 0 to 100".to_owned()),
+    }
+}
+
+fn part(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(part) if (0.0..=1.0).contains(&part) => Ok(part),
+        _ => Err("give a number from 0 to 1".to_owned()),
     }
 }
