@@ -11,6 +11,7 @@
 //! | [`decompose`] | a photograph into normals, albedo, shading, highlight and light |
 //! | [`eval`] | the protocols of the paper's tables |
 //! | [`image`] | planes of `f32`, colours that know their space, files |
+//! | [`insert`] | objects out of photographs in another light and in other pictures |
 //! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
 //! | [`metrics`] | how far an estimate is from the truth |
 //! | [`movie`] | frames into MP4 and WebM, by the `ffmpeg` program |
@@ -23,6 +24,7 @@ pub mod data;
 pub mod decompose;
 pub mod eval;
 pub mod image;
+pub mod insert;
 pub mod light;
 pub mod metrics;
 pub mod movie;

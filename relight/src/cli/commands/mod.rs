@@ -2,6 +2,8 @@
 
 pub(super) mod decompose;
 pub(super) mod eval;
+pub(super) mod insert;
+pub(super) mod relight;
 pub(super) mod render;
 pub(super) mod synth;
 #[cfg(feature = "train")]
