@@ -18,9 +18,11 @@ const ALIKE: f32 = 1.0;
 /// Evidence of a pixel that equals its row's ends, in units of the log-likelihood.
 const STRENGTH: f32 = 8.0;
 /// Evidence of a pixel in the object's shadow on the table.
-const SHADOW_STRENGTH: f32 = 5.0;
+const SHADOW_STRENGTH: f32 = 2.0;
+/// Evidence of a pixel of the table's rim, which may have any colour.
+const RIM_STRENGTH: f32 = 25.0;
 /// The rim of the table, between table and room, is at most twice this share of the width wide.
-const RIM: f64 = 0.008;
+const RIM: f64 = 0.014;
 
 /// Evidence from the rows' ends and the table.
 #[derive(Debug)]
@@ -46,8 +48,10 @@ impl Backdrop {
         let alike = with_rim(&room, &table.surface, size.0);
         let evidence = distance.iter().enumerate().map(|(at, &distance)| {
             let equal = (-distance / (2.0 * ends.alike)).exp();
+            let is_surface = room.bits()[at] || table.surface.bits()[at];
             match (alike.bits()[at], table.shadow.bits()[at]) {
-                (true, _) => -STRENGTH,
+                (true, _) if is_surface => -STRENGTH,
+                (true, _) => -RIM_STRENGTH,
                 (false, true) => -SHADOW_STRENGTH,
                 (false, false) => -STRENGTH * equal,
             }

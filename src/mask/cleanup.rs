@@ -30,12 +30,7 @@ pub(super) struct Cleaned {
 
 /// Keeps the largest component and those of a similar size, or with `keep_all` every one, and fills
 /// holes of at most `fill_to` times the object's area, except those in which the seeds mark background.
-pub(super) fn clean(
-    raw: &Bitmap,
-    seeds: Option<&Seeds>,
-    keep_all: bool,
-    fill_to: f64,
-) -> Cleaned {
+pub(super) fn clean(raw: &Bitmap, seeds: Option<&Seeds>, keep_all: bool, fill_to: f64) -> Cleaned {
     let components = raw.components(Connectivity::Eight);
     let largest = components.largest();
     let least = largest.map_or(0.0, |at| components.list[at].area as f64 * KEPT_FROM);

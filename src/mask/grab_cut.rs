@@ -81,7 +81,11 @@ impl<const D: usize> Models<D> {
         labels: &[Label],
         take: impl Fn(Label) -> bool,
     ) -> Self {
-        let of = |object| samples(field, labels, |label| take(label) && label.is_object() == object);
+        let of = |object| {
+            samples(field, labels, |label| {
+                take(label) && label.is_object() == object
+            })
+        };
         Self {
             object: Mixture::learn(&of(true), COMPONENTS, F::VARIANCE_FLOOR),
             background: Mixture::learn(&of(false), COMPONENTS, F::VARIANCE_FLOOR),
@@ -273,9 +277,7 @@ pub(super) fn neighbour(
     (width, height): (usize, usize),
 ) -> Option<usize> {
     let (dx, dy) = DIRECTIONS[direction];
-    let x = (at % width)
-        .checked_add_signed(dx)
-        .filter(|&x| x < width)?;
+    let x = (at % width).checked_add_signed(dx).filter(|&x| x < width)?;
     let y = (at / width)
         .checked_add_signed(dy)
         .filter(|&y| y < height)?;

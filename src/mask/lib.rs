@@ -54,6 +54,7 @@ mod opencv_grab_cut;
 mod preview;
 mod pyramid;
 mod record;
+mod registration;
 mod score;
 mod segment;
 mod settings;

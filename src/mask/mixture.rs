@@ -243,7 +243,10 @@ fn split<const D: usize>(samples: &[[f32; D]], count: usize) -> Vec<[f32; D]> {
         let moments = moments_of_groups(samples, &group, new + 1);
         centres = moments.iter().map(Moments::mean).collect();
     }
-    let mut centres: Vec<[f32; D]> = centres.iter().map(|c| c.map(|value| value as f32)).collect();
+    let mut centres: Vec<[f32; D]> = centres
+        .iter()
+        .map(|c| c.map(|value| value as f32))
+        .collect();
     for _ in 0..LLOYD_ROUNDS {
         for (sample, group) in samples.iter().zip(&mut group) {
             *group = nearest(&centres, sample);

@@ -29,10 +29,11 @@ pub fn opencv_grab_cut(
         .collect();
     run(&pixels, (width, height), &mut labels, iterations)
         .map_err(MaskError::opencv("running OpenCV's GrabCut"))?;
-    let is_object = |label: u8| {
-        i32::from(label) == imgproc::GC_FGD || i32::from(label) == imgproc::GC_PR_FGD
-    };
-    let levels = labels.into_iter().map(|label| if is_object(label) { 255 } else { 0 });
+    let is_object =
+        |label: u8| i32::from(label) == imgproc::GC_FGD || i32::from(label) == imgproc::GC_PR_FGD;
+    let levels = labels
+        .into_iter()
+        .map(|label| if is_object(label) { 255 } else { 0 });
     Ok(GrayImage::from_raw(width, height, levels.collect()).unwrap_or_default())
 }
 

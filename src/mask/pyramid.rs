@@ -49,10 +49,26 @@ pub(super) fn segment(
     let mut models = None;
     let mut coarser: Option<(Vec<Label>, (usize, usize))> = None;
     for (image, mut known) in levels.into_iter().rev() {
-        solve(&image, &mut known, coarser.as_ref(), &mut models, first, iterations, &table)?;
+        solve(
+            &image,
+            &mut known,
+            coarser.as_ref(),
+            &mut models,
+            first,
+            iterations,
+            &table,
+        )?;
         coarser = Some((known, size(&image)));
     }
-    solve(image, labels, coarser.as_ref(), &mut models, first, iterations, &table)
+    solve(
+        image,
+        labels,
+        coarser.as_ref(),
+        &mut models,
+        first,
+        iterations,
+        &table,
+    )
 }
 
 fn solve(
@@ -165,7 +181,8 @@ pub(super) fn half_labels(labels: &[Label], (width, height): (usize, usize)) -> 
     let of = |at: usize| {
         let (x, y) = (at % half_width * 2, at / half_width * 2);
         let (right, below) = ((x + 1).min(width - 1), (y + 1).min(height - 1));
-        let four = [(x, y), (right, y), (x, below), (right, below)].map(|(x, y)| labels[y * width + x]);
+        let four =
+            [(x, y), (right, y), (x, below), (right, below)].map(|(x, y)| labels[y * width + x]);
         let has = |wanted| four.contains(&wanted);
         if has(Label::Object) && !has(Label::Background) {
             Label::Object

@@ -58,7 +58,10 @@ pub fn score(
             truth: size,
         });
     }
-    let found = Bitmap::new(size, mask.as_raw().iter().map(|&level| level >= OBJECT_FROM));
+    let found = Bitmap::new(
+        size,
+        mask.as_raw().iter().map(|&level| level >= OBJECT_FROM),
+    );
     let known = |level: u8| match level {
         0..KNOWN_WITHIN => Some(false),
         level if level > 255 - KNOWN_WITHIN => Some(true),
@@ -87,7 +90,11 @@ pub fn score(
     }
     Ok(MaskScore {
         error: wrong as f64 / counted as f64,
-        iou: if either == 0 { 1.0 } else { both as f64 / either as f64 },
+        iou: if either == 0 {
+            1.0
+        } else {
+            both as f64 / either as f64
+        },
         boundary_f: boundary_f(&found, &resolved(&truth, size)),
     })
 }
@@ -123,7 +130,11 @@ fn boundary_f(found: &Bitmap, truth: &Bitmap) -> f64 {
     let (found, truth) = (edge(found), edge(truth));
     let share = |of: &Bitmap, near: &Bitmap| {
         let near = near.dilated(BOUNDARY_TOLERANCE_PX as usize);
-        let right = of.bits().iter().zip(near.bits()).filter(|(a, b)| **a && **b);
+        let right = of
+            .bits()
+            .iter()
+            .zip(near.bits())
+            .filter(|(a, b)| **a && **b);
         (right.count() as f64, of.count() as f64)
     };
     let (right, all) = share(&found, &truth);
@@ -176,9 +187,8 @@ mod tests {
 
     #[test]
     fn an_edge_two_pixels_away_is_right_and_one_three_away_is_wrong() {
-        let image = |from: u32| {
-            GrayImage::from_fn(20, 6, |x, _| Luma([if x >= from { 255 } else { 0 }]))
-        };
+        let image =
+            |from: u32| GrayImage::from_fn(20, 6, |x, _| Luma([if x >= from { 255 } else { 0 }]));
         let f = |from| score(&image(from), &image(8), None).unwrap().boundary_f;
         assert!((f(10) - 1.0).abs() < 1e-12);
         assert!(f(11).abs() < 1e-12);
@@ -187,9 +197,8 @@ mod tests {
     #[test]
     fn the_middle_of_the_open_band_is_the_edge() {
         let truth = drawn(&["..........????????##########"; 4]);
-        let mask = |from: u32| {
-            GrayImage::from_fn(28, 4, |x, _| Luma([if x >= from { 255 } else { 0 }]))
-        };
+        let mask =
+            |from: u32| GrayImage::from_fn(28, 4, |x, _| Luma([if x >= from { 255 } else { 0 }]));
         assert!(score(&mask(14), &truth, None).unwrap().boundary_f > 0.99);
         assert!(score(&mask(10), &truth, None).unwrap().boundary_f < 0.01);
     }
@@ -199,9 +208,6 @@ mod tests {
         let fault = score(&GrayImage::new(3, 3), &GrayImage::new(4, 3), None).unwrap_err();
         assert!(fault.to_string().contains("3 x 3"), "{fault}");
         let open = GrayImage::from_pixel(3, 3, Luma([128]));
-        assert_eq!(
-            score(&open, &open, None),
-            Err(ScoreFault::NothingCounts)
-        );
+        assert_eq!(score(&open, &open, None), Err(ScoreFault::NothingCounts));
     }
 }

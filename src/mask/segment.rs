@@ -3,9 +3,9 @@
 use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
 
-use super::settings::{MAX_PIXELS, MIN_SIDE};
 use super::bitmap::Bitmap;
 use super::initial::InitialLabels;
+use super::settings::{MAX_PIXELS, MIN_SIDE};
 use super::{Hints, MaskError, SegmentSettings, Turn, Warning, cleanup, pyramid, turn, warning};
 
 /// On one frame a hole of this share of the object may be a highlight, and is filled.

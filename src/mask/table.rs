@@ -5,22 +5,25 @@ use super::bitmap::{Bitmap, Connectivity};
 /// Largest average brightness, as a feature.
 const MOST_LIGHT: f32 = 50.0 / 3.0;
 /// Largest average chroma, as a feature.
-const MOST_CHROMA: f32 = 10.0 / 3.0;
+const MOST_CHROMA: f32 = 14.0 / 3.0;
 /// Largest change of the brightness, as a feature.
 const MOST_CHANGE: f32 = 7.5;
-/// A contrast of so many times the median is structure.
+/// A contrast of so many times the median of what is dark and below is structure.
 const STRUCTURE: f32 = 3.0;
 /// And at least and at most so much.
-const STRUCTURE_BOUNDS: (f32, f32) = (0.5, 3.0);
+const STRUCTURE_BOUNDS: (f32, f32) = (0.3, 30.0);
 /// The table covers at least this share of the frame.
 const LEAST: f64 = 0.01;
+/// It comes as near to the lower border as this share of the height, or is this share of the width wide.
+const FOOT: f64 = 0.03;
+const WIDE: f64 = 0.5;
 
 /// The largest brightness that a shadow on the table has beyond the table's, as a feature.
 const SHADOW_LIGHT: f32 = 0.3;
 /// How far the colour of a shadow is from the table's, as a feature.
 const SHADOW_COLOUR: f32 = 0.8;
-/// A contrast of so many times that of structure ends a shadow: it is an outline.
-const OUTLINE: f32 = 4.0;
+/// A contrast of so many times the square of the table's brightness is an outline and ends a shadow.
+const OUTLINE: f32 = 0.009 * 9.0;
 /// A shadow reaches at most this share of the frame's height beyond the plain surface.
 const SHADOW_REACH: f64 = 0.08;
 
@@ -38,14 +41,14 @@ pub(super) struct Table {
 /// found.
 pub(super) fn table(features: &[[f32; 5]], contrast: &[f32], size: (usize, usize)) -> Table {
     let (width, height) = size;
-    let structure = structure_from(contrast);
-    let plain = features.iter().zip(contrast).map(|(feature, &contrast)| {
-        let [light, a, b, change, _] = *feature;
-        light < MOST_LIGHT
-            && a.hypot(b) < MOST_CHROMA
-            && change < MOST_CHANGE
-            && contrast < structure
-    });
+    let dark = |at: usize| {
+        let [light, a, b, change, _] = features[at];
+        light < MOST_LIGHT && a.hypot(b) < MOST_CHROMA && change < MOST_CHANGE
+    };
+    let below = height * 2 / 3 * width..width * height;
+    let below = below.filter(|&at| dark(at)).map(|at| contrast[at]);
+    let structure = structure_from(below.collect());
+    let plain = (0..features.len()).map(|at| dark(at) && contrast[at] < structure);
     let plain = Bitmap::new((width as u32, height as u32), plain);
     // Away from its border, so that it does not run into the object through a gap in the outline.
     let inner = plain.inverted().dilated(1).inverted();
@@ -56,14 +59,22 @@ pub(super) fn table(features: &[[f32; 5]], contrast: &[f32], size: (usize, usize
             below[component] += 1;
         }
     }
-    let lowest = below.iter().enumerate().max_by_key(|&(at, count)| (count, std::cmp::Reverse(at)));
+    let lowest = below
+        .iter()
+        .enumerate()
+        .max_by_key(|&(at, count)| (count, std::cmp::Reverse(at)));
     let least = (width * height) as f64 * LEAST;
     let lowest = lowest
         .map(|(at, _)| at)
-        .filter(|&at| components.list[at].area as f64 >= least);
+        .filter(|&at| components.list[at].area as f64 >= least)
+        .filter(|&at| {
+            let bounds = components.list[at].bounds;
+            let gap = height as i64 - bounds.bottom();
+            gap as f64 <= height as f64 * FOOT || f64::from(bounds.w) >= width as f64 * WIDE
+        });
     let is_table = |at: usize, _| lowest.is_some() && components.at(at) == lowest;
     let surface = inner.map(is_table).dilated(1);
-    let shadow = shadow(features, contrast, structure * OUTLINE, &surface, size);
+    let shadow = shadow(features, contrast, structure, &surface, size);
     Table { surface, shadow }
 }
 
@@ -71,13 +82,14 @@ pub(super) fn table(features: &[[f32; 5]], contrast: &[f32], size: (usize, usize
 fn shadow(
     features: &[[f32; 5]],
     contrast: &[f32],
-    outline: f32,
+    structure: f32,
     surface: &Bitmap,
     size: (usize, usize),
 ) -> Bitmap {
     let Some(mean) = mean(features, surface) else {
         return surface.clone();
     };
+    let outline = structure.max(OUTLINE * mean[0] * mean[0]);
     let may_be = |at: usize| {
         let [light, a, b, ..] = features[at];
         light < mean[0] + SHADOW_LIGHT
@@ -103,13 +115,12 @@ fn mean(features: &[[f32; 5]], surface: &Bitmap) -> Option<[f32; 3]> {
     (count > 0).then(|| sum.map(|s| s / count as f32))
 }
 
-fn structure_from(contrast: &[f32]) -> f32 {
-    let mut sorted = contrast.to_vec();
-    let middle = sorted.len() / 2;
-    if sorted.is_empty() {
+fn structure_from(mut contrast: Vec<f32>) -> f32 {
+    if contrast.is_empty() {
         return STRUCTURE_BOUNDS.0;
     }
-    let (_, median, _) = sorted.select_nth_unstable_by(middle, f32::total_cmp);
+    let middle = contrast.len() / 2;
+    let (_, median, _) = contrast.select_nth_unstable_by(middle, f32::total_cmp);
     (STRUCTURE * *median).clamp(STRUCTURE_BOUNDS.0, STRUCTURE_BOUNDS.1)
 }
 
@@ -132,11 +143,21 @@ mod tests {
         };
         let contrast = |at: usize| {
             let (x, y) = (at % 40, at / 40);
-            let near = [(x + 1, y), (x.saturating_sub(1), y), (x, y + 1), (x, y.saturating_sub(1))];
-            let differs = near.iter().any(|&(i, j)| kind(i.min(39), j.min(29)) != kind(x, y));
+            let near = [
+                (x + 1, y),
+                (x.saturating_sub(1), y),
+                (x, y + 1),
+                (x, y.saturating_sub(1)),
+            ];
+            let differs = near
+                .iter()
+                .any(|&(i, j)| kind(i.min(39), j.min(29)) != kind(x, y));
             if differs { 40.0 } else { 0.1 }
         };
-        ((0..1200).map(feature).collect(), (0..1200).map(contrast).collect())
+        (
+            (0..1200).map(feature).collect(),
+            (0..1200).map(contrast).collect(),
+        )
     }
 
     #[test]
@@ -151,7 +172,10 @@ mod tests {
     #[test]
     fn without_a_table_nothing_is_found() {
         let (features, contrast) = scene();
-        let bright: Vec<_> = features.iter().map(|f| [f[0] + 20.0, f[1], f[2], f[3], f[4]]).collect();
+        let bright: Vec<_> = features
+            .iter()
+            .map(|f| [f[0] + 20.0, f[1], f[2], f[3], f[4]])
+            .collect();
         assert_eq!(table(&bright, &contrast, SIZE).surface.count(), 0);
     }
 }

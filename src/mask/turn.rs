@@ -16,7 +16,7 @@ use super::initial::InitialLabels;
 use super::lab::LabTable;
 use super::pyramid::{FirstModels, RgbField, half_image, half_labels, refine, start};
 use super::table::table;
-use super::{Hints, Iterations};
+use super::{Hints, Iterations, registration};
 
 /// Fewest frames from which anything can be learned.
 pub const MIN_TURN_FRAMES: usize = 4;
@@ -25,7 +25,7 @@ pub const TURN_FRAMES: usize = 32;
 /// Frames are halved until they have at most so many pixels.
 const MOST_PIXELS: usize = 600_000;
 /// And once more for the first cut, until they have at most so many.
-const COARSE_PIXELS: usize = 200_000;
+const COARSE_PIXELS: usize = 100_000;
 /// Share of the frame's shorter side that is background at each border.
 const BORDER: f64 = 0.01;
 /// Share of the frame's shorter side from which the background is learned at first.
@@ -171,7 +171,9 @@ impl TurnField {
         let open = |label: &Label| *label == Label::ProbablyObject;
         let all = labels.iter().filter(|label| open(label)).count() as f64;
         let pixels = labels.iter().zip(self.backdrop.bits());
-        let left = pixels.filter(|(label, alike)| open(label) && !**alike).count() as f64;
+        let left = pixels
+            .filter(|(label, alike)| open(label) && !**alike)
+            .count() as f64;
         if left < LEAST_LEFT * all || left > MOST_LEFT * all {
             return false;
         }
@@ -284,8 +286,10 @@ pub(super) fn segment(
     let fine = TurnField::new(&turn.frames, &table);
     let at_fine = levels.iter().position(|level| level.size() == fine.size);
     let at_fine = at_fine.ok_or(MaskError::FewFrames { found: 0 })?;
-    let (mut labels, mut models) = cut_turn(turn, &fine, &levels[at_fine..], share, iterations, &table)?;
+    let (mut labels, mut models) =
+        cut_turn(turn, &fine, &levels[at_fine..], share, iterations, &table)?;
     let mut size = fine.size;
+    labels = register(frame, &levels[at_fine], &fine, &labels, &table);
     for (steps, level) in levels[..at_fine].iter().rev().enumerate() {
         let field = FrameInTurn {
             turn: &fine,
@@ -300,6 +304,41 @@ pub(super) fn segment(
         (labels, size) = (finer, level.size());
     }
     Ok(labels)
+}
+
+/// Moves the result from where the object is on average to where it is in the frame.
+fn register(
+    frame: &RgbImage,
+    level: &Level,
+    turn: &TurnField,
+    labels: &[Label],
+    colours: &LabTable,
+) -> Vec<Label> {
+    let (width, height) = turn.size;
+    let object = labels.iter().map(|label| label.is_object());
+    let object = Bitmap::new((width as u32, height as u32), object);
+    let average: Vec<f32> = turn
+        .features
+        .iter()
+        .map(|feature| feature[0] / COLOUR_WEIGHT)
+        .collect();
+    let image = level.image.as_ref().unwrap_or(frame);
+    let light: Vec<f32> = image
+        .pixels()
+        .map(|pixel| colours.lab(pixel.0)[0])
+        .collect();
+    let by = registration::shift(&average, &light, &object, turn.size);
+    let moved = registration::moved(&object, by, turn.size);
+    let pairs = level.labels.iter().zip(moved.bits());
+    pairs
+        .map(|(&known, &object)| {
+            if known.is_sure() {
+                known
+            } else {
+                Label::probably(object)
+            }
+        })
+        .collect()
 }
 
 /// A size of the frame, with what is known at it.

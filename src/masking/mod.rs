@@ -18,8 +18,9 @@ use image::RgbImage;
 use relit_data::durable;
 use relit_data::session::{MASK_FILE, Notice, Recording};
 use relit_mask::{
-    Hints, MASK_SCHEMA, Mask, MaskError, MaskRecord, MaskSoftware, RecordFault, RecordedHints, RecordedResult,
-    SegmentSettings, SourceFrame, Warning, grey_png, preview, rgb_png, segment, segment_turn,
+    Hints, MASK_SCHEMA, Mask, MaskError, MaskRecord, MaskSoftware, RecordFault, RecordedHints,
+    RecordedResult, SegmentSettings, SourceFrame, Warning, grey_png, preview, rgb_png, segment,
+    segment_turn,
 };
 use relit_video::Video;
 

@@ -115,7 +115,9 @@ impl MaskArguments {
             None => {
                 let seeds = self.seeds.as_deref().map(Seeds::read).transpose()?;
                 if self.auto && self.rect.is_none() && seeds.is_none() {
-                    return Ok(MaskRequest::auto(self.frame, None, self.settings()).with_force(self.force));
+                    return Ok(
+                        MaskRequest::auto(self.frame, None, self.settings()).with_force(self.force)
+                    );
                 }
                 let hints = Hints::from_parts(self.rect, seeds)?;
                 match self.auto {

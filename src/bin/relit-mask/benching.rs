@@ -36,10 +36,23 @@ pub(crate) fn run(console: Console, folder: &Path) -> Result<Outcome, MaskingErr
 fn print_head(console: Console) {
     let text = format!(
         "{:<24} {:<8}  {:^26}  {:^26}\n{:<24} {:<8}  {:>8} {:>8} {:>8}  {:>8} {:>8} {:>8}",
-        "", "", "relit-mask", "OpenCV's GrabCut", "image", "hint", "error %", "IoU", "F 2 px",
-        "error %", "IoU", "F 2 px",
+        "",
+        "",
+        "relit-mask",
+        "OpenCV's GrabCut",
+        "image",
+        "hint",
+        "error %",
+        "IoU",
+        "F 2 px",
+        "error %",
+        "IoU",
+        "F 2 px",
     );
-    console.say(&text, &json!({ "event": "bench", "tolerance_px": relit_mask::BOUNDARY_TOLERANCE_PX }));
+    console.say(
+        &text,
+        &json!({ "event": "bench", "tolerance_px": relit_mask::BOUNDARY_TOLERANCE_PX }),
+    );
 }
 
 fn print_row(console: Console, row: &BenchRow) {
@@ -62,10 +75,18 @@ fn print_average(console: Console, prompt: Prompt, rows: &[BenchRow]) {
     let ours = average(rows.iter().map(|row| row.ours));
     let opencv = average(rows.iter().map(|row| row.opencv));
     let is_worse = |row: &&&BenchRow| row.ours.iou < row.opencv.iou - WORSE_BY;
-    let worse: Vec<&str> = rows.iter().filter(is_worse).map(|row| &*row.image).collect();
+    let worse: Vec<&str> = rows
+        .iter()
+        .filter(is_worse)
+        .map(|row| &*row.image)
+        .collect();
     let ratio = ours.error / opencv.error.max(f64::MIN_POSITIVE);
     let mut text = line("average", prompt, &ours, &opencv);
-    text += &format!("\n{:<24} {:<8}  error {ratio:.2} x OpenCV's; ", "", prompt.name());
+    text += &format!(
+        "\n{:<24} {:<8}  error {ratio:.2} x OpenCV's; ",
+        "",
+        prompt.name()
+    );
     text += &match worse.len() {
         0 => "no image is worse by more than 2 points of IoU".to_owned(),
         _ => format!("worse by more than 2 points of IoU: {}", worse.join(", ")),
