@@ -213,6 +213,12 @@ impl TurnCurves {
         f64::from(Srgb::to_linear(CLIPPED_VALUE))
     }
 
+    /// The part of a pixel's light, 0 to 1, that is left out because it is clipped.
+    pub(super) fn clipped_at(&self, pixel: usize) -> f64 {
+        let weights = self.weights(pixel).as_flattened();
+        1.0 - weights.iter().map(|&weight| f64::from(weight)).sum::<f64>() / weights.len() as f64
+    }
+
     /// Where the pixels under the mask stand in the frame, row by row.
     pub(super) fn places(&self) -> &[usize] {
         &self.places

