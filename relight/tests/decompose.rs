@@ -463,6 +463,17 @@ fn what_is_wrong_with_a_photograph_is_said_in_a_sentence() {
         let found = with_causes(&error);
         assert!(found.contains(expected), "{found}");
     }
+    let huge = folder.save("huge.png", |path| {
+        let file = BufWriter::new(File::create(path).unwrap());
+        let encoder = png::Encoder::new(file, 9000, 8000);
+        drop(encoder.write_header().unwrap());
+    });
+    let error = load(&huge, &PhotoReading::default()).map(|photo| photo.name);
+    let text = error.unwrap_err().to_string();
+    assert!(
+        text.contains("9000 x 8000 pixels, and at most 64000000"),
+        "{text}"
+    );
     let masks = folder.path("masks");
     fs::create_dir(&masks).unwrap();
     let error = load(&grey, &with_mask(masks.clone())).map(|photo| photo.name);
