@@ -1,4 +1,4 @@
-//! Photographs in, folders of layers out. The network is not trained: these tests are about files, masks,
+//! Photographs in, folders of layers out. But for one test, the network is not trained: they are about files, masks,
 //! encodings and faults, not about how good the layers are.
 #![allow(
     clippy::unwrap_used,
@@ -17,11 +17,12 @@ use relight::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, Decomposition, DecompositionFiles, MaskSource,
     Photo, PhotoInput, PhotoReading, Rectangle, SpecularGate,
 };
-use relight::image::{Extent, Rgb, Transfer, read_planes};
-use relight::light::{Normals, Panorama, ShLight, YUp};
+use relight::image::{Extent, Planes, Rgb, Transfer, read_planes};
+use relight::light::{Normals, Order, Panorama, ShLight, YUp};
+use relight::metrics::{Comparison, ScaleFit, angular_error};
 use relight::nets::paper::{Head, light_net, normal_net};
 use relight::nets::{WeightPrecision, Weights, decomposer, to_onnx};
-use relight::render::NormalsFrame;
+use relight::render::{DiffuseForm, DiffuseLayer, NormalsFrame};
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
 use relit_data::image_stats::MaskSpans;
@@ -462,6 +463,17 @@ fn what_is_wrong_with_a_photograph_is_said_in_a_sentence() {
         let found = with_causes(&error);
         assert!(found.contains(expected), "{found}");
     }
+    let huge = folder.save("huge.png", |path| {
+        let file = BufWriter::new(File::create(path).unwrap());
+        let encoder = png::Encoder::new(file, 9000, 8000);
+        drop(encoder.write_header().unwrap());
+    });
+    let error = load(&huge, &PhotoReading::default()).map(|photo| photo.name);
+    let text = error.unwrap_err().to_string();
+    assert!(
+        text.contains("9000 x 8000 pixels, and at most 64000000"),
+        "{text}"
+    );
     let masks = folder.path("masks");
     fs::create_dir(&masks).unwrap();
     let error = load(&grey, &with_mask(masks.clone())).map(|photo| photo.name);
@@ -631,6 +643,70 @@ fn normals_of_another_network_replace_ours() {
         error.to_string().contains("normals.onnx cannot be run"),
         "{error}"
     );
+}
+
+/// How far normals and shading are from the truth, over how far those are that say nothing: normals towards the
+/// viewer, and constant shading.
+struct Quality {
+    normals: f64,
+    shading: f64,
+}
+
+/// The quality of the layers of a painted ball in the light of a lamp.
+fn quality(weights: &Weights) -> Quality {
+    let truth = Normals::<YUp>::sphere(120);
+    let extent = truth.extent();
+    let mut light = ShLight::even(Order::TWO, [0.25; 3]);
+    for (at, value) in [(1, 0.35), (2, 0.35), (3, -0.3)] {
+        light.coefficients_mut()[at] = [value; 3];
+    }
+    let shading = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&truth);
+    let picture = Planes::from_fn(extent, |x, y| {
+        let paint = match (x / 24 + y / 24) % 3 {
+            0 => [0.7, 0.65, 0.6],
+            1 => [0.6, 0.25, 0.2],
+            _ => [0.2, 0.3, 0.5],
+        };
+        let [shading, ..] = shading.planes().pixel(x, y);
+        paint.map(|paint| paint * shading)
+    });
+    let is_ball: Vec<bool> = truth.planes().plane(2).iter().map(|&z| z > 0.0).collect();
+    let mask = Planes::from_planes(
+        extent,
+        [is_ball.iter().map(|&m| f32::from(u8::from(m))).collect()],
+    );
+    let decomposer = Decomposer::with_side(weights, 128).unwrap();
+    let options = DecomposeOptions::default();
+    let found = decomposer
+        .decompose(&Rgb::new(picture), &mask.unwrap(), &options)
+        .unwrap();
+
+    let angle = |estimate: [&[f32]; 3]| {
+        let truth = truth.planes().planes();
+        angular_error(extent, truth, estimate, &is_ball)
+            .unwrap()
+            .mean
+    };
+    let flat = Planes::filled(extent, [0.0, 0.0, 1.0]);
+    let error = |estimate: &[f32]| {
+        let truth = [shading.planes().plane(0)];
+        let pair = Comparison::new(extent, &truth, &[estimate], &is_ball).unwrap();
+        pair.mse(ScaleFit::Image)
+    };
+    Quality {
+        normals: angle(found.normals.planes().planes()) / angle(flat.planes()),
+        shading: error(found.shading.plane(0)) / error(flat.plane(2)),
+    }
+}
+
+#[test]
+fn the_shipped_weights_find_shape_and_shading_and_untrained_ones_do_not() {
+    let shipped = quality(&Decomposer::shipped_weights().unwrap());
+    assert!(shipped.normals < 0.6, "normals: {}", shipped.normals);
+    assert!(shipped.shading < 0.4, "shading: {}", shipped.shading);
+    let untrained = quality(&Weights::initial(&decomposer(), 3));
+    assert!(untrained.normals > 0.8, "normals: {}", untrained.normals);
+    assert!(untrained.shading > 0.8, "shading: {}", untrained.shading);
 }
 
 fn relight(folder: &Folder, arguments: &str) -> Output {

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::encoding::{AnsweredMaps, EncodedPicture, LEAST_FACING};
 use super::region::{self, Region, enlarged, inside, reduced};
-use crate::image::{Extent, Planes};
-use crate::light::Normals;
+use crate::image::{Extent, ImageError, Part, Planes};
+use crate::light::{Normals, YUp};
 use crate::nets::{Inference, NetError};
 
 /// What answers an encoded picture of `side` x `side` pixels with the planes that
@@ -115,40 +115,43 @@ fn of_maps(maps: AnsweredMaps) -> Fields {
     fields
 }
 
-/// The maps that fields stand for, 0 outside the mask.
-pub(super) fn to_maps(fields: &Fields, mask: &[bool]) -> AnsweredMaps {
+/// The maps that fields stand for, 0 outside the mask; in the memory of the fields.
+pub(super) fn to_maps(mut fields: Fields, mask: &[bool]) -> Result<AnsweredMaps, ImageError> {
     let extent = fields.extent();
-    let planes = fields.planes();
-    let masked = |channel: usize, change: fn(f32) -> f32| -> Vec<f32> {
-        let values = planes[channel].iter().zip(mask);
-        values
-            .map(|(&value, &inside)| if inside { change(value) } else { 0.0 })
-            .collect()
-    };
-    let plain = |channel| masked(channel, |value| value);
-    let image = |planes: [Vec<f32>; 3]| of_planes(extent, planes);
-    AnsweredMaps {
-        // Where two answers cancel out, the neighbour's counts.
-        // Details can turn a normal away: what is seen faces the viewer.
-        normals: Normals::new(image([
-            plain(0),
-            plain(1),
-            masked(2, |z| z.max(LEAST_FACING)),
-        ]))
-        .completed(mask),
-        albedo: image([3, 4, 5].map(|channel| masked(channel, f32::exp))),
-        shading: of_planes(extent, [masked(6, f32::exp)]),
-        highlight: of_planes(extent, [masked(7, |value| value.max(0.0))]),
-    }
+    fields.fill_rows(|y, row| {
+        let mask = &mask[y * extent.width..][..extent.width];
+        for (channel, values) in row.into_iter().enumerate() {
+            let change: fn(f32) -> f32 = match channel {
+                // Details can turn a normal away: what is seen faces the viewer.
+                2 => |z| z.max(LEAST_FACING),
+                3..7 => f32::exp,
+                7 => |value| value.max(0.0),
+                _ => |value| value,
+            };
+            for (value, &inside) in values.iter_mut().zip(mask) {
+                *value = if inside { change(*value) } else { 0.0 };
+            }
+        }
+    });
+    let [x, y, z, red, green, blue, shading, highlight] = fields.into_planes();
+    let normals = Normals::new(Planes::from_planes(extent, [x, y, z])?);
+    Ok(AnsweredMaps {
+        normals: without_gaps(normals, mask),
+        albedo: Planes::from_planes(extent, [red, green, blue])?,
+        shading: Planes::from_planes(extent, [shading])?,
+        highlight: Planes::from_planes(extent, [highlight])?,
+    })
 }
 
-/// Planes of which the length is known.
-fn of_planes<const C: usize>(extent: Extent, planes: [Vec<f32>; C]) -> Planes<C> {
-    let mut image = Planes::zeros(extent);
-    for (to, from) in image.planes_mut().into_iter().zip(&planes) {
-        to.copy_from_slice(from);
+/// The same normals; where two answers cancelled out, the neighbour's.
+fn without_gaps(normals: Normals<YUp>, mask: &[bool]) -> Normals<YUp> {
+    let [x, y, z] = normals.planes().planes();
+    let is_gap = |at: usize| mask[at] && (x[at], y[at], z[at]) == (0.0, 0.0, 0.0);
+    if (0..mask.len()).any(is_gap) {
+        normals.completed(mask)
+    } else {
+        normals
     }
-    image
 }
 
 /// The fields of a mirror image as those of the picture: a normal's x points the other way.
@@ -227,8 +230,8 @@ fn tile_detail(
     if !known.contains(&true) {
         return Ok(None);
     }
-    let fields = fields(net, &region::cut_out(&picture, &mask), &mask, mirror)?;
-    let mut fine = enlarged(&fields, &known, tile.extent());
+    let fields = fields(net, &region::cut_out(picture, &mask), &mask, mirror)?;
+    let mut fine = enlarged(&fields, &known, &Part::all(tile.extent()));
     let low = fine
         .resized(Extent::new(coarse, coarse))
         .resized(tile.extent());
@@ -285,15 +288,17 @@ pub(super) struct Whole {
 }
 
 impl Whole {
+    /// Of a picture and its mask that are a part of the square around the object.
     pub(super) fn new(
         scales: &Scales,
         picture: &Planes<3>,
         mask: &Planes<1>,
+        part: &Part,
         mirror: bool,
     ) -> Result<Self, NetError> {
         let at_scale = |net: &dyn MapsNet, mirror| {
             let extent = Extent::new(net.side(), net.side());
-            let (picture, mask) = reduced(picture, mask, extent);
+            let (picture, mask) = reduced(picture, mask, part, extent);
             let fields = fields(net, &picture, &mask, mirror)?;
             Ok::<_, NetError>(Self {
                 picture,
@@ -313,10 +318,10 @@ impl Whole {
 
     /// Its own details on the shape of a coarser scale.
     fn with_shape_of(mut self, other: &Self) -> Self {
-        let extent = self.mask.extent();
+        let (extent, small) = (self.mask.extent(), other.mask.extent());
         let known = inside(&self.mask);
-        let low = enlarged(&self.fields, &known, other.mask.extent()).resized(extent);
-        let shape = enlarged(&other.fields, &inside(&other.mask), extent);
+        let low = enlarged(&self.fields, &known, &Part::all(small)).resized(extent);
+        let shape = enlarged(&other.fields, &inside(&other.mask), &Part::all(extent));
         for (channel, plane) in self.fields.planes_mut().into_iter().enumerate() {
             let share = if NORMAL_PLANES.contains(&channel) {
                 SHAPE_OF_NORMALS

@@ -1,8 +1,8 @@
 //! From the network's maps to layers that give the picture back.
 
-use crate::image::Planes;
-
 use super::encoding::AnsweredMaps;
+use crate::image::Planes;
+use crate::light::{Normals, YUp};
 
 /// How much the albedo follows the network's own where there is little light: what is added to the
 /// square of the shading, whose mean is 1.
@@ -11,6 +11,8 @@ const RIDGE: f64 = 0.1;
 /// Layers of a picture I: I = R S + H up to the ridge. All are 0 outside the mask.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ComposedLayers {
+    /// The network's normals.
+    pub(super) normals: Normals<YUp>,
     /// R.
     pub(super) albedo: Planes<3>,
     /// S, mean 1 under the mask.
@@ -19,6 +21,8 @@ pub(super) struct ComposedLayers {
     pub(super) highlight: Planes<1>,
     /// R S.
     pub(super) diffuse: Planes<3>,
+    /// The root mean square of I - R S - H under the mask, over that of I; 0 for a black picture.
+    pub(super) residual: f64,
 }
 
 impl ComposedLayers {
@@ -28,54 +32,49 @@ impl ComposedLayers {
     /// the network's shading over its mean. R = (I_d S + 0.1 R_h) / (S² + 0.1), where R_h is the
     /// network's albedo, scaled so that R_h S is nearest to I_d: the albedo is I_d / S where there is
     /// light, and the network's where there is hardly any.
+    ///
+    /// Everything is computed in the memory of the picture and the maps: those of a large photograph take gigabytes.
     pub(super) fn new(
-        picture: &Planes<3>,
+        picture: Planes<3>,
         mask: &[bool],
-        maps: &AnsweredMaps,
+        maps: AnsweredMaps,
         with_highlight: bool,
     ) -> Self {
         let highlight = if with_highlight {
-            possible_highlight(picture, mask, &maps.highlight)
+            possible_highlight(&picture, mask, maps.highlight)
         } else {
-            Planes::zeros(picture.extent())
+            maps.highlight.map(|_| 0.0)
         };
-        let shading = normalised(&maps.shading, mask);
-        let matt = without(picture, &highlight, mask);
-        let scale = albedo_scale(&matt, &maps.albedo, shading.plane(0));
-        let (mut albedo, mut diffuse) = (maps.albedo.clone(), matt);
+        let shading = normalised(maps.shading, mask);
+        let (s, h) = (shading.plane(0), highlight.plane(0));
+        let scale = albedo_scale(&picture, h, &maps.albedo, s);
+        let (mut albedo, mut diffuse) = (maps.albedo, picture);
+        let (mut left, mut all) = (0.0_f64, 0.0_f64);
         let layers = albedo.planes_mut().into_iter().zip(diffuse.planes_mut());
         for (albedo, diffuse) in layers {
-            for (at, (albedo, diffuse)) in albedo.iter_mut().zip(diffuse).enumerate() {
-                let (s, d) = (f64::from(shading.plane(0)[at]), f64::from(*diffuse));
-                let answered = scale * f64::from(*albedo);
-                let r = if mask[at] {
-                    (d * s + RIDGE * answered) / (s * s + RIDGE)
-                } else {
-                    0.0
-                };
-                *albedo = r as f32;
-                *diffuse = (r * s) as f32;
+            for at in 0..mask.len() {
+                if !mask[at] {
+                    [albedo[at], diffuse[at]] = [0.0; 2];
+                    continue;
+                }
+                let light = diffuse[at];
+                let (shading, matt) = (f64::from(s[at]), f64::from(matt(light, h[at])));
+                let answered = scale * f64::from(albedo[at]);
+                let r = (matt * shading + RIDGE * answered) / (shading * shading + RIDGE);
+                albedo[at] = r as f32;
+                diffuse[at] = (r * shading) as f32;
+                left += f64::from(light - diffuse[at] - h[at]).powi(2);
+                all += f64::from(light).powi(2);
             }
         }
         Self {
+            normals: maps.normals,
             albedo,
             shading,
             highlight,
             diffuse,
+            residual: if all > 0.0 { (left / all).sqrt() } else { 0.0 },
         }
-    }
-
-    /// The root mean square of I - R S - H under the mask, over that of I; 0 for a black picture.
-    pub(super) fn residual(&self, picture: &Planes<3>, mask: &[bool]) -> f64 {
-        let (mut left, mut all) = (0.0_f64, 0.0_f64);
-        for (picture, diffuse) in picture.planes().into_iter().zip(self.diffuse.planes()) {
-            for at in (0..mask.len()).filter(|&at| mask[at]) {
-                let rest = picture[at] - diffuse[at] - self.highlight.plane(0)[at];
-                left += f64::from(rest).powi(2);
-                all += f64::from(picture[at]).powi(2);
-            }
-        }
-        if all > 0.0 { (left / all).sqrt() } else { 0.0 }
     }
 }
 
@@ -83,11 +82,10 @@ impl ComposedLayers {
 pub(super) fn possible_highlight(
     picture: &Planes<3>,
     mask: &[bool],
-    highlight: &Planes<1>,
+    mut highlight: Planes<1>,
 ) -> Planes<1> {
     let [red, green, blue] = picture.planes();
-    let mut possible = highlight.clone();
-    for (at, value) in possible.planes_mut()[0].iter_mut().enumerate() {
+    for (at, value) in highlight.planes_mut()[0].iter_mut().enumerate() {
         let least = red[at].min(green[at]).min(blue[at]);
         *value = if mask[at] {
             value.min(least).max(0.0)
@@ -95,43 +93,41 @@ pub(super) fn possible_highlight(
             0.0
         };
     }
-    possible
+    highlight
 }
 
 /// The shading over its mean under the mask.
-pub(super) fn normalised(shading: &Planes<1>, mask: &[bool]) -> Planes<1> {
+pub(super) fn normalised(mut shading: Planes<1>, mask: &[bool]) -> Planes<1> {
     let inside = shading.plane(0).iter().zip(mask).filter(|(_, m)| **m);
     let (sum, count) = inside.fold((0.0_f64, 0_u64), |(sum, count), (&value, _)| {
         (sum + f64::from(value), count + 1)
     });
     let mean = sum / count.max(1) as f64;
     let scale = if mean > 0.0 { (1.0 / mean) as f32 } else { 0.0 };
-    let mut shading = shading.clone();
     for (value, &inside) in shading.planes_mut()[0].iter_mut().zip(mask) {
         *value = if inside { *value * scale } else { 0.0 };
     }
     shading
 }
 
-/// The picture less the highlight, 0 outside the mask.
-fn without(picture: &Planes<3>, highlight: &Planes<1>, mask: &[bool]) -> Planes<3> {
-    let mut matt = picture.clone();
-    for plane in matt.planes_mut() {
-        for (at, value) in plane.iter_mut().enumerate() {
-            let rest = *value - highlight.plane(0)[at];
-            *value = if mask[at] { rest.max(0.0) } else { 0.0 };
-        }
-    }
-    matt
+/// Light less its highlight.
+fn matt(light: f32, highlight: f32) -> f32 {
+    (light - highlight).max(0.0)
 }
 
-/// The factor that brings albedo times shading nearest to the picture, by least squares.
-fn albedo_scale(matt: &Planes<3>, albedo: &Planes<3>, shading: &[f32]) -> f64 {
+/// The factor that brings albedo, 0 outside the mask, times shading nearest to the picture less its highlight, by
+/// least squares.
+fn albedo_scale(
+    picture: &Planes<3>,
+    highlight: &[f32],
+    albedo: &Planes<3>,
+    shading: &[f32],
+) -> f64 {
     let (mut product, mut square) = (0.0_f64, 0.0_f64);
-    for (matt, albedo) in matt.planes().into_iter().zip(albedo.planes()) {
-        for ((&matt, &albedo), &shading) in matt.iter().zip(albedo).zip(shading) {
-            let answered = f64::from(albedo) * f64::from(shading);
-            product += answered * f64::from(matt);
+    for (light, albedo) in picture.planes().into_iter().zip(albedo.planes()) {
+        for at in 0..shading.len() {
+            let answered = f64::from(albedo[at]) * f64::from(shading[at]);
+            product += answered * f64::from(matt(light[at], highlight[at]));
             square += answered * answered;
         }
     }
@@ -175,8 +171,8 @@ mod tests {
     fn maps_that_are_right_give_the_picture_back_and_the_shading_has_mean_one() {
         let (picture, maps) = scene();
         let mask = vec![true; EXTENT.pixels()];
-        let layers = ComposedLayers::new(&picture, &mask, &maps, true);
-        assert!(layers.residual(&picture, &mask) < 1e-6);
+        let layers = ComposedLayers::new(picture, &mask, maps.clone(), true);
+        assert!(layers.residual < 1e-6);
         let mean = layers.shading.plane(0).iter().sum::<f32>() / EXTENT.pixels() as f32;
         assert!((mean - 1.0).abs() < 1e-5);
         assert_eq!(layers.highlight, maps.highlight);
@@ -189,15 +185,16 @@ mod tests {
         let (picture, mut maps) = scene();
         maps.albedo = Planes::filled(EXTENT, [0.5; 3]);
         let mask = vec![true; EXTENT.pixels()];
-        let layers = ComposedLayers::new(&picture, &mask, &maps, false);
-        let scale = albedo_scale(&picture, &maps.albedo, layers.shading.plane(0)) as f32;
+        let layers = ComposedLayers::new(picture.clone(), &mask, maps.clone(), false);
+        let none = vec![0.0; EXTENT.pixels()];
+        let scale = albedo_scale(&picture, &none, &maps.albedo, layers.shading.plane(0)) as f32;
         for at in 0..EXTENT.pixels() {
             let s = layers.shading.plane(0)[at];
             let rest = picture.plane(1)[at] - layers.diffuse.plane(1)[at];
             let ridge = 0.1 * (picture.plane(1)[at] - scale * 0.5 * s) / (s * s + 0.1);
             assert!((rest - ridge).abs() < 1e-5, "{rest} {ridge}");
         }
-        assert!(layers.residual(&picture, &mask) < 0.1);
+        assert!(layers.residual < 0.1);
     }
 
     #[test]
@@ -205,7 +202,7 @@ mod tests {
         let (picture, mut maps) = scene();
         maps.highlight = Planes::filled(EXTENT, [9.0]);
         let mask: Vec<bool> = (0..EXTENT.pixels()).map(|at| at != 5).collect();
-        let layers = ComposedLayers::new(&picture, &mask, &maps, true);
+        let layers = ComposedLayers::new(picture.clone(), &mask, maps, true);
         for at in 0..EXTENT.pixels() {
             let least = [0, 1, 2].map(|c| picture.plane(c)[at]);
             let least = least.into_iter().fold(f32::INFINITY, f32::min);
@@ -220,7 +217,7 @@ mod tests {
         let (_, maps) = scene();
         let mask = vec![true; EXTENT.pixels()];
         let black = Planes::zeros(EXTENT);
-        let layers = ComposedLayers::new(&black, &mask, &maps, true);
+        let layers = ComposedLayers::new(black, &mask, maps, true);
         assert!(
             layers
                 .albedo
@@ -229,6 +226,6 @@ mod tests {
                 .flatten()
                 .all(|&v| v == 0.0)
         );
-        assert_eq!(layers.residual(&black, &mask), 0.0);
+        assert_eq!(layers.residual, 0.0);
     }
 }

@@ -8,12 +8,15 @@ use super::encoding::AnsweredMaps;
 use super::error::DecomposeError;
 use super::gloss::{FittedGloss, fit_gloss};
 use super::other::OtherNormals;
-use super::region::{Region, cut_out, enlarged, inside};
+use super::region::{Region, Window, cut_out, enlarged, inside};
 use crate::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use crate::light::{Normals, ShLight, YUp};
 use crate::nets::{Inference, InferenceEngine, NetError, Weights, decomposer};
 use crate::render::{DiffuseForm, DiffuseLayer, NormalsFrame, fit_light};
 
+/// Most pixels of a photograph, and with [`WorkingSize::Native`] of the square around the object: 24 million take 2.5 GB of
+/// memory, so these more than 6 GB.
+pub const MOST_PIXELS: usize = 64_000_000;
 /// Width and height of the picture that the network sees.
 pub const WORKING_SIDE: usize = 256;
 /// Highlights are separated where a larger part of the object's pixels is saturated, as in the paper.
@@ -232,7 +235,8 @@ impl Decomposer {
     /// of the picture that are negative or no numbers count as black.
     ///
     /// # Errors
-    /// Where the mask has another size or is empty, the picture is black under it, or the network fails.
+    /// Where the mask has another size or is empty, the picture is black under it or has more than [`MOST_PIXELS`], or the
+    /// network fails.
     pub fn decompose(
         &self,
         picture: &Rgb<Linear>,
@@ -246,45 +250,45 @@ impl Decomposer {
                 expected,
             });
         }
-        let region = Region::around(mask).ok_or(DecomposeError::EmptyMask)?;
-        let mask = region.cut(mask).map(|m| f32::from(u8::from(m >= 0.5)));
-        let picture = region.cut(picture.planes()).map(usable);
-        let picture = cut_out(&picture, &mask);
-        if !picture.planes().into_iter().flatten().any(|&v| v > 0.0) {
-            return Err(DecomposeError::Unlit);
-        }
-        let under = inside(&mask);
+        let object = CutObject::new(picture, mask, options.size)?;
         let saturated_fraction = options
             .saturated_fraction
-            .unwrap_or_else(|| saturated(&picture, &under, options.saturated_from));
+            .unwrap_or_else(|| object.saturated(options.saturated_from));
         let is_glossy = match options.specular {
             SpecularGate::Auto => saturated_fraction > SATURATED_PART,
             SpecularGate::On => true,
             SpecularGate::Off => false,
         };
-        let whole = Whole::new(&self.scales, &picture, &mask, options.mirror)?;
+        let (region, window) = (object.region, object.window);
+        let part = region.part(&window);
+        let whole = Whole::new(
+            &self.scales,
+            &object.picture,
+            &object.mask,
+            &part,
+            options.mirror,
+        )?;
         let explained = self.explain(&whole, is_glossy)?;
-        let mut maps = self.maps(&whole, &picture, &mask, options)?;
+        let mut maps = self.maps(&whole, &object, options)?;
         if self.normals.is_some() {
             let known = inside(&whole.mask);
-            let vectors = enlarged(explained.normals.planes(), &known, region.extent());
-            maps.normals = Normals::new(cut_out(&vectors, &mask));
+            let vectors = enlarged(explained.normals.planes(), &known, &part);
+            maps.normals = Normals::new(cut_out(vectors, &object.mask));
         }
-        let layers = ComposedLayers::new(&picture, &under, &maps, is_glossy);
-        let residual = layers.residual(&picture, &under);
-        let normals = region.put_back(maps.normals.planes(), extent);
+        let layers = ComposedLayers::new(object.picture, &object.inside, maps, is_glossy);
+        let normals = window.put_back(layers.normals.into_planes(), extent);
         Ok(Decomposition {
             normals: Normals::new(normals),
-            albedo: Rgb::new(region.put_back(&layers.albedo, extent)),
-            shading: region.put_back(&layers.shading, extent),
-            diffuse: Rgb::new(region.put_back(&layers.diffuse, extent)),
-            highlight: region.put_back(&layers.highlight, extent),
+            albedo: Rgb::new(window.put_back(layers.albedo, extent)),
+            shading: window.put_back(layers.shading, extent),
+            diffuse: Rgb::new(window.put_back(layers.diffuse, extent)),
+            highlight: window.put_back(layers.highlight, extent),
             light: explained.light,
             gloss: explained.gloss,
             region,
             is_glossy,
             saturated_fraction,
-            residual,
+            residual: layers.residual,
             light_residual: explained.light_residual,
         })
     }
@@ -293,35 +297,36 @@ impl Decomposer {
     fn maps(
         &self,
         whole: &Whole,
-        picture: &Planes<3>,
-        mask: &Planes<1>,
+        object: &CutObject,
         options: &DecomposeOptions,
     ) -> Result<AnsweredMaps, DecomposeError> {
-        let extent = picture.extent();
-        let mut fields = enlarged(&whole.fields, &inside(&whole.mask), extent);
-        if options.size == WorkingSize::Native && extent.width > self.side() {
+        let part = object.region.part(&object.window);
+        let mut fields = enlarged(&whole.fields, &inside(&whole.mask), &part);
+        if options.size == WorkingSize::Native && part.extent.width > self.side() {
+            let net = self.scales.fine.as_ref();
             add(
                 &mut fields,
-                &details(self.scales.fine.as_ref(), picture, mask, options.mirror)?,
+                &details(net, &object.picture, &object.mask, options.mirror)?,
             );
         }
-        Ok(to_maps(&fields, &inside(mask)))
+        Ok(to_maps(fields, &object.inside)?)
     }
 
     /// Fits light and gloss to the maps at the network's size.
     fn explain(&self, whole: &Whole, is_glossy: bool) -> Result<Explained, DecomposeError> {
         let known = inside(&whole.mask);
-        let maps = to_maps(&whole.fields, &known);
+        let maps = to_maps(whole.fields.clone(), &known)?;
         let others = match &self.normals {
             Some(other) => other.run(&whole.picture, &known)?,
             None => None,
         };
         let normals = others.unwrap_or(maps.normals);
-        let shading = normalised(&maps.shading, &known);
-        let light = fit_light(&normals, &grey(&shading), &known, STIFFNESS)?;
+        let shading = normalised(maps.shading, &known);
+        let target = Rgb::new(in_colour(shading.clone()));
+        let light = fit_light(&normals, &target, &known, STIFFNESS)?;
         let lit = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&normals);
         let gloss = if is_glossy {
-            let highlight = possible_highlight(&whole.picture, &known, &maps.highlight);
+            let highlight = possible_highlight(&whole.picture, &known, maps.highlight);
             fit_gloss(&light, &normals, &highlight)?
         } else {
             None
@@ -333,6 +338,68 @@ impl Decomposer {
             gloss,
         })
     }
+}
+
+/// An object cut out of its photograph.
+struct CutObject {
+    /// The square that the network sees.
+    region: Region,
+    /// Where in the photograph these pixels are.
+    window: Window,
+    /// Light, 0 outside the mask.
+    picture: Planes<3>,
+    /// 0 or 1.
+    mask: Planes<1>,
+    /// The same.
+    inside: Vec<bool>,
+}
+
+impl CutObject {
+    fn new(
+        picture: &Rgb<Linear>,
+        mask: &Planes<1>,
+        size: WorkingSize,
+    ) -> Result<Self, DecomposeError> {
+        let region = Region::around(mask).ok_or(DecomposeError::EmptyMask)?;
+        let window = match size {
+            WorkingSize::Network => Window::around(mask).ok_or(DecomposeError::EmptyMask)?,
+            // Tiles cover a square.
+            WorkingSize::Native => region.window(),
+        };
+        check_size("photograph", mask.extent())?;
+        check_size("square around the object", window.extent)?;
+        let mask = window.cut(mask).map(|m| f32::from(u8::from(m >= 0.5)));
+        let picture = cut_out(window.cut(picture.planes()).map(usable), &mask);
+        if !picture.planes().into_iter().flatten().any(|&v| v > 0.0) {
+            return Err(DecomposeError::Unlit);
+        }
+        Ok(Self {
+            region,
+            window,
+            picture,
+            inside: inside(&mask),
+            mask,
+        })
+    }
+
+    /// The part of the pixels under the mask of which all channels have at least so much light.
+    fn saturated(&self, from: f32) -> f64 {
+        let [red, green, blue] = self.picture.planes();
+        let (mut all, mut full) = (0_u64, 0_u64);
+        for at in (0..self.inside.len()).filter(|&at| self.inside[at]) {
+            all += 1;
+            full += u64::from(red[at].min(green[at]).min(blue[at]) >= from);
+        }
+        full as f64 / all.max(1) as f64
+    }
+}
+
+/// Whether there is memory for the layers of so many pixels.
+pub(super) fn check_size(what: &'static str, extent: Extent) -> Result<(), DecomposeError> {
+    if extent.width.saturating_mul(extent.height) > MOST_PIXELS {
+        return Err(DecomposeError::TooLarge { what, extent });
+    }
+    Ok(())
 }
 
 /// Normals, light and gloss at the network's size.
@@ -352,17 +419,6 @@ fn usable(value: f32) -> f32 {
     }
 }
 
-/// The part of the pixels under the mask of which all channels have at least so much light.
-fn saturated(picture: &Planes<3>, mask: &[bool], from: f32) -> f64 {
-    let [red, green, blue] = picture.planes();
-    let (mut all, mut full) = (0_u64, 0_u64);
-    for at in (0..mask.len()).filter(|&at| mask[at]) {
-        all += 1;
-        full += u64::from(red[at].min(green[at]).min(blue[at]) >= from);
-    }
-    full as f64 / all.max(1) as f64
-}
-
 fn add(fields: &mut Fields, details: &Fields) {
     for (to, from) in fields.planes_mut().into_iter().zip(details.planes()) {
         for (to, from) in to.iter_mut().zip(from) {
@@ -371,13 +427,13 @@ fn add(fields: &mut Fields, details: &Fields) {
     }
 }
 
-/// A colour image of one plane.
-pub(super) fn grey(plane: &Planes<1>) -> Rgb<Linear> {
-    let Extent { width, .. } = plane.extent();
-    let values = plane.plane(0);
-    Rgb::new(Planes::from_fn(plane.extent(), |x, y| {
-        [values[y * width + x]; 3]
-    }))
+/// A grey image as three equal channels.
+pub(super) fn in_colour(grey: Planes<1>) -> Planes<3> {
+    let mut colour = Planes::zeros(grey.extent());
+    for plane in colour.planes_mut() {
+        plane.copy_from_slice(grey.plane(0));
+    }
+    colour
 }
 
 /// The root mean square of the difference over that of `b`.

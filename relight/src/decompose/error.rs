@@ -3,6 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::decomposer::MOST_PIXELS;
 use crate::data::{DamagedSample, OpenError};
 use crate::image::{Extent, ImageError};
 use crate::light::{LightError, LightFileError};
@@ -30,6 +31,17 @@ pub enum DecomposeError {
     /// There is nothing under the mask.
     #[error("the mask is empty: it is nowhere at least one half")]
     EmptyMask,
+    /// There are more pixels than are decomposed.
+    #[error(
+        "the {what} has {} x {} pixels, and at most {MOST_PIXELS} are decomposed: make the photograph smaller",
+        extent.width, extent.height
+    )]
+    TooLarge {
+        /// What is too large.
+        what: &'static str,
+        /// Its size.
+        extent: Extent,
+    },
     /// There is no light on the object.
     #[error("the picture is black all over the object: nothing is lit")]
     Unlit,

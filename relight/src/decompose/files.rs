@@ -5,7 +5,7 @@ use std::path::Path;
 use relit_data::durable::write_whole;
 use serde::Serialize;
 
-use super::decomposer::{DecomposeOptions, Decomposition, SpecularGate, WorkingSize, grey};
+use super::decomposer::{DecomposeOptions, Decomposition, SpecularGate, WorkingSize, in_colour};
 use super::error::DecomposeError;
 use super::mask::MaskSource;
 use super::photo::Photo;
@@ -134,13 +134,11 @@ impl DecompositionFiles<'_> {
         found
             .normals
             .write_png(&path("normal.png"), Depth::Sixteen)?;
-        let shading = grey(&found.shading);
-        let highlight = grey(&found.highlight);
         let white = FigureWhites {
-            albedo: write_light(&path("albedo.png"), &found.albedo)?,
-            shading: write_light(&path("shading.png"), &shading)?,
-            diffuse: write_light(&path("diffuse.png"), &found.diffuse)?,
-            specular: write_light(&path("specular.png"), &highlight)?,
+            albedo: write_light(&path("albedo.png"), found.albedo.planes(), |same| same)?,
+            shading: write_light(&path("shading.png"), &found.shading, in_colour)?,
+            diffuse: write_light(&path("diffuse.png"), found.diffuse.planes(), |same| same)?,
+            specular: write_light(&path("specular.png"), &found.highlight, in_colour)?,
         };
         found.light.write(&path("light.txt"))?;
         ball(found)
@@ -153,8 +151,9 @@ impl DecompositionFiles<'_> {
             .clone()
             .map(|value| value.max(0.0));
         Rgb::<Linear>::new(radiance).write_exr(&path("light-panorama.exr"))?;
-        let mask = grey(&self.photo.mask);
-        write_png(&path("mask.png"), mask.planes(), Depth::Eight)?;
+        let mask = in_colour(self.photo.mask.clone());
+        write_png(&path("mask.png"), &mask, Depth::Eight)?;
+        drop(mask);
         write_png(&path("contact.png"), &self.sheet()?, Depth::Eight)?;
         let figures = self.figures(white);
         let mut json = serde_json::to_vec_pretty(&figures).unwrap_or_default();
@@ -214,28 +213,32 @@ impl DecompositionFiles<'_> {
     /// One sheet: the photograph, normals, albedo and shading; the diffuse part, the highlight, a ball in
     /// the light, and the shading that this light makes on the normals.
     fn sheet(&self) -> Result<Planes<3>, DecomposeError> {
-        let found = self.found;
-        let lit = DiffuseLayer::new(&found.light, DiffuseForm::Irradiance).shading(&found.normals);
+        let (found, mask) = (self.found, &self.photo.mask);
         let picture = self.photo.picture.planes();
-        let tile = |planes: &Planes<3>| self.found.region.cut(planes).resized(square());
-        // The layers are shown as bright as the photograph, whose values are light of a screen.
-        let own = bright(picture, &self.photo.mask).max(1.0);
-        let shown = |planes: &Planes<3>, white: f32| {
-            let scaled = tile(planes).map(|value| value / white);
-            scaled.map(|value| Srgb::from_linear(value.clamp(0.0, 1.0)))
+        let (albedo, diffuse) = (found.albedo.planes(), found.diffuse.planes());
+        let region = &found.region;
+        let lit = {
+            let layer = DiffuseLayer::new(&found.light, DiffuseForm::Irradiance);
+            region.resized(layer.shading(&found.normals).planes(), square())
         };
-        let of = |planes: &Planes<3>| shown(planes, bright(planes, &self.photo.mask));
-        let shading = grey(&found.shading);
-        let white = bright(shading.planes(), &self.photo.mask);
+        // The layers are shown as bright as the photograph, whose values are light of a screen.
+        let own = bright(picture, mask).max(1.0);
+        let white = bright(&found.shading, mask);
+        let shown = |tile: Planes<3>, white: f32| {
+            tile.map(|value| Srgb::from_linear((value / white).clamp(0.0, 1.0)))
+        };
+        let colour = |planes: &Planes<3>, white| shown(region.resized(planes, square()), white);
+        let grey =
+            |planes: &Planes<1>, white| shown(in_colour(region.resized(planes, square())), white);
         let tiles = [
-            shown(picture, own),
-            tile(&found.normals.to_colours()),
-            of(found.albedo.planes()),
-            shown(shading.planes(), white),
-            shown(found.diffuse.planes(), own),
-            shown(grey(&found.highlight).planes(), own),
+            colour(picture, own),
+            region.resized(&found.normals.to_colours(), square()),
+            colour(albedo, bright(albedo, mask)),
+            grey(&found.shading, white),
+            colour(diffuse, own),
+            grey(&found.highlight, own),
             ball(found).encode::<Srgb>().into_planes(),
-            shown(lit.planes(), white),
+            shown(lit, white),
         ];
         Ok(Planes::sheet(&tiles, COLUMNS)?)
     }
@@ -254,26 +257,31 @@ fn ball(found: &Decomposition) -> Rgb<Linear> {
 }
 
 /// Writes light as a PNG of 16 bits, sRGB; the light that its largest value stands for.
-pub(crate) fn write_light(path: &Path, light: &Rgb<Linear>) -> Result<f32, ImageError> {
-    let planes = light.planes();
-    let most = planes
-        .planes()
-        .into_iter()
-        .flatten()
-        .fold(0.0_f32, |a, &b| a.max(b));
+pub(crate) fn write_light<const C: usize>(
+    path: &Path,
+    light: &Planes<C>,
+    in_colour: fn(Planes<C>) -> Planes<3>,
+) -> Result<f32, ImageError> {
+    let values = light.planes().into_iter().flatten();
+    let most = values.fold(0.0_f32, |a, &b| a.max(b));
     // What fits in is written as it is, so that files can be compared.
     let white = most.max(1.0);
-    let encoded = planes.clone().map(|value| Srgb::from_linear(value / white));
-    write_png(path, &encoded, Depth::Sixteen)?;
+    let encoded = light.clone().map(|value| Srgb::from_linear(value / white));
+    write_png(path, &in_colour(encoded), Depth::Sixteen)?;
     Ok(white)
 }
 
 /// The value that one in two hundred under the mask exceeds; 1 where all is dark.
-pub(crate) fn bright(planes: &Planes<3>, mask: &Planes<1>) -> f32 {
-    let [red, green, blue] = planes.planes();
+pub(crate) fn bright<const C: usize>(planes: &Planes<C>, mask: &Planes<1>) -> f32 {
+    let channels = planes.planes();
+    let brightest = |at: usize| {
+        channels
+            .iter()
+            .fold(0.0_f32, |most, plane| most.max(plane[at]))
+    };
     let mut values: Vec<f32> = (0..mask.extent().pixels())
         .filter(|&at| mask.plane(0)[at] >= 0.5)
-        .map(|at| red[at].max(green[at]).max(blue[at]))
+        .map(brightest)
         .collect();
     let place = (values.len() as f64 * (1.0 - BEYOND_WHITE)) as usize;
     if place >= values.len() {

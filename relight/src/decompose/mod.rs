@@ -19,7 +19,8 @@ mod shipped;
 mod tests;
 
 pub use decomposer::{
-    DecomposeOptions, Decomposer, Decomposition, SpecularGate, WORKING_SIDE, WorkingSize,
+    DecomposeOptions, Decomposer, Decomposition, MOST_PIXELS, SpecularGate, WORKING_SIDE,
+    WorkingSize,
 };
 pub use encoding::{AnsweredMaps, EncodedPicture};
 #[cfg(feature = "train")]

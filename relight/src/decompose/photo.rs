@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use relit_data::shard::Dataset;
 
-use super::decomposer::{DecomposeOptions, SATURATED_VALUE};
+use super::decomposer::{DecomposeOptions, SATURATED_VALUE, check_size};
 use super::error::DecomposeError;
 use super::mask::{MaskSource, NoObject, Rectangle, find_mask, is_empty, read_mask};
 use crate::data::{Encoding, SampleId, Source, Turns};
@@ -229,6 +229,9 @@ fn name_of(path: &Path) -> String {
 }
 
 fn read_photo(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeError> {
+    if let Some(extent) = stated_extent(path) {
+        check_size("photograph", extent)?;
+    }
     let image = StoredImage::read(path)?;
     let transfer = match (image.samples, reading.transfer) {
         (Samples::Float, _) => None,
@@ -267,6 +270,13 @@ fn read_photo(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeErr
         },
         saturated_fraction: None,
     })
+}
+
+/// The size that a file says it has; none where it cannot be read.
+fn stated_extent(path: &Path) -> Option<Extent> {
+    let reader = ::image::ImageReader::open(path).ok()?;
+    let sides = reader.with_guessed_format().ok()?.into_dimensions().ok()?;
+    Some(Extent::new(sides.0 as usize, sides.1 as usize))
 }
 
 fn mask_file(given: &Path, name: &str) -> Result<PathBuf, DecomposeError> {

@@ -320,13 +320,43 @@ fn fields_and_maps_are_the_same_but_for_the_mask() {
     let mask = disc(extent, 12.0);
     let found = fields(&net, &smooth(extent), &mask, false).unwrap();
     let inside: Vec<bool> = mask.plane(0).iter().map(|&m| m > 0.5).collect();
-    let maps = to_maps(&found, &inside);
+    let maps = to_maps(found, &inside).unwrap();
     let encoded = EncodedPicture::new(&smooth(extent), &mask);
     let decoded = encoded.decode(&net.answer(encoded.values()).unwrap());
     assert!(most_apart(maps.shading.plane(0), decoded.shading.plane(0)) < 1e-5);
     assert!(most_apart(maps.albedo.plane(2), decoded.albedo.plane(2)) < 1e-5);
     let [a, b] = [maps.normals, decoded.normals].map(|n| n.planes().plane(0).to_vec());
     assert!(most_apart(&a, &b) < 1e-5);
+}
+
+#[test]
+fn what_is_too_large_is_refused_before_anything_is_computed() {
+    let net = Decomposer::of(
+        Box::new(PixelNet {
+            side: 32,
+            pixel: by_colour,
+        }),
+        None,
+    );
+    // The square around this line has far more pixels than the photograph.
+    let extent = Extent::new(8400, 1);
+    let picture = Rgb::new(Planes::filled(extent, [0.5; 3]));
+    let mask = Planes::filled(extent, [1.0]);
+    let decompose = |size| {
+        let options = DecomposeOptions {
+            size,
+            ..DecomposeOptions::default()
+        };
+        net.decompose(&picture, &mask, &options)
+    };
+    let found = decompose(WorkingSize::Network).unwrap();
+    assert_eq!(found.region.side, 8736);
+    assert!(found.residual < 0.5);
+    let text = decompose(WorkingSize::Native).unwrap_err().to_string();
+    assert!(
+        text.contains("the square around the object has 8736 x 8736 pixels"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -10,4 +10,4 @@ pub use colour::{ColourSpace, Gamma22, Linear, Rgb, Srgb, Transfer};
 pub use error::ImageError;
 pub use files::{Depth, Samples, StoredImage, read_planes, write_exr, write_png};
 pub use planes::{Extent, Planes};
-pub(crate) use resize::{area_shares, beside};
+pub(crate) use resize::{Part, area_shares, beside};

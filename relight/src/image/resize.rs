@@ -4,6 +4,28 @@ use std::ops::Range;
 
 use super::{Extent, Planes};
 
+/// A rectangle of an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Part {
+    /// Size of the whole image.
+    pub(crate) whole: Extent,
+    /// Column and row of the rectangle's first pixel in it.
+    pub(crate) at: [i64; 2],
+    /// Size of the rectangle.
+    pub(crate) extent: Extent,
+}
+
+impl Part {
+    /// All of an image.
+    pub(crate) const fn all(whole: Extent) -> Self {
+        Self {
+            whole,
+            at: [0; 2],
+            extent: whole,
+        }
+    }
+}
+
 impl<const C: usize> Planes<C> {
     /// The image in another size. Where it becomes smaller, each pixel is the mean of the area that it
     /// covers; where it becomes larger, it is interpolated linearly between the pixels' middles.
@@ -12,8 +34,32 @@ impl<const C: usize> Planes<C> {
         if extent == self.extent() {
             return self.clone();
         }
-        let from = self.extent();
-        let across = taps(from.width, extent.width);
+        self.resized_part(&Part::all(self.extent()), &Part::all(extent))
+    }
+
+    /// A part, `target`, of an image in another size, of which this is the part `source`. The image is 0 beside that
+    /// part, and ends where it ends even where the part goes on.
+    ///
+    /// # Panics
+    /// Where this has another size than `source`, or `target` reaches beyond its image.
+    #[must_use]
+    pub(crate) fn resized_part(&self, source: &Part, target: &Part) -> Self {
+        assert_eq!(source.extent, self.extent(), "size of the part");
+        let (from, extent) = (self.extent(), target.extent);
+        let line = |axis: usize, size: fn(Extent) -> usize| -> Vec<Vec<(usize, f32)>> {
+            let all = taps(size(source.whole), size(target.whole));
+            let first = usize::try_from(target.at[axis]).unwrap_or(usize::MAX);
+            let given = |&(at, share): &(usize, f32)| {
+                let at = usize::try_from(at as i64 - source.at[axis]).ok()?;
+                (at < size(from)).then_some((at, share))
+            };
+            let within = all[first..][..size(extent)].iter();
+            within
+                .map(|taps| taps.iter().filter_map(given).collect())
+                .collect()
+        };
+        let across = line(0, |extent| extent.width);
+        let down = line(1, |extent| extent.height);
         let mut wide = Self::zeros(Extent::new(extent.width, from.height));
         wide.fill_rows(|y, row| {
             for (out, plane) in row.into_iter().zip(self.planes()) {
@@ -23,7 +69,6 @@ impl<const C: usize> Planes<C> {
                 }
             }
         });
-        let down = taps(from.height, extent.height);
         let mut resized = Self::zeros(extent);
         resized.fill_rows(|y, row| {
             for (out, plane) in row.into_iter().zip(wide.planes()) {
@@ -156,6 +201,38 @@ mod tests {
         assert_eq!(large.pixel(0, 0), [0.0, 0.0]);
         assert_eq!(large.pixel(3, 1), [1.25, 2.5]);
         assert_eq!(large.pixel(7, 3), [3.0, 10.0]);
+    }
+
+    #[test]
+    fn a_part_in_another_size_is_that_part_of_all_in_another_size() {
+        let whole = Extent::new(24, 18);
+        // What is given reaches beyond the image on the left, and is not all of it.
+        let source = Part {
+            whole,
+            at: [-3, 2],
+            extent: Extent::new(20, 11),
+        };
+        let given = ramp(source.extent).map(|value| value + 1.0);
+        let full = Planes::from_fn(whole, |x, y| match (x + 3, y.checked_sub(2)) {
+            (x, Some(y)) if x < 20 && y < 11 => given.pixel(x, y),
+            _ => [0.0; 2],
+        });
+        for extent in [whole, Extent::new(7, 5), Extent::new(60, 50)] {
+            let all = full.resized(extent);
+            let target = Part {
+                whole: extent,
+                at: [2, 1],
+                extent: Extent::new(extent.width - 3, extent.height - 2),
+            };
+            let part = given.resized_part(&source, &target);
+            for y in 0..target.extent.height {
+                for x in 0..target.extent.width {
+                    let (found, wanted) = (part.pixel(x, y), all.pixel(x + 2, y + 1));
+                    let apart = (0..2).map(|c| (found[c] - wanted[c]).abs());
+                    assert!(apart.fold(0.0, f32::max) < 1e-4, "{found:?} {wanted:?}");
+                }
+            }
+        }
     }
 
     #[test]

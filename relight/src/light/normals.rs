@@ -171,6 +171,12 @@ impl<Y: YAxis> Normals<Y> {
         &self.planes
     }
 
+    /// x, y and z themselves.
+    #[must_use]
+    pub fn into_planes(self) -> Planes<3> {
+        self.planes
+    }
+
     /// Width and height.
     #[must_use]
     pub const fn extent(&self) -> Extent {

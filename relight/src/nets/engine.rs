@@ -11,7 +11,7 @@ pub enum InferenceEngine {
     /// Pure Rust, always there.
     #[default]
     Tract,
-    /// A library; several times as fast.
+    /// A library; faster.
     OnnxRuntime(OnnxRuntime),
 }
 
