@@ -19,6 +19,8 @@ const COARSE_PIXELS: usize = 2500;
 const ROUNDS: usize = 18;
 /// How many of them, the first, take the object for matt.
 const MATT_ROUNDS: usize = 8;
+/// In a known light the rounds end where one improves the cost by less than this.
+const SETTLED: f64 = 2e-5;
 /// Bands of the room's light that gloss is fitted with, of order 0 and up.
 const GLOSS_BANDS: usize = GLOSS_ORDER + 1;
 /// How smooth the normals are that an unknown light is fitted to: the deviation in the first round, in parts of
@@ -539,7 +541,7 @@ impl Alternation<'_> {
     fn run(&self, start: Vec<[f64; 3]>) -> Option<(f64, Room)> {
         let mut normals = start;
         let mut albedo = self.first_albedo();
-        let mut ended = None;
+        let mut ended: Option<(f64, Room)> = None;
         let mut shares = Shares::default();
         for round in 0..ROUNDS {
             let bands = self.bands(round);
@@ -553,7 +555,12 @@ impl Alternation<'_> {
             for (albedo, fit) in albedo.iter_mut().zip(&fits) {
                 *albedo = fit.albedo;
             }
-            ended = Some((self.cost(&fits), room));
+            let cost = self.cost(&fits);
+            let settled = ended.is_some_and(|(before, _)| before - cost < SETTLED);
+            ended = Some((cost, room));
+            if settled && self.known.is_some() {
+                break;
+            }
             normals = self.smoothed(&fits, round);
         }
         ended
