@@ -10,6 +10,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use relight::asset::Asset;
+use relight::data::{TruthLayout, TruthSet};
 use relight::image::{Linear, Planes, Rgb, Transfer};
 use relight::light::{Normals, ShLight, YUp};
 use relight::metrics::{Comparison, ScaleFit, angular_error};
@@ -134,8 +136,13 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
         "-o",
         out.to_str().unwrap(),
     ];
-    for _ in 0..2 {
-        let run = relight(&arguments);
+    let object = folder.path().join("object.relit");
+    let labels = folder.path().join("labels");
+    let mut more = arguments.to_vec();
+    more.extend(["--asset", object.to_str().unwrap()]);
+    more.extend(["--labels", labels.to_str().unwrap()]);
+    for arguments in [&arguments[..], &more] {
+        let run = relight(arguments);
         assert!(run.status.success(), "{}", text(&run.stderr));
         assert!(text(&run.stderr).contains("elevation is not known"));
         let event: serde_json::Value =
@@ -144,6 +151,15 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
         assert_eq!(event["figures"]["elevation"]["source"], "assumed");
         assert!(event["figures"]["ambiguity"].is_null());
     }
+    let asset = Asset::read(&object).unwrap();
+    assert!(!asset.surface().normals().is_empty());
+    assert_eq!(
+        TruthSet::open(&labels, TruthLayout::Synth)
+            .unwrap()
+            .names()
+            .len(),
+        12
+    );
     let mut names: Vec<String> = fs::read_dir(&out)
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())

@@ -19,6 +19,8 @@ const COARSE_PIXELS: usize = 2500;
 const ROUNDS: usize = 18;
 /// How many of them, the first, take the object for matt.
 const MATT_ROUNDS: usize = 8;
+/// In a known light the rounds end where one improves the cost by less than this.
+const SETTLED: f64 = 2e-5;
 /// Bands of the room's light that gloss is fitted with, of order 0 and up.
 const GLOSS_BANDS: usize = GLOSS_ORDER + 1;
 /// How smooth the normals are that an unknown light is fitted to: the deviation in the first round, in parts of
@@ -36,6 +38,9 @@ const HEIGHTS: [(&str, f64); 3] = [
 const OUTLINE_WEIGHT: f64 = 0.15;
 /// Rounds in which what does not fit is left out.
 const ROBUST_ROUNDS: usize = 2;
+/// How far the surroundings of a pixel reach, in parts of the frame's width: a normal that differs from theirs is not to be
+/// believed as far.
+const SURROUNDINGS: f64 = 1.0 / 40.0;
 /// Degrees of freedom of what is left of a curve: fitted to the angles that its looseness stands for.
 const FREEDOM: f64 = 3.0;
 /// How far normals are off as a whole in unknown light, radians: a bend that light makes up for, which no residual
@@ -287,9 +292,22 @@ impl Solver<'_> {
         self.fits = self.search();
     }
 
+    /// The normals around each pixel, smoothed.
+    fn surroundings(&self) -> Vec<[f64; 3]> {
+        let map = self
+            .curves
+            .map(|pixel| self.fits[pixel].normal.map(|v| v as f32));
+        let deviation = SURROUNDINGS * self.curves.extent().width as f64;
+        let smooth = blurred(&map, &self.curves.mask(), deviation.max(LEAST_BLUR));
+        let [x, y, z] = smooth.planes();
+        let at = |&place: &usize| unit([x, y, z].map(|plane| f64::from(plane[place])));
+        self.curves.places().iter().map(at).collect()
+    }
+
     /// The error of each pixel by itself, and the one that all have in `common`.
     fn expected_errors(&self, common: f64) -> Vec<f64> {
         let search = Search::new(&self.room);
+        let surroundings = self.surroundings();
         (0..self.fits.len())
             .into_par_iter()
             .map(|pixel| {
@@ -301,9 +319,11 @@ impl Solver<'_> {
                 let fit = &self.fits[pixel];
                 let angle = search.looseness(moments, expected, fit, FREEDOM);
                 let clipped = CLIPPED_ERROR * self.curves.clipped_at(pixel);
+                let bent = super::search::dot(surroundings[pixel], fit.normal);
                 angle
                     .hypot(common)
                     .hypot(clipped)
+                    .hypot(bent.clamp(-1.0, 1.0).acos())
                     .min(std::f64::consts::FRAC_PI_2)
             })
             .collect()
@@ -521,7 +541,7 @@ impl Alternation<'_> {
     fn run(&self, start: Vec<[f64; 3]>) -> Option<(f64, Room)> {
         let mut normals = start;
         let mut albedo = self.first_albedo();
-        let mut ended = None;
+        let mut ended: Option<(f64, Room)> = None;
         let mut shares = Shares::default();
         for round in 0..ROUNDS {
             let bands = self.bands(round);
@@ -535,7 +555,12 @@ impl Alternation<'_> {
             for (albedo, fit) in albedo.iter_mut().zip(&fits) {
                 *albedo = fit.albedo;
             }
-            ended = Some((self.cost(&fits), room));
+            let cost = self.cost(&fits);
+            let settled = ended.is_some_and(|(before, _)| before - cost < SETTLED);
+            ended = Some((cost, room));
+            if settled && self.known.is_some() {
+                break;
+            }
             normals = self.smoothed(&fits, round);
         }
         ended

@@ -65,7 +65,7 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_name = "DIR")]
     labels: Option<PathBuf>,
     /// The least confidence, 0 to 1, of pixels in the labels.
-    #[arg(long, value_name = "PART", default_value_t = 0.5, value_parser = part, requires = "labels")]
+    #[arg(long, value_name = "PART", default_value_t = 0.3, value_parser = part, requires = "labels")]
     labels_confidence: f32,
     /// Do not write the video, which needs the program ffmpeg.
     #[arg(long)]
