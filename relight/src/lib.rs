@@ -6,20 +6,25 @@
 //!
 //! | module | concern |
 //! | --- | --- |
+//! | [`asset`] | a captured object in one file, ready to be lit |
 //! | [`data`] | shards and folders as streams of arrays |
 //! | [`decompose`] | a photograph into normals, albedo, shading, highlight and light |
 //! | [`eval`] | the protocols of the paper's tables |
 //! | [`image`] | planes of `f32`, colours that know their space, files |
+//! | [`insert`] | objects out of photographs in another light and in other pictures |
 //! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
 //! | [`metrics`] | how far an estimate is from the truth |
 //! | [`movie`] | frames into MP4 and WebM, by the `ffmpeg` program |
 //! | [`nets`] | the networks as data, their weights in files, inference |
 //! | [`render`] | diffuse and specular layers on normals, their derivatives, the truth by Monte Carlo |
 //! | [`synth`] | pictures of objects with the truth that they were made of |
+//! | [`turn`] | a whole turn into normals, albedo and light, without training |
+pub mod asset;
 pub mod data;
 pub mod decompose;
 pub mod eval;
 pub mod image;
+pub mod insert;
 pub mod light;
 pub mod metrics;
 pub mod movie;
@@ -28,3 +33,5 @@ pub mod render;
 pub mod synth;
 #[cfg(feature = "train")]
 pub mod train;
+pub mod turn;
+mod whole;

@@ -1,4 +1,4 @@
-//! Frames into a video file, by the `ffmpeg` program. Knows nothing of what the frames show.
+//! Frames into a video file and out of one, by the programs `ffmpeg` and `ffprobe`. Knows nothing of what the frames show.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -10,7 +10,7 @@ use std::thread::{self, JoinHandle};
 
 use relit_data::durable;
 
-use crate::image::{Extent, Rgb, Srgb};
+use crate::image::{Extent, Planes, Rgb, Srgb};
 
 /// What a video file is encoded as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +35,14 @@ pub enum MovieError {
         /// The video.
         path: PathBuf,
         /// The last line that it wrote.
+        said: String,
+    },
+    /// A file is no video.
+    #[error("{} is not a readable video: {said}", path.display())]
+    NoVideo {
+        /// The file.
+        path: PathBuf,
+        /// What the program says.
         said: String,
     },
     /// A frame has another size than the first.
@@ -206,6 +214,152 @@ impl Drop for MovieWriter {
     }
 }
 
+/// The most pixels of a video's frame.
+const MOST_PIXELS: usize = 1 << 26;
+
+/// A video that is read, frame by frame.
+#[derive(Debug)]
+pub struct MovieReader {
+    path: PathBuf,
+    extent: Extent,
+    frames_per_second: u32,
+    program: Child,
+    errors: Option<JoinHandle<String>>,
+}
+
+impl MovieReader {
+    /// Starts `ffmpeg` for a file.
+    ///
+    /// # Errors
+    /// Where a program cannot be started, or the file is no video.
+    pub fn open(path: &Path) -> Result<Self, MovieError> {
+        let (extent, frames_per_second) = probe(path)?;
+        let mut program = Command::new("ffmpeg")
+            .args(["-hide_banner", "-loglevel", "error", "-nostdin", "-i"])
+            .arg(path)
+            .args(["-map", "0:v:0", "-f", "rawvideo", "-pix_fmt", "rgb24"])
+            // Frames that are turned on the screen are turned here; all have the size of the first.
+            .args([
+                "-vf",
+                &format!("scale={}:{}", extent.width, extent.height),
+                "pipe:1",
+            ])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(MovieError::NoProgram)?;
+        let errors = program
+            .stderr
+            .take()
+            .map(|pipe| thread::spawn(|| last_line(pipe)));
+        Ok(Self {
+            path: path.to_owned(),
+            extent,
+            frames_per_second,
+            program,
+            errors,
+        })
+    }
+
+    /// Width and height of its frames.
+    #[must_use]
+    pub const fn extent(&self) -> Extent {
+        self.extent
+    }
+
+    /// Frames a second, rounded.
+    #[must_use]
+    pub const fn frames_per_second(&self) -> u32 {
+        self.frames_per_second
+    }
+
+    /// The next frame; none after the last.
+    ///
+    /// # Errors
+    /// Where the program fails, or the file ends in the middle of a frame.
+    pub fn frame(&mut self) -> Result<Option<Rgb<Srgb>>, MovieError> {
+        let Some(pipe) = &mut self.program.stdout else {
+            return Ok(None);
+        };
+        let mut bytes = Vec::with_capacity(3 * self.extent.pixels());
+        let read = pipe
+            .take(3 * self.extent.pixels() as u64)
+            .read_to_end(&mut bytes);
+        if read.is_err() || (!bytes.is_empty() && bytes.len() < 3 * self.extent.pixels()) {
+            return Err(self.failure());
+        }
+        if bytes.is_empty() {
+            let is_done = self.program.wait().is_ok_and(|status| status.success());
+            return if is_done {
+                Ok(None)
+            } else {
+                Err(self.failure())
+            };
+        }
+        let mut planes = Planes::zeros(self.extent);
+        for (channel, plane) in planes.planes_mut().into_iter().enumerate() {
+            for (value, pixel) in plane.iter_mut().zip(bytes.chunks_exact(3)) {
+                *value = f32::from(pixel[channel]) / 255.0;
+            }
+        }
+        Ok(Some(Rgb::new(planes)))
+    }
+
+    fn failure(&mut self) -> MovieError {
+        drop(self.program.stdout.take());
+        // What is not read any more cannot end by itself.
+        let _ = self.program.kill();
+        let said = self.errors.take().and_then(|thread| thread.join().ok());
+        MovieError::NoVideo {
+            path: self.path.clone(),
+            said: said.unwrap_or_default(),
+        }
+    }
+}
+
+impl Drop for MovieReader {
+    fn drop(&mut self) {
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}
+
+/// Size and rate of a video's frames, by `ffprobe`.
+fn probe(path: &Path) -> Result<(Extent, u32), MovieError> {
+    let output = Command::new("ffprobe")
+        .args(["-v", "error", "-select_streams", "v:0", "-of", "csv=p=0"])
+        .args(["-show_entries", "stream=width,height,r_frame_rate"])
+        .arg(path)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(MovieError::NoProgram)?;
+    let errors = String::from_utf8_lossy(&output.stderr);
+    let text = String::from_utf8_lossy(&output.stdout);
+    let mut parts = text
+        .trim()
+        .split([',', '/'])
+        .map(|part| part.trim().parse::<usize>().ok());
+    let mut next = || parts.next().flatten().filter(|&number| number > 0);
+    match (next(), next(), next(), next()) {
+        (Some(width), Some(height), Some(rate), Some(seconds))
+            if width.saturating_mul(height) <= MOST_PIXELS =>
+        {
+            let rate = (rate as f64 / seconds as f64).round().clamp(1.0, 240.0) as u32;
+            Ok((Extent::new(width, height), rate))
+        }
+        _ => Err(MovieError::NoVideo {
+            path: path.to_owned(),
+            said: errors
+                .lines()
+                .last()
+                .unwrap_or("it has no frames of a known size")
+                .trim()
+                .to_owned(),
+        }),
+    }
+}
+
 /// The name under which a video is written, in the same folder.
 fn partial_name(path: &Path) -> PathBuf {
     static COUNTER: AtomicU64 = AtomicU64::new(0);
@@ -328,5 +482,37 @@ mod tests {
             Some(MovieFormat::Webm)
         );
         assert_eq!(MovieFormat::of(Path::new("mp4")), None);
+    }
+
+    #[test]
+    fn what_is_written_is_read_frame_by_frame_and_what_is_no_video_is_refused() {
+        if !has_ffmpeg() {
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("clip.mp4");
+        let mut movie =
+            MovieWriter::create(&path, MovieFormat::Mp4, Extent::new(32, 16), 12).unwrap();
+        for level in [0.2, 0.6] {
+            let frame = Rgb::new(Planes::filled(Extent::new(32, 16), [level; 3]));
+            movie.push(&frame).unwrap();
+        }
+        movie.finish().unwrap();
+        let mut clip = MovieReader::open(&path).unwrap();
+        assert_eq!(
+            (clip.extent(), clip.frames_per_second()),
+            (Extent::new(32, 16), 12)
+        );
+        for level in [0.2, 0.6] {
+            let frame = clip.frame().unwrap().unwrap();
+            assert!((frame.planes().pixel(9, 9)[1] - level).abs() < 0.02);
+        }
+        assert!(clip.frame().unwrap().is_none());
+        fs::write(&path, "no video").unwrap();
+        let error = MovieReader::open(&path).unwrap_err().to_string();
+        assert!(
+            error.contains("clip.mp4 is not a readable video"),
+            "{error}"
+        );
     }
 }

@@ -20,10 +20,11 @@ use relight::nets::paper::{Head, light_net, normal_net, spec_net};
 use relight::nets::{Graph, Inference, Weights, decomposer};
 use relight::synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
 use relight::train::{
-    Adam, AdamSettings, AnsweredTensors, Composer, Composition, ComputePrecision, DataSettings,
-    DecomposeSettings, DecomposeTask, Model, PaperInputs, PaperLosses, PaperPhase, PaperSettings,
-    PaperTask, PrecisionChoice, Resources, Run, RunOutcome, RunSettings, TABLE, Task, TrainError,
-    TrainObserver, TruthArrays, read_settings,
+    Adam, AdamSettings, AnsweredTensors, Checkpoint, Composer, Composition, ComputePrecision,
+    DataSettings, DecomposeSettings, DecomposeTask, Journal, Learner, LearnerSettings, Model,
+    PaperInputs, PaperLosses, PaperPhase, PaperSettings, PaperTask, PrecisionChoice, ProcessGroup,
+    Resources, Run, RunOutcome, RunSettings, StepLosses, TABLE, Task, TrainError, TrainObserver,
+    TruthArrays, Validation, read_settings,
 };
 use tch::{Device, Kind, Tensor};
 
@@ -101,7 +102,7 @@ fn a_run_that_was_saved_goes_on_to_the_same_losses() {
     let graph = light_net(Head::Pooled);
     let second = Model::new(graph, &weights, Device::Cpu, ComputePrecision::Single).unwrap();
     let mut adam = Adam::new(AdamSettings::default(), second.parameters()).unwrap();
-    adam.recall(&memory, 3).unwrap();
+    adam.recall(&memory).unwrap();
     assert_eq!(descend(&second, &mut adam, 3), undisturbed);
 }
 
@@ -114,7 +115,7 @@ fn the_memory_of_another_network_is_refused() {
         .unwrap();
     let other = model(decomposer(), ComputePrecision::Single);
     let mut adam = Adam::new(AdamSettings::default(), other.parameters()).unwrap();
-    assert!(adam.recall(&memory, 3).is_err());
+    assert!(adam.recall(&memory).is_err());
 }
 
 /// Small settings: a run of seconds.
@@ -148,13 +149,19 @@ fn decompose_task(steps: u64) -> (DecomposeTask, RunSettings) {
         ..DecomposeSettings::default()
     };
     let run = settings.run.clone();
-    (DecomposeTask::new(settings, RESOURCES, None).unwrap(), run)
+    (
+        DecomposeTask::new(settings, resources(), None).unwrap(),
+        run,
+    )
 }
 
-const RESOURCES: Resources = Resources {
-    device: Device::Cpu,
-    composers: 2,
-};
+fn resources() -> Resources {
+    Resources {
+        device: Device::Cpu,
+        composers: 2,
+        stop: Arc::default(),
+    }
+}
 
 /// Stops a run after so many steps.
 struct StopAfter<'a> {
@@ -230,7 +237,7 @@ fn a_folder_with_a_run_is_not_overwritten_and_another_runs_checkpoint_is_refused
     assert!(
         error
             .to_string()
-            .contains("its settings are others: run.seed"),
+            .contains("its settings are others: run.steps"),
         "{error}"
     );
 }
@@ -339,7 +346,7 @@ fn every_phase_of_the_paper_makes_its_steps_and_goes_on_where_it_was_stopped() {
         PaperPhase::Joint,
         PaperPhase::Specular,
     ] {
-        let task = || PaperTask::new(phase, paper_settings(3), RESOURCES, &inputs).unwrap();
+        let task = || PaperTask::new(phase, paper_settings(3), resources(), &inputs).unwrap();
         let run = paper_settings(3).run;
         let (whole, parted) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let outcome = make_run(&mut task(), &run, whole.path(), (false, u64::MAX)).unwrap();
@@ -373,7 +380,7 @@ fn turns_that_are_held_out_are_judged_at_the_start_and_at_the_end() {
         ..paper_settings(12)
     };
     let run = settings.run.clone();
-    let mut task = PaperTask::new(PaperPhase::Light, settings, RESOURCES, &inputs).unwrap();
+    let mut task = PaperTask::new(PaperPhase::Light, settings, resources(), &inputs).unwrap();
     let folder = tempfile::tempdir().unwrap();
     make_run(&mut task, &run, folder.path(), (false, u64::MAX)).unwrap();
     let read = |step: &str, name: &str| -> f64 {
@@ -399,7 +406,7 @@ fn a_phase_says_what_it_needs() {
         (PaperPhase::Specular, "--turns"),
     ] {
         let inputs = PaperInputs::default();
-        let error = PaperTask::new(phase, paper_settings(1), RESOURCES, &inputs).unwrap_err();
+        let error = PaperTask::new(phase, paper_settings(1), resources(), &inputs).unwrap_err();
         assert!(error.to_string().contains(option), "{error}");
     }
     let turns = turns();
@@ -411,7 +418,7 @@ fn a_phase_says_what_it_needs() {
         (PaperPhase::Light, "--normal"),
         (PaperPhase::Joint, "--light"),
     ] {
-        let error = PaperTask::new(phase, paper_settings(1), RESOURCES, &inputs).unwrap_err();
+        let error = PaperTask::new(phase, paper_settings(1), resources(), &inputs).unwrap_err();
         assert!(error.to_string().contains(option), "{error}");
     }
 }
@@ -432,7 +439,8 @@ fn a_damaged_sample_of_a_turn_is_told_and_the_run_goes_on() {
         turns: Some(turns.path().to_owned()),
         ..PaperInputs::default()
     };
-    let mut task = PaperTask::new(PaperPhase::Spec, paper_settings(6), RESOURCES, &inputs).unwrap();
+    let mut task =
+        PaperTask::new(PaperPhase::Spec, paper_settings(6), resources(), &inputs).unwrap();
     let (folder, run) = (tempfile::tempdir().unwrap(), paper_settings(6).run);
     let stop = AtomicBool::new(false);
     let mut observer = StopAfter {
@@ -446,6 +454,163 @@ fn a_damaged_sample_of_a_turn_is_told_and_the_run_goes_on() {
         .unwrap();
     assert_eq!(outcome.steps, 6);
     assert!(!observer.damage.is_empty());
+    assert!(outcome.damaged);
+}
+
+/// A network of which every second step has nothing to learn from, as where the gate of saturation is closed.
+struct EverySecondStep {
+    learner: Learner,
+}
+
+impl EverySecondStep {
+    fn new() -> Self {
+        let settings = LearnerSettings {
+            adam: AdamSettings::default(),
+            average: 0.9,
+            precision: ComputePrecision::Single,
+            device: Device::Cpu,
+        };
+        let graph = light_net(Head::Pooled);
+        let weights = Weights::initial(&graph, 5);
+        Self {
+            learner: Learner::new(graph, &weights, settings).unwrap(),
+        }
+    }
+}
+
+impl Task for EverySecondStep {
+    fn name(&self) -> &'static str {
+        "every second step"
+    }
+    fn settings(&self) -> String {
+        String::new()
+    }
+    fn differing_setting(&self, _: &str) -> Option<String> {
+        None
+    }
+    fn join(&mut self, _: &ProcessGroup) -> Result<(), TrainError> {
+        Ok(())
+    }
+    fn learners(&mut self) -> Vec<&mut Learner> {
+        vec![&mut self.learner]
+    }
+    fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
+        let mut losses = StepLosses::default();
+        if step.is_multiple_of(2) {
+            let input = Tensor::full(
+                [1, 3, SIDE, SIDE],
+                0.1 * step as f64,
+                (Kind::Float, Device::Cpu),
+            );
+            let answer = &self.learner.model.forward(&input)?[0];
+            losses
+                .terms
+                .add("square", 1.0, answer.square().mean(None))?;
+        }
+        Ok(losses)
+    }
+    fn validate(&mut self) -> Result<Validation, TrainError> {
+        Ok(Validation::default())
+    }
+}
+
+#[test]
+fn a_run_goes_on_to_the_same_losses_after_steps_that_taught_nothing() {
+    tch::set_num_threads(1);
+    let run = small_run(9);
+    let (whole, parted) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let make = |folder: &tempfile::TempDir, resume, until| {
+        make_run(
+            &mut EverySecondStep::new(),
+            &run,
+            folder.path(),
+            (resume, until),
+        )
+        .unwrap()
+    };
+    make(&whole, false, u64::MAX);
+    make(&parted, false, 5);
+    make(&parted, true, u64::MAX);
+    assert_eq!(table(parted.path()), table(whole.path()));
+    let saved = |folder: &tempfile::TempDir| Checkpoint::read(folder.path()).unwrap().unwrap();
+    assert_eq!(saved(&parted), saved(&whole));
+}
+
+#[test]
+fn a_run_does_not_go_on_with_other_turns_or_another_network_beside_it() {
+    tch::set_num_threads(1);
+    let (turns, others) = (turns(), turns());
+    let shards = fs::read_dir(others.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let shard = shards
+        .into_iter()
+        .find(|path| path.extension().is_some_and(|e| e == "tar"));
+    // The same number of samples, of one turn twice.
+    let shard = shard.unwrap();
+    let twice = fs::read_dir(others.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    for path in twice.filter(|path| path.extension().is_some_and(|e| e == "tar") && *path != shard)
+    {
+        fs::copy(&shard, path).unwrap();
+    }
+    let task = |turns: &tempfile::TempDir, seed| {
+        let inputs = PaperInputs {
+            turns: Some(turns.path().to_owned()),
+            normal: Some(Weights::initial(&normal_net(), seed)),
+            ..PaperInputs::default()
+        };
+        PaperTask::new(PaperPhase::Light, paper_settings(2), resources(), &inputs).unwrap()
+    };
+    let (folder, run) = (tempfile::tempdir().unwrap(), paper_settings(2).run);
+    make_run(&mut task(&turns, 1), &run, folder.path(), (false, 1)).unwrap();
+    for mut other in [task(&others, 1), task(&turns, 2)] {
+        let error = make_run(&mut other, &run, folder.path(), (true, u64::MAX)).unwrap_err();
+        assert!(error.to_string().contains("other turns"), "{error}");
+    }
+    make_run(&mut task(&turns, 1), &run, folder.path(), (true, u64::MAX)).unwrap();
+}
+
+#[test]
+fn a_run_that_is_asked_to_stop_while_its_first_samples_are_composed_stops_then() {
+    let settings = DecomposeSettings {
+        run: small_run(4),
+        data: DataSettings {
+            window: 1_000_000,
+            ..small_data()
+        },
+        ..DecomposeSettings::default()
+    };
+    let (resources, folder) = (resources(), tempfile::tempdir().unwrap());
+    let stop = Arc::clone(&resources.stop);
+    let mut task = DecomposeTask::new(settings.clone(), resources, None).unwrap();
+    let asked = Arc::clone(&stop);
+    let later = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        asked.store(true, Ordering::Relaxed);
+    });
+    let mut observer = StopAfter {
+        steps: u64::MAX,
+        stop: &AtomicBool::new(false),
+        damage: Vec::new(),
+    };
+    let run = Run::open(&mut task, &settings.run, folder.path(), false).unwrap();
+    let outcome = run.finish(&stop, &mut observer).unwrap();
+    later.join().unwrap();
+    assert_eq!((outcome.steps, outcome.stopped), (0, true));
+    assert!(Checkpoint::path(folder.path()).is_file());
+}
+
+#[test]
+fn a_run_that_another_program_makes_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut task, settings) = decompose_task(1);
+    let open = Journal::open(folder.path(), 0).unwrap();
+    let error = make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap_err();
+    assert!(matches!(error, TrainError::Running { .. }), "{error}");
+    drop(open);
+    make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap();
 }
 
 #[test]

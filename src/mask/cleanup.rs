@@ -10,6 +10,8 @@ use super::{Feather, Mark, MaskError, Seeds};
 /// Width of the rise from 10 % to 90 % of a Gaussian edge, in standard deviations.
 const RISE: f64 = 2.563;
 
+/// A component with at least this share of the largest one's area is kept.
+const KEPT_FROM: f64 = 0.1;
 /// The cleaned mask, and what was changed.
 #[derive(Debug)]
 pub(super) struct Cleaned {
@@ -26,14 +28,15 @@ pub(super) struct Cleaned {
     pub(super) holes: Vec<Component>,
 }
 
-/// Keeps the largest component, or with `keep_all` every one, and fills holes, except those in which
-/// the seeds mark background.
-pub(super) fn clean(raw: &Bitmap, seeds: Option<&Seeds>, keep_all: bool) -> Cleaned {
+/// Keeps the largest component and those of a similar size, or with `keep_all` every one, and fills
+/// holes of at most `fill_to` times the object's area, except those in which the seeds mark background.
+pub(super) fn clean(raw: &Bitmap, seeds: Option<&Seeds>, keep_all: bool, fill_to: f64) -> Cleaned {
     let components = raw.components(Connectivity::Eight);
     let largest = components.largest();
-    let is_kept = |component: usize| keep_all || Some(component) == largest;
+    let least = largest.map_or(0.0, |at| components.list[at].area as f64 * KEPT_FROM);
+    let is_kept = |component: usize| keep_all || components.list[component].area as f64 >= least;
     let kept = raw.map(|at, _| components.at(at).is_some_and(is_kept));
-    let (mask, holes) = fill_holes(&kept, seeds);
+    let (mask, holes) = fill_holes(&kept, seeds, fill_to);
     let all = || components.list.iter().enumerate();
     Cleaned {
         components: components.list.len(),
@@ -52,16 +55,18 @@ pub(super) fn clean(raw: &Bitmap, seeds: Option<&Seeds>, keep_all: bool) -> Clea
 
 /// Fills the holes: background that is not 4-connected to the border (4, because the object is
 /// 8-connected).
-fn fill_holes(object: &Bitmap, seeds: Option<&Seeds>) -> (Bitmap, Vec<Component>) {
+fn fill_holes(object: &Bitmap, seeds: Option<&Seeds>, fill_to: f64) -> (Bitmap, Vec<Component>) {
     let ground = object.inverted();
     let components = ground.components(Connectivity::Four);
     let frame = object.map(|_, _| true).bounds();
+    let most = object.count() as f64 * fill_to;
     let mut is_hole: Vec<bool> = components
         .list
         .iter()
         .map(|component| {
             let bounds = component.bounds;
-            bounds.x > 0
+            component.area as f64 <= most
+                && bounds.x > 0
                 && bounds.y > 0
                 && bounds.right() < frame.right()
                 && bounds.bottom() < frame.bottom()
@@ -156,7 +161,7 @@ mod tests {
 
     #[test]
     fn the_largest_component_is_kept_and_its_hole_is_filled() {
-        let cleaned = clean(&Bitmap::drawn(&RING), None, false);
+        let cleaned = clean(&Bitmap::drawn(&RING), None, false, 1.0);
         let wanted = [
             "#......", ".####..", ".####..", ".####..", ".......", ".......",
         ];
@@ -168,7 +173,7 @@ mod tests {
 
     #[test]
     fn every_component_is_kept_on_request() {
-        let cleaned = clean(&Bitmap::drawn(&RING), None, true);
+        let cleaned = clean(&Bitmap::drawn(&RING), None, true, 1.0);
         assert_eq!((cleaned.components, cleaned.kept), (2, 2));
         assert!(cleaned.dropped.is_empty());
         assert_eq!(cleaned.mask.count(), 15);
@@ -177,7 +182,7 @@ mod tests {
     #[test]
     fn a_hole_marked_as_background_stays_open() {
         let marks = seeds((7, 6), &[(1, 1, 255), (2, 2, 0)]);
-        let cleaned = clean(&Bitmap::drawn(&RING), Some(&marks), false);
+        let cleaned = clean(&Bitmap::drawn(&RING), Some(&marks), false, 1.0);
         assert!(cleaned.holes.is_empty());
         assert_eq!(cleaned.mask.count(), 11);
     }
@@ -185,14 +190,14 @@ mod tests {
     #[test]
     fn a_dropped_mark_is_counted() {
         let marks = seeds((7, 6), &[(6, 4, 255), (1, 1, 255)]);
-        let cleaned = clean(&Bitmap::drawn(&RING), Some(&marks), false);
+        let cleaned = clean(&Bitmap::drawn(&RING), Some(&marks), false, 1.0);
         assert_eq!(cleaned.dropped_marks_px, 1);
     }
 
     #[test]
     fn a_bay_that_is_open_to_the_border_is_not_a_hole() {
         let bay = Bitmap::drawn(&["###", "#.#", "#.#"]);
-        assert_eq!(clean(&bay, None, false).mask, bay);
+        assert_eq!(clean(&bay, None, false, 1.0).mask, bay);
     }
 
     #[test]

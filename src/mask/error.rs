@@ -61,6 +61,14 @@ pub enum MaskError {
         /// The rectangle as given.
         rect: Rect,
     },
+    /// A turn with too few frames.
+    #[error(
+        "the video has only {found} usable frame(s), too few to see what moves: give a rectangle or seeds"
+    )]
+    FewFrames {
+        /// Number of frames.
+        found: usize,
+    },
     /// There are neither a rectangle nor seeds.
     #[error("there is no hint where the object is: give a rectangle, seeds, or both")]
     NoHints,

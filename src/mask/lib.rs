@@ -39,25 +39,39 @@
 //! component is kept. Holes (background that is not 4-connected to the border) are filled, except
 //! those in which seeds mark background.
 
+mod backdrop;
 mod bitmap;
 mod cleanup;
-mod cut;
 mod encode;
 mod error;
+mod grab_cut;
 mod hints;
+mod initial;
+mod lab;
+mod max_flow;
+mod mixture;
+mod opencv_grab_cut;
 mod preview;
+mod pyramid;
 mod record;
+mod registration;
+mod score;
 mod segment;
 mod settings;
+mod table;
+mod turn;
 mod warning;
 
 pub use encode::{grey_png, rgb_png};
 pub use error::{MaskError, SeedsFault};
 pub use hints::{Hints, Mark, Seeds};
+pub use opencv_grab_cut::opencv_grab_cut;
 pub use preview::preview;
 pub use record::{
     MASK_SCHEMA, MaskRecord, MaskSoftware, RecordFault, RecordedHints, RecordedResult, SourceFrame,
 };
-pub use segment::{Mask, MaskStatistics, segment};
+pub use score::{BOUNDARY_TOLERANCE_PX, MaskScore, ScoreFault, score};
+pub use segment::{Mask, MaskStatistics, segment, segment_turn};
 pub use settings::{Feather, Iterations, MAX_PIXELS, MIN_SIDE, SegmentSettings, SettingsFault};
+pub use turn::{MIN_TURN_FRAMES, TURN_FRAMES, Turn};
 pub use warning::{Side, Warning};

@@ -71,6 +71,9 @@ pub struct RecordedHints {
     pub seeds: Option<String>,
     /// Number of coloured pixels of the painted seeds, which count as unknown.
     pub seeds_coloured_px: u64,
+    /// The frames of the video by which the mask was made; none if only one frame was looked at.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub turn_frames: Vec<u64>,
 }
 
 /// [`MaskStatistics`] and hash of a mask as they are recorded.
@@ -164,20 +167,22 @@ impl RecordedHints {
     ///
     /// # Errors
     /// [`MaskError::Encode`].
-    pub fn new(hints: &Hints) -> Result<Self, MaskError> {
-        let seeds = hints.seeds().map(Seeds::to_record).transpose()?;
+    pub fn new(hints: Option<&Hints>, turn_frames: &[u64]) -> Result<Self, MaskError> {
+        let seeds = hints.and_then(Hints::seeds);
+        let png = seeds.map(Seeds::to_record).transpose()?;
         Ok(Self {
-            rect: hints.rect(),
-            seeds: seeds.map(|png| STANDARD.encode(png)),
-            seeds_coloured_px: hints.seeds().map_or(0, Seeds::coloured_px),
+            rect: hints.and_then(Hints::rect),
+            seeds: png.map(|png| STANDARD.encode(png)),
+            seeds_coloured_px: seeds.map_or(0, Seeds::coloured_px),
+            turn_frames: turn_frames.to_vec(),
         })
     }
 
-    /// The hints that were recorded.
+    /// The hints that were recorded; none where the video alone was enough.
     ///
     /// # Errors
     /// [`RecordFault::NoHints`], [`RecordFault::Base64`] or [`RecordFault::Seeds`].
-    pub fn hints(&self) -> Result<Hints, RecordFault> {
+    pub fn hints(&self) -> Result<Option<Hints>, RecordFault> {
         let seeds = match &self.seeds {
             None => None,
             Some(text) => {
@@ -185,7 +190,11 @@ impl RecordedHints {
                 Some(Seeds::from_record(&png, self.seeds_coloured_px)?)
             }
         };
-        Hints::from_parts(self.rect, seeds).map_err(|_| RecordFault::NoHints)
+        if self.rect.is_none() && seeds.is_none() && !self.turn_frames.is_empty() {
+            return Ok(None);
+        }
+        let hints = Hints::from_parts(self.rect, seeds);
+        hints.map(Some).map_err(|_| RecordFault::NoHints)
     }
 }
 
@@ -227,7 +236,7 @@ mod tests {
                 height: 48,
                 frame_blake3: "00".to_owned(),
             },
-            hints: RecordedHints::new(&Hints::Rect(Rect::new(-1, 2, 30, 40))).unwrap(),
+            hints: RecordedHints::new(Some(&Hints::Rect(Rect::new(-1, 2, 30, 40))), &[]).unwrap(),
             settings: SegmentSettings::default(),
             result: RecordedResult::new(statistics, b"png"),
             warnings: vec!["look".to_owned()],
@@ -262,6 +271,7 @@ mod tests {
             rect,
             seeds: seeds.map(str::to_owned),
             seeds_coloured_px: 0,
+            turn_frames: Vec::new(),
         };
         let no_hints = of(None, None).hints();
         assert!(matches!(no_hints, Err(RecordFault::NoHints)));

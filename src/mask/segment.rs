@@ -3,8 +3,15 @@
 use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
 
+use super::bitmap::Bitmap;
+use super::initial::InitialLabels;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
-use super::{Hints, MaskError, SegmentSettings, Warning, cleanup, cut, warning};
+use super::{Hints, MaskError, SegmentSettings, Turn, Warning, cleanup, pyramid, turn, warning};
+
+/// On one frame a hole of this share of the object may be a highlight, and is filled.
+const FILLED_OF_FRAME: f64 = 0.01;
+/// Over a turn highlights move: only specks are filled.
+const FILLED_OF_TURN: f64 = 0.001;
 
 /// An object's mask on one frame.
 #[derive(Debug, Clone)]
@@ -64,10 +71,48 @@ pub fn segment(
 ) -> Result<Mask, MaskError> {
     let size = frame.dimensions();
     check_size(size)?;
-    let labels = cut::InitialLabels::new(hints, size)?;
-    let rect = labels.rect;
-    let raw = cut::cut(frame, labels, settings.iterations)?;
-    let cleaned = cleanup::clean(&raw, hints.seeds(), settings.keep_all);
+    let InitialLabels {
+        mut labels,
+        first,
+        rect,
+    } = InitialLabels::new(hints, size)?;
+    pyramid::segment(frame, &mut labels, first, settings.iterations)?;
+    let raw = Bitmap::new(size, labels.iter().map(|label| label.is_object()));
+    drop(labels);
+    finish(&raw, size, Some(hints), rect, settings, FILLED_OF_FRAME)
+}
+
+/// Finds the object in `frame` by what a turn tells, with or without hints. `turn` holds frames of the
+/// same recording. The same input gives the same mask.
+///
+/// # Errors
+/// [`MaskError::FewFrames`]; otherwise as [`segment`].
+pub fn segment_turn(
+    frame: &RgbImage,
+    turn: &Turn,
+    hints: Option<&Hints>,
+    settings: &SegmentSettings,
+) -> Result<Mask, MaskError> {
+    let size = frame.dimensions();
+    check_size(size)?;
+    let labels = turn::segment(frame, turn, hints, settings.iterations)?;
+    let raw = Bitmap::new(size, labels.iter().map(|label| label.is_object()));
+    drop(labels);
+    let rect = hints.and_then(Hints::rect);
+    let rect = rect.and_then(|rect| rect.clipped_to(size.0, size.1));
+    finish(&raw, size, hints, rect, settings, FILLED_OF_TURN)
+}
+
+fn finish(
+    raw: &Bitmap,
+    size: (u32, u32),
+    hints: Option<&Hints>,
+    rect: Option<Rect>,
+    settings: &SegmentSettings,
+    fill_to: f64,
+) -> Result<Mask, MaskError> {
+    let seeds = hints.and_then(Hints::seeds);
+    let cleaned = cleanup::clean(raw, seeds, settings.keep_all, fill_to);
     Ok(Mask {
         image: cleanup::soften(&cleaned.mask, size, settings.feather)?,
         statistics: MaskStatistics {

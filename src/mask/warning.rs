@@ -91,17 +91,17 @@ pub enum Warning {
 
 /// The warnings about a mask that was made with these hints.
 pub(super) fn warnings(
-    hints: &Hints,
+    hints: Option<&Hints>,
     used: Option<Rect>,
     cleaned: &Cleaned,
     size: (u32, u32),
 ) -> Vec<Warning> {
     let area = cleaned.mask.count() as f64;
     let fraction = area / (f64::from(size.0) * f64::from(size.1));
-    let coloured = hints.seeds().map_or(0, Seeds::coloured_px);
+    let coloured = hints.and_then(Hints::seeds).map_or(0, Seeds::coloured_px);
     let marks = cleaned.dropped_marks_px;
     [
-        clipped(hints.rect(), used),
+        clipped(hints.and_then(Hints::rect), used),
         (coloured > 0).then_some(Warning::ColouredSeeds { px: coloured }),
         touches(cleaned.mask.bounds(), size),
         (fraction < SMALL).then_some(Warning::Small { fraction }),
@@ -231,9 +231,9 @@ mod tests {
     fn warnings_of(rows: &[&str], rect: Rect) -> Vec<Warning> {
         let raw = Bitmap::drawn(rows);
         let size = (rows[0].len() as u32, rows.len() as u32);
-        let cleaned = super::super::cleanup::clean(&raw, None, false);
+        let cleaned = super::super::cleanup::clean(&raw, None, false, 1.0);
         let used = rect.clipped_to(size.0, size.1);
-        warnings(&Hints::Rect(rect), used, &cleaned, size)
+        warnings(Some(&Hints::Rect(rect)), used, &cleaned, size)
     }
 
     #[test]

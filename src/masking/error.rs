@@ -62,6 +62,14 @@ pub enum MaskingError {
         /// This software.
         now: String,
     },
+    /// A folder or file that cannot be measured with.
+    #[error("{path} cannot be measured: {why}")]
+    Bench {
+        /// The folder or file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
     /// The recording cannot be opened.
     #[error(transparent)]
     Session(#[from] session::SessionError),

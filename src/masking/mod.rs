@@ -5,7 +5,9 @@
 //!
 //! This module brings frames and folders to `relit-mask`. It knows nothing of data sets and the rig.
 
+mod bench;
 mod error;
+mod sampling;
 
 use std::fs;
 use std::io;
@@ -16,21 +18,36 @@ use image::RgbImage;
 use relit_data::durable;
 use relit_data::session::{MASK_FILE, Notice, Recording};
 use relit_mask::{
-    Hints, MASK_SCHEMA, Mask, MaskRecord, MaskSoftware, RecordFault, RecordedHints, RecordedResult,
-    SegmentSettings, SourceFrame, Warning, grey_png, preview, rgb_png, segment,
+    Hints, MASK_SCHEMA, Mask, MaskError, MaskRecord, MaskSoftware, RecordFault, RecordedHints,
+    RecordedResult, SegmentSettings, SourceFrame, Warning, grey_png, preview, rgb_png, segment,
+    segment_turn,
 };
 use relit_video::Video;
 
+pub use bench::{BenchImage, BenchRow, Prompt, bench_image, bench_images};
 pub use error::MaskingError;
+use sampling::read_turn;
 
 /// How to make a mask.
 #[derive(Debug, Clone)]
 pub struct MaskRequest {
     frame: u64,
-    hints: Hints,
+    hints: Option<Hints>,
+    turn: TurnRequest,
     settings: SegmentSettings,
     recipe: Option<Recipe>,
     force: bool,
+}
+
+/// Which frames of the turn are looked at.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum TurnRequest {
+    /// None but the one on which the mask is made.
+    None,
+    /// Some, spread over the video.
+    Sampled,
+    /// These.
+    Frames(Vec<u64>),
 }
 
 /// A record whose mask has to be reproduced byte for byte.
@@ -70,7 +87,21 @@ impl MaskRequest {
     pub fn new(frame: u64, hints: Hints, settings: SegmentSettings) -> Self {
         Self {
             frame,
+            hints: Some(hints),
+            turn: TurnRequest::None,
+            settings,
+            recipe: None,
+            force: false,
+        }
+    }
+
+    /// A mask by what the whole video tells, on frame number `frame`, with or without hints.
+    #[must_use]
+    pub fn auto(frame: u64, hints: Option<Hints>, settings: SegmentSettings) -> Self {
+        Self {
+            frame,
             hints,
+            turn: TurnRequest::Sampled,
             settings,
             recipe: None,
             force: false,
@@ -93,6 +124,10 @@ impl MaskRequest {
         Ok(Self {
             frame: record.source.frame,
             hints,
+            turn: match record.hints.turn_frames.as_slice() {
+                [] => TurnRequest::None,
+                frames => TurnRequest::Frames(frames.to_vec()),
+            },
             settings: record.settings,
             recipe: Some(Recipe { path, record }),
             force: false,
@@ -177,6 +212,8 @@ fn segment_and_write(
     files: &MaskFiles,
     request: &MaskRequest,
 ) -> Result<MaskRecord, MaskingError> {
+    let video_path = video;
+    let video = &Video::open(video_path)?;
     let (frame, source) = read_frame(video, request.frame)?;
     if let Some(recipe) = &request.recipe
         && !request.force
@@ -184,13 +221,21 @@ fn segment_and_write(
     {
         return Err(MaskingError::OtherFrame {
             frame: request.frame,
-            video: video.to_owned(),
+            video: video_path.to_owned(),
             recipe: recipe.path.clone(),
         });
     }
-    let mask = segment(&frame, &request.hints, &request.settings)?;
+    let turn = read_turn(video, frame.dimensions(), &request.turn)?;
+    let hints = request.hints.as_ref();
+    let mask = match (&turn, hints) {
+        (Some(turn), hints) => segment_turn(&frame, &turn.pictures, hints, &request.settings)?,
+        (None, Some(hints)) => segment(&frame, hints, &request.settings)?,
+        (None, None) => return Err(MaskError::NoHints.into()),
+    };
     let png = grey_png(mask.image(), "the mask")?;
-    let record = record_of(source, request, &mask, &png)?;
+    let turn_frames = turn.as_ref().map_or(&[][..], |turn| &turn.frames);
+    let record = record_of(source, request, turn_frames, &mask, &png)?;
+    drop(turn);
     let preview_png = rgb_png(&preview(&frame, mask.image()), "the preview")?;
     let json = record.to_json();
     let json = json.map_err(|error| MaskingError::io(&files.record, "written")(error.into()))?;
@@ -200,11 +245,10 @@ fn segment_and_write(
     Ok(record)
 }
 
-fn read_frame(path: &Path, number: u64) -> Result<(RgbImage, SourceFrame), MaskingError> {
-    let video = Video::open(path)?;
+fn read_frame(video: &Video, number: u64) -> Result<(RgbImage, SourceFrame), MaskingError> {
     let frame = video.frame(number)?;
     let info = video.frames().iter().find(|info| info.number == number);
-    let name = path.file_name().unwrap_or_default();
+    let name = video.path().file_name().unwrap_or_default();
     let source = SourceFrame {
         video: name.to_string_lossy().into_owned(),
         frame: number,
@@ -223,6 +267,7 @@ fn same_image(a: &SourceFrame, b: &SourceFrame) -> bool {
 fn record_of(
     source: SourceFrame,
     request: &MaskRequest,
+    turn_frames: &[u64],
     mask: &Mask,
     png: &[u8],
 ) -> Result<MaskRecord, MaskingError> {
@@ -245,7 +290,7 @@ fn record_of(
         schema: MASK_SCHEMA.to_owned(),
         software,
         source,
-        hints: RecordedHints::new(&request.hints)?,
+        hints: RecordedHints::new(request.hints.as_ref(), turn_frames)?,
         settings: request.settings,
         result,
         warnings,

@@ -3,6 +3,8 @@
 mod commands;
 mod console;
 mod folder;
+mod light;
+mod photos;
 mod values;
 
 use std::process::ExitCode;
@@ -12,7 +14,7 @@ use clap::{ArgMatches, CommandFactory, Error, FromArgMatches, Parser, Subcommand
 
 #[cfg(feature = "train")]
 use commands::train;
-use commands::{decompose, eval, render, synth, weights};
+use commands::{decompose, eval, insert, relight, render, synth, turn, weights};
 use console::Console;
 
 /// Single-view relighting: photographs taken apart, light, rendering, data with truth, measures of the results.
@@ -35,6 +37,12 @@ enum Verb {
     /// Take photographs apart: normals, albedo, shading, highlight and light.
     #[command(after_help = decompose::EXAMPLES)]
     Decompose(decompose::Arguments),
+    /// Show the objects of photographs in another light: a picture, or a video in which the light turns.
+    #[command(after_help = relight::EXAMPLES)]
+    Relight(Box<relight::Arguments>),
+    /// Put the objects of photographs into another picture, a panorama or a video.
+    #[command(after_help = insert::EXAMPLES)]
+    Insert(Box<insert::Arguments>),
     /// Light an object that is given by its maps: an image, a turn, or a sweep of materials.
     #[command(after_help = render::EXAMPLES)]
     Render(render::Arguments),
@@ -48,6 +56,9 @@ enum Verb {
     #[cfg(feature = "train")]
     #[command(after_help = train::EXAMPLES)]
     Train(train::Arguments),
+    /// Take a whole turn apart: normals, albedo and light from the angle that the light turns by.
+    #[command(after_help = turn::EXAMPLES)]
+    Turn(turn::Arguments),
     /// Convert weights of networks.
     #[command(after_help = weights::EXAMPLES)]
     Weights(weights::Arguments),
@@ -58,11 +69,14 @@ impl Verb {
     fn fault(&self) -> Option<String> {
         match self {
             Self::Decompose(arguments) => arguments.fault(),
+            Self::Relight(arguments) => arguments.fault(),
+            Self::Insert(arguments) => arguments.fault(),
             Self::Render(arguments) => arguments.fault(),
             Self::Eval(arguments) => arguments.fault(),
             Self::Synth(arguments) => arguments.fault(),
             #[cfg(feature = "train")]
             Self::Train(_) => None,
+            Self::Turn(_) => None,
             Self::Weights(arguments) => arguments.fault(),
         }
     }
@@ -78,11 +92,14 @@ pub(crate) fn run() -> ExitCode {
     let console = Console::new(line.json);
     console.finish(match line.verb {
         Verb::Decompose(arguments) => decompose::run(&arguments, console),
+        Verb::Relight(arguments) => relight::run(&arguments, console),
+        Verb::Insert(arguments) => insert::run(&arguments, console),
         Verb::Render(arguments) => render::run(&arguments, console),
         Verb::Eval(arguments) => eval::run(&arguments, console),
         Verb::Synth(arguments) => synth::run(&arguments, console),
         #[cfg(feature = "train")]
         Verb::Train(arguments) => train::run(&arguments, console),
+        Verb::Turn(arguments) => turn::run(&arguments, console),
         Verb::Weights(arguments) => weights::run(&arguments, console),
     })
 }

@@ -8,6 +8,7 @@ use crate::data::{DamagedSample, OpenError};
 use crate::image::{Extent, ImageError};
 use crate::light::{LightError, LightFileError};
 use crate::nets::NetError;
+use crate::whole::FolderFault;
 
 /// Why a photograph cannot be decomposed.
 #[derive(Debug, thiserror::Error)]
@@ -195,5 +196,16 @@ impl DecomposeError {
     pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         |source| Self::Write { path, source }
+    }
+}
+
+impl From<FolderFault> for DecomposeError {
+    fn from(fault: FolderFault) -> Self {
+        match fault {
+            FolderFault::Foreign(path, name) => Self::Foreign { path, name },
+            FolderFault::NoFolder(path) => Self::NoFolder { path },
+            FolderFault::Read(path, source) => Self::Read { path, source },
+            FolderFault::Write(path, source) => Self::Write { path, source },
+        }
     }
 }

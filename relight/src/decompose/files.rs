@@ -1,6 +1,5 @@
 //! What is written of a decomposition: a folder that appears when it is whole.
 
-use std::fs;
 use std::path::Path;
 
 use relit_data::durable::write_whole;
@@ -11,15 +10,15 @@ use super::error::DecomposeError;
 use super::mask::MaskSource;
 use super::photo::Photo;
 use super::region::Region;
-use super::replace;
-use crate::image::{ColourSpace, Depth, Extent, Linear, Planes, Rgb, Srgb, write_png};
+use crate::image::{ColourSpace, Depth, Extent, ImageError, Linear, Planes, Rgb, Srgb, write_png};
 use crate::light::{Normals, Panorama};
 use crate::render::{DiffuseForm, DiffuseLayer, exposure_for};
+use crate::whole::ResultFolder;
 
 /// The file of figures.
-pub(super) const FIGURES: &str = "decomposition.json";
+const FIGURES: &str = "decomposition.json";
 /// All files of a decomposition.
-pub(super) const FILES: [&str; 11] = [
+const FILES: [&str; 11] = [
     "normal.png",
     "albedo.png",
     "shading.png",
@@ -32,6 +31,10 @@ pub(super) const FILES: [&str; 11] = [
     "contact.png",
     FIGURES,
 ];
+const RESULTS: ResultFolder = ResultFolder {
+    marker: FIGURES,
+    holds: |name| FILES.contains(&name),
+};
 /// What it says it is.
 const SCHEMA: &str = "relight.decomposition/1";
 /// Width and height of the lit ball, and of the pictures of the sheet, pixels.
@@ -113,12 +116,7 @@ impl DecompositionFiles<'_> {
     /// # Errors
     /// As [`Self::check`], or where a file cannot be written: then the folder is as it was.
     pub fn write(&self, out: &Path) -> Result<DecompositionFigures, DecomposeError> {
-        Self::check(out)?;
-        let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty());
-        if let Some(parent) = parent {
-            fs::create_dir_all(parent).map_err(DecomposeError::write(parent))?;
-        }
-        replace::with_folder(out, |partial| self.write_files(partial))
+        RESULTS.write(out, |folder| self.write_files(folder))
     }
 
     /// Whether a decomposition may be written to the folder `out`: it is not there, empty, or holds the files of an
@@ -127,7 +125,7 @@ impl DecompositionFiles<'_> {
     /// # Errors
     /// [`DecomposeError::Foreign`] or [`DecomposeError::NoFolder`], or where the folder cannot be read.
     pub fn check(out: &Path) -> Result<(), DecomposeError> {
-        replace::check(out)
+        Ok(RESULTS.check(out)?)
     }
 
     fn write_files(&self, folder: &Path) -> Result<DecompositionFigures, DecomposeError> {
@@ -259,14 +257,14 @@ fn ball(found: &Decomposition) -> Rgb<Linear> {
 }
 
 /// Writes light as a PNG of 16 bits, sRGB; the light that its largest value stands for.
-fn write_light(path: &Path, light: &Rgb<Linear>) -> Result<f32, DecomposeError> {
+pub(crate) fn write_light(path: &Path, light: &Rgb<Linear>) -> Result<f32, ImageError> {
     let (encoded, white) = encoded(light.planes());
     write_png(path, &encoded, Depth::Sixteen)?;
     Ok(white)
 }
 
 /// The same of grey light.
-fn write_grey(path: &Path, light: &Planes<1>) -> Result<f32, DecomposeError> {
+fn write_grey(path: &Path, light: &Planes<1>) -> Result<f32, ImageError> {
     let (encoded, white) = encoded(light);
     write_png(path, &in_colour(encoded), Depth::Sixteen)?;
     Ok(white)
@@ -282,7 +280,7 @@ fn encoded<const C: usize>(light: &Planes<C>) -> (Planes<C>, f32) {
 }
 
 /// The value that one in two hundred under the mask exceeds; 1 where all is dark.
-fn bright<const C: usize>(planes: &Planes<C>, mask: &Planes<1>) -> f32 {
+pub(crate) fn bright<const C: usize>(planes: &Planes<C>, mask: &Planes<1>) -> f32 {
     let channels = planes.planes();
     let brightest = |at: usize| {
         channels

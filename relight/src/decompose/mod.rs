@@ -14,7 +14,6 @@ mod mask;
 mod other;
 mod photo;
 mod region;
-mod replace;
 mod shipped;
 #[cfg(test)]
 mod tests;
@@ -28,7 +27,9 @@ pub use encoding::{AnsweredMaps, EncodedPicture};
 pub(crate) use encoding::{HIGHLIGHT_OFFSET, LEAST_FACING, LOG_LUMINANCE, LOG_SHADING, MASK};
 pub use error::DecomposeError;
 pub use files::{DecompositionFigures, DecompositionFiles};
+pub(crate) use files::{bright, write_light};
 pub use gloss::FittedGloss;
+pub(crate) use gloss::fit_gloss;
 pub use mask::{MaskSource, Rectangle};
 pub use photo::{Photo, PhotoInput, PhotoReading};
 pub use region::Region;

@@ -35,6 +35,8 @@ pub struct Photo {
     pub mask: Planes<1>,
     /// What said so.
     pub mask_source: MaskSource,
+    /// The alpha that its file has, 0 to 1, as it stands there.
+    pub alpha: Option<Planes<1>>,
     saturated_from: f32,
     saturated_fraction: Option<f64>,
 }
@@ -260,6 +262,7 @@ fn read_photo(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeErr
         picture: Rgb::new(image.planes.map(to_linear(transfer))),
         mask,
         mask_source,
+        alpha: image.alpha,
         saturated_from: match transfer {
             // There is no largest value in floating point: what a screen shows as white counts.
             None => Srgb::to_linear(SATURATED_VALUE),
@@ -418,6 +421,7 @@ fn read_frame(turns: &Turns, id: SampleId) -> Result<Photo, DecomposeError> {
         picture: Rgb::new(Planes::from_planes(batch.extent, [red, green, blue])?),
         mask: Planes::from_planes(batch.extent, [batch.masks])?,
         mask_source: MaskSource::Shard,
+        alpha: None,
         saturated_from: Srgb::to_linear(SATURATED_VALUE),
         saturated_fraction: record.map(|record| record.saturated_fraction),
     };

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::data::{DamagedSample, OpenError};
 use crate::image::{Extent, ImageError};
+use crate::insert::InsertError;
 use crate::light::LightError;
 use crate::metrics::MetricError;
 
@@ -110,6 +111,14 @@ pub enum EvalError {
         sample: String,
         /// Why.
         source: LightError,
+    },
+    /// An object cannot be taken apart or inserted.
+    #[error("{sample} cannot be inserted")]
+    Insertion {
+        /// The sample.
+        sample: String,
+        /// Why.
+        source: Box<InsertError>,
     },
     /// A measure cannot be taken.
     #[error("{sample} cannot be measured")]

@@ -7,6 +7,8 @@
 //! | [`evaluate_light`] | normals and shading | light as coefficients | MSE, SMSE, SSIM of the shading that it makes |
 //! | [`evaluate_highlights`] | image, highlight | highlight | MSE, DSSIM of the highlight and of what it leaves |
 //! | [`evaluate_ordinal`] | what people judged of points | albedo | WHDR |
+//! | [`evaluate_insertion`] | an object rendered in another picture | nothing: it runs `insert` | MSE, DSSIM |
+//! | [`evaluate_trust`] | normals | nothing: it runs `decompose` | errors ordered by trust |
 //! | [`evaluate_relighting`] | an object's maps, images under many lights | maps, or images | MSE, DSSIM |
 //!
 //! Each line of a [`ScoreTable`] says what was compared and how: numbers under one name differ by a
@@ -15,6 +17,7 @@
 
 mod error;
 mod highlights;
+mod insertion;
 mod intrinsic;
 mod light;
 mod normals;
@@ -24,9 +27,11 @@ mod relighting;
 mod retinex;
 mod run;
 mod table;
+mod trust;
 
 pub use error::EvalError;
 pub use highlights::{HighlightMethod, evaluate_highlights};
+pub use insertion::{InsertionMethod, InsertionRecipe, SheetWriter, evaluate_insertion};
 pub use intrinsic::{IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, evaluate_intrinsic};
 pub use light::{LightMethod, evaluate_light};
 pub use normals::{NormalMethod, evaluate_normals};
@@ -38,3 +43,4 @@ pub use relighting::{
 pub use retinex::{IntrinsicImages, Retinex};
 pub use run::EvalProgress;
 pub use table::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
+pub use trust::{TrustCurve, TrustTable, evaluate_trust};

@@ -80,6 +80,16 @@ impl Library {
             panoramas,
         })
     }
+
+    /// The same without its meshes: all shapes are made.
+    #[must_use]
+    pub fn without_meshes(&self) -> Self {
+        Self {
+            meshes: Vec::new(),
+            pictures: self.pictures.clone(),
+            panoramas: self.panoramas.clone(),
+        }
+    }
 }
 
 /// The panoramas that are made here, by name: four each of studio, room and sky, and one even light.

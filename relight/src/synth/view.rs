@@ -87,7 +87,7 @@ impl Pose {
     }
 
     /// The map from the mesh's own frame into the viewer's.
-    pub(super) fn place(&self, mesh: &Mesh, projection: Projection) -> Affine3A {
+    pub(crate) fn place(&self, mesh: &Mesh, projection: Projection) -> Affine3A {
         let linear = self.turn * Mat3::from_diagonal(self.stretch);
         let turned: Vec<Vec3> = mesh.positions().iter().map(|&p| linear * p).collect();
         let (mut scale, mut offset) = (0.5, Vec3::ZERO);

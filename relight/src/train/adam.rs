@@ -10,7 +10,12 @@ use tch::{Tensor, no_grad};
 
 use super::error::TrainError;
 use super::model::{copy_into, to_weights};
-use crate::nets::Weights;
+use crate::nets::{self, Weights};
+
+/// The number of steps in a saved memory, in thousands and the rest: 32 bits hold both exactly. Steps of which nothing could
+/// be learned do not count, so it is not that of the run.
+const STEPS: &str = "steps";
+const STEPS_PART: u64 = 1000;
 
 /// Keeps the root of the second moment from being zero.
 const EPSILON: f64 = 1e-8;
@@ -74,7 +79,7 @@ impl Adam {
         self.steps
     }
 
-    /// Both moments, `first.<name>` and `second.<name>`, to be saved.
+    /// Both moments, `first.<name>` and `second.<name>`, and the steps made, [`STEPS`], to be saved.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
@@ -89,17 +94,25 @@ impl Adam {
         };
         let mut all = named("first", &first);
         all.extend(named("second", &second));
+        let steps = [self.steps / STEPS_PART, self.steps % STEPS_PART].map(|part| part as f32);
+        all.extend(
+            nets::Tensor::new(vec![2], steps.to_vec()).map(|steps| (STEPS.to_owned(), steps)),
+        );
         Ok(all.into_iter().collect())
     }
 
-    /// Goes on from a memory that was saved after so many steps.
+    /// Goes on from a memory that was saved.
     ///
     /// # Errors
     /// [`TrainError::Memory`] where it is another network's.
-    pub fn recall(&mut self, memory: &Weights, steps: u64) -> Result<(), TrainError> {
+    pub fn recall(&mut self, memory: &Weights) -> Result<(), TrainError> {
         copy_into(&mut self.first, &memory.under("first."))?;
         copy_into(&mut self.second, &memory.under("second."))?;
-        self.steps = steps;
+        let steps = memory.get(STEPS).map(nets::Tensor::values);
+        let Some(&[thousands, rest]) = steps else {
+            return Err(TrainError::Memory(STEPS.to_owned()));
+        };
+        self.steps = thousands as u64 * STEPS_PART + rest as u64;
         Ok(())
     }
 

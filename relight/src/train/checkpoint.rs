@@ -23,6 +23,8 @@ pub struct Checkpoint {
     pub step: u64,
     /// The settings, as TOML: another run's are refused.
     pub settings: String,
+    /// What the run was given beside its settings: another run's is refused.
+    pub inputs: String,
     /// Where the task stands in its data.
     pub place: String,
     /// Networks, averages and optimisers.
@@ -47,6 +49,7 @@ impl Checkpoint {
             ("task".to_owned(), self.task.clone()),
             ("step".to_owned(), self.step.to_string()),
             ("settings".to_owned(), self.settings.clone()),
+            ("inputs".to_owned(), self.inputs.clone()),
             ("place".to_owned(), self.place.clone()),
         ]);
         let bytes = self
@@ -102,6 +105,7 @@ impl Checkpoint {
             task: fact("task")?,
             step: fact("step")?.parse().map_err(|_| "its step is no number")?,
             settings: fact("settings")?,
+            inputs: fact("inputs")?,
             place: fact("place")?,
             state: Weights::from_bytes(bytes)?,
         })
@@ -118,6 +122,7 @@ mod tests {
             task: "decompose".to_owned(),
             step: 12,
             settings: "steps = 3".to_owned(),
+            inputs: String::new(),
             place: String::new(),
             state: Weights::initial(&decomposer(), 1),
         }

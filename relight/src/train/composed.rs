@@ -86,7 +86,7 @@ impl ComposedBatches {
                 self.settings,
                 self.share,
                 &self.composition,
-                self.resources.composers,
+                &self.resources,
                 step,
             )?,
         };

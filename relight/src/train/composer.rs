@@ -4,6 +4,7 @@
 //! is resumed sees the samples that it would have seen.
 
 use std::collections::BTreeMap;
+use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
@@ -33,8 +34,8 @@ pub struct Composition {
     pub plain_share: f64,
 }
 
-/// The samples of one view, by the view's number.
-type Batch = (u64, Vec<TruthArrays>);
+/// The samples of one view, by the view's number; none where composing them panicked.
+type Batch = (u64, Option<Vec<TruthArrays>>);
 
 /// Threads that compose samples.
 #[derive(Debug)]
@@ -76,8 +77,11 @@ impl Composer {
                 .spawn(move || {
                     loop {
                         let view = next.fetch_add(stride, Ordering::Relaxed);
+                        // The one that waits for this view has to learn of a panic: the other threads go on.
+                        let made = AssertUnwindSafe(|| composition.samples_of(view));
+                        let samples = panic::catch_unwind(made).ok();
                         // Nobody takes views any more once the composer is dropped.
-                        if sender.send((view, composition.samples_of(view))).is_err() {
+                        if sender.send((view, samples)).is_err() {
                             return;
                         }
                     }
@@ -98,7 +102,7 @@ impl Composer {
     /// The next sample, with its number.
     ///
     /// # Errors
-    /// [`TrainError::Composer`] where all threads have ended, which only a fault of theirs makes them do.
+    /// [`TrainError::Composer`] where composing panicked: a fault of the program.
     pub fn next_sample(&mut self) -> Result<(u64, TruthArrays), TrainError> {
         loop {
             if let Some(sample) = self.current.pop() {
@@ -112,7 +116,8 @@ impl Composer {
                 continue;
             }
             let (view, samples) = self.views.recv().map_err(|_| TrainError::Composer)?;
-            self.early.insert(view, samples);
+            self.early
+                .insert(view, samples.ok_or(TrainError::Composer)?);
         }
     }
 }
@@ -122,7 +127,7 @@ impl Drop for Composer {
         // Without a receiver, threads end after the view they are at.
         self.views = bounded(0).1;
         for thread in self.threads.drain(..) {
-            // A thread that panicked has been told by `next_sample`.
+            // What panics in one is caught in it.
             let _ = thread.join();
         }
     }

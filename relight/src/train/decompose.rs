@@ -17,9 +17,9 @@ const ALBEDO_FLOOR: f64 = 0.02;
 /// Added to shading before the picture is divided by it.
 const DIVISOR_FLOOR: f64 = 0.02;
 /// Highlights of this size count fully.
-const FULL_HIGHLIGHT: f64 = 0.1;
+pub(super) const FULL_HIGHLIGHT: f64 = 0.1;
 /// How much more a full highlight counts than none: most pixels have none, and an answer without any would do.
-const HIGHLIGHT_EMPHASIS: f64 = 8.0;
+pub(super) const HIGHLIGHT_EMPHASIS: f64 = 8.0;
 /// Energy of a faint highlight, a pixel.
 const FAINT_ENERGY: f64 = 1e-4;
 
@@ -211,14 +211,17 @@ pub fn head_spreads(
     ];
     pairs
         .into_iter()
-        .map(|(name, found, truth)| {
-            let (found, truth) = (
-                deviation(found, &batch.mask)?,
-                deviation(truth, &batch.mask)?,
-            );
-            Ok((name, if truth > 0.0 { found / truth } else { 1.0 }))
-        })
+        .map(|(name, found, truth)| Ok((name, spread(found, truth, &batch.mask)?)))
         .collect()
+}
+
+/// How much an answer varies under the mask, as a part of the truth's variation; 1 where that has none.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(super) fn spread(found: &Tensor, truth: &Tensor, mask: &Tensor) -> Result<f64, TrainError> {
+    let (found, truth) = (deviation(found, mask)?, deviation(truth, mask)?);
+    Ok(if truth > 0.0 { found / truth } else { 1.0 })
 }
 
 /// Standard deviation under the mask, all channels together.

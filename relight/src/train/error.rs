@@ -38,8 +38,8 @@ pub enum TrainError {
     /// Threads could not be started.
     #[error("threads that compose samples could not be started")]
     Threads(#[source] io::Error),
-    /// The threads that compose samples have ended.
-    #[error("the threads that compose samples have ended: this is a fault of the program")]
+    /// Composing samples panicked.
+    #[error("a sample could not be composed: this is a fault of the program")]
     Composer,
     /// A sheet of answers could not be laid out.
     #[error("a sheet of answers could not be laid out: this is a fault of the program")]
@@ -88,6 +88,23 @@ pub enum TrainError {
     Occupied {
         /// The folder.
         path: PathBuf,
+    },
+    /// A folder whose run goes on in another program.
+    #[error(
+        "the run in {path} is being made by another program: wait for its end, or give another folder"
+    )]
+    Running {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A run that was asked to stop while its first samples were being composed.
+    #[error("the run was asked to stop while its first samples were being composed")]
+    Stopped,
+    /// Turns to judge a network by that the phase has no figures for.
+    #[error("relight train {phase} has no figures on turns: leave --held-out away")]
+    NotJudged {
+        /// The phase.
+        phase: &'static str,
     },
     /// An environment in which a variable is missing that a launcher sets.
     #[error(
@@ -166,9 +183,7 @@ pub enum TrainError {
         saved: String,
     },
     /// A loss that is not a number, or has grown out of all proportion.
-    #[error(
-        "at step {step} the loss {loss} is {value}: the run ends before this step is made; the batch is in {batch}"
-    )]
+    #[error("at step {step} the {loss} is {value}: the run ends before this step is made; {batch}")]
     BadLoss {
         /// The step.
         step: u64,
@@ -176,13 +191,13 @@ pub enum TrainError {
         loss: String,
         /// Its value.
         value: f64,
-        /// Where the batch was saved.
-        batch: PathBuf,
+        /// Where the batch was saved, or why it was not.
+        batch: String,
     },
     /// A head that answers the same for every pixel of every picture.
     #[error(
         "at step {step} the answers for {head} have hardly any variation left ({spread:.2e} of the truth's): the head has collapsed, and the run \
-         ends; the batch is in {batch}"
+         ends; {batch}"
     )]
     Collapsed {
         /// The step.
@@ -191,7 +206,7 @@ pub enum TrainError {
         head: &'static str,
         /// Standard deviation of the answers over that of the truth.
         spread: f64,
-        /// Where the batch was saved.
-        batch: PathBuf,
+        /// Where the batch was saved, or why it was not.
+        batch: String,
     },
 }

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use relit_data::causes::with_causes;
+
 use super::error::TrainError;
 
 /// Steps before losses and heads are judged by their past.
@@ -23,10 +25,10 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// Looks at the losses and spreads of a step; `save` saves its batch and tells where.
+    /// Looks at the losses and spreads of a step; `save` saves its batch and answers where.
     ///
     /// # Errors
-    /// [`TrainError::BadLoss`] or [`TrainError::Collapsed`]; what `save` fails with.
+    /// [`TrainError::BadLoss`] or [`TrainError::Collapsed`].
     pub fn check(
         &mut self,
         step: u64,
@@ -36,12 +38,14 @@ impl Guard {
     ) -> Result<(), TrainError> {
         let total = losses.get("loss").copied().unwrap_or(0.0);
         let exploded = self.seen >= SETTLING && total > EXPLOSION * self.loss;
-        let bad = losses.iter().find(|(_, value)| !value.is_finite());
-        if let Some((name, &value)) = bad {
-            return Err(bad_loss(step, name, value, save()?));
+        // The sum of all is bad wherever one is: the one itself is named.
+        let of_parts = losses.iter().filter(|(name, _)| *name != "loss");
+        let mut named = of_parts.chain(losses.get_key_value("loss"));
+        if let Some((name, &value)) = named.find(|(_, value)| !value.is_finite()) {
+            return Err(bad_loss(step, name, value, save));
         }
         if exploded {
-            return Err(bad_loss(step, "loss", total, save()?));
+            return Err(bad_loss(step, "loss", total, save));
         }
         self.seen += 1;
         self.loss = mean(self.loss, total, self.seen);
@@ -59,7 +63,7 @@ impl Guard {
                 step,
                 head,
                 spread,
-                batch: save()?,
+                batch: saved(save),
             }),
         }
     }
@@ -70,12 +74,28 @@ fn mean(running: f64, value: f64, seen: u64) -> f64 {
     keep * running + (1.0 - keep) * value
 }
 
-fn bad_loss(step: u64, loss: &str, value: f64, batch: PathBuf) -> TrainError {
+fn bad_loss(
+    step: u64,
+    loss: &str,
+    value: f64,
+    save: impl FnOnce() -> Result<PathBuf, TrainError>,
+) -> TrainError {
     TrainError::BadLoss {
         step,
-        loss: loss.to_owned(),
+        loss: match loss {
+            "loss" => "sum of all losses".to_owned(),
+            part => part.to_owned(),
+        },
         value,
-        batch,
+        batch: saved(save),
+    }
+}
+
+/// What became of the batch. That it cannot be saved must not hide why the run ends.
+fn saved(save: impl FnOnce() -> Result<PathBuf, TrainError>) -> String {
+    match save() {
+        Ok(path) => format!("the batch is in {}", path.display()),
+        Err(fault) => format!("the batch could not be saved: {}", with_causes(&fault)),
     }
 }
 
@@ -101,6 +121,20 @@ mod tests {
     fn a_loss_that_is_no_number_ends_it_at_once() {
         let error = step(&mut Guard::default(), 4, f64::NAN, 1.0).unwrap_err();
         assert!(matches!(error, TrainError::BadLoss { step: 4, .. }));
+    }
+
+    #[test]
+    fn the_loss_that_is_no_number_is_named_also_where_its_batch_cannot_be_saved() {
+        let losses = BTreeMap::from([
+            ("loss".to_owned(), f64::NAN),
+            ("loss/albedo".to_owned(), 0.2),
+            ("loss/normals".to_owned(), f64::NAN),
+        ]);
+        let full = || Err(TrainError::Composer);
+        let error = Guard::default().check(7, &losses, &BTreeMap::new(), full);
+        let text = error.unwrap_err().to_string();
+        assert!(text.contains("loss/normals is NaN"), "{text}");
+        assert!(text.contains("the batch could not be saved"), "{text}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! What networks are judged by while they train: turns and composed samples on which none of them trains.
 
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -25,20 +26,32 @@ pub(super) type Figures = BTreeMap<String, f64>;
 
 /// Batches of 12 frames of turns: the first of a fixed order, so that runs can be compared.
 #[derive(Debug)]
-pub(super) struct HeldOutTurns(Vec<TurnTensors>);
+pub(super) struct HeldOutTurns {
+    batches: Vec<TurnTensors>,
+    /// What of them was damaged, until it was said.
+    damage: Option<String>,
+}
 
 impl HeldOutTurns {
     /// Reads the batches of a data set.
     pub(super) fn read(path: &Path, kind: Kind, device: Device) -> Result<Self, TrainError> {
         let mut reader = TurnReader::open(path, stream(0x74_75_72_6e, 23))?;
-        let mut batches = Vec::with_capacity(TURN_BATCHES);
+        let (mut batches, mut damage) = (Vec::with_capacity(TURN_BATCHES), Vec::new());
         while batches.len() < TURN_BATCHES && reader.place().epoch == 0 {
-            batches.extend(reader.next_group(kind, device)?.frames);
+            let group = reader.next_group(kind, device)?;
+            batches.extend(group.frames);
+            damage.extend(group.damage);
         }
         if batches.is_empty() {
             return Err(TrainError::NoFrames);
         }
-        Ok(Self(batches))
+        let damage = (!damage.is_empty()).then(|| format!("held out: {}", damage.join("; ")));
+        Ok(Self { batches, damage })
+    }
+
+    /// What was damaged, once.
+    pub(super) fn take_damage(&mut self) -> Option<String> {
+        self.damage.take()
     }
 
     /// The mean of each figure over the batches that have it.
@@ -47,7 +60,7 @@ impl HeldOutTurns {
         of: impl Fn(&TurnTensors) -> Result<Vec<(&'static str, f64)>, TrainError>,
     ) -> Result<Figures, TrainError> {
         let mut sums: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
-        for batch in &self.0 {
+        for batch in &self.batches {
             for (name, value) in no_grad(|| of(batch))? {
                 let sum = sums.entry(name).or_default();
                 *sum = (sum.0 + value, sum.1 + 1.0);
@@ -58,15 +71,20 @@ impl HeldOutTurns {
     }
 }
 
-/// Composed samples of objects that are never trained on.
+/// Composed samples of objects that are never trained on: their shapes are made, none of them is a mesh.
 #[derive(Debug)]
-pub(super) struct HeldOutSamples(Vec<TruthArrays>);
+pub(super) struct HeldOutSamples {
+    composition: Composition,
+    count: u64,
+    /// Composed when they are needed first: only one process of several looks at them.
+    samples: OnceCell<Vec<TruthArrays>>,
+}
 
 impl HeldOutSamples {
     /// One sample each of `count` objects. Neither their seed nor their light depends on the run's, so that runs can be
     /// compared.
-    pub(super) fn compose(composition: &Composition, count: u64) -> Self {
-        let held_out = Composition {
+    pub(super) fn new(composition: &Composition, count: u64) -> Self {
+        let composition = Composition {
             recipe: Recipe {
                 seed: stream(0x76_61_6c, 23),
                 size: composition.recipe.size,
@@ -74,19 +92,29 @@ impl HeldOutSamples {
                 lightings: 1,
                 ..Recipe::default()
             },
-            library: composition.library.clone(),
+            library: composition.library.without_meshes(),
             plain_share: composition.plain_share,
         };
-        Self(
-            (0..count)
-                .flat_map(|view| held_out.samples_of(view))
-                .collect(),
-        )
+        Self {
+            composition,
+            count,
+            samples: OnceCell::new(),
+        }
+    }
+
+    fn samples(&self) -> &[TruthArrays] {
+        let compose = |view| self.composition.samples_of(view);
+        self.samples
+            .get_or_init(|| (0..self.count).flat_map(compose).collect())
     }
 
     /// A batch of the first of them, at most as many as are taken at once.
     pub(super) fn first(&self, kind: Kind, device: Device) -> Result<TruthBatch, TrainError> {
-        batch_of(&self.0[..self.0.len().min(SAMPLE_BATCH)], kind, device)
+        let views = 0..self.count.min(SAMPLE_BATCH as u64);
+        let samples: Vec<TruthArrays> = views
+            .flat_map(|view| self.composition.samples_of(view))
+            .collect();
+        batch_of(&samples, kind, device)
     }
 
     /// The mean of each figure over the samples.
@@ -97,8 +125,8 @@ impl HeldOutSamples {
         mut of: impl FnMut(&TruthBatch) -> Result<Vec<(&'static str, f64)>, TrainError>,
     ) -> Result<Figures, TrainError> {
         let mut sums = Figures::new();
-        for samples in self.0.chunks(SAMPLE_BATCH) {
-            let share = samples.len() as f64 / self.0.len() as f64;
+        for samples in self.samples().chunks(SAMPLE_BATCH) {
+            let share = samples.len() as f64 / self.samples().len() as f64;
             let batch = batch_of(samples, kind, device)?;
             for (name, value) in no_grad(|| of(&batch))? {
                 *sums.entry(name.to_owned()).or_default() += share * value;

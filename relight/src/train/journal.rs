@@ -31,12 +31,20 @@ impl Journal {
     /// The journal in a run's folder; a resumed run goes on behind the line of its last step.
     ///
     /// # Errors
-    /// [`TrainError::Io`].
+    /// [`TrainError::Io`], [`TrainError::Running`] where another program has it open.
     pub fn open(folder: &Path, from_step: u64) -> Result<Self, TrainError> {
+        let running = || TrainError::Running {
+            path: folder.to_owned(),
+        };
+        if Self::is_open(folder) {
+            return Err(running());
+        }
         let table_path = folder.join(TABLE);
         let table = open_table(&table_path, from_step).map_err(written(&table_path))?;
-        // Only for `is_open`; some file systems have no locks.
-        let _ = table.try_lock();
+        // Some file systems have no locks.
+        if matches!(table.try_lock(), Err(TryLockError::WouldBlock)) {
+            return Err(running());
+        }
         let seconds = now();
         let events_path = folder.join(format!(
             "events.out.tfevents.{:010}.{from_step}",

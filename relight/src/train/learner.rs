@@ -25,7 +25,7 @@ pub struct LearnerSettings {
     pub adam: AdamSettings,
     /// Part of the average that is kept at each step, 0..1.
     pub average: f64,
-    /// ComputePrecision of its layers.
+    /// In which precision its layers are computed.
     pub precision: ComputePrecision,
     /// Where it is computed.
     pub device: Device,
@@ -87,7 +87,8 @@ impl Learner {
         Ok(model)
     }
 
-    /// All that is needed to go on: `<name>.model.*`, `<name>.average.*`, `<name>.first.*`, `<name>.second.*`.
+    /// All that is needed to go on: `<name>.model.*`, `<name>.average.*`, `<name>.first.*`, `<name>.second.*`,
+    /// `<name>.steps`.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
@@ -107,14 +108,14 @@ impl Learner {
         Ok(all.into_iter().collect())
     }
 
-    /// Goes on from a state that was saved after so many steps.
+    /// Goes on from a state that was saved.
     ///
     /// # Errors
     /// [`TrainError::Memory`] where it is another network's.
-    pub fn recall(&mut self, state: &Weights, steps: u64) -> Result<(), TrainError> {
+    pub fn recall(&mut self, state: &Weights) -> Result<(), TrainError> {
         let own = state.under(&format!("{}.", self.name));
         self.model.recall(&own.under("model."))?;
         self.average.recall(&own.under("average."))?;
-        self.adam.recall(&own, steps)
+        self.adam.recall(&own)
     }
 }

@@ -19,6 +19,24 @@ pub enum ComputePrecision {
 }
 
 impl ComputePrecision {
+    const ALL: [Self; 3] = [Self::Single, Self::Mixed, Self::Double];
+
+    /// Its name, as in settings.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Mixed => "mixed",
+            Self::Double => "double",
+        }
+    }
+
+    /// The one of a name.
+    #[must_use]
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|one| one.name() == name)
+    }
+
     /// The type of parameters, of what goes in and of what comes out.
     #[must_use]
     pub fn kind(self) -> Kind {

@@ -34,7 +34,7 @@ pub fn to_srgb(linear: &Tensor) -> Result<Tensor, TrainError> {
 }
 
 /// Normals (p, q, 1) over their length of slopes (p, q), 0 outside the mask. y is as the slopes have it: down in the
-/// paper's figures and in what [`slopes_of`] gives.
+/// paper's figures and in the answers of Normal-Net.
 ///
 /// # Errors
 /// [`TrainError::Torch`].

@@ -13,6 +13,7 @@
 
 use tch::Tensor;
 
+use super::decompose::{FULL_HIGHLIGHT, HIGHLIGHT_EMPHASIS, spread};
 use super::error::TrainError;
 use super::losses::{Mean, angular, scale_invariant};
 use super::low_rank::{LowRankForm, chromaticity, low_rank_loss};
@@ -58,6 +59,12 @@ impl PaperPhase {
             Self::Joint => "joint",
             Self::Specular => "specular",
         }
+    }
+
+    /// Whether there are figures of how well it does on turns.
+    #[must_use]
+    pub fn is_judged_by_turns(self) -> bool {
+        matches!(self, Self::Spec | Self::Light | Self::Joint)
     }
 
     /// Whether it cannot do without turns.
@@ -174,44 +181,68 @@ pub fn spec_on_turns(
     low_rank(&diffuse_chromaticity(spec, &picture, &mask)?, &mask, form).map(Some)
 }
 
+/// What an answer on composed samples comes to.
+#[derive(Debug)]
+pub struct TruthLoss {
+    /// Its loss.
+    pub mean: Mean,
+    /// What is answered.
+    pub head: &'static str,
+    /// How much it varies, as a part of the truth's variation.
+    pub spread: f64,
+}
+
 /// Mean error of Spec-Net's highlight on composed samples; highlights count more than their absence.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
+pub fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
     let found = highlight_of(spec, &batch.picture, &batch.mask)?;
     let truth = batch.highlight.f_clamp(0.0, 1.0)?;
     let emphasis = truth
-        .f_clamp(0.0, 0.1)?
-        .f_mul_scalar(80.0)?
+        .f_clamp(0.0, FULL_HIGHLIGHT)?
+        .f_mul_scalar(HIGHLIGHT_EMPHASIS / FULL_HIGHLIGHT)?
         .f_add_scalar(1.0)?
         .f_mul(&batch.mask)?;
     let error = found.f_sub(&truth)?.f_abs()?.f_mul(&emphasis)?;
     let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
     let value = error.f_sum(None)?.f_div(&over)?.f_mul_scalar(1.0 / 3.0)?;
-    Ok(Mean { value, over })
+    let grey = found.f_mean_dim([1_i64].as_slice(), true, None)?;
+    Ok(TruthLoss {
+        mean: Mean { value, over },
+        head: "highlight",
+        spread: spread(&grey, &truth, &batch.mask)?,
+    })
 }
 
 /// `1 - cos` of Normal-Net's normals on composed samples.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
+pub fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
     let found = normals_of(normal, &batch.picture, &batch.mask)?;
-    angular(&found, &batch.normals, &batch.mask)
+    Ok(TruthLoss {
+        mean: angular(&found, &batch.normals, &batch.mask)?,
+        head: "normals",
+        spread: spread(&found, &batch.normals, &batch.mask)?,
+    })
 }
 
 /// Scale-invariant error of the shading that Light-Net's light makes of the true normals of composed samples.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
+pub fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
     let coefficients = light_of(light, &batch.picture, &batch.mask)?;
     let shading = diffuse_shading(&batch.normals, &coefficients, DiffuseForm::Released)?;
     let grey = shading.f_mean_dim([1_i64].as_slice(), true, None)?;
     let value = scale_invariant(&grey, &batch.shading, &batch.mask)?;
     let over = Tensor::f_from_slice(&[batch.mask.size()[0]])?;
-    Ok(Mean { value, over })
+    Ok(TruthLoss {
+        mean: Mean { value, over },
+        head: "shading",
+        spread: spread(&grey, &batch.shading, &batch.mask)?,
+    })
 }
 
 /// Low-rank loss of the reflectance.
@@ -241,15 +272,7 @@ pub fn reflectance(
     let (picture, mask) = (&turns.picture, &turns.mask);
     let diffuse = match spec {
         Some(spec) => {
-            let gate: Vec<f32> = turns
-                .spec_net
-                .iter()
-                .map(|&o| f32::from(u8::from(o)))
-                .collect();
-            let gate = Tensor::f_from_slice(&gate)?
-                .f_to_device(picture.device())?
-                .f_view([-1, 1, 1, 1])?;
-            let highlight = highlight_of(spec, picture, mask)?.f_mul(&gate)?;
+            let highlight = highlight_of(spec, picture, mask)?.f_mul(&gate(turns)?)?;
             picture.f_sub(&highlight)?.f_clamp(0.0, 1.0)?
         }
         None => picture.shallow_clone(),
@@ -260,6 +283,18 @@ pub fn reflectance(
     Ok(diffuse
         .f_div(&shading.f_clamp_min(LEAST_SHADING)?)?
         .f_clamp(0.0, 1.0)?)
+}
+
+/// 1 for the frames for which the gate of saturation opens Spec-Net, 0 for the others: `frames x 1 x 1 x 1`.
+fn gate(turns: &TurnTensors) -> Result<Tensor, TrainError> {
+    let open = turns
+        .spec_net
+        .iter()
+        .map(|&is_open| f32::from(u8::from(is_open)));
+    let open = Tensor::f_from_slice(&open.collect::<Vec<_>>())?;
+    Ok(open
+        .f_to_device(turns.picture.device())?
+        .f_view([-1, 1, 1, 1])?)
 }
 
 /// Mean squared difference between Spec-Net's highlight and the one that the answered reflectance and smoothness
@@ -284,15 +319,7 @@ pub fn specular_on_turns(
     let rendered = power_highlight(&normals, &coefficients, &strength, &smoothness)?
         .f_clamp(0.0, 1.0)?
         .f_mul(mask)?;
-    let open: Vec<f32> = turns
-        .spec_net
-        .iter()
-        .map(|&o| f32::from(u8::from(o)))
-        .collect();
-    let weight = Tensor::f_from_slice(&open)?
-        .f_to_device(picture.device())?
-        .f_view([-1, 1, 1, 1])?
-        .f_mul(mask)?;
+    let weight = gate(turns)?.f_mul(mask)?;
     let error = rendered.f_sub(&highlight)?.f_square()?.f_mul(&weight)?;
     let pixels = weight.f_sum(None)?.f_mul_scalar(3.0)?.f_clamp_min(1.0)?;
     Ok(Some(error.f_sum(None)?.f_div(&pixels)?))

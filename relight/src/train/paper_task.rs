@@ -1,10 +1,12 @@
 //! The runs of the paper's phases.
 
+use std::iter;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use tch::{Kind, Tensor};
+use tch::{Device, Kind, Tensor};
 
+use super::agreement::fingerprint;
 use super::composed::{ComposedBatches, composition, window_settings};
 use super::decompose_task::Resources;
 use super::error::TrainError;
@@ -14,14 +16,14 @@ use super::losses::{Mean, angular_degrees};
 use super::low_rank::chromaticity;
 use super::model::{ComputePrecision, Model};
 use super::paper_phases::{
-    PaperPhase, diffuse_chromaticity, highlight_of, light_on_truth, normal_on_truth, normals_of,
-    reflectance, reflectance_on_turns, saturated_frames, spec_on_truth, spec_on_turns,
+    PaperPhase, TruthLoss, diffuse_chromaticity, highlight_of, light_on_truth, normal_on_truth,
+    normals_of, reflectance, reflectance_on_turns, saturated_frames, spec_on_truth, spec_on_turns,
     specular_on_turns,
 };
 use super::process_group::ProcessGroup;
 use super::run::{StepLosses, Task, Validation};
 use super::sample::TruthBatch;
-use super::settings::{PaperSettings, PrecisionChoice, first_difference};
+use super::settings::{PaperSettings, first_difference};
 use super::turn_reader::{TurnGroup, TurnReader, TurnTensors};
 use crate::data::Share;
 use crate::nets::paper::{Head, light_net, normal_net, reflectance_net, spec_net};
@@ -96,6 +98,11 @@ impl PaperTask {
         if phase.needs_turns() && inputs.turns.is_none() {
             return Err(needed(phase, "--turns"));
         }
+        if inputs.held_out.is_some() && !phase.is_judged_by_turns() {
+            return Err(TrainError::NotJudged {
+                phase: phase.name(),
+            });
+        }
         let graph = learned(phase);
         let initial = || Weights::initial(&graph, settings.run.seed);
         let weights = inputs.weights.clone().unwrap_or_else(initial);
@@ -117,16 +124,16 @@ impl PaperTask {
             _ => settings.data.validation,
         };
         Ok(Self {
-            held_out_samples: HeldOutSamples::compose(&composition, samples),
+            held_out_samples: HeldOutSamples::new(&composition, samples),
             held_out_turns: inputs.held_out.as_ref().map(held_out).transpose()?,
-            phase: Phase::new(phase, &settings, resources, inputs)?,
+            phase: Phase::new(phase, &settings, resources.device, inputs)?,
             name: phase.name(),
             learner: Learner::new(graph, &weights, learner)?,
             composed: ComposedBatches::new(
                 composition,
                 window_settings(&settings.data, &settings.run),
                 precision(&settings).kind(),
-                resources,
+                resources.clone(),
             ),
             turns: inputs.turns.as_ref().map(open).transpose()?,
             share: Share::ALL,
@@ -186,12 +193,12 @@ impl Phase {
     fn new(
         phase: PaperPhase,
         settings: &PaperSettings,
-        resources: Resources,
+        device: Device,
         inputs: &PaperInputs,
     ) -> Result<Self, TrainError> {
         let optional = |graph: Graph, weights: &Option<Weights>| {
             let model = weights.as_ref().map(|weights| {
-                let mut model = Model::new(graph, weights, resources.device, precision(settings))?;
+                let mut model = Model::new(graph, weights, device, precision(settings))?;
                 model.set_trainable(false)?;
                 Ok::<_, TrainError>(model)
             });
@@ -223,8 +230,22 @@ impl Phase {
         })
     }
 
+    /// The networks that it uses and does not change.
+    fn given(&self) -> Vec<&Model> {
+        match self {
+            Self::Spec | Self::Normal => Vec::new(),
+            Self::Light { normal, spec } => iter::once(normal).chain(spec).collect(),
+            Self::Joint { light, spec } => iter::once(light).chain(spec).collect(),
+            Self::Specular {
+                spec,
+                normal,
+                light,
+            } => vec![spec, normal, light],
+        }
+    }
+
     /// The loss on a batch of composed samples; none where the phase has none.
-    fn on_truth(&self, own: &Model, batch: &TruthBatch) -> Result<Option<Mean>, TrainError> {
+    fn on_truth(&self, own: &Model, batch: &TruthBatch) -> Result<Option<TruthLoss>, TrainError> {
         match self {
             Self::Spec => spec_on_truth(own, batch).map(Some),
             Self::Normal | Self::Joint { .. } => normal_on_truth(own, batch).map(Some),
@@ -252,7 +273,10 @@ impl Phase {
                 vec![("normals_deg", f64::try_from(degrees)?)]
             }
             Self::Light { .. } => {
-                vec![("shading", f64::try_from(light_on_truth(own, batch)?.value)?)]
+                vec![(
+                    "shading",
+                    f64::try_from(light_on_truth(own, batch)?.mean.value)?,
+                )]
             }
             Self::Specular { .. } => Vec::new(),
         })
@@ -337,9 +361,15 @@ impl Task for PaperTask {
         vec![&mut self.learner]
     }
 
-    fn inputs(&self) -> String {
-        let turns = self.turns.as_ref().map(TurnReader::turns);
-        format!("{turns:?}")
+    fn inputs(&self) -> Result<String, TrainError> {
+        let mut inputs = self
+            .turns
+            .as_ref()
+            .map_or(String::new(), TurnReader::identity);
+        for model in self.phase.given() {
+            inputs += &fingerprint(model.parameters())?;
+        }
+        Ok(inputs)
     }
 
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
@@ -368,7 +398,8 @@ impl Task for PaperTask {
         if anchor > 0.0 {
             let batch = self.composed.batch(step)?;
             if let Some(loss) = self.phase.on_truth(&self.learner.model, &batch)? {
-                losses.terms.add_mean("truth", anchor, loss);
+                losses.terms.add_mean("truth", anchor, loss.mean);
+                losses.spreads.insert(loss.head, loss.spread);
             }
             losses.batch.extend(batch.named());
         }
@@ -384,12 +415,15 @@ impl Task for PaperTask {
             .figures(self.kind(), device, |batch| {
                 self.phase.sample_figures(&own, batch)
             })?;
-        if let Some(turns) = &self.held_out_turns {
+        let mut damage = None;
+        if let Some(turns) = &mut self.held_out_turns {
+            damage = turns.take_damage();
             figures.extend(turns.figures(|turns| self.phase.turn_figures(&own, turns))?);
         }
         Ok(Validation {
             figures,
             sheet: None,
+            damage,
         })
     }
 
@@ -429,9 +463,9 @@ fn learned(phase: PaperPhase) -> Graph {
 
 /// Single where nothing else was asked for: these networks are small.
 fn precision(settings: &PaperSettings) -> ComputePrecision {
-    match settings.run.precision {
-        PrecisionChoice::Mixed => ComputePrecision::Mixed,
-        PrecisionChoice::Double => ComputePrecision::Double,
-        PrecisionChoice::Single | PrecisionChoice::Fastest => ComputePrecision::Single,
-    }
+    settings
+        .run
+        .precision
+        .named()
+        .unwrap_or(ComputePrecision::Single)
 }

@@ -40,9 +40,12 @@ pub trait Task {
     /// The first setting that another run's settings have otherwise.
     fn differing_setting(&self, other: &str) -> Option<String>;
 
-    /// What it was given beside its settings, as text that is the same where that is.
-    fn inputs(&self) -> String {
-        String::new()
+    /// What it was given beside its settings and what learns, as text that is the same where that is.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    fn inputs(&self) -> Result<String, TrainError> {
+        Ok(String::new())
     }
 
     /// Takes this process's part of the work from now on. Called before the first step.
@@ -101,6 +104,8 @@ pub struct Validation {
     pub figures: BTreeMap<String, f64>,
     /// A sheet of answers beside the truth, a PNG file, with its size.
     pub sheet: Option<(Vec<u8>, (usize, usize))>,
+    /// What was damaged in the data, and is not in the figures.
+    pub damage: Option<String>,
 }
 
 /// What a run says while it goes on.
@@ -122,6 +127,8 @@ pub struct RunOutcome {
     pub steps: u64,
     /// Whether it was asked to stop before its last step.
     pub stopped: bool,
+    /// Whether something in the data was damaged, and left out.
+    pub damaged: bool,
     /// Figures of the last validation; none in other processes than the first.
     pub figures: BTreeMap<String, f64>,
     /// The files of weights, which the first process writes.
@@ -140,6 +147,8 @@ pub struct Run<'a> {
     step: u64,
     /// Where the task stands after that step.
     place: String,
+    /// Whether something in the data was left out.
+    damaged: bool,
 }
 
 impl<'a> Run<'a> {
@@ -196,6 +205,7 @@ impl<'a> Run<'a> {
             journal: is_first.then(|| Journal::open(folder, step)).transpose()?,
             guard: Guard::default(),
             step,
+            damaged: false,
         })
     }
 
@@ -234,6 +244,7 @@ impl<'a> Run<'a> {
         Ok(RunOutcome {
             steps: self.step,
             stopped: self.step < self.settings.steps,
+            damaged: self.damaged,
             figures,
             weights,
         })
@@ -260,7 +271,10 @@ impl<'a> Run<'a> {
                 break;
             }
             // Processes of a group stop after the same step, the one in which the first of them is asked to.
-            stopped = self.make_step(asked, observer)?;
+            stopped = match self.make_step(asked, observer) {
+                Err(TrainError::Stopped) => break,
+                made => made?,
+            };
             if self.journal.is_none() {
                 continue;
             }
@@ -286,6 +300,7 @@ impl<'a> Run<'a> {
         let rate = self.settings.rate_at(self.step);
         let losses = self.task.step(self.step)?;
         if let Some(damage) = &losses.damage {
+            self.damaged = true;
             observer.damaged(self.step, damage);
         }
         let joint = match &self.group {
@@ -406,7 +421,15 @@ impl<'a> Run<'a> {
         let Some(journal) = &mut self.journal else {
             return Ok(BTreeMap::new());
         };
-        let Validation { figures, sheet } = self.task.validate()?;
+        let Validation {
+            figures,
+            sheet,
+            damage,
+        } = self.task.validate()?;
+        if let Some(damage) = damage {
+            self.damaged = true;
+            observer.damaged(self.step, &damage);
+        }
         let named: BTreeMap<String, f64> = figures
             .iter()
             .map(|(name, value)| (format!("validation/{name}"), *value))
@@ -434,6 +457,7 @@ impl<'a> Run<'a> {
             task: self.task.name().to_owned(),
             step: self.step,
             settings: self.task.settings(),
+            inputs: self.task.inputs()?,
             place: self.place.clone(),
             state,
         }
@@ -467,7 +491,7 @@ fn facts(task: &mut dyn Task, step: u64) -> Result<Vec<Fact>, TrainError> {
     Ok(vec![
         ("version and task", version),
         ("the settings", task.settings()),
-        ("the turns", task.inputs()),
+        ("the turns and the networks that are given", task.inputs()?),
         ("the steps made before", step.to_string()),
         ("the weights", weights),
     ])
@@ -489,9 +513,14 @@ fn recall(task: &mut dyn Task, checkpoint: &Checkpoint, folder: &Path) -> Result
     if let Some(setting) = task.differing_setting(&checkpoint.settings) {
         return Err(other(format!("its settings are others: {setting}")));
     }
+    if checkpoint.inputs != task.inputs()? {
+        let fault =
+            "it was trained on other turns, or with other networks beside the one that learns";
+        return Err(other(fault.to_owned()));
+    }
     task.go_to(&checkpoint.place).map_err(other)?;
     for learner in task.learners() {
-        learner.recall(&checkpoint.state, checkpoint.step)?;
+        learner.recall(&checkpoint.state)?;
     }
     Ok(checkpoint.step)
 }

@@ -10,7 +10,14 @@ use super::adam::AdamSettings;
 use super::decompose::DecomposeWeights;
 use super::error::TrainError;
 use super::low_rank::LowRankForm;
+use super::model::ComputePrecision;
 use crate::synth::LightKind;
+
+// Nobody trains more: these keep a slip of the pen from filling the memory.
+const MOST_STEPS: u64 = 1_000_000_000;
+const MOST_SAMPLES: u64 = 1_000_000;
+const MOST_MINUTES: f64 = 1e6;
+const LARGEST_SIZE: u32 = 1024;
 
 /// How long and how fast a network learns: the table `[run]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -58,8 +65,22 @@ pub enum PrecisionChoice {
     Mixed,
     /// 64 bits, several times slower: to compare runs. Checkpoints keep 32 of them.
     Double,
-    /// The faster of single and mixed, by a short measurement when the run begins; a resumed run measures again.
+    /// Of `decompose` the faster of single and mixed, by a short measurement when the run begins; a resumed run keeps it.
+    /// The paper's networks are small: single.
     Fastest,
+}
+
+impl PrecisionChoice {
+    /// The precision that it names; none where it is to be found out.
+    #[must_use]
+    pub fn named(self) -> Option<ComputePrecision> {
+        match self {
+            Self::Single => Some(ComputePrecision::Single),
+            Self::Mixed => Some(ComputePrecision::Mixed),
+            Self::Double => Some(ComputePrecision::Double),
+            Self::Fastest => None,
+        }
+    }
 }
 
 impl Default for RunSettings {
@@ -206,11 +227,16 @@ impl PaperSettings {
     pub fn check(&self) -> Result<(), TrainError> {
         self.run.check()?;
         self.data.check()?;
-        if self.turns.groups == 0 {
+        check_weights(&[
+            ("loss.low_rank", self.loss.low_rank),
+            ("loss.anchor", self.loss.anchor),
+        ])?;
+        let groups = self.turns.groups;
+        if !(1..=MOST_SAMPLES).contains(&groups) {
             return Err(TrainError::Setting {
                 name: "turns.groups",
-                value: "0".to_owned(),
-                allowed: "at least 1",
+                value: groups.to_string(),
+                allowed: "from 1 to a million",
             });
         }
         Ok(())
@@ -224,8 +250,47 @@ impl DecomposeSettings {
     /// [`TrainError::Setting`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
         self.run.check()?;
-        self.data.check()
+        self.data.check()?;
+        let loss = &self.loss;
+        check_weights(&[
+            ("loss.whole", loss.whole),
+            ("loss.windows", loss.windows),
+            ("loss.gradient", loss.gradient),
+            ("loss.normals", loss.normals),
+            ("loss.highlight", loss.highlight),
+            ("loss.highlight_energy", loss.highlight_energy),
+        ])?;
+        // A part of others: alone it counts nothing.
+        check_weight("loss.quotient", loss.quotient)
     }
+}
+
+/// Whether weights of losses are in range, and not all of them 0.
+fn check_weights(weights: &[(&'static str, f64)]) -> Result<(), TrainError> {
+    for &(name, weight) in weights {
+        check_weight(name, weight)?;
+    }
+    match weights {
+        [(name, _), ..] if weights.iter().all(|&(_, weight)| weight == 0.0) => {
+            Err(TrainError::Setting {
+                name,
+                value: "0, as all others of [loss] are".to_owned(),
+                allowed: "above 0 for one of them",
+            })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_weight(name: &'static str, weight: f64) -> Result<(), TrainError> {
+    if weight >= 0.0 && weight.is_finite() {
+        return Ok(());
+    }
+    Err(TrainError::Setting {
+        name,
+        value: weight.to_string(),
+        allowed: "a number from 0",
+    })
 }
 
 /// Reads settings from a TOML file; what it does not name has its default, and a name that is none is an
@@ -281,15 +346,15 @@ impl RunSettings {
         for (name, is_right, value, allowed) in [
             (
                 "run.steps",
-                self.steps > 0,
+                (1..=MOST_STEPS).contains(&self.steps),
                 self.steps.to_string(),
-                "at least 1",
+                "from 1 to a thousand million",
             ),
             (
                 "run.batch",
-                self.batch > 0,
+                (1..=MOST_SAMPLES).contains(&self.batch),
                 self.batch.to_string(),
-                "at least 1",
+                "from 1 to a million",
             ),
             (
                 "run.rate",
@@ -347,9 +412,9 @@ impl RunSettings {
             ),
             (
                 "run.checkpoint_minutes",
-                positive(self.checkpoint_minutes),
+                positive(self.checkpoint_minutes) && self.checkpoint_minutes <= MOST_MINUTES,
                 self.checkpoint_minutes.to_string(),
-                "above 0",
+                "above 0 and at most a million",
             ),
         ] {
             if !is_right {
@@ -392,15 +457,15 @@ impl DataSettings {
         for (name, is_right, value, allowed) in [
             (
                 "data.size",
-                self.size > 0 && self.size.is_multiple_of(32),
+                (32..=LARGEST_SIZE).contains(&self.size) && self.size.is_multiple_of(32),
                 self.size.to_string(),
-                "a multiple of 32",
+                "a multiple of 32 up to 1024",
             ),
             (
                 "data.window",
-                self.window > 0,
+                (1..=MOST_SAMPLES).contains(&self.window),
                 self.window.to_string(),
-                "at least 1",
+                "from 1 to a million",
             ),
             (
                 "data.reuse",
@@ -416,9 +481,9 @@ impl DataSettings {
             ),
             (
                 "data.validation",
-                self.validation > 0,
+                (1..=MOST_SAMPLES).contains(&self.validation),
                 self.validation.to_string(),
-                "at least 1",
+                "from 1 to a million",
             ),
         ] {
             if !is_right {
@@ -483,6 +548,11 @@ mod tests {
         for (text, name) in [
             ("[run]\nrate = -1.0", "run.rate"),
             ("[run]\nbeta1 = 1.0", "run.beta1"),
+            (
+                "[run]\ncheckpoint_minutes = 1e300",
+                "run.checkpoint_minutes",
+            ),
+            ("[run]\nbatch = 1000000000000", "run.batch"),
         ] {
             let error = read(text).unwrap().run.check().unwrap_err().to_string();
             assert!(error.contains(name), "{error}");
@@ -497,6 +567,36 @@ mod tests {
                 .to_string()
                 .contains("multiple of 32")
         );
+    }
+
+    #[test]
+    fn weights_of_losses_that_teach_nothing_are_named() {
+        let losses = DecomposeWeights::default();
+        let error = |loss: DecomposeWeights| {
+            let settings = DecomposeSettings {
+                loss,
+                ..DecomposeSettings::default()
+            };
+            settings.check().map_err(|error| error.to_string())
+        };
+        assert_eq!(error(losses), Ok(()));
+        for whole in [-1.0, f64::NAN, f64::INFINITY] {
+            let told = error(DecomposeWeights { whole, ..losses }).unwrap_err();
+            assert!(told.contains("loss.whole"), "{told}");
+        }
+        let quotient = -0.5;
+        assert!(error(DecomposeWeights { quotient, ..losses }).is_err());
+        let nothing = DecomposeWeights {
+            whole: 0.0,
+            quotient: 0.5,
+            windows: 0.0,
+            gradient: 0.0,
+            normals: 0.0,
+            highlight: 0.0,
+            highlight_energy: 0.0,
+        };
+        let told = error(nothing).unwrap_err();
+        assert!(told.contains("all others"), "{told}");
     }
 
     #[test]

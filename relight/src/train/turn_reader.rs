@@ -77,10 +77,18 @@ impl TurnReader {
         self.go_to(self.place)
     }
 
-    /// How many samples each of the turns has.
+    /// Text that tells data sets apart: of each turn its name, the number of its samples, and the bytes that they are stored
+    /// in.
     #[must_use]
-    pub fn turns(&self) -> Vec<u32> {
-        self.turns.turns()
+    pub fn identity(&self) -> String {
+        let turns = self
+            .turns
+            .names()
+            .zip(self.turns.turns())
+            .zip(self.turns.bytes());
+        turns
+            .map(|((name, samples), bytes)| format!("{name}: {samples} samples, {bytes} bytes\n"))
+            .collect()
     }
 
     /// Where the next batch stands.

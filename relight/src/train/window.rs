@@ -9,8 +9,10 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::composer::{Composer, Composition, unit};
+use super::decompose_task::Resources;
 use super::error::TrainError;
 use super::sample::{DrawnSample, TruthArrays};
 use crate::data::Share;
@@ -50,26 +52,28 @@ pub struct SampleWindow {
 }
 
 impl SampleWindow {
-    /// The window of the batch `step`: the samples before it are composed, which takes a while. `threads` compose.
+    /// The window of the batch `step`: the samples before it are composed, which takes a while.
     ///
     /// # Errors
-    /// Those of the composer.
+    /// Those of the composer; [`TrainError::Stopped`] where a run of one process is asked to stop meanwhile.
     pub fn open(
         settings: SampleWindowSettings,
         share: Share,
         composition: &Arc<Composition>,
-        threads: usize,
+        resources: &Resources,
         step: u64,
     ) -> Result<Self, TrainError> {
         let view = settings.taken_before(step) / settings.lightings;
         let mut window = Self {
             settings,
             share,
-            composer: Composer::start(Arc::clone(composition), share, view, threads)?,
+            composer: Composer::start(Arc::clone(composition), share, view, resources.composers)?,
             samples: BTreeMap::new(),
             next: None,
         };
-        window.move_to(step)?;
+        // The other processes of a group wait for this one's first step.
+        let stop = (share == Share::ALL).then_some(resources.stop.as_ref());
+        window.move_to(step, stop)?;
         Ok(window)
     }
 
@@ -78,7 +82,7 @@ impl SampleWindow {
     /// # Errors
     /// Those of the composer.
     pub fn batch(&mut self, step: u64) -> Result<Vec<DrawnSample<'_>>, TrainError> {
-        self.move_to(step)?;
+        self.move_to(step, None)?;
         let draws = self.settings.draws(step, self.share);
         draws
             .map(|draw| {
@@ -89,9 +93,12 @@ impl SampleWindow {
             .collect()
     }
 
-    fn move_to(&mut self, step: u64) -> Result<(), TrainError> {
+    fn move_to(&mut self, step: u64, stop: Option<&AtomicBool>) -> Result<(), TrainError> {
         let oldest = self.settings.taken_before(step);
         loop {
+            if stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+                return Err(TrainError::Stopped);
+            }
             let (number, sample) = match self.next.take() {
                 Some(next) => next,
                 None => self.composer.next_sample()?,

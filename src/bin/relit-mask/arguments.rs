@@ -3,25 +3,57 @@
 use std::path::PathBuf;
 
 use clap::error::ErrorKind;
-use clap::{ArgGroup, CommandFactory, Parser};
+use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand};
 use relit::masking::{MaskFiles, MaskRequest, MaskingError};
 use relit_data::geometry::Rect;
 use relit_mask::{Feather, Hints, Iterations, Seeds, SegmentSettings};
 
 const EXAMPLES: &str = "\
 Examples:
+  relit-mask 20261120T093015Z-mug --auto
   relit-mask 20261120T093015Z-mug --rect 610,240,420,380
   relit-mask clip.mp4 --seeds seeds.png --frame 30 -o masks/mug.png
   relit-mask sessions/ --rect 610,240,420,380 --keep-all
+  relit-mask bench images/
 
 Check mask-preview.png afterwards. Exit codes: 0 all masks made, 1 none, 2 wrong usage, \
 3 some recordings have no mask.";
 
 /// Find the object in one frame of a recording; writes mask.png, mask.json and mask-preview.png.
 #[derive(Debug, Parser)]
-#[command(name = "relit-mask", version, after_help = EXAMPLES)]
-#[command(group = ArgGroup::new("hint").args(["rect", "seeds", "recipe"]).required(true).multiple(true))]
-pub(crate) struct Arguments {
+#[command(
+    name = "relit-mask",
+    version,
+    after_help = EXAMPLES,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true
+)]
+pub(crate) struct CommandLine {
+    #[command(subcommand)]
+    pub(crate) verb: Option<Verb>,
+    #[command(flatten)]
+    pub(crate) mask: Option<MaskArguments>,
+}
+
+/// What is done other than making masks.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Verb {
+    /// Measure masks of images with truth, and OpenCV's GrabCut beside them
+    #[command(after_help = "Example:\n  relit-mask bench images/")]
+    Bench {
+        /// A folder with NAME.jpg, NAME.gt.png, and NAME.box.txt or NAME.scribble.png for each image
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+        /// Print one JSON line per event on standard output
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// What mask is to be made.
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("hint").args(["rect", "seeds", "auto", "recipe"]).required(true).multiple(true))]
+pub(crate) struct MaskArguments {
     /// A session folder, a folder of sessions (each gets a mask with the same hints), or a video
     #[arg(value_name = "INPUT")]
     pub(crate) input: PathBuf,
@@ -33,6 +65,10 @@ pub(crate) struct Arguments {
     /// An image of the frame's size: white is object, black is background, the rest is unknown
     #[arg(long, value_name = "PNG")]
     seeds: Option<PathBuf>,
+
+    /// Find the object by what stands still while the turntable turns; alone or with --rect or --seeds
+    #[arg(long)]
+    auto: bool,
 
     /// The number of the frame to make the mask on, from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -60,7 +96,7 @@ pub(crate) struct Arguments {
 
     /// Make the mask again that this mask.json describes, to the same bytes
     #[arg(long, value_name = "JSON", conflicts_with_all =
-        ["rect", "seeds", "frame", "iterations", "keep_all", "feather"])]
+        ["rect", "seeds", "auto", "frame", "iterations", "keep_all", "feather"])]
     recipe: Option<PathBuf>,
 
     /// Print one JSON line per event on standard output
@@ -68,7 +104,7 @@ pub(crate) struct Arguments {
     pub(crate) json: bool,
 }
 
-impl Arguments {
+impl MaskArguments {
     /// The requested mask.
     ///
     /// # Errors
@@ -78,8 +114,16 @@ impl Arguments {
             Some(path) => MaskRequest::from_recipe(path)?,
             None => {
                 let seeds = self.seeds.as_deref().map(Seeds::read).transpose()?;
+                if self.auto && self.rect.is_none() && seeds.is_none() {
+                    return Ok(
+                        MaskRequest::auto(self.frame, None, self.settings()).with_force(self.force)
+                    );
+                }
                 let hints = Hints::from_parts(self.rect, seeds)?;
-                MaskRequest::new(self.frame, hints, self.settings())
+                match self.auto {
+                    true => MaskRequest::auto(self.frame, Some(hints), self.settings()),
+                    false => MaskRequest::new(self.frame, hints, self.settings()),
+                }
             }
         };
         Ok(request.with_force(self.force))
@@ -97,7 +141,7 @@ impl Arguments {
             "-o names one mask, but {} holds {recordings} recordings: leave it out, and each gets its mask.png",
             self.input.display()
         );
-        Err(Self::command().error(ErrorKind::ArgumentConflict, text))
+        Err(CommandLine::command().error(ErrorKind::ArgumentConflict, text))
     }
 
     fn settings(&self) -> SegmentSettings {

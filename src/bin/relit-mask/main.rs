@@ -1,56 +1,29 @@
 //! `relit-mask`: finds the object in recordings.
 
 mod arguments;
+mod benching;
+mod making;
 mod report;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::Parser;
-use relit::console::{Console, Outcome};
-use relit::masking::{MaskingError, make_mask};
-use relit_data::session::recordings;
+use clap::{CommandFactory, Parser};
+use relit::console::Console;
 
-use arguments::Arguments;
+use arguments::{CommandLine, Verb};
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    let console = Console::new(arguments.json);
-    let paths = match recordings(&arguments.input) {
-        Ok(paths) => paths,
-        Err(error) => return console.finish(Err(error)),
-    };
-    if let Err(usage) = arguments.check_output(paths.len()) {
-        // Nothing can be done if standard error is closed.
-        let _ = usage.print();
-        return ExitCode::from(2);
-    }
-    console.finish(run(&paths, &arguments, console))
-}
-
-fn run(
-    paths: &[PathBuf],
-    arguments: &Arguments,
-    console: Console,
-) -> Result<Outcome, MaskingError> {
-    let request = arguments.request()?;
-    let bar = console.progress(paths.len() as u64, "masks");
-    let mut failed = 0;
-    for path in paths {
-        match make_mask(path, arguments.output.clone(), &request) {
-            Ok(output) => bar.suspend(|| report::print(&output, console)),
-            Err(error) if paths.len() == 1 => return Err(error),
-            Err(error) => {
-                failed += 1;
-                bar.suspend(|| console.error(&error));
-            }
+    let line = CommandLine::parse();
+    match (line.verb, line.mask) {
+        (Some(Verb::Bench { folder, json }), _) => {
+            let console = Console::new(json);
+            console.finish(benching::run(console, &folder))
         }
-        bar.inc(1);
+        (None, Some(arguments)) => making::run(&arguments),
+        (None, None) => {
+            // Nothing can be done if standard output is closed.
+            let _ = CommandLine::command().print_help();
+            ExitCode::from(2)
+        }
     }
-    bar.finish_and_clear();
-    Ok(match failed {
-        0 => Outcome::Whole,
-        all if all == paths.len() => Outcome::Wrong,
-        _ => Outcome::Lossy,
-    })
 }

@@ -314,7 +314,7 @@ impl Run {
     }
 }
 
-fn rectangle(text: &str) -> Result<Rectangle, String> {
+pub(in crate::cli) fn rectangle(text: &str) -> Result<Rectangle, String> {
     let numbers: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
     match numbers.as_deref() {
         Ok(&[x, y, width, height]) if width > 0 && height > 0 => Ok(Rectangle {

@@ -5,18 +5,24 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 use relight::data::{JudgedImages, TruthLayout, TruthSet};
+use relight::decompose::Decomposer;
 use relight::eval::{
-    HighlightMethod, IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, LightMethod, NormalMethod,
-    OrdinalMethod, Predictions, RelightMethod, RelightingRecipe, RelightingSet, ScoreTable,
-    evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal,
-    evaluate_relighting, make_relighting,
+    EvalError, HighlightMethod, InsertionRecipe, IntrinsicBaseline, IntrinsicInput,
+    IntrinsicMethod, LightMethod, NormalMethod, OrdinalMethod, Predictions, RelightMethod,
+    RelightingRecipe, RelightingSet, ScoreTable, evaluate_highlights, evaluate_insertion,
+    evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal, evaluate_relighting,
+    evaluate_trust, make_relighting,
 };
+use relight::image::{Depth, Planes, write_png};
+use relight::nets::Weights;
 use relight::render::{DiffuseForm, SpecularForm};
 use relight::synth::{Folders, Library};
 use relit_data::durable::write_whole;
+use serde::Serialize;
 use serde_json::json;
 
 use crate::cli::console::{CommandResult, Console, Outcome};
+use crate::cli::folder::make_folder;
 use crate::cli::values::{TransferName, YName};
 
 pub(in crate::cli) const EXAMPLES: &str = "\
@@ -28,7 +34,11 @@ Examples:
   relight eval normals --layout janner --data intrinsics --count 500 --predictions out/net
       estimates out/net/<name>/normal.png on 500 images, spread over the set
   relight eval relighting --data relighting --make
-      100 objects under 30 lights each, made by the renderer of `relight synth`";
+      100 objects under 30 lights each, made by the renderer of `relight synth`
+  relight eval insertion --panoramas hdri -o insertion.json
+      24 objects in other pictures, with and without shadow, edge colours and relighting
+  relight eval trust --data MIT-intrinsic
+      errors of the most trusted pixels";
 
 #[derive(Args)]
 pub(in crate::cli) struct Arguments {
@@ -66,6 +76,16 @@ enum Protocol {
     },
     /// Relighting: MSE and DSSIM of an object under many lights, from its image under one.
     Relighting(RelightingArguments),
+    /// Insertion: MSE and DSSIM of objects in other pictures, with and without each part of `relight insert`.
+    Insertion(InsertionArguments),
+    /// Trust: whether what is said to be doubtful is wrong.
+    Trust {
+        #[command(flatten)]
+        set: SetArguments,
+        /// The network's weights [default: those that come with the program].
+        #[arg(long, value_name = "FILE")]
+        weights: Option<PathBuf>,
+    },
     /// Albedo as people judge it: WHDR on the folder of Intrinsic Images in the Wild.
     Whdr(CommonArguments),
 }
@@ -134,6 +154,34 @@ struct RelightingArguments {
     panoramas: Option<PathBuf>,
 }
 
+#[derive(Args)]
+struct InsertionArguments {
+    /// How many objects to make, each with one new picture.
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    objects: u64,
+    /// Width and height of the pictures.
+    #[arg(long, value_name = "PIXELS", default_value_t = 192, value_parser = clap::value_parser!(u32).range(32..=1024))]
+    size: u32,
+    /// What objects, materials and lights are drawn from.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Meshes to draw from besides procedural shapes (.obj, .gltf, .glb).
+    #[arg(long, value_name = "DIR")]
+    meshes: Option<PathBuf>,
+    /// Panoramas (.hdr, .exr) in place of those that are made.
+    #[arg(long, value_name = "DIR")]
+    panoramas: Option<PathBuf>,
+    /// The network's weights [default: those that come with the program].
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// Write a sheet for each object: photograph, new picture, truth, and each method's result.
+    #[arg(long, value_name = "DIR")]
+    sheets: Option<PathBuf>,
+    /// Write the table as JSON, with the scores of each image, to this file.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
 #[derive(Clone, Copy, ValueEnum)]
 enum InputName {
     /// Without highlights.
@@ -157,22 +205,27 @@ impl Arguments {
             Protocol::Mit { set, .. }
             | Protocol::Normals { set }
             | Protocol::Light { set, .. }
+            | Protocol::Trust { set, .. }
             | Protocol::Highlight { set } => {
                 (set.count == Some(0)).then(|| "--count 0 leaves no image to compare".to_owned())
             }
-            Protocol::Relighting(_) | Protocol::Whdr(_) => None,
+            Protocol::Relighting(_) | Protocol::Insertion(_) | Protocol::Whdr(_) => None,
         }
     }
 
-    fn common(&self) -> &CommonArguments {
-        match &self.protocol {
+    /// The file for the table.
+    fn output(&self) -> Option<&Path> {
+        let common = match &self.protocol {
+            Protocol::Insertion(arguments) => return arguments.output.as_deref(),
             Protocol::Mit { set, .. }
             | Protocol::Normals { set }
             | Protocol::Light { set, .. }
+            | Protocol::Trust { set, .. }
             | Protocol::Highlight { set } => &set.common,
             Protocol::Relighting(arguments) => &arguments.common,
             Protocol::Whdr(common) => common,
-        }
+        };
+        common.output.as_deref()
     }
 }
 
@@ -215,8 +268,10 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
         Protocol::Highlight { set } => highlight(set, console),
         Protocol::Relighting(arguments) => relighting(arguments, console),
         Protocol::Whdr(common) => ordinal(common, console),
+        Protocol::Insertion(arguments) => insertion(arguments, console),
+        Protocol::Trust { set, weights } => return trust(set, weights.as_deref(), console),
     }?;
-    report(&table, arguments.common().output.as_deref(), console)
+    report(&table, arguments.output(), console)
 }
 
 type Evaluated = Result<ScoreTable, Box<dyn Error>>;
@@ -307,6 +362,59 @@ fn make(arguments: &RelightingArguments, console: Console) -> Result<(), Box<dyn
     })
 }
 
+fn insertion(arguments: &InsertionArguments, console: Console) -> Evaluated {
+    let recipe = InsertionRecipe {
+        objects: arguments.objects,
+        size: arguments.size,
+        seed: arguments.seed,
+    };
+    let library = Library::read(&Folders {
+        meshes: arguments.meshes.clone(),
+        textures: None,
+        panoramas: arguments.panoramas.clone(),
+    })?;
+    let network = network(arguments.weights.as_deref())?;
+    if let Some(folder) = &arguments.sheets {
+        make_folder(folder)?;
+    }
+    let mut show = |name: &str, tiles: &[Planes<3>]| match &arguments.sheets {
+        None => Ok(()),
+        Some(folder) => {
+            let sheet = Planes::sheet(tiles, tiles.len())?;
+            Ok::<(), EvalError>(write_png(
+                &folder.join(format!("{name}.png")),
+                &sheet,
+                Depth::Eight,
+            )?)
+        }
+    };
+    with_progress(
+        arguments.objects as usize,
+        "inserting",
+        console,
+        |progress| evaluate_insertion(&recipe, &library, &network, &mut show, progress),
+    )
+}
+
+fn trust(arguments: &SetArguments, weights: Option<&Path>, console: Console) -> CommandResult {
+    let (set, split) = arguments.open()?;
+    let network = network(weights)?;
+    let table = with_progress(set.names().len(), "looking again", console, |progress| {
+        evaluate_trust(&set, &split, &network, progress)
+    })?;
+    write_json(&table, arguments.common.output.as_deref())?;
+    let event = json!({ "event": "table", "table": table });
+    console.say(table.to_string().trim_end(), &event);
+    Ok(Outcome::Whole)
+}
+
+fn network(weights: Option<&Path>) -> Result<Decomposer, Box<dyn Error>> {
+    Ok(match weights {
+        None => Decomposer::shipped()?,
+        Some(path) => Decomposer::new(&Weights::read(path)?)?,
+    })
+}
+
 fn ordinal(common: &CommonArguments, console: Console) -> Evaluated {
     let images = JudgedImages::open(&common.data)?;
     let baselines = [
@@ -342,13 +450,18 @@ fn with_progress<T, E: Error + 'static>(
     Ok(result?)
 }
 
-fn report(table: &ScoreTable, output: Option<&Path>, console: Console) -> CommandResult {
+fn write_json(table: &impl Serialize, output: Option<&Path>) -> Result<(), Box<dyn Error>> {
     if let Some(path) = output {
         let mut bytes = serde_json::to_vec_pretty(table)?;
         bytes.push(b'\n');
         write_whole(path, &bytes)
             .map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
     }
+    Ok(())
+}
+
+fn report(table: &ScoreTable, output: Option<&Path>, console: Console) -> CommandResult {
+    write_json(table, output)?;
     let event = json!({ "event": "table", "table": table });
     console.say(table.to_string().trim_end(), &event);
     Ok(Outcome::Whole)

@@ -2,8 +2,11 @@
 
 pub(super) mod decompose;
 pub(super) mod eval;
+pub(super) mod insert;
+pub(super) mod relight;
 pub(super) mod render;
 pub(super) mod synth;
 #[cfg(feature = "train")]
 pub(super) mod train;
+pub(super) mod turn;
 pub(super) mod weights;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::env;
 use std::error::Error;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -20,6 +21,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::json;
 use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 use tch::Device;
 
 use crate::cli::console::{CommandResult, Console, Outcome};
@@ -29,7 +31,8 @@ Examples:
   relight train decompose -o run
       the network of relight decompose, on samples that are made while it trains
   relight train decompose --settings relight/weights/decompose.toml -o run
-      as the weights that come with relight were trained
+      as the weights that come with relight were trained, from the folders meshes and panoramas of what
+      relight/weights/README.md names
   relight train decompose --settings my.toml -o run --resume
       goes on with a run that was stopped, to the same losses
   relight train normal -o normal
@@ -43,6 +46,9 @@ Examples:
 
 In the folder of a run: checkpoint.safetensors, losses.csv, event files for TensorBoard, validation.png, and at
 the end the averaged weights. Ctrl-C ends a run with a checkpoint (exit code 3).";
+
+/// The exit code of a run that a second signal ends without a checkpoint, as the shell has it for SIGINT.
+const ENDED_BY_SIGNAL: i32 = 130;
 
 #[derive(Args)]
 pub(in crate::cli) struct Arguments {
@@ -90,7 +96,14 @@ struct PaperArguments {
 #[derive(Args)]
 struct RunArguments {
     /// The folder of the run; made where it is missing.
-    #[arg(short, long, value_name = "RUN")]
+    #[arg(
+        short,
+        long,
+        value_name = "RUN",
+        required_unless_present = "print_settings",
+        default_value = "",
+        hide_default_value = true
+    )]
     output: PathBuf,
     /// Settings, a TOML file; what it does not name has its default.
     #[arg(long, value_name = "FILE")]
@@ -170,7 +183,8 @@ fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
     let run = settings.run.clone();
     let processes = arguments.join()?;
     let weights = read_weights(arguments.weights.as_deref())?;
-    let mut task = DecomposeTask::new(settings, processes.resources, weights.as_ref())?;
+    let resources = processes.resources.clone();
+    let mut task = DecomposeTask::new(settings, resources, weights.as_ref())?;
     train(&mut task, &run, (arguments, processes), console)
 }
 
@@ -189,7 +203,7 @@ fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> Com
         normal: read_weights(arguments.normal.as_deref())?,
         light: read_weights(arguments.light.as_deref())?,
     };
-    let mut task = PaperTask::new(phase, settings, processes.resources, &inputs)?;
+    let mut task = PaperTask::new(phase, settings, processes.resources.clone(), &inputs)?;
     train(&mut task, &run, (&arguments.run, processes), console)
 }
 
@@ -208,6 +222,7 @@ impl RunArguments {
 
     /// Meets the other processes that a launcher has started, if it has; sets the number of the network's threads.
     fn join(&self) -> Result<Processes, Box<dyn Error>> {
+        let stop = stop_at_signals()?;
         let launch = Launch::from_variables(|name| env::var(name).ok())?;
         if let Some(threads) = self.threads {
             tch::set_num_threads(threads as i32);
@@ -215,6 +230,7 @@ impl RunArguments {
         let resources = Resources {
             device: self.device.device(launch.as_ref())?,
             composers: self.composers,
+            stop,
         };
         let group = launch.as_ref().map(ProcessGroup::join).transpose()?;
         Ok(Processes { resources, group })
@@ -238,10 +254,7 @@ fn train(
     (arguments, processes): (&RunArguments, Processes),
     console: Console,
 ) -> CommandResult {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register(signal, Arc::clone(&stop))?;
-    }
+    let stop = processes.resources.stop;
     let group = processes.group;
     let process = group.as_ref().map_or(0, |group| group.share().index());
     let run = Run::open_among(task, settings, &arguments.output, arguments.resume, group)?;
@@ -262,8 +275,19 @@ fn train(
     Ok(outcome_of(&outcome))
 }
 
+/// The flag that the first Ctrl-C or SIGTERM sets. The second ends the program at once.
+fn stop_at_signals() -> io::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        // In this order: the first signal finds the flag not set yet.
+        flag::register_conditional_shutdown(signal, ENDED_BY_SIGNAL, Arc::clone(&stop))?;
+        flag::register(signal, Arc::clone(&stop))?;
+    }
+    Ok(stop)
+}
+
 fn outcome_of(outcome: &RunOutcome) -> Outcome {
-    if outcome.stopped {
+    if outcome.stopped || outcome.damaged {
         Outcome::Incomplete
     } else {
         Outcome::Whole
@@ -304,7 +328,7 @@ impl TrainObserver for OtherProcess {
         let event =
             json!({ "event": "damaged", "step": step, "process": process, "message": what });
         let line = format!("step {step}, process {process}: left out: {what}");
-        self.console.say(&line, &event);
+        self.console.warn(&line, &event);
     }
 
     fn validated(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
@@ -329,7 +353,7 @@ impl TrainObserver for View {
     fn damaged(&mut self, step: u64, what: &str) {
         let event = json!({ "event": "damaged", "step": step, "message": what });
         let line = format!("step {step}: left out: {what}");
-        self.bar.suspend(|| self.console.say(&line, &event));
+        self.bar.suspend(|| self.console.warn(&line, &event));
     }
 
     fn validated(&mut self, step: u64, figures: &BTreeMap<String, f64>) {

@@ -55,6 +55,13 @@ impl FolderTurn {
         u32::try_from(self.files.len()).unwrap_or(u32::MAX)
     }
 
+    /// Bytes of the frames that were found.
+    pub(super) fn bytes(&self) -> u64 {
+        let found = self.files.iter().flatten();
+        let sizes = found.filter_map(|name| fs::metadata(self.folder.join(name)).ok());
+        sizes.map(|file| file.len()).sum()
+    }
+
     pub(super) fn frame(&self, position: u32) -> Result<Frame, DamagedSample> {
         let index = self
             .order

@@ -70,6 +70,15 @@ impl Turns {
             Turn::Folder(folder) => folder.name(),
         })
     }
+
+    /// The bytes in which the samples of each turn are stored, in the same order: turns that differ hardly ever have the same
+    /// number.
+    pub fn bytes(&self) -> impl Iterator<Item = u64> {
+        self.turns.iter().map(|turn| match turn {
+            Turn::Shard(shard) => shard.bytes(),
+            Turn::Folder(folder) => folder.bytes(),
+        })
+    }
 }
 
 impl Turn {

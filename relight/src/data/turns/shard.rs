@@ -69,6 +69,15 @@ impl ShardTurn {
         u32::try_from(self.slots.len()).unwrap_or(u32::MAX)
     }
 
+    /// Bytes of the samples that were found.
+    pub(super) fn bytes(&self) -> u64 {
+        let sizes = self.slots.iter().map(|slot| match slot {
+            Slot::At(place) => place.end - place.start,
+            Slot::Lost(_) => 0,
+        });
+        sizes.sum()
+    }
+
     pub(super) fn frame(&self, position: u32) -> Result<Frame, DamagedSample> {
         let damage = |fault| DamagedSample {
             sample: format!("{}, sample {position}", self.path.display()),

@@ -35,7 +35,7 @@ struct Surface {
 impl GBuffer {
     /// Looks at a mesh that `placement` moves into the viewer's frame, in a square picture of `size`
     /// pixels.
-    pub(in crate::synth) fn render(
+    pub(crate) fn render(
         mesh: &Mesh,
         placement: Affine3A,
         projection: Projection,

@@ -20,7 +20,7 @@ pub struct Occluder {
 
 impl Occluder {
     /// The mesh in its place.
-    pub(in crate::synth) fn new(mesh: &Mesh, placement: Affine3A) -> Self {
+    pub(crate) fn new(mesh: &Mesh, placement: Affine3A) -> Self {
         Self::of(triangles(mesh, placement))
     }
 

@@ -105,7 +105,7 @@ impl Mesh {
     }
 
     /// The vertices; the farthest is at distance 1 from the origin.
-    pub(super) fn positions(&self) -> &[Vec3] {
+    pub(crate) fn positions(&self) -> &[Vec3] {
         &self.positions
     }
 

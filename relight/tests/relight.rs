@@ -1,0 +1,297 @@
+//! `relight relight` from outside: what it writes, and what it refuses. The network is not trained.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
+use std::fs::{self, File};
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use image::{GrayImage, Luma, Rgb, RgbImage};
+use relight::image::{ColourSpace, Extent, Planes, Srgb, read_planes, write_exr};
+use relight::light::{Order, Panorama, ShLight};
+use relight::nets::{WeightPrecision, Weights, decomposer};
+
+const WIDTH: u32 = 64;
+const HEIGHT: u32 = 48;
+
+fn is_inside(x: u32, y: u32) -> bool {
+    (f64::from(x) - 32.0).hypot(f64::from(y) - 24.0) < 18.0
+}
+
+fn photo() -> RgbImage {
+    RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        if is_inside(x, y) {
+            Rgb([110 + x as u8, 100, 60 + 2 * y as u8])
+        } else {
+            Rgb([70, 120, 200])
+        }
+    })
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    /// Two photographs, a folder of their masks, a panorama, and weights.
+    fn new() -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        for name in ["photos", "masks"] {
+            fs::create_dir(folder.path(name)).unwrap();
+        }
+        let mask = GrayImage::from_fn(WIDTH, HEIGHT, |x, y| {
+            Luma([if is_inside(x, y) { 255 } else { 0 }])
+        });
+        for name in ["one", "two"] {
+            photo()
+                .save(folder.path(&format!("photos/{name}.png")))
+                .unwrap();
+            mask.save(folder.path(&format!("masks/{name}.png")))
+                .unwrap();
+        }
+        let light = ShLight::even(Order::TWO, [0.5, 1.0, 2.0]);
+        let panorama = Panorama::of_light(&light, Extent::new(32, 16));
+        panorama.image().write_exr(&folder.path("sky.exr")).unwrap();
+        let weights = Weights::initial(&decomposer(), 3);
+        weights
+            .write(&folder.path("w.safetensors"), WeightPrecision::Half)
+            .unwrap();
+        folder
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn run(&self, arguments: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_relight"))
+            .args(arguments.split(' '))
+            .current_dir(self.0.path())
+            .output()
+            .unwrap()
+    }
+
+    /// Exit code and what was written on standard error.
+    fn told(&self, arguments: &str) -> (i32, String) {
+        let output = self.run(arguments);
+        let errors = String::from_utf8(output.stderr).unwrap();
+        (output.status.code().unwrap(), errors)
+    }
+
+    fn names_in(&self, name: &str) -> Vec<String> {
+        let entries = fs::read_dir(self.path(name)).unwrap();
+        let mut names: Vec<String> = entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+#[test]
+fn photographs_of_a_pattern_are_relit_before_the_panorama_and_what_has_no_mask_is_named() {
+    let folder = Folder::new();
+    photo().save(folder.path("photos/three.png")).unwrap();
+    let (code, errors) = folder
+        .told("relight photos/*.png --mask masks --light sky.exr --compare --weights w.safetensors -o out");
+    assert_eq!(code, 3, "{errors}");
+    assert!(
+        errors.contains("photos/three.png: there is no mask"),
+        "{errors}"
+    );
+    assert_eq!(folder.names_in("out"), ["one.png", "two.png"]);
+    let (sheet, _) = read_planes(&folder.path("out/one.png")).unwrap();
+    assert_eq!(
+        sheet.extent(),
+        Extent::new(3 * WIDTH as usize, HEIGHT as usize)
+    );
+    // The photograph, naive insertion before the blue sky, and the object in that light.
+    assert!((sheet.pixel(2, 2)[2] - 200.0 / 255.0).abs() < 1e-3);
+    let [red, _, blue] = sheet.pixel(2 + WIDTH as usize, 2);
+    assert!(blue > 1.5 * red);
+    let pixel = |tile: usize| sheet.pixel(32 + tile * WIDTH as usize, 24);
+    assert_eq!(pixel(0), pixel(1));
+    assert!(pixel(2)[2] > pixel(0)[2]);
+}
+
+#[test]
+fn the_photograph_s_own_light_gives_the_photograph_back_and_exr_is_linear() {
+    let folder = Folder::new();
+    let command = "relight photos/one.png --mask masks/one.png --own-light --weights w.safetensors";
+    let (code, errors) = folder.told(&format!("{command} -o same.png"));
+    assert_eq!((code, errors.as_str()), (0, ""));
+    let same = image::open(folder.path("same.png")).unwrap().into_rgb8();
+    for (a, b) in same.pixels().zip(photo().pixels()) {
+        assert!((0..3).all(|c| a.0[c].abs_diff(b.0[c]) <= 1), "{a:?} {b:?}");
+    }
+    assert_eq!(
+        folder
+            .told(&format!("{command} --exposure 1 -o twice.exr"))
+            .0,
+        0
+    );
+    let (twice, _) = read_planes(&folder.path("twice.exr")).unwrap();
+    let sky = Srgb::to_linear(200.0 / 255.0);
+    assert!((twice.pixel(0, 0)[2] - sky).abs() < 1e-4);
+}
+
+#[test]
+fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
+    let folder = Folder::new();
+    GrayImage::new(WIDTH, HEIGHT)
+        .save(folder.path("empty.png"))
+        .unwrap();
+    GrayImage::new(9, 9).save(folder.path("small.png")).unwrap();
+    let extent = Extent::new(WIDTH as usize, HEIGHT as usize);
+    let odd = Planes::from_fn(extent, |x, _| [if x == 5 { f32::NAN } else { 0.5 }; 3]);
+    write_exr(&folder.path("odd.exr"), &odd).unwrap();
+    let black = Panorama::of_light(&ShLight::dark(Order::TWO), Extent::new(32, 16));
+    black.image().write_exr(&folder.path("black.exr")).unwrap();
+    fs::write(folder.path("text.txt"), "1 2 3\n1 2\n").unwrap();
+    huge(&folder.path("huge.png"));
+    let one = "relight photos/one.png";
+    for (command, code, expected) in [
+        (
+            format!("{one} --lamp 30,40 -o o.png"),
+            1,
+            "does not say where the object is",
+        ),
+        (
+            format!("{one} --mask empty.png --lamp 30,40 -o o.png"),
+            1,
+            "the mask is empty",
+        ),
+        (
+            format!("{one} --mask small.png --lamp 30,40 -o o.png"),
+            1,
+            "the mask has 9 x 9 pixels, and the photograph 64 x 48",
+        ),
+        (
+            format!("{one} --mask masks/one.png --light photos/two.png -o o.png"),
+            1,
+            "a panorama is an HDR or EXR file",
+        ),
+        (
+            format!("{one} --mask masks/one.png --light odd.exr -o o.png"),
+            1,
+            "odd.exr is no panorama: the light has a value that is infinite or not a number",
+        ),
+        (
+            format!(
+                "{one} --mask masks/one.png --light black.exr --weights w.safetensors -o o.png"
+            ),
+            1,
+            "the light is dark",
+        ),
+        (
+            format!("{one} --mask masks/one.png --light text.txt -o o.png"),
+            1,
+            "line 2 of the coefficients",
+        ),
+        (
+            "relight odd.exr --mask masks/one.png --lamp 0,0 --weights w.safetensors -o o.png"
+                .to_owned(),
+            1,
+            "not a number at column 5, row 0",
+        ),
+        (
+            "relight huge.png --mask masks/one.png --lamp 0,0 -o o.png".to_owned(),
+            1,
+            "huge.png is too large",
+        ),
+        (
+            "relight none.png --lamp 0,0 -o o.png".to_owned(),
+            1,
+            "none.png cannot be read",
+        ),
+        (
+            "relight none*.png --lamp 0,0 -o o".to_owned(),
+            1,
+            "none*.png names no file",
+        ),
+        (format!("{one} -o o.png"), 2, "--lamp AZIMUTH,ELEVATION"),
+        (
+            format!("{one} --lamp 30 -o o.png"),
+            2,
+            "give AZIMUTH,ELEVATION",
+        ),
+        (
+            format!("{one} --lamp 30,40 -o o.mp4"),
+            2,
+            "give .png or .exr, or --turn DEGREES",
+        ),
+        (
+            format!("{one} --lamp 30,40 --turn 360 -o o.png"),
+            2,
+            "give .mp4 or .webm",
+        ),
+        (
+            format!("{one} --lamp 30,40 -o o.bmp"),
+            2,
+            "give .png or .exr",
+        ),
+        (
+            format!("{one} --lamp 30,40 --background light -o o.png"),
+            2,
+            "there is no panorama",
+        ),
+        (
+            format!("{one} --lamp 30,40 --gloss 2,5 -o o.png"),
+            2,
+            "a part from 0 to 1",
+        ),
+    ] {
+        let (found, errors) = folder.told(&command);
+        assert_eq!(found, code, "{command}: {errors}");
+        assert!(errors.contains(expected), "{command}: {errors}");
+    }
+    for name in ["o.png", "o.mp4", "o.bmp", "o"] {
+        assert!(!folder.path(name).exists(), "{name}");
+    }
+}
+
+/// A PNG that says it has 20 000 x 20 000 pixels, and holds none.
+fn huge(path: &std::path::Path) {
+    let mut encoder = png::Encoder::new(File::create(path).unwrap(), 20_000, 20_000);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    let mut writer = encoder.write_header().unwrap();
+    writer
+        .write_chunk(png::chunk::IDAT, &[0x78, 0x9c, 0x03, 0x00])
+        .unwrap();
+}
+
+#[test]
+fn a_turn_is_a_video_of_as_many_frames() {
+    if Command::new("ffmpeg").arg("-version").output().is_err() {
+        eprintln!("skipped: the program ffmpeg is not installed");
+        return;
+    }
+    let folder = Folder::new();
+    let command = "relight photos/one.png --mask masks/one.png --light sky.exr --turn 360 --seconds 0.5 --fps 12 \
+                   --size 32 --weights w.safetensors --json -o turn.mp4";
+    let output = folder.run(&command.split_whitespace().collect::<Vec<_>>().join(" "));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let event: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(event["frames"], 6);
+    let probed = Command::new("ffprobe")
+        .args([
+            "-v",
+            "error",
+            "-count_frames",
+            "-of",
+            "csv=p=0",
+            "-show_entries",
+            "stream=width,height,nb_read_frames",
+        ])
+        .arg(folder.path("turn.mp4"))
+        .output()
+        .unwrap();
+    assert_eq!(String::from_utf8_lossy(&probed.stdout).trim(), "32,24,6");
+}

@@ -1,0 +1,298 @@
+//! GrabCut on any features: colour models of both sides and minimum cuts take turns.
+//!
+//! The energy is that of Rother, Kolmogorov and Blake (2004): the costs of the pixels under two Gaussian
+//! mixtures, and a cost for every pair of neighbours that the cut separates, which is smaller where
+//! they differ. Only a set of active pixels is decided; the others keep their labels.
+
+use super::MaskError;
+use super::max_flow::{DIRECTIONS, NONE, PixelGraph};
+use super::mixture::Mixture;
+
+/// Gaussians of each side.
+const COMPONENTS: usize = 5;
+/// Cost of separating two equal neighbours, in units of the log-likelihood.
+const SMOOTHNESS: f32 = 50.0;
+/// Integer capacity of one unit of cost.
+const UNIT: f32 = 256.0;
+/// The largest cost of a pixel, far above any sum of smoothness around it.
+const MOST_COST: f32 = 4000.0;
+/// Most pixels from which a model learns, and over which the contrast is averaged.
+const MOST_SAMPLES: usize = 120_000;
+
+/// The half of the directions that lead to later pixels.
+pub(super) const DIRECTIONS_AHEAD: [usize; 4] = [4, 5, 6, 7];
+
+/// What is known of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Label {
+    Background,
+    Object,
+    ProbablyBackground,
+    ProbablyObject,
+}
+
+impl Label {
+    pub(super) fn is_object(self) -> bool {
+        matches!(self, Self::Object | Self::ProbablyObject)
+    }
+
+    pub(super) fn is_sure(self) -> bool {
+        matches!(self, Self::Object | Self::Background)
+    }
+
+    pub(super) fn probably(object: bool) -> Self {
+        if object {
+            Self::ProbablyObject
+        } else {
+            Self::ProbablyBackground
+        }
+    }
+}
+
+/// Pixels with features, as far as the cut needs them.
+pub(super) trait Field<const D: usize> {
+    /// Variance of the features of equal surfaces.
+    const VARIANCE_FLOOR: f64;
+
+    /// Columns and rows.
+    fn size(&self) -> (usize, usize);
+    /// The feature of a pixel, whose units are those of the colour space L*a*b*.
+    fn feature(&self, at: usize) -> [f32; D];
+    /// How different two neighbours are, squared.
+    fn contrast(&self, a: usize, b: usize) -> f32;
+    /// What else makes a pixel more likely object (positive) or background (negative), in units of the
+    /// log-likelihood.
+    fn evidence(&self, _at: usize) -> f32 {
+        0.0
+    }
+}
+
+/// The colour models of both sides.
+#[derive(Debug, Clone)]
+pub(super) struct Models<const D: usize> {
+    object: Mixture<D>,
+    background: Mixture<D>,
+}
+
+impl<const D: usize> Models<D> {
+    /// Learns both from the pixels for which `take` is true of their label.
+    pub(super) fn learn<F: Field<D>>(
+        field: &F,
+        labels: &[Label],
+        take: impl Fn(Label) -> bool,
+    ) -> Self {
+        let of = |object| {
+            samples(field, labels, |label| {
+                take(label) && label.is_object() == object
+            })
+        };
+        Self {
+            object: Mixture::learn(&of(true), COMPONENTS, F::VARIANCE_FLOOR),
+            background: Mixture::learn(&of(false), COMPONENTS, F::VARIANCE_FLOOR),
+        }
+    }
+
+    /// Learns again from all pixels, starting from these models.
+    pub(super) fn refine<F: Field<D>>(&mut self, field: &F, labels: &[Label]) {
+        self.object
+            .refine(&samples(field, labels, Label::is_object));
+        self.background
+            .refine(&samples(field, labels, |label| !label.is_object()));
+    }
+
+    /// How much more likely a feature is object than background, as a logarithm.
+    pub(super) fn log_ratio(&self, feature: &[f32; D]) -> f32 {
+        self.background.cost(feature) - self.object.cost(feature)
+    }
+}
+
+/// Of the pixels that are probably object, makes the `share` that is most like the sure background, or
+/// like what `also` names, probably background.
+pub(super) fn rank<const D: usize, F: Field<D>>(
+    field: &F,
+    labels: &mut [Label],
+    share: f64,
+    also: impl Fn(usize) -> bool,
+) {
+    let known: Vec<Label> = labels
+        .iter()
+        .enumerate()
+        .map(|(at, &label)| match label {
+            Label::ProbablyObject if also(at) => Label::Background,
+            other => other,
+        })
+        .collect();
+    let background = samples(field, &known, |label| label == Label::Background);
+    let model = Mixture::learn(&background, COMPONENTS, F::VARIANCE_FLOOR);
+    let open = |&at: &usize| known[at] == Label::ProbablyObject;
+    let mut costs: Vec<(f32, usize)> = (0..known.len())
+        .filter(open)
+        .map(|at| (model.cost(&field.feature(at)), at))
+        .collect();
+    let split = (costs.len() as f64 * share) as usize;
+    if split > 0 && split < costs.len() {
+        costs.select_nth_unstable_by(split, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        for &(_, at) in &costs[..split] {
+            labels[at] = Label::ProbablyBackground;
+        }
+    }
+    for (label, known) in labels.iter_mut().zip(&known) {
+        if *known == Label::Background && !label.is_sure() {
+            *label = Label::ProbablyBackground;
+        }
+    }
+}
+
+/// Lets models and cuts take turns until nothing changes, at most `iterations` times.
+pub(super) fn iterate<const D: usize, F: Field<D>>(
+    field: &F,
+    labels: &mut [Label],
+    first: Option<Models<D>>,
+    iterations: u32,
+) -> Result<Models<D>, MaskError> {
+    let active = open_pixels(labels);
+    let scale = contrast_scale(field);
+    let mut models = match first {
+        Some(models) => {
+            cut(field, &models, scale, labels, &active);
+            check_sides(labels)?;
+            models
+        }
+        None => Models::learn(field, labels, |_| true),
+    };
+    for round in 0..iterations {
+        if round > 0 {
+            models.refine(field, labels);
+        }
+        let changed = cut(field, &models, scale, labels, &active);
+        check_sides(labels)?;
+        if changed == 0 && round > 0 {
+            break;
+        }
+    }
+    Ok(models)
+}
+
+/// The pixels that are not sure, in order.
+pub(super) fn open_pixels(labels: &[Label]) -> Vec<u32> {
+    let open = labels.iter().enumerate();
+    open.filter(|(_, label)| !label.is_sure())
+        .map(|(at, _)| at as u32)
+        .collect()
+}
+
+fn check_sides(labels: &[Label]) -> Result<(), MaskError> {
+    if !labels.iter().any(|label| label.is_object()) {
+        return Err(MaskError::Empty);
+    }
+    if labels.iter().all(|label| label.is_object()) {
+        return Err(MaskError::Everything);
+    }
+    Ok(())
+}
+
+/// The factor that makes the average contrast 1/2.
+pub(super) fn contrast_scale<const D: usize, F: Field<D>>(field: &F) -> f32 {
+    let (width, height) = field.size();
+    let step = (width * height).div_ceil(MOST_SAMPLES).max(1);
+    let (mut sum, mut count) = (0.0, 0_u32);
+    for at in (0..width * height).step_by(step) {
+        for direction in DIRECTIONS_AHEAD {
+            if let Some(next) = neighbour(at, direction, (width, height)) {
+                sum += f64::from(field.contrast(at, next));
+                count += 1;
+            }
+        }
+    }
+    let mean = sum / f64::from(count.max(1));
+    (0.5 / mean.max(1e-6)) as f32
+}
+
+/// Decides the `active` pixels, which are in order, by one minimum cut. Returns how many changed.
+pub(super) fn cut<const D: usize, F: Field<D>>(
+    field: &F,
+    models: &Models<D>,
+    scale: f32,
+    labels: &mut [Label],
+    active: &[u32],
+) -> usize {
+    let size = field.size();
+    let mut node_of = vec![NONE; labels.len()];
+    for (node, &at) in active.iter().enumerate() {
+        node_of[at as usize] = node as u32;
+    }
+    let mut graph = PixelGraph::with_capacity(active.len());
+    for &at in active {
+        let at = at as usize;
+        let ratio = models.log_ratio(&field.feature(at)) + field.evidence(at);
+        let mut terminal = (ratio.clamp(-MOST_COST, MOST_COST) * UNIT) as i32;
+        let mut neighbours = [NONE; 8];
+        let mut capacity = [0; 8];
+        for direction in 0..8 {
+            let Some(next) = neighbour(at, direction, size) else {
+                continue;
+            };
+            let cost = separation(field, scale, at, next, direction);
+            match node_of[next] {
+                NONE if labels[next].is_object() => terminal += cost,
+                NONE => terminal -= cost,
+                node => {
+                    neighbours[direction] = node;
+                    capacity[direction] = cost;
+                }
+            }
+        }
+        graph.add(terminal, neighbours, capacity);
+    }
+    let mut changed = 0;
+    for (&at, object) in active.iter().zip(graph.cut()) {
+        let label = &mut labels[at as usize];
+        changed += usize::from(label.is_object() != object);
+        *label = Label::probably(object);
+    }
+    changed
+}
+
+fn separation<const D: usize, F: Field<D>>(
+    field: &F,
+    scale: f32,
+    at: usize,
+    next: usize,
+    direction: usize,
+) -> i32 {
+    let (dx, dy) = DIRECTIONS[direction];
+    let length = if dx != 0 && dy != 0 {
+        std::f32::consts::SQRT_2
+    } else {
+        1.0
+    };
+    let alike = (-scale * field.contrast(at.min(next), at.max(next))).exp();
+    (SMOOTHNESS / length * alike * UNIT) as i32
+}
+
+/// The neighbour of a pixel in one of [`DIRECTIONS`].
+pub(super) fn neighbour(
+    at: usize,
+    direction: usize,
+    (width, height): (usize, usize),
+) -> Option<usize> {
+    let (dx, dy) = DIRECTIONS[direction];
+    let x = (at % width).checked_add_signed(dx).filter(|&x| x < width)?;
+    let y = (at / width)
+        .checked_add_signed(dy)
+        .filter(|&y| y < height)?;
+    Some(y * width + x)
+}
+
+/// The features of the pixels whose label is wanted, thinned out evenly if there are too many.
+fn samples<const D: usize, F: Field<D>>(
+    field: &F,
+    labels: &[Label],
+    wanted: impl Fn(Label) -> bool,
+) -> Vec<[f32; D]> {
+    let wanted = |&at: &usize| wanted(labels[at]);
+    let all = (0..labels.len()).filter(wanted).count();
+    let step = all.div_ceil(MOST_SAMPLES).max(1);
+    let taken = (0..labels.len()).filter(wanted).step_by(step);
+    taken.map(|at| field.feature(at)).collect()
+}

@@ -1,0 +1,257 @@
+//! Coarse to fine: the whole image is cut at a small size, and at each larger size only a band along
+//! the edge is decided again.
+//!
+//! Time and memory therefore grow with the length of the object's edge, not with the image's area.
+
+use image::RgbImage;
+
+use super::bitmap::Bitmap;
+use super::grab_cut::{self, Field, Label, Models};
+use super::lab::LabTable;
+use super::{Iterations, MaskError};
+
+/// The image is halved until it has at most so many pixels.
+const COARSE_PIXELS: usize = 200_000;
+/// Variance of the colour of equal surfaces.
+const COLOUR_VARIANCE: f64 = 0.1;
+/// Half the width of the band, pixels of the finer image: the coarse edge is uncertain by 2.
+const BAND: usize = 3;
+
+/// Where the first colour models come from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum FirstModels {
+    /// From all pixels, after the given share of the probable object that is most like the sure
+    /// background was set to probably background.
+    Ranked(f64),
+    /// From the sure pixels alone.
+    Sure,
+    /// From all pixels.
+    All,
+}
+
+/// Cuts the object out of `image`. `labels` holds what is known, row by row, and the result.
+pub(super) fn segment(
+    image: &RgbImage,
+    labels: &mut Vec<Label>,
+    first: FirstModels,
+    iterations: Iterations,
+) -> Result<(), MaskError> {
+    let table = LabTable::new();
+    let mut levels: Vec<(RgbImage, Vec<Label>)> = Vec::new();
+    loop {
+        let (image, known) = levels.last().map_or((image, &*labels), |(i, l)| (i, l));
+        if pixels(image) <= COARSE_PIXELS {
+            break;
+        }
+        let half = (half_image(image), half_labels(known, size(image)));
+        levels.push(half);
+    }
+    let mut models = None;
+    let mut coarser: Option<(Vec<Label>, (usize, usize))> = None;
+    for (image, mut known) in levels.into_iter().rev() {
+        solve(
+            &image,
+            &mut known,
+            coarser.as_ref(),
+            &mut models,
+            first,
+            iterations,
+            &table,
+        )?;
+        coarser = Some((known, size(&image)));
+    }
+    solve(
+        image,
+        labels,
+        coarser.as_ref(),
+        &mut models,
+        first,
+        iterations,
+        &table,
+    )
+}
+
+fn solve(
+    image: &RgbImage,
+    labels: &mut [Label],
+    coarser: Option<&(Vec<Label>, (usize, usize))>,
+    models: &mut Option<Models<3>>,
+    first: FirstModels,
+    iterations: Iterations,
+    table: &LabTable,
+) -> Result<(), MaskError> {
+    match (coarser, models.as_mut()) {
+        (Some((coarse, coarse_size)), Some(models)) => {
+            let field = RgbField { image, table };
+            refine(&field, labels, coarse, *coarse_size, models);
+        }
+        _ => {
+            let field = LabField::new(image, table);
+            *models = Some(start(&field, labels, first, iterations)?);
+        }
+    }
+    Ok(())
+}
+
+/// Cuts at the coarsest size.
+pub(super) fn start<const D: usize>(
+    field: &impl Field<D>,
+    labels: &mut [Label],
+    first: FirstModels,
+    iterations: Iterations,
+) -> Result<Models<D>, MaskError> {
+    let models = match first {
+        FirstModels::Ranked(share) => {
+            grab_cut::rank(field, labels, share, |_| false);
+            None
+        }
+        FirstModels::Sure => Some(Models::learn(field, labels, Label::is_sure)),
+        FirstModels::All => None,
+    };
+    grab_cut::iterate(field, labels, models, iterations.get())
+}
+
+/// Decides a band along the coarse result's edge; elsewhere the coarse result stays.
+pub(super) fn refine<const D: usize>(
+    field: &impl Field<D>,
+    labels: &mut [Label],
+    coarse: &[Label],
+    coarse_size: (usize, usize),
+    models: &mut Models<D>,
+) {
+    let size = field.size();
+    for (at, label) in labels.iter_mut().enumerate() {
+        if !label.is_sure() {
+            let (x, y) = (at % size.0 / 2, at / size.0 / 2);
+            let from = y.min(coarse_size.1 - 1) * coarse_size.0 + x.min(coarse_size.0 - 1);
+            *label = Label::probably(coarse[from].is_object());
+        }
+    }
+    let band = band(labels, size, BAND);
+    models.refine(field, labels);
+    let scale = grab_cut::contrast_scale(field);
+    grab_cut::cut(field, models, scale, labels, &band);
+}
+
+/// The pixels that are not sure within `radius` of the edge between the labels, in order.
+pub(super) fn band(labels: &[Label], size: (usize, usize), radius: usize) -> Vec<u32> {
+    let differs = |at: usize, direction| {
+        grab_cut::neighbour(at, direction, size)
+            .is_some_and(|next| labels[next].is_object() != labels[at].is_object())
+    };
+    let edge = (0..labels.len()).map(|at| [1, 3, 4, 6].iter().any(|&to| differs(at, to)));
+    let near = Bitmap::new((size.0 as u32, size.1 as u32), edge).dilated(radius - 1);
+    let near = near.bits().iter().zip(labels).enumerate();
+    near.filter(|(_, (near, label))| **near && !label.is_sure())
+        .map(|(at, _)| at as u32)
+        .collect()
+}
+
+fn size(image: &RgbImage) -> (usize, usize) {
+    (image.width() as usize, image.height() as usize)
+}
+
+fn pixels(image: &RgbImage) -> usize {
+    size(image).0 * size(image).1
+}
+
+/// Each pixel is the average of 2 x 2; the last column and row of an odd side are doubled.
+pub(super) fn half_image(image: &RgbImage) -> RgbImage {
+    let (width, height) = image.dimensions();
+    RgbImage::from_fn(width.div_ceil(2), height.div_ceil(2), |x, y| {
+        let columns = [2 * x, (2 * x + 1).min(width - 1)];
+        let rows = [2 * y, (2 * y + 1).min(height - 1)];
+        let mut sum = [2_u16; 3];
+        for row in rows {
+            for column in columns {
+                let pixel = image.get_pixel(column, row).0;
+                sum.iter_mut()
+                    .zip(pixel)
+                    .for_each(|(sum, level)| *sum += u16::from(level));
+            }
+        }
+        image::Rgb(sum.map(|sum| (sum / 4) as u8))
+    })
+}
+
+/// A coarse pixel is what the marks in it say; background from outside a rectangle counts only if it
+/// fills the pixel.
+pub(super) fn half_labels(labels: &[Label], (width, height): (usize, usize)) -> Vec<Label> {
+    let (half_width, half_height) = (width.div_ceil(2), height.div_ceil(2));
+    let of = |at: usize| {
+        let (x, y) = (at % half_width * 2, at / half_width * 2);
+        let (right, below) = ((x + 1).min(width - 1), (y + 1).min(height - 1));
+        let four =
+            [(x, y), (right, y), (x, below), (right, below)].map(|(x, y)| labels[y * width + x]);
+        let has = |wanted| four.contains(&wanted);
+        if has(Label::Object) && !has(Label::Background) {
+            Label::Object
+        } else if four.iter().all(|&label| label == Label::Background) {
+            Label::Background
+        } else if has(Label::ProbablyObject) || has(Label::Object) {
+            Label::ProbablyObject
+        } else {
+            Label::ProbablyBackground
+        }
+    };
+    (0..half_width * half_height).map(of).collect()
+}
+
+/// A small image, its colours converted once.
+pub(super) struct LabField {
+    size: (usize, usize),
+    lab: Vec<[f32; 3]>,
+}
+
+impl LabField {
+    pub(super) fn new(image: &RgbImage, table: &LabTable) -> Self {
+        Self {
+            size: size(image),
+            lab: image.pixels().map(|pixel| table.lab(pixel.0)).collect(),
+        }
+    }
+}
+
+impl Field<3> for LabField {
+    const VARIANCE_FLOOR: f64 = COLOUR_VARIANCE;
+
+    fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
+    fn feature(&self, at: usize) -> [f32; 3] {
+        self.lab[at]
+    }
+
+    fn contrast(&self, a: usize, b: usize) -> f32 {
+        squared_distance(&self.lab[a], &self.lab[b])
+    }
+}
+
+/// A large image, of which few pixels are needed.
+pub(super) struct RgbField<'a> {
+    pub(super) image: &'a RgbImage,
+    pub(super) table: &'a LabTable,
+}
+
+impl Field<3> for RgbField<'_> {
+    const VARIANCE_FLOOR: f64 = COLOUR_VARIANCE;
+
+    fn size(&self) -> (usize, usize) {
+        size(self.image)
+    }
+
+    fn feature(&self, at: usize) -> [f32; 3] {
+        let bytes = self.image.as_raw();
+        self.table
+            .lab([bytes[3 * at], bytes[3 * at + 1], bytes[3 * at + 2]])
+    }
+
+    fn contrast(&self, a: usize, b: usize) -> f32 {
+        squared_distance(&self.feature(a), &self.feature(b))
+    }
+}
+
+fn squared_distance(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+}

@@ -1,0 +1,442 @@
+//! What a turn tells about each pixel: how its colour is on average and how much it changes.
+//!
+//! Object and table stand still in the image while background and light move. Averaged over a turn the
+//! background becomes a smooth band without structure, shadows on the table disappear, and highlights
+//! fade; how much brightness and colour change separates what moves from what is only lit differently.
+//! Two neighbours on the object change together, those on both sides of its outline do not: that is the
+//! contrast along which the cut runs.
+
+use image::RgbImage;
+
+use super::MaskError;
+use super::backdrop::Backdrop;
+use super::bitmap::Bitmap;
+use super::grab_cut::{self, DIRECTIONS_AHEAD, Field, Label, Models, neighbour};
+use super::initial::InitialLabels;
+use super::lab::LabTable;
+use super::pyramid::{FirstModels, RgbField, half_image, half_labels, refine, start};
+use super::table::table;
+use super::{Hints, Iterations, registration};
+
+/// Fewest frames from which anything can be learned.
+pub const MIN_TURN_FRAMES: usize = 4;
+/// Frames that are sampled of a turn.
+pub const TURN_FRAMES: usize = 32;
+/// Frames are halved until they have at most so many pixels.
+const MOST_PIXELS: usize = 600_000;
+/// And once more for the first cut, until they have at most so many.
+const COARSE_PIXELS: usize = 100_000;
+/// Share of the frame's shorter side that is background at each border.
+const BORDER: f64 = 0.01;
+/// Share of the frame's shorter side from which the background is learned at first.
+const RING: f64 = 0.06;
+/// Share of the pixels within the ring that is taken for background at first.
+const SHARE: f64 = 0.7;
+/// The rows' ends are of use at first if they leave at least this share of the open pixels.
+const LEAST_LEFT: f64 = 0.01;
+/// And at most this.
+const MOST_LEFT: f64 = 0.7;
+/// Weight of the average colour against that of the current one.
+const COLOUR_WEIGHT: f32 = 1.0 / 3.0;
+/// Weight of the logarithms of the changes.
+const CHANGE_WEIGHT: f32 = 3.0;
+/// How much a constant difference counts against one that changes: edges of paint on the object are
+/// constant, its outline is not.
+const CONSTANT_WEIGHT: f32 = 0.25;
+/// A larger contrast counts as this.
+const MOST_CONTRAST: f32 = 100.0;
+
+/// Frames of a turn, all of one size, reduced to what the statistics need.
+#[derive(Debug, Clone)]
+pub struct Turn {
+    frames: Vec<RgbImage>,
+    full: (u32, u32),
+}
+
+impl Turn {
+    /// A turn without frames, whose frames are `width` x `height` pixels large.
+    #[must_use]
+    pub fn new(width: u32, height: u32) -> Self {
+        Self {
+            frames: Vec::new(),
+            full: (width, height),
+        }
+    }
+
+    /// Adds a frame. One of another size is left out.
+    pub fn push(&mut self, frame: &RgbImage) {
+        if frame.dimensions() != self.full {
+            return;
+        }
+        let mut small = None;
+        while pixels(small.as_ref().unwrap_or(frame)) > MOST_PIXELS {
+            small = Some(half_image(small.as_ref().unwrap_or(frame)));
+        }
+        self.frames.push(small.unwrap_or_else(|| frame.clone()));
+    }
+
+    /// Number of frames.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// True without any frame.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
+}
+
+fn pixels(image: &RgbImage) -> usize {
+    image.width() as usize * image.height() as usize
+}
+
+/// Averages and changes of each pixel over the frames.
+#[derive(Debug)]
+pub(super) struct TurnField {
+    size: (usize, usize),
+    features: Vec<[f32; 5]>,
+    /// To the neighbours in [`DIRECTIONS_AHEAD`].
+    contrasts: Vec<[f32; 4]>,
+    /// Pixels that are background by the ends of their rows.
+    backdrop: Bitmap,
+    evidence: Vec<f32>,
+}
+
+impl TurnField {
+    fn new(frames: &[RgbImage], colours: &LabTable) -> Self {
+        let size = frames.first().map_or((0, 0), |frame| {
+            (frame.width() as usize, frame.height() as usize)
+        });
+        let count = size.0 * size.1;
+        let mut sum = vec![[0.0_f32; 3]; count];
+        let mut square = vec![[0.0_f32; 2]; count];
+        let mut difference = vec![[0.0_f32; 4]; count];
+        for frame in frames {
+            let lab: Vec<[f32; 3]> = frame.pixels().map(|p| colours.lab(p.0)).collect();
+            for (at, &[l, a, b]) in lab.iter().enumerate() {
+                sum[at].iter_mut().zip([l, a, b]).for_each(|(s, v)| *s += v);
+                square[at][0] += l * l;
+                square[at][1] += a * a + b * b;
+                for (to, &direction) in DIRECTIONS_AHEAD.iter().enumerate() {
+                    if let Some(next) = neighbour(at, direction, size) {
+                        difference[at][to] += squared(&lab[at], &lab[next]);
+                    }
+                }
+            }
+        }
+        let many = frames.len().max(1) as f32;
+        let mean: Vec<[f32; 3]> = sum.iter().map(|sum| sum.map(|s| s / many)).collect();
+        let feature = |at: usize| {
+            let [l, a, b] = mean[at];
+            let change_of_light = (square[at][0] / many - l * l).max(0.0).sqrt();
+            let change_of_colour = (square[at][1] / many - a * a - b * b).max(0.0).sqrt();
+            [
+                COLOUR_WEIGHT * l,
+                COLOUR_WEIGHT * a,
+                COLOUR_WEIGHT * b,
+                CHANGE_WEIGHT * change_of_light.ln_1p(),
+                CHANGE_WEIGHT * change_of_colour.ln_1p(),
+            ]
+        };
+        let contrast = |at: usize| {
+            std::array::from_fn(|to| {
+                let Some(next) = neighbour(at, DIRECTIONS_AHEAD[to], size) else {
+                    return 0.0;
+                };
+                let constant = squared(&mean[at], &mean[next]);
+                let all = difference[at][to] / many - (1.0 - CONSTANT_WEIGHT) * constant;
+                all.clamp(0.0, MOST_CONTRAST)
+            })
+        };
+        let features: Vec<[f32; 5]> = (0..count).map(feature).collect();
+        let contrasts: Vec<[f32; 4]> = (0..count).map(contrast).collect();
+        let table = table(&features, &largest(&contrasts, size), size);
+        let backdrop = Backdrop::new(&features, &table, size);
+        Self {
+            size,
+            backdrop: backdrop.alike,
+            evidence: backdrop.evidence,
+            features,
+            contrasts,
+        }
+    }
+}
+
+impl TurnField {
+    /// Takes what equals the ends of its row for background at first. False, and nothing is done, if that
+    /// leaves too little or too much for the object.
+    fn start_from_backdrop(&self, labels: &mut [Label]) -> bool {
+        let open = |label: &Label| *label == Label::ProbablyObject;
+        let all = labels.iter().filter(|label| open(label)).count() as f64;
+        let pixels = labels.iter().zip(self.backdrop.bits());
+        let left = pixels
+            .filter(|(label, alike)| open(label) && !**alike)
+            .count() as f64;
+        if left < LEAST_LEFT * all || left > MOST_LEFT * all {
+            return false;
+        }
+        for (label, &alike) in labels.iter_mut().zip(self.backdrop.bits()) {
+            if open(label) && alike {
+                *label = Label::ProbablyBackground;
+            }
+        }
+        true
+    }
+}
+
+/// The largest contrast of each pixel to its eight neighbours.
+fn largest(contrasts: &[[f32; 4]], size: (usize, usize)) -> Vec<f32> {
+    let mut largest = vec![0.0_f32; contrasts.len()];
+    for (at, ahead) in contrasts.iter().enumerate() {
+        for (&contrast, &direction) in ahead.iter().zip(&DIRECTIONS_AHEAD) {
+            if let Some(next) = neighbour(at, direction, size) {
+                largest[at] = largest[at].max(contrast);
+                largest[next] = largest[next].max(contrast);
+            }
+        }
+    }
+    largest
+}
+
+fn squared(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+}
+
+impl Field<5> for TurnField {
+    const VARIANCE_FLOOR: f64 = 0.05;
+
+    fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
+    fn feature(&self, at: usize) -> [f32; 5] {
+        self.features[at]
+    }
+
+    fn contrast(&self, a: usize, b: usize) -> f32 {
+        let (first, second) = (a.min(b), a.max(b));
+        let step = second - first;
+        let to = match step {
+            1 => 0,
+            _ if step + 1 == self.size.0 => 1,
+            _ if step == self.size.0 => 2,
+            _ => 3,
+        };
+        self.contrasts[first][to]
+    }
+
+    fn evidence(&self, at: usize) -> f32 {
+        self.evidence[at]
+    }
+}
+
+/// A frame larger than the turn's statistics: these say what a pixel is, the frame says where the edge
+/// is.
+struct FrameInTurn<'a> {
+    turn: &'a TurnField,
+    frame: RgbField<'a>,
+    /// The frame is so many times larger.
+    factor: usize,
+}
+
+impl Field<5> for FrameInTurn<'_> {
+    const VARIANCE_FLOOR: f64 = TurnField::VARIANCE_FLOOR;
+
+    fn size(&self) -> (usize, usize) {
+        self.frame.size()
+    }
+
+    fn feature(&self, at: usize) -> [f32; 5] {
+        self.turn.features[self.in_turn(at)]
+    }
+
+    fn contrast(&self, a: usize, b: usize) -> f32 {
+        self.frame.contrast(a, b)
+    }
+
+    fn evidence(&self, at: usize) -> f32 {
+        self.turn.evidence[self.in_turn(at)]
+    }
+}
+
+impl FrameInTurn<'_> {
+    fn in_turn(&self, at: usize) -> usize {
+        let (width, _) = self.frame.size();
+        let (columns, rows) = self.turn.size;
+        let (x, y) = (at % width / self.factor, at / width / self.factor);
+        y.min(rows - 1) * columns + x.min(columns - 1)
+    }
+}
+
+/// Cuts the object out by what the turn tells, on the pixels of `frame`.
+pub(super) fn segment(
+    frame: &RgbImage,
+    turn: &Turn,
+    hints: Option<&Hints>,
+    iterations: Iterations,
+) -> Result<Vec<Label>, MaskError> {
+    if turn.len() < MIN_TURN_FRAMES || turn.full != frame.dimensions() {
+        return Err(MaskError::FewFrames { found: turn.len() });
+    }
+    let table = LabTable::new();
+    let (known, share) = known(hints, frame.dimensions())?;
+    let levels = levels(frame, known);
+    let fine = TurnField::new(&turn.frames, &table);
+    let at_fine = levels.iter().position(|level| level.size() == fine.size);
+    let at_fine = at_fine.ok_or(MaskError::FewFrames { found: 0 })?;
+    let (mut labels, mut models) =
+        cut_turn(turn, &fine, &levels[at_fine..], share, iterations, &table)?;
+    let mut size = fine.size;
+    labels = register(frame, &levels[at_fine], &fine, &labels, &table);
+    for (steps, level) in levels[..at_fine].iter().rev().enumerate() {
+        let field = FrameInTurn {
+            turn: &fine,
+            frame: RgbField {
+                image: level.image.as_ref().unwrap_or(frame),
+                table: &table,
+            },
+            factor: 2 << steps,
+        };
+        let mut finer = level.labels.clone();
+        refine(&field, &mut finer, &labels, size, &mut models);
+        (labels, size) = (finer, level.size());
+    }
+    Ok(labels)
+}
+
+/// Moves the result from where the object is on average to where it is in the frame.
+fn register(
+    frame: &RgbImage,
+    level: &Level,
+    turn: &TurnField,
+    labels: &[Label],
+    colours: &LabTable,
+) -> Vec<Label> {
+    let (width, height) = turn.size;
+    let object = labels.iter().map(|label| label.is_object());
+    let object = Bitmap::new((width as u32, height as u32), object);
+    let average: Vec<f32> = turn
+        .features
+        .iter()
+        .map(|feature| feature[0] / COLOUR_WEIGHT)
+        .collect();
+    let image = level.image.as_ref().unwrap_or(frame);
+    let light: Vec<f32> = image
+        .pixels()
+        .map(|pixel| colours.lab(pixel.0)[0])
+        .collect();
+    let by = registration::shift(&average, &light, &object, turn.size);
+    let moved = registration::moved(&object, by, turn.size);
+    let pairs = level.labels.iter().zip(moved.bits());
+    pairs
+        .map(|(&known, &object)| {
+            if known.is_sure() {
+                known
+            } else {
+                Label::probably(object)
+            }
+        })
+        .collect()
+}
+
+/// A size of the frame, with what is known at it.
+struct Level {
+    /// `None` for the frame itself.
+    image: Option<RgbImage>,
+    full: (u32, u32),
+    labels: Vec<Label>,
+}
+
+impl Level {
+    fn size(&self) -> (usize, usize) {
+        let (width, height) = self.image.as_ref().map_or(self.full, RgbImage::dimensions);
+        (width as usize, height as usize)
+    }
+}
+
+/// The frame, its half, its quarter, down to the coarsest size.
+fn levels(frame: &RgbImage, known: Vec<Label>) -> Vec<Level> {
+    let mut level = Level {
+        image: None,
+        full: frame.dimensions(),
+        labels: known,
+    };
+    let mut levels = Vec::new();
+    while level.size().0 * level.size().1 > COARSE_PIXELS {
+        let half = Level {
+            image: Some(half_image(level.image.as_ref().unwrap_or(frame))),
+            full: level.full,
+            labels: half_labels(&level.labels, level.size()),
+        };
+        levels.push(level);
+        level = half;
+    }
+    levels.push(level);
+    levels
+}
+
+/// What is known of each pixel: hints, and that the object does not touch the frame's border. With it
+/// the share of the rest that is taken for background at first.
+fn known(hints: Option<&Hints>, size: (u32, u32)) -> Result<(Vec<Label>, f64), MaskError> {
+    let border = ring(size, BORDER);
+    let open = |at: usize| match border(at) {
+        true => Label::Background,
+        false => Label::ProbablyObject,
+    };
+    let Some(hints) = hints else {
+        let pixels = size.0 as usize * size.1 as usize;
+        return Ok(((0..pixels).map(open).collect(), SHARE));
+    };
+    let initial = InitialLabels::new(hints, size)?;
+    let labels = initial.labels.into_iter().enumerate();
+    let labels = labels.map(|(at, label)| match label {
+        Label::ProbablyBackground => open(at),
+        other => other,
+    });
+    let share = match initial.first {
+        FirstModels::Ranked(share) => share,
+        _ => SHARE,
+    };
+    Ok((labels.collect(), share))
+}
+
+/// Whether a pixel is within `share` of the shorter side from the border, at least one pixel.
+fn ring(size: (u32, u32), share: f64) -> impl Fn(usize) -> bool {
+    let (width, height) = (size.0 as usize, size.1 as usize);
+    let depth = ((width.min(height) as f64 * share).round() as usize).max(1);
+    move |at| {
+        let (x, y) = (at % width, at / width);
+        x < depth || y < depth || x + depth >= width || y + depth >= height
+    }
+}
+
+/// The cut at the turn's own size; `levels` begins with that size.
+fn cut_turn(
+    turn: &Turn,
+    fine: &TurnField,
+    levels: &[Level],
+    share: f64,
+    iterations: Iterations,
+    table: &LabTable,
+) -> Result<(Vec<Label>, Models<5>), MaskError> {
+    let begin = |field: &TurnField, labels: &mut Vec<Label>| {
+        if !field.start_from_backdrop(labels) {
+            let size = (field.size.0 as u32, field.size.1 as u32);
+            grab_cut::rank(field, labels, share, ring(size, RING));
+        }
+        start(field, labels, FirstModels::All, iterations)
+    };
+    let mut labels = levels[0].labels.clone();
+    let Some(coarser) = levels.get(1) else {
+        let models = begin(fine, &mut labels)?;
+        return Ok((labels, models));
+    };
+    let half: Vec<RgbImage> = turn.frames.iter().map(half_image).collect();
+    let coarse = TurnField::new(&half, table);
+    let mut coarse_labels = coarser.labels.clone();
+    let mut models = begin(&coarse, &mut coarse_labels)?;
+    refine(fine, &mut labels, &coarse_labels, coarse.size, &mut models);
+    Ok((labels, models))
+}

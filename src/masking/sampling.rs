@@ -1,0 +1,63 @@
+//! Frames of a turn, spread over a video.
+
+use relit_data::geometry::Rect;
+use relit_mask::{TURN_FRAMES, Turn};
+use relit_video::Video;
+
+use super::{MaskingError, TurnRequest};
+
+/// Threads that decode ahead where frames depend on each other.
+const DECODERS: usize = 2;
+
+/// Frames of a turn, and their numbers.
+#[derive(Debug)]
+pub(super) struct SampledTurn {
+    pub(super) frames: Vec<u64>,
+    pub(super) pictures: Turn,
+}
+
+/// Reads the frames that are asked for; none where one frame is enough. Frames that cannot be decoded
+/// are left out.
+pub(super) fn read_turn(
+    video: &Video,
+    (width, height): (u32, u32),
+    request: &TurnRequest,
+) -> Result<Option<SampledTurn>, MaskingError> {
+    let numbers = match request {
+        TurnRequest::None => return Ok(None),
+        TurnRequest::Sampled => spread(video, TURN_FRAMES),
+        TurnRequest::Frames(frames) => frames.clone(),
+    };
+    let mut turn = SampledTurn {
+        frames: Vec::new(),
+        pictures: Turn::new(width, height),
+    };
+    let whole = Rect::new(0, 0, width, height);
+    for pending in video.read(&numbers, DECODERS)? {
+        let Ok(picture) = video.picture(pending) else {
+            continue;
+        };
+        if picture.size() != (width, height) {
+            continue;
+        }
+        if let Ok(image) = picture.rgb(whole) {
+            turn.frames.push(picture.number());
+            turn.pictures.push(&image);
+        }
+    }
+    Ok(Some(turn))
+}
+
+/// Up to `count` frames of the video at equal distances, without those that are known to be damaged.
+pub(super) fn spread(video: &Video, count: usize) -> Vec<u64> {
+    let whole: Vec<u64> = video
+        .frames()
+        .iter()
+        .filter(|frame| !frame.damaged)
+        .map(|frame| frame.number)
+        .collect();
+    let count = count.min(whole.len());
+    (0..count)
+        .map(|step| whole[(2 * step + 1) * whole.len() / (2 * count)])
+        .collect()
+}
