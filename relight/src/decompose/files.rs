@@ -135,10 +135,10 @@ impl DecompositionFiles<'_> {
             .normals
             .write_png(&path("normal.png"), Depth::Sixteen)?;
         let white = FigureWhites {
-            albedo: write_light(&path("albedo.png"), found.albedo.planes(), |same| same)?,
-            shading: write_light(&path("shading.png"), &found.shading, in_colour)?,
-            diffuse: write_light(&path("diffuse.png"), found.diffuse.planes(), |same| same)?,
-            specular: write_light(&path("specular.png"), &found.highlight, in_colour)?,
+            albedo: write_light(&path("albedo.png"), &found.albedo)?,
+            shading: write_grey(&path("shading.png"), &found.shading)?,
+            diffuse: write_light(&path("diffuse.png"), &found.diffuse)?,
+            specular: write_grey(&path("specular.png"), &found.highlight)?,
         };
         found.light.write(&path("light.txt"))?;
         ball(found)
@@ -257,18 +257,26 @@ fn ball(found: &Decomposition) -> Rgb<Linear> {
 }
 
 /// Writes light as a PNG of 16 bits, sRGB; the light that its largest value stands for.
-pub(crate) fn write_light<const C: usize>(
-    path: &Path,
-    light: &Planes<C>,
-    in_colour: fn(Planes<C>) -> Planes<3>,
-) -> Result<f32, ImageError> {
-    let values = light.planes().into_iter().flatten();
-    let most = values.fold(0.0_f32, |a, &b| a.max(b));
-    // What fits in is written as it is, so that files can be compared.
-    let white = most.max(1.0);
-    let encoded = light.clone().map(|value| Srgb::from_linear(value / white));
+pub(crate) fn write_light(path: &Path, light: &Rgb<Linear>) -> Result<f32, ImageError> {
+    let (encoded, white) = encoded(light.planes());
+    write_png(path, &encoded, Depth::Sixteen)?;
+    Ok(white)
+}
+
+/// The same of grey light.
+fn write_grey(path: &Path, light: &Planes<1>) -> Result<f32, ImageError> {
+    let (encoded, white) = encoded(light);
     write_png(path, &in_colour(encoded), Depth::Sixteen)?;
     Ok(white)
+}
+
+/// Light as sRGB over its largest value, and that value. What fits in stays as it is, so that files can be
+/// compared.
+fn encoded<const C: usize>(light: &Planes<C>) -> (Planes<C>, f32) {
+    let values = light.planes().into_iter().flatten();
+    let white = values.fold(1.0_f32, |a, &b| a.max(b));
+    let encoded = light.clone();
+    (encoded.map(|value| Srgb::from_linear(value / white)), white)
 }
 
 /// The value that one in two hundred under the mask exceeds; 1 where all is dark.

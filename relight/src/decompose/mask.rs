@@ -95,12 +95,12 @@ pub(super) enum NoObject {
 /// them.
 pub(super) fn find_mask(
     encoded: &Planes<3>,
-    alpha: Option<Planes<1>>,
+    alpha: Option<&Planes<1>>,
     rectangle: Option<Rectangle>,
 ) -> Result<(Planes<1>, MaskSource), NoObject> {
     let extent = encoded.extent();
     let found = match alpha {
-        Some(alpha) => Ok((binary(alpha), MaskSource::Alpha)),
+        Some(alpha) => Ok((binary(alpha.clone()), MaskSource::Alpha)),
         None => before_black(encoded).map(|mask| (mask, MaskSource::BlackBackground)),
     };
     let Some(rectangle) = rectangle else {
@@ -247,7 +247,7 @@ mod tests {
             width: 30,
             height: 40,
         };
-        let (mask, source) = find_mask(&ring(0.0), Some(alpha), Some(rectangle)).unwrap();
+        let (mask, source) = find_mask(&ring(0.0), Some(&alpha), Some(rectangle)).unwrap();
         assert_eq!(source, MaskSource::Alpha);
         assert_eq!(mask.plane(0).iter().sum::<f32>(), 6.0 * 40.0);
     }

@@ -247,7 +247,7 @@ fn read_photo(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeErr
         ),
         None => {
             let encoded = shown(&image.planes, transfer);
-            find_mask(&encoded, image.alpha.clone(), reading.rectangle).map_err(|why| {
+            find_mask(&encoded, image.alpha.as_ref(), reading.rectangle).map_err(|why| {
                 let path = path.to_owned();
                 match why {
                     NoObject::Background => DecomposeError::NoMask { path },

@@ -154,13 +154,9 @@ impl TurnFiles<'_> {
             .normals()
             .write_png(&path("normal.png"), Depth::Sixteen)?;
         let white = FigureWhites {
-            albedo: write_light(&path("albedo.png"), surface.albedo().planes(), |same| same)?,
-            shading: write_light(&path("shading.png"), shading.planes(), |same| same)?,
-            highlight: write_light(
-                &path("highlight.png"),
-                grey(&maps.highlight).planes(),
-                |same| same,
-            )?,
+            albedo: write_light(&path("albedo.png"), surface.albedo())?,
+            shading: write_light(&path("shading.png"), &shading)?,
+            highlight: write_light(&path("highlight.png"), &grey(&maps.highlight))?,
         };
         let confidence = grey(&solution.confidence(curves));
         write_png(
