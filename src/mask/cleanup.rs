@@ -11,7 +11,7 @@ use super::{Feather, Mark, MaskError, Seeds};
 const RISE: f64 = 2.563;
 
 /// A component with at least this share of the largest one's area is kept.
-const KEPT_FROM: f64 = 0.1;
+const KEPT_FROM: f64 = 0.3;
 /// The cleaned mask, and what was changed.
 #[derive(Debug)]
 pub(super) struct Cleaned {

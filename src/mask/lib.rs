@@ -1,11 +1,13 @@
-//! Which pixels of an image are the object: hints from a person, OpenCV's GrabCut, clean-up.
+//! Which pixels of an image are the object: hints from a person or what a turn shows, GrabCut, clean-up.
 //!
 //! Camera and object ride on the same turntable, so one mask fits all frames of a turn. [`segment`]
-//! makes it from one image; [`preview`] shows it for a person to check; a [`MaskRecord`] is what is
-//! written beside a mask to make it again.
+//! makes it from one image and hints, [`segment_turn`] from frames of a whole [`Turn`], with or without
+//! hints; [`preview`] shows it for a person to check; a [`MaskRecord`] is what is written beside a mask to
+//! make it again. [`score`] measures a mask against the truth.
 //!
-//! The crate needs OpenCV (core and imgproc) and nothing else: neither FFmpeg nor a session. It knows
-//! nothing of videos, session folders and shards, nor of how masks are used.
+//! The crate needs OpenCV (core and imgproc) for comparison and for soft edges, and nothing else: neither
+//! FFmpeg nor a session. It knows nothing of videos, session folders and shards, nor of how masks are
+//! used.
 //!
 //! # Cut an object out by a rectangle
 //!
@@ -33,12 +35,20 @@
 //!
 //! # How it decides
 //!
-//! With a rectangle, pixels outside are background and pixels inside are probably object; seeds
-//! overrule both. With seeds alone, the colours of the marked pixels decide first; if no background is
-//! marked, unmarked pixels start as probable background. Of the result the largest 8-connected
-//! component is kept. Holes (background that is not 4-connected to the border) are filled, except
-//! those in which seeds mark background.
+//! With a rectangle, pixels outside are background, and the half of those inside that looks most like the
+//! outside starts as background too; seeds overrule both. With seeds alone, the colours of the marked
+//! pixels decide first; if no background is marked, unmarked pixels start as probable background. Colour
+//! models of both sides and minimum cuts then take turns at a small size, and at each larger size a band
+//! along the edge is decided again.
+//!
+//! With a turn, a pixel's colour is its average over the frames, how much it changes counts too, and
+//! neighbours that change together belong together. What equals the ends of its row is background: the
+//! room passes through the whole row. So are the table and its rim.
+//!
+//! Of the result the largest 8-connected component is kept, and those that have three tenths of its area.
+//! Small holes are filled, except those in which seeds mark background.
 
+mod alpha;
 mod backdrop;
 mod bitmap;
 mod cleanup;
@@ -62,6 +72,7 @@ mod table;
 mod turn;
 mod warning;
 
+pub use alpha::alpha;
 pub use encode::{grey_png, rgb_png};
 pub use error::{MaskError, SeedsFault};
 pub use hints::{Hints, Mark, Seeds};

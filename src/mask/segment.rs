@@ -10,6 +10,8 @@ use super::{Hints, MaskError, SegmentSettings, Turn, Warning, cleanup, pyramid, 
 
 /// On one frame a hole of this share of the object may be a highlight, and is filled.
 const FILLED_OF_FRAME: f64 = 0.01;
+/// The turn's outline has at least this share of the strength of the hints' one.
+const LEAST_OF_HINTS: f32 = 0.85;
 /// Over a turn highlights move: only specks are filled.
 const FILLED_OF_TURN: f64 = 0.001;
 
@@ -37,6 +39,11 @@ pub struct MaskStatistics {
 }
 
 impl Mask {
+    fn with_warning(mut self, warning: Option<Warning>) -> Self {
+        self.warnings.extend(warning);
+        self
+    }
+
     /// The mask, in the size of the frame: 255 object, 0 background; with a feather also values
     /// between.
     #[must_use]
@@ -82,11 +89,15 @@ pub fn segment(
     finish(&raw, size, Some(hints), rect, settings, FILLED_OF_FRAME)
 }
 
-/// Finds the object in `frame` by what a turn tells, with or without hints. `turn` holds frames of the
+/// Finds the object in `frame` by what a turn shows, with or without hints. `turn` holds frames of the
 /// same recording. The same input gives the same mask.
 ///
+/// With hints there is a guard against a turn that misleads: if its mask has an outline along which less
+/// moves differently than along that of the hints alone, or if there are too few frames, the hints alone
+/// decide, and a warning says so.
+///
 /// # Errors
-/// [`MaskError::FewFrames`]; otherwise as [`segment`].
+/// [`MaskError::FewFrames`] without hints; otherwise as [`segment`].
 pub fn segment_turn(
     frame: &RgbImage,
     turn: &Turn,
@@ -95,12 +106,51 @@ pub fn segment_turn(
 ) -> Result<Mask, MaskError> {
     let size = frame.dimensions();
     check_size(size)?;
-    let labels = turn::segment(frame, turn, hints, settings.iterations)?;
-    let raw = Bitmap::new(size, labels.iter().map(|label| label.is_object()));
-    drop(labels);
-    let rect = hints.and_then(Hints::rect);
-    let rect = rect.and_then(|rect| rect.clipped_to(size.0, size.1));
-    finish(&raw, size, hints, rect, settings, FILLED_OF_TURN)
+    let by_turn = turn::segment(frame, turn, hints, settings.iterations);
+    let Some(hints) = hints else {
+        let by_turn = by_turn?;
+        let still = (!by_turn.moves()).then_some(Warning::NothingMoves);
+        let mask = finish(&by_turn.object, size, None, None, settings, FILLED_OF_TURN)?;
+        return Ok(mask.with_warning(still));
+    };
+    let by_hints = segment(frame, hints, settings);
+    let by_turn = match by_turn {
+        Ok(by_turn) => by_turn,
+        Err(error) => {
+            let dropped = Warning::TurnDropped {
+                why: error.to_string(),
+            };
+            return by_hints.map(|mask| mask.with_warning(Some(dropped)));
+        }
+    };
+    if let Ok(by_hints) = by_hints {
+        let object = by_hints.image.as_raw().iter().map(|&level| level >= 128);
+        let object = Bitmap::new(size, object);
+        let width = size.0 as usize;
+        let (of_turn, of_hints) = (
+            by_turn.outline(&by_turn.object, width),
+            by_turn.outline(&object, width),
+        );
+        if of_turn < LEAST_OF_HINTS * of_hints {
+            let why = format!(
+                "its outline follows what moves less well ({of_turn:.2}) than that of the hints alone ({of_hints:.2})"
+            );
+            return Ok(by_hints.with_warning(Some(Warning::TurnDropped { why })));
+        }
+    }
+    let still = (!by_turn.moves()).then_some(Warning::NothingMoves);
+    let rect = hints
+        .rect()
+        .and_then(|rect| rect.clipped_to(size.0, size.1));
+    let mask = finish(
+        &by_turn.object,
+        size,
+        Some(hints),
+        rect,
+        settings,
+        FILLED_OF_TURN,
+    )?;
+    Ok(mask.with_warning(still))
 }
 
 fn finish(

@@ -93,6 +93,9 @@ pub struct SegmentSettings {
     pub keep_all: bool,
     /// Width of the soft edge.
     pub feather: Feather,
+    /// Whether the share of the object in each pixel of the edge is wanted beside the mask.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub alpha: bool,
 }
 
 impl TryFrom<u32> for Iterations {

@@ -43,6 +43,8 @@ const CHANGE_WEIGHT: f32 = 3.0;
 /// How much a constant difference counts against one that changes: edges of paint on the object are
 /// constant, its outline is not.
 const CONSTANT_WEIGHT: f32 = 0.25;
+/// A smaller change of the brightness, in L, is noise.
+const STILL: f32 = 1.0;
 /// A larger contrast counts as this.
 const MOST_CONTRAST: f32 = 100.0;
 
@@ -276,7 +278,7 @@ pub(super) fn segment(
     turn: &Turn,
     hints: Option<&Hints>,
     iterations: Iterations,
-) -> Result<Vec<Label>, MaskError> {
+) -> Result<TurnCut, MaskError> {
     if turn.len() < MIN_TURN_FRAMES || turn.full != frame.dimensions() {
         return Err(MaskError::FewFrames { found: turn.len() });
     }
@@ -303,7 +305,67 @@ pub(super) fn segment(
         refine(&field, &mut finer, &labels, size, &mut models);
         (labels, size) = (finer, level.size());
     }
-    Ok(labels)
+    let object = labels.iter().map(|label| label.is_object());
+    Ok(TurnCut {
+        object: Bitmap::new(frame.dimensions(), object),
+        field: fine,
+        factor: 1 << at_fine,
+    })
+}
+
+/// The result of a cut by a turn, and what other results can be compared by.
+pub(super) struct TurnCut {
+    pub(super) object: Bitmap,
+    field: TurnField,
+    /// The frame is so many times larger than the field.
+    factor: usize,
+}
+
+impl TurnCut {
+    /// How well an outline follows what moves differently: the mean over its edges of the strength of
+    /// the contrast there, 0..=1.
+    pub(super) fn outline(&self, object: &Bitmap, width: usize) -> f32 {
+        let (columns, rows) = self.field.size;
+        let is_object = |at: usize| {
+            let (x, y) = (at % columns * self.factor, at / columns * self.factor);
+            object.bits().get(y * width + x).copied().unwrap_or(false)
+        };
+        let scale = grab_cut::contrast_scale(&self.field);
+        let (mut sum, mut edges) = (0.0, 0.0);
+        for at in 0..columns * rows {
+            for direction in [4, 6] {
+                let next = neighbour(at, direction, self.field.size);
+                if let Some(next) = next.filter(|&next| is_object(next) != is_object(at)) {
+                    // The edge may lie a pixel beside it.
+                    let strongest = self.strongest_near(at).max(self.strongest_near(next));
+                    sum += 1.0 - (-scale * strongest).exp();
+                    edges += 1.0;
+                }
+            }
+        }
+        sum / f32::max(edges, 1.0)
+    }
+
+    fn strongest_near(&self, at: usize) -> f32 {
+        let contrasts = self.field.contrasts[at].iter();
+        contrasts.copied().fold(0.0, f32::max)
+    }
+
+    /// Whether anything moves: the median change of the brightness away from the table.
+    pub(super) fn moves(&self) -> bool {
+        let mut changes: Vec<f32> = self
+            .field
+            .features
+            .iter()
+            .map(|feature| feature[3])
+            .collect();
+        let upper = changes.len() * 3 / 4;
+        if changes.is_empty() {
+            return false;
+        }
+        let (_, change, _) = changes.select_nth_unstable_by(upper, f32::total_cmp);
+        *change > CHANGE_WEIGHT * STILL.ln_1p()
+    }
 }
 
 /// Moves the result from where the object is on average to where it is in the frame.

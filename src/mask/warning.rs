@@ -85,6 +85,13 @@ pub enum Warning {
         /// The fraction of the rectangle that the mask covers, 0..=1.
         fraction: f64,
     },
+    /// What the turn shows was not used; the hints alone decided.
+    TurnDropped {
+        /// Why.
+        why: String,
+    },
+    /// Hardly anything changes over the video.
+    NothingMoves,
     /// Following a recipe on another frame, or with other software, gave another mask.
     NotReproduced,
 }
@@ -216,6 +223,14 @@ impl fmt::Display for Warning {
                 f,
                 "the mask covers {:.0} % of the rectangle: hardly anything was cut away; draw the rectangle a little larger, or give seeds",
                 100.0 * fraction
+            ),
+            Self::TurnDropped { why } => write!(
+                f,
+                "the turn was not used, only the rectangle or the seeds: {why}"
+            ),
+            Self::NothingMoves => write!(
+                f,
+                "hardly anything changes over the video: without a moving background the mask rests on the average colours alone; check it, or give a rectangle"
             ),
             Self::NotReproduced => {
                 write!(f, "this mask differs from the one that the recipe recorded")

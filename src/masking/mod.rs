@@ -1,6 +1,7 @@
 //! The mask of a recording: reads one frame and writes three files.
 //!
-//! `NAME.png` is the mask, `NAME.json` its record, `NAME-preview.png` the image for checking it. An
+//! `NAME.png` is the mask, `NAME.json` its record, `NAME-preview.png` the image for checking it, and on
+//! request `NAME-alpha.png` (`alpha.png` beside `mask.png`) its soft form. An
 //! existing mask is replaced only if its record has its hash, because then it can be made again.
 //!
 //! This module brings frames and folders to `relit-mask`. It knows nothing of data sets and the rig.
@@ -19,8 +20,8 @@ use relit_data::durable;
 use relit_data::session::{MASK_FILE, Notice, Recording};
 use relit_mask::{
     Hints, MASK_SCHEMA, Mask, MaskError, MaskRecord, MaskSoftware, RecordFault, RecordedHints,
-    RecordedResult, SegmentSettings, SourceFrame, Warning, grey_png, preview, rgb_png, segment,
-    segment_turn,
+    RecordedResult, SegmentSettings, SourceFrame, Warning, alpha, grey_png, preview, rgb_png,
+    segment, segment_turn,
 };
 use relit_video::Video;
 
@@ -79,6 +80,8 @@ pub struct MaskFiles {
     pub record: PathBuf,
     /// The preview.
     pub preview: PathBuf,
+    /// The share of the object in each pixel; written only if the settings ask for it.
+    pub alpha: PathBuf,
 }
 
 impl MaskRequest {
@@ -155,10 +158,16 @@ impl MaskFiles {
             Some(stem) if is_png => {
                 let mut preview = stem.to_owned();
                 preview.push("-preview.png");
+                let mut alpha = stem.to_owned();
+                alpha.push("-alpha.png");
+                if stem == "mask" {
+                    alpha = "alpha.png".into();
+                }
                 Ok(Self {
                     mask: mask.to_owned(),
                     record: mask.with_extension("json"),
                     preview: mask.with_file_name(preview),
+                    alpha: mask.with_file_name(alpha),
                 })
             }
             _ => Err(MaskingError::OutputName(mask.to_owned())),
@@ -240,6 +249,10 @@ fn segment_and_write(
     let json = record.to_json();
     let json = json.map_err(|error| MaskingError::io(&files.record, "written")(error.into()))?;
     write(&files.preview, &preview_png)?;
+    if request.settings.alpha {
+        let soft = alpha(&frame, mask.image());
+        write(&files.alpha, &grey_png(&soft, "the soft mask")?)?;
+    }
     write(&files.record, &json)?;
     write(&files.mask, &png)?;
     Ok(record)
@@ -344,6 +357,9 @@ mod tests {
         let files = MaskFiles::of(Path::new("a/mug.v2.PNG")).unwrap();
         assert_eq!(files.record, Path::new("a/mug.v2.json"));
         assert_eq!(files.preview, Path::new("a/mug.v2-preview.png"));
+        assert_eq!(files.alpha, Path::new("a/mug.v2-alpha.png"));
+        let files = MaskFiles::of(Path::new("a/mask.png")).unwrap();
+        assert_eq!(files.alpha, Path::new("a/alpha.png"));
     }
 
     #[test]

@@ -9,7 +9,10 @@ mod scene;
 use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage};
 use proptest::prelude::*;
 use relit_data::geometry::Rect;
-use relit_mask::{Feather, Hints, Iterations, MaskError, Seeds, SegmentSettings, Warning, segment};
+use relit_mask::{
+    Feather, Hints, Iterations, MaskError, Seeds, SegmentSettings, Turn, Warning, alpha, segment,
+    segment_turn,
+};
 
 use scene::{AROUND, HEIGHT, WIDTH, disc_share, in_disc, seeds_image, strokes};
 
@@ -181,6 +184,86 @@ fn a_frame_of_one_colour_yields_a_mask_with_a_warning_or_a_refusal() {
     }
 }
 
+/// Frame `at` of a turn: the disc on a dark table, before a striped room that passes from left to right,
+/// in a light that changes. Two of the room's colours are the disc's.
+fn turn_frame(at: u32) -> RgbImage {
+    let light = 0.6 + 0.1 * f64::from(at % 5);
+    RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        let room = [[200, 150, 60], [90, 120, 160], [230, 180, 70], [40, 60, 50]];
+        let noise = ((x * 7 + y * 13 + at * 5) % 4) as u8;
+        let lit = |rgb: [u8; 3]| Rgb(rgb.map(|v| (f64::from(v) * light) as u8 + noise));
+        if in_disc(x, y) {
+            lit([210, 160, 60])
+        } else if y >= 44 {
+            lit([22, 22, 24])
+        } else {
+            lit(room[((x + 6 * at) / 12 % 4) as usize])
+        }
+    })
+}
+
+fn turn(frames: u32) -> Turn {
+    let mut turn = Turn::new(WIDTH, HEIGHT);
+    (0..frames).for_each(|at| turn.push(&turn_frame(at)));
+    turn
+}
+
+#[test]
+fn a_turn_alone_finds_the_object_before_a_room_of_its_colours() {
+    let settings = SegmentSettings::default();
+    let mask = segment_turn(&turn_frame(0), &turn(16), None, &settings).unwrap();
+    assert!(
+        disc_share(mask.image()) > 0.95,
+        "{}",
+        disc_share(mask.image())
+    );
+    assert_eq!(mask.warnings(), []);
+}
+
+#[test]
+fn a_turn_of_too_few_frames_leaves_the_decision_to_the_hints_and_says_so() {
+    let settings = SegmentSettings::default();
+    let alone = segment_turn(&turn_frame(0), &turn(2), None, &settings);
+    assert!(matches!(alone, Err(MaskError::FewFrames { found: 2 })));
+    let mask = segment_turn(&disc(), &turn(2), Some(&around()), &settings).unwrap();
+    assert!(disc_share(mask.image()) > 0.98);
+    let dropped = |warning: &Warning| matches!(warning, Warning::TurnDropped { .. });
+    assert!(mask.warnings().iter().any(dropped));
+}
+
+#[test]
+fn a_video_in_which_nothing_moves_gives_a_warning() {
+    let mut still = Turn::new(WIDTH, HEIGHT);
+    (0..8).for_each(|_| still.push(&disc()));
+    let settings = SegmentSettings::default();
+    let mask = segment_turn(&disc(), &still, Some(&around()), &settings).unwrap();
+    assert!(disc_share(mask.image()) > 0.95);
+    let nothing = |warning: &Warning| matches!(warning, Warning::NothingMoves);
+    assert!(mask.warnings().iter().any(nothing));
+}
+
+#[test]
+fn a_large_frame_is_cut_along_the_same_edge_as_a_small_one() {
+    let large = image::imageops::resize(
+        &disc(),
+        WIDTH * 8,
+        HEIGHT * 8,
+        image::imageops::FilterType::Triangle,
+    );
+    let hints = Hints::Rect(Rect::new(24 * 8, 8 * 8, 50 * 8, 48 * 8));
+    let mask = segment(&large, &hints, &SegmentSettings::default()).unwrap();
+    let small = image::imageops::thumbnail(mask.image(), WIDTH, HEIGHT);
+    assert!(disc_share(&small) > 0.98);
+}
+
+#[test]
+fn the_soft_mask_equals_the_hard_one_away_from_the_edge() {
+    let mask = segment(&disc(), &around(), &SegmentSettings::default()).unwrap();
+    let soft = alpha(&disc(), mask.image());
+    assert_eq!(soft.get_pixel(48, 32).0, [255]);
+    assert_eq!(soft.get_pixel(5, 5).0, [0]);
+}
+
 #[test]
 fn an_object_at_the_border_gives_warnings() {
     let frame = RgbImage::from_fn(64, 64, |x, y| {
@@ -246,6 +329,7 @@ proptest! {
             iterations: Iterations::new(count).unwrap(),
             feather: Feather::new(feather).unwrap(),
             keep_all,
+            alpha: false,
         };
         if let Some(hints) = hints {
             match segment(&frame, &hints, &settings) {

@@ -173,8 +173,11 @@ fn wrong_usage_exits_with_2_and_a_failure_with_1() {
     let folder = clip();
     let path = folder.path();
     seeds_image(|_, _| 0).save(path.join("black.png")).unwrap();
-    let wrong: [&[&str]; 6] = [
+    let wrong: [&[&str]; 9] = [
         &["clip.y4m"],
+        &["bench"],
+        &["bench", "nothing", "--rect", AROUND],
+        &["clip.y4m", "--recipe", "mask.json", "--auto"],
         &["clip.y4m", "--rect", "1,2,3"],
         &["clip.y4m", "--rect", AROUND, "--iterations", "0"],
         &["clip.y4m", "--rect", AROUND, "--feather", "9999"],
@@ -184,7 +187,8 @@ fn wrong_usage_exits_with_2_and_a_failure_with_1() {
     for arguments in wrong {
         assert_eq!(code(&relit_mask(path, arguments)), 2, "{arguments:?}");
     }
-    let failed: [&[&str]; 6] = [
+    let failed: [&[&str]; 7] = [
+        &["clip.y4m", "--auto"],
         &["nothing.mkv", "--rect", AROUND],
         &["clip.y4m", "--rect", AROUND, "--frame", "3"],
         &["clip.y4m", "--rect=-50,0,10,10"],
@@ -208,6 +212,77 @@ fn a_frame_beyond_the_end_is_reported_with_the_last_one() {
         &["clip.y4m", "--rect", AROUND, "--frame", "3"],
     );
     assert!(said(&output).contains("0 to 2"), "{}", said(&output));
+}
+
+/// A turn of 12 frames: the disc before stripes that move.
+fn turn_video() -> Vec<u8> {
+    let mut bytes = format!("YUV4MPEG2 W{WIDTH} H{HEIGHT} F30:1 Ip A1:1 C444\n").into_bytes();
+    for at in 0..12 {
+        let luma = |x: u32, y: u32| match in_disc(x, y) {
+            true => 200 + ((x + y) % 3) as u8,
+            false => 30 + 60 * ((x + 5 * at) / 10 % 4) as u8,
+        };
+        bytes.extend_from_slice(b"FRAME\n");
+        bytes.extend((0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| luma(x, y))));
+        bytes.extend(vec![128; (2 * WIDTH * HEIGHT) as usize]);
+    }
+    bytes
+}
+
+#[test]
+fn auto_needs_no_hint_and_its_recipe_makes_the_same_files_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    fs::write(path.join("turn.y4m"), turn_video()).unwrap();
+    let output = relit_mask(path, &["turn.y4m", "--auto", "--alpha", "-o", "a.png"]);
+    assert_eq!(code(&output), 0, "{}", said(&output));
+    let mask = image::load_from_memory(&read(path, "a.png")).unwrap();
+    let share = disc_share(mask.as_luma8().unwrap());
+    assert!(share > 0.9, "{share}");
+    let record: serde_json::Value = serde_json::from_slice(&read(path, "a.json")).unwrap();
+    assert_eq!(record["hints"]["turn_frames"].as_array().unwrap().len(), 12);
+    let output = relit_mask(path, &["turn.y4m", "--recipe", "a.json", "-o", "b.png"]);
+    assert_eq!(code(&output), 0, "{}", said(&output));
+    for (first, second) in [
+        ("a.png", "b.png"),
+        ("a.json", "b.json"),
+        ("a-alpha.png", "b-alpha.png"),
+    ] {
+        assert!(read(path, first) == read(path, second), "{second} differs");
+    }
+}
+
+#[test]
+fn bench_measures_every_hint_and_names_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let output = relit_mask(path, &["bench", "."]);
+    assert_eq!(code(&output), 1);
+    assert!(
+        said(&output).contains("holds no image"),
+        "{}",
+        said(&output)
+    );
+    let frame = image::RgbImage::from_fn(WIDTH, HEIGHT, |x, y| match in_disc(x, y) {
+        true => image::Rgb([200, 150, 60 + ((x + y) % 5) as u8]),
+        false => image::Rgb([20, 30, 40 + ((x + y) % 5) as u8]),
+    });
+    frame.save(path.join("disc.png")).unwrap();
+    let truth = seeds_image(|x, y| if in_disc(x, y) { 255 } else { 0 });
+    truth.save(path.join("disc.gt.png")).unwrap();
+    fs::write(path.join("disc.box.txt"), "24 8 73 55\n").unwrap();
+    let output = relit_mask(path, &["bench", ".", "--json"]);
+    assert_eq!(code(&output), 0, "{}", said(&output));
+    let events = String::from_utf8(output.stdout).unwrap();
+    let average = events.lines().last().unwrap();
+    let average: serde_json::Value = serde_json::from_str(average).unwrap();
+    assert_eq!(average["event"], "average");
+    assert_eq!(average["hint"], "box");
+    assert!(average["ours"]["iou"].as_f64().unwrap() > 0.97);
+    fs::write(path.join("disc.box.txt"), "24 8 73").unwrap();
+    let output = relit_mask(path, &["bench", "."]);
+    assert_eq!(code(&output), 1);
+    assert!(said(&output).contains("disc.box.txt"), "{}", said(&output));
 }
 
 /// A session folder `<name>` in `root` with the disc as its video.

@@ -86,6 +86,10 @@ pub(crate) struct MaskArguments {
     #[arg(long, value_name = "PX", default_value = "0", value_parser = feather)]
     feather: Feather,
 
+    /// Write also how much of each pixel is object: alpha.png beside mask.png
+    #[arg(long)]
+    alpha: bool,
+
     /// The mask's file name, ending in .png [default: mask.png in the session folder, or here]
     #[arg(short, long, value_name = "PNG", value_parser = output)]
     pub(crate) output: Option<MaskFiles>,
@@ -96,7 +100,7 @@ pub(crate) struct MaskArguments {
 
     /// Make the mask again that this mask.json describes, to the same bytes
     #[arg(long, value_name = "JSON", conflicts_with_all =
-        ["rect", "seeds", "auto", "frame", "iterations", "keep_all", "feather"])]
+        ["rect", "seeds", "auto", "frame", "iterations", "keep_all", "feather", "alpha"])]
     recipe: Option<PathBuf>,
 
     /// Print one JSON line per event on standard output
@@ -149,6 +153,7 @@ impl MaskArguments {
             iterations: self.iterations,
             keep_all: self.keep_all,
             feather: self.feather,
+            alpha: self.alpha,
         }
     }
 }
