@@ -1,4 +1,4 @@
-//! `relight relight` from outside: what it writes, and what it refuses. The network is not trained.
+//! `relight relight` and `relight insert` from outside: what it writes, and what it refuses. The network is not trained.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -294,4 +294,110 @@ fn a_turn_is_a_video_of_as_many_frames() {
         .output()
         .unwrap();
     assert_eq!(String::from_utf8_lossy(&probed.stdout).trim(), "32,24,6");
+}
+
+#[test]
+fn objects_are_inserted_from_back_to_front_by_options_and_by_a_scene_file() {
+    let folder = Folder::new();
+    let common = "--weights w.safetensors -o";
+    let options = "insert photos/one.png photos/two.png --mask masks --into sky.exr --size 96,64 --at 0.3,0.9 --at 0.7,0.9 --height 0.5";
+    let (code, errors) = folder.told(&format!("{options} {common} options.png"));
+    assert_eq!((code, errors.as_str()), (0, ""));
+    let scene = "background = \"sky.exr\"\nsize = [96, 64]\n\
+                 [[object]]\nphoto = \"photos/one.png\"\nmask = \"masks/one.png\"\nat = [0.3, 0.9]\nheight = 0.5\n\
+                 [[object]]\nphoto = \"photos/two.png\"\nmask = \"masks/two.png\"\nat = [0.7, 0.9]\nheight = 0.5\n";
+    fs::write(folder.path("scene.toml"), scene).unwrap();
+    assert_eq!(
+        folder
+            .told(&format!("insert --scene scene.toml {common} file.png"))
+            .0,
+        0
+    );
+    let [a, b] = ["options.png", "file.png"].map(|name| read_planes(&folder.path(name)).unwrap().0);
+    assert_eq!(a, b);
+    assert_eq!(a.extent(), Extent::new(96, 64));
+    // The sky is blue, what stands before it is not as blue.
+    assert!(a.pixel(2, 2)[2] > 1.3 * a.pixel(2, 2)[0]);
+    assert_ne!(a.pixel(29, 44), a.pixel(2, 44));
+    // Into a photograph, 16 bits.
+    let command = format!(
+        "insert photos/one.png --mask masks/one.png --into photos/two.png --bits 16 {common} deep.png"
+    );
+    assert_eq!(folder.told(&command).0, 0);
+    assert_eq!(
+        image::open(folder.path("deep.png")).unwrap().color(),
+        image::ColorType::Rgb16
+    );
+}
+
+#[test]
+fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
+    let folder = Folder::new();
+    fs::write(
+        folder.path("odd.toml"),
+        "background = \"sky.exr\"\nhight = 3\n",
+    )
+    .unwrap();
+    fs::write(folder.path("none.toml"), "background = \"none.exr\"\n[[object]]\nphoto = \"photos/one.png\"\nmask = \"masks/one.png\"\n").unwrap();
+    let one = "insert photos/one.png --mask masks/one.png";
+    for (command, code, expected) in [
+        (
+            "insert --scene odd.toml -o o.png".to_owned(),
+            1,
+            "unknown field `hight`",
+        ),
+        (
+            "insert --scene none.toml -o o.png".to_owned(),
+            1,
+            "none.exr cannot be read",
+        ),
+        (
+            "insert --scene missing.toml -o o.png".to_owned(),
+            1,
+            "missing.toml cannot be read",
+        ),
+        (
+            format!("{one} --into sky.exr --height 9 -o o.png"),
+            1,
+            "object 1: height is 9",
+        ),
+        (
+            format!("{one} --into sky.exr --lamp 5 -o o.png"),
+            1,
+            "light.lamp: give AZIMUTH,ELEVATION",
+        ),
+        (
+            format!("{one} --into photos/two.png -o o.mp4"),
+            1,
+            "a photograph does not move",
+        ),
+        (
+            format!("{one} --into sky.exr -o o.mp4"),
+            1,
+            "a panorama moves with --turn DEGREES",
+        ),
+        (
+            format!("{one} --into sky.exr --at 0.1,0.2 --at 0.3,0.4 -o o.png"),
+            2,
+            "--at is given 2 times for 1 photographs",
+        ),
+        (
+            "insert photos/one.png photos/two.png --mask masks/one.png --into sky.exr -o o.png"
+                .to_owned(),
+            2,
+            "give a folder of masks",
+        ),
+        (
+            format!("{one} --into sky.exr -o o.bmp"),
+            2,
+            "give .png, .exr, .mp4 or .webm",
+        ),
+    ] {
+        let (found, errors) = folder.told(&command);
+        assert_eq!(found, code, "{command}: {errors}");
+        assert!(errors.contains(expected), "{command}: {errors}");
+    }
+    for name in ["o.png", "o.mp4", "o.bmp"] {
+        assert!(!folder.path(name).exists(), "{name}");
+    }
 }

@@ -23,6 +23,8 @@ pub(super) struct Relief {
     pub(super) scale: f64,
     /// Half the thickness, cells; 0 where there is nothing.
     pub(super) half: Vec<f32>,
+    /// The most of it.
+    pub(super) thickest: f32,
 }
 
 impl Relief {
@@ -54,10 +56,12 @@ impl Relief {
                 0.0
             }
         });
+        let half: Vec<f32> = half.collect();
         Some(Self {
             extent,
             scale,
-            half: half.collect(),
+            thickest: half.iter().fold(0.0, |a, &b| a.max(b)),
+            half,
         })
     }
 }

@@ -113,7 +113,7 @@ impl Relief {
     /// Whether the shape is in the way from a point in a direction. Its cells are 1 wide; rows lie below y = 0.
     fn blocks(&self, from: [f64; 3], towards: [f64; 3]) -> bool {
         let Extent { width, height } = self.extent;
-        let thickest = f64::from(self.half.iter().fold(0.0_f32, |a, &b| a.max(b)));
+        let thickest = f64::from(self.thickest);
         let low = [0.0, -(height as f64), -thickest];
         let high = [width as f64, 0.0, thickest];
         let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);

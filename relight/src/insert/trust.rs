@@ -10,7 +10,7 @@ use crate::render::{DiffuseForm, DiffuseLayer};
 /// A rescaled look sees the object at this part of the network's side.
 const RESCALED_SIDE: usize = 112;
 /// Doubts are means over squares that reach this part of the object's side.
-const NEIGHBOURHOOD: f64 = 0.015;
+const NEIGHBOURHOOD: f64 = 0.05;
 /// The doubt at which trust is one half.
 const HALF_TRUST: f32 = 0.5;
 /// Shading below this part of its mean is not divided by.
@@ -22,8 +22,7 @@ const DARK: f32 = 0.05;
 pub struct TrustMap {
     /// How far shading is from what the light makes on the normals, as a part of it: shadows, bounced light, wrong normals.
     pub unexplained: Planes<1>,
-    /// How far the mirrored photograph's answer is from the photograph's: the angle between the normals in radians, and the
-    /// difference of the shadings' logarithms.
+    /// How far the normals of the mirrored photograph are from the photograph's, radians.
     pub mirrored: Planes<1>,
     /// The same for the photograph in a smaller size.
     pub rescaled: Planes<1>,
@@ -79,14 +78,14 @@ impl TrustMap {
             decomposer.decompose(&mirror(picture), &mask.clone().mirrored(), &options)?;
         let rescaled = rescaled(picture, mask, plain.region.side, decomposer, &options)?;
         let inside: Vec<bool> = mask.plane(0).iter().map(|&m| m >= 0.5).collect();
-        let answer = Answer::of(&plain);
+        let normals = plain.normals.planes();
         Ok(Self {
             unexplained: smooth(&unexplained(&plain), &inside),
             mirrored: smooth(
-                &answer.apart(&Answer::of(&mirrored).turned_back(), &inside),
+                &angles(normals, &turned_back(mirrored.normals.planes()), &inside),
                 &inside,
             ),
-            rescaled: smooth(&answer.apart(&rescaled, &inside), &inside),
+            rescaled: smooth(&angles(normals, &rescaled, &inside), &inside),
             inside,
         })
     }
@@ -159,57 +158,42 @@ impl TrustMap {
 /// How much what the light does not explain counts beside the differences between looks.
 const UNEXPLAINED_WEIGHT: f32 = 0.5;
 
-/// What two looks are compared by.
-struct Answer {
-    normals: Planes<3>,
-    shading: Planes<1>,
+/// The normals of a mirrored picture, as if they were the picture's.
+fn turned_back(normals: &Planes<3>) -> Planes<3> {
+    let mut normals = normals.clone().mirrored();
+    normals.planes_mut()[0].iter_mut().for_each(|x| *x = -*x);
+    normals
 }
 
-impl Answer {
-    fn of(found: &Decomposition) -> Self {
-        Self {
-            normals: found.normals.planes().clone(),
-            shading: found.shading.clone(),
-        }
+/// The angles between normals, radians.
+fn angles(a: &Planes<3>, b: &Planes<3>, inside: &[bool]) -> Planes<1> {
+    let mut angles = Planes::zeros(a.extent());
+    let (a, b) = (a.planes(), b.planes());
+    let length = |n: [&[f32]; 3], at: usize| n.iter().map(|p| p[at] * p[at]).sum::<f32>().sqrt();
+    for (at, angle) in angles.planes_mut()[0]
+        .iter_mut()
+        .enumerate()
+        .filter(|(at, _)| inside[*at])
+    {
+        let dot: f32 = (0..3).map(|c| a[c][at] * b[c][at]).sum();
+        let cosine = dot / (length(a, at) * length(b, at)).max(1e-6);
+        *angle = cosine.clamp(-1.0, 1.0).acos();
     }
-
-    /// The answer to a mirrored picture, as if it were to the picture.
-    fn turned_back(self) -> Self {
-        let mut normals = self.normals.mirrored();
-        normals.planes_mut()[0].iter_mut().for_each(|x| *x = -*x);
-        Self {
-            normals,
-            shading: self.shading.mirrored(),
-        }
-    }
-
-    fn apart(&self, other: &Self, inside: &[bool]) -> Planes<1> {
-        let mut apart = Planes::zeros(self.shading.extent());
-        let [values] = apart.planes_mut();
-        let (a, b) = (self.normals.planes(), other.normals.planes());
-        for (at, value) in values.iter_mut().enumerate().filter(|(at, _)| inside[*at]) {
-            let length = |n: [&[f32]; 3]| n.iter().map(|p| p[at] * p[at]).sum::<f32>().sqrt();
-            let dot: f32 = (0..3).map(|c| a[c][at] * b[c][at]).sum();
-            let cosine = dot / (length(a) * length(b)).max(1e-6);
-            let [s, t] = [self, other].map(|answer| answer.shading.plane(0)[at].max(0.0) + DARK);
-            *value = cosine.clamp(-1.0, 1.0).acos() + (s / t).ln().abs();
-        }
-        apart
-    }
+    angles
 }
 
 fn mirror(picture: &Rgb<Linear>) -> Rgb<Linear> {
     Rgb::new(picture.planes().clone().mirrored())
 }
 
-/// The answer to a smaller picture, at the size of the picture.
+/// The normals of a smaller picture, at the size of the picture.
 fn rescaled(
     picture: &Rgb<Linear>,
     mask: &Planes<1>,
     side: usize,
     decomposer: &Decomposer,
     options: &DecomposeOptions,
-) -> Result<Answer, InsertError> {
+) -> Result<Planes<3>, InsertError> {
     let extent = mask.extent();
     let wanted = RESCALED_SIDE
         .min(decomposer.side() * 7 / 16)
@@ -225,15 +209,8 @@ fn rescaled(
     let found = decomposer.decompose(&Rgb::new(colours), &small, options)?;
     let known: Vec<bool> = small.plane(0).iter().map(|&m| m >= 0.5).collect();
     let everywhere = vec![true; known.len()];
-    let back = |normals: Planes<3>| normals.extended(&known, &everywhere).resized(extent);
-    Ok(Answer {
-        normals: back(found.normals.planes().clone()),
-        shading: found
-            .shading
-            .clone()
-            .extended(&known, &everywhere)
-            .resized(extent),
-    })
+    let normals = found.normals.planes().clone();
+    Ok(normals.extended(&known, &everywhere).resized(extent))
 }
 
 /// The mean colours of what a mask covers of each smaller pixel, and how much that is.
@@ -281,4 +258,69 @@ fn smooth(map: &Planes<1>, inside: &[bool]) -> Planes<1> {
         *value = if inside { *value } else { 0.0 };
     }
     mean
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nets::{Weights, decomposer};
+
+    fn map(level: impl Fn(usize) -> f32) -> TrustMap {
+        let plane = |part: f32| Planes::from_fn(Extent::new(4, 1), |x, _| [part * level(x)]);
+        TrustMap {
+            unexplained: plane(0.0),
+            mirrored: plane(1.0),
+            rescaled: plane(0.5),
+            inside: vec![true, true, true, false],
+        }
+    }
+
+    #[test]
+    fn trust_falls_with_doubt_and_is_nothing_outside() {
+        let trust = map(|x| x as f32 / 3.0).trust();
+        let values = trust.plane(0);
+        assert_eq!((values[0], values[3]), (1.0, 0.0));
+        assert!(values[0] > values[1] && values[1] > values[2]);
+        assert!((values[1] - 0.5).abs() < 1e-6);
+        let figures = map(|_| 1.0).figures();
+        assert_eq!(figures.doubtful, 1.0);
+        assert!((figures.mean - 0.25).abs() < 1e-6 && (figures.mirrored - 4.0 / 3.0).abs() < 1e-6);
+        let picture = map(|x| x as f32 * 10.0).picture();
+        let [first, _, last] = [0, 1, 2].map(|x| picture.pixel(x, 0));
+        assert!(first[2] > first[0] && last[0] > last[2]);
+        assert_eq!(picture.pixel(3, 0), [0.0; 3]);
+    }
+
+    #[test]
+    fn other_looks_are_compared_in_the_picture_s_own_frame() {
+        let extent = Extent::new(3, 1);
+        let normals = Planes::from_fn(extent, |x, _| {
+            [[-0.6, 0.0, 0.8], [0.0, 0.0, 1.0], [0.8, 0.0, 0.6]][x]
+        });
+        let mut seen_in_mirror = normals.clone().mirrored();
+        seen_in_mirror.planes_mut()[0]
+            .iter_mut()
+            .for_each(|x| *x = -*x);
+        let apart = angles(&normals, &turned_back(&seen_in_mirror), &[true; 3]);
+        assert!(apart.plane(0).iter().all(|&angle| angle < 1e-3));
+        let apart = angles(&normals, &seen_in_mirror, &[true, true, false]);
+        assert!((apart.pixel(0, 0)[0] - (0.6_f32.asin() - 0.8_f32.asin()).abs()).abs() < 1e-3);
+        assert_eq!(apart.plane(0)[1..], [0.0, 0.0]);
+    }
+
+    #[test]
+    fn an_object_is_looked_at_three_times() {
+        let extent = Extent::new(64, 48);
+        let net = Decomposer::with_side(&Weights::initial(&decomposer(), 3), 32).unwrap();
+        let mask = Planes::from_fn(extent, |x, _| [f32::from(u8::from((12..52).contains(&x)))]);
+        let picture = Rgb::new(Planes::from_fn(extent, |x, y| {
+            [x as f32 / 70.0, 0.3, y as f32 / 100.0]
+        }));
+        let trust =
+            TrustMap::of_picture(&picture, &mask, &net, &DecomposeOptions::default()).unwrap();
+        for map in [&trust.unexplained, &trust.mirrored, &trust.rescaled] {
+            assert_eq!(map.pixel(2, 20), [0.0]);
+            assert!(map.pixel(32, 20)[0] > 0.0 && map.plane(0).iter().all(|v| v.is_finite()));
+        }
+    }
 }

@@ -227,3 +227,46 @@ fn shown(picture: &Rgb<Linear>) -> Planes<3> {
     let clipped = Rgb::<Linear>::new(picture.planes().clone().map(|v| v.clamp(0.0, 1.0)));
     clipped.encode::<Srgb>().into_planes()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nets::{Weights, decomposer};
+    use crate::synth::Folders;
+
+    #[test]
+    fn every_method_is_scored_on_every_part_and_the_same_seed_gives_the_same_scores() {
+        let library = Library::read(&Folders::default()).unwrap();
+        let net = Decomposer::with_side(&Weights::initial(&decomposer(), 3), 32).unwrap();
+        let recipe = InsertionRecipe {
+            objects: 1,
+            size: 48,
+            seed: 5,
+        };
+        let mut sheets = Vec::new();
+        let mut evaluate = || {
+            let mut show = |name: &str, tiles: &[Planes<3>]| {
+                sheets.push((name.to_owned(), tiles.len()));
+                Ok(())
+            };
+            evaluate_insertion(&recipe, &library, &net, &mut show, &|| ()).unwrap()
+        };
+        let table = evaluate();
+        assert_eq!(table, evaluate());
+        assert_eq!(table.lines.len(), 4 * InsertionMethod::ALL.len());
+        assert_eq!(sheets[0].1, 3 + InsertionMethod::ALL.len());
+        // The table's top is the same in all, but for shadows.
+        let ground = |method: InsertionMethod| {
+            let line = table
+                .lines
+                .iter()
+                .find(|line| line.method == method.name() && line.part == "ground");
+            line.unwrap().measures[0].value
+        };
+        assert_eq!(
+            ground(InsertionMethod::WithoutEdgeColours),
+            ground(InsertionMethod::Whole)
+        );
+        assert!(ground(InsertionMethod::Naive) > 0.0);
+    }
+}
