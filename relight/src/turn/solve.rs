@@ -600,13 +600,12 @@ impl Alternation<'_> {
 
     fn smoothed(&self, fits: &[PixelFit], round: usize) -> Vec<[f64; 3]> {
         let across = self.curves.extent().width as f64;
-        let first = if self.has_shape {
+        let deviation = if self.has_shape {
             0.0
         } else {
-            FIRST_BLUR * across
+            let fall = BLUR_FALL.powi(round as i32);
+            (FIRST_BLUR * across * fall).max(LEAST_BLUR / self.side as f64)
         };
-        let deviation = first * BLUR_FALL.powi(round as i32);
-        let deviation = deviation.max(LEAST_BLUR / self.side as f64);
         if deviation < 0.3 {
             return fits.iter().map(|fit| fit.normal).collect();
         }
