@@ -93,10 +93,12 @@ impl<const D: usize> Gaussian<D> {
     fn log(&self, sample: &[f32; D]) -> f32 {
         let mut distance = 0.0;
         for row in 0..D {
-            let mut sum = 0.0;
-            for column in 0..=row {
-                sum += self.whitening[row][column] * (sample[column] - self.mean[column]);
-            }
+            let offsets = sample
+                .iter()
+                .zip(&self.mean)
+                .map(|(value, mean)| value - mean);
+            let terms = offsets.zip(&self.whitening[row]).take(row + 1);
+            let sum: f32 = terms.map(|(offset, weight)| weight * offset).sum();
             distance += sum * sum;
         }
         self.log_scale - 0.5 * distance
@@ -297,7 +299,7 @@ mod tests {
         let spread = |at: usize| ((at * 7 % 11) as f32 / 11.0, (at * 5 % 13) as f32 / 13.0);
         let sample = |at: usize| {
             let (dx, dy) = spread(at);
-            if at % 2 == 0 {
+            if at.is_multiple_of(2) {
                 [dx, dy]
             } else {
                 [10.0 + dx, 4.0 + dy]

@@ -11,7 +11,7 @@ use super::lab::LabTable;
 use super::{Iterations, MaskError};
 
 /// The image is halved until it has at most so many pixels.
-const COARSE_PIXELS: usize = 300_000;
+const COARSE_PIXELS: usize = 200_000;
 /// Variance of the colour of equal surfaces.
 const COLOUR_VARIANCE: f64 = 0.1;
 /// Half the width of the band, pixels of the finer image: the coarse edge is uncertain by 2.

@@ -214,10 +214,10 @@ fn a_frame_beyond_the_end_is_reported_with_the_last_one() {
     assert!(said(&output).contains("0 to 2"), "{}", said(&output));
 }
 
-/// A turn of 12 frames: the disc before stripes that move.
+/// A turn of 16 frames: the disc before stripes that move.
 fn turn_video() -> Vec<u8> {
     let mut bytes = format!("YUV4MPEG2 W{WIDTH} H{HEIGHT} F30:1 Ip A1:1 C444\n").into_bytes();
-    for at in 0..12 {
+    for at in 0..16 {
         let luma = |x: u32, y: u32| match in_disc(x, y) {
             true => 200 + ((x + y) % 3) as u8,
             false => 30 + 60 * ((x + 5 * at) / 10 % 4) as u8,
@@ -240,7 +240,7 @@ fn auto_needs_no_hint_and_its_recipe_makes_the_same_files_again() {
     let share = disc_share(mask.as_luma8().unwrap());
     assert!(share > 0.9, "{share}");
     let record: serde_json::Value = serde_json::from_slice(&read(path, "a.json")).unwrap();
-    assert_eq!(record["hints"]["turn_frames"].as_array().unwrap().len(), 12);
+    assert_eq!(record["hints"]["turn_frames"].as_array().unwrap().len(), 16);
     let output = relit_mask(path, &["turn.y4m", "--recipe", "a.json", "-o", "b.png"]);
     assert_eq!(code(&output), 0, "{}", said(&output));
     for (first, second) in [

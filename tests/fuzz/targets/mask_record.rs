@@ -7,7 +7,7 @@
 mod completed;
 
 use libfuzzer_sys::fuzz_target;
-use relit_mask::{MASK_SCHEMA, MaskRecord, RecordedHints};
+use relit_mask::{Hints, MASK_SCHEMA, MaskRecord, RecordedHints};
 
 /// A whole record.
 const WHOLE: &[u8] = include_bytes!("../seeds/mask_record/both.json");
@@ -31,7 +31,8 @@ fn check(bytes: &[u8]) {
     let Ok(hints) = record.hints.hints() else {
         return;
     };
-    assert_eq!(hints.rect(), record.hints.rect);
-    let again = RecordedHints::new(&hints).expect("hints that were read can be recorded");
+    assert_eq!(hints.as_ref().and_then(Hints::rect), record.hints.rect);
+    let again = RecordedHints::new(hints.as_ref(), &record.hints.turn_frames)
+        .expect("hints that were read can be recorded");
     assert_eq!(again.hints().ok(), Some(hints));
 }
