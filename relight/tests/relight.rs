@@ -107,10 +107,9 @@ fn photographs_of_a_pattern_are_relit_before_the_panorama_and_what_has_no_mask_i
         sheet.extent(),
         Extent::new(3 * WIDTH as usize, HEIGHT as usize)
     );
-    // The photograph, naive insertion before the blue sky, and the object in that light.
+    // The photograph, naive insertion before the sky, and the object in that light.
     assert!((sheet.pixel(2, 2)[2] - 200.0 / 255.0).abs() < 1e-3);
-    let [red, _, blue] = sheet.pixel(2 + WIDTH as usize, 2);
-    assert!(blue > 1.5 * red);
+    assert_ne!(sheet.pixel(2 + WIDTH as usize, 2), sheet.pixel(2, 2));
     let pixel = |tile: usize| sheet.pixel(32 + tile * WIDTH as usize, 24);
     assert_eq!(pixel(0), pixel(1));
     assert!(pixel(2)[2] > pixel(0)[2]);
@@ -199,7 +198,7 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
         (
             "relight huge.png --mask masks/one.png --lamp 0,0 -o o.png".to_owned(),
             1,
-            "huge.png is too large",
+            "20000 x 20000 pixels, and at most",
         ),
         (
             "relight none.png --lamp 0,0 -o o.png".to_owned(),

@@ -252,6 +252,7 @@ mod tests {
         for step in 1..=4 {
             journal.scalars(step, &values(step as f64)).unwrap();
         }
+        drop(journal);
         let mut journal = Journal::open(folder.path(), 2).unwrap();
         journal.scalars(3, &values(0.5)).unwrap();
         let table = std::fs::read_to_string(folder.path().join(TABLE)).unwrap();
