@@ -145,6 +145,8 @@ pub struct Run<'a> {
     journal: Option<Journal>,
     guard: Guard,
     step: u64,
+    /// What the task was given beside its settings.
+    inputs: String,
     /// Where the task stands after that step.
     place: String,
     /// Whether something in the data was left out.
@@ -182,6 +184,7 @@ impl<'a> Run<'a> {
             doing: "made",
             source,
         })?;
+        let inputs = task.inputs()?;
         let step = match Checkpoint::read(folder)? {
             None => 0,
             Some(_) if !resume => {
@@ -189,14 +192,15 @@ impl<'a> Run<'a> {
                     path: folder.to_owned(),
                 });
             }
-            Some(checkpoint) => recall(task, &checkpoint, folder)?,
+            Some(checkpoint) => recall(task, &inputs, &checkpoint, folder)?,
         };
         if let Some(group) = &group {
-            agree(group, &facts(task, step)?)?;
+            agree(group, &facts(task, &inputs, step)?)?;
             task.join(group)?;
         }
         let is_first = group.as_ref().is_none_or(ProcessGroup::is_first);
         Ok(Self {
+            inputs,
             place: task.place(),
             task,
             settings,
@@ -457,7 +461,7 @@ impl<'a> Run<'a> {
             task: self.task.name().to_owned(),
             step: self.step,
             settings: self.task.settings(),
-            inputs: self.task.inputs()?,
+            inputs: self.inputs.clone(),
             place: self.place.clone(),
             state,
         }
@@ -482,7 +486,7 @@ impl<'a> Run<'a> {
 }
 
 /// What has to be the same in all processes.
-fn facts(task: &mut dyn Task, step: u64) -> Result<Vec<Fact>, TrainError> {
+fn facts(task: &mut dyn Task, inputs: &str, step: u64) -> Result<Vec<Fact>, TrainError> {
     let version = format!("{} {}", env!("CARGO_PKG_VERSION"), task.name());
     let mut weights = String::new();
     for learner in task.learners() {
@@ -491,14 +495,22 @@ fn facts(task: &mut dyn Task, step: u64) -> Result<Vec<Fact>, TrainError> {
     Ok(vec![
         ("version and task", version),
         ("the settings", task.settings()),
-        ("the turns and the networks that are given", task.inputs()?),
+        (
+            "the turns and the networks that are given",
+            inputs.to_owned(),
+        ),
         ("the steps made before", step.to_string()),
         ("the weights", weights),
     ])
 }
 
 /// Brings a task to a checkpoint; its step.
-fn recall(task: &mut dyn Task, checkpoint: &Checkpoint, folder: &Path) -> Result<u64, TrainError> {
+fn recall(
+    task: &mut dyn Task,
+    inputs: &str,
+    checkpoint: &Checkpoint,
+    folder: &Path,
+) -> Result<u64, TrainError> {
     let other = |fault: String| TrainError::Checkpoint {
         path: Checkpoint::path(folder),
         fault,
@@ -513,7 +525,7 @@ fn recall(task: &mut dyn Task, checkpoint: &Checkpoint, folder: &Path) -> Result
     if let Some(setting) = task.differing_setting(&checkpoint.settings) {
         return Err(other(format!("its settings are others: {setting}")));
     }
-    if checkpoint.inputs != task.inputs()? {
+    if checkpoint.inputs != inputs {
         let fault =
             "it was trained on other turns, or with other networks beside the one that learns";
         return Err(other(fault.to_owned()));
