@@ -10,6 +10,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -621,4 +622,26 @@ fn the_settings_that_come_with_relight_can_be_read() {
     assert_eq!((paper.run.rate, paper.run.batch), (1e-6, 12));
     let ours: DecomposeSettings = read_settings(&folder.join("decompose.toml")).unwrap();
     ours.check().unwrap();
+}
+
+#[test]
+fn the_settings_that_are_printed_are_the_defaults_and_can_be_read_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("settings.toml");
+    for verb in ["decompose", "spec", "normal", "light", "joint", "specular"] {
+        let print = |more: &[&str]| {
+            let output = Command::new(env!("CARGO_BIN_EXE_relight"))
+                .args(["train", verb, "--print-settings"])
+                .args(more)
+                .output()
+                .unwrap();
+            let errors = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "{verb}: {errors}");
+            String::from_utf8(output.stdout).unwrap()
+        };
+        let defaults = print(&[]);
+        assert!(defaults.contains("[run]\nseed = 1\n"), "{defaults}");
+        fs::write(&file, &defaults).unwrap();
+        assert_eq!(print(&["--settings", file.to_str().unwrap()]), defaults);
+    }
 }

@@ -141,6 +141,8 @@ pub fn first_singular_values(rows: &Tensor) -> Result<Tensor, TrainError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::collection::vec;
+    use proptest::prelude::*;
 
     fn random(shape: &[i64]) -> Tensor {
         tch::manual_seed(3);
@@ -201,6 +203,40 @@ mod tests {
             let found = low_rank_loss(&rows, &ones, form).unwrap().double_value(&[]);
             let wanted = wanted.mean(None).double_value(&[]);
             assert!((found - wanted).abs() < 1e-5, "{found} {wanted}");
+        }
+    }
+
+    proptest! {
+        /// Theorem 1: no `b c^T` is nearer to R. For a given b, the best c is `R^T b / |b|^2`.
+        #[test]
+        fn no_other_matrix_of_rank_one_is_nearer(
+            entries in vec(-2.0..2.0_f64, 5 * 9),
+            direction in vec(-1.0..1.0_f64, 5),
+            toward in 0.0..1.0_f64,
+        ) {
+            let rows = Tensor::from_slice(&entries).view([1, 5, 9]);
+            let best = first_singular_vector(&rows).unwrap();
+            // Any direction, and directions close to the best one.
+            let b = Tensor::from_slice(&direction).view([1, 5, 1]) * (1.0 - toward) + best * toward;
+            let square = b.square().sum(None).double_value(&[]);
+            prop_assume!(square > 1e-6);
+            let c = b.transpose(1, 2).matmul(&rows) / square;
+            let distance = (&rows - b.matmul(&c)).square().sum(None).double_value(&[]);
+            // Of two equal singular values, either vector is right; 256th powers leave a little of the second.
+            prop_assert!(loss(&rows) <= distance * (1.0 + 1e-4), "{} {distance}", loss(&rows));
+        }
+
+        /// What a light does to a row, making it brighter or darker, is neither a gain nor a loss where the
+        /// rows belong together: the rest of rank-one rows that were scaled, and then disturbed, is at most the disturbance.
+        #[test]
+        fn scaled_rows_with_a_disturbance_cost_at_most_the_disturbance(
+            factors in vec(0.1..3.0_f64, 6),
+            disturbance in vec(-0.1..0.1_f64, 6 * 9),
+        ) {
+            let rows = Tensor::from_slice(&factors).view([1, 6, 1]).matmul(&random(&[1, 1, 9]));
+            let disturbance = Tensor::from_slice(&disturbance).view([1, 6, 9]);
+            let most = disturbance.square().sum(None).double_value(&[]);
+            prop_assert!(loss(&(rows + disturbance)) <= most * (1.0 + 1e-4));
         }
     }
 

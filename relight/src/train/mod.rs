@@ -26,6 +26,7 @@ mod guard;
 mod held_out;
 mod joint;
 mod journal;
+mod labelled;
 mod launch;
 mod learner;
 pub mod losses;

@@ -11,6 +11,7 @@ use super::composed::{ComposedBatches, composition, window_settings};
 use super::decompose_task::Resources;
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, HeldOutTurns, highlight_figures, rank_figures};
+use super::labelled::LabelledFrames;
 use super::learner::{Learner, LearnerSettings};
 use super::losses::{Mean, angular_degrees};
 use super::low_rank::chromaticity;
@@ -37,6 +38,8 @@ pub struct PaperInputs {
     pub turns: Option<PathBuf>,
     /// A data set of turns that the networks are judged by, and that should not be among `turns`.
     pub held_out: Option<PathBuf>,
+    /// Frames with labels, in the layout of `relight synth`.
+    pub labels: Option<PathBuf>,
     /// Weights to begin with.
     pub weights: Option<Weights>,
     /// Spec-Net's weights.
@@ -57,6 +60,7 @@ pub struct PaperTask {
     learner: Learner,
     composed: ComposedBatches,
     turns: Option<TurnReader>,
+    labels: Option<LabelledFrames>,
     share: Share,
     held_out_samples: HeldOutSamples,
     held_out_turns: Option<HeldOutTurns>,
@@ -103,6 +107,11 @@ impl PaperTask {
                 phase: phase.name(),
             });
         }
+        if inputs.labels.is_some() && phase == PaperPhase::Specular {
+            return Err(TrainError::NotLabelled {
+                phase: phase.name(),
+            });
+        }
         let graph = learned(phase);
         let initial = || Weights::initial(&graph, settings.run.seed);
         let weights = inputs.weights.clone().unwrap_or_else(initial);
@@ -114,6 +123,7 @@ impl PaperTask {
         };
         let seed = stream(settings.run.seed, 31);
         let open = |path: &PathBuf| TurnReader::open(path, seed);
+        let labels = |path: &PathBuf| LabelledFrames::open(path, stream(settings.run.seed, 32));
         let held_out = |path: &PathBuf| {
             HeldOutTurns::read(path, precision(&settings).kind(), resources.device)
         };
@@ -136,6 +146,7 @@ impl PaperTask {
                 resources.clone(),
             ),
             turns: inputs.turns.as_ref().map(open).transpose()?,
+            labels: inputs.labels.as_ref().map(labels).transpose()?,
             share: Share::ALL,
             settings,
             resources,
@@ -167,7 +178,7 @@ impl PaperTask {
                 losses.batch.insert(name, turns.picture);
             }
         }
-        losses.damage = (!damage.is_empty()).then(|| damage.join("; "));
+        losses.add_damage(&damage);
         let weight = self.settings.loss.low_rank;
         if values.is_empty() {
             losses.terms.add_nothing("turns", weight);
@@ -175,6 +186,32 @@ impl PaperTask {
             let over = Tensor::f_from_slice(&[values.len() as i64])?;
             let value = Tensor::f_stack(&values, 0)?.f_mean(None)?;
             losses.terms.add_mean("turns", weight, Mean { value, over });
+        }
+        Ok(())
+    }
+
+    /// The loss on this process's frames with labels of a step.
+    fn on_labels(&self, step: u64, losses: &mut StepLosses) -> Result<(), TrainError> {
+        let Some(labels) = &self.labels else {
+            return Ok(());
+        };
+        let weight = self.settings.loss.labels;
+        let drawn = labels.batch(step, self.settings.turns.labelled);
+        losses.add_damage(&drawn.damage);
+        let frames = drawn.drawn();
+        let batch = match frames.as_slice() {
+            [] => None,
+            frames => Some(TruthBatch::new(frames, self.kind(), self.resources.device)?),
+        };
+        let loss = batch
+            .as_ref()
+            .map(|batch| self.phase.on_truth(&self.learner.model, batch));
+        match loss.transpose()?.flatten() {
+            Some(loss) => losses.terms.add_mean("labels", weight, loss.mean),
+            None => losses.terms.add_nothing("labels", weight),
+        }
+        for (name, tensor) in batch.iter().flat_map(TruthBatch::named) {
+            losses.batch.insert(format!("labels.{name}"), tensor);
         }
         Ok(())
     }
@@ -366,6 +403,10 @@ impl Task for PaperTask {
             .turns
             .as_ref()
             .map_or(String::new(), TurnReader::identity);
+        inputs += &self
+            .labels
+            .as_ref()
+            .map_or(String::new(), LabelledFrames::identity);
         for model in self.phase.given() {
             inputs += &fingerprint(model.parameters())?;
         }
@@ -388,6 +429,9 @@ impl Task for PaperTask {
             }
             reader.take_share(share)?;
         }
+        if let Some(labels) = &mut self.labels {
+            labels.take_share(share);
+        }
         self.share = share;
         Ok(())
     }
@@ -404,6 +448,7 @@ impl Task for PaperTask {
             losses.batch.extend(batch.named());
         }
         self.on_turns(&mut losses)?;
+        self.on_labels(step, &mut losses)?;
         Ok(losses)
     }
 

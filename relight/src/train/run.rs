@@ -97,6 +97,17 @@ pub struct StepLosses {
     pub damage: Option<String>,
 }
 
+impl StepLosses {
+    /// Adds what was damaged in a part of the data.
+    pub(super) fn add_damage(&mut self, damage: &[String]) {
+        if !damage.is_empty() {
+            let earlier = self.damage.take();
+            let all: Vec<&str> = earlier.iter().chain(damage).map(String::as_str).collect();
+            self.damage = Some(all.join("; "));
+        }
+    }
+}
+
 /// What a validation gives.
 #[derive(Debug, Default)]
 pub struct Validation {

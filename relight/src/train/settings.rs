@@ -177,6 +177,8 @@ pub struct PaperLosses {
     pub low_rank: f64,
     /// The loss on composed samples beside turns; 0: none is composed.
     pub anchor: f64,
+    /// The loss on frames with labels.
+    pub labels: f64,
     /// Which low-rank loss.
     pub form: LowRankForm,
 }
@@ -186,6 +188,7 @@ impl Default for PaperLosses {
         Self {
             low_rank: 1.0,
             anchor: 1.0,
+            labels: 1.0,
             form: LowRankForm::Squared,
         }
     }
@@ -197,11 +200,16 @@ impl Default for PaperLosses {
 pub struct TurnSettings {
     /// Groups of a step, at least 1, each of 12 frames of one turn.
     pub groups: u64,
+    /// Frames with labels of a step, at least 1, where there are labels.
+    pub labelled: u64,
 }
 
 impl Default for TurnSettings {
     fn default() -> Self {
-        Self { groups: 1 }
+        Self {
+            groups: 1,
+            labelled: 8,
+        }
     }
 }
 
@@ -230,14 +238,19 @@ impl PaperSettings {
         check_weights(&[
             ("loss.low_rank", self.loss.low_rank),
             ("loss.anchor", self.loss.anchor),
+            ("loss.labels", self.loss.labels),
         ])?;
-        let groups = self.turns.groups;
-        if !(1..=MOST_SAMPLES).contains(&groups) {
-            return Err(TrainError::Setting {
-                name: "turns.groups",
-                value: groups.to_string(),
-                allowed: "from 1 to a million",
-            });
+        for (name, value) in [
+            ("turns.groups", self.turns.groups),
+            ("turns.labelled", self.turns.labelled),
+        ] {
+            if !(1..=MOST_SAMPLES).contains(&value) {
+                return Err(TrainError::Setting {
+                    name,
+                    value: value.to_string(),
+                    allowed: "from 1 to a million",
+                });
+            }
         }
         Ok(())
     }

@@ -82,6 +82,9 @@ struct PaperArguments {
     /// Turns that are not trained on: validations say how near to rank one their reflectance is.
     #[arg(long, value_name = "SHARDS")]
     held_out: Option<PathBuf>,
+    /// Frames with labels, as relight turn --labels and relight synth write them, beside turns and composed samples.
+    #[arg(long, value_name = "FOLDER")]
+    labels: Option<PathBuf>,
     /// Spec-Net's weights, for light, joint and specular.
     #[arg(long, value_name = "FILE")]
     spec: Option<PathBuf>,
@@ -100,11 +103,9 @@ struct RunArguments {
         short,
         long,
         value_name = "RUN",
-        required_unless_present = "print_settings",
-        default_value = "",
-        hide_default_value = true
+        required_unless_present = "print_settings"
     )]
-    output: PathBuf,
+    output: Option<PathBuf>,
     /// Settings, a TOML file; what it does not name has its default.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
@@ -198,6 +199,7 @@ fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> Com
     let inputs = PaperInputs {
         turns: arguments.turns.clone(),
         held_out: arguments.held_out.clone(),
+        labels: arguments.labels.clone(),
         weights: read_weights(arguments.run.weights.as_deref())?,
         spec: read_weights(arguments.spec.as_deref())?,
         normal: read_weights(arguments.normal.as_deref())?,
@@ -218,6 +220,12 @@ impl RunArguments {
         self.settings
             .as_deref()
             .map_or_else(|| Ok(S::default()), read_settings)
+    }
+
+    fn folder(&self) -> Result<&Path, &'static str> {
+        self.output
+            .as_deref()
+            .ok_or("--output RUN is missing: where the run is kept")
     }
 
     /// Meets the other processes that a launcher has started, if it has; sets the number of the network's threads.
@@ -257,7 +265,8 @@ fn train(
     let stop = processes.resources.stop;
     let group = processes.group;
     let process = group.as_ref().map_or(0, |group| group.share().index());
-    let run = Run::open_among(task, settings, &arguments.output, arguments.resume, group)?;
+    let folder = arguments.folder()?;
+    let run = Run::open_among(task, settings, folder, arguments.resume, group)?;
     if process > 0 {
         let outcome = run.finish(&stop, &mut OtherProcess { console, process })?;
         return Ok(outcome_of(&outcome));
