@@ -6,6 +6,7 @@
 //!
 //! | module | concern |
 //! | --- | --- |
+//! | [`asset`] | a captured object in one file, ready to be lit |
 //! | [`data`] | shards and folders as streams of arrays |
 //! | [`decompose`] | a photograph into normals, albedo, shading, highlight and light |
 //! | [`eval`] | the protocols of the paper's tables |
@@ -17,6 +18,7 @@
 //! | [`nets`] | the networks as data, their weights in files, inference |
 //! | [`render`] | diffuse and specular layers on normals, their derivatives, the truth by Monte Carlo |
 //! | [`synth`] | pictures of objects with the truth that they were made of |
+pub mod asset;
 pub mod data;
 pub mod decompose;
 pub mod eval;

@@ -11,9 +11,11 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
-use relight::image::{ColourSpace, Extent, Planes, Srgb, read_planes, write_exr};
-use relight::light::{Order, Panorama, ShLight};
+use relight::asset::Asset;
+use relight::image::{ColourSpace, Extent, Planes, Rgb as Picture, Srgb, read_planes, write_exr};
+use relight::light::{Normals, Order, Panorama, ShLight};
 use relight::nets::{WeightPrecision, Weights, decomposer};
+use relight::render::Surface;
 
 const WIDTH: u32 = 64;
 const HEIGHT: u32 = 48;
@@ -327,6 +329,32 @@ fn objects_are_inserted_from_back_to_front_by_options_and_by_a_scene_file() {
         image::open(folder.path("deep.png")).unwrap().color(),
         image::ColorType::Rgb16
     );
+}
+
+#[test]
+fn a_captured_object_is_inserted_beside_photographs_and_needs_no_mask() {
+    let folder = Folder::new();
+    let normals = Normals::sphere(40);
+    let full = Planes::filled(normals.extent(), [1.0]);
+    let albedo = Picture::new(Planes::filled(normals.extent(), [0.7, 0.1, 0.1]));
+    let surface = Surface::new(normals, albedo, None).unwrap();
+    let asset = Asset::new("red", surface, full.clone(), full).unwrap();
+    asset.write(&folder.path("red.relit")).unwrap();
+    let common = "--into sky.exr --size 96,64 --height 0.5 --weights w.safetensors -o";
+    let command = format!("insert photos/one.png red.relit --mask masks {common} both.png");
+    assert_eq!(folder.told(&command), (0, String::new()));
+    let (picture, _) = read_planes(&folder.path("both.png")).unwrap();
+    let red = picture.pixel(72, 42);
+    // In light as blue as this, paper would be blue.
+    assert!(red[0] > red[2], "{red:?}");
+
+    let command = format!("insert red.relit --mask masks/one.png {common} none.png");
+    let (code, errors) = folder.told(&command);
+    assert!(code == 1 && errors.contains("its own mask"), "{errors}");
+    fs::write(folder.path("red.relit"), b"PK").unwrap();
+    let (code, errors) = folder.told(&format!("insert red.relit {common} none.png"));
+    assert!(code == 1 && errors.contains("red.relit"), "{errors}");
+    assert!(!folder.path("none.png").exists());
 }
 
 #[test]

@@ -81,7 +81,7 @@ pub struct LightDescription {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectDescription {
-    /// Its photograph.
+    /// Its photograph, or a captured object (`.relit`).
     pub photo: PathBuf,
     /// Its mask in it.
     #[serde(default)]

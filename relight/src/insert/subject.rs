@@ -4,10 +4,13 @@ use super::InsertError;
 use super::matte::Matte;
 use super::smooth::weighted_mean;
 use super::source::likeness;
-use crate::decompose::{DecomposeOptions, Decomposer, Decomposition, Region};
+use crate::asset::Asset;
+use crate::decompose::{DecomposeError, DecomposeOptions, Decomposer, Decomposition, Region};
 use crate::image::{Extent, Linear, Planes, Rgb};
-use crate::light::{Normals, ShLight, YUp};
-use crate::render::{DiffuseForm, DiffuseLayer, Gloss, LobeLayer, mirror_reflectance};
+use crate::light::{Normals, Order, ShLight, YUp};
+use crate::render::{
+    DiffuseForm, DiffuseLayer, Gloss, LobeLayer, exposure_for, mirror_reflectance,
+};
 
 /// Added to irradiance, whose mean on the object is 1, before ratios of it are taken.
 const DARK: f32 = 0.05;
@@ -159,6 +162,39 @@ impl Subject {
         let foreground = Rgb::new(cut.matte.foreground.clone());
         let found = decomposer.decompose(&foreground, &cut.mask, options)?;
         Self::of_parts(cut, &found)
+    }
+
+    /// A captured object, whose maps are known. It counts as photographed in even light of irradiance 1, in which it looks as
+    /// its albedo is; its gloss is the mean over what it covers.
+    ///
+    /// # Errors
+    /// Where it covers no pixel by a half.
+    pub fn of_asset(asset: &Asset) -> Result<Self, InsertError> {
+        let (extent, surface) = (asset.extent(), asset.surface());
+        let mask = asset.alpha().clone().map(|a| f32::from(u8::from(a >= 0.5)));
+        let covered: Vec<usize> = (0..extent.pixels())
+            .filter(|&at| mask.plane(0)[at] > 0.0)
+            .collect();
+        if covered.is_empty() {
+            return Err(DecomposeError::EmptyMask.into());
+        }
+        let wanted: Vec<bool> = asset.alpha().plane(0).iter().map(|&a| a > 0.0).collect();
+        let albedo = surface.albedo().planes().clone();
+        let light = even_light();
+        let ones = Planes::filled(extent, [1.0]);
+        Ok(Self {
+            place: [0, 0],
+            photo: extent,
+            mask,
+            matte: Matte::of_cut_out(&albedo, asset.alpha()),
+            normals: surface.normals().completed(&wanted),
+            albedo,
+            shading: Shading::new(&ones, &Planes::filled(extent, [1.0; 3]), &wanted),
+            highlight: Planes::zeros(extent),
+            gloss: surface.gloss().map(|gloss| mean_gloss(gloss, &covered)),
+            rest: Planes::zeros(extent),
+            light,
+        })
     }
 
     /// The layers of a cut-out part, continued over its soft edge.
@@ -510,7 +546,7 @@ impl Cut {
             }
         }
         check_light(photo)?;
-        let region = Region::around(mask).ok_or(crate::decompose::DecomposeError::EmptyMask)?;
+        let region = Region::around(mask).ok_or(DecomposeError::EmptyMask)?;
         let edge = Matte::edge_for(region.extent());
         let margin = 4 * edge + 4;
         let (place, extent) = window(&region, margin, expected);
@@ -570,6 +606,24 @@ fn cropped<const C: usize>(image: &Planes<C>, place: [usize; 2], extent: Extent)
         }
     }
     part
+}
+
+/// Light from everywhere, of which a white matt surface is 1.
+fn even_light() -> ShLight {
+    let light = ShLight::even(Order::TWO, [1.0; 3]);
+    let exposure = f64::from(exposure_for(&light));
+    light.tinted([exposure; 3])
+}
+
+fn mean_gloss(gloss: &Gloss, covered: &[usize]) -> ObjectGloss {
+    let mean = |plane: &[f32]| {
+        let sum: f64 = covered.iter().map(|&at| f64::from(plane[at])).sum();
+        (sum / covered.len() as f64) as f32
+    };
+    ObjectGloss {
+        reflectance: gloss.reflectance().planes().map(mean),
+        smoothness: mean(gloss.smoothness().plane(0)).max(1.0),
+    }
 }
 
 fn lobes(

@@ -1,12 +1,14 @@
 //! Objects relit by a network that is not trained: these tests are about what holds for any decomposition.
 
+use crate::asset::Asset;
 use crate::decompose::{DecomposeOptions, Decomposer, SpecularGate};
 use crate::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use crate::insert::{
     InsertError, Lamp, LightSource, MaterialChange, ObjectGloss, Subject, exposure_between,
 };
-use crate::light::{Direction, Rotation};
+use crate::light::{Direction, Normals, Rotation};
 use crate::nets::{Weights, decomposer};
+use crate::render::Surface;
 
 const EXTENT: Extent = Extent::new(90, 70);
 
@@ -183,4 +185,47 @@ fn what_is_no_photograph_is_refused() {
         LightSource::Coefficients(crate::light::ShLight::dark(crate::light::Order::TWO)).light(),
         Err(InsertError::Dark)
     ));
+}
+
+/// A captured ball of one colour.
+fn captured_ball() -> Asset {
+    let normals = Normals::sphere(33);
+    let extent = normals.extent();
+    let alpha = Planes::from_fn(extent, |x, y| {
+        let far = (x as f64 - 16.0).hypot(y as f64 - 16.0);
+        [(16.5 - far).clamp(0.0, 1.0) as f32]
+    });
+    let albedo = Rgb::new(Planes::filled(extent, [0.6, 0.3, 0.1]));
+    let surface = Surface::new(normals, albedo, None).unwrap();
+    Asset::new("ball", surface, alpha.clone(), alpha).unwrap()
+}
+
+#[test]
+fn a_captured_object_has_the_colours_of_its_albedo_in_even_light_and_is_bright_where_a_lamp_is() {
+    let subject = Subject::of_asset(&captured_ball()).unwrap();
+    let none = MaterialChange::default();
+    let even = subject.relit(subject.light(), &none).unwrap();
+    for (found, wanted) in even.pixel(12, 20).into_iter().zip([0.6, 0.3, 0.1]) {
+        assert!((found - wanted).abs() < 1e-3, "{found} {wanted}");
+    }
+    let lamp = LightSource::Lamp(Lamp {
+        azimuth: 90.0,
+        ..Lamp::default()
+    });
+    let light = lamp.light().unwrap();
+    let scale = f64::from(exposure_between(subject.light(), &light));
+    let lit = subject.relit(&light.tinted([scale; 3]), &none).unwrap();
+    let (right, left) = (lit.pixel(28, 16)[0], lit.pixel(4, 16)[0]);
+    assert!(right > 2.0 * left, "{right} {left}");
+    // Where the light is strongest it is as bright as in even light.
+    let brightest = lit.plane(0).iter().fold(0.0_f32, |a, &b| a.max(b));
+    assert!((brightest - 0.6).abs() < 0.05, "{brightest}");
+}
+
+#[test]
+fn a_captured_object_that_covers_nothing_is_refused() {
+    let ball = captured_ball();
+    let nothing = Planes::zeros(ball.extent());
+    let empty = Asset::new("none", ball.surface().clone(), nothing.clone(), nothing).unwrap();
+    assert!(Subject::of_asset(&empty).is_err());
 }

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{ArgAction, Args};
+use relight::asset::Asset;
 use relight::decompose::{Photo, PhotoInput, PhotoReading};
 use relight::image::{Extent, Linear, Planes, Rgb, StoredImage, Transfer};
 use relight::insert::{
@@ -30,6 +31,8 @@ Examples:
       two objects, from back to front, in a panorama; their masks are masks/bear.png and masks/cup.png
   relight insert cup.jpg --mask cup-mask.png --into room.jpg --lamp 60,30 -o out.exr
       in the light of a lamp
+  relight insert object.relit --into room.hdr -o out.png
+      an object that relight turn --asset has written
   relight insert --scene scene.toml -o out.png
       all of it from a file (docs/insert.md)";
 
@@ -249,7 +252,10 @@ impl ObjectArguments {
         // Beside each other, where nothing is said.
         let across = (number as f64 + 0.5) / photos.len() as f64;
         ObjectDescription {
-            mask: of(&self.mask, number).map(|mask| own_mask(&mask, &photo)),
+            mask: of(&self.mask, number)
+                // A folder of masks is for the photographs.
+                .filter(|mask| !(is_captured(&photo) && mask.is_dir()))
+                .map(|mask| own_mask(&mask, &photo)),
             at: of(&self.at, number).unwrap_or([across, 0.9]),
             height: of(&self.height, number).unwrap_or(0.4),
             rotation: of(&self.rotate, number).unwrap_or(0.0),
@@ -268,6 +274,12 @@ fn of<T: Clone>(given: &[T], number: usize) -> Option<T> {
         [one] => Some(one.clone()),
         many => many.get(number).cloned(),
     }
+}
+
+/// Whether a file is a captured object, which `relight turn --asset` writes.
+fn is_captured(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("relit"))
 }
 
 /// The mask of a photograph in a folder of masks.
@@ -289,7 +301,7 @@ enum Background {
 pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let (scene, folder) = arguments.description()?;
     let file = |path: &Path| folder.join(path);
-    let photos = scene
+    let sources = scene
         .objects
         .iter()
         .map(|object| load(object, &folder))
@@ -301,7 +313,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     );
     check_output(&background, is_movie, arguments)?;
     let mut work = Work::new(&scene, background, &folder, &arguments.network)?;
-    let subjects = work.subjects(&scene, photos)?;
+    let subjects = work.subjects(&scene, sources)?;
     let objects = scene.objects.iter().zip(&subjects);
     let objects = objects.map(|(object, subject)| SceneObject {
         subject,
@@ -330,20 +342,33 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     Ok(Outcome::Whole)
 }
 
-fn load(object: &ObjectDescription, folder: &Path) -> Result<Photo, Box<dyn Error>> {
+/// What an object is made of.
+enum Source {
+    Photo(Photo),
+    Captured(Box<Asset>),
+}
+
+fn load(object: &ObjectDescription, folder: &Path) -> Result<Source, Box<dyn Error>> {
+    let path = folder.join(&object.photo);
+    if is_captured(&path) {
+        if object.mask.is_some() {
+            return Err(format!("{}: it has its own mask, give none", path.display()).into());
+        }
+        return Ok(Source::Captured(Box::new(Asset::read(&path)?)));
+    }
     let reading = PhotoReading {
         mask: object.mask.as_ref().map(|mask| folder.join(mask)),
         ..PhotoReading::default()
     };
-    let path = folder.join(&object.photo);
     let photo = PhotoInput::File(path.clone()).load(&reading);
-    Ok(photo.map_err(|error| {
+    let photo = photo.map_err(|error| {
         format!(
             "{}: {}",
             path.display(),
             relit_data::causes::with_causes(&error)
         )
-    })?)
+    })?;
+    Ok(Source::Photo(photo))
 }
 
 fn read_background(path: &Path, scene: &SceneDescription) -> Result<Background, Box<dyn Error>> {
@@ -486,9 +511,13 @@ impl Work {
     fn subjects(
         &self,
         scene: &SceneDescription,
-        photos: Vec<Photo>,
+        sources: Vec<Source>,
     ) -> Result<Vec<Subject>, Box<dyn Error>> {
-        let subject = |(object, photo): (&ObjectDescription, Photo)| {
+        let subject = |(object, source): (&ObjectDescription, Source)| {
+            let photo = match source {
+                Source::Photo(photo) => photo,
+                Source::Captured(asset) => return Ok(Subject::of_asset(&asset)?),
+            };
             let wanted = object.height * self.extent.height as f64 * RESERVE;
             let Extent { width, height } = photo.picture.planes().extent();
             let own = object_height(&photo.mask) as f64;
@@ -497,7 +526,7 @@ impl Work {
                 .network
                 .subject(&at_most(photo, Some((longest as usize).max(32))))?)
         };
-        scene.objects.iter().zip(photos).map(subject).collect()
+        scene.objects.iter().zip(sources).map(subject).collect()
     }
 
     /// Writes the picture or the video; how many frames it has.
