@@ -821,3 +821,34 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
     );
     assert!(fs::metadata(folder.path("w.onnx")).unwrap().len() > 1_000_000);
 }
+
+#[test]
+fn photographs_side_by_side_come_out_as_one_by_one() {
+    let folder = Folder::new();
+    let weights = Weights::initial(&decomposer(), 3);
+    weights
+        .write(&folder.path("w.safetensors"), WeightPrecision::Half)
+        .unwrap();
+    fs::create_dir(folder.path("photos")).unwrap();
+    for (name, shade) in [("a", 0), ("b", 3), ("c", 6), ("d", 90), ("e", 9)] {
+        object(shade)
+            .save(folder.path(&format!("photos/{name}.png")))
+            .unwrap();
+    }
+    for threads in ["1", "3"] {
+        let command =
+            format!("decompose photos --weights w.safetensors --threads {threads} -o {threads}");
+        let (code, errors) = code_and_errors(&relight(&folder, &command));
+        assert_eq!((code, errors.lines().count()), (3, 1), "{errors}");
+        assert!(errors.contains("photos/d.png"), "{errors}");
+    }
+    assert_eq!(names_in(&folder.path("1")), ["a", "b", "c", "e"]);
+    for name in names_in(&folder.path("1")) {
+        let [one, three] = ["1", "3"].map(|threads| folder.path(threads).join(&name));
+        assert_eq!(names_in(&one), names_in(&three));
+        for file in names_in(&one) {
+            let [one, three] = [&one, &three].map(|results| fs::read(results.join(&file)).unwrap());
+            assert!(one == three, "{name}/{file}");
+        }
+    }
+}

@@ -5,17 +5,23 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
 use relight::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, DecompositionFigures, DecompositionFiles,
     MaskSource, PhotoInput, PhotoReading, Rectangle, SpecularGate, WORKING_SIDE, WorkingSize,
 };
 use relight::nets::{InferenceEngine, NetError, OnnxRuntime, Weights};
 use relit_data::causes::with_causes;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::cli::console::{CommandResult, Console, Outcome};
 use crate::cli::values::{TransferName, YName};
+
+/// Each photograph takes its memory, gigabytes where it is large.
+const MOST_SIDE_BY_SIDE: usize = 4;
 
 pub(in crate::cli) const EXAMPLES: &str = "\
 Examples:
@@ -71,6 +77,9 @@ pub(in crate::cli) struct Arguments {
     /// Of each shard the first so many samples, which are spread over the turn.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     count: Option<u32>,
+    /// How many photographs are decomposed side by side [default: as many as there are cores, at most 4].
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
+    threads: Option<usize>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -215,26 +224,43 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     if !run.own_folders
         && let [input] = inputs.as_slice()
     {
-        run.decompose(input, console)?;
+        let done = run.decompose(input)?;
+        console.say(&done.text, &done.event);
         return Ok(Outcome::Whole);
     }
     let bar = console.progress(inputs.len() as u64, "photographs");
-    let mut lost = 0;
-    for input in &inputs {
-        if let Err(error) = bar.suspend(|| run.decompose(input, console)) {
-            lost += 1;
-            let text = format!("{}: {}", input.place(), with_causes(&error));
-            let event = json!({ "event": "failed", "photo": input.place(), "message": with_causes(&error) });
-            bar.suspend(|| console.warn(&text, &event));
-        }
+    let decompose = |input: &PhotoInput| {
+        let result = run.decompose(input);
+        bar.suspend(|| match &result {
+            Ok(done) => console.say(&done.text, &done.event),
+            Err(error) => {
+                let message = with_causes(error);
+                let text = format!("{}: {message}", input.place());
+                let event =
+                    json!({ "event": "failed", "photo": input.place(), "message": message });
+                console.warn(&text, &event);
+            }
+        });
         bar.inc(1);
-    }
+        result.is_err()
+    };
+    let side_by_side = arguments
+        .threads
+        .unwrap_or_else(|| rayon::current_num_threads().min(MOST_SIDE_BY_SIDE));
+    let threads = ThreadPoolBuilder::new().num_threads(side_by_side).build()?;
+    let lost = threads.install(|| inputs.par_iter().filter(|&input| decompose(input)).count());
     bar.finish_and_clear();
     match lost {
         0 => Ok(Outcome::Whole),
         _ if lost == inputs.len() => Err("no photograph could be decomposed".into()),
         _ => Ok(Outcome::Incomplete),
     }
+}
+
+/// What is said of a photograph.
+struct Decomposed {
+    text: String,
+    event: Value,
 }
 
 /// All that is the same for every photograph.
@@ -264,7 +290,7 @@ impl Run {
         })
     }
 
-    fn decompose(&self, input: &PhotoInput, console: Console) -> Result<(), DecomposeError> {
+    fn decompose(&self, input: &PhotoInput) -> Result<Decomposed, DecomposeError> {
         let photo = input.load(&self.reading)?;
         let out = if self.own_folders {
             self.output.join(&photo.name)
@@ -309,8 +335,7 @@ impl Run {
             "engine": self.decomposer.engine().name(),
             "figures": figures,
         });
-        console.say(&text, &event);
-        Ok(())
+        Ok(Decomposed { text, event })
     }
 }
 
