@@ -25,9 +25,7 @@ pub enum MovieFormat {
 #[derive(Debug, thiserror::Error)]
 pub enum MovieError {
     /// The program is not there.
-    #[error(
-        "a video needs the program ffmpeg, which cannot be started; install it, or give a folder for PNG frames"
-    )]
+    #[error("a video needs the program ffmpeg, which cannot be started: install it")]
     NoProgram(#[source] io::Error),
     /// The program failed.
     #[error("ffmpeg could not write {}: {said}", path.display())]
@@ -108,7 +106,7 @@ pub struct MovieWriter {
     partial: PathBuf,
     extent: Extent,
     program: Child,
-    errors: Option<JoinHandle<String>>,
+    errors: Option<JoinHandle<Option<String>>>,
 }
 
 impl MovieWriter {
@@ -183,8 +181,10 @@ impl MovieWriter {
     pub fn finish(mut self) -> Result<(), MovieError> {
         drop(self.program.stdin.take());
         let is_done = self.program.wait().is_ok_and(|status| status.success());
-        if !is_done {
-            return Err(self.failure());
+        let said = self.said();
+        // On a full disk ffmpeg says so, ends without an error, and leaves a file that no player opens.
+        if !is_done || said.is_some() {
+            return Err(self.failed(said));
         }
         let published = File::open(&self.partial)
             .and_then(|file| file.sync_all())
@@ -197,10 +197,18 @@ impl MovieWriter {
 
     fn failure(&mut self) -> MovieError {
         drop(self.program.stdin.take());
-        let said = self.errors.take().and_then(|thread| thread.join().ok());
+        let said = self.said();
+        self.failed(said)
+    }
+
+    fn said(&mut self) -> Option<String> {
+        self.errors.take()?.join().ok()?
+    }
+
+    fn failed(&self, said: Option<String>) -> MovieError {
         MovieError::Failed {
             path: self.path.clone(),
-            said: said.unwrap_or_default(),
+            said: said.unwrap_or_else(|| SILENT.to_owned()),
         }
     }
 }
@@ -224,7 +232,7 @@ pub struct MovieReader {
     extent: Extent,
     frames_per_second: u32,
     program: Child,
-    errors: Option<JoinHandle<String>>,
+    errors: Option<JoinHandle<Option<String>>>,
 }
 
 impl MovieReader {
@@ -313,7 +321,7 @@ impl MovieReader {
         let said = self.errors.take().and_then(|thread| thread.join().ok());
         MovieError::NoVideo {
             path: self.path.clone(),
-            said: said.unwrap_or_default(),
+            said: said.flatten().unwrap_or_else(|| SILENT.to_owned()),
         }
     }
 }
@@ -370,14 +378,17 @@ fn partial_name(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
+/// What is said of a program that said nothing.
+const SILENT: &str = "it ended without a word";
+
 /// Reads all that a program writes, and keeps its last line.
-fn last_line(mut pipe: ChildStderr) -> String {
+fn last_line(mut pipe: ChildStderr) -> Option<String> {
     let mut bytes = Vec::new();
     // What was read before an error is all there is to say.
     let _ = pipe.read_to_end(&mut bytes);
     let text = String::from_utf8_lossy(&bytes);
     let last = text.lines().rfind(|line| !line.trim().is_empty());
-    last.unwrap_or("it ended without a word").trim().to_owned()
+    Some(last?.trim().to_owned())
 }
 
 #[cfg(test)]

@@ -148,6 +148,10 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
     let extent = Extent::new(WIDTH as usize, HEIGHT as usize);
     let odd = Planes::from_fn(extent, |x, _| [if x == 5 { f32::NAN } else { 0.5 }; 3]);
     write_exr(&folder.path("odd.exr"), &odd).unwrap();
+    let sky = Planes::from_fn(Extent::new(32, 16), |x, _| {
+        [if x == 5 { f32::NAN } else { 0.5 }; 3]
+    });
+    write_exr(&folder.path("odd-sky.exr"), &sky).unwrap();
     let black = Panorama::of_light(&ShLight::dark(Order::TWO), Extent::new(32, 16));
     black.image().write_exr(&folder.path("black.exr")).unwrap();
     fs::write(folder.path("text.txt"), "1 2 3\n1 2\n").unwrap();
@@ -177,7 +181,12 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
         (
             format!("{one} --mask masks/one.png --light odd.exr -o o.png"),
             1,
-            "odd.exr is no panorama: the light has a value that is infinite or not a number",
+            "odd.exr has 64 x 48 pixels; a panorama is twice as wide as high",
+        ),
+        (
+            format!("{one} --mask masks/one.png --light odd-sky.exr -o o.png"),
+            1,
+            "odd-sky.exr is no panorama: the light has a value that is infinite or not a number",
         ),
         (
             format!(
@@ -243,6 +252,23 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
             2,
             "a part from 0 to 1",
         ),
+        (
+            format!("{one} --lamp 30,40 -o o.png --trust o.jpg"),
+            2,
+            "--trust o.jpg: give a .png",
+        ),
+        (
+            format!("{one} --lamp 30,40 -o o.png --trust o.png"),
+            2,
+            "that is not --output",
+        ),
+        (
+            format!(
+                "{one} --mask masks/one.png --lamp 30,40 --weights w.safetensors -o o.png --trust none/t.png"
+            ),
+            1,
+            "none is no folder",
+        ),
     ] {
         let (found, errors) = folder.told(&command);
         assert_eq!(found, code, "{command}: {errors}");
@@ -251,6 +277,69 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
     for name in ["o.png", "o.mp4", "o.bmp", "o"] {
         assert!(!folder.path(name).exists(), "{name}");
     }
+}
+
+#[test]
+fn no_file_that_is_read_is_overwritten() {
+    let folder = Folder::new();
+    let files = [
+        "photos/one.png",
+        "masks/one.png",
+        "photos/two.png",
+        "sky.exr",
+    ];
+    let before = files.map(|name| fs::read(folder.path(name)).unwrap());
+    let given =
+        "relight photos/one.png --mask masks/one.png --weights w.safetensors --light sky.exr";
+    let inserted = "insert photos/one.png --mask masks/one.png --weights w.safetensors --into";
+    for command in [
+        format!("{given} -o photos/one.png"),
+        format!("{given} -o ./masks/one.png"),
+        format!("{given} -o sky.exr"),
+        format!("{given} -o o.png --trust masks/one.png"),
+        "relight photos --mask masks --weights w.safetensors --lamp 30,40 -o masks".to_owned(),
+        format!("{inserted} photos/two.png -o photos/two.png"),
+        format!("{inserted} sky.exr -o masks/one.png"),
+    ] {
+        let (code, errors) = folder.told(&command);
+        assert_eq!(code, 1, "{command}: {errors}");
+        assert!(errors.contains("is read as well"), "{command}: {errors}");
+        let after = files.map(|name| fs::read(folder.path(name)).unwrap());
+        assert!(before == after, "{command}");
+    }
+    assert!(!folder.path("o.png").exists());
+}
+
+/// On a full disk, ffmpeg says so and ends without an error.
+#[cfg(unix)]
+#[test]
+fn a_video_of_which_ffmpeg_says_that_it_failed_is_not_left() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = Folder::new();
+    fs::create_dir(folder.path("bin")).unwrap();
+    let script = "#!/bin/sh\ncat > /dev/null\nfor last; do :; done\necho part > \"$last\"\n\
+                  echo 'Error writing trailer: No space left on device' >&2\n";
+    fs::write(folder.path("bin/ffmpeg"), script).unwrap();
+    fs::set_permissions(folder.path("bin/ffmpeg"), fs::Permissions::from_mode(0o755)).unwrap();
+    let path = format!(
+        "{}:{}",
+        folder.path("bin").display(),
+        std::env::var("PATH").unwrap()
+    );
+    let command = "relight photos/one.png --mask masks/one.png --weights w.safetensors \
+                   --lamp 30,40 --turn 90 --seconds 0.1 -o turn.mp4";
+    let output = Command::new(env!("CARGO_BIN_EXE_relight"))
+        .args(command.split_whitespace())
+        .env("PATH", path)
+        .current_dir(folder.0.path())
+        .output()
+        .unwrap();
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(errors.contains("No space left on device"), "{errors}");
+    let names = folder.names_in(".");
+    assert!(!names.iter().any(|name| name.contains("turn")), "{names:?}");
 }
 
 /// A PNG that says it has 20 000 x 20 000 pixels, and holds none.

@@ -48,7 +48,6 @@ impl Console {
     }
 
     /// Whether lines are for a machine.
-    #[cfg(feature = "train")]
     pub(crate) fn is_json(self) -> bool {
         self.json
     }

@@ -137,6 +137,21 @@ pub(crate) fn write_picture(
     Ok(())
 }
 
+/// Refuses to overwrite a file that is read.
+pub(crate) fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<(), String> {
+    let Ok(place) = output.canonicalize() else {
+        // There is no such file yet.
+        return Ok(());
+    };
+    let is_same = |input: &&PathBuf| input.canonicalize().is_ok_and(|input| input == place);
+    inputs.iter().find(is_same).map_or(Ok(()), |_| {
+        Err(format!(
+            "{} is read as well: give the result another name",
+            output.display()
+        ))
+    })
+}
+
 /// The files that patterns with *, ? and [...] name; what is no pattern, or names a file, stays.
 pub(crate) fn globbed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Box<dyn Error>> {
     let mut found = Vec::new();

@@ -4,9 +4,9 @@ use super::smooth::{blurred, weighted_mean};
 use crate::image::{Extent, Planes};
 
 /// How far a matte may lie from the mask where colours say otherwise.
-const GEOMETRY_DEVIATION: f32 = 0.35;
+const GEOMETRY_DEVIATION: f32 = 0.25;
 /// The deviation of colours that counts where they do not vary at all, as a part of them.
-const LEAST_DEVIATION: f32 = 0.02;
+const LEAST_DEVIATION: f32 = 0.08;
 /// The weight of the object's edge where nothing of its inside is near.
 const EDGE_WEIGHT: f32 = 1e-3;
 /// The part of an object's side that its soft edge is wide.

@@ -319,8 +319,8 @@ impl Fit {
         let own = alpha.extent();
         let angle = placement.rotation.to_radians();
         let wanted = placement.height * scene.height as f64;
-        // What stands upright after it was turned is measured as it is then.
-        let height = rows(&rotated(alpha, angle)).len().max(1) as f64;
+        // Turning does not change the size.
+        let height = rows(alpha).len().max(1) as f64;
         let scale = wanted / height;
         let side = |pixels: usize| ((pixels as f64 * scale).round() as usize).max(1);
         Self {

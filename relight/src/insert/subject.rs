@@ -5,7 +5,9 @@ use super::matte::Matte;
 use super::smooth::weighted_mean;
 use super::source::likeness;
 use crate::asset::Asset;
-use crate::decompose::{DecomposeError, DecomposeOptions, Decomposer, Decomposition, Region};
+use crate::decompose::{
+    DecomposeError, DecomposeOptions, Decomposer, Decomposition, Region, WORKING_SIDE,
+};
 use crate::image::{Extent, Linear, Planes, Rgb};
 use crate::light::{Normals, Order, ShLight, YUp};
 use crate::render::{
@@ -206,7 +208,11 @@ impl Subject {
             .zip(&known)
             .map(|(&a, &known)| a > 0.0 || known)
             .collect();
-        let normals = found.normals.completed(&wanted);
+        let normals = smoothed(
+            &found.normals.completed(&wanted),
+            &wanted,
+            found.region.side,
+        );
         let own = DiffuseLayer::new(&found.light, DiffuseForm::Irradiance).shading(&normals);
         let shading = found.shading.clone().extended(&known, &wanted);
         let highlight = found.highlight.clone().extended(&known, &wanted);
@@ -412,6 +418,22 @@ impl Subject {
         )
     }
 
+    /// A map of the size of [`Subject::extent`] at its place in the photograph; 0 elsewhere.
+    ///
+    /// # Panics
+    /// Where the map has another size.
+    #[must_use]
+    pub fn in_photo(&self, map: &Planes<3>) -> Planes<3> {
+        let Extent { width, height } = self.extent();
+        assert_eq!(map.extent(), self.extent(), "size of the map");
+        let [left, top] = self.place;
+        let mut photo = Planes::zeros(self.photo);
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            photo.set_pixel(left + x, top + y, map.pixel(x, y));
+        }
+        photo
+    }
+
     /// A background with the photograph's pixels under the mask, as they are: naive insertion.
     ///
     /// # Panics
@@ -606,6 +628,20 @@ fn cropped<const C: usize>(image: &Planes<C>, place: [usize; 2], extent: Extent)
         }
     }
     part
+}
+
+/// Normals without what is finer than the network's pixels: a grid of them would show where light falls flat. Fine relief is in
+/// the shading.
+fn smoothed(normals: &Normals<YUp>, wanted: &[bool], side: usize) -> Normals<YUp> {
+    let radius = (side as f64 / WORKING_SIDE as f64).round() as usize;
+    let weights = wanted.iter().map(|&w| f32::from(u8::from(w))).collect();
+    match Planes::from_planes(normals.extent(), [weights]) {
+        Ok(weights) if radius > 0 => {
+            let (once, _) = weighted_mean(normals.planes(), &weights, radius);
+            Normals::new(weighted_mean(&once, &weights, radius).0)
+        }
+        _ => normals.clone(),
+    }
 }
 
 /// Light from everywhere, of which a white matt surface is 1.

@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::fs;
+use std::iter;
 use std::path::{Path, PathBuf};
 
 use clap::{ArgAction, Args};
@@ -10,7 +11,7 @@ use relight::decompose::{Photo, PhotoInput, PhotoReading};
 use relight::image::{Extent, Linear, Planes, Rgb, StoredImage, Transfer};
 use relight::insert::{
     LightDescription, LightSource, Matching, ObjectDescription, PanoramaView, Scene,
-    SceneDescription, SceneObject, Subject,
+    SceneDescription, SceneObject, Subject, TrustFigures, TrustMap,
 };
 use relight::light::Panorama;
 use relight::movie::{MovieFormat, MovieReader, MovieWriter};
@@ -20,7 +21,9 @@ use serde_json::json;
 use super::relight::{degrees, gloss_numbers, tint};
 use crate::cli::console::{CommandResult, Console, Outcome};
 use crate::cli::light::read_light;
-use crate::cli::photos::{Bits, Network, NetworkArguments, OutputKind, at_most, write_picture};
+use crate::cli::photos::{
+    Bits, Network, NetworkArguments, OutputKind, at_most, not_an_input, write_picture,
+};
 
 pub(in crate::cli) const EXAMPLES: &str = "\
 Examples:
@@ -312,10 +315,11 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
         Some(OutputKind::Movie(_))
     );
     check_output(&background, is_movie, arguments)?;
+    not_an_input(&arguments.output, &files_of(&scene, &folder))?;
     let mut work = Work::new(&scene, background, &folder, &arguments.network)?;
-    let subjects = work.subjects(&scene, sources)?;
+    let subjects = work.subjects(&scene, sources, console.is_json())?;
     let objects = scene.objects.iter().zip(&subjects);
-    let objects = objects.map(|(object, subject)| SceneObject {
+    let objects = objects.map(|(object, (subject, _))| SceneObject {
         subject,
         placement: object.placement(),
         change: object.change(),
@@ -332,11 +336,12 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     )?;
     let frames = work.write(&set, arguments, console)?;
     let output = &arguments.output;
+    let trust: Vec<Option<TrustFigures>> = subjects.iter().map(|(_, trust)| *trust).collect();
     console.say(
         &format!("{}: {} object(s), {frames} frame(s)", output.display(), scene.objects.len()),
         &json!({
             "event": "inserted", "output": output, "objects": scene.objects.len(), "frames": frames,
-            "tilt": work.tilt, "level": work.matching.level, "balance": work.matching.balance, "grain": work.matching.grain,
+            "trust": trust, "tilt": work.tilt, "level": work.matching.level, "balance": work.matching.balance, "grain": work.matching.grain,
         }),
     );
     Ok(Outcome::Whole)
@@ -360,15 +365,7 @@ fn load(object: &ObjectDescription, folder: &Path) -> Result<Source, Box<dyn Err
         mask: object.mask.as_ref().map(|mask| folder.join(mask)),
         ..PhotoReading::default()
     };
-    let photo = PhotoInput::File(path.clone()).load(&reading);
-    let photo = photo.map_err(|error| {
-        format!(
-            "{}: {}",
-            path.display(),
-            relit_data::causes::with_causes(&error)
-        )
-    })?;
-    Ok(Source::Photo(photo))
+    Ok(Source::Photo(PhotoInput::File(path).load(&reading)?))
 }
 
 fn read_background(path: &Path, scene: &SceneDescription) -> Result<Background, Box<dyn Error>> {
@@ -405,6 +402,21 @@ fn read_background(path: &Path, scene: &SceneDescription) -> Result<Background, 
         .into());
     }
     Ok(Background::Photo(picture))
+}
+
+/// What is read.
+fn files_of(scene: &SceneDescription, folder: &Path) -> Vec<PathBuf> {
+    let light = &scene.light;
+    let lights = [&light.panorama, &light.coefficients, &light.object];
+    let objects = scene
+        .objects
+        .iter()
+        .flat_map(|object| iter::once(&object.photo).chain(&object.mask));
+    iter::once(&scene.background)
+        .chain(lights.into_iter().flatten())
+        .chain(objects)
+        .map(|path| folder.join(path))
+        .collect()
 }
 
 /// Whether this background can become that output.
@@ -512,19 +524,26 @@ impl Work {
         &self,
         scene: &SceneDescription,
         sources: Vec<Source>,
-    ) -> Result<Vec<Subject>, Box<dyn Error>> {
+        with_trust: bool,
+    ) -> Result<Vec<(Subject, Option<TrustFigures>)>, Box<dyn Error>> {
         let subject = |(object, source): (&ObjectDescription, Source)| {
             let photo = match source {
                 Source::Photo(photo) => photo,
-                Source::Captured(asset) => return Ok(Subject::of_asset(&asset)?),
+                // It was measured, and not estimated.
+                Source::Captured(asset) => return Ok((Subject::of_asset(&asset)?, None)),
             };
             let wanted = object.height * self.extent.height as f64 * RESERVE;
             let Extent { width, height } = photo.picture.planes().extent();
             let own = object_height(&photo.mask) as f64;
             let longest = (width.max(height) as f64 * wanted / own).ceil();
-            Ok(self
-                .network
-                .subject(&at_most(photo, Some((longest as usize).max(32))))?)
+            let photo = at_most(photo, Some((longest as usize).max(32)));
+            let subject = self.network.subject(&photo)?;
+            let options = photo.options(&self.network.options);
+            // It takes three more looks.
+            let trust = with_trust
+                .then(|| TrustMap::of(&subject, &self.network.decomposer, &options))
+                .transpose()?;
+            Ok((subject, trust.map(|trust| trust.figures())))
         };
         scene.objects.iter().zip(sources).map(subject).collect()
     }

@@ -22,7 +22,7 @@ use crate::cli::console::{CommandResult, Console, Outcome};
 use crate::cli::folder::make_folder;
 use crate::cli::light::NewLightArguments;
 use crate::cli::photos::{
-    Bits, Network, NetworkArguments, OutputKind, at_most, globbed, write_picture,
+    Bits, Network, NetworkArguments, OutputKind, at_most, globbed, not_an_input, write_picture,
 };
 use crate::cli::values::TransferName;
 
@@ -143,11 +143,17 @@ impl Arguments {
                 "--background light: there is no panorama; give one by --light".to_owned(),
             );
         }
+        if let Some(trust) = &self.trust {
+            if self.is_set() {
+                return Some("--trust: give one photograph".to_owned());
+            }
+            if *trust == self.output || OutputKind::of(trust) != Some(OutputKind::Png) {
+                let trust = trust.display();
+                return Some(format!("--trust {trust}: give a .png that is not --output"));
+            }
+        }
         if self.is_set() {
-            return self
-                .trust
-                .as_ref()
-                .map(|_| "--trust: give one photograph".to_owned());
+            return None;
         }
         let wanted = match OutputKind::of(&self.output) {
             Some(OutputKind::Movie(_)) if self.turn.is_none() => ".png or .exr, or --turn DEGREES",
@@ -211,6 +217,8 @@ struct Run<'a> {
     network: OnceLock<Network>,
     light: Option<LightSource>,
     reading: PhotoReading,
+    /// The files of all photographs.
+    photos: Vec<PathBuf>,
 }
 
 pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandResult {
@@ -220,6 +228,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
         light: arguments.light.read()?,
         network: OnceLock::new(),
         reading: arguments.reading(),
+        photos: inputs.iter().filter_map(file_of).collect(),
     };
     if !arguments.is_set()
         && let [input] = inputs.as_slice()
@@ -250,6 +259,8 @@ impl Run<'_> {
     fn relight(&self, input: &PhotoInput, console: Console) -> Result<(), Box<dyn Error>> {
         let arguments = self.arguments;
         let photo = at_most(input.load(&self.reading)?, arguments.longest());
+        let output = arguments.output_of(&photo.name);
+        self.check_outputs(&output, &photo.name)?;
         let network = match self.network.get() {
             Some(network) => network,
             None => {
@@ -279,7 +290,6 @@ impl Run<'_> {
             &photo.options(&network.options),
         )?;
         let figures = trust.figures();
-        let output = arguments.output_of(&photo.name);
         if let Some(parent) = output.parent().filter(|_| arguments.is_set()) {
             make_folder(parent)?;
         }
@@ -293,7 +303,7 @@ impl Run<'_> {
             }
         };
         if let Some(path) = &arguments.trust {
-            write_png(path, &trust.picture(), Depth::Eight)?;
+            write_png(path, &subject.in_photo(&trust.picture()), Depth::Eight)?;
         }
         let seconds = start.elapsed().as_secs_f64();
         let text = format!(
@@ -314,6 +324,27 @@ impl Run<'_> {
         });
         console.say(&text, &event);
         Ok(())
+    }
+
+    /// Nothing that is read may be overwritten, and nothing is written where the map of trust cannot be.
+    fn check_outputs(&self, output: &Path, name: &str) -> Result<(), String> {
+        let arguments = self.arguments;
+        let own_mask = |mask: &PathBuf| {
+            let own = mask.join(format!("{name}.png"));
+            if mask.is_dir() { own } else { mask.clone() }
+        };
+        let mut inputs: Vec<PathBuf> = arguments.mask.iter().map(own_mask).collect();
+        inputs.extend(self.photos.iter().cloned());
+        inputs.extend(arguments.light.light.clone());
+        let trust = arguments.trust.as_deref();
+        for output in [Some(output), trust].into_iter().flatten() {
+            not_an_input(output, &inputs)?;
+        }
+        let folder = trust.and_then(Path::parent);
+        match folder.filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
+            Some(folder) => Err(format!("--trust: {} is no folder", folder.display())),
+            None => Ok(()),
+        }
     }
 
     fn backdrop(&self, extent: relight::image::Extent) -> Backdrop {
@@ -395,6 +426,13 @@ impl Run<'_> {
         }
         bar.finish_and_clear();
         Ok(frames)
+    }
+}
+
+fn file_of(input: &PhotoInput) -> Option<PathBuf> {
+    match input {
+        PhotoInput::File(path) => Some(path.clone()),
+        _ => None,
     }
 }
 

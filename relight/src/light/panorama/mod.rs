@@ -31,6 +31,9 @@ pub struct Panorama {
     image: Rgb<Linear>,
 }
 
+/// Files of fewer rows are no panoramas.
+const LEAST_HEIGHT: usize = 4;
+
 /// Why a panorama is not read.
 #[derive(Debug, thiserror::Error)]
 pub enum PanoramaError {
@@ -42,6 +45,14 @@ pub enum PanoramaError {
     NotRadiance {
         /// The file.
         path: PathBuf,
+    },
+    /// The picture does not show all directions.
+    #[error("{} has {} x {} pixels; a panorama is twice as wide as high, and at least 4 pixels high", path.display(), extent.width, extent.height)]
+    Shape {
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        extent: Extent,
     },
     /// What it holds is no light.
     #[error("{} is no panorama", path.display())]
@@ -73,12 +84,19 @@ impl Panorama {
     /// Reads an HDR (Radiance) or EXR file.
     ///
     /// # Errors
-    /// Where it cannot be read, is of integers, has no pixels or values that are not finite.
+    /// Where it cannot be read, is of integers, is not twice as wide as high, or has values that are not finite.
     pub fn read(path: &Path) -> Result<Self, PanoramaError> {
         let (planes, samples) = read_planes(path)?;
         if samples == Samples::Integer {
             return Err(PanoramaError::NotRadiance {
                 path: path.to_owned(),
+            });
+        }
+        let extent = planes.extent();
+        if extent.width != 2 * extent.height || extent.height < LEAST_HEIGHT {
+            return Err(PanoramaError::Shape {
+                path: path.to_owned(),
+                extent,
             });
         }
         Self::new(Rgb::new(planes)).map_err(|source| PanoramaError::Light {
