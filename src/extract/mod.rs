@@ -1,13 +1,14 @@
-//! From a recording and its mask to a training shard: select -> decode -> crop -> measure ->
-//! scale -> encode -> write, as one streaming pipeline whose memory does not grow with the video.
+//! From a recording and its mask to a training shard: select -> decode -> crop -> align ->
+//! measure -> scale -> encode -> write, as one streaming pipeline whose memory does not grow with the video.
 //!
 //! [`extract`] extracts any number of recordings into one data set; a failure does not stop the
 //! others. The steps can be used alone: [`Selection`] chooses the frames of a turn, [`square_around`]
-//! makes the crop, [`Scaler`] scales without mixing object and background.
+//! makes the crop, [`Aligner`] measures how far the object moved, [`Scaler`] scales without mixing object and background.
 //!
 //! This module knows the formats (`relit-data`) and videos (`relit-video`), and nothing of how masks
 //! are made or of the rig. It prints nothing: progress goes to an [`Observer`].
 
+mod align;
 mod collected;
 mod crop;
 mod error;
@@ -19,6 +20,7 @@ mod pipeline;
 mod plan;
 mod scale;
 mod select;
+mod steadiness;
 mod timeline;
 
 use std::collections::HashSet;
@@ -29,11 +31,12 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use relit_data::session::{self, recordings};
 use relit_data::shard::{self, Dataset, ExtractionSettings, OutputFolder};
 
+pub use align::{AlignBuffers, AlignSample, Aligner, Alignment, MIN_CONFIDENCE};
 pub use crop::{bounding_box, cut, square_around};
 pub use error::ExtractError;
 pub use observer::{Observer, RecordingOutcome};
-pub use options::{ExtractOptions, MAX_MARGIN, MAX_SIDE};
-pub use scale::Scaler;
+pub use options::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
+pub use scale::{APRON, Scaler};
 pub use select::{Candidate, Selection, TimeGap, TurnSpan, runs_back_at, time_gaps};
 
 /// The outcome of an extraction: numbers of recordings.

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::builder::RangedU64ValueParser;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
-use relit::extract::{ExtractOptions, MAX_MARGIN, MAX_SIDE};
-use relit_data::shard::{ImageSize, Layout};
+use relit::extract::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
+use relit_data::shard::{Align, ImageSize, Layout};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -98,9 +98,15 @@ struct ExtractArguments {
     /// How samples are stored.
     #[arg(long, value_enum, default_value_t = LayoutName::Webdataset)]
     layout: LayoutName,
-    /// How shifts of the object in the image are handled.
-    #[arg(long, value_enum, default_value_t = AlignName::Off)]
+    /// What to do about shifts of the object against its mask, from vibration or drift.
+    #[arg(long, value_enum, default_value_t = AlignName::Correct)]
     align: AlignName,
+    /// Shifts up to this many source pixels are not corrected.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.1, value_parser = tolerance)]
+    align_tolerance: f64,
+    /// Refuse a turn in which the object moves by more source pixels than this.
+    #[arg(long, value_name = "PIXELS", default_value_t = 8.0, value_parser = max_shift)]
+    max_shift: f64,
     /// Refuse recordings in which a frame would be used twice or something is lost.
     #[arg(long)]
     strict: bool,
@@ -131,8 +137,22 @@ enum LayoutName {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum AlignName {
-    /// Shifts are neither measured nor corrected.
+    /// Measured, and corrected above the tolerance.
+    Correct,
+    /// Measured only.
+    Measure,
+    /// Neither measured nor corrected.
     Off,
+}
+
+impl From<AlignName> for Align {
+    fn from(name: AlignName) -> Self {
+        match name {
+            AlignName::Correct => Self::Correct,
+            AlignName::Measure => Self::Measure,
+            AlignName::Off => Self::Off,
+        }
+    }
 }
 
 impl From<LayoutName> for Layout {
@@ -164,7 +184,6 @@ pub(crate) fn parse() -> Arguments {
 
 impl From<ExtractArguments> for Arguments {
     fn from(line: ExtractArguments) -> Self {
-        let AlignName::Off = line.align;
         let defaults = ExtractOptions::default();
         let options = ExtractOptions {
             frames: line.frames,
@@ -173,6 +192,9 @@ impl From<ExtractArguments> for Arguments {
             saturation_level: line.saturation_level,
             gate: line.gate,
             layout: line.layout.into(),
+            align: line.align.into(),
+            align_tolerance: line.align_tolerance,
+            max_shift: line.max_shift,
             mask: line.mask,
             strict: line.strict,
             partial: line.partial,
@@ -200,6 +222,21 @@ fn size(text: &str) -> Result<ImageSize, String> {
         Ok(side) if (1..=MAX_SIDE).contains(&side) => Ok(ImageSize::Pixels(side)),
         _ => Err(format!("give 1 to {MAX_SIDE} pixels, or native")),
     }
+}
+
+fn pixels(text: &str, least: f64) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if (least..=MAX_SHIFT).contains(&value) => Ok(value),
+        _ => Err(format!("give {least} to {MAX_SHIFT} pixels")),
+    }
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    pixels(text, 0.0)
+}
+
+fn max_shift(text: &str) -> Result<f64, String> {
+    pixels(text, 1.0)
 }
 
 fn within(text: &str, most: f64) -> Result<f64, String> {

@@ -230,9 +230,14 @@ fn first_not_finite(record: &FrameRecord) -> Option<&'static str> {
     let fields = [
         ("angle_deg", record.angle_deg.unwrap_or_default()),
         ("shift_px", dx + dy),
+        (
+            "align_confidence",
+            record.align_confidence.unwrap_or_default(),
+        ),
         ("saturated_fraction", record.saturated_fraction),
         ("mean_rgb", r + g + b),
         ("sharpness", record.sharpness),
+        ("exposure_step", record.exposure_step.unwrap_or_default()),
     ];
     fields
         .into_iter()
