@@ -17,6 +17,7 @@ use super::collected::Collected;
 use super::object::ObjectMask;
 use super::pipeline::{self, LostFrame, ProcessedFrame, Stage};
 use super::plan::{Assignment, Plan};
+use super::quality;
 use super::select::{TURN_DEG, TURN_TOLERANCE_DEG};
 use super::steadiness::Steadiness;
 use super::{Aligner, ExtractError, ExtractOptions, Observer, Scaler, cut, square_around};
@@ -161,6 +162,12 @@ impl Job {
         steadiness.check()?;
         notices.extend(notices_of_lost(&lost));
         notices.extend(steadiness.notices());
+        let taken: Vec<_> = (0..samples).filter_map(|k| writer.sample(k)).collect();
+        let findings = quality::findings(&taken);
+        for found in &findings {
+            writer.set_quality(found.index, found.exposure_step, found.identical_to)?;
+        }
+        notices.extend(quality::notices(&findings));
         let collected = collected.sorted();
         // Whatever can fail is done before the shard of an earlier run is replaced.
         let page = self.page(options, &collected, &notices)?;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::thread::available_parallelism;
 
 use relit_data::image_stats::SATURATION_LEVEL;
-use relit_data::shard::{Align, ExtractionSettings, ImageSize, Layout};
+use relit_data::shard::{Align, ExtractionSettings, ImageSize, Layout, Task};
 
 use super::{ExtractError, scale};
 
@@ -49,6 +49,8 @@ pub struct ExtractOptions {
     pub resume: bool,
     /// Replace sessions of the same name that were made from another video.
     pub replace: bool,
+    /// The task whose part of the recordings is extracted; `None` extracts all of them.
+    pub task: Option<Task>,
     /// Number of worker threads, at least 1.
     pub threads: usize,
 }
@@ -70,6 +72,7 @@ impl Default for ExtractOptions {
             partial: false,
             resume: false,
             replace: false,
+            task: None,
             threads: available_parallelism().map_or(1, std::num::NonZero::get),
         }
     }

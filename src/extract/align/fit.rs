@@ -155,7 +155,7 @@ fn weighed(pixel: &TemplatePixel, found: [f32; 2]) -> (f32, [f32; 2]) {
     let residual = [found[0] - x, found[1] - y];
     let square = residual[0] * residual[0] + residual[1] * residual[1];
     let fall = 1.0 + square * pixel.trust / (OUTLIER * OUTLIER);
-    (pixel.trust / (fall * fall), residual)
+    (pixel.weight / (fall * fall), residual)
 }
 
 impl Sums {

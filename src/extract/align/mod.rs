@@ -32,6 +32,8 @@ const OUTLINE: [usize; 2] = [2, 1];
 const ROUNDS: [usize; 3] = [3, 2, 1];
 /// Shifts up to this many times the largest are looked for, so that a larger one is told from none.
 const LOOK_BEYOND: f64 = 1.5;
+/// A shift that a scale finds from nothing, pixels.
+const LITTLE: f64 = 0.75;
 /// Further than this, pixels at the object's mean distance from its centre, a rotation or growth counts.
 const SIGNIFICANT: f64 = 0.5;
 
@@ -124,7 +126,12 @@ impl Aligner {
             }
             templates.push(Template::of(&planes, &shifts, inner));
             if scale > 0 {
-                shifts.iter_mut().flatten().for_each(|part| *part *= 2.0);
+                for shift in &mut shifts {
+                    let doubled = shift.map(|part| 2.0 * part);
+                    // The finer scale finds less from nothing, and without the light's pull on the coarser.
+                    let little = doubled[0].hypot(doubled[1]) < LITTLE;
+                    *shift = if little { [0.0; 2] } else { doubled };
+                }
             }
         }
         templates.reverse();

@@ -9,7 +9,7 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use super::structure::{Plane, add_scaled, cubic};
 
 /// Pixels of a template; those that say most about a shift are kept.
-const MOST_PIXELS: usize = 40_000;
+const MOST_PIXELS: usize = 20_000;
 /// Deviation of the gradients by noise.
 const NOISE: f32 = 0.01;
 
@@ -24,6 +24,8 @@ pub(super) struct TemplatePixel {
     pub(super) change: [f32; 3],
     /// 1 / the square of its usual deviation.
     pub(super) trust: f32,
+    /// How much it counts: it falls faster than the trust, because what deviates often is light.
+    pub(super) weight: f32,
 }
 
 /// The object's lasting structure.
@@ -68,6 +70,7 @@ fn pixel(rows: &[TemplateRow], x: usize, y: usize) -> TemplatePixel {
     let (above, below) = (at(x, y - 1), at(x, y + 1));
     let across = 0.25 * (right[1] - left[1] + below[0] - above[0]);
     let deviation = rows[y].deviations[x];
+    let trust = 1.0 / (deviation * deviation + NOISE * NOISE);
     TemplatePixel {
         x: x as u32,
         y: y as u32,
@@ -77,14 +80,15 @@ fn pixel(rows: &[TemplateRow], x: usize, y: usize) -> TemplatePixel {
             across,
             0.5 * (below[1] - above[1]),
         ],
-        trust: 1.0 / (deviation * deviation + NOISE * NOISE),
+        trust,
+        weight: trust * trust.sqrt().sqrt(),
     }
 }
 
 /// What a pixel says about a shift.
 fn information(pixel: &TemplatePixel) -> f32 {
     let [xx, xy, yy] = pixel.change;
-    pixel.trust * (xx * xx + 2.0 * xy * xy + yy * yy)
+    pixel.weight * (xx * xx + 2.0 * xy * xy + yy * yy)
 }
 
 fn keep_most_telling(pixels: &mut Vec<TemplatePixel>) {
