@@ -119,7 +119,7 @@ impl Scaler {
             })
             .collect();
         let options = match &self.to {
-            Some(target) => target.options.clone(),
+            Some(target) => target.options,
             None => ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::CatmullRom)),
         };
         let [left, top] = part.map(|part| f64::from(APRON) + part);

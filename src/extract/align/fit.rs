@@ -15,6 +15,8 @@ const STILL: f64 = 2e-3;
 const LONGEST_STEP: f64 = 1.0;
 /// Deviations at which a pixel's weight is a quarter.
 const OUTLIER: f32 = 1.5;
+/// The same for a rotation or growth, which the shift leaves in the residuals.
+const FAR_OUTLIER: f32 = 6.0;
 /// Fewest pixels from which a shift is measured.
 const LEAST_PIXELS: usize = 60;
 /// Pixels that are looked at in a search.
@@ -115,7 +117,7 @@ impl Template {
             };
             let (x, y) = (f64::from(pixel.x) - centre.0, f64::from(pixel.y) - centre.1);
             distance += x.hypot(y);
-            let (weight, residual) = weighed(pixel, found);
+            let (weight, residual) = weighed(pixel, found, FAR_OUTLIER);
             let weight = f64::from(weight);
             let [xx, xy, yy] = pixel.change.map(f64::from);
             for (residual, [jx, jy]) in residual.into_iter().zip([[xx, xy], [xy, yy]]) {
@@ -149,18 +151,18 @@ impl Template {
     }
 }
 
-/// The robust weight of a pixel, and its residual.
-fn weighed(pixel: &TemplatePixel, found: [f32; 2]) -> (f32, [f32; 2]) {
+/// The robust weight of a pixel, a quarter at `outlier` deviations, and its residual.
+fn weighed(pixel: &TemplatePixel, found: [f32; 2], outlier: f32) -> (f32, [f32; 2]) {
     let [x, y] = pixel.gradient;
     let residual = [found[0] - x, found[1] - y];
     let square = residual[0] * residual[0] + residual[1] * residual[1];
-    let fall = 1.0 + square * pixel.trust / (OUTLIER * OUTLIER);
+    let fall = 1.0 + square * pixel.trust / (outlier * outlier);
     (pixel.weight / (fall * fall), residual)
 }
 
 impl Sums {
     fn add(&mut self, pixel: &TemplatePixel, found: [f32; 2]) {
-        let (weight, [rx, ry]) = weighed(pixel, found);
+        let (weight, [rx, ry]) = weighed(pixel, found, OUTLIER);
         let [xx, xy, yy] = pixel.change;
         let add = |sum: &mut f64, value: f32| *sum += f64::from(weight * value);
         let [nxx, nxy, nyy] = &mut self.normal;
@@ -262,8 +264,9 @@ fn solved(mut matrix: [[f64; 4]; 4], mut right: [f64; 4]) -> Option<[f64; 4]> {
         }
         for below in at + 1..4 {
             let factor = matrix[below][at] / matrix[at][at];
-            for column in at..4 {
-                matrix[below][column] -= factor * matrix[at][column];
+            let pivot = matrix[at];
+            for (to, from) in matrix[below].iter_mut().zip(pivot) {
+                *to -= factor * from;
             }
             right[below] -= factor * right[at];
         }

@@ -109,7 +109,7 @@ fn a_rotation_is_reported_where_it_is_significant_and_not_else() {
     let aligner = learnt(|_| [0.0; 2], 0.1);
     assert_eq!(measured(&aligner, &frame([1.3, 0.4], 0.7)).turned, None);
     let AlignSample(still) = frame([0.0; 2], 0.7);
-    let degrees = 1.0_f64;
+    let degrees = 1.5_f64;
     let (sin, cos) = degrees.to_radians().sin_cos();
     let turned = GrayImage::from_fn(SIDE, SIDE, |x, y| {
         let (x, y) = (f64::from(x) - 74.5, f64::from(y) - 74.5);
@@ -122,6 +122,6 @@ fn a_rotation_is_reported_where_it_is_significant_and_not_else() {
         Luma([((1.0 - down) * line(0) + down * line(1)).round() as u8])
     });
     let found = measured(&aligner, &AlignSample(turned)).turned.unwrap();
-    assert!((found.0 - degrees).abs() < 0.25, "{found:?}");
+    assert!((found.0 - degrees).abs() < 0.4, "{found:?}");
     assert!(found.1.abs() < 0.01, "{found:?}");
 }
