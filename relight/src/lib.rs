@@ -6,6 +6,7 @@
 //!
 //! | module | concern |
 //! | --- | --- |
+//! | [`asset`] | a captured object in one file, ready to be lit |
 //! | [`data`] | shards and folders as streams of arrays |
 //! | [`decompose`] | a photograph into normals, albedo, shading, highlight and light |
 //! | [`eval`] | the protocols of the paper's tables |
@@ -17,6 +18,8 @@
 //! | [`nets`] | the networks as data, their weights in files, inference |
 //! | [`render`] | diffuse and specular layers on normals, their derivatives, the truth by Monte Carlo |
 //! | [`synth`] | pictures of objects with the truth that they were made of |
+//! | [`turn`] | a whole turn into normals, albedo and light, without training |
+pub mod asset;
 pub mod data;
 pub mod decompose;
 pub mod eval;
@@ -30,4 +33,5 @@ pub mod render;
 pub mod synth;
 #[cfg(feature = "train")]
 pub mod train;
+pub mod turn;
 mod whole;
