@@ -10,6 +10,9 @@ use super::light::{HARMONICS, WAVES};
 const PARTS: usize = 72;
 /// A value from which a channel counts as clipped: 250 of 255, less rounding.
 const CLIPPED_VALUE: f32 = 249.5 / 255.0;
+/// A part of the turn counts for a pixel's channel where at least this part of its frames is not clipped: the mean of
+/// the others would be that of the darker ones.
+const LEAST_SEEN: f32 = 0.95;
 /// Angles that are needed for five terms with something left over.
 const LEAST_ANGLES: usize = 8;
 
@@ -35,7 +38,7 @@ struct Part {
 }
 
 /// Light over the table's angle. The turn is divided into parts; of each part a pixel has the mean of its
-/// light, channel by channel, over the frames in which the channel is not clipped.
+/// light, channel by channel, where the channel is not clipped.
 #[derive(Debug, Clone)]
 pub struct TurnCurves {
     extent: Extent,
@@ -134,7 +137,10 @@ impl CurveBuilder {
         let weights = cells()
             .map(|cell| {
                 let frames = self.parts[cell % PARTS].frames as f32;
-                self.counts[cell].map(|count| (f32::from(count) / frames).min(1.0))
+                self.counts[cell].map(|count| {
+                    let is_seen = f32::from(count) >= LEAST_SEEN * frames;
+                    f32::from(u8::from(is_seen))
+                })
             })
             .collect();
         Ok(TurnCurves {
@@ -196,7 +202,7 @@ impl TurnCurves {
         self.waves.len()
     }
 
-    /// The part of the light, 0 to 1, that is left out because it is clipped.
+    /// The part of the light, 0 to 1, that is left out because it is clipped in the same part of the turn.
     #[must_use]
     pub fn clipped(&self) -> f64 {
         let sum: f64 = self
@@ -246,7 +252,7 @@ impl TurnCurves {
         &self.values[pixel * self.parts()..][..self.parts()]
     }
 
-    /// How much each of them counts: the part of its frames, 0 to 1, in which it is not clipped.
+    /// How much each of them counts, 0 or 1: nothing where it is clipped.
     pub(super) fn weights(&self, pixel: usize) -> &[[f32; 3]] {
         &self.weights[pixel * self.parts()..][..self.parts()]
     }

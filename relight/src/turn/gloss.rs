@@ -1,5 +1,7 @@
 //! What a shining surface shows of the room beside its matt part, as it acts on the curve of a pixel.
 
+use std::sync::LazyLock;
+
 use super::light::{WAVES, WaveTerm};
 use crate::light::{LightError, ShLight};
 
@@ -69,6 +71,12 @@ impl GlossLight {
         for terms in &mut self.terms {
             terms[..first * first].fill(0.0);
         }
+        self
+    }
+
+    /// The same with one term changed by so much.
+    pub(super) fn moved(mut self, channel: usize, term: usize, by: f64) -> Self {
+        self.terms[channel][term] += by;
         self
     }
 
@@ -172,8 +180,7 @@ pub(super) fn gloss_terms(facing: f64, [x, y, z]: [f64; 3]) -> [WaveTerm; GLOSS_
     terms
 }
 
-/// The m-th derivative of Legendre's polynomial l at z, for each l and m up to l, times the square root of
-/// (2 l + 1) (l - m)! / (l + m)!, twice that for m above 0.
+/// The m-th derivative of Legendre's polynomial l at z, for each l and m up to l, times its scale.
 fn derivatives(z: f64) -> [[f64; GLOSS_ORDER + 1]; GLOSS_ORDER + 1] {
     let mut values = [[0.0; GLOSS_ORDER + 1]; GLOSS_ORDER + 1];
     // P_00 = 1, P_lm = (2 l - 1) P_(l-1)(m-1) + P_(l-2)m, and l P_l0 = (2 l - 1) z P_(l-1)0 - (l - 1) P_(l-2)0.
@@ -189,15 +196,26 @@ fn derivatives(z: f64) -> [[f64; GLOSS_ORDER + 1]; GLOSS_ORDER + 1] {
             };
         }
     }
-    for (l, row) in values.iter_mut().enumerate() {
-        for (m, value) in row.iter_mut().enumerate().take(l + 1) {
-            let ratio: f64 = (l - m + 1..=l + m).map(|k| k as f64).product();
-            let twice = if m == 0 { 1.0 } else { 2.0 };
-            *value *= (twice * (2 * l + 1) as f64 / ratio).sqrt();
+    for (row, scales) in values.iter_mut().zip(SCALES.iter()) {
+        for (value, scale) in row.iter_mut().zip(scales) {
+            *value *= scale;
         }
     }
     values
 }
+
+/// The root of (2 l + 1) (l - m)! / (l + m)!, twice that for m above 0, for each l and m up to l.
+static SCALES: LazyLock<[[f64; GLOSS_ORDER + 1]; GLOSS_ORDER + 1]> = LazyLock::new(|| {
+    let mut scales = [[0.0; GLOSS_ORDER + 1]; GLOSS_ORDER + 1];
+    for (l, row) in scales.iter_mut().enumerate() {
+        for (m, scale) in row.iter_mut().enumerate().take(l + 1) {
+            let ratio: f64 = (l - m + 1..=l + m).map(|k| k as f64).product();
+            let twice = if m == 0 { 1.0 } else { 2.0 };
+            *scale = (twice * (2 * l + 1) as f64 / ratio).sqrt();
+        }
+    }
+    scales
+});
 
 #[cfg(test)]
 mod tests {

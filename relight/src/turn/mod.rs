@@ -14,6 +14,7 @@
 //! | `moments`, `search`, `robust` | the normal and albedo of one pixel |
 //! | `start`, `prior` | normals to begin with |
 //! | `room` | the light that explains all pixels |
+//! | `joint` | light, gloss, normals and albedo at once |
 //! | `solve` | light and normals of all pixels |
 //! | `maps`, `verdict` | what is left over, and whether the room is fit for this |
 //! | `shine` | the gloss of the whole object; the object as a file |
@@ -24,6 +25,7 @@ mod error;
 mod files;
 mod frame;
 mod gloss;
+mod joint;
 mod labels;
 mod light;
 mod maps;

@@ -214,6 +214,18 @@ impl Moments {
         [0, 1, 2].map(|channel| self.share(channel, waves, &products).albedo())
     }
 
+    /// The products of each wave with a list of waves.
+    pub(super) fn times(&self, channel: usize, waves: &[f64; WAVES]) -> [f64; WAVES] {
+        let own = &self.products[channel];
+        std::array::from_fn(|i| (0..WAVES).map(|j| own[pair(i, j)] * waves[j]).sum())
+    }
+
+    /// The products of each wave with what such waves leave of the curve.
+    pub(super) fn rest(&self, channel: usize, waves: &[f64; WAVES]) -> [f64; WAVES] {
+        let seen = self.times(channel, waves);
+        std::array::from_fn(|i| self.right[channel][i] - seen[i])
+    }
+
     /// The product of two lists of waves.
     pub(super) fn product(&self, channel: usize, a: &[f64; WAVES], b: &[f64; WAVES]) -> f64 {
         let mut products = [0.0; PAIRS];
@@ -259,7 +271,16 @@ impl Moments {
     }
 }
 
-/// The sum of products, as far as the shorter list goes.
+/// The sum of products, as far as the shorter list goes: in four sums, which do not wait for each other.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    let length = a.len().min(b.len());
+    let (mut a, mut b) = (a[..length].chunks_exact(4), b[..length].chunks_exact(4));
+    let mut sums = [0.0; 4];
+    for (a, b) in a.by_ref().zip(b.by_ref()) {
+        for i in 0..4 {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    let rest = a.remainder().iter().zip(b.remainder());
+    sums.iter().sum::<f64>() + rest.map(|(a, b)| a * b).sum::<f64>()
 }

@@ -1,9 +1,7 @@
 //! The light of the room, matt and as gloss shows it, that explains the curves of all pixels best.
 
-use std::ops::Range;
-
 use super::gloss::{GLOSS_TERMS, GlossLight, gloss_terms};
-use super::light::{MATT_BANDS, MATT_IN_GLOSS, TERMS, WAVES, WaveTerm, wave_terms};
+use super::light::{MATT_BANDS, TERMS, WaveTerm, wave_terms};
 use super::moments::Moments;
 use super::search::{Room, reflected};
 use super::{TableFrame, TableLight, TurnCurves, TurnError};
@@ -23,15 +21,6 @@ const LEAST_GLOSS: f64 = 0.05;
 /// How much gloss shows of the bands of a light that a matt surface shows too.
 pub(super) type Shares = [f64; MATT_BANDS];
 
-/// What is to be found of a room.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum RoomFit<'a> {
-    /// Light, and gloss that shows so many bands of it, 0 for a matt object, and the first of them by these shares.
-    All { bands: usize, shares: Shares },
-    /// How much gloss shows of the bands of a light that is known.
-    Gloss(&'a KnownLight),
-}
-
 /// A light that was measured.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct KnownLight {
@@ -45,6 +34,11 @@ impl KnownLight {
             matt: TableLight::from_viewer(light, frame),
             bands: GlossLight::bands(&light.rotated(&frame.rotation())),
         }
+    }
+
+    /// What gloss shows of each of its bands that blurs nothing.
+    pub(super) fn bands(&self) -> &[GlossLight] {
+        &self.bands
     }
 }
 
@@ -78,7 +72,7 @@ pub fn fit_turn_light(
         }
     }
     let pixels = pixels(&moments, &known, frame);
-    let (light, gloss) = fit_light(&pixels, &colours, Tie::Free).ok_or(TurnError::NoLight)?;
+    let (light, gloss) = fit_light(&pixels, &colours, Finish::Glossy).ok_or(TurnError::NoLight)?;
     let light = with_higher_bands(light.coefficients()?, &gloss)?;
     Ok(light.rotated(&frame.rotation().inverse()))
 }
@@ -97,28 +91,18 @@ fn with_higher_bands(light: ShLight, gloss: &GlossLight) -> Result<ShLight, Turn
     Ok(ShLight::new(coefficients)?)
 }
 
-/// The room that explains the curves best on these normals, in turns with the albedo, which is brought along.
-pub(super) fn fit_room(
+/// The room in which a matt object with these normals explains the curves best, in turns with the albedo, which is
+/// brought along.
+pub(super) fn fit_matt_room(
     moments: &[Moments],
     normals: &[[f64; 3]],
     albedo: &mut [[f64; 3]],
     frame: &TableFrame,
-    fit: RoomFit<'_>,
 ) -> Option<Room> {
     let pixels = pixels(moments, normals, frame);
     let mut found = None;
     for _ in 0..ROUNDS {
-        let (light, gloss) = match fit {
-            RoomFit::All { bands, shares } => {
-                let tie = if bands == 0 {
-                    Tie::Matt
-                } else {
-                    Tie::Shares(shares, bands)
-                };
-                fit_light(&pixels, albedo, tie)?
-            }
-            RoomFit::Gloss(known) => (known.matt, fit_gloss(&pixels, albedo, known)?),
-        };
+        let (light, gloss) = fit_light(&pixels, albedo, Finish::Matt)?;
         let room = Room {
             frame: *frame,
             light,
@@ -152,76 +136,51 @@ fn pixels<'a>(
     moments.iter().zip(normals).map(pixel).collect()
 }
 
-/// What gloss has to do with the matt light.
-#[derive(Debug, Clone, Copy)]
-enum Tie {
-    /// There is no gloss.
+/// What a surface is taken for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Finish {
+    /// It has no gloss.
     Matt,
-    /// It shows these shares of the light's first bands, and any light in those from there to so many.
-    Shares(Shares, usize),
-    /// It shows any light.
-    Free,
+    /// Its gloss shows any light.
+    Glossy,
 }
 
 /// Light and gloss by least squares, for pixels of known albedo.
 fn fit_light(
     pixels: &[LitPixel<'_>],
     albedo: &[[f64; 3]],
-    tie: Tie,
+    finish: Finish,
 ) -> Option<(TableLight, GlossLight)> {
-    let (shares, free) = match tie {
-        Tie::Matt => ([0.0; MATT_BANDS], 0..0),
-        Tie::Shares(shares, bands) => (shares, TERMS..(bands * bands).max(TERMS)),
-        Tie::Free => ([0.0; MATT_BANDS], 0..GLOSS_TERMS),
+    let free = match finish {
+        Finish::Matt => 0,
+        Finish::Glossy => GLOSS_TERMS,
     };
     let mut light = [[0.0; TERMS]; 3];
     let mut gloss = [[0.0; GLOSS_TERMS]; 3];
     for channel in 0..3 {
-        let mut equations = NormalEquations::new(TERMS + free.len());
+        let mut equations = NormalEquations::new(TERMS + free);
         for (pixel, albedo) in pixels.iter().zip(albedo) {
-            let terms = pixel.terms(albedo[channel], &shares, free.clone());
+            let matt = pixel.matt.iter().map(|term| WaveTerm {
+                wave: term.wave,
+                parts: term.parts.map(|part| albedo[channel] * part),
+            });
+            let terms: Vec<WaveTerm> = matt.chain(pixel.gloss[..free].iter().copied()).collect();
             pixel.add(&mut equations, channel, &terms);
         }
         equations.add_ridge(1, STIFFNESS);
         equations.add_ridge(TERMS, GLOSS_STIFFNESS);
         let found = equations.solve()?;
-        let all = light[channel]
-            .iter_mut()
-            .chain(&mut gloss[channel][free.clone()]);
+        let all = light[channel].iter_mut().chain(&mut gloss[channel]);
         for (term, [value, ..]) in all.zip(found) {
             *term = value;
-        }
-        for (light, (at, factor)) in light[channel].into_iter().zip(MATT_IN_GLOSS) {
-            gloss[channel][at] += shares[band(at)] * light / factor;
         }
     }
     Some((TableLight::new(light), GlossLight::new(gloss)))
 }
 
 /// The band of a term of gloss.
-const fn band(at: usize) -> usize {
+pub(super) const fn band(at: usize) -> usize {
     at.isqrt()
-}
-
-/// How much gloss shows of the first bands of a light that was found, by the light of its other bands and these pixels.
-pub(super) fn next_shares(
-    room: &Room,
-    (moments, normals, albedo): (&[Moments], &[[f64; 3]], &[[f64; 3]]),
-) -> Shares {
-    let pixels = pixels(moments, normals, &room.frame);
-    let Ok(light) = room.light.coefficients() else {
-        return Shares::default();
-    };
-    let known = KnownLight {
-        matt: room.light,
-        bands: GlossLight::bands(&light)
-            .into_iter()
-            .chain([room.gloss.beyond(MATT_BANDS)])
-            .collect(),
-    };
-    let gloss = fit_gloss(&pixels, albedo, &known);
-    let found = gloss.map(|gloss| shares(&Room { gloss, ..*room }));
-    found.unwrap_or_default().map(|share| share.max(0.0))
 }
 
 /// How much gloss shows of the first bands of a light that was found.
@@ -233,80 +192,12 @@ pub(super) fn shares(room: &Room) -> Shares {
     [0; MATT_BANDS].map(|_| bands.next().map_or(0.0, |band| room.gloss.share_of(&band)))
 }
 
-/// How much gloss shows of each band of a known light, by least squares, for pixels of known albedo.
-fn fit_gloss(
-    pixels: &[LitPixel<'_>],
-    albedo: &[[f64; 3]],
-    known: &KnownLight,
-) -> Option<GlossLight> {
-    let mut equations = NormalEquations::new(known.bands.len());
-    for (pixel, albedo) in pixels.iter().zip(albedo) {
-        let bands: Vec<_> = known
-            .bands
-            .iter()
-            .map(|band| band.waves_of(&pixel.gloss))
-            .collect();
-        for channel in 0..3 {
-            let matt = pixel.matt_waves(known.matt.terms()[channel], albedo[channel]);
-            let moments = pixel.moments;
-            let product = |i: usize, j: usize| {
-                moments.product(channel, &bands[i][channel], &bands[j][channel])
-            };
-            let right = |i: usize| {
-                let band = &bands[i][channel];
-                [
-                    moments.along(channel, band) - moments.product(channel, &matt, band),
-                    0.0,
-                    0.0,
-                ]
-            };
-            equations.add_sums(product, right);
-        }
-    }
-    equations.add_ridge(0, GLOSS_STIFFNESS);
-    let factors: Vec<f64> = equations
-        .solve()?
-        .iter()
-        .map(|[factor, ..]| *factor)
-        .collect();
-    Some(GlossLight::sum(&known.bands, &factors))
-}
-
 impl LitPixel<'_> {
-    /// What each term of the light contributes where gloss shows shares of it, and what those terms of the gloss do that
-    /// are free.
-    fn terms(&self, albedo: f64, shares: &Shares, free: Range<usize>) -> Vec<WaveTerm> {
-        let tied = self
-            .matt
-            .iter()
-            .zip(MATT_IN_GLOSS)
-            .map(|(matt, (at, factor))| {
-                let share = shares[band(at)] / factor;
-                let gloss = self.gloss[at].parts;
-                WaveTerm {
-                    wave: matt.wave,
-                    parts: [0, 1].map(|i| albedo * matt.parts[i] + share * gloss[i]),
-                }
-            });
-        tied.chain(self.gloss[free].iter().copied()).collect()
-    }
-
     /// Adds what the pixel says of a channel's light and gloss; bright pixels, whose curves stand out of the noise,
     /// count more.
     fn add(&self, equations: &mut NormalEquations, channel: usize, terms: &[WaveTerm]) {
         let product = |i: usize, j: usize| self.moments.term_product(channel, &terms[i], &terms[j]);
         let right = |i: usize| [self.moments.term_along(channel, &terms[i]), 0.0, 0.0];
         equations.add_sums(product, right);
-    }
-
-    /// The waves of its matt part in a channel.
-    fn matt_waves(&self, light: [f64; TERMS], albedo: f64) -> [f64; WAVES] {
-        let mut waves = [0.0; WAVES];
-        for (light, term) in light.into_iter().zip(&self.matt) {
-            for (wave, part) in waves[term.wave..].iter_mut().zip(term.parts) {
-                *wave += albedo * light * part;
-            }
-        }
-        waves
     }
 }

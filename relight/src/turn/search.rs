@@ -13,8 +13,10 @@ const TRIED: usize = 400;
 const STARTS: usize = 3;
 /// A surface that is seen faces the viewer by at least this.
 const LEAST_FACING: f64 = 0.02;
+/// Steps by which each of these is refined before the best is taken.
+const FIRST_STEPS: usize = 4;
 /// Most steps of the refinement, the one at which it ends, radians, and the longest.
-const STEPS: usize = 20;
+const STEPS: usize = 16;
 const LAST_STEP: f64 = 1e-4;
 const LONGEST_STEP: f64 = 0.2;
 /// The step by which a slope is measured, radians.
@@ -104,30 +106,46 @@ impl<'a> Search<'a> {
                 insert(&mut best, (cost, tried.normal));
             }
         }
-        let fits = best.map(|(_, start)| self.near(moments, expected, start));
-        let [first, rest @ ..] = fits;
-        let (fit, _) = rest.into_iter().fold(
+        let refined = best.map(|(_, start)| self.downhill(moments, expected, start, FIRST_STEPS));
+        let [first, rest @ ..] = refined;
+        let (start, _) = rest.into_iter().fold(
             first,
             |best, other| {
                 if other.1 < best.1 { other } else { best }
             },
         );
-        fit
+        self.near(moments, expected, start)
     }
 
-    /// The best normal that is reached from `start` downhill, and what it costs: Gauss and Newton's steps, damped
-    /// as Levenberg and Marquardt do, with the albedo at its best for each normal.
-    fn near(
+    /// The best normal that is reached from `start` downhill.
+    pub(super) fn near(
         &self,
         moments: &Moments,
         expected: Option<Expected>,
         start: [f64; 3],
-    ) -> (PixelFit, f64) {
+    ) -> PixelFit {
+        let (normal, _) = self.downhill(moments, expected, start, STEPS);
+        PixelFit {
+            normal,
+            albedo: moments.albedo(&self.room.waves(normal)),
+            residual: self.residual(moments, normal),
+        }
+    }
+
+    /// Where so many steps lead, and what it costs there: Gauss and Newton's steps, damped as Levenberg and Marquardt do,
+    /// with the albedo at its best for each normal.
+    fn downhill(
+        &self,
+        moments: &Moments,
+        expected: Option<Expected>,
+        start: [f64; 3],
+        steps: usize,
+    ) -> ([f64; 3], f64) {
         let cost = |normal| self.residual(moments, normal) + bias(expected, normal);
         let mut normal = start;
         let mut least = cost(normal);
         let mut damping = 1e-3;
-        for _ in 0..STEPS {
+        for _ in 0..steps {
             let axes = tangents(normal);
             let slope = self.slope(moments, expected, normal, axes);
             let step = slope.step(damping);
@@ -144,12 +162,7 @@ impl<'a> Search<'a> {
                 break;
             }
         }
-        let fit = PixelFit {
-            normal,
-            albedo: moments.albedo(&self.room.waves(normal)),
-            residual: self.residual(moments, normal),
-        };
-        (fit, least)
+        (normal, least)
     }
 
     /// How the cost changes as a normal leans.
@@ -158,37 +171,56 @@ impl<'a> Search<'a> {
         moments: &Moments,
         expected: Option<Expected>,
         normal: [f64; 3],
-        [u, v]: [[f64; 3]; 2],
+        axes: [[f64; 3]; 2],
     ) -> Slope {
+        let leaning = self.leaning(moments, normal, axes);
+        let mut slope = Slope::default();
+        for (channel, ways) in leaning.ways.iter().enumerate() {
+            slope.add(moments, channel, ways, &leaning.seen[channel]);
+        }
+        slope.scale(moments.unit());
+        if let Some(expected) = expected {
+            slope.lean(expected, normal, axes);
+        }
+        slope
+    }
+
+    /// How the waves of a pixel change as its normal leans.
+    pub(super) fn leaning(
+        &self,
+        moments: &Moments,
+        normal: [f64; 3],
+        [u, v]: [[f64; 3]; 2],
+    ) -> Leaning {
         let here = self.room.waves(normal);
         let albedo = moments.albedo(&here);
         let there = [[SLOPE_STEP, 0.0], [0.0, SLOPE_STEP]]
             .map(|step| self.room.waves(leant(normal, [u, v], step)));
-        let mut slope = Slope::default();
-        for (channel, albedo) in albedo.into_iter().enumerate() {
-            let matt = padded(&here.matt[channel]);
-            let seen = sum(&matt, albedo, &here.gloss[channel]);
-            let own = moments.product(channel, &matt, &matt);
-            let ways = there.map(|there| {
-                let moved = sum(&padded(&there.matt[channel]), albedo, &there.gloss[channel]);
+        let matt = here.matt.each_ref().map(padded);
+        let seen: [_; 3] =
+            std::array::from_fn(|c| sum(&matt[c], albedo[c], &here.gloss[c]));
+        let ways = std::array::from_fn(|c| {
+            let own = moments.product(c, &matt[c], &matt[c]);
+            there.map(|there| {
+                let moved = sum(&padded(&there.matt[c]), albedo[c], &there.gloss[c]);
                 let mut way: [f64; WAVES] =
-                    std::array::from_fn(|i| (moved[i] - seen[i]) / SLOPE_STEP);
+                    std::array::from_fn(|i| (moved[i] - seen[c][i]) / SLOPE_STEP);
                 // The albedo follows the normal.
-                if own > 1e-12 && albedo > 0.0 {
-                    let share = moments.product(channel, &way, &matt) / own;
+                if own > 1e-12 && albedo[c] > 0.0 {
+                    let share = moments.product(c, &way, &matt[c]) / own;
                     way.iter_mut()
-                        .zip(&matt)
+                        .zip(&matt[c])
                         .for_each(|(way, matt)| *way -= share * matt);
                 }
                 way
-            });
-            slope.add(moments, channel, &ways, &seen);
+            })
+        });
+        Leaning {
+            albedo,
+            matt,
+            seen,
+            ways,
         }
-        slope.scale(moments.unit());
-        if let Some(expected) = expected {
-            slope.lean(expected, normal, [u, v]);
-        }
-        slope
     }
 
     /// What a normal leaves of a curve.
@@ -229,16 +261,28 @@ impl<'a> Search<'a> {
     }
 }
 
+/// The waves of a pixel, channel by channel, and how they change as its normal leans.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Leaning {
+    pub(super) albedo: [f64; 3],
+    /// Those of its matt part, for an albedo of 1.
+    pub(super) matt: [[f64; WAVES]; 3],
+    /// Those of all that is seen.
+    pub(super) seen: [[f64; WAVES]; 3],
+    /// The change of the latter with a normal that leans to either side, while the albedo follows.
+    pub(super) ways: [[[f64; WAVES]; 2]; 3],
+}
+
 /// Half the gradient of the cost over two leanings, and half its second derivative.
 #[derive(Debug, Clone, Copy, Default)]
-struct Slope {
-    gradient: [f64; 2],
+pub(super) struct Slope {
+    pub(super) gradient: [f64; 2],
     /// uu, uv, vv.
-    bend: [f64; 3],
+    pub(super) bend: [f64; 3],
 }
 
 impl Slope {
-    fn add(
+    pub(super) fn add(
         &mut self,
         moments: &Moments,
         channel: usize,
@@ -253,13 +297,13 @@ impl Slope {
         }
     }
 
-    fn scale(&mut self, factor: f64) {
+    pub(super) fn scale(&mut self, factor: f64) {
         self.gradient.iter_mut().for_each(|value| *value *= factor);
         self.bend.iter_mut().for_each(|value| *value *= factor);
     }
 
     /// Adds the prior's part.
-    fn lean(&mut self, expected: Expected, normal: [f64; 3], axes: [[f64; 3]; 2]) {
+    pub(super) fn lean(&mut self, expected: Expected, normal: [f64; 3], axes: [[f64; 3]; 2]) {
         let half = 0.5 * expected.weight;
         for (gradient, axis) in self.gradient.iter_mut().zip(axes) {
             *gradient -= half * dot(expected.normal, axis);
@@ -323,7 +367,7 @@ fn half_sphere(count: usize) -> impl Iterator<Item = [f64; 3]> {
 }
 
 /// Two directions at right angles to a normal and to each other.
-fn tangents(normal: [f64; 3]) -> [[f64; 3]; 2] {
+pub(super) fn tangents(normal: [f64; 3]) -> [[f64; 3]; 2] {
     let helper = if normal[2].abs() < 0.9 {
         [0.0, 0.0, 1.0]
     } else {

@@ -4,9 +4,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::gloss::{GLOSS_ORDER, GlossLight};
+use super::joint::{Joint, Unknowns};
 use super::moments::Moments;
 use super::robust::trust;
-use super::room::{KnownLight, RoomFit, Shares, fit_room, next_shares, shares};
+use super::room::{KnownLight, fit_matt_room};
 use super::search::{Expected, PixelFit, Room, Search, unit};
 use super::start::{blurred, inflated};
 use super::{Elevation, TableFrame, TableLight, TurnCurves, TurnError};
@@ -15,12 +16,14 @@ use crate::light::{Normals, ShLight, YUp};
 
 /// Pixels on which an unknown light is looked for: more are averaged in blocks first.
 const COARSE_PIXELS: usize = 2500;
-/// Rounds of light and normals in turn.
-const ROUNDS: usize = 18;
-/// How many of them, the first, take the object for matt.
-const MATT_ROUNDS: usize = 8;
-/// In a known light the rounds end where one improves the cost by less than this.
-const SETTLED: f64 = 2e-5;
+/// Rounds of light and normals in turn, for a matt object, with which an unknown light begins.
+const ROUNDS: usize = 8;
+/// Then all that is unknown is refined together, in so many steps; after that the best normals are looked for anywhere,
+/// and so on for so many rounds.
+const JOINT_STEPS: usize = 8;
+const JOINT_ROUNDS: usize = 2;
+/// Steps for those whose highlights and shadows are left out.
+const ROBUST_STEPS: usize = 3;
 /// Bands of the room's light that gloss is fitted with, of order 0 and up.
 const GLOSS_BANDS: usize = GLOSS_ORDER + 1;
 /// How smooth the normals are that an unknown light is fitted to: the deviation in the first round, in parts of
@@ -141,12 +144,11 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         expected,
         room,
         has_shape,
-        shares: shares(&room),
         known,
         moments: all_moments(curves),
         fits: Vec::new(),
     };
-    solver.fits = solver.search();
+    solver.fits = solver.search(None);
     for _ in 0..ROBUST_ROUNDS {
         solver.refine();
     }
@@ -251,15 +253,14 @@ struct Solver<'a> {
     room: Room,
     known: Option<KnownLight>,
     has_shape: bool,
-    shares: Shares,
     moments: Vec<Moments>,
     fits: Vec<PixelFit>,
 }
 
 impl Solver<'_> {
-    /// The best normals anywhere.
-    fn search(&self) -> Vec<PixelFit> {
-        search_all(&self.room, &self.moments, self.expected.as_deref())
+    /// The best normals near others, or anywhere.
+    fn search(&self, near: Option<&[PixelFit]>) -> Vec<PixelFit> {
+        search_all(&self.room, &self.moments, self.expected.as_deref(), near)
     }
 
     /// Leaves out what does not fit, fits the room again, and then every pixel.
@@ -274,22 +275,18 @@ impl Solver<'_> {
             .collect();
         let every = self.moments.len().div_ceil(COARSE_PIXELS).max(1);
         let moments: Vec<Moments> = self.moments.iter().step_by(every).copied().collect();
-        let fits = || self.fits.iter().step_by(every);
-        let normals: Vec<[f64; 3]> = fits().map(|fit| fit.normal).collect();
-        let mut albedo: Vec<[f64; 3]> = fits().map(|fit| fit.albedo).collect();
-        let all = RoomFit::All {
-            bands: if self.has_shape { GLOSS_BANDS } else { 0 },
-            shares: self.shares,
+        let fits: Vec<PixelFit> = self.fits.iter().step_by(every).copied().collect();
+        let expected = self.expected.as_ref();
+        let expected: Option<Vec<Expected>> =
+            expected.map(|all| all.iter().step_by(every).copied().collect());
+        let joint = Joint {
+            moments: &moments,
+            expected: expected.as_deref(),
+            unknowns: unknowns(self.known.as_ref(), self.has_shape),
         };
-        let fit = self.known.as_ref().map_or(all, RoomFit::Gloss);
-        if let Some(room) = fit_room(&moments, &normals, &mut albedo, &self.room.frame, fit) {
-            self.room = room;
-        }
-        if self.known.is_none() {
-            let pixels = (&moments[..], &normals[..], &albedo[..]);
-            self.shares = next_shares(&self.room, pixels);
-        }
-        self.fits = self.search();
+        let near = search_all(&self.room, &moments, joint.expected, Some(&fits));
+        (self.room, _) = joint.refined(self.room, near, ROBUST_STEPS);
+        self.fits = self.search(Some(&self.fits));
     }
 
     /// The normals around each pixel, smoothed.
@@ -356,7 +353,13 @@ fn all_moments(curves: &TurnCurves) -> Vec<Moments> {
         .collect()
 }
 
-fn search_all(room: &Room, moments: &[Moments], expected: Option<&[Expected]>) -> Vec<PixelFit> {
+/// The best normals of all pixels: near those of other fits, or anywhere.
+pub(super) fn search_all(
+    room: &Room,
+    moments: &[Moments],
+    expected: Option<&[Expected]>,
+    near: Option<&[PixelFit]>,
+) -> Vec<PixelFit> {
     let search = Search::new(room);
     moments
         .par_iter()
@@ -370,9 +373,28 @@ fn search_all(room: &Room, moments: &[Moments], expected: Option<&[Expected]>) -
                     residual: 1.0,
                 };
             }
-            search.anywhere(moments, expected)
+            match near {
+                Some(fits) => search.near(moments, expected, fits[pixel].normal),
+                None => search.anywhere(moments, expected),
+            }
         })
         .collect()
+}
+
+/// What is left of the curves, with what normals are off those that are expected, the mean over the pixels.
+pub(super) fn cost(fits: &[PixelFit], expected: Option<&[Expected]>) -> f64 {
+    let sum: f64 = fits
+        .iter()
+        .enumerate()
+        .map(|(pixel, fit)| {
+            let off = expected.map_or(0.0, |all| {
+                let expected = all[pixel];
+                expected.weight * (1.0 - super::search::dot(expected.normal, fit.normal))
+            });
+            fit.residual.min(1.0) + off
+        })
+        .sum();
+    sum / fits.len().max(1) as f64
 }
 
 /// The normals of the body in the outline, where nothing else is known of the shape.
@@ -405,6 +427,13 @@ fn expected(
     Ok(curves.places().iter().map(at).collect())
 }
 
+/// What is to be found of the room. Where nothing is known of the shape but its outline, light and gloss together could
+/// explain any shape: the object is taken for matt.
+fn unknowns(known: Option<&KnownLight>, has_shape: bool) -> Unknowns<'_> {
+    let bands = if has_shape { GLOSS_BANDS } else { 0 };
+    known.map_or(Unknowns::Light { bands }, Unknowns::Gloss)
+}
+
 /// The gloss in a known light.
 fn find_gloss(
     curves: &TurnCurves,
@@ -418,11 +447,8 @@ fn find_gloss(
         light: known.matt,
         gloss: GlossLight::NONE,
     };
-    let alternation = coarse.alternation(frame, Some(known), true);
-    let fits = search_all(&matt, &coarse.moments, alternation.expected);
-    let normals = alternation.smoothed(&fits, ROUNDS);
-    let found = alternation.run(normals);
-    found.map_or(matt, |(_, room)| room)
+    let joint = coarse.joint(Unknowns::Gloss(known));
+    joint.found(matt, JOINT_ROUNDS, JOINT_STEPS).1
 }
 
 /// A turn on blocks of pixels.
@@ -446,20 +472,11 @@ impl Coarse {
         }
     }
 
-    fn alternation<'a>(
-        &'a self,
-        frame: &'a TableFrame,
-        known: Option<&'a KnownLight>,
-        has_shape: bool,
-    ) -> Alternation<'a> {
-        Alternation {
-            curves: &self.curves,
+    fn joint<'a>(&'a self, unknowns: Unknowns<'a>) -> Joint<'a> {
+        Joint {
             moments: &self.moments,
             expected: self.expected.as_deref(),
-            frame,
-            side: self.side,
-            known,
-            has_shape,
+            unknowns,
         }
     }
 }
@@ -480,7 +497,11 @@ fn find_light(
     for (name, height) in HEIGHTS {
         begun.push((name, inflated(&coarse.curves, height)));
     }
-    let alternation = coarse.alternation(frame, None, has_shape);
+    let alternation = Alternation {
+        coarse: &coarse,
+        frame,
+        has_shape,
+    };
     let ended: Vec<(String, Option<(f64, Room)>)> = begun
         .into_iter()
         .map(|(name, normals)| (name.to_owned(), alternation.run(normals)))
@@ -524,97 +545,66 @@ fn reduced(
     coarse.places().iter().map(at).collect()
 }
 
-/// Light and normals in turns.
+/// An unknown light from one start.
 struct Alternation<'a> {
-    curves: &'a TurnCurves,
-    moments: &'a [Moments],
-    expected: Option<&'a [Expected]>,
+    coarse: &'a Coarse,
     frame: &'a TableFrame,
-    side: usize,
-    known: Option<&'a KnownLight>,
     /// Whether more is known of the shape than its outline.
     has_shape: bool,
 }
 
 impl Alternation<'_> {
-    /// What is left in the end, and the light.
+    /// What is left in the end, and the light: light and normals in turns for a matt object, then both together, and then
+    /// with gloss.
     fn run(&self, start: Vec<[f64; 3]>) -> Option<(f64, Room)> {
+        let coarse = self.coarse;
         let mut normals = start;
         let mut albedo = self.first_albedo();
-        let mut ended: Option<(f64, Room)> = None;
-        let mut shares = Shares::default();
+        let mut room = None;
         for round in 0..ROUNDS {
-            let bands = self.bands(round);
-            let all = RoomFit::All { bands, shares };
-            let fit = self.known.map_or(all, RoomFit::Gloss);
-            let room = fit_room(self.moments, &normals, &mut albedo, self.frame, fit)?;
-            if self.known.is_none() && bands > 0 {
-                shares = next_shares(&room, (self.moments, &normals, &albedo));
-            }
-            let fits = search_all(&room, self.moments, self.expected);
+            let found = fit_matt_room(&coarse.moments, &normals, &mut albedo, self.frame)?;
+            let fits = search_all(&found, &coarse.moments, coarse.expected.as_deref(), None);
             for (albedo, fit) in albedo.iter_mut().zip(&fits) {
                 *albedo = fit.albedo;
             }
-            let cost = self.cost(&fits);
-            let settled = ended.is_some_and(|(before, _)| before - cost < SETTLED);
-            ended = Some((cost, room));
-            if settled && self.known.is_some() {
-                break;
-            }
             normals = self.smoothed(&fits, round);
+            room = Some(found);
         }
-        ended
-    }
-
-    /// The bands of gloss in a round: the matt part comes first, and where nothing is known of the shape but its outline,
-    /// light and gloss together could explain any shape.
-    fn bands(&self, round: usize) -> usize {
-        if round < MATT_ROUNDS || !self.has_shape {
-            0
-        } else {
-            (round - MATT_ROUNDS + 1).min(GLOSS_BANDS)
+        let matt = coarse.joint(Unknowns::Light { bands: 0 });
+        let (cost, room) = matt.found(room?, 1, JOINT_STEPS);
+        if !self.has_shape {
+            return Some((cost, room));
         }
+        let glossy = coarse.joint(unknowns(None, true));
+        Some(glossy.found(room, JOINT_ROUNDS, JOINT_STEPS))
     }
 
     /// As if the shading were even.
     fn first_albedo(&self) -> Vec<[f64; 3]> {
-        (0..self.curves.pixels())
-            .map(|pixel| Moments::mean(self.curves, pixel).map(|mean| mean.max(1e-6)))
+        let curves = &self.coarse.curves;
+        (0..curves.pixels())
+            .map(|pixel| Moments::mean(curves, pixel).map(|mean| mean.max(1e-6)))
             .collect()
     }
 
-    fn cost(&self, fits: &[PixelFit]) -> f64 {
-        let sum: f64 = fits
-            .iter()
-            .enumerate()
-            .map(|(pixel, fit)| {
-                let off = self.expected.map_or(0.0, |all| {
-                    let expected = all[pixel];
-                    expected.weight * (1.0 - super::search::dot(expected.normal, fit.normal))
-                });
-                fit.residual.min(1.0) + off
-            })
-            .sum();
-        sum / fits.len().max(1) as f64
-    }
-
     fn smoothed(&self, fits: &[PixelFit], round: usize) -> Vec<[f64; 3]> {
-        let across = self.curves.extent().width as f64;
+        let across = self.coarse.curves.extent().width as f64;
         let deviation = if self.has_shape {
             0.0
         } else {
             let fall = BLUR_FALL.powi(round as i32);
-            (FIRST_BLUR * across * fall).max(LEAST_BLUR / self.side as f64)
+            (FIRST_BLUR * across * fall).max(LEAST_BLUR / self.coarse.side as f64)
         };
         if deviation < 0.3 {
             return fits.iter().map(|fit| fit.normal).collect();
         }
         let map = self
+            .coarse
             .curves
             .map(|pixel| fits[pixel].normal.map(|v| v as f32));
-        let smooth = blurred(&map, &self.curves.mask(), deviation);
+        let smooth = blurred(&map, &self.coarse.curves.mask(), deviation);
         let [x, y, z] = smooth.planes();
         let at = |&place: &usize| unit([x, y, z].map(|plane| f64::from(plane[place])));
-        self.curves.places().iter().map(at).collect()
+        self.coarse.curves.places().iter().map(at).collect()
     }
 }

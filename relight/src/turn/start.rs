@@ -5,8 +5,8 @@ use crate::image::{Extent, Planes};
 use super::TurnCurves;
 use super::search::unit;
 
-/// Steps of relaxation for each pixel of the mask's width.
-const STEPS_A_PIXEL: usize = 60;
+/// Steps of relaxation for each pixel of the longer side: over-relaxation needs so many in proportion to it.
+const STEPS_A_PIXEL: usize = 4;
 
 /// The normals of a round body in the outline of the mask, one a pixel: the height is the root of the solution
 /// of Poisson's equation that is 0 at the outline, times `height`. At the outline the normals lie in the image
@@ -44,7 +44,7 @@ fn relaxed(inside: &[bool], extent: Extent, steps: usize) -> Vec<f64> {
     let mut values = vec![0.0; extent.pixels()];
     let side = extent.width.max(extent.height) as f64;
     let factor = 2.0 / (1.0 + (std::f64::consts::PI / side).sin());
-    for _ in 0..steps.min(8 * extent.width.max(extent.height)) {
+    for _ in 0..steps {
         for here in (0..values.len()).filter(|&here| inside[here]) {
             let beside = values[here - 1]
                 + values[here + 1]
