@@ -20,6 +20,8 @@ const DAMPING: f64 = 1e-3;
 const MOST_DAMPING: f64 = 1e3;
 /// The steps end where one improves the cost by less than this part of it.
 const SETTLED: f64 = 2e-3;
+/// The most that gloss shows of a band, over what a smooth dielectric shows of it.
+const MOST_SHARE: f64 = 1.5;
 /// Pixels added up by one task.
 const CHUNK: usize = 128;
 /// How much a pixel counts falls to a quarter where it leaves this many times the median of what pixels leave.
@@ -190,13 +192,17 @@ impl Guess {
         for (channel, terms) in terms.iter_mut().enumerate() {
             let own = &step[layout.of_channel(channel)..][..layout.light + layout.higher];
             let (light, rest) = own.split_at(layout.light);
-            terms.iter_mut().zip(light).for_each(|(term, by)| *term += by);
+            terms
+                .iter_mut()
+                .zip(light)
+                .for_each(|(term, by)| *term += by);
             for (at, by) in rest.iter().enumerate() {
                 higher = higher.moved(channel, TERMS + at, *by);
             }
         }
         let by = &step[layout.of_channel(3)..];
-        let shares = self.shares.iter().zip(by).map(|(share, by)| share + by);
+        let shares = self.shares.iter().zip(by);
+        let shares = shares.map(|(share, by)| (share + by).clamp(0.0, MOST_SHARE));
         Self {
             light: TableLight::new(terms),
             shares: shares.collect(),
@@ -342,7 +348,7 @@ impl Sums {
     ) {
         let axes = tangents(normal);
         let leaning = search.leaning(moments, normal, axes);
-        let weight = weight * moments.unit();
+        let weight = weight;
         let mut slope = Slope::default();
         let mut couplings = vec![[0.0; 2]; self.count];
         let all = columns.of(normal, leaning.albedo);
@@ -356,7 +362,10 @@ impl Sums {
                 // The albedo follows.
                 for (_, waves) in &mut columns {
                     let share = dot(waves, &along) / own;
-                    waves.iter_mut().zip(matt).for_each(|(w, m)| *w -= share * m);
+                    waves
+                        .iter_mut()
+                        .zip(matt)
+                        .for_each(|(w, m)| *w -= share * m);
                 }
             }
             for (k, (at, waves)) in columns.iter().enumerate() {
@@ -371,7 +380,10 @@ impl Sums {
             }
         }
         slope.scale(moments.unit());
-        couplings.iter_mut().flatten().for_each(|value| *value *= moments.unit());
+        couplings
+            .iter_mut()
+            .flatten()
+            .for_each(|value| *value *= moments.unit());
         if let Some(expected) = expected {
             slope.lean(expected, normal, axes);
         }
@@ -409,7 +421,9 @@ impl Sums {
             right,
         } = self;
         // In units of what holds each: they are of very different sizes.
-        let largest = (0..count).map(|i| matrix[i * count + i]).fold(0.0, f64::max);
+        let largest = (0..count)
+            .map(|i| matrix[i * count + i])
+            .fold(0.0, f64::max);
         let least = 1e-12 * largest + f64::MIN_POSITIVE;
         let units: Vec<f64> = (0..count)
             .map(|i| matrix[i * count + i].max(least).sqrt())

@@ -197,8 +197,7 @@ impl<'a> Search<'a> {
         let there = [[SLOPE_STEP, 0.0], [0.0, SLOPE_STEP]]
             .map(|step| self.room.waves(leant(normal, [u, v], step)));
         let matt = here.matt.each_ref().map(padded);
-        let seen: [_; 3] =
-            std::array::from_fn(|c| sum(&matt[c], albedo[c], &here.gloss[c]));
+        let seen: [_; 3] = std::array::from_fn(|c| sum(&matt[c], albedo[c], &here.gloss[c]));
         let ways = std::array::from_fn(|c| {
             let own = moments.product(c, &matt[c], &matt[c]);
             there.map(|there| {

@@ -40,7 +40,7 @@ const HEIGHTS: [(&str, f64); 3] = [
 /// How much the normals of such a body count where there is no prior.
 const OUTLINE_WEIGHT: f64 = 0.15;
 /// Rounds in which what does not fit is left out.
-const ROBUST_ROUNDS: usize = 2;
+const ROBUST_ROUNDS: usize = 3;
 /// How far the surroundings of a pixel reach, in parts of the frame's width: a normal that differs from theirs is not to be
 /// believed as far.
 const SURROUNDINGS: f64 = 1.0 / 40.0;

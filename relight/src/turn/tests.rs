@@ -218,7 +218,8 @@ fn clipped_light_is_left_out() {
         curves.clipped()
     );
     let found = solve_turn(&curves, &known(&light)).unwrap();
-    assert!(off(&surface, &found.normals(&curves)) < 1.0);
+    let off = off(&surface, &found.normals(&curves));
+    assert!(off < 0.3, "{off}");
 }
 
 #[test]
@@ -227,7 +228,7 @@ fn a_turn_of_which_a_third_is_missing_tells_the_same() {
     let curves = film(&surface, &light, Take { part: 0.67, ..TAKE });
     let found = solve_turn(&curves, &known(&light)).unwrap();
     let off = off(&surface, &found.normals(&curves));
-    assert!(off < 0.5, "{off}");
+    assert!(off < 0.3, "{off}");
     let albedo_off = albedo_off(&surface, &found.albedo(&curves), 1.0);
     assert!(albedo_off < 0.01, "{albedo_off}");
 }
@@ -275,7 +276,7 @@ fn gloss_beside_the_matt_part_is_found_in_known_light() {
     let curves = builder.finish().unwrap();
     let found = solve_turn(&curves, &known(&light)).unwrap();
     let off = off(&surface, &found.normals(&curves));
-    assert!(off < 2.0, "{off}");
+    assert!(off < 1.0, "{off}");
     let gloss = found.gloss(&curves).unwrap().unwrap();
     assert!(gloss.reflectance > 0.0 && gloss.residual < 0.8, "{gloss:?}");
     let maps = TurnMaps::new(&curves, &found);
@@ -298,7 +299,13 @@ fn labels_of_a_turn_are_read_as_samples_with_truth() {
     assert_eq!(set.names().len(), 3);
     let sample = set.load(1).unwrap();
     let believed = sample.normals.unwrap();
-    let believed = believed.completed(&mask(&surface).plane(0).iter().map(|&m| m >= 0.5).collect::<Vec<_>>());
+    let believed = believed.completed(
+        &mask(&surface)
+            .plane(0)
+            .iter()
+            .map(|&m| m >= 0.5)
+            .collect::<Vec<_>>(),
+    );
     assert!(off(&surface, &believed) < 1.0);
     let at = |image: &Rgb<Linear>| image.planes().pixel(SIDE / 2, SIDE / 3)[1];
     let (image, diffuse) = (sample.image.unwrap(), sample.diffuse.unwrap());
@@ -344,30 +351,36 @@ fn shadows_and_highlights_of_some_frames_are_left_out_and_shown() {
     let mut builder = CurveBuilder::new(extent, mask(&surface).plane(0)).unwrap();
     for k in 0..90 {
         let angle = f64::from(k) * 4.0;
-        let factor = match k {
-            20..35 => 0.5,
-            60..64 => 1.5,
-            _ => 1.0,
-        };
-        let image = frame(&surface, &light, angle)
-            .into_planes()
-            .map(|v| v * factor);
+        let mut image = frame(&surface, &light, angle).into_planes();
+        for y in 0..SIDE {
+            for x in 0..SIDE {
+                // The shadow of a pole goes from the left to the right, and a spot of light back.
+                let factor = match k {
+                    20..40 if (k - 20) / 2 == x as u32 / 4 => 0.5,
+                    60..72 if (71 - k) / 2 == x as u32 / 4 => 1.5,
+                    _ => 1.0,
+                };
+                let value = image.pixel(x, y);
+                image.set_pixel(x, y, value.map(|v| v * factor));
+            }
+        }
         builder.push(angle, extent, image.planes()).unwrap();
     }
     let curves = builder.finish().unwrap();
     let found = solve_turn(&curves, &known(&light)).unwrap();
     let off = off(&surface, &found.normals(&curves));
-    assert!(off < 2.0, "{off}");
+    assert!(off < 1.0, "{off}");
     let maps = TurnMaps::new(&curves, &found);
     let middle = maps.shadow.pixel(SIDE / 2, SIDE / 2)[0];
-    assert!((0.04..0.14).contains(&middle), "{middle}");
+    // Two of 90 frames, half of their light.
+    assert!((0.005..0.02).contains(&middle), "{middle}");
     assert!(maps.highlight.pixel(SIDE / 2, SIDE / 2)[0] > 0.01);
     let darkest = maps
         .over_angle
         .iter()
         .max_by(|a, b| a.shadow.total_cmp(&b.shadow))
         .unwrap();
-    assert!((80.0..140.0).contains(&darkest.angle_deg), "{darkest:?}");
+    assert!((80.0..130.0).contains(&darkest.angle_deg), "{darkest:?}");
 }
 
 #[test]
