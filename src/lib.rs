@@ -6,6 +6,7 @@
 //! | --- | --- | --- | --- |
 //! | `relit` (this one) | `src/` | extraction, and the programs | |
 //! | [`relit_rig`] | `src/rig/` | camera, turntable, simulator, capture, HTTP service | |
+//! | [`relit_web`] | `src/web/` | what the programs' pages share: tokens, who gets in, limits | |
 //! | [`relit_mask`] | `src/mask/` | GrabCut on an image | OpenCV |
 //! | [`relit_video`] | `src/video/` | decoding and muxing | FFmpeg |
 //! | [`relit_data`] | `src/data/` | sessions, data sets, reports on disk | none |

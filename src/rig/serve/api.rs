@@ -12,13 +12,12 @@ use futures_util::{Stream, StreamExt};
 use tokio::time::timeout;
 use tokio_stream::wrappers::WatchStream;
 
-use super::extract::JsonBody;
-use super::failure::{Failure, Problem};
-use super::options::Shutdown;
 use super::permits::{Permits, Work, permit};
 use super::rig::{Command, Rig};
 use super::snapshots::{PERIOD, Snapshots};
 use crate::state::RigState;
+use relit_web::Shutdown;
+use relit_web::{Failure, JsonBody, Problem};
 
 /// A subscriber hears something at least so often: silence means a lost connection.
 const BEAT: Duration = Duration::from_secs(2);

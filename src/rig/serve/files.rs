@@ -15,10 +15,9 @@ use tower_http::services::ServeFile;
 use utoipa::IntoParams;
 
 use super::archive::Archive;
-use super::extract::QueryParams;
-use super::failure::{Failure, Problem};
 use super::library::Library;
 use super::permits::{Permits, Work, permit};
+use relit_web::{Failure, Problem, QueryParams};
 
 const NO_RANGE: &str = "there is one range at a time, and it has to begin inside the file";
 

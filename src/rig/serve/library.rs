@@ -10,13 +10,13 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::cache::Cache;
-use super::failure::Failure;
 use relit_data::causes::with_causes;
 use relit_data::durable;
 use relit_data::naming::is_session_name;
 use relit_data::session::{
     self, FrameIndex, INDEX_FILE, MANIFEST_FILE, MASK_FILE, Manifest, Status, object_of,
 };
+use relit_web::Failure;
 
 /// Where sessions go that were put away. It begins with a dot: nobody takes it for a session.
 const TRASH: &str = ".trash";

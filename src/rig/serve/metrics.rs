@@ -9,11 +9,11 @@ use axum::http::header;
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use super::failure::Problem;
 use super::options::ClientLimits;
 use super::permits::Permits;
 use super::snapshots::Snapshots;
 use crate::state::{Phase, RigState};
+use relit_web::Problem;
 
 const PHASES: [Phase; 9] = [
     Phase::Idle,

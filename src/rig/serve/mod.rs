@@ -11,16 +11,11 @@
 //! one. Everywhere else a token of 128 random bits is demanded; the page's own files alone go
 //! without, as they hold nothing of the rig.
 
-mod access;
-mod address;
 mod api;
 mod archive;
 mod cache;
-mod extract;
-mod failure;
 mod files;
 mod library;
-mod listen;
 mod metrics;
 mod options;
 mod page;
@@ -31,7 +26,6 @@ pub mod rig;
 mod routes;
 mod sessions;
 mod snapshots;
-mod token;
 
 #[cfg(test)]
 mod tests;
@@ -42,9 +36,8 @@ use std::sync::Arc;
 
 use tokio::time::{MissedTickBehavior, interval};
 
-pub use self::address::Announcement;
-pub use self::options::{ClientLimits, Heartbeat, ServeOptions, Shutdown};
-pub use self::token::{InvalidToken, Token, TokenFileError};
+pub use self::options::{ClientLimits, Heartbeat, ServeOptions};
+pub use relit_web::{Announcement, InvalidToken, Shutdown, Token, TokenFileError};
 use rig::Rig;
 
 /// Threads that carry requests; files and decoding have their own.
@@ -108,7 +101,7 @@ pub fn serve(
         .build()
         .map_err(ServeError::Threads)?;
     let announcement = Announcement::new(address, &options.names, token.as_ref());
-    let policy = access::AccessPolicy::new(address.port(), token, options.names, page::paths());
+    let policy = relit_web::AccessPolicy::new(address.port(), token, options.names, page::paths());
     let app = routes::App::new(rig, policy, options.limits, shutdown.clone());
     let served = runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(failed)?;
@@ -117,10 +110,18 @@ pub fn serve(
         if let Some(heartbeat) = options.heartbeat {
             tokio::spawn(beat(heartbeat, app.rig.clone()));
         }
-        listen::run(listener, &app).await;
+        let (limits, connections) = (app.limits.of_connections(), &app.permits.connections);
+        relit_web::run(
+            listener,
+            routes::router(&app),
+            limits,
+            connections,
+            shutdown,
+        )
+        .await;
         Ok(())
     });
-    runtime.shutdown_timeout(listen::GRACE);
+    runtime.shutdown_timeout(relit_web::GRACE);
     served
 }
 

@@ -3,10 +3,7 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
-/// Asks a server to end, from any thread. Copies ask the same server.
-pub use tokio_util::sync::CancellationToken as Shutdown;
-
-use super::token::Token;
+use relit_web::{ConnectionLimits, Token};
 
 /// Where and for whom the rig is served.
 #[derive(Debug, Clone)]
@@ -70,17 +67,31 @@ pub struct ClientLimits {
     pub stall: Duration,
 }
 
+impl ClientLimits {
+    /// Those that concern connections, whatever is asked for on them.
+    pub(super) fn of_connections(&self) -> ConnectionLimits {
+        ConnectionLimits {
+            connections: self.connections,
+            per_address: self.per_address,
+            first_byte: self.first_byte,
+            head: self.head,
+            stall: self.stall,
+        }
+    }
+}
+
 impl Default for ClientLimits {
     fn default() -> Self {
+        let of_connections = ConnectionLimits::default();
         Self {
-            connections: 256,
-            per_address: 128,
+            connections: of_connections.connections,
+            per_address: of_connections.per_address,
             viewers: 16,
             subscribers: 32,
-            first_byte: Duration::from_secs(2),
-            head: Duration::from_secs(10),
+            first_byte: of_connections.first_byte,
+            head: of_connections.head,
             body: Duration::from_secs(10),
-            stall: Duration::from_secs(20),
+            stall: of_connections.stall,
         }
     }
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::spawn_blocking;
 
-use super::failure::Failure;
 use super::options::ClientLimits;
+use relit_web::Failure;
 
 /// Listings of the session folder at once.
 const LISTINGS: usize = 2;

@@ -9,8 +9,8 @@ use relit_data::causes::with_causes;
 use relit_video::Video;
 
 use super::cache::Cache;
-use super::failure::Failure;
 use super::library::VideoFile;
+use relit_web::Failure;
 
 /// Width of a thumbnail, pixels.
 const THUMBNAIL: u32 = 192;

@@ -14,11 +14,10 @@ use tokio::time::timeout;
 use tokio_stream::wrappers::WatchStream;
 use utoipa::IntoParams;
 
-use super::extract::QueryParams;
-use super::failure::{Failure, Problem};
-use super::options::Shutdown;
 use super::permits::{Permits, permit};
 use crate::state::{Monitor, PreviewFrame};
+use relit_web::Shutdown;
+use relit_web::{Failure, Problem, QueryParams};
 
 /// Shortest time between two pictures of a stream: 15 a second.
 const PERIOD: Duration = Duration::from_millis(66);

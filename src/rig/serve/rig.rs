@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use axum::http::StatusCode;
+use relit_web::Failure;
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
@@ -97,6 +99,17 @@ pub enum Refused {
     /// What is needed is not there: camera, table, disk.
     #[error("{0}")]
     Unavailable(String),
+}
+
+impl From<Refused> for Failure {
+    fn from(refused: Refused) -> Self {
+        let (status, error) = match refused {
+            Refused::Busy(error) => (StatusCode::CONFLICT, error),
+            Refused::Invalid(error) => (StatusCode::UNPROCESSABLE_ENTITY, error),
+            Refused::Unavailable(error) => (StatusCode::SERVICE_UNAVAILABLE, error),
+        };
+        Self::new(status, error)
+    }
 }
 
 /// Reads a field that may be `null`, which differs from one that is left out.

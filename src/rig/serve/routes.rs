@@ -13,17 +13,20 @@ use utoipa::openapi::{Components, InfoBuilder, OpenApi, OpenApiBuilder};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use super::access::{AccessPolicy, guard};
-use super::failure::Failure;
 use super::library::Library;
 use super::metrics::Responses;
-use super::options::{ClientLimits, Shutdown};
+use super::options::ClientLimits;
 use super::permits::Permits;
 use super::pictures::Pictures;
 use super::rig::Rig;
 use super::snapshots::Snapshots;
 use super::{api, files, metrics, page, preview, sessions};
 use crate::state::Monitor;
+use relit_web::Shutdown;
+use relit_web::{AccessPolicy, BodyLimit, Failure, Index, guard};
+
+/// Largest body of a request, bytes.
+const LARGEST_BODY: usize = 16 * 1024;
 
 /// What all requests share; each handler takes the parts that it needs.
 #[derive(Clone, FromRef)]
@@ -58,6 +61,21 @@ impl App {
             responses: Arc::default(),
             shutdown,
             rig,
+        }
+    }
+}
+
+impl FromRef<App> for Index {
+    fn from_ref(_: &App) -> Self {
+        page::INDEX
+    }
+}
+
+impl FromRef<App> for BodyLimit {
+    fn from_ref(app: &App) -> Self {
+        Self {
+            bytes: LARGEST_BODY,
+            time: app.limits.body,
         }
     }
 }
@@ -125,7 +143,7 @@ struct TarPath;
 
 /// Everything that is served.
 pub(super) fn router(app: &App) -> Router {
-    let mut router = Router::from(interface()).route("/", get(page::index));
+    let mut router = Router::from(interface()).route("/", get(relit_web::index));
     for asset in &page::ASSETS {
         router = router.route(asset.path, get(async || asset.answer()));
     }

@@ -9,12 +9,11 @@ use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use utoipa::{IntoParams, ToSchema};
 
-use super::extract::{JsonBody, QueryParams};
-use super::failure::{Failure, Problem};
 use super::files::session_tar;
 use super::library::{Library, SessionDetail, SessionSummary};
 use super::permits::{Permits, Work};
 use super::pictures::Pictures;
+use relit_web::{Failure, JsonBody, Problem, QueryParams};
 
 /// Sessions in one answer, unless asked otherwise, and at most.
 const SESSIONS: usize = 100;

@@ -11,15 +11,17 @@ use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 use tokio_io_timeout::TimeoutWriter;
 
-use super::access::Local;
-use super::options::{ClientLimits, Shutdown};
-use super::routes::{App, router};
+/// Asks a server to end, from any thread. Copies ask the same server.
+pub use tokio_util::sync::CancellationToken as Shutdown;
+
+use crate::access::Local;
 
 /// Time that running requests get when the server ends.
-pub(super) const GRACE: Duration = Duration::from_secs(1);
+pub const GRACE: Duration = Duration::from_secs(1);
 /// Header lines of a request.
 const MOST_HEADERS: usize = 64;
 /// Bytes of a request's head, and of an answer that wait to be sent beyond the piece at hand.
@@ -27,13 +29,47 @@ const BUFFER: usize = 64 * 1024;
 /// Pause after the system refused a connection, mostly for want of file descriptors.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// Serves until the server is asked to end.
-pub(super) async fn run(listener: TcpListener, app: &App) {
-    let accepting = accept(listener, app);
-    app.shutdown.run_until_cancelled(accepting).await;
-    let all = u32::try_from(app.limits.connections).unwrap_or(u32::MAX);
+/// What all connections together, and each of them, may take up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ConnectionLimits {
+    /// Connections at once; further ones wait to be accepted.
+    pub connections: usize,
+    /// Connections from one address at once; further ones are closed.
+    pub per_address: usize,
+    /// Time in which the first byte has to come after connecting.
+    pub first_byte: Duration,
+    /// Time in which a request's head has to come, and how long a connection may lie idle.
+    pub head: Duration,
+    /// Longest time in which a client takes not a single byte of an answer.
+    pub stall: Duration,
+}
+
+impl Default for ConnectionLimits {
+    fn default() -> Self {
+        Self {
+            connections: 256,
+            per_address: 128,
+            first_byte: Duration::from_secs(2),
+            head: Duration::from_secs(10),
+            stall: Duration::from_secs(20),
+        }
+    }
+}
+
+/// Serves `router` until `shutdown` is cancelled. `connections` has as many permits as the limits allow
+/// connections; each holds one while it is open. Requests carry a [`Local`].
+pub async fn run(
+    listener: TcpListener,
+    router: Router,
+    limits: ConnectionLimits,
+    connections: &Arc<Semaphore>,
+    shutdown: &Shutdown,
+) {
+    let accepting = accept(listener, router, limits, connections, shutdown);
+    shutdown.run_until_cancelled(accepting).await;
+    let all = u32::try_from(limits.connections).unwrap_or(u32::MAX);
     // Who is not ready by then is cut off.
-    let _ = timeout(GRACE, app.permits.connections.acquire_many(all)).await;
+    let _ = timeout(GRACE, connections.acquire_many(all)).await;
 }
 
 /// Connections by address: one client cannot take all of them.
@@ -78,12 +114,17 @@ impl Drop for Guest {
     }
 }
 
-async fn accept(listener: TcpListener, app: &App) {
-    let router = router(app);
+async fn accept(
+    listener: TcpListener,
+    router: Router,
+    limits: ConnectionLimits,
+    connections: &Arc<Semaphore>,
+    shutdown: &Shutdown,
+) {
     let guests = Arc::new(Guests::default());
     loop {
         // Without a permit the next client waits in the system's queue.
-        let Ok(permit) = app.permits.connections.clone().acquire_owned().await else {
+        let Ok(permit) = connections.clone().acquire_owned().await else {
             return;
         };
         let Ok((socket, peer)) = listener.accept().await else {
@@ -91,10 +132,10 @@ async fn accept(listener: TcpListener, app: &App) {
             continue;
         };
         let address = peer.ip().to_canonical();
-        let Some(guest) = Guests::admit(&guests, address, app.limits.per_address) else {
+        let Some(guest) = Guests::admit(&guests, address, limits.per_address) else {
             continue;
         };
-        let connection = converse(socket, router.clone(), app.limits, app.shutdown.clone());
+        let connection = converse(socket, router.clone(), limits, shutdown.clone());
         tokio::spawn(async move {
             connection.await;
             drop((guest, permit));
@@ -102,7 +143,7 @@ async fn accept(listener: TcpListener, app: &App) {
     }
 }
 
-async fn converse(socket: TcpStream, router: Router, limits: ClientLimits, shutdown: Shutdown) {
+async fn converse(socket: TcpStream, router: Router, limits: ConnectionLimits, shutdown: Shutdown) {
     let Ok(local) = socket.local_addr() else {
         return;
     };

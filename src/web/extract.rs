@@ -1,26 +1,34 @@
 //! Requests' JSON bodies and queries, bounded in size and time, with errors in words.
 
+use std::time::Duration;
+
 use axum::body::to_bytes;
 use axum::extract::{FromRef, FromRequest, FromRequestParts, Query, Request};
 use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
 use tokio::time::timeout;
 
-use super::failure::Failure;
-use super::options::ClientLimits;
+use crate::failure::Failure;
 
-/// Largest body, bytes.
-const LARGEST: usize = 16 * 1024;
-/// So much of a body that is too large is read and thrown away, so that its sender gets to read the
-/// answer; a connection that is closed on unread data would lose it.
-const READ_AWAY: usize = 4 * LARGEST;
+/// So many times the largest body is read and thrown away, so that the sender of one that is too large
+/// gets to read the answer; a connection that is closed on unread data would lose it.
+const READ_AWAY: usize = 4;
+
+/// What a request's body may take up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BodyLimit {
+    /// Most bytes.
+    pub bytes: usize,
+    /// Time in which it has to come.
+    pub time: Duration,
+}
 
 /// A JSON body.
-pub(super) struct JsonBody<T>(pub(super) T);
+pub struct JsonBody<T>(pub T);
 
 impl<S: Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T>
 where
-    ClientLimits: FromRef<S>,
+    BodyLimit: FromRef<S>,
 {
     type Rejection = Failure;
 
@@ -29,16 +37,20 @@ where
             let error = "the body has to be JSON: send it with \"Content-Type: application/json\"";
             return Err(Failure::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, error));
         }
-        let limit = ClientLimits::from_ref(state).body;
-        let read = timeout(limit, to_bytes(request.into_body(), READ_AWAY)).await;
+        let limit = BodyLimit::from_ref(state);
+        let body = to_bytes(request.into_body(), limit.bytes.saturating_mul(READ_AWAY));
+        let read = timeout(limit.time, body).await;
         let read = read.map_err(|_| {
-            let error = format!("the body did not come within {} s", limit.as_secs_f64());
+            let error = format!(
+                "the body did not come within {} s",
+                limit.time.as_secs_f64()
+            );
             Failure::new(StatusCode::REQUEST_TIMEOUT, error)
         })?;
         // A body that broke off has nobody left to read the answer.
-        let bytes = read.ok().filter(|bytes| bytes.len() <= LARGEST);
+        let bytes = read.ok().filter(|bytes| bytes.len() <= limit.bytes);
         let bytes = bytes.ok_or_else(|| {
-            let error = format!("the body is larger than {LARGEST} bytes");
+            let error = format!("the body is larger than {} bytes", limit.bytes);
             Failure::new(StatusCode::PAYLOAD_TOO_LARGE, error)
         })?;
         let value = serde_json::from_slice(&bytes);
@@ -59,4 +71,4 @@ fn is_json(headers: &HeaderMap) -> bool {
 /// The values in the URL's query.
 #[derive(FromRequestParts)]
 #[from_request(via(Query), rejection(Failure))]
-pub(super) struct QueryParams<T>(pub(super) T);
+pub struct QueryParams<T>(pub T);

@@ -1,11 +1,11 @@
-//! Under which addresses the rig is served, and how a phone gets to know.
+//! Under which addresses a server is reached, and how a phone gets to know.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 
 use qrcode::QrCode;
 use qrcode::render::unicode::Dense1x2;
 
-use super::token::Token;
+use crate::token::Token;
 
 /// How clients reach the server, for the person who started it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,7 +20,9 @@ pub struct Announcement {
 }
 
 impl Announcement {
-    pub(super) fn new(address: SocketAddr, names: &[String], token: Option<&Token>) -> Self {
+    /// How to reach a server at `address`, by the first of `names` if there is one.
+    #[must_use]
+    pub fn new(address: SocketAddr, names: &[String], token: Option<&Token>) -> Self {
         let port = address.port();
         let place = match names.first() {
             Some(name) => format!("{name}:{port}"),

@@ -7,57 +7,55 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::serve::rig::Refused;
-
 /// Why a request was not served.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{error}")]
-pub(super) struct Failure {
-    pub(super) status: StatusCode,
+pub struct Failure {
+    status: StatusCode,
     error: String,
 }
 
 /// What the client gets to read.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Problem {
+pub struct Problem {
     /// What failed, on what, what to do.
     #[schema(example = "a capture is under way: stop it first")]
     error: String,
 }
 
 impl Failure {
-    pub(super) fn new(status: StatusCode, error: impl Into<String>) -> Self {
+    /// The status.
+    #[must_use]
+    pub fn status(&self) -> StatusCode {
+        self.status
+    }
+
+    /// A status and what failed, on what, and what to do.
+    pub fn new(status: StatusCode, error: impl Into<String>) -> Self {
         Self {
             status,
             error: error.into(),
         }
     }
 
-    pub(super) fn bad(error: impl Into<String>) -> Self {
+    /// 400: the request makes no sense.
+    pub fn bad(error: impl Into<String>) -> Self {
         Self::new(StatusCode::BAD_REQUEST, error)
     }
 
-    pub(super) fn not_found(error: impl Into<String>) -> Self {
+    /// 404: there is no such thing.
+    pub fn not_found(error: impl Into<String>) -> Self {
         Self::new(StatusCode::NOT_FOUND, error)
     }
 
-    pub(super) fn busy(error: impl Into<String>) -> Self {
+    /// 503: it would work later.
+    pub fn busy(error: impl Into<String>) -> Self {
         Self::new(StatusCode::SERVICE_UNAVAILABLE, error)
     }
 
-    pub(super) fn broken(error: impl Into<String>) -> Self {
+    /// 500: it should have worked.
+    pub fn broken(error: impl Into<String>) -> Self {
         Self::new(StatusCode::INTERNAL_SERVER_ERROR, error)
-    }
-}
-
-impl From<Refused> for Failure {
-    fn from(refused: Refused) -> Self {
-        let (status, error) = match refused {
-            Refused::Busy(error) => (StatusCode::CONFLICT, error),
-            Refused::Invalid(error) => (StatusCode::UNPROCESSABLE_ENTITY, error),
-            Refused::Unavailable(error) => (StatusCode::SERVICE_UNAVAILABLE, error),
-        };
-        Self { status, error }
     }
 }
 

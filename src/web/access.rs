@@ -10,8 +10,8 @@ use axum::http::{StatusCode, Uri};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use super::failure::Failure;
-use super::token::Token;
+use crate::failure::Failure;
+use crate::token::Token;
 
 /// How long a browser keeps the token, seconds: 30 days.
 const KEPT_S: u32 = 30 * 24 * 3600;
@@ -38,23 +38,24 @@ const HEADERS: [(HeaderName, &str); 6] = [
 
 /// The address of this machine that a connection was made to.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Local(pub(super) IpAddr);
+pub struct Local(pub IpAddr);
 
 /// Which requests are let in.
 #[derive(Debug)]
-pub(super) struct AccessPolicy {
+pub struct AccessPolicy {
     token: Option<Token>,
     names: Vec<String>,
     /// Paths that need no token.
     open_paths: Vec<&'static str>,
-    /// Browsers share cookies between ports: the name keeps two rigs on one machine apart.
+    /// Browsers share cookies between ports: the name keeps two servers on one machine apart.
     cookie: String,
 }
 
 impl AccessPolicy {
     /// The policy of a server at `port` that demands `token`, save for `open_paths`, and is known
     /// under `names` besides its addresses.
-    pub(super) fn new(
+    #[must_use]
+    pub fn new(
         port: u16,
         token: Option<Token>,
         names: Vec<String>,
@@ -110,12 +111,14 @@ impl AccessPolicy {
     }
 
     /// True where no token is asked for.
-    pub(super) fn is_open(&self) -> bool {
+    #[must_use]
+    pub fn is_open(&self) -> bool {
         self.token.is_none()
     }
 
     /// The cookie that lets a browser in, if `given` is the token.
-    pub(super) fn cookie_for(&self, given: &str) -> Option<String> {
+    #[must_use]
+    pub fn cookie_for(&self, given: &str) -> Option<String> {
         let token = self.token.as_ref().filter(|token| token.is(given))?;
         Some(format!(
             "{}={}; Path=/; Max-Age={KEPT_S}; HttpOnly; SameSite=Strict",
@@ -168,7 +171,7 @@ fn cookies(headers: &HeaderMap) -> impl Iterator<Item = (&str, &str)> {
 }
 
 /// Lets a request through or refuses it, and gives the answer the headers that all have.
-pub(super) async fn guard(
+pub async fn guard(
     State(policy): State<Arc<AccessPolicy>>,
     request: Request,
     next: Next,
@@ -210,7 +213,7 @@ mod tests {
         let local = local.parse().unwrap();
         match policy.admit(local, &Uri::from_static(path), &headers(pairs)) {
             Ok(()) => 200,
-            Err(failure) => failure.status.as_u16(),
+            Err(failure) => failure.status().as_u16(),
         }
     }
 

@@ -1,0 +1,22 @@
+//! What the pages of the programs share: who gets in, how much clients may take up, and answers in words
+//! to what cannot be served.
+//!
+//! A server keeps an [`AccessPolicy`], puts [`guard`] around its routes and [`run`]s them on a listener.
+//! [`index`] lets a browser in that comes with the [`Token`] in its URL; the [`Announcement`] holds that
+//! URL. The crate knows nothing of what is served: neither the rig nor masks.
+
+mod access;
+mod address;
+mod extract;
+mod failure;
+mod listen;
+mod page;
+mod token;
+
+pub use access::{AccessPolicy, Local, guard};
+pub use address::Announcement;
+pub use extract::{BodyLimit, JsonBody, QueryParams};
+pub use failure::{Failure, Problem};
+pub use listen::{ConnectionLimits, GRACE, Shutdown, run};
+pub use page::{Asset, Entry, Index, SCRIPT, STYLE, asset, index};
+pub use token::{InvalidToken, Token, TokenFileError};
