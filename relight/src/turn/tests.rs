@@ -369,7 +369,7 @@ fn shadows_and_highlights_of_some_frames_are_left_out_and_shown() {
     let curves = builder.finish().unwrap();
     let found = solve_turn(&curves, &known(&light)).unwrap();
     let off = off(&surface, &found.normals(&curves));
-    assert!(off < 1.0, "{off}");
+    assert!(off < 2.0, "{off}");
     let maps = TurnMaps::new(&curves, &found);
     let middle = maps.shadow.pixel(SIDE / 2, SIDE / 2)[0];
     // Two of 90 frames, half of their light.
