@@ -3,6 +3,7 @@
 use crate::image::{ColourSpace, Extent, Planes, Srgb};
 
 use super::TurnError;
+use super::exposure::{ExposureStep, ExposureWatch};
 use super::light::{HARMONICS, WAVES};
 
 /// Into how many parts the turn is divided. A part is narrow beside the second harmonic, and its own mean of
@@ -13,11 +14,13 @@ const CLIPPED_VALUE: f32 = 249.5 / 255.0;
 /// A part of the turn counts for a pixel's channel where at least this part of its frames is not clipped: the mean of
 /// the others would be that of the darker ones.
 const LEAST_SEEN: f32 = 0.95;
+/// Exposures of the frames of a part that differ by more than this part are not the same.
+const SAME_EXPOSURE: f64 = 0.01;
 /// Angles that are needed for five terms with something left over.
 const LEAST_ANGLES: usize = 8;
 
-/// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Its memory does not grow with the number of
-/// frames.
+/// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Of each frame it keeps the light of a few pixels, about a
+/// kilobyte; beyond that its memory does not grow with the number of frames.
 #[derive(Debug)]
 pub struct CurveBuilder {
     extent: Extent,
@@ -28,12 +31,16 @@ pub struct CurveBuilder {
     /// Pixel by pixel, in it part by part: sum of light and number of frames that are not clipped.
     sums: Vec<[f32; 3]>,
     counts: Vec<[u16; 3]>,
+    watch: ExposureWatch,
+    frames: usize,
 }
 
 /// The frames of a part of the turn.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 struct Part {
     frames: u32,
+    /// Which frames, in the order in which they came.
+    members: Vec<usize>,
     waves: [f64; WAVES - 1],
 }
 
@@ -44,6 +51,7 @@ pub struct TurnCurves {
     extent: Extent,
     places: Vec<usize>,
     frames: u32,
+    steps: Vec<ExposureStep>,
     /// The mean of 1, cos t, -sin t, cos 2t, -sin 2t and so on over each part's frames.
     waves: Vec<[f64; WAVES]>,
     /// The middle of each part, radians.
@@ -73,6 +81,8 @@ impl CurveBuilder {
             parts: vec![Part::default(); PARTS],
             sums: vec![[0.0; 3]; cells],
             counts: vec![[0; 3]; cells],
+            watch: ExposureWatch::default(),
+            frames: 0,
         })
     }
 
@@ -97,7 +107,10 @@ impl CurveBuilder {
             return Ok(());
         }
         let part = (angle_deg.rem_euclid(360.0) / 360.0 * PARTS as f64) as usize % PARTS;
-        self.parts[part].add(angle_deg.to_radians());
+        self.watch
+            .push(angle_deg, &self.places, planes, self.clipped);
+        self.parts[part].add(angle_deg.to_radians(), self.frames);
+        self.frames += 1;
         for (pixel, &at) in self.places.iter().enumerate() {
             let cell = pixel * PARTS + part;
             for (channel, plane) in planes.iter().enumerate() {
@@ -123,7 +136,12 @@ impl CurveBuilder {
                 needed: LEAST_ANGLES,
             });
         }
-        let frames: u32 = self.parts.iter().map(|part| part.frames).sum();
+        let (steps, exposures) = self.watch.finish();
+        let exposures: Vec<Option<f64>> = self
+            .parts
+            .iter()
+            .map(|part| part.exposure(&exposures))
+            .collect();
         let cells = || {
             self.places
                 .iter()
@@ -131,21 +149,25 @@ impl CurveBuilder {
                 .flat_map(|(pixel, _)| seen.iter().map(move |part| pixel * PARTS + part))
         };
         let mean = |cell: usize| {
-            [0, 1, 2].map(|c| self.sums[cell][c] / f32::from(self.counts[cell][c].max(1)))
+            let exposure = exposures[cell % PARTS].unwrap_or(1.0) as f32;
+            [0, 1, 2]
+                .map(|c| self.sums[cell][c] / f32::from(self.counts[cell][c].max(1)) / exposure)
         };
         let values = cells().map(mean).collect();
         let weights = cells()
             .map(|cell| {
                 let frames = self.parts[cell % PARTS].frames as f32;
                 self.counts[cell].map(|count| {
-                    let is_seen = f32::from(count) >= LEAST_SEEN * frames;
+                    let is_seen = f32::from(count) >= LEAST_SEEN * frames
+                        && exposures[cell % PARTS].is_some();
                     f32::from(u8::from(is_seen))
                 })
             })
             .collect();
         Ok(TurnCurves {
             extent: self.extent,
-            frames,
+            frames: self.frames as u32,
+            steps,
             waves: seen.iter().map(|&at| self.parts[at].waves()).collect(),
             angles: seen
                 .iter()
@@ -159,13 +181,24 @@ impl CurveBuilder {
 }
 
 impl Part {
-    fn add(&mut self, angle: f64) {
+    fn add(&mut self, angle: f64, frame: usize) {
         self.frames += 1;
+        self.members.push(frame);
         for harmonic in 1..=HARMONICS {
             let (sin, cos) = (harmonic as f64 * angle).sin_cos();
             self.waves[2 * harmonic - 2] += cos;
             self.waves[2 * harmonic - 1] -= sin;
         }
+    }
+
+    /// The exposure of its frames; none where they are not all the same.
+    fn exposure(&self, of_frames: &[f64]) -> Option<f64> {
+        let all = || self.members.iter().map(|&frame| of_frames[frame]);
+        let (least, most) = (
+            all().fold(f64::INFINITY, f64::min),
+            all().fold(0.0, f64::max),
+        );
+        (most <= least * (1.0 + SAME_EXPOSURE)).then_some(most)
     }
 
     fn waves(&self) -> [f64; WAVES] {
@@ -194,6 +227,12 @@ impl TurnCurves {
     #[must_use]
     pub const fn frames(&self) -> u32 {
         self.frames
+    }
+
+    /// Where the exposure changed. The curves are as if it had not: they have the exposure of most frames.
+    #[must_use]
+    pub fn exposure_steps(&self) -> &[ExposureStep] {
+        &self.steps
     }
 
     /// In how many parts of the turn there are frames.
@@ -291,6 +330,7 @@ impl TurnCurves {
         let mut reduced = Self {
             extent,
             frames: self.frames,
+            steps: self.steps.clone(),
             waves: self.waves.clone(),
             angles: self.angles.clone(),
             values: Vec::with_capacity(places.len() * self.parts()),

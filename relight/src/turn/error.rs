@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use relit_data::session::SessionError;
+
 use crate::asset::AssetError;
 use crate::data::OpenError;
 use crate::decompose::DecomposeError;
@@ -97,7 +99,18 @@ pub enum TurnError {
         /// The path.
         path: PathBuf,
     },
-    /// The video cannot be written.
+    /// The session whose video shows the room cannot be read.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The video is not that of the turn.
+    #[error("none of the turn's frames is among the {frames} of {}: give the session from which the shard was made", path.display())]
+    OtherVideo {
+        /// The video.
+        path: PathBuf,
+        /// How many frames it has.
+        frames: u64,
+    },
+    /// A video cannot be read or written.
     #[error(transparent)]
     Movie(#[from] MovieError),
     /// A file or folder cannot be read.

@@ -9,7 +9,8 @@ use serde::Serialize;
 use super::light::TERMS;
 use super::maps::AngleFigure;
 use super::{
-    Conditioning, Elevation, ReadTurn, StartFigure, TurnCurves, TurnError, TurnMaps, TurnSolution,
+    Conditioning, Elevation, ExposureStep, ReadTurn, RoomStrip, StartFigure, StripFigures,
+    TableLight, TurnCurves, TurnError, TurnMaps, TurnSolution,
 };
 use crate::decompose::{bright, write_light};
 use crate::image::{ColourSpace, Depth, Extent, Linear, Planes, Rgb, Srgb, write_png};
@@ -66,6 +67,8 @@ pub struct TurnFiles<'a> {
     pub light_source: Option<&'a str>,
     /// Where the normals to start from are from.
     pub normals_source: Option<&'a str>,
+    /// The room, where the video was read.
+    pub strip: Option<&'a RoomStrip>,
     /// Whether to write the video.
     pub has_movie: bool,
 }
@@ -95,8 +98,35 @@ pub struct TurnFigures {
     gloss: Option<FigureGloss>,
     /// Which ambiguity nothing broke.
     ambiguity: Option<&'static str>,
+    exposure_steps: Vec<ExposureStep>,
+    /// What the room's strip says; none where the video was not read, or its sides do not show the same room.
+    room: Option<FigureRoom>,
     white: FigureWhites,
     over_angle: Vec<AngleFigure>,
+}
+
+/// The room by the background of the video, beside the light that was found.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct FigureRoom {
+    #[serde(flatten)]
+    strip: StripFigures,
+    /// The light's bright side, as that of the strip.
+    light_azimuth_deg: f64,
+    /// How far the two are apart, degrees.
+    apart_deg: f64,
+}
+
+impl FigureRoom {
+    fn new(strip: &RoomStrip, light: &TableLight) -> Self {
+        let strip = *strip.figures();
+        let light_azimuth_deg = light.bright_azimuth_deg();
+        let apart = (strip.bright_azimuth_deg - light_azimuth_deg).rem_euclid(360.0);
+        Self {
+            strip,
+            light_azimuth_deg,
+            apart_deg: apart.min(360.0 - apart),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -175,6 +205,9 @@ impl TurnFiles<'_> {
         write_json(&path("light.json"), &self.light_file()?)?;
         let sheet = self.sheet(&surface, &light)?;
         write_png(&path("contact.png"), &sheet, Depth::Eight)?;
+        if let Some(strip) = self.strip {
+            strip.write_png(&path("room.png"))?;
+        }
         if self.has_movie {
             write_movie(&path("relit.mp4"), &surface)?;
         }
@@ -229,6 +262,10 @@ impl TurnFiles<'_> {
                 "light and shape are both unknown: the outline says that the object bulges, \
                  but how steep it is as a whole is open",
             ),
+            exposure_steps: turn.curves.exposure_steps().to_vec(),
+            room: self
+                .strip
+                .map(|strip| FigureRoom::new(strip, solution.light())),
             white,
             over_angle: self.maps.over_angle.clone(),
         })

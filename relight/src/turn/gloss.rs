@@ -6,7 +6,7 @@ use super::light::{WAVES, WaveTerm};
 use crate::light::{LightError, ShLight};
 
 /// The order of the light that gloss is taken to show.
-pub(super) const GLOSS_ORDER: usize = 4;
+pub(super) const GLOSS_ORDER: usize = 6;
 /// Terms of a channel's gloss.
 pub(super) const GLOSS_TERMS: usize = (GLOSS_ORDER + 1) * (GLOSS_ORDER + 1);
 /// The part of the light that a dielectric reflects head-on; at a glancing angle it is all.

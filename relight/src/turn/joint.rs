@@ -134,8 +134,8 @@ impl Joint<'_> {
     }
 }
 
-/// How much each pixel counts: over the energy of its variation, so that all count the same, but for those that the model
-/// does not explain.
+/// How much the energy that is left of each pixel's curve counts, so that bright pixels, which stand out of the noise, count
+/// more: less where the model does not explain it.
 fn weights(fits: &[PixelFit]) -> Vec<f64> {
     let median = super::solve::median(fits.iter().map(|fit| fit.residual)).max(LEAST_MEDIAN);
     let weight = |fit: &PixelFit| {
@@ -348,7 +348,6 @@ impl Sums {
     ) {
         let axes = tangents(normal);
         let leaning = search.leaning(moments, normal, axes);
-        let weight = weight;
         let mut slope = Slope::default();
         let mut couplings = vec![[0.0; 2]; self.count];
         let all = columns.of(normal, leaning.albedo);

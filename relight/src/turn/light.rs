@@ -104,6 +104,14 @@ impl TableLight {
         Ok(self.coefficients()?.rotated(&frame.rotation().inverse()))
     }
 
+    /// From where more light comes, by the first harmonic of a level normal's curve: the azimuth in the table's frame at angle
+    /// 0, from x towards y, degrees.
+    #[must_use]
+    pub fn bright_azimuth_deg(&self) -> f64 {
+        let sum = |at: usize| self.terms.iter().map(|terms| terms[at]).sum::<f64>();
+        (-sum(4)).atan2(sum(3)).to_degrees()
+    }
+
     /// The terms of each channel.
     #[must_use]
     pub const fn terms(&self) -> &[[f64; TERMS]; 3] {
@@ -218,6 +226,18 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn the_bright_side_is_where_the_light_comes_from() {
+        let mut light = ShLight::even(Order::TWO, [1.0; 3]);
+        // Y_1,1 is x, Y_1,-1 is y.
+        light.coefficients_mut()[3] = [0.3; 3];
+        light.coefficients_mut()[1] = [0.3; 3];
+        let frame = TableFrame::new(Elevation::given(0.0).unwrap());
+        let viewer = light.rotated(&frame.rotation().inverse());
+        let table = TableLight::from_viewer(&viewer, &frame);
+        assert!((table.bright_azimuth_deg() - 45.0).abs() < 1e-6);
     }
 
     #[test]

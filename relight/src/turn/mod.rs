@@ -9,6 +9,8 @@
 //! | --- | --- |
 //! | `frame` | the camera over the table |
 //! | `curves`, `read` | light over the table's angle, from a shard |
+//! | `exposure` | steps of the exposure |
+//! | `film`, `strip`, `probe` | what the video shows beside the object: the room, and a ball that measures its light |
 //! | `light` | light of order 2 in the table's frame |
 //! | `gloss` | what a shining surface shows of the room |
 //! | `moments`, `search`, `robust` | the normal and albedo of one pixel |
@@ -22,7 +24,9 @@
 
 mod curves;
 mod error;
+mod exposure;
 mod files;
+mod film;
 mod frame;
 mod gloss;
 mod joint;
@@ -31,6 +35,7 @@ mod light;
 mod maps;
 mod moments;
 mod prior;
+mod probe;
 mod read;
 mod robust;
 mod room;
@@ -38,6 +43,7 @@ mod search;
 mod shine;
 mod solve;
 mod start;
+mod strip;
 mod verdict;
 
 #[cfg(test)]
@@ -45,13 +51,17 @@ mod tests;
 
 pub use curves::{CurveBuilder, TurnCurves};
 pub use error::TurnError;
+pub use exposure::ExposureStep;
 pub use files::{TurnFigures, TurnFiles};
+pub use film::{Filmed, film};
 pub use frame::{Elevation, ElevationSource, TableFrame};
 pub use labels::TurnLabels;
 pub use light::TableLight;
 pub use maps::TurnMaps;
 pub use prior::{NormalsSource, prior_normals};
+pub use probe::{ProbeBuilder, ProbePlace};
 pub use read::{ReadTurn, TableSense, read_curves};
 pub use room::fit_turn_light;
 pub use solve::{StartFigure, TurnOptions, TurnSolution, solve_turn};
+pub use strip::{RoomStrip, StripBuilder, StripFigures};
 pub use verdict::{Conditioning, RoomVerdict};

@@ -216,21 +216,25 @@ impl Moments {
 
     /// The products of each wave with a list of waves.
     pub(super) fn times(&self, channel: usize, waves: &[f64; WAVES]) -> [f64; WAVES] {
-        let own = &self.products[channel];
-        std::array::from_fn(|i| (0..WAVES).map(|j| own[pair(i, j)] * waves[j]).sum())
+        let mut all = [0.0; WAVES];
+        let mut at = 0;
+        for j in 0..WAVES {
+            for i in 0..j {
+                let product = self.products[channel][at];
+                all[i] += product * waves[j];
+                all[j] += product * waves[i];
+                at += 1;
+            }
+            all[j] += self.products[channel][at] * waves[j];
+            at += 1;
+        }
+        all
     }
 
     /// The products of each wave with what such waves leave of the curve.
     pub(super) fn rest(&self, channel: usize, waves: &[f64; WAVES]) -> [f64; WAVES] {
         let seen = self.times(channel, waves);
         std::array::from_fn(|i| self.right[channel][i] - seen[i])
-    }
-
-    /// The product of two lists of waves.
-    pub(super) fn product(&self, channel: usize, a: &[f64; WAVES], b: &[f64; WAVES]) -> f64 {
-        let mut products = [0.0; PAIRS];
-        symmetric(&mut products, a, b);
-        dot(&self.products[channel], &products)
     }
 
     /// The product of two terms of a light.
@@ -245,11 +249,6 @@ impl Moments {
     pub(super) fn term_along(&self, channel: usize, term: &WaveTerm) -> f64 {
         let right = &self.right[channel][term.wave..];
         term.parts[0] * right[0] + term.parts[1] * right[1]
-    }
-
-    /// The product of waves with the curve.
-    pub(super) fn along(&self, channel: usize, waves: &[f64; WAVES]) -> f64 {
-        dot(&self.right[channel], waves)
     }
 
     /// The constant wave's share of the curve, channel by channel: its mean light.
@@ -272,7 +271,7 @@ impl Moments {
 }
 
 /// The sum of products, as far as the shorter list goes: in four sums, which do not wait for each other.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let length = a.len().min(b.len());
     let (mut a, mut b) = (a[..length].chunks_exact(4), b[..length].chunks_exact(4));
     let mut sums = [0.0; 4];

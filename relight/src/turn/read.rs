@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::thread::available_parallelism;
 
 use relit_data::causes::with_causes;
+use serde::Serialize;
 
 use super::{CurveBuilder, TurnCurves, TurnError};
 use crate::data::{
@@ -17,7 +18,8 @@ use crate::image::{Extent, Linear, Planes, Rgb};
 const BATCH: u32 = 12;
 
 /// Which way the table turns as its angle grows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum TableSense {
     /// Counter-clockwise, seen from above: the background moves to the right.
     #[default]
@@ -37,6 +39,8 @@ pub struct ReadTurn {
     pub first: Vec<Rgb<Linear>>,
     /// Their angles of the table, degrees.
     pub first_angles: Vec<f64>,
+    /// Where the frames stand in the turn's video, from 0, and the table's angle of each, degrees.
+    pub sources: Vec<(u64, f64)>,
     /// 1 on the object, else 0.
     pub mask: Planes<1>,
     /// Whether frames told their angles; else they are taken for evenly spread over one turn.
@@ -82,6 +86,7 @@ pub fn read_curves(
         builder: None,
         first: Vec::new(),
         first_angles: Vec::new(),
+        sources: Vec::new(),
         mask: None,
         has_angles: true,
         damage: Vec::new(),
@@ -109,6 +114,7 @@ struct Reader {
     builder: Option<CurveBuilder>,
     first: Vec<Rgb<Linear>>,
     first_angles: Vec<f64>,
+    sources: Vec<(u64, f64)>,
     mask: Option<Planes<1>>,
     has_angles: bool,
     damage: Vec<String>,
@@ -125,6 +131,9 @@ impl Reader {
                 continue;
             }
             let angle = self.angle(frame);
+            if let Some(record) = &frame.record {
+                self.sources.push((record.source_frame, angle));
+            }
             self.builder(extent, mask)?.push(angle, extent, planes)?;
             if self.first.len() < BATCH as usize {
                 let planes = planes.map(<[f32]>::to_vec);
@@ -164,6 +173,7 @@ impl Reader {
             curves: builder.finish()?,
             first: self.first,
             first_angles: self.first_angles,
+            sources: self.sources,
             mask: self.mask.ok_or(TurnError::Empty)?,
             has_angles: self.has_angles,
             damage: self.damage,

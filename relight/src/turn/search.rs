@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::gloss::GlossLight;
 use super::light::{MATT_WAVES, WAVES};
-use super::moments::{Moments, PixelWaves, WaveProducts};
+use super::moments::{Moments, PixelWaves, WaveProducts, dot as sum_of_products};
 use super::{TableFrame, TableLight};
 
 /// How many normals are tried first, evenly over the half sphere that faces the viewer: about 7 degrees apart.
@@ -199,14 +199,15 @@ impl<'a> Search<'a> {
         let matt = here.matt.each_ref().map(padded);
         let seen: [_; 3] = std::array::from_fn(|c| sum(&matt[c], albedo[c], &here.gloss[c]));
         let ways = std::array::from_fn(|c| {
-            let own = moments.product(c, &matt[c], &matt[c]);
+            let along = moments.times(c, &matt[c]);
+            let own = sum_of_products(&matt[c], &along);
             there.map(|there| {
                 let moved = sum(&padded(&there.matt[c]), albedo[c], &there.gloss[c]);
                 let mut way: [f64; WAVES] =
                     std::array::from_fn(|i| (moved[i] - seen[c][i]) / SLOPE_STEP);
                 // The albedo follows the normal.
                 if own > 1e-12 && albedo[c] > 0.0 {
-                    let share = moments.product(c, &way, &matt[c]) / own;
+                    let share = sum_of_products(&way, &along) / own;
                     way.iter_mut()
                         .zip(&matt[c])
                         .for_each(|(way, matt)| *way -= share * matt);
@@ -288,11 +289,13 @@ impl Slope {
         [u, v]: &[[f64; WAVES]; 2],
         seen: &[f64; WAVES],
     ) {
+        let rest = moments.rest(channel, seen);
         for (gradient, way) in self.gradient.iter_mut().zip([u, v]) {
-            *gradient += moments.product(channel, way, seen) - moments.along(channel, way);
+            *gradient -= sum_of_products(way, &rest);
         }
-        for (bend, (a, b)) in self.bend.iter_mut().zip([(u, u), (u, v), (v, v)]) {
-            *bend += moments.product(channel, a, b);
+        let [of_u, of_v] = [u, v].map(|way| moments.times(channel, way));
+        for (bend, (a, b)) in self.bend.iter_mut().zip([(u, of_u), (u, of_v), (v, of_v)]) {
+            *bend += sum_of_products(a, &b);
         }
     }
 

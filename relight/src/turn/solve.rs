@@ -62,7 +62,7 @@ const HALF_CONFIDENCE: f64 = 0.2;
 pub struct TurnOptions {
     /// The camera over the table.
     pub elevation: Elevation,
-    /// The light, in the viewer's frame at the table's angle 0, where it was measured; bands up to 4
+    /// The light, in the viewer's frame at the table's angle 0, where it was measured; bands up to 6
     /// count, those beyond 2 for gloss alone.
     pub light: Option<ShLight>,
     /// Normals to start from, where there are any.

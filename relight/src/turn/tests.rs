@@ -244,6 +244,7 @@ fn read(surface: &Surface, light: &ShLight) -> ReadTurn {
             .map(|&angle| frame(surface, light, angle))
             .collect(),
         first_angles,
+        sources: Vec::new(),
         mask: mask(surface),
         has_angles: true,
         damage: Vec::new(),
@@ -436,6 +437,33 @@ fn a_dark_turn_and_a_white_one_have_no_light_and_a_prior_of_another_size_is_refu
     };
     let refused = solve_turn(&of(0.3), &options);
     assert!(matches!(refused, Err(TurnError::PriorSize { .. })));
+}
+
+#[test]
+fn steps_of_the_exposure_are_found_and_taken_out() {
+    let (surface, light) = (ball(), room());
+    let extent = surface.extent();
+    let mut builder = CurveBuilder::new(extent, mask(&surface).plane(0)).unwrap();
+    for k in 0..180 {
+        let angle = f64::from(k) * 2.0;
+        let exposure = if (51..120).contains(&k) { 0.8 } else { 1.0 };
+        let image = frame(&surface, &light, angle).into_planes();
+        builder
+            .push(angle, extent, image.map(|v| exposure * v).planes())
+            .unwrap();
+    }
+    let curves = builder.finish().unwrap();
+    let [down, up] = curves.exposure_steps() else {
+        panic!("{:?}", curves.exposure_steps());
+    };
+    assert_eq!((down.angle_deg, up.angle_deg), (102.0, 240.0));
+    assert!((down.factor - 0.8).abs() < 0.01, "{down:?}");
+    assert!((up.factor - 1.25).abs() < 0.015, "{up:?}");
+    let found = solve_turn(&curves, &known(&light)).unwrap();
+    let off = off(&surface, &found.normals(&curves));
+    assert!(off < 0.5, "{off}");
+    assert!(albedo_off(&surface, &found.albedo(&curves), 1.0) < 0.02);
+    assert!(SOLVED.0.curves.exposure_steps().is_empty());
 }
 
 proptest! {

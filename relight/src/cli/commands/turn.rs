@@ -7,8 +7,9 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use relight::light::{Order, Panorama, ShLight};
 use relight::turn::{
-    Conditioning, Elevation, ElevationSource, NormalsSource, ReadTurn, RoomVerdict, TableSense,
-    TurnFiles, TurnLabels, TurnMaps, TurnOptions, prior_normals, read_curves, solve_turn,
+    Conditioning, Elevation, ElevationSource, Filmed, NormalsSource, ProbePlace, ReadTurn,
+    RoomStrip, RoomVerdict, TableFrame, TableSense, TurnFiles, TurnLabels, TurnMaps, TurnOptions,
+    film, prior_normals, read_curves, solve_turn,
 };
 use serde_json::json;
 
@@ -41,9 +42,17 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_name = "W,H", value_parser = rim)]
     rim: Option<Elevation>,
     /// The light where it is known, in the viewer's frame at the table's angle 0: coefficients of spherical harmonics
-    /// (nine lines of red, green and blue, or 25), or a panorama (.hdr, .exr).
+    /// (nine lines of red, green and blue, or up to 49), or a panorama (.hdr, .exr).
     #[arg(long, value_name = "FILE")]
     light: Option<PathBuf>,
+    /// The session from which the shard was made, or its video: to see the room (room.png), and the ball of --probe. Needs the
+    /// program ffmpeg.
+    #[arg(long, value_name = "PATH")]
+    session: Option<PathBuf>,
+    /// A matt grey ball on the table, which measures the light: its middle and radius in the video, pixels. The light is then in
+    /// units in which the ball's albedo is 1.
+    #[arg(long, value_name = "X,Y,R", value_parser = probe, requires = "session", conflicts_with = "light")]
+    probe: Option<ProbePlace>,
     /// Normals to start from: "shipped" (the network that comes with the program), "none", a network (.onnx, or weights
     /// of decompose: .safetensors, .pth), a map of normals (.png, .exr), or a folder with normal.png
     /// [default: shipped, and none with --light].
@@ -91,23 +100,33 @@ impl Arguments {
     /// The normals to start from, and how they are named.
     fn normals(&self) -> Option<(NormalsSource, &str)> {
         match self.normals.as_deref() {
-            None if self.light.is_some() => None,
+            None if self.light.is_some() || self.probe.is_some() => None,
             Some("none") => None,
             None | Some("shipped") => Some((NormalsSource::Shipped, "shipped")),
             Some(path) => Some((NormalsSource::of(Path::new(path)), path)),
         }
     }
 
-    fn options(&self, turn: &ReadTurn) -> Result<TurnOptions, Box<dyn Error>> {
+    fn elevation(&self) -> Elevation {
+        let given = self.elevation.or(self.rim);
+        given.unwrap_or_else(Elevation::assumed)
+    }
+
+    /// `measured` is the light by the ball.
+    fn options(
+        &self,
+        turn: &ReadTurn,
+        measured: Option<ShLight>,
+    ) -> Result<TurnOptions, Box<dyn Error>> {
         let prior = self.normals().map(|(source, _)| {
             prior_normals(&source, self.normals_y.into(), &turn.first, &turn.mask)
         });
         Ok(TurnOptions {
-            elevation: self
-                .elevation
-                .or(self.rim)
-                .unwrap_or_else(Elevation::assumed),
-            light: self.light.as_deref().map(read_light).transpose()?,
+            elevation: self.elevation(),
+            light: match &self.light {
+                Some(path) => Some(read_light(path)?),
+                None => measured,
+            },
             prior: prior.transpose()?,
             prior_weight: self.normals_weight,
         })
@@ -123,14 +142,32 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     })?;
     bar.finish_and_clear();
     let read_seconds = start.elapsed().as_secs_f64();
-    let options = arguments.options(&turn)?;
+    let mut filmed = arguments
+        .session
+        .as_ref()
+        .map(|path| {
+            let bar = console.progress(0, "frames of the video");
+            film(path, &turn, arguments.probe, &|done, all| {
+                bar.set_length(all);
+                bar.set_position(done);
+            })
+        })
+        .transpose()?;
+    let measured = filmed
+        .as_mut()
+        .map(|filmed| filmed.light(&TableFrame::new(arguments.elevation())))
+        .transpose()?
+        .flatten();
+    let options = arguments.options(&turn, measured)?;
     let conditioning = Conditioning::of(&turn.curves);
     let solution = solve_turn(&turn.curves, &options)?;
     let maps = TurnMaps::new(&turn.curves, &solution);
-    let light_source = arguments
+    let strip = filmed.as_ref().and_then(Filmed::strip);
+    let given = arguments
         .light
         .as_ref()
         .map(|path| path.display().to_string());
+    let light_source = given.or_else(|| arguments.probe.map(|_| "probe".to_owned()));
     let figures = TurnFiles {
         turn: &turn,
         solution: &solution,
@@ -138,6 +175,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
         conditioning,
         light_source: light_source.as_deref(),
         normals_source: arguments.normals().map(|(_, name)| name),
+        strip,
         has_movie: !arguments.no_video,
     }
     .write(&arguments.output)?;
@@ -158,10 +196,10 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
         arguments.output.display(),
         turn.curves.frames(),
         solution.expected_error_deg(),
-        if arguments.light.is_some() {
-            "given"
-        } else {
-            "found"
+        match (&arguments.light, arguments.probe) {
+            (Some(_), _) => "given",
+            (None, Some(_)) => "measured",
+            (None, None) => "found",
         },
     );
     let event = json!({
@@ -172,7 +210,29 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
         "figures": figures,
     });
     console.say(&text, &event);
+    if arguments.session.is_some() {
+        warn_of_room(strip, arguments.sense, console);
+    }
     Ok(warn(&turn, &options, conditioning, console))
+}
+
+/// Says where the room does not fit.
+fn warn_of_room(strip: Option<&RoomStrip>, sense: SenseName, console: Console) {
+    let text = match strip.map(|strip| strip.figures().sense) {
+        // Angles were negated for the other sense: with the right one they always grow counter-clockwise.
+        Some(TableSense::CounterClockwise) => return,
+        Some(TableSense::Clockwise) => {
+            let other = match sense {
+                SenseName::CounterClockwise => "clockwise",
+                SenseName::Clockwise => "counter-clockwise",
+            };
+            format!("the background moves the other way: the normals are mirrored, give --sense {other}")
+        }
+        None => "the two sides of the picture do not show the same room: there is no room.png, and the table's sense is not \
+                 checked"
+            .to_owned(),
+    };
+    console.warn(&text, &json!({ "event": "warning", "message": text }));
 }
 
 /// Says what a user should know; whether something was left out.
@@ -207,7 +267,7 @@ fn warn(
 }
 
 /// The order to which a panorama is taken up: gloss shows more of it than a matt surface.
-const KNOWN_ORDER: usize = 4;
+const KNOWN_ORDER: usize = 6;
 
 fn read_light(path: &Path) -> Result<ShLight, Box<dyn Error>> {
     let is_panorama = path.extension().is_some_and(|ending| {
@@ -230,6 +290,14 @@ fn rim(text: &str) -> Result<Elevation, String> {
     match numbers.as_deref() {
         Ok(&[width, height]) => Elevation::of_rim(width, height).map_err(|error| error.to_string()),
         _ => Err("give W,H: width and height of the ellipse, pixels".to_owned()),
+    }
+}
+
+fn probe(text: &str) -> Result<ProbePlace, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(str::parse).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, radius]) => ProbePlace::new([x, y], radius).map_err(|error| error.to_string()),
+        _ => Err("give X,Y,R: middle and radius of the ball, pixels".to_owned()),
     }
 }
 
