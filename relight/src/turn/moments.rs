@@ -237,6 +237,17 @@ impl Moments {
         std::array::from_fn(|i| self.right[channel][i] - seen[i])
     }
 
+    /// The energy of a channel's curve.
+    pub(super) const fn energy(&self, channel: usize) -> f64 {
+        self.energy[channel]
+    }
+
+    /// How much of it such waves leave.
+    pub(super) fn left(&self, channel: usize, waves: &[f64; WAVES]) -> f64 {
+        let rest = self.rest(channel, waves);
+        self.energy[channel] - dot(waves, &self.right[channel]) - dot(waves, &rest)
+    }
+
     /// The product of two terms of a light.
     pub(super) fn term_product(&self, channel: usize, a: &WaveTerm, b: &WaveTerm) -> f64 {
         let own = &self.products[channel];

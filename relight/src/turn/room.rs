@@ -15,6 +15,8 @@ const ROUNDS: usize = 3;
 const STIFFNESS: f64 = 1e-5;
 /// The same for gloss, in parts of the matt light.
 const GLOSS_STIFFNESS: f64 = 1e-4;
+/// A surface of which light without gloss leaves no more than this part of the curves' energy is matt.
+const MATT_LEFT: f64 = 1e-3;
 /// The least part of the light that counts as shown by gloss.
 const LEAST_GLOSS: f64 = 0.05;
 
@@ -72,8 +74,14 @@ pub fn fit_turn_light(
         }
     }
     let pixels = pixels(&moments, &known, frame);
-    let (light, gloss) = fit_light(&pixels, &colours, Finish::Glossy).ok_or(TurnError::NoLight)?;
-    let light = with_higher_bands(light.coefficients()?, &gloss)?;
+    let (matt, none) = fit_light(&pixels, &colours, Finish::Matt).ok_or(TurnError::NoLight)?;
+    let light = if left(&pixels, &colours, (&matt, &none)) < MATT_LEFT {
+        matt.coefficients()?
+    } else {
+        let (light, gloss) =
+            fit_light(&pixels, &colours, Finish::Glossy).ok_or(TurnError::NoLight)?;
+        with_higher_bands(light.coefficients()?, &gloss)?
+    };
     Ok(light.rotated(&frame.rotation().inverse()))
 }
 
@@ -176,6 +184,27 @@ fn fit_light(
         }
     }
     Some((TableLight::new(light), GlossLight::new(gloss)))
+}
+
+/// What a light and its gloss leave of the curves, over their energy.
+fn left(
+    pixels: &[LitPixel<'_>],
+    albedo: &[[f64; 3]],
+    (light, gloss): (&TableLight, &GlossLight),
+) -> f64 {
+    let (mut rest, mut all) = (0.0, 0.0);
+    for (pixel, albedo) in pixels.iter().zip(albedo) {
+        let mut waves = gloss.waves_of(&pixel.gloss);
+        for channel in 0..3 {
+            for (light, term) in light.terms()[channel].iter().zip(&pixel.matt) {
+                let wanted = waves[channel][term.wave..].iter_mut().zip(term.parts);
+                wanted.for_each(|(wave, part)| *wave += albedo[channel] * light * part);
+            }
+            rest += pixel.moments.left(channel, &waves[channel]);
+            all += pixel.moments.energy(channel);
+        }
+    }
+    rest / f64::max(all, f64::MIN_POSITIVE)
 }
 
 /// The band of a term of gloss.
