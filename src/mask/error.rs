@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use relit_data::geometry::Rect;
 
+use super::StrokesFault;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
 
 /// Why no mask could be made.
@@ -95,6 +96,9 @@ pub enum MaskError {
         /// What is wrong with it.
         fault: SeedsFault,
     },
+    /// Strokes that cannot be painted.
+    #[error(transparent)]
+    Strokes(#[from] StrokesFault),
     /// GrabCut classified every pixel as background.
     #[error(
         "no object was found: it does not differ enough from its background for this hint; draw the rectangle closer, or mark the object white in seeds"

@@ -144,7 +144,11 @@ impl Seeds {
         Self::new(levels.dimensions(), marks, coloured_px)
     }
 
-    fn new(size: (u32, u32), marks: Vec<Mark>, coloured_px: u64) -> Result<Self, SeedsFault> {
+    pub(super) fn new(
+        size: (u32, u32),
+        marks: Vec<Mark>,
+        coloured_px: u64,
+    ) -> Result<Self, SeedsFault> {
         if marks.iter().all(|&mark| mark == Mark::Unknown) {
             return Err(SeedsFault::WithoutMark);
         }

@@ -1,7 +1,7 @@
 //! Which pixels of an image are the object: hints from a person or what a turn shows, GrabCut, clean-up.
 //!
 //! Camera and object ride on the same turntable, so one mask fits all frames of a turn. [`segment`]
-//! makes it from one image and hints, [`segment_turn`] from frames of a whole [`Turn`], with or without
+//! makes it from one image and hints, [`segment_turn`] from what a whole [`Turn`] shows, with or without
 //! hints; [`preview`] shows it for a person to check; a [`MaskRecord`] is what is written beside a mask to
 //! make it again. [`score`] measures a mask against the truth.
 //!
@@ -52,6 +52,7 @@ mod alpha;
 mod backdrop;
 mod bitmap;
 mod cleanup;
+mod drawing;
 mod encode;
 mod error;
 mod grab_cut;
@@ -61,6 +62,7 @@ mod lab;
 mod max_flow;
 mod mixture;
 mod opencv_grab_cut;
+mod outline;
 mod preview;
 mod pyramid;
 mod record;
@@ -68,21 +70,27 @@ mod registration;
 mod score;
 mod segment;
 mod settings;
+mod strokes;
 mod table;
 mod turn;
 mod warning;
 
 pub use alpha::alpha;
+pub use drawing::Drawing;
 pub use encode::{grey_png, rgb_png};
 pub use error::{MaskError, SeedsFault};
 pub use hints::{Hints, Mark, Seeds};
 pub use opencv_grab_cut::opencv_grab_cut;
+pub use outline::outline;
 pub use preview::preview;
 pub use record::{
     MASK_SCHEMA, MaskRecord, MaskSoftware, RecordFault, RecordedHints, RecordedResult, SourceFrame,
 };
 pub use score::{BOUNDARY_TOLERANCE_PX, MaskScore, ScoreFault, score};
-pub use segment::{Mask, MaskStatistics, segment, segment_turn};
-pub use settings::{Feather, Iterations, MAX_PIXELS, MIN_SIDE, SegmentSettings, SettingsFault};
-pub use turn::{MIN_TURN_FRAMES, TURN_FRAMES, Turn};
+pub use segment::{Mask, MaskStatistics, segment, segment_turn, segment_with};
+pub use settings::{
+    Effort, Feather, Iterations, MAX_PIXELS, MIN_SIDE, SegmentSettings, SettingsFault,
+};
+pub use strokes::{Brush, Stroke, Strokes, StrokesFault};
+pub use turn::{MIN_TURN_FRAMES, TURN_FRAMES, Turn, TurnStatistics};
 pub use warning::{Side, Warning};

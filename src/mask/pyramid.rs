@@ -8,10 +8,8 @@ use image::RgbImage;
 use super::bitmap::Bitmap;
 use super::grab_cut::{self, Field, Label, Models};
 use super::lab::LabTable;
-use super::{Iterations, MaskError};
+use super::{Effort, Iterations, MaskError};
 
-/// The image is halved until it has at most so many pixels.
-const COARSE_PIXELS: usize = 200_000;
 /// Variance of the colour of equal surfaces.
 const COLOUR_VARIANCE: f64 = 0.1;
 /// Half the width of the band, pixels of the finer image: the coarse edge is uncertain by 2.
@@ -35,12 +33,13 @@ pub(super) fn segment(
     labels: &mut Vec<Label>,
     first: FirstModels,
     iterations: Iterations,
+    effort: Effort,
 ) -> Result<(), MaskError> {
     let table = LabTable::new();
     let mut levels: Vec<(RgbImage, Vec<Label>)> = Vec::new();
     loop {
         let (image, known) = levels.last().map_or((image, &*labels), |(i, l)| (i, l));
-        if pixels(image) <= COARSE_PIXELS {
+        if pixels(image) <= effort.coarsest_px() {
             break;
         }
         let half = (half_image(image), half_labels(known, size(image)));
@@ -49,25 +48,28 @@ pub(super) fn segment(
     let mut models = None;
     let mut coarser: Option<(Vec<Label>, (usize, usize))> = None;
     for (image, mut known) in levels.into_iter().rev() {
+        let begin =
+            |field: &LabField, labels: &mut [Label]| start(field, labels, first, iterations);
         solve(
             &image,
             &mut known,
             coarser.as_ref(),
             &mut models,
-            first,
-            iterations,
+            effort,
             &table,
+            begin,
         )?;
         coarser = Some((known, size(&image)));
     }
+    let begin = |field: &LabField, labels: &mut [Label]| start(field, labels, first, iterations);
     solve(
         image,
         labels,
         coarser.as_ref(),
         &mut models,
-        first,
-        iterations,
+        effort,
         &table,
+        begin,
     )
 }
 
@@ -76,19 +78,19 @@ fn solve(
     labels: &mut [Label],
     coarser: Option<&(Vec<Label>, (usize, usize))>,
     models: &mut Option<Models<3>>,
-    first: FirstModels,
-    iterations: Iterations,
+    effort: Effort,
     table: &LabTable,
+    begin: impl FnOnce(&LabField, &mut [Label]) -> Result<Models<3>, MaskError>,
 ) -> Result<(), MaskError> {
     match (coarser, models.as_mut()) {
+        (Some((coarse, coarse_size)), Some(_)) if pixels(image) > effort.finest_px() => {
+            grow(labels, size(image), coarse, *coarse_size);
+        }
         (Some((coarse, coarse_size)), Some(models)) => {
             let field = RgbField { image, table };
             refine(&field, labels, coarse, *coarse_size, models);
         }
-        _ => {
-            let field = LabField::new(image, table);
-            *models = Some(start(&field, labels, first, iterations)?);
-        }
+        _ => *models = Some(begin(&LabField::new(image, table), labels)?),
     }
     Ok(())
 }
@@ -120,6 +122,20 @@ pub(super) fn refine<const D: usize>(
     models: &mut Models<D>,
 ) {
     let size = field.size();
+    grow(labels, size, coarse, coarse_size);
+    let band = band(labels, size, BAND);
+    models.refine(field, labels);
+    let scale = grab_cut::contrast_scale(field);
+    grab_cut::cut(field, models, scale, labels, &band);
+}
+
+/// Each pixel that is not sure takes the coarse result.
+pub(super) fn grow(
+    labels: &mut [Label],
+    size: (usize, usize),
+    coarse: &[Label],
+    coarse_size: (usize, usize),
+) {
     for (at, label) in labels.iter_mut().enumerate() {
         if !label.is_sure() {
             let (x, y) = (at % size.0 / 2, at / size.0 / 2);
@@ -127,10 +143,6 @@ pub(super) fn refine<const D: usize>(
             *label = Label::probably(coarse[from].is_object());
         }
     }
-    let band = band(labels, size, BAND);
-    models.refine(field, labels);
-    let scale = grab_cut::contrast_scale(field);
-    grab_cut::cut(field, models, scale, labels, &band);
 }
 
 /// The pixels that are not sure within `radius` of the edge between the labels, in order.

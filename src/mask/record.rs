@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::error::SeedsFault;
-use super::{Hints, MaskError, MaskStatistics, Seeds, SegmentSettings};
+use super::{Drawing, MaskError, MaskStatistics, Seeds, SegmentSettings, Strokes};
 
 /// The schema that this version writes and reads.
 pub const MASK_SCHEMA: &str = "relit.mask/1";
@@ -60,8 +60,8 @@ pub struct SourceFrame {
     pub frame_blake3: String,
 }
 
-/// [`Hints`] as they are recorded.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+/// A [`Drawing`] as it is recorded, and the turn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordedHints {
     /// The rectangle as given; null without one.
@@ -71,6 +71,9 @@ pub struct RecordedHints {
     pub seeds: Option<String>,
     /// Number of coloured pixels of the painted seeds, which count as unknown.
     pub seeds_coloured_px: u64,
+    /// What was painted over them in the editor.
+    #[serde(default, skip_serializing_if = "Strokes::is_empty")]
+    pub strokes: Strokes,
     /// The frames of the video by which the mask was made; none if only one frame was looked at.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub turn_frames: Vec<u64>,
@@ -167,22 +170,23 @@ impl RecordedHints {
     ///
     /// # Errors
     /// [`MaskError::Encode`].
-    pub fn new(hints: Option<&Hints>, turn_frames: &[u64]) -> Result<Self, MaskError> {
-        let seeds = hints.and_then(Hints::seeds);
+    pub fn new(drawing: &Drawing, turn_frames: &[u64]) -> Result<Self, MaskError> {
+        let seeds = drawing.seeds.as_ref();
         let png = seeds.map(Seeds::to_record).transpose()?;
         Ok(Self {
-            rect: hints.and_then(Hints::rect),
+            rect: drawing.rect,
+            strokes: drawing.strokes.clone(),
             seeds: png.map(|png| STANDARD.encode(png)),
             seeds_coloured_px: seeds.map_or(0, Seeds::coloured_px),
             turn_frames: turn_frames.to_vec(),
         })
     }
 
-    /// The hints that were recorded; none where the video alone was enough.
+    /// The hints that were recorded; empty where the video alone was enough.
     ///
     /// # Errors
     /// [`RecordFault::NoHints`], [`RecordFault::Base64`] or [`RecordFault::Seeds`].
-    pub fn hints(&self) -> Result<Option<Hints>, RecordFault> {
+    pub fn drawing(&self) -> Result<Drawing, RecordFault> {
         let seeds = match &self.seeds {
             None => None,
             Some(text) => {
@@ -190,11 +194,15 @@ impl RecordedHints {
                 Some(Seeds::from_record(&png, self.seeds_coloured_px)?)
             }
         };
-        if self.rect.is_none() && seeds.is_none() && !self.turn_frames.is_empty() {
-            return Ok(None);
+        let drawing = Drawing {
+            rect: self.rect,
+            seeds,
+            strokes: self.strokes.clone(),
+        };
+        if drawing.is_empty() && self.turn_frames.is_empty() {
+            return Err(RecordFault::NoHints);
         }
-        let hints = Hints::from_parts(self.rect, seeds);
-        hints.map(Some).map_err(|_| RecordFault::NoHints)
+        Ok(drawing)
     }
 }
 
@@ -216,6 +224,7 @@ impl RecordedResult {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Brush, Hints, Stroke};
 
     fn record() -> MaskRecord {
         let statistics = MaskStatistics {
@@ -236,7 +245,7 @@ mod tests {
                 height: 48,
                 frame_blake3: "00".to_owned(),
             },
-            hints: RecordedHints::new(Some(&Hints::Rect(Rect::new(-1, 2, 30, 40))), &[]).unwrap(),
+            hints: RecordedHints::new(&Hints::Rect(Rect::new(-1, 2, 30, 40)).into(), &[]).unwrap(),
             settings: SegmentSettings::default(),
             result: RecordedResult::new(statistics, b"png"),
             warnings: vec!["look".to_owned()],
@@ -247,6 +256,29 @@ mod tests {
     fn a_record_is_read_back_as_it_was_written() {
         let bytes = record().to_json().unwrap();
         assert_eq!(MaskRecord::from_json(&bytes).unwrap(), record());
+    }
+
+    #[test]
+    fn strokes_are_read_back_as_they_were_painted() {
+        let stroke = Stroke {
+            brush: Brush::Eraser,
+            radius: 7.3,
+            points: vec![[0.1, 1.0 / 3.0], [-12.5, 99.999]],
+        };
+        let drawing = Drawing {
+            strokes: Strokes::new(vec![stroke]).unwrap(),
+            ..Drawing::default()
+        };
+        let hints = RecordedHints::new(&drawing, &[]).unwrap();
+        let bytes = MaskRecord { hints, ..record() }.to_json().unwrap();
+        let read = MaskRecord::from_json(&bytes).unwrap();
+        assert_eq!(read.hints.drawing().unwrap(), drawing);
+        let text = String::from_utf8(bytes).unwrap();
+        let wrong = text.replace("\"eraser\"", "\"magic\"");
+        assert!(MaskRecord::from_json(wrong.as_bytes()).is_err());
+        let wrong = text.replace("\"radius\": 7.3", "\"radius\": 0.0");
+        let error = MaskRecord::from_json(wrong.as_bytes()).unwrap_err();
+        assert!(error.to_string().contains("stroke 0"), "{error}");
     }
 
     #[test]
@@ -271,13 +303,14 @@ mod tests {
             rect,
             seeds: seeds.map(str::to_owned),
             seeds_coloured_px: 0,
+            strokes: Strokes::default(),
             turn_frames: Vec::new(),
         };
-        let no_hints = of(None, None).hints();
+        let no_hints = of(None, None).drawing();
         assert!(matches!(no_hints, Err(RecordFault::NoHints)));
-        let no_base64 = of(None, Some("%")).hints();
+        let no_base64 = of(None, Some("%")).drawing();
         assert!(matches!(no_base64, Err(RecordFault::Base64(_))));
-        let no_png = of(None, Some("aaaa")).hints();
+        let no_png = of(None, Some("aaaa")).drawing();
         assert!(matches!(no_png, Err(RecordFault::Seeds(_))));
     }
 }

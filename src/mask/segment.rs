@@ -6,7 +6,8 @@ use relit_data::geometry::Rect;
 use super::bitmap::Bitmap;
 use super::initial::InitialLabels;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
-use super::{Hints, MaskError, SegmentSettings, Turn, Warning, cleanup, pyramid, turn, warning};
+use super::turn::{self, TurnCut, TurnStatistics};
+use super::{Effort, Hints, MaskError, SegmentSettings, Warning, cleanup, pyramid, warning};
 
 /// On one frame a hole of this share of the object may be a highlight, and is filled.
 const FILLED_OF_FRAME: f64 = 0.01;
@@ -76,6 +77,75 @@ pub fn segment(
     hints: &Hints,
     settings: &SegmentSettings,
 ) -> Result<Mask, MaskError> {
+    by_hints(frame, hints, settings, Effort::Fine)
+}
+
+/// Finds the object in `frame` by what a turn shows, with or without hints. `turn` was made from frames of
+/// the same recording. The same input gives the same mask.
+///
+/// With a rectangle there is a guard against a turn that misleads: if its mask has an outline along which less
+/// moves differently than along that of the hints alone, the hints alone decide, and a warning says so; so it is
+/// with any hints if there are too few frames.
+///
+/// # Errors
+/// [`MaskError::FewFrames`] without hints; otherwise as [`segment`].
+pub fn segment_turn(
+    frame: &RgbImage,
+    turn: &TurnStatistics,
+    hints: Option<&Hints>,
+    settings: &SegmentSettings,
+) -> Result<Mask, MaskError> {
+    segment_with(frame, Some(turn), hints, settings, Effort::Fine)
+}
+
+/// [`segment_turn`], or [`segment`] without a turn, with more or less effort.
+///
+/// # Errors
+/// As these; [`MaskError::NoHints`] with neither turn nor hints.
+pub fn segment_with(
+    frame: &RgbImage,
+    turn: Option<&TurnStatistics>,
+    hints: Option<&Hints>,
+    settings: &SegmentSettings,
+    effort: Effort,
+) -> Result<Mask, MaskError> {
+    let Some(turn) = turn else {
+        let hints = hints.ok_or(MaskError::NoHints)?;
+        return by_hints(frame, hints, settings, effort);
+    };
+    let size = frame.dimensions();
+    check_size(size)?;
+    let by_turn = match turn::segment(frame, turn, hints, settings.iterations, effort) {
+        Ok(by_turn) => by_turn,
+        Err(error) => {
+            let Some(hints) = hints else {
+                return Err(error);
+            };
+            let why = error.to_string();
+            let mask = by_hints(frame, hints, settings, effort)?;
+            return Ok(mask.with_warning(Some(Warning::TurnDropped { why })));
+        }
+    };
+    let rect = hints
+        .and_then(Hints::rect)
+        .and_then(|rect| rect.clipped_to(size.0, size.1));
+    if let (Some(hints), Some(_)) = (hints, rect)
+        && let Ok(other) = by_hints(frame, hints, settings, effort)
+        && let Some(why) = misled(&by_turn, &other)
+    {
+        return Ok(other.with_warning(Some(Warning::TurnDropped { why })));
+    }
+    let still = (!by_turn.moves()).then_some(Warning::NothingMoves);
+    let mask = finish(&by_turn.object, size, hints, rect, settings, FILLED_OF_TURN)?;
+    Ok(mask.with_warning(still))
+}
+
+fn by_hints(
+    frame: &RgbImage,
+    hints: &Hints,
+    settings: &SegmentSettings,
+    effort: Effort,
+) -> Result<Mask, MaskError> {
     let size = frame.dimensions();
     check_size(size)?;
     let InitialLabels {
@@ -83,74 +153,25 @@ pub fn segment(
         first,
         rect,
     } = InitialLabels::new(hints, size)?;
-    pyramid::segment(frame, &mut labels, first, settings.iterations)?;
+    pyramid::segment(frame, &mut labels, first, settings.iterations, effort)?;
     let raw = Bitmap::new(size, labels.iter().map(|label| label.is_object()));
     drop(labels);
     finish(&raw, size, Some(hints), rect, settings, FILLED_OF_FRAME)
 }
 
-/// Finds the object in `frame` by what a turn shows, with or without hints. `turn` holds frames of the
-/// same recording. The same input gives the same mask.
-///
-/// With hints there is a guard against a turn that misleads: if its mask has an outline along which less
-/// moves differently than along that of the hints alone, or if there are too few frames, the hints alone
-/// decide, and a warning says so.
-///
-/// # Errors
-/// [`MaskError::FewFrames`] without hints; otherwise as [`segment`].
-pub fn segment_turn(
-    frame: &RgbImage,
-    turn: &Turn,
-    hints: Option<&Hints>,
-    settings: &SegmentSettings,
-) -> Result<Mask, MaskError> {
-    let size = frame.dimensions();
-    check_size(size)?;
-    let by_turn = turn::segment(frame, turn, hints, settings.iterations);
-    let Some(hints) = hints else {
-        let by_turn = by_turn?;
-        let still = (!by_turn.moves()).then_some(Warning::NothingMoves);
-        let mask = finish(&by_turn.object, size, None, None, settings, FILLED_OF_TURN)?;
-        return Ok(mask.with_warning(still));
-    };
-    let by_hints = segment(frame, hints, settings);
-    let by_turn = match by_turn {
-        Ok(by_turn) => by_turn,
-        Err(error) => {
-            let dropped = Warning::TurnDropped {
-                why: error.to_string(),
-            };
-            return by_hints.map(|mask| mask.with_warning(Some(dropped)));
-        }
-    };
-    if let Ok(by_hints) = by_hints {
-        let object = by_hints.image.as_raw().iter().map(|&level| level >= 128);
-        let object = Bitmap::new(size, object);
-        let width = size.0 as usize;
-        let (of_turn, of_hints) = (
-            by_turn.outline(&by_turn.object, width),
-            by_turn.outline(&object, width),
-        );
-        if of_turn < LEAST_OF_HINTS * of_hints {
-            let why = format!(
-                "its outline follows what moves less well ({of_turn:.2}) than that of the hints alone ({of_hints:.2})"
-            );
-            return Ok(by_hints.with_warning(Some(Warning::TurnDropped { why })));
-        }
-    }
-    let still = (!by_turn.moves()).then_some(Warning::NothingMoves);
-    let rect = hints
-        .rect()
-        .and_then(|rect| rect.clipped_to(size.0, size.1));
-    let mask = finish(
-        &by_turn.object,
-        size,
-        Some(hints),
-        rect,
-        settings,
-        FILLED_OF_TURN,
-    )?;
-    Ok(mask.with_warning(still))
+/// Why the turn's mask is worse than that of the hints alone; none if it is not.
+fn misled(by_turn: &TurnCut<'_>, by_hints: &Mask) -> Option<String> {
+    let size = by_hints.image.dimensions();
+    let object = by_hints.image.as_raw().iter().map(|&level| level >= 128);
+    let object = Bitmap::new(size, object);
+    let width = size.0 as usize;
+    let of_turn = by_turn.outline(&by_turn.object, width);
+    let of_hints = by_turn.outline(&object, width);
+    (of_turn < LEAST_OF_HINTS * of_hints).then(|| {
+        format!(
+            "its outline follows what moves less well ({of_turn:.2}) than that of the hints alone ({of_hints:.2})"
+        )
+    })
 }
 
 fn finish(

@@ -98,6 +98,44 @@ pub struct SegmentSettings {
     pub alpha: bool,
 }
 
+/// How much work a cut is worth.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Effort {
+    /// Coarse to fine up to about a million pixels; an edge in a larger frame is blocky. For showing a
+    /// result while it is worked on.
+    Draft,
+    /// Coarse to fine, up to the frame's own size.
+    #[default]
+    Fine,
+    /// All pixels at the frame's own size, as GrabCut was published: slow, and needs much memory. What
+    /// coarse to fine is measured against.
+    Whole,
+}
+
+impl Effort {
+    /// The frame is halved until it has at most so many pixels.
+    pub(super) fn coarsest_px(self) -> usize {
+        match self {
+            Self::Draft | Self::Fine => 200_000,
+            Self::Whole => usize::MAX,
+        }
+    }
+
+    /// Whether a frame is cut up to its own size.
+    #[must_use]
+    pub fn covers(self, width: u32, height: u32) -> bool {
+        width as usize * height as usize <= self.finest_px()
+    }
+
+    /// The edge is decided again up to so many pixels.
+    pub(super) fn finest_px(self) -> usize {
+        match self {
+            Self::Draft => 1_000_000,
+            Self::Fine | Self::Whole => usize::MAX,
+        }
+    }
+}
+
 impl TryFrom<u32> for Iterations {
     type Error = SettingsFault;
 

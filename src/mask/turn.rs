@@ -14,9 +14,9 @@ use super::bitmap::Bitmap;
 use super::grab_cut::{self, DIRECTIONS_AHEAD, Field, Label, Models, neighbour};
 use super::initial::InitialLabels;
 use super::lab::LabTable;
-use super::pyramid::{FirstModels, RgbField, half_image, half_labels, refine, start};
+use super::pyramid::{FirstModels, RgbField, grow, half_image, half_labels, refine, start};
 use super::table::table;
-use super::{Hints, Iterations, registration};
+use super::{Effort, Hints, Iterations, registration};
 
 /// Fewest frames from which anything can be learned.
 pub const MIN_TURN_FRAMES: usize = 4;
@@ -92,6 +92,41 @@ impl Turn {
 
 fn pixels(image: &RgbImage) -> usize {
     image.width() as usize * image.height() as usize
+}
+
+/// What the frames of a turn tell about each pixel; any number of cuts can be made with it.
+#[derive(Debug)]
+pub struct TurnStatistics {
+    frames: usize,
+    full: (u32, u32),
+    fine: TurnField,
+    /// At half the size; none where the fine one is small enough for the first cut.
+    coarse: Option<TurnField>,
+}
+
+impl TurnStatistics {
+    /// Looks at the frames of a turn.
+    #[must_use]
+    pub fn new(turn: &Turn) -> Self {
+        let colours = LabTable::new();
+        let fine = TurnField::new(&turn.frames, &colours);
+        let coarse = (fine.size.0 * fine.size.1 > COARSE_PIXELS).then(|| {
+            let half: Vec<RgbImage> = turn.frames.iter().map(half_image).collect();
+            TurnField::new(&half, &colours)
+        });
+        Self {
+            frames: turn.len(),
+            full: turn.full,
+            fine,
+            coarse,
+        }
+    }
+
+    /// Number of frames that were looked at.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.frames
+    }
 }
 
 /// Averages and changes of each pixel over the frames.
@@ -273,28 +308,28 @@ impl FrameInTurn<'_> {
 }
 
 /// Cuts the object out by what the turn tells, on the pixels of `frame`.
-pub(super) fn segment(
+pub(super) fn segment<'a>(
     frame: &RgbImage,
-    turn: &Turn,
+    turn: &'a TurnStatistics,
     hints: Option<&Hints>,
     iterations: Iterations,
-) -> Result<TurnCut, MaskError> {
-    if turn.len() < MIN_TURN_FRAMES || turn.full != frame.dimensions() {
-        return Err(MaskError::FewFrames { found: turn.len() });
+    effort: Effort,
+) -> Result<TurnCut<'a>, MaskError> {
+    if turn.frames < MIN_TURN_FRAMES || turn.full != frame.dimensions() {
+        return Err(MaskError::FewFrames { found: turn.frames });
     }
     let table = LabTable::new();
     let (known, share) = known(hints, frame.dimensions())?;
     let levels = levels(frame, known);
-    let fine = TurnField::new(&turn.frames, &table);
+    let fine = &turn.fine;
     let at_fine = levels.iter().position(|level| level.size() == fine.size);
     let at_fine = at_fine.ok_or(MaskError::FewFrames { found: 0 })?;
-    let (mut labels, mut models) =
-        cut_turn(turn, &fine, &levels[at_fine..], share, iterations, &table)?;
+    let (mut labels, mut models) = cut_turn(turn, &levels[at_fine..], share, iterations)?;
     let mut size = fine.size;
-    labels = register(frame, &levels[at_fine], &fine, &labels, &table);
+    labels = register(frame, &levels[at_fine], fine, &labels, &table);
     for (steps, level) in levels[..at_fine].iter().rev().enumerate() {
         let field = FrameInTurn {
-            turn: &fine,
+            turn: fine,
             frame: RgbField {
                 image: level.image.as_ref().unwrap_or(frame),
                 table: &table,
@@ -302,7 +337,11 @@ pub(super) fn segment(
             factor: 2 << steps,
         };
         let mut finer = level.labels.clone();
-        refine(&field, &mut finer, &labels, size, &mut models);
+        if finer.len() > effort.finest_px() {
+            grow(&mut finer, level.size(), &labels, size);
+        } else {
+            refine(&field, &mut finer, &labels, size, &mut models);
+        }
         (labels, size) = (finer, level.size());
     }
     let object = labels.iter().map(|label| label.is_object());
@@ -314,14 +353,14 @@ pub(super) fn segment(
 }
 
 /// The result of a cut by a turn, and what other results can be compared by.
-pub(super) struct TurnCut {
+pub(super) struct TurnCut<'a> {
     pub(super) object: Bitmap,
-    field: TurnField,
+    field: &'a TurnField,
     /// The frame is so many times larger than the field.
     factor: usize,
 }
 
-impl TurnCut {
+impl TurnCut<'_> {
     /// How well an outline follows what moves differently: the mean over its edges of the strength of
     /// the contrast there, 0..=1.
     pub(super) fn outline(&self, object: &Bitmap, width: usize) -> f32 {
@@ -330,7 +369,7 @@ impl TurnCut {
             let (x, y) = (at % columns * self.factor, at / columns * self.factor);
             object.bits().get(y * width + x).copied().unwrap_or(false)
         };
-        let scale = grab_cut::contrast_scale(&self.field);
+        let scale = grab_cut::contrast_scale(self.field);
         let (mut sum, mut edges) = (0.0, 0.0);
         for at in 0..columns * rows {
             for direction in [4, 6] {
@@ -476,12 +515,10 @@ fn ring(size: (u32, u32), share: f64) -> impl Fn(usize) -> bool {
 
 /// The cut at the turn's own size; `levels` begins with that size.
 fn cut_turn(
-    turn: &Turn,
-    fine: &TurnField,
+    turn: &TurnStatistics,
     levels: &[Level],
     share: f64,
     iterations: Iterations,
-    table: &LabTable,
 ) -> Result<(Vec<Label>, Models<5>), MaskError> {
     let begin = |field: &TurnField, labels: &mut Vec<Label>| {
         if !field.start_from_backdrop(labels) {
@@ -491,14 +528,18 @@ fn cut_turn(
         start(field, labels, FirstModels::All, iterations)
     };
     let mut labels = levels[0].labels.clone();
-    let Some(coarser) = levels.get(1) else {
-        let models = begin(fine, &mut labels)?;
+    let (Some(coarser), Some(coarse)) = (levels.get(1), &turn.coarse) else {
+        let models = begin(&turn.fine, &mut labels)?;
         return Ok((labels, models));
     };
-    let half: Vec<RgbImage> = turn.frames.iter().map(half_image).collect();
-    let coarse = TurnField::new(&half, table);
     let mut coarse_labels = coarser.labels.clone();
-    let mut models = begin(&coarse, &mut coarse_labels)?;
-    refine(fine, &mut labels, &coarse_labels, coarse.size, &mut models);
+    let mut models = begin(coarse, &mut coarse_labels)?;
+    refine(
+        &turn.fine,
+        &mut labels,
+        &coarse_labels,
+        coarse.size,
+        &mut models,
+    );
     Ok((labels, models))
 }

@@ -1,6 +1,7 @@
 //! The errors of making the mask of a recording.
 
 use std::io;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use relit_data::session;
@@ -69,6 +70,17 @@ pub enum MaskingError {
         path: PathBuf,
         /// What is wrong with it.
         why: String,
+    },
+    /// The editor cannot be served: the address is taken or not this machine's, or there are no threads or no
+    /// random numbers.
+    #[error(
+        "the editor cannot be served at {address}: {source}; give another address or port with --listen"
+    )]
+    Serve {
+        /// The address.
+        address: SocketAddr,
+        /// The system's answer.
+        source: io::Error,
     },
     /// The recording cannot be opened.
     #[error(transparent)]

@@ -1,19 +1,20 @@
 //! Frames of a turn, spread over a video.
 
 use relit_data::geometry::Rect;
-use relit_mask::{TURN_FRAMES, Turn};
+use relit_mask::{TURN_FRAMES, Turn, TurnStatistics};
 use relit_video::Video;
 
-use super::{MaskingError, TurnRequest};
+use super::MaskingError;
+use super::request::TurnRequest;
 
 /// Threads that decode ahead where frames depend on each other.
 const DECODERS: usize = 2;
 
-/// Frames of a turn, and their numbers.
+/// The numbers of some frames of a turn, and what they tell.
 #[derive(Debug)]
 pub(super) struct SampledTurn {
     pub(super) frames: Vec<u64>,
-    pub(super) pictures: Turn,
+    pub(super) statistics: TurnStatistics,
 }
 
 /// Reads the frames that are asked for; none where one frame is enough. Frames that cannot be decoded
@@ -28,10 +29,8 @@ pub(super) fn read_turn(
         TurnRequest::Sampled => spread(video, TURN_FRAMES),
         TurnRequest::Frames(frames) => frames.clone(),
     };
-    let mut turn = SampledTurn {
-        frames: Vec::new(),
-        pictures: Turn::new(width, height),
-    };
+    let mut frames = Vec::new();
+    let mut turn = Turn::new(width, height);
     let whole = Rect::new(0, 0, width, height);
     for pending in video.read(&numbers, DECODERS)? {
         let Ok(picture) = video.picture(pending) else {
@@ -41,11 +40,12 @@ pub(super) fn read_turn(
             continue;
         }
         if let Ok(image) = picture.rgb(whole) {
-            turn.frames.push(picture.number());
-            turn.pictures.push(&image);
+            frames.push(picture.number());
+            turn.push(&image);
         }
     }
-    Ok(Some(turn))
+    let statistics = TurnStatistics::new(&turn);
+    Ok(Some(SampledTurn { frames, statistics }))
 }
 
 /// Up to `count` frames of the video at equal distances, without those that are known to be damaged.

@@ -10,8 +10,8 @@ use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage};
 use proptest::prelude::*;
 use relit_data::geometry::Rect;
 use relit_mask::{
-    Feather, Hints, Iterations, MaskError, Seeds, SegmentSettings, Turn, Warning, alpha, segment,
-    segment_turn,
+    Feather, Hints, Iterations, MaskError, Seeds, SegmentSettings, Turn, TurnStatistics, Warning,
+    alpha, segment, segment_turn,
 };
 
 use scene::{AROUND, HEIGHT, WIDTH, disc_share, in_disc, seeds_image, strokes};
@@ -202,16 +202,16 @@ fn turn_frame(at: u32) -> RgbImage {
     })
 }
 
-fn turn(frames: u32) -> Turn {
+fn statistics(frames: u32) -> TurnStatistics {
     let mut turn = Turn::new(WIDTH, HEIGHT);
     (0..frames).for_each(|at| turn.push(&turn_frame(at)));
-    turn
+    TurnStatistics::new(&turn)
 }
 
 #[test]
 fn a_turn_alone_finds_the_object_before_a_room_of_its_colours() {
     let settings = SegmentSettings::default();
-    let mask = segment_turn(&turn_frame(0), &turn(16), None, &settings).unwrap();
+    let mask = segment_turn(&turn_frame(0), &statistics(16), None, &settings).unwrap();
     assert!(
         disc_share(mask.image()) > 0.95,
         "{}",
@@ -223,9 +223,9 @@ fn a_turn_alone_finds_the_object_before_a_room_of_its_colours() {
 #[test]
 fn a_turn_of_too_few_frames_leaves_the_decision_to_the_hints_and_says_so() {
     let settings = SegmentSettings::default();
-    let alone = segment_turn(&turn_frame(0), &turn(2), None, &settings);
+    let alone = segment_turn(&turn_frame(0), &statistics(2), None, &settings);
     assert!(matches!(alone, Err(MaskError::FewFrames { found: 2 })));
-    let mask = segment_turn(&disc(), &turn(2), Some(&around()), &settings).unwrap();
+    let mask = segment_turn(&disc(), &statistics(2), Some(&around()), &settings).unwrap();
     assert!(disc_share(mask.image()) > 0.98);
     let dropped = |warning: &Warning| matches!(warning, Warning::TurnDropped { .. });
     assert!(mask.warnings().iter().any(dropped));
@@ -236,7 +236,13 @@ fn a_video_in_which_nothing_moves_gives_a_warning() {
     let mut still = Turn::new(WIDTH, HEIGHT);
     (0..8).for_each(|_| still.push(&disc()));
     let settings = SegmentSettings::default();
-    let mask = segment_turn(&disc(), &still, Some(&around()), &settings).unwrap();
+    let mask = segment_turn(
+        &disc(),
+        &TurnStatistics::new(&still),
+        Some(&around()),
+        &settings,
+    )
+    .unwrap();
     assert!(disc_share(mask.image()) > 0.95);
     let nothing = |warning: &Warning| matches!(warning, Warning::NothingMoves);
     assert!(mask.warnings().iter().any(nothing));

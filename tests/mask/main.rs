@@ -5,5 +5,9 @@
     reason = "a test fails by a panic, in its helpers too"
 )]
 
+mod browser;
+mod chromium;
+mod editing;
+mod editor;
 mod program;
 mod scene;

@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use super::scene::{AROUND, HEIGHT, WIDTH, disc_share, in_disc, seeds_image, strokes};
 
 /// A video of three frames of the disc, as YUV4MPEG2: a container that needs no encoder.
-fn video() -> Vec<u8> {
+pub(crate) fn video() -> Vec<u8> {
     let mut bytes = format!("YUV4MPEG2 W{WIDTH} H{HEIGHT} F30:1 Ip A1:1 C444\n").into_bytes();
     let luma = |x, y| {
         if in_disc(x, y) {
@@ -26,7 +26,7 @@ fn video() -> Vec<u8> {
     bytes
 }
 
-fn relit_mask(folder: &Path, arguments: &[&str]) -> Output {
+pub(crate) fn relit_mask(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_relit-mask"))
         .current_dir(folder)
         .args(arguments)
@@ -34,11 +34,11 @@ fn relit_mask(folder: &Path, arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-fn said(output: &Output) -> String {
+pub(crate) fn said(output: &Output) -> String {
     String::from_utf8_lossy(&[&output.stdout[..], &output.stderr].concat()).into_owned()
 }
 
-fn code(output: &Output) -> i32 {
+pub(crate) fn code(output: &Output) -> i32 {
     output
         .status
         .code()
@@ -46,13 +46,13 @@ fn code(output: &Output) -> i32 {
 }
 
 /// A folder with `clip.y4m` in it.
-fn clip() -> TempDir {
+pub(crate) fn clip() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("clip.y4m"), video()).unwrap();
     folder
 }
 
-fn read(folder: &Path, name: &str) -> Vec<u8> {
+pub(crate) fn read(folder: &Path, name: &str) -> Vec<u8> {
     fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
@@ -215,7 +215,7 @@ fn a_frame_beyond_the_end_is_reported_with_the_last_one() {
 }
 
 /// A turn of 16 frames: the disc before stripes that move.
-fn turn_video() -> Vec<u8> {
+pub(crate) fn turn_video() -> Vec<u8> {
     let mut bytes = format!("YUV4MPEG2 W{WIDTH} H{HEIGHT} F30:1 Ip A1:1 C444\n").into_bytes();
     for at in 0..16 {
         let luma = |x: u32, y: u32| match in_disc(x, y) {
@@ -286,7 +286,7 @@ fn bench_measures_every_hint_and_names_what_is_wrong() {
 }
 
 /// A session folder `<name>` in `root` with the disc as its video.
-fn session(root: &Path, name: &str) -> PathBuf {
+pub(crate) fn session(root: &Path, name: &str) -> PathBuf {
     let folder = root.join(name);
     fs::create_dir(&folder).unwrap();
     let video = video();

@@ -1,17 +1,19 @@
 //! The command line of relit-mask.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::error::ErrorKind;
 use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand};
 use relit::masking::{MaskFiles, MaskRequest, MaskingError};
 use relit_data::geometry::Rect;
-use relit_mask::{Feather, Hints, Iterations, Seeds, SegmentSettings};
+use relit_mask::{Drawing, Feather, Iterations, Seeds, SegmentSettings};
 
 const EXAMPLES: &str = "\
 Examples:
   relit-mask 20261120T093015Z-mug --auto
   relit-mask 20261120T093015Z-mug --rect 610,240,420,380
+  relit-mask 20261120T093015Z-mug --edit
   relit-mask clip.mp4 --seeds seeds.png --frame 30 -o masks/mug.png
   relit-mask sessions/ --rect 610,240,420,380 --keep-all
   relit-mask bench images/
@@ -52,7 +54,7 @@ pub(crate) enum Verb {
 
 /// What mask is to be made.
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("hint").args(["rect", "seeds", "auto", "recipe"]).required(true).multiple(true))]
+#[command(group = ArgGroup::new("hint").args(["rect", "seeds", "auto", "edit", "recipe"]).required(true).multiple(true))]
 pub(crate) struct MaskArguments {
     /// A session folder, a folder of sessions (each gets a mask with the same hints), or a video
     #[arg(value_name = "INPUT")]
@@ -69,6 +71,19 @@ pub(crate) struct MaskArguments {
     /// Find the object by what stands still while the turntable turns; alone or with --rect or --seeds
     #[arg(long)]
     auto: bool,
+
+    /// Draw the hints on a page in the browser, which begins with the other hints
+    #[arg(long)]
+    pub(crate) edit: bool,
+
+    /// Address and port at which the page is served; port 0 is any free one
+    #[arg(
+        long,
+        value_name = "ADDRESS:PORT",
+        default_value = "127.0.0.1:0",
+        requires = "edit"
+    )]
+    pub(crate) listen: SocketAddr,
 
     /// The number of the frame to make the mask on, from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -117,34 +132,36 @@ impl MaskArguments {
         let request = match &self.recipe {
             Some(path) => MaskRequest::from_recipe(path)?,
             None => {
-                let seeds = self.seeds.as_deref().map(Seeds::read).transpose()?;
-                if self.auto && self.rect.is_none() && seeds.is_none() {
-                    return Ok(
-                        MaskRequest::auto(self.frame, None, self.settings()).with_force(self.force)
-                    );
-                }
-                let hints = Hints::from_parts(self.rect, seeds)?;
+                let drawing = Drawing {
+                    rect: self.rect,
+                    seeds: self.seeds.as_deref().map(Seeds::read).transpose()?,
+                    ..Drawing::default()
+                };
                 match self.auto {
-                    true => MaskRequest::auto(self.frame, Some(hints), self.settings()),
-                    false => MaskRequest::new(self.frame, hints, self.settings()),
+                    true => MaskRequest::auto(self.frame, drawing, self.settings()),
+                    false => MaskRequest::new(self.frame, drawing, self.settings()),
                 }
             }
         };
         Ok(request.with_force(self.force))
     }
 
-    /// Refuses one name for the masks of several recordings.
+    /// Refuses one name, or one page, for the masks of several recordings.
     ///
     /// # Errors
     /// A usage error, ready to be printed.
-    pub(crate) fn check_output(&self, recordings: usize) -> Result<(), clap::Error> {
-        if self.output.is_none() || recordings == 1 {
-            return Ok(());
-        }
-        let text = format!(
-            "-o names one mask, but {} holds {recordings} recordings: leave it out, and each gets its mask.png",
-            self.input.display()
-        );
+    pub(crate) fn check_recordings(&self, recordings: usize) -> Result<(), clap::Error> {
+        let input = self.input.display();
+        let text = match (self.edit, &self.output) {
+            _ if recordings == 1 => return Ok(()),
+            (true, _) => format!(
+                "--edit shows one recording, but {input} holds {recordings}: name one of them"
+            ),
+            (false, Some(_)) => format!(
+                "-o names one mask, but {input} holds {recordings} recordings: leave it out, and each gets its mask.png"
+            ),
+            (false, None) => return Ok(()),
+        };
         Err(CommandLine::command().error(ErrorKind::ArgumentConflict, text))
     }
 

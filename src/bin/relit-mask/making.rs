@@ -1,11 +1,12 @@
 //! Making masks.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use relit::console::{Console, Outcome};
-use relit::masking::{MaskingError, make_mask};
+use relit::masking::{MaskingError, edit, make_mask};
 use relit_data::session::recordings;
+use relit_web::Announcement;
 
 use super::arguments::MaskArguments;
 use super::report;
@@ -17,12 +18,32 @@ pub(crate) fn run(arguments: &MaskArguments) -> ExitCode {
         Ok(paths) => paths,
         Err(error) => return console.finish(Err(error)),
     };
-    if let Err(usage) = arguments.check_output(paths.len()) {
+    if let Err(usage) = arguments.check_recordings(paths.len()) {
         // Nothing can be done if standard error is closed.
         let _ = usage.print();
         return ExitCode::from(2);
     }
-    console.finish(make(&paths, arguments, console))
+    match (arguments.edit, paths.first()) {
+        (true, Some(path)) => console.finish(draw(path, arguments, console)),
+        _ => console.finish(make(&paths, arguments, console)),
+    }
+}
+
+/// Lets a person draw the hints in a browser.
+fn draw(path: &Path, arguments: &MaskArguments, console: Console) -> Result<Outcome, MaskingError> {
+    let request = arguments.request()?;
+    let output = arguments.output.clone();
+    let announce = |announcement: &Announcement| report::print_editor(announcement, console);
+    match edit(path, output, request, arguments.listen, announce)? {
+        Some(output) => {
+            report::print(&output, console);
+            Ok(Outcome::Whole)
+        }
+        None => {
+            console.warn("the editor was left without a mask: nothing was written");
+            Ok(Outcome::Wrong)
+        }
+    }
 }
 
 fn make(

@@ -2,6 +2,7 @@
 
 use relit::console::Console;
 use relit::masking::MaskOutput;
+use relit_web::Announcement;
 use serde_json::json;
 
 /// Prints the warnings about one mask, its files and its size.
@@ -36,4 +37,17 @@ pub(crate) fn print(output: &MaskOutput, console: Console) {
         "warnings": output.record.warnings,
     });
     console.say(&text, &event);
+}
+
+/// Prints where the editor is.
+pub(crate) fn print_editor(announcement: &Announcement, console: Console) {
+    let url = &announcement.url;
+    let qr = match (announcement.address.ip().is_loopback(), &announcement.qr) {
+        (false, Some(qr)) => format!("{qr}\n"),
+        _ => String::new(),
+    };
+    console.say(
+        &format!("{qr}Open in a browser: {url}"),
+        &json!({ "event": "editor", "address": announcement.address.to_string(), "url": url }),
+    );
 }

@@ -1,5 +1,5 @@
 //! `mask.json`: a record that can be read is unchanged after writing and reading it again, and so are
-//! its hints if they are valid.
+//! its hints if they are valid; its strokes can be painted or are refused.
 
 #![no_main]
 #![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]
@@ -7,7 +7,7 @@
 mod completed;
 
 use libfuzzer_sys::fuzz_target;
-use relit_mask::{Hints, MASK_SCHEMA, MaskRecord, RecordedHints};
+use relit_mask::{MASK_SCHEMA, MaskRecord, RecordedHints};
 
 /// A whole record.
 const WHOLE: &[u8] = include_bytes!("../seeds/mask_record/both.json");
@@ -28,11 +28,17 @@ fn check(bytes: &[u8]) {
     let read = MaskRecord::from_json(&written).expect("what was written can be read");
     assert_eq!(read, record);
 
-    let Ok(hints) = record.hints.hints() else {
+    let Ok(drawing) = record.hints.drawing() else {
         return;
     };
-    assert_eq!(hints.as_ref().and_then(Hints::rect), record.hints.rect);
-    let again = RecordedHints::new(hints.as_ref(), &record.hints.turn_frames)
+    assert_eq!(drawing.rect, record.hints.rect);
+    let again = RecordedHints::new(&drawing, &record.hints.turn_frames)
         .expect("hints that were read can be recorded");
-    assert_eq!(again.hints().ok(), Some(hints));
+    assert_eq!(again.drawing().ok().as_ref(), Some(&drawing));
+
+    // A frame of any size can be said to be the source; what is painted on a small one shows the same.
+    let (width, height) = (record.source.width.min(64), record.source.height.min(64));
+    if let Ok(Some(seeds)) = drawing.strokes.paint((width, height), None) {
+        assert_eq!(seeds.size(), (width, height));
+    }
 }
