@@ -18,7 +18,7 @@ const GLOSS_STIFFNESS: f64 = 1e-4;
 /// A surface of which light without gloss leaves no more than this part of the curves' energy is matt.
 const MATT_LEFT: f64 = 1e-3;
 /// The least part of the light that counts as shown by gloss.
-const LEAST_GLOSS: f64 = 0.05;
+const LEAST_GLOSS: f64 = 0.01;
 
 /// How much gloss shows of the bands of a light that a matt surface shows too.
 pub(super) type Shares = [f64; MATT_BANDS];
