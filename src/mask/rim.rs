@@ -7,11 +7,11 @@ use super::table::Table;
 /// A line is at most twice this share of the frame's width wide.
 const WIDTH: f64 = 0.005;
 /// The table begins at most this share of the frame's width below it, and the room as far above it.
-const REACH: f64 = 0.015;
+const REACH: f64 = 0.03;
 /// A line is at least so many times as long as wide.
 const LENGTH: usize = 4;
 /// This share of a line's pixels has the table below and the room above.
-const BETWEEN: f64 = 0.6;
+const BETWEEN: f64 = 0.4;
 
 /// The object without thin lines that have the table below and the room above them.
 pub(super) fn without_rim(object: &Bitmap, table: &Table, size: (usize, usize)) -> Bitmap {
@@ -39,7 +39,7 @@ pub(super) fn without_rim(object: &Bitmap, table: &Table, size: (usize, usize)) 
     object.map(|at, bit| bit && !components.at(at).is_some_and(|component| is_rim[component]))
 }
 
-/// Whether the first thing below a pixel is the table, and the first above it neither table nor object.
+/// Whether there is a plain dark surface below a pixel, and something else than that and the object above.
 fn is_between(
     at: usize,
     object: &Bitmap,
@@ -48,14 +48,13 @@ fn is_between(
     reach: usize,
 ) -> bool {
     let (x, y) = (at % width, at / width);
-    let on_table = |at: usize| table.surface.bits()[at] || table.shadow.bits()[at];
-    let below = (y + 1..(y + reach + 1).min(height)).map(|row| row * width + x);
-    let above = (y.saturating_sub(reach)..y)
+    let is_plain = |at: usize| !object.bits()[at] && table.plain.bits()[at];
+    let mut below = (y + 1..(y + reach + 1).min(height)).map(|row| row * width + x);
+    let mut above = (y.saturating_sub(reach)..y)
         .rev()
         .map(|row| row * width + x);
-    let table_below = below.into_iter().find(|&at| on_table(at)).is_some();
-    let first_above = above.into_iter().find(|&at| !object.bits()[at]);
-    table_below && first_above.is_some_and(|at| !on_table(at))
+    let first_above = above.find(|&at| !object.bits()[at]);
+    below.any(is_plain) && first_above.is_some_and(|at| !is_plain(at))
 }
 
 #[cfg(test)]
@@ -72,6 +71,7 @@ mod tests {
         Table {
             surface: bitmap(|_, y| y > 41),
             shadow: bitmap(|_, _| false),
+            plain: bitmap(|_, y| y > 41),
         }
     }
 

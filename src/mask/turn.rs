@@ -301,6 +301,7 @@ impl TurnField {
             table: Table {
                 surface: Bitmap::new((0, 0), std::iter::empty()),
                 shadow: Bitmap::new((0, 0), std::iter::empty()),
+                plain: Bitmap::new((0, 0), std::iter::empty()),
             },
             evidence: Vec::new(),
         }

@@ -129,7 +129,7 @@ fn check_recording(
     let places = places(&video, &check, image.dimensions(), advanced)?;
     let drifts = drifts(&places, origin);
     let drift = summary(&drifts, video.frames().len());
-    let shape = check.shape(&frame)?;
+    let shape = shape(&check, &frame)?;
     let (verdict, reasons) = verdict(drift.as_ref(), shape.as_ref());
     let report = MaskReport {
         verdict,
@@ -160,12 +160,20 @@ pub fn mask_doubts(video: &Video, mask: &GrayImage) -> Result<Vec<String>, Maski
     let Some(&middle) = numbers.get(numbers.len() / 2) else {
         return Ok(Vec::new());
     };
-    let shape = check.shape(&video.frame(middle)?)?;
+    let shape = shape(&check, &video.frame(middle)?)?;
     let (verdict, reasons) = verdict(None, shape.as_ref());
     Ok(match verdict {
         Verdict::Wrong => reasons,
         Verdict::Fits | Verdict::Drifts | Verdict::Unknown => Vec::new(),
     })
+}
+
+/// The comparison of the shapes; none where the turn alone shows no object.
+fn shape(check: &MaskCheck<'_>, frame: &RgbImage) -> Result<Option<ShapeCheck>, MaskingError> {
+    match check.shape(frame) {
+        Err(MaskError::Empty | MaskError::Everything | MaskError::FrameTooSmall { .. }) => Ok(None),
+        shape => Ok(shape?),
+    }
 }
 
 fn read_mask(path: &Path) -> Result<GrayImage, MaskingError> {
