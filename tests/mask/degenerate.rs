@@ -1,4 +1,4 @@
-//! Every combination of unusable and of odd input: a sentence and exit code 1 or 2, or a mask; never a
+//! Combinations of unusable and of odd input: a sentence and exit code 1 or 2, or a mask; never a
 //! panic.
 
 use std::fs;
@@ -99,24 +99,27 @@ fn fault(folder: &Path, arguments: &[&str]) -> Option<String> {
 }
 
 #[test]
-fn every_combination_of_hints_ends_with_a_mask_or_a_sentence() {
+fn all_pairs_of_bad_input_end_with_a_mask_or_a_sentence() {
     let folder = clip();
     lay_out(folder.path());
     let mut faults = Vec::new();
-    // All hints on a good video; all videos with some hints.
+    // Each pair of hints on a good video, each hint beside a turn, and each video with some hints.
     let mut run = |input: &str, parts: [Choice; 3]| {
         let arguments = [&[input][..], &parts.concat(), &["-o", "out.png"]].concat();
         faults.extend(fault(folder.path(), &arguments));
     };
-    for (&rect, &seeds, &way) in combinations(&RECTS, &SEEDS, &WAYS[..2]) {
-        run("turn.y4m", [rect, seeds, way]);
-    }
-    for (&rect, &seeds, &way) in combinations(&RECTS[..2], &SEEDS[..2], &WAYS[2..]) {
+    for (&rect, &seeds, &way) in combinations(&RECTS, &SEEDS, &WAYS[..1]) {
         run("clip.y4m", [rect, seeds, way]);
     }
-    for (&input, &rect, &seeds) in combinations(&INPUTS, &RECTS[..3], &SEEDS[..3]) {
-        run(input, [rect, seeds, WAYS[0]]);
-        run(input, [rect, seeds, WAYS[1]]);
+    for (&rect, &seeds, &way) in combinations(&RECTS, &SEEDS[..1], &WAYS[1..]) {
+        run("turn.y4m", [rect, seeds, way]);
+    }
+    for (&rect, &seeds, &way) in combinations(&RECTS[..1], &SEEDS[1..], &WAYS[1..2]) {
+        run("turn.y4m", [rect, seeds, way]);
+    }
+    for (&input, &rect, &way) in combinations(&INPUTS, &RECTS[..2], &WAYS[..2]) {
+        run(input, [rect, SEEDS[0], way]);
+        run(input, [rect, SEEDS[1], way]);
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
