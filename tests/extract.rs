@@ -41,9 +41,12 @@ impl Bench {
         ffmpeg(self.folder.path(), &arguments);
     }
 
+    /// The pattern moves, and no object does: its shifts are not looked for unless the line says so.
     fn run(&self, line: &str) -> Output {
+        let extracts = line.contains(" -o ") && !line.contains("--align");
         Command::new(env!("CARGO_BIN_EXE_relit-extract"))
             .args(line.split_whitespace())
+            .args(extracts.then_some("--align=off"))
             .current_dir(self.folder.path())
             .output()
             .unwrap()
@@ -421,7 +424,7 @@ fn what_is_missing_or_does_not_fit_is_reported_in_one_line() {
         "",
         "clip.mkv",
         "clip.mkv -o out --size 0",
-        "clip.mkv -o out --align correct",
+        "clip.mkv -o out --align maybe",
     ] {
         bench.errors(2, line);
     }
@@ -536,4 +539,63 @@ fn names_in(folder: &Path) -> Vec<String> {
         .collect();
     names.sort();
     names
+}
+
+const SHAKEN: &str = "fixtures/20261120T102000Z-bust-short";
+
+/// The true shifts of the frames of [`SHAKEN`], pixels.
+fn true_shifts() -> Vec<[f64; 2]> {
+    let truth = fs::read(
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join(SHAKEN)
+            .join("truth.json"),
+    );
+    let truth: serde_json::Value = serde_json::from_slice(&truth.unwrap()).unwrap();
+    let frames = truth["by_sequence"].as_array().unwrap().iter();
+    frames
+        .map(|frame| serde_json::from_value(frame["shift_px"].clone()).unwrap())
+        .collect()
+}
+
+#[test]
+fn shifts_of_a_shaken_turn_are_measured_and_corrected() {
+    let bench = Bench::new();
+    let session = Path::new(env!("CARGO_MANIFEST_DIR")).join(SHAKEN);
+    let session = session.display();
+    let line = format!("{session} --mask {session}/mask_gt.png --frames 30 --size 64");
+    bench.errors(0, &format!("{line} --align correct -o corrected"));
+    let records = bench.records("corrected/20261120T102000Z-bust-short.tar");
+    let truth = true_shifts();
+    let mut squares = 0.0;
+    for record in &records {
+        let [dx, dy] = record.shift_px.unwrap();
+        let [tx, ty] = truth[record.source_frame as usize];
+        let (tx, ty) = (tx - truth[0][0], ty - truth[0][1]);
+        let error = (dx - tx).hypot(dy - ty);
+        assert!(error < 0.35, "{}: {dx} {dy} for {tx} {ty}", record.index);
+        squares += error * error;
+        assert_eq!(record.shift_applied, dx.hypot(dy) > 0.1, "{}", record.index);
+        assert!(record.align_confidence.unwrap() > 0.5);
+    }
+    let rms = (squares / records.len() as f64).sqrt();
+    assert!(rms < 0.2, "{rms}");
+    bench.verified(0, "corrected");
+
+    bench.errors(0, &format!("{line} --align measure -o measured"));
+    let measured = bench.records("measured/20261120T102000Z-bust-short.tar");
+    assert!(measured.iter().all(|record| !record.shift_applied));
+    let shifts = |records: &[FrameRecord]| -> Vec<_> {
+        records.iter().map(|record| record.shift_px).collect()
+    };
+    assert_eq!(shifts(&measured), shifts(&records));
+
+    let line = format!("{line} --max-shift 1.5 --align measure -o refused");
+    let errors = bench.errors(1, &line);
+    let sentence = "more than 1.5: was it or the camera pushed?";
+    assert!(errors.contains(sentence), "{errors}");
+    assert!(
+        !bench
+            .path("refused/20261120T102000Z-bust-short.tar")
+            .exists()
+    );
 }

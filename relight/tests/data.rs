@@ -59,6 +59,7 @@ fn sample(session: &str, index: u32) -> Sample {
         size: [WIDTH, HEIGHT],
         shift_px: None,
         shift_applied: false,
+        align_confidence: None,
         mask_px: measures.mask_px,
         saturated_px: 0,
         saturated_fraction: 0.0,
@@ -66,6 +67,8 @@ fn sample(session: &str, index: u32) -> Sample {
         spec_net: false,
         mean_rgb: measures.mean_rgb,
         sharpness: measures.sharpness,
+        exposure_step: None,
+        identical_to: None,
     };
     Sample::encode(record, image).unwrap()
 }
@@ -278,6 +281,7 @@ fn samples_that_the_description_tells_of_and_no_shard_holds_are_told() {
         saturation_level: 250,
         gate: 0.05,
         align: Align::Off,
+        align_tolerance: None,
         layout: Layout::Webdataset,
         scaling: "none".to_owned(),
     });

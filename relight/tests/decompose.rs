@@ -523,6 +523,7 @@ fn sample(index: u32, saturated: f64) -> Sample {
         size: [WIDTH, HEIGHT],
         shift_px: None,
         shift_applied: false,
+        align_confidence: None,
         mask_px: measures.mask_px,
         saturated_px: (saturated * measures.mask_px as f64) as u64,
         saturated_fraction: saturated,
@@ -530,6 +531,8 @@ fn sample(index: u32, saturated: f64) -> Sample {
         spec_net: saturated > 0.05,
         mean_rgb: measures.mean_rgb,
         sharpness: measures.sharpness,
+        exposure_step: None,
+        identical_to: None,
     };
     Sample::encode(record, image).unwrap()
 }

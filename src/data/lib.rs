@@ -65,6 +65,7 @@
 //!     saturation_level: 250,
 //!     gate: 0.05,
 //!     align: Align::Off,
+//!     align_tolerance: None,
 //!     layout: Layout::Webdataset,
 //!     scaling: "none".to_owned(),
 //! };
@@ -93,6 +94,7 @@
 //!         size: [8, 8],
 //!         shift_px: None,
 //!         shift_applied: false,
+//!         align_confidence: None,
 //!         mask_px: measures.mask_px,
 //!         saturated_px: measures.saturated_px,
 //!         saturated_fraction: measures.saturated_fraction(),
@@ -100,6 +102,8 @@
 //!         spec_net: measures.saturated_fraction() > settings.gate,
 //!         mean_rgb: measures.mean_rgb,
 //!         sharpness: measures.sharpness,
+//!         exposure_step: None,
+//!         identical_to: None,
 //!     };
 //!     writer.push(Sample::encode(record, image)?)?;
 //! }

@@ -141,6 +141,18 @@ pub enum ExtractError {
         /// Degrees that are there, by the planned speed.
         covered_deg: f64,
     },
+    /// The object moved further than it may.
+    #[error(
+        "from frame {frame} on the object lies {shift_px:.1} pixels away from its place in the mask, more than {max_shift}: was it or the camera pushed? Record it again, make the mask on another frame, or give a larger --max-shift"
+    )]
+    Moved {
+        /// The first such frame.
+        frame: u64,
+        /// How far, source pixels.
+        shift_px: f64,
+        /// The largest that was allowed, source pixels.
+        max_shift: f64,
+    },
     /// With `strict`: a frame is used twice or something is lost.
     #[error("refused by --strict: {0}")]
     Strict(String),

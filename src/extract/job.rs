@@ -9,21 +9,25 @@ use relit_data::image_stats::MaskSpans;
 use relit_data::report::{self, Page};
 use relit_data::session::{INDEX_FILE, Notice, Recording, Status};
 use relit_data::shard::{
-    Dataset, Digest, FrameRecord, ImageSize, MaskInfo, OutputFolder, Sample, SessionEntry,
+    Align, Dataset, Digest, FrameRecord, ImageSize, MaskInfo, OutputFolder, Sample, SessionEntry,
     ShardEntry, ShardWriter, SourceVideo,
 };
 use relit_video::Video;
 
 use super::collected::Collected;
 use super::object::ObjectMask;
-use super::pipeline::{LostFrame, ProcessedFrame, Stage};
+use super::pipeline::{self, LostFrame, ProcessedFrame, Stage};
 use super::plan::{Assignment, Plan};
+use super::quality;
 use super::select::{TURN_DEG, TURN_TOLERANCE_DEG};
-use super::{ExtractError, ExtractOptions, Observer, Scaler, cut, square_around};
+use super::steadiness::Steadiness;
+use super::{Aligner, ExtractError, ExtractOptions, Observer, Scaler, cut, square_around};
 use crate::masking::mask_doubts;
 
 /// Number of runs of damaged frames that are reported one by one.
 const MAX_REPORTED: usize = 8;
+/// Frames in which shifts are learnt, spread over the turn.
+const ALIGN_FRAMES: usize = 36;
 /// Largest crop, pixels: each thread needs memory for a few images of this size.
 const MAX_CROP_PIXELS: u64 = 1 << 26;
 
@@ -127,7 +131,17 @@ impl Job {
         if options.strict {
             check_strict(&plan, &notices)?;
         }
-        let stage = self.stage(options)?;
+        let mut stage = self.stage(options)?;
+        if options.align != Align::Off {
+            stage.align = self.align(&stage, &plan, options, pool)?;
+            if stage.align.is_none() {
+                notices.push(Notice::Warning(
+                    "the object has too little structure to measure its shifts: they are unknown"
+                        .to_owned(),
+                ));
+            }
+        }
+        let mut steadiness = Steadiness::new(options.max_shift);
         let mut writer = ShardWriter::create(
             folder.path(),
             options.layout,
@@ -140,6 +154,9 @@ impl Job {
         let mut lost = Vec::new();
         while !assignments.is_empty() {
             let newly_lost = stage.run(&assignments, pool, |frame| {
+                if let Some(alignment) = &frame.alignment {
+                    steadiness.add(frame.number, alignment);
+                }
                 for &sample in assignments.get(&frame.number).into_iter().flatten() {
                     let record = self.record(&stage, &plan, &frame, sample, options);
                     collected.add(&record, &frame.image);
@@ -156,7 +173,15 @@ impl Job {
                 return Err(ExtractError::Strict(first.text().to_owned()));
             }
         }
+        steadiness.check()?;
         notices.extend(notices_of_lost(&lost));
+        notices.extend(steadiness.notices());
+        let taken: Vec<_> = (0..samples).filter_map(|k| writer.sample(k)).collect();
+        let findings = quality::findings(&taken);
+        for found in &findings {
+            writer.set_quality(found.index, found.exposure_step, found.identical_to)?;
+        }
+        notices.extend(quality::notices(&findings));
         let collected = collected.sorted();
         // Whatever can fail is done before the shard of an earlier run is replaced.
         let page = self.page(options, &collected, &notices)?;
@@ -230,7 +255,38 @@ impl Job {
             spans: MaskSpans::of(&crop_mask),
             scaler: Scaler::new(crop_mask, side)?,
             saturation_level: options.saturation_level,
+            align: None,
         })
+    }
+
+    /// Learns the object from frames of the whole turn; `None` if it has too little structure.
+    fn align(
+        &self,
+        stage: &Stage<'_>,
+        plan: &Plan,
+        options: &ExtractOptions,
+        pool: &ThreadPool,
+    ) -> Result<Option<pipeline::Align>, ExtractError> {
+        let (frames, reference) = frames_to_align(&plan.selection.frames, self.mask.frame);
+        let samples = stage.align_samples(&frames, pool)?;
+        // If the mask's frame is lost, the nearest one takes its place.
+        let nearest = samples
+            .iter()
+            .enumerate()
+            .min_by_key(|(_, (number, _))| number.abs_diff(reference));
+        let Some((nearest, _)) = nearest else {
+            return Ok(None);
+        };
+        let samples: Vec<_> = samples.into_iter().map(|(_, sample)| sample).collect();
+        let mask = cut(&self.mask.image, stage.crop);
+        let aligner = pool.install(|| {
+            let (max, tolerance) = (options.max_shift, options.align_tolerance);
+            Aligner::learn(&samples, nearest, &mask, max, tolerance)
+        });
+        Ok(aligner.map(|aligner| pipeline::Align {
+            aligner,
+            correct_above: (options.align == Align::Correct).then_some(options.align_tolerance),
+        }))
     }
 
     fn record(
@@ -243,6 +299,7 @@ impl Job {
     ) -> FrameRecord {
         let candidate = plan.candidate(frame.number);
         let measures = &frame.measures;
+        let alignment = frame.alignment;
         let saturated_fraction = measures.saturated_fraction();
         FrameRecord {
             session: self.recording.id.clone(),
@@ -254,8 +311,11 @@ impl Job {
             duplicate: sample.duplicate,
             crop: stage.crop,
             size: frame.image.dimensions().into(),
-            shift_px: None,
-            shift_applied: false,
+            shift_px: alignment
+                .and_then(|alignment| alignment.shift)
+                .map(|s| s.map(thousandths)),
+            shift_applied: frame.shift_applied,
+            align_confidence: alignment.map(|alignment| thousandths(alignment.confidence)),
             mask_px: measures.mask_px,
             saturated_px: measures.saturated_px,
             saturated_fraction,
@@ -263,6 +323,8 @@ impl Job {
             spec_net: saturated_fraction > options.gate,
             mean_rgb: measures.mean_rgb,
             sharpness: measures.sharpness,
+            exposure_step: None,
+            identical_to: None,
         }
     }
 
@@ -334,6 +396,25 @@ impl Job {
             saturation_level: options.saturation_level,
         })?)
     }
+}
+
+/// Frames that are spread over the chosen ones (sorted), with that of the mask, and the latter: the first one
+/// if it is not known.
+fn frames_to_align(chosen: &[u64], of_mask: Option<u64>) -> (Vec<u64>, u64) {
+    let mut frames: Vec<u64> = (0..ALIGN_FRAMES)
+        .filter_map(|k| chosen.get(k * chosen.len() / ALIGN_FRAMES))
+        .copied()
+        .collect();
+    let reference = of_mask.or(frames.first().copied()).unwrap_or_default();
+    frames.push(reference);
+    frames.sort_unstable();
+    frames.dedup();
+    (frames, reference)
+}
+
+/// A value of pixels or of a share as it is recorded: to three decimals.
+fn thousandths(value: f64) -> f64 {
+    (1000.0 * value).round() / 1000.0
 }
 
 /// The degrees that are there, where they are no whole turn.

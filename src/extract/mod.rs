@@ -1,13 +1,15 @@
-//! From a recording and its mask to a training shard: select -> decode -> crop -> measure ->
-//! scale -> encode -> write, as one streaming pipeline whose memory does not grow with the video.
+//! From a recording and its mask to a training shard: select -> decode -> crop -> align ->
+//! measure -> scale -> encode -> write, as one streaming pipeline whose memory does not grow with the video.
 //!
 //! [`extract`] extracts any number of recordings into one data set; a failure does not stop the
 //! others. The steps can be used alone: [`Selection`] chooses the frames of a turn, [`square_around`]
-//! makes the crop, [`Scaler`] scales without mixing object and background.
+//! makes the crop, [`Aligner`] measures how far the object moved, [`Scaler`] scales without mixing object and background.
 //!
 //! This module knows the formats (`relit-data`) and videos (`relit-video`), and nothing of how masks
 //! are made or of the rig. It prints nothing: progress goes to an [`Observer`].
 
+mod align;
+mod catalog;
 mod collected;
 mod crop;
 mod error;
@@ -17,8 +19,10 @@ mod observer;
 mod options;
 mod pipeline;
 mod plan;
+mod quality;
 mod scale;
 mod select;
+mod steadiness;
 mod timeline;
 
 use std::collections::HashSet;
@@ -27,13 +31,16 @@ use std::path::{Path, PathBuf};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use relit_data::session::{self, recordings};
-use relit_data::shard::{self, Dataset, ExtractionSettings, OutputFolder};
+use relit_data::shard::OutputFolder;
 
+use catalog::Catalog;
+
+pub use align::{AlignBuffers, AlignSample, Aligner, Alignment, MIN_CONFIDENCE};
 pub use crop::{bounding_box, cut, square_around};
 pub use error::ExtractError;
 pub use observer::{Observer, RecordingOutcome};
-pub use options::{ExtractOptions, MAX_MARGIN, MAX_SIDE};
-pub use scale::Scaler;
+pub use options::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
+pub use scale::{APRON, Scaler};
 pub use select::{Candidate, Selection, TimeGap, TurnSpan, runs_back_at, time_gaps};
 
 /// The outcome of an extraction: numbers of recordings.
@@ -68,35 +75,68 @@ pub fn extract(
     if out.join(session::MANIFEST_FILE).exists() {
         return Err(ExtractError::IntoSession(out.to_owned()));
     }
-    let folder = OutputFolder::lock(out)?;
-    let dataset = open_dataset(out, options.settings())?;
+    let folder = match options.task {
+        None => OutputFolder::lock(out)?,
+        Some(task) => OutputFolder::lock_for(out, task)?,
+    };
+    let mut tally = Tally::default();
+    let found = find(inputs, observer, &mut tally);
     let pool = ThreadPoolBuilder::new()
         .num_threads(options.threads)
         .build()?;
     let mut run = Run {
+        catalog: Catalog::open(&folder, &found, options)?,
         folder,
-        dataset,
         options,
         pool,
         names: HashSet::new(),
         observer,
     };
-    let mut tally = Tally::default();
-    for input in inputs {
-        match recordings(input) {
-            Ok(found) => found
-                .iter()
-                .for_each(|recording| run.extract(recording, &mut tally)),
-            Err(error) => run.end(input, Err(error.into()), &mut tally),
+    for (position, recording) in found.iter().enumerate() {
+        if options.task.is_none_or(|task| task.takes(position)) {
+            run.extract(position, recording, &mut tally)?;
         }
     }
     Ok(tally)
 }
 
+/// All recordings in the inputs, in the order in which tasks share them; inputs without any are reported.
+fn find(inputs: &[PathBuf], observer: &dyn Observer, tally: &mut Tally) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for input in inputs {
+        match recordings(input) {
+            Ok(inside) => found.extend(inside),
+            Err(error) => {
+                let outcome = RecordingOutcome::of(Err(error.into()));
+                tally.count(&outcome);
+                observer.ended(input, &outcome);
+            }
+        }
+    }
+    found
+}
+
+impl Tally {
+    fn count(&mut self, outcome: &RecordingOutcome) {
+        match outcome {
+            RecordingOutcome::Extracted(entry) => {
+                self.extracted += 1;
+                self.lossy += usize::from(entry.lossy);
+            }
+            RecordingOutcome::Skipped(entry) => {
+                self.skipped += 1;
+                self.lossy += usize::from(entry.lossy);
+            }
+            RecordingOutcome::LeftOut(_) => self.left_out += 1,
+            RecordingOutcome::Failed(_) => self.failed += 1,
+        }
+    }
+}
+
 /// One extraction into one data set.
 struct Run<'a> {
     folder: OutputFolder,
-    dataset: Dataset,
+    catalog: Catalog,
     options: &'a ExtractOptions,
     pool: ThreadPool,
     /// Names of the recordings so far.
@@ -105,34 +145,17 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    fn extract(&mut self, recording: &Path, tally: &mut Tally) {
-        let outcome = self.extract_one(recording);
-        self.end(recording, outcome, tally);
-    }
-
-    fn end(
-        &self,
+    /// Extracts a recording and notes the outcome; an error if a task's outcome cannot be noted.
+    fn extract(
+        &mut self,
+        position: usize,
         recording: &Path,
-        outcome: Result<RecordingOutcome, ExtractError>,
         tally: &mut Tally,
-    ) {
-        let outcome = outcome.unwrap_or_else(|error| match error.leaves_out() {
-            true => RecordingOutcome::LeftOut(error),
-            false => RecordingOutcome::Failed(error),
-        });
-        match &outcome {
-            RecordingOutcome::Extracted(entry) => {
-                tally.extracted += 1;
-                tally.lossy += usize::from(entry.lossy);
-            }
-            RecordingOutcome::Skipped(entry) => {
-                tally.skipped += 1;
-                tally.lossy += usize::from(entry.lossy);
-            }
-            RecordingOutcome::LeftOut(_) => tally.left_out += 1,
-            RecordingOutcome::Failed(_) => tally.failed += 1,
-        }
+    ) -> Result<(), ExtractError> {
+        let outcome = RecordingOutcome::of(self.extract_one(recording));
+        tally.count(&outcome);
         self.observer.ended(recording, &outcome);
+        self.catalog.note(&self.folder, position, &outcome)
     }
 
     fn extract_one(&mut self, path: &Path) -> Result<RecordingOutcome, ExtractError> {
@@ -143,48 +166,22 @@ impl Run<'_> {
         if !self.names.insert(job.id().to_owned()) {
             return Err(ExtractError::SameName(job.id().to_owned()));
         }
+        let dataset = self.catalog.dataset();
         if options.resume
-            && let Some(entry) = job.existing_entry(&self.dataset, folder.path(), options)
+            && let Some(entry) = job.existing_entry(dataset, folder.path(), options)
         {
             return Ok(RecordingOutcome::Skipped(Box::new(entry.clone())));
         }
-        if !options.replace && job.would_replace_another(&self.dataset) {
+        if !options.replace && job.would_replace_another(dataset) {
             let (out, id) = (folder.path().to_owned(), job.id().to_owned());
             return Err(ExtractError::NameTaken { out, id });
         }
+        if options.task.is_some() {
+            folder.clear_leftovers_of(job.id())?;
+        }
         self.observer.started(path, options.frames);
         let (entry, shards) = job.run(folder, options, &self.pool, self.observer)?;
-        // A description that could not be written does not replace the one in memory.
-        let mut dataset = self.dataset.clone();
-        dataset.replace(entry.clone(), shards);
-        dataset.write(folder.path())?;
-        self.dataset = dataset;
+        self.catalog.add(folder, entry.clone(), shards)?;
         Ok(RecordingOutcome::Extracted(Box::new(entry)))
     }
-}
-
-/// The data set in `out`, or a new one.
-fn open_dataset(out: &Path, settings: ExtractionSettings) -> Result<Dataset, ExtractError> {
-    let existing = match Dataset::read(out) {
-        Ok(existing) => existing,
-        Err(shard::ShardError::NoDataset { .. }) => return Ok(Dataset::new(settings)),
-        Err(error) => return Err(error.into()),
-    };
-    if existing.settings == settings {
-        return Ok(existing);
-    }
-    let values = [&existing.settings, &settings];
-    let [old, new] = values.map(|s| serde_json::to_value(s).unwrap_or_default());
-    let differ = old
-        .as_object()
-        .into_iter()
-        .flatten()
-        .filter_map(|(name, old)| {
-            let new = &new[name];
-            (old != new).then(|| format!("{name} {old} there, {new} now"))
-        });
-    Err(ExtractError::OtherSettings {
-        out: out.to_owned(),
-        differ: differ.collect::<Vec<_>>().join("; "),
-    })
 }

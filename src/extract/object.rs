@@ -24,6 +24,8 @@ pub(super) struct ObjectMask {
     pub(super) bounding_box: Rect,
     /// BLAKE3 of the mask's file.
     pub(super) blake3: Digest,
+    /// The frame on which it was made, if the record beside it says so.
+    pub(super) frame: Option<u64>,
 }
 
 impl ObjectMask {
@@ -67,11 +69,14 @@ impl ObjectMask {
                 0
             }])
         });
+        let blake3 = Digest::of(&bytes);
+        let frame = frame_of(&path, &blake3);
         let bounding_box = bounding_box(&mask_image).ok_or(ExtractError::EmptyMask(path))?;
         Ok(Self {
             image: mask_image,
             bounding_box,
-            blake3: Digest::of(&bytes),
+            blake3,
+            frame,
         })
     }
 
@@ -86,5 +91,32 @@ impl ObjectMask {
                 100.0 * fraction
             )
         })
+    }
+}
+
+/// The frame on which a mask was made, by the record beside it (`mask.json` of `mask.png`). A record that is
+/// damaged, or that of another mask, says nothing.
+fn frame_of(mask: &Path, blake3: &Digest) -> Option<u64> {
+    let record = std::fs::read(mask.with_extension("json")).ok()?;
+    let record: serde_json::Value = serde_json::from_slice(&record).ok()?;
+    let of_this_mask = record["result"]["mask_blake3"].as_str()? == blake3.to_string();
+    record["source"]["frame"].as_u64().filter(|_| of_this_mask)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_frame_of_a_mask_is_read_from_its_own_record_only() {
+        let folder = tempfile::tempdir().unwrap();
+        let mask = folder.path().join("m.png");
+        let blake3 = Digest::of(b"mask");
+        assert_eq!(frame_of(&mask, &blake3), None);
+        let record =
+            format!(r#"{{"source": {{"frame": 7}}, "result": {{"mask_blake3": "{blake3}"}}}}"#);
+        std::fs::write(mask.with_extension("json"), record).unwrap();
+        assert_eq!(frame_of(&mask, &blake3), Some(7));
+        assert_eq!(frame_of(&mask, &Digest::of(b"another")), None);
     }
 }

@@ -34,3 +34,13 @@ pub enum RecordingOutcome {
     /// It is not in the data set.
     Failed(ExtractError),
 }
+
+impl RecordingOutcome {
+    /// The outcome, of which some errors are no failures.
+    pub(super) fn of(result: Result<Self, ExtractError>) -> Self {
+        result.unwrap_or_else(|error| match error.leaves_out() {
+            true => Self::LeftOut(error),
+            false => Self::Failed(error),
+        })
+    }
+}

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::thread::available_parallelism;
 
 use relit_data::image_stats::SATURATION_LEVEL;
-use relit_data::shard::{Align, ExtractionSettings, ImageSize, Layout};
+use relit_data::shard::{Align, ExtractionSettings, ImageSize, Layout, Task};
 
 use super::{ExtractError, scale};
 
@@ -12,6 +12,8 @@ use super::{ExtractError, scale};
 pub const MAX_SIDE: u32 = 8192;
 /// Largest margin, as a fraction of the object's longer side.
 pub const MAX_MARGIN: f64 = 4.0;
+/// Largest `align_tolerance` and `max_shift`, source pixels.
+pub const MAX_SHIFT: f64 = 64.0;
 
 /// How to extract. The default is that of the program `relit-extract`.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +32,13 @@ pub struct ExtractOptions {
     pub gate: f64,
     /// How samples are stored.
     pub layout: Layout,
+    /// How shifts of the object against its mask are handled.
+    pub align: Align,
+    /// Shifts up to this are not corrected, source pixels, 0..=[`MAX_SHIFT`].
+    pub align_tolerance: f64,
+    /// A turn in which the object moves further fails, source pixels, 1..=[`MAX_SHIFT`]. Without effect
+    /// where shifts are not measured.
+    pub max_shift: f64,
     /// The mask for all recordings; `None` uses the `mask.png` in each session folder.
     pub mask: Option<PathBuf>,
     /// Refuse recordings in which a frame would be used twice or something is lost.
@@ -40,6 +49,8 @@ pub struct ExtractOptions {
     pub resume: bool,
     /// Replace sessions of the same name that were made from another video.
     pub replace: bool,
+    /// The task whose part of the recordings is extracted; `None` extracts all of them.
+    pub task: Option<Task>,
     /// Number of worker threads, at least 1.
     pub threads: usize,
 }
@@ -53,11 +64,15 @@ impl Default for ExtractOptions {
             saturation_level: SATURATION_LEVEL,
             gate: 0.05,
             layout: Layout::Webdataset,
+            align: Align::Correct,
+            align_tolerance: 0.1,
+            max_shift: 8.0,
             mask: None,
             strict: false,
             partial: false,
             resume: false,
             replace: false,
+            task: None,
             threads: available_parallelism().map_or(1, std::num::NonZero::get),
         }
     }
@@ -72,7 +87,8 @@ impl ExtractOptions {
             margin: self.margin,
             saturation_level: self.saturation_level,
             gate: self.gate,
-            align: Align::Off,
+            align: self.align,
+            align_tolerance: (self.align == Align::Correct).then_some(self.align_tolerance),
             layout: self.layout,
             scaling: match self.size {
                 ImageSize::Pixels(_) => scale::METHOD,
@@ -103,6 +119,12 @@ impl ExtractOptions {
         }
         if !(0.0..=1.0).contains(&self.gate) {
             return wrong("gate", self.gate, "0 to 1");
+        }
+        if !(0.0..=MAX_SHIFT).contains(&self.align_tolerance) {
+            return wrong("align-tolerance", self.align_tolerance, "0 to 64 pixels");
+        }
+        if !(1.0..=MAX_SHIFT).contains(&self.max_shift) {
+            return wrong("max-shift", self.max_shift, "1 to 64 pixels");
         }
         if self.threads == 0 {
             return wrong("threads", 0.0, "at least 1");

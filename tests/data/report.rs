@@ -33,6 +33,7 @@ fn record(index: u32, frames: u32) -> FrameRecord {
         size: [256, 256],
         shift_px: None,
         shift_applied: false,
+        align_confidence: None,
         mask_px,
         saturated_px: pixels(fraction),
         saturated_fraction,
@@ -40,6 +41,8 @@ fn record(index: u32, frames: u32) -> FrameRecord {
         spec_net: saturated_fraction > 0.05,
         mean_rgb: [118.0, 126.0, 131.0].map(|mean| mean + 22.0 * lights + 0.6 * flutter),
         sharpness: 410.0 + 60.0 * (3.0 * angle).cos() + 9.0 * flutter,
+        exposure_step: None,
+        identical_to: None,
     }
 }
 

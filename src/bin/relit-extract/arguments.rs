@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::builder::RangedU64ValueParser;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
-use relit::extract::{ExtractOptions, MAX_MARGIN, MAX_SIDE};
-use relit_data::shard::{ImageSize, Layout};
+use relit::extract::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
+use relit_data::shard::{Align, ImageSize, Layout, MAX_TASKS, Task};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -18,6 +18,8 @@ Examples:
       a bare video, in its own pixels
   relit-extract verify dataset
       read everything back
+  relit-extract sessions -o dataset --task-id 3 --task-count 10
+      the fourth of ten parts; afterwards: relit-extract merge dataset
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost.";
 
@@ -27,7 +29,7 @@ pub(crate) struct Arguments {
     pub(crate) command: Command,
 }
 
-/// The two commands of the program.
+/// The commands of the program.
 pub(crate) enum Command {
     Extract {
         inputs: Vec<PathBuf>,
@@ -35,6 +37,9 @@ pub(crate) enum Command {
         options: ExtractOptions,
     },
     Verify {
+        out: PathBuf,
+    },
+    Merge {
         out: PathBuf,
     },
 }
@@ -60,6 +65,16 @@ enum Verb {
     /// Read a data set back and check everything in it.
     #[command(after_help = "Example:\n  relit-extract verify dataset")]
     Verify {
+        /// The data set's folder.
+        #[arg(value_name = "OUT")]
+        out: PathBuf,
+        /// Print one JSON line per event on standard output.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Join what several tasks wrote into one data set.
+    #[command(after_help = "Example:\n  relit-extract merge dataset")]
+    Merge {
         /// The data set's folder.
         #[arg(value_name = "OUT")]
         out: PathBuf,
@@ -98,9 +113,15 @@ struct ExtractArguments {
     /// How samples are stored.
     #[arg(long, value_enum, default_value_t = LayoutName::Webdataset)]
     layout: LayoutName,
-    /// How shifts of the object in the image are handled.
-    #[arg(long, value_enum, default_value_t = AlignName::Off)]
+    /// What to do about shifts of the object against its mask, from vibration or drift.
+    #[arg(long, value_enum, default_value_t = AlignName::Correct)]
     align: AlignName,
+    /// Shifts up to this many source pixels are not corrected.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.1, value_parser = tolerance)]
+    align_tolerance: f64,
+    /// Refuse a turn in which the object moves by more source pixels than this.
+    #[arg(long, value_name = "PIXELS", default_value_t = 8.0, value_parser = max_shift)]
+    max_shift: f64,
     /// Refuse recordings in which a frame would be used twice or something is lost.
     #[arg(long)]
     strict: bool,
@@ -113,6 +134,13 @@ struct ExtractArguments {
     /// Replace sessions of the same name that were made from another video.
     #[arg(long)]
     replace: bool,
+    /// Extract one part of the recordings: the number of this task, from 0 [default: that of a Slurm array
+    /// job or a Kubernetes indexed job, where this is one].
+    #[arg(long, value_name = "I")]
+    task_id: Option<u32>,
+    /// Number of tasks that share the recordings.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_TASKS)))]
+    task_count: Option<u32>,
     /// Number of worker threads [default: one per core].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
@@ -131,8 +159,22 @@ enum LayoutName {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum AlignName {
-    /// Shifts are neither measured nor corrected.
+    /// Measured, and corrected above the tolerance.
+    Correct,
+    /// Measured only.
+    Measure,
+    /// Neither measured nor corrected.
     Off,
+}
+
+impl From<AlignName> for Align {
+    fn from(name: AlignName) -> Self {
+        match name {
+            AlignName::Correct => Self::Correct,
+            AlignName::Measure => Self::Measure,
+            AlignName::Off => Self::Off,
+        }
+    }
 }
 
 impl From<LayoutName> for Layout {
@@ -152,7 +194,16 @@ pub(crate) fn parse() -> Arguments {
             json,
             command: Command::Verify { out },
         },
-        (None, Some(extract)) => extract.into(),
+        (Some(Verb::Merge { out, json }), _) => Arguments {
+            json,
+            command: Command::Merge { out },
+        },
+        (None, Some(extract)) => match task(&extract, &|name| std::env::var(name).ok()) {
+            Ok(task) => extract.with(task),
+            Err(wrong) => CommandLine::command()
+                .error(ErrorKind::ValueValidation, wrong)
+                .exit(),
+        },
         (None, None) => CommandLine::command()
             .error(
                 ErrorKind::MissingRequiredArgument,
@@ -162,9 +213,43 @@ pub(crate) fn parse() -> Arguments {
     }
 }
 
-impl From<ExtractArguments> for Arguments {
-    fn from(line: ExtractArguments) -> Self {
-        let AlignName::Off = line.align;
+/// The task that is asked for on the command line, else by the scheduler that started the program.
+fn task(
+    line: &ExtractArguments,
+    variable: &dyn Fn(&str) -> Option<String>,
+) -> Result<Option<Task>, String> {
+    let number = |name: &str| -> Result<Option<u32>, String> {
+        let text = variable(name).filter(|text| !text.is_empty());
+        text.map(|text| {
+            text.parse()
+                .map_err(|_| format!("{name} is {text:?}, no number"))
+        })
+        .transpose()
+    };
+    let count = |from: Option<u32>| line.task_count.or(from);
+    let (index, count) = if let Some(index) = line.task_id {
+        (index, count(None))
+    } else if let Some(index) = number("SLURM_ARRAY_TASK_ID")? {
+        // An array may start at any number.
+        let first = number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0);
+        let count = count(number("SLURM_ARRAY_TASK_COUNT")?);
+        (index.saturating_sub(first), count)
+    } else if let Some(index) = number("JOB_COMPLETION_INDEX")? {
+        (index, count(None))
+    } else if line.task_count.is_some() {
+        return Err("--task-count needs --task-id: the number of this task, from 0".to_owned());
+    } else {
+        return Ok(None);
+    };
+    let count = count.ok_or("give --task-count, the number of tasks")?;
+    let task = Task::new(index, count);
+    task.map(Some)
+        .ok_or_else(|| format!("there is no task {index} of {count}: they count from 0"))
+}
+
+impl ExtractArguments {
+    fn with(self, task: Option<Task>) -> Arguments {
+        let line = self;
         let defaults = ExtractOptions::default();
         let options = ExtractOptions {
             frames: line.frames,
@@ -173,11 +258,15 @@ impl From<ExtractArguments> for Arguments {
             saturation_level: line.saturation_level,
             gate: line.gate,
             layout: line.layout.into(),
+            align: line.align.into(),
+            align_tolerance: line.align_tolerance,
+            max_shift: line.max_shift,
             mask: line.mask,
             strict: line.strict,
             partial: line.partial,
             resume: line.resume,
             replace: line.replace,
+            task,
             threads: line.threads.unwrap_or(defaults.threads),
         };
         let command = Command::Extract {
@@ -185,7 +274,7 @@ impl From<ExtractArguments> for Arguments {
             out: line.out,
             options,
         };
-        Self {
+        Arguments {
             json: line.json,
             command,
         }
@@ -202,6 +291,21 @@ fn size(text: &str) -> Result<ImageSize, String> {
     }
 }
 
+fn pixels(text: &str, least: f64) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if (least..=MAX_SHIFT).contains(&value) => Ok(value),
+        _ => Err(format!("give {least} to {MAX_SHIFT} pixels")),
+    }
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    pixels(text, 0.0)
+}
+
+fn max_shift(text: &str) -> Result<f64, String> {
+    pixels(text, 1.0)
+}
+
 fn within(text: &str, most: f64) -> Result<f64, String> {
     match text.parse() {
         Ok(value) if (0.0..=most).contains(&value) => Ok(value),
@@ -215,4 +319,54 @@ fn margin(text: &str) -> Result<f64, String> {
 
 fn fraction(text: &str) -> Result<f64, String> {
     within(text, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn asked(line: &str, variables: &[(&str, &str)]) -> Result<Option<Task>, String> {
+        let words = "relit-extract in -o out"
+            .split(' ')
+            .chain(line.split_whitespace());
+        let line = CommandLine::try_parse_from(words).map_err(|error| error.to_string())?;
+        let variable = |name: &str| {
+            let found = variables.iter().find(|(known, _)| *known == name);
+            found.map(|(_, value)| (*value).to_owned())
+        };
+        match line.extract {
+            Some(extract) => task(&extract, &variable),
+            None => Err("no arguments".to_owned()),
+        }
+    }
+
+    #[test]
+    fn the_task_is_that_of_the_command_line_or_of_the_scheduler() {
+        let slurm = [
+            ("SLURM_ARRAY_TASK_ID", "4"),
+            ("SLURM_ARRAY_TASK_MIN", "1"),
+            ("SLURM_ARRAY_TASK_COUNT", "8"),
+        ];
+        let index = [("JOB_COMPLETION_INDEX", "2")];
+        assert_eq!(asked("", &[]), Ok(None));
+        assert_eq!(asked("", &slurm), Ok(Task::new(3, 8)));
+        assert_eq!(
+            asked("--task-id 0 --task-count 2", &slurm),
+            Ok(Task::new(0, 2))
+        );
+        assert_eq!(asked("--task-count 3", &index), Ok(Task::new(2, 3)));
+    }
+
+    #[test]
+    fn half_a_task_and_one_beyond_the_last_are_refused() {
+        for (line, variables) in [
+            ("--task-id 1", &[][..]),
+            ("--task-count 2", &[]),
+            ("--task-id 2 --task-count 2", &[]),
+            ("", &[("JOB_COMPLETION_INDEX", "2")]),
+            ("", &[("SLURM_ARRAY_TASK_ID", "x")]),
+        ] {
+            assert!(asked(line, variables).is_err(), "{line} {variables:?}");
+        }
+    }
 }

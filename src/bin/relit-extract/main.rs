@@ -1,7 +1,8 @@
-//! `relit-extract`: turns recordings into training shards of masked frames, and verifies them.
+//! `relit-extract`: turns recordings into training shards of masked frames, joins and verifies them.
 
 mod arguments;
 mod extracting;
+mod merging;
 mod verifying;
 
 use std::process::ExitCode;
@@ -18,6 +19,7 @@ fn main() -> ExitCode {
             out,
             options,
         } => console.finish(extracting::run(console, &inputs, &out, &options)),
+        Command::Merge { out } => console.finish(merging::run(console, &out)),
         Command::Verify { out } => console.finish(verifying::run(console, &out)),
     }
 }

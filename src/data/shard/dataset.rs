@@ -244,7 +244,7 @@ impl Dataset {
         session_files.chain(shard_files).map(String::as_str)
     }
 
-    fn check_names(&self) -> Result<(), ShardError> {
+    pub(super) fn check_names(&self) -> Result<(), ShardError> {
         self.sessions
             .iter()
             .try_for_each(|session| names::check_session(&session.id))?;

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use parquet::errors::ParquetError;
+
 use crate::image_stats::SizeMismatch;
 
 /// Why a data set could not be written, read or checked.
@@ -21,6 +23,33 @@ pub enum ShardError {
         path: PathBuf,
         /// The system's error.
         source: io::Error,
+    },
+    /// The disk is full.
+    #[error(
+        "the disk is full: {what} needs about {} in {folder} until it is written, and had {}; free some space, or give another folder",
+        in_megabytes(*needed), in_megabytes(*written), folder = .folder.display()
+    )]
+    DiskFull {
+        /// The session or file.
+        what: String,
+        /// The data set's folder.
+        folder: PathBuf,
+        /// Bytes that it needs until all is written.
+        needed: u64,
+        /// Bytes of them that were written.
+        written: u64,
+        /// The system's error: the disk, a quota or a limit on file sizes is exhausted.
+        source: io::Error,
+    },
+    /// The pieces of several tasks do not make a data set.
+    #[error(
+        "the tasks' pieces in {path} do not make a whole data set: {}", .problems.join("; "), path = .path.display()
+    )]
+    Pieces {
+        /// The folder of the pieces.
+        path: PathBuf,
+        /// What is wrong, one sentence each.
+        problems: Vec<String>,
     },
     /// Another process is writing into the folder.
     #[error(
@@ -304,7 +333,32 @@ pub enum ShardError {
     },
 }
 
+/// A number of bytes for a reader.
+fn in_megabytes(bytes: u64) -> String {
+    format!("{:.1} MB", bytes as f64 / 1e6)
+}
+
 impl ShardError {
+    /// The same error, or if it says that no more can be written, that `what` needs so many bytes in the
+    /// folder, of which so many were written.
+    pub(super) fn with_needs(self, what: &str, folder: &Path, needed: u64, written: u64) -> Self {
+        let source = match self {
+            Self::Io { source, .. } if is_full(&source) => source,
+            Self::Table {
+                source: ParquetError::External(source),
+                ..
+            } if source.downcast_ref().is_some_and(is_full) => io::Error::other(source),
+            other => return other,
+        };
+        Self::DiskFull {
+            what: what.to_owned(),
+            folder: folder.to_owned(),
+            needed,
+            written,
+            source,
+        }
+    }
+
     /// For `map_err`: an I/O error with what was attempted and the path.
     pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Io {
@@ -313,6 +367,11 @@ impl ShardError {
             source,
         }
     }
+}
+
+fn is_full(error: &io::Error) -> bool {
+    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
 }
 
 impl From<SizeMismatch> for ShardError {

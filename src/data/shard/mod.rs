@@ -15,6 +15,7 @@
 //! | [`Dataset`], [`ExtractionSettings`] | `dataset.json`; `integrity` compares the files with it |
 //! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tarball`) |
 //! | [`SampleSpans`] | where the samples of a shard stand, for reading in any order (`index`) |
+//! | [`Task`], [`TaskPiece`], [`merge`] | a data set that several tasks write |
 //! | [`verify`](verify()) | reads everything back and reports what is wrong |
 //!
 //! This module knows pixel rectangles, images and their statistics
@@ -38,6 +39,7 @@ mod settings;
 mod spool;
 mod table;
 mod tarball;
+mod task;
 mod verify;
 mod writer;
 
@@ -56,6 +58,7 @@ pub use reader::{ShardReader, ShardSample};
 pub use record::FrameRecord;
 pub use settings::{Align, ExtractionSettings, ImageSize, Layout, Native};
 pub use table::{TableRow, read_table};
+pub use task::{MAX_TASKS, Merged, Task, TaskOutcome, TaskPiece, merge};
 pub use verify::{Problem, VerifyReport, verify};
 pub use writer::{Sample, ShardFiles, ShardWriter};
 

@@ -106,6 +106,8 @@ pub(super) fn mean_file(session: &str) -> String {
 pub(super) const IMAGES: &str = "imgs";
 pub(super) const MASKS: &str = "masks";
 pub(super) const MEANS: &str = "mean_img";
+/// The folder of the tasks' pieces.
+pub(super) const TASKS: &str = "tasks";
 
 /// The name under which a folder of images is written before it is complete.
 pub(super) fn partial(session: &str) -> String {
@@ -140,6 +142,17 @@ pub(super) fn is_leftover(name: &str) -> bool {
     // Earlier versions used no numbers in the name.
     let written = |plain| finished(durable::target_of(name).unwrap_or(plain));
     rest.ends_with(".spool") || rest.strip_suffix(".partial").is_some_and(written)
+}
+
+/// Whether a file of this name was left behind by an interrupted writer of `session`.
+pub(super) fn is_leftover_of(session: &str, name: &str) -> bool {
+    let of_session = |target: &str| {
+        target
+            .rsplit_once('.')
+            .is_some_and(|(stem, _)| stem == session)
+    };
+    is_leftover(name)
+        && (name == spool(session) || durable::target_of(name).is_some_and(of_session))
 }
 
 #[cfg(test)]

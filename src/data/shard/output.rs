@@ -6,15 +6,17 @@ use std::path::{Path, PathBuf};
 
 use super::digest::HashingWriter;
 use super::file::FileEntry;
+use super::task::Task;
 use super::{ShardError, names};
-use crate::durable::{Partial, Sealed};
+use crate::durable::{self, Partial, Sealed};
 
 /// The folder of a data set, locked by this process until it is dropped.
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
-    /// The lock is held as long as this handle.
+    /// The locks are held as long as these handles.
     _handle: File,
+    _task: Option<File>,
 }
 
 impl OutputFolder {
@@ -26,21 +28,58 @@ impl OutputFolder {
     /// created, opened, locked or cleaned.
     pub fn lock(out: &Path) -> Result<Self, ShardError> {
         fs::create_dir_all(out).map_err(ShardError::io("make the folder", out))?;
+        Self::lock_existing(out)
+    }
+
+    /// As [`lock`](Self::lock), of a folder that exists.
+    pub(super) fn lock_existing(out: &Path) -> Result<Self, ShardError> {
         let handle = File::open(out).map_err(ShardError::io("open the folder", out))?;
-        handle.try_lock().map_err(|reason| match reason {
-            TryLockError::WouldBlock => ShardError::Locked {
-                path: out.to_owned(),
-            },
-            TryLockError::Error(source) => ShardError::Io {
-                doing: "lock the folder",
-                path: out.to_owned(),
-                source,
-            },
-        })?;
+        locked(handle.try_lock(), out)?;
         clear_leftovers(out)?;
         Ok(Self {
             path: out.to_owned(),
             _handle: handle,
+            _task: None,
+        })
+    }
+
+    /// Locks the folder for one of several tasks, which is created if it does not exist. Other tasks may
+    /// write into it at the same time; a run of all recordings, a merge, and the same task may not.
+    /// Temporary files stay: see [`clear_leftovers_of`](Self::clear_leftovers_of).
+    ///
+    /// # Errors
+    /// As [`lock`](Self::lock).
+    pub fn lock_for(out: &Path, task: Task) -> Result<Self, ShardError> {
+        let tasks = out.join(names::TASKS);
+        fs::create_dir_all(&tasks).map_err(ShardError::io("make the folder", &tasks))?;
+        let handle = File::open(out).map_err(ShardError::io("open the folder", out))?;
+        locked(handle.try_lock_shared(), out)?;
+        let path = tasks.join(format!(".{task}.lock"));
+        let own = File::create(&path).map_err(ShardError::io("create", &path))?;
+        locked(own.try_lock(), &path)?;
+        let file = task.file();
+        let own_name = file.rsplit('/').next().unwrap_or_default();
+        for name in names_in(&tasks)? {
+            if durable::target_of(&name) == Some(own_name) {
+                remove_leftover(&tasks.join(name))?;
+            }
+        }
+        Ok(Self {
+            path: out.to_owned(),
+            _handle: handle,
+            _task: Some(own),
+        })
+    }
+
+    /// Removes what an interrupted writer of `session` left behind; an image folder that was being replaced
+    /// gets its name back.
+    ///
+    /// # Errors
+    /// [`ShardError::Io`] if the folder cannot be cleaned.
+    pub fn clear_leftovers_of(&self, session: &str) -> Result<(), ShardError> {
+        clear_files(&self.path, |name| names::is_leftover_of(session, name))?;
+        clear_image_leftovers(&self.path.join(names::IMAGES), |name| {
+            name == names::partial(session) || name == names::outgoing(session)
         })
     }
 
@@ -60,9 +99,25 @@ impl OutputFolder {
     }
 }
 
+fn locked(result: Result<(), TryLockError>, path: &Path) -> Result<(), ShardError> {
+    result.map_err(|reason| match reason {
+        TryLockError::WouldBlock => ShardError::Locked {
+            path: path.to_owned(),
+        },
+        TryLockError::Error(source) => ShardError::Io {
+            doing: "lock",
+            path: path.to_owned(),
+            source,
+        },
+    })
+}
+
 /// Writes `bytes` to `file`, a path relative to `out`, whole or not at all.
 pub(super) fn write_whole(out: &Path, file: &str, bytes: &[u8]) -> Result<FileEntry, ShardError> {
-    seal_whole(out, file, bytes)?.publish()
+    let needs = |error: ShardError| error.with_needs(file, out, bytes.len() as u64, 0);
+    seal_whole(out, file, bytes)
+        .and_then(SealedFile::publish)
+        .map_err(needs)
 }
 
 /// As [`write_whole`], without the final rename.
@@ -213,19 +268,18 @@ pub(super) fn names_in(folder: &Path) -> Result<Vec<String>, ShardError> {
 }
 
 fn clear_leftovers(out: &Path) -> Result<(), ShardError> {
-    for folder in [
-        out.to_owned(),
-        out.join(names::MASKS),
-        out.join(names::MEANS),
-    ] {
-        for name in names_in(&folder)?
-            .iter()
-            .filter(|name| names::is_leftover(name))
-        {
+    clear_files(out, names::is_leftover)?;
+    clear_image_leftovers(&out.join(names::IMAGES), |_| true)
+}
+
+fn clear_files(out: &Path, is_leftover: impl Fn(&str) -> bool) -> Result<(), ShardError> {
+    for folder in ["", names::MASKS, names::MEANS, names::TASKS] {
+        let folder = out.join(folder);
+        for name in names_in(&folder)?.iter().filter(|name| is_leftover(name)) {
             remove_leftover(&folder.join(name))?;
         }
     }
-    clear_image_leftovers(&out.join(names::IMAGES))
+    Ok(())
 }
 
 /// Removes a file or a link (not its target), and leaves folders alone.
@@ -237,8 +291,9 @@ fn remove_leftover(path: &Path) -> Result<(), ShardError> {
     fs::remove_file(path).map_err(ShardError::io("remove", path))
 }
 
-fn clear_image_leftovers(images: &Path) -> Result<(), ShardError> {
-    let found = names_in(images)?;
+fn clear_image_leftovers(images: &Path, wanted: impl Fn(&str) -> bool) -> Result<(), ShardError> {
+    let mut found = names_in(images)?;
+    found.retain(|name| wanted(name));
     for name in &found {
         // The writer was killed between moving the old folder away and renaming the new one: the old
         // one, which dataset.json still describes, gets its name back.

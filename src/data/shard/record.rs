@@ -35,6 +35,10 @@ pub struct FrameRecord {
     pub shift_px: Option<[f64; 2]>,
     /// True if `shift_px` was corrected in the image.
     pub shift_applied: bool,
+    /// How well the frame's structure fits the object's, 0..=1; null if shifts were not measured. With a
+    /// value and without `shift_px`, the frame could not be registered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub align_confidence: Option<f64>,
     /// Source pixels under the mask.
     pub mask_px: u64,
     /// Source pixels under the mask with all three channels at or above the saturation level.
@@ -50,4 +54,12 @@ pub struct FrameRecord {
     /// Variance of the Laplacian of luma over the source pixels under the mask whose four
     /// neighbours are under the mask too. Larger is sharper.
     pub sharpness: f64,
+    /// The change of exposure against the sample before, stops, where it is a step that moving light
+    /// cannot explain; else null.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure_step: Option<f64>,
+    /// The nearest earlier source frame whose picture is the same, pixel for pixel: the camera delivered it
+    /// twice; null if there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identical_to: Option<u64>,
 }

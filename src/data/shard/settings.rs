@@ -83,6 +83,10 @@ impl ImageSize {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Align {
+    /// Measured, and corrected where they exceed the tolerance.
+    Correct,
+    /// Measured only.
+    Measure,
     /// Neither measured nor corrected.
     Off,
 }
@@ -102,6 +106,9 @@ pub struct ExtractionSettings {
     pub gate: f64,
     /// How shifts are handled.
     pub align: Align,
+    /// Shifts up to this, source pixels, are not corrected; `None` unless `align` is `correct`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub align_tolerance: Option<f64>,
     /// How samples are stored.
     pub layout: Layout,
     /// The name of the method that scaled the images.

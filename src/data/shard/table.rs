@@ -46,6 +46,7 @@ enum Column {
     I64(fn(&TableRow) -> i64),
     Real(fn(&TableRow) -> f64),
     MaybeReal(fn(&TableRow) -> Option<f64>),
+    MaybeU64(fn(&TableRow) -> Option<u64>),
     Flag(fn(&TableRow) -> bool),
 }
 
@@ -60,12 +61,13 @@ impl Column {
             Self::I64(_) => format!("required int64 {name} (integer(64,true));"),
             Self::Real(_) => format!("required double {name};"),
             Self::MaybeReal(_) => format!("optional double {name};"),
+            Self::MaybeU64(_) => format!("optional int64 {name} (integer(64,false));"),
             Self::Flag(_) => format!("required boolean {name};"),
         }
     }
 }
 
-const COLUMNS: [(&str, Column); 27] = [
+const COLUMNS: [(&str, Column); 30] = [
     ("session", Column::Text(|r| r.record.session.clone())),
     ("object", Column::Text(|r| r.record.object.clone())),
     ("index", Column::U32(|r| r.record.index)),
@@ -88,6 +90,10 @@ const COLUMNS: [(&str, Column); 27] = [
         Column::MaybeReal(|r| r.record.shift_px.map(|shift| shift[1])),
     ),
     ("shift_applied", Column::Flag(|r| r.record.shift_applied)),
+    (
+        "align_confidence",
+        Column::MaybeReal(|r| r.record.align_confidence),
+    ),
     ("mask_px", Column::U64(|r| r.record.mask_px)),
     ("saturated_px", Column::U64(|r| r.record.saturated_px)),
     (
@@ -103,6 +109,11 @@ const COLUMNS: [(&str, Column); 27] = [
     ("mean_g", Column::Real(|r| r.record.mean_rgb[1])),
     ("mean_b", Column::Real(|r| r.record.mean_rgb[2])),
     ("sharpness", Column::Real(|r| r.record.sharpness)),
+    (
+        "exposure_step",
+        Column::MaybeReal(|r| r.record.exposure_step),
+    ),
+    ("identical_to", Column::MaybeU64(|r| r.record.identical_to)),
     ("png_blake3", Column::Text(|r| r.png_blake3.to_string())),
     ("mask_blake3", Column::Text(|r| r.mask_blake3.to_string())),
 ];
@@ -164,6 +175,11 @@ fn write_column(
         }
         (ColumnWriter::DoubleColumnWriter(w), Column::MaybeReal(get)) => {
             let values: Vec<f64> = rows.iter().filter_map(get).collect();
+            let present = all(rows, |r| i16::from(get(r).is_some()));
+            w.write_batch(&values, Some(&present), None)
+        }
+        (ColumnWriter::Int64ColumnWriter(w), Column::MaybeU64(get)) => {
+            let values: Vec<i64> = rows.iter().filter_map(get).map(u64::cast_signed).collect();
             let present = all(rows, |r| i16::from(get(r).is_some()));
             w.write_batch(&values, Some(&present), None)
         }
@@ -262,6 +278,7 @@ impl Fields<'_> {
                 _ => return Err(self.invalid("shift_dx")),
             },
             shift_applied: self.flag("shift_applied")?,
+            align_confidence: self.later_real("align_confidence")?,
             mask_px: self.u64("mask_px")?,
             saturated_px: self.u64("saturated_px")?,
             saturated_fraction: self.real("saturated_fraction")?,
@@ -273,6 +290,8 @@ impl Fields<'_> {
                 self.real("mean_b")?,
             ],
             sharpness: self.real("sharpness")?,
+            exposure_step: self.later_real("exposure_step")?,
+            identical_to: self.later_u64("identical_to")?,
         };
         let png_blake3 = self.digest("png_blake3")?;
         let mask_blake3 = self.digest("mask_blake3")?;
@@ -356,6 +375,23 @@ impl Fields<'_> {
         })
     }
 
+    /// A value that tables of earlier versions do not have.
+    fn later_real(&self, column: &'static str) -> Result<Option<f64>, ShardError> {
+        match self.fields.contains_key(column) {
+            true => self.maybe_real(column),
+            false => Ok(None),
+        }
+    }
+
+    /// As [`later_real`](Self::later_real).
+    fn later_u64(&self, column: &'static str) -> Result<Option<u64>, ShardError> {
+        match self.fields.get(column) {
+            None | Some(Field::Null) => Ok(None),
+            Some(Field::ULong(value)) => Ok(Some(*value)),
+            Some(_) => Err(self.invalid(column)),
+        }
+    }
+
     fn flag(&self, column: &'static str) -> Result<bool, ShardError> {
         self.get(column, |field| match field {
             Field::Bool(value) => Some(*value),
@@ -383,6 +419,7 @@ mod tests {
                 size: [256, 255],
                 shift_px: (!even).then_some([0.25, -1.0 / 3.0]),
                 shift_applied: !even,
+                align_confidence: (!even).then_some(0.75),
                 mask_px: 1 << 40,
                 saturated_px: 3,
                 saturated_fraction: 3.0 / 7.0,
@@ -390,6 +427,8 @@ mod tests {
                 spec_net: even,
                 mean_rgb: [1.1, 2.2, 1e-300],
                 sharpness: 12.5,
+                exposure_step: even.then_some(-0.5),
+                identical_to: even.then_some(u64::MAX),
             },
             png_blake3: Digest::of(&index.to_le_bytes()),
             mask_blake3: Digest::of(b"mask"),

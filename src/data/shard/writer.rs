@@ -1,6 +1,6 @@
 //! Writing the shard and the table of one session from samples in any order.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use image::{GrayImage, RgbImage};
 
@@ -54,6 +54,43 @@ enum Store {
     Folder(FolderStore),
 }
 
+/// The bytes of a session that is being written, for a message about a full disk.
+#[derive(Debug, Clone)]
+struct Needs {
+    out: PathBuf,
+    layout: Layout,
+    samples: u64,
+    pushed: u64,
+    images: u64,
+    mask: u64,
+}
+
+impl Needs {
+    /// What all files take until the last is written, by the images so far.
+    fn estimate(&self) -> u64 {
+        let images = self.images.checked_div(self.pushed).unwrap_or_default() * self.samples;
+        match self.layout {
+            // The images are in the spool and in the tar, whose members have headers and are padded.
+            Layout::Webdataset => {
+                2 * images + self.samples * (self.mask + RECORD_BYTES + 3 * TAR_MEMBER_BYTES)
+            }
+            Layout::Relit => images + self.samples * IMAGE_PADDING,
+        }
+    }
+
+    fn explain(&self, session: &str, error: ShardError) -> ShardError {
+        let (needed, written) = (self.estimate(), self.images);
+        error.with_needs(&format!("session {session}"), &self.out, needed, written)
+    }
+}
+
+/// A record as JSON, about.
+const RECORD_BYTES: u64 = 700;
+/// A member's header in a tar, and half a block of padding.
+const TAR_MEMBER_BYTES: u64 = 512 + 256;
+/// What a file takes beyond its bytes, about: half a block.
+const IMAGE_PADDING: u64 = 2048;
+
 /// Writes the shard and the table of one session. The files appear under their names in
 /// [`finish`](Self::finish); a writer that is dropped leaves nothing behind. Memory does not grow with
 /// the images, which are kept on disk. The bytes of all files do not depend on the order in which the
@@ -68,6 +105,7 @@ pub struct ShardWriter {
     mask_blake3: Digest,
     rows: Vec<Option<TableRow>>,
     store: Store,
+    needs: Needs,
 }
 
 impl ShardWriter {
@@ -95,8 +133,17 @@ impl ShardWriter {
             Layout::Webdataset => Store::Spool(SpoolStore::create(out, session, samples)?),
             Layout::Relit => Store::Folder(FolderStore::create(out, session, samples, size)?),
         };
+        let needs = Needs {
+            out: out.to_owned(),
+            layout,
+            samples: u64::from(samples),
+            pushed: 0,
+            images: 0,
+            mask: mask_png.len() as u64,
+        };
         Ok(Self {
             session: session.to_owned(),
+            needs,
             size,
             mask_blake3: Digest::of(&mask_png),
             mask_png,
@@ -110,7 +157,7 @@ impl ShardWriter {
     /// # Errors
     /// [`ShardError::WrongSession`], [`ShardError::OutOfRange`], [`ShardError::DoubledSample`],
     /// [`ShardError::SizeMismatch`] if image, record and mask differ in size, [`ShardError::NotFinite`],
-    /// [`ShardError::Io`]. The sample is then not added.
+    /// [`ShardError::DiskFull`], [`ShardError::Io`]. The sample is then not added.
     pub fn push(&mut self, sample: Sample) -> Result<(), ShardError> {
         let Sample { record, image, png } = sample;
         self.check(&record, &image)?;
@@ -127,10 +174,13 @@ impl ShardWriter {
                 index,
             });
         }
-        match &mut self.store {
-            Store::Spool(spool) => spool.push(index, &png)?,
-            Store::Folder(folder) => folder.push(index, &png, &image)?,
-        }
+        let pushed = match &mut self.store {
+            Store::Spool(spool) => spool.push(index, &png),
+            Store::Folder(folder) => folder.push(index, &png, &image),
+        };
+        pushed.map_err(|error| self.needs.explain(&self.session, error))?;
+        self.needs.pushed += 1;
+        self.needs.images += png.len() as u64;
         if let Some(row) = self.rows.get_mut(slot) {
             *row = Some(TableRow {
                 png_blake3: Digest::of(&png),
@@ -141,13 +191,50 @@ impl ShardWriter {
         Ok(())
     }
 
+    /// The record of a sample that was added and the digest of its image's PNG.
+    #[must_use]
+    pub fn sample(&self, index: u32) -> Option<(&FrameRecord, Digest)> {
+        let row = self.rows.get(index as usize)?.as_ref()?;
+        Some((&row.record, row.png_blake3))
+    }
+
+    /// Completes the record of a sample that was added, by what only the whole turn shows.
+    ///
+    /// # Errors
+    /// [`ShardError::NotFinite`]; the record is then as it was.
+    pub fn set_quality(
+        &mut self,
+        index: u32,
+        exposure_step: Option<f64>,
+        identical_to: Option<u64>,
+    ) -> Result<(), ShardError> {
+        if exposure_step.is_some_and(|step| !step.is_finite()) {
+            return Err(ShardError::NotFinite {
+                session: self.session.clone(),
+                index,
+                field: "exposure_step",
+            });
+        }
+        if let Some(Some(row)) = self.rows.get_mut(index as usize) {
+            row.record.exposure_step = exposure_step;
+            row.record.identical_to = identical_to;
+        }
+        Ok(())
+    }
+
     /// Writes the session's files under their final names, replacing older ones.
     ///
     /// # Errors
-    /// [`ShardError::MissingSample`] if samples were not given; [`ShardError::Io`], [`ShardError::Table`] or
-    /// [`ShardError::Json`] if a file could not be written. Then nothing of the session is left, except
+    /// [`ShardError::MissingSample`] if samples were not given; [`ShardError::DiskFull`], [`ShardError::Io`],
+    /// [`ShardError::Table`] or [`ShardError::Json`] if a file could not be written. Then nothing of the session is left, except
     /// files that got their names before the error, which `dataset.json` does not list.
     pub fn finish(self) -> Result<ShardFiles, ShardError> {
+        let (needs, session) = (self.needs.clone(), self.session.clone());
+        self.write_files()
+            .map_err(|error| needs.explain(&session, error))
+    }
+
+    fn write_files(self) -> Result<ShardFiles, ShardError> {
         let Self {
             session,
             mask_png,
@@ -230,9 +317,14 @@ fn first_not_finite(record: &FrameRecord) -> Option<&'static str> {
     let fields = [
         ("angle_deg", record.angle_deg.unwrap_or_default()),
         ("shift_px", dx + dy),
+        (
+            "align_confidence",
+            record.align_confidence.unwrap_or_default(),
+        ),
         ("saturated_fraction", record.saturated_fraction),
         ("mean_rgb", r + g + b),
         ("sharpness", record.sharpness),
+        ("exposure_step", record.exposure_step.unwrap_or_default()),
     ];
     fields
         .into_iter()

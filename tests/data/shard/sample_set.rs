@@ -58,6 +58,7 @@ pub(crate) fn record(session: &str, index: u32, image: &RgbImage) -> FrameRecord
         size: [WIDTH, HEIGHT],
         shift_px: None,
         shift_applied: false,
+        align_confidence: None,
         mask_px: measures.mask_px,
         saturated_px: measures.saturated_px,
         saturated_fraction: measures.saturated_fraction(),
@@ -65,6 +66,8 @@ pub(crate) fn record(session: &str, index: u32, image: &RgbImage) -> FrameRecord
         spec_net: measures.saturated_fraction() > GATE,
         mean_rgb: measures.mean_rgb,
         sharpness: measures.sharpness,
+        exposure_step: None,
+        identical_to: None,
     }
 }
 
@@ -81,6 +84,7 @@ pub(crate) fn settings(layout: Layout) -> ExtractionSettings {
         saturation_level: LEVEL,
         gate: GATE,
         align: Align::Off,
+        align_tolerance: None,
         layout,
         scaling: "none".to_owned(),
     }

@@ -153,6 +153,7 @@ impl TurnRecipe {
             saturation_level: SATURATION_LEVEL,
             gate: GATE,
             align: Align::Off,
+            align_tolerance: None,
             layout: Layout::Webdataset,
             scaling: "none".to_owned(),
         }
@@ -422,6 +423,7 @@ impl<'a> Turn<'a> {
             size: [size, size],
             shift_px: None,
             shift_applied: false,
+            align_confidence: None,
             mask_px: measures.mask_px,
             saturated_px: measures.saturated_px,
             saturated_fraction,
@@ -429,6 +431,8 @@ impl<'a> Turn<'a> {
             spec_net: saturated_fraction > GATE,
             mean_rgb: measures.mean_rgb,
             sharpness: measures.sharpness,
+            exposure_step: None,
+            identical_to: None,
         })
     }
 }

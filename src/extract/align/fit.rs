@@ -1,0 +1,281 @@
+//! The place at which a picture's gradients fit a template: Gauss-Newton steps on robust weights.
+//!
+//! With a shift s, r(x) = G(x + s) - T(x) is, to the first order, T's change times the error of s. Each
+//! pixel counts by its trust, and the less the more its r exceeds its usual deviation (Geman and
+//! McClure's weights): a highlight that passes is no movement.
+
+use super::structure::{Gradients, cubic};
+use super::template::{Template, TemplatePixel};
+
+/// Steps; fewer where it stands still.
+const MOST_STEPS: usize = 8;
+/// A shift that changes by less stands still, pixels.
+const STILL: f64 = 2e-3;
+/// Largest step, pixels: beyond, the first order does not hold.
+const LONGEST_STEP: f64 = 1.0;
+/// Deviations at which a pixel's weight is a quarter.
+const OUTLIER: f32 = 1.5;
+/// The same for a rotation or growth, which the shift leaves in the residuals.
+const FAR_OUTLIER: f32 = 6.0;
+/// Fewest pixels from which a shift is measured.
+const LEAST_PIXELS: usize = 60;
+/// Pixels that are looked at in a search.
+const SEARCH_PIXELS: usize = 3000;
+/// The object has structure in one direction only if the other has less than this part of its weight.
+const LEAST_CROSS: f64 = 1e-3;
+
+/// A shift that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Fit {
+    /// To the right and down, pixels.
+    pub(super) shift: [f64; 2],
+    /// Correlation of the gradients there, -1..=1.
+    pub(super) correlation: f64,
+}
+
+/// How an object is turned and scaled, beside its shift.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Similarity {
+    /// Clockwise, radians.
+    pub(super) turned: f64,
+    /// Growth, 0 is none.
+    pub(super) grown: f64,
+    /// Mean distance of the object's pixels from their centre, pixels.
+    pub(super) radius: f64,
+}
+
+/// The normal equations of one step.
+#[derive(Default)]
+struct Sums {
+    count: usize,
+    /// xx, xy, yy.
+    normal: [f64; 3],
+    right: [f64; 2],
+    template: f64,
+    frame: f64,
+    product: f64,
+}
+
+impl Template {
+    /// The fit nearest to `start`; `None` where there is none within `reach` pixels.
+    pub(super) fn fit(&self, frame: &Gradients, start: [f64; 2], reach: f64) -> Option<Fit> {
+        let mut shift = start;
+        for _ in 0..MOST_STEPS {
+            let sums = self.sums(frame, shift);
+            let [dx, dy] = sums.step()?;
+            shift = [shift[0] - dx, shift[1] - dy];
+            if shift[0].abs().max(shift[1].abs()) > reach {
+                return None;
+            }
+            if dx.abs().max(dy.abs()) < STILL {
+                break;
+            }
+        }
+        let correlation = self.sums(frame, shift).correlation();
+        Some(Fit { shift, correlation })
+    }
+
+    /// The best whole-pixel shift within `reach`.
+    pub(super) fn search(&self, frame: &Gradients, reach: f64) -> [f64; 2] {
+        let reach = reach.ceil() as i32;
+        let places = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)));
+        let mut best = (f64::NEG_INFINITY, [0.0; 2]);
+        let every = self.pixels.len().div_ceil(SEARCH_PIXELS).max(1);
+        for (dx, dy) in places {
+            let mut sums = Sums::default();
+            for pixel in self.pixels.iter().step_by(every) {
+                let x = usize::try_from(i64::from(pixel.x) + i64::from(dx));
+                let y = usize::try_from(i64::from(pixel.y) + i64::from(dy));
+                if let (Ok(x), Ok(y)) = (x, y)
+                    && x < frame.width
+                    && let Some(found) = frame.values.get(y * frame.width + x)
+                {
+                    sums.compare(pixel, *found);
+                }
+            }
+            if sums.correlation() > best.0 {
+                best = (sums.correlation(), [f64::from(dx), f64::from(dy)]);
+            }
+        }
+        best.1
+    }
+
+    /// What a rotation and a growth about the object's centre explain beyond the shift.
+    pub(super) fn similarity(&self, frame: &Gradients, shift: [f64; 2]) -> Option<Similarity> {
+        let count = self.pixels.len().max(1) as f64;
+        let sum = |of: fn(&TemplatePixel) -> u32| -> f64 {
+            self.pixels.iter().map(|pixel| f64::from(of(pixel))).sum()
+        };
+        let centre = (sum(|p| p.x) / count, sum(|p| p.y) / count);
+        let mut normal = [[0.0; 4]; 4];
+        let mut right = [0.0; 4];
+        let mut distance = 0.0;
+        let sampler = Sampler::new(frame, shift);
+        for pixel in &self.pixels {
+            let Some(found) = sampler.at(pixel) else {
+                continue;
+            };
+            let (x, y) = (f64::from(pixel.x) - centre.0, f64::from(pixel.y) - centre.1);
+            distance += x.hypot(y);
+            let (weight, residual) = weighed(pixel, found, FAR_OUTLIER);
+            let weight = f64::from(weight);
+            let [xx, xy, yy] = pixel.change.map(f64::from);
+            for (residual, [jx, jy]) in residual.into_iter().zip([[xx, xy], [xy, yy]]) {
+                let row = [jx, jy, x * jy - y * jx, x * jx + y * jy];
+                for (i, a) in row.into_iter().enumerate() {
+                    right[i] += weight * a * f64::from(residual);
+                    for (j, b) in row.into_iter().enumerate() {
+                        normal[i][j] += weight * a * b;
+                    }
+                }
+            }
+        }
+        let [_, _, turned, grown] = solved(normal, right)?;
+        // The residual is that of the template's place minus the frame's.
+        Some(Similarity {
+            turned: -turned,
+            grown: -grown,
+            radius: distance / count,
+        })
+    }
+
+    fn sums(&self, frame: &Gradients, shift: [f64; 2]) -> Sums {
+        let sampler = Sampler::new(frame, shift);
+        let mut sums = Sums::default();
+        for pixel in &self.pixels {
+            if let Some(found) = sampler.at(pixel) {
+                sums.add(pixel, found);
+            }
+        }
+        sums
+    }
+}
+
+/// The robust weight of a pixel, a quarter at `outlier` deviations, and its residual.
+fn weighed(pixel: &TemplatePixel, found: [f32; 2], outlier: f32) -> (f32, [f32; 2]) {
+    let [x, y] = pixel.gradient;
+    let residual = [found[0] - x, found[1] - y];
+    let square = residual[0] * residual[0] + residual[1] * residual[1];
+    let fall = 1.0 + square * pixel.trust / (outlier * outlier);
+    (pixel.weight / (fall * fall), residual)
+}
+
+impl Sums {
+    fn add(&mut self, pixel: &TemplatePixel, found: [f32; 2]) {
+        let (weight, [rx, ry]) = weighed(pixel, found, OUTLIER);
+        let [xx, xy, yy] = pixel.change;
+        let add = |sum: &mut f64, value: f32| *sum += f64::from(weight * value);
+        let [nxx, nxy, nyy] = &mut self.normal;
+        add(nxx, xx * xx + xy * xy);
+        add(nxy, xx * xy + xy * yy);
+        add(nyy, xy * xy + yy * yy);
+        add(&mut self.right[0], xx * rx + xy * ry);
+        add(&mut self.right[1], xy * rx + yy * ry);
+        self.compare(pixel, found);
+        self.count += 1;
+    }
+
+    /// Adds to the sums of the correlation.
+    fn compare(&mut self, pixel: &TemplatePixel, found: [f32; 2]) {
+        let [tx, ty] = pixel.gradient;
+        let trust = pixel.trust;
+        self.template += f64::from(trust * (tx * tx + ty * ty));
+        self.frame += f64::from(trust * (found[0] * found[0] + found[1] * found[1]));
+        self.product += f64::from(trust * (tx * found[0] + ty * found[1]));
+    }
+
+    /// The error of the shift; `None` where the object does not say it in both directions.
+    fn step(&self) -> Option<[f64; 2]> {
+        let [xx, xy, yy] = self.normal;
+        let determinant = xx * yy - xy * xy;
+        let size = xx + yy;
+        if self.count < LEAST_PIXELS
+            || determinant.is_nan()
+            || determinant <= LEAST_CROSS * size * size
+        {
+            return None;
+        }
+        let dx = (yy * self.right[0] - xy * self.right[1]) / determinant;
+        let dy = (xx * self.right[1] - xy * self.right[0]) / determinant;
+        Some([dx, dy].map(|step| step.clamp(-LONGEST_STEP, LONGEST_STEP)))
+    }
+
+    fn correlation(&self) -> f64 {
+        let scale = (self.template * self.frame).sqrt();
+        if scale > 0.0 {
+            self.product / scale
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Reads gradients at a shift, between pixels by cubic convolution.
+struct Sampler<'a> {
+    frame: &'a Gradients,
+    offset: (i64, i64),
+    across: [f32; 4],
+    down: [f32; 4],
+}
+
+impl<'a> Sampler<'a> {
+    fn new(frame: &'a Gradients, [dx, dy]: [f64; 2]) -> Self {
+        let (whole_x, whole_y) = (dx.floor(), dy.floor());
+        Self {
+            frame,
+            offset: (whole_x as i64 - 1, whole_y as i64 - 1),
+            across: cubic((dx - whole_x) as f32),
+            down: cubic((dy - whole_y) as f32),
+        }
+    }
+
+    /// The gradient at a pixel of the template; `None` beyond the picture.
+    fn at(&self, pixel: &TemplatePixel) -> Option<[f32; 2]> {
+        let x = usize::try_from(i64::from(pixel.x) + self.offset.0).ok()?;
+        let y = usize::try_from(i64::from(pixel.y) + self.offset.1).ok()?;
+        let width = self.frame.width;
+        if x + 4 > width || y + 4 > self.frame.height {
+            return None;
+        }
+        let start = y * width + x;
+        let four = self.frame.values.get(start..start + 3 * width + 4)?;
+        let mut sum = [0.0_f32; 2];
+        for (row, down) in four.chunks(width).zip(self.down) {
+            let mut line = [0.0_f32; 2];
+            for (value, across) in row.iter().zip(self.across) {
+                line[0] += across * value[0];
+                line[1] += across * value[1];
+            }
+            sum[0] += down * line[0];
+            sum[1] += down * line[1];
+        }
+        Some(sum)
+    }
+}
+
+/// The solution of four linear equations, by elimination with pivots; `None` if they do not have one.
+fn solved(mut matrix: [[f64; 4]; 4], mut right: [f64; 4]) -> Option<[f64; 4]> {
+    for at in 0..4 {
+        let pivot = (at..4).max_by(|&a, &b| matrix[a][at].abs().total_cmp(&matrix[b][at].abs()))?;
+        matrix.swap(at, pivot);
+        right.swap(at, pivot);
+        if matrix[at][at].abs() < 1e-12 {
+            return None;
+        }
+        for below in at + 1..4 {
+            let factor = matrix[below][at] / matrix[at][at];
+            let pivot = matrix[at];
+            for (to, from) in matrix[below].iter_mut().zip(pivot) {
+                *to -= factor * from;
+            }
+            right[below] -= factor * right[at];
+        }
+    }
+    for at in (0..4).rev() {
+        let known: f64 = (at + 1..4)
+            .map(|column| matrix[at][column] * right[column])
+            .sum();
+        right[at] = (right[at] - known) / matrix[at][at];
+    }
+    Some(right)
+}

@@ -1,0 +1,293 @@
+//! Where the object is in each frame, compared with the frame on which its mask was made.
+//!
+//! A rig's belt vibrates and its table sags: the object moves by a fraction of a pixel or a few. The light
+//! moves far more, so frames are not compared with each other. A template of what lasts (`template`) is made of
+//! frames spread over the turn, and each frame is fitted to it on its own (`fit`), from a coarse scale to a
+//! fine one (`structure`): the result does not depend on other frames, nor on the number of threads.
+//!
+//! This module knows pictures and a mask, and nothing of files, videos or shards.
+
+mod fit;
+mod structure;
+mod template;
+
+use image::{GrayImage, RgbImage};
+use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterator};
+
+use fit::Fit;
+use structure::{Extractor, Gradients, Plane, half, luma};
+use template::Template;
+
+/// A fit whose correlation is less is none.
+pub const MIN_CONFIDENCE: f64 = 0.3;
+/// Pictures are halved until their longer side is at most this, pixels.
+const COARSEST_SIDE: u32 = 128;
+/// Fewest pixels of the object at the coarsest scale.
+const LEAST_PIXELS: usize = 150;
+/// Largest number of scales.
+const MOST_SCALES: usize = 6;
+/// Pixels at the object's outline that are left out, at the finest and at the other scales.
+const OUTLINE: [usize; 2] = [2, 1];
+/// Times that the template is made anew at the coarsest, the finest, and the scales between.
+const ROUNDS: [usize; 3] = [3, 2, 1];
+/// Shifts up to this many times the largest are looked for, so that a larger one is told from none.
+const LOOK_BEYOND: f64 = 1.5;
+/// A shift that a scale finds from nothing, pixels.
+const LITTLE: f64 = 0.75;
+/// Further than this, pixels at the object's mean distance from its centre, a rotation or growth counts.
+const SIGNIFICANT: f64 = 0.5;
+
+/// The brightness of the part of a frame in which the object is looked for.
+#[derive(Debug, Clone)]
+pub struct AlignSample(GrayImage);
+
+impl AlignSample {
+    /// The brightness of `crop`.
+    #[must_use]
+    pub fn of(crop: &RgbImage) -> Self {
+        Self(luma(crop))
+    }
+}
+
+/// Where the object of a frame is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alignment {
+    /// To the right and down of its place in the mask, pixels; `None` where the frame cannot be registered.
+    pub shift: Option<[f64; 2]>,
+    /// Correlation of the frame's structure with the object's lasting one, 0..=1.
+    pub confidence: f64,
+    /// How far a rotation and a growth move the object's pixels in the mean, beyond the shift: degrees
+    /// clockwise, and the factor of size minus 1. `None` where it is not significant.
+    pub turned: Option<(f64, f64)>,
+}
+
+/// Measures shifts of one object in frames of one video.
+#[derive(Debug)]
+pub struct Aligner {
+    /// From the finest to the coarsest.
+    templates: Vec<Template>,
+    /// Largest shift that is looked for, pixels.
+    reach: f64,
+}
+
+/// What a thread needs to measure shifts; it keeps its buffers from frame to frame.
+#[derive(Debug, Default)]
+pub struct AlignBuffers {
+    extractor: Extractor,
+    plane: Plane,
+    gradients: Vec<Gradients>,
+}
+
+impl Aligner {
+    /// Learns the object under `mask` (not 0) from frames that are spread over the turn, in the mask's size.
+    /// Shifts count from the object's place in `samples[reference]`, the frame of the mask; where that is
+    /// within `tolerance` pixels of the turn's middle place, which is known more exactly, from there.
+    ///
+    /// `None` if the object has too little structure.
+    #[must_use]
+    pub fn learn(
+        samples: &[AlignSample],
+        reference: usize,
+        mask: &GrayImage,
+        max_shift: f64,
+        tolerance: f64,
+    ) -> Option<Self> {
+        let scales = scales(mask);
+        let reach = max_shift * LOOK_BEYOND + 1.0;
+        let mut shifts = vec![[0.0; 2]; samples.len()];
+        let mut templates = Vec::new();
+        for (scale, inner) in scales.iter().enumerate().rev() {
+            let planes: Vec<Plane> = samples
+                .par_iter()
+                .map(|sample| plane_at(&sample.0, scale))
+                .collect();
+            let reach = reach / (1_u32 << scale) as f64;
+            let coarsest = scale + 1 == scales.len();
+            let rounds = ROUNDS[if coarsest {
+                0
+            } else if scale == 0 {
+                1
+            } else {
+                2
+            }];
+            for round in 0..rounds {
+                let template = Template::of(&planes, &shifts, inner);
+                // The first template of all is too blurred to search with.
+                let search = coarsest && round > 0;
+                fit_all(&template, &planes, &mut shifts, reach, search);
+                let last = scale == 0 && round + 1 == rounds;
+                let origin = match shifts.get(reference).copied() {
+                    Some(origin) if !last => origin,
+                    origin => final_origin(origin, &shifts, tolerance),
+                };
+                for shift in &mut shifts {
+                    *shift = [shift[0] - origin[0], shift[1] - origin[1]];
+                }
+            }
+            templates.push(Template::of(&planes, &shifts, inner));
+            if scale > 0 {
+                for shift in &mut shifts {
+                    let doubled = shift.map(|part| 2.0 * part);
+                    // The finer scale finds less from nothing, and without the light's pull on the coarser.
+                    let little = doubled[0].hypot(doubled[1]) < LITTLE;
+                    *shift = if little { [0.0; 2] } else { doubled };
+                }
+            }
+        }
+        templates.reverse();
+        let aligner = Self { templates, reach };
+        let mut buffers = AlignBuffers::default();
+        let found = samples.get(reference)?;
+        let usable = aligner.measure(found, &mut buffers).shift.is_some();
+        usable.then_some(aligner)
+    }
+
+    /// Where the object is in a frame, in pixels of the frame.
+    #[must_use]
+    pub fn measure(&self, frame: &AlignSample, buffers: &mut AlignBuffers) -> Alignment {
+        self.take(frame, buffers);
+        let gradients = &buffers.gradients;
+        let sure = |fit: &Fit| fit.correlation >= MIN_CONFIDENCE;
+        let coarsest = self.templates.len() - 1;
+        let reach = self.reach / (1_u32 << coarsest) as f64;
+        let start = self.templates[coarsest].search(&gradients[coarsest], reach);
+        let fit = self.refine(gradients, start);
+        let confidence = fit.map_or(0.0, |fit| fit.correlation.clamp(0.0, 1.0));
+        let fit = fit.filter(sure);
+        Alignment {
+            shift: fit.map(|fit| fit.shift),
+            confidence,
+            turned: fit.and_then(|fit| self.turned(gradients, fit)),
+        }
+    }
+
+    /// Fills the buffers with the frame's gradients at all scales.
+    fn take(&self, frame: &AlignSample, buffers: &mut AlignBuffers) {
+        let AlignBuffers {
+            extractor,
+            plane,
+            gradients,
+        } = buffers;
+        gradients.resize_with(self.templates.len(), Gradients::default);
+        let mut smaller: Option<GrayImage> = None;
+        for (scale, gradients) in gradients.iter_mut().enumerate() {
+            if scale > 0 {
+                smaller = Some(half(smaller.as_ref().unwrap_or(&frame.0)));
+            }
+            extractor.structure(smaller.as_ref().unwrap_or(&frame.0), plane);
+            gradients.take(plane);
+        }
+    }
+
+    /// From the coarsest scale to the finest; `start` is in the coarsest's pixels.
+    fn refine(&self, gradients: &[Gradients], start: [f64; 2]) -> Option<Fit> {
+        let mut start = start;
+        let mut found = None;
+        for (scale, template) in self.templates.iter().enumerate().rev() {
+            let reach = self.reach / (1_u32 << scale) as f64;
+            let fit = template.fit(gradients.get(scale)?, start, reach);
+            // A scale at which the object has no structure says nothing.
+            if let Some(fit) = fit {
+                start = fit.shift;
+            }
+            found = fit;
+            if scale > 0 {
+                start = start.map(|part| 2.0 * part);
+            }
+        }
+        found
+    }
+
+    fn turned(&self, gradients: &[Gradients], fit: Fit) -> Option<(f64, f64)> {
+        // At the second scale, movements are half as many pixels: nearer to the first order.
+        let scale = 1.min(self.templates.len() - 1);
+        let pixels = (1_u32 << scale) as f64;
+        let shift = fit.shift.map(|part| part / pixels);
+        let similarity = self.templates[scale].similarity(&gradients[scale], shift)?;
+        let moved = pixels * similarity.radius * similarity.turned.hypot(similarity.grown);
+        (moved > SIGNIFICANT).then_some((similarity.turned.to_degrees(), similarity.grown))
+    }
+}
+
+/// Where shifts count from in the end.
+fn final_origin(reference: Option<[f64; 2]>, shifts: &[[f64; 2]], tolerance: f64) -> [f64; 2] {
+    let middle = [0, 1].map(|axis| {
+        let mut parts: Vec<f64> = shifts.iter().map(|shift| shift[axis]).collect();
+        parts.sort_unstable_by(f64::total_cmp);
+        parts.get(parts.len() / 2).copied().unwrap_or_default()
+    });
+    let far = |[x, y]: &[f64; 2]| (x - middle[0]).hypot(y - middle[1]) > tolerance;
+    reference.filter(far).unwrap_or(middle)
+}
+
+fn fit_all(
+    template: &Template,
+    planes: &[Plane],
+    shifts: &mut [[f64; 2]],
+    reach: f64,
+    search: bool,
+) {
+    let found: Vec<[f64; 2]> = (0..planes.len())
+        .into_par_iter()
+        .map_init(Gradients::default, |gradients, at| {
+            gradients.take(&planes[at]);
+            let start = match search {
+                true => template.search(gradients, reach),
+                false => shifts[at],
+            };
+            let fit = template.fit(gradients, start, reach);
+            fit.map_or(shifts[at], |fit| fit.shift)
+        })
+        .collect();
+    shifts.copy_from_slice(&found);
+}
+
+fn plane_at(sample: &GrayImage, scale: usize) -> Plane {
+    let mut smaller: Option<GrayImage> = None;
+    for _ in 0..scale {
+        smaller = Some(half(smaller.as_ref().unwrap_or(sample)));
+    }
+    let mut plane = Plane::default();
+    Extractor::default().structure(smaller.as_ref().unwrap_or(sample), &mut plane);
+    plane
+}
+
+/// The object without its outline at each scale, from the finest to the coarsest.
+fn scales(mask: &GrayImage) -> Vec<Vec<bool>> {
+    let full = |mask: &GrayImage| mask.as_raw().iter().map(|&m| m != 0).collect();
+    let mut scales: Vec<Vec<bool>> = vec![eroded(full(mask), mask.dimensions(), OUTLINE[0])];
+    let mut image = mask.clone();
+    while image.width().max(image.height()) > COARSEST_SIDE && scales.len() < MOST_SCALES {
+        image = half(&image);
+        // Only what was object in all four pixels.
+        let whole = image.as_raw().iter().map(|&m| m == 255).collect();
+        let inner = eroded(whole, image.dimensions(), OUTLINE[1]);
+        if inner.iter().filter(|&&inside| inside).count() < LEAST_PIXELS {
+            break;
+        }
+        scales.push(inner);
+    }
+    scales
+}
+
+/// Without the pixels within `by` of one outside, in both directions.
+fn eroded(inside: Vec<bool>, (width, height): (u32, u32), by: usize) -> Vec<bool> {
+    let (width, height) = (width as usize, height as usize);
+    let along = |from: &[bool], step: usize, last: usize, at: usize, place: usize| {
+        let range = place.saturating_sub(by)..=(place + by).min(last);
+        let whole = place >= by && place + by <= last;
+        whole
+            && range
+                .into_iter()
+                .all(|to| from[at - place * step + to * step])
+    };
+    let rows: Vec<bool> = (0..inside.len())
+        .map(|at| along(&inside, 1, width - 1, at, at % width))
+        .collect();
+    (0..rows.len())
+        .map(|at| along(&rows, width, height - 1, at, at / width))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,180 @@
+//! What stays the same on an object while the light moves: the median of its gradients over a turn.
+//!
+//! The median of log gradients over many lights is the gradient of the paint (Weiss, "Deriving intrinsic
+//! images from image sequences", 2001). How far single frames are from it says how much a pixel can be
+//! trusted: where highlights and shadows pass, little.
+
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+
+use super::structure::{Plane, add_scaled, cubic};
+
+/// Pixels of a template; those that say most about a shift are kept.
+const MOST_PIXELS: usize = 20_000;
+/// Deviation of the gradients by noise.
+const NOISE: f32 = 0.01;
+
+/// A pixel of a template.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TemplatePixel {
+    pub(super) x: u32,
+    pub(super) y: u32,
+    /// The gradient.
+    pub(super) gradient: [f32; 2],
+    /// The gradient's change to the right and, from there, downwards: xx, xy, yy.
+    pub(super) change: [f32; 3],
+    /// 1 / the square of its usual deviation.
+    pub(super) trust: f32,
+    /// How much it counts: it falls faster than the trust, because what deviates often is light.
+    pub(super) weight: f32,
+}
+
+/// The object's lasting structure.
+#[derive(Debug, Default)]
+pub(super) struct Template {
+    pub(super) pixels: Vec<TemplatePixel>,
+}
+
+/// Median and deviation of the gradients of one row.
+struct TemplateRow {
+    gradients: Vec<[f32; 2]>,
+    deviations: Vec<f32>,
+}
+
+impl Template {
+    /// The template of pictures whose object lies at these shifts, under `inner` (row by row).
+    pub(super) fn of(planes: &[Plane], shifts: &[[f64; 2]], inner: &[bool]) -> Self {
+        let Some((width, height)) = planes.first().map(|plane| (plane.width, plane.height)) else {
+            return Self::default();
+        };
+        if width < 3 || height < 3 {
+            return Self::default();
+        }
+        let rows: Vec<TemplateRow> = (0..height)
+            .into_par_iter()
+            .map(|y| row(planes, shifts, inner, y))
+            .collect();
+        let mut pixels = Vec::new();
+        for y in 1..height - 1 {
+            for x in (1..width - 1).filter(|x| inner.get(y * width + x) == Some(&true)) {
+                pixels.push(pixel(&rows, x, y));
+            }
+        }
+        keep_most_telling(&mut pixels);
+        Self { pixels }
+    }
+}
+
+fn pixel(rows: &[TemplateRow], x: usize, y: usize) -> TemplatePixel {
+    let at = |x: usize, y: usize| rows[y].gradients[x];
+    let (left, right) = (at(x - 1, y), at(x + 1, y));
+    let (above, below) = (at(x, y - 1), at(x, y + 1));
+    let across = 0.25 * (right[1] - left[1] + below[0] - above[0]);
+    let deviation = rows[y].deviations[x];
+    let trust = 1.0 / (deviation * deviation + NOISE * NOISE);
+    TemplatePixel {
+        x: x as u32,
+        y: y as u32,
+        gradient: at(x, y),
+        change: [
+            0.5 * (right[0] - left[0]),
+            across,
+            0.5 * (below[1] - above[1]),
+        ],
+        trust,
+        weight: trust * trust.sqrt().sqrt(),
+    }
+}
+
+/// What a pixel says about a shift.
+fn information(pixel: &TemplatePixel) -> f32 {
+    let [xx, xy, yy] = pixel.change;
+    pixel.weight * (xx * xx + 2.0 * xy * xy + yy * yy)
+}
+
+fn keep_most_telling(pixels: &mut Vec<TemplatePixel>) {
+    if pixels.len() <= MOST_PIXELS {
+        return;
+    }
+    pixels.select_nth_unstable_by(MOST_PIXELS, |a, b| {
+        information(b)
+            .total_cmp(&information(a))
+            .then((a.y, a.x).cmp(&(b.y, b.x)))
+    });
+    pixels.truncate(MOST_PIXELS);
+    pixels.sort_unstable_by_key(|pixel| (pixel.y, pixel.x));
+}
+
+fn row(planes: &[Plane], shifts: &[[f64; 2]], inner: &[bool], y: usize) -> TemplateRow {
+    let width = planes.first().map_or(0, |plane| plane.width);
+    let mut found = TemplateRow {
+        gradients: vec![[0.0; 2]; width],
+        deviations: vec![0.0; width],
+    };
+    // A pixel's change needs the gradients of its four neighbours.
+    let wanted = |y: usize, x: usize| inner.get(y * width + x) == Some(&true);
+    let needed: Vec<usize> = (1..width - 1)
+        .filter(|&x| {
+            wanted(y, x - 1)
+                || wanted(y, x)
+                || wanted(y, x + 1)
+                || wanted(y + 1, x)
+                || y.checked_sub(1).is_some_and(|above| wanted(above, x))
+        })
+        .collect();
+    if needed.is_empty() {
+        return found;
+    }
+    let moved: Vec<[Vec<f32>; 3]> = planes
+        .iter()
+        .zip(shifts)
+        .map(|(plane, &shift)| {
+            let y = y as isize;
+            [y - 1, y, y + 1].map(|y| moved_row(plane, shift, y))
+        })
+        .collect();
+    let mut across = Vec::with_capacity(planes.len());
+    let mut down = Vec::with_capacity(planes.len());
+    for x in needed {
+        across.clear();
+        down.clear();
+        for [above, here, below] in &moved {
+            across.push(0.5 * (here[x + 1] - here[x - 1]));
+            down.push(0.5 * (below[x] - above[x]));
+        }
+        let (mid_x, mid_y) = (middle(&mut across.clone()), middle(&mut down.clone()));
+        for (a, d) in across.iter_mut().zip(&down) {
+            *a = (*a - mid_x).hypot(d - mid_y);
+        }
+        found.gradients[x] = [mid_x, mid_y];
+        found.deviations[x] = middle(&mut across);
+    }
+    found
+}
+
+/// Row `y` of a picture that is moved back by its shift.
+fn moved_row(plane: &Plane, [dx, dy]: [f64; 2], y: isize) -> Vec<f32> {
+    let (whole_x, whole_y) = (dx.floor(), dy.floor());
+    let (weights_x, weights_y) = (cubic((dx - whole_x) as f32), cubic((dy - whole_y) as f32));
+    let mut line = vec![0.0; plane.width];
+    for (weight, step) in weights_y.into_iter().zip(-1..) {
+        add_scaled(&mut line, plane.row(y + whole_y as isize + step), weight);
+    }
+    let mut moved = vec![0.0; plane.width];
+    let last = plane.width as isize - 1;
+    for (weight, step) in weights_x.into_iter().zip(-1..) {
+        let by = whole_x as isize + step;
+        for (x, to) in (0..).zip(&mut moved) {
+            *to += weight * line[(x + by).clamp(0, last) as usize];
+        }
+    }
+    moved
+}
+
+/// The median, for an even number the upper one; 0 of nothing.
+fn middle(values: &mut [f32]) -> f32 {
+    let at = values.len() / 2;
+    if at >= values.len() {
+        return 0.0;
+    }
+    *values.select_nth_unstable_by(at, f32::total_cmp).1
+}

@@ -1,0 +1,127 @@
+//! Shifts of made objects whose place is known.
+
+use image::{GrayImage, Luma, Rgb, RgbImage};
+
+use super::{AlignBuffers, AlignSample, Aligner, Alignment};
+
+const SIDE: u32 = 150;
+
+/// A disc in the middle.
+fn mask() -> GrayImage {
+    GrayImage::from_fn(SIDE, SIDE, |x, y| {
+        let far = (f64::from(x) - 74.5).hypot(f64::from(y) - 74.5);
+        Luma([if far < 55.0 { 255 } else { 0 }])
+    })
+}
+
+/// A painted object at a shift, under a light from `angle` with a highlight that travels with it, in front of
+/// a background that travels too.
+fn frame(shift: [f64; 2], angle: f64) -> AlignSample {
+    let image = RgbImage::from_fn(SIDE, SIDE, |x, y| {
+        let (x, y) = (f64::from(x) - 74.5, f64::from(y) - 74.5);
+        let (u, v) = (x - shift[0], y - shift[1]);
+        if u.hypot(v) >= 58.0 {
+            let stripes = 120.0 + 100.0 * (0.3 * x + 20.0 * angle).sin();
+            return Rgb([stripes as u8; 3]);
+        }
+        let paint = 90.0
+            + 25.0 * ((0.55 * u + 0.2 * v).sin() + (0.5 * v - 0.31 * u).cos())
+            + 20.0 * (0.9 * u + 1.7).sin() * (0.8 * v).cos();
+        let light = 1.0 + 0.012 * (u * angle.cos() + v * angle.sin());
+        let (hx, hy) = (25.0 * angle.cos(), 25.0 * angle.sin());
+        let highlight = 150.0 * (-((u - hx).powi(2) + (v - hy).powi(2)) / 60.0).exp();
+        Rgb([(paint * light + highlight).round().clamp(0.0, 255.0) as u8; 3])
+    });
+    AlignSample::of(&image)
+}
+
+fn angle(at: usize, of: usize) -> f64 {
+    std::f64::consts::TAU * at as f64 / of as f64
+}
+
+/// Learns from a turn whose frames have these shifts, counted from the first.
+fn learnt(shift: impl Fn(usize) -> [f64; 2], tolerance: f64) -> Aligner {
+    let samples: Vec<AlignSample> = (0..24).map(|at| frame(shift(at), angle(at, 24))).collect();
+    Aligner::learn(&samples, 0, &mask(), 8.0, tolerance).unwrap()
+}
+
+fn measured(aligner: &Aligner, frame: &AlignSample) -> Alignment {
+    aligner.measure(frame, &mut AlignBuffers::default())
+}
+
+fn error(aligner: &Aligner, shift: [f64; 2], angle: f64) -> f64 {
+    let found = measured(aligner, &frame(shift, angle)).shift.unwrap();
+    (found[0] - shift[0]).hypot(found[1] - shift[1])
+}
+
+#[test]
+fn shifts_are_found_to_a_tenth_of_a_pixel_while_light_and_highlight_move() {
+    let aligner = learnt(|at| [0.1 * at as f64, 0.3 * (at as f64).sin()], 0.1);
+    for (shift, at) in [
+        ([0.0, 0.0], 1),
+        ([0.4, -0.7], 5),
+        ([2.3, 1.1], 11),
+        ([-6.2, 4.9], 17),
+    ] {
+        let error = error(&aligner, shift, angle(at, 20));
+        assert!(error < 0.1, "{shift:?}: {error}");
+    }
+}
+
+#[test]
+fn a_turn_that_stands_still_stays_where_it_is() {
+    let aligner = learnt(|_| [0.0; 2], 0.1);
+    for at in 0..15 {
+        let error = error(&aligner, [0.0; 2], angle(at, 15));
+        assert!(error < 0.05, "{at}: {error}");
+    }
+}
+
+#[test]
+fn shifts_count_from_the_frame_of_the_mask() {
+    // All frames but the mask's lie 2 pixels further right.
+    let aligner = learnt(|at| [if at == 0 { 0.0 } else { 2.0 }, 0.0], 0.1);
+    let error = error(&aligner, [2.0, 0.0], angle(7, 24));
+    assert!(error < 0.1, "{error}");
+}
+
+#[test]
+fn a_frame_without_the_object_is_not_registered() {
+    let aligner = learnt(|_| [0.0; 2], 0.1);
+    let noise = RgbImage::from_fn(SIDE, SIDE, |x, y| {
+        Rgb([(x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503_001)).to_le_bytes()[2]; 3])
+    });
+    for image in [noise, RgbImage::from_pixel(SIDE, SIDE, Rgb([9; 3]))] {
+        let found = measured(&aligner, &AlignSample::of(&image));
+        assert_eq!(found.shift, None, "{found:?}");
+    }
+}
+
+#[test]
+fn an_object_without_structure_cannot_be_learnt() {
+    let grey = AlignSample::of(&RgbImage::from_pixel(SIDE, SIDE, Rgb([99; 3])));
+    let samples = vec![grey; 8];
+    assert!(Aligner::learn(&samples, 0, &mask(), 8.0, 0.1).is_none());
+}
+
+#[test]
+fn a_rotation_is_reported_where_it_is_significant_and_not_else() {
+    let aligner = learnt(|_| [0.0; 2], 0.1);
+    assert_eq!(measured(&aligner, &frame([1.3, 0.4], 0.7)).turned, None);
+    let AlignSample(still) = frame([0.0; 2], 0.7);
+    let degrees = 1.5_f64;
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let turned = GrayImage::from_fn(SIDE, SIDE, |x, y| {
+        let (x, y) = (f64::from(x) - 74.5, f64::from(y) - 74.5);
+        let (u, v) = (74.5 + cos * x + sin * y, 74.5 - sin * x + cos * y);
+        let (left, top) = (u.floor().clamp(0.0, 148.0), v.floor().clamp(0.0, 148.0));
+        let at =
+            |dx: u32, dy: u32| f64::from(still.get_pixel(left as u32 + dx, top as u32 + dy).0[0]);
+        let (across, down) = ((u - left).clamp(0.0, 1.0), (v - top).clamp(0.0, 1.0));
+        let line = |dy| (1.0 - across) * at(0, dy) + across * at(1, dy);
+        Luma([((1.0 - down) * line(0) + down * line(1)).round() as u8])
+    });
+    let found = measured(&aligner, &AlignSample(turned)).turned.unwrap();
+    assert!((found.0 - degrees).abs() < 0.4, "{found:?}");
+    assert!(found.1.abs() < 0.01, "{found:?}");
+}

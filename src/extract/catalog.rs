@@ -1,0 +1,129 @@
+//! The description of what is extracted: that of the data set, or a task's piece of it.
+
+use std::path::{Path, PathBuf};
+
+use relit_data::causes::with_causes;
+use relit_data::shard::{
+    Dataset, ExtractionSettings, OutputFolder, SessionEntry, ShardEntry, ShardError, TaskOutcome,
+    TaskPiece,
+};
+
+use super::{ExtractError, ExtractOptions, RecordingOutcome};
+
+/// The description in the output folder.
+pub(super) enum Catalog {
+    /// `dataset.json`.
+    Whole(Dataset),
+    /// A task's piece.
+    Piece(Box<TaskPiece>),
+}
+
+impl Catalog {
+    /// That in the folder, or a new one. A task's piece of an earlier run over other recordings is begun
+    /// anew, with the sessions that it holds.
+    pub(super) fn open(
+        folder: &OutputFolder,
+        found: &[PathBuf],
+        options: &ExtractOptions,
+    ) -> Result<Self, ExtractError> {
+        let (out, settings) = (folder.path(), options.settings());
+        let Some(task) = options.task else {
+            let dataset = match Dataset::read(out) {
+                Ok(existing) => existing,
+                Err(ShardError::NoDataset { .. }) => Dataset::new(settings.clone()),
+                Err(error) => return Err(error.into()),
+            };
+            check_settings(out, &dataset.settings, &settings)?;
+            return Ok(Self::Whole(dataset));
+        };
+        let name = |path: &PathBuf| {
+            let name = path.file_name().unwrap_or(path.as_os_str());
+            name.to_string_lossy().into_owned()
+        };
+        let dataset = match TaskPiece::read(out, task)? {
+            Some(piece) => piece.dataset,
+            None => Dataset::new(settings.clone()),
+        };
+        check_settings(out, &dataset.settings, &settings)?;
+        let piece = TaskPiece::new(task, found.iter().map(name).collect(), dataset);
+        // A task without recordings has a piece too, so that none is missing.
+        piece.write(out)?;
+        Ok(Self::Piece(Box::new(piece)))
+    }
+
+    pub(super) fn dataset(&self) -> &Dataset {
+        match self {
+            Self::Whole(dataset) => dataset,
+            Self::Piece(piece) => &piece.dataset,
+        }
+    }
+
+    /// Adds a session; an older one of the same id is replaced.
+    pub(super) fn add(
+        &mut self,
+        folder: &OutputFolder,
+        entry: SessionEntry,
+        shards: Vec<ShardEntry>,
+    ) -> Result<(), ExtractError> {
+        match self {
+            // A description that could not be written does not replace the one in memory.
+            Self::Whole(dataset) => {
+                let mut changed = dataset.clone();
+                changed.replace(entry, shards);
+                changed.write(folder.path())?;
+                *dataset = changed;
+            }
+            // It is written with the outcome.
+            Self::Piece(piece) => piece.dataset.replace(entry, shards),
+        }
+        Ok(())
+    }
+
+    /// Notes what became of a task's recording.
+    pub(super) fn note(
+        &mut self,
+        folder: &OutputFolder,
+        position: usize,
+        outcome: &RecordingOutcome,
+    ) -> Result<(), ExtractError> {
+        let Self::Piece(piece) = self else {
+            return Ok(());
+        };
+        let outcome = match outcome {
+            RecordingOutcome::Extracted(entry) | RecordingOutcome::Skipped(entry) => {
+                TaskOutcome::Extracted {
+                    session: entry.id.clone(),
+                }
+            }
+            RecordingOutcome::LeftOut(error) => TaskOutcome::LeftOut {
+                why: with_causes(error),
+            },
+            RecordingOutcome::Failed(error) => TaskOutcome::Failed {
+                why: with_causes(error),
+            },
+        };
+        piece.outcomes.insert(position, outcome);
+        Ok(piece.write(folder.path())?)
+    }
+}
+
+fn check_settings(
+    out: &Path,
+    old: &ExtractionSettings,
+    new: &ExtractionSettings,
+) -> Result<(), ExtractError> {
+    if old == new {
+        return Ok(());
+    }
+    let [old, new] = [old, new].map(|s| serde_json::to_value(s).unwrap_or_default());
+    let names = old.as_object().into_iter().chain(new.as_object());
+    let mut names: Vec<&String> = names.flat_map(serde_json::Map::keys).collect();
+    names.sort_unstable();
+    names.dedup();
+    let differ = names.into_iter().filter(|name| old[*name] != new[*name]);
+    let differ = differ.map(|name| format!("{name} {} there, {} now", old[name], new[name]));
+    Err(ExtractError::OtherSettings {
+        out: out.to_owned(),
+        differ: differ.collect::<Vec<_>>().join("; "),
+    })
+}

@@ -1,0 +1,162 @@
+//! What the records of a turn show of the camera: pictures that it delivered twice, and steps of its exposure.
+
+use std::collections::HashMap;
+
+use relit_data::session::Notice;
+use relit_data::shard::{Digest, FrameRecord};
+
+/// Samples on each side with which a step is compared.
+const AROUND: usize = 12;
+/// A step is at least this large, stops.
+const LEAST_STEP: f64 = 0.1;
+/// And so many times the median change around it, which is the light's.
+const BEYOND_LIGHT: f64 = 6.0;
+
+/// What was found, for one sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Finding {
+    pub(super) index: u32,
+    pub(super) exposure_step: Option<f64>,
+    pub(super) identical_to: Option<u64>,
+}
+
+/// The samples of which there is something to say; `samples` are sorted by index, each with the digest of its
+/// image.
+pub(super) fn findings(samples: &[(&FrameRecord, Digest)]) -> Vec<Finding> {
+    let steps = exposure_steps(samples);
+    let twins = identical(samples);
+    let all = samples.iter().zip(steps).zip(twins);
+    let findings = all.map(|((&(record, _), exposure_step), identical_to)| Finding {
+        index: record.index,
+        exposure_step,
+        identical_to,
+    });
+    findings
+        .filter(|finding| finding.exposure_step.is_some() || finding.identical_to.is_some())
+        .collect()
+}
+
+/// What a user should know of them.
+pub(super) fn notices(findings: &[Finding]) -> Vec<Notice> {
+    let mut notices = Vec::new();
+    let twins = || findings.iter().filter(|f| f.identical_to.is_some());
+    if let Some(first) = twins().next() {
+        let (count, index) = (twins().count(), first.index);
+        notices.push(Notice::Warning(format!(
+            "{count} samples show the same picture as an earlier frame, pixel for pixel, the first is sample {index}: the camera repeats frames"
+        )));
+    }
+    let steps = || {
+        findings
+            .iter()
+            .filter_map(|f| Some((f.index, f.exposure_step?)))
+    };
+    if let Some((index, step)) = steps().next() {
+        let count = steps().count();
+        notices.push(Notice::Warning(format!(
+            "the exposure changes in steps that light cannot explain, at {count} samples, the first is sample {index} ({step:+.2} stops): switch the camera's automatic exposure and gain off"
+        )));
+    }
+    notices
+}
+
+/// The nearest earlier source frame with the same picture, for each sample.
+fn identical(samples: &[(&FrameRecord, Digest)]) -> Vec<Option<u64>> {
+    // A picture is the same if its image and its exact figures, taken on source pixels, are.
+    let mut seen = HashMap::new();
+    let same = |&(record, image): &(&FrameRecord, Digest)| {
+        let [red, green, blue] = record.mean_rgb.map(f64::to_bits);
+        let figures = (red, green, blue, record.sharpness.to_bits());
+        let earlier = seen.insert((image, figures), record.source_frame);
+        earlier.filter(|&frame| frame != record.source_frame && !record.duplicate)
+    };
+    samples.iter().map(same).collect()
+}
+
+/// The change against the sample before, where it is a step, for each sample.
+fn exposure_steps(samples: &[(&FrameRecord, Digest)]) -> Vec<Option<f64>> {
+    let brightness = |record: &FrameRecord| record.mean_rgb.iter().sum::<f64>().max(1.0).log2();
+    let levels: Vec<f64> = samples
+        .iter()
+        .map(|(record, _)| brightness(record))
+        .collect();
+    let changes: Vec<f64> = std::iter::once(0.0)
+        .chain(levels.windows(2).map(|pair| pair[1] - pair[0]))
+        .collect();
+    let step = |(at, &change): (usize, &f64)| {
+        let around = at.saturating_sub(AROUND)..(at + AROUND + 1).min(changes.len());
+        let mut usual: Vec<f64> = changes.get(around)?.iter().map(|c| c.abs()).collect();
+        usual.sort_unstable_by(f64::total_cmp);
+        let middle = usual.get(usual.len() / 2)?;
+        let is_step = change.abs() > LEAST_STEP.max(BEYOND_LIGHT * middle);
+        is_step.then_some((1000.0 * change).round() / 1000.0)
+    };
+    changes.iter().enumerate().map(step).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relit_data::geometry::Rect;
+
+    /// A sample whose brightness is `level`, of its own picture.
+    fn record(index: u32, level: f64) -> FrameRecord {
+        FrameRecord {
+            session: "s".to_owned(),
+            object: "o".to_owned(),
+            index,
+            source_frame: u64::from(index),
+            t_us: 0,
+            angle_deg: None,
+            duplicate: false,
+            crop: Rect::new(0, 0, 1, 1),
+            size: [1, 1],
+            shift_px: None,
+            shift_applied: false,
+            align_confidence: None,
+            mask_px: 1,
+            saturated_px: 0,
+            saturated_fraction: 0.0,
+            saturated_any_px: 0,
+            spec_net: false,
+            mean_rgb: [level; 3],
+            sharpness: 1.0,
+            exposure_step: None,
+            identical_to: None,
+        }
+    }
+
+    fn found(levels: impl Iterator<Item = f64>) -> Vec<Finding> {
+        let records: Vec<FrameRecord> = (0..).zip(levels).map(|(n, l)| record(n, l)).collect();
+        let digest = |record: &FrameRecord| Digest::of(&record.index.to_le_bytes());
+        let samples: Vec<_> = records.iter().map(|r| (r, digest(r))).collect();
+        findings(&samples)
+    }
+
+    #[test]
+    fn a_step_of_the_exposure_is_found_and_a_light_that_moves_is_not() {
+        let light = |n: i32| 100.0 + 40.0 * (f64::from(n) * 0.2).sin();
+        assert!(found((0..60).map(light)).is_empty());
+        let stepped = |n: i32| light(n) * if n >= 30 { 1.4 } else { 1.0 };
+        let findings = found((0..60).map(stepped));
+        assert_eq!(findings.len(), 1, "{findings:?}");
+        assert_eq!(findings[0].index, 30);
+        assert!(findings[0].exposure_step.unwrap() > 0.3);
+        assert!(notices(&findings)[0].text().contains("sample 30"));
+    }
+
+    #[test]
+    fn a_picture_that_was_delivered_twice_is_found_and_a_duplicate_sample_is_not() {
+        let mut records: Vec<FrameRecord> = (0..4).map(|n| record(n, 9.0)).collect();
+        records[3].duplicate = true;
+        let image = |n: usize| Digest::of(&[[0, 1, 1, 1][n]]);
+        let samples: Vec<_> = records
+            .iter()
+            .enumerate()
+            .map(|(n, r)| (r, image(n)))
+            .collect();
+        let findings = findings(&samples);
+        assert_eq!(findings.len(), 1, "{findings:?}");
+        assert_eq!((findings[0].index, findings[0].identical_to), (2, Some(1)));
+    }
+}

@@ -1,0 +1,126 @@
+//! What the shifts of a turn's frames say as a whole.
+
+use relit_data::session::Notice;
+
+use super::ExtractError;
+use super::align::{Alignment, MIN_CONFIDENCE};
+
+/// The shifts of a turn, frame by frame, in any order.
+#[derive(Debug, Default)]
+pub(super) struct Steadiness {
+    max_shift: f64,
+    frames: u64,
+    unregistered: Vec<u64>,
+    /// The first frame whose object lies too far away, and how far.
+    beyond: Option<(u64, f64)>,
+    /// The frame that is turned or grown most: degrees, factor minus 1.
+    turned: Option<(u64, (f64, f64))>,
+    turned_frames: u64,
+}
+
+impl Steadiness {
+    /// Of a turn whose object may move by `max_shift` pixels.
+    pub(super) fn new(max_shift: f64) -> Self {
+        Self {
+            max_shift,
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn add(&mut self, frame: u64, alignment: &Alignment) {
+        self.frames += 1;
+        let Some([dx, dy]) = alignment.shift else {
+            return self.unregistered.push(frame);
+        };
+        let far = dx.hypot(dy);
+        if far > self.max_shift && self.beyond.is_none_or(|(first, _)| frame < first) {
+            self.beyond = Some((frame, far));
+        }
+        if let Some((degrees, growth)) = alignment.turned {
+            self.turned_frames += 1;
+            let size = |(degrees, growth): (f64, f64)| degrees.to_radians().hypot(growth);
+            let largest = self.turned.is_none_or(|(first, other)| {
+                let (new, old) = (size((degrees, growth)), size(other));
+                new > old || (new == old && frame < first)
+            });
+            if largest {
+                self.turned = Some((frame, (degrees, growth)));
+            }
+        }
+    }
+
+    /// An error if the object moved further than it may.
+    pub(super) fn check(&self) -> Result<(), ExtractError> {
+        match self.beyond {
+            None => Ok(()),
+            Some((frame, shift_px)) => Err(ExtractError::Moved {
+                frame,
+                shift_px,
+                max_shift: self.max_shift,
+            }),
+        }
+    }
+
+    pub(super) fn notices(&self) -> Vec<Notice> {
+        let mut notices = Vec::new();
+        if let Some(first) = self.unregistered.iter().min() {
+            let (count, all) = (self.unregistered.len(), self.frames);
+            notices.push(Notice::Warning(format!(
+                "{count} of {all} frames could not be registered (their align_confidence is below {MIN_CONFIDENCE}) and are as they were taken, the first is frame {first}"
+            )));
+        }
+        if let Some((frame, (degrees, growth))) = self.turned {
+            let (count, percent) = (self.turned_frames, 100.0 * growth);
+            notices.push(Notice::Warning(format!(
+                "in {count} frames the object is also turned or scaled against the mask, most in frame {frame}: by {degrees:.2} degrees and {percent:+.2} %; only its shift is corrected"
+            )));
+        }
+        notices
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moved_by(dx: f64) -> Alignment {
+        Alignment {
+            shift: Some([dx, 0.0]),
+            confidence: 0.9,
+            turned: None,
+        }
+    }
+
+    #[test]
+    fn the_first_frame_beyond_the_largest_shift_is_named_in_any_order() {
+        let mut steadiness = Steadiness::new(8.0);
+        for (frame, dx) in [(3, 1.0), (9, -8.5), (7, 9.0), (8, 2.0)] {
+            steadiness.add(frame, &moved_by(dx));
+        }
+        let error = steadiness.check().unwrap_err();
+        assert!(
+            matches!(error, ExtractError::Moved { frame: 7, .. }),
+            "{error}"
+        );
+        assert!(Steadiness::new(8.0).check().is_ok());
+    }
+
+    #[test]
+    fn frames_that_cannot_be_registered_are_counted() {
+        let mut steadiness = Steadiness::new(8.0);
+        steadiness.add(1, &moved_by(0.2));
+        assert!(steadiness.notices().is_empty());
+        let lost = Alignment {
+            shift: None,
+            confidence: 0.1,
+            turned: None,
+        };
+        steadiness.add(6, &lost);
+        steadiness.add(5, &lost);
+        let text = steadiness.notices().remove(0).text().to_owned();
+        assert!(
+            text.contains("2 of 3") && text.contains("frame 5"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,149 @@
+//! A small file system that fills up, and files that may not be read or written.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::support::{PROGRAM, SETTINGS, Workshop, files};
+
+/// A file system in memory; unmounted when dropped.
+struct SmallDisk {
+    path: PathBuf,
+}
+
+impl SmallDisk {
+    /// `None`, with the reason on standard error, where none can be mounted.
+    fn mount(path: PathBuf, kilobytes: u64) -> Option<Self> {
+        fs::create_dir_all(&path).unwrap();
+        let size = format!("size={kilobytes}k");
+        let mounted = Command::new("mount")
+            .args(["-t", "tmpfs", "-o", &size, "tmpfs"])
+            .arg(&path)
+            .output();
+        match mounted {
+            Ok(output) if output.status.success() => Some(Self { path }),
+            Ok(output) => {
+                let why = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+                eprintln!("skipped: no small file system can be mounted: {why}");
+                None
+            }
+            Err(error) => {
+                eprintln!("skipped: no small file system can be mounted: {error}");
+                None
+            }
+        }
+    }
+
+    fn resize(&self, kilobytes: u64) {
+        let size = format!("remount,size={kilobytes}k");
+        let done = Command::new("mount")
+            .args(["-o", &size])
+            .arg(&self.path)
+            .status();
+        assert!(done.unwrap().success());
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(&self.path).status();
+    }
+}
+
+#[test]
+fn a_full_disk_ends_with_what_is_needed_and_leaves_no_partial_file() {
+    let workshop = Workshop::with(&["a.mkv"]);
+    for layout in ["webdataset", "relit"] {
+        let line = format!("a.mkv {SETTINGS} --layout {layout} --resume -o");
+        workshop.errors(0, &format!("{line} whole-{layout}"));
+        let whole = files(&workshop.path(&format!("whole-{layout}")));
+        let kilobytes: u64 = whole.values().map(|bytes| bytes.len() as u64).sum::<u64>() / 1024;
+        // From too small for the first image to too small for the last file.
+        for part in [4, 30, 60, 90] {
+            let name = format!("{layout}-{part}");
+            let Some(disk) = SmallDisk::mount(workshop.path(&name), 4 + kilobytes * part / 100)
+            else {
+                return;
+            };
+            let errors = workshop.errors(1, &format!("{line} {name}/out"));
+            assert!(errors.contains("No space left on device"), "{errors}");
+            if part >= 30 {
+                assert!(errors.contains("the disk is full: ") && errors.contains(" needs about "));
+            }
+            for (file, bytes) in files(&disk.path.join("out")) {
+                assert!(whole[&file] == bytes, "{file} is torn at {part} %");
+            }
+            disk.resize(16 * kilobytes + 1024);
+            workshop.errors(0, &format!("{line} {name}/out"));
+            assert!(files(&disk.path.join("out")) == whole, "{layout} {part}");
+        }
+    }
+}
+
+/// Runs the program as a user without rights; `None`, with the reason on standard error, where it cannot.
+fn as_nobody(workshop: &Workshop, line: &str) -> Option<(Option<i32>, String)> {
+    let status = Command::new("id").arg("-u").output().unwrap();
+    let root = status.stdout == b"0\n";
+    let mut command = workshop.command(line);
+    if root {
+        let program = workshop.path("program");
+        if !program.exists() {
+            fs::copy(PROGRAM, &program).unwrap();
+            fs::set_permissions(workshop.folder.path(), fs::Permissions::from_mode(0o755)).unwrap();
+        }
+        command = Command::new(program);
+        command
+            .args(line.split_whitespace())
+            .current_dir(workshop.folder.path())
+            .uid(65_534)
+            .gid(65_534);
+    }
+    match command.output() {
+        Ok(output) => Some((
+            output.status.code(),
+            String::from_utf8_lossy(&output.stderr).into_owned(),
+        )),
+        Err(error) => {
+            eprintln!("skipped: no program can be run without rights: {error}");
+            None
+        }
+    }
+}
+
+fn forbid(path: &Path) {
+    fs::set_permissions(path, fs::Permissions::from_mode(0o000)).unwrap();
+}
+
+#[test]
+fn what_may_not_be_read_or_written_is_named_with_the_systems_reason() {
+    let workshop = Workshop::with(&["a.mkv", "b.mkv"]);
+    let open = workshop.path("open");
+    fs::create_dir(&open).unwrap();
+    fs::set_permissions(&open, fs::Permissions::from_mode(0o777)).unwrap();
+    let closed = workshop.path("closed");
+    fs::create_dir(&closed).unwrap();
+    fs::set_permissions(&closed, fs::Permissions::from_mode(0o555)).unwrap();
+    forbid(&workshop.path("b.mkv"));
+    let line = format!("a.mkv b.mkv {SETTINGS} -o open/out");
+    let Some((code, errors)) = as_nobody(&workshop, &line) else {
+        return;
+    };
+    assert_eq!(code, Some(3), "{errors}");
+    assert!(
+        errors.contains("b.mkv") && errors.contains("Permission denied"),
+        "{errors}"
+    );
+    assert!(open.join("out/a.tar").is_file() && !open.join("out/b.tar").exists());
+    let line = format!("a.mkv {SETTINGS} -o closed");
+    let Some((code, errors)) = as_nobody(&workshop, &line) else {
+        return;
+    };
+    assert_eq!(code, Some(1), "{errors}");
+    assert!(
+        errors.contains("closed") && errors.contains("Permission denied"),
+        "{errors}"
+    );
+    assert!(files(&closed).is_empty());
+}

@@ -1,0 +1,110 @@
+//! Several tasks that write one data set, and their merge.
+
+use std::fs;
+
+use crate::support::{SETTINGS, Workshop, files};
+
+const VIDEOS: &str = "a.mkv b.mkv c.mkv d.mkv";
+
+fn workshop() -> Workshop {
+    Workshop::with(&["a.mkv", "b.mkv", "c.mkv", "d.mkv"])
+}
+
+fn part(index: u32, count: u32) -> String {
+    format!("{VIDEOS} {SETTINGS} -o out --resume --task-id {index} --task-count {count}")
+}
+
+#[test]
+fn tasks_at_the_same_time_and_a_merge_make_the_same_data_set_as_one_run() {
+    let workshop = workshop();
+    workshop.errors(0, &format!("{VIDEOS} {SETTINGS} -o whole"));
+    let whole = files(&workshop.path("whole"));
+    let running: Vec<_> = (0..3)
+        .map(|index| workshop.command(&part(index, 3)).spawn().unwrap())
+        .collect();
+    for mut child in running {
+        assert!(child.wait().unwrap().success());
+    }
+    for _ in 0..2 {
+        workshop.errors(0, "merge out");
+        let mut merged = files(&workshop.path("out"));
+        merged.retain(|name, _| !name.starts_with("tasks/"));
+        assert!(merged == whole, "{:?}", merged.keys());
+    }
+    workshop.errors(0, "verify out");
+}
+
+#[test]
+fn a_task_that_is_missing_or_was_killed_is_named_and_nothing_is_written() {
+    let workshop = workshop();
+    workshop.errors(0, &part(0, 3));
+    workshop.errors(0, &part(2, 3));
+    let errors = workshop.errors(1, "merge out");
+    assert!(errors.contains("no piece of task 1"), "{errors}");
+    // A task that was killed after its first of two recordings: the second is not in its piece.
+    workshop.errors(0, &part(1, 3));
+    let piece = workshop.path("out/tasks/0-of-3.json");
+    let whole = fs::read_to_string(&piece).unwrap();
+    let mut cut: serde_json::Value = serde_json::from_str(&whole).unwrap();
+    cut["outcomes"].as_object_mut().unwrap().remove("3");
+    fs::write(&piece, cut.to_string()).unwrap();
+    let errors = workshop.errors(1, "merge out");
+    assert!(errors.contains("task 0 lacks d.mkv"), "{errors}");
+    assert!(!workshop.path("out/dataset.json").exists());
+    // Requeued, it goes on.
+    let output = workshop.run(&part(0, 3));
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        printed.contains("0 extracted (0 with losses), 2 skipped"),
+        "{printed}"
+    );
+    assert_eq!(fs::read_to_string(&piece).unwrap(), whole);
+    workshop.errors(0, "merge out");
+}
+
+#[test]
+fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
+    let workshop = workshop();
+    fs::create_dir(workshop.path("x")).unwrap();
+    fs::copy(workshop.path("a.mkv"), workshop.path("x/a.mkv")).unwrap();
+    for index in 0..2 {
+        let line = format!("a.mkv x/a.mkv {SETTINGS} -o twice --task-id {index} --task-count 2");
+        workshop.errors(0, &line);
+    }
+    let errors = workshop.errors(1, "merge twice");
+    assert!(errors.contains("session a is there twice"), "{errors}");
+
+    fs::write(workshop.path("bad.mkv"), "no video").unwrap();
+    workshop.errors(
+        1,
+        &format!("bad.mkv {SETTINGS} -o bad --task-id 0 --task-count 1"),
+    );
+    let errors = workshop.errors(1, "merge bad");
+    assert!(errors.contains("task 0 failed with bad.mkv"), "{errors}");
+
+    workshop.errors(0, &part(0, 2));
+    workshop.errors(
+        0,
+        &format!("b.mkv d.mkv {SETTINGS} -o out --task-id 1 --task-count 2"),
+    );
+    let errors = workshop.errors(1, "merge out");
+    assert!(
+        errors.contains("tasks 0 and 1 saw different recordings"),
+        "{errors}"
+    );
+}
+
+#[test]
+fn a_session_that_no_task_made_and_a_file_that_is_gone_are_noticed() {
+    let workshop = workshop();
+    workshop.errors(0, &part(0, 1));
+    fs::remove_file(workshop.path("out/c.parquet")).unwrap();
+    let errors = workshop.errors(1, "merge out");
+    assert!(errors.contains("c.parquet"), "{errors}");
+    workshop.errors(0, &part(0, 1));
+    workshop.errors(0, "merge out");
+    fs::copy(workshop.path("a.mkv"), workshop.path("e.mkv")).unwrap();
+    workshop.errors(0, &format!("e.mkv {SETTINGS} -o out"));
+    let errors = workshop.errors(1, "merge out");
+    assert!(errors.contains("session e, which is no task's"), "{errors}");
+}
