@@ -7,10 +7,8 @@ SHELL := /bin/bash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
-# The recorded session of a whole turn, which the demonstration replays as a camera, and the rectangle
-# around its object; its folder also holds painted seeds.
+# The recorded session of a whole turn, which the demonstration replays as a camera.
 SESSION := 20261120T093015Z-cow
-RECT := 170,20,325,390
 DEMO := $(TARGET)/demo
 
 # The input of the benchmark, and the number of runs of each program.
@@ -77,7 +75,7 @@ demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of 
 	$(TARGET)/release/relit-capture record --yes --object cow --root $(DEMO)/sessions \
 	    --camera 'replay:fixtures/$(SESSION)?loop=1' --turntable sim:
 	@session=$$(echo $(DEMO)/sessions/*-cow); \
-	$(TARGET)/release/relit-mask "$$session" --rect $(RECT) --seeds fixtures/$(SESSION)/seeds.png; \
+	$(TARGET)/release/relit-mask "$$session" --auto; \
 	$(TARGET)/release/relit-extract "$$session" -o $(DEMO)/out; \
 	$(TARGET)/release/relit-extract verify $(DEMO)/out; \
 	cp "$$session/mask.png" $(DEMO)/mask.png; \

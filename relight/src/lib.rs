@@ -18,6 +18,7 @@
 //! | [`nets`] | the networks as data, their weights in files, inference |
 //! | [`render`] | diffuse and specular layers on normals, their derivatives, the truth by Monte Carlo |
 //! | [`synth`] | pictures of objects with the truth that they were made of |
+//! | [`turn`] | a whole turn into normals, albedo and light, without training |
 pub mod asset;
 pub mod data;
 pub mod decompose;
@@ -32,4 +33,5 @@ pub mod render;
 pub mod synth;
 #[cfg(feature = "train")]
 pub mod train;
+pub mod turn;
 mod whole;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use rayon::ThreadPool;
 
+use relit_data::causes::with_causes;
 use relit_data::image_stats::MaskSpans;
 use relit_data::report::{self, Page};
 use relit_data::session::{INDEX_FILE, Notice, Recording, Status};
@@ -21,6 +22,7 @@ use super::quality;
 use super::select::{TURN_DEG, TURN_TOLERANCE_DEG};
 use super::steadiness::Steadiness;
 use super::{Aligner, ExtractError, ExtractOptions, Observer, Scaler, cut, square_around};
+use crate::masking::mask_doubts;
 
 /// Number of runs of damaged frames that are reported one by one.
 const MAX_REPORTED: usize = 8;
@@ -71,6 +73,17 @@ impl Job {
         })
     }
 
+    /// What a few frames of the video say against the mask.
+    fn doubts_about_the_mask(&self) -> Vec<Notice> {
+        let doubts = mask_doubts(&self.video, &self.mask.image).unwrap_or_else(|error| {
+            vec![format!(
+                "the mask could not be checked: {}",
+                with_causes(&error)
+            )]
+        });
+        doubts.into_iter().map(Notice::Warning).collect()
+    }
+
     pub(super) fn id(&self) -> &str {
         &self.recording.id
     }
@@ -114,6 +127,7 @@ impl Job {
         let samples = u32::try_from(plan.selection.frames.len()).unwrap_or(options.frames);
         let mut notices = self.notices.clone();
         notices.extend(self.notices_of_plan(&plan, options.frames));
+        notices.extend(self.doubts_about_the_mask());
         if options.strict {
             check_strict(&plan, &notices)?;
         }

@@ -148,7 +148,8 @@ mod tests {
         let nothing = Bitmap::new((40, 30), std::iter::empty());
         Table {
             surface: nothing.clone(),
-            shadow: nothing,
+            shadow: nothing.clone(),
+            plain: nothing,
         }
     }
 
@@ -171,7 +172,7 @@ mod tests {
         let features = room(|x, y| stick(x, y) || rim(x, y));
         let table = Table {
             surface: no_table().surface.map(|at, _| at / 40 > 15),
-            shadow: no_table().shadow,
+            ..no_table()
         };
         let backdrop = Backdrop::new(&features, &table, (40, 30));
         let at = |x: usize, y: usize| backdrop.alike.bits()[y * 40 + x];

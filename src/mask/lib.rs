@@ -51,6 +51,7 @@
 mod alpha;
 mod backdrop;
 mod bitmap;
+mod check;
 mod cleanup;
 mod drawing;
 mod encode;
@@ -67,6 +68,7 @@ mod preview;
 mod pyramid;
 mod record;
 mod registration;
+mod rim;
 mod score;
 mod segment;
 mod settings;
@@ -76,6 +78,7 @@ mod turn;
 mod warning;
 
 pub use alpha::alpha;
+pub use check::{MaskCheck, Place, Region, ShapeCheck};
 pub use drawing::Drawing;
 pub use encode::{grey_png, rgb_png};
 pub use error::{MaskError, SeedsFault};

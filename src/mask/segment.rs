@@ -6,7 +6,7 @@ use relit_data::geometry::Rect;
 use super::bitmap::Bitmap;
 use super::initial::InitialLabels;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
-use super::turn::{self, TurnCut, TurnStatistics};
+use super::turn::{self, TurnStatistics};
 use super::{Effort, Hints, MaskError, SegmentSettings, Warning, cleanup, pyramid, warning};
 
 /// On one frame a hole of this share of the object may be a highlight, and is filled.
@@ -131,12 +131,12 @@ pub fn segment_with(
         .and_then(|rect| rect.clipped_to(size.0, size.1));
     if let (Some(hints), Some(_)) = (hints, rect)
         && let Ok(other) = by_hints(frame, hints, settings, effort)
-        && let Some(why) = misled(&by_turn, &other)
+        && let Some(why) = misled(turn, &by_turn, &other)
     {
         return Ok(other.with_warning(Some(Warning::TurnDropped { why })));
     }
-    let still = (!by_turn.moves()).then_some(Warning::NothingMoves);
-    let mask = finish(&by_turn.object, size, hints, rect, settings, FILLED_OF_TURN)?;
+    let still = (!turn.moves()).then_some(Warning::NothingMoves);
+    let mask = finish(&by_turn, size, hints, rect, settings, FILLED_OF_TURN)?;
     Ok(mask.with_warning(still))
 }
 
@@ -160,13 +160,11 @@ fn by_hints(
 }
 
 /// Why the turn's mask is worse than that of the hints alone; none if it is not.
-fn misled(by_turn: &TurnCut<'_>, by_hints: &Mask) -> Option<String> {
+fn misled(turn: &TurnStatistics, by_turn: &Bitmap, by_hints: &Mask) -> Option<String> {
     let size = by_hints.image.dimensions();
     let object = by_hints.image.as_raw().iter().map(|&level| level >= 128);
     let object = Bitmap::new(size, object);
-    let width = size.0 as usize;
-    let of_turn = by_turn.outline(&by_turn.object, width);
-    let of_hints = by_turn.outline(&object, width);
+    let (of_turn, of_hints) = (turn.outline(by_turn), turn.outline(&object));
     (of_turn < LEAST_OF_HINTS * of_hints).then(|| {
         format!(
             "its outline follows what moves less well ({of_turn:.2}) than that of the hints alone ({of_hints:.2})"

@@ -34,6 +34,8 @@ pub(super) struct Table {
     pub(super) surface: Bitmap,
     /// Darker pixels of the same colour beside it: where the object shadows it all the time.
     pub(super) shadow: Bitmap,
+    /// All that is as dark, still and plain as a table, connected with its surface or not.
+    pub(super) plain: Bitmap,
 }
 
 /// The table, from the features of a turn (average L, a, b, changes of light and colour)
@@ -75,7 +77,11 @@ pub(super) fn table(features: &[[f32; 5]], contrast: &[f32], size: (usize, usize
     let is_table = |at: usize, _| lowest.is_some() && components.at(at) == lowest;
     let surface = inner.map(is_table).dilated(1);
     let shadow = shadow(features, contrast, structure, &surface, size);
-    Table { surface, shadow }
+    Table {
+        surface,
+        shadow,
+        plain,
+    }
 }
 
 /// Grows from the surface, row by row and column by column, over what may be its shadow.

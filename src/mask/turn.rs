@@ -15,7 +15,8 @@ use super::grab_cut::{self, DIRECTIONS_AHEAD, Field, Label, Models, neighbour};
 use super::initial::InitialLabels;
 use super::lab::LabTable;
 use super::pyramid::{FirstModels, RgbField, grow, half_image, half_labels, refine, start};
-use super::table::table;
+use super::rim::without_rim;
+use super::table::{Table, table};
 use super::{Effort, Hints, Iterations, registration};
 
 /// Fewest frames from which anything can be learned.
@@ -127,6 +128,92 @@ impl TurnStatistics {
     pub fn frames(&self) -> usize {
         self.frames
     }
+
+    /// That there are enough frames.
+    pub(super) fn check(&self) -> Result<(), MaskError> {
+        match self.frames >= MIN_TURN_FRAMES {
+            true => Ok(()),
+            false => Err(MaskError::FewFrames { found: self.frames }),
+        }
+    }
+
+    /// The frames' width and height.
+    pub(super) fn frame_size(&self) -> (u32, u32) {
+        self.full
+    }
+
+    /// Columns and rows of the statistics.
+    pub(super) fn size(&self) -> (usize, usize) {
+        self.fine.size
+    }
+
+    /// The frames are so many times larger: a power of two.
+    pub(super) fn factor(&self) -> usize {
+        let ratio = (self.full.0 as usize).div_ceil(self.fine.size.0.max(1));
+        ratio.next_power_of_two()
+    }
+
+    /// The average brightness L of each pixel.
+    pub(super) fn light(&self) -> Vec<f32> {
+        let features = self.fine.features.iter();
+        features.map(|feature| feature[0] / COLOUR_WEIGHT).collect()
+    }
+
+    /// A bitmap of the frames' size in that of the statistics.
+    pub(super) fn reduced(&self, object: &Bitmap) -> Bitmap {
+        let (columns, rows) = self.fine.size;
+        let bits = (0..columns * rows).map(|at| self.is_set(object, at));
+        Bitmap::new((columns as u32, rows as u32), bits)
+    }
+
+    fn is_set(&self, object: &Bitmap, at: usize) -> bool {
+        let (columns, factor) = (self.fine.size.0, self.factor());
+        let (x, y) = (at % columns * factor, at / columns * factor);
+        let pixel = y * self.full.0 as usize + x;
+        object.bits().get(pixel).copied().unwrap_or(false)
+    }
+
+    /// How well an outline follows what moves differently: the mean over its edges of the strength of
+    /// the contrast there, 0..=1.
+    pub(super) fn outline(&self, object: &Bitmap) -> f32 {
+        let (columns, rows) = self.fine.size;
+        let is_object = |at: usize| self.is_set(object, at);
+        let scale = grab_cut::contrast_scale(&self.fine);
+        let (mut sum, mut edges) = (0.0, 0.0);
+        for at in 0..columns * rows {
+            for direction in [4, 6] {
+                let next = neighbour(at, direction, self.fine.size);
+                if let Some(next) = next.filter(|&next| is_object(next) != is_object(at)) {
+                    // The edge may lie a pixel beside it.
+                    let strongest = self.strongest_near(at).max(self.strongest_near(next));
+                    sum += 1.0 - (-scale * strongest).exp();
+                    edges += 1.0;
+                }
+            }
+        }
+        sum / f32::max(edges, 1.0)
+    }
+
+    fn strongest_near(&self, at: usize) -> f32 {
+        let contrasts = self.fine.contrasts[at].iter();
+        contrasts.copied().fold(0.0, f32::max)
+    }
+
+    /// Whether anything moves: the median change of the brightness away from the table.
+    pub(super) fn moves(&self) -> bool {
+        let mut changes: Vec<f32> = self
+            .fine
+            .features
+            .iter()
+            .map(|feature| feature[3])
+            .collect();
+        let upper = changes.len() * 3 / 4;
+        if changes.is_empty() {
+            return false;
+        }
+        let (_, change, _) = changes.select_nth_unstable_by(upper, f32::total_cmp);
+        *change > CHANGE_WEIGHT * STILL.ln_1p()
+    }
 }
 
 /// Averages and changes of each pixel over the frames.
@@ -138,14 +225,16 @@ pub(super) struct TurnField {
     contrasts: Vec<[f32; 4]>,
     /// Pixels that are background by the ends of their rows.
     backdrop: Bitmap,
+    table: Table,
     evidence: Vec<f32>,
 }
 
 impl TurnField {
     fn new(frames: &[RgbImage], colours: &LabTable) -> Self {
-        let size = frames.first().map_or((0, 0), |frame| {
-            (frame.width() as usize, frame.height() as usize)
-        });
+        let Some(first) = frames.first().filter(|frame| pixels(frame) > 0) else {
+            return Self::empty();
+        };
+        let size = (first.width() as usize, first.height() as usize);
         let count = size.0 * size.1;
         let mut sum = vec![[0.0_f32; 3]; count];
         let mut square = vec![[0.0_f32; 2]; count];
@@ -195,6 +284,7 @@ impl TurnField {
             size,
             backdrop: backdrop.alike,
             evidence: backdrop.evidence,
+            table,
             features,
             contrasts,
         }
@@ -202,6 +292,21 @@ impl TurnField {
 }
 
 impl TurnField {
+    fn empty() -> Self {
+        Self {
+            size: (0, 0),
+            features: Vec::new(),
+            contrasts: Vec::new(),
+            backdrop: Bitmap::new((0, 0), std::iter::empty()),
+            table: Table {
+                surface: Bitmap::new((0, 0), std::iter::empty()),
+                shadow: Bitmap::new((0, 0), std::iter::empty()),
+                plain: Bitmap::new((0, 0), std::iter::empty()),
+            },
+            evidence: Vec::new(),
+        }
+    }
+
     /// Takes what equals the ends of its row for background at first. False, and nothing is done, if that
     /// leaves too little or too much for the object.
     fn start_from_backdrop(&self, labels: &mut [Label]) -> bool {
@@ -308,15 +413,16 @@ impl FrameInTurn<'_> {
 }
 
 /// Cuts the object out by what the turn tells, on the pixels of `frame`.
-pub(super) fn segment<'a>(
+pub(super) fn segment(
     frame: &RgbImage,
-    turn: &'a TurnStatistics,
+    turn: &TurnStatistics,
     hints: Option<&Hints>,
     iterations: Iterations,
     effort: Effort,
-) -> Result<TurnCut<'a>, MaskError> {
-    if turn.frames < MIN_TURN_FRAMES || turn.full != frame.dimensions() {
-        return Err(MaskError::FewFrames { found: turn.frames });
+) -> Result<Bitmap, MaskError> {
+    turn.check()?;
+    if turn.full != frame.dimensions() {
+        return Err(MaskError::FewFrames { found: 0 });
     }
     let table = LabTable::new();
     let (known, share) = known(hints, frame.dimensions())?;
@@ -326,6 +432,7 @@ pub(super) fn segment<'a>(
     let at_fine = at_fine.ok_or(MaskError::FewFrames { found: 0 })?;
     let (mut labels, mut models) = cut_turn(turn, &levels[at_fine..], share, iterations)?;
     let mut size = fine.size;
+    take_rim_away(fine, &mut labels);
     labels = register(frame, &levels[at_fine], fine, &labels, &table);
     for (steps, level) in levels[..at_fine].iter().rev().enumerate() {
         let field = FrameInTurn {
@@ -345,65 +452,19 @@ pub(super) fn segment<'a>(
         (labels, size) = (finer, level.size());
     }
     let object = labels.iter().map(|label| label.is_object());
-    Ok(TurnCut {
-        object: Bitmap::new(frame.dimensions(), object),
-        field: fine,
-        factor: 1 << at_fine,
-    })
+    Ok(Bitmap::new(frame.dimensions(), object))
 }
 
-/// The result of a cut by a turn, and what other results can be compared by.
-pub(super) struct TurnCut<'a> {
-    pub(super) object: Bitmap,
-    field: &'a TurnField,
-    /// The frame is so many times larger than the field.
-    factor: usize,
-}
-
-impl TurnCut<'_> {
-    /// How well an outline follows what moves differently: the mean over its edges of the strength of
-    /// the contrast there, 0..=1.
-    pub(super) fn outline(&self, object: &Bitmap, width: usize) -> f32 {
-        let (columns, rows) = self.field.size;
-        let is_object = |at: usize| {
-            let (x, y) = (at % columns * self.factor, at / columns * self.factor);
-            object.bits().get(y * width + x).copied().unwrap_or(false)
-        };
-        let scale = grab_cut::contrast_scale(self.field);
-        let (mut sum, mut edges) = (0.0, 0.0);
-        for at in 0..columns * rows {
-            for direction in [4, 6] {
-                let next = neighbour(at, direction, self.field.size);
-                if let Some(next) = next.filter(|&next| is_object(next) != is_object(at)) {
-                    // The edge may lie a pixel beside it.
-                    let strongest = self.strongest_near(at).max(self.strongest_near(next));
-                    sum += 1.0 - (-scale * strongest).exp();
-                    edges += 1.0;
-                }
-            }
+/// Makes what hangs on the object as the table's rim background.
+fn take_rim_away(turn: &TurnField, labels: &mut [Label]) {
+    let (width, height) = turn.size;
+    let object = labels.iter().map(|label| label.is_object());
+    let object = Bitmap::new((width as u32, height as u32), object);
+    let left = without_rim(&object, &turn.table, turn.size);
+    for (label, &object) in labels.iter_mut().zip(left.bits()) {
+        if !label.is_sure() {
+            *label = Label::probably(object);
         }
-        sum / f32::max(edges, 1.0)
-    }
-
-    fn strongest_near(&self, at: usize) -> f32 {
-        let contrasts = self.field.contrasts[at].iter();
-        contrasts.copied().fold(0.0, f32::max)
-    }
-
-    /// Whether anything moves: the median change of the brightness away from the table.
-    pub(super) fn moves(&self) -> bool {
-        let mut changes: Vec<f32> = self
-            .field
-            .features
-            .iter()
-            .map(|feature| feature[3])
-            .collect();
-        let upper = changes.len() * 3 / 4;
-        if changes.is_empty() {
-            return false;
-        }
-        let (_, change, _) = changes.select_nth_unstable_by(upper, f32::total_cmp);
-        *change > CHANGE_WEIGHT * STILL.ln_1p()
     }
 }
 

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use image::{GrayImage, Luma, RgbImage};
 use relit_data::geometry::Rect;
 use relit_mask::{
-    Hints, Iterations, MaskError, MaskScore, Seeds, SegmentSettings, opencv_grab_cut, score,
-    segment,
+    Effort, Hints, Iterations, MaskError, MaskScore, Seeds, SegmentSettings, opencv_grab_cut,
+    score, segment_with,
 };
 
 use super::MaskingError;
@@ -53,6 +53,8 @@ pub struct BenchRow {
     pub ours: MaskScore,
     /// The mask of OpenCV's GrabCut after 5 iterations.
     pub opencv: MaskScore,
+    /// Our mask, cut at the image's own size instead of coarse to fine; if it was asked for.
+    pub whole: Option<MaskScore>,
 }
 
 /// One image of the folder.
@@ -89,11 +91,12 @@ pub fn bench_images(folder: &Path) -> Result<Vec<BenchImage>, MaskingError> {
     Ok(images)
 }
 
-/// Measures our mask and OpenCV's on one image, for each hint that it has.
+/// Measures our mask and OpenCV's on one image, for each hint that it has; with `whole` also ours cut at
+/// the image's own size.
 ///
 /// # Errors
 /// [`MaskingError::Io`], [`MaskingError::Bench`] for a file that cannot be used, or the error of segmenting.
-pub fn bench_image(entry: &BenchImage) -> Result<Vec<BenchRow>, MaskingError> {
+pub fn bench_image(entry: &BenchImage, whole: bool) -> Result<Vec<BenchRow>, MaskingError> {
     let image = open(&entry.path)?.into_rgb8();
     let truth_path = entry.beside("gt.png");
     let truth = open(&truth_path)?.into_luma8();
@@ -110,16 +113,26 @@ pub fn bench_image(entry: &BenchImage) -> Result<Vec<BenchRow>, MaskingError> {
         rows.push(BenchRow {
             image: entry.name.clone(),
             prompt,
-            ours: measure(&ours(&image, &hints)?)?,
+            ours: measure(&ours(&image, &hints, Effort::Fine)?)?,
             opencv: measure(&opencv_grab_cut(&image, &hints, Iterations::default())?)?,
+            whole: match whole {
+                true => Some(measure(&ours(&image, &hints, Effort::Whole)?)?),
+                false => None,
+            },
         });
     }
     Ok(rows)
 }
 
 /// A hint for which there is no mask leaves everything background.
-fn ours(image: &RgbImage, hints: &Hints) -> Result<GrayImage, MaskingError> {
-    match segment(image, hints, &SegmentSettings::default()) {
+fn ours(image: &RgbImage, hints: &Hints, effort: Effort) -> Result<GrayImage, MaskingError> {
+    match segment_with(
+        image,
+        None,
+        Some(hints),
+        &SegmentSettings::default(),
+        effort,
+    ) {
         Ok(mask) => Ok(mask.image().clone()),
         Err(MaskError::Empty) => Ok(GrayImage::new(image.width(), image.height())),
         Err(error) => Err(error.into()),

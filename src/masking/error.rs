@@ -63,6 +63,14 @@ pub enum MaskingError {
         /// This software.
         now: String,
     },
+    /// A mask that cannot be checked.
+    #[error("the mask {path} cannot be checked: {why}")]
+    Check {
+        /// The mask.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
     /// A folder or file that cannot be measured with.
     #[error("{path} cannot be measured: {why}")]
     Bench {

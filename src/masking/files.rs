@@ -78,7 +78,7 @@ pub(super) fn check_replaceable(files: &MaskFiles, force: bool) -> Result<(), Ma
     }
 }
 
-fn read_if_exists(path: &Path) -> Result<Option<Vec<u8>>, MaskingError> {
+pub(super) fn read_if_exists(path: &Path) -> Result<Option<Vec<u8>>, MaskingError> {
     match fs::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),

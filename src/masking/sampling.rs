@@ -1,5 +1,6 @@
 //! Frames of a turn, spread over a video.
 
+use image::RgbImage;
 use relit_data::geometry::Rect;
 use relit_mask::{TURN_FRAMES, Turn, TurnStatistics};
 use relit_video::Video;
@@ -31,21 +32,29 @@ pub(super) fn read_turn(
     };
     let mut frames = Vec::new();
     let mut turn = Turn::new(width, height);
-    let whole = Rect::new(0, 0, width, height);
-    for pending in video.read(&numbers, DECODERS)? {
-        let Ok(picture) = video.picture(pending) else {
-            continue;
-        };
-        if picture.size() != (width, height) {
-            continue;
-        }
-        if let Ok(image) = picture.rgb(whole) {
-            frames.push(picture.number());
-            turn.push(&image);
-        }
+    for (number, picture) in pictures(video, &numbers, (width, height))? {
+        frames.push(number);
+        turn.push(&picture);
     }
     let statistics = TurnStatistics::new(&turn);
     Ok(Some(SampledTurn { frames, statistics }))
+}
+
+/// Reads frames one after the other. Those that cannot be decoded, or have another size, are left out.
+pub(super) fn pictures<'a>(
+    video: &'a Video,
+    numbers: &[u64],
+    (width, height): (u32, u32),
+) -> Result<impl Iterator<Item = (u64, RgbImage)> + use<'a>, MaskingError> {
+    let whole = Rect::new(0, 0, width, height);
+    let pending = video.read(numbers, DECODERS)?;
+    Ok(pending.filter_map(move |pending| {
+        let picture = video.picture(pending).ok()?;
+        if picture.size() != (width, height) {
+            return None;
+        }
+        Some((picture.number(), picture.rgb(whole).ok()?))
+    }))
 }
 
 /// Up to `count` frames of the video at equal distances, without those that are known to be damaged.

@@ -232,6 +232,15 @@ fn a_turn_of_too_few_frames_leaves_the_decision_to_the_hints_and_says_so() {
 }
 
 #[test]
+fn a_turn_without_any_frame_is_refused() {
+    let settings = SegmentSettings::default();
+    let alone = segment_turn(&turn_frame(0), &statistics(0), None, &settings);
+    assert!(matches!(alone, Err(MaskError::FewFrames { found: 0 })));
+    let other = TurnStatistics::new(&Turn::new(0, 0));
+    assert_eq!(other.frames(), 0);
+}
+
+#[test]
 fn a_video_in_which_nothing_moves_gives_a_warning() {
     let mut still = Turn::new(WIDTH, HEIGHT);
     (0..8).for_each(|_| still.push(&disc()));

@@ -6,7 +6,9 @@
 )]
 
 mod browser;
+mod check;
 mod chromium;
+mod degenerate;
 mod editing;
 mod editor;
 mod program;

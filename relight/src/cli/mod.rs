@@ -14,7 +14,7 @@ use clap::{ArgMatches, CommandFactory, Error, FromArgMatches, Parser, Subcommand
 
 #[cfg(feature = "train")]
 use commands::train;
-use commands::{decompose, eval, insert, relight, render, synth, weights};
+use commands::{decompose, eval, insert, relight, render, synth, turn, weights};
 use console::Console;
 
 /// Single-view relighting: photographs taken apart, light, rendering, data with truth, measures of the results.
@@ -56,6 +56,9 @@ enum Verb {
     #[cfg(feature = "train")]
     #[command(after_help = train::EXAMPLES)]
     Train(train::Arguments),
+    /// Take a whole turn apart: normals, albedo and light from the angle that the light turns by.
+    #[command(after_help = turn::EXAMPLES)]
+    Turn(turn::Arguments),
     /// Convert weights of networks.
     #[command(after_help = weights::EXAMPLES)]
     Weights(weights::Arguments),
@@ -73,6 +76,7 @@ impl Verb {
             Self::Synth(arguments) => arguments.fault(),
             #[cfg(feature = "train")]
             Self::Train(_) => None,
+            Self::Turn(_) => None,
             Self::Weights(arguments) => arguments.fault(),
         }
     }
@@ -95,6 +99,7 @@ pub(crate) fn run() -> ExitCode {
         Verb::Synth(arguments) => synth::run(&arguments, console),
         #[cfg(feature = "train")]
         Verb::Train(arguments) => train::run(&arguments, console),
+        Verb::Turn(arguments) => turn::run(&arguments, console),
         Verb::Weights(arguments) => weights::run(&arguments, console),
     })
 }

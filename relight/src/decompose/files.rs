@@ -257,7 +257,7 @@ fn ball(found: &Decomposition) -> Rgb<Linear> {
 }
 
 /// Writes light as a PNG of 16 bits, sRGB; the light that its largest value stands for.
-fn write_light(path: &Path, light: &Rgb<Linear>) -> Result<f32, ImageError> {
+pub(crate) fn write_light(path: &Path, light: &Rgb<Linear>) -> Result<f32, ImageError> {
     let (encoded, white) = encoded(light.planes());
     write_png(path, &encoded, Depth::Sixteen)?;
     Ok(white)
@@ -280,7 +280,7 @@ fn encoded<const C: usize>(light: &Planes<C>) -> (Planes<C>, f32) {
 }
 
 /// The value that one in two hundred under the mask exceeds; 1 where all is dark.
-fn bright<const C: usize>(planes: &Planes<C>, mask: &Planes<1>) -> f32 {
+pub(crate) fn bright<const C: usize>(planes: &Planes<C>, mask: &Planes<1>) -> f32 {
     let channels = planes.planes();
     let brightest = |at: usize| {
         channels

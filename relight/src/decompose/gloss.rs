@@ -24,7 +24,7 @@ pub struct FittedGloss {
 /// The gloss whose highlight in this light is nearest to the one that is given: the best of a few
 /// smoothnesses, each with its s_p by least squares. None where there is no highlight, or none that
 /// the light explains.
-pub(super) fn fit_gloss(
+pub(crate) fn fit_gloss(
     light: &ShLight,
     normals: &Normals<YUp>,
     highlight: &Planes<1>,

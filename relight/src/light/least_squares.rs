@@ -29,6 +29,23 @@ impl NormalEquations {
         }
     }
 
+    /// Adds equations of which the sums of products are known: of factors `i` and `j <= i`, and of factor `i`
+    /// and the value.
+    pub(crate) fn add_sums(
+        &mut self,
+        product: impl Fn(usize, usize) -> f64,
+        right: impl Fn(usize) -> [f64; 3],
+    ) {
+        for i in 0..self.unknowns {
+            for j in 0..=i {
+                self.matrix[i * self.unknowns + j] += product(i, j);
+            }
+            for (sum, value) in self.right[i].iter_mut().zip(right(i)) {
+                *sum += value;
+            }
+        }
+    }
+
     /// Draws the unknowns from `first` on towards 0, by `part` of the mean of the diagonal: with it, few
     /// or equal equations have a solution too.
     pub(crate) fn add_ridge(&mut self, first: usize, part: f64) {

@@ -16,6 +16,7 @@ Examples:
   relit-mask 20261120T093015Z-mug --edit
   relit-mask clip.mp4 --seeds seeds.png --frame 30 -o masks/mug.png
   relit-mask sessions/ --rect 610,240,420,380 --keep-all
+  relit-mask check 20261120T093015Z-mug
   relit-mask bench images/
 
 Check mask-preview.png afterwards. Exit codes: 0 all masks made, 1 none, 2 wrong usage, \
@@ -40,12 +41,30 @@ pub(crate) struct CommandLine {
 /// What is done other than making masks.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Verb {
+    /// Hold the mask of a recording against all its frames; writes NAME-check.html beside it
+    #[command(
+        after_help = "Example:\n  relit-mask check 20261120T093015Z-mug\n\nExit codes: 0 the mask fits, 1 it does not or could not be checked."
+    )]
+    Check {
+        /// A session folder, a folder of sessions, or a video
+        #[arg(value_name = "SESSION")]
+        input: PathBuf,
+        /// The mask [default: mask.png in the session folder, or here]
+        #[arg(long, value_name = "PNG")]
+        mask: Option<PathBuf>,
+        /// Print one JSON line per event on standard output
+        #[arg(long)]
+        json: bool,
+    },
     /// Measure masks of images with truth, and OpenCV's GrabCut beside them
     #[command(after_help = "Example:\n  relit-mask bench images/")]
     Bench {
         /// A folder with NAME.jpg, NAME.gt.png, and NAME.box.txt or NAME.scribble.png for each image
         #[arg(value_name = "DIR")]
         folder: PathBuf,
+        /// Measure also our masks cut at each image's own size, which coarse to fine comes close to
+        #[arg(long)]
+        whole: bool,
         /// Print one JSON line per event on standard output
         #[arg(long)]
         json: bool,

@@ -11,13 +11,13 @@ use serde_json::{Value, json};
 const WORSE_BY: f64 = 0.02;
 
 /// Measures every image, and prints a line for each and one for the average.
-pub(crate) fn run(console: Console, folder: &Path) -> Result<Outcome, MaskingError> {
+pub(crate) fn run(console: Console, folder: &Path, whole: bool) -> Result<Outcome, MaskingError> {
     let images = bench_images(folder)?;
     let bar = console.progress(images.len() as u64, "images");
     bar.suspend(|| print_head(console));
     let mut rows = Vec::new();
     for image in &images {
-        for row in bench_image(image)? {
+        for row in bench_image(image, whole)? {
             bar.suspend(|| print_row(console, &row));
             rows.push(row);
         }
@@ -56,13 +56,17 @@ fn print_head(console: Console) {
 }
 
 fn print_row(console: Console, row: &BenchRow) {
-    let text = line(&row.image, row.prompt, &row.ours, &row.opencv);
+    let mut text = line(&row.image, row.prompt, &row.ours, &row.opencv);
+    if let Some(whole) = &row.whole {
+        text += &format!("  cut whole: IoU {:.3}", whole.iou);
+    }
     let event = json!({
         "event": "image",
         "image": row.image,
         "hint": row.prompt.name(),
         "ours": figures(&row.ours),
         "opencv": figures(&row.opencv),
+        "whole": row.whole.as_ref().map(figures),
     });
     console.say(&text, &event);
 }
@@ -91,12 +95,23 @@ fn print_average(console: Console, prompt: Prompt, rows: &[BenchRow]) {
         0 => "no image is worse by more than 2 points of IoU".to_owned(),
         _ => format!("worse by more than 2 points of IoU: {}", worse.join(", ")),
     };
+    let whole: Vec<MaskScore> = rows.iter().filter_map(|row| row.whole).collect();
+    let whole = (!whole.is_empty()).then(|| average(whole.iter().copied()));
+    if let Some(whole) = &whole {
+        let points = 100.0 * (ours.iou - whole.iou);
+        text += &format!(
+            "\n{:<24} {:<8}  {points:+.2} points of IoU against masks cut whole",
+            "",
+            prompt.name()
+        );
+    }
     let event = json!({
         "event": "average",
         "hint": prompt.name(),
         "images": rows.len(),
         "ours": figures(&ours),
         "opencv": figures(&opencv),
+        "whole": whole.as_ref().map(figures),
         "error_ratio": ratio,
         "worse": worse,
     });

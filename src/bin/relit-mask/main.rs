@@ -2,6 +2,7 @@
 
 mod arguments;
 mod benching;
+mod checking;
 mod making;
 mod report;
 
@@ -15,9 +16,20 @@ use arguments::{CommandLine, Verb};
 fn main() -> ExitCode {
     let line = CommandLine::parse();
     match (line.verb, line.mask) {
-        (Some(Verb::Bench { folder, json }), _) => {
+        (Some(Verb::Check { input, mask, json }), _) => {
             let console = Console::new(json);
-            console.finish(benching::run(console, &folder))
+            console.finish(checking::run(console, &input, mask.as_deref()))
+        }
+        (
+            Some(Verb::Bench {
+                folder,
+                whole,
+                json,
+            }),
+            _,
+        ) => {
+            let console = Console::new(json);
+            console.finish(benching::run(console, &folder, whole))
         }
         (None, Some(arguments)) => making::run(&arguments),
         (None, None) => {

@@ -10,7 +10,7 @@ use super::template::{Template, TemplatePixel};
 /// Steps; fewer where it stands still.
 const MOST_STEPS: usize = 8;
 /// A shift that changes by less stands still, pixels.
-const STILL: f64 = 2e-3;
+const STILL: f64 = 5e-3;
 /// Largest step, pixels: beyond, the first order does not hold.
 const LONGEST_STEP: f64 = 1.0;
 /// Deviations at which a pixel's weight is a quarter.
@@ -20,7 +20,7 @@ const FAR_OUTLIER: f32 = 6.0;
 /// Fewest pixels from which a shift is measured.
 const LEAST_PIXELS: usize = 60;
 /// Pixels that are looked at in a search.
-const SEARCH_PIXELS: usize = 3000;
+const SEARCH_PIXELS: usize = 1000;
 /// The object has structure in one direction only if the other has less than this part of its weight.
 const LEAST_CROSS: f64 = 1e-3;
 

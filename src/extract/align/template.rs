@@ -9,7 +9,7 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use super::structure::{Plane, add_scaled, cubic};
 
 /// Pixels of a template; those that say most about a shift are kept.
-const MOST_PIXELS: usize = 20_000;
+const MOST_PIXELS: usize = 8_000;
 /// Deviation of the gradients by noise.
 const NOISE: f32 = 0.01;
 

@@ -8,4 +8,5 @@ pub(super) mod render;
 pub(super) mod synth;
 #[cfg(feature = "train")]
 pub(super) mod train;
+pub(super) mod turn;
 pub(super) mod weights;

@@ -1,0 +1,316 @@
+//! `relight turn`: a whole turn into normals, albedo, light and what they leave over.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use relight::light::{Order, Panorama, ShLight};
+use relight::turn::{
+    Conditioning, Elevation, ElevationSource, Filmed, NormalsSource, ProbePlace, ReadTurn,
+    RoomStrip, RoomVerdict, TableFrame, TableSense, TurnFiles, TurnLabels, TurnMaps, TurnOptions,
+    film, prior_normals, read_curves, solve_turn,
+};
+use serde_json::json;
+
+use crate::cli::console::{CommandResult, Console, Outcome};
+use crate::cli::values::YName;
+
+pub(in crate::cli) const EXAMPLES: &str = "\
+Examples:
+  relight turn 20261120T093015Z-mug.tar --elevation 18 -o mug
+      a turn in unknown light: mug/normal.png, albedo.png, light.json, contact.png, relit.mp4 ...
+  relight turn mug.tar --elevation 18 --light light.txt -o mug
+      the light was measured: coefficients in the viewer's frame at the table's angle 0, or a panorama
+  relight turn mug.tar --rim 812,251 --normals none -o mug
+      the table's rim is an ellipse of 812 x 251 pixels; no network, but the outline to start from";
+
+#[derive(Args)]
+pub(in crate::cli) struct Arguments {
+    /// The shard of one turn (.tar), or a folder that holds one turn.
+    #[arg(value_name = "SHARD")]
+    shard: PathBuf,
+    /// The folder for the results.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// How high the camera looks down on the table, degrees: 0 from the side, 90 from above [default: 18, and 8
+    /// either way].
+    #[arg(long, value_name = "DEGREES", value_parser = elevation, conflicts_with = "rim")]
+    elevation: Option<Elevation>,
+    /// Width and height, pixels, of the ellipse that the table's rim is in the video: another way to say the
+    /// elevation.
+    #[arg(long, value_name = "W,H", value_parser = rim)]
+    rim: Option<Elevation>,
+    /// The light where it is known, in the viewer's frame at the table's angle 0: coefficients of spherical harmonics
+    /// (nine lines of red, green and blue, or up to 49), or a panorama (.hdr, .exr).
+    #[arg(long, value_name = "FILE")]
+    light: Option<PathBuf>,
+    /// The session from which the shard was made, or its video: to see the room (room.png), and the ball of --probe. Needs the
+    /// program ffmpeg.
+    #[arg(long, value_name = "PATH")]
+    session: Option<PathBuf>,
+    /// A matt grey ball on the table, which measures the light: its middle and radius in the video, pixels. The light is then in
+    /// units in which the ball's albedo is 1.
+    #[arg(long, value_name = "X,Y,R", value_parser = probe, requires = "session", conflicts_with = "light")]
+    probe: Option<ProbePlace>,
+    /// Normals to start from: "shipped" (the network that comes with the program), "none", a network (.onnx, or weights
+    /// of decompose: .safetensors, .pth), a map of normals (.png, .exr), or a folder with normal.png
+    /// [default: shipped, and none with --light].
+    #[arg(long, value_name = "FROM")]
+    normals: Option<String>,
+    /// Which way y points in these normals.
+    #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up)]
+    normals_y: YName,
+    /// How much these normals count beside what the turn says.
+    #[arg(long, value_name = "WEIGHT", default_value_t = TurnOptions::default().prior_weight, value_parser = weight)]
+    normals_weight: f64,
+    /// Which way the table turns as its angle grows, seen from above.
+    #[arg(long, value_enum, default_value_t = SenseName::CounterClockwise)]
+    sense: SenseName,
+    /// Write the object as one file that can be lit, object.relit.
+    #[arg(long, value_name = "FILE")]
+    asset: Option<PathBuf>,
+    /// Write twelve frames with what was found as their truth, in the layout of synth, for train to read.
+    #[arg(long, value_name = "DIR")]
+    labels: Option<PathBuf>,
+    /// The least confidence, 0 to 1, of pixels in the labels.
+    #[arg(long, value_name = "PART", default_value_t = 0.3, value_parser = part, requires = "labels")]
+    labels_confidence: f32,
+    /// Do not write the video, which needs the program ffmpeg.
+    #[arg(long)]
+    no_video: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum SenseName {
+    /// The background moves to the right.
+    CounterClockwise,
+    /// The background moves to the left.
+    Clockwise,
+}
+
+impl Arguments {
+    fn sense(&self) -> TableSense {
+        match self.sense {
+            SenseName::CounterClockwise => TableSense::CounterClockwise,
+            SenseName::Clockwise => TableSense::Clockwise,
+        }
+    }
+
+    /// The normals to start from, and how they are named.
+    fn normals(&self) -> Option<(NormalsSource, &str)> {
+        match self.normals.as_deref() {
+            None if self.light.is_some() || self.probe.is_some() => None,
+            Some("none") => None,
+            None | Some("shipped") => Some((NormalsSource::Shipped, "shipped")),
+            Some(path) => Some((NormalsSource::of(Path::new(path)), path)),
+        }
+    }
+
+    fn elevation(&self) -> Elevation {
+        let given = self.elevation.or(self.rim);
+        given.unwrap_or_else(Elevation::assumed)
+    }
+
+    /// `measured` is the light by the ball.
+    fn options(
+        &self,
+        turn: &ReadTurn,
+        measured: Option<ShLight>,
+    ) -> Result<TurnOptions, Box<dyn Error>> {
+        let prior = self.normals().map(|(source, _)| {
+            prior_normals(&source, self.normals_y.into(), &turn.first, &turn.mask)
+        });
+        Ok(TurnOptions {
+            elevation: self.elevation(),
+            light: match &self.light {
+                Some(path) => Some(read_light(path)?),
+                None => measured,
+            },
+            prior: prior.transpose()?,
+            prior_weight: self.normals_weight,
+        })
+    }
+}
+
+pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandResult {
+    let start = Instant::now();
+    let bar = console.progress(0, "frames");
+    let turn = read_curves(&arguments.shard, arguments.sense(), &|done, all| {
+        bar.set_length(all);
+        bar.set_position(done);
+    })?;
+    bar.finish_and_clear();
+    let read_seconds = start.elapsed().as_secs_f64();
+    let mut filmed = arguments
+        .session
+        .as_ref()
+        .map(|path| {
+            let bar = console.progress(0, "frames of the video");
+            film(path, &turn, arguments.probe, &|done, all| {
+                bar.set_length(all);
+                bar.set_position(done);
+            })
+        })
+        .transpose()?;
+    let measured = filmed
+        .as_mut()
+        .map(|filmed| filmed.light(&TableFrame::new(arguments.elevation())))
+        .transpose()?
+        .flatten();
+    let options = arguments.options(&turn, measured)?;
+    let conditioning = Conditioning::of(&turn.curves);
+    let solution = solve_turn(&turn.curves, &options)?;
+    let maps = TurnMaps::new(&turn.curves, &solution);
+    let strip = filmed.as_ref().and_then(Filmed::strip);
+    let given = arguments
+        .light
+        .as_ref()
+        .map(|path| path.display().to_string());
+    let light_source = given.or_else(|| arguments.probe.map(|_| "probe".to_owned()));
+    let figures = TurnFiles {
+        turn: &turn,
+        solution: &solution,
+        maps: &maps,
+        conditioning,
+        light_source: light_source.as_deref(),
+        normals_source: arguments.normals().map(|(_, name)| name),
+        strip,
+        has_movie: !arguments.no_video,
+    }
+    .write(&arguments.output)?;
+    if let Some(path) = &arguments.asset {
+        solution.asset(&turn)?.write(path)?;
+    }
+    if let Some(folder) = &arguments.labels {
+        let labels = TurnLabels {
+            turn: &turn,
+            solution: &solution,
+            least_confidence: arguments.labels_confidence,
+        };
+        labels.write(folder)?;
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    let text = format!(
+        "{}: {} frames in {read_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees (median), light {}",
+        arguments.output.display(),
+        turn.curves.frames(),
+        solution.expected_error_deg(),
+        match (&arguments.light, arguments.probe) {
+            (Some(_), _) => "given",
+            (None, Some(_)) => "measured",
+            (None, None) => "found",
+        },
+    );
+    let event = json!({
+        "event": "turned",
+        "output": arguments.output,
+        "seconds": seconds,
+        "reading_seconds": read_seconds,
+        "figures": figures,
+    });
+    console.say(&text, &event);
+    if arguments.session.is_some() {
+        warn_of_room(strip, arguments.sense, console);
+    }
+    Ok(warn(&turn, &options, conditioning, console))
+}
+
+/// Says where the room does not fit.
+fn warn_of_room(strip: Option<&RoomStrip>, sense: SenseName, console: Console) {
+    let text = match strip.map(|strip| strip.figures().sense) {
+        // Angles were negated for the other sense: with the right one they always grow counter-clockwise.
+        Some(TableSense::CounterClockwise) => return,
+        Some(TableSense::Clockwise) => {
+            let other = match sense {
+                SenseName::CounterClockwise => "clockwise",
+                SenseName::Clockwise => "counter-clockwise",
+            };
+            format!("the background moves the other way: the normals are mirrored, give --sense {other}")
+        }
+        None => "the two sides of the picture do not show the same room: there is no room.png, and the table's sense is not \
+                 checked"
+            .to_owned(),
+    };
+    console.warn(&text, &json!({ "event": "warning", "message": text }));
+}
+
+/// Says what a user should know; whether something was left out.
+fn warn(
+    turn: &ReadTurn,
+    options: &TurnOptions,
+    conditioning: Conditioning,
+    console: Console,
+) -> Outcome {
+    let warn = |text: &str| console.warn(text, &json!({ "event": "warning", "message": text }));
+    if options.elevation.source() == ElevationSource::Assumed {
+        warn(&format!(
+            "the camera's elevation is not known and taken as {} degrees, {} either way: give --elevation or --rim",
+            options.elevation.degrees(),
+            options.elevation.uncertainty_deg(),
+        ));
+    }
+    if !turn.has_angles {
+        warn("the frames have no angles: they are taken for evenly spread over one turn");
+    }
+    for damage in &turn.damage {
+        warn(damage);
+    }
+    if let Some(advice) = conditioning.verdict.advice() {
+        warn(advice);
+    }
+    if turn.damage.is_empty() && conditioning.verdict != RoomVerdict::TooEven {
+        Outcome::Whole
+    } else {
+        Outcome::Incomplete
+    }
+}
+
+/// The order to which a panorama is taken up: gloss shows more of it than a matt surface.
+const KNOWN_ORDER: usize = 6;
+
+fn read_light(path: &Path) -> Result<ShLight, Box<dyn Error>> {
+    let is_panorama = path.extension().is_some_and(|ending| {
+        ending.eq_ignore_ascii_case("hdr") || ending.eq_ignore_ascii_case("exr")
+    });
+    if is_panorama {
+        let order = Order::new(KNOWN_ORDER).unwrap_or(Order::TWO);
+        return Ok(Panorama::read(path)?.project(order));
+    }
+    Ok(ShLight::read(path)?)
+}
+
+fn elevation(text: &str) -> Result<Elevation, String> {
+    let degrees = text.parse().map_err(|_| "give degrees".to_owned())?;
+    Elevation::given(degrees).map_err(|error| error.to_string())
+}
+
+fn rim(text: &str) -> Result<Elevation, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(str::parse).collect();
+    match numbers.as_deref() {
+        Ok(&[width, height]) => Elevation::of_rim(width, height).map_err(|error| error.to_string()),
+        _ => Err("give W,H: width and height of the ellipse, pixels".to_owned()),
+    }
+}
+
+fn probe(text: &str) -> Result<ProbePlace, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(str::parse).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, radius]) => ProbePlace::new([x, y], radius).map_err(|error| error.to_string()),
+        _ => Err("give X,Y,R: middle and radius of the ball, pixels".to_owned()),
+    }
+}
+
+fn weight(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(weight) if (0.0..=100.0).contains(&weight) => Ok(weight),
+        _ => Err("give a number from 0 to 100".to_owned()),
+    }
+}
+
+fn part(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(part) if (0.0..=1.0).contains(&part) => Ok(part),
+        _ => Err("give a number from 0 to 1".to_owned()),
+    }
+}

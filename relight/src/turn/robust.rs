@@ -1,0 +1,88 @@
+//! Which parts of the turn a pixel's fit may believe: not those in which it is in another's shadow or shows
+//! a highlight.
+
+use super::TurnCurves;
+use super::light::{MATT_WAVES, WAVES};
+use super::moments::{Moments, PixelWaves};
+use super::search::{PixelFit, Room};
+
+/// Residuals of so many deviations count a quarter.
+const WIDTH: f64 = 2.0;
+/// The least deviation, as a part of the pixel's mean light.
+const LEAST_DEVIATION: f64 = 0.01;
+
+/// The least part of what is seen that the model is taken to explain.
+const LEAST_MODEL: f64 = 0.1;
+
+/// How far each part of the turn is to be believed for a pixel, 0 to 1: near 0 where the fit is far from what
+/// is seen, measured by the median of how far it is elsewhere.
+pub(super) fn trust(curves: &TurnCurves, pixel: usize, fit: &PixelFit, room: &Room) -> Vec<f32> {
+    let rest = rest(curves, pixel, fit, room);
+    let mut sizes: Vec<f64> = rest.iter().flatten().map(|rest| rest.abs()).collect();
+    if sizes.is_empty() {
+        return vec![1.0; rest.len()];
+    }
+    let middle = sizes.len() / 2;
+    let (_, &mut median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    let deviation = 1.4826 * median + LEAST_DEVIATION;
+    let trust = |rest: &Option<f64>| {
+        let size = rest.unwrap_or(0.0) / (WIDTH * deviation);
+        (1.0 / (1.0 + size * size).powi(2)) as f32
+    };
+    rest.iter().map(trust).collect()
+}
+
+/// The light by which what is left of a pixel is measured: the model's mean over the turn, or a tenth of what is
+/// seen where that is more.
+pub(super) fn reference(curves: &TurnCurves, pixel: usize, fit: &PixelFit, room: &Room) -> f64 {
+    let waves = room.waves(fit.normal);
+    let model: f64 = (0..3).map(|c| fit.albedo[c] * waves.matt[c][0]).sum();
+    let seen: f64 = Moments::mean(curves, pixel).iter().sum();
+    (model.max(LEAST_MODEL * seen) / 3.0).max(1e-6)
+}
+
+/// How much more light than the fit's each part of the turn has, the mean of the channels, over the
+/// [`reference`]; none where all channels are clipped.
+pub(super) fn rest(
+    curves: &TurnCurves,
+    pixel: usize,
+    fit: &PixelFit,
+    room: &Room,
+) -> Vec<Option<f64>> {
+    let waves = room.waves(fit.normal);
+    let reference = reference(curves, pixel, fit, room);
+    let parts = curves.values(pixel).iter().zip(curves.weights(pixel));
+    parts
+        .zip(curves.waves())
+        .map(|((value, weight), basis)| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for channel in (0..3).filter(|&c| weight[c] > 0.0) {
+                let model = model(&waves, fit.albedo[channel], channel, basis);
+                sum += f64::from(value[channel]) - model;
+                count += 1.0;
+            }
+            (count > 0.0).then(|| sum / count / reference)
+        })
+        .collect()
+}
+
+/// What a channel shows where the waves' basis has these values.
+fn model(waves: &PixelWaves, albedo: f64, channel: usize, basis: &[f64; WAVES]) -> f64 {
+    let matt: f64 = (0..MATT_WAVES)
+        .map(|i| waves.matt[channel][i] * basis[i])
+        .sum();
+    let gloss: f64 = (0..WAVES).map(|i| waves.gloss[channel][i] * basis[i]).sum();
+    albedo * matt + gloss
+}
+
+/// What the room's matt light and its gloss make of a pixel at an angle: its irradiance, and the gloss.
+pub(super) fn lit(room: &Room, normal: [f64; 3], basis: &[f64; WAVES]) -> [[f64; 3]; 2] {
+    let waves = room.waves(normal);
+    let dot = |waves: &[f64]| -> f64 { waves.iter().zip(basis).map(|(a, b)| a * b).sum() };
+    let (mut matt, mut gloss) = ([0.0; 3], [0.0; 3]);
+    for channel in 0..3 {
+        matt[channel] = dot(&waves.matt[channel]);
+        gloss[channel] = dot(&waves.gloss[channel]);
+    }
+    [matt, gloss]
+}

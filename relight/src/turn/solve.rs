@@ -1,0 +1,610 @@
+//! Normals, albedo and light of a whole turn.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::gloss::{GLOSS_ORDER, GlossLight};
+use super::joint::{Joint, Unknowns};
+use super::moments::Moments;
+use super::robust::trust;
+use super::room::{KnownLight, fit_matt_room};
+use super::search::{Expected, PixelFit, Room, Search, unit};
+use super::start::{blurred, inflated};
+use super::{Elevation, TableFrame, TableLight, TurnCurves, TurnError};
+use crate::image::{Linear, Planes, Rgb};
+use crate::light::{Normals, ShLight, YUp};
+
+/// Pixels on which an unknown light is looked for: more are averaged in blocks first.
+const COARSE_PIXELS: usize = 2500;
+/// Rounds of light and normals in turn, for a matt object, with which an unknown light begins.
+const ROUNDS: usize = 8;
+/// Then all that is unknown is refined together, in so many steps; after that the best normals are looked for anywhere,
+/// and so on for so many rounds.
+const JOINT_STEPS: usize = 8;
+const JOINT_ROUNDS: usize = 2;
+/// Steps for those whose highlights and shadows are left out.
+const ROBUST_STEPS: usize = 3;
+/// Bands of the room's light that gloss is fitted with, of order 0 and up.
+const GLOSS_BANDS: usize = GLOSS_ORDER + 1;
+/// How smooth the normals are that an unknown light is fitted to: the deviation in the first round, in parts of
+/// the frame's width, by how much it falls with each round, and the least, pixels.
+const FIRST_BLUR: f64 = 6.0 / 256.0;
+const BLUR_FALL: f64 = 0.8;
+const LEAST_BLUR: f64 = 0.6;
+/// How round the bodies are that an unknown light is started from.
+const HEIGHTS: [(&str, f64); 3] = [
+    ("outline", 1.0),
+    ("outline, flatter", 0.6),
+    ("outline, rounder", 1.6),
+];
+/// How much the normals of such a body count where there is no prior.
+const OUTLINE_WEIGHT: f64 = 0.15;
+/// Rounds in which what does not fit is left out.
+const ROBUST_ROUNDS: usize = 3;
+/// How far the surroundings of a pixel reach, in parts of the frame's width: a normal that differs from theirs is not to be
+/// believed as far.
+const SURROUNDINGS: f64 = 1.0 / 40.0;
+/// Degrees of freedom of what is left of a curve: fitted to the angles that its looseness stands for.
+const FREEDOM: f64 = 3.0;
+/// How far normals are off as a whole in unknown light, radians: a bend that light makes up for, which no residual
+/// shows. With a prior, and without.
+const BENT_WITH_PRIOR: f64 = 0.25;
+const BENT_ALONE: f64 = 0.35;
+/// What shade in hollows and bounced light do to normals in known light, radians.
+const BENT_IN_KNOWN_LIGHT: f64 = 0.08;
+/// How far a normal is off where nearly all of its light is clipped, radians.
+const CLIPPED_ERROR: f64 = 0.8;
+/// The expected error at which the confidence is one half, radians.
+const HALF_CONFIDENCE: f64 = 0.2;
+
+/// What is known of a turn beforehand.
+#[derive(Debug, Clone)]
+pub struct TurnOptions {
+    /// The camera over the table.
+    pub elevation: Elevation,
+    /// The light, in the viewer's frame at the table's angle 0, where it was measured; bands up to 6
+    /// count, those beyond 2 for gloss alone.
+    pub light: Option<ShLight>,
+    /// Normals to start from, where there are any.
+    pub prior: Option<Normals<YUp>>,
+    /// How much these count: `weight (1 - cos)` is added to what is left of a pixel's curve, over the energy
+    /// of its variation.
+    pub prior_weight: f64,
+}
+
+impl Default for TurnOptions {
+    fn default() -> Self {
+        Self {
+            elevation: Elevation::assumed(),
+            light: None,
+            prior: None,
+            prior_weight: 0.15,
+        }
+    }
+}
+
+/// How a start ended.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StartFigure {
+    /// Its name.
+    pub start: String,
+    /// What it left of the curves, with what its normals are off the prior.
+    pub residual: f64,
+    /// Whether its light was taken.
+    pub taken: bool,
+}
+
+/// Normals, albedo and light.
+#[derive(Debug, Clone)]
+pub struct TurnSolution {
+    /// One a pixel under the mask.
+    pub(super) fits: Vec<PixelFit>,
+    /// The angle that each normal is expected to be off, radians.
+    pub(super) expected_errors: Vec<f64>,
+    pub(super) room: Room,
+    pub(super) elevation: Elevation,
+    pub(super) starts: Vec<StartFigure>,
+    pub(super) had_prior: bool,
+}
+
+/// Finds the normals, albedo and light that explain the curves of a turn best.
+///
+/// With a known light every pixel is solved by itself. With an unknown one, light and normals are found in
+/// turns, from several starts, on blocks of pixels; the start with the least residual is taken. Then
+/// parts of the turn that a pixel's fit does not explain, shadows and highlights, are left out for that pixel,
+/// and it is fitted again.
+///
+/// # Errors
+/// Where the prior has another size, or no light explains the curves.
+pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolution, TurnError> {
+    let frame = TableFrame::new(options.elevation);
+    let expected = options
+        .prior
+        .as_ref()
+        .map(|prior| expected(curves, prior, options.prior_weight))
+        .transpose()?;
+    let has_shape = expected.is_some();
+    let expected = match (expected, &options.light) {
+        (None, None) => Some(of_outline(curves)),
+        (expected, _) => expected,
+    };
+    let known = options
+        .light
+        .as_ref()
+        .map(|light| KnownLight::new(light, &frame));
+    let (room, starts) = match &known {
+        Some(known) => (
+            find_gloss(curves, expected.as_deref(), &frame, known),
+            Vec::new(),
+        ),
+        None => find_light(curves, expected.as_deref(), has_shape, &frame)?,
+    };
+    let mut solver = Solver {
+        curves,
+        expected,
+        room,
+        has_shape,
+        known,
+        moments: all_moments(curves),
+        fits: Vec::new(),
+    };
+    solver.fits = solver.search(None);
+    for _ in 0..ROBUST_ROUNDS {
+        solver.refine();
+    }
+    let common = match (&options.light, &options.prior) {
+        (Some(_), _) => BENT_IN_KNOWN_LIGHT,
+        (None, Some(_)) => BENT_WITH_PRIOR,
+        (None, None) => BENT_ALONE,
+    };
+    let common = common.hypot(options.elevation.uncertainty_deg().to_radians());
+    let expected_errors = solver.expected_errors(common);
+    if solver.known.is_none() {
+        solver.normalise();
+    }
+    Ok(TurnSolution {
+        had_prior: options.prior.is_some(),
+        fits: solver.fits,
+        expected_errors,
+        room: solver.room,
+        elevation: options.elevation,
+        starts,
+    })
+}
+
+impl TurnSolution {
+    /// The normals in the viewer's frame.
+    #[must_use]
+    pub fn normals(&self, curves: &TurnCurves) -> Normals<YUp> {
+        Normals::new(curves.map(|pixel| self.fits[pixel].normal.map(|v| v as f32)))
+    }
+
+    /// The albedo: in the light's units where that was known, else in such units that the mean shading of the
+    /// object over the turn is 1 in each channel.
+    #[must_use]
+    pub fn albedo(&self, curves: &TurnCurves) -> Rgb<Linear> {
+        Rgb::new(curves.map(|pixel| self.fits[pixel].albedo.map(|v| v as f32)))
+    }
+
+    /// The shading over the whole turn, mean irradiance of each pixel.
+    #[must_use]
+    pub fn shading(&self, curves: &TurnCurves) -> Rgb<Linear> {
+        Rgb::new(curves.map(|pixel| {
+            let waves = self.room.waves(self.fits[pixel].normal);
+            waves.matt.map(|waves| waves[0].max(0.0) as f32)
+        }))
+    }
+
+    /// How far each normal is to be believed, 0 to 1: one half where it is expected to be off by 11.5 degrees.
+    #[must_use]
+    pub fn confidence(&self, curves: &TurnCurves) -> Planes<1> {
+        curves.map(|pixel| [confidence(self.expected_errors[pixel]) as f32])
+    }
+
+    /// The light.
+    #[must_use]
+    pub const fn light(&self) -> &TableLight {
+        &self.room.light
+    }
+
+    /// The camera over the table.
+    #[must_use]
+    pub const fn frame(&self) -> &TableFrame {
+        &self.room.frame
+    }
+
+    /// How each start of an unknown light ended; none where it was known.
+    #[must_use]
+    pub fn starts(&self) -> &[StartFigure] {
+        &self.starts
+    }
+
+    /// The median over the pixels of what is left of a curve, over the energy of its variation.
+    #[must_use]
+    pub fn residual(&self) -> f64 {
+        median(self.fits.iter().map(|fit| fit.residual))
+    }
+
+    /// The median over the pixels of the angle that a normal is expected to be off, degrees.
+    #[must_use]
+    pub fn expected_error_deg(&self) -> f64 {
+        median(self.expected_errors.iter().copied()).to_degrees()
+    }
+}
+
+pub(super) fn confidence(expected_error: f64) -> f64 {
+    1.0 / (1.0 + (expected_error / HALF_CONFIDENCE).powi(2))
+}
+
+/// The lower of the two values in the middle; 0 where there are none.
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = (values.len() - 1) / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// All pixels under one light.
+struct Solver<'a> {
+    curves: &'a TurnCurves,
+    expected: Option<Vec<Expected>>,
+    room: Room,
+    known: Option<KnownLight>,
+    has_shape: bool,
+    moments: Vec<Moments>,
+    fits: Vec<PixelFit>,
+}
+
+impl Solver<'_> {
+    /// The best normals near others, or anywhere.
+    fn search(&self, near: Option<&[PixelFit]>) -> Vec<PixelFit> {
+        search_all(&self.room, &self.moments, self.expected.as_deref(), near)
+    }
+
+    /// Leaves out what does not fit, fits the room again, and then every pixel.
+    fn refine(&mut self) {
+        let (curves, room) = (self.curves, &self.room);
+        self.moments = (0..curves.pixels())
+            .into_par_iter()
+            .map(|pixel| {
+                let trust = trust(curves, pixel, &self.fits[pixel], room);
+                Moments::new(curves, pixel, Some(&trust))
+            })
+            .collect();
+        let every = self.moments.len().div_ceil(COARSE_PIXELS).max(1);
+        let moments: Vec<Moments> = self.moments.iter().step_by(every).copied().collect();
+        let fits: Vec<PixelFit> = self.fits.iter().step_by(every).copied().collect();
+        let expected = self.expected.as_ref();
+        let expected: Option<Vec<Expected>> =
+            expected.map(|all| all.iter().step_by(every).copied().collect());
+        let joint = Joint {
+            moments: &moments,
+            expected: expected.as_deref(),
+            unknowns: unknowns(self.known.as_ref(), self.has_shape),
+        };
+        let near = search_all(&self.room, &moments, joint.expected, Some(&fits));
+        (self.room, _) = joint.refined(self.room, near, ROBUST_STEPS);
+        self.fits = self.search(Some(&self.fits));
+    }
+
+    /// The normals around each pixel, smoothed.
+    fn surroundings(&self) -> Vec<[f64; 3]> {
+        let map = self
+            .curves
+            .map(|pixel| self.fits[pixel].normal.map(|v| v as f32));
+        let deviation = SURROUNDINGS * self.curves.extent().width as f64;
+        let smooth = blurred(&map, &self.curves.mask(), deviation.max(LEAST_BLUR));
+        let [x, y, z] = smooth.planes();
+        let at = |&place: &usize| unit([x, y, z].map(|plane| f64::from(plane[place])));
+        self.curves.places().iter().map(at).collect()
+    }
+
+    /// The error of each pixel by itself, and the one that all have in `common`.
+    fn expected_errors(&self, common: f64) -> Vec<f64> {
+        let search = Search::new(&self.room);
+        let surroundings = self.surroundings();
+        (0..self.fits.len())
+            .into_par_iter()
+            .map(|pixel| {
+                let moments = &self.moments[pixel];
+                if moments.is_dark() {
+                    return std::f64::consts::FRAC_PI_2;
+                }
+                let expected = self.expected.as_ref().map(|all| all[pixel]);
+                let fit = &self.fits[pixel];
+                let angle = search.looseness(moments, expected, fit, FREEDOM);
+                let clipped = CLIPPED_ERROR * self.curves.clipped_at(pixel);
+                let bent = super::search::dot(surroundings[pixel], fit.normal);
+                angle
+                    .hypot(common)
+                    .hypot(clipped)
+                    .hypot(bent.clamp(-1.0, 1.0).acos())
+                    .min(std::f64::consts::FRAC_PI_2)
+            })
+            .collect()
+    }
+
+    /// Brings the mean shading of each channel to 1.
+    fn normalise(&mut self) {
+        let mut sums = [0.0; 3];
+        for fit in &self.fits {
+            let waves = self.room.waves(fit.normal);
+            for (sum, waves) in sums.iter_mut().zip(waves.matt) {
+                *sum += waves[0];
+            }
+        }
+        let factors = sums.map(|sum| {
+            let mean = sum / self.fits.len() as f64;
+            if mean > 1e-12 { mean } else { 1.0 }
+        });
+        self.room.light = self.room.light.times(factors.map(|factor| 1.0 / factor));
+        for fit in &mut self.fits {
+            fit.albedo = [0, 1, 2].map(|c| fit.albedo[c] * factors[c]);
+        }
+    }
+}
+
+fn all_moments(curves: &TurnCurves) -> Vec<Moments> {
+    (0..curves.pixels())
+        .into_par_iter()
+        .map(|pixel| Moments::new(curves, pixel, None))
+        .collect()
+}
+
+/// The best normals of all pixels: near those of other fits, or anywhere.
+pub(super) fn search_all(
+    room: &Room,
+    moments: &[Moments],
+    expected: Option<&[Expected]>,
+    near: Option<&[PixelFit]>,
+) -> Vec<PixelFit> {
+    let search = Search::new(room);
+    moments
+        .par_iter()
+        .enumerate()
+        .map(|(pixel, moments)| {
+            let expected = expected.map(|all| all[pixel]);
+            if moments.is_dark() {
+                return PixelFit {
+                    normal: expected.map_or([0.0, 0.0, 1.0], |expected| expected.normal),
+                    albedo: [0.0; 3],
+                    residual: 1.0,
+                };
+            }
+            match near {
+                Some(fits) => search.near(moments, expected, fits[pixel].normal),
+                None => search.anywhere(moments, expected),
+            }
+        })
+        .collect()
+}
+
+/// What is left of the curves, with what normals are off those that are expected, the mean over the pixels.
+pub(super) fn cost(fits: &[PixelFit], expected: Option<&[Expected]>) -> f64 {
+    let sum: f64 = fits
+        .iter()
+        .enumerate()
+        .map(|(pixel, fit)| {
+            let off = expected.map_or(0.0, |all| {
+                let expected = all[pixel];
+                expected.weight * (1.0 - super::search::dot(expected.normal, fit.normal))
+            });
+            fit.residual.min(1.0) + off
+        })
+        .sum();
+    sum / fits.len().max(1) as f64
+}
+
+/// The normals of the body in the outline, where nothing else is known of the shape.
+fn of_outline(curves: &TurnCurves) -> Vec<Expected> {
+    let normal = |normal| Expected {
+        normal,
+        weight: OUTLINE_WEIGHT,
+    };
+    inflated(curves, 1.0).into_iter().map(normal).collect()
+}
+
+/// The prior at each pixel under the mask.
+fn expected(
+    curves: &TurnCurves,
+    prior: &Normals<YUp>,
+    weight: f64,
+) -> Result<Vec<Expected>, TurnError> {
+    if prior.extent() != curves.extent() {
+        return Err(TurnError::PriorSize {
+            found: prior.extent(),
+            expected: curves.extent(),
+        });
+    }
+    let whole = prior.completed(&curves.mask());
+    let [x, y, z] = whole.planes().planes();
+    let at = |&place: &usize| Expected {
+        normal: unit([x, y, z].map(|plane| f64::from(plane[place]))),
+        weight,
+    };
+    Ok(curves.places().iter().map(at).collect())
+}
+
+/// What is to be found of the room. Where nothing is known of the shape but its outline, light and gloss together could
+/// explain any shape: the object is taken for matt.
+fn unknowns(known: Option<&KnownLight>, has_shape: bool) -> Unknowns<'_> {
+    let bands = if has_shape { GLOSS_BANDS } else { 0 };
+    known.map_or(Unknowns::Light { bands }, Unknowns::Gloss)
+}
+
+/// The gloss in a known light.
+fn find_gloss(
+    curves: &TurnCurves,
+    expected: Option<&[Expected]>,
+    frame: &TableFrame,
+    known: &KnownLight,
+) -> Room {
+    let coarse = Coarse::new(curves, expected);
+    let matt = Room {
+        frame: *frame,
+        light: known.matt,
+        gloss: GlossLight::NONE,
+    };
+    let joint = coarse.joint(Unknowns::Gloss(known));
+    joint.found(matt, JOINT_ROUNDS, JOINT_STEPS).1
+}
+
+/// A turn on blocks of pixels.
+struct Coarse {
+    side: usize,
+    curves: TurnCurves,
+    moments: Vec<Moments>,
+    expected: Option<Vec<Expected>>,
+}
+
+impl Coarse {
+    fn new(curves: &TurnCurves, expected: Option<&[Expected]>) -> Self {
+        let pixels = curves.pixels() as f64 / COARSE_PIXELS as f64;
+        let side = (pixels.sqrt().ceil() as usize).max(1);
+        let coarse = curves.reduced(side);
+        Self {
+            side,
+            moments: all_moments(&coarse),
+            expected: expected.map(|fine| reduced(curves, fine, &coarse, side)),
+            curves: coarse,
+        }
+    }
+
+    fn joint<'a>(&'a self, unknowns: Unknowns<'a>) -> Joint<'a> {
+        Joint {
+            moments: &self.moments,
+            expected: self.expected.as_deref(),
+            unknowns,
+        }
+    }
+}
+
+/// An unknown light, from all starts.
+fn find_light(
+    curves: &TurnCurves,
+    expected: Option<&[Expected]>,
+    has_shape: bool,
+    frame: &TableFrame,
+) -> Result<(Room, Vec<StartFigure>), TurnError> {
+    let coarse = Coarse::new(curves, expected);
+    let mut begun: Vec<(&str, Vec<[f64; 3]>)> = Vec::new();
+    if let Some(expected) = coarse.expected.as_ref().filter(|_| has_shape) {
+        let normals = expected.iter().map(|expected| expected.normal).collect();
+        begun.push(("prior", normals));
+    }
+    for (name, height) in HEIGHTS {
+        begun.push((name, inflated(&coarse.curves, height)));
+    }
+    let alternation = Alternation {
+        coarse: &coarse,
+        frame,
+        has_shape,
+    };
+    let ended: Vec<(String, Option<(f64, Room)>)> = begun
+        .into_iter()
+        .map(|(name, normals)| (name.to_owned(), alternation.run(normals)))
+        .collect();
+    let best = ended
+        .iter()
+        .filter_map(|(_, ended)| *ended)
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let (least, room) = best.ok_or(TurnError::NoLight)?;
+    let figures = ended.into_iter().map(|(start, ended)| {
+        let residual = ended.map_or(1.0, |(residual, _)| residual);
+        StartFigure {
+            start,
+            residual,
+            taken: residual <= least,
+        }
+    });
+    Ok((room, figures.collect()))
+}
+
+/// The prior on blocks of pixels.
+fn reduced(
+    curves: &TurnCurves,
+    fine: &[Expected],
+    coarse: &TurnCurves,
+    side: usize,
+) -> Vec<Expected> {
+    let (width, across) = (curves.extent().width, coarse.extent().width);
+    let mut sums = vec![[0.0; 3]; coarse.extent().pixels()];
+    for (expected, &place) in fine.iter().zip(curves.places()) {
+        let block = place / width / side * across + place % width / side;
+        for (sum, value) in sums[block].iter_mut().zip(expected.normal) {
+            *sum += value;
+        }
+    }
+    let weight = fine.first().map_or(0.0, |expected| expected.weight);
+    let at = |&place: &usize| Expected {
+        normal: unit(sums[place]),
+        weight,
+    };
+    coarse.places().iter().map(at).collect()
+}
+
+/// An unknown light from one start.
+struct Alternation<'a> {
+    coarse: &'a Coarse,
+    frame: &'a TableFrame,
+    /// Whether more is known of the shape than its outline.
+    has_shape: bool,
+}
+
+impl Alternation<'_> {
+    /// What is left in the end, and the light: light and normals in turns for a matt object, then both together, and then
+    /// with gloss.
+    fn run(&self, start: Vec<[f64; 3]>) -> Option<(f64, Room)> {
+        let coarse = self.coarse;
+        let mut normals = start;
+        let mut albedo = self.first_albedo();
+        let mut room = None;
+        for round in 0..ROUNDS {
+            let found = fit_matt_room(&coarse.moments, &normals, &mut albedo, self.frame)?;
+            let fits = search_all(&found, &coarse.moments, coarse.expected.as_deref(), None);
+            for (albedo, fit) in albedo.iter_mut().zip(&fits) {
+                *albedo = fit.albedo;
+            }
+            normals = self.smoothed(&fits, round);
+            room = Some(found);
+        }
+        let matt = coarse.joint(Unknowns::Light { bands: 0 });
+        let (cost, room) = matt.found(room?, 1, JOINT_STEPS);
+        if !self.has_shape {
+            return Some((cost, room));
+        }
+        let glossy = coarse.joint(unknowns(None, true));
+        Some(glossy.found(room, JOINT_ROUNDS, JOINT_STEPS))
+    }
+
+    /// As if the shading were even.
+    fn first_albedo(&self) -> Vec<[f64; 3]> {
+        let curves = &self.coarse.curves;
+        (0..curves.pixels())
+            .map(|pixel| Moments::mean(curves, pixel).map(|mean| mean.max(1e-6)))
+            .collect()
+    }
+
+    fn smoothed(&self, fits: &[PixelFit], round: usize) -> Vec<[f64; 3]> {
+        let across = self.coarse.curves.extent().width as f64;
+        let deviation = if self.has_shape {
+            0.0
+        } else {
+            let fall = BLUR_FALL.powi(round as i32);
+            (FIRST_BLUR * across * fall).max(LEAST_BLUR / self.coarse.side as f64)
+        };
+        if deviation < 0.3 {
+            return fits.iter().map(|fit| fit.normal).collect();
+        }
+        let map = self
+            .coarse
+            .curves
+            .map(|pixel| fits[pixel].normal.map(|v| v as f32));
+        let smooth = blurred(&map, &self.coarse.curves.mask(), deviation);
+        let [x, y, z] = smooth.planes();
+        let at = |&place: &usize| unit([x, y, z].map(|plane| f64::from(plane[place])));
+        self.coarse.curves.places().iter().map(at).collect()
+    }
+}

@@ -1,0 +1,213 @@
+//! From figures to a verdict with its reasons.
+
+use relit_mask::{Region, ShapeCheck};
+use serde::Serialize;
+
+use super::DriftCheck;
+
+/// The object may lie so far beside the mask in the worst frame, pixels.
+const MOST_DRIFT: f32 = 2.0;
+/// And so far in the median frame, pixels.
+const MEDIAN_DRIFT: f32 = 1.0;
+/// Parts of the mask that are background, of the object that are not in it, or holes in it may have this
+/// share of its area.
+const MOST_REGION: f64 = 0.01;
+/// The mask's outline follows what moves at least so well, compared with the turn's own.
+const LEAST_OUTLINE: f32 = 0.85;
+/// Where it follows it better than the turn's own, differences are the turn's mistakes.
+const BETTER_OUTLINE: f32 = 1.05;
+/// Regions that are named.
+const NAMED: usize = 3;
+
+/// Whether a mask fits its recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// It does, in every frame.
+    Fits,
+    /// Its shape is right, but the object moves beside it.
+    Drifts,
+    /// Its shape is not that of the object.
+    Wrong,
+    /// Hardly anything moves in the video, and the object was not found in single frames.
+    Unknown,
+}
+
+/// The verdict about a mask, and why it is not "fits".
+pub(super) fn verdict(
+    drift: Option<&DriftCheck>,
+    shape: Option<&ShapeCheck>,
+) -> (Verdict, Vec<String>) {
+    let mut reasons = shape.map(reasons_of_shape).unwrap_or_default();
+    let wrong = !reasons.is_empty();
+    let moved = drift.and_then(reason_of_drift);
+    let verdict = match (wrong, &moved) {
+        (true, _) => Verdict::Wrong,
+        (false, Some(_)) => Verdict::Drifts,
+        (false, None) if drift.is_none() && shape.is_none() => Verdict::Unknown,
+        (false, None) => Verdict::Fits,
+    };
+    reasons.extend(moved);
+    if verdict == Verdict::Unknown {
+        reasons.push("hardly anything moves in the video, and the object was not found in single frames: look at mask-preview.png".to_owned());
+    }
+    (verdict, reasons)
+}
+
+fn reason_of_drift(drift: &DriftCheck) -> Option<String> {
+    let most = drift.most;
+    (most.px() > MOST_DRIFT || drift.median_px > MEDIAN_DRIFT).then(|| {
+        format!(
+            "the object lies up to {:.1} px beside the mask ({:+.1} right, {:+.1} down, in frame {}), {:.1} px in the median frame: extraction aligns the frames unless it is told not to; fasten camera and object, or make the mask on a frame in the middle",
+            most.px(), most.dx, most.dy, most.frame, drift.median_px
+        )
+    })
+}
+
+fn reasons_of_shape(shape: &ShapeCheck) -> Vec<String> {
+    if shape.outline > BETTER_OUTLINE * shape.outline_of_turn {
+        return Vec::new();
+    }
+    let mut reasons = Vec::new();
+    if shape.outline < LEAST_OUTLINE * shape.outline_of_turn {
+        reasons.push(format!(
+            "the mask's outline does not follow what moves differently ({:.2}; the turn's own {:.2}): make it again, with --auto or --edit",
+            shape.outline, shape.outline_of_turn
+        ));
+    }
+    let area = shape.area_px as f64;
+    let named = [
+        (&shape.leaks, "background in the mask", "mark it black"),
+        (&shape.missing, "object outside the mask", "mark it white"),
+        (
+            &shape.holes,
+            "holes in the mask where there is object",
+            "mark them white",
+        ),
+    ];
+    for (regions, what, remedy) in named {
+        let px: u64 = regions.iter().map(|region| region.px).sum();
+        if px as f64 > MOST_REGION * area {
+            reasons.push(format!(
+                "{what}, {px} pixels ({:.1} % of it), at {}: {remedy}, in --edit or in seeds",
+                100.0 * px as f64 / area,
+                places(regions)
+            ));
+        }
+    }
+    reasons
+}
+
+fn places(regions: &[Region]) -> String {
+    let named: Vec<String> = regions
+        .iter()
+        .take(NAMED)
+        .map(|region| region.bounds.to_string())
+        .collect();
+    let more = regions.len().saturating_sub(NAMED);
+    match more {
+        0 => named.join(" and "),
+        _ => format!("{} and {more} more", named.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::FrameDrift;
+    use super::*;
+    use relit_data::geometry::Rect;
+
+    fn shape() -> ShapeCheck {
+        ShapeCheck {
+            area_px: 10_000,
+            outline: 0.8,
+            outline_of_turn: 0.8,
+            iou: 0.99,
+            edge_px: [0.0, 1.0],
+            leaks: Vec::new(),
+            missing: Vec::new(),
+            holes: Vec::new(),
+        }
+    }
+
+    fn drift(dx: f32) -> DriftCheck {
+        DriftCheck {
+            median_px: 0.2,
+            p95_px: 0.5,
+            most: FrameDrift {
+                frame: 420,
+                dx,
+                dy: 0.0,
+            },
+            frames: 1500,
+            unsure: 0,
+        }
+    }
+
+    #[test]
+    fn each_verdict_has_its_reason() {
+        let region = |px| {
+            vec![Region {
+                px,
+                bounds: Rect::new(1, 2, 30, 40),
+            }]
+        };
+        assert_eq!(
+            verdict(Some(&drift(0.5)), Some(&shape())),
+            (Verdict::Fits, Vec::new())
+        );
+        let (found, reasons) = verdict(Some(&drift(-3.1)), Some(&shape()));
+        assert_eq!(found, Verdict::Drifts);
+        assert!(reasons[0].contains("3.1 px") && reasons[0].contains("frame 420"));
+        for (changed, word) in [
+            (
+                ShapeCheck {
+                    leaks: region(500),
+                    ..shape()
+                },
+                "background in the mask",
+            ),
+            (
+                ShapeCheck {
+                    missing: region(500),
+                    ..shape()
+                },
+                "object outside",
+            ),
+            (
+                ShapeCheck {
+                    holes: region(500),
+                    ..shape()
+                },
+                "holes",
+            ),
+            (
+                ShapeCheck {
+                    outline: 0.5,
+                    ..shape()
+                },
+                "does not follow",
+            ),
+        ] {
+            let (found, reasons) = verdict(None, Some(&changed));
+            assert_eq!((found, reasons.len()), (Verdict::Wrong, 1), "{word}");
+            assert!(reasons[0].contains(word), "{}", reasons[0]);
+        }
+        assert_eq!(verdict(None, None).0, Verdict::Unknown);
+        assert_eq!(verdict(None, None).1.len(), 1);
+    }
+
+    #[test]
+    fn a_mask_that_follows_what_moves_better_than_the_turn_is_not_blamed() {
+        let leaks = vec![Region {
+            px: 900,
+            bounds: Rect::new(1, 2, 30, 40),
+        }];
+        let shape = ShapeCheck {
+            outline: 0.9,
+            leaks,
+            ..shape()
+        };
+        assert_eq!(verdict(Some(&drift(0.1)), Some(&shape)).0, Verdict::Fits);
+    }
+}

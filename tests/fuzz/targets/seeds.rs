@@ -1,0 +1,26 @@
+//! Painted seeds: any bytes are marks of the image's size, or are refused.
+
+#![no_main]
+#![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]
+
+use libfuzzer_sys::fuzz_target;
+use relit_mask::{Drawing, Mark, RecordedHints, Seeds};
+
+fuzz_target!(|bytes: &[u8]| {
+    let Ok(seeds) = Seeds::from_png(bytes) else {
+        return;
+    };
+    let (width, height) = seeds.size();
+    assert_eq!(
+        seeds.marks().len() as u64,
+        u64::from(width) * u64::from(height)
+    );
+    assert!(seeds.marks().iter().any(|&mark| mark != Mark::Unknown));
+    let drawing = Drawing {
+        seeds: Some(seeds),
+        ..Drawing::default()
+    };
+    let recorded = RecordedHints::new(&drawing, &[]).expect("seeds can be recorded");
+    let again = recorded.drawing().expect("what was recorded can be read");
+    assert_eq!(again, drawing);
+});

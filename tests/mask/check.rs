@@ -1,0 +1,129 @@
+//! `relit-mask check` on recordings of which the truth is known.
+
+use std::fs;
+use std::path::Path;
+
+use image::{GrayImage, Luma};
+use serde_json::Value;
+
+use super::program::{code, relit_mask, said};
+use super::scene::{HEIGHT, WIDTH};
+
+/// A turn of 24 frames: a disc with a pattern of its own before stripes that move, `drift(frame)` pixels
+/// to the right of (48, 32).
+fn turn(folder: &Path, drift: impl Fn(u32) -> f64) {
+    let mut bytes = format!("YUV4MPEG2 W{WIDTH} H{HEIGHT} F30:1 Ip A1:1 C444\n").into_bytes();
+    for at in 0..24 {
+        let by = drift(at);
+        let luma = |x: u32, y: u32| {
+            let (x, y) = (f64::from(x) - by, f64::from(y));
+            let pattern = 25.0 * (x * 0.5).sin() * (y * 0.4 + x * 0.1).cos();
+            match (x - 48.0).hypot(y - 32.0) <= 18.0 {
+                true => (180.0 + pattern) as u8,
+                false => 30 + 40 * (((x + by) as u32 + 5 * at) / 10 % 4) as u8,
+            }
+        };
+        bytes.extend_from_slice(b"FRAME\n");
+        bytes.extend((0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| luma(x, y))));
+        bytes.extend(vec![128; (2 * WIDTH * HEIGHT) as usize]);
+    }
+    fs::write(folder.join("turn.y4m"), bytes).unwrap();
+}
+
+fn mask(folder: &Path, inside: impl Fn(f64, f64) -> bool) {
+    let mask = GrayImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        Luma([if inside(f64::from(x), f64::from(y)) {
+            255
+        } else {
+            0
+        }])
+    });
+    mask.save(folder.join("mask.png")).unwrap();
+}
+
+fn disc(x: f64, y: f64) -> bool {
+    (x - 48.0).hypot(y - 32.0) <= 18.0
+}
+
+/// The exit code and the report.
+fn check(folder: &Path) -> (i32, Value) {
+    let output = relit_mask(folder, &["check", "turn.y4m", "--json"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let event: Value = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{}", said(&output)));
+    (code(&output), event["report"].clone())
+}
+
+#[test]
+fn a_mask_that_fits_is_said_to_fit_and_its_page_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    turn(folder.path(), |_| 0.0);
+    mask(folder.path(), disc);
+    let (code, report) = check(folder.path());
+    assert_eq!((code, &report["verdict"]), (0, &"fits".into()), "{report}");
+    assert!(report["drift"]["most"]["dx"].as_f64().unwrap().abs() < 0.3);
+    let page = fs::read_to_string(folder.path().join("mask-check.html")).unwrap();
+    assert!(page.contains("The mask fits.") && page.contains("data:image/jpeg;base64,"));
+    assert!(!page.contains("<script"));
+}
+
+#[test]
+fn drift_is_measured_in_pixels_with_its_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    turn(folder.path(), |at| if at == 15 { 3.0 } else { 0.0 });
+    mask(folder.path(), disc);
+    let (code, report) = check(folder.path());
+    assert_eq!(
+        (code, &report["verdict"]),
+        (1, &"drifts".into()),
+        "{report}"
+    );
+    let most = &report["drift"]["most"];
+    assert_eq!(most["frame"], 15);
+    assert!((most["dx"].as_f64().unwrap() - 3.0).abs() < 0.4, "{most}");
+    assert!(report["drift"]["median_px"].as_f64().unwrap() < 0.3);
+    assert!(report["reasons"][0].as_str().unwrap().contains("frame 15"));
+}
+
+#[test]
+fn masks_of_another_shape_are_wrong_with_the_place_of_what_differs() {
+    let folder = tempfile::tempdir().unwrap();
+    turn(folder.path(), |_| 0.0);
+    let path = folder.path();
+    let wrong = |inside: &dyn Fn(f64, f64) -> bool, list: &str| {
+        mask(path, inside);
+        let (code, report) = check(path);
+        assert_eq!((code, &report["verdict"]), (1, &"wrong".into()), "{report}");
+        let px = report["shape"][list][0]["px"].as_u64();
+        assert!(px > Some(60), "{list}: {report}");
+    };
+    wrong(
+        &|x, y| disc(x, y) || (70.0..85.0).contains(&x) && (20.0..40.0).contains(&y),
+        "leaks",
+    );
+    wrong(&|x, y| disc(x, y) && x < 52.0, "missing");
+    wrong(
+        &|x, y| disc(x, y) && (x - 46.0).hypot(y - 32.0) > 6.0,
+        "holes",
+    );
+}
+
+#[test]
+fn what_cannot_be_checked_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    turn(path, |_| 0.0);
+    let failed = |word: &str| {
+        let output = relit_mask(path, &["check", "turn.y4m"]);
+        assert_eq!(code(&output), 1);
+        assert!(said(&output).contains(word), "{}", said(&output));
+        assert_eq!(said(&output).lines().count(), 1);
+    };
+    failed("mask.png could not be read");
+    fs::write(path.join("mask.png"), "painted").unwrap();
+    failed("cannot be checked");
+    mask(path, |_, _| false);
+    failed("no object");
+    GrayImage::new(9, 9).save(path.join("mask.png")).unwrap();
+    failed("9 x 9");
+    assert!(!path.join("mask-check.html").exists());
+}
