@@ -1,6 +1,12 @@
 //! From recorded turns to networks: `relit-extract` makes shards of the bundled sessions, `relight train` learns from
 //! them by the paper's phases. Runs where both programs were built, relight with the feature `train`.
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stderr
+)]
 
 use std::fs;
 use std::path::{Path, PathBuf};
