@@ -319,8 +319,8 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     let mut work = Work::new(&scene, background, &folder, &arguments.network)?;
     let subjects = work.subjects(&scene, sources, console.is_json())?;
     let objects = scene.objects.iter().zip(&subjects);
-    let objects = objects.map(|(object, (subject, _))| SceneObject {
-        subject,
+    let objects = objects.map(|(object, read)| SceneObject {
+        subject: &read.subject,
         placement: object.placement(),
         change: object.change(),
         exposure: object.exposure,
@@ -336,7 +336,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     )?;
     let frames = work.write(&set, arguments, console)?;
     let output = &arguments.output;
-    let trust: Vec<Option<TrustFigures>> = subjects.iter().map(|(_, trust)| *trust).collect();
+    let trust: Vec<Option<TrustFigures>> = subjects.iter().map(|read| read.trust).collect();
     console.say(
         &format!("{}: {} object(s), {frames} frame(s)", output.display(), scene.objects.len()),
         &json!({
@@ -349,8 +349,14 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
 
 /// What an object is made of.
 enum Source {
-    Photo(Photo),
+    Photo(Box<Photo>),
     Captured(Box<Asset>),
+}
+
+/// An object taken apart, and how far that can be trusted where somebody asks.
+struct ReadObject {
+    subject: Subject,
+    trust: Option<TrustFigures>,
 }
 
 fn load(object: &ObjectDescription, folder: &Path) -> Result<Source, Box<dyn Error>> {
@@ -365,7 +371,8 @@ fn load(object: &ObjectDescription, folder: &Path) -> Result<Source, Box<dyn Err
         mask: object.mask.as_ref().map(|mask| folder.join(mask)),
         ..PhotoReading::default()
     };
-    Ok(Source::Photo(PhotoInput::File(path).load(&reading)?))
+    let photo = PhotoInput::File(path).load(&reading)?;
+    Ok(Source::Photo(Box::new(photo)))
 }
 
 fn read_background(path: &Path, scene: &SceneDescription) -> Result<Background, Box<dyn Error>> {
@@ -525,12 +532,17 @@ impl Work {
         scene: &SceneDescription,
         sources: Vec<Source>,
         with_trust: bool,
-    ) -> Result<Vec<(Subject, Option<TrustFigures>)>, Box<dyn Error>> {
+    ) -> Result<Vec<ReadObject>, Box<dyn Error>> {
         let subject = |(object, source): (&ObjectDescription, Source)| {
             let photo = match source {
-                Source::Photo(photo) => photo,
+                Source::Photo(photo) => *photo,
                 // It was measured, and not estimated.
-                Source::Captured(asset) => return Ok((Subject::of_asset(&asset)?, None)),
+                Source::Captured(asset) => {
+                    return Ok(ReadObject {
+                        subject: Subject::of_asset(&asset)?,
+                        trust: None,
+                    });
+                }
             };
             let wanted = object.height * self.extent.height as f64 * RESERVE;
             let Extent { width, height } = photo.picture.planes().extent();
@@ -543,7 +555,8 @@ impl Work {
             let trust = with_trust
                 .then(|| TrustMap::of(&subject, &self.network.decomposer, &options))
                 .transpose()?;
-            Ok((subject, trust.map(|trust| trust.figures())))
+            let trust = trust.map(|trust| trust.figures());
+            Ok(ReadObject { subject, trust })
         };
         scene.objects.iter().zip(sources).map(subject).collect()
     }
