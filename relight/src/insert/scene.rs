@@ -575,7 +575,7 @@ mod tests {
         ));
         let (width, height) = ((right - left + 1) as f64, (bottom - top + 1) as f64);
         assert!(
-            (height - 48.0).abs() <= 2.0 && (width / height - 30.0 / 24.0).abs() < 0.08,
+            (width - 48.0).abs() <= 2.0 && (width / height - 30.0 / 24.0).abs() < 0.08,
             "{width} {height}"
         );
     }
