@@ -18,7 +18,7 @@ use super::files::{read_if_exists, write};
 use super::sampling::{pictures, spread};
 use super::{MaskFiles, MaskingError};
 pub use verdict::Verdict;
-use verdict::verdict;
+use verdict::{MOST_REGION, MOST_REGION_OF_A_LOOK, verdict};
 
 /// Frames that the light form looks at.
 const LIGHT_FRAMES: usize = 12;
@@ -130,7 +130,7 @@ fn check_recording(
     let drifts = drifts(&places, origin);
     let drift = summary(&drifts, video.frames().len());
     let shape = shape(&check, &frame)?;
-    let (verdict, reasons) = verdict(drift.as_ref(), shape.as_ref());
+    let (verdict, reasons) = verdict(drift.as_ref(), shape.as_ref(), MOST_REGION);
     let report = MaskReport {
         verdict,
         reasons,
@@ -161,7 +161,7 @@ pub fn mask_doubts(video: &Video, mask: &GrayImage) -> Result<Vec<String>, Maski
         return Ok(Vec::new());
     };
     let shape = shape(&check, &video.frame(middle)?)?;
-    let (verdict, reasons) = verdict(None, shape.as_ref());
+    let (verdict, reasons) = verdict(None, shape.as_ref(), MOST_REGION_OF_A_LOOK);
     Ok(match verdict {
         Verdict::Wrong => reasons,
         Verdict::Fits | Verdict::Drifts | Verdict::Unknown => Vec::new(),

@@ -10,8 +10,10 @@ const MOST_DRIFT: f32 = 2.0;
 /// And so far in the median frame, pixels.
 const MEDIAN_DRIFT: f32 = 1.0;
 /// Parts of the mask that are background, of the object that are not in it, or holes in it may have this
-/// share of its area.
-const MOST_REGION: f64 = 0.01;
+/// share of its area, where all of the turn is looked at.
+pub(super) const MOST_REGION: f64 = 0.01;
+/// The same of a look at a few frames, which takes shadows for parts of the object.
+pub(super) const MOST_REGION_OF_A_LOOK: f64 = 0.03;
 /// The mask's outline follows what moves at least so well, compared with the turn's own.
 const LEAST_OUTLINE: f32 = 0.85;
 /// Where it follows it better than the turn's own, differences are the turn's mistakes.
@@ -37,8 +39,11 @@ pub enum Verdict {
 pub(super) fn verdict(
     drift: Option<&DriftCheck>,
     shape: Option<&ShapeCheck>,
+    most_region: f64,
 ) -> (Verdict, Vec<String>) {
-    let mut reasons = shape.map(reasons_of_shape).unwrap_or_default();
+    let mut reasons = shape
+        .map(|shape| reasons_of_shape(shape, most_region))
+        .unwrap_or_default();
     let wrong = !reasons.is_empty();
     let moved = drift.and_then(reason_of_drift);
     let verdict = match (wrong, &moved) {
@@ -64,7 +69,7 @@ fn reason_of_drift(drift: &DriftCheck) -> Option<String> {
     })
 }
 
-fn reasons_of_shape(shape: &ShapeCheck) -> Vec<String> {
+fn reasons_of_shape(shape: &ShapeCheck, most_region: f64) -> Vec<String> {
     if shape.outline > BETTER_OUTLINE * shape.outline_of_turn {
         return Vec::new();
     }
@@ -87,7 +92,7 @@ fn reasons_of_shape(shape: &ShapeCheck) -> Vec<String> {
     ];
     for (regions, what, remedy) in named {
         let px: u64 = regions.iter().map(|region| region.px).sum();
-        if px as f64 > MOST_REGION * area {
+        if px as f64 > most_region * area {
             reasons.push(format!(
                 "{what}, {px} pixels ({:.1} % of it), at {}: {remedy}, in --edit or in seeds",
                 100.0 * px as f64 / area,
@@ -153,10 +158,10 @@ mod tests {
             }]
         };
         assert_eq!(
-            verdict(Some(&drift(0.5)), Some(&shape())),
+            verdict(Some(&drift(0.5)), Some(&shape()), MOST_REGION),
             (Verdict::Fits, Vec::new())
         );
-        let (found, reasons) = verdict(Some(&drift(-3.1)), Some(&shape()));
+        let (found, reasons) = verdict(Some(&drift(-3.1)), Some(&shape()), MOST_REGION);
         assert_eq!(found, Verdict::Drifts);
         assert!(reasons[0].contains("3.1 px") && reasons[0].contains("frame 420"));
         for (changed, word) in [
@@ -189,12 +194,12 @@ mod tests {
                 "does not follow",
             ),
         ] {
-            let (found, reasons) = verdict(None, Some(&changed));
+            let (found, reasons) = verdict(None, Some(&changed), MOST_REGION);
             assert_eq!((found, reasons.len()), (Verdict::Wrong, 1), "{word}");
             assert!(reasons[0].contains(word), "{}", reasons[0]);
         }
-        assert_eq!(verdict(None, None).0, Verdict::Unknown);
-        assert_eq!(verdict(None, None).1.len(), 1);
+        assert_eq!(verdict(None, None, MOST_REGION).0, Verdict::Unknown);
+        assert_eq!(verdict(None, None, MOST_REGION).1.len(), 1);
     }
 
     #[test]
@@ -208,6 +213,9 @@ mod tests {
             leaks,
             ..shape()
         };
-        assert_eq!(verdict(Some(&drift(0.1)), Some(&shape)).0, Verdict::Fits);
+        assert_eq!(
+            verdict(Some(&drift(0.1)), Some(&shape), MOST_REGION).0,
+            Verdict::Fits
+        );
     }
 }
