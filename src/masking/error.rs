@@ -106,6 +106,14 @@ pub enum MaskingError {
         /// The system's error.
         source: io::Error,
     },
+    /// The mask of one recording cannot be checked.
+    #[error("{recording}: {source}")]
+    Checked {
+        /// The recording's id.
+        recording: String,
+        /// What went wrong.
+        source: Box<Self>,
+    },
     /// Any of the others, with the recording's id.
     #[error("no mask for {recording}: {source}")]
     Recording {

@@ -52,21 +52,20 @@ impl MaskFiles {
     }
 }
 
-/// Checks that existing files may be replaced.
-pub(super) fn check_replaceable(files: &MaskFiles, force: bool) -> Result<(), MaskingError> {
-    let record = match read_if_exists(&files.record)? {
-        None => None,
-        Some(bytes) => {
-            let record =
-                MaskRecord::from_json(&bytes).map_err(|fault| MaskingError::ForeignFile {
-                    path: files.record.clone(),
-                    why: fault.to_string(),
-                })?;
-            Some(record)
-        }
-    };
+/// Checks that existing files may be replaced; `with_alpha`: also the soft mask.
+pub(super) fn check_replaceable(
+    files: &MaskFiles,
+    force: bool,
+    with_alpha: bool,
+) -> Result<(), MaskingError> {
+    check_folder(&files.mask)?;
+    let record = read_record(files)?;
     if force {
         return Ok(());
+    }
+    let made_alpha = record.as_ref().is_some_and(|record| record.settings.alpha);
+    if with_alpha && !made_alpha && files.alpha.exists() {
+        return Err(MaskingError::Handmade(files.alpha.clone()));
     }
     let Some(mask) = read_if_exists(&files.mask)? else {
         return Ok(());
@@ -75,6 +74,43 @@ pub(super) fn check_replaceable(files: &MaskFiles, force: bool) -> Result<(), Ma
     match record {
         Some(record) if record.result.mask_blake3 == found.as_str() => Ok(()),
         _ => Err(MaskingError::Handmade(files.mask.clone())),
+    }
+}
+
+/// Said before anybody works on a mask that cannot be kept.
+fn check_folder(mask: &Path) -> Result<(), MaskingError> {
+    match mask.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => {
+            fs::read_dir(folder).map_err(MaskingError::io(folder, "written to"))?;
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+fn read_record(files: &MaskFiles) -> Result<Option<MaskRecord>, MaskingError> {
+    let Some(bytes) = read_if_exists(&files.record)? else {
+        return Ok(None);
+    };
+    let record = MaskRecord::from_json(&bytes).map_err(|fault| MaskingError::ForeignFile {
+        path: files.record.clone(),
+        why: fault.to_string(),
+    })?;
+    Ok(Some(record))
+}
+
+/// Whether the mask that is there was written with its soft form, which belongs to no other mask.
+pub(super) fn has_alpha(files: &MaskFiles) -> Result<bool, MaskingError> {
+    Ok(read_record(files)?.is_some_and(|record| record.settings.alpha))
+}
+
+/// Removes a file if it is there.
+pub(super) fn remove(path: &Path) -> Result<(), MaskingError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(MaskingError::io(path, "removed")(error))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -117,7 +153,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let files = MaskFiles::of(&folder.path().join("session.png")).unwrap();
         fs::write(&files.record, r#"{"schema": "relit.session/1"}"#).unwrap();
-        let result = check_replaceable(&files, true);
+        let result = check_replaceable(&files, true, false);
         assert!(matches!(result, Err(MaskingError::ForeignFile { .. })));
     }
 
@@ -125,12 +161,26 @@ mod tests {
     fn a_mask_without_record_is_replaced_only_with_force() {
         let folder = tempfile::tempdir().unwrap();
         let files = MaskFiles::of(&folder.path().join("mask.png")).unwrap();
-        assert!(check_replaceable(&files, false).is_ok());
+        assert!(check_replaceable(&files, false, false).is_ok());
         fs::write(&files.mask, "painted").unwrap();
         assert!(matches!(
-            check_replaceable(&files, false),
+            check_replaceable(&files, false, false),
             Err(MaskingError::Handmade(_))
         ));
-        assert!(check_replaceable(&files, true).is_ok());
+        assert!(check_replaceable(&files, true, false).is_ok());
+    }
+
+    #[test]
+    fn a_soft_mask_that_no_record_tells_of_is_replaced_only_with_force() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = MaskFiles::of(&folder.path().join("mask.png")).unwrap();
+        assert!(check_replaceable(&files, false, true).is_ok());
+        fs::write(&files.alpha, "painted").unwrap();
+        assert!(check_replaceable(&files, false, false).is_ok());
+        assert!(matches!(
+            check_replaceable(&files, false, true),
+            Err(MaskingError::Handmade(path)) if path == files.alpha
+        ));
+        assert!(check_replaceable(&files, true, true).is_ok());
     }
 }

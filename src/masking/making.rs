@@ -10,7 +10,7 @@ use relit_mask::{
 };
 use relit_video::Video;
 
-use super::files::{check_replaceable, write};
+use super::files::{check_replaceable, has_alpha, remove, write};
 use super::request::Recipe;
 use super::sampling::{SampledTurn, read_turn};
 use super::{MaskFiles, MaskRequest, MaskingError};
@@ -61,7 +61,7 @@ fn mask_recording(
     request: &MaskRequest,
 ) -> Result<(MaskFiles, MaskRecord), MaskingError> {
     let files = files_of(recording, output)?;
-    check_replaceable(&files, request.force)?;
+    check_replaceable(&files, request.force, request.settings.alpha)?;
     let record = segment_and_write(&recording.video, &files, request)?;
     Ok((files, record))
 }
@@ -122,12 +122,17 @@ pub(super) fn write_files(
         true => Some(grey_png(&alpha(frame, mask.image()), "the soft mask")?),
         false => None,
     };
+    // A soft mask of an earlier mask would be taken for this one's.
+    let is_stale = soft.is_none() && has_alpha(files)?;
     write(&files.preview, &preview_png)?;
     if let Some(soft) = soft {
         write(&files.alpha, &soft)?;
     }
     write(&files.record, &json)?;
     write(&files.mask, &png)?;
+    if is_stale {
+        remove(&files.alpha)?;
+    }
     Ok(record)
 }
 

@@ -361,3 +361,29 @@ fn a_session_gets_its_mask_in_its_folder() {
         assert!(folder.join(name).is_file(), "{name}");
     }
 }
+
+#[test]
+fn a_soft_mask_goes_with_its_mask_and_a_painted_one_is_kept() {
+    let folder = clip();
+    let run = |more: &[&str]| {
+        let hints = ["clip.y4m", "--rect", AROUND, "-o", "n.png"];
+        relit_mask(folder.path(), &[&hints, more].concat())
+    };
+    fs::write(folder.path().join("n-alpha.png"), "painted").unwrap();
+    let refused = run(&["--alpha"]);
+    assert_eq!(code(&refused), 1);
+    assert!(said(&refused).contains("n-alpha.png"), "{}", said(&refused));
+    assert_eq!(code(&run(&[])), 0);
+    assert_eq!(read(folder.path(), "n-alpha.png"), b"painted");
+
+    let made = run(&["--alpha", "--force", "--json"]);
+    assert!(
+        said(&made).contains("\"alpha\":\"n-alpha.png\""),
+        "{}",
+        said(&made)
+    );
+    assert_ne!(read(folder.path(), "n-alpha.png"), b"painted");
+    assert_eq!(code(&run(&["--alpha"])), 0);
+    assert_eq!(code(&run(&[])), 0);
+    assert!(!folder.path().join("n-alpha.png").exists());
+}

@@ -26,12 +26,15 @@ pub(crate) fn print(output: &MaskOutput, console: Console) {
         result.components,
         output.files.preview.display(),
     );
+    let alpha = output.record.settings.alpha;
+    let alpha = alpha.then(|| output.files.alpha.to_string_lossy());
     let event = json!({
         "event": "mask",
         "recording": id,
         "mask": output.files.mask.to_string_lossy(),
         "record": output.files.record.to_string_lossy(),
         "preview": output.files.preview.to_string_lossy(),
+        "alpha": alpha,
         "source": source,
         "result": result,
         "warnings": output.record.warnings,

@@ -100,7 +100,7 @@ pub fn check_mask(
 ) -> Result<CheckOutput, MaskingError> {
     let recording = Recording::open(input)?;
     let checked = check_recording(&recording, mask, advanced);
-    let (report, page) = checked.map_err(|source| MaskingError::Recording {
+    let (report, page) = checked.map_err(|source| MaskingError::Checked {
         recording: recording.id.clone(),
         source: Box::new(source),
     })?;
@@ -121,6 +121,12 @@ fn check_recording(
     let image = read_mask(&files.mask)?;
     let video = Video::open(&recording.video)?;
     check_size(&files.mask, &image, &video)?;
+    if image.pixels().all(|pixel| pixel.0[0] < 128) {
+        return Err(MaskingError::Check {
+            path: files.mask.clone(),
+            why: "it is empty: no pixel is white".to_owned(),
+        });
+    }
     let source = source_frame(&files, &video)?;
     let statistics = statistics(&video, image.dimensions(), TURN_FRAMES)?;
     let check = MaskCheck::new(&image, &statistics)?;

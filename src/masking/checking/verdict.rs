@@ -31,7 +31,7 @@ pub enum Verdict {
     Drifts,
     /// Its shape is not that of the object.
     Wrong,
-    /// Hardly anything moves in the video, and the object was not found in single frames.
+    /// Hardly anything moves in the video: it does not show what the object is.
     Unknown,
 }
 
@@ -49,12 +49,13 @@ pub(super) fn verdict(
     let verdict = match (wrong, &moved) {
         (true, _) => Verdict::Wrong,
         (false, Some(_)) => Verdict::Drifts,
-        (false, None) if drift.is_none() && shape.is_none() => Verdict::Unknown,
+        // A picture that stands still is found in its place whatever the mask is.
+        (false, None) if shape.is_none() => Verdict::Unknown,
         (false, None) => Verdict::Fits,
     };
     reasons.extend(moved);
     if verdict == Verdict::Unknown {
-        reasons.push("hardly anything moves in the video, and the object was not found in single frames: look at mask-preview.png".to_owned());
+        reasons.push("hardly anything moves in the video, so that it does not show what the object is: look at mask-preview.png".to_owned());
     }
     (verdict, reasons)
 }
@@ -200,6 +201,12 @@ mod tests {
         }
         assert_eq!(verdict(None, None, MOST_REGION).0, Verdict::Unknown);
         assert_eq!(verdict(None, None, MOST_REGION).1.len(), 1);
+        let still = verdict(Some(&drift(0.1)), None, MOST_REGION);
+        assert_eq!((still.0, still.1.len()), (Verdict::Unknown, 1));
+        assert_eq!(
+            verdict(Some(&drift(3.1)), None, MOST_REGION).0,
+            Verdict::Drifts
+        );
     }
 
     #[test]

@@ -143,7 +143,7 @@ impl Desk {
         let request = self.request_of(sketch);
         let mask = cut(&frame.picture, turn.as_deref(), &request, Effort::Fine)?;
         // Somebody may have painted one meanwhile.
-        check_replaceable(&self.files, request.force)?;
+        check_replaceable(&self.files, request.force, request.settings.alpha)?;
         let source = frame.source.clone();
         let turn = turn.as_deref();
         write_files(&frame.picture, source, turn, &mask, &self.files, &request)

@@ -47,7 +47,7 @@ pub fn edit(
         source: Box::new(source),
     };
     let files = files_of(&recording, output)?;
-    check_replaceable(&files, request.force).map_err(of_recording)?;
+    check_replaceable(&files, request.force, request.settings.alpha).map_err(of_recording)?;
     let desk = Desk::new(&recording, files.clone(), request).map_err(of_recording)?;
     let app = serve(desk, address, announce)?;
     let record = app.accepted();
