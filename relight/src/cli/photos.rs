@@ -137,6 +137,14 @@ pub(crate) fn write_picture(
     Ok(())
 }
 
+/// The mask of a photograph of this name: the file itself, or that of the photograph in a folder of masks.
+pub(crate) fn own_mask(mask: &Path, name: &str) -> PathBuf {
+    if mask.is_dir() {
+        return mask.join(format!("{name}.png"));
+    }
+    mask.to_owned()
+}
+
 /// Refuses to overwrite a file that is read.
 pub(crate) fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<(), String> {
     let Ok(place) = output.canonicalize() else {

@@ -92,7 +92,7 @@ pub struct CheckOutput {
 /// video, except for a few bytes a frame.
 ///
 /// # Errors
-/// [`MaskingError::Session`] if there is no recording; otherwise [`MaskingError::Recording`] around the cause.
+/// [`MaskingError::Session`] if there is no recording; otherwise [`MaskingError::Checked`] around the cause.
 pub fn check_mask(
     input: &Path,
     mask: Option<&Path>,

@@ -22,7 +22,7 @@ use super::relight::{degrees, gloss_numbers, tint};
 use crate::cli::console::{CommandResult, Console, Outcome};
 use crate::cli::light::read_light;
 use crate::cli::photos::{
-    Bits, Network, NetworkArguments, OutputKind, at_most, not_an_input, write_picture,
+    Bits, Network, NetworkArguments, OutputKind, at_most, not_an_input, own_mask, write_picture,
 };
 
 pub(in crate::cli) const EXAMPLES: &str = "\
@@ -258,7 +258,10 @@ impl ObjectArguments {
             mask: of(&self.mask, number)
                 // A folder of masks is for the photographs.
                 .filter(|mask| !(is_captured(&photo) && mask.is_dir()))
-                .map(|mask| own_mask(&mask, &photo)),
+                .map(|mask| {
+                    let name = photo.file_stem().unwrap_or_default();
+                    own_mask(&mask, &name.to_string_lossy())
+                }),
             at: of(&self.at, number).unwrap_or([across, 0.9]),
             height: of(&self.height, number).unwrap_or(0.4),
             rotation: of(&self.rotate, number).unwrap_or(0.0),
@@ -283,15 +286,6 @@ fn of<T: Clone>(given: &[T], number: usize) -> Option<T> {
 fn is_captured(path: &Path) -> bool {
     path.extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("relit"))
-}
-
-/// The mask of a photograph in a folder of masks.
-fn own_mask(mask: &Path, photo: &Path) -> PathBuf {
-    if mask.is_dir() {
-        let name = photo.file_stem().unwrap_or_default().to_string_lossy();
-        return mask.join(format!("{name}.png"));
-    }
-    mask.to_owned()
 }
 
 /// What objects are put before.

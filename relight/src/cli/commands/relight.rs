@@ -22,7 +22,8 @@ use crate::cli::console::{CommandResult, Console, Outcome};
 use crate::cli::folder::make_folder;
 use crate::cli::light::NewLightArguments;
 use crate::cli::photos::{
-    Bits, Network, NetworkArguments, OutputKind, at_most, globbed, not_an_input, write_picture,
+    Bits, Network, NetworkArguments, OutputKind, at_most, globbed, not_an_input, own_mask,
+    write_picture,
 };
 use crate::cli::values::TransferName;
 
@@ -329,11 +330,8 @@ impl Run<'_> {
     /// Nothing that is read may be overwritten, and nothing is written where the map of trust cannot be.
     fn check_outputs(&self, output: &Path, name: &str) -> Result<(), String> {
         let arguments = self.arguments;
-        let own_mask = |mask: &PathBuf| {
-            let own = mask.join(format!("{name}.png"));
-            if mask.is_dir() { own } else { mask.clone() }
-        };
-        let mut inputs: Vec<PathBuf> = arguments.mask.iter().map(own_mask).collect();
+        let mask = arguments.mask.as_deref().map(|mask| own_mask(mask, name));
+        let mut inputs: Vec<PathBuf> = mask.into_iter().collect();
         inputs.extend(self.photos.iter().cloned());
         inputs.extend(arguments.light.light.clone());
         let trust = arguments.trust.as_deref();
