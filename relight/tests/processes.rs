@@ -272,6 +272,38 @@ fn all_processes_stop_together_and_go_on_to_the_same_losses() {
 }
 
 #[test]
+fn signals_that_a_launcher_repeats_cost_no_checkpoint() {
+    let (folder, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let file = scratch.path().join("settings.toml");
+    fs::write(&file, settings(1_000_000, "single")).unwrap();
+    let command = || train("decompose", &file, folder.path());
+    let mut processes = Processes::launch(2, |_| command());
+    wait_for_a_step(folder.path(), &mut processes);
+    let all: Vec<Pid> = processes
+        .0
+        .iter()
+        .map(|process| Pid::from_raw(process.id() as i32).unwrap())
+        .collect();
+    // As Ctrl-C under torchrun: by the terminal, and by torchrun.
+    for signal in [Signal::INT, Signal::TERM] {
+        for &process in &all {
+            kill_process(process, signal).unwrap();
+        }
+        sleep(Duration::from_millis(50));
+    }
+    // As srun --kill-on-bad-exit: whoever ends first ends the others.
+    let has_ended = |process: &mut Child| process.try_wait().unwrap().is_some();
+    while !processes.0.iter_mut().any(has_ended) {
+        sleep(Duration::from_millis(1));
+    }
+    for process in &mut processes.0 {
+        let _ = process.kill();
+    }
+    assert!(checkpoint(folder.path()).step > 0);
+    assert!(folder.path().join("decomposer.safetensors").is_file());
+}
+
+#[test]
 fn processes_that_were_started_with_other_settings_say_so() {
     let (folder, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let files = ["one.toml", "other.toml"].map(|name| scratch.path().join(name));

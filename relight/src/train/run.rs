@@ -26,8 +26,9 @@ use super::settings::RunSettings;
 use super::terms::Terms;
 use crate::nets::{WeightPrecision, Weights};
 
-/// How long a process waits for process 0 to write its checkpoint and end, where the run ends early.
-const SUCCESSION: Duration = Duration::from_secs(60);
+/// How long a process waits for process 0 to write its checkpoint and end, where the run ends early. No longer, as process 0 can
+/// itself be waiting for this one: only the neighbours of a lost process notice at once. Launchers kill after 30 seconds.
+const SUCCESSION: Duration = Duration::from_secs(3);
 
 /// What is trained.
 pub trait Task {
@@ -248,13 +249,14 @@ impl<'a> Run<'a> {
             }
             Err(fault) => return Err(fault),
         };
-        if let Some(group) = self.group.take() {
-            group.leave();
-        }
         let mut weights = Vec::new();
         if self.journal.is_some() {
             self.save(observer)?;
             weights = self.write_weights()?;
+        }
+        // Only now: launchers end all processes as soon as one has ended with another code than 0.
+        if let Some(group) = self.group.take() {
+            group.leave();
         }
         Ok(RunOutcome {
             steps: self.step,
@@ -418,15 +420,22 @@ impl<'a> Run<'a> {
         if self.journal.is_none() {
             let begun = Instant::now();
             while Journal::is_open(self.folder) && begun.elapsed() < SUCCESSION {
-                std::thread::sleep(Duration::from_millis(200));
+                if self.is_saved() {
+                    return Ok(());
+                }
+                std::thread::sleep(Duration::from_millis(500));
             }
-            // A checkpoint that cannot be read is replaced.
-            let found = Checkpoint::read(self.folder).ok().flatten();
-            if found.is_some_and(|checkpoint| checkpoint.step >= self.step) {
+            if self.is_saved() {
                 return Ok(());
             }
         }
         self.save(observer)
+    }
+
+    /// Whether a checkpoint has this process's steps. One that cannot be read does not.
+    fn is_saved(&self) -> bool {
+        let found = Checkpoint::read(self.folder).ok().flatten();
+        found.is_some_and(|checkpoint| checkpoint.step >= self.step)
     }
 
     fn validate(

@@ -230,17 +230,18 @@ impl RunArguments {
 
     /// Meets the other processes that a launcher has started, if it has; sets the number of the network's threads.
     fn join(&self) -> Result<Processes, Box<dyn Error>> {
-        let stop = stop_at_signals()?;
         let launch = Launch::from_variables(|name| env::var(name).ok())?;
         if let Some(threads) = self.threads {
             tch::set_num_threads(threads as i32);
         }
-        let resources = Resources {
-            device: self.device.device(launch.as_ref())?,
-            composers: self.composers,
-            stop,
-        };
+        let device = self.device.device(launch.as_ref())?;
         let group = launch.as_ref().map(ProcessGroup::join).transpose()?;
+        let resources = Resources {
+            device,
+            composers: self.composers,
+            // While processes wait for each other, signals end them: there is nothing to save.
+            stop: stop_at_signals(group.is_some())?,
+        };
         Ok(Processes { resources, group })
     }
 }
@@ -284,12 +285,15 @@ fn train(
     Ok(outcome_of(&outcome))
 }
 
-/// The flag that the first Ctrl-C or SIGTERM sets. The second ends the program at once.
-fn stop_at_signals() -> io::Result<Arc<AtomicBool>> {
+/// The flag that Ctrl-C and SIGTERM set. Where no launcher has started the program, the second signal ends it at once; launchers
+/// repeat signals themselves.
+fn stop_at_signals(is_launched: bool) -> io::Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
-        // In this order: the first signal finds the flag not set yet.
-        flag::register_conditional_shutdown(signal, ENDED_BY_SIGNAL, Arc::clone(&stop))?;
+        if !is_launched {
+            // In this order: the first signal finds the flag not set yet.
+            flag::register_conditional_shutdown(signal, ENDED_BY_SIGNAL, Arc::clone(&stop))?;
+        }
         flag::register(signal, Arc::clone(&stop))?;
     }
     Ok(stop)
