@@ -139,7 +139,7 @@ fn every_codec_gives_the_pictures_that_the_ffmpeg_program_gives() {
     for (name, encoding, most) in [
         ("a.mkv", "-pix_fmt yuvj444p -c:v mjpeg -q:v 2", 3),
         ("b.mkv", "-pix_fmt yuv444p -c:v ffv1 -level 3", 3),
-        ("b.mkv", "-pix_fmt yuv422p -c:v ffv1"),
+        ("c.mkv", "-pix_fmt bgr0 -c:v ffv1 -level 3", 1),
         ("d.mp4", "-pix_fmt yuv444p -c:v libx264 -qp 0 -bf 2", 3),
         ("e.avi", "-pix_fmt bgr24 -c:v rawvideo", 1),
         ("f.mkv", "-pix_fmt gray -c:v ffv1", 1),
@@ -299,10 +299,7 @@ fn a_part_of_motion_jpeg_is_the_same_for_any_region_and_nearly_what_ffmpeg_makes
 fn a_part_of_other_video_is_that_of_its_picture() {
     for (name, encoding) in [
         ("a.mkv", "-pix_fmt yuv420p -c:v libx264"),
-        (
-            "c.mkv",
-            "-pix_fmt yuvj411p -c:v mjpeg -strict unofficial -q:v 2",
-        ),
+        ("b.mkv", "-pix_fmt yuv422p -c:v ffv1"),
     ] {
         let (_folder, path) = made(PATTERN, name, encoding);
         let video = Video::open(&path).unwrap();
