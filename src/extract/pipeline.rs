@@ -140,10 +140,9 @@ impl Stage<'_> {
 
     /// Where the crop's object went in whole pixels, and the rest of the way; `None` if it is not corrected.
     fn moved<'v>(&self, crop: View<'v>, alignment: Alignment) -> Option<(View<'v>, [f64; 2])> {
-        let correction = self.align.as_ref()?.correction.as_ref()?;
-        let shift = alignment
-            .shift
-            .filter(|[dx, dy]| dx.hypot(*dy) > correction.above)?;
+        let align = self.align.as_ref()?;
+        let correction = align.correction.as_ref()?;
+        let shift = align.aligner.to_correct(&alignment, correction.above)?;
         let whole = shift.map(f64::round);
         // None beyond the largest shift, with which the turn fails.
         let crop = crop.moved(whole.map(|part| part as i32), APRON)?;
