@@ -127,19 +127,25 @@ impl Job {
         let samples = u32::try_from(plan.selection.frames.len()).unwrap_or(options.frames);
         let mut notices = self.notices.clone();
         notices.extend(self.notices_of_plan(&plan, options.frames));
-        notices.extend(self.doubts_about_the_mask());
         if options.strict {
             check_strict(&plan, &notices)?;
         }
         let mut stage = self.stage(options)?;
-        if options.align != Align::Off {
-            stage.align = self.align(&stage, &plan, options, pool)?;
-            if stage.align.is_none() {
-                notices.push(Notice::Warning(
-                    "the object has too little structure to measure its shifts: they are unknown"
-                        .to_owned(),
-                ));
-            }
+        // The look at the mask takes one thread, which leaves the others to the learning.
+        let (doubts, align) = pool.join(
+            || self.doubts_about_the_mask(),
+            || match options.align {
+                Align::Off => Ok(None),
+                _ => self.align(&stage, &plan, options, pool),
+            },
+        );
+        notices.extend(doubts);
+        stage.align = align?;
+        if options.align != Align::Off && stage.align.is_none() {
+            notices.push(Notice::Warning(
+                "the object has too little structure to measure its shifts: they are unknown"
+                    .to_owned(),
+            ));
         }
         let mut steadiness = Steadiness::new(options.max_shift);
         let mut writer = ShardWriter::create(

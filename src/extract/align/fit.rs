@@ -19,6 +19,8 @@ const OUTLIER: f32 = 1.5;
 const FAR_OUTLIER: f32 = 6.0;
 /// Fewest pixels from which a shift is measured.
 const LEAST_PIXELS: usize = 60;
+/// Pixels from which a rotation and a growth are measured.
+const SIMILARITY_PIXELS: usize = 3000;
 /// Pixels that are looked at in a search.
 const SEARCH_PIXELS: usize = 1000;
 /// The object has structure in one direction only if the other has less than this part of its weight.
@@ -121,21 +123,23 @@ impl Template {
 
     /// What a rotation and a growth about the object's centre explain beyond the shift.
     pub(super) fn similarity(&self, frame: &Gradients, shift: [f64; 2]) -> Option<Similarity> {
-        let count = self.pixels.len().max(1) as f64;
+        let every = self.pixels.len().div_ceil(SIMILARITY_PIXELS).max(1);
+        let pixels = || self.pixels.iter().step_by(every);
+        let count = pixels().count().max(1) as f64;
         let sum = |of: fn(&TemplatePixel) -> u32| -> f64 {
-            self.pixels.iter().map(|pixel| f64::from(of(pixel))).sum()
+            pixels().map(|pixel| f64::from(of(pixel))).sum()
         };
         let centre = (sum(|p| p.x) / count, sum(|p| p.y) / count);
         let mut normal = [[0.0; 4]; 4];
         let mut right = [0.0; 4];
         let mut distance = 0.0;
         let sampler = Sampler::new(frame, shift);
-        for pixel in &self.pixels {
+        for pixel in pixels() {
             let Some(found) = sampler.at(pixel) else {
                 continue;
             };
             let (x, y) = (f64::from(pixel.x) - centre.0, f64::from(pixel.y) - centre.1);
-            distance += x.hypot(y);
+            distance += (x * x + y * y).sqrt();
             let (weight, residual) = weighed(pixel, found, FAR_OUTLIER);
             let weight = f64::from(weight);
             let [xx, xy, yy] = pixel.change.map(f64::from);

@@ -133,20 +133,33 @@ impl Gradients {
     /// Replaces these by the gradients of `plane`; 0 at its border.
     pub(super) fn take(&mut self, plane: &Plane) {
         (self.width, self.height) = (plane.width, plane.height);
-        self.values.clear();
         self.values.resize(plane.values.len(), [0.0; 2]);
-        if plane.width < 3 || plane.height < 3 {
-            return;
-        }
-        let rows = self.values.chunks_exact_mut(plane.width).enumerate();
-        for (y, row) in rows.skip(1).take(plane.height - 2) {
-            let y = y as isize;
-            let sides = plane.row(y).windows(3);
-            let above = plane.row(y - 1).iter().skip(1);
-            let below = plane.row(y + 1).iter().skip(1);
-            let sides = sides.zip(above.zip(below));
-            for (gradient, (side, (above, below))) in row.iter_mut().skip(1).zip(sides) {
-                *gradient = [0.5 * (side[2] - side[0]), 0.5 * (below - above)];
+        Arch::new().dispatch(Taking(self, plane));
+    }
+}
+
+/// The making of gradients, compiled for the kind of processor.
+struct Taking<'a>(&'a mut Gradients, &'a Plane);
+
+impl WithSimd for Taking<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self(gradients, plane) = self;
+        let (width, height) = (plane.width, plane.height);
+        for (y, row) in (0..).zip(gradients.values.chunks_exact_mut(width.max(1))) {
+            if width < 3 || y == 0 || y + 1 == height as isize {
+                row.fill([0.0; 2]);
+                continue;
+            }
+            let (above, here, below) = (plane.row(y - 1), plane.row(y), plane.row(y + 1));
+            (row[0], row[width - 1]) = ([0.0; 2], [0.0; 2]);
+            let inner = row[1..width - 1].iter_mut();
+            let across = here[2..].iter().zip(here);
+            let down = below[1..].iter().zip(&above[1..]);
+            for ((gradient, (right, left)), (below, above)) in inner.zip(across).zip(down) {
+                *gradient = [0.5 * (right - left), 0.5 * (below - above)];
             }
         }
     }
@@ -166,40 +179,61 @@ pub(super) fn cubic(part: f32) -> [f32; 4] {
 
 /// Brightness of a picture, 0..=255.
 pub(super) fn luma(picture: View<'_>) -> GrayImage {
-    let (width, height) = picture.dimensions();
-    let mut grey = GrayImage::new(width, height);
-    let rows = grey.as_flat_samples_mut().samples;
-    let rows = rows.chunks_exact_mut((width as usize).max(1));
-    for (to, row) in rows.zip(picture.rows()) {
-        for (to, pixel) in to.iter_mut().zip(row.chunks_exact(4)) {
-            *to = (sum_of(pixel) >> 8) as u8;
-        }
-    }
-    grey
+    Arch::new().dispatch(Luma {
+        picture,
+        half: false,
+    })
 }
 
 /// The brightness of half the picture, each pixel the mean of two by two.
 pub(super) fn half_luma(picture: View<'_>) -> GrayImage {
-    let (width, height) = picture.dimensions();
-    let (width, height) = (width / 2, height / 2);
-    let mut grey = GrayImage::new(width, height);
-    let rows = grey.as_flat_samples_mut().samples;
-    let rows = rows.chunks_exact_mut((width as usize).max(1));
-    for (y, to) in (0..i64::from(height)).zip(rows) {
-        let (above, below) = (picture.row(2 * y, 0), picture.row(2 * y + 1, 0));
-        let pairs = above.chunks_exact(8).zip(below.chunks_exact(8));
-        for (to, (above, below)) in to.iter_mut().zip(pairs) {
-            let sum = sum_of(above) + sum_of(&above[4..]) + sum_of(below) + sum_of(&below[4..]);
-            *to = (sum >> 10) as u8;
+    Arch::new().dispatch(Luma {
+        picture,
+        half: true,
+    })
+}
+
+/// The making of a picture's brightness, compiled for the kind of processor.
+struct Luma<'a> {
+    picture: View<'a>,
+    half: bool,
+}
+
+impl WithSimd for Luma<'_> {
+    type Output = GrayImage;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> GrayImage {
+        let by = if self.half { 2 } else { 1 };
+        let (width, height) = self.picture.dimensions();
+        let mut grey = GrayImage::new(width / by, height / by);
+        let rows = grey.as_flat_samples_mut().samples;
+        let rows = rows.chunks_exact_mut(((width / by) as usize).max(1));
+        for (to, y) in rows.zip((0_i64..).step_by(by as usize)) {
+            let above = self.picture.row(y, 0);
+            if self.half {
+                let below = self.picture.row(y + 1, 0);
+                let pairs = above.chunks_exact(8).zip(below.chunks_exact(8));
+                for (to, (above, below)) in to.iter_mut().zip(pairs) {
+                    let above = sum_of(&above[..4]) + sum_of(&above[4..]);
+                    let below = sum_of(&below[..4]) + sum_of(&below[4..]);
+                    *to = ((above + below) >> 10) as u8;
+                }
+            } else {
+                for (to, pixel) in to.iter_mut().zip(above.chunks_exact(4)) {
+                    *to = (sum_of(pixel) >> 8) as u8;
+                }
+            }
         }
+        grey
     }
-    grey
 }
 
 /// 256 times a pixel's brightness.
 #[inline(always)]
 fn sum_of(pixel: &[u8]) -> u32 {
-    77 * u32::from(pixel[0]) + 150 * u32::from(pixel[1]) + 29 * u32::from(pixel[2])
+    let all = u32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
+    77 * (all & 255) + 150 * ((all >> 8) & 255) + 29 * ((all >> 16) & 255)
 }
 
 /// Half the picture: means of two by two pixels.
