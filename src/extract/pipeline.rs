@@ -4,7 +4,8 @@
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
-use image::{RgbImage, RgbaImage};
+use image::imageops::replace;
+use image::{DynamicImage, RgbImage, RgbaImage};
 use rayon::ThreadPool;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 
@@ -188,6 +189,20 @@ impl Stage<'_> {
         });
         samples.sort_by_key(|(number, _)| *number);
         Ok(samples)
+    }
+
+    /// The crop of one frame, found by the file's index; `None` if it cannot be decoded.
+    pub(super) fn sought_sample(&self, frame: u64) -> Option<(u64, AlignSample)> {
+        let whole = self.video.frame(frame).ok()?;
+        let mut crop = RgbaImage::new(self.crop.w, self.crop.h);
+        let (left, top) = (-i64::from(self.crop.x), -i64::from(self.crop.y));
+        replace(
+            &mut crop,
+            &DynamicImage::from(whole).into_rgba8(),
+            left,
+            top,
+        );
+        Some((frame, AlignSample::of(View::whole(&crop))))
     }
 }
 
