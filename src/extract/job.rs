@@ -289,7 +289,10 @@ impl Job {
         });
         Ok(aligner.map(|aligner| pipeline::Align {
             aligner,
-            correct_above: (options.align == Align::Correct).then_some(options.align_tolerance),
+            correction: (options.align == Align::Correct).then_some(pipeline::Correction {
+                above: options.align_tolerance,
+                most: options.max_shift,
+            }),
         }))
     }
 

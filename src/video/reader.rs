@@ -42,6 +42,14 @@ impl Pending {
         self.number
     }
 
+    /// The frame's data, if it is still coded and stands alone.
+    pub(super) fn coded(&self) -> Option<&[u8]> {
+        match &self.state {
+            State::Coded(packet) => packet.0.data(),
+            State::Decoded(_) | State::Lost(_) => None,
+        }
+    }
+
     pub(super) fn decode(self, track: &Track, pool: &Pool) -> Result<Picture, DecodeFault> {
         match self.state {
             State::Coded(packet) => track.picture(self.number, pool.decode(&packet.0)?),

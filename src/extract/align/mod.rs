@@ -11,9 +11,10 @@ mod fit;
 mod structure;
 mod template;
 
-use image::{GrayImage, RgbImage};
+use image::GrayImage;
 use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterator};
 
+use super::View;
 use fit::Fit;
 use structure::{Extractor, Gradients, Plane, half, luma};
 use template::Template;
@@ -44,7 +45,7 @@ pub struct AlignSample(GrayImage);
 impl AlignSample {
     /// The brightness of `crop`.
     #[must_use]
-    pub fn of(crop: &RgbImage) -> Self {
+    pub fn of(crop: View<'_>) -> Self {
         Self(luma(crop))
     }
 }

@@ -4,7 +4,9 @@
 //! gradient. What is left of the light is smooth, and the band-pass removes most of it; paint, creases
 //! and edges of the surface remain.
 
-use image::{GrayImage, RgbImage};
+use image::GrayImage;
+
+use crate::extract::View;
 
 /// Added to the brightness before the logarithm, 8-bit levels: dark pixels are mostly noise.
 const DARK: f32 = 8.0;
@@ -128,13 +130,14 @@ pub(super) fn cubic(part: f32) -> [f32; 4] {
 }
 
 /// Brightness of a picture, 0..=255.
-pub(super) fn luma(image: &RgbImage) -> GrayImage {
-    let pixels = image.as_raw().chunks_exact(3);
+pub(super) fn luma(picture: View<'_>) -> GrayImage {
+    let pixels = picture.rows().flat_map(|row| row.chunks_exact(4));
     let levels = pixels.map(|p| {
         let sum = 77 * u32::from(p[0]) + 150 * u32::from(p[1]) + 29 * u32::from(p[2]);
         (sum >> 8) as u8
     });
-    let mut grey = GrayImage::new(image.width(), image.height());
+    let (width, height) = picture.dimensions();
+    let mut grey = GrayImage::new(width, height);
     grey.iter_mut()
         .zip(levels)
         .for_each(|(to, level)| *to = level);
