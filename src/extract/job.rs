@@ -10,7 +10,7 @@ use relit_data::report::{self, Page};
 use relit_data::session::{INDEX_FILE, Notice, Recording, Status};
 use relit_data::shard::{
     Align, Dataset, Digest, FrameRecord, ImageSize, MaskInfo, OutputFolder, Sample, SessionEntry,
-    ShardEntry, ShardWriter, SourceVideo,
+    SessionQuality, ShardEntry, ShardWriter, SourceVideo,
 };
 use relit_video::Video;
 
@@ -182,17 +182,20 @@ impl Job {
             }
         }
         steadiness.check()?;
+        let mut collected = collected.sorted();
         notices.extend(notices_of_lost(&lost));
         notices.extend(steadiness.notices());
         let taken: Vec<_> = (0..samples).filter_map(|k| writer.sample(k)).collect();
-        let findings = quality::findings(&taken);
+        let findings = quality::findings(&taken, options.frames);
         for found in &findings {
-            writer.set_quality(found.index, found.exposure_step, found.identical_to)?;
+            writer.set_finding(*found)?;
+            collected.complete(found);
         }
         notices.extend(quality::notices(&findings));
-        let collected = collected.sorted();
+        let lossy = notices.iter().any(Notice::is_loss);
+        let quality = SessionQuality::of(&collected.records, lossy, part_of_turn(&plan));
         // Whatever can fail is done before the shard of an earlier run is replaced.
-        let page = self.page(options, &collected, &notices)?;
+        let page = self.page(options, &collected, &notices, &quality)?;
         let files = writer.finish()?;
         let report = folder.write(&format!("{}.html", self.id()), page.as_bytes())?;
         let entry = SessionEntry {
@@ -209,7 +212,8 @@ impl Job {
             covered_deg: part_of_turn(&plan),
             duplicates: collected.count(|r| r.duplicate),
             spec_net: collected.count(|r| r.spec_net),
-            lossy: notices.iter().any(Notice::is_loss),
+            lossy,
+            quality: Some(quality),
             warnings: texts(&notices),
             table: files.table,
             report: Some(report),
@@ -341,6 +345,7 @@ impl Job {
             sharpness: measures.sharpness,
             exposure_step: None,
             identical_to: None,
+            blur: None,
         }
     }
 
@@ -383,6 +388,7 @@ impl Job {
         options: &ExtractOptions,
         collected: &Collected,
         notices: &[Notice],
+        quality: &SessionQuality,
     ) -> Result<String, ExtractError> {
         let facts = self.video.facts();
         let pair = |name: &str, value: String| (name.to_owned(), value);
@@ -408,6 +414,7 @@ impl Job {
                 pair("mask BLAKE3", self.mask.blake3.to_string()),
             ],
             warnings: &texts(notices),
+            quality: Some(quality),
             gate: options.gate,
             saturation_level: options.saturation_level,
         })?)

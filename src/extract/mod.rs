@@ -9,6 +9,7 @@
 //! are made or of the rig. It prints nothing: progress goes to an [`Observer`].
 
 mod align;
+mod blur;
 mod catalog;
 mod collected;
 mod crop;
