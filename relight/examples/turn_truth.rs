@@ -1,8 +1,8 @@
-//! Holds `relight turn` against truth: `turn_truth SHARD TRUTH [NORMALS]`.
+//! Holds `relight turn` against truth: `turn_truth SHARD TRUTH [NORMALS] [metal]`.
 //!
 //! TRUTH is a rendered session (`normal_gt.png`, `albedo_gt.png`, `truth.json`) or a folder that `relight synth --turn`
 //! wrote (`normal.png`, `albedo.png`, `turn.json`). NORMALS are those to start from, as `--normals` takes them; without
-//! it those of the shipped network.
+//! it those of the shipped network. `metal` says how the light that is called known is fitted to the truth.
 #![allow(clippy::print_stdout, reason = "the example is a program of its own")]
 
 use std::error::Error;
@@ -16,8 +16,8 @@ use relight::light::{Normals, YUp};
 use relight::metrics::{Comparison, ScaleFit, angular_error};
 use relight::render::{NormalsFrame, Surface};
 use relight::turn::{
-    Conditioning, Elevation, NormalsSource, ReadTurn, TableFrame, TableSense, TurnOptions,
-    fit_turn_light, prior_normals, read_curves, solve_turn,
+    BodyKind, Conditioning, Elevation, NormalsSource, ReadTurn, TableFrame, TableSense,
+    TurnOptions, fit_turn_light, prior_normals, read_curves, solve_turn,
 };
 use serde_json::Value;
 
@@ -28,6 +28,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [shard, truth, normals @ ..] = arguments.as_slice() else {
         return Err("give a shard and its truth".into());
+    };
+    let (normals, body) = match normals {
+        [normals @ .., kind] if kind == "metal" => (normals, BodyKind::Metal),
+        normals => (normals, BodyKind::Diffuse),
     };
     let (shard, truth) = (Path::new(shard), Path::new(truth));
     let start = Instant::now();
@@ -45,7 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     });
     let prior = prior_normals(&source, NormalsFrame::YUp, &turn.first, &turn.mask)?;
     truth.angles("prior alone", &prior)?;
-    let known = fit_turn_light(&turn.curves, &truth.surface, &frame)?;
+    let known = fit_turn_light(&turn.curves, &truth.surface, body, &frame)?;
     let options = |light, prior| TurnOptions {
         elevation: truth.elevation,
         light,
@@ -130,6 +134,7 @@ impl Truth {
             found.residual(),
             found.expected_error_deg(),
         );
+        println!("    body {:?}, {:?}", found.body(), found.bodies());
         for start in found.starts() {
             println!("    start {start:?}");
         }

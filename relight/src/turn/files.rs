@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::light::TERMS;
 use super::maps::AngleFigure;
 use super::{
-    Conditioning, Elevation, ExposureStep, ReadTurn, RoomStrip, StartFigure, StripFigures,
-    TableLight, TurnCurves, TurnError, TurnMaps, TurnSolution,
+    BodyFigure, BodyKind, Conditioning, Elevation, ExposureStep, ReadTurn, RoomStrip, StartFigure,
+    StripFigures, TableLight, TurnCurves, TurnError, TurnMaps, TurnSolution,
 };
 use crate::decompose::{bright, write_light};
 use crate::image::{ColourSpace, Depth, Extent, Linear, Planes, Rgb, Srgb, write_png};
@@ -90,6 +90,9 @@ pub struct TurnFigures {
     advice: Option<&'static str>,
     normals: Option<String>,
     light: FigureLight,
+    /// What the object is taken for, and what each kind that was tried leaves.
+    body: BodyKind,
+    bodies: Vec<BodyFigure>,
     /// What is left of a curve, over the energy of its variation, the median.
     residual: f64,
     /// The angle that normals are expected to be off, degrees, the median.
@@ -255,6 +258,8 @@ impl TurnFiles<'_> {
                 source: self.light_source.map(str::to_owned),
                 starts: solution.starts().to_vec(),
             },
+            body: solution.body(),
+            bodies: solution.bodies().to_vec(),
             residual: solution.residual(),
             expected_error_deg: solution.expected_error_deg(),
             gloss,

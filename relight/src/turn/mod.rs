@@ -22,6 +22,8 @@
 //! | `shine` | the gloss of the whole object; the object as a file |
 //! | `files`, `labels` | what is written |
 
+mod begin;
+mod body;
 mod curves;
 mod error;
 mod exposure;
@@ -49,6 +51,7 @@ mod verdict;
 #[cfg(test)]
 mod tests;
 
+pub use body::{BodyFigure, BodyKind};
 pub use curves::{CurveBuilder, TurnCurves};
 pub use error::TurnError;
 pub use exposure::ExposureStep;

@@ -1,6 +1,6 @@
 //! A grey ball on the table, which measures the light.
 
-use super::{CurveBuilder, TableFrame, TurnCurves, TurnError, fit_turn_light};
+use super::{BodyKind, CurveBuilder, TableFrame, TurnCurves, TurnError, fit_turn_light};
 use crate::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use crate::light::{Normals, ShLight};
 use crate::render::Surface;
@@ -98,7 +98,8 @@ impl ProbeBuilder {
         let curves = self.builder.finish()?;
         let normals = Normals::sphere(SIDE);
         let albedo = Rgb::<Linear>::new(Planes::filled(normals.extent(), [1.0; 3]));
-        let light = fit_turn_light(&curves, &Surface::new(normals, albedo, None)?, frame)?;
+        let surface = Surface::new(normals, albedo, None)?;
+        let light = fit_turn_light(&curves, &surface, BodyKind::Diffuse, frame)?;
         Ok((light, curves))
     }
 }

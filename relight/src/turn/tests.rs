@@ -154,7 +154,7 @@ fn a_matt_ball_in_known_light_is_found_as_it_is() {
 fn the_light_of_a_known_surface_is_found_as_it_is() {
     let (surface, light) = (ball(), room());
     let frame = TableFrame::new(elevation());
-    let found = fit_turn_light(&SOLVED.0.curves, &surface, &frame).unwrap();
+    let found = fit_turn_light(&SOLVED.0.curves, &surface, BodyKind::Diffuse, &frame).unwrap();
     let largest = 1.1;
     for (a, b) in found.coefficients().iter().zip(light.coefficients()) {
         for (a, b) in a.iter().zip(b) {
@@ -251,6 +251,24 @@ fn read(surface: &Surface, light: &ShLight) -> ReadTurn {
     }
 }
 
+/// The curves of the ball in a room.
+fn film_in(room: &Room, surface: &Surface) -> TurnCurves {
+    let extent = surface.extent();
+    let mut builder = CurveBuilder::new(extent, mask(surface).plane(0)).unwrap();
+    for k in 0..90 {
+        let angle = f64::from(k) * 4.0;
+        let basis = basis_at(angle.to_radians());
+        let image = Planes::from_fn(extent, |x, y| {
+            let normal = surface.normals().planes().pixel(x, y).map(f64::from);
+            let [body, gloss] = lit(room, normal, &basis);
+            let albedo = surface.albedo().planes().pixel(x, y).map(f64::from);
+            [0, 1, 2].map(|c| (albedo[c] * body[c] + gloss[c]) as f32)
+        });
+        builder.push(angle, extent, image.planes()).unwrap();
+    }
+    builder.finish().unwrap()
+}
+
 #[test]
 fn gloss_beside_the_matt_part_is_found_in_known_light() {
     let (surface, light) = (ball(), room());
@@ -260,28 +278,99 @@ fn gloss_beside_the_matt_part_is_found_in_known_light() {
         frame: table,
         light: TableLight::from_viewer(&light, &table),
         gloss: GlossLight::sum(&shown, &[0.5, 0.4, 0.3]),
+        body: BodyKind::Diffuse,
     };
-    let extent = surface.extent();
-    let mut builder = CurveBuilder::new(extent, mask(&surface).plane(0)).unwrap();
-    for k in 0..90 {
-        let angle = f64::from(k) * 4.0;
-        let basis = basis_at(angle.to_radians());
-        let image = Planes::from_fn(extent, |x, y| {
-            let normal = surface.normals().planes().pixel(x, y).map(f64::from);
-            let [matt, gloss] = lit(&glossy, normal, &basis);
-            let albedo = surface.albedo().planes().pixel(x, y).map(f64::from);
-            [0, 1, 2].map(|c| (albedo[c] * matt[c] + gloss[c]) as f32)
-        });
-        builder.push(angle, extent, image.planes()).unwrap();
-    }
-    let curves = builder.finish().unwrap();
+    let curves = film_in(&glossy, &surface);
     let found = solve_turn(&curves, &known(&light)).unwrap();
+    assert_eq!(found.body(), BodyKind::Diffuse);
     let off = off(&surface, &found.normals(&curves));
     assert!(off < 1.0, "{off}");
     let gloss = found.gloss(&curves).unwrap().unwrap();
     assert!(gloss.reflectance > 0.0 && gloss.residual < 0.8, "{gloss:?}");
     let maps = TurnMaps::new(&curves, &found);
     assert!(maps.highlight.pixel(SIDE / 2, SIDE / 2)[0] > 0.002);
+}
+
+/// A room with so much in its higher bands that it has small bright windows.
+fn windows() -> ShLight {
+    let mut light = room().with_order(Order::new(4).unwrap());
+    for (at, values) in light.coefficients_mut().iter_mut().enumerate().skip(9) {
+        let value = 0.15 * (1.7 * at as f64).sin();
+        *values = [value, 0.9 * value, 0.8 * value];
+    }
+    light
+}
+
+/// A ball of metal in a room, whose lobe leaves less of each band.
+fn metal_ball() -> (Surface, ShLight, TurnCurves) {
+    let (surface, light) = (ball(), windows());
+    let table = TableFrame::new(elevation());
+    let shown = GlossLight::bands(&light.rotated(&table.rotation()));
+    let factors = [1.0, 0.95, 0.9, 0.8, 0.7].map(|factor| std::f64::consts::PI * factor);
+    let metal = Room {
+        frame: table,
+        light: TableLight::from_viewer(&light, &table),
+        gloss: GlossLight::sum(&shown, &factors),
+        body: BodyKind::Metal,
+    };
+    let curves = film_in(&metal, &surface);
+    (surface, light, curves)
+}
+
+#[test]
+fn metal_is_told_by_what_it_leaves_and_found_in_known_light() {
+    let (surface, light, curves) = metal_ball();
+    let found = solve_turn(&curves, &known(&light)).unwrap();
+    assert_eq!(found.body(), BodyKind::Metal);
+    let [diffuse, metal] = found.bodies() else {
+        panic!("{:?}", found.bodies());
+    };
+    assert!(
+        diffuse.residual > 10.0 * metal.residual,
+        "{diffuse:?} {metal:?}"
+    );
+    let off = off(&surface, &found.normals(&curves));
+    assert!(off < 1.0, "{off}");
+    assert!(albedo_off(&surface, &found.albedo(&curves), 1.0) < 0.05);
+    let lit = found.surface(&curves).unwrap();
+    assert_eq!(lit.albedo().planes().pixel(SIDE / 2, SIDE / 2), [0.0; 3]);
+    let [r, g, _] = lit.gloss().unwrap().reflectance().pixel(SIDE / 2, SIDE / 2);
+    let [red, green, _] = surface.albedo().planes().pixel(SIDE / 2, SIDE / 2);
+    assert!((r / g - red / green).abs() < 0.1, "{r} {g}");
+}
+
+#[test]
+fn metal_is_found_in_unknown_light_with_normals_to_lean_on() {
+    let (surface, _, curves) = metal_ball();
+    let options = TurnOptions {
+        elevation: elevation(),
+        prior: Some(surface.normals().clone()),
+        ..TurnOptions::default()
+    };
+    let found = solve_turn(&curves, &options).unwrap();
+    assert_eq!(found.body(), BodyKind::Metal);
+    let off = off(&surface, &found.normals(&curves));
+    assert!(off < 1.0, "{off}");
+}
+
+#[test]
+fn a_body_that_was_given_is_not_doubted_and_metal_has_no_labels() {
+    let turn = read(&ball(), &room());
+    let options = TurnOptions {
+        body: Some(BodyKind::Metal),
+        ..known(&room())
+    };
+    let found = solve_turn(&turn.curves, &options).unwrap();
+    assert_eq!((found.body(), found.bodies().len()), (BodyKind::Metal, 1));
+    let labels = TurnLabels {
+        turn: &turn,
+        solution: &found,
+        least_confidence: 0.5,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("labels");
+    assert!(matches!(labels.write(&out), Err(TurnError::NoMattPart)));
+    assert!(!out.exists());
 }
 
 #[test]

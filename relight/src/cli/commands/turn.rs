@@ -7,9 +7,9 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use relight::light::{Order, Panorama, ShLight};
 use relight::turn::{
-    Conditioning, Elevation, ElevationSource, Filmed, NormalsSource, ProbePlace, ReadTurn,
-    RoomStrip, RoomVerdict, TableFrame, TableSense, TurnFiles, TurnLabels, TurnMaps, TurnOptions,
-    film, prior_normals, read_curves, solve_turn,
+    BodyKind, Conditioning, Elevation, ElevationSource, Filmed, NormalsSource, ProbePlace,
+    ReadTurn, RoomStrip, RoomVerdict, TableFrame, TableSense, TurnError, TurnFiles, TurnLabels,
+    TurnMaps, TurnOptions, film, prior_normals, read_curves, solve_turn,
 };
 use serde_json::json;
 
@@ -64,6 +64,9 @@ pub(in crate::cli) struct Arguments {
     /// How much these normals count beside what the turn says.
     #[arg(long, value_name = "WEIGHT", default_value_t = TurnOptions::default().prior_weight, value_parser = weight)]
     normals_weight: f64,
+    /// What the object is made of: without it, what explains the turn.
+    #[arg(long, value_enum, value_name = "KIND")]
+    body: Option<BodyName>,
     /// Which way the table turns as its angle grows, seen from above.
     #[arg(long, value_enum, default_value_t = SenseName::CounterClockwise)]
     sense: SenseName,
@@ -87,6 +90,23 @@ enum SenseName {
     CounterClockwise,
     /// The background moves to the left.
     Clockwise,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum BodyName {
+    /// It scatters light, with gloss or without.
+    Diffuse,
+    /// It only reflects, in its own colour.
+    Metal,
+}
+
+impl From<BodyName> for BodyKind {
+    fn from(name: BodyName) -> Self {
+        match name {
+            BodyName::Diffuse => Self::Diffuse,
+            BodyName::Metal => Self::Metal,
+        }
+    }
 }
 
 impl Arguments {
@@ -129,6 +149,7 @@ impl Arguments {
             },
             prior: prior.transpose()?,
             prior_weight: self.normals_weight,
+            body: self.body.map(BodyKind::from),
         })
     }
 }
@@ -182,7 +203,8 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     if let Some(path) = &arguments.asset {
         solution.asset(&turn)?.write(path)?;
     }
-    if let Some(folder) = &arguments.labels {
+    let has_labels = solution.body() == BodyKind::Diffuse;
+    if let Some(folder) = arguments.labels.as_ref().filter(|_| has_labels) {
         let labels = TurnLabels {
             turn: &turn,
             solution: &solution,
@@ -192,7 +214,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     }
     let seconds = start.elapsed().as_secs_f64();
     let text = format!(
-        "{}: {} frames in {read_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees (median), light {}",
+        "{}: {} frames in {read_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees (median), light {}, body {}",
         arguments.output.display(),
         turn.curves.frames(),
         solution.expected_error_deg(),
@@ -200,6 +222,10 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
             (Some(_), _) => "given",
             (None, Some(_)) => "measured",
             (None, None) => "found",
+        },
+        match solution.body() {
+            BodyKind::Diffuse => "diffuse",
+            BodyKind::Metal => "metal",
         },
     );
     let event = json!({
@@ -213,7 +239,13 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     if arguments.session.is_some() {
         warn_of_room(strip, arguments.sense, console);
     }
-    Ok(warn(&turn, &options, conditioning, console))
+    let outcome = warn(&turn, &options, conditioning, console);
+    if arguments.labels.is_some() && !has_labels {
+        let text = TurnError::NoMattPart.to_string();
+        console.warn(&text, &json!({ "event": "warning", "message": text }));
+        return Ok(Outcome::Incomplete);
+    }
+    Ok(outcome)
 }
 
 /// Says where the room does not fit.
