@@ -21,8 +21,10 @@ const DAMPING: f64 = 1e-3;
 const MOST_DAMPING: f64 = 1e3;
 /// The steps end where one improves the cost by less than this part of it.
 const SETTLED: f64 = 2e-3;
-/// The most that gloss shows of a band, over what a smooth dielectric shows of it.
-const MOST_SHARE: f64 = 1.5;
+/// The most that gloss shows of a band, over what a smooth dielectric shows of it: light by a dark grey ball is in small units.
+const MOST_SHARE: f64 = 20.0;
+/// The most that metal shows of a band, over the first.
+const MOST_METAL_SHARE: f64 = 1.2;
 /// The least share of the first band by which those of metal are divided.
 const LEAST_FIRST_SHARE: f64 = 0.05;
 /// Pixels added up by one task.
@@ -222,9 +224,10 @@ impl Guess {
             .collect();
         if let (Unknowns::Mirror(_), Some(&first)) = (unknowns, shares.first()) {
             // Of an even light metal shows its albedo's part, whatever its lobe is.
-            shares
-                .iter_mut()
-                .for_each(|share| *share /= first.max(LEAST_FIRST_SHARE));
+            let first = first.max(LEAST_FIRST_SHARE);
+            for share in &mut shares {
+                *share = (*share / first).min(MOST_METAL_SHARE);
+            }
         }
         Self {
             light: TableLight::new(terms),

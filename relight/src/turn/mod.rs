@@ -62,7 +62,7 @@ pub use labels::TurnLabels;
 pub use light::TableLight;
 pub use maps::TurnMaps;
 pub use prior::{NormalsSource, prior_normals};
-pub use probe::{ProbeBuilder, ProbePlace};
+pub use probe::{Probe, ProbeBall, ProbeBuilder, ProbeLight, ProbePlace};
 pub use read::{ReadTurn, TableSense, read_curves};
 pub use room::fit_turn_light;
 pub use solve::{StartFigure, TurnOptions, TurnSolution, solve_turn};

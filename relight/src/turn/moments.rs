@@ -93,6 +93,15 @@ struct Share {
 }
 
 impl Share {
+    /// The albedo that is drawn to another one, by this much beside what the curve says.
+    fn drawn(self, to: f64, by: f64) -> f64 {
+        if self.own + by > 1e-12 {
+            ((self.along + by * to) / (self.own + by)).max(0.0)
+        } else {
+            0.0
+        }
+    }
+
     fn albedo(self) -> f64 {
         if self.own > 1e-12 {
             (self.along / self.own).max(0.0)
@@ -213,6 +222,23 @@ impl Moments {
     pub(super) fn albedo(&self, waves: &PixelWaves) -> [f64; 3] {
         let products = WaveProducts::of(waves);
         [0, 1, 2].map(|channel| self.share(channel, waves, &products).albedo())
+    }
+
+    /// The albedo that explains the curve best, drawn to one from which albedos of an object are `spread` away: as far as what is
+    /// left of the curve, taken for noise of `freedom` degrees of freedom, lets it be any other.
+    pub(super) fn drawn_albedo(
+        &self,
+        waves: &PixelWaves,
+        (to, spread): ([f64; 3], [f64; 3]),
+        freedom: f64,
+    ) -> [f64; 3] {
+        let products = WaveProducts::of(waves);
+        [0, 1, 2].map(|channel| {
+            let share = self.share(channel, waves, &products);
+            let noise = share.left().max(0.0) / freedom;
+            let by = noise / spread[channel].powi(2).max(1e-12);
+            share.drawn(to[channel], by)
+        })
     }
 
     /// The products of each wave with a list of waves.

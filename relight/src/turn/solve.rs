@@ -137,6 +137,7 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
     for _ in 0..ROBUST_ROUNDS {
         solver.refine();
     }
+    solver.draw_albedo();
     let common = match (&options.light, &options.prior) {
         (Some(_), _) => BENT_IN_KNOWN_LIGHT,
         (None, Some(_)) => BENT_WITH_PRIOR,
@@ -285,6 +286,24 @@ impl Solver<'_> {
         let near = search_all(&self.room, &moments, joint.expected, Some(&fits));
         (self.room, _) = joint.refined(self.room, near, ROBUST_STEPS);
         self.fits = self.search(Some(&self.fits));
+    }
+
+    /// Draws the albedo of pixels that hardly see light, or of whose curve much is left, to the median of all.
+    fn draw_albedo(&mut self) {
+        let fits = &self.fits;
+        let of_channel = |c: usize| fits.iter().map(move |fit| fit.albedo[c]);
+        let middle = [0, 1, 2].map(|c| median(of_channel(c)));
+        // Half of the albedos are within it.
+        let spread = [0, 1, 2].map(|c| median(of_channel(c).map(|one| (one - middle[c]).abs())));
+        let room = &self.room;
+        self.fits
+            .par_iter_mut()
+            .zip(&self.moments)
+            .filter(|(_, moments)| !moments.is_dark())
+            .for_each(|(fit, moments)| {
+                let waves = room.waves(fit.normal);
+                fit.albedo = moments.drawn_albedo(&waves, (middle, spread), FREEDOM);
+            });
     }
 
     /// The normals around each pixel, smoothed.
