@@ -15,7 +15,7 @@ const SIDE: usize = 48;
 /// The part of the ball's radius that is looked at: its rim shows the background too, and reflects it.
 const PART: f32 = 0.92;
 /// A ball looks like chrome where more than this part of what varies over the turn lies beyond the second harmonic.
-const SHARP: f64 = 0.12;
+const SHARP: f64 = 0.06;
 /// Rows and columns of the panorama that a chrome ball shows.
 const ROWS: usize = 32;
 const COLUMNS: usize = 2 * ROWS;
@@ -292,11 +292,11 @@ mod tests {
 
     /// A room with windows: beyond band 2 too.
     fn room() -> ShLight {
-        let values = [1.1, 0.3, 0.24, 0.36, 0.07, -0.06, 0.03, 0.12, 0.09];
+        let values = [2.0, 0.3, 0.24, 0.36, 0.07, -0.06, 0.03, 0.12, 0.09];
         let light = ShLight::new(values.map(|v| [v, 0.9 * v, 0.8 * v]).to_vec()).unwrap();
         let mut light = light.with_order(Order::new(4).unwrap());
         for (at, values) in light.coefficients_mut().iter_mut().enumerate().skip(9) {
-            *values = [0.06 * (1.7 * at as f64).sin(); 3];
+            *values = [0.15 * (1.7 * at as f64).sin(); 3];
         }
         light
     }
