@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-train test test-rig lint demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-train test test-rig test-slurm lint demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -48,6 +48,10 @@ test: setup ## Run all tests
 
 test-rig: setup ## Capture with the kernel's camera drivers and a real tty, in a virtual machine
 	@tests/rig-vm/run
+
+test-slurm: setup ## Extract as an array job on a real Slurm, started on this machine for it
+	cargo build --locked -p relit --bin relit-extract
+	@tests/slurm/run $(TARGET)/debug/relit-extract
 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check

@@ -58,6 +58,13 @@ impl Console {
         }
     }
 
+    /// Text for a person; nothing for a machine.
+    pub fn say_to_people(self, text: &str) {
+        if !self.json {
+            print_line(text);
+        }
+    }
+
     /// What is being done: on standard error for a person, as a JSON line for a machine.
     pub fn say_phase(self, text: &str, event: &Value) {
         if self.json {

@@ -69,6 +69,7 @@ fn sample(session: &str, index: u32) -> Sample {
         sharpness: measures.sharpness,
         exposure_step: None,
         identical_to: None,
+        blur: None,
     };
     Sample::encode(record, image).unwrap()
 }
@@ -154,6 +155,18 @@ fn a_shard_is_given_as_it_was_written() {
             }
         }
     }
+}
+
+#[test]
+fn a_data_set_of_an_earlier_version_is_given_too() {
+    let earlier = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/earlier");
+    let turns = open(&earlier);
+    assert_eq!(turns.turns(), [12]);
+    let drawn = whole(stream(&turns, 1, Place::default()));
+    let frames = drawn.iter().flat_map(|drawn| &drawn.batch.frames);
+    let records: Vec<&FrameRecord> = frames.filter_map(|frame| frame.record.as_ref()).collect();
+    assert_eq!(records.len(), 12);
+    assert!(records.iter().all(|record| record.blur.is_none()));
 }
 
 #[test]

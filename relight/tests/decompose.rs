@@ -533,6 +533,7 @@ fn sample(index: u32, saturated: f64) -> Sample {
         sharpness: measures.sharpness,
         exposure_step: None,
         identical_to: None,
+        blur: None,
     };
     Sample::encode(record, image).unwrap()
 }

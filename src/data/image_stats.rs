@@ -20,8 +20,9 @@ pub struct SizeMismatch {
 }
 
 /// Luma of a pixel in thousandths of a grey level, 0..=255 000.
-fn luma(r: u8, g: u8, b: u8) -> i32 {
-    299 * i32::from(r) + 587 * i32::from(g) + 114 * i32::from(b)
+#[inline(always)]
+fn luma([r, g, b]: [u32; 3]) -> i32 {
+    (299 * r + 587 * g + 114 * b) as i32
 }
 
 /// Statistics of one image under one mask.
@@ -154,30 +155,22 @@ impl MaskSpans {
 
     fn sum(&self, image: &RgbImage, level: u8) -> Measures {
         let row_bytes = self.width as usize * 3;
-        let mut sums = [0_u64; 3];
-        let (mut all, mut any) = (0_u64, 0_u64);
-        let mut laplacian = Laplacian::new(self.width as usize);
-        let rows = image.as_raw().chunks_exact(row_bytes.max(3));
-        for ((row, spans), y) in rows.zip(&self.rows).zip(0_usize..) {
-            for span in spans {
-                let Some(pixels) = row.get(span.start * 3..span.end * 3) else {
-                    continue;
-                };
-                let found = count(pixels, level);
-                all += found.all;
-                any += found.any;
-                for (sum, part) in sums.iter_mut().zip(found.sums) {
-                    *sum += part;
-                }
-            }
-            laplacian.add_row(row, y, &self.inner);
+        let mut measuring = self.measuring(level);
+        for row in image.as_raw().chunks_exact(row_bytes.max(3)) {
+            measuring.add_row::<3>(row);
         }
-        Measures {
-            mask_px: self.pixels,
-            saturated_px: all,
-            saturated_any_px: any,
-            mean_rgb: sums.map(|sum| fraction(sum, self.pixels)),
-            sharpness: laplacian.variance(),
+        measuring.finish()
+    }
+
+    /// Starts measuring an image that comes row by row.
+    #[must_use]
+    pub fn measuring(&self, level: u8) -> Measuring<'_> {
+        Measuring {
+            spans: self,
+            level: u32::from(level),
+            rows: 0,
+            total: Counts::default(),
+            laplacian: Laplacian::new(self.width as usize),
         }
     }
 
@@ -254,42 +247,93 @@ fn inner_row(under: &[Vec<bool>], y: usize) -> Vec<bool> {
         .collect()
 }
 
-/// Sums over one run of pixels.
+/// Measures an image row by row, under the mask of [`MaskSpans`].
+#[derive(Debug)]
+pub struct Measuring<'a> {
+    spans: &'a MaskSpans,
+    level: u32,
+    rows: usize,
+    total: Counts,
+    laplacian: Laplacian,
+}
+
+impl Measuring<'_> {
+    /// Adds the next row: `BYTES` bytes a pixel, at least three, of which the first are red, green and blue.
+    /// What lies beyond the mask's size does not count.
+    // Compiled into the caller, which knows the processor's vector instructions.
+    #[inline(always)]
+    pub fn add_row<const BYTES: usize>(&mut self, row: &[u8]) {
+        for span in self.spans.rows.get(self.rows).into_iter().flatten() {
+            let pixels = row.get(span.start * BYTES..span.end * BYTES);
+            self.total
+                .add::<BYTES>(pixels.unwrap_or_default(), self.level);
+        }
+        self.laplacian.add_row::<BYTES>(row, self.rows, self.spans);
+        self.rows += 1;
+    }
+
+    /// The measures of the rows so far.
+    #[must_use]
+    pub fn finish(self) -> Measures {
+        let pixels = self.spans.pixels;
+        Measures {
+            mask_px: pixels,
+            saturated_px: self.total.all,
+            saturated_any_px: self.total.any,
+            mean_rgb: self.total.sums.map(|sum| fraction(sum, pixels)),
+            sharpness: self.laplacian.variance(),
+        }
+    }
+}
+
+/// Red, green and blue of a pixel.
+#[inline(always)]
+fn channels<const BYTES: usize>(pixel: &[u8]) -> [u32; 3] {
+    match pixel {
+        // One load of the four bytes becomes vector instructions.
+        &[r, g, b, x] => {
+            let all = u32::from_le_bytes([r, g, b, x]);
+            [all & 255, (all >> 8) & 255, (all >> 16) & 255]
+        }
+        _ => [pixel[0], pixel[1], pixel[2]].map(u32::from),
+    }
+}
+
+/// Sums over runs of pixels.
+#[derive(Debug, Default)]
 struct Counts {
     sums: [u64; 3],
     all: u64,
     any: u64,
 }
 
-/// Sums a run of RGB pixels, in short pieces so that the inner loop needs 32 bits only and can be
-/// vectorised.
-fn count(pixels: &[u8], level: u8) -> Counts {
-    let mut total = Counts {
-        sums: [0; 3],
-        all: 0,
-        any: 0,
-    };
-    for piece in pixels.chunks(3 * 4096) {
-        let mut sums = [0_u32; 3];
-        let (mut all, mut any) = (0_u32, 0_u32);
-        for pixel in piece.chunks_exact(3) {
-            let (r, g, b) = (pixel[0], pixel[1], pixel[2]);
-            sums[0] += u32::from(r);
-            sums[1] += u32::from(g);
-            sums[2] += u32::from(b);
-            all += u32::from(r.min(g).min(b) >= level);
-            any += u32::from(r.max(g).max(b) >= level);
+impl Counts {
+    /// Adds a run of pixels, in short pieces so that the inner loop needs 32 bits only and can be
+    /// vectorised.
+    #[inline(always)]
+    fn add<const BYTES: usize>(&mut self, pixels: &[u8], level: u32) {
+        for piece in pixels.chunks(BYTES * 4096) {
+            let [mut red, mut green, mut blue] = [0_u32; 3];
+            let (mut all, mut any) = (0_u32, 0_u32);
+            for pixel in piece.chunks_exact(BYTES) {
+                let [r, g, b] = channels::<BYTES>(pixel);
+                red += r;
+                green += g;
+                blue += b;
+                all += u32::from(r.min(g).min(b) >= level);
+                any += u32::from(r.max(g).max(b) >= level);
+            }
+            for (sum, part) in self.sums.iter_mut().zip([red, green, blue]) {
+                *sum += u64::from(part);
+            }
+            self.all += u64::from(all);
+            self.any += u64::from(any);
         }
-        for (sum, part) in total.sums.iter_mut().zip(sums) {
-            *sum += u64::from(part);
-        }
-        total.all += u64::from(all);
-        total.any += u64::from(any);
     }
-    total
 }
 
 /// Sums of the Laplacian over an image that is added row by row; holds three rows of luma.
+#[derive(Debug)]
 struct Laplacian {
     above: Vec<i32>,
     here: Vec<i32>,
@@ -313,19 +357,26 @@ impl Laplacian {
     }
 
     /// Adds row `y`. The Laplacian of the row above is then complete, and is summed over that row's
-    /// runs in `inner`.
-    fn add_row(&mut self, row: &[u8], y: usize, inner: &[Vec<Span>]) {
+    /// runs of inner pixels, whose neighbours are all under the mask: luma is not needed elsewhere.
+    #[inline(always)]
+    fn add_row<const BYTES: usize>(&mut self, row: &[u8], y: usize, spans: &MaskSpans) {
         std::mem::swap(&mut self.above, &mut self.here);
         std::mem::swap(&mut self.here, &mut self.below);
-        for (value, pixel) in self.below.iter_mut().zip(row.chunks_exact(3)) {
-            *value = luma(pixel[0], pixel[1], pixel[2]);
+        for span in spans.rows.get(y).into_iter().flatten() {
+            let pixels = row.get(span.start * BYTES..span.end * BYTES);
+            let below = self.below.get_mut(span.start..span.end);
+            let pixels = pixels.unwrap_or_default().chunks_exact(BYTES);
+            for (value, pixel) in below.unwrap_or_default().iter_mut().zip(pixels) {
+                *value = luma(channels::<BYTES>(pixel));
+            }
         }
-        let spans = y.checked_sub(1).and_then(|above| inner.get(above));
-        for &span in spans.into_iter().flatten() {
+        let inner = y.checked_sub(1).and_then(|above| spans.inner.get(above));
+        for &span in inner.into_iter().flatten() {
             self.add_span(span);
         }
     }
 
+    #[inline(always)]
     fn add_span(&mut self, Span { start, end }: Span) {
         // An inner pixel has a left and a right neighbour, so the slices exist.
         let (Some(above), Some(left), Some(here), Some(right), Some(below)) = (
@@ -339,16 +390,23 @@ impl Laplacian {
         ) else {
             return;
         };
-        let (mut sum, mut squares) = (0_i64, 0_u64);
-        for ((((a, l), h), r), b) in above.iter().zip(left).zip(here).zip(right).zip(below) {
-            let value = 4 * h - a - l - r - b;
-            let magnitude = u64::from(value.unsigned_abs());
-            sum += i64::from(value);
-            squares += magnitude * magnitude;
+        // Pieces whose sums need 32 and 64 bits only.
+        let length = end - start;
+        for from in (0..length).step_by(1024) {
+            let piece = from..length.min(from + 1024);
+            let (mut sum, mut squares) = (0_i32, 0_u64);
+            let around = above[piece.clone()].iter().zip(&left[piece.clone()]);
+            let around = around.zip(&right[piece.clone()]).zip(&below[piece.clone()]);
+            for ((((a, l), r), b), h) in around.zip(&here[piece]) {
+                let value = 4 * h - a - l - r - b;
+                let magnitude = u64::from(value.unsigned_abs());
+                sum += value;
+                squares += magnitude * magnitude;
+            }
+            self.sum += i64::from(sum);
+            self.squares += u128::from(squares);
         }
-        self.count += (end - start) as u64;
-        self.sum += sum;
-        self.squares += u128::from(squares);
+        self.count += length as u64;
     }
 
     /// Population variance in squared grey levels (the sums are in thousandths of a level).

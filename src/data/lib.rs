@@ -104,6 +104,7 @@
 //!         sharpness: measures.sharpness,
 //!         exposure_step: None,
 //!         identical_to: None,
+//!         blur: None,
 //!     };
 //!     writer.push(Sample::encode(record, image)?)?;
 //! }
@@ -133,6 +134,7 @@
 //!     duplicates: 0,
 //!     spec_net: 0,
 //!     lossy: false,
+//!     quality: None,
 //!     warnings: Vec::new(),
 //!     table: files.table,
 //!     report: None,

@@ -4,7 +4,7 @@ use image::RgbImage;
 use image::imageops::thumbnail;
 
 use relit_data::report::{THUMBNAIL_SIDE, Thumbnail};
-use relit_data::shard::FrameRecord;
+use relit_data::shard::{FrameRecord, TurnFinding};
 
 /// Images on the report's contact sheet.
 const THUMBNAILS: u32 = 24;
@@ -42,6 +42,15 @@ impl Collected {
         self.records.sort_by_key(|record| record.index);
         self.thumbnails.sort_by_key(|thumbnail| thumbnail.index);
         self
+    }
+
+    /// Completes the record of a sample, after sorting, by what only the whole turn shows.
+    pub(super) fn complete(&mut self, found: &TurnFinding) {
+        if let Some(record) = self.records.get_mut(found.index as usize) {
+            record.exposure_step = found.exposure_step;
+            record.identical_to = found.identical_to;
+            record.blur = found.blur;
+        }
     }
 
     /// Number of records for which `is` is true.

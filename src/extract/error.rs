@@ -89,7 +89,7 @@ pub enum ExtractError {
     CropTooLarge(Rect),
     /// Scaling failed.
     #[error("a frame could not be scaled: {0}")]
-    Scaling(String),
+    Scaling(&'static str),
     /// No frame can be decoded.
     #[error("no frame of the video can be decoded: record it again, or give another file")]
     NoFrameLeft,

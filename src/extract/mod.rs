@@ -9,6 +9,7 @@
 //! are made or of the rig. It prints nothing: progress goes to an [`Observer`].
 
 mod align;
+mod blur;
 mod catalog;
 mod collected;
 mod crop;
@@ -24,6 +25,7 @@ mod scale;
 mod select;
 mod steadiness;
 mod timeline;
+mod view;
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -40,8 +42,9 @@ pub use crop::{bounding_box, cut, square_around};
 pub use error::ExtractError;
 pub use observer::{Observer, RecordingOutcome};
 pub use options::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
-pub use scale::{APRON, Scaler};
+pub use scale::{APRON, ScaleBuffers, Scaler};
 pub use select::{Candidate, Selection, TimeGap, TurnSpan, runs_back_at, time_gaps};
+pub use view::View;
 
 /// The outcome of an extraction: numbers of recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -4,20 +4,21 @@
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
-use fast_image_resize::Resizer;
-use image::RgbImage;
-use image::imageops::crop_imm;
+use image::imageops::replace;
+use image::{DynamicImage, RgbImage, RgbaImage};
 use rayon::ThreadPool;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 
 use relit_data::geometry::Rect;
 use relit_data::image_stats::{MaskSpans, Measures};
-use relit_data::shard::{self, ShardError};
-use relit_video::{DecodeFault, Pending, Picture, Reader, Video};
+use relit_data::shard;
+use relit_video::{DecodeFault, Pending, Reader, Video};
 
 use super::plan::Assignments;
 use super::scale::APRON;
-use super::{AlignBuffers, AlignSample, Aligner, Alignment, ExtractError, Scaler};
+use super::{
+    AlignBuffers, AlignSample, Aligner, Alignment, ExtractError, ScaleBuffers, Scaler, View,
+};
 
 /// The processing of the frames of one video.
 pub(super) struct Stage<'a> {
@@ -33,8 +34,15 @@ pub(super) struct Stage<'a> {
 /// How shifts are measured and corrected.
 pub(super) struct Align {
     pub(super) aligner: Aligner,
-    /// Shifts above this are corrected, pixels; `None` if none are.
-    pub(super) correct_above: Option<f64>,
+    /// `None` if no shifts are corrected.
+    pub(super) correction: Option<Correction>,
+}
+
+/// Which shifts are corrected, pixels.
+pub(super) struct Correction {
+    pub(super) above: f64,
+    /// A turn with larger ones fails.
+    pub(super) most: f64,
 }
 
 /// A frame as it is written to the data set.
@@ -48,18 +56,11 @@ pub(super) struct ProcessedFrame {
     pub(super) shift_applied: bool,
 }
 
-/// A frame's pixels under the crop, and its image.
-struct Seen {
-    crop: RgbImage,
-    image: RgbImage,
-    alignment: Option<Alignment>,
-    shift_applied: bool,
-}
-
 /// What a thread keeps from frame to frame.
 #[derive(Default)]
 struct Buffers {
-    resizer: Resizer,
+    region: RgbaImage,
+    scale: ScaleBuffers,
     align: AlignBuffers,
 }
 
@@ -104,73 +105,69 @@ impl Stage<'_> {
 
     fn process(&self, pending: Pending, buffers: &mut Buffers) -> Finished {
         let number = pending.number();
-        let seen = match self.video.picture(pending) {
-            Ok(picture) => self.see(&picture, buffers)?,
-            Err(fault) => Err(fault),
-        };
-        let seen = match seen {
-            Ok(seen) => seen,
+        match self.video.part(pending, self.region(), &mut buffers.region) {
+            Ok(()) => {}
             // The other frames have the same pixel format.
             Err(fault @ DecodeFault::PixelFormat(_)) => {
                 return Err(ExtractError::Frame { number, fault });
             }
             Err(fault) => return Ok(Err(LostFrame { number, fault })),
+        }
+        let Buffers {
+            region,
+            scale,
+            align,
+        } = buffers;
+        let crop = View::within(region, self.border());
+        let alignment = self.align.as_ref().map(|by| {
+            let sample = AlignSample::of(crop);
+            by.aligner.measure(&sample, align)
+        });
+        let moved = alignment.and_then(|alignment| self.moved(crop, alignment));
+        let mut measuring = self.spans.measuring(self.saturation_level);
+        let image = match moved {
+            None => self.scaler.scale(crop, scale, &mut measuring)?,
+            Some((crop, part)) => self.scaler.scale_moved(crop, part, scale, &mut measuring)?,
         };
-        let measures = self.spans.measure(&seen.crop, self.saturation_level);
-        let measures = measures.map_err(ShardError::from)?;
-        let png = shard::encode_rgb(&seen.image)?;
         Ok(Ok(ProcessedFrame {
             number,
-            image: seen.image,
-            png,
-            measures,
-            alignment: seen.alignment,
-            shift_applied: seen.shift_applied,
+            png: shard::encode_rgb(&image)?,
+            image,
+            measures: measuring.finish(),
+            alignment,
+            shift_applied: moved.is_some(),
         }))
     }
 
-    /// The picture under the crop, or where the object moved to.
-    fn see(
-        &self,
-        picture: &Picture,
-        buffers: &mut Buffers,
-    ) -> Result<Result<Seen, DecodeFault>, ExtractError> {
-        let crop = match picture.rgb(self.crop) {
-            Ok(crop) => crop,
-            Err(fault) => return Ok(Err(fault)),
-        };
-        let alignment = self.align.as_ref().map(|align| {
-            let sample = AlignSample::of(&crop);
-            align.aligner.measure(&sample, &mut buffers.align)
-        });
-        let limit = self.align.as_ref().and_then(|align| align.correct_above);
-        let shift = alignment.and_then(|alignment| alignment.shift);
-        let shift = shift.filter(|[dx, dy]| limit.is_some_and(|limit| dx.hypot(*dy) > limit));
-        let Some(shift) = shift else {
-            let image = self.scaler.scale(&crop, &mut buffers.resizer)?;
-            return Ok(Ok(Seen {
-                crop,
-                image,
-                alignment,
-                shift_applied: false,
-            }));
-        };
+    /// Where the crop's object went in whole pixels, and the rest of the way; `None` if it is not corrected.
+    fn moved<'v>(&self, crop: View<'v>, alignment: Alignment) -> Option<(View<'v>, [f64; 2])> {
+        let align = self.align.as_ref()?;
+        let correction = align.correction.as_ref()?;
+        let shift = align.aligner.to_correct(&alignment, correction.above)?;
         let whole = shift.map(f64::round);
-        let around = match picture.rgb(grown(self.crop, whole.map(|part| part as i32))) {
-            Ok(around) => around,
-            Err(fault) => return Ok(Err(fault)),
-        };
-        let part = [shift[0] - whole[0], shift[1] - whole[1]];
-        let image = self
-            .scaler
-            .scale_moved(&around, part, &mut buffers.resizer)?;
-        let (width, height) = crop.dimensions();
-        Ok(Ok(Seen {
-            crop: crop_imm(&around, APRON, APRON, width, height).to_image(),
-            image,
-            alignment,
-            shift_applied: true,
-        }))
+        // None beyond the largest shift, with which the turn fails.
+        let crop = crop.moved(whole.map(|part| part as i32), APRON)?;
+        Some((crop, [shift[0] - whole[0], shift[1] - whole[1]]))
+    }
+
+    /// Pixels that are decoded around the crop, for objects that moved.
+    fn border(&self) -> u32 {
+        let correction = self
+            .align
+            .as_ref()
+            .and_then(|align| align.correction.as_ref());
+        correction.map_or(0, |correction| correction.most.ceil() as u32 + APRON)
+    }
+
+    /// The part of a frame that is decoded.
+    fn region(&self) -> Rect {
+        let border = self.border();
+        Rect::new(
+            self.crop.x.saturating_sub_unsigned(border),
+            self.crop.y.saturating_sub_unsigned(border),
+            self.crop.w + 2 * border,
+            self.crop.h + 2 * border,
+        )
     }
 
     /// The crops of some frames, in which shifts are learnt, in order; frames that cannot be decoded are
@@ -181,27 +178,32 @@ impl Stage<'_> {
         pool: &ThreadPool,
     ) -> Result<Vec<(u64, AlignSample)>, ExtractError> {
         let reader = self.video.read(frames, pool.current_num_threads())?;
-        let sample = |pending: Pending| {
+        let sample = |crop: &mut RgbaImage, pending: Pending| {
             let number = pending.number();
-            let picture = self.video.picture(pending).ok()?;
-            Some((number, AlignSample::of(&picture.rgb(self.crop).ok()?)))
+            self.video.part(pending, self.crop, crop).ok()?;
+            Some((number, AlignSample::of(View::whole(crop))))
         };
-        let mut samples: Vec<(u64, AlignSample)> =
-            pool.install(|| reader.par_bridge().filter_map(sample).collect());
+        let mut samples: Vec<(u64, AlignSample)> = pool.install(|| {
+            let samples = reader.par_bridge().map_init(RgbaImage::default, sample);
+            samples.flatten().collect()
+        });
         samples.sort_by_key(|(number, _)| *number);
         Ok(samples)
     }
-}
 
-/// The crop moved by whole pixels, with its apron.
-fn grown(crop: Rect, [dx, dy]: [i32; 2]) -> Rect {
-    let apron = APRON as i32;
-    Rect::new(
-        crop.x.saturating_add(dx - apron),
-        crop.y.saturating_add(dy - apron),
-        crop.w + 2 * APRON,
-        crop.h + 2 * APRON,
-    )
+    /// The crop of one frame, found by the file's index; `None` if it cannot be decoded.
+    pub(super) fn sought_sample(&self, frame: u64) -> Option<(u64, AlignSample)> {
+        let whole = self.video.frame(frame).ok()?;
+        let mut crop = RgbaImage::new(self.crop.w, self.crop.h);
+        let (left, top) = (-i64::from(self.crop.x), -i64::from(self.crop.y));
+        replace(
+            &mut crop,
+            &DynamicImage::from(whole).into_rgba8(),
+            left,
+            top,
+        );
+        Some((frame, AlignSample::of(View::whole(&crop))))
+    }
 }
 
 fn collect(

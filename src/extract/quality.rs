@@ -1,9 +1,12 @@
-//! What the records of a turn show of the camera: pictures that it delivered twice, and steps of its exposure.
+//! What the records of a turn show of the camera and its stand: pictures that were delivered twice, steps of
+//! the exposure, and blurred frames.
 
 use std::collections::HashMap;
 
 use relit_data::session::Notice;
-use relit_data::shard::{Digest, FrameRecord};
+use relit_data::shard::{Digest, FrameRecord, TurnFinding};
+
+use super::blur::blurs;
 
 /// Samples on each side with which a step is compared.
 const AROUND: usize = 12;
@@ -12,32 +15,40 @@ const LEAST_STEP: f64 = 0.1;
 /// And so many times the median change around it, which is the light's.
 const BEYOND_LIGHT: f64 = 6.0;
 
-/// What was found, for one sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Finding {
-    pub(super) index: u32,
-    pub(super) exposure_step: Option<f64>,
-    pub(super) identical_to: Option<u64>,
-}
-
 /// The samples of which there is something to say; `samples` are sorted by index, each with the digest of its
-/// image.
-pub(super) fn findings(samples: &[(&FrameRecord, Digest)]) -> Vec<Finding> {
-    let steps = exposure_steps(samples);
-    let twins = identical(samples);
-    let all = samples.iter().zip(steps).zip(twins);
-    let findings = all.map(|((&(record, _), exposure_step), identical_to)| Finding {
+/// image. A whole turn would have `whole_turn` of them.
+pub(super) fn findings(samples: &[(&FrameRecord, Digest)], whole_turn: u32) -> Vec<TurnFinding> {
+    // Several samples of one source frame are one picture, in which nothing changes.
+    let frames = samples.iter().map(|&(record, _)| record);
+    let frames: Vec<&FrameRecord> = frames.filter(|record| !record.duplicate).collect();
+    let distinct = frames.len() * whole_turn as usize / samples.len().max(1);
+    let steps = exposure_steps(&frames);
+    let blurs = blurs(&frames, distinct);
+    let of_frame = |values: Vec<Option<f64>>| -> HashMap<u64, f64> {
+        let numbers = frames.iter().map(|record| record.source_frame);
+        let found = numbers.zip(values);
+        found
+            .filter_map(|(number, value)| Some((number, value?)))
+            .collect()
+    };
+    let (steps, blurs) = (of_frame(steps), of_frame(blurs));
+    let all = samples.iter().zip(identical(samples));
+    let findings = all.map(|(&(record, _), identical_to)| TurnFinding {
         index: record.index,
-        exposure_step,
+        exposure_step: steps
+            .get(&record.source_frame)
+            .copied()
+            .filter(|_| !record.duplicate),
         identical_to,
+        blur: blurs.get(&record.source_frame).copied(),
     });
-    findings
-        .filter(|finding| finding.exposure_step.is_some() || finding.identical_to.is_some())
-        .collect()
+    let says =
+        |f: &TurnFinding| f.exposure_step.is_some() || f.identical_to.is_some() || f.blur.is_some();
+    findings.filter(says).collect()
 }
 
 /// What a user should know of them.
-pub(super) fn notices(findings: &[Finding]) -> Vec<Notice> {
+pub(super) fn notices(findings: &[TurnFinding]) -> Vec<Notice> {
     let mut notices = Vec::new();
     let twins = || findings.iter().filter(|f| f.identical_to.is_some());
     if let Some(first) = twins().next() {
@@ -57,6 +68,13 @@ pub(super) fn notices(findings: &[Finding]) -> Vec<Notice> {
             "the exposure changes in steps that light cannot explain, at {count} samples, the first is sample {index} ({step:+.2} stops): switch the camera's automatic exposure and gain off"
         )));
     }
+    let blurred = || findings.iter().filter_map(|f| Some((f.index, f.blur?)));
+    if let Some((index, _)) = blurred().next() {
+        let count = blurred().count();
+        notices.push(Notice::Warning(format!(
+            "{count} samples are blurred in a way that light cannot explain, the first is sample {index}: does something shake camera or table?"
+        )));
+    }
     notices
 }
 
@@ -73,13 +91,10 @@ fn identical(samples: &[(&FrameRecord, Digest)]) -> Vec<Option<u64>> {
     samples.iter().map(same).collect()
 }
 
-/// The change against the sample before, where it is a step, for each sample.
-fn exposure_steps(samples: &[(&FrameRecord, Digest)]) -> Vec<Option<f64>> {
-    let brightness = |record: &FrameRecord| record.mean_rgb.iter().sum::<f64>().max(1.0).log2();
-    let levels: Vec<f64> = samples
-        .iter()
-        .map(|(record, _)| brightness(record))
-        .collect();
+/// The change against the frame before, where it is a step, for each frame.
+fn exposure_steps(frames: &[&FrameRecord]) -> Vec<Option<f64>> {
+    let brightness = |record: &&FrameRecord| record.mean_rgb.iter().sum::<f64>().max(1.0).log2();
+    let levels: Vec<f64> = frames.iter().map(brightness).collect();
     let changes: Vec<f64> = std::iter::once(0.0)
         .chain(levels.windows(2).map(|pair| pair[1] - pair[0]))
         .collect();
@@ -95,12 +110,12 @@ fn exposure_steps(samples: &[(&FrameRecord, Digest)]) -> Vec<Option<f64>> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use relit_data::geometry::Rect;
 
     /// A sample whose brightness is `level`, of its own picture.
-    fn record(index: u32, level: f64) -> FrameRecord {
+    pub(in super::super) fn record(index: u32, level: f64) -> FrameRecord {
         FrameRecord {
             session: "s".to_owned(),
             object: "o".to_owned(),
@@ -123,14 +138,15 @@ mod tests {
             sharpness: 1.0,
             exposure_step: None,
             identical_to: None,
+            blur: None,
         }
     }
 
-    fn found(levels: impl Iterator<Item = f64>) -> Vec<Finding> {
+    fn found(levels: impl Iterator<Item = f64>) -> Vec<TurnFinding> {
         let records: Vec<FrameRecord> = (0..).zip(levels).map(|(n, l)| record(n, l)).collect();
         let digest = |record: &FrameRecord| Digest::of(&record.index.to_le_bytes());
         let samples: Vec<_> = records.iter().map(|r| (r, digest(r))).collect();
-        findings(&samples)
+        findings(&samples, samples.len() as u32)
     }
 
     #[test]
@@ -155,8 +171,26 @@ mod tests {
             .enumerate()
             .map(|(n, r)| (r, image(n)))
             .collect();
-        let findings = findings(&samples);
+        let findings = findings(&samples, 4);
         assert_eq!(findings.len(), 1, "{findings:?}");
         assert_eq!((findings[0].index, findings[0].identical_to), (2, Some(1)));
+    }
+
+    #[test]
+    fn a_frame_in_several_samples_is_one_picture() {
+        // Six degrees apart, each frame in five samples.
+        let records: Vec<FrameRecord> = (0..300)
+            .map(|n| {
+                let light = 100.0 + 40.0 * (f64::from(n / 5) * 0.2).sin();
+                let mut record = record(n, light);
+                record.sharpness = light * light;
+                record.source_frame = u64::from(n / 5);
+                record.duplicate = n % 5 != 2;
+                record
+            })
+            .collect();
+        let digest = |record: &FrameRecord| Digest::of(&record.source_frame.to_le_bytes());
+        let samples: Vec<_> = records.iter().map(|r| (r, digest(r))).collect();
+        assert_eq!(findings(&samples, 300), []);
     }
 }

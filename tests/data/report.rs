@@ -43,6 +43,7 @@ fn record(index: u32, frames: u32) -> FrameRecord {
         sharpness: 410.0 + 60.0 * (3.0 * angle).cos() + 9.0 * flutter,
         exposure_step: None,
         identical_to: None,
+        blur: None,
     }
 }
 
@@ -94,6 +95,7 @@ fn page<'a>(records: &'a [FrameRecord], thumbnails: &'a [Thumbnail]) -> Page<'a>
         settings: &[],
         facts: &[],
         warnings: &[],
+        quality: None,
         gate: 0.05,
         saturation_level: 250,
     }

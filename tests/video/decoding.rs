@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use image::RgbImage;
+use image::{RgbImage, RgbaImage};
 use relit_data::geometry::Rect;
 use relit_test_support::{ffmpeg, packets};
 use relit_video::{CodedFrame, Damage, DecodeFault, PixelFormat, Video, VideoError};
@@ -253,6 +253,90 @@ fn a_region_is_cut_from_the_whole_picture_wherever_it_begins() {
 }
 
 #[test]
+fn key_frames_are_decoded_alone_and_as_among_the_others() {
+    let encoding = "-pix_fmt yuv420p -c:v libx264 -g 4 -sc_threshold 0 -bf 2";
+    let (_folder, path) = made(PATTERN, "a.mkv", encoding);
+    let video = Video::open(&path).unwrap();
+    assert_eq!(video.key_frames(), [0, 4, 8]);
+    let picture = |pending| {
+        let picture = video.picture(pending).unwrap();
+        (picture.number(), picture.rgb(PARTS[0]).unwrap())
+    };
+    let all: Vec<u64> = (0..10).collect();
+    let all: Vec<_> = video.read(&all, 2).unwrap().map(picture).collect();
+    let alone: Vec<_> = video.read(&[0, 4, 8], 2).unwrap().map(picture).collect();
+    let wanted: Vec<_> = all
+        .into_iter()
+        .filter(|(number, _)| number % 4 == 0)
+        .collect();
+    assert!(alone == wanted);
+    let (_folder, path) = made(PATTERN, "b.mkv", "-pix_fmt yuvj422p -c:v mjpeg");
+    assert_eq!(Video::open(&path).unwrap().key_frames().len(), 10);
+}
+
+/// The part of a frame, and whether its fourth bytes say what lies inside the picture.
+fn part(video: &Video, number: u64, region: Rect) -> Result<RgbImage, DecodeFault> {
+    let pending = video.read(&[number], 1).unwrap().next().unwrap();
+    // What an earlier frame left there must not show.
+    let mut part = RgbaImage::from_pixel(region.w, region.h, image::Rgba([77; 4]));
+    video.part(pending, region, &mut part)?;
+    let (width, height) = (video.facts().width, video.facts().height);
+    for (x, y, pixel) in part.enumerate_pixels() {
+        let at = Rect::new(region.x + x as i32, region.y + y as i32, 1, 1);
+        let inside = at.clipped_to(width, height).is_some();
+        assert_eq!(pixel.0[3], if inside { 255 } else { 0 });
+    }
+    Ok(image::DynamicImage::from(part).to_rgb8())
+}
+
+const PARTS: [Rect; 5] = [
+    Rect::new(0, 0, 70, 50),
+    Rect::new(11, 7, 20, 21),
+    Rect::new(-5, -3, 30, 20),
+    Rect::new(60, 40, 30, 30),
+    Rect::new(500, 0, 4, 4),
+];
+
+#[test]
+fn a_part_of_motion_jpeg_is_the_same_for_any_region_and_nearly_what_ffmpeg_makes_of_it() {
+    for format in ["yuvj420p", "yuvj422p", "yuvj444p", "gray"] {
+        let encoding = format!("-pix_fmt {format} -c:v mjpeg -q:v 2");
+        let (_folder, path) = made(PATTERN, "a.mkv", &encoding);
+        let video = Video::open(&path).unwrap();
+        let whole = part(&video, 3, PARTS[0]).unwrap();
+        let by_ffmpeg = video.frame(3).unwrap();
+        assert!(largest_difference(&whole, &by_ffmpeg) <= 4, "{format}");
+        assert!(mean_difference(&whole, &by_ffmpeg) < 0.5, "{format}");
+        for region in PARTS {
+            let mut wanted = RgbImage::new(region.w, region.h);
+            let (left, top) = (-i64::from(region.x), -i64::from(region.y));
+            image::imageops::replace(&mut wanted, &whole, left, top);
+            let found = part(&video, 3, region).unwrap();
+            assert_eq!(largest_difference(&found, &wanted), 0, "{format} {region}");
+        }
+    }
+}
+
+#[test]
+fn a_part_of_other_video_is_that_of_its_picture() {
+    for (name, encoding) in [
+        ("a.mkv", "-pix_fmt yuv420p -c:v libx264"),
+        ("b.mkv", "-pix_fmt yuv422p -c:v ffv1"),
+    ] {
+        let (_folder, path) = made(PATTERN, name, encoding);
+        let video = Video::open(&path).unwrap();
+        for region in PARTS {
+            let pending = video.read(&[3], 1).unwrap().next().unwrap();
+            let wanted = video.picture(pending).unwrap().rgb(region).unwrap();
+            assert!(
+                part(&video, 3, region).unwrap() == wanted,
+                "{name} {region}"
+            );
+        }
+    }
+}
+
+#[test]
 fn the_rotation_that_the_file_asks_for_is_applied() {
     let (folder, _) = made(PATTERN, "up.mp4", "-pix_fmt yuv444p -c:v libx264 -qp 0");
     for degrees in ["90", "180", "270"] {
@@ -398,8 +482,15 @@ fn a_damaged_jpeg_is_an_error_and_the_frames_around_it_come() {
         ),
         "{fault}"
     );
+    // The damage lies below the part.
+    let above = Rect::new(0, 0, 70, 8);
+    assert!(matches!(
+        part(&video, 4, above),
+        Err(DecodeFault::Damaged(_))
+    ));
     for number in (0..10).filter(|&number| number != 4) {
         video.frame(number).unwrap();
+        part(&video, number, PARTS[0]).unwrap();
     }
 }
 

@@ -8,6 +8,7 @@
 //! | `source`, `lamp`, `surroundings` | new light: a panorama, a lamp, coefficients, what a picture tells of it |
 //! | `shot` | pictures of an object in light that stands or turns |
 //! | `view` | what a camera sees of a panorama |
+//! | `placement` | where an object stands, and how its pixels get there |
 //! | `scene` | objects in a new picture, with their shadows |
 //! | `relief`, `shadow` | an object's shape out of its normals, and what it keeps from the ground |
 //! | `description` | a scene as a text in TOML |
@@ -20,6 +21,7 @@ mod error;
 mod lamp;
 mod matching;
 mod matte;
+mod placement;
 mod relief;
 mod scene;
 mod shadow;
@@ -38,7 +40,8 @@ pub use error::InsertError;
 pub use lamp::{Lamp, LampFault, colour_of_temperature};
 pub use matching::Matching;
 pub use matte::Matte;
-pub use scene::{Placement, Scene, SceneLayer, SceneObject};
+pub use placement::Placement;
+pub use scene::{Scene, SceneLayer, SceneObject};
 pub use shot::{Backdrop, Shot};
 pub use source::{LightSource, exposure_between, likeness};
 pub use subject::{EdgeColours, MaterialChange, ObjectGloss, Subject};

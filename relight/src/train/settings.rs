@@ -356,7 +356,7 @@ impl RunSettings {
     pub fn check(&self) -> Result<(), TrainError> {
         let part = |value: f64| (0.0..1.0).contains(&value);
         let positive = |value: f64| value > 0.0 && value.is_finite();
-        for (name, is_right, value, allowed) in [
+        all_allowed([
             (
                 "run.steps",
                 (1..=MOST_STEPS).contains(&self.steps),
@@ -429,16 +429,7 @@ impl RunSettings {
                 self.checkpoint_minutes.to_string(),
                 "above 0 and at most a million",
             ),
-        ] {
-            if !is_right {
-                return Err(TrainError::Setting {
-                    name,
-                    value,
-                    allowed,
-                });
-            }
-        }
-        Ok(())
+        ])
     }
 
     /// The learning rate of a step, from 0: it grows evenly at first, and falls along a cosine.
@@ -467,7 +458,7 @@ impl DataSettings {
     /// # Errors
     /// [`TrainError::Setting`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
-        for (name, is_right, value, allowed) in [
+        all_allowed([
             (
                 "data.size",
                 (32..=LARGEST_SIZE).contains(&self.size) && self.size.is_multiple_of(32),
@@ -498,16 +489,24 @@ impl DataSettings {
                 self.validation.to_string(),
                 "from 1 to a million",
             ),
-        ] {
-            if !is_right {
-                return Err(TrainError::Setting {
-                    name,
-                    value,
-                    allowed,
-                });
-            }
-        }
-        Ok(())
+        ])
+    }
+}
+
+/// The first setting that is not allowed: its name, whether it is allowed, its value, and what is allowed.
+fn all_allowed<const N: usize>(
+    settings: [(&'static str, bool, String, &'static str); N],
+) -> Result<(), TrainError> {
+    match settings
+        .into_iter()
+        .find(|&(_, is_allowed, ..)| !is_allowed)
+    {
+        Some((name, _, value, allowed)) => Err(TrainError::Setting {
+            name,
+            value,
+            allowed,
+        }),
+        None => Ok(()),
     }
 }
 

@@ -18,6 +18,8 @@ Examples:
       a bare video, in its own pixels
   relit-extract verify dataset
       read everything back
+  relit-extract stats dataset --html dataset/index.html
+      the data set at a glance
   relit-extract sessions -o dataset --task-id 3 --task-count 10
       the fourth of ten parts; afterwards: relit-extract merge dataset
 
@@ -41,6 +43,10 @@ pub(crate) enum Command {
     },
     Merge {
         out: PathBuf,
+    },
+    Stats {
+        out: PathBuf,
+        html: Option<PathBuf>,
     },
 }
 
@@ -78,6 +84,21 @@ enum Verb {
         /// The data set's folder.
         #[arg(value_name = "OUT")]
         out: PathBuf,
+        /// Print one JSON line per event on standard output.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Show a data set at a glance: sessions with verdicts, saturation, shifts and what else was found.
+    #[command(
+        after_help = "Example:\n  relit-extract stats dataset --html dataset/index.html\n\nIt reads dataset.json and the tables, and no shards."
+    )]
+    Stats {
+        /// The data set's folder.
+        #[arg(value_name = "OUT")]
+        out: PathBuf,
+        /// Write a page for a browser, too.
+        #[arg(long, value_name = "FILE")]
+        html: Option<PathBuf>,
         /// Print one JSON line per event on standard output.
         #[arg(long)]
         json: bool,
@@ -197,6 +218,10 @@ pub(crate) fn parse() -> Arguments {
         (Some(Verb::Merge { out, json }), _) => Arguments {
             json,
             command: Command::Merge { out },
+        },
+        (Some(Verb::Stats { out, html, json }), _) => Arguments {
+            json,
+            command: Command::Stats { out, html },
         },
         (None, Some(extract)) => match task(&extract, &|name| std::env::var(name).ok()) {
             Ok(task) => extract.with(task),

@@ -1,8 +1,10 @@
-//! `relit-extract`: turns recordings into training shards of masked frames, joins and verifies them.
+//! `relit-extract`: turns recordings into training shards of masked frames, joins, verifies and
+//! sums them up.
 
 mod arguments;
 mod extracting;
 mod merging;
+mod stats;
 mod verifying;
 
 use std::process::ExitCode;
@@ -20,6 +22,7 @@ fn main() -> ExitCode {
             options,
         } => console.finish(extracting::run(console, &inputs, &out, &options)),
         Command::Merge { out } => console.finish(merging::run(console, &out)),
+        Command::Stats { out, html } => console.finish(stats::run(console, &out, html.as_deref())),
         Command::Verify { out } => console.finish(verifying::run(console, &out)),
     }
 }

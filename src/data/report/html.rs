@@ -1,4 +1,27 @@
-//! Text that is safe inside HTML, for any name of a session, an object or a path.
+//! What the pages share: the document around a body, and text that is safe inside HTML, for any name of a
+//! session, an object or a path.
+
+use crate::shard::QualityVerdict;
+
+const STYLE: &str = include_str!("style.css");
+
+/// A page with this title, which is safe already.
+pub(super) fn document(title: &str, body: &str) -> String {
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
+         img-src data:; style-src 'unsafe-inline'\">\n\
+         <title>{title} \u{2013} relit</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
+         {body}</body>\n</html>\n"
+    )
+}
+
+/// A verdict as a mark.
+pub(super) fn badge(verdict: QualityVerdict) -> String {
+    format!("<b class=\"badge {verdict}\">{verdict}</b>")
+}
 
 /// `text` for an element's content or a quoted attribute: markup is escaped, and characters that
 /// HTML does not allow or that change the writing direction are replaced by U+FFFD.
@@ -27,6 +50,27 @@ fn is_noncharacter(c: char) -> bool {
 
 fn is_direction_override(c: char) -> bool {
     matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// `no duplicates`, `1 duplicate`, `2 duplicates`, the number in bold.
+pub(super) fn counted(count: usize, noun: &str) -> String {
+    match count {
+        0 => format!("no {noun}s"),
+        1 => format!("<b>1</b> {noun}"),
+        _ => format!("<b>{count}</b> {noun}s"),
+    }
+}
+
+/// The warnings as a section; empty text if there are none.
+pub(super) fn warnings(warnings: &[String]) -> String {
+    if warnings.is_empty() {
+        return String::new();
+    }
+    let items: String = warnings
+        .iter()
+        .map(|text| format!("<li><bdi>{}</bdi></li>\n", escape(text)))
+        .collect();
+    format!("<section class=\"warnings\">\n<h2>Warnings</h2>\n<ul>\n{items}</ul>\n</section>\n")
 }
 
 /// A table of names and values, one row each; empty text if there are none.

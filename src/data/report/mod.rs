@@ -1,22 +1,25 @@
-//! The HTML page that shows one extracted session: the result, its warnings, and how the light
-//! moved around the object.
+//! The HTML pages that show one extracted session ([`render`]: the result, its warnings, and how the light
+//! moved around the object) and a data set ([`render_overview`]).
 //!
 //! One file that a browser opens from disk without a network: the frames are `data:` URIs, the plots
 //! are inline SVG, and there is no script. The same input gives the same bytes.
 //!
-//! This module knows the frame's record ([`crate::shard::record`]) and small RGB images. It knows
-//! nothing of videos, masks, shards or files: [`render`] returns text.
+//! This module knows the frame's record ([`crate::shard::record`]), sums of records
+//! ([`Overview`](crate::shard::Overview)) and small RGB images. It knows nothing of videos, masks, shards or
+//! files: the functions return text.
 
 mod axis;
 mod contact;
 mod error;
 mod html;
+mod overview;
 mod page;
 mod plot;
 mod sections;
 mod turn;
 
 pub use error::ReportError;
+pub use overview::render_overview;
 pub use page::{Page, THUMBNAIL_SIDE, Thumbnail};
 
 use crate::image_stats::fraction;

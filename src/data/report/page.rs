@@ -2,6 +2,7 @@
 
 use image::RgbImage;
 
+use crate::shard::SessionQuality;
 use crate::shard::record::FrameRecord;
 
 /// Longest side of a thumbnail, pixels.
@@ -29,6 +30,8 @@ pub struct Page<'a> {
     pub facts: &'a [(String, String)],
     /// What a person should check before using the data, one sentence each.
     pub warnings: &'a [String],
+    /// The session's figures summed, with a verdict, if they are known.
+    pub quality: Option<&'a SessionQuality>,
     /// Saturated fraction above which Spec-Net runs, 0..=1.
     pub gate: f64,
     /// 8-bit value from which a channel counts as saturated.

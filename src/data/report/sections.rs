@@ -1,18 +1,17 @@
 //! The sections of the page, from the title to the tables.
 
 use super::axis::{degrees, number, percent};
-use super::html::{escape, table};
+use super::html::{self, badge, counted, escape, table, warnings};
 use super::page::Page;
 use super::plot::{Level, Plot, Series};
 use super::turn::Turn;
 use crate::image_stats::fraction;
+use crate::shard::SessionQuality;
 use crate::shard::record::FrameRecord;
 
 /// Heights of the plotting areas; the width is 500.
 const TALL: f64 = 240.0;
 const LOW: f64 = 120.0;
-
-const STYLE: &str = include_str!("style.css");
 
 /// The whole document around the figures of the contact sheet.
 pub(super) fn document(page: &Page<'_>, turn: &Turn, contact: &str) -> String {
@@ -21,22 +20,16 @@ pub(super) fn document(page: &Page<'_>, turn: &Turn, contact: &str) -> String {
         .first()
         .map(|r| escape(&r.session))
         .unwrap_or_default();
-    format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
-         img-src data:; style-src 'unsafe-inline'\">\n\
-         <title>{session} \u{2013} relit</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
-         {header}{warnings}{contact}{plots}<div class=\"tables\">\n{settings}{facts}</div>\n\
-         </body>\n</html>\n",
+    let body = format!(
+        "{header}{warnings}{contact}{plots}<div class=\"tables\">\n{settings}{facts}</div>\n",
         header = header(page),
         warnings = warnings(page.warnings),
         contact = contact_sheet(contact),
         plots = plots(page, turn),
         settings = table("Settings", page.settings),
         facts = table("Facts", page.facts),
-    )
+    );
+    html::document(&session, &body)
 }
 
 fn header(page: &Page<'_>) -> String {
@@ -45,11 +38,21 @@ fn header(page: &Page<'_>) -> String {
     };
     format!(
         "<header>\n<p class=\"kind\">Extracted session</p>\n<h1><bdi>{session}</bdi></h1>\n\
-         <p>Object: <bdi>{object}</bdi></p>\n<p class=\"verdict\">{verdict}</p>\n</header>\n",
+         <p>Object: <bdi>{object}</bdi></p>\n<p class=\"verdict\">{verdict}</p>\n{quality}</header>\n",
         session = escape(&first.session),
         object = escape(&first.object),
         verdict = verdict(page),
+        quality = page.quality.map(quality).unwrap_or_default(),
     )
+}
+
+/// The verdict on the session, with its reasons.
+fn quality(quality: &SessionQuality) -> String {
+    let reasons = match quality.reasons.as_slice() {
+        [] => "nothing was found that speaks against its use".to_owned(),
+        reasons => escape(&reasons.join("; ")),
+    };
+    format!("<p>{}: {reasons}.</p>\n", badge(quality.verdict))
 }
 
 fn verdict(page: &Page<'_>) -> String {
@@ -74,14 +77,6 @@ fn verdict(page: &Page<'_>) -> String {
     )
 }
 
-fn counted(count: usize, noun: &str) -> String {
-    match count {
-        0 => format!("no {noun}s"),
-        1 => format!("<b>1</b> {noun}"),
-        _ => format!("<b>{count}</b> {noun}s"),
-    }
-}
-
 fn capitalised(text: &str) -> String {
     match text.strip_prefix("no ") {
         Some(rest) => format!("No {rest}"),
@@ -95,17 +90,6 @@ fn capitalised(text: &str) -> String {
 )]
 fn share(part: usize, whole: usize) -> f64 {
     part as f64 / whole.max(1) as f64
-}
-
-fn warnings(warnings: &[String]) -> String {
-    if warnings.is_empty() {
-        return String::new();
-    }
-    let items: String = warnings
-        .iter()
-        .map(|text| format!("<li><bdi>{}</bdi></li>\n", escape(text)))
-        .collect();
-    format!("<section class=\"warnings\">\n<h2>Warnings</h2>\n<ul>\n{items}</ul>\n</section>\n")
 }
 
 fn contact_sheet(figures: &str) -> String {

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::digest::Digest;
 use super::file::FileEntry;
+use super::quality::SessionQuality;
 use super::settings::ExtractionSettings;
 use super::{ShardError, names, output};
 use crate::geometry::Rect;
@@ -111,6 +112,9 @@ pub struct SessionEntry {
     pub spec_net: u32,
     /// True if something of the source was lost; the warnings say what.
     pub lossy: bool,
+    /// Its figures summed, with a verdict; `None` in data sets of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quality: Option<SessionQuality>,
     /// What a user should know, one sentence each.
     pub warnings: Vec<String>,
     /// The table, `<session>.parquet`.

@@ -87,8 +87,7 @@ impl FolderStore {
         rows: &[TableRow],
         mask_png: &[u8],
     ) -> Result<ShardEntry, ShardError> {
-        (0..self.samples).try_for_each(|index| output::sync(&self.image_path(index)))?;
-        output::sync(&self.partial.path)?;
+        output::sync_content(&self.partial.path)?;
         let mask = output::seal_whole(&self.out, &names::mask_file(&self.session), mask_png)?;
         let mean_png = encode_rgb(&self.mean.image()?)?;
         let mean_img = output::seal_whole(&self.out, &names::mean_file(&self.session), &mean_png)?;

@@ -12,10 +12,12 @@
 //! | [`Digest`], [`sample_key`] | BLAKE3 digests; names and whether they are safe |
 //! | [`OutputFolder`] | locks the folder; writes files that appear whole or not at all |
 //! | [`ShardWriter`] | writes one session (layouts: `spool` for the tar, `folder` for images) |
+//! | [`SessionQuality`] | a session's figures summed, with a verdict |
 //! | [`Dataset`], [`ExtractionSettings`] | `dataset.json`; `integrity` compares the files with it |
 //! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tarball`) |
 //! | [`SampleSpans`] | where the samples of a shard stand, for reading in any order (`index`) |
 //! | [`Task`], [`TaskPiece`], [`merge`] | a data set that several tasks write |
+//! | [`Overview`] | a data set at a glance, by its tables |
 //! | [`verify`](verify()) | reads everything back and reports what is wrong |
 //!
 //! This module knows pixel rectangles, images and their statistics
@@ -33,6 +35,8 @@ mod integrity;
 mod names;
 mod order;
 mod output;
+mod overview;
+mod quality;
 mod reader;
 pub mod record;
 mod settings;
@@ -54,13 +58,17 @@ pub use index::{SampleSpan, SampleSpans};
 pub use names::{check_session, sample_key};
 pub use order::order;
 pub use output::OutputFolder;
+pub use overview::{
+    Overview, OverviewTotals, SATURATION_BOUNDS, SaturationHistogram, SessionOverview,
+};
+pub use quality::{QualityVerdict, SessionQuality};
 pub use reader::{ShardReader, ShardSample};
 pub use record::FrameRecord;
 pub use settings::{Align, ExtractionSettings, ImageSize, Layout, Native};
 pub use table::{TableRow, read_table};
 pub use task::{MAX_TASKS, Merged, Task, TaskOutcome, TaskPiece, merge};
 pub use verify::{Problem, VerifyReport, verify};
-pub use writer::{Sample, ShardFiles, ShardWriter};
+pub use writer::{Sample, ShardFiles, ShardWriter, TurnFinding};
 
 /// Largest number of samples of a session.
 pub const MAX_SAMPLES: u32 = 1_000_000;

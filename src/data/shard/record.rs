@@ -62,4 +62,53 @@ pub struct FrameRecord {
     /// twice; null if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identical_to: Option<u64>,
+    /// How much less sharp the frame is than the frames around it, as the base-2 logarithm of the ratio,
+    /// where it is a blur that moving light cannot explain; else null.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blur: Option<f64>,
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A record of which nothing is to say.
+    pub(in crate::shard) fn record(index: u32) -> FrameRecord {
+        FrameRecord {
+            session: "s".to_owned(),
+            object: "o".to_owned(),
+            index,
+            source_frame: u64::from(index),
+            t_us: i64::from(index) * 33_333,
+            angle_deg: None,
+            duplicate: false,
+            crop: Rect::new(0, 0, 8, 8),
+            size: [8, 8],
+            shift_px: None,
+            shift_applied: false,
+            align_confidence: None,
+            mask_px: 40,
+            saturated_px: 2,
+            saturated_fraction: 0.05,
+            saturated_any_px: 4,
+            spec_net: false,
+            mean_rgb: [90.0; 3],
+            sharpness: 12.5,
+            exposure_step: None,
+            identical_to: None,
+            blur: None,
+        }
+    }
+
+    #[test]
+    fn a_record_as_earlier_versions_wrote_it_is_read() {
+        let text = r#"{"session":"s","object":"o","index":3,"source_frame":3,"t_us":99999,
+            "angle_deg":null,"duplicate":false,"crop":[0,0,8,8],"size":[8,8],"shift_px":null,
+            "shift_applied":false,"mask_px":40,"saturated_px":2,"saturated_fraction":0.05,
+            "saturated_any_px":4,"spec_net":false,"mean_rgb":[90.0,90.0,90.0],"sharpness":12.5}"#;
+        assert_eq!(
+            serde_json::from_str::<FrameRecord>(text).unwrap(),
+            record(3)
+        );
+    }
 }

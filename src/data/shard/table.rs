@@ -67,7 +67,7 @@ impl Column {
     }
 }
 
-const COLUMNS: [(&str, Column); 30] = [
+const COLUMNS: [(&str, Column); 31] = [
     ("session", Column::Text(|r| r.record.session.clone())),
     ("object", Column::Text(|r| r.record.object.clone())),
     ("index", Column::U32(|r| r.record.index)),
@@ -114,6 +114,7 @@ const COLUMNS: [(&str, Column); 30] = [
         Column::MaybeReal(|r| r.record.exposure_step),
     ),
     ("identical_to", Column::MaybeU64(|r| r.record.identical_to)),
+    ("blur", Column::MaybeReal(|r| r.record.blur)),
     ("png_blake3", Column::Text(|r| r.png_blake3.to_string())),
     ("mask_blake3", Column::Text(|r| r.mask_blake3.to_string())),
 ];
@@ -292,6 +293,7 @@ impl Fields<'_> {
             sharpness: self.real("sharpness")?,
             exposure_step: self.later_real("exposure_step")?,
             identical_to: self.later_u64("identical_to")?,
+            blur: self.later_real("blur")?,
         };
         let png_blake3 = self.digest("png_blake3")?;
         let mask_blake3 = self.digest("mask_blake3")?;
@@ -429,6 +431,7 @@ mod tests {
                 sharpness: 12.5,
                 exposure_step: even.then_some(-0.5),
                 identical_to: even.then_some(u64::MAX),
+                blur: (!even).then_some(1.25),
             },
             png_blake3: Digest::of(&index.to_le_bytes()),
             mask_blake3: Digest::of(b"mask"),

@@ -132,6 +132,11 @@ impl TaskPiece {
         output::write_whole(out, &task.file(), &bytes).map(|_| ())
     }
 
+    /// Number of tasks that write the data set together.
+    pub(super) fn task_count(&self) -> u32 {
+        self.count
+    }
+
     fn parse(path: &Path, bytes: &[u8]) -> Result<Self, ShardError> {
         let piece: Self =
             serde_json::from_slice(bytes).map_err(|source| ShardError::Description {
@@ -189,7 +194,8 @@ pub fn merge(out: &Path) -> Result<Merged, ShardError> {
     }
 }
 
-fn read_pieces(out: &Path) -> Result<Vec<TaskPiece>, ShardError> {
+/// The pieces of all tasks that are there.
+pub(super) fn read_pieces(out: &Path) -> Result<Vec<TaskPiece>, ShardError> {
     let folder = out.join(names::TASKS);
     let files = output::names_in(&folder)?;
     let pieces = files

@@ -39,6 +39,19 @@ impl Sample {
     }
 }
 
+/// What only the whole turn shows of a sample: fields of its record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurnFinding {
+    /// The sample.
+    pub index: u32,
+    /// [`FrameRecord::exposure_step`].
+    pub exposure_step: Option<f64>,
+    /// [`FrameRecord::identical_to`].
+    pub identical_to: Option<u64>,
+    /// [`FrameRecord::blur`].
+    pub blur: Option<f64>,
+}
+
 /// The files of a session that was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ShardFiles {
@@ -202,22 +215,26 @@ impl ShardWriter {
     ///
     /// # Errors
     /// [`ShardError::NotFinite`]; the record is then as it was.
-    pub fn set_quality(
-        &mut self,
-        index: u32,
-        exposure_step: Option<f64>,
-        identical_to: Option<u64>,
-    ) -> Result<(), ShardError> {
-        if exposure_step.is_some_and(|step| !step.is_finite()) {
-            return Err(ShardError::NotFinite {
-                session: self.session.clone(),
-                index,
-                field: "exposure_step",
-            });
+    pub fn set_finding(&mut self, finding: TurnFinding) -> Result<(), ShardError> {
+        let TurnFinding {
+            index,
+            exposure_step,
+            identical_to,
+            blur,
+        } = finding;
+        for (field, value) in [("exposure_step", exposure_step), ("blur", blur)] {
+            if value.is_some_and(|value| !value.is_finite()) {
+                return Err(ShardError::NotFinite {
+                    session: self.session.clone(),
+                    index,
+                    field,
+                });
+            }
         }
         if let Some(Some(row)) = self.rows.get_mut(index as usize) {
             row.record.exposure_step = exposure_step;
             row.record.identical_to = identical_to;
+            row.record.blur = blur;
         }
         Ok(())
     }
@@ -325,6 +342,7 @@ fn first_not_finite(record: &FrameRecord) -> Option<&'static str> {
         ("mean_rgb", r + g + b),
         ("sharpness", record.sharpness),
         ("exposure_step", record.exposure_step.unwrap_or_default()),
+        ("blur", record.blur.unwrap_or_default()),
     ];
     fields
         .into_iter()

@@ -1,10 +1,15 @@
 //! Shifts of made objects whose place is known.
 
-use image::{GrayImage, Luma, Rgb, RgbImage};
+use image::{GrayImage, Luma, Rgba, RgbaImage};
 
 use super::{AlignBuffers, AlignSample, Aligner, Alignment};
+use crate::extract::View;
 
 const SIDE: u32 = 150;
+
+fn grey(level: u8) -> Rgba<u8> {
+    Rgba([level, level, level, 255])
+}
 
 /// A disc in the middle.
 fn mask() -> GrayImage {
@@ -17,12 +22,12 @@ fn mask() -> GrayImage {
 /// A painted object at a shift, under a light from `angle` with a highlight that travels with it, in front of
 /// a background that travels too.
 fn frame(shift: [f64; 2], angle: f64) -> AlignSample {
-    let image = RgbImage::from_fn(SIDE, SIDE, |x, y| {
+    let image = RgbaImage::from_fn(SIDE, SIDE, |x, y| {
         let (x, y) = (f64::from(x) - 74.5, f64::from(y) - 74.5);
         let (u, v) = (x - shift[0], y - shift[1]);
         if u.hypot(v) >= 58.0 {
             let stripes = 120.0 + 100.0 * (0.3 * x + 20.0 * angle).sin();
-            return Rgb([stripes as u8; 3]);
+            return grey(stripes as u8);
         }
         let paint = 90.0
             + 25.0 * ((0.55 * u + 0.2 * v).sin() + (0.5 * v - 0.31 * u).cos())
@@ -30,9 +35,9 @@ fn frame(shift: [f64; 2], angle: f64) -> AlignSample {
         let light = 1.0 + 0.012 * (u * angle.cos() + v * angle.sin());
         let (hx, hy) = (25.0 * angle.cos(), 25.0 * angle.sin());
         let highlight = 150.0 * (-((u - hx).powi(2) + (v - hy).powi(2)) / 60.0).exp();
-        Rgb([(paint * light + highlight).round().clamp(0.0, 255.0) as u8; 3])
+        grey((paint * light + highlight).round().clamp(0.0, 255.0) as u8)
     });
-    AlignSample::of(&image)
+    AlignSample::of(View::whole(&image))
 }
 
 fn angle(at: usize, of: usize) -> f64 {
@@ -88,18 +93,18 @@ fn shifts_count_from_the_frame_of_the_mask() {
 #[test]
 fn a_frame_without_the_object_is_not_registered() {
     let aligner = learnt(|_| [0.0; 2], 0.1);
-    let noise = RgbImage::from_fn(SIDE, SIDE, |x, y| {
-        Rgb([(x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503_001)).to_le_bytes()[2]; 3])
+    let noise = RgbaImage::from_fn(SIDE, SIDE, |x, y| {
+        grey((x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503_001)).to_le_bytes()[2])
     });
-    for image in [noise, RgbImage::from_pixel(SIDE, SIDE, Rgb([9; 3]))] {
-        let found = measured(&aligner, &AlignSample::of(&image));
+    for image in [noise, RgbaImage::from_pixel(SIDE, SIDE, grey(9))] {
+        let found = measured(&aligner, &AlignSample::of(View::whole(&image)));
         assert_eq!(found.shift, None, "{found:?}");
     }
 }
 
 #[test]
 fn an_object_without_structure_cannot_be_learnt() {
-    let grey = AlignSample::of(&RgbImage::from_pixel(SIDE, SIDE, Rgb([99; 3])));
+    let grey = AlignSample::of(View::whole(&RgbaImage::from_pixel(SIDE, SIDE, grey(99))));
     let samples = vec![grey; 8];
     assert!(Aligner::learn(&samples, 0, &mask(), 8.0, 0.1).is_none());
 }
@@ -124,4 +129,43 @@ fn a_rotation_is_reported_where_it_is_significant_and_not_else() {
     let found = measured(&aligner, &AlignSample(turned)).turned.unwrap();
     assert!((found.0 - degrees).abs() < 0.4, "{found:?}");
     assert!(found.1.abs() < 0.01, "{found:?}");
+}
+
+#[test]
+fn in_a_turn_that_stands_still_only_a_sure_shift_is_corrected() {
+    let aligner = learnt(|_| [0.0; 2], 0.1);
+    let unsure = Alignment {
+        shift: Some([0.12, 0.05]),
+        uncertainty: 0.08,
+        confidence: 0.8,
+        turned: None,
+    };
+    assert_eq!(aligner.to_correct(&unsure, 0.1), None);
+    let jolt = measured(&aligner, &frame([1.2, -0.8], angle(3, 24)));
+    assert!(jolt.uncertainty < 0.5, "{jolt:?}");
+    assert_eq!(aligner.to_correct(&jolt, 0.1), jolt.shift);
+    assert_eq!(aligner.to_correct(&jolt, 2.0), None);
+    let shaken = learnt(|at| [0.1 * at as f64, 0.3 * (at as f64).sin()], 0.1);
+    assert_eq!(shaken.to_correct(&unsure, 0.1), unsure.shift);
+}
+
+#[test]
+fn a_large_picture_is_measured_in_its_own_pixels() {
+    let large = |sample: &AlignSample| {
+        let side = 5 * SIDE;
+        RgbaImage::from_fn(side, side, |x, y| {
+            grey(sample.0.get_pixel(x / 5, y / 5).0[0])
+        })
+    };
+    let samples: Vec<AlignSample> = (0..24)
+        .map(|at| AlignSample::of(View::whole(&large(&frame([0.0; 2], angle(at, 24))))))
+        .collect();
+    assert!(samples[0].0.width() <= 640);
+    let mask = image::imageops::resize(&mask(), 5 * SIDE, 5 * SIDE, image::imageops::Nearest);
+    let aligner = Aligner::learn(&samples, 0, &mask, 16.0, 0.1).unwrap();
+    let moved = large(&frame([2.0, -1.0], angle(7, 24)));
+    let found = measured(&aligner, &AlignSample::of(View::whole(&moved)))
+        .shift
+        .unwrap();
+    assert!((found[0] - 10.0).hypot(found[1] + 5.0) < 0.5, "{found:?}");
 }

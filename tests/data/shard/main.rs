@@ -4,5 +4,6 @@
 mod damage;
 mod description;
 mod folder;
+mod overview;
 mod sample_set;
 mod write;

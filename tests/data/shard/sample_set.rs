@@ -68,6 +68,7 @@ pub(crate) fn record(session: &str, index: u32, image: &RgbImage) -> FrameRecord
         sharpness: measures.sharpness,
         exposure_step: None,
         identical_to: None,
+        blur: None,
     }
 }
 
@@ -121,6 +122,7 @@ pub(crate) fn entry(
         duplicates: count(|r| r.duplicate),
         spec_net: count(|r| r.spec_net),
         lossy: false,
+        quality: None,
         warnings: Vec::new(),
         table: files.table.clone(),
         report: None,

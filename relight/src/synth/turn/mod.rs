@@ -22,7 +22,8 @@ use relit_data::geometry::Rect;
 use relit_data::image_stats::MaskSpans;
 use relit_data::shard::{
     self, Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
-    OutputFolder, Sample, SamplingBasis, SessionEntry, ShardEntry, ShardWriter, SourceVideo,
+    OutputFolder, Sample, SamplingBasis, SessionEntry, SessionQuality, ShardEntry, ShardWriter,
+    SourceVideo,
 };
 use serde::{Deserialize, Serialize};
 
@@ -371,6 +372,7 @@ impl<'a> Turn<'a> {
             duplicates: 0,
             spec_net: spec_net as u32,
             lossy: false,
+            quality: Some(SessionQuality::of(&page.records, false, None)),
             warnings: Vec::new(),
             table: files.table,
             report: Some(report),
@@ -433,6 +435,7 @@ impl<'a> Turn<'a> {
             sharpness: measures.sharpness,
             exposure_step: None,
             identical_to: None,
+            blur: None,
         })
     }
 }

@@ -61,6 +61,7 @@ impl TurnPage {
             settings: &settings,
             facts: &facts,
             warnings: &[],
+            quality: None,
             gate: GATE,
             saturation_level: SATURATION_LEVEL,
         })?)

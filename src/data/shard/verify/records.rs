@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use crate::image_stats::fraction;
 use crate::shard::dataset::SessionEntry;
+use crate::shard::quality::SessionQuality;
 use crate::shard::record::FrameRecord;
 use crate::shard::settings::{ExtractionSettings, ImageSize};
 
@@ -158,13 +159,26 @@ fn totals(session: &SessionEntry, records: &[Option<&FrameRecord>]) -> Vec<Strin
             count(|r| r.spec_net),
         ),
     ];
-    counts
+    let mut problems: Vec<String> = counts
         .into_iter()
         .filter(|(_, listed, found)| listed != found)
         .map(|(what, listed, found)| {
             format!("dataset.json says {listed} samples have {what}, the records say {found}")
         })
-        .collect()
+        .collect();
+    if let Some(listed) = &session.quality {
+        let records: Vec<FrameRecord> = records.iter().copied().flatten().cloned().collect();
+        // The verdict is that of the version that wrote it.
+        let found = SessionQuality {
+            verdict: listed.verdict,
+            reasons: listed.reasons.clone(),
+            ..SessionQuality::of(&records, session.lossy, session.covered_deg)
+        };
+        if found != *listed {
+            problems.push("the figures under quality are not those of the records".to_owned());
+        }
+    }
+    problems
 }
 
 /// The fields in which two records differ.

@@ -1,0 +1,143 @@
+//! libjpeg-turbo's decoder, of which the crate `mozjpeg-sys` has a copy.
+//!
+//! The library reports errors by a function that must not return: it unwinds through the library, which is
+//! compiled for that, and is caught here.
+#![allow(unsafe_code)]
+
+use std::ffi::{c_int, c_ulong};
+use std::mem;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
+use mozjpeg_sys::{
+    J_COLOR_SPACE, J_DCT_METHOD, JPEG_LIB_VERSION, jpeg_CreateDecompress, jpeg_common_struct,
+    jpeg_crop_scanline, jpeg_decompress_struct, jpeg_destroy_decompress, jpeg_error_mgr,
+    jpeg_mem_src, jpeg_read_header, jpeg_read_scanlines, jpeg_skip_scanlines,
+    jpeg_start_decompress, jpeg_std_error,
+};
+
+use super::Refused;
+use super::layout::size_of_plain;
+use relit_data::geometry::Rect;
+
+/// Bytes of a pixel: red, green, blue, 255.
+const PIXEL: usize = 4;
+
+/// Decodes the pixels of a JPEG of this size under `part`, which lies inside, to rows of red, green, blue and
+/// 255. `rows` holds the first byte of each row at multiples of `stride`.
+pub(in super::super) fn decode_part(
+    jpeg: &[u8],
+    size: (u32, u32),
+    part: Rect,
+    rows: &mut [u8],
+    stride: usize,
+) -> Result<(), Refused> {
+    if size_of_plain(jpeg)? != size || part.clipped_to(size.0, size.1) != Some(part) {
+        return Err(Refused);
+    }
+    let mut library = Library::new();
+    // What was unwound through is only freed afterwards.
+    catch_unwind(AssertUnwindSafe(|| {
+        library.decode(jpeg, part, rows, stride)
+    }))
+    .unwrap_or(Err(Refused))
+}
+
+/// The library's state for one picture. It is freed when this is dropped.
+struct Library {
+    // In boxes: the library keeps addresses of both.
+    state: Box<jpeg_decompress_struct>,
+    _errors: Box<jpeg_error_mgr>,
+}
+
+impl Library {
+    fn new() -> Self {
+        // SAFETY: both are plain C structures, for which all bytes 0 is a valid value (optional functions
+        // and pointers). The library fills them in, keeps no address but those of the boxes, and does not
+        // fail here except without memory, where it calls `fail`.
+        unsafe {
+            let mut errors: Box<jpeg_error_mgr> = Box::new(mem::zeroed());
+            jpeg_std_error(&mut errors);
+            errors.error_exit = Some(fail);
+            errors.emit_message = Some(judge);
+            errors.output_message = Some(ignore);
+            let mut state: Box<jpeg_decompress_struct> = Box::new(mem::zeroed());
+            state.common.err = &mut *errors;
+            let bytes = mem::size_of::<jpeg_decompress_struct>();
+            jpeg_CreateDecompress(&mut *state, JPEG_LIB_VERSION, bytes);
+            Self {
+                state,
+                _errors: errors,
+            }
+        }
+    }
+
+    fn decode(
+        &mut self,
+        jpeg: &[u8],
+        part: Rect,
+        rows: &mut [u8],
+        stride: usize,
+    ) -> Result<(), Refused> {
+        let state = &mut *self.state;
+        let (x, y) = (part.x.unsigned_abs(), part.y.unsigned_abs());
+        let length = c_ulong::try_from(jpeg.len()).map_err(|_| Refused)?;
+        // SAFETY: the data outlive the calls, which read no further than their length.
+        unsafe {
+            jpeg_mem_src(state, jpeg.as_ptr(), length);
+            jpeg_read_header(state, 1);
+        }
+        if !matches!(
+            state.jpeg_color_space,
+            J_COLOR_SPACE::JCS_YCbCr | J_COLOR_SPACE::JCS_GRAYSCALE
+        ) {
+            return Err(Refused);
+        }
+        state.out_color_space = J_COLOR_SPACE::JCS_EXT_RGBA;
+        state.dct_method = J_DCT_METHOD::JDCT_ISLOW;
+        state.do_fancy_upsampling = 0;
+        let (mut left, mut width) = (x, part.w);
+        // SAFETY: the header is read; the part lies inside the picture, whose size was compared.
+        unsafe {
+            jpeg_start_decompress(state);
+            jpeg_crop_scanline(state, &mut left, &mut width);
+            if y > 0 {
+                jpeg_skip_scanlines(state, y);
+            }
+        }
+        // The library begins at a whole block, up to 15 columns before the part.
+        let surplus = PIXEL * (x - left) as usize;
+        let bytes = PIXEL * part.w as usize;
+        let mut line = vec![0; PIXEL * width as usize];
+        for row in rows.chunks_mut(stride).take(part.h as usize) {
+            let mut at = line.as_mut_ptr();
+            // SAFETY: the line holds `width` pixels of the output's format.
+            if unsafe { jpeg_read_scanlines(state, &mut at, 1) } != 1 {
+                return Err(Refused);
+            }
+            let pixels = line.get(surplus..surplus + bytes).ok_or(Refused)?;
+            row.get_mut(..bytes).ok_or(Refused)?.copy_from_slice(pixels);
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Library {
+    fn drop(&mut self) {
+        // SAFETY: the state was created and is freed once.
+        unsafe { jpeg_destroy_decompress(&mut self.state) }
+    }
+}
+
+/// Ends the decoding. Unlike a panic, this prints nothing.
+extern "C-unwind" fn fail(_: &mut jpeg_common_struct) {
+    resume_unwind(Box::new(Refused));
+}
+
+/// A negative level is a warning: data are damaged, and the library would go on with what it makes of them.
+extern "C-unwind" fn judge(state: &mut jpeg_common_struct, level: c_int) {
+    if level < 0 {
+        fail(state);
+    }
+}
+
+extern "C-unwind" fn ignore(_: &mut jpeg_common_struct) {}
