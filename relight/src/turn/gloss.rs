@@ -9,6 +9,9 @@ use crate::light::{LightError, ShLight};
 pub(super) const GLOSS_ORDER: usize = 6;
 /// Terms of a channel's gloss.
 pub(super) const GLOSS_TERMS: usize = (GLOSS_ORDER + 1) * (GLOSS_ORDER + 1);
+/// What white metal shows of a light, over the sum of its terms times the light's coefficients: as bright as a matt white surface in
+/// even light, π times it, and the terms are √(4π) times the harmonics.
+pub(super) const MIRROR: f64 = 0.886_226_925_452_758;
 /// The part of the light that a dielectric reflects head-on; at a glancing angle it is all.
 const HEAD_ON: f64 = 0.04;
 

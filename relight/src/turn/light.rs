@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::light::{LightError, Order, ShLight};
 
 use super::TableFrame;
-use super::gloss::{GLOSS_ORDER, GlossLight};
+use super::gloss::{GLOSS_ORDER, GlossLight, MIRROR};
 
 /// Terms of a channel's light.
 pub(super) const TERMS: usize = 9;
@@ -112,7 +112,7 @@ impl TableLight {
         let light = shown.light()?;
         let coefficients = light.coefficients();
         let factor = |channel: usize| {
-            OF_COEFFICIENTS.map(|(at, factor)| factor * coefficients[at][channel] / PI)
+            OF_COEFFICIENTS.map(|(at, factor)| factor * coefficients[at][channel] / MIRROR)
         };
         Ok(Self {
             terms: [0, 1, 2].map(factor),

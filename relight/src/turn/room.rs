@@ -1,9 +1,7 @@
 //! The light of the room, matt and as gloss shows it, that explains the curves of all pixels best.
 
-use std::f64::consts::{FRAC_1_PI, PI};
-
 use super::body::BodyKind;
-use super::gloss::{GLOSS_TERMS, GlossLight, gloss_terms, mirror_terms};
+use super::gloss::{GLOSS_TERMS, GlossLight, MIRROR, gloss_terms, mirror_terms};
 use super::light::{MATT_BANDS, TERMS, WaveTerm, wave_terms};
 use super::moments::Moments;
 use super::search::{Room, reflected};
@@ -37,7 +35,7 @@ pub(super) struct KnownLight {
 impl KnownLight {
     pub(super) fn new(light: &ShLight, frame: &TableFrame) -> Self {
         let bands = GlossLight::bands(&light.rotated(&frame.rotation()));
-        let mirror = bands.iter().map(|band| band.times([PI; 3]));
+        let mirror = bands.iter().map(|band| band.times([MIRROR; 3]));
         Self {
             matt: TableLight::from_viewer(light, frame),
             mirror: mirror.collect(),
@@ -91,7 +89,7 @@ pub fn fit_turn_light(
         let light = room
             .ok_or(TurnError::NoLight)?
             .gloss
-            .times([FRAC_1_PI; 3])
+            .times([1.0 / MIRROR; 3])
             .light()?;
         return Ok(light.rotated(&frame.rotation().inverse()));
     }
@@ -303,4 +301,37 @@ fn add(equations: &mut NormalEquations, (moments, channel): (&Moments, usize), t
     let product = |i: usize, j: usize| moments.term_product(channel, &terms[i], &terms[j]);
     let right = |i: usize| [moments.term_along(channel, &terms[i]), 0.0, 0.0];
     equations.add_sums(product, right);
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::light::Order;
+    use crate::turn::Elevation;
+
+    #[test]
+    fn white_metal_is_as_bright_as_a_matt_white_surface_in_even_light() {
+        let frame = TableFrame::new(Elevation::assumed());
+        let known = KnownLight::new(&ShLight::even(Order::TWO, [1.0; 3]), &frame);
+        let normal = [0.48, 0.36, 0.8];
+        let room = |body| Room {
+            frame,
+            light: known.matt,
+            gloss: GlossLight::sum(known.mirror(), &[1.0; 3]),
+            body,
+        };
+        for body in [BodyKind::Diffuse, BodyKind::Metal] {
+            let shown = room(body).waves(normal).body[1];
+            assert!((shown[0] - PI).abs() < 1e-6, "{body:?} {shown:?}");
+        }
+        let back = TableLight::of_mirror(&room(BodyKind::Metal).gloss).unwrap();
+        let pairs = back
+            .terms()
+            .iter()
+            .flatten()
+            .zip(known.matt.terms().iter().flatten());
+        assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-9));
+    }
 }

@@ -23,6 +23,9 @@ const OUTLINE_WEIGHT: f64 = 0.15;
 const LEAST_BLUR: f64 = 0.6;
 /// Rounds in which what does not fit is left out.
 const ROBUST_ROUNDS: usize = 3;
+/// Nine tenths of normally distributed values are within so many deviations.
+const NINTH_TENTH: f64 = 0.9;
+const DEVIATIONS: f64 = 1.645;
 /// How far the surroundings of a pixel reach, in parts of the frame's width: a normal that differs from theirs is not to be
 /// believed as far.
 const SURROUNDINGS: f64 = 1.0 / 40.0;
@@ -238,12 +241,17 @@ pub(super) fn confidence(expected_error: f64) -> f64 {
 
 /// The lower of the two values in the middle; 0 where there are none.
 pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// The value that this part of the others, 0 to 1, does not exceed; 0 where there are none.
+fn quantile(values: impl Iterator<Item = f64>, part: f64) -> f64 {
     let mut values: Vec<f64> = values.collect();
     if values.is_empty() {
         return 0.0;
     }
-    let middle = (values.len() - 1) / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    let place = ((values.len() - 1) as f64 * part) as usize;
+    *values.select_nth_unstable_by(place, f64::total_cmp).1
 }
 
 /// All pixels under one light.
@@ -293,8 +301,11 @@ impl Solver<'_> {
         let fits = &self.fits;
         let of_channel = |c: usize| fits.iter().map(move |fit| fit.albedo[c]);
         let middle = [0, 1, 2].map(|c| median(of_channel(c)));
-        // Half of the albedos are within it.
-        let spread = [0, 1, 2].map(|c| median(of_channel(c).map(|one| (one - middle[c]).abs())));
+        // By the ninth tenth of the distances: spots of another colour count, a few pixels that went wrong do not.
+        let spread = [0, 1, 2].map(|c| {
+            let distances = of_channel(c).map(|one| (one - middle[c]).abs());
+            quantile(distances, NINTH_TENTH) / DEVIATIONS
+        });
         let room = &self.room;
         self.fits
             .par_iter_mut()

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use proptest::prelude::*;
 
-use super::gloss::GlossLight;
+use super::gloss::{GlossLight, MIRROR};
 use super::light::basis_at;
 use super::robust::lit;
 use super::search::Room;
@@ -307,7 +307,7 @@ fn metal_ball() -> (Surface, ShLight, TurnCurves) {
     let (surface, light) = (ball(), windows());
     let table = TableFrame::new(elevation());
     let shown = GlossLight::bands(&light.rotated(&table.rotation()));
-    let factors = [1.0, 0.95, 0.9, 0.8, 0.7].map(|factor| std::f64::consts::PI * factor);
+    let factors = [1.0, 0.95, 0.9, 0.8, 0.7].map(|factor| MIRROR * factor);
     let metal = Room {
         frame: table,
         light: TableLight::from_viewer(&light, &table),
