@@ -28,6 +28,8 @@ use crate::masking::mask_doubts;
 const MAX_REPORTED: usize = 8;
 /// Frames in which shifts are learnt, spread over the turn.
 const ALIGN_FRAMES: usize = 36;
+/// Fewest key frames that do for that.
+const LEAST_KEY_FRAMES: usize = 20;
 /// Largest crop, pixels: each thread needs memory for a few images of this size.
 const MAX_CROP_PIXELS: u64 = 1 << 26;
 
@@ -126,19 +128,25 @@ impl Job {
         let samples = u32::try_from(plan.selection.frames.len()).unwrap_or(options.frames);
         let mut notices = self.notices.clone();
         notices.extend(self.notices_of_plan(&plan, options.frames));
-        notices.extend(self.doubts_about_the_mask());
         if options.strict {
             check_strict(&plan, &notices)?;
         }
         let mut stage = self.stage(options)?;
-        if options.align != Align::Off {
-            stage.align = self.align(&stage, &plan, options, pool)?;
-            if stage.align.is_none() {
-                notices.push(Notice::Warning(
-                    "the object has too little structure to measure its shifts: they are unknown"
-                        .to_owned(),
-                ));
-            }
+        // The look at the mask takes one thread, which leaves the others to the learning.
+        let (doubts, align) = pool.join(
+            || self.doubts_about_the_mask(),
+            || match options.align {
+                Align::Off => Ok(None),
+                _ => self.align(&stage, &plan, options, pool),
+            },
+        );
+        notices.extend(doubts);
+        stage.align = align?;
+        if options.align != Align::Off && stage.align.is_none() {
+            notices.push(Notice::Warning(
+                "the object has too little structure to measure its shifts: they are unknown"
+                    .to_owned(),
+            ));
         }
         let mut steadiness = Steadiness::new(options.max_shift);
         let mut writer = ShardWriter::create(
@@ -270,8 +278,13 @@ impl Job {
         options: &ExtractOptions,
         pool: &ThreadPool,
     ) -> Result<Option<pipeline::Align>, ExtractError> {
-        let (frames, reference) = frames_to_align(&plan.selection.frames, self.mask.frame);
-        let samples = stage.align_samples(&frames, pool)?;
+        let chosen = &plan.selection.frames;
+        let keys = self.video.key_frames();
+        let (frames, reference) = frames_to_align(chosen, keys, self.mask.frame);
+        let mut samples = stage.align_samples(&frames, pool)?;
+        if !frames.contains(&reference) {
+            samples.extend(stage.sought_sample(reference));
+        }
         // If the mask's frame is lost, the nearest one takes its place.
         let nearest = samples
             .iter()
@@ -407,15 +420,22 @@ impl Job {
     }
 }
 
-/// Frames that are spread over the chosen ones (sorted), with that of the mask, and the latter: the first one
-/// if it is not known.
-fn frames_to_align(chosen: &[u64], of_mask: Option<u64>) -> (Vec<u64>, u64) {
+/// Frames that are spread over the chosen ones (sorted), and that of the mask: the first one if it is not known.
+/// They are key frames, which are decoded alone, if enough are among the chosen; the mask's may then be none of
+/// them.
+fn frames_to_align(chosen: &[u64], keys: &[u64], of_mask: Option<u64>) -> (Vec<u64>, u64) {
+    let is_key = |number: &u64| keys.binary_search(number).is_ok();
+    let alone: Vec<u64> = chosen.iter().copied().filter(is_key).collect();
+    let few = alone.len() < LEAST_KEY_FRAMES;
+    let from = if few { chosen } else { &alone };
     let mut frames: Vec<u64> = (0..ALIGN_FRAMES)
-        .filter_map(|k| chosen.get(k * chosen.len() / ALIGN_FRAMES))
+        .filter_map(|k| from.get(k * from.len() / ALIGN_FRAMES))
         .copied()
         .collect();
     let reference = of_mask.or(frames.first().copied()).unwrap_or_default();
-    frames.push(reference);
+    if few || is_key(&reference) {
+        frames.push(reference);
+    }
     frames.sort_unstable();
     frames.dedup();
     (frames, reference)

@@ -4,7 +4,8 @@
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
-use image::{RgbImage, RgbaImage};
+use image::imageops::replace;
+use image::{DynamicImage, RgbImage, RgbaImage};
 use rayon::ThreadPool;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 
@@ -140,10 +141,9 @@ impl Stage<'_> {
 
     /// Where the crop's object went in whole pixels, and the rest of the way; `None` if it is not corrected.
     fn moved<'v>(&self, crop: View<'v>, alignment: Alignment) -> Option<(View<'v>, [f64; 2])> {
-        let correction = self.align.as_ref()?.correction.as_ref()?;
-        let shift = alignment
-            .shift
-            .filter(|[dx, dy]| dx.hypot(*dy) > correction.above)?;
+        let align = self.align.as_ref()?;
+        let correction = align.correction.as_ref()?;
+        let shift = align.aligner.to_correct(&alignment, correction.above)?;
         let whole = shift.map(f64::round);
         // None beyond the largest shift, with which the turn fails.
         let crop = crop.moved(whole.map(|part| part as i32), APRON)?;
@@ -189,6 +189,20 @@ impl Stage<'_> {
         });
         samples.sort_by_key(|(number, _)| *number);
         Ok(samples)
+    }
+
+    /// The crop of one frame, found by the file's index; `None` if it cannot be decoded.
+    pub(super) fn sought_sample(&self, frame: u64) -> Option<(u64, AlignSample)> {
+        let whole = self.video.frame(frame).ok()?;
+        let mut crop = RgbaImage::new(self.crop.w, self.crop.h);
+        let (left, top) = (-i64::from(self.crop.x), -i64::from(self.crop.y));
+        replace(
+            &mut crop,
+            &DynamicImage::from(whole).into_rgba8(),
+            left,
+            top,
+        );
+        Some((frame, AlignSample::of(View::whole(&crop))))
     }
 }
 

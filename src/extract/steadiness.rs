@@ -86,6 +86,7 @@ mod tests {
     fn moved_by(dx: f64) -> Alignment {
         Alignment {
             shift: Some([dx, 0.0]),
+            uncertainty: 0.01,
             confidence: 0.9,
             turned: None,
         }
@@ -112,6 +113,7 @@ mod tests {
         assert!(steadiness.notices().is_empty());
         let lost = Alignment {
             shift: None,
+            uncertainty: f64::INFINITY,
             confidence: 0.1,
             turned: None,
         };

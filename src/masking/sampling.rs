@@ -65,8 +65,13 @@ pub(super) fn spread(video: &Video, count: usize) -> Vec<u64> {
         .filter(|frame| !frame.damaged)
         .map(|frame| frame.number)
         .collect();
-    let count = count.min(whole.len());
+    evenly(&whole, count)
+}
+
+/// Up to `count` of these at equal distances.
+pub(super) fn evenly(frames: &[u64], count: usize) -> Vec<u64> {
+    let count = count.min(frames.len());
     (0..count)
-        .map(|step| whole[(2 * step + 1) * whole.len() / (2 * count)])
+        .map(|step| frames[(2 * step + 1) * frames.len() / (2 * count)])
         .collect()
 }

@@ -67,6 +67,8 @@ pub(super) struct Ordered {
     /// Time stamps and numbers, sorted; empty if frames have none or share them. Frames are then
     /// numbered in the order in which the decoder returns them.
     pub(super) number_at: Vec<(i64, u64)>,
+    /// Numbers of the frames that can be decoded without any other, sorted.
+    pub(super) keys: Vec<u64>,
     /// What had to be assumed, for the user.
     pub(super) note: Option<String>,
 }
@@ -89,8 +91,12 @@ impl Ordered {
         };
         let mut number_of_packet = vec![None; stamps.len()];
         let mut frames = Vec::with_capacity(order.len());
+        let mut keys = Vec::new();
         for ((number, &at), t_us) in (0_u64..).zip(&order).zip(times) {
             number_of_packet[at] = Some(number);
+            if stamps[at].key {
+                keys.push(number);
+            }
             frames.push(FrameInfo {
                 number,
                 t_us,
@@ -110,6 +116,7 @@ impl Ordered {
             frames,
             number_of_packet,
             number_at,
+            keys,
             note,
         }
     }
@@ -170,6 +177,7 @@ mod tests {
         assert_eq!(found.number_of_packet, [Some(0), Some(2), Some(1)]);
         assert_eq!(times(&found), [0, 40_000, 80_000]);
         assert_eq!(found.number_at, [(0, 0), (40, 1), (80, 2)]);
+        assert_eq!(found.keys, [0, 1, 2]);
     }
 
     #[test]

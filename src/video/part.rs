@@ -37,7 +37,11 @@ impl Video {
         {
             return Ok(());
         }
-        copy_part(&self.picture(pending)?, region, part)
+        let picture = self.picture(pending)?;
+        match direct_part(&picture, region, part) {
+            Some(()) => Ok(()),
+            None => copy_part(&picture, region, part),
+        }
     }
 }
 
@@ -51,14 +55,27 @@ impl Track {
 
 /// `None` if the JPEG is to be decoded by FFmpeg.
 fn jpeg_part(jpeg: &[u8], size: (u32, u32), region: Rect, part: &mut RgbaImage) -> Option<()> {
+    let (inside, start) = cleared(size, region, part)?;
+    let rows = part.get_mut(start..)?;
+    decode_part(jpeg, size, inside, rows, 4 * region.w as usize).ok()
+}
+
+/// `None` if the picture is to be converted in another way.
+fn direct_part(picture: &Picture, region: Rect, part: &mut RgbaImage) -> Option<()> {
+    let (inside, start) = cleared(picture.size(), region, part)?;
+    let rows = part.get_mut(start..)?;
+    picture.direct_rgba(inside, rows, 4 * region.w as usize)
+}
+
+/// The part of the region that lies in the picture, and its first byte; everything is 0 where it is not all.
+fn cleared(size: (u32, u32), region: Rect, part: &mut RgbaImage) -> Option<(Rect, usize)> {
     let inside = region.clipped_to(size.0, size.1)?;
-    let stride = 4 * region.w as usize;
     if inside != region {
         part.fill(0);
     }
-    let (left, top) = (inside.x - region.x, inside.y - region.y);
-    let start = stride * usize::try_from(top).ok()? + 4 * usize::try_from(left).ok()?;
-    decode_part(jpeg, size, inside, part.get_mut(start..)?, stride).ok()
+    let left = usize::try_from(inside.x - region.x).ok()?;
+    let top = usize::try_from(inside.y - region.y).ok()?;
+    Some((inside, 4 * (region.w as usize * top + left)))
 }
 
 fn copy_part(picture: &Picture, region: Rect, part: &mut RgbaImage) -> Result<(), DecodeFault> {

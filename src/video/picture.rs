@@ -71,6 +71,14 @@ impl Colour {
 }
 
 impl Colour {
+    fn range(self) -> YuvRange {
+        if self.full_range {
+            YuvRange::Full
+        } else {
+            YuvRange::Limited
+        }
+    }
+
     /// What had to be assumed, as a remark for the user.
     pub(super) fn note(self) -> Option<String> {
         let why = match self.matrix_from {
@@ -192,6 +200,89 @@ impl Picture {
     }
 }
 
+impl Picture {
+    /// Writes `rect`, which lies inside the picture, to rows of red, green, blue and 255 that begin at multiples of
+    /// `stride`. `None` if that takes more than a conversion of its planes.
+    pub(super) fn direct_rgba(&self, rect: Rect, rows: &mut [u8], stride: usize) -> Option<()> {
+        let format = self.frame.format();
+        let direct = is_planar(format) && strides_are_forward(&self.frame);
+        if !direct || self.orientation != Orientation::default() {
+            return None;
+        }
+        let (left, top) = (usize::try_from(rect.x).ok()?, usize::try_from(rect.y).ok()?);
+        let end = usize::try_from(rect.right()).ok()?.next_multiple_of(BLOCK);
+        // As in `planes_to_rgb`: in blocks from the frame's edge.
+        let x = left - left % BLOCK;
+        let width = end.min(self.frame.width() as usize) - x;
+        let (_, shift_y) = chroma_shifts(format);
+        let (skipped, bytes) = (4 * (left - x), 4 * rect.w as usize);
+        let mut strip = vec![0; 4 * width * STRIP];
+        let mut rows = rows.chunks_mut(stride).take(rect.h as usize);
+        let mut y = top - (top & shift_y);
+        while y < top + rect.h as usize {
+            let height = STRIP.min(top + rect.h as usize - y);
+            let strip = &mut strip[..4 * width * height];
+            let size = (u32::try_from(width).ok()?, u32::try_from(height).ok()?);
+            planes_to_rgba(&self.frame, format, self.colour, (x, y), size, strip)?;
+            for row in strip.chunks_exact(4 * width).skip(top.saturating_sub(y)) {
+                rows.next()?
+                    .get_mut(..bytes)?
+                    .copy_from_slice(row.get(skipped..skipped + bytes)?);
+            }
+            y += height;
+        }
+        Some(())
+    }
+}
+
+/// Rows that are converted at a time: few enough for the processor's cache.
+const STRIP: usize = 16;
+
+/// RGBA of part of a planar YUV picture, from a pixel on that a chroma sample begins with.
+fn planes_to_rgba(
+    frame: &frame::Video,
+    format: Pixel,
+    colour: Colour,
+    (x, y): (usize, usize),
+    (width, height): (u32, u32),
+    rgba: &mut [u8],
+) -> Option<()> {
+    let (shift_x, shift_y) = chroma_shifts(format);
+    let (y_plane, y_stride) = plane(frame, 0, x, y)?;
+    let (u_plane, u_stride) = plane(frame, 1, x >> shift_x, y >> shift_y)?;
+    let (v_plane, v_stride) = plane(frame, 2, x >> shift_x, y >> shift_y)?;
+    let planes = YuvPlanarImage {
+        y_plane,
+        y_stride,
+        u_plane,
+        u_stride,
+        v_plane,
+        v_stride,
+        width,
+        height,
+    };
+    let to_rgba = match (shift_x, shift_y) {
+        (1, 1) => yuv::yuv420_to_rgba,
+        (1, 0) => yuv::yuv422_to_rgba,
+        _ => yuv::yuv444_to_rgba,
+    };
+    to_rgba(&planes, rgba, 4 * width, colour.range(), colour.matrix).ok()
+}
+
+/// Halvings of the chroma planes of a planar format, across and down.
+fn chroma_shifts(format: Pixel) -> (usize, usize) {
+    use Pixel::{YUV420P, YUV422P, YUVJ420P, YUVJ422P};
+    match format {
+        YUV420P | YUVJ420P => (1, 1),
+        YUV422P | YUVJ422P => (1, 0),
+        _ => (0, 0),
+    }
+}
+
+fn is_planar(format: Pixel) -> bool {
+    is_direct(format) && !matches!(format, Pixel::GRAY8 | Pixel::RGB24)
+}
+
 fn unconvertible(format: Pixel) -> DecodeFault {
     DecodeFault::PixelFormat(name_of(format).to_owned())
 }
@@ -272,12 +363,8 @@ fn planes_to_rgb(
     colour: Colour,
     rect: Rect,
 ) -> Option<RgbImage> {
-    use Pixel::{GRAY8, RGB24, YUV420P, YUV422P, YUVJ420P, YUVJ422P};
-    let (shift_x, shift_y) = match format {
-        YUV420P | YUVJ420P => (1, 1),
-        YUV422P | YUVJ422P => (1, 0),
-        _ => (0, 0),
-    };
+    use Pixel::{GRAY8, RGB24};
+    let (shift_x, shift_y) = chroma_shifts(format);
     // The converter works in blocks, and rounds differently in a block that is not full. The blocks
     // start at the frame's edge, so that a pixel's value does not depend on the region; the region
     // then also starts at a chroma sample.
@@ -292,11 +379,7 @@ fn planes_to_rgb(
         return copy_rgb(frame, left, y, rect.w, rect.h);
     }
     let mut rgb = RgbImage::new(width, height);
-    let range = if colour.full_range {
-        YuvRange::Full
-    } else {
-        YuvRange::Limited
-    };
+    let range = colour.range();
     let (y_plane, y_stride) = plane(frame, 0, x, y)?;
     let stride = width * 3;
     let converted = if format == GRAY8 {

@@ -94,6 +94,8 @@ pub struct Reader<'a> {
     wanted: Wanted,
     /// The decoder, if frames depend on each other.
     chain: Option<Chain>,
+    /// Only frames that depend on no other are wanted, and the time stamps tell which ones come.
+    keys_only: bool,
     ready: VecDeque<Pending>,
     ended: bool,
 }
@@ -119,7 +121,9 @@ impl<'a> Reader<'a> {
                 why,
             })?)
         };
+        let is_key = |number: &u64| video.track.keys.binary_search(number).is_ok();
         Ok(Self {
+            keys_only: !video.track.number_at.is_empty() && wanted.iter().all(is_key),
             video,
             input,
             packets: 0,
@@ -148,6 +152,7 @@ impl<'a> Reader<'a> {
         let number = track.number_of_packet.get(self.packets).copied().flatten();
         self.packets += 1;
         match &mut self.chain {
+            Some(_) if self.keys_only && !packet.is_key() => {}
             Some(chain) => chain.feed(&packet, track, &mut self.wanted, &mut self.ready),
             None => {
                 if let Some(number) = number.filter(|&number| self.wanted.take(number)) {

@@ -127,6 +127,8 @@ pub(super) struct Track {
     pub(super) orientation: Orientation,
     pub(super) number_of_packet: Vec<Option<u64>>,
     pub(super) number_at: Vec<(i64, u64)>,
+    /// Numbers of the frames that need no other, sorted.
+    pub(super) keys: Vec<u64>,
 }
 
 impl Video {
@@ -190,6 +192,7 @@ impl Video {
                 orientation,
                 number_of_packet: ordered.number_of_packet,
                 number_at: ordered.number_at,
+                keys: ordered.keys,
             },
             pool: Pool::new(parameters),
         })
@@ -211,6 +214,13 @@ impl Video {
     #[must_use]
     pub fn frames(&self) -> &[FrameInfo] {
         &self.frames
+    }
+
+    /// Numbers of the frames that can be decoded without any other, sorted: all of Motion JPEG, the key frames of
+    /// H.264. A [`Reader`] that is asked for none but these decodes no other.
+    #[must_use]
+    pub fn key_frames(&self) -> &[u64] {
+        &self.track.keys
     }
 
     /// Signs that the file is incomplete or damaged; empty if there are none.

@@ -252,6 +252,28 @@ fn a_region_is_cut_from_the_whole_picture_wherever_it_begins() {
     }
 }
 
+#[test]
+fn key_frames_are_decoded_alone_and_as_among_the_others() {
+    let encoding = "-pix_fmt yuv420p -c:v libx264 -g 4 -sc_threshold 0 -bf 2";
+    let (_folder, path) = made(PATTERN, "a.mkv", encoding);
+    let video = Video::open(&path).unwrap();
+    assert_eq!(video.key_frames(), [0, 4, 8]);
+    let picture = |pending| {
+        let picture = video.picture(pending).unwrap();
+        (picture.number(), picture.rgb(PARTS[0]).unwrap())
+    };
+    let all: Vec<u64> = (0..10).collect();
+    let all: Vec<_> = video.read(&all, 2).unwrap().map(picture).collect();
+    let alone: Vec<_> = video.read(&[0, 4, 8], 2).unwrap().map(picture).collect();
+    let wanted: Vec<_> = all
+        .into_iter()
+        .filter(|(number, _)| number % 4 == 0)
+        .collect();
+    assert!(alone == wanted);
+    let (_folder, path) = made(PATTERN, "b.mkv", "-pix_fmt yuvj422p -c:v mjpeg");
+    assert_eq!(Video::open(&path).unwrap().key_frames().len(), 10);
+}
+
 /// The part of a frame, and whether its fourth bytes say what lies inside the picture.
 fn part(video: &Video, number: u64, region: Rect) -> Result<RgbImage, DecodeFault> {
     let pending = video.read(&[number], 1).unwrap().next().unwrap();

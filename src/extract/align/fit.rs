@@ -4,13 +4,13 @@
 //! pixel counts by its trust, and the less the more its r exceeds its usual deviation (Geman and
 //! McClure's weights): a highlight that passes is no movement.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::structure::{Gradients, cubic};
 use super::template::{Template, TemplatePixel};
 
 /// Steps; fewer where it stands still.
 const MOST_STEPS: usize = 8;
-/// A shift that changes by less stands still, pixels.
-const STILL: f64 = 5e-3;
 /// Largest step, pixels: beyond, the first order does not hold.
 const LONGEST_STEP: f64 = 1.0;
 /// Deviations at which a pixel's weight is a quarter.
@@ -19,6 +19,8 @@ const OUTLIER: f32 = 1.5;
 const FAR_OUTLIER: f32 = 6.0;
 /// Fewest pixels from which a shift is measured.
 const LEAST_PIXELS: usize = 60;
+/// Pixels from which a rotation and a growth are measured.
+const SIMILARITY_PIXELS: usize = 3000;
 /// Pixels that are looked at in a search.
 const SEARCH_PIXELS: usize = 1000;
 /// The object has structure in one direction only if the other has less than this part of its weight.
@@ -31,6 +33,8 @@ pub(super) struct Fit {
     pub(super) shift: [f64; 2],
     /// Correlation of the gradients there, -1..=1.
     pub(super) correlation: f64,
+    /// Standard deviation of the shift, pixels.
+    pub(super) uncertainty: f64,
 }
 
 /// How an object is turned and scaled, beside its shift.
@@ -44,35 +48,52 @@ pub(super) struct Similarity {
     pub(super) radius: f64,
 }
 
-/// The normal equations of one step.
+/// What is summed over the pixels: the normal matrix (xx, xy, yy) and the right side of one step, and the
+/// products of the correlation (template, frame, both).
+const TERMS: usize = 8;
+/// The first of the right side.
+const RIGHT: usize = 3;
+/// Pixels that lie together, whose errors are taken for one: light that passes pulls at all of them.
+const PIECE: usize = 128;
+
+/// The normal equations of one step, and what goes with them.
 #[derive(Default)]
 struct Sums {
     count: usize,
-    /// xx, xy, yy.
-    normal: [f64; 3],
-    right: [f64; 2],
-    template: f64,
-    frame: f64,
-    product: f64,
+    terms: [f64; TERMS],
+    /// Products of what single pieces add to the right side: xx, xy, yy.
+    scatter: [f64; 3],
 }
 
 impl Template {
-    /// The fit nearest to `start`; `None` where there is none within `reach` pixels.
-    pub(super) fn fit(&self, frame: &Gradients, start: [f64; 2], reach: f64) -> Option<Fit> {
+    /// The fit nearest to `start`, up to a last step of less than `still`; `None` where there is none within
+    /// `reach` pixels.
+    pub(super) fn fit(
+        &self,
+        frame: &Gradients,
+        start: [f64; 2],
+        reach: f64,
+        still: f64,
+    ) -> Option<Fit> {
         let mut shift = start;
-        for _ in 0..MOST_STEPS {
-            let sums = self.sums(frame, shift);
+        let mut sums = self.sums(frame, shift);
+        for step in 1..=MOST_STEPS {
             let [dx, dy] = sums.step()?;
             shift = [shift[0] - dx, shift[1] - dy];
             if shift[0].abs().max(shift[1].abs()) > reach {
                 return None;
             }
-            if dx.abs().max(dy.abs()) < STILL {
+            // So small a last step changes nothing that the sums say.
+            if dx.abs().max(dy.abs()) < still || step == MOST_STEPS {
                 break;
             }
+            sums = self.sums(frame, shift);
         }
-        let correlation = self.sums(frame, shift).correlation();
-        Some(Fit { shift, correlation })
+        Some(Fit {
+            shift,
+            correlation: sums.correlation(),
+            uncertainty: sums.uncertainty(),
+        })
     }
 
     /// The best whole-pixel shift within `reach`.
@@ -102,21 +123,23 @@ impl Template {
 
     /// What a rotation and a growth about the object's centre explain beyond the shift.
     pub(super) fn similarity(&self, frame: &Gradients, shift: [f64; 2]) -> Option<Similarity> {
-        let count = self.pixels.len().max(1) as f64;
+        let every = self.pixels.len().div_ceil(SIMILARITY_PIXELS).max(1);
+        let pixels = || self.pixels.iter().step_by(every);
+        let count = pixels().count().max(1) as f64;
         let sum = |of: fn(&TemplatePixel) -> u32| -> f64 {
-            self.pixels.iter().map(|pixel| f64::from(of(pixel))).sum()
+            pixels().map(|pixel| f64::from(of(pixel))).sum()
         };
         let centre = (sum(|p| p.x) / count, sum(|p| p.y) / count);
         let mut normal = [[0.0; 4]; 4];
         let mut right = [0.0; 4];
         let mut distance = 0.0;
         let sampler = Sampler::new(frame, shift);
-        for pixel in &self.pixels {
+        for pixel in pixels() {
             let Some(found) = sampler.at(pixel) else {
                 continue;
             };
             let (x, y) = (f64::from(pixel.x) - centre.0, f64::from(pixel.y) - centre.1);
-            distance += x.hypot(y);
+            distance += (x * x + y * y).sqrt();
             let (weight, residual) = weighed(pixel, found, FAR_OUTLIER);
             let weight = f64::from(weight);
             let [xx, xy, yy] = pixel.change.map(f64::from);
@@ -140,18 +163,51 @@ impl Template {
     }
 
     fn sums(&self, frame: &Gradients, shift: [f64; 2]) -> Sums {
-        let sampler = Sampler::new(frame, shift);
+        Arch::new().dispatch(Summing {
+            template: self,
+            sampler: Sampler::new(frame, shift),
+        })
+    }
+}
+
+/// A loop over a template's pixels, compiled for the kind of processor.
+struct Summing<'a> {
+    template: &'a Template,
+    sampler: Sampler<'a>,
+}
+
+impl WithSimd for Summing<'_> {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Sums {
         let mut sums = Sums::default();
-        for pixel in &self.pixels {
-            if let Some(found) = sampler.at(pixel) {
-                sums.add(pixel, found);
+        // Within a piece, single precision suffices.
+        for pixels in self.template.pixels.chunks(PIECE) {
+            let mut piece = [0.0_f32; TERMS];
+            for pixel in pixels {
+                if let Some(found) = self.sampler.at(pixel) {
+                    for (sum, term) in piece.iter_mut().zip(terms(pixel, found)) {
+                        *sum += term;
+                    }
+                    sums.count += 1;
+                }
             }
+            for (sum, part) in sums.terms.iter_mut().zip(piece) {
+                *sum += f64::from(part);
+            }
+            let [right, down] = [piece[RIGHT], piece[RIGHT + 1]].map(f64::from);
+            let [xx, xy, yy] = &mut sums.scatter;
+            *xx += right * right;
+            *xy += right * down;
+            *yy += down * down;
         }
         sums
     }
 }
 
 /// The robust weight of a pixel, a quarter at `outlier` deviations, and its residual.
+#[inline(always)]
 fn weighed(pixel: &TemplatePixel, found: [f32; 2], outlier: f32) -> (f32, [f32; 2]) {
     let [x, y] = pixel.gradient;
     let residual = [found[0] - x, found[1] - y];
@@ -160,53 +216,83 @@ fn weighed(pixel: &TemplatePixel, found: [f32; 2], outlier: f32) -> (f32, [f32; 
     (pixel.weight / (fall * fall), residual)
 }
 
-impl Sums {
-    fn add(&mut self, pixel: &TemplatePixel, found: [f32; 2]) {
-        let (weight, [rx, ry]) = weighed(pixel, found, OUTLIER);
-        let [xx, xy, yy] = pixel.change;
-        let add = |sum: &mut f64, value: f32| *sum += f64::from(weight * value);
-        let [nxx, nxy, nyy] = &mut self.normal;
-        add(nxx, xx * xx + xy * xy);
-        add(nxy, xx * xy + xy * yy);
-        add(nyy, xy * xy + yy * yy);
-        add(&mut self.right[0], xx * rx + xy * ry);
-        add(&mut self.right[1], xy * rx + yy * ry);
-        self.compare(pixel, found);
-        self.count += 1;
-    }
+/// What a pixel adds to the sums.
+#[inline(always)]
+fn terms(pixel: &TemplatePixel, found: [f32; 2]) -> [f32; TERMS] {
+    let (weight, [rx, ry]) = weighed(pixel, found, OUTLIER);
+    let [xx, xy, yy] = pixel.change;
+    let (right, down) = (weight * (xx * rx + xy * ry), weight * (xy * rx + yy * ry));
+    let [template, frame, product] = compared(pixel, found);
+    [
+        weight * (xx * xx + xy * xy),
+        weight * (xx * xy + xy * yy),
+        weight * (xy * xy + yy * yy),
+        right,
+        down,
+        template,
+        frame,
+        product,
+    ]
+}
 
+/// What a pixel adds to the products of the correlation.
+#[inline(always)]
+fn compared(pixel: &TemplatePixel, found: [f32; 2]) -> [f32; 3] {
+    let [tx, ty] = pixel.gradient;
+    [
+        pixel.trust * (tx * tx + ty * ty),
+        pixel.trust * (found[0] * found[0] + found[1] * found[1]),
+        pixel.trust * (tx * found[0] + ty * found[1]),
+    ]
+}
+
+impl Sums {
     /// Adds to the sums of the correlation.
     fn compare(&mut self, pixel: &TemplatePixel, found: [f32; 2]) {
-        let [tx, ty] = pixel.gradient;
-        let trust = pixel.trust;
-        self.template += f64::from(trust * (tx * tx + ty * ty));
-        self.frame += f64::from(trust * (found[0] * found[0] + found[1] * found[1]));
-        self.product += f64::from(trust * (tx * found[0] + ty * found[1]));
+        let [.., template, frame, product] = &mut self.terms;
+        let parts = compared(pixel, found);
+        for (sum, part) in [template, frame, product].into_iter().zip(parts) {
+            *sum += f64::from(part);
+        }
     }
 
-    /// The error of the shift; `None` where the object does not say it in both directions.
-    fn step(&self) -> Option<[f64; 2]> {
-        let [xx, xy, yy] = self.normal;
+    /// The normal matrix and its determinant; `None` where the object does not say a shift in both directions.
+    fn normal(&self) -> Option<([f64; 3], f64)> {
+        let [xx, xy, yy, ..] = self.terms;
         let determinant = xx * yy - xy * xy;
         let size = xx + yy;
-        if self.count < LEAST_PIXELS
-            || determinant.is_nan()
-            || determinant <= LEAST_CROSS * size * size
-        {
-            return None;
-        }
-        let dx = (yy * self.right[0] - xy * self.right[1]) / determinant;
-        let dy = (xx * self.right[1] - xy * self.right[0]) / determinant;
+        let enough = self.count >= LEAST_PIXELS && determinant > LEAST_CROSS * size * size;
+        enough.then_some(([xx, xy, yy], determinant))
+    }
+
+    /// The error of the shift.
+    fn step(&self) -> Option<[f64; 2]> {
+        let ([xx, xy, yy], determinant) = self.normal()?;
+        let [_, _, _, right, down, ..] = self.terms;
+        let dx = (yy * right - xy * down) / determinant;
+        let dy = (xx * down - xy * right) / determinant;
         Some([dx, dy].map(|step| step.clamp(-LONGEST_STEP, LONGEST_STEP)))
     }
 
+    /// The standard deviation of the shift: the "sandwich" of the normal matrix and the scatter of the right side
+    /// (Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 1967), by pieces of
+    /// the object.
+    fn uncertainty(&self) -> f64 {
+        let Some(([xx, xy, yy], determinant)) = self.normal() else {
+            return f64::INFINITY;
+        };
+        let [sxx, sxy, syy] = self.scatter;
+        // The rows of the inverse of the normal matrix.
+        let variance = |a: f64, b: f64| (a * a * sxx + 2.0 * a * b * sxy + b * b * syy).max(0.0);
+        let across = variance(yy / determinant, -xy / determinant);
+        let down = variance(-xy / determinant, xx / determinant);
+        (across + down).sqrt()
+    }
+
     fn correlation(&self) -> f64 {
-        let scale = (self.template * self.frame).sqrt();
-        if scale > 0.0 {
-            self.product / scale
-        } else {
-            0.0
-        }
+        let [.., template, frame, product] = self.terms;
+        let scale = (template * frame).sqrt();
+        if scale > 0.0 { product / scale } else { 0.0 }
     }
 }
 
@@ -230,6 +316,7 @@ impl<'a> Sampler<'a> {
     }
 
     /// The gradient at a pixel of the template; `None` beyond the picture.
+    #[inline(always)]
     fn at(&self, pixel: &TemplatePixel) -> Option<[f32; 2]> {
         let x = usize::try_from(i64::from(pixel.x) + self.offset.0).ok()?;
         let y = usize::try_from(i64::from(pixel.y) + self.offset.1).ok()?;
@@ -237,19 +324,22 @@ impl<'a> Sampler<'a> {
         if x + 4 > width || y + 4 > self.frame.height {
             return None;
         }
+        // Four gradients of each of four rows, both directions side by side.
         let start = y * width + x;
-        let four = self.frame.values.get(start..start + 3 * width + 4)?;
-        let mut sum = [0.0_f32; 2];
-        for (row, down) in four.chunks(width).zip(self.down) {
-            let mut line = [0.0_f32; 2];
-            for (value, across) in row.iter().zip(self.across) {
-                line[0] += across * value[0];
-                line[1] += across * value[1];
+        let mut sums = [0.0_f32; 8];
+        for (row, down) in (0..4).zip(self.down) {
+            let from = start + row * width;
+            let four = self.frame.values.get(from..from + 4)?.as_flattened();
+            for (sum, value) in sums.iter_mut().zip(four) {
+                *sum += down * value;
             }
-            sum[0] += down * line[0];
-            sum[1] += down * line[1];
         }
-        Some(sum)
+        let [a, b, c, d] = self.across;
+        let [ax, ay, bx, by, cx, cy, dx, dy] = sums;
+        Some([
+            (a * ax + b * bx) + (c * cx + d * dx),
+            (a * ay + b * by) + (c * cy + d * dy),
+        ])
     }
 }
 

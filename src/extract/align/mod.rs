@@ -16,11 +16,13 @@ use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterato
 
 use super::View;
 use fit::Fit;
-use structure::{Extractor, Gradients, Plane, half, luma};
+use structure::{Extractor, Gradients, Plane, half, half_luma, luma};
 use template::Template;
 
 /// A fit whose correlation is less is none.
 pub const MIN_CONFIDENCE: f64 = 0.3;
+/// Larger crops are halved until their longer side is at most this, pixels: what is gained beyond is little.
+const FINEST_SIDE: u32 = 640;
 /// Pictures are halved until their longer side is at most this, pixels.
 const COARSEST_SIDE: u32 = 128;
 /// Fewest pixels of the object at the coarsest scale.
@@ -35,10 +37,16 @@ const ROUNDS: [usize; 3] = [3, 2, 1];
 const LOOK_BEYOND: f64 = 1.5;
 /// A shift that a scale finds from nothing, pixels.
 const LITTLE: f64 = 0.75;
+/// Scales, from the finest on, that are compared with the next coarser one.
+const COMPARED: usize = 2;
+/// Standard deviations from which on a shift of an object that stands still is one.
+const SURE: f64 = 2.0;
+/// Shifts that change by less stand still, pixels, at the finest scale and at the others.
+const STILL: [f64; 2] = [5e-3, 0.03];
 /// Further than this, pixels at the object's mean distance from its centre, a rotation or growth counts.
 const SIGNIFICANT: f64 = 0.5;
 
-/// The brightness of the part of a frame in which the object is looked for.
+/// The brightness of the part of a frame in which the object is looked for, at the resolution that is needed.
 #[derive(Debug, Clone)]
 pub struct AlignSample(GrayImage);
 
@@ -46,8 +54,20 @@ impl AlignSample {
     /// The brightness of `crop`.
     #[must_use]
     pub fn of(crop: View<'_>) -> Self {
-        Self(luma(crop))
+        let halvings = halvings(crop.dimensions());
+        if halvings == 0 {
+            return Self(luma(crop));
+        }
+        Self((1..halvings).fold(half_luma(crop), |image, _| half(&image)))
     }
+}
+
+/// How often a crop of this size is halved before anything else.
+fn halvings((width, height): (u32, u32)) -> u32 {
+    let longer = width.max(height);
+    (0..16)
+        .find(|&by| longer >> by <= FINEST_SIDE)
+        .unwrap_or(16)
 }
 
 /// Where the object of a frame is.
@@ -55,6 +75,10 @@ impl AlignSample {
 pub struct Alignment {
     /// To the right and down of its place in the mask, pixels; `None` where the frame cannot be registered.
     pub shift: Option<[f64; 2]>,
+    /// Standard deviation of the shift, pixels, as far as the frame itself shows it: by how differently parts of
+    /// the object and neighbouring scales say it, of which light that moves pulls more at the coarser.
+    /// Infinite where there is no shift.
+    pub uncertainty: f64,
     /// Correlation of the frame's structure with the object's lasting one, 0..=1.
     pub confidence: f64,
     /// How far a rotation and a growth move the object's pixels in the mean, beyond the shift: degrees
@@ -67,8 +91,12 @@ pub struct Alignment {
 pub struct Aligner {
     /// From the finest to the coarsest.
     templates: Vec<Template>,
-    /// Largest shift that is looked for, pixels.
+    /// Largest shift that is looked for, pixels of the finest template.
     reach: f64,
+    /// Pixels of a frame in one of the finest template.
+    unit: f64,
+    /// Whether the object moved in the frames that it was learnt from: by more in the mean than is uncertain.
+    moves: bool,
 }
 
 /// What a thread needs to measure shifts; it keeps its buffers from frame to frame.
@@ -93,8 +121,11 @@ impl Aligner {
         max_shift: f64,
         tolerance: f64,
     ) -> Option<Self> {
-        let scales = scales(mask);
-        let reach = max_shift * LOOK_BEYOND + 1.0;
+        let halvings = halvings(mask.dimensions());
+        let unit = f64::from(1_u32 << halvings);
+        let scales = scales(&halved(mask, halvings));
+        let reach = (max_shift * LOOK_BEYOND + 1.0) / unit;
+        let tolerance = tolerance / unit;
         let mut shifts = vec![[0.0; 2]; samples.len()];
         let mut templates = Vec::new();
         for (scale, inner) in scales.iter().enumerate().rev() {
@@ -115,7 +146,7 @@ impl Aligner {
                 let template = Template::of(&planes, &shifts, inner);
                 // The first template of all is too blurred to search with.
                 let search = coarsest && round > 0;
-                fit_all(&template, &planes, &mut shifts, reach, search);
+                fit_all(&template, &planes, &mut shifts, reach, search, still(scale));
                 let last = scale == 0 && round + 1 == rounds;
                 let origin = match shifts.get(reference).copied() {
                     Some(origin) if !last => origin,
@@ -136,11 +167,39 @@ impl Aligner {
             }
         }
         templates.reverse();
-        let aligner = Self { templates, reach };
-        let mut buffers = AlignBuffers::default();
-        let found = samples.get(reference)?;
-        let usable = aligner.measure(found, &mut buffers).shift.is_some();
+        let mut aligner = Self {
+            templates,
+            reach,
+            unit,
+            moves: false,
+        };
+        let found: Vec<Alignment> = samples
+            .par_iter()
+            .map_init(AlignBuffers::default, |buffers, sample| {
+                aligner.measure(sample, buffers)
+            })
+            .collect();
+        let square = |found: &Alignment| {
+            let [dx, dy] = found.shift?;
+            Some(dx * dx + dy * dy - found.uncertainty * found.uncertainty)
+        };
+        aligner.moves = found.iter().filter_map(square).sum::<f64>() > 0.0;
+        let usable = found.get(reference)?.shift.is_some();
         usable.then_some(aligner)
+    }
+
+    /// The shift of a frame, if it is more than `tolerance` pixels and is one: in a turn that stands still, what
+    /// is uncertain is taken for none.
+    #[must_use]
+    pub fn to_correct(&self, frame: &Alignment, tolerance: f64) -> Option<[f64; 2]> {
+        let sure = if self.moves {
+            0.0
+        } else {
+            SURE * frame.uncertainty
+        };
+        frame
+            .shift
+            .filter(|[dx, dy]| dx.hypot(*dy) > tolerance.max(sure))
     }
 
     /// Where the object is in a frame, in pixels of the frame.
@@ -155,8 +214,10 @@ impl Aligner {
         let fit = self.refine(gradients, start);
         let confidence = fit.map_or(0.0, |fit| fit.correlation.clamp(0.0, 1.0));
         let fit = fit.filter(sure);
+        let in_pixels = |length: f64| self.unit * length;
         Alignment {
-            shift: fit.map(|fit| fit.shift),
+            shift: fit.map(|fit| fit.shift.map(in_pixels)),
+            uncertainty: fit.map_or(f64::INFINITY, |fit| in_pixels(fit.uncertainty)),
             confidence,
             turned: fit.and_then(|fit| self.turned(gradients, fit)),
         }
@@ -184,11 +245,18 @@ impl Aligner {
     fn refine(&self, gradients: &[Gradients], start: [f64; 2]) -> Option<Fit> {
         let mut start = start;
         let mut found = None;
+        let mut apart = 0.0;
         for (scale, template) in self.templates.iter().enumerate().rev() {
-            let reach = self.reach / (1_u32 << scale) as f64;
-            let fit = template.fit(gradients.get(scale)?, start, reach);
+            let pixels = f64::from(1_u32 << scale);
+            let reach = self.reach / pixels;
+            let fit = template.fit(gradients.get(scale)?, start, reach, still(scale));
             // A scale at which the object has no structure says nothing.
             if let Some(fit) = fit {
+                let [dx, dy] = [fit.shift[0] - start[0], fit.shift[1] - start[1]];
+                let has_coarser = scale + 1 < self.templates.len();
+                if has_coarser && scale < COMPARED {
+                    apart += pixels * pixels * (dx * dx + dy * dy);
+                }
                 start = fit.shift;
             }
             found = fit;
@@ -196,7 +264,10 @@ impl Aligner {
                 start = start.map(|part| 2.0 * part);
             }
         }
-        found
+        found.map(|fit| Fit {
+            uncertainty: (fit.uncertainty * fit.uncertainty + apart).sqrt(),
+            ..fit
+        })
     }
 
     fn turned(&self, gradients: &[Gradients], fit: Fit) -> Option<(f64, f64)> {
@@ -205,7 +276,8 @@ impl Aligner {
         let pixels = (1_u32 << scale) as f64;
         let shift = fit.shift.map(|part| part / pixels);
         let similarity = self.templates[scale].similarity(&gradients[scale], shift)?;
-        let moved = pixels * similarity.radius * similarity.turned.hypot(similarity.grown);
+        let moved =
+            self.unit * pixels * similarity.radius * similarity.turned.hypot(similarity.grown);
         (moved > SIGNIFICANT).then_some((similarity.turned.to_degrees(), similarity.grown))
     }
 }
@@ -227,6 +299,7 @@ fn fit_all(
     shifts: &mut [[f64; 2]],
     reach: f64,
     search: bool,
+    still: f64,
 ) {
     let found: Vec<[f64; 2]> = (0..planes.len())
         .into_par_iter()
@@ -236,11 +309,16 @@ fn fit_all(
                 true => template.search(gradients, reach),
                 false => shifts[at],
             };
-            let fit = template.fit(gradients, start, reach);
+            let fit = template.fit(gradients, start, reach, still);
             fit.map_or(shifts[at], |fit| fit.shift)
         })
         .collect();
     shifts.copy_from_slice(&found);
+}
+
+/// A change of the shift at which a scale is done, its pixels: a finer scale improves on the coarser.
+fn still(scale: usize) -> f64 {
+    STILL[usize::from(scale > 0)]
 }
 
 fn plane_at(sample: &GrayImage, scale: usize) -> Plane {
@@ -251,6 +329,21 @@ fn plane_at(sample: &GrayImage, scale: usize) -> Plane {
     let mut plane = Plane::default();
     Extractor::default().structure(smaller.as_ref().unwrap_or(sample), &mut plane);
     plane
+}
+
+/// The mask of as many halvings as the frames have: only what is object in all pixels.
+fn halved(mask: &GrayImage, halvings: u32) -> GrayImage {
+    let mut small = mask.clone();
+    small
+        .iter_mut()
+        .for_each(|m| *m = if *m != 0 { 255 } else { 0 });
+    for _ in 0..halvings {
+        small = half(&small);
+        small
+            .iter_mut()
+            .for_each(|m| *m = if *m == 255 { 255 } else { 0 });
+    }
+    small
 }
 
 /// The object without its outline at each scale, from the finest to the coarsest.

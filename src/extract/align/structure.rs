@@ -5,6 +5,7 @@
 //! and edges of the surface remain.
 
 use image::GrayImage;
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::extract::View;
 
@@ -13,6 +14,9 @@ const DARK: f32 = 8.0;
 /// Standard deviations of the two Gaussians of the band-pass, pixels.
 const FINE: f32 = 0.5;
 const COARSE: f32 = 1.2;
+/// Values of the finer one, and of the one that makes the coarser of it: up to three deviations.
+const FINE_TAPS: usize = 5;
+const REST_TAPS: usize = 9;
 
 /// Values of a picture's pixels, row by row.
 #[derive(Debug, Clone, Default)]
@@ -50,8 +54,8 @@ pub(super) struct Gradients {
 #[derive(Debug)]
 pub(super) struct Extractor {
     logarithms: Vec<f32>,
-    fine: Vec<f32>,
-    rest: Vec<f32>,
+    fine: [f32; FINE_TAPS],
+    rest: [f32; REST_TAPS],
     rows: Plane,
     blurred: Plane,
     light: Plane,
@@ -76,19 +80,50 @@ impl Default for Extractor {
 impl Extractor {
     /// The fine structure of a picture's brightness.
     pub(super) fn structure(&mut self, luma: &GrayImage, out: &mut Plane) {
-        let (width, height) = (luma.width() as usize, luma.height() as usize);
-        self.light.resize(width, height);
-        for (light, &level) in self.light.values.iter_mut().zip(luma.as_raw()) {
-            *light = self
-                .logarithms
+        Arch::new().dispatch(Structure {
+            extractor: self,
+            luma,
+            out,
+        });
+    }
+}
+
+/// The making of one plane, compiled for the kind of processor.
+struct Structure<'a> {
+    extractor: &'a mut Extractor,
+    luma: &'a GrayImage,
+    out: &'a mut Plane,
+}
+
+impl WithSimd for Structure<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self {
+            extractor,
+            luma,
+            out,
+        } = self;
+        let Extractor {
+            logarithms,
+            fine,
+            rest,
+            rows,
+            blurred,
+            light,
+            line,
+        } = extractor;
+        light.resize(luma.width() as usize, luma.height() as usize);
+        for (light, &level) in light.values.iter_mut().zip(luma.as_raw()) {
+            *light = logarithms
                 .get(usize::from(level))
                 .copied()
                 .unwrap_or_default();
         }
-        let Self { rows, line, .. } = self;
-        blur(&self.light, &self.fine, rows, line, &mut self.blurred);
-        blur(&self.blurred, &self.rest, rows, line, out);
-        for (coarse, fine) in out.values.iter_mut().zip(&self.blurred.values) {
+        blur(light, fine, rows, line, blurred);
+        blur(blurred, rest, rows, line, out);
+        for (coarse, fine) in out.values.iter_mut().zip(&blurred.values) {
             *coarse = fine - *coarse;
         }
     }
@@ -98,20 +133,33 @@ impl Gradients {
     /// Replaces these by the gradients of `plane`; 0 at its border.
     pub(super) fn take(&mut self, plane: &Plane) {
         (self.width, self.height) = (plane.width, plane.height);
-        self.values.clear();
         self.values.resize(plane.values.len(), [0.0; 2]);
-        if plane.width < 3 || plane.height < 3 {
-            return;
-        }
-        let rows = self.values.chunks_exact_mut(plane.width).enumerate();
-        for (y, row) in rows.skip(1).take(plane.height - 2) {
-            let y = y as isize;
-            let sides = plane.row(y).windows(3);
-            let above = plane.row(y - 1).iter().skip(1);
-            let below = plane.row(y + 1).iter().skip(1);
-            let sides = sides.zip(above.zip(below));
-            for (gradient, (side, (above, below))) in row.iter_mut().skip(1).zip(sides) {
-                *gradient = [0.5 * (side[2] - side[0]), 0.5 * (below - above)];
+        Arch::new().dispatch(Taking(self, plane));
+    }
+}
+
+/// The making of gradients, compiled for the kind of processor.
+struct Taking<'a>(&'a mut Gradients, &'a Plane);
+
+impl WithSimd for Taking<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self(gradients, plane) = self;
+        let (width, height) = (plane.width, plane.height);
+        for (y, row) in (0..).zip(gradients.values.chunks_exact_mut(width.max(1))) {
+            if width < 3 || y == 0 || y + 1 == height as isize {
+                row.fill([0.0; 2]);
+                continue;
+            }
+            let (above, here, below) = (plane.row(y - 1), plane.row(y), plane.row(y + 1));
+            (row[0], row[width - 1]) = ([0.0; 2], [0.0; 2]);
+            let inner = row[1..width - 1].iter_mut();
+            let across = here[2..].iter().zip(here);
+            let down = below[1..].iter().zip(&above[1..]);
+            for ((gradient, (right, left)), (below, above)) in inner.zip(across).zip(down) {
+                *gradient = [0.5 * (right - left), 0.5 * (below - above)];
             }
         }
     }
@@ -131,17 +179,61 @@ pub(super) fn cubic(part: f32) -> [f32; 4] {
 
 /// Brightness of a picture, 0..=255.
 pub(super) fn luma(picture: View<'_>) -> GrayImage {
-    let pixels = picture.rows().flat_map(|row| row.chunks_exact(4));
-    let levels = pixels.map(|p| {
-        let sum = 77 * u32::from(p[0]) + 150 * u32::from(p[1]) + 29 * u32::from(p[2]);
-        (sum >> 8) as u8
-    });
-    let (width, height) = picture.dimensions();
-    let mut grey = GrayImage::new(width, height);
-    grey.iter_mut()
-        .zip(levels)
-        .for_each(|(to, level)| *to = level);
-    grey
+    Arch::new().dispatch(Luma {
+        picture,
+        half: false,
+    })
+}
+
+/// The brightness of half the picture, each pixel the mean of two by two.
+pub(super) fn half_luma(picture: View<'_>) -> GrayImage {
+    Arch::new().dispatch(Luma {
+        picture,
+        half: true,
+    })
+}
+
+/// The making of a picture's brightness, compiled for the kind of processor.
+struct Luma<'a> {
+    picture: View<'a>,
+    half: bool,
+}
+
+impl WithSimd for Luma<'_> {
+    type Output = GrayImage;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> GrayImage {
+        let by = if self.half { 2 } else { 1 };
+        let (width, height) = self.picture.dimensions();
+        let mut grey = GrayImage::new(width / by, height / by);
+        let rows = grey.as_flat_samples_mut().samples;
+        let rows = rows.chunks_exact_mut(((width / by) as usize).max(1));
+        for (to, y) in rows.zip((0_i64..).step_by(by as usize)) {
+            let above = self.picture.row(y, 0);
+            if self.half {
+                let below = self.picture.row(y + 1, 0);
+                let pairs = above.chunks_exact(8).zip(below.chunks_exact(8));
+                for (to, (above, below)) in to.iter_mut().zip(pairs) {
+                    let above = sum_of(&above[..4]) + sum_of(&above[4..]);
+                    let below = sum_of(&below[..4]) + sum_of(&below[4..]);
+                    *to = ((above + below) >> 10) as u8;
+                }
+            } else {
+                for (to, pixel) in to.iter_mut().zip(above.chunks_exact(4)) {
+                    *to = (sum_of(pixel) >> 8) as u8;
+                }
+            }
+        }
+        grey
+    }
+}
+
+/// 256 times a pixel's brightness.
+#[inline(always)]
+fn sum_of(pixel: &[u8]) -> u32 {
+    let all = u32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
+    77 * (all & 255) + 150 * ((all >> 8) & 255) + 29 * ((all >> 16) & 255)
 }
 
 /// Half the picture: means of two by two pixels.
@@ -165,26 +257,31 @@ pub(super) fn half(image: &GrayImage) -> GrayImage {
     small
 }
 
-/// A Gaussian of this standard deviation, cut off at three of them; its sum is 1.
-fn gaussian(deviation: f32) -> Vec<f32> {
-    let radius = (3.0 * deviation).ceil();
-    let places = (0..=2 * radius as usize).map(|at| at as f32 - radius);
-    let values: Vec<f32> = places
-        .map(|x| (-0.5 * (x / deviation).powi(2)).exp())
-        .collect();
+/// A Gaussian of this standard deviation, cut off at both ends; its sum is 1.
+fn gaussian<const TAPS: usize>(deviation: f32) -> [f32; TAPS] {
+    let radius = (TAPS / 2) as f32;
+    let values: [f32; TAPS] =
+        std::array::from_fn(|at| (-0.5 * ((at as f32 - radius) / deviation).powi(2)).exp());
     let sum: f32 = values.iter().sum();
-    values.iter().map(|value| value / sum).collect()
+    values.map(|value| value / sum)
 }
 
 /// Both passes of a separable filter; the border is continued.
-fn blur(from: &Plane, kernel: &[f32], rows: &mut Plane, line: &mut Vec<f32>, to: &mut Plane) {
+#[inline(always)]
+fn blur<const TAPS: usize>(
+    from: &Plane,
+    kernel: &[f32; TAPS],
+    rows: &mut Plane,
+    line: &mut Vec<f32>,
+    to: &mut Plane,
+) {
     let width = from.width;
     rows.resize(width, from.height);
     to.resize(width, from.height);
     if width == 0 {
         return;
     }
-    let radius = kernel.len() / 2;
+    let radius = TAPS / 2;
     for (source, target) in from
         .values
         .chunks_exact(width)
@@ -194,20 +291,29 @@ fn blur(from: &Plane, kernel: &[f32], rows: &mut Plane, line: &mut Vec<f32>, to:
         line.extend(std::iter::repeat_n(source[0], radius));
         line.extend_from_slice(source);
         line.extend(std::iter::repeat_n(source[width - 1], radius));
-        target.fill(0.0);
-        for (at, weight) in kernel.iter().enumerate() {
-            add_scaled(target, &line[at..], *weight);
-        }
+        weigh(
+            std::array::from_fn(|at| &line[at..at + width]),
+            kernel,
+            target,
+        );
     }
-    for (y, target) in to.values.chunks_exact_mut(width).enumerate() {
-        target.fill(0.0);
-        for (at, weight) in kernel.iter().enumerate() {
-            add_scaled(
-                target,
-                rows.row(y as isize + at as isize - radius as isize),
-                *weight,
-            );
+    for (y, target) in (0..).zip(to.values.chunks_exact_mut(width)) {
+        let row = |at: usize| rows.row(y + at as isize - radius as isize);
+        weigh(std::array::from_fn(row), kernel, target);
+    }
+}
+
+/// The sum of lines times their weights.
+#[inline(always)]
+fn weigh<const TAPS: usize>(lines: [&[f32]; TAPS], kernel: &[f32; TAPS], to: &mut [f32]) {
+    let length = to.len();
+    let lines = lines.map(|line| &line[..length]);
+    for (x, to) in to.iter_mut().enumerate() {
+        let mut sum = 0.0;
+        for (line, weight) in lines.iter().zip(kernel) {
+            sum += weight * line[x];
         }
+        *to = sum;
     }
 }
 

@@ -4,12 +4,18 @@
 //! images from image sequences", 2001). How far single frames are from it says how much a pixel can be
 //! trusted: where highlights and shadows pass, little.
 
+use std::ops::Range;
+
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::structure::{Plane, add_scaled, cubic};
 
 /// Pixels of a template; those that say most about a shift are kept.
 const MOST_PIXELS: usize = 8_000;
+/// Side of the squares in whose order the pixels stand, so that neighbours are near each other.
+const TILE: u32 = 24;
+/// Rows of a template that a thread makes at a time.
+const BAND: usize = 16;
 /// Deviation of the gradients by noise.
 const NOISE: f32 = 0.01;
 
@@ -31,6 +37,7 @@ pub(super) struct TemplatePixel {
 /// The object's lasting structure.
 #[derive(Debug, Default)]
 pub(super) struct Template {
+    /// In an order in which neighbours are near each other.
     pub(super) pixels: Vec<TemplatePixel>,
 }
 
@@ -49,10 +56,12 @@ impl Template {
         if width < 3 || height < 3 {
             return Self::default();
         }
-        let rows: Vec<TemplateRow> = (0..height)
+        let bands = (0..height).step_by(BAND).collect::<Vec<_>>();
+        let bands: Vec<Vec<TemplateRow>> = bands
             .into_par_iter()
-            .map(|y| row(planes, shifts, inner, y))
+            .map(|from| band(planes, shifts, inner, from..(from + BAND).min(height)))
             .collect();
+        let rows: Vec<TemplateRow> = bands.into_iter().flatten().collect();
         let mut pixels = Vec::new();
         for y in 1..height - 1 {
             for x in (1..width - 1).filter(|x| inner.get(y * width + x) == Some(&true)) {
@@ -60,6 +69,8 @@ impl Template {
             }
         }
         keep_most_telling(&mut pixels);
+        let tile = |pixel: &TemplatePixel| (pixel.y / TILE, pixel.x / TILE, pixel.y, pixel.x);
+        pixels.sort_unstable_by_key(tile);
         Self { pixels }
     }
 }
@@ -101,18 +112,63 @@ fn keep_most_telling(pixels: &mut Vec<TemplatePixel>) {
             .then((a.y, a.x).cmp(&(b.y, b.x)))
     });
     pixels.truncate(MOST_PIXELS);
-    pixels.sort_unstable_by_key(|pixel| (pixel.y, pixel.x));
 }
 
-fn row(planes: &[Plane], shifts: &[[f64; 2]], inner: &[bool], y: usize) -> TemplateRow {
+/// Rows that are made together: of those above and below, which both need, few are made twice.
+fn band(
+    planes: &[Plane],
+    shifts: &[[f64; 2]],
+    inner: &[bool],
+    rows: Range<usize>,
+) -> Vec<TemplateRow> {
     let width = planes.first().map_or(0, |plane| plane.width);
-    let mut found = TemplateRow {
-        gradients: vec![[0.0; 2]; width],
-        deviations: vec![0.0; width],
-    };
-    // A pixel's change needs the gradients of its four neighbours.
+    let mut found: Vec<TemplateRow> = rows
+        .clone()
+        .map(|_| TemplateRow {
+            gradients: vec![[0.0; 2]; width],
+            deviations: vec![0.0; width],
+        })
+        .collect();
+    let needed: Vec<Vec<usize>> = rows.clone().map(|y| needed(inner, width, y)).collect();
+    if needed.iter().all(Vec::is_empty) {
+        return found;
+    }
+    let first = rows.start as isize - 1;
+    let moved: Vec<Vec<Vec<f32>>> = planes
+        .iter()
+        .zip(shifts)
+        .map(|(plane, &shift)| {
+            let around = first..rows.end as isize + 1;
+            around.map(|y| moved_row(plane, shift, y)).collect()
+        })
+        .collect();
+    let mut across = Vec::with_capacity(planes.len());
+    let mut down = Vec::with_capacity(planes.len());
+    for (at, (row, needed)) in found.iter_mut().zip(needed).enumerate() {
+        for x in needed {
+            across.clear();
+            down.clear();
+            for rows in &moved {
+                let [above, here, below] = [&rows[at], &rows[at + 1], &rows[at + 2]];
+                across.push(0.5 * (here[x + 1] - here[x - 1]));
+                down.push(0.5 * (below[x] - above[x]));
+            }
+            let (mid_x, mid_y) = (middle(&mut across.clone()), middle(&mut down.clone()));
+            for (a, d) in across.iter_mut().zip(&down) {
+                let (x, y) = (*a - mid_x, d - mid_y);
+                *a = (x * x + y * y).sqrt();
+            }
+            row.gradients[x] = [mid_x, mid_y];
+            row.deviations[x] = middle(&mut across);
+        }
+    }
+    found
+}
+
+/// The columns of row `y` whose gradients are needed: a pixel's change needs those of its four neighbours.
+fn needed(inner: &[bool], width: usize, y: usize) -> Vec<usize> {
     let wanted = |y: usize, x: usize| inner.get(y * width + x) == Some(&true);
-    let needed: Vec<usize> = (1..width - 1)
+    (1..width - 1)
         .filter(|&x| {
             wanted(y, x - 1)
                 || wanted(y, x)
@@ -120,35 +176,7 @@ fn row(planes: &[Plane], shifts: &[[f64; 2]], inner: &[bool], y: usize) -> Templ
                 || wanted(y + 1, x)
                 || y.checked_sub(1).is_some_and(|above| wanted(above, x))
         })
-        .collect();
-    if needed.is_empty() {
-        return found;
-    }
-    let moved: Vec<[Vec<f32>; 3]> = planes
-        .iter()
-        .zip(shifts)
-        .map(|(plane, &shift)| {
-            let y = y as isize;
-            [y - 1, y, y + 1].map(|y| moved_row(plane, shift, y))
-        })
-        .collect();
-    let mut across = Vec::with_capacity(planes.len());
-    let mut down = Vec::with_capacity(planes.len());
-    for x in needed {
-        across.clear();
-        down.clear();
-        for [above, here, below] in &moved {
-            across.push(0.5 * (here[x + 1] - here[x - 1]));
-            down.push(0.5 * (below[x] - above[x]));
-        }
-        let (mid_x, mid_y) = (middle(&mut across.clone()), middle(&mut down.clone()));
-        for (a, d) in across.iter_mut().zip(&down) {
-            *a = (*a - mid_x).hypot(d - mid_y);
-        }
-        found.gradients[x] = [mid_x, mid_y];
-        found.deviations[x] = middle(&mut across);
-    }
-    found
+        .collect()
 }
 
 /// Row `y` of a picture that is moved back by its shift.

@@ -130,3 +130,42 @@ fn a_rotation_is_reported_where_it_is_significant_and_not_else() {
     assert!((found.0 - degrees).abs() < 0.4, "{found:?}");
     assert!(found.1.abs() < 0.01, "{found:?}");
 }
+
+#[test]
+fn in_a_turn_that_stands_still_only_a_sure_shift_is_corrected() {
+    let aligner = learnt(|_| [0.0; 2], 0.1);
+    let unsure = Alignment {
+        shift: Some([0.12, 0.05]),
+        uncertainty: 0.08,
+        confidence: 0.8,
+        turned: None,
+    };
+    assert_eq!(aligner.to_correct(&unsure, 0.1), None);
+    let jolt = measured(&aligner, &frame([1.2, -0.8], angle(3, 24)));
+    assert!(jolt.uncertainty < 0.5, "{jolt:?}");
+    assert_eq!(aligner.to_correct(&jolt, 0.1), jolt.shift);
+    assert_eq!(aligner.to_correct(&jolt, 2.0), None);
+    let shaken = learnt(|at| [0.1 * at as f64, 0.3 * (at as f64).sin()], 0.1);
+    assert_eq!(shaken.to_correct(&unsure, 0.1), unsure.shift);
+}
+
+#[test]
+fn a_large_picture_is_measured_in_its_own_pixels() {
+    let large = |sample: &AlignSample| {
+        let side = 5 * SIDE;
+        RgbaImage::from_fn(side, side, |x, y| {
+            grey(sample.0.get_pixel(x / 5, y / 5).0[0])
+        })
+    };
+    let samples: Vec<AlignSample> = (0..24)
+        .map(|at| AlignSample::of(View::whole(&large(&frame([0.0; 2], angle(at, 24))))))
+        .collect();
+    assert!(samples[0].0.width() <= 640);
+    let mask = image::imageops::resize(&mask(), 5 * SIDE, 5 * SIDE, image::imageops::Nearest);
+    let aligner = Aligner::learn(&samples, 0, &mask, 16.0, 0.1).unwrap();
+    let moved = large(&frame([2.0, -1.0], angle(7, 24)));
+    let found = measured(&aligner, &AlignSample::of(View::whole(&moved)))
+        .shift
+        .unwrap();
+    assert!((found[0] - 10.0).hypot(found[1] + 5.0) < 0.5, "{found:?}");
+}

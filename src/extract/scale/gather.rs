@@ -193,15 +193,13 @@ impl ScaleBuffers {
 /// The light of a run of pixels, at their columns.
 #[inline(always)]
 fn light_of(pixels: &[u8], columns: &Range<usize>, light: &mut [Vec<f32>; PLANES]) {
-    let [red, green, blue, _] = light;
-    let red = &mut red[columns.clone()];
-    let green = &mut green[columns.clone()];
-    let blue = &mut blue[columns.clone()];
-    for (((pixel, red), green), blue) in pixels.chunks_exact(4).zip(red).zip(green).zip(blue) {
-        let all = u32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
-        *red = linear(all & 255);
-        *green = linear((all >> 8) & 255);
-        *blue = linear((all >> 16) & 255);
+    // One channel at a time: the processor has too few registers for three.
+    for (channel, plane) in (0..3).zip(light) {
+        let plane = &mut plane[columns.clone()];
+        for (pixel, light) in pixels.chunks_exact(4).zip(plane) {
+            let all = u32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
+            *light = linear((all >> (8 * channel)) & 255);
+        }
     }
 }
 

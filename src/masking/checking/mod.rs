@@ -15,7 +15,7 @@ use relit_video::Video;
 use serde::Serialize;
 
 use super::files::{read_if_exists, write};
-use super::sampling::{pictures, spread};
+use super::sampling::{evenly, pictures, spread};
 use super::{MaskFiles, MaskingError};
 pub use verdict::Verdict;
 use verdict::{MOST_REGION, MOST_REGION_OF_A_LOOK, verdict};
@@ -128,7 +128,8 @@ fn check_recording(
         });
     }
     let source = source_frame(&files, &video)?;
-    let statistics = statistics(&video, image.dimensions(), TURN_FRAMES)?;
+    let sampled = spread(&video, TURN_FRAMES);
+    let statistics = statistics(&video, image.dimensions(), &sampled)?;
     let check = MaskCheck::new(&image, &statistics)?;
     let frame = video.frame(source)?;
     let origin = check.place(&frame);
@@ -156,13 +157,13 @@ fn check_recording(
 /// # Errors
 /// [`MaskingError::Video`] or [`MaskingError::Mask`].
 pub fn mask_doubts(video: &Video, mask: &GrayImage) -> Result<Vec<String>, MaskingError> {
-    let statistics = statistics(video, mask.dimensions(), LIGHT_FRAMES)?;
+    let numbers = quick_frames(video);
+    let statistics = statistics(video, mask.dimensions(), &numbers)?;
     let check = match MaskCheck::new(mask, &statistics) {
         Ok(check) => check,
         Err(MaskError::FewFrames { .. } | MaskError::Empty) => return Ok(Vec::new()),
         Err(error) => return Err(error.into()),
     };
-    let numbers = spread(video, LIGHT_FRAMES);
     let Some(&middle) = numbers.get(numbers.len() / 2) else {
         return Ok(Vec::new());
     };
@@ -172,6 +173,20 @@ pub fn mask_doubts(video: &Video, mask: &GrayImage) -> Result<Vec<String>, Maski
         Verdict::Wrong => reasons,
         Verdict::Fits | Verdict::Drifts | Verdict::Unknown => Vec::new(),
     })
+}
+
+/// A few frames of the turn: key frames, which are decoded alone, where there are enough.
+fn quick_frames(video: &Video) -> Vec<u64> {
+    let damaged = |&number: &u64| {
+        let at = usize::try_from(number).unwrap_or(usize::MAX);
+        video.frames().get(at).is_none_or(|frame| frame.damaged)
+    };
+    let keys = video.key_frames().iter().copied();
+    let keys: Vec<u64> = keys.filter(|number| !damaged(number)).collect();
+    if keys.len() < LIGHT_FRAMES {
+        return spread(video, LIGHT_FRAMES);
+    }
+    evenly(&keys, LIGHT_FRAMES)
 }
 
 /// The comparison of the shapes; none where the turn alone shows no object.
@@ -220,10 +235,10 @@ fn source_frame(files: &MaskFiles, video: &Video) -> Result<u64, MaskingError> {
 fn statistics(
     video: &Video,
     size: (u32, u32),
-    frames: usize,
+    frames: &[u64],
 ) -> Result<TurnStatistics, MaskingError> {
     let mut turn = Turn::new(size.0, size.1);
-    for picture in pictures(video, &spread(video, frames), size)? {
+    for picture in pictures(video, frames, size)? {
         turn.push(&picture.1);
     }
     Ok(TurnStatistics::new(&turn))
