@@ -1,8 +1,8 @@
-//! Holds `relight turn` against truth: `turn_truth SHARD TRUTH [NORMALS]`.
+//! Holds `relight turn` against truth: `turn_truth SHARD TRUTH [NORMALS] [metal]`.
 //!
 //! TRUTH is a rendered session (`normal_gt.png`, `albedo_gt.png`, `truth.json`) or a folder that `relight synth --turn`
 //! wrote (`normal.png`, `albedo.png`, `turn.json`). NORMALS are those to start from, as `--normals` takes them; without
-//! it those of the shipped network.
+//! it those of the shipped network. `metal` says how the light that is called known is fitted to the truth.
 #![allow(clippy::print_stdout, reason = "the example is a program of its own")]
 
 use std::error::Error;
@@ -16,11 +16,13 @@ use relight::light::{Normals, YUp};
 use relight::metrics::{Comparison, ScaleFit, angular_error};
 use relight::render::{NormalsFrame, Surface};
 use relight::turn::{
-    Conditioning, Elevation, NormalsSource, ReadTurn, TableFrame, TableSense, TurnOptions,
-    fit_turn_light, prior_normals, read_curves, solve_turn,
+    BodyKind, Conditioning, Elevation, NormalsSource, ReadTurn, TableFrame, TableSense, TurnMaps,
+    TurnOptions, fit_turn_light, prior_normals, read_curves, solve_turn,
 };
 use serde_json::Value;
 
+/// Light from which a pixel counts as a highlight, in parts of white.
+const HIGHLIGHTS: [f32; 4] = [0.02, 0.05, 0.1, 0.2];
 /// Confidences above which the error is told.
 const LEVELS: [f32; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 0.9];
 
@@ -28,6 +30,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [shard, truth, normals @ ..] = arguments.as_slice() else {
         return Err("give a shard and its truth".into());
+    };
+    let (normals, body) = match normals {
+        [normals @ .., kind] if kind == "metal" => (normals, BodyKind::Metal),
+        normals => (normals, BodyKind::Diffuse),
     };
     let (shard, truth) = (Path::new(shard), Path::new(truth));
     let start = Instant::now();
@@ -45,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     });
     let prior = prior_normals(&source, NormalsFrame::YUp, &turn.first, &turn.mask)?;
     truth.angles("prior alone", &prior)?;
-    let known = fit_turn_light(&turn.curves, &truth.surface, &frame)?;
+    let known = fit_turn_light(&turn.curves, &truth.surface, body, &frame)?;
     let options = |light, prior| TurnOptions {
         elevation: truth.elevation,
         light,
@@ -66,6 +72,8 @@ struct Truth {
     surface: Surface,
     mask: Vec<bool>,
     elevation: Elevation,
+    /// The most that each pixel shines anywhere in the turn, where that is known.
+    highlight: Option<Vec<f32>>,
 }
 
 impl Truth {
@@ -98,6 +106,7 @@ impl Truth {
         Ok(Self {
             mask: mask.collect(),
             surface: Surface::new(normals, albedo, None)?,
+            highlight: highlight(folder)?,
             elevation: Elevation::given(degrees)?,
         })
     }
@@ -130,8 +139,13 @@ impl Truth {
             found.residual(),
             found.expected_error_deg(),
         );
+        println!("    body {:?}, {:?}", found.body(), found.bodies());
         for start in found.starts() {
             println!("    start {start:?}");
+        }
+        if let Some(highlight) = &self.highlight {
+            let maps = TurnMaps::new(&turn.curves, &found);
+            self.tell_highlights(highlight, &maps.highlight);
         }
         let confidence = found.confidence(&turn.curves);
         for level in LEVELS {
@@ -158,6 +172,26 @@ impl Truth {
         Ok(())
     }
 
+    /// Which pixels shine by more than a level, found and true.
+    fn tell_highlights(&self, truth: &[f32], found: &Planes<1>) {
+        for level in HIGHLIGHTS {
+            let (mut both, mut of_truth, mut of_found) = (0.0, 0.0, 0.0);
+            let pairs = truth.iter().zip(found.plane(0)).zip(&self.mask);
+            for ((truth, found), _) in pairs.filter(|(_, mask)| **mask) {
+                let (is, seems) = (*truth >= level, *found >= level);
+                both += f64::from(u8::from(is && seems));
+                of_truth += f64::from(u8::from(is));
+                of_found += f64::from(u8::from(seems));
+            }
+            println!(
+                "    highlight >= {level}: {of_truth} of {} pixels, precision {:.2}, recall {:.2}",
+                self.mask.iter().filter(|&&mask| mask).count(),
+                both / f64::max(of_found, 1.0),
+                both / f64::max(of_truth, 1.0)
+            );
+        }
+    }
+
     fn angles(&self, name: &str, normals: &Normals<YUp>) -> Result<(), Box<dyn Error>> {
         let whole = normals.completed(&self.mask);
         let truth = self.surface.normals().planes().planes();
@@ -168,6 +202,27 @@ impl Truth {
         );
         Ok(())
     }
+}
+
+/// The most of the highlights of a simulated turn's frames, the mean of the channels; none where there are none.
+fn highlight(folder: &Path) -> Result<Option<Vec<f32>>, Box<dyn Error>> {
+    let Ok(lines) = fs::read_to_string(folder.join("frames.jsonl")) else {
+        return Ok(None);
+    };
+    let mut most: Vec<f32> = Vec::new();
+    for line in lines.lines() {
+        let frame: Value = serde_json::from_str(line)?;
+        let index = frame["index"].as_u64().ok_or("no index")?;
+        let white = frame["white"]["highlight"].as_f64().ok_or("no white")? as f32;
+        let path = folder.join(format!("highlight/{index:04}.png"));
+        let image = Rgb::<Linear>::read(&path, Transfer::Linear)?.into_planes();
+        let [r, g, b] = image.planes();
+        most.resize(r.len(), 0.0);
+        for (at, most) in most.iter_mut().enumerate() {
+            *most = most.max((r[at] + g[at] + b[at]) / 3.0 * white);
+        }
+    }
+    Ok(Some(most))
 }
 
 /// Where the frames lie in the video, by the first record.

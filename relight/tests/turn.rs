@@ -20,8 +20,8 @@ use relight::synth::{
     Folders, FrameTruth, Library, LightKind, Recipe, TurnDescription, TurnRecipe, write_turns,
 };
 use relight::turn::{
-    Elevation, NormalsSource, TableFrame, TableSense, TurnError, TurnOptions, fit_turn_light,
-    prior_normals, read_curves, solve_turn,
+    BodyKind, Elevation, NormalsSource, TableFrame, TableSense, TurnError, TurnOptions,
+    fit_turn_light, prior_normals, read_curves, solve_turn,
 };
 
 /// The light of this seed is positive on every normal: of others the shading is cut off at 0, which no light of order 2 does.
@@ -109,7 +109,7 @@ fn a_turn_in_light_of_order_two_gives_normals_albedo_and_light_back() {
     let relative = (pair.mse(ScaleFit::None) / own.mse(ScaleFit::None)).sqrt();
     assert!(relative < 0.01, "{relative}");
     let frame = TableFrame::new(Elevation::given(degrees).unwrap());
-    let solved = fit_turn_light(&read.curves, &surface, &frame).unwrap();
+    let solved = fit_turn_light(&read.curves, &surface, BodyKind::Diffuse, &frame).unwrap();
     let size = |light: &[[f64; 3]]| light.iter().flatten().map(|v| v * v).sum::<f64>().sqrt();
     let difference: Vec<[f64; 3]> = solved
         .coefficients()

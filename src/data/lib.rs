@@ -166,3 +166,4 @@ pub mod naming;
 pub mod report;
 pub mod session;
 pub mod shard;
+pub mod turn_light;

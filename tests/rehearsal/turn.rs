@@ -1,9 +1,12 @@
 //! Takes that come out well.
 
+use std::path::{Path, PathBuf};
+
 use relit::extract::{ExtractOptions, extract};
 use relit_data::session::Status;
 use relit_data::shard::ImageSize;
 use relit_rig::state::Verdict;
+use relit_video::{Muxer, PixelFormat, StreamFormat, Video};
 
 use crate::support::{Rehearsal, SHORT, TURN, fixture};
 
@@ -74,4 +77,47 @@ fn a_camera_without_a_table_is_recorded_as_long_as_a_turn_takes() {
             .iter()
             .all(|entry| entry.angle_deg.is_none())
     );
+}
+
+/// A video of a room that is the same all around: one frame of a session again and again.
+fn even_room(folder: &Path) -> PathBuf {
+    let video = Video::open(&fixture(SHORT).join("video.mkv")).unwrap();
+    let first = video.packets().unwrap().next().unwrap();
+    let (width, height) = video.coded_size();
+    let stream = StreamFormat {
+        format: PixelFormat::Mjpeg,
+        width,
+        height,
+        fps: 30.0,
+    };
+    let path = folder.join("even.mkv");
+    let mut muxer = Muxer::create(&path, stream).unwrap();
+    for n in 0..30 {
+        muxer.write(&first.data, 33_333 * n).unwrap();
+    }
+    muxer.finish().unwrap();
+    path
+}
+
+/// What a take says of the room: whether it is good, and a sentence.
+fn room_check(rig: &mut Rehearsal) -> (bool, String) {
+    let take = rig.capture(false).unwrap();
+    assert_eq!(take.verdict, Verdict::Clean, "{take:?}");
+    let checks = rig.monitor.state().checks;
+    let check = checks.into_iter().find(|check| check.what == "light");
+    check.map(|check| (check.good, check.found)).unwrap()
+}
+
+#[test]
+fn a_take_says_whether_the_room_is_too_even() {
+    let (good, found) = room_check(&mut Rehearsal::short("", |_| {}));
+    assert!(good, "{found}");
+    let folder = tempfile::tempdir().unwrap();
+    let path = even_room(folder.path());
+    let mut rig = Rehearsal::with(path.to_str().unwrap(), "", "sim:?speed=0", |settings| {
+        settings.degrees_per_second = 36.0;
+    });
+    let (good, found) = room_check(&mut rig);
+    assert!(!good);
+    assert!(found.contains("turn on one lamp"), "{found}");
 }

@@ -79,6 +79,11 @@ pub enum TurnError {
     /// The object cannot be made a file.
     #[error("the object cannot be written as a file that can be lit")]
     Asset(#[source] Box<AssetError>),
+    /// Metal has no matt part that a network could learn from.
+    #[error(
+        "the object is taken for metal, which has no albedo and shading apart: there are no labels of it"
+    )]
+    NoMattPart,
     /// Light cannot be used.
     #[error(transparent)]
     Light(#[from] LightError),

@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::light::TERMS;
 use super::maps::AngleFigure;
 use super::{
-    Conditioning, Elevation, ExposureStep, ReadTurn, RoomStrip, StartFigure, StripFigures,
-    TableLight, TurnCurves, TurnError, TurnMaps, TurnSolution,
+    BodyFigure, BodyKind, Conditioning, Elevation, ExposureStep, ReadTurn, RoomStrip, StartFigure,
+    StripFigures, TableLight, TurnCurves, TurnError, TurnMaps, TurnSolution,
 };
 use crate::decompose::{bright, write_light};
 use crate::image::{ColourSpace, Depth, Extent, Linear, Planes, Rgb, Srgb, write_png};
@@ -48,8 +48,10 @@ const COLUMNS: usize = 4;
 /// Frames of the video, and frames a second.
 const MOVIE_FRAMES: u32 = 90;
 const MOVIE_RATE: u32 = 30;
-/// Order of the lamp that goes around the object in the video, and how high it stands, radians.
-const LAMP_ORDER: usize = 6;
+/// Order of the lamp that goes around the object in the video, how wide it is, radians: a smaller one would have rings in this
+/// order, and how high it stands, radians.
+const LAMP_ORDER: usize = 8;
+const LAMP_SPREAD: f64 = 0.3;
 const LAMP_HEIGHT: f64 = 0.6;
 
 /// A solved turn with all that is written of it.
@@ -90,6 +92,9 @@ pub struct TurnFigures {
     advice: Option<&'static str>,
     normals: Option<String>,
     light: FigureLight,
+    /// What the object is taken for, and what each kind that was tried leaves.
+    body: BodyKind,
+    bodies: Vec<BodyFigure>,
     /// What is left of a curve, over the energy of its variation, the median.
     residual: f64,
     /// The angle that normals are expected to be off, degrees, the median.
@@ -179,12 +184,13 @@ impl TurnFiles<'_> {
         let curves = &self.turn.curves;
         let path = |name: &str| folder.join(name);
         let surface = solution.surface(curves)?;
+        let albedo = solution.albedo(curves);
         let shading = solution.shading(curves);
         surface
             .normals()
             .write_png(&path("normal.png"), Depth::Sixteen)?;
         let white = FigureWhites {
-            albedo: write_light(&path("albedo.png"), surface.albedo())?,
+            albedo: write_light(&path("albedo.png"), &albedo)?,
             shading: write_light(&path("shading.png"), &shading)?,
             highlight: write_light(&path("highlight.png"), &grey(&maps.highlight))?,
         };
@@ -209,7 +215,8 @@ impl TurnFiles<'_> {
             strip.write_png(&path("room.png"))?;
         }
         if self.has_movie {
-            write_movie(&path("relit.mp4"), &surface)?;
+            let white = bright(albedo.planes(), &self.turn.mask);
+            write_movie(&path("relit.mp4"), &surface, white)?;
         }
         let figures = self.figures(white)?;
         write_json(&path(FIGURES), &figures)?;
@@ -255,6 +262,8 @@ impl TurnFiles<'_> {
                 source: self.light_source.map(str::to_owned),
                 starts: solution.starts().to_vec(),
             },
+            body: solution.body(),
+            bodies: solution.bodies().to_vec(),
             residual: solution.residual(),
             expected_error_deg: solution.expected_error_deg(),
             gloss,
@@ -305,7 +314,7 @@ impl TurnFiles<'_> {
         let tiles = [
             picture.unwrap_or_else(|| Planes::zeros(tile(curves))),
             plain(&surface.normals().to_colours()),
-            lit(surface.albedo().planes()),
+            lit(solution.albedo(curves).planes()),
             lit(shading.planes()),
             lit(grey(&maps.highlight).planes()),
             plain(grey(&maps.shadow).planes()),
@@ -337,13 +346,13 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), TurnError> {
     write_whole(path, &json).map_err(TurnError::write(path))
 }
 
-/// The object while a lamp goes around it once.
-fn write_movie(path: &Path, surface: &Surface) -> Result<(), TurnError> {
+/// The object while a lamp goes around it once; `white`: the albedo that is shown as white.
+fn write_movie(path: &Path, surface: &Surface, white: f32) -> Result<(), TurnError> {
     let lamp = lamp();
     let look = Look {
         diffuse: DiffuseForm::Irradiance,
         specular: SpecularForm::Lobe,
-        exposure: exposure_for(&lamp) / bright(surface.albedo().planes(), &mask_of(surface)),
+        exposure: exposure_for(&lamp) / white,
     };
     let extent = surface.extent();
     let mut movie = MovieWriter::create(path, MovieFormat::Mp4, extent, MOVIE_RATE)?;
@@ -354,23 +363,18 @@ fn write_movie(path: &Path, surface: &Surface) -> Result<(), TurnError> {
     Ok(movie.finish()?)
 }
 
-/// Where there is a surface.
-fn mask_of(surface: &Surface) -> Planes<1> {
-    let normals = surface.normals().planes();
-    Planes::from_fn(surface.extent(), |x, y| {
-        [f32::from(u8::from(normals.pixel(x, y) != [0.0; 3]))]
-    })
-}
-
 /// A lamp high before the object, and weak light from everywhere.
 fn lamp() -> ShLight {
     let order = Order::new(LAMP_ORDER).unwrap_or(Order::TWO);
     let from = Direction::from_angles(LAMP_HEIGHT, FRAC_PI_2);
     let mut light = ShLight::even(order, [0.15; 3]);
     let values = basis(order, from);
-    for (coefficient, value) in light.coefficients_mut().iter_mut().zip(values) {
+    let pairs = light.coefficients_mut().iter_mut().zip(values);
+    for (at, (coefficient, value)) in pairs.enumerate() {
+        let l = at.isqrt() as f64;
+        let blur = (-0.5 * l * (l + 1.0) * LAMP_SPREAD * LAMP_SPREAD).exp();
         for channel in coefficient {
-            *channel += TAU * value;
+            *channel += TAU * blur * value;
         }
     }
     light

@@ -5,8 +5,7 @@ use std::path::Path;
 
 use relit_data::session::Recording;
 
-use super::{ProbeBuilder, ProbePlace, ReadTurn, RoomStrip, StripBuilder, TableFrame, TurnError};
-use crate::light::ShLight;
+use super::{Probe, ProbeBuilder, ProbeLight, ReadTurn, RoomStrip, StripBuilder, TurnError};
 use crate::movie::MovieReader;
 
 /// What was seen beside the object.
@@ -24,7 +23,7 @@ pub struct Filmed {
 pub fn film(
     path: &Path,
     turn: &ReadTurn,
-    probe: Option<ProbePlace>,
+    probe: Option<Probe>,
     progress: &dyn Fn(u64, u64),
 ) -> Result<Filmed, TurnError> {
     let recording = Recording::open(path)?;
@@ -63,15 +62,11 @@ impl Filmed {
         self.strip.as_ref()
     }
 
-    /// The light by the ball, where there is one: in the viewer's frame at the table's angle 0, in units in which the ball's
-    /// albedo is 1.
+    /// The light by the ball, where there is one.
     ///
     /// # Errors
     /// Where the ball's frames tell too little.
-    pub fn light(&mut self, frame: &TableFrame) -> Result<Option<ShLight>, TurnError> {
-        let probe = self.probe.take();
-        probe
-            .map(|probe| probe.finish(frame).map(|(light, _)| light))
-            .transpose()
+    pub fn light(&mut self) -> Result<Option<ProbeLight>, TurnError> {
+        self.probe.take().map(ProbeBuilder::finish).transpose()
     }
 }

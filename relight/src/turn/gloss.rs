@@ -9,6 +9,9 @@ use crate::light::{LightError, ShLight};
 pub(super) const GLOSS_ORDER: usize = 6;
 /// Terms of a channel's gloss.
 pub(super) const GLOSS_TERMS: usize = (GLOSS_ORDER + 1) * (GLOSS_ORDER + 1);
+/// What white metal shows of a light, over the sum of its terms times the light's coefficients: as bright as a matt white surface in
+/// even light, π times it, and the terms are √(4π) times the harmonics.
+pub(super) const MIRROR: f64 = 0.886_226_925_452_758;
 /// The part of the light that a dielectric reflects head-on; at a glancing angle it is all.
 const HEAD_ON: f64 = 0.04;
 
@@ -74,6 +77,15 @@ impl GlossLight {
         self
     }
 
+    /// The first so many bands.
+    pub(super) fn within(mut self, bands: usize) -> Self {
+        let count = (bands * bands).min(GLOSS_TERMS);
+        for terms in &mut self.terms {
+            terms[count..].fill(0.0);
+        }
+        self
+    }
+
     /// The same with one term changed by so much.
     pub(super) fn moved(mut self, channel: usize, term: usize, by: f64) -> Self {
         self.terms[channel][term] += by;
@@ -91,6 +103,14 @@ impl GlossLight {
             }
         }
         sum
+    }
+
+    /// The same with each channel times a factor.
+    pub(super) fn times(mut self, factors: [f64; 3]) -> Self {
+        for (terms, factor) in self.terms.iter_mut().zip(factors) {
+            terms.iter_mut().for_each(|term| *term *= factor);
+        }
+        self
     }
 
     /// The factor by which it is nearest to another.
@@ -149,8 +169,16 @@ fn reflectance(facing: f64) -> f64 {
 }
 
 /// What each term of the gloss contributes to the waves of a pixel.
-pub(super) fn gloss_terms(facing: f64, [x, y, z]: [f64; 3]) -> [WaveTerm; GLOSS_TERMS] {
-    let part = reflectance(facing);
+pub(super) fn gloss_terms(facing: f64, reflected: [f64; 3]) -> [WaveTerm; GLOSS_TERMS] {
+    terms_of(reflectance(facing), reflected)
+}
+
+/// The same where all light is reflected.
+pub(super) fn mirror_terms(reflected: [f64; 3]) -> [WaveTerm; GLOSS_TERMS] {
+    terms_of(1.0, reflected)
+}
+
+fn terms_of(part: f64, [x, y, z]: [f64; 3]) -> [WaveTerm; GLOSS_TERMS] {
     let legendre = derivatives(z);
     let mut terms = [WaveTerm {
         wave: 0,

@@ -6,7 +6,8 @@
 
 use rayon::prelude::*;
 
-use super::gloss::{GLOSS_TERMS, GlossLight, gloss_terms};
+use super::body::BodyKind;
+use super::gloss::{GLOSS_TERMS, GlossLight, gloss_terms, mirror_terms};
 use super::light::{MATT_BANDS, MATT_IN_GLOSS, TERMS, WAVES, WaveTerm, wave_terms};
 use super::moments::Moments;
 use super::room::{KnownLight, Shares, band, shares};
@@ -20,8 +21,12 @@ const DAMPING: f64 = 1e-3;
 const MOST_DAMPING: f64 = 1e3;
 /// The steps end where one improves the cost by less than this part of it.
 const SETTLED: f64 = 2e-3;
-/// The most that gloss shows of a band, over what a smooth dielectric shows of it.
-const MOST_SHARE: f64 = 1.5;
+/// The most that gloss shows of a band, over what a smooth dielectric shows of it: light by a dark grey ball is in small units.
+const MOST_SHARE: f64 = 20.0;
+/// The most that metal shows of a band, over the first.
+const MOST_METAL_SHARE: f64 = 1.2;
+/// The least share of the first band by which those of metal are divided.
+const LEAST_FIRST_SHARE: f64 = 0.05;
 /// Pixels added up by one task.
 const CHUNK: usize = 128;
 /// How much a pixel counts falls to a quarter where it leaves this many times the median of what pixels leave.
@@ -39,6 +44,10 @@ pub(super) enum Unknowns<'a> {
         /// Those from the fourth on are free, the others are shares of the light.
         bands: usize,
     },
+    /// How much metal shows of the bands of a light that is known.
+    Mirror(&'a KnownLight),
+    /// What metal shows of an unknown light: all terms are free.
+    Reflection,
 }
 
 /// Pixels whose room is to be found.
@@ -114,7 +123,7 @@ impl Joint<'_> {
             guess,
             bands: self.unknowns.bands(guess)?,
             layout: self.unknowns.layout(),
-            frame: &room.frame,
+            room,
         };
         let search = Search::new(room);
         let sums = (0..fits.len().div_ceil(CHUNK))
@@ -157,31 +166,39 @@ struct Guess {
 impl Guess {
     fn of(room: &Room, unknowns: Unknowns<'_>) -> Self {
         let shares = match unknowns {
-            Unknowns::Gloss(known) => {
+            Unknowns::Gloss(known) | Unknowns::Mirror(known) => {
                 let share = |band| room.gloss.share_of(band);
-                known.bands().iter().map(share).collect()
+                unknowns.known_bands(known).iter().map(share).collect()
             }
             Unknowns::Light { bands } => shares(room)[..bands.min(MATT_BANDS)].to_vec(),
+            Unknowns::Reflection => Vec::new(),
         };
+        let layout = unknowns.layout();
         Self {
             light: room.light,
             shares,
-            higher: room.gloss.beyond(MATT_BANDS),
+            higher: room.gloss.beyond(layout.first.isqrt()),
         }
     }
 
     fn room(&self, frame: &TableFrame, unknowns: Unknowns<'_>) -> Room {
         let mut parts = unknowns.bands(self).unwrap_or_default();
         let mut factors = self.shares.clone();
-        if let Unknowns::Light { .. } = unknowns {
+        if unknowns.layout().higher > 0 {
             parts.truncate(factors.len());
             parts.push(self.higher);
             factors.push(1.0);
         }
+        let gloss = GlossLight::sum(&parts, &factors);
+        let light = match unknowns {
+            Unknowns::Reflection => TableLight::of_mirror(&gloss).unwrap_or(self.light),
+            _ => self.light,
+        };
         Room {
             frame: *frame,
-            light: self.light,
-            gloss: GlossLight::sum(&parts, &factors),
+            light,
+            gloss,
+            body: unknowns.body(),
         }
     }
 
@@ -197,15 +214,24 @@ impl Guess {
                 .zip(light)
                 .for_each(|(term, by)| *term += by);
             for (at, by) in rest.iter().enumerate() {
-                higher = higher.moved(channel, TERMS + at, *by);
+                higher = higher.moved(channel, layout.first + at, *by);
             }
         }
         let by = &step[layout.of_channel(3)..];
         let shares = self.shares.iter().zip(by);
-        let shares = shares.map(|(share, by)| (share + by).clamp(0.0, MOST_SHARE));
+        let mut shares: Vec<f64> = shares
+            .map(|(share, by)| (share + by).clamp(0.0, MOST_SHARE))
+            .collect();
+        if let (Unknowns::Mirror(_), Some(&first)) = (unknowns, shares.first()) {
+            // Of an even light metal shows its albedo's part, whatever its lobe is.
+            let first = first.max(LEAST_FIRST_SHARE);
+            for share in &mut shares {
+                *share = (*share / first).min(MOST_METAL_SHARE);
+            }
+        }
         Self {
             light: TableLight::new(terms),
-            shares: shares.collect(),
+            shares,
             higher,
         }
     }
@@ -217,25 +243,50 @@ impl Guess {
 }
 
 impl Unknowns<'_> {
-    /// What gloss shows of each band of the light that it has shares of.
+    /// What the object is taken for.
+    const fn body(&self) -> BodyKind {
+        match self {
+            Self::Gloss(_) | Self::Light { .. } => BodyKind::Diffuse,
+            Self::Mirror(_) | Self::Reflection => BodyKind::Metal,
+        }
+    }
+
+    /// What the object would show of each band of a light if it blurred nothing.
+    fn known_bands<'a>(&self, known: &'a KnownLight) -> &'a [GlossLight] {
+        match self.body() {
+            BodyKind::Diffuse => known.bands(),
+            BodyKind::Metal => known.mirror(),
+        }
+    }
+
+    /// The same of each band of the light that the object has shares of.
     fn bands(&self, guess: &Guess) -> Option<Vec<GlossLight>> {
         match self {
-            Self::Gloss(known) => Some(known.bands().to_vec()),
+            Self::Gloss(known) | Self::Mirror(known) => Some(self.known_bands(known).to_vec()),
             Self::Light { .. } => Some(GlossLight::bands(&guess.light.coefficients().ok()?)),
+            Self::Reflection => Some(Vec::new()),
         }
     }
 
     fn layout(&self) -> Layout {
         match *self {
-            Self::Gloss(known) => Layout {
+            Self::Gloss(known) | Self::Mirror(known) => Layout {
                 light: 0,
+                first: TERMS,
                 higher: 0,
                 shares: known.bands().len(),
             },
             Self::Light { bands } => Layout {
                 light: TERMS,
+                first: TERMS,
                 higher: (bands * bands).clamp(TERMS, GLOSS_TERMS) - TERMS,
                 shares: bands.min(MATT_BANDS),
+            },
+            Self::Reflection => Layout {
+                light: 0,
+                first: 0,
+                higher: GLOSS_TERMS,
+                shares: 0,
             },
         }
     }
@@ -245,6 +296,8 @@ impl Unknowns<'_> {
 #[derive(Debug, Clone, Copy)]
 struct Layout {
     light: usize,
+    /// The first term of the gloss that is free, and how many are.
+    first: usize,
     higher: usize,
     shares: usize,
 }
@@ -264,14 +317,20 @@ struct Columns<'a> {
     guess: &'a Guess,
     bands: Vec<GlossLight>,
     layout: Layout,
-    frame: &'a TableFrame,
+    room: &'a Room,
 }
 
 impl Columns<'_> {
     /// The unknowns that act on a channel of a pixel, and its waves for each.
     fn of(&self, normal: [f64; 3], albedo: [f64; 3]) -> [Vec<(usize, [f64; WAVES])>; 3] {
-        let matt = wave_terms(self.frame.to_table(normal));
-        let gloss = gloss_terms(normal[2], self.frame.to_table(reflected(normal)));
+        let frame = &self.room.frame;
+        let matt = wave_terms(frame.to_table(normal));
+        let reflected = frame.to_table(reflected(normal));
+        // What gloss shows does not depend on the albedo, and what metal shows is times it.
+        let (gloss, colour) = match self.room.body {
+            BodyKind::Diffuse => (gloss_terms(normal[2], reflected), [1.0; 3]),
+            BodyKind::Metal => (mirror_terms(reflected), albedo),
+        };
         let matt_shares = self.guess.matt_shares();
         let bands: Vec<_> = self.bands[..self.layout.shares]
             .iter()
@@ -287,12 +346,17 @@ impl Columns<'_> {
                 add(&mut waves, &spread(&gloss[at], share));
                 columns.push((first + columns.len(), waves));
             }
-            for term in &gloss[TERMS..TERMS + self.layout.higher] {
-                columns.push((first + columns.len(), spread(term, 1.0)));
+            for term in &gloss[self.layout.first..][..self.layout.higher] {
+                columns.push((first + columns.len(), spread(term, colour[channel])));
             }
             let shares = self.layout.of_channel(3);
             let bands = bands.iter().enumerate();
-            columns.extend(bands.map(|(l, waves)| (shares + l, waves[channel])));
+            columns.extend(bands.map(|(l, waves)| {
+                (
+                    shares + l,
+                    waves[channel].map(|wave| colour[channel] * wave),
+                )
+            }));
             columns
         })
     }
@@ -352,10 +416,10 @@ impl Sums {
         let mut couplings = vec![[0.0; 2]; self.count];
         let all = columns.of(normal, leaning.albedo);
         for (channel, mut columns) in all.into_iter().enumerate() {
-            let (matt, ways) = (&leaning.matt[channel], &leaning.ways[channel]);
+            let (body, ways) = (&leaning.body[channel], &leaning.ways[channel]);
             slope.add(moments, channel, ways, &leaning.seen[channel]);
-            let along = moments.times(channel, matt);
-            let own = dot(matt, &along);
+            let along = moments.times(channel, body);
+            let own = dot(body, &along);
             let rest = moments.rest(channel, &leaning.seen[channel]);
             if own > 1e-12 && leaning.albedo[channel] > 0.0 {
                 // The albedo follows.
@@ -363,8 +427,8 @@ impl Sums {
                     let share = dot(waves, &along) / own;
                     waves
                         .iter_mut()
-                        .zip(matt)
-                        .for_each(|(w, m)| *w -= share * m);
+                        .zip(body)
+                        .for_each(|(wave, body)| *wave -= share * body);
                 }
             }
             for (k, (at, waves)) in columns.iter().enumerate() {

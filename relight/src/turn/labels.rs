@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::light::basis_at;
 use super::robust::lit;
-use super::{ReadTurn, TurnError, TurnSolution};
+use super::{BodyKind, ReadTurn, TurnError, TurnSolution};
 use crate::image::{Depth, Linear, Planes, Rgb, Srgb, write_png};
 use crate::light::Normals;
 use crate::whole::ResultFolder;
@@ -68,8 +68,11 @@ impl TurnLabels<'_> {
     /// labels in it are replaced. Returns how many samples there are.
     ///
     /// # Errors
-    /// Where the folder holds something else or a file cannot be written: then the folder is as it was.
+    /// Where the object is metal, the folder holds something else or a file cannot be written: then the folder is as it was.
     pub fn write(&self, out: &Path) -> Result<usize, TurnError> {
+        if self.solution.body() == BodyKind::Metal {
+            return Err(TurnError::NoMattPart);
+        }
         RESULTS.write(out, |folder| self.write_samples(folder))
     }
 

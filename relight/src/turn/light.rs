@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::light::{LightError, Order, ShLight};
 
 use super::TableFrame;
-use super::gloss::GLOSS_ORDER;
+use super::gloss::{GLOSS_ORDER, GlossLight, MIRROR};
 
 /// Terms of a channel's light.
 pub(super) const TERMS: usize = 9;
@@ -104,6 +104,21 @@ impl TableLight {
         Ok(self.coefficients()?.rotated(&frame.rotation().inverse()))
     }
 
+    /// The light of which a mirror shows this.
+    ///
+    /// # Errors
+    /// Where a term is not finite.
+    pub(super) fn of_mirror(shown: &GlossLight) -> Result<Self, LightError> {
+        let light = shown.light()?;
+        let coefficients = light.coefficients();
+        let factor = |channel: usize| {
+            OF_COEFFICIENTS.map(|(at, factor)| factor * coefficients[at][channel] / MIRROR)
+        };
+        Ok(Self {
+            terms: [0, 1, 2].map(factor),
+        })
+    }
+
     /// From where more light comes, by the first harmonic of a level normal's curve: the azimuth in the table's frame at angle
     /// 0, from x towards y, degrees.
     #[must_use]
@@ -127,8 +142,9 @@ impl TableLight {
         self
     }
 
-    /// The irradiance on a normal in the table's frame, as factors of 1, cos t, -sin t, cos 2t, -sin 2t.
-    pub(super) fn waves(&self, normal: [f64; 3]) -> [[f64; MATT_WAVES]; 3] {
+    /// The irradiance on a normal in the table's frame, as factors of 1, cos t, -sin t, cos 2t, -sin 2t, and
+    /// 0 for the other harmonics.
+    pub(super) fn waves(&self, normal: [f64; 3]) -> [[f64; WAVES]; 3] {
         let [x, y, z] = normal;
         let (x2, y2) = (x * x - y * y, 2.0 * x * y);
         let square = 3.0 * z * z - 1.0;
@@ -136,13 +152,15 @@ impl TableLight {
             .each_ref()
             .map(|[e, f, g, ar, ai, br, bi, dr, di]| {
                 let (re, im) = (ar + br * z, ai + bi * z);
-                [
+                let mut waves = [0.0; WAVES];
+                waves[..MATT_WAVES].copy_from_slice(&[
                     e + f * z + g * square,
                     re * x - im * y,
                     re * y + im * x,
                     dr * x2 - di * y2,
                     dr * y2 + di * x2,
-                ]
+                ]);
+                waves
             })
     }
 }

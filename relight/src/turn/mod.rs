@@ -22,6 +22,8 @@
 //! | `shine` | the gloss of the whole object; the object as a file |
 //! | `files`, `labels` | what is written |
 
+mod begin;
+mod body;
 mod curves;
 mod error;
 mod exposure;
@@ -49,6 +51,7 @@ mod verdict;
 #[cfg(test)]
 mod tests;
 
+pub use body::{BodyFigure, BodyKind};
 pub use curves::{CurveBuilder, TurnCurves};
 pub use error::TurnError;
 pub use exposure::ExposureStep;
@@ -59,7 +62,7 @@ pub use labels::TurnLabels;
 pub use light::TableLight;
 pub use maps::TurnMaps;
 pub use prior::{NormalsSource, prior_normals};
-pub use probe::{ProbeBuilder, ProbePlace};
+pub use probe::{Probe, ProbeBall, ProbeBuilder, ProbeLight, ProbePlace};
 pub use read::{ReadTurn, TableSense, read_curves};
 pub use room::fit_turn_light;
 pub use solve::{StartFigure, TurnOptions, TurnSolution, solve_turn};

@@ -1,12 +1,10 @@
 //! What a curve comes down to for a least-squares fit of its waves.
 
 use super::TurnCurves;
-use super::light::{MATT_WAVES, WAVES, WaveTerm};
+use super::light::{WAVES, WaveTerm};
 
 /// Products of two waves.
 pub(super) const PAIRS: usize = WAVES * (WAVES + 1) / 2;
-/// Products of two waves of a matt pixel, the first of them.
-pub(super) const MATT_PAIRS: usize = MATT_WAVES * (MATT_WAVES + 1) / 2;
 /// How much the mean of a curve counts beside how it varies: shade in hollows and bounced light change the
 /// mean more than they change the harmonics.
 const MEAN_SHARE: f64 = 0.1;
@@ -24,18 +22,22 @@ pub(super) struct Moments {
     unit: f64,
 }
 
-/// The waves of a surface of albedo 1, and those that its gloss adds, for each channel.
+/// The waves of a body of albedo 1, and those that gloss adds whatever the albedo is, for each channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PixelWaves {
-    pub(super) matt: [[f64; MATT_WAVES]; 3],
+    pub(super) body: [[f64; WAVES]; 3],
+    /// How many waves of the body there are: the others are 0.
+    pub(super) count: usize,
     pub(super) gloss: [[f64; WAVES]; 3],
 }
 
 /// Products of [`PixelWaves`] with themselves and each other, as [`Moments`] take them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WaveProducts {
-    matt: [[f64; MATT_PAIRS]; 3],
-    /// Of both, and of the gloss with itself; none for a matt surface.
+    body: [[f64; PAIRS]; 3],
+    /// How many products of the body there are.
+    count: usize,
+    /// Of both, and of the gloss with itself; none without gloss.
     gloss: Option<[[[f64; PAIRS]; 2]; 3]>,
 }
 
@@ -48,19 +50,18 @@ const fn pair(i: usize, j: usize) -> usize {
 impl WaveProducts {
     pub(super) fn of(waves: &PixelWaves) -> Self {
         let mut products = Self {
-            matt: [[0.0; MATT_PAIRS]; 3],
+            body: [[0.0; PAIRS]; 3],
+            count: waves.count * (waves.count + 1) / 2,
             gloss: None,
         };
-        for (products, waves) in products.matt.iter_mut().zip(&waves.matt) {
-            symmetric(products, waves, waves);
+        for (products, own) in products.body.iter_mut().zip(&waves.body) {
+            symmetric(products, &own[..waves.count], &own[..waves.count]);
         }
         if waves.gloss != [[0.0; WAVES]; 3] {
             products.gloss = Some([0, 1, 2].map(|channel| {
                 let gloss = &waves.gloss[channel];
-                let mut matt = [0.0; WAVES];
-                matt[..MATT_WAVES].copy_from_slice(&waves.matt[channel]);
                 let mut both = [[0.0; PAIRS]; 2];
-                symmetric(&mut both[0], &matt, gloss);
+                symmetric(&mut both[0], &waves.body[channel], gloss);
                 symmetric(&mut both[1], gloss, gloss);
                 both
             }));
@@ -82,8 +83,8 @@ fn symmetric(products: &mut [f64], a: &[f64], b: &[f64]) {
     }
 }
 
-/// What a channel's curve has to do with a pixel's waves: products of the matt waves with what the gloss leaves of the curve,
-/// of the matt waves with themselves, and the energy that the gloss leaves.
+/// What a channel's curve has to do with a pixel's waves: products of the body's waves with what the gloss leaves of the curve,
+/// of the body's waves with themselves, and the energy that the gloss leaves.
 #[derive(Debug, Clone, Copy)]
 struct Share {
     along: f64,
@@ -92,6 +93,15 @@ struct Share {
 }
 
 impl Share {
+    /// The albedo that is drawn to another one, by this much beside what the curve says.
+    fn drawn(self, to: f64, by: f64) -> f64 {
+        if self.own + by > 1e-12 {
+            ((self.along + by * to) / (self.own + by)).max(0.0)
+        } else {
+            0.0
+        }
+    }
+
     fn albedo(self) -> f64 {
         if self.own > 1e-12 {
             (self.along / self.own).max(0.0)
@@ -188,8 +198,8 @@ impl Moments {
     fn share(&self, channel: usize, waves: &PixelWaves, products: &WaveProducts) -> Share {
         let own = &self.products[channel];
         let mut share = Share {
-            along: dot(&self.right[channel], &waves.matt[channel]),
-            own: dot(own, &products.matt[channel]),
+            along: dot(&self.right[channel], &waves.body[channel][..waves.count]),
+            own: dot(own, &products.body[channel][..products.count]),
             rest: self.energy[channel],
         };
         if let Some(gloss) = &products.gloss {
@@ -212,6 +222,23 @@ impl Moments {
     pub(super) fn albedo(&self, waves: &PixelWaves) -> [f64; 3] {
         let products = WaveProducts::of(waves);
         [0, 1, 2].map(|channel| self.share(channel, waves, &products).albedo())
+    }
+
+    /// The albedo that explains the curve best, drawn to one from which albedos of an object are `spread` away: as far as what is
+    /// left of the curve, taken for noise of `freedom` degrees of freedom, lets it be any other.
+    pub(super) fn drawn_albedo(
+        &self,
+        waves: &PixelWaves,
+        (to, spread): ([f64; 3], [f64; 3]),
+        freedom: f64,
+    ) -> [f64; 3] {
+        let products = WaveProducts::of(waves);
+        [0, 1, 2].map(|channel| {
+            let share = self.share(channel, waves, &products);
+            let noise = share.left().max(0.0) / freedom;
+            let by = noise / spread[channel].powi(2).max(1e-12);
+            share.drawn(to[channel], by)
+        })
     }
 
     /// The products of each wave with a list of waves.

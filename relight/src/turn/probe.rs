@@ -1,14 +1,60 @@
-//! A grey ball on the table, which measures the light.
+//! A ball on the table, matt grey or chrome, which measures the light.
 
-use super::{CurveBuilder, TableFrame, TurnCurves, TurnError, fit_turn_light};
+use std::f64::consts::{FRAC_1_PI, PI, TAU};
+
+use super::search::reflected;
+use super::{
+    BodyKind, Conditioning, CurveBuilder, Elevation, TableFrame, TurnError, fit_turn_light,
+};
 use crate::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
-use crate::light::{Normals, ShLight};
+use crate::light::{Direction, Normals, Order, ShLight, YUp, basis};
 use crate::render::Surface;
 
 /// The side of the square to which the ball is brought, pixels.
 const SIDE: usize = 48;
 /// The part of the ball's radius that is looked at: its rim shows the background too, and reflects it.
 const PART: f32 = 0.92;
+/// A ball looks like chrome where more than this part of what varies over the turn lies beyond the second harmonic.
+const SHARP: f64 = 0.06;
+/// Rows and columns of the panorama that a chrome ball shows.
+const ROWS: usize = 32;
+const COLUMNS: usize = 2 * ROWS;
+/// The order of the light by a chrome ball: as much as gloss is fitted with.
+const CHROME_ORDER: usize = 6;
+
+/// What a ball is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ProbeBall {
+    /// Matt grey.
+    Grey,
+    /// It mirrors.
+    Chrome,
+}
+
+/// A ball that measures the light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Probe {
+    /// Where it is.
+    pub place: ProbePlace,
+    /// What it is made of; what it looks like where that is not known.
+    pub ball: Option<ProbeBall>,
+    /// The camera over the table.
+    pub elevation: Elevation,
+}
+
+/// The light that a ball measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProbeLight {
+    /// In the viewer's frame at the table's angle 0: of order 2 by a grey ball, in units in which the ball's albedo is 1; of order 6
+    /// by a chrome one, in units in which it reflects everything and a white matt surface has albedo 1.
+    pub light: ShLight,
+    /// How many frames it was measured in.
+    pub frames: u32,
+    /// What the ball was taken for.
+    pub ball: ProbeBall,
+    /// What it looks like.
+    pub looks: ProbeBall,
+}
 
 /// Where a ball is in the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,8 +68,10 @@ pub struct ProbePlace {
 /// Gathers what a ball shows over a turn.
 #[derive(Debug)]
 pub struct ProbeBuilder {
-    place: ProbePlace,
+    probe: Probe,
+    normals: Normals<YUp>,
     builder: CurveBuilder,
+    mirrored: Mirrored,
 }
 
 impl ProbePlace {
@@ -58,7 +106,7 @@ impl ProbeBuilder {
     ///
     /// # Errors
     /// None for a ball.
-    pub fn new(place: ProbePlace) -> Result<Self, TurnError> {
+    pub fn new(probe: Probe) -> Result<Self, TurnError> {
         let extent = Extent::new(SIDE, SIDE);
         let mask = Planes::from_fn(extent, |x, y| {
             let from_middle = |at: usize| 2.0 * (at as f32 + 0.5) / SIDE as f32 - 1.0;
@@ -66,8 +114,10 @@ impl ProbeBuilder {
             [f32::from(u8::from(inside))]
         });
         Ok(Self {
-            place,
+            probe,
+            normals: Normals::sphere(SIDE).masked(&mask)?,
             builder: CurveBuilder::new(extent, mask.plane(0))?,
+            mirrored: Mirrored::new(TableFrame::new(probe.elevation)),
         })
     }
 
@@ -77,30 +127,127 @@ impl ProbeBuilder {
     /// [`TurnError::Setting`] where the ball is not in it.
     pub fn push(&mut self, angle_deg: f64, frame: &Rgb<Srgb>) -> Result<(), TurnError> {
         let planes = frame.planes();
-        if !self.place.is_within(planes.extent()) {
+        let place = self.probe.place;
+        if !place.is_within(planes.extent()) {
             return Err(TurnError::Setting {
                 what: "the radius of the ball",
-                value: self.place.radius,
+                value: place.radius,
                 allowed: "so small that all of the ball is in the picture",
             });
         }
-        let ball = Planes::from_fn(Extent::new(SIDE, SIDE), |x, y| {
-            self.place.light(planes, x, y)
-        });
+        let ball = Planes::from_fn(Extent::new(SIDE, SIDE), |x, y| place.light(planes, x, y));
+        self.mirrored.add(angle_deg, &self.normals, &ball);
         self.builder.push(angle_deg, ball.extent(), ball.planes())
     }
 
-    /// The light, in the viewer's frame at the table's angle 0, in units in which the ball's albedo is 1, and the ball's curves.
+    /// The light.
     ///
     /// # Errors
     /// Where the frames tell too little.
-    pub fn finish(self, frame: &TableFrame) -> Result<(ShLight, TurnCurves), TurnError> {
+    pub fn finish(self) -> Result<ProbeLight, TurnError> {
+        let frame = TableFrame::new(self.probe.elevation);
         let curves = self.builder.finish()?;
-        let normals = Normals::sphere(SIDE);
-        let albedo = Rgb::<Linear>::new(Planes::filled(normals.extent(), [1.0; 3]));
-        let light = fit_turn_light(&curves, &Surface::new(normals, albedo, None)?, frame)?;
-        Ok((light, curves))
+        let looks = if Conditioning::of(&curves).beyond > SHARP {
+            ProbeBall::Chrome
+        } else {
+            ProbeBall::Grey
+        };
+        let ball = self.probe.ball.unwrap_or(looks);
+        let light = match ball {
+            ProbeBall::Grey => {
+                let albedo = Rgb::<Linear>::new(Planes::filled(self.normals.extent(), [1.0; 3]));
+                let surface = Surface::new(self.normals, albedo, None)?;
+                fit_turn_light(&curves, &surface, BodyKind::Diffuse, &frame)?
+            }
+            ProbeBall::Chrome => {
+                let light = self.mirrored.light()?;
+                light.rotated(&frame.rotation().inverse())
+            }
+        };
+        Ok(ProbeLight {
+            light,
+            frames: curves.frames(),
+            ball,
+            looks,
+        })
     }
+}
+
+/// The panorama that a chrome ball shows of the room while it turns, in the table's frame at its angle 0.
+#[derive(Debug)]
+struct Mirrored {
+    frame: TableFrame,
+    sums: Vec<[f64; 3]>,
+    counts: Vec<f64>,
+}
+
+impl Mirrored {
+    fn new(frame: TableFrame) -> Self {
+        Self {
+            frame,
+            sums: vec![[0.0; 3]; ROWS * COLUMNS],
+            counts: vec![0.0; ROWS * COLUMNS],
+        }
+    }
+
+    /// Adds what the ball shows at an angle of the table, degrees.
+    fn add(&mut self, angle_deg: f64, normals: &Normals<YUp>, ball: &Planes<3>) {
+        if !angle_deg.is_finite() {
+            return;
+        }
+        let [x, y, z] = normals.planes().planes();
+        for at in 0..z.len() {
+            let normal = [x[at], y[at], z[at]].map(f64::from);
+            if normal[2] <= 0.0 {
+                continue;
+            }
+            let [x, y, z] = self.frame.to_table(reflected(normal));
+            let azimuth = y.atan2(x) + angle_deg.to_radians();
+            let column = (azimuth.rem_euclid(TAU) / TAU * COLUMNS as f64) as usize % COLUMNS;
+            let row = ((z.clamp(-1.0, 1.0).acos() / PI * ROWS as f64) as usize).min(ROWS - 1);
+            let cell = row * COLUMNS + column;
+            for (sum, plane) in self.sums[cell].iter_mut().zip(ball.planes()) {
+                *sum += f64::from(plane[at]);
+            }
+            self.counts[cell] += 1.0;
+        }
+    }
+
+    /// What it shows, as coefficients; directions that it never shows are as bright as their row, or as all.
+    fn light(&self) -> Result<ShLight, TurnError> {
+        let all = mean(&self.sums, &self.counts).ok_or(TurnError::NoLight)?;
+        let order = Order::new(CHROME_ORDER).unwrap_or(Order::TWO);
+        let mut light = ShLight::even(order, [0.0; 3]);
+        for row in 0..ROWS {
+            let cells = row * COLUMNS..(row + 1) * COLUMNS;
+            let of_row = mean(&self.sums[cells.clone()], &self.counts[cells]).unwrap_or(all);
+            let polar = PI * (row as f64 + 0.5) / ROWS as f64;
+            let edges = [row, row + 1].map(|edge| (PI * edge as f64 / ROWS as f64).cos());
+            let area = (edges[0] - edges[1]) * TAU / COLUMNS as f64;
+            for column in 0..COLUMNS {
+                let cell = row * COLUMNS + column;
+                let shown = mean(&self.sums[cell..=cell], &self.counts[cell..=cell]);
+                let azimuth = TAU * (column as f64 + 0.5) / COLUMNS as f64;
+                let (sin, cos) = azimuth.sin_cos();
+                let to = Direction::new(polar.sin() * cos, polar.sin() * sin, polar.cos());
+                let Some(to) = to else { continue };
+                let values = basis(order, to);
+                for (coefficient, value) in light.coefficients_mut().iter_mut().zip(values) {
+                    for (sum, shown) in coefficient.iter_mut().zip(shown.unwrap_or(of_row)) {
+                        *sum += FRAC_1_PI * area * value * shown;
+                    }
+                }
+            }
+        }
+        Ok(light)
+    }
+}
+
+/// The mean of all cells that were seen.
+fn mean(sums: &[[f64; 3]], counts: &[f64]) -> Option<[f64; 3]> {
+    let count: f64 = counts.iter().sum();
+    let sum = |channel: usize| sums.iter().map(|sum| sum[channel]).sum::<f64>();
+    (count > 0.0).then(|| [0, 1, 2].map(|channel| sum(channel) / count))
 }
 
 impl ProbePlace {
@@ -130,51 +277,135 @@ impl ProbePlace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::{Direction, Rotation};
+    use crate::light::Rotation;
     use crate::render::{DiffuseForm, DiffuseLayer};
-    use crate::turn::Elevation;
 
-    #[test]
-    fn a_ball_tells_the_light_in_units_of_its_albedo() {
-        let frame = TableFrame::new(Elevation::given(22.0).unwrap());
-        let values = [1.1, 0.3, 0.24, 0.36, 0.07, -0.06, 0.03, 0.12, 0.09];
+    const ELEVATION: f64 = 22.0;
+
+    fn probe(ball: Option<ProbeBall>) -> Probe {
+        Probe {
+            place: ProbePlace::new([61.0, 40.0], 30.0).unwrap(),
+            ball,
+            elevation: Elevation::given(ELEVATION).unwrap(),
+        }
+    }
+
+    /// A room with windows: beyond band 2 too.
+    fn room() -> ShLight {
+        let values = [2.0, 0.3, 0.24, 0.36, 0.07, -0.06, 0.03, 0.12, 0.09];
         let light = ShLight::new(values.map(|v| [v, 0.9 * v, 0.8 * v]).to_vec()).unwrap();
-        let place = ProbePlace::new([61.0, 40.0], 30.0).unwrap();
-        let mut probe = ProbeBuilder::new(place).unwrap();
+        let mut light = light.with_order(Order::new(4).unwrap());
+        for (at, values) in light.coefficients_mut().iter_mut().enumerate().skip(9) {
+            *values = [0.15 * (1.7 * at as f64).sin(); 3];
+        }
+        light
+    }
+
+    /// Films a ball that shows of a light what `shown` says, pixel by pixel.
+    fn measure(
+        ball: Option<ProbeBall>,
+        shown: impl Fn(&ShLight, &Normals<YUp>) -> Planes<3>,
+    ) -> ProbeLight {
+        let mut builder = ProbeBuilder::new(probe(ball)).unwrap();
         let normals = Normals::sphere(60);
+        let frame = TableFrame::new(Elevation::given(ELEVATION).unwrap());
         let [x, y, z] = frame.axis();
         let axis = Direction::new(x, y, z).unwrap();
         for k in 0..60 {
             let angle = 6.0 * f64::from(k);
-            let turned = light.rotated(&Rotation::about(axis, -angle.to_radians()));
-            let shading = DiffuseLayer::new(&turned, DiffuseForm::Irradiance).shading(&normals);
+            let turned = room().rotated(&Rotation::about(axis, -angle.to_radians()));
+            let light = shown(&turned, &normals);
             let picture = Planes::from_fn(Extent::new(120, 90), |x, y| {
                 let (at_x, at_y) = (x.wrapping_sub(31), y.wrapping_sub(10));
                 if at_x < 60 && at_y < 60 && normals.planes().pixel(at_x, at_y)[2] > 0.0 {
-                    let light = shading.planes().pixel(at_x, at_y);
-                    light.map(|v| Srgb::from_linear(0.2 * v))
+                    light.pixel(at_x, at_y).map(Srgb::from_linear)
                 } else {
                     [0.9; 3]
                 }
             });
-            probe.push(angle, &Rgb::new(picture)).unwrap();
+            builder.push(angle, &Rgb::new(picture)).unwrap();
         }
-        let (found, curves) = probe.finish(&frame).unwrap();
-        assert_eq!(curves.frames(), 60);
-        for (found, light) in found.coefficients().iter().zip(light.coefficients()) {
+        builder.finish().unwrap()
+    }
+
+    fn grey(light: &ShLight, normals: &Normals<YUp>) -> Planes<3> {
+        let shading = DiffuseLayer::new(light, DiffuseForm::Irradiance).shading(normals);
+        shading.into_planes().map(|v| 0.2 * v)
+    }
+
+    fn chrome(light: &ShLight, normals: &Normals<YUp>) -> Planes<3> {
+        Planes::from_fn(normals.extent(), |x, y| {
+            let normal = normals.planes().pixel(x, y).map(f64::from);
+            let [x, y, z] = reflected(normal);
+            let Some(to) = Direction::new(x, y, z) else {
+                return [0.0; 3];
+            };
+            let values = basis(light.order(), to);
+            [0, 1, 2].map(|c| {
+                let pairs = light.coefficients().iter().zip(&values);
+                let sum: f64 = pairs.map(|(light, value)| light[c] * value).sum();
+                (0.5 * sum) as f32
+            })
+        })
+    }
+
+    fn check(found: &ShLight, factor: f64, count: usize) {
+        let wanted = room();
+        assert!(found.coefficients().len() >= count);
+        for (found, light) in found
+            .coefficients()
+            .iter()
+            .zip(wanted.coefficients())
+            .take(count)
+        {
             for (found, light) in found.iter().zip(light) {
-                assert!((found - 0.2 * light).abs() < 0.2 * 0.03, "{found} {light}");
+                assert!(
+                    (found - factor * light).abs() < 0.03 * factor,
+                    "{found} {light}"
+                );
             }
         }
+    }
+
+    #[test]
+    fn a_grey_ball_tells_the_light_in_units_of_its_albedo() {
+        let found = measure(None, grey);
+        assert_eq!(
+            (found.frames, found.ball, found.looks),
+            (60, ProbeBall::Grey, ProbeBall::Grey)
+        );
+        check(&found.light, 0.2, 9);
+    }
+
+    #[test]
+    fn a_chrome_ball_tells_more_of_the_light_in_units_of_what_it_reflects() {
+        let found = measure(None, chrome);
+        assert_eq!(
+            (found.ball, found.looks),
+            (ProbeBall::Chrome, ProbeBall::Chrome)
+        );
+        check(&found.light, 0.5 * FRAC_1_PI, 25);
+    }
+
+    #[test]
+    fn a_ball_is_taken_for_what_is_said_of_it() {
+        let found = measure(Some(ProbeBall::Grey), chrome);
+        assert_eq!(
+            (found.ball, found.looks),
+            (ProbeBall::Grey, ProbeBall::Chrome)
+        );
     }
 
     #[test]
     fn a_ball_beyond_the_picture_is_refused() {
         assert!(ProbePlace::new([10.0, 10.0], f64::NAN).is_err());
         assert!(ProbePlace::new([10.0, 10.0], 2.0).is_err());
-        let place = ProbePlace::new([10.0, 10.0], 20.0).unwrap();
+        let beyond = Probe {
+            place: ProbePlace::new([10.0, 10.0], 20.0).unwrap(),
+            ..probe(None)
+        };
         let picture = Rgb::<Srgb>::new(Planes::zeros(Extent::new(100, 100)));
-        let refused = ProbeBuilder::new(place).unwrap().push(0.0, &picture);
+        let refused = ProbeBuilder::new(beyond).unwrap().push(0.0, &picture);
         assert!(matches!(refused, Err(TurnError::Setting { .. })));
     }
 }

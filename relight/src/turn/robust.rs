@@ -2,7 +2,7 @@
 //! a highlight.
 
 use super::TurnCurves;
-use super::light::{MATT_WAVES, WAVES};
+use super::light::WAVES;
 use super::moments::{Moments, PixelWaves};
 use super::search::{PixelFit, Room};
 
@@ -36,7 +36,7 @@ pub(super) fn trust(curves: &TurnCurves, pixel: usize, fit: &PixelFit, room: &Ro
 /// seen where that is more.
 pub(super) fn reference(curves: &TurnCurves, pixel: usize, fit: &PixelFit, room: &Room) -> f64 {
     let waves = room.waves(fit.normal);
-    let model: f64 = (0..3).map(|c| fit.albedo[c] * waves.matt[c][0]).sum();
+    let model: f64 = (0..3).map(|c| fit.albedo[c] * waves.body[c][0]).sum();
     let seen: f64 = Moments::mean(curves, pixel).iter().sum();
     (model.max(LEAST_MODEL * seen) / 3.0).max(1e-6)
 }
@@ -68,21 +68,17 @@ pub(super) fn rest(
 
 /// What a channel shows where the waves' basis has these values.
 fn model(waves: &PixelWaves, albedo: f64, channel: usize, basis: &[f64; WAVES]) -> f64 {
-    let matt: f64 = (0..MATT_WAVES)
-        .map(|i| waves.matt[channel][i] * basis[i])
-        .sum();
-    let gloss: f64 = (0..WAVES).map(|i| waves.gloss[channel][i] * basis[i]).sum();
-    albedo * matt + gloss
+    let all =
+        (0..WAVES).map(|i| (albedo * waves.body[channel][i] + waves.gloss[channel][i]) * basis[i]);
+    all.sum()
 }
 
-/// What the room's matt light and its gloss make of a pixel at an angle: its irradiance, and the gloss.
+/// What a pixel shows at an angle: its body at an albedo of 1, which of a matt one is its irradiance, and its gloss.
 pub(super) fn lit(room: &Room, normal: [f64; 3], basis: &[f64; WAVES]) -> [[f64; 3]; 2] {
     let waves = room.waves(normal);
     let dot = |waves: &[f64]| -> f64 { waves.iter().zip(basis).map(|(a, b)| a * b).sum() };
-    let (mut matt, mut gloss) = ([0.0; 3], [0.0; 3]);
-    for channel in 0..3 {
-        matt[channel] = dot(&waves.matt[channel]);
-        gloss[channel] = dot(&waves.gloss[channel]);
-    }
-    [matt, gloss]
+    [
+        waves.body.each_ref().map(|waves| dot(waves)),
+        waves.gloss.each_ref().map(|waves| dot(waves)),
+    ]
 }

@@ -1,6 +1,7 @@
 //! The light of the room, matt and as gloss shows it, that explains the curves of all pixels best.
 
-use super::gloss::{GLOSS_TERMS, GlossLight, gloss_terms};
+use super::body::BodyKind;
+use super::gloss::{GLOSS_TERMS, GlossLight, MIRROR, gloss_terms, mirror_terms};
 use super::light::{MATT_BANDS, TERMS, WaveTerm, wave_terms};
 use super::moments::Moments;
 use super::search::{Room, reflected};
@@ -28,14 +29,23 @@ pub(super) type Shares = [f64; MATT_BANDS];
 pub(super) struct KnownLight {
     pub(super) matt: TableLight,
     bands: Vec<GlossLight>,
+    mirror: Vec<GlossLight>,
 }
 
 impl KnownLight {
     pub(super) fn new(light: &ShLight, frame: &TableFrame) -> Self {
+        let bands = GlossLight::bands(&light.rotated(&frame.rotation()));
+        let mirror = bands.iter().map(|band| band.times([MIRROR; 3]));
         Self {
             matt: TableLight::from_viewer(light, frame),
-            bands: GlossLight::bands(&light.rotated(&frame.rotation())),
+            mirror: mirror.collect(),
+            bands,
         }
+    }
+
+    /// What metal of albedo 1 shows of each of its bands that blurs nothing: as bright as a matt white surface in even light.
+    pub(super) fn mirror(&self) -> &[GlossLight] {
+        &self.mirror
     }
 
     /// What gloss shows of each of its bands that blurs nothing.
@@ -54,6 +64,7 @@ impl KnownLight {
 pub fn fit_turn_light(
     curves: &TurnCurves,
     surface: &Surface,
+    body: BodyKind,
     frame: &TableFrame,
 ) -> Result<ShLight, TurnError> {
     if surface.extent() != curves.extent() {
@@ -72,6 +83,15 @@ pub fn fit_turn_light(
             known.push(at(normals));
             colours.push(at(albedo));
         }
+    }
+    if body == BodyKind::Metal {
+        let room = fit_reflection(&moments, &known, &colours, frame, GLOSS_TERMS);
+        let light = room
+            .ok_or(TurnError::NoLight)?
+            .gloss
+            .times([1.0 / MIRROR; 3])
+            .light()?;
+        return Ok(light.rotated(&frame.rotation().inverse()));
     }
     let pixels = pixels(&moments, &known, frame);
     let (matt, none) = fit_light(&pixels, &colours, Finish::Matt).ok_or(TurnError::NoLight)?;
@@ -115,13 +135,68 @@ pub(super) fn fit_matt_room(
             frame: *frame,
             light,
             gloss,
+            body: BodyKind::Diffuse,
         };
-        for ((moments, &normal), albedo) in moments.iter().zip(normals).zip(albedo.iter_mut()) {
-            *albedo = moments.albedo(&room.waves(normal));
-        }
+        follow(&room, moments, normals, albedo);
         found = Some(room);
     }
     found
+}
+
+/// The same for metal that shows so many bands of its light.
+pub(super) fn fit_metal_room(
+    moments: &[Moments],
+    normals: &[[f64; 3]],
+    albedo: &mut [[f64; 3]],
+    frame: &TableFrame,
+    bands: usize,
+) -> Option<Room> {
+    let mut found = None;
+    for _ in 0..ROUNDS {
+        let room = fit_reflection(moments, normals, albedo, frame, bands * bands)?;
+        follow(&room, moments, normals, albedo);
+        found = Some(room);
+    }
+    found
+}
+
+/// Gives every pixel the albedo that explains it best.
+fn follow(room: &Room, moments: &[Moments], normals: &[[f64; 3]], albedo: &mut [[f64; 3]]) {
+    for ((moments, &normal), albedo) in moments.iter().zip(normals).zip(albedo) {
+        *albedo = moments.albedo(&room.waves(normal));
+    }
+}
+
+/// The room of which metal with these normals and albedos shows this, with so many terms of its light.
+fn fit_reflection(
+    moments: &[Moments],
+    normals: &[[f64; 3]],
+    albedo: &[[f64; 3]],
+    frame: &TableFrame,
+    count: usize,
+) -> Option<Room> {
+    let mut shown = [[0.0; GLOSS_TERMS]; 3];
+    for (channel, shown) in shown.iter_mut().enumerate() {
+        let mut equations = NormalEquations::new(count);
+        for ((moments, &normal), albedo) in moments.iter().zip(normals).zip(albedo) {
+            let mut terms = mirror_terms(frame.to_table(reflected(normal)));
+            for part in terms.iter_mut().flat_map(|term| &mut term.parts) {
+                *part *= albedo[channel];
+            }
+            add(&mut equations, (moments, channel), &terms[..count]);
+        }
+        equations.add_ridge(1, STIFFNESS);
+        for (term, [value, ..]) in shown.iter_mut().zip(equations.solve()?) {
+            *term = value;
+        }
+    }
+    let gloss = GlossLight::new(shown);
+    Some(Room {
+        frame: *frame,
+        light: TableLight::of_mirror(&gloss).ok()?,
+        gloss,
+        body: BodyKind::Metal,
+    })
 }
 
 /// A pixel with what each term of the room contributes to it, for an albedo of 1.
@@ -173,7 +248,7 @@ fn fit_light(
                 parts: term.parts.map(|part| albedo[channel] * part),
             });
             let terms: Vec<WaveTerm> = matt.chain(pixel.gloss[..free].iter().copied()).collect();
-            pixel.add(&mut equations, channel, &terms);
+            add(&mut equations, (pixel.moments, channel), &terms);
         }
         equations.add_ridge(1, STIFFNESS);
         equations.add_ridge(TERMS, GLOSS_STIFFNESS);
@@ -221,12 +296,42 @@ pub(super) fn shares(room: &Room) -> Shares {
     [0; MATT_BANDS].map(|_| bands.next().map_or(0.0, |band| room.gloss.share_of(&band)))
 }
 
-impl LitPixel<'_> {
-    /// Adds what the pixel says of a channel's light and gloss; bright pixels, whose curves stand out of the noise,
-    /// count more.
-    fn add(&self, equations: &mut NormalEquations, channel: usize, terms: &[WaveTerm]) {
-        let product = |i: usize, j: usize| self.moments.term_product(channel, &terms[i], &terms[j]);
-        let right = |i: usize| [self.moments.term_along(channel, &terms[i]), 0.0, 0.0];
-        equations.add_sums(product, right);
+/// Adds what a pixel says of a channel's light and gloss; bright pixels, whose curves stand out of the noise, count more.
+fn add(equations: &mut NormalEquations, (moments, channel): (&Moments, usize), terms: &[WaveTerm]) {
+    let product = |i: usize, j: usize| moments.term_product(channel, &terms[i], &terms[j]);
+    let right = |i: usize| [moments.term_along(channel, &terms[i]), 0.0, 0.0];
+    equations.add_sums(product, right);
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::light::Order;
+    use crate::turn::Elevation;
+
+    #[test]
+    fn white_metal_is_as_bright_as_a_matt_white_surface_in_even_light() {
+        let frame = TableFrame::new(Elevation::assumed());
+        let known = KnownLight::new(&ShLight::even(Order::TWO, [1.0; 3]), &frame);
+        let normal = [0.48, 0.36, 0.8];
+        let room = |body| Room {
+            frame,
+            light: known.matt,
+            gloss: GlossLight::sum(known.mirror(), &[1.0; 3]),
+            body,
+        };
+        for body in [BodyKind::Diffuse, BodyKind::Metal] {
+            let shown = room(body).waves(normal).body[1];
+            assert!((shown[0] - PI).abs() < 1e-6, "{body:?} {shown:?}");
+        }
+        let back = TableLight::of_mirror(&room(BodyKind::Metal).gloss).unwrap();
+        let pairs = back
+            .terms()
+            .iter()
+            .flatten()
+            .zip(known.matt.terms().iter().flatten());
+        assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-9));
     }
 }

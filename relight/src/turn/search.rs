@@ -2,7 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::gloss::GlossLight;
+use super::body::BodyKind;
+use super::gloss::{GlossLight, mirror_terms};
 use super::light::{MATT_WAVES, WAVES};
 use super::moments::{Moments, PixelWaves, WaveProducts, dot as sum_of_products};
 use super::{TableFrame, TableLight};
@@ -47,18 +48,26 @@ pub(super) struct PixelFit {
 pub(super) struct Room {
     pub(super) frame: TableFrame,
     pub(super) light: TableLight,
+    /// What gloss shows of it beside the matt part; of metal, what a white one shows.
     pub(super) gloss: GlossLight,
+    pub(super) body: BodyKind,
 }
 
 impl Room {
     /// The waves of a normal in the viewer's frame.
     pub(super) fn waves(&self, normal: [f64; 3]) -> PixelWaves {
-        let facing = normal[2];
-        PixelWaves {
-            matt: self.light.waves(self.frame.to_table(normal)),
-            gloss: self
-                .gloss
-                .waves(facing, self.frame.to_table(reflected(normal))),
+        let reflected = self.frame.to_table(reflected(normal));
+        match self.body {
+            BodyKind::Diffuse => PixelWaves {
+                body: self.light.waves(self.frame.to_table(normal)),
+                count: MATT_WAVES,
+                gloss: self.gloss.waves(normal[2], reflected),
+            },
+            BodyKind::Metal => PixelWaves {
+                body: self.gloss.waves_of(&mirror_terms(reflected)),
+                count: WAVES,
+                gloss: [[0.0; WAVES]; 3],
+            },
         }
     }
 }
@@ -196,28 +205,28 @@ impl<'a> Search<'a> {
         let albedo = moments.albedo(&here);
         let there = [[SLOPE_STEP, 0.0], [0.0, SLOPE_STEP]]
             .map(|step| self.room.waves(leant(normal, [u, v], step)));
-        let matt = here.matt.each_ref().map(padded);
-        let seen: [_; 3] = std::array::from_fn(|c| sum(&matt[c], albedo[c], &here.gloss[c]));
+        let body = here.body;
+        let seen: [_; 3] = std::array::from_fn(|c| sum(&body[c], albedo[c], &here.gloss[c]));
         let ways = std::array::from_fn(|c| {
-            let along = moments.times(c, &matt[c]);
-            let own = sum_of_products(&matt[c], &along);
+            let along = moments.times(c, &body[c]);
+            let own = sum_of_products(&body[c], &along);
             there.map(|there| {
-                let moved = sum(&padded(&there.matt[c]), albedo[c], &there.gloss[c]);
+                let moved = sum(&there.body[c], albedo[c], &there.gloss[c]);
                 let mut way: [f64; WAVES] =
                     std::array::from_fn(|i| (moved[i] - seen[c][i]) / SLOPE_STEP);
                 // The albedo follows the normal.
                 if own > 1e-12 && albedo[c] > 0.0 {
                     let share = sum_of_products(&way, &along) / own;
                     way.iter_mut()
-                        .zip(&matt[c])
-                        .for_each(|(way, matt)| *way -= share * matt);
+                        .zip(&body[c])
+                        .for_each(|(way, body)| *way -= share * body);
                 }
                 way
             })
         });
         Leaning {
             albedo,
-            matt,
+            body,
             seen,
             ways,
         }
@@ -265,8 +274,8 @@ impl<'a> Search<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Leaning {
     pub(super) albedo: [f64; 3],
-    /// Those of its matt part, for an albedo of 1.
-    pub(super) matt: [[f64; WAVES]; 3],
+    /// Those of its body, for an albedo of 1.
+    pub(super) body: [[f64; WAVES]; 3],
     /// Those of all that is seen.
     pub(super) seen: [[f64; WAVES]; 3],
     /// The change of the latter with a normal that leans to either side, while the albedo follows.
@@ -335,14 +344,8 @@ impl Slope {
     }
 }
 
-fn padded(waves: &[f64; MATT_WAVES]) -> [f64; WAVES] {
-    let mut padded = [0.0; WAVES];
-    padded[..MATT_WAVES].copy_from_slice(waves);
-    padded
-}
-
-fn sum(matt: &[f64; WAVES], albedo: f64, gloss: &[f64; WAVES]) -> [f64; WAVES] {
-    std::array::from_fn(|i| albedo * matt[i] + gloss[i])
+fn sum(body: &[f64; WAVES], albedo: f64, gloss: &[f64; WAVES]) -> [f64; WAVES] {
+    std::array::from_fn(|i| albedo * body[i] + gloss[i])
 }
 
 /// Puts one of less cost in its place, and the last one out.

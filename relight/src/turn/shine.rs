@@ -4,8 +4,9 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::light::basis_at;
 use super::robust::lit;
+use super::search::Room;
 use super::start::blurred;
-use super::{ReadTurn, TurnCurves, TurnError, TurnSolution};
+use super::{BodyKind, ReadTurn, TurnCurves, TurnError, TurnSolution};
 use crate::asset::Asset;
 use crate::decompose::{FittedGloss, fit_gloss};
 use crate::image::{Planes, Rgb, beside};
@@ -14,6 +15,8 @@ use crate::render::{Gloss, Surface};
 
 /// Angles of the table at which the gloss is looked at: all that lies between shows nothing new.
 const ANGLES: [f64; 4] = [0.0, FRAC_PI_2, 2.0 * FRAC_PI_2, 3.0 * FRAC_PI_2];
+/// The smoothness that metal in an unknown light is taken to have.
+const METAL_SMOOTHNESS: f32 = 60.0;
 /// How far the coverage of a pixel reaches beyond the edge of the mask, pixels.
 const EDGE: f64 = 0.6;
 
@@ -23,32 +26,51 @@ impl TurnSolution {
     /// # Errors
     /// Where a term is not finite.
     pub fn light_at(&self, angle: f64) -> Result<ShLight, TurnError> {
-        let light = self.light().to_viewer(self.frame())?;
-        let [x, y, z] = self.frame().axis();
-        let axis = Direction::new(x, y, z);
-        Ok(axis.map_or(light.clone(), |axis| {
-            light.rotated(&Rotation::about(axis, -angle))
-        }))
+        Ok(self.turned(self.light().to_viewer(self.frame())?, angle))
     }
 
-    /// The object as the render layers take it, with the gloss of [`TurnSolution::gloss`].
+    fn turned(&self, light: ShLight, angle: f64) -> ShLight {
+        let [x, y, z] = self.frame().axis();
+        let axis = Direction::new(x, y, z);
+        axis.map_or(light.clone(), |axis| {
+            light.rotated(&Rotation::about(axis, -angle))
+        })
+    }
+
+    /// The light of which gloss shows a part: with the bands that are known beside it.
+    fn gloss_light(&self) -> Result<ShLight, TurnError> {
+        match &self.measured {
+            Some(light) => Ok(light.clone()),
+            None => Ok(self.light().to_viewer(self.frame())?),
+        }
+    }
+
+    /// The object as the render layers take it, with the gloss of [`TurnSolution::gloss`]. Metal is black with a gloss of its own
+    /// colour.
     ///
     /// # Errors
     /// None for maps of one size.
     pub fn surface(&self, curves: &TurnCurves) -> Result<Surface, TurnError> {
         let extent = curves.extent();
-        let gloss = self
-            .gloss(curves)?
-            .map(|gloss| Gloss::even(extent, [gloss.reflectance; 3], gloss.smoothness));
-        Ok(Surface::new(
-            self.normals(curves),
-            self.albedo(curves),
-            gloss,
-        )?)
+        let (normals, albedo) = (self.normals(curves), self.albedo(curves));
+        let gloss = self.gloss(curves)?;
+        Ok(match (self.body(), gloss) {
+            (BodyKind::Metal, Some(gloss)) => {
+                let colour = albedo.into_planes().map(|value| value * gloss.reflectance);
+                let smoothness = Planes::filled(extent, [gloss.smoothness]);
+                let black = Rgb::new(Planes::zeros(extent));
+                Surface::new(normals, black, Some(Gloss::new(colour, smoothness)?))?
+            }
+            (_, gloss) => {
+                let gloss = gloss
+                    .map(|gloss| Gloss::even(extent, [gloss.reflectance; 3], gloss.smoothness));
+                Surface::new(normals, albedo, gloss)?
+            }
+        })
     }
 
     /// Specular reflectance and smoothness of the whole object: those whose highlight in the light is nearest to the gloss
-    /// that was found. None for a matt object.
+    /// that was found. Of metal, the reflectance is that of an albedo of 1. None for an object without gloss.
     ///
     /// # Errors
     /// Where a term of the light is not finite.
@@ -56,15 +78,35 @@ impl TurnSolution {
         if self.room.gloss.is_none() {
             return Ok(None);
         }
+        if self.body() == BodyKind::Metal && self.measured.is_none() {
+            // What it shows is all that is known of the light: it may be blurred or not.
+            return Ok(Some(FittedGloss {
+                reflectance: (METAL_SMOOTHNESS + 2.0) / 8.0,
+                smoothness: METAL_SMOOTHNESS,
+                residual: 1.0,
+            }));
+        }
         let normals = self.normals(curves);
+        let shown = Room {
+            gloss: self
+                .room
+                .gloss
+                .within(self.gloss_light()?.order().get() + 1),
+            ..self.room
+        };
         let mut best: Option<FittedGloss> = None;
         for angle in ANGLES {
             let basis = basis_at(angle);
             let highlight = curves.map(|pixel| {
-                let [_, gloss] = lit(&self.room, self.fits[pixel].normal, &basis);
+                let [body, gloss] = lit(&shown, self.fits[pixel].normal, &basis);
+                let gloss = match self.body() {
+                    BodyKind::Diffuse => gloss,
+                    BodyKind::Metal => body,
+                };
                 [(gloss.iter().sum::<f64>() / 3.0).max(0.0) as f32]
             });
-            let found = fit_gloss(&self.light_at(angle)?, &normals, &highlight)?;
+            let light = self.turned(self.gloss_light()?, angle);
+            let found = fit_gloss(&light, &normals, &highlight)?;
             if found.is_some_and(|found| best.is_none_or(|best| found.residual < best.residual)) {
                 best = found;
             }

@@ -3,44 +3,29 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::gloss::{GLOSS_ORDER, GlossLight};
-use super::joint::{Joint, Unknowns};
+use super::begin::{COARSE_PIXELS, Setting};
+use super::body::{BodyFigure, BodyKind};
+use super::joint::Joint;
 use super::moments::Moments;
 use super::robust::trust;
-use super::room::{KnownLight, fit_matt_room};
+use super::room::KnownLight;
 use super::search::{Expected, PixelFit, Room, Search, unit};
 use super::start::{blurred, inflated};
 use super::{Elevation, TableFrame, TableLight, TurnCurves, TurnError};
 use crate::image::{Linear, Planes, Rgb};
 use crate::light::{Normals, ShLight, YUp};
 
-/// Pixels on which an unknown light is looked for: more are averaged in blocks first.
-const COARSE_PIXELS: usize = 2500;
-/// Rounds of light and normals in turn, for a matt object, with which an unknown light begins.
-const ROUNDS: usize = 8;
-/// Then all that is unknown is refined together, in so many steps; after that the best normals are looked for anywhere,
-/// and so on for so many rounds.
-const JOINT_STEPS: usize = 8;
-const JOINT_ROUNDS: usize = 2;
 /// Steps for those whose highlights and shadows are left out.
 const ROBUST_STEPS: usize = 3;
-/// Bands of the room's light that gloss is fitted with, of order 0 and up.
-const GLOSS_BANDS: usize = GLOSS_ORDER + 1;
-/// How smooth the normals are that an unknown light is fitted to: the deviation in the first round, in parts of
-/// the frame's width, by how much it falls with each round, and the least, pixels.
-const FIRST_BLUR: f64 = 6.0 / 256.0;
-const BLUR_FALL: f64 = 0.8;
-const LEAST_BLUR: f64 = 0.6;
-/// How round the bodies are that an unknown light is started from.
-const HEIGHTS: [(&str, f64); 3] = [
-    ("outline", 1.0),
-    ("outline, flatter", 0.6),
-    ("outline, rounder", 1.6),
-];
-/// How much the normals of such a body count where there is no prior.
+/// How much the normals of a body inflated out of the outline count where there is no prior.
 const OUTLINE_WEIGHT: f64 = 0.15;
+/// The least smoothing of a map of normals, pixels.
+const LEAST_BLUR: f64 = 0.6;
 /// Rounds in which what does not fit is left out.
 const ROBUST_ROUNDS: usize = 3;
+/// Nine tenths of normally distributed values are within so many deviations.
+const NINTH_TENTH: f64 = 0.9;
+const DEVIATIONS: f64 = 1.645;
 /// How far the surroundings of a pixel reach, in parts of the frame's width: a normal that differs from theirs is not to be
 /// believed as far.
 const SURROUNDINGS: f64 = 1.0 / 40.0;
@@ -70,6 +55,8 @@ pub struct TurnOptions {
     /// How much these count: `weight (1 - cos)` is added to what is left of a pixel's curve, over the energy
     /// of its variation.
     pub prior_weight: f64,
+    /// What the object is made of; what explains the curves where it is not known.
+    pub body: Option<BodyKind>,
 }
 
 impl Default for TurnOptions {
@@ -79,6 +66,7 @@ impl Default for TurnOptions {
             light: None,
             prior: None,
             prior_weight: 0.15,
+            body: None,
         }
     }
 }
@@ -103,7 +91,10 @@ pub struct TurnSolution {
     pub(super) expected_errors: Vec<f64>,
     pub(super) room: Room,
     pub(super) elevation: Elevation,
+    /// The light, where it was measured.
+    pub(super) measured: Option<ShLight>,
     pub(super) starts: Vec<StartFigure>,
+    pub(super) bodies: Vec<BodyFigure>,
     pub(super) had_prior: bool,
 }
 
@@ -128,23 +119,20 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         (None, None) => Some(of_outline(curves)),
         (expected, _) => expected,
     };
-    let known = options
-        .light
-        .as_ref()
-        .map(|light| KnownLight::new(light, &frame));
-    let (room, starts) = match &known {
-        Some(known) => (
-            find_gloss(curves, expected.as_deref(), &frame, known),
-            Vec::new(),
-        ),
-        None => find_light(curves, expected.as_deref(), has_shape, &frame)?,
+    let setting = Setting {
+        frame,
+        known: options
+            .light
+            .as_ref()
+            .map(|light| KnownLight::new(light, &frame)),
+        has_shape,
     };
+    let found = setting.find(curves, expected.as_deref(), options.body)?;
     let mut solver = Solver {
         curves,
         expected,
-        room,
-        has_shape,
-        known,
+        room: found.room,
+        setting,
         moments: all_moments(curves),
         fits: Vec::new(),
     };
@@ -152,6 +140,7 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
     for _ in 0..ROBUST_ROUNDS {
         solver.refine();
     }
+    solver.draw_albedo();
     let common = match (&options.light, &options.prior) {
         (Some(_), _) => BENT_IN_KNOWN_LIGHT,
         (None, Some(_)) => BENT_WITH_PRIOR,
@@ -159,7 +148,7 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
     };
     let common = common.hypot(options.elevation.uncertainty_deg().to_radians());
     let expected_errors = solver.expected_errors(common);
-    if solver.known.is_none() {
+    if solver.setting.known.is_none() {
         solver.normalise();
     }
     Ok(TurnSolution {
@@ -168,7 +157,9 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         expected_errors,
         room: solver.room,
         elevation: options.elevation,
-        starts,
+        measured: options.light.clone(),
+        starts: found.starts,
+        bodies: found.bodies,
     })
 }
 
@@ -186,12 +177,12 @@ impl TurnSolution {
         Rgb::new(curves.map(|pixel| self.fits[pixel].albedo.map(|v| v as f32)))
     }
 
-    /// The shading over the whole turn, mean irradiance of each pixel.
+    /// The shading over the whole turn: the mean irradiance of each pixel, or what white metal would show.
     #[must_use]
     pub fn shading(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| {
             let waves = self.room.waves(self.fits[pixel].normal);
-            waves.matt.map(|waves| waves[0].max(0.0) as f32)
+            waves.body.map(|waves| waves[0].max(0.0) as f32)
         }))
     }
 
@@ -211,6 +202,18 @@ impl TurnSolution {
     #[must_use]
     pub const fn frame(&self) -> &TableFrame {
         &self.room.frame
+    }
+
+    /// What the object is taken for.
+    #[must_use]
+    pub const fn body(&self) -> BodyKind {
+        self.room.body
+    }
+
+    /// What each kind of body that was tried leaves of the curves.
+    #[must_use]
+    pub fn bodies(&self) -> &[BodyFigure] {
+        &self.bodies
     }
 
     /// How each start of an unknown light ended; none where it was known.
@@ -238,12 +241,17 @@ pub(super) fn confidence(expected_error: f64) -> f64 {
 
 /// The lower of the two values in the middle; 0 where there are none.
 pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// The value that this part of the others, 0 to 1, does not exceed; 0 where there are none.
+fn quantile(values: impl Iterator<Item = f64>, part: f64) -> f64 {
     let mut values: Vec<f64> = values.collect();
     if values.is_empty() {
         return 0.0;
     }
-    let middle = (values.len() - 1) / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    let place = ((values.len() - 1) as f64 * part) as usize;
+    *values.select_nth_unstable_by(place, f64::total_cmp).1
 }
 
 /// All pixels under one light.
@@ -251,8 +259,7 @@ struct Solver<'a> {
     curves: &'a TurnCurves,
     expected: Option<Vec<Expected>>,
     room: Room,
-    known: Option<KnownLight>,
-    has_shape: bool,
+    setting: Setting,
     moments: Vec<Moments>,
     fits: Vec<PixelFit>,
 }
@@ -282,11 +289,32 @@ impl Solver<'_> {
         let joint = Joint {
             moments: &moments,
             expected: expected.as_deref(),
-            unknowns: unknowns(self.known.as_ref(), self.has_shape),
+            unknowns: self.setting.unknowns(self.room.body),
         };
         let near = search_all(&self.room, &moments, joint.expected, Some(&fits));
         (self.room, _) = joint.refined(self.room, near, ROBUST_STEPS);
         self.fits = self.search(Some(&self.fits));
+    }
+
+    /// Draws the albedo of pixels that hardly see light, or of whose curve much is left, to the median of all.
+    fn draw_albedo(&mut self) {
+        let fits = &self.fits;
+        let of_channel = |c: usize| fits.iter().map(move |fit| fit.albedo[c]);
+        let middle = [0, 1, 2].map(|c| median(of_channel(c)));
+        // By the ninth tenth of the distances: spots of another colour count, a few pixels that went wrong do not.
+        let spread = [0, 1, 2].map(|c| {
+            let distances = of_channel(c).map(|one| (one - middle[c]).abs());
+            quantile(distances, NINTH_TENTH) / DEVIATIONS
+        });
+        let room = &self.room;
+        self.fits
+            .par_iter_mut()
+            .zip(&self.moments)
+            .filter(|(_, moments)| !moments.is_dark())
+            .for_each(|(fit, moments)| {
+                let waves = room.waves(fit.normal);
+                fit.albedo = moments.drawn_albedo(&waves, (middle, spread), FREEDOM);
+            });
     }
 
     /// The normals around each pixel, smoothed.
@@ -331,7 +359,7 @@ impl Solver<'_> {
         let mut sums = [0.0; 3];
         for fit in &self.fits {
             let waves = self.room.waves(fit.normal);
-            for (sum, waves) in sums.iter_mut().zip(waves.matt) {
+            for (sum, waves) in sums.iter_mut().zip(waves.body) {
                 *sum += waves[0];
             }
         }
@@ -339,14 +367,18 @@ impl Solver<'_> {
             let mean = sum / self.fits.len() as f64;
             if mean > 1e-12 { mean } else { 1.0 }
         });
-        self.room.light = self.room.light.times(factors.map(|factor| 1.0 / factor));
+        let parts = factors.map(|factor| 1.0 / factor);
+        self.room.light = self.room.light.times(parts);
+        if self.room.body == BodyKind::Metal {
+            self.room.gloss = self.room.gloss.times(parts);
+        }
         for fit in &mut self.fits {
             fit.albedo = [0, 1, 2].map(|c| fit.albedo[c] * factors[c]);
         }
     }
 }
 
-fn all_moments(curves: &TurnCurves) -> Vec<Moments> {
+pub(super) fn all_moments(curves: &TurnCurves) -> Vec<Moments> {
     (0..curves.pixels())
         .into_par_iter()
         .map(|pixel| Moments::new(curves, pixel, None))
@@ -425,186 +457,4 @@ fn expected(
         weight,
     };
     Ok(curves.places().iter().map(at).collect())
-}
-
-/// What is to be found of the room. Where nothing is known of the shape but its outline, light and gloss together could
-/// explain any shape: the object is taken for matt.
-fn unknowns(known: Option<&KnownLight>, has_shape: bool) -> Unknowns<'_> {
-    let bands = if has_shape { GLOSS_BANDS } else { 0 };
-    known.map_or(Unknowns::Light { bands }, Unknowns::Gloss)
-}
-
-/// The gloss in a known light.
-fn find_gloss(
-    curves: &TurnCurves,
-    expected: Option<&[Expected]>,
-    frame: &TableFrame,
-    known: &KnownLight,
-) -> Room {
-    let coarse = Coarse::new(curves, expected);
-    let matt = Room {
-        frame: *frame,
-        light: known.matt,
-        gloss: GlossLight::NONE,
-    };
-    let joint = coarse.joint(Unknowns::Gloss(known));
-    joint.found(matt, JOINT_ROUNDS, JOINT_STEPS).1
-}
-
-/// A turn on blocks of pixels.
-struct Coarse {
-    side: usize,
-    curves: TurnCurves,
-    moments: Vec<Moments>,
-    expected: Option<Vec<Expected>>,
-}
-
-impl Coarse {
-    fn new(curves: &TurnCurves, expected: Option<&[Expected]>) -> Self {
-        let pixels = curves.pixels() as f64 / COARSE_PIXELS as f64;
-        let side = (pixels.sqrt().ceil() as usize).max(1);
-        let coarse = curves.reduced(side);
-        Self {
-            side,
-            moments: all_moments(&coarse),
-            expected: expected.map(|fine| reduced(curves, fine, &coarse, side)),
-            curves: coarse,
-        }
-    }
-
-    fn joint<'a>(&'a self, unknowns: Unknowns<'a>) -> Joint<'a> {
-        Joint {
-            moments: &self.moments,
-            expected: self.expected.as_deref(),
-            unknowns,
-        }
-    }
-}
-
-/// An unknown light, from all starts.
-fn find_light(
-    curves: &TurnCurves,
-    expected: Option<&[Expected]>,
-    has_shape: bool,
-    frame: &TableFrame,
-) -> Result<(Room, Vec<StartFigure>), TurnError> {
-    let coarse = Coarse::new(curves, expected);
-    let mut begun: Vec<(&str, Vec<[f64; 3]>)> = Vec::new();
-    if let Some(expected) = coarse.expected.as_ref().filter(|_| has_shape) {
-        let normals = expected.iter().map(|expected| expected.normal).collect();
-        begun.push(("prior", normals));
-    }
-    for (name, height) in HEIGHTS {
-        begun.push((name, inflated(&coarse.curves, height)));
-    }
-    let alternation = Alternation {
-        coarse: &coarse,
-        frame,
-        has_shape,
-    };
-    let ended: Vec<(String, Option<(f64, Room)>)> = begun
-        .into_iter()
-        .map(|(name, normals)| (name.to_owned(), alternation.run(normals)))
-        .collect();
-    let best = ended
-        .iter()
-        .filter_map(|(_, ended)| *ended)
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    let (least, room) = best.ok_or(TurnError::NoLight)?;
-    let figures = ended.into_iter().map(|(start, ended)| {
-        let residual = ended.map_or(1.0, |(residual, _)| residual);
-        StartFigure {
-            start,
-            residual,
-            taken: residual <= least,
-        }
-    });
-    Ok((room, figures.collect()))
-}
-
-/// The prior on blocks of pixels.
-fn reduced(
-    curves: &TurnCurves,
-    fine: &[Expected],
-    coarse: &TurnCurves,
-    side: usize,
-) -> Vec<Expected> {
-    let (width, across) = (curves.extent().width, coarse.extent().width);
-    let mut sums = vec![[0.0; 3]; coarse.extent().pixels()];
-    for (expected, &place) in fine.iter().zip(curves.places()) {
-        let block = place / width / side * across + place % width / side;
-        for (sum, value) in sums[block].iter_mut().zip(expected.normal) {
-            *sum += value;
-        }
-    }
-    let weight = fine.first().map_or(0.0, |expected| expected.weight);
-    let at = |&place: &usize| Expected {
-        normal: unit(sums[place]),
-        weight,
-    };
-    coarse.places().iter().map(at).collect()
-}
-
-/// An unknown light from one start.
-struct Alternation<'a> {
-    coarse: &'a Coarse,
-    frame: &'a TableFrame,
-    /// Whether more is known of the shape than its outline.
-    has_shape: bool,
-}
-
-impl Alternation<'_> {
-    /// What is left in the end, and the light: light and normals in turns for a matt object, then both together, and then
-    /// with gloss.
-    fn run(&self, start: Vec<[f64; 3]>) -> Option<(f64, Room)> {
-        let coarse = self.coarse;
-        let mut normals = start;
-        let mut albedo = self.first_albedo();
-        let mut room = None;
-        for round in 0..ROUNDS {
-            let found = fit_matt_room(&coarse.moments, &normals, &mut albedo, self.frame)?;
-            let fits = search_all(&found, &coarse.moments, coarse.expected.as_deref(), None);
-            for (albedo, fit) in albedo.iter_mut().zip(&fits) {
-                *albedo = fit.albedo;
-            }
-            normals = self.smoothed(&fits, round);
-            room = Some(found);
-        }
-        let matt = coarse.joint(Unknowns::Light { bands: 0 });
-        let (cost, room) = matt.found(room?, 1, JOINT_STEPS);
-        if !self.has_shape {
-            return Some((cost, room));
-        }
-        let glossy = coarse.joint(unknowns(None, true));
-        Some(glossy.found(room, JOINT_ROUNDS, JOINT_STEPS))
-    }
-
-    /// As if the shading were even.
-    fn first_albedo(&self) -> Vec<[f64; 3]> {
-        let curves = &self.coarse.curves;
-        (0..curves.pixels())
-            .map(|pixel| Moments::mean(curves, pixel).map(|mean| mean.max(1e-6)))
-            .collect()
-    }
-
-    fn smoothed(&self, fits: &[PixelFit], round: usize) -> Vec<[f64; 3]> {
-        let across = self.coarse.curves.extent().width as f64;
-        let deviation = if self.has_shape {
-            0.0
-        } else {
-            let fall = BLUR_FALL.powi(round as i32);
-            (FIRST_BLUR * across * fall).max(LEAST_BLUR / self.coarse.side as f64)
-        };
-        if deviation < 0.3 {
-            return fits.iter().map(|fit| fit.normal).collect();
-        }
-        let map = self
-            .coarse
-            .curves
-            .map(|pixel| fits[pixel].normal.map(|v| v as f32));
-        let smooth = blurred(&map, &self.coarse.curves.mask(), deviation);
-        let [x, y, z] = smooth.planes();
-        let at = |&place: &usize| unit([x, y, z].map(|plane| f64::from(plane[place])));
-        self.coarse.curves.places().iter().map(at).collect()
-    }
 }

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use proptest::prelude::*;
 
-use super::gloss::GlossLight;
+use super::gloss::{GlossLight, MIRROR};
 use super::light::basis_at;
 use super::robust::lit;
 use super::search::Room;
@@ -13,6 +13,7 @@ use crate::data::{TruthLayout, TruthSet};
 use crate::image::{Extent, Linear, Planes, Rgb};
 use crate::light::{Direction, Normals, Order, Rotation, ShLight, YUp};
 use crate::metrics::angular_error;
+use crate::movie::MovieReader;
 use crate::render::{DiffuseForm, DiffuseLayer, Surface};
 
 const SIDE: usize = 24;
@@ -154,7 +155,7 @@ fn a_matt_ball_in_known_light_is_found_as_it_is() {
 fn the_light_of_a_known_surface_is_found_as_it_is() {
     let (surface, light) = (ball(), room());
     let frame = TableFrame::new(elevation());
-    let found = fit_turn_light(&SOLVED.0.curves, &surface, &frame).unwrap();
+    let found = fit_turn_light(&SOLVED.0.curves, &surface, BodyKind::Diffuse, &frame).unwrap();
     let largest = 1.1;
     for (a, b) in found.coefficients().iter().zip(light.coefficients()) {
         for (a, b) in a.iter().zip(b) {
@@ -251,6 +252,24 @@ fn read(surface: &Surface, light: &ShLight) -> ReadTurn {
     }
 }
 
+/// The curves of the ball in a room.
+fn film_in(room: &Room, surface: &Surface) -> TurnCurves {
+    let extent = surface.extent();
+    let mut builder = CurveBuilder::new(extent, mask(surface).plane(0)).unwrap();
+    for k in 0..90 {
+        let angle = f64::from(k) * 4.0;
+        let basis = basis_at(angle.to_radians());
+        let image = Planes::from_fn(extent, |x, y| {
+            let normal = surface.normals().planes().pixel(x, y).map(f64::from);
+            let [body, gloss] = lit(room, normal, &basis);
+            let albedo = surface.albedo().planes().pixel(x, y).map(f64::from);
+            [0, 1, 2].map(|c| (albedo[c] * body[c] + gloss[c]) as f32)
+        });
+        builder.push(angle, extent, image.planes()).unwrap();
+    }
+    builder.finish().unwrap()
+}
+
 #[test]
 fn gloss_beside_the_matt_part_is_found_in_known_light() {
     let (surface, light) = (ball(), room());
@@ -260,28 +279,99 @@ fn gloss_beside_the_matt_part_is_found_in_known_light() {
         frame: table,
         light: TableLight::from_viewer(&light, &table),
         gloss: GlossLight::sum(&shown, &[0.5, 0.4, 0.3]),
+        body: BodyKind::Diffuse,
     };
-    let extent = surface.extent();
-    let mut builder = CurveBuilder::new(extent, mask(&surface).plane(0)).unwrap();
-    for k in 0..90 {
-        let angle = f64::from(k) * 4.0;
-        let basis = basis_at(angle.to_radians());
-        let image = Planes::from_fn(extent, |x, y| {
-            let normal = surface.normals().planes().pixel(x, y).map(f64::from);
-            let [matt, gloss] = lit(&glossy, normal, &basis);
-            let albedo = surface.albedo().planes().pixel(x, y).map(f64::from);
-            [0, 1, 2].map(|c| (albedo[c] * matt[c] + gloss[c]) as f32)
-        });
-        builder.push(angle, extent, image.planes()).unwrap();
-    }
-    let curves = builder.finish().unwrap();
+    let curves = film_in(&glossy, &surface);
     let found = solve_turn(&curves, &known(&light)).unwrap();
+    assert_eq!(found.body(), BodyKind::Diffuse);
     let off = off(&surface, &found.normals(&curves));
     assert!(off < 1.0, "{off}");
     let gloss = found.gloss(&curves).unwrap().unwrap();
     assert!(gloss.reflectance > 0.0 && gloss.residual < 0.8, "{gloss:?}");
     let maps = TurnMaps::new(&curves, &found);
     assert!(maps.highlight.pixel(SIDE / 2, SIDE / 2)[0] > 0.002);
+}
+
+/// A room with so much in its higher bands that it has small bright windows.
+fn windows() -> ShLight {
+    let mut light = room().with_order(Order::new(4).unwrap());
+    for (at, values) in light.coefficients_mut().iter_mut().enumerate().skip(9) {
+        let value = 0.15 * (1.7 * at as f64).sin();
+        *values = [value, 0.9 * value, 0.8 * value];
+    }
+    light
+}
+
+/// A ball of metal in a room, whose lobe leaves less of each band.
+fn metal_ball() -> (Surface, ShLight, TurnCurves) {
+    let (surface, light) = (ball(), windows());
+    let table = TableFrame::new(elevation());
+    let shown = GlossLight::bands(&light.rotated(&table.rotation()));
+    let factors = [1.0, 0.95, 0.9, 0.8, 0.7].map(|factor| MIRROR * factor);
+    let metal = Room {
+        frame: table,
+        light: TableLight::from_viewer(&light, &table),
+        gloss: GlossLight::sum(&shown, &factors),
+        body: BodyKind::Metal,
+    };
+    let curves = film_in(&metal, &surface);
+    (surface, light, curves)
+}
+
+#[test]
+fn metal_is_told_by_what_it_leaves_and_found_in_known_light() {
+    let (surface, light, curves) = metal_ball();
+    let found = solve_turn(&curves, &known(&light)).unwrap();
+    assert_eq!(found.body(), BodyKind::Metal);
+    let [diffuse, metal] = found.bodies() else {
+        panic!("{:?}", found.bodies());
+    };
+    assert!(
+        diffuse.residual > 10.0 * metal.residual,
+        "{diffuse:?} {metal:?}"
+    );
+    let off = off(&surface, &found.normals(&curves));
+    assert!(off < 1.0, "{off}");
+    assert!(albedo_off(&surface, &found.albedo(&curves), 1.0) < 0.05);
+    let lit = found.surface(&curves).unwrap();
+    assert_eq!(lit.albedo().planes().pixel(SIDE / 2, SIDE / 2), [0.0; 3]);
+    let [r, g, _] = lit.gloss().unwrap().reflectance().pixel(SIDE / 2, SIDE / 2);
+    let [red, green, _] = surface.albedo().planes().pixel(SIDE / 2, SIDE / 2);
+    assert!((r / g - red / green).abs() < 0.1, "{r} {g}");
+}
+
+#[test]
+fn metal_is_found_in_unknown_light_with_normals_to_lean_on() {
+    let (surface, _, curves) = metal_ball();
+    let options = TurnOptions {
+        elevation: elevation(),
+        prior: Some(surface.normals().clone()),
+        ..TurnOptions::default()
+    };
+    let found = solve_turn(&curves, &options).unwrap();
+    assert_eq!(found.body(), BodyKind::Metal);
+    let off = off(&surface, &found.normals(&curves));
+    assert!(off < 1.0, "{off}");
+}
+
+#[test]
+fn a_body_that_was_given_is_not_doubted_and_metal_has_no_labels() {
+    let turn = read(&ball(), &room());
+    let options = TurnOptions {
+        body: Some(BodyKind::Metal),
+        ..known(&room())
+    };
+    let found = solve_turn(&turn.curves, &options).unwrap();
+    assert_eq!((found.body(), found.bodies().len()), (BodyKind::Metal, 1));
+    let labels = TurnLabels {
+        turn: &turn,
+        solution: &found,
+        least_confidence: 0.5,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("labels");
+    assert!(matches!(labels.write(&out), Err(TurnError::NoMattPart)));
+    assert!(!out.exists());
 }
 
 #[test]
@@ -312,6 +402,70 @@ fn labels_of_a_turn_are_read_as_samples_with_truth() {
     let (image, diffuse) = (sample.image.unwrap(), sample.diffuse.unwrap());
     assert!((at(&image) - at(&diffuse)).abs() < 0.005);
     assert!(at(&sample.highlight.unwrap()) < 0.005);
+}
+
+/// The frames of the video that is written of a turn, as planes of sRGB.
+fn film_of(turn: &ReadTurn, solution: &TurnSolution, out: &std::path::Path) -> Vec<Planes<3>> {
+    let maps = TurnMaps::new(&turn.curves, solution);
+    let files = TurnFiles {
+        turn,
+        solution,
+        maps: &maps,
+        conditioning: Conditioning::of(&turn.curves),
+        light_source: None,
+        normals_source: None,
+        strip: None,
+        has_movie: true,
+    };
+    files.write(out).unwrap();
+    let mut movie = MovieReader::open(&out.join("relit.mp4")).unwrap();
+    let mut frames = Vec::new();
+    while let Some(frame) = movie.frame().unwrap() {
+        frames.push(frame.planes().clone());
+    }
+    frames
+}
+
+/// The mean of a part of the ball's columns.
+fn columns(frame: &Planes<3>, columns: std::ops::Range<usize>) -> f32 {
+    let rows = SIDE / 3..2 * SIDE / 3;
+    let count = (columns.len() * rows.len()) as f32;
+    let all = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+    all.map(|(x, y)| frame.pixel(x, y)[1]).sum::<f32>() / count
+}
+
+#[test]
+fn the_film_shows_the_object_while_a_lamp_goes_around_it() {
+    let run = std::process::Command::new("ffmpeg")
+        .arg("-version")
+        .output();
+    if run.is_err() {
+        eprintln!("skipped: the program ffmpeg is not installed");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (surface, light, curves) = metal_ball();
+    let metal = ReadTurn {
+        curves,
+        ..read(&surface, &light)
+    };
+    let of_metal = solve_turn(&metal.curves, &known(&light)).unwrap();
+    let (turn, solution) = &*SOLVED;
+    for (name, turn, solution) in [("matt", turn, solution), ("metal", &metal, &of_metal)] {
+        let frames = film_of(turn, solution, &folder.path().join(name));
+        assert_eq!(frames.len(), 90);
+        let [left, right] = [2..SIDE / 3, 2 * SIDE / 3..SIDE - 2];
+        let leaning =
+            |frame: &Planes<3>| columns(frame, right.clone()) - columns(frame, left.clone());
+        let most = frames.iter().map(leaning).fold(f32::MIN, f32::max);
+        let least = frames.iter().map(leaning).fold(f32::MAX, f32::min);
+        assert!(most > 0.02 && least < -0.02, "{name}: {least} to {most}");
+        let middle = |frame: &Planes<3>| columns(frame, SIDE / 3..2 * SIDE / 3);
+        assert!(
+            frames.iter().map(middle).fold(f32::MIN, f32::max) > 0.2,
+            "{name}"
+        );
+    }
 }
 
 #[test]

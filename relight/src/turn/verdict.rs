@@ -1,6 +1,7 @@
 //! Whether the room's light is fit for this.
 
 use rayon::prelude::*;
+use relit_data::turn_light::LEAST_MODULATION;
 use serde::Serialize;
 
 use super::TurnCurves;
@@ -8,8 +9,6 @@ use super::light::MATT_WAVES;
 use super::solve::median;
 use crate::light::NormalEquations;
 
-/// Below this modulation the room is too even.
-const LEAST_MODULATION: f64 = 0.08;
 /// Above this part beyond the second harmonic, the modulation is not that of a matt surface.
 const MOST_BEYOND: f64 = 0.3;
 

@@ -12,6 +12,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use relit_data::causes::with_causes;
+use relit_data::turn_light::LEAST_MODULATION;
 
 use super::context::{CaptureContext, CaptureRequest};
 use super::equipment::Equipment;
@@ -115,12 +116,33 @@ fn run_take(
     let mut repeatable = matches!(recorded.end(), End::Over);
     let angle = |t_us| track.as_ref().and_then(|track| track.angle_at(t_us));
     // The session is closed before the table turns back: nothing that happens on the way costs it.
+    let modulation = recorded.modulation();
     let take = recorded.finish(&angle, &control_faults)?;
+    if take.verdict != Verdict::Aborted {
+        context.note(modulation.map(check_room));
+    }
     context.end_take(&take);
     if let (Some(table), Some(finished)) = (equipment.table.as_ref(), finished) {
         repeatable &= unwind(table, finished, &clock, context).is_ok();
     }
     Ok((take, repeatable))
+}
+
+/// Whether a turn in this light tells normals and albedo, and trains networks on what changes.
+fn check_room(modulation: f64) -> Check {
+    let percent = 100.0 * modulation;
+    if modulation < LEAST_MODULATION {
+        let found = format!(
+            "the room is too even: the object's light changes by {percent:.0} % over the turn, \
+             where {:.0} % are needed to learn from it; turn on one lamp at the side, and capture the turn again",
+            100.0 * LEAST_MODULATION
+        );
+        return Check::noted("light", found);
+    }
+    Check::passed(
+        "light",
+        format!("it changes by {percent:.0} % over the turn"),
+    )
 }
 
 /// What is recorded, and where; shows it.

@@ -7,9 +7,9 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use relight::light::{Order, Panorama, ShLight};
 use relight::turn::{
-    Conditioning, Elevation, ElevationSource, Filmed, NormalsSource, ProbePlace, ReadTurn,
-    RoomStrip, RoomVerdict, TableFrame, TableSense, TurnFiles, TurnLabels, TurnMaps, TurnOptions,
-    film, prior_normals, read_curves, solve_turn,
+    BodyKind, Conditioning, Elevation, ElevationSource, Filmed, NormalsSource, Probe, ProbeBall,
+    ProbePlace, ReadTurn, RoomStrip, RoomVerdict, TableSense, TurnError, TurnFiles, TurnLabels,
+    TurnMaps, TurnOptions, film, prior_normals, read_curves, solve_turn,
 };
 use serde_json::json;
 
@@ -49,10 +49,13 @@ pub(in crate::cli) struct Arguments {
     /// program ffmpeg.
     #[arg(long, value_name = "PATH")]
     session: Option<PathBuf>,
-    /// A matt grey ball on the table, which measures the light: its middle and radius in the video, pixels. The light is then in
-    /// units in which the ball's albedo is 1.
+    /// A ball on the table, matt grey or chrome, which measures the light: its middle and radius in the video, pixels. The light is
+    /// then in units in which the ball's albedo is 1.
     #[arg(long, value_name = "X,Y,R", value_parser = probe, requires = "session", conflicts_with = "light")]
     probe: Option<ProbePlace>,
+    /// What the ball is made of: without it, what it looks like.
+    #[arg(long, value_enum, value_name = "KIND", requires = "probe")]
+    probe_ball: Option<BallName>,
     /// Normals to start from: "shipped" (the network that comes with the program), "none", a network (.onnx, or weights
     /// of decompose: .safetensors, .pth), a map of normals (.png, .exr), or a folder with normal.png
     /// [default: shipped, and none with --light].
@@ -64,6 +67,9 @@ pub(in crate::cli) struct Arguments {
     /// How much these normals count beside what the turn says.
     #[arg(long, value_name = "WEIGHT", default_value_t = TurnOptions::default().prior_weight, value_parser = weight)]
     normals_weight: f64,
+    /// What the object is made of: without it, what explains the turn.
+    #[arg(long, value_enum, value_name = "KIND")]
+    body: Option<BodyName>,
     /// Which way the table turns as its angle grows, seen from above.
     #[arg(long, value_enum, default_value_t = SenseName::CounterClockwise)]
     sense: SenseName,
@@ -89,6 +95,40 @@ enum SenseName {
     Clockwise,
 }
 
+#[derive(Clone, Copy, ValueEnum)]
+enum BallName {
+    /// It is matt.
+    Grey,
+    /// It mirrors.
+    Chrome,
+}
+
+impl From<BallName> for ProbeBall {
+    fn from(name: BallName) -> Self {
+        match name {
+            BallName::Grey => Self::Grey,
+            BallName::Chrome => Self::Chrome,
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum BodyName {
+    /// It scatters light, with gloss or without.
+    Diffuse,
+    /// It only reflects, in its own colour.
+    Metal,
+}
+
+impl From<BodyName> for BodyKind {
+    fn from(name: BodyName) -> Self {
+        match name {
+            BodyName::Diffuse => Self::Diffuse,
+            BodyName::Metal => Self::Metal,
+        }
+    }
+}
+
 impl Arguments {
     fn sense(&self) -> TableSense {
         match self.sense {
@@ -105,6 +145,14 @@ impl Arguments {
             None | Some("shipped") => Some((NormalsSource::Shipped, "shipped")),
             Some(path) => Some((NormalsSource::of(Path::new(path)), path)),
         }
+    }
+
+    fn probe(&self) -> Option<Probe> {
+        self.probe.map(|place| Probe {
+            place,
+            ball: self.probe_ball.map(ProbeBall::from),
+            elevation: self.elevation(),
+        })
     }
 
     fn elevation(&self) -> Elevation {
@@ -129,6 +177,7 @@ impl Arguments {
             },
             prior: prior.transpose()?,
             prior_weight: self.normals_weight,
+            body: self.body.map(BodyKind::from),
         })
     }
 }
@@ -147,18 +196,23 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
         .as_ref()
         .map(|path| {
             let bar = console.progress(0, "frames of the video");
-            film(path, &turn, arguments.probe, &|done, all| {
+            film(path, &turn, arguments.probe(), &|done, all| {
                 bar.set_length(all);
                 bar.set_position(done);
             })
         })
         .transpose()?;
-    let measured = filmed
-        .as_mut()
-        .map(|filmed| filmed.light(&TableFrame::new(arguments.elevation())))
-        .transpose()?
-        .flatten();
-    let options = arguments.options(&turn, measured)?;
+    let measured = filmed.as_mut().map(Filmed::light).transpose()?.flatten();
+    if let Some(measured) = measured.as_ref().filter(|found| found.ball != found.looks) {
+        let looks = ball_name(measured.looks);
+        let text = format!(
+            "the ball was called {}, but it looks {looks}",
+            ball_name(measured.ball)
+        );
+        console.warn(&text, &json!({ "event": "warning", "message": text }));
+    }
+    let ball = measured.as_ref().map(|measured| measured.ball);
+    let options = arguments.options(&turn, measured.map(|measured| measured.light))?;
     let conditioning = Conditioning::of(&turn.curves);
     let solution = solve_turn(&turn.curves, &options)?;
     let maps = TurnMaps::new(&turn.curves, &solution);
@@ -167,7 +221,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
         .light
         .as_ref()
         .map(|path| path.display().to_string());
-    let light_source = given.or_else(|| arguments.probe.map(|_| "probe".to_owned()));
+    let light_source = given.or_else(|| ball.map(|ball| format!("probe, {}", ball_name(ball))));
     let figures = TurnFiles {
         turn: &turn,
         solution: &solution,
@@ -182,7 +236,8 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     if let Some(path) = &arguments.asset {
         solution.asset(&turn)?.write(path)?;
     }
-    if let Some(folder) = &arguments.labels {
+    let has_labels = solution.body() == BodyKind::Diffuse;
+    if let Some(folder) = arguments.labels.as_ref().filter(|_| has_labels) {
         let labels = TurnLabels {
             turn: &turn,
             solution: &solution,
@@ -192,7 +247,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     }
     let seconds = start.elapsed().as_secs_f64();
     let text = format!(
-        "{}: {} frames in {read_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees (median), light {}",
+        "{}: {} frames in {read_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees (median), light {}, body {}",
         arguments.output.display(),
         turn.curves.frames(),
         solution.expected_error_deg(),
@@ -200,6 +255,10 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
             (Some(_), _) => "given",
             (None, Some(_)) => "measured",
             (None, None) => "found",
+        },
+        match solution.body() {
+            BodyKind::Diffuse => "diffuse",
+            BodyKind::Metal => "metal",
         },
     );
     let event = json!({
@@ -213,7 +272,20 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     if arguments.session.is_some() {
         warn_of_room(strip, arguments.sense, console);
     }
-    Ok(warn(&turn, &options, conditioning, console))
+    let outcome = warn(&turn, &options, conditioning, console);
+    if arguments.labels.is_some() && !has_labels {
+        let text = TurnError::NoMattPart.to_string();
+        console.warn(&text, &json!({ "event": "warning", "message": text }));
+        return Ok(Outcome::Incomplete);
+    }
+    Ok(outcome)
+}
+
+fn ball_name(ball: ProbeBall) -> &'static str {
+    match ball {
+        ProbeBall::Grey => "grey",
+        ProbeBall::Chrome => "chrome",
+    }
 }
 
 /// Says where the room does not fit.

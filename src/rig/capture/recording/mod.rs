@@ -21,6 +21,7 @@ mod finding;
 mod outcome;
 mod progress;
 mod recorder;
+mod room_light;
 mod salvage;
 mod timing;
 mod verdict;

@@ -12,6 +12,7 @@ use super::cutter::{Cutter, IsKey};
 use super::error::RecordingError;
 use super::outcome::{CameraOutcome, WriterOutcome};
 use super::progress::{Progress, Shared, State};
+use super::room_light::RoomLight;
 use super::verdict::Recorded;
 use super::window::Window;
 use super::writer_thread::{JournalLine, WriterThread};
@@ -82,6 +83,7 @@ impl Recorder {
             delivered: Vec::new(),
             findings: Vec::new(),
             queue,
+            light: RoomLight::new(stream),
             shared: Arc::clone(&shared),
         };
         let is_key = (stream.format == PixelFormat::H264).then_some(is_key as IsKey);

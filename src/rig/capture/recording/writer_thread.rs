@@ -11,6 +11,7 @@ use super::error::RecordingError;
 use super::finding::Finding;
 use super::outcome::WriterOutcome;
 use super::progress::Shared;
+use super::room_light::RoomLight;
 use relit_data::session::{FrameEntry, JournaledReport, JournaledTurn, SessionWriter};
 use relit_video::{Muxer, StreamFormat, Written};
 
@@ -33,6 +34,7 @@ pub(super) struct WriterThread {
     pub(super) findings: Vec<Finding>,
     pub(super) queue: Receiver<TurnFrame>,
     pub(super) journal: Receiver<JournalLine>,
+    pub(super) light: RoomLight,
     pub(super) shared: Arc<Shared>,
 }
 
@@ -46,6 +48,7 @@ impl WriterThread {
             session: self.session,
             delivered: self.delivered,
             findings: self.findings,
+            light: self.light,
             bytes,
             failure: written.and(finished.map_err(RecordingError::from)).err(),
         }
@@ -106,6 +109,9 @@ impl WriterThread {
         };
         self.session.push(entry)?;
         self.delivered.push(turn_frame.delivered);
+        if let Some(at) = turn_frame.delivered {
+            self.light.add(at, &frame.data);
+        }
         Ok(())
     }
 

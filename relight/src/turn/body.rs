@@ -1,0 +1,62 @@
+//! What an object is made of, as far as its curves tell it.
+
+use serde::Serialize;
+
+use super::search::PixelFit;
+use super::solve::median;
+
+/// A diffuse body that leaves no more than this of a curve, over the energy of its variation, explains the turn.
+const EXPLAINED: f64 = 0.03;
+/// The part of what a diffuse body leaves that a metal has to leave at most to be taken for what the object is: its light
+/// has many more terms.
+const METAL_LEAVES: f64 = 0.5;
+
+/// What gives an object its colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BodyKind {
+    /// It scatters light evenly, and may have gloss that shows the light as it is: plastic, wood, stone, leather.
+    Diffuse,
+    /// It has no matt part, and its reflection is coloured: bronze, steel, gold.
+    Metal,
+}
+
+/// How well a kind of body explains a turn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BodyFigure {
+    /// The kind.
+    pub body: BodyKind,
+    /// What it leaves of a curve, over the energy of its variation: the median over blocks of pixels.
+    pub residual: f64,
+}
+
+impl BodyFigure {
+    pub(super) fn new(body: BodyKind, fits: &[PixelFit]) -> Self {
+        Self {
+            body,
+            residual: median(fits.iter().map(|fit| fit.residual)),
+        }
+    }
+}
+
+/// Whether what a diffuse body leaves lets the object be metal.
+pub(super) fn may_be_metal(diffuse: f64) -> bool {
+    diffuse > EXPLAINED
+}
+
+/// Whether what both kinds leave says that the object is metal.
+pub(super) fn is_metal(diffuse: f64, metal: f64) -> bool {
+    may_be_metal(diffuse) && metal < METAL_LEAVES * diffuse
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn metal_has_to_explain_clearly_more() {
+        assert!(is_metal(0.11, 0.04));
+        assert!(!is_metal(0.11, 0.10));
+        assert!(!is_metal(0.02, 0.001));
+    }
+}
