@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-train test test-rig test-slurm lint demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-train test test-rig test-slurm test-objects lint demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -16,6 +16,7 @@ BENCH_VIDEO ?= fixtures/$(SESSION)/video.mkv
 BENCH_MASK ?= fixtures/$(SESSION)/mask_gt.png
 BENCH_RUNS ?= 3
 BENCH_VENV := $(TARGET)/bench-venv
+OBJECTS_VENV := $(TARGET)/objects-venv
 
 # The turntable's firmware, and the emulated chip that its tests run on.
 FIRMWARE := $(TARGET)/firmware
@@ -53,10 +54,17 @@ test-slurm: setup ## Extract as an array job on a real Slurm, started on this ma
 	cargo build --locked -p relit --bin relit-extract
 	@tests/slurm/run $(TARGET)/debug/relit-extract
 
+test-objects: setup $(OBJECTS_VENV)/ready ## Extract from and to object stores, with an S3 server on this machine
+	cargo test --locked -p relit --features object-store --lib objects
+	cargo test --locked -p relit --features object-store --test objects
+	cargo build --locked -p relit --features object-store --bin relit-extract
+	tests/objects/s3 $(TARGET)/debug/relit-extract $(abspath $(OBJECTS_VENV))/bin/python
+
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check
 	cargo clippy --locked --workspace --all-targets $$(.ci/setup-train --features) -- -D warnings
 	cargo clippy --locked -p relight -- -D warnings
+	cargo clippy --locked -p relit --features object-store --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps
 	@if cargo tree --locked -p relight -e normal --prefix none \
 	    | grep -E '^(ffmpeg|opencv|axum|hyper|tokio|relit-(video|mask|rig))'; then \
@@ -127,6 +135,11 @@ $(EMULATOR): $(EMULATOR_SOURCES) $(wildcard rig-firmware/emulator/*.h)
 
 $(DEMO)/mask.png:
 	$(MAKE) demo
+
+$(OBJECTS_VENV)/ready: tests/objects/requirements.txt
+	python3 -m venv $(OBJECTS_VENV)
+	$(OBJECTS_VENV)/bin/pip install --quiet -r $<
+	touch $@
 
 $(BENCH_VENV)/ready: tests/bench/requirements.txt
 	python3 -m venv $(BENCH_VENV)

@@ -175,6 +175,9 @@ pub enum ExtractError {
     /// The data set cannot be written.
     #[error(transparent)]
     Shard(#[from] shard::ShardError),
+    /// An object store cannot be used.
+    #[error(transparent)]
+    Objects(#[from] super::objects::ObjectError),
     /// The report cannot be made.
     #[error(transparent)]
     Report(#[from] report::ReportError),

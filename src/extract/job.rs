@@ -90,19 +90,18 @@ impl Job {
         &self.recording.id
     }
 
-    /// The entry of this recording in the data set in `out`, if it was made from the same video, index
-    /// and mask, its files are intact, and these options accept it.
+    /// The entry of this recording in the data set, if it was made from the same video, index and mask, and these
+    /// options accept it.
     pub(super) fn existing_entry<'a>(
         &self,
         dataset: &'a Dataset,
-        out: &Path,
         options: &ExtractOptions,
     ) -> Option<&'a SessionEntry> {
         let entry = dataset.session(self.id())?;
         let same = entry.input == self.input && entry.mask.blake3 == self.mask.blake3;
         let accepted = (options.partial || entry.covered_deg.is_none())
             && (!options.strict || (!entry.lossy && entry.duplicates == 0));
-        (same && accepted && dataset.check_integrity(out, self.id()).is_ok()).then_some(entry)
+        (same && accepted).then_some(entry)
     }
 
     /// Whether the data set holds a session of this name from another video.

@@ -13,9 +13,11 @@ mod blur;
 mod catalog;
 mod collected;
 mod crop;
+mod depot;
 mod error;
 mod job;
 mod object;
+pub mod objects;
 mod observer;
 mod options;
 mod pipeline;
@@ -36,6 +38,7 @@ use relit_data::session::{self, recordings};
 use relit_data::shard::OutputFolder;
 
 use catalog::Catalog;
+use depot::{Depot, OnDisk};
 
 pub use align::{AlignBuffers, AlignSample, Aligner, Alignment, MIN_CONFIDENCE};
 pub use crop::{bounding_box, cut, square_around};
@@ -62,7 +65,8 @@ pub struct Tally {
 }
 
 /// Extracts all recordings in `inputs` (session folders, folders of sessions, video files) into the
-/// data set in the folder `out`, which is created if it does not exist.
+/// data set in the folder `out`, which is created if it does not exist. With the feature `object-store`, both may
+/// be URLs: see [`objects`].
 ///
 /// # Errors
 /// [`ExtractError`] if nothing can be extracted: an option is out of range, `out` holds a data set with other
@@ -75,6 +79,23 @@ pub fn extract(
     observer: &dyn Observer,
 ) -> Result<Tally, ExtractError> {
     options.check()?;
+    if inputs.iter().any(|input| objects::is_url(input)) || objects::is_url(out) {
+        return objects::extract(inputs, out, options, observer);
+    }
+    let mut tally = Tally::default();
+    let found = find(inputs, observer, &mut tally);
+    extract_recordings(&found, out, options, observer, &OnDisk, tally)
+}
+
+/// Extracts the recordings `found` into the folder `out`, and adds the outcomes to `tally`.
+fn extract_recordings(
+    found: &[PathBuf],
+    out: &Path,
+    options: &ExtractOptions,
+    observer: &dyn Observer,
+    depot: &dyn Depot,
+    mut tally: Tally,
+) -> Result<Tally, ExtractError> {
     if out.join(session::MANIFEST_FILE).exists() {
         return Err(ExtractError::IntoSession(out.to_owned()));
     }
@@ -82,18 +103,17 @@ pub fn extract(
         None => OutputFolder::lock(out)?,
         Some(task) => OutputFolder::lock_for(out, task)?,
     };
-    let mut tally = Tally::default();
-    let found = find(inputs, observer, &mut tally);
     let pool = ThreadPoolBuilder::new()
         .num_threads(options.threads)
         .build()?;
     let mut run = Run {
-        catalog: Catalog::open(&folder, &found, options)?,
+        catalog: Catalog::open(&folder, found, options)?,
         folder,
         options,
         pool,
         names: HashSet::new(),
         observer,
+        depot,
     };
     for (position, recording) in found.iter().enumerate() {
         if options.task.is_none_or(|task| task.takes(position)) {
@@ -145,6 +165,7 @@ struct Run<'a> {
     /// Names of the recordings so far.
     names: HashSet<String>,
     observer: &'a dyn Observer,
+    depot: &'a dyn Depot,
 }
 
 impl Run<'_> {
@@ -158,20 +179,28 @@ impl Run<'_> {
         let outcome = RecordingOutcome::of(self.extract_one(recording));
         tally.count(&outcome);
         self.observer.ended(recording, &outcome);
-        self.catalog.note(&self.folder, position, &outcome)
+        self.catalog.note(&self.folder, position, &outcome)?;
+        let extracted = match &outcome {
+            RecordingOutcome::Extracted(entry) => Some(entry.id.as_str()),
+            _ => None,
+        };
+        self.depot
+            .ended(recording, self.catalog.dataset(), extracted)
     }
 
     fn extract_one(&mut self, path: &Path) -> Result<RecordingOutcome, ExtractError> {
         let Self {
             folder, options, ..
         } = self;
-        let job = job::Job::open(path, options)?;
+        let local = self.depot.fetch(path)?;
+        let job = job::Job::open(&local, options)?;
         if !self.names.insert(job.id().to_owned()) {
             return Err(ExtractError::SameName(job.id().to_owned()));
         }
         let dataset = self.catalog.dataset();
         if options.resume
-            && let Some(entry) = job.existing_entry(dataset, folder.path(), options)
+            && let Some(entry) = job.existing_entry(dataset, options)
+            && self.depot.holds(dataset, folder.path(), job.id())
         {
             return Ok(RecordingOutcome::Skipped(Box::new(entry.clone())));
         }

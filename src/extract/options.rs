@@ -51,6 +51,9 @@ pub struct ExtractOptions {
     pub replace: bool,
     /// The task whose part of the recordings is extracted; `None` extracts all of them.
     pub task: Option<Task>,
+    /// The folder through which recordings and data sets of object stores pass; `None` is the system's folder
+    /// for temporary files.
+    pub cache: Option<PathBuf>,
     /// Number of worker threads, at least 1.
     pub threads: usize,
 }
@@ -73,6 +76,7 @@ impl Default for ExtractOptions {
             resume: false,
             replace: false,
             task: None,
+            cache: None,
             threads: available_parallelism().map_or(1, std::num::NonZero::get),
         }
     }

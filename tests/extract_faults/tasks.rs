@@ -108,3 +108,18 @@ fn a_session_that_no_task_made_and_a_file_that_is_gone_are_noticed() {
     let errors = workshop.errors(1, "merge out");
     assert!(errors.contains("session e, which is no task's"), "{errors}");
 }
+
+#[cfg(not(feature = "object-store"))]
+#[test]
+fn a_url_is_refused_by_a_program_without_object_stores() {
+    let workshop = Workshop::with(&[]);
+    for line in [
+        "s3://lab/in -o out",
+        "in -o s3://lab/out",
+        "merge s3://lab/out",
+        "stats s3://lab/out",
+    ] {
+        let errors = workshop.errors(1, line);
+        assert!(errors.contains("built without object stores"), "{errors}");
+    }
+}

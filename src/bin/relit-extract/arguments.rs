@@ -81,7 +81,7 @@ enum Verb {
     /// Join what several tasks wrote into one data set.
     #[command(after_help = "Example:\n  relit-extract merge dataset")]
     Merge {
-        /// The data set's folder.
+        /// The data set's folder, or a URL of one.
         #[arg(value_name = "OUT")]
         out: PathBuf,
         /// Print one JSON line per event on standard output.
@@ -93,7 +93,7 @@ enum Verb {
         after_help = "Example:\n  relit-extract stats dataset --html dataset/index.html\n\nIt reads dataset.json and the tables, and no shards."
     )]
     Stats {
-        /// The data set's folder.
+        /// The data set's folder, or a URL of one.
         #[arg(value_name = "OUT")]
         out: PathBuf,
         /// Write a page for a browser, too.
@@ -107,10 +107,10 @@ enum Verb {
 
 #[derive(Args)]
 struct ExtractArguments {
-    /// A session folder, a folder of sessions, or a video file.
+    /// A session folder, a folder of sessions, a video file, or a URL of one: s3://BUCKET/PATH, gs://, az://, file://.
     #[arg(value_name = "INPUT", required = true)]
     inputs: Vec<PathBuf>,
-    /// The data set's folder; created if it does not exist.
+    /// The data set's folder, or a URL of one; created if it does not exist.
     #[arg(short, long, value_name = "OUT")]
     out: PathBuf,
     /// The mask for all inputs [default: each session folder's mask.png].
@@ -162,6 +162,10 @@ struct ExtractArguments {
     /// Number of tasks that share the recordings.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_TASKS)))]
     task_count: Option<u32>,
+    /// Folder on the local disk through which recordings and data sets of object stores pass [default: the
+    /// system's folder for temporary files].
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
     /// Number of worker threads [default: one per core].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
@@ -292,6 +296,7 @@ impl ExtractArguments {
             resume: line.resume,
             replace: line.replace,
             task,
+            cache: line.cache,
             threads: line.threads.unwrap_or(defaults.threads),
         };
         let command = Command::Extract {

@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use relit::console::{Console, Outcome};
-use relit_data::shard::{ShardError, merge};
+use relit::extract::ExtractError;
+use relit::extract::objects::merge;
 use serde_json::json;
 
-pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ShardError> {
+pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError> {
     let merged = merge(out)?;
     for (name, why) in &merged.left_out {
         console.say(

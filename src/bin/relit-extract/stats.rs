@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use relit::console::{Console, Outcome};
+use relit::extract::ExtractError;
+use relit::extract::objects::overview;
 use relit_data::durable;
 use relit_data::report::render_overview;
 use relit_data::shard::{
@@ -19,8 +21,8 @@ pub(crate) fn run(
     console: Console,
     out: &Path,
     page: Option<&Path>,
-) -> Result<Outcome, ShardError> {
-    let overview = Overview::read(out)?;
+) -> Result<Outcome, ExtractError> {
+    let overview = overview(out)?;
     if let Some(page) = page {
         write_page(out, page, &overview)?;
     }

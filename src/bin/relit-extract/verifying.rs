@@ -3,13 +3,19 @@
 use std::path::Path;
 
 use relit::console::{Console, Outcome};
-use relit_data::shard::{ShardError, verify};
+use relit::extract::ExtractError;
+use relit::extract::objects::{ObjectError, is_url};
+use relit_data::shard::verify;
 use serde_json::json;
 
 /// Number of problems that are printed for a person.
 const MAX_PRINTED: usize = 50;
 
-pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ShardError> {
+pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError> {
+    if is_url(out) {
+        let url = out.display().to_string();
+        return Err(ObjectError::FolderOnly(url).into());
+    }
     let bar = console.progress(0, "verify");
     let report = verify(out, &|done, total| {
         bar.set_length(total);

@@ -219,6 +219,21 @@ impl Dataset {
         self.shards.iter().filter(move |shard| shard.session == id)
     }
 
+    /// The files of a session, with their lengths; a folder of images has none.
+    pub fn files_of<'a>(&'a self, id: &'a str) -> impl Iterator<Item = (&'a str, Option<u64>)> {
+        let tables = self.session(id).into_iter();
+        let tables =
+            tables.flat_map(|session| std::iter::once(&session.table).chain(&session.report));
+        let shards = self.shards_of(id).flat_map(|shard| {
+            let is_folder = shard.mask.is_some();
+            let own = (shard.file.as_str(), (!is_folder).then_some(shard.bytes));
+            let others = shard.mask.iter().chain(&shard.mean_img);
+            std::iter::once(own).chain(others.map(|entry| (entry.file.as_str(), Some(entry.bytes))))
+        });
+        let tables = tables.map(|entry| (entry.file.as_str(), Some(entry.bytes)));
+        tables.chain(shards)
+    }
+
     /// Adds a session and its shards, replacing an older entry with the same id.
     pub fn replace(&mut self, session: SessionEntry, shards: Vec<ShardEntry>) {
         self.remove(&session.id);

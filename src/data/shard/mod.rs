@@ -66,7 +66,7 @@ pub use reader::{ShardReader, ShardSample};
 pub use record::FrameRecord;
 pub use settings::{Align, ExtractionSettings, ImageSize, Layout, Native};
 pub use table::{TableRow, read_table};
-pub use task::{MAX_TASKS, Merged, Task, TaskOutcome, TaskPiece, merge};
+pub use task::{MAX_TASKS, Merged, Task, TaskOutcome, TaskPiece, merge, merge_with};
 pub use verify::{Problem, VerifyReport, verify};
 pub use writer::{Sample, ShardFiles, ShardWriter, TurnFinding};
 

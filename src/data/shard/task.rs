@@ -42,7 +42,8 @@ impl Task {
     }
 
     /// The file of its piece, relative to the data set.
-    pub(super) fn file(self) -> String {
+    #[must_use]
+    pub fn file(self) -> String {
         format!("{}/{self}.json", names::TASKS)
     }
 }
@@ -174,12 +175,26 @@ pub struct Merged {
 /// different recordings or settings, or a file is missing; then nothing is written.
 /// [`ShardError::Locked`] while a task is running, [`ShardError::Description`], [`ShardError::Io`].
 pub fn merge(out: &Path) -> Result<Merged, ShardError> {
+    merge_with(out, &|file| {
+        fs::metadata(out.join(file)).map(|found| found.len())
+    })
+}
+
+/// As [`merge`], of a data set whose files are elsewhere: `length` is that of a file, or of anything for a folder of
+/// images, or an error where there is none.
+///
+/// # Errors
+/// As [`merge`].
+pub fn merge_with(
+    out: &Path,
+    length: &dyn Fn(&str) -> io::Result<u64>,
+) -> Result<Merged, ShardError> {
     let folder = OutputFolder::lock_existing(out)?;
     let pieces = read_pieces(out)?;
     let mut problems = Vec::new();
     let merged = join(&pieces, &mut problems);
     if let Some(merged) = &merged {
-        problems.extend(missing_files(out, &merged.dataset));
+        problems.extend(missing_files(&merged.dataset, length));
         problems.extend(not_of_a_task(out, &merged.dataset)?);
     }
     match merged.filter(|_| problems.is_empty()) {
@@ -279,25 +294,16 @@ fn join(pieces: &[TaskPiece], problems: &mut Vec<String>) -> Option<Merged> {
 }
 
 /// Files of the data set that are not there or have another length.
-fn missing_files(out: &Path, dataset: &Dataset) -> Vec<String> {
-    let tables = dataset.sessions.iter().flat_map(|session| {
-        std::iter::once(&session.table)
-            .chain(&session.report)
-            .map(|entry| (entry.file.as_str(), Some(entry.bytes)))
-    });
-    let shards = dataset.shards.iter().map(|shard| {
-        let is_folder = shard.mask.is_some();
-        (shard.file.as_str(), (!is_folder).then_some(shard.bytes))
-    });
-    tables
-        .chain(shards)
-        .filter_map(|(file, bytes)| match fs::metadata(out.join(file)) {
-            Err(error) => Some(format!("{file}: {error}")),
-            Ok(found) => bytes
-                .filter(|&bytes| bytes != found.len())
-                .map(|bytes| format!("{file} has {} bytes, not {bytes}", found.len())),
-        })
-        .collect()
+fn missing_files(dataset: &Dataset, length: &dyn Fn(&str) -> io::Result<u64>) -> Vec<String> {
+    let ids = dataset.sessions.iter().map(|session| session.id.as_str());
+    let files = ids.flat_map(|id| dataset.files_of(id));
+    let problem = |(file, bytes): (&str, Option<u64>)| match length(file) {
+        Err(error) => Some(format!("{file}: {error}")),
+        Ok(found) => bytes
+            .filter(|&bytes| bytes != found)
+            .map(|bytes| format!("{file} has {found} bytes, not {bytes}")),
+    };
+    files.filter_map(problem).collect()
 }
 
 /// Sessions of an existing description that no task has.
