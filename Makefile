@@ -11,10 +11,10 @@ TARGET := $(or $(CARGO_TARGET_DIR),target)
 SESSION := 20261120T093015Z-cow
 DEMO := $(TARGET)/demo
 
-# The input of the benchmark, and the number of runs of each program.
+# The input of the benchmark, which scales it to 1080p, and the number of runs of each program.
 BENCH_VIDEO ?= fixtures/$(SESSION)/video.mkv
-BENCH_MASK ?= $(DEMO)/mask.png
-BENCH_RUNS ?= 5
+BENCH_MASK ?= fixtures/$(SESSION)/mask_gt.png
+BENCH_RUNS ?= 3
 BENCH_VENV := $(TARGET)/bench-venv
 OBJECTS_VENV := $(TARGET)/objects-venv
 
@@ -97,12 +97,13 @@ demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of 
 	echo "The report, for a browser:        $$(echo $(DEMO)/out/*-cow.html)"; \
 	echo "The shard of 1500 samples:        $$(echo $(DEMO)/out/*-cow.tar)"
 
-bench: setup $(BENCH_MASK) $(BENCH_VENV)/ready ## Measure relit-extract against ffmpeg and Python OpenCV
-	cargo build --locked --release -p relit --bins
+bench: setup $(BENCH_VENV)/ready ## Measure relit-extract at 1080p against ffmpeg and Python OpenCV
+	cargo build --locked --release -p relit --bins --example stages
 	$(BENCH_VENV)/bin/python tests/bench/bench.py --program $(TARGET)/release/relit-extract \
+	    --stages $(TARGET)/release/examples/stages \
 	    --video $(BENCH_VIDEO) --mask $(BENCH_MASK) --runs $(BENCH_RUNS) --work $(TARGET)/bench
 
-bench-reader: setup $(BENCH_MASK) $(BENCH_VENV)/ready ## Measure relight's reader of shards against Python webdataset
+bench-reader: setup $(DEMO)/mask.png $(BENCH_VENV)/ready ## Measure relight's reader of shards against Python webdataset
 	cargo build --locked --release -p relight --example read_turns
 	$(BENCH_VENV)/bin/python tests/bench/reader.py --reader $(TARGET)/release/examples/read_turns \
 	    --runs $(BENCH_RUNS) $(DEMO)/out

@@ -132,22 +132,6 @@ impl Job {
             check_strict(&plan, &notices)?;
         }
         let mut stage = self.stage(options)?;
-        // The look at the mask takes one thread, which leaves the others to the learning.
-        let (doubts, align) = pool.join(
-            || self.doubts_about_the_mask(),
-            || match options.align {
-                Align::Off => Ok(None),
-                _ => self.align(&stage, &plan, options, pool),
-            },
-        );
-        notices.extend(doubts);
-        stage.align = align?;
-        if options.align != Align::Off && stage.align.is_none() {
-            notices.push(Notice::Warning(
-                "the object has too little structure to measure its shifts: they are unknown"
-                    .to_owned(),
-            ));
-        }
         let mut steadiness = Steadiness::new(options.max_shift);
         let mut writer = ShardWriter::create(
             folder.path(),
@@ -159,26 +143,43 @@ impl Job {
         let mut collected = Collected::new(samples);
         let mut assignments = plan.assignments();
         let mut lost = Vec::new();
-        while !assignments.is_empty() {
-            let newly_lost = stage.run(&assignments, pool, |frame| {
-                if let Some(alignment) = &frame.alignment {
-                    steadiness.add(frame.number, alignment);
-                }
-                for &sample in assignments.get(&frame.number).into_iter().flatten() {
-                    let record = self.record(&stage, &plan, &frame, sample, options);
-                    collected.add(&record, &frame.image);
-                    let (image, png) = (frame.image.clone(), frame.png.clone());
-                    writer.push(Sample { record, image, png })?;
-                    observer.advanced();
-                }
-                Ok(())
-            })?;
-            assignments = plan.replace(&newly_lost.iter().map(|frame| frame.number).collect())?;
-            lost.extend(newly_lost);
-            if options.strict && !lost.is_empty() {
-                let first = notices_of_lost(&lost).swap_remove(0);
-                return Err(ExtractError::Strict(first.text().to_owned()));
+        let mut doubts = Vec::new();
+        pool.in_place_scope(|scope| {
+            // The look at the mask takes one thread for a while, and the others go on.
+            scope.spawn(|_| doubts = self.doubts_about_the_mask());
+            if options.align != Align::Off {
+                stage.align = self.align(&stage, &plan, options, pool)?;
             }
+            while !assignments.is_empty() {
+                let newly_lost = stage.run(&assignments, pool, |frame| {
+                    if let Some(alignment) = &frame.alignment {
+                        steadiness.add(frame.number, alignment);
+                    }
+                    for &sample in assignments.get(&frame.number).into_iter().flatten() {
+                        let record = self.record(&stage, &plan, &frame, sample, options);
+                        collected.add(&record, &frame.image);
+                        let (image, png) = (frame.image.clone(), frame.png.clone());
+                        writer.push(Sample { record, image, png })?;
+                        observer.advanced();
+                    }
+                    Ok(())
+                })?;
+                assignments =
+                    plan.replace(&newly_lost.iter().map(|frame| frame.number).collect())?;
+                lost.extend(newly_lost);
+                if options.strict && !lost.is_empty() {
+                    let first = notices_of_lost(&lost).swap_remove(0);
+                    return Err(ExtractError::Strict(first.text().to_owned()));
+                }
+            }
+            Ok(())
+        })?;
+        notices.extend(doubts);
+        if options.align != Align::Off && stage.align.is_none() {
+            notices.push(Notice::Warning(
+                "the object has too little structure to measure its shifts: they are unknown"
+                    .to_owned(),
+            ));
         }
         steadiness.check()?;
         let mut collected = collected.sorted();

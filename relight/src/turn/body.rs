@@ -9,7 +9,7 @@ use super::solve::median;
 const EXPLAINED: f64 = 0.03;
 /// The part of what a diffuse body leaves that a metal has to leave at most to be taken for what the object is: its light
 /// has many more terms.
-const METAL_LEAVES: f64 = 0.5;
+const METAL_LEAVES: f64 = 0.58;
 
 /// What gives an object its colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -40,9 +40,9 @@ const LITTLE: f64 = 0.75;
 /// Scales, from the finest on, that are compared with the next coarser one.
 const COMPARED: usize = 2;
 /// Standard deviations from which on a shift of an object that stands still is one.
-const SURE: f64 = 2.0;
+const SURE: f64 = 2.5;
 /// Shifts that change by less stand still, pixels, at the finest scale and at the others.
-const STILL: [f64; 2] = [5e-3, 0.03];
+const STILL: [f64; 2] = [0.01, 0.05];
 /// Further than this, pixels at the object's mean distance from its centre, a rotation or growth counts.
 const SIGNIFICANT: f64 = 0.5;
 

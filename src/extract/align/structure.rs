@@ -209,15 +209,17 @@ impl WithSimd for Luma<'_> {
         let mut grey = GrayImage::new(width / by, height / by);
         let rows = grey.as_flat_samples_mut().samples;
         let rows = rows.chunks_exact_mut(((width / by) as usize).max(1));
+        let mut line = vec![0_u32; width as usize];
         for (to, y) in rows.zip((0_i64..).step_by(by as usize)) {
             let above = self.picture.row(y, 0);
             if self.half {
-                let below = self.picture.row(y + 1, 0);
-                let pairs = above.chunks_exact(8).zip(below.chunks_exact(8));
-                for (to, (above, below)) in to.iter_mut().zip(pairs) {
-                    let above = sum_of(&above[..4]) + sum_of(&above[4..]);
-                    let below = sum_of(&below[..4]) + sum_of(&below[4..]);
-                    *to = ((above + below) >> 10) as u8;
+                let below = self.picture.row(y + 1, 0).chunks_exact(4);
+                let columns = line.iter_mut().zip(above.chunks_exact(4)).zip(below);
+                for ((sum, above), below) in columns {
+                    *sum = sum_of(above) + sum_of(below);
+                }
+                for (to, pair) in to.iter_mut().zip(line.chunks_exact(2)) {
+                    *to = ((pair[0] + pair[1]) >> 10) as u8;
                 }
             } else {
                 for (to, pixel) in to.iter_mut().zip(above.chunks_exact(4)) {

@@ -11,7 +11,7 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use super::structure::{Plane, add_scaled, cubic};
 
 /// Pixels of a template; those that say most about a shift are kept.
-const MOST_PIXELS: usize = 8_000;
+const MOST_PIXELS: usize = 4_000;
 /// Side of the squares in whose order the pixels stand, so that neighbours are near each other.
 const TILE: u32 = 24;
 /// Rows of a template that a thread makes at a time.
