@@ -29,6 +29,9 @@ pub enum ExtractError {
         /// The settings that differ.
         differ: String,
     },
+    /// A page would take the place of a file of the data set.
+    #[error("{0} is a file of the data set: give the page another name")]
+    PageInTheWay(PathBuf),
     /// Two recordings have the same name.
     #[error(
         "another recording of this call is also named {0}: extract them into different folders, or rename one"

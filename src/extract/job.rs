@@ -296,10 +296,7 @@ impl Job {
         };
         let samples: Vec<_> = samples.into_iter().map(|(_, sample)| sample).collect();
         let mask = cut(&self.mask.image, stage.crop);
-        let aligner = pool.install(|| {
-            let (max, tolerance) = (options.max_shift, options.align_tolerance);
-            Aligner::learn(&samples, nearest, &mask, max, tolerance)
-        });
+        let aligner = pool.install(|| Aligner::learn(&samples, nearest, &mask, options.max_shift));
         Ok(aligner.map(|aligner| pipeline::Align {
             aligner,
             correction: (options.align == Align::Correct).then_some(pipeline::Correction {

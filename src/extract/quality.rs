@@ -14,6 +14,8 @@ const AROUND: usize = 12;
 const LEAST_STEP: f64 = 0.1;
 /// And so many times the median change around it, which is the light's.
 const BEYOND_LIGHT: f64 = 6.0;
+/// Linear light, of all channels together, below which nothing is compared: steps of 8 bits are large there.
+const DARKEST: f64 = 1e-3;
 
 /// The samples of which there is something to say; `samples` are sorted by index, each with the digest of its
 /// image. A whole turn would have `whole_turn` of them.
@@ -93,7 +95,10 @@ fn identical(samples: &[(&FrameRecord, Digest)]) -> Vec<Option<u64>> {
 
 /// The change against the frame before, where it is a step, for each frame.
 fn exposure_steps(frames: &[&FrameRecord]) -> Vec<Option<f64>> {
-    let brightness = |record: &&FrameRecord| record.mean_rgb.iter().sum::<f64>().max(1.0).log2();
+    let brightness = |record: &&FrameRecord| {
+        let light: f64 = record.mean_rgb.iter().map(|&mean| linear(mean)).sum();
+        light.max(DARKEST).log2()
+    };
     let levels: Vec<f64> = frames.iter().map(brightness).collect();
     let changes: Vec<f64> = std::iter::once(0.0)
         .chain(levels.windows(2).map(|pair| pair[1] - pair[0]))
@@ -107,6 +112,16 @@ fn exposure_steps(frames: &[&FrameRecord]) -> Vec<Option<f64>> {
         is_step.then_some((1000.0 * change).round() / 1000.0)
     };
     changes.iter().enumerate().map(step).collect()
+}
+
+/// Linear light, 0..=1, of a mean of 8-bit sRGB values.
+fn linear(mean: f64) -> f64 {
+    let value = mean / 255.0;
+    if value <= 0.040_45 {
+        value / 12.92
+    } else {
+        ((value + 0.055) / 1.055).powf(2.4)
+    }
 }
 
 #[cfg(test)]
@@ -157,8 +172,15 @@ pub(super) mod tests {
         let findings = found((0..60).map(stepped));
         assert_eq!(findings.len(), 1, "{findings:?}");
         assert_eq!(findings[0].index, 30);
-        assert!(findings[0].exposure_step.unwrap() > 0.3);
         assert!(notices(&findings)[0].text().contains("sample 30"));
+    }
+
+    #[test]
+    fn a_step_is_told_in_stops_of_light() {
+        let shown = |light: f64| 255.0 * (1.055 * light.powf(1.0 / 2.4) - 0.055);
+        let findings = found((0..60).map(|n| shown(if n >= 30 { 0.1 } else { 0.2 })));
+        assert_eq!(findings.len(), 1, "{findings:?}");
+        assert_eq!(findings[0].exposure_step, Some(-1.0));
     }
 
     #[test]

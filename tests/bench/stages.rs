@@ -74,9 +74,7 @@ fn measure(path: &Path, mask: &GrayImage, frames: u64, side: u32) -> Result<(), 
         video.part(pending, crop, &mut part)?;
         samples.push(AlignSample::of(View::whole(&part)));
     }
-    let aligner = timed(&mut learnt, || {
-        Aligner::learn(&samples, 0, &crop_mask, 8.0, 0.1)
-    });
+    let aligner = timed(&mut learnt, || Aligner::learn(&samples, 0, &crop_mask, 8.0));
     let aligner = aligner.ok_or("the object has too little structure")?;
 
     let [mut read, mut decoded, mut aligned, mut scaled, mut encoded] = [Duration::ZERO; 5];

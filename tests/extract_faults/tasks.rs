@@ -109,6 +109,37 @@ fn a_session_that_no_task_made_and_a_file_that_is_gone_are_noticed() {
     assert!(errors.contains("session e, which is no task's"), "{errors}");
 }
 
+#[test]
+fn a_task_without_recordings_says_so() {
+    let workshop = workshop();
+    let errors = workshop.errors(0, &part(7, 100));
+    assert!(
+        errors.contains("task 7-of-100 has none of the recordings"),
+        "{errors}"
+    );
+    let errors = workshop.errors(0, &part(0, 1));
+    assert!(
+        errors.contains("task 0-of-1") && !errors.contains("none"),
+        "{errors}"
+    );
+}
+
+#[test]
+fn a_page_of_sums_takes_no_file_of_the_data_set() {
+    let workshop = workshop();
+    workshop.errors(0, &format!("a.mkv {SETTINGS} -o out"));
+    let whole = files(&workshop.path("out"));
+    for page in ["dataset.json", "a.html", "a.parquet"] {
+        let errors = workshop.errors(1, &format!("stats out --html out/{page}"));
+        assert!(errors.contains("is a file of the data set"), "{errors}");
+    }
+    assert!(files(&workshop.path("out")) == whole);
+    for _ in 0..2 {
+        workshop.errors(0, "stats out --html out/index.html");
+    }
+    assert!(workshop.path("out/index.html").is_file());
+}
+
 #[cfg(not(feature = "object-store"))]
 #[test]
 fn a_url_is_refused_by_a_program_without_object_stores() {

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::ProgressBar;
 use relit::console::{Console, Outcome};
-use relit::extract::{ExtractError, ExtractOptions, Observer, RecordingOutcome, extract};
+use relit::extract::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally, extract};
 use relit_data::causes::with_causes;
 use relit_data::shard::SessionEntry;
 use serde_json::json;
@@ -21,7 +21,24 @@ pub(crate) fn run(
         out,
         bar: Mutex::new(ProgressBar::hidden()),
     };
+    if let Some(task) = options.task {
+        // It may be the scheduler's variables that say so.
+        console.say_phase(
+            &format!(
+                "task {task}: every {}th recording is this one's",
+                task.count()
+            ),
+            &json!({ "event": "task", "task": task.to_string() }),
+        );
+    }
     let tally = extract(inputs, out, options, &reporter)?;
+    if let Some(task) = options.task
+        && tally == Tally::default()
+    {
+        console.warn(&format!(
+            "task {task} has none of the recordings: name all of them to each task, or give --task-id 0 --task-count 1 for all that are named"
+        ));
+    }
     console.say(
         &format!(
             "{}: {} extracted ({} with losses), {} skipped, {} left out, {} failed",

@@ -24,6 +24,9 @@ pub(crate) fn run(
 ) -> Result<Outcome, ExtractError> {
     let overview = overview(out)?;
     if let Some(page) = page {
+        if is_of_data_set(out, page, &overview) {
+            return Err(ExtractError::PageInTheWay(page.to_owned()));
+        }
         write_page(out, page, &overview)?;
     }
     for problem in &overview.problems {
@@ -50,6 +53,22 @@ pub(crate) fn run(
         true => Outcome::Whole,
         false => Outcome::Lossy,
     })
+}
+
+/// Whether a page would take the place of a file of the data set.
+fn is_of_data_set(out: &Path, page: &Path, overview: &Overview) -> bool {
+    let Ok(page) = page.canonicalize() else {
+        return false;
+    };
+    let is_report = |session: &SessionOverview| {
+        let report = session.entry.report.as_ref();
+        report.is_some_and(|report| {
+            out.join(&report.file).canonicalize().ok().as_deref() == Some(&page)
+        })
+    };
+    let is_other = page.extension().is_none_or(|e| e != "html");
+    let is_inside = out.canonicalize().is_ok_and(|out| page.starts_with(out));
+    (is_inside && is_other) || overview.sessions.iter().any(is_report)
 }
 
 fn write_page(out: &Path, page: &Path, overview: &Overview) -> Result<(), ShardError> {

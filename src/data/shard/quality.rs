@@ -10,6 +10,8 @@ use super::record::FrameRecord;
 const TURN_DEG: f64 = 360.0;
 /// Up to this share of pictures that the camera repeated, or of blurred ones, a session is usable.
 const USABLE_SHARE: f64 = 0.05;
+/// Up to so many flawed samples, a session is usable, however few it has.
+const FEW: f64 = 2.0;
 /// Up to this share of samples at which the exposure steps, a session is usable.
 const USABLE_STEPS: f64 = 0.01;
 /// An object whose mean is nowhere above this 8-bit value is black.
@@ -147,7 +149,7 @@ impl SessionQuality {
         ];
         for (samples, most, what) in flaws {
             if samples > 0 {
-                let few = f64::from(samples) <= most;
+                let few = f64::from(samples) <= most.max(FEW);
                 let verdict = if few {
                     QualityVerdict::Usable
                 } else {

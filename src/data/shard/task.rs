@@ -35,6 +35,12 @@ impl Task {
         (index < count && count <= MAX_TASKS).then_some(Self { index, count })
     }
 
+    /// How many tasks there are.
+    #[must_use]
+    pub fn count(self) -> u32 {
+        self.count
+    }
+
     /// Whether the recording at this position of the list of all is this task's.
     #[must_use]
     pub fn takes(self, position: usize) -> bool {

@@ -31,6 +31,9 @@ const LEAST_PIXELS: usize = 150;
 const MOST_SCALES: usize = 6;
 /// Pixels at the object's outline that are left out, at the finest and at the other scales.
 const OUTLINE: [usize; 2] = [2, 1];
+/// Source pixels by which the mask's frame may lie beside the turn's middle and still be taken to lie there: as exactly as one
+/// frame can be measured.
+const SAME_PLACE: f64 = 0.1;
 /// Times that the template is made anew at the coarsest, the finest, and the scales between.
 const ROUNDS: [usize; 3] = [3, 2, 1];
 /// Shifts up to this many times the largest are looked for, so that a larger one is told from none.
@@ -110,7 +113,7 @@ pub struct AlignBuffers {
 impl Aligner {
     /// Learns the object under `mask` (not 0) from frames that are spread over the turn, in the mask's size.
     /// Shifts count from the object's place in `samples[reference]`, the frame of the mask; where that is
-    /// within `tolerance` pixels of the turn's middle place, which is known more exactly, from there.
+    /// within a tenth of a pixel of the turn's middle place, which is known more exactly, from there.
     ///
     /// `None` if the object has too little structure.
     #[must_use]
@@ -119,13 +122,12 @@ impl Aligner {
         reference: usize,
         mask: &GrayImage,
         max_shift: f64,
-        tolerance: f64,
     ) -> Option<Self> {
         let halvings = halvings(mask.dimensions());
         let unit = f64::from(1_u32 << halvings);
         let scales = scales(&halved(mask, halvings));
         let reach = (max_shift * LOOK_BEYOND + 1.0) / unit;
-        let tolerance = tolerance / unit;
+        let near = SAME_PLACE / unit;
         let mut shifts = vec![[0.0; 2]; samples.len()];
         let mut templates = Vec::new();
         for (scale, inner) in scales.iter().enumerate().rev() {
@@ -150,7 +152,7 @@ impl Aligner {
                 let last = scale == 0 && round + 1 == rounds;
                 let origin = match shifts.get(reference).copied() {
                     Some(origin) if !last => origin,
-                    origin => final_origin(origin, &shifts, tolerance),
+                    origin => final_origin(origin, &shifts, near),
                 };
                 for shift in &mut shifts {
                     *shift = [shift[0] - origin[0], shift[1] - origin[1]];
@@ -283,13 +285,13 @@ impl Aligner {
 }
 
 /// Where shifts count from in the end.
-fn final_origin(reference: Option<[f64; 2]>, shifts: &[[f64; 2]], tolerance: f64) -> [f64; 2] {
+fn final_origin(reference: Option<[f64; 2]>, shifts: &[[f64; 2]], near: f64) -> [f64; 2] {
     let middle = [0, 1].map(|axis| {
         let mut parts: Vec<f64> = shifts.iter().map(|shift| shift[axis]).collect();
         parts.sort_unstable_by(f64::total_cmp);
         parts.get(parts.len() / 2).copied().unwrap_or_default()
     });
-    let far = |[x, y]: &[f64; 2]| (x - middle[0]).hypot(y - middle[1]) > tolerance;
+    let far = |[x, y]: &[f64; 2]| (x - middle[0]).hypot(y - middle[1]) > near;
     reference.filter(far).unwrap_or(middle)
 }
 

@@ -45,9 +45,9 @@ fn angle(at: usize, of: usize) -> f64 {
 }
 
 /// Learns from a turn whose frames have these shifts, counted from the first.
-fn learnt(shift: impl Fn(usize) -> [f64; 2], tolerance: f64) -> Aligner {
+fn learnt(shift: impl Fn(usize) -> [f64; 2]) -> Aligner {
     let samples: Vec<AlignSample> = (0..24).map(|at| frame(shift(at), angle(at, 24))).collect();
-    Aligner::learn(&samples, 0, &mask(), 8.0, tolerance).unwrap()
+    Aligner::learn(&samples, 0, &mask(), 8.0).unwrap()
 }
 
 fn measured(aligner: &Aligner, frame: &AlignSample) -> Alignment {
@@ -61,7 +61,7 @@ fn error(aligner: &Aligner, shift: [f64; 2], angle: f64) -> f64 {
 
 #[test]
 fn shifts_are_found_to_a_tenth_of_a_pixel_while_light_and_highlight_move() {
-    let aligner = learnt(|at| [0.1 * at as f64, 0.3 * (at as f64).sin()], 0.1);
+    let aligner = learnt(|at| [0.1 * at as f64, 0.3 * (at as f64).sin()]);
     for (shift, at) in [
         ([0.0, 0.0], 1),
         ([0.4, -0.7], 5),
@@ -75,7 +75,7 @@ fn shifts_are_found_to_a_tenth_of_a_pixel_while_light_and_highlight_move() {
 
 #[test]
 fn a_turn_that_stands_still_stays_where_it_is() {
-    let aligner = learnt(|_| [0.0; 2], 0.1);
+    let aligner = learnt(|_| [0.0; 2]);
     for at in 0..15 {
         let error = error(&aligner, [0.0; 2], angle(at, 15));
         assert!(error < 0.05, "{at}: {error}");
@@ -85,14 +85,14 @@ fn a_turn_that_stands_still_stays_where_it_is() {
 #[test]
 fn shifts_count_from_the_frame_of_the_mask() {
     // All frames but the mask's lie 2 pixels further right.
-    let aligner = learnt(|at| [if at == 0 { 0.0 } else { 2.0 }, 0.0], 0.1);
+    let aligner = learnt(|at| [if at == 0 { 0.0 } else { 2.0 }, 0.0]);
     let error = error(&aligner, [2.0, 0.0], angle(7, 24));
     assert!(error < 0.1, "{error}");
 }
 
 #[test]
 fn a_frame_without_the_object_is_not_registered() {
-    let aligner = learnt(|_| [0.0; 2], 0.1);
+    let aligner = learnt(|_| [0.0; 2]);
     let noise = RgbaImage::from_fn(SIDE, SIDE, |x, y| {
         grey((x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503_001)).to_le_bytes()[2])
     });
@@ -106,12 +106,12 @@ fn a_frame_without_the_object_is_not_registered() {
 fn an_object_without_structure_cannot_be_learnt() {
     let grey = AlignSample::of(View::whole(&RgbaImage::from_pixel(SIDE, SIDE, grey(99))));
     let samples = vec![grey; 8];
-    assert!(Aligner::learn(&samples, 0, &mask(), 8.0, 0.1).is_none());
+    assert!(Aligner::learn(&samples, 0, &mask(), 8.0).is_none());
 }
 
 #[test]
 fn a_rotation_is_reported_where_it_is_significant_and_not_else() {
-    let aligner = learnt(|_| [0.0; 2], 0.1);
+    let aligner = learnt(|_| [0.0; 2]);
     assert_eq!(measured(&aligner, &frame([1.3, 0.4], 0.7)).turned, None);
     let AlignSample(still) = frame([0.0; 2], 0.7);
     let degrees = 1.5_f64;
@@ -133,7 +133,7 @@ fn a_rotation_is_reported_where_it_is_significant_and_not_else() {
 
 #[test]
 fn in_a_turn_that_stands_still_only_a_sure_shift_is_corrected() {
-    let aligner = learnt(|_| [0.0; 2], 0.1);
+    let aligner = learnt(|_| [0.0; 2]);
     let unsure = Alignment {
         shift: Some([0.12, 0.05]),
         uncertainty: 0.08,
@@ -145,7 +145,7 @@ fn in_a_turn_that_stands_still_only_a_sure_shift_is_corrected() {
     assert!(jolt.uncertainty < 0.5, "{jolt:?}");
     assert_eq!(aligner.to_correct(&jolt, 0.1), jolt.shift);
     assert_eq!(aligner.to_correct(&jolt, 2.0), None);
-    let shaken = learnt(|at| [0.1 * at as f64, 0.3 * (at as f64).sin()], 0.1);
+    let shaken = learnt(|at| [0.1 * at as f64, 0.3 * (at as f64).sin()]);
     assert_eq!(shaken.to_correct(&unsure, 0.1), unsure.shift);
 }
 
@@ -162,7 +162,7 @@ fn a_large_picture_is_measured_in_its_own_pixels() {
         .collect();
     assert!(samples[0].0.width() <= 640);
     let mask = image::imageops::resize(&mask(), 5 * SIDE, 5 * SIDE, image::imageops::Nearest);
-    let aligner = Aligner::learn(&samples, 0, &mask, 16.0, 0.1).unwrap();
+    let aligner = Aligner::learn(&samples, 0, &mask, 16.0).unwrap();
     let moved = large(&frame([2.0, -1.0], angle(7, 24)));
     let found = measured(&aligner, &AlignSample::of(View::whole(&moved)))
         .shift

@@ -11,8 +11,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use mozjpeg_sys::{
     J_COLOR_SPACE, J_DCT_METHOD, JPEG_LIB_VERSION, jpeg_CreateDecompress, jpeg_common_struct,
     jpeg_crop_scanline, jpeg_decompress_struct, jpeg_destroy_decompress, jpeg_error_mgr,
-    jpeg_mem_src, jpeg_read_header, jpeg_read_scanlines, jpeg_skip_scanlines,
-    jpeg_start_decompress, jpeg_std_error,
+    jpeg_finish_decompress, jpeg_mem_src, jpeg_read_header, jpeg_read_scanlines,
+    jpeg_skip_scanlines, jpeg_start_decompress, jpeg_std_error,
 };
 
 use super::Refused;
@@ -117,7 +117,27 @@ impl Library {
             let pixels = line.get(surplus..surplus + bytes).ok_or(Refused)?;
             row.get_mut(..bytes).ok_or(Refused)?.copy_from_slice(pixels);
         }
-        Ok(())
+        finish(state, &mut line)
+    }
+}
+
+/// Reads what follows the part. Damaged data are mostly noticed only at their end: some are left over, or missing.
+fn finish(state: &mut jpeg_decompress_struct, line: &mut [u8]) -> Result<(), Refused> {
+    let rows = state.output_height - state.output_scanline;
+    let mut at = line.as_mut_ptr();
+    // SAFETY: decoding has begun, and the line holds a row of the part's width. The last row is read, because the
+    // library does not look at rows that are skipped up to the end.
+    unsafe {
+        if rows > 1 {
+            jpeg_skip_scanlines(state, rows - 1);
+        }
+        if rows > 0 && jpeg_read_scanlines(state, &mut at, 1) != 1 {
+            return Err(Refused);
+        }
+        match jpeg_finish_decompress(state) {
+            0 => Err(Refused),
+            _ => Ok(()),
+        }
     }
 }
 

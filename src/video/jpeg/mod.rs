@@ -1,7 +1,7 @@
 //! Decoding a part of a JPEG, and no more than that needs.
 //!
-//! libjpeg-turbo skips rows and columns: what lies outside is parsed and neither transformed nor
-//! converted, and what follows the last row is not read. A pixel of a part is the same as in the whole
+//! libjpeg-turbo skips rows and columns: what lies outside is parsed, because damage shows there, and neither
+//! transformed nor converted. A pixel of a part is the same as in the whole
 //! picture: the accurate integer transform, each pixel with the colour of its own chroma sample, and the
 //! conversion of JFIF (full-range BT.601).
 //!

@@ -130,6 +130,21 @@ fn data_that_are_cut_off_or_damaged_in_the_part_are_refused() {
     assert!(part(&early, all).is_err());
 }
 
+#[test]
+fn damage_that_shows_only_at_the_end_of_the_data_refuses_any_part() {
+    for jpeg in JPEGS.iter() {
+        let mut damaged = jpeg.clone();
+        let middle = damaged.len() / 2;
+        for byte in &mut damaged[middle..middle + 6] {
+            *byte ^= 0x55;
+        }
+        for region in [Rect::new(0, 0, 16, 8), Rect::new(30, 20, 77, 61)] {
+            assert!(part(jpeg, region).is_ok());
+            assert!(part(&damaged, region).is_err(), "{region:?}");
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
