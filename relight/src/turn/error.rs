@@ -28,6 +28,16 @@ pub enum TurnError {
         /// How many it has.
         found: usize,
     },
+    /// Frames are missing, and none of them has an angle.
+    #[error(
+        "the frames have no angles, and only {found} of at least {indices} of the turn are there: without angles, a turn has to be whole"
+    )]
+    NoAngles {
+        /// How many frames there are.
+        found: u32,
+        /// The last frame's number, from 1.
+        indices: u64,
+    },
     /// A frame has another size than the first.
     #[error("a frame has {} x {} pixels where {} x {} are needed", found.width, found.height, expected.width, expected.height)]
     FrameSize {

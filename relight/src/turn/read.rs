@@ -88,7 +88,8 @@ pub fn read_curves(
         first_angles: Vec::new(),
         sources: Vec::new(),
         mask: None,
-        has_angles: true,
+        has_angles: None,
+        last_index: 0.0,
         damage: Vec::new(),
     };
     let mut stream = Stream::start(&turns, streaming)?;
@@ -116,7 +117,9 @@ struct Reader {
     first_angles: Vec<f64>,
     sources: Vec<(u64, f64)>,
     mask: Option<Planes<1>>,
-    has_angles: bool,
+    /// As the first frame has it.
+    has_angles: Option<bool>,
+    last_index: f64,
     damage: Vec<String>,
 }
 
@@ -130,7 +133,9 @@ impl Reader {
             if frame.record.as_ref().is_some_and(|record| record.duplicate) {
                 continue;
             }
-            let angle = self.angle(frame);
+            let Some(angle) = self.angle(frame) else {
+                continue;
+            };
             if let Some(record) = &frame.record {
                 self.sources.push((record.source_frame, angle));
             }
@@ -154,19 +159,34 @@ impl Reader {
         self.builder.as_mut().ok_or(TurnError::Empty)
     }
 
-    fn angle(&mut self, frame: &TurnFrame) -> f64 {
+    /// The angle of a frame in degrees; `None` if others have one and it has none, or the other way around.
+    fn angle(&mut self, frame: &TurnFrame) -> Option<f64> {
         let told = frame.record.as_ref().and_then(|record| record.angle_deg);
-        let degrees = told.unwrap_or_else(|| {
-            self.has_angles = false;
-            360.0 * index(frame) / f64::from(self.frames.max(1))
-        });
-        match self.sense {
+        if *self.has_angles.get_or_insert(told.is_some()) != told.is_some() {
+            let key = &frame.key;
+            self.damage.push(match told {
+                Some(_) => format!("{key} has an angle and others have none: it is left out"),
+                None => format!("{key} has no angle and others do: it is left out"),
+            });
+            return None;
+        }
+        self.last_index = self.last_index.max(index(frame));
+        let degrees = told.unwrap_or_else(|| 360.0 * index(frame) / f64::from(self.frames.max(1)));
+        Some(match self.sense {
             TableSense::CounterClockwise => degrees,
             TableSense::Clockwise => -degrees,
-        }
+        })
     }
 
     fn finish(self, name: String) -> Result<ReadTurn, TurnError> {
+        let has_angles = self.has_angles.unwrap_or(true);
+        let indices = self.last_index as u64 + 1;
+        if !has_angles && indices > self.frames.into() {
+            return Err(TurnError::NoAngles {
+                found: self.frames,
+                indices,
+            });
+        }
         let builder = self.builder.ok_or(TurnError::Empty)?;
         Ok(ReadTurn {
             name,
@@ -175,7 +195,7 @@ impl Reader {
             first_angles: self.first_angles,
             sources: self.sources,
             mask: self.mask.ok_or(TurnError::Empty)?,
-            has_angles: self.has_angles,
+            has_angles,
             damage: self.damage,
         })
     }

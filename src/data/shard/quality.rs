@@ -223,18 +223,27 @@ mod tests {
             |r| r.identical_to = Some(0),
             |r| r.blur = Some(1.0),
         ];
-        for (set, most) in set.into_iter().zip([1, 5, 5]) {
+        for (set, most) in set.into_iter().zip([3, 15, 15]) {
             for (samples, verdict) in [
                 (most, QualityVerdict::Usable),
                 (most + 1, QualityVerdict::Broken),
             ] {
-                let mut records = turn(100);
+                let mut records = turn(300);
                 records.iter_mut().take(samples).for_each(set);
                 let quality = SessionQuality::of(&records, false, None);
                 assert_eq!(quality.verdict, verdict, "{:?}", quality.reasons);
                 assert_eq!(quality.reasons.len(), 1);
             }
         }
+    }
+
+    #[test]
+    fn two_flaws_break_no_session_however_short() {
+        let mut records = turn(3);
+        records[0].exposure_step = Some(0.5);
+        records[1].blur = Some(1.0);
+        let quality = SessionQuality::of(&records, false, None);
+        assert_eq!(quality.verdict, QualityVerdict::Usable);
     }
 
     #[test]

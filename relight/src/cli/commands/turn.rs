@@ -160,6 +160,23 @@ impl Arguments {
         given.unwrap_or_else(Elevation::assumed)
     }
 
+    /// An asset takes the place of an earlier one, and of nothing else.
+    fn check_asset(&self) -> Result<(), String> {
+        let Some(path) = self.asset.as_deref() else {
+            return Ok(());
+        };
+        let is_asset = path
+            .extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("relit"));
+        if is_asset {
+            return Ok(());
+        }
+        Err(format!(
+            "--asset {}: give a name that ends in .relit",
+            path.display()
+        ))
+    }
+
     /// `measured` is the light by the ball.
     fn options(
         &self,
@@ -184,6 +201,7 @@ impl Arguments {
 
 pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let start = Instant::now();
+    arguments.check_asset()?;
     let bar = console.progress(0, "frames");
     let turn = read_curves(&arguments.shard, arguments.sense(), &|done, all| {
         bar.set_length(all);
@@ -272,7 +290,7 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
     if arguments.session.is_some() {
         warn_of_room(strip, arguments.sense, console);
     }
-    let outcome = warn(&turn, &options, conditioning, console);
+    let outcome = warn(&turn, &options, solution.body(), conditioning, console);
     if arguments.labels.is_some() && !has_labels {
         let text = TurnError::NoMattPart.to_string();
         console.warn(&text, &json!({ "event": "warning", "message": text }));
@@ -311,6 +329,7 @@ fn warn_of_room(strip: Option<&RoomStrip>, sense: SenseName, console: Console) {
 fn warn(
     turn: &ReadTurn,
     options: &TurnOptions,
+    body: BodyKind,
     conditioning: Conditioning,
     console: Console,
 ) -> Outcome {
@@ -330,6 +349,11 @@ fn warn(
     }
     if let Some(advice) = conditioning.verdict.advice() {
         warn(advice);
+    }
+    if body == BodyKind::Metal && options.body.is_none() && options.light.is_none() {
+        warn(
+            "the object is taken for metal, which in unknown light can be wrong: do not use its albedo, and give --body diffuse if it is not of metal",
+        );
     }
     if turn.damage.is_empty() && conditioning.verdict != RoomVerdict::TooEven {
         Outcome::Whole
