@@ -152,6 +152,34 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
         assert_eq!(event["figures"]["elevation"]["source"], "assumed");
         assert!(event["figures"]["ambiguity"].is_null());
     }
+    let taken_for = |name: &str| {
+        let mut other = arguments.to_vec();
+        other.extend(["--asset", name]);
+        let run = relight(&other);
+        assert_eq!(run.status.code(), Some(1));
+        assert!(text(&run.stderr).contains("give a name that ends in .relit"));
+    };
+    let before = fs::read(&shard).unwrap();
+    taken_for(shard.to_str().unwrap());
+    assert!(fs::read(&shard).unwrap() == before);
+    let lit = folder.path().join("lit.png");
+    let light = out.join("light.txt");
+    let run = relight(&[
+        "render",
+        object.to_str().unwrap(),
+        "--light",
+        light.to_str().unwrap(),
+        "-o",
+        lit.to_str().unwrap(),
+    ]);
+    assert!(run.status.success(), "{}", text(&run.stderr));
+    let lit = Rgb::<Linear>::read(&lit, Transfer::Srgb).unwrap();
+    assert!(
+        lit.planes()
+            .planes()
+            .iter()
+            .any(|plane| plane.iter().any(|&v| v > 0.2))
+    );
     let asset = Asset::read(&object).unwrap();
     assert!(!asset.surface().normals().is_empty());
     assert_eq!(

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
+use relight::asset::Asset;
 use relight::image::{Linear, Rgb, Srgb};
 use relight::light::{Direction, Order, Panorama, Rotation, ShLight};
 use relight::movie::{MovieFormat, MovieWriter};
@@ -60,9 +61,12 @@ pub(in crate::cli) struct Arguments {
 
 #[derive(Args)]
 struct ObjectArguments {
+    /// A captured object, which relight turn --asset has written, in place of maps.
+    #[arg(value_name = "OBJECT.relit", conflicts_with_all = ["normals", "mask", "albedo", "reflectance", "smoothness"])]
+    asset: Option<PathBuf>,
     /// Normals: PNG of 8 or 16 bits, colours (n + 1) / 2, black outside; or EXR of vectors. x right, z to the viewer.
-    #[arg(long, value_name = "FILE")]
-    normals: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "asset")]
+    normals: Option<PathBuf>,
     /// Which way y points in the map of normals.
     #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up)]
     normals_y: YName,
@@ -197,9 +201,17 @@ impl Arguments {
 }
 
 impl ObjectArguments {
-    fn files(&self) -> MapFiles {
+    fn read(&self) -> Result<Surface, Box<dyn Error>> {
+        match (&self.asset, &self.normals) {
+            (Some(path), _) => Ok(Asset::read(path)?.surface().clone()),
+            (None, Some(normals)) => Ok(self.files(normals).read()?),
+            (None, None) => Err("give an object (.relit), or --normals".into()),
+        }
+    }
+
+    fn files(&self, normals: &Path) -> MapFiles {
         MapFiles {
-            normals: self.normals.clone(),
+            normals: normals.to_owned(),
             frame: self.normals_y.into(),
             mask: self.mask.clone(),
             albedo: self.albedo.clone(),
@@ -227,7 +239,7 @@ impl LightArguments {
 }
 
 pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let surface = arguments.object.files().read()?;
+    let surface = arguments.object.read()?;
     let light = arguments.light.read()?;
     let look = arguments.look(&light);
     let frames = arguments.turn.unwrap_or(1);
