@@ -11,6 +11,8 @@
 //! | [`report`] | the HTML page of one extracted session |
 //! | [`geometry`] | pixel rectangles |
 //! | [`image_stats`] | statistics of an image's pixels, all or under a mask |
+//! | [`srgb`] | sRGB values to light and back |
+//! | [`turn_light`] | how much light changes over a turn |
 //! | [`naming`] | the names that a session may have |
 //! | [`durable`] | files that appear whole or not at all |
 //! | [`causes`] | errors as text, with their causes |
@@ -166,4 +168,5 @@ pub mod naming;
 pub mod report;
 pub mod session;
 pub mod shard;
+pub mod srgb;
 pub mod turn_light;

@@ -396,7 +396,7 @@ impl Job {
         Ok(report::render(&Page {
             records: &collected.records,
             thumbnails: &collected.thumbnails,
-            settings: &setting_rows(options),
+            settings: &options.settings().rows(),
             facts: &[
                 pair("video", self.input.video.clone()),
                 pair("codec", format!("{}, {}", facts.codec, facts.pixel_format)),
@@ -495,18 +495,6 @@ fn notices_of_lost(lost: &[LostFrame]) -> Vec<Notice> {
         )));
     }
     notices
-}
-
-fn setting_rows(options: &ExtractOptions) -> Vec<(String, String)> {
-    let settings = serde_json::to_value(options.settings()).unwrap_or_default();
-    let rows = settings.as_object().into_iter().flatten();
-    rows.map(|(name, value)| {
-        let text = value
-            .as_str()
-            .map_or_else(|| value.to_string(), str::to_owned);
-        (name.replace('_', " "), text)
-    })
-    .collect()
 }
 
 /// BLAKE3 of the frame index, if it was used.

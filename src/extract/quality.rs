@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use relit_data::session::Notice;
 use relit_data::shard::{Digest, FrameRecord, TurnFinding};
+use relit_data::srgb::to_linear;
 
 use super::blur::blurs;
 
@@ -96,7 +97,11 @@ fn identical(samples: &[(&FrameRecord, Digest)]) -> Vec<Option<u64>> {
 /// The change against the frame before, where it is a step, for each frame.
 fn exposure_steps(frames: &[&FrameRecord]) -> Vec<Option<f64>> {
     let brightness = |record: &&FrameRecord| {
-        let light: f64 = record.mean_rgb.iter().map(|&mean| linear(mean)).sum();
+        let light: f64 = record
+            .mean_rgb
+            .iter()
+            .map(|&mean| to_linear(mean / 255.0))
+            .sum();
         light.max(DARKEST).log2()
     };
     let levels: Vec<f64> = frames.iter().map(brightness).collect();
@@ -112,16 +117,6 @@ fn exposure_steps(frames: &[&FrameRecord]) -> Vec<Option<f64>> {
         is_step.then_some((1000.0 * change).round() / 1000.0)
     };
     changes.iter().enumerate().map(step).collect()
-}
-
-/// Linear light, 0..=1, of a mean of 8-bit sRGB values.
-fn linear(mean: f64) -> f64 {
-    let value = mean / 255.0;
-    if value <= 0.040_45 {
-        value / 12.92
-    } else {
-        ((value + 0.055) / 1.055).powf(2.4)
-    }
 }
 
 #[cfg(test)]
@@ -177,7 +172,7 @@ pub(super) mod tests {
 
     #[test]
     fn a_step_is_told_in_stops_of_light() {
-        let shown = |light: f64| 255.0 * (1.055 * light.powf(1.0 / 2.4) - 0.055);
+        let shown = |light: f64| 255.0 * relit_data::srgb::from_linear(light);
         let findings = found((0..60).map(|n| shown(if n >= 30 { 0.1 } else { 0.2 })));
         assert_eq!(findings.len(), 1, "{findings:?}");
         assert_eq!(findings[0].exposure_step, Some(-1.0));

@@ -247,11 +247,27 @@ fn planes_to_rgba(
     (width, height): (u32, u32),
     rgba: &mut [u8],
 ) -> Option<()> {
-    let (shift_x, shift_y) = chroma_shifts(format);
+    let shifts = chroma_shifts(format);
+    let planes = yuv_planes(frame, shifts, (x, y), (width, height))?;
+    let to_rgba = match shifts {
+        (1, 1) => yuv::yuv420_to_rgba,
+        (1, 0) => yuv::yuv422_to_rgba,
+        _ => yuv::yuv444_to_rgba,
+    };
+    to_rgba(&planes, rgba, 4 * width, colour.range(), colour.matrix).ok()
+}
+
+/// Part of a planar YUV picture, from a pixel on that a chroma sample begins with.
+fn yuv_planes(
+    frame: &frame::Video,
+    (shift_x, shift_y): (usize, usize),
+    (x, y): (usize, usize),
+    (width, height): (u32, u32),
+) -> Option<YuvPlanarImage<'_, u8>> {
     let (y_plane, y_stride) = plane(frame, 0, x, y)?;
     let (u_plane, u_stride) = plane(frame, 1, x >> shift_x, y >> shift_y)?;
     let (v_plane, v_stride) = plane(frame, 2, x >> shift_x, y >> shift_y)?;
-    let planes = YuvPlanarImage {
+    Some(YuvPlanarImage {
         y_plane,
         y_stride,
         u_plane,
@@ -260,13 +276,7 @@ fn planes_to_rgba(
         v_stride,
         width,
         height,
-    };
-    let to_rgba = match (shift_x, shift_y) {
-        (1, 1) => yuv::yuv420_to_rgba,
-        (1, 0) => yuv::yuv422_to_rgba,
-        _ => yuv::yuv444_to_rgba,
-    };
-    to_rgba(&planes, rgba, 4 * width, colour.range(), colour.matrix).ok()
+    })
 }
 
 /// Halvings of the chroma planes of a planar format, across and down.
@@ -380,9 +390,9 @@ fn planes_to_rgb(
     }
     let mut rgb = RgbImage::new(width, height);
     let range = colour.range();
-    let (y_plane, y_stride) = plane(frame, 0, x, y)?;
     let stride = width * 3;
     let converted = if format == GRAY8 {
+        let (y_plane, y_stride) = plane(frame, 0, x, y)?;
         let grey = YuvGrayImage {
             y_plane,
             y_stride,
@@ -391,18 +401,7 @@ fn planes_to_rgb(
         };
         yuv::yuv400_to_rgb(&grey, &mut rgb, stride, range, colour.matrix)
     } else {
-        let (u_plane, u_stride) = plane(frame, 1, x >> shift_x, y >> shift_y)?;
-        let (v_plane, v_stride) = plane(frame, 2, x >> shift_x, y >> shift_y)?;
-        let planes = YuvPlanarImage {
-            y_plane,
-            y_stride,
-            u_plane,
-            u_stride,
-            v_plane,
-            v_stride,
-            width,
-            height,
-        };
+        let planes = yuv_planes(frame, (shift_x, shift_y), (x, y), (width, height))?;
         let to_rgb = match (shift_x, shift_y) {
             (1, 1) => yuv::yuv420_to_rgb,
             (1, 0) => yuv::yuv422_to_rgb,

@@ -27,7 +27,7 @@ pub fn render_overview(name: &str, overview: &Overview, beside: bool) -> String 
         sessions = sessions(overview, beside),
         histogram = histogram(overview),
         found = found(overview),
-        settings = table("Settings", &settings(overview)),
+        settings = table("Settings", &overview.settings.rows()),
     );
     html::document(&name, &body)
 }
@@ -224,16 +224,4 @@ fn found(overview: &Overview) -> String {
         row("warnings", totals.warnings.to_string()),
     ];
     table("Found, samples", &rows)
-}
-
-fn settings(overview: &Overview) -> Vec<(String, String)> {
-    let settings = serde_json::to_value(&overview.settings).unwrap_or_default();
-    let rows = settings.as_object().into_iter().flatten();
-    rows.map(|(name, value)| {
-        let text = value
-            .as_str()
-            .map_or_else(|| value.to_string(), str::to_owned);
-        (name.replace('_', " "), text)
-    })
-    .collect()
 }

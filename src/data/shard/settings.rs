@@ -115,6 +115,22 @@ pub struct ExtractionSettings {
     pub scaling: String,
 }
 
+impl ExtractionSettings {
+    /// Names and values as they are shown to people.
+    #[must_use]
+    pub fn rows(&self) -> Vec<(String, String)> {
+        let settings = serde_json::to_value(self).unwrap_or_default();
+        let rows = settings.as_object().into_iter().flatten();
+        rows.map(|(name, value)| {
+            let text = value
+                .as_str()
+                .map_or_else(|| value.to_string(), str::to_owned);
+            (name.replace('_', " "), text)
+        })
+        .collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

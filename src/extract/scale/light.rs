@@ -1,4 +1,6 @@
-//! sRGB values to light and back (IEC 61966-2-1).
+//! 8-bit sRGB values to light and back, as fast as frames need it.
+
+use relit_data::srgb::from_linear;
 
 /// From light to sRGB values.
 #[derive(Debug)]
@@ -6,7 +8,7 @@ pub(super) struct Srgb(Vec<u8>);
 
 impl Srgb {
     pub(super) fn new() -> Self {
-        let value = |light: u16| 255.0 * srgb_from_linear(f64::from(light) / 65535.0);
+        let value = |light: u16| 255.0 * from_linear(f64::from(light) / 65535.0);
         Self(
             (0..=u16::MAX)
                 .map(|light| value(light).round() as u8)
@@ -18,14 +20,6 @@ impl Srgb {
     #[inline(always)]
     pub(super) fn value(&self, light: f32) -> u8 {
         self.0[usize::from((65535.0 * light + 0.5) as u16)]
-    }
-}
-
-fn srgb_from_linear(light: f64) -> f64 {
-    if light <= 0.003_130_8 {
-        12.92 * light
-    } else {
-        1.055 * light.powf(1.0 / 2.4) - 0.055
     }
 }
 
@@ -63,12 +57,7 @@ mod tests {
     fn each_value_comes_back_and_its_light_is_right() {
         let srgb = Srgb::new();
         for value in 0..=255_u32 {
-            let x = f64::from(value) / 255.0;
-            let exact = if x <= 0.04045 {
-                x / 12.92
-            } else {
-                ((x + 0.055) / 1.055).powf(2.4)
-            };
+            let exact = relit_data::srgb::to_linear(f64::from(value) / 255.0);
             let light = linear(value);
             assert!((f64::from(light) - exact).abs() < 6e-6, "{value}: {light}");
             assert_eq!(u32::from(srgb.value(light)), value);

@@ -2,6 +2,7 @@
 
 use image::RgbImage;
 use relit_data::geometry::Rect;
+use relit_data::srgb::to_linear;
 use relit_data::turn_light::modulation;
 use relit_video::{LiveDecoder, PixelFormat, StreamFormat, is_key};
 
@@ -34,18 +35,10 @@ struct Sample {
 
 impl RoomLight {
     pub(super) fn new(stream: StreamFormat) -> Self {
-        let linear = |value: usize| {
-            let value = value as f64 / 255.0;
-            if value <= 0.04045 {
-                value / 12.92
-            } else {
-                ((value + 0.055) / 1.055).powf(2.4)
-            }
-        };
         Self {
             stream,
             decoder: LiveDecoder::new(stream.format, stream.width, stream.height).ok(),
-            linear: std::array::from_fn(linear),
+            linear: std::array::from_fn(|value| to_linear(value as f64 / 255.0)),
             every: FIRST_STEP,
             next: 0,
             samples: Vec::new(),
