@@ -93,6 +93,8 @@ impl Camera for Scripted {
     }
 
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError> {
+        // A frame takes time, so that none comes while a participant of the clock is busy.
+        self.clock.sleep(Duration::from_micros(1));
         let step = if self.silent { None } else { self.steps.next() };
         match step {
             Some(Step::Frame(frame)) => {
