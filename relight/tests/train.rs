@@ -620,8 +620,10 @@ fn the_settings_that_come_with_relight_can_be_read() {
     let paper: PaperSettings = read_settings(&folder.join("paper.toml")).unwrap();
     paper.check().unwrap();
     assert_eq!((paper.run.rate, paper.run.batch), (1e-6, 12));
-    let ours: DecomposeSettings = read_settings(&folder.join("decompose.toml")).unwrap();
-    ours.check().unwrap();
+    for ours in ["decompose.toml", "refine.toml"] {
+        let ours: DecomposeSettings = read_settings(&folder.join(ours)).unwrap();
+        ours.check().unwrap();
+    }
 }
 
 #[test]
