@@ -199,7 +199,7 @@ impl Setting {
     }
 
     /// A room of known light to begin with: without gloss, or with metal that is hardly rough.
-    fn unblurred(&self, known: &KnownLight, body: BodyKind) -> Room {
+    pub(super) fn unblurred(&self, known: &KnownLight, body: BodyKind) -> Room {
         let mirror = known.mirror();
         let shares: Vec<f64> = (0..mirror.len())
             .map(|l| METAL_FALL.powi(l as i32))

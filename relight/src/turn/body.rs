@@ -11,7 +11,7 @@ const EXPLAINED: f64 = 0.03;
 /// has many more terms.
 const METAL_LEAVES: f64 = 0.58;
 
-/// Metal that leaves no more than this is not doubted.
+/// Metal that leaves no more than this explains the turn too.
 const LITTLE: f64 = 0.01;
 
 /// What gives an object its colour.
@@ -59,8 +59,15 @@ pub(super) fn doubted(bodies: &[BodyFigure]) -> Option<BodyKind> {
     };
     let is_better = match other.body {
         BodyKind::Metal => is_metal(given.residual, other.residual),
-        // It has fewer terms: that it leaves less says enough.
-        BodyKind::Diffuse => given.residual > LITTLE && other.residual < given.residual,
+        // It has fewer terms: that it leaves less says enough, where both leave much.
+        BodyKind::Diffuse => {
+            let part = if given.residual > LITTLE {
+                1.0
+            } else {
+                METAL_LEAVES
+            };
+            other.residual < part * given.residual
+        }
     };
     is_better.then_some(other.body)
 }

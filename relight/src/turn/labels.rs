@@ -72,14 +72,14 @@ impl TurnLabels<'_> {
         Ok(RESULTS.check(out)?)
     }
 
-    /// Why there is nothing to write: the object is metal, the turn tells too little, or no pixel is believed.
+    /// Why there is nothing to write: the turn tells too little, the object is metal, or no pixel is believed.
     #[must_use]
     pub fn refusal(&self) -> Option<TurnError> {
-        if self.solution.body() == BodyKind::Metal {
-            return Some(TurnError::NoMattPart);
-        }
         if !self.solution.conditioning().verdict.is_fit() {
             return Some(TurnError::NothingTold);
+        }
+        if self.solution.body() == BodyKind::Metal {
+            return Some(TurnError::NoMattPart);
         }
         let confidence = self.solution.confidence(&self.turn.curves);
         let most = confidence.plane(0).iter().copied().fold(0.0, f32::max);

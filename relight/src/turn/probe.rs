@@ -197,7 +197,20 @@ impl ProbeBuilder {
         };
         let ball = self.probe.ball.unwrap_or(looks);
         let left = match self.surroundings {
-            Some(surroundings) => surroundings.check(ball, self.probe.elevation)?,
+            Some(surroundings) => {
+                surroundings
+                    .check(ball, self.probe.elevation)
+                    .map_err(|error| match error {
+                        // Of a ball of the other kind, where it is cannot be told.
+                        TurnError::Misplaced {
+                            given, explained, ..
+                        } if ball != looks => TurnError::NoBall {
+                            given,
+                            explained: explained[0],
+                        },
+                        error => error,
+                    })?
+            }
             None => 1.0,
         };
         let light = match ball {
@@ -473,16 +486,16 @@ mod tests {
     }
 
     #[test]
-    fn a_ball_is_taken_for_what_is_said_of_it_if_that_explains_it() {
-        let found = measure(Some(ProbeBall::Chrome), grey);
-        assert_eq!(
-            (found.ball, found.looks),
-            (ProbeBall::Chrome, ProbeBall::Grey)
-        );
-        assert!(found.is_doubtful(), "{}", found.left);
-        // The light of a mirror explains a matt ball in part, but not the other way round.
-        let refused = try_measure(probe(Some(ProbeBall::Grey)), chrome);
-        assert!(matches!(refused, Err(TurnError::NoBall { .. })));
+    fn a_ball_that_is_not_of_what_is_said_of_it_is_refused() {
+        for refused in [
+            try_measure(probe(Some(ProbeBall::Chrome)), grey),
+            try_measure(probe(Some(ProbeBall::Grey)), chrome),
+        ] {
+            let refused = refused.unwrap_err();
+            assert!(matches!(refused, TurnError::NoBall { .. }), "{refused}");
+            let said = refused.to_string();
+            assert!(said.contains("say what the ball is made of"), "{said}");
+        }
     }
 
     #[test]

@@ -154,8 +154,8 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         found,
         is_prior_left_out,
     } = led;
-    let conditioning = match &options.light {
-        Some(_) => of_turn.in_given(&found.room),
+    let conditioning = match &setting.known {
+        Some(known) => of_turn.in_given(&setting.unblurred(known, found.room.body)),
         None => of_turn,
     };
     let sense = if conditioning.verdict.is_fit() {

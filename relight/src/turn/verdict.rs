@@ -126,13 +126,19 @@ impl Conditioning {
         is_even && self.modulation >= LEAST_MODULATION
     }
 
-    /// The same where the light was given, as this room has it: one that is too even tells no more than an even turn.
+    /// The same where the light was given, as an object shows it in this room that blurs nothing: one that is too even tells no more
+    /// than an even turn.
     pub(super) fn in_given(self, room: &Room) -> Self {
         let modulations = half_sphere(NORMALS).map(|normal| {
             let waves = room.waves(normal).body;
             let sum = |wave: usize| waves.iter().map(|waves| waves[wave]).sum::<f64>();
             let harmonics: f64 = (1..WAVES).map(|wave| sum(wave).powi(2)).sum();
-            (harmonics / 2.0).sqrt() / sum(0).max(f64::MIN_POSITIVE)
+            let mean = sum(0);
+            if mean > 0.0 {
+                (harmonics / 2.0).sqrt() / mean
+            } else {
+                0.0
+            }
         });
         let modulation = median(modulations);
         let is_even = modulation < LEAST_MODULATION && self.verdict.is_fit();
