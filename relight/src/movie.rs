@@ -110,6 +110,21 @@ pub struct MovieWriter {
 }
 
 impl MovieWriter {
+    /// Whether `ffmpeg` can be started.
+    ///
+    /// # Errors
+    /// [`MovieError::NoProgram`] where it cannot.
+    pub fn check() -> Result<(), MovieError> {
+        Command::new("ffmpeg")
+            .arg("-version")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .status()
+            .map(drop)
+            .map_err(MovieError::NoProgram)
+    }
+
     /// Starts `ffmpeg` for frames of one size. An odd width or height is filled up with a black line, since
     /// both formats halve the resolution of colours.
     ///
@@ -397,14 +412,11 @@ mod tests {
     use crate::image::Planes;
 
     fn has_ffmpeg() -> bool {
-        let run = Command::new("ffmpeg")
-            .arg("-version")
-            .stdout(Stdio::null())
-            .status();
-        if run.is_err() {
+        let found = MovieWriter::check();
+        if found.is_err() {
             eprintln!("skipped: the program ffmpeg is not installed");
         }
-        run.is_ok()
+        found.is_ok()
     }
 
     fn grey(side: usize) -> Rgb<Srgb> {

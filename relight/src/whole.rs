@@ -7,10 +7,10 @@
 
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{Path, PathBuf, absolute};
 use std::process;
 
-use relit_data::durable::{publish, sync_folder};
+use relit_data::durable::{Partial, publish, sync_folder};
 
 /// Why a folder is not written.
 #[derive(Debug)]
@@ -47,10 +47,11 @@ pub(crate) struct ResultFolder {
 }
 
 impl ResultFolder {
-    /// Whether results may be written to the folder `out`: it is not there, empty, or holds earlier results and nothing else.
+    /// Whether results may be written to the folder `out`: it is not there, empty, or holds earlier results and nothing else, and
+    /// what it is to lie in can be written.
     ///
     /// # Errors
-    /// [`FolderFault::Foreign`] or [`FolderFault::NoFolder`], or where the folder cannot be read.
+    /// [`FolderFault::Foreign`] or [`FolderFault::NoFolder`], or where a folder cannot be read or written.
     pub(crate) fn check(self, out: &Path) -> Result<(), FolderFault> {
         let no_folder = |path: &Path| FolderFault::NoFolder(path.to_owned());
         out.file_name().ok_or_else(|| no_folder(out))?;
@@ -61,6 +62,12 @@ impl ResultFolder {
             return Err(no_folder(nearest));
         }
         let out = &resolved(out);
+        let whole = absolute(out).map_err(FolderFault::write(out))?;
+        if let Some(parent) = whole.ancestors().skip(1).find(|path| path.is_dir()) {
+            // Such a file is gone when it is dropped.
+            let trial = Partial::create(&parent.join("results"));
+            trial.map(drop).map_err(FolderFault::write(out))?;
+        }
         let earlier = hidden_beside(out, "earlier");
         for folder in [out, &earlier] {
             if exists(folder) {

@@ -13,7 +13,7 @@ use std::process::{Command, Output};
 use relight::asset::Asset;
 use relight::data::{TruthLayout, TruthSet};
 use relight::image::{Linear, Planes, Rgb, Transfer};
-use relight::light::{Normals, ShLight, YUp};
+use relight::light::{Normals, Order, ShLight, YUp};
 use relight::metrics::{Comparison, ScaleFit, angular_error};
 use relight::render::{NormalsFrame, Surface};
 use relight::synth::{
@@ -137,12 +137,13 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
         "-o",
         out.to_str().unwrap(),
     ];
-    let object = folder.path().join("object.relit");
+    let object = out.join("object.relit");
     let labels = folder.path().join("labels");
     let mut more = arguments.to_vec();
     more.extend(["--asset", object.to_str().unwrap()]);
     more.extend(["--labels", labels.to_str().unwrap()]);
-    for arguments in [&arguments[..], &more] {
+    // The third run finds the object of the second among its results.
+    for arguments in [&arguments[..], &more, &more] {
         let run = relight(arguments);
         assert!(run.status.success(), "{}", text(&run.stderr));
         assert!(text(&run.stderr).contains("elevation is not known"));
@@ -203,6 +204,7 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
         "light.txt",
         "mask.png",
         "normal.png",
+        "object.relit",
         "shading.png",
         "shadow.png",
         "turn.json",
@@ -231,6 +233,99 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
     assert_eq!(run.status.code(), Some(1));
     assert!(text(&run.stderr).contains("which is no result of a turn"));
     assert_eq!(fs::read_dir(&foreign).unwrap().count(), 1);
+}
+
+#[test]
+fn an_even_light_makes_no_labels_but_all_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let (shard, _) = turn(folder.path(), 24);
+    let light = folder.path().join("even.txt");
+    let mut even = ShLight::even(Order::TWO, [1.0; 3]);
+    even.coefficients_mut()[1] = [0.02; 3];
+    even.write(&light).unwrap();
+    let (out, labels) = (folder.path().join("solved"), folder.path().join("labels"));
+    let run = relight(&[
+        "turn",
+        shard.to_str().unwrap(),
+        "--elevation",
+        "20",
+        "--light",
+        light.to_str().unwrap(),
+        "--labels",
+        labels.to_str().unwrap(),
+        "--no-video",
+        "--json",
+        "-o",
+        out.to_str().unwrap(),
+    ]);
+    assert_eq!(run.status.code(), Some(3), "{}", text(&run.stderr));
+    let said: Vec<serde_json::Value> = text(&run.stdout)
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(
+        said[0]["figures"]["conditioning"]["verdict"], "too_even",
+        "{said:?}"
+    );
+    for sentence in ["the room is too even", "no labels are written"] {
+        let has = |line: &serde_json::Value| {
+            let message = line["message"].as_str();
+            line["event"] == "warning" && message.is_some_and(|said| said.starts_with(sentence))
+        };
+        assert_eq!(said.iter().filter(|line| has(line)).count(), 1, "{said:?}");
+    }
+    assert!(out.join("normal.png").is_file());
+    assert!(!labels.exists());
+}
+
+#[test]
+fn places_that_cannot_be_written_are_told_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    fs::create_dir(folder.path().join("thesis")).unwrap();
+    fs::write(folder.path().join("thesis/thesis.tex"), "").unwrap();
+    fs::write(folder.path().join("file"), "").unwrap();
+    // The shard is not there: were it read first, this would be what is told.
+    let (shard, out) = (path("missing.tar"), path("solved"));
+    for (option, place, says) in [
+        ("--labels", "thesis", "thesis.tex, which is no result"),
+        ("--labels", "file/labels", "cannot be the folder"),
+        (
+            "--labels",
+            "solved/labels",
+            "neither in that of the results",
+        ),
+        ("--labels", ".", "neither in that of the results"),
+        ("--asset", "nowhere/a.relit", "cannot be written"),
+        ("--asset", "file/a.relit", "cannot be written"),
+        ("--asset", "solved/a.relit", "is called object.relit"),
+    ] {
+        let run = relight(&[
+            "turn",
+            &shard,
+            "--no-video",
+            option,
+            &path(place),
+            "-o",
+            &out,
+        ]);
+        assert_eq!(run.status.code(), Some(1), "{option} {place}");
+        let said = text(&run.stderr);
+        assert!(said.contains(says), "{option} {place}: {said}");
+    }
+    let run = Command::new(env!("CARGO_BIN_EXE_relight"))
+        .args(["turn", &shard, "-o", &out])
+        .env("PATH", "")
+        .output()
+        .unwrap();
+    let said = text(&run.stderr);
+    assert!(said.contains("needs the program ffmpeg"), "{said}");
+    let mut names: Vec<_> = fs::read_dir(folder.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["file", "thesis"]);
 }
 
 #[test]

@@ -26,8 +26,10 @@ mod write;
 mod tests;
 
 use std::collections::BTreeMap;
+use std::io;
 use std::path::Path;
 
+use relit_data::durable::{Partial, write_whole};
 use serde::{Deserialize, Serialize};
 
 use crate::image::{Extent, ImageError, Planes};
@@ -143,6 +145,22 @@ impl Asset {
         write::bytes(self)
     }
 
+    /// Whether a file can be written at a path.
+    ///
+    /// # Errors
+    /// Where its folder is not there or cannot be written, or it is a folder itself.
+    pub fn check(path: &Path) -> Result<(), AssetError> {
+        let write = |source| AssetError::Write {
+            path: path.to_owned(),
+            source,
+        };
+        if path.is_dir() {
+            return Err(write(io::ErrorKind::IsADirectory.into()));
+        }
+        // Such a file is gone when it is dropped.
+        Partial::create(path).map(drop).map_err(write)
+    }
+
     /// Writes the file, whole or not at all.
     ///
     /// # Errors
@@ -152,7 +170,7 @@ impl Asset {
             path: path.to_owned(),
             source,
         };
-        relit_data::durable::write_whole(path, &self.to_bytes()?).map_err(write)
+        write_whole(path, &self.to_bytes()?).map_err(write)
     }
 
     /// What it is called.

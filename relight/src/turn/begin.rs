@@ -6,7 +6,7 @@ use super::joint::{Joint, Unknowns};
 use super::moments::Moments;
 use super::room::{KnownLight, fit_matt_room, fit_metal_room};
 use super::search::{Expected, PixelFit, Room, unit};
-use super::solve::{StartFigure, all_moments, search_all};
+use super::solve::{SenseFigure, StartFigure, all_moments, search_all};
 use super::start::{blurred, inflated};
 use super::{TableFrame, TurnCurves, TurnError};
 
@@ -33,6 +33,9 @@ const HEIGHTS: [(&str, f64); 3] = [
     ("outline, flatter", 0.6),
     ("outline, rounder", 1.6),
 ];
+/// A matt object in an unknown light that leaves no more than this of the curves has no gloss: with it, light and shape could be
+/// others and explain as much.
+const MATT_LEAVES: f64 = 0.005;
 /// What metal is taken to show of band l of a light at first: this to the power of l.
 const METAL_FALL: f64 = 0.9;
 
@@ -50,8 +53,10 @@ pub(super) struct Setting {
 pub(super) struct FoundRoom {
     pub(super) room: Room,
     pub(super) starts: Vec<StartFigure>,
-    /// One a kind that was tried, at least one.
+    /// One a kind that was tried, at least one; that of the room first where it was given.
     pub(super) bodies: Vec<BodyFigure>,
+    /// For each of them, what is left of the blocks' curves, with what their normals are off those that are expected.
+    pub(super) costs: Vec<f64>,
 }
 
 impl Setting {
@@ -67,6 +72,14 @@ impl Setting {
         }
     }
 
+    /// What is still to be found of a room.
+    pub(super) fn unknowns_of(&self, room: &Room) -> Unknowns<'_> {
+        match self.unknowns(room.body) {
+            Unknowns::Light { .. } if room.gloss.is_none() => Unknowns::Light { bands: 0 },
+            unknowns => unknowns,
+        }
+    }
+
     /// The room in which an object of this kind explains the curves best; where the kind is not known, one of the kind that does.
     pub(super) fn find(
         &self,
@@ -77,7 +90,15 @@ impl Setting {
         let coarse = Coarse::new(curves, expected);
         let run = |body| self.find_of(&coarse, body);
         if let Some(body) = body {
-            return run(body);
+            let mut given = run(body)?;
+            if let Some(other) = self.other_kind(given.bodies[0]) {
+                // What was given is taken, whatever comes of the other.
+                if let Ok(found) = run(other) {
+                    given.bodies.extend(found.bodies);
+                    given.costs.extend(found.costs);
+                }
+            }
+            return Ok(given);
         }
         let diffuse = run(BodyKind::Diffuse)?;
         if !may_be_metal(diffuse.bodies[0].residual) {
@@ -85,6 +106,7 @@ impl Setting {
         }
         let metal = run(BodyKind::Metal)?;
         let bodies = [&diffuse, &metal].map(|found| found.bodies[0]);
+        let costs = [&diffuse, &metal].map(|found| found.costs[0]);
         let [of_diffuse, of_metal] = bodies.map(|figure| figure.residual);
         let taken = if is_metal(of_diffuse, of_metal) {
             metal
@@ -93,29 +115,91 @@ impl Setting {
         };
         Ok(FoundRoom {
             bodies: bodies.to_vec(),
+            costs: costs.to_vec(),
             ..taken
         })
     }
 
+    /// The other kind, where what the given one leaves does not settle that it is right. Without gloss a diffuse body is not to
+    /// be compared with metal.
+    fn other_kind(&self, given: BodyFigure) -> Option<BodyKind> {
+        let has_gloss = self.has_shape || self.known.is_some();
+        match given.body {
+            BodyKind::Diffuse => {
+                (has_gloss && may_be_metal(given.residual)).then_some(BodyKind::Metal)
+            }
+            BodyKind::Metal => Some(BodyKind::Diffuse),
+        }
+    }
+
+    /// How well the other sense of turning explains the curves, beside that of a room that was found: for the first kind of body
+    /// of which it is doubted, else the last that was tried.
+    pub(super) fn sense(
+        &self,
+        curves: &TurnCurves,
+        expected: Option<&[Expected]>,
+        found: &FoundRoom,
+    ) -> Option<SenseFigure> {
+        let coarse = Coarse::new(curves, expected).with_other_sense();
+        let mut told = None;
+        for (figure, &residual) in found.bodies.iter().zip(&found.costs) {
+            // Metal in the wrong sense can seem to explain a diffuse body, so that both are compared.
+            let other_residual = self.cost_in(&coarse, figure.body)?;
+            let sense = SenseFigure {
+                residual,
+                other_residual,
+            };
+            told = Some(sense);
+            if sense.is_doubted() {
+                break;
+            }
+        }
+        told
+    }
+
+    /// What an object leaves: in unknown light, from the best start that is at hand.
+    fn cost_in(&self, coarse: &Coarse, body: BodyKind) -> Option<f64> {
+        if let Some(known) = &self.known {
+            return Some(self.find_in(coarse, known, body).0);
+        }
+        let alternation = Alternation {
+            coarse,
+            setting: self,
+            body,
+        };
+        let (_, start) = self.starts(coarse).swap_remove(0);
+        let (cost, room) = alternation.run(start)?;
+        if !self.has_shape || body == BodyKind::Metal || alternation.is_matt(&room) {
+            return Some(cost);
+        }
+        Some(alternation.with_gloss(room).0)
+    }
+
     fn find_of(&self, coarse: &Coarse, body: BodyKind) -> Result<FoundRoom, TurnError> {
-        let (room, starts) = match &self.known {
+        let (cost, room, starts) = match &self.known {
             Some(known) => {
-                let joint = coarse.joint(self.unknowns(body));
-                let start = self.unblurred(known, body);
-                (joint.found(start, JOINT_ROUNDS, JOINT_STEPS).1, Vec::new())
+                let (cost, room) = self.find_in(coarse, known, body);
+                (cost, room, Vec::new())
             }
             None => self.find_light(coarse, body)?,
         };
-        let fits = search_all(&room, &coarse.moments, coarse.expected.as_deref(), None);
+        let fits = coarse.fits(&room);
         Ok(FoundRoom {
             room,
             starts,
             bodies: vec![BodyFigure::new(body, &fits)],
+            costs: vec![cost],
         })
     }
 
+    /// A room of known light.
+    fn find_in(&self, coarse: &Coarse, known: &KnownLight, body: BodyKind) -> (f64, Room) {
+        let joint = coarse.joint(self.unknowns(body));
+        joint.found(self.unblurred(known, body), JOINT_ROUNDS, JOINT_STEPS)
+    }
+
     /// A room of known light to begin with: without gloss, or with metal that is hardly rough.
-    fn unblurred(&self, known: &KnownLight, body: BodyKind) -> Room {
+    pub(super) fn unblurred(&self, known: &KnownLight, body: BodyKind) -> Room {
         let mirror = known.mirror();
         let shares: Vec<f64> = (0..mirror.len())
             .map(|l| METAL_FALL.powi(l as i32))
@@ -132,44 +216,56 @@ impl Setting {
         }
     }
 
+    /// Normals to start an unknown light from, the best ones first.
+    fn starts(&self, coarse: &Coarse) -> Vec<(&'static str, Vec<[f64; 3]>)> {
+        let mut starts = Vec::new();
+        if let Some(expected) = coarse.expected.as_ref().filter(|_| self.has_shape) {
+            let normals = expected.iter().map(|expected| expected.normal).collect();
+            starts.push(("prior", normals));
+        }
+        starts.extend(HEIGHTS.map(|(name, height)| (name, inflated(&coarse.curves, height))));
+        starts
+    }
+
     /// An unknown light, from all starts.
     fn find_light(
         &self,
         coarse: &Coarse,
         body: BodyKind,
-    ) -> Result<(Room, Vec<StartFigure>), TurnError> {
-        let mut begun: Vec<(&str, Vec<[f64; 3]>)> = Vec::new();
-        if let Some(expected) = coarse.expected.as_ref().filter(|_| self.has_shape) {
-            let normals = expected.iter().map(|expected| expected.normal).collect();
-            begun.push(("prior", normals));
-        }
-        for (name, height) in HEIGHTS {
-            begun.push((name, inflated(&coarse.curves, height)));
-        }
+    ) -> Result<(f64, Room, Vec<StartFigure>), TurnError> {
         let alternation = Alternation {
             coarse,
             setting: self,
             body,
         };
-        let ended: Vec<(String, Option<(f64, Room)>)> = begun
+        let mut ended: Vec<(&str, Option<(f64, Room)>)> = self
+            .starts(coarse)
             .into_iter()
-            .map(|(name, normals)| (name.to_owned(), alternation.run(normals)))
+            .map(|(name, normals)| (name, alternation.run(normals)))
             .collect();
-        let best = ended
-            .iter()
-            .filter_map(|(_, ended)| *ended)
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        let (least, room) = best.ok_or(TurnError::NoLight)?;
+        let (_, room) = best(&ended).ok_or(TurnError::NoLight)?;
+        if self.has_shape && body == BodyKind::Diffuse && !alternation.is_matt(&room) {
+            for (_, ended) in &mut ended {
+                *ended = ended.map(|(_, room)| alternation.with_gloss(room));
+            }
+        }
+        let (least, room) = best(&ended).ok_or(TurnError::NoLight)?;
         let figures = ended.into_iter().map(|(start, ended)| {
             let residual = ended.map_or(1.0, |(residual, _)| residual);
             StartFigure {
-                start,
+                start: start.to_owned(),
                 residual,
                 taken: residual <= least,
             }
         });
-        Ok((room, figures.collect()))
+        Ok((least, room, figures.collect()))
     }
+}
+
+/// The end that leaves least.
+fn best(ended: &[(&str, Option<(f64, Room)>)]) -> Option<(f64, Room)> {
+    let ended = ended.iter().filter_map(|(_, ended)| *ended);
+    ended.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// A turn on blocks of pixels.
@@ -191,6 +287,21 @@ impl Coarse {
             expected: expected.map(|fine| reduced(curves, fine, &coarse, side)),
             curves: coarse,
         }
+    }
+
+    /// The same if the table turns the other way.
+    fn with_other_sense(self) -> Self {
+        let curves = self.curves.with_other_sense();
+        Self {
+            moments: all_moments(&curves),
+            curves,
+            ..self
+        }
+    }
+
+    /// The best normals anywhere, and what they leave.
+    fn fits(&self, room: &Room) -> Vec<PixelFit> {
+        search_all(room, &self.moments, self.expected.as_deref(), None)
     }
 
     fn joint<'a>(&'a self, unknowns: Unknowns<'a>) -> Joint<'a> {
@@ -233,8 +344,7 @@ struct Alternation<'a> {
 }
 
 impl Alternation<'_> {
-    /// What is left in the end, and the room: light and normals in turns for an object without gloss, then both together, and
-    /// then with gloss.
+    /// What is left in the end, and the room: light and normals in turns, then both together. A diffuse object has no gloss yet.
     fn run(&self, start: Vec<[f64; 3]>) -> Option<(f64, Room)> {
         let coarse = self.coarse;
         let mut normals = start;
@@ -242,23 +352,31 @@ impl Alternation<'_> {
         let mut room = None;
         for round in 0..ROUNDS {
             let found = self.room_of(&normals, &mut albedo, round)?;
-            let fits = search_all(&found, &coarse.moments, coarse.expected.as_deref(), None);
+            let fits = coarse.fits(&found);
             for (albedo, fit) in albedo.iter_mut().zip(&fits) {
                 *albedo = fit.albedo;
             }
             normals = self.smoothed(&fits, round);
             room = Some(found);
         }
-        let all = coarse.joint(self.setting.unknowns(self.body));
         if self.body == BodyKind::Metal {
+            let all = coarse.joint(self.setting.unknowns(self.body));
             return Some(all.found(room?, JOINT_ROUNDS, JOINT_STEPS));
         }
         let matt = coarse.joint(Unknowns::Light { bands: 0 });
-        let (cost, room) = matt.found(room?, 1, JOINT_STEPS);
-        if !self.setting.has_shape {
-            return Some((cost, room));
-        }
-        Some(all.found(room, JOINT_ROUNDS, JOINT_STEPS))
+        Some(matt.found(room?, 1, JOINT_STEPS))
+    }
+
+    /// The same with gloss.
+    fn with_gloss(&self, room: Room) -> (f64, Room) {
+        let all = self.coarse.joint(self.setting.unknowns(self.body));
+        all.found(room, JOINT_ROUNDS, JOINT_STEPS)
+    }
+
+    /// Whether a room without gloss explains the curves.
+    fn is_matt(&self, room: &Room) -> bool {
+        let fits = self.coarse.fits(room);
+        BodyFigure::new(self.body, &fits).residual <= MATT_LEAVES
     }
 
     /// The room that goes with normals, in turns with the albedo.

@@ -11,6 +11,9 @@ const EXPLAINED: f64 = 0.03;
 /// has many more terms.
 const METAL_LEAVES: f64 = 0.58;
 
+/// Metal that leaves no more than this explains the turn too.
+const LITTLE: f64 = 0.01;
+
 /// What gives an object its colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -49,6 +52,26 @@ pub(super) fn is_metal(diffuse: f64, metal: f64) -> bool {
     may_be_metal(diffuse) && metal < METAL_LEAVES * diffuse
 }
 
+/// The other kind, where it explains clearly more than the one that was given, whose figure is the first.
+pub(super) fn doubted(bodies: &[BodyFigure]) -> Option<BodyKind> {
+    let [given, other] = bodies else {
+        return None;
+    };
+    let is_better = match other.body {
+        BodyKind::Metal => is_metal(given.residual, other.residual),
+        // It has fewer terms: that it leaves less says enough, where both leave much.
+        BodyKind::Diffuse => {
+            let part = if given.residual > LITTLE {
+                1.0
+            } else {
+                METAL_LEAVES
+            };
+            other.residual < part * given.residual
+        }
+    };
+    is_better.then_some(other.body)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -58,5 +81,19 @@ mod tests {
         assert!(is_metal(0.11, 0.04));
         assert!(!is_metal(0.11, 0.10));
         assert!(!is_metal(0.02, 0.001));
+    }
+
+    #[test]
+    fn a_kind_that_was_given_is_doubted_where_the_other_explains_clearly_more() {
+        let figures = |given, other| {
+            let figure = |(body, residual)| BodyFigure { body, residual };
+            doubted(&[given, other].map(figure))
+        };
+        let (diffuse, metal) = (BodyKind::Diffuse, BodyKind::Metal);
+        assert_eq!(figures((diffuse, 0.11), (metal, 0.04)), Some(metal));
+        assert_eq!(figures((diffuse, 0.11), (metal, 0.10)), None);
+        assert_eq!(figures((metal, 0.05), (diffuse, 0.03)), Some(diffuse));
+        assert_eq!(figures((metal, 0.04), (diffuse, 0.11)), None);
+        assert_eq!(doubted(&[]), None);
     }
 }

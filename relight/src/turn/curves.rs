@@ -309,6 +309,20 @@ impl TurnCurves {
         map
     }
 
+    /// The curves as they are if the table turns the other way as its angle grows.
+    pub(super) fn with_other_sense(&self) -> Self {
+        let mut other = self.clone();
+        for waves in &mut other.waves {
+            for sine in waves.iter_mut().skip(2).step_by(2) {
+                *sine = -*sine;
+            }
+        }
+        for angle in &mut other.angles {
+            *angle = -*angle;
+        }
+        other
+    }
+
     /// The curves of blocks of `side` x `side` pixels, of those that are mostly under the mask; of an object
     /// that fills no block, of all that it touches.
     pub(super) fn reduced(&self, side: usize) -> Self {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use relit_data::session::SessionError;
 
+use super::{ProbePlace, RoomVerdict};
 use crate::asset::AssetError;
 use crate::data::OpenError;
 use crate::decompose::DecomposeError;
@@ -72,6 +73,9 @@ pub enum TurnError {
     /// No light explains the curves.
     #[error("no light explains the turn: all of it is dark, or all of it is clipped")]
     NoLight,
+    /// The exposure was wrong.
+    #[error("no light explains the turn: {}", .0.advice().unwrap_or("it is wrongly exposed"))]
+    Unfit(RoomVerdict),
     /// A map of normals has another size than the frames.
     #[error("the normals have {} x {} pixels, and the frames {} x {}", found.width, found.height, expected.width, expected.height)]
     PriorSize {
@@ -94,6 +98,19 @@ pub enum TurnError {
         "the object is taken for metal, which has no albedo and shading apart: there are no labels of it"
     )]
     NoMattPart,
+    /// The turn tells too little for labels.
+    #[error("no labels are written: the turn does not tell normals and albedo")]
+    NothingTold,
+    /// No pixel is believed.
+    #[error(
+        "no labels are written: no pixel's confidence reaches {least}, the highest is {most:.2}"
+    )]
+    NothingBelieved {
+        /// The least confidence that was asked for.
+        least: f32,
+        /// The largest there is.
+        most: f32,
+    },
     /// Light cannot be used.
     #[error(transparent)]
     Light(#[from] LightError),
@@ -124,6 +141,54 @@ pub enum TurnError {
         path: PathBuf,
         /// How many frames it has.
         frames: u64,
+    },
+    /// The shard says that it was made from another session.
+    #[error("the shard was made from the session {session}, and {} is the session {found}: give the session from which the shard was made", path.display())]
+    OtherSession {
+        /// The session that was given.
+        path: PathBuf,
+        /// Its id.
+        found: String,
+        /// The id in the shard's records.
+        session: String,
+    },
+    /// The video shows something else than the shard.
+    #[error("the frames of {} do not show what those of the shard do: give the session from which the shard was made", path.display())]
+    OtherPictures {
+        /// The video.
+        path: PathBuf,
+    },
+    /// The ball is under the object's mask.
+    #[error(
+        "the object's mask covers {percent:.0} % of the ball at {given}: measure the ball's place in the video again, or take the ball out of the mask"
+    )]
+    BallInMask {
+        /// Where it is said to be.
+        given: ProbePlace,
+        /// The part of the ball that is covered.
+        percent: f64,
+    },
+    /// There is no ball.
+    #[error(
+        "the circle at {given} shows no ball: the light by it explains {explained:.0} % of what varies in it; measure the ball's middle and radius in the video again, \
+         see that nothing covers it, and say what the ball is made of"
+    )]
+    NoBall {
+        /// Where it is said to be.
+        given: ProbePlace,
+        /// The part that is explained, percent.
+        explained: f64,
+    },
+    /// The ball is elsewhere.
+    #[error("the ball is not at {given}, where the light by it explains {:.0} % of what varies, but at about {},{},{}, where it explains {:.0} %: \
+         measure its middle and radius in the video again", explained[0], better[0], better[1], better[2], explained[1])]
+    Misplaced {
+        /// Where it is said to be.
+        given: ProbePlace,
+        /// Middle and radius of a circle that explains clearly more, pixels.
+        better: [f64; 3],
+        /// The parts that both explain, percent.
+        explained: [f64; 2],
     },
     /// A video cannot be read or written.
     #[error(transparent)]

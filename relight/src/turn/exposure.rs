@@ -15,6 +15,11 @@ const AROUND: usize = 3;
 /// step.
 const LEAST_STEP: f64 = 0.03;
 const UNUSUAL: f64 = 8.0;
+/// Gaps between frames, in parts of the usual one, that are too narrow to say how fast the light changes, and those that are too
+/// wide to tell a step from the light itself, unless they are narrower than this, degrees.
+const LEAST_SPAN: f64 = 0.2;
+const WIDE_SPAN: f64 = 1.5;
+const WIDE_GAP_DEG: f64 = 12.0;
 /// All steps of a whole turn lead back to where they began, but for this, as a logarithm, for each.
 const CLOSED: f64 = 0.02;
 
@@ -74,23 +79,47 @@ impl ExposureWatch {
             return (Vec::new(), even);
         }
         let frame = |at: usize| &self.frames[order[at % count]];
-        // The change that leads to each frame, but for how the light itself changes there.
+        // Where frames are missing, the light itself has had longer to change.
+        let gaps: Vec<f64> = (0..count)
+            .map(|at| {
+                let gap = frame(at).angle_deg - frame(at + count - 1).angle_deg;
+                gap.rem_euclid(360.0)
+            })
+            .collect();
+        let usual_gap = median(gaps.iter().copied());
+        let spans: Vec<f64> = gaps
+            .iter()
+            .map(|gap| {
+                if usual_gap > 0.0 {
+                    gap / usual_gap
+                } else {
+                    1.0
+                }
+            })
+            .collect();
         let changes: Vec<f64> = (0..count)
             .map(|at| change(frame(at + count - 1), frame(at)))
             .collect();
+        // The change that leads to each frame, but for how the light itself changes there.
         let jumps: Vec<f64> = (0..count)
             .map(|at| {
                 let around = (1..=AROUND).flat_map(|k| [at + k, at + count - k]);
-                changes[at] - median(around.map(|other| changes[other % count]))
+                let slopes = around
+                    .map(|other| other % count)
+                    .filter(|&other| spans[other] > LEAST_SPAN)
+                    .map(|other| changes[other] / spans[other]);
+                changes[at] - spans[at] * median(slopes)
             })
             .collect();
         let usual = median(jumps.iter().map(|jump| jump.abs()));
-        let least = LEAST_STEP.max(UNUSUAL * usual);
+        // What is expected over a gap is off by how the light bends there: by the square of its span.
+        let least = |at: usize| LEAST_STEP.max(UNUSUAL * usual * spans[at].powi(2).max(1.0));
+        let is_told = |at: usize| spans[at] < WIDE_SPAN || gaps[at] < WIDE_GAP_DEG;
         let steps: Vec<(usize, f64)> = jumps
             .iter()
             .copied()
             .enumerate()
-            .filter(|(_, jump)| jump.abs() > least)
+            .filter(|&(at, jump)| is_told(at) && jump.abs() > least(at))
             .collect();
         let sum: f64 = steps.iter().map(|(_, jump)| jump).sum();
         if steps.is_empty() || sum.abs() > CLOSED * steps.len() as f64 {

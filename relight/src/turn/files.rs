@@ -9,9 +9,10 @@ use serde::Serialize;
 use super::light::TERMS;
 use super::maps::AngleFigure;
 use super::{
-    BodyFigure, BodyKind, Conditioning, Elevation, ExposureStep, ReadTurn, RoomStrip, StartFigure,
-    StripFigures, TableLight, TurnCurves, TurnError, TurnMaps, TurnSolution,
+    BodyFigure, BodyKind, Conditioning, Elevation, ExposureStep, ReadTurn, RoomStrip, SenseFigure,
+    StartFigure, StripFigures, TableLight, TurnCurves, TurnError, TurnMaps, TurnSolution,
 };
+use crate::asset::Asset;
 use crate::decompose::{bright, write_light};
 use crate::image::{ColourSpace, Depth, Extent, Linear, Planes, Rgb, Srgb, write_png};
 use crate::light::{Direction, Normals, Order, ShLight, basis};
@@ -21,8 +22,10 @@ use crate::whole::ResultFolder;
 
 /// The file of figures.
 const FIGURES: &str = "turn.json";
+/// The object as a file that can be lit.
+const ASSET: &str = "object.relit";
 /// What is written beside it.
-const FILES: [&str; 12] = [
+const FILES: [&str; 13] = [
     "normal.png",
     "albedo.png",
     "shading.png",
@@ -35,6 +38,7 @@ const FILES: [&str; 12] = [
     "contact.png",
     "relit.mp4",
     "room.png",
+    ASSET,
 ];
 const RESULTS: ResultFolder = ResultFolder {
     marker: FIGURES,
@@ -63,14 +67,14 @@ pub struct TurnFiles<'a> {
     pub solution: &'a TurnSolution,
     /// What it leaves over.
     pub maps: &'a TurnMaps,
-    /// Whether the room is fit for it.
-    pub conditioning: Conditioning,
     /// Where the light is from: a file's name, or none where it was found.
     pub light_source: Option<&'a str>,
     /// Where the normals to start from are from.
     pub normals_source: Option<&'a str>,
     /// The room, where the video was read.
     pub strip: Option<&'a RoomStrip>,
+    /// The object, where it is to be among the files, as `object.relit`.
+    pub asset: Option<&'a Asset>,
     /// Whether to write the video.
     pub has_movie: bool,
 }
@@ -91,10 +95,14 @@ pub struct TurnFigures {
     conditioning: Conditioning,
     advice: Option<&'static str>,
     normals: Option<String>,
+    /// Whether these normals were left out: a body inflated out of the outline agrees with the turn better.
+    normals_left_out: bool,
     light: FigureLight,
     /// What the object is taken for, and what each kind that was tried leaves.
     body: BodyKind,
     bodies: Vec<BodyFigure>,
+    /// How well both senses of turning explain the turn; none where that is not told.
+    sense: Option<SenseFigure>,
     /// What is left of a curve, over the energy of its variation, the median.
     residual: f64,
     /// The angle that normals are expected to be off, degrees, the median.
@@ -169,7 +177,23 @@ struct LightFile {
     elevation: Elevation,
 }
 
+impl TurnFigures {
+    /// How many frames were read.
+    #[must_use]
+    pub const fn frames(&self) -> u32 {
+        self.frames
+    }
+}
+
 impl TurnFiles<'_> {
+    /// Whether results may be written to the folder `out`: it is not there, empty, or holds earlier results and nothing else.
+    ///
+    /// # Errors
+    /// Where it holds something else, or cannot be read or written.
+    pub fn check(out: &Path) -> Result<(), TurnError> {
+        Ok(RESULTS.check(out)?)
+    }
+
     /// Writes all files into the folder `out`, which appears when they are there; an earlier result in it is
     /// replaced.
     ///
@@ -214,6 +238,9 @@ impl TurnFiles<'_> {
         if let Some(strip) = self.strip {
             strip.write_png(&path("room.png"))?;
         }
+        if let Some(asset) = self.asset {
+            asset.write(&path(ASSET))?;
+        }
         if self.has_movie {
             let white = bright(albedo.planes(), &self.turn.mask);
             write_movie(&path("relit.mp4"), &surface, white)?;
@@ -238,7 +265,7 @@ impl TurnFiles<'_> {
     fn figures(&self, white: FigureWhites) -> Result<TurnFigures, TurnError> {
         let Self { turn, solution, .. } = *self;
         let Extent { width, height } = turn.curves.extent();
-        let is_open = self.light_source.is_none() && !solution.had_prior;
+        let is_open = self.light_source.is_none() && !solution.has_prior;
         let gloss = solution.gloss(&turn.curves)?.map(|gloss| FigureGloss {
             reflectance: gloss.reflectance,
             smoothness: gloss.smoothness,
@@ -255,15 +282,17 @@ impl TurnFiles<'_> {
             has_angles: turn.has_angles,
             clipped: turn.curves.clipped(),
             elevation: solution.elevation,
-            conditioning: self.conditioning,
-            advice: self.conditioning.verdict.advice(),
+            conditioning: solution.conditioning(),
+            advice: solution.conditioning().verdict.advice(),
             normals: self.normals_source.map(str::to_owned),
+            normals_left_out: solution.is_prior_left_out(),
             light: FigureLight {
                 source: self.light_source.map(str::to_owned),
                 starts: solution.starts().to_vec(),
             },
             body: solution.body(),
             bodies: solution.bodies().to_vec(),
+            sense: solution.sense(),
             residual: solution.residual(),
             expected_error_deg: solution.expected_error_deg(),
             gloss,

@@ -64,14 +64,39 @@ struct Label {
 }
 
 impl TurnLabels<'_> {
+    /// Whether labels may be written to the folder `out`: it is not there, empty, or holds earlier labels and nothing else.
+    ///
+    /// # Errors
+    /// Where it holds something else or cannot be read.
+    pub fn check(out: &Path) -> Result<(), TurnError> {
+        Ok(RESULTS.check(out)?)
+    }
+
+    /// Why there is nothing to write: the turn tells too little, the object is metal, or no pixel is believed.
+    #[must_use]
+    pub fn refusal(&self) -> Option<TurnError> {
+        if !self.solution.conditioning().verdict.is_fit() {
+            return Some(TurnError::NothingTold);
+        }
+        if self.solution.body() == BodyKind::Metal {
+            return Some(TurnError::NoMattPart);
+        }
+        let confidence = self.solution.confidence(&self.turn.curves);
+        let most = confidence.plane(0).iter().copied().fold(0.0, f32::max);
+        (most < self.least_confidence).then_some(TurnError::NothingBelieved {
+            least: self.least_confidence,
+            most,
+        })
+    }
+
     /// Writes a folder in the layout of `relight synth`, one sample a frame, which appears when it is whole; earlier
     /// labels in it are replaced. Returns how many samples there are.
     ///
     /// # Errors
-    /// Where the object is metal, the folder holds something else or a file cannot be written: then the folder is as it was.
+    /// For a [`Self::refusal`], or where the folder holds something else or a file cannot be written: then the folder is as it was.
     pub fn write(&self, out: &Path) -> Result<usize, TurnError> {
-        if self.solution.body() == BodyKind::Metal {
-            return Err(TurnError::NoMattPart);
+        if let Some(refusal) = self.refusal() {
+            return Err(refusal);
         }
         RESULTS.write(out, |folder| self.write_samples(folder))
     }
@@ -88,7 +113,7 @@ impl TurnLabels<'_> {
             .collect();
         let part = f64::from(believed.iter().sum::<f32>()) / curves.pixels() as f64;
         let mask = Planes::from_planes(curves.extent(), [believed])?;
-        let albedo = masked(self.solution.albedo(curves).planes(), &mask);
+        let albedo = masked(self.solution.fitted_albedo(curves).planes(), &mask);
         // Files of albedo end at 1: what is larger is given to the light.
         let most = largest(&albedo).max(1.0);
         let albedo = albedo.map(|value| value / most);

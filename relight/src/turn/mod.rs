@@ -11,6 +11,7 @@
 //! | `curves`, `read` | light over the table's angle, from a shard |
 //! | `exposure` | steps of the exposure |
 //! | `film`, `strip`, `probe` | what the video shows beside the object: the room, and a ball that measures its light |
+//! | `placing` | whether the ball is where it is said to be |
 //! | `light` | light of order 2 in the table's frame |
 //! | `gloss` | what a shining surface shows of the room |
 //! | `moments`, `search`, `robust` | the normal and albedo of one pixel |
@@ -18,10 +19,12 @@
 //! | `room` | the light that explains all pixels |
 //! | `joint` | light, gloss, normals and albedo at once |
 //! | `solve` | light and normals of all pixels |
+//! | `albedo` | albedo where a normal is hardly to be believed |
 //! | `maps`, `verdict` | what is left over, and whether the room is fit for this |
 //! | `shine` | the gloss of the whole object; the object as a file |
 //! | `files`, `labels` | what is written |
 
+mod albedo;
 mod begin;
 mod body;
 mod curves;
@@ -36,6 +39,7 @@ mod labels;
 mod light;
 mod maps;
 mod moments;
+mod placing;
 mod prior;
 mod probe;
 mod read;
@@ -63,8 +67,8 @@ pub use light::TableLight;
 pub use maps::TurnMaps;
 pub use prior::{NormalsSource, prior_normals};
 pub use probe::{Probe, ProbeBall, ProbeBuilder, ProbeLight, ProbePlace};
-pub use read::{ReadTurn, TableSense, read_curves};
+pub use read::{ReadTurn, TableSense, TurnOrigin, read_curves};
 pub use room::fit_turn_light;
-pub use solve::{StartFigure, TurnOptions, TurnSolution, solve_turn};
+pub use solve::{SenseFigure, StartFigure, TurnOptions, TurnSolution, solve_turn};
 pub use strip::{RoomStrip, StripBuilder, StripFigures};
 pub use verdict::{Conditioning, RoomVerdict};

@@ -1,7 +1,9 @@
 //! A ball on the table, matt grey or chrome, which measures the light.
 
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
+use std::fmt;
 
+use super::placing::{Surroundings, most_left};
 use super::search::reflected;
 use super::{
     BodyKind, Conditioning, CurveBuilder, Elevation, TableFrame, TurnError, fit_turn_light,
@@ -14,6 +16,8 @@ use crate::render::Surface;
 const SIDE: usize = 48;
 /// The part of the ball's radius that is looked at: its rim shows the background too, and reflects it.
 const PART: f32 = 0.92;
+/// The least part of a pixel that counts as covered.
+const TOUCHED: f64 = 1e-6;
 /// A ball looks like chrome where more than this part of what varies over the turn lies beyond the second harmonic.
 const SHARP: f64 = 0.06;
 /// Rows and columns of the panorama that a chrome ball shows.
@@ -54,6 +58,16 @@ pub struct ProbeLight {
     pub ball: ProbeBall,
     /// What it looks like.
     pub looks: ProbeBall,
+    /// The part of what varies in the ball, over the turn and from place to place, that this light does not explain, 0 to 1.
+    pub left: f64,
+}
+
+impl ProbeLight {
+    /// Whether the light explains so little of the ball that its place is to be checked.
+    #[must_use]
+    pub fn is_doubtful(&self) -> bool {
+        self.left > most_left(self.ball) / 2.0
+    }
 }
 
 /// Where a ball is in the picture.
@@ -65,6 +79,13 @@ pub struct ProbePlace {
     pub radius: f64,
 }
 
+impl fmt::Display for ProbePlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y] = self.middle;
+        write!(f, "{x},{y},{}", self.radius)
+    }
+}
+
 /// Gathers what a ball shows over a turn.
 #[derive(Debug)]
 pub struct ProbeBuilder {
@@ -72,6 +93,8 @@ pub struct ProbeBuilder {
     normals: Normals<YUp>,
     builder: CurveBuilder,
     mirrored: Mirrored,
+    /// From the first frame on.
+    surroundings: Option<Surroundings>,
 }
 
 impl ProbePlace {
@@ -118,6 +141,7 @@ impl ProbeBuilder {
             normals: Normals::sphere(SIDE).masked(&mask)?,
             builder: CurveBuilder::new(extent, mask.plane(0))?,
             mirrored: Mirrored::new(TableFrame::new(probe.elevation)),
+            surroundings: None,
         })
     }
 
@@ -135,15 +159,34 @@ impl ProbeBuilder {
                 allowed: "so small that all of the ball is in the picture",
             });
         }
+        let surroundings = match &mut self.surroundings {
+            Some(surroundings) => surroundings,
+            none => none.insert(Surroundings::new(place, planes.extent())?),
+        };
+        surroundings.push(angle_deg, planes)?;
         let ball = Planes::from_fn(Extent::new(SIDE, SIDE), |x, y| place.light(planes, x, y));
-        self.mirrored.add(angle_deg, &self.normals, &ball);
+        self.add_mirrored(angle_deg, &ball);
         self.builder.push(angle_deg, ball.extent(), ball.planes())
+    }
+
+    /// Adds what the ball shows were it a mirror.
+    fn add_mirrored(&mut self, angle_deg: f64, ball: &Planes<3>) {
+        if !angle_deg.is_finite() {
+            return;
+        }
+        let [x, y, z] = self.normals.planes().planes();
+        for at in (0..z.len()).filter(|&at| z[at] > 0.0) {
+            let normal = [x[at], y[at], z[at]].map(f64::from);
+            let value = ball.planes().map(|plane| f64::from(plane[at]));
+            self.mirrored.add(angle_deg.to_radians(), normal, value);
+        }
     }
 
     /// The light.
     ///
     /// # Errors
-    /// Where the frames tell too little.
+    /// Where the frames tell too little, or the ball is not where it is said to be: [`TurnError::Misplaced`] and
+    /// [`TurnError::NoBall`].
     pub fn finish(self) -> Result<ProbeLight, TurnError> {
         let frame = TableFrame::new(self.probe.elevation);
         let curves = self.builder.finish()?;
@@ -153,6 +196,23 @@ impl ProbeBuilder {
             ProbeBall::Grey
         };
         let ball = self.probe.ball.unwrap_or(looks);
+        let left = match self.surroundings {
+            Some(surroundings) => {
+                surroundings
+                    .check(ball, self.probe.elevation)
+                    .map_err(|error| match error {
+                        // Of a ball of the other kind, where it is cannot be told.
+                        TurnError::Misplaced {
+                            given, explained, ..
+                        } if ball != looks => TurnError::NoBall {
+                            given,
+                            explained: explained[0],
+                        },
+                        error => error,
+                    })?
+            }
+            None => 1.0,
+        };
         let light = match ball {
             ProbeBall::Grey => {
                 let albedo = Rgb::<Linear>::new(Planes::filled(self.normals.extent(), [1.0; 3]));
@@ -169,20 +229,21 @@ impl ProbeBuilder {
             frames: curves.frames(),
             ball,
             looks,
+            left,
         })
     }
 }
 
 /// The panorama that a chrome ball shows of the room while it turns, in the table's frame at its angle 0.
 #[derive(Debug)]
-struct Mirrored {
+pub(super) struct Mirrored {
     frame: TableFrame,
     sums: Vec<[f64; 3]>,
     counts: Vec<f64>,
 }
 
 impl Mirrored {
-    fn new(frame: TableFrame) -> Self {
+    pub(super) fn new(frame: TableFrame) -> Self {
         Self {
             frame,
             sums: vec![[0.0; 3]; ROWS * COLUMNS],
@@ -190,32 +251,38 @@ impl Mirrored {
         }
     }
 
-    /// Adds what the ball shows at an angle of the table, degrees.
-    fn add(&mut self, angle_deg: f64, normals: &Normals<YUp>, ball: &Planes<3>) {
-        if !angle_deg.is_finite() {
-            return;
+    /// Adds what a normal of the ball shows at an angle of the table, radians.
+    pub(super) fn add(&mut self, angle: f64, normal: [f64; 3], light: [f64; 3]) {
+        let cell = self.cell(angle, normal);
+        for (sum, light) in self.sums[cell].iter_mut().zip(light) {
+            *sum += light;
         }
-        let [x, y, z] = normals.planes().planes();
-        for at in 0..z.len() {
-            let normal = [x[at], y[at], z[at]].map(f64::from);
-            if normal[2] <= 0.0 {
-                continue;
-            }
-            let [x, y, z] = self.frame.to_table(reflected(normal));
-            let azimuth = y.atan2(x) + angle_deg.to_radians();
-            let column = (azimuth.rem_euclid(TAU) / TAU * COLUMNS as f64) as usize % COLUMNS;
-            let row = ((z.clamp(-1.0, 1.0).acos() / PI * ROWS as f64) as usize).min(ROWS - 1);
-            let cell = row * COLUMNS + column;
-            for (sum, plane) in self.sums[cell].iter_mut().zip(ball.planes()) {
-                *sum += f64::from(plane[at]);
-            }
-            self.counts[cell] += 1.0;
-        }
+        self.counts[cell] += 1.0;
+    }
+
+    /// What the same direction of the room showed in the mean; none where it was never added.
+    pub(super) fn seen(&self, angle: f64, normal: [f64; 3]) -> Option<[f64; 3]> {
+        let cell = self.cell(angle, normal);
+        mean(&self.sums[cell..=cell], &self.counts[cell..=cell])
+    }
+
+    /// The mean of all that was added.
+    pub(super) fn all(&self) -> Option<[f64; 3]> {
+        mean(&self.sums, &self.counts)
+    }
+
+    /// Where the direction is that a normal of the ball shows.
+    fn cell(&self, angle: f64, normal: [f64; 3]) -> usize {
+        let [x, y, z] = self.frame.to_table(reflected(normal));
+        let azimuth = y.atan2(x) + angle;
+        let column = (azimuth.rem_euclid(TAU) / TAU * COLUMNS as f64) as usize % COLUMNS;
+        let row = ((z.clamp(-1.0, 1.0).acos() / PI * ROWS as f64) as usize).min(ROWS - 1);
+        row * COLUMNS + column
     }
 
     /// What it shows, as coefficients; directions that it never shows are as bright as their row, or as all.
     fn light(&self) -> Result<ShLight, TurnError> {
-        let all = mean(&self.sums, &self.counts).ok_or(TurnError::NoLight)?;
+        let all = self.all().ok_or(TurnError::NoLight)?;
         let order = Order::new(CHROME_ORDER).unwrap_or(Order::TWO);
         let mut light = ShLight::even(order, [0.0; 3]);
         for row in 0..ROWS {
@@ -251,19 +318,32 @@ fn mean(sums: &[[f64; 3]], counts: &[f64]) -> Option<[f64; 3]> {
 }
 
 impl ProbePlace {
-    /// The light at a pixel of the square that the ball fills, the mean of the picture's pixels that it covers; white where
-    /// one of them is.
+    /// The light at a pixel of the square that the ball fills.
     fn light(&self, planes: &Planes<3>, x: usize, y: usize) -> [f32; 3] {
+        let from = |at: usize| (2 * at + 1) as f64 / SIDE as f64 - 1.0;
         let pixel = 2.0 * self.radius / SIDE as f64;
-        let range = |middle: f64, at: usize| {
-            let first = middle - self.radius + pixel * at as f64;
-            let from = first as usize;
-            from..((first + pixel).ceil() as usize).max(from + 1)
+        self.mean_light(planes, self.in_picture([from(x), -from(y)]), pixel)
+    }
+
+    /// Where a place is in the picture that is given in radii from the ball's middle, to the right and up.
+    pub(super) fn in_picture(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [
+            self.middle[0] + self.radius * x,
+            self.middle[1] - self.radius * y,
+        ]
+    }
+
+    /// The light of a square of the picture, the mean of the pixels that it covers; white where one of them is.
+    pub(super) fn mean_light(&self, planes: &Planes<3>, [x, y]: [f64; 2], size: f64) -> [f32; 3] {
+        let range = |middle: f64| {
+            // A pixel that is only touched, by rounding, is not covered.
+            let from = (middle - size / 2.0 + TOUCHED).max(0.0) as usize;
+            from..((middle + size / 2.0 - TOUCHED).ceil().max(0.0) as usize).max(from + 1)
         };
         let Extent { width, height } = planes.extent();
         let (mut sum, mut count) = ([0.0; 3], 0.0);
-        for row in range(self.middle[1], y).filter(|&row| row < height) {
-            for column in range(self.middle[0], x).filter(|&column| column < width) {
+        for row in range(y).filter(|&row| row < height) {
+            for column in range(x).filter(|&column| column < width) {
                 for (sum, value) in sum.iter_mut().zip(planes.pixel(column, row)) {
                     *sum += Srgb::to_linear(value);
                 }
@@ -301,12 +381,30 @@ mod tests {
         light
     }
 
+    /// What is seen beside the ball: above, a room that moves past, and below, the table.
+    fn behind(angle_deg: f64, x: usize, y: usize) -> [f32; 3] {
+        if y > 50 {
+            return [0.5, 0.45, 0.4];
+        }
+        let azimuth = (angle_deg + 0.5 * x as f64).to_radians();
+        let wall = 0.5 + 0.2 * (3.0 * azimuth).sin() + 0.2 * (11.0 * azimuth).cos();
+        [wall as f32; 3]
+    }
+
     /// Films a ball that shows of a light what `shown` says, pixel by pixel.
     fn measure(
         ball: Option<ProbeBall>,
         shown: impl Fn(&ShLight, &Normals<YUp>) -> Planes<3>,
     ) -> ProbeLight {
-        let mut builder = ProbeBuilder::new(probe(ball)).unwrap();
+        try_measure(probe(ball), shown).unwrap()
+    }
+
+    /// The same for a ball that is said to be elsewhere.
+    fn try_measure(
+        probe: Probe,
+        shown: impl Fn(&ShLight, &Normals<YUp>) -> Planes<3>,
+    ) -> Result<ProbeLight, TurnError> {
+        let mut builder = ProbeBuilder::new(probe).unwrap();
         let normals = Normals::sphere(60);
         let frame = TableFrame::new(Elevation::given(ELEVATION).unwrap());
         let [x, y, z] = frame.axis();
@@ -320,12 +418,12 @@ mod tests {
                 if at_x < 60 && at_y < 60 && normals.planes().pixel(at_x, at_y)[2] > 0.0 {
                     light.pixel(at_x, at_y).map(Srgb::from_linear)
                 } else {
-                    [0.9; 3]
+                    behind(angle, x, y)
                 }
             });
             builder.push(angle, &Rgb::new(picture)).unwrap();
         }
-        builder.finish().unwrap()
+        builder.finish()
     }
 
     fn grey(light: &ShLight, normals: &Normals<YUp>) -> Planes<3> {
@@ -388,12 +486,57 @@ mod tests {
     }
 
     #[test]
-    fn a_ball_is_taken_for_what_is_said_of_it() {
-        let found = measure(Some(ProbeBall::Grey), chrome);
-        assert_eq!(
-            (found.ball, found.looks),
-            (ProbeBall::Grey, ProbeBall::Chrome)
-        );
+    fn a_ball_that_is_not_of_what_is_said_of_it_is_refused() {
+        for refused in [
+            try_measure(probe(Some(ProbeBall::Chrome)), grey),
+            try_measure(probe(Some(ProbeBall::Grey)), chrome),
+        ] {
+            let refused = refused.unwrap_err();
+            assert!(matches!(refused, TurnError::NoBall { .. }), "{refused}");
+            let said = refused.to_string();
+            assert!(said.contains("say what the ball is made of"), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_ball_beside_its_place_is_refused_with_where_it_is() {
+        type Shown = fn(&ShLight, &Normals<YUp>) -> Planes<3>;
+        for (ball, shown) in [
+            (ProbeBall::Grey, grey as Shown),
+            (ProbeBall::Chrome, chrome as Shown),
+        ] {
+            let there = measure(Some(ball), shown);
+            assert!(there.left < 0.05 && !there.is_doubtful(), "{there:?}");
+            for (middle, radius) in [
+                ([69.0, 40.0], 30.0),
+                ([61.0, 34.0], 30.0),
+                ([61.0, 40.0], 24.0),
+                ([57.0, 43.0], 36.0),
+            ] {
+                let place = ProbePlace::new(middle, radius).unwrap();
+                let other = Probe {
+                    place,
+                    ..probe(Some(ball))
+                };
+                let refused = try_measure(other, shown).unwrap_err();
+                let TurnError::Misplaced { better, .. } = &refused else {
+                    panic!("{ball:?} at {place}: {refused}");
+                };
+                let apart = [0, 1, 2].map(|i| (better[i] - [61.0, 40.0, 30.0][i]).abs());
+                assert!(apart.iter().all(|&apart| apart <= 2.0), "{refused}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_ball_is_refused() {
+        // A board that leans to the camera.
+        let flat = |light: &ShLight, normals: &Normals<YUp>| {
+            let board = Planes::filled(normals.extent(), [0.0, 0.6, 0.8]);
+            grey(light, &Normals::new(board))
+        };
+        let refused = try_measure(probe(Some(ProbeBall::Grey)), flat).unwrap_err();
+        assert!(matches!(refused, TurnError::NoBall { .. }), "{refused}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::thread::available_parallelism;
 
 use relit_data::causes::with_causes;
+use relit_data::geometry::Rect;
 use serde::Serialize;
 
 use super::{CurveBuilder, TurnCurves, TurnError};
@@ -28,6 +29,15 @@ pub enum TableSense {
     Clockwise,
 }
 
+/// What the records of a shard say of the video that it was made from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TurnOrigin {
+    /// The session's id.
+    pub session: String,
+    /// The part of the video's frames that the shard's show, pixels.
+    pub crop: Rect,
+}
+
 /// A turn that was read.
 #[derive(Debug)]
 pub struct ReadTurn {
@@ -41,6 +51,8 @@ pub struct ReadTurn {
     pub first_angles: Vec<f64>,
     /// Where the frames stand in the turn's video, from 0, and the table's angle of each, degrees.
     pub sources: Vec<(u64, f64)>,
+    /// The video itself; none where the frames have no records.
+    pub origin: Option<TurnOrigin>,
     /// 1 on the object, else 0.
     pub mask: Planes<1>,
     /// Whether frames told their angles; else they are taken for evenly spread over one turn.
@@ -87,6 +99,7 @@ pub fn read_curves(
         first: Vec::new(),
         first_angles: Vec::new(),
         sources: Vec::new(),
+        origin: None,
         mask: None,
         has_angles: None,
         last_index: 0.0,
@@ -116,6 +129,7 @@ struct Reader {
     first: Vec<Rgb<Linear>>,
     first_angles: Vec<f64>,
     sources: Vec<(u64, f64)>,
+    origin: Option<TurnOrigin>,
     mask: Option<Planes<1>>,
     /// As the first frame has it.
     has_angles: Option<bool>,
@@ -138,6 +152,10 @@ impl Reader {
             };
             if let Some(record) = &frame.record {
                 self.sources.push((record.source_frame, angle));
+                self.origin.get_or_insert_with(|| TurnOrigin {
+                    session: record.session.clone(),
+                    crop: record.crop,
+                });
             }
             self.builder(extent, mask)?.push(angle, extent, planes)?;
             if self.first.len() < BATCH as usize {
@@ -194,6 +212,7 @@ impl Reader {
             first: self.first,
             first_angles: self.first_angles,
             sources: self.sources,
+            origin: self.origin,
             mask: self.mask.ok_or(TurnError::Empty)?,
             has_angles,
             damage: self.damage,

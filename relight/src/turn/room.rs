@@ -207,7 +207,7 @@ struct LitPixel<'a> {
 }
 
 fn pixels<'a>(
-    moments: &'a [Moments],
+    moments: impl IntoIterator<Item = &'a Moments>,
     normals: &[[f64; 3]],
     frame: &TableFrame,
 ) -> Vec<LitPixel<'a>> {
@@ -216,7 +216,37 @@ fn pixels<'a>(
         matt: wave_terms(frame.to_table(normal)),
         gloss: gloss_terms(normal[2], frame.to_table(reflected(normal))),
     };
-    moments.iter().zip(normals).map(pixel).collect()
+    moments.into_iter().zip(normals).map(pixel).collect()
+}
+
+/// What the light leaves that explains an evenly coloured matt body of these normals best, over what an even light leaves; none
+/// where nothing varies.
+pub(super) fn unexplained<'a>(
+    moments: impl IntoIterator<Item = &'a Moments>,
+    normals: &[[f64; 3]],
+    frame: &TableFrame,
+) -> Option<f64> {
+    let pixels = pixels(moments, normals, frame);
+    let white = vec![[1.0; 3]; pixels.len()];
+    let (light, gloss) = fit_light(&pixels, &white, Finish::Matt)?;
+    let constant = WaveTerm {
+        wave: 0,
+        parts: [1.0, 0.0],
+    };
+    let (mut by_even, mut all) = (0.0, 0.0);
+    for channel in 0..3 {
+        let (mut along, mut own) = (0.0, 0.0);
+        for pixel in &pixels {
+            along += pixel.moments.term_along(channel, &constant);
+            own += pixel.moments.term_product(channel, &constant, &constant);
+            all += pixel.moments.energy(channel);
+        }
+        if own > 0.0 {
+            by_even += along * along / own;
+        }
+    }
+    let varying = all - by_even;
+    (varying > 1e-9 * all).then(|| left(&pixels, &white, (&light, &gloss)) * all / varying)
 }
 
 /// What a surface is taken for.

@@ -361,7 +361,7 @@ fn bias(expected: Option<Expected>, normal: [f64; 3]) -> f64 {
 }
 
 /// Directions of a half sphere around the viewer, by a spiral.
-fn half_sphere(count: usize) -> impl Iterator<Item = [f64; 3]> {
+pub(super) fn half_sphere(count: usize) -> impl Iterator<Item = [f64; 3]> {
     let golden = PI * (3.0 - 5.0_f64.sqrt());
     (0..count).map(move |at| {
         let z = 1.0 - (1.0 - LEAST_FACING) * (at as f64 + 0.5) / count as f64;

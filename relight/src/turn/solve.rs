@@ -1,17 +1,20 @@
 //! Normals, albedo and light of a whole turn.
 
+use std::f64::consts::FRAC_PI_2;
+
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::begin::{COARSE_PIXELS, Setting};
-use super::body::{BodyFigure, BodyKind};
+use super::albedo::shared;
+use super::begin::{COARSE_PIXELS, FoundRoom, Setting};
+use super::body::{BodyFigure, BodyKind, doubted};
 use super::joint::Joint;
 use super::moments::Moments;
 use super::robust::trust;
 use super::room::KnownLight;
 use super::search::{Expected, PixelFit, Room, Search, unit};
 use super::start::{blurred, inflated};
-use super::{Elevation, TableFrame, TableLight, TurnCurves, TurnError};
+use super::{Conditioning, Elevation, RoomVerdict, TableFrame, TableLight, TurnCurves, TurnError};
 use crate::image::{Linear, Planes, Rgb};
 use crate::light::{Normals, ShLight, YUp};
 
@@ -31,12 +34,19 @@ const DEVIATIONS: f64 = 1.645;
 const SURROUNDINGS: f64 = 1.0 / 40.0;
 /// Degrees of freedom of what is left of a curve: fitted to the angles that its looseness stands for.
 const FREEDOM: f64 = 3.0;
+/// A turn of which the median pixel leaves this much is not explained so well that bends of the surface are real.
+const UNEXPLAINED: f64 = 0.005;
 /// How far normals are off as a whole in unknown light, radians: a bend that light makes up for, which no residual
 /// shows. With a prior, and without.
 const BENT_WITH_PRIOR: f64 = 0.25;
 const BENT_ALONE: f64 = 0.35;
 /// What shade in hollows and bounced light do to normals in known light, radians.
 const BENT_IN_KNOWN_LIGHT: f64 = 0.08;
+/// A sense of turning that leaves no more than this is not doubted, and another one only where it leaves less than this part.
+const SENSE_LEAVES: f64 = 0.02;
+const SENSE_CLEARLY: f64 = 0.75;
+/// How far normals are off where the turn does not tell them, radians.
+const UNTOLD: f64 = 1.0;
 /// How far a normal is off where nearly all of its light is clipped, radians.
 const CLIPPED_ERROR: f64 = 0.8;
 /// The expected error at which the confidence is one half, radians.
@@ -82,11 +92,30 @@ pub struct StartFigure {
     pub taken: bool,
 }
 
+/// How well both senses in which the table can turn explain the curves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SenseFigure {
+    /// What the one that was taken leaves of the curves of blocks of pixels, with what the normals are off the prior.
+    pub residual: f64,
+    /// The same of the other one.
+    pub other_residual: f64,
+}
+
+impl SenseFigure {
+    /// Whether the other sense explains clearly more.
+    #[must_use]
+    pub fn is_doubted(&self) -> bool {
+        self.residual > SENSE_LEAVES && self.other_residual < SENSE_CLEARLY * self.residual
+    }
+}
+
 /// Normals, albedo and light.
 #[derive(Debug, Clone)]
 pub struct TurnSolution {
     /// One a pixel under the mask.
     pub(super) fits: Vec<PixelFit>,
+    /// The albedo of each pixel, which is that of its fit where its normal is to be believed.
+    albedo: Vec<[f64; 3]>,
     /// The angle that each normal is expected to be off, radians.
     pub(super) expected_errors: Vec<f64>,
     pub(super) room: Room,
@@ -95,7 +124,11 @@ pub struct TurnSolution {
     pub(super) measured: Option<ShLight>,
     pub(super) starts: Vec<StartFigure>,
     pub(super) bodies: Vec<BodyFigure>,
-    pub(super) had_prior: bool,
+    pub(super) has_prior: bool,
+    is_prior_left_out: bool,
+    sense: Option<SenseFigure>,
+    given_body: Option<BodyKind>,
+    conditioning: Conditioning,
 }
 
 /// Finds the normals, albedo and light that explain the curves of a turn best.
@@ -106,28 +139,30 @@ pub struct TurnSolution {
 /// and it is fitted again.
 ///
 /// # Errors
-/// Where the prior has another size, or no light explains the curves.
+/// Where the prior has another size, or no light explains the curves: [`TurnError::Unfit`] where the exposure is why.
 pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolution, TurnError> {
-    let frame = TableFrame::new(options.elevation);
-    let expected = options
-        .prior
-        .as_ref()
-        .map(|prior| expected(curves, prior, options.prior_weight))
-        .transpose()?;
-    let has_shape = expected.is_some();
-    let expected = match (expected, &options.light) {
-        (None, None) => Some(of_outline(curves)),
-        (expected, _) => expected,
+    let of_turn = Conditioning::of(curves);
+    let led = Led::find(curves, options).map_err(|error| match (error, of_turn.verdict) {
+        (TurnError::NoLight, verdict @ (RoomVerdict::Overexposed | RoomVerdict::Underexposed)) => {
+            TurnError::Unfit(verdict)
+        }
+        (error, _) => error,
+    })?;
+    let Led {
+        expected,
+        setting,
+        found,
+        is_prior_left_out,
+    } = led;
+    let conditioning = match &setting.known {
+        Some(known) => of_turn.in_given(&setting.unblurred(known, found.room.body)),
+        None => of_turn,
     };
-    let setting = Setting {
-        frame,
-        known: options
-            .light
-            .as_ref()
-            .map(|light| KnownLight::new(light, &frame)),
-        has_shape,
+    let sense = if conditioning.verdict.is_fit() {
+        setting.sense(curves, expected.as_deref(), &found)
+    } else {
+        None
     };
-    let found = setting.find(curves, expected.as_deref(), options.body)?;
     let mut solver = Solver {
         curves,
         expected,
@@ -141,18 +176,33 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         solver.refine();
     }
     solver.draw_albedo();
-    let common = match (&options.light, &options.prior) {
-        (Some(_), _) => BENT_IN_KNOWN_LIGHT,
-        (None, Some(_)) => BENT_WITH_PRIOR,
-        (None, None) => BENT_ALONE,
+    let has_prior = options.prior.is_some() && !is_prior_left_out;
+    let common = match &options.light {
+        Some(_) => BENT_IN_KNOWN_LIGHT,
+        None if has_prior => BENT_WITH_PRIOR,
+        None => BENT_ALONE,
     };
-    let common = common.hypot(options.elevation.uncertainty_deg().to_radians());
-    let expected_errors = solver.expected_errors(common);
+    let untold = if conditioning.verdict.is_fit() {
+        0.0
+    } else {
+        UNTOLD
+    };
+    let common = common
+        .hypot(options.elevation.uncertainty_deg().to_radians())
+        .hypot(untold);
+    let own_errors = solver.own_errors();
     if solver.setting.known.is_none() {
         solver.normalise();
     }
+    let albedo = solver.shared_albedo(&own_errors);
+    let whole = |own: &OwnError| own.whole().hypot(common).min(FRAC_PI_2);
+    let expected_errors = own_errors.iter().map(whole).collect();
     Ok(TurnSolution {
-        had_prior: options.prior.is_some(),
+        has_prior,
+        is_prior_left_out,
+        sense,
+        given_body: options.body,
+        albedo,
         fits: solver.fits,
         expected_errors,
         room: solver.room,
@@ -160,6 +210,7 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         measured: options.light.clone(),
         starts: found.starts,
         bodies: found.bodies,
+        conditioning,
     })
 }
 
@@ -171,9 +222,15 @@ impl TurnSolution {
     }
 
     /// The albedo: in the light's units where that was known, else in such units that the mean shading of the
-    /// object over the turn is 1 in each channel.
+    /// object over the turn is 1 in each channel. Where a normal is hardly to be believed, it is that of the same colour around.
     #[must_use]
     pub fn albedo(&self, curves: &TurnCurves) -> Rgb<Linear> {
+        Rgb::new(curves.map(|pixel| self.albedo[pixel].map(|v| v as f32)))
+    }
+
+    /// The albedo that goes with each normal's shading, right or wrong.
+    #[must_use]
+    pub fn fitted_albedo(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| self.fits[pixel].albedo.map(|v| v as f32)))
     }
 
@@ -216,6 +273,30 @@ impl TurnSolution {
         &self.bodies
     }
 
+    /// Whether the light, of the turn and where it was given, is fit for this.
+    #[must_use]
+    pub const fn conditioning(&self) -> Conditioning {
+        self.conditioning
+    }
+
+    /// The other kind, where one was given and the other explains clearly more.
+    #[must_use]
+    pub fn doubted_body(&self) -> Option<BodyKind> {
+        self.given_body.and_then(|_| doubted(&self.bodies))
+    }
+
+    /// How well both senses of turning explain the curves; none where that is not told.
+    #[must_use]
+    pub const fn sense(&self) -> Option<SenseFigure> {
+        self.sense
+    }
+
+    /// Whether the normals to start from were left out: a body inflated out of the outline agrees with the turn better.
+    #[must_use]
+    pub const fn is_prior_left_out(&self) -> bool {
+        self.is_prior_left_out
+    }
+
     /// How each start of an unknown light ended; none where it was known.
     #[must_use]
     pub fn starts(&self) -> &[StartFigure] {
@@ -254,6 +335,100 @@ fn quantile(values: impl Iterator<Item = f64>, part: f64) -> f64 {
     *values.select_nth_unstable_by(place, f64::total_cmp).1
 }
 
+/// Normals to lean on, and the room on blocks of pixels that goes with them.
+struct Led {
+    expected: Option<Vec<Expected>>,
+    setting: Setting,
+    found: FoundRoom,
+    is_prior_left_out: bool,
+}
+
+impl Led {
+    fn find(curves: &TurnCurves, options: &TurnOptions) -> Result<Self, TurnError> {
+        let frame = TableFrame::new(options.elevation);
+        let known = options.light.as_ref();
+        let known = known.map(|light| KnownLight::new(light, &frame));
+        let prior = options
+            .prior
+            .as_ref()
+            .map(|prior| expected(curves, prior, options.prior_weight))
+            .transpose()?;
+        let has_shape = prior.is_some();
+        let expected = match &known {
+            None => Some(prior.unwrap_or_else(|| of_outline(curves, OUTLINE_WEIGHT))),
+            Some(_) => prior,
+        };
+        let setting = Setting {
+            frame,
+            known,
+            has_shape,
+        };
+        let found = setting.find(curves, expected.as_deref(), options.body)?;
+        let led = Self {
+            expected,
+            setting,
+            found,
+            is_prior_left_out: false,
+        };
+        Ok(led.or_outline(curves, options.prior_weight))
+    }
+
+    /// Where a matt body explains the turn, light and shape that go with the prior explain it as well as others do: then the
+    /// outline leads if what it expects is nearer to what explains the turn.
+    fn or_outline(mut self, curves: &TurnCurves, weight: f64) -> Self {
+        let is_matt = self.found.room.body == BodyKind::Diffuse && self.found.room.gloss.is_none();
+        if self.setting.known.is_some() || !self.setting.has_shape || !is_matt || weight <= 0.0 {
+            return self;
+        }
+        let setting = Setting {
+            has_shape: false,
+            ..self.setting.clone()
+        };
+        let outline = of_outline(curves, weight);
+        let Ok(found) = setting.find(curves, Some(&outline), Some(BodyKind::Diffuse)) else {
+            return self;
+        };
+        let is_nearer = found.costs[0] < self.found.costs[0];
+        let groups = [
+            (&self.found.starts, "", !is_nearer),
+            (&found.starts, " alone", is_nearer),
+        ];
+        let starts = groups.into_iter().flat_map(|(starts, ending, counts)| {
+            starts.iter().map(move |start| StartFigure {
+                start: format!("{}{ending}", start.start),
+                residual: start.residual,
+                taken: start.taken && counts,
+            })
+        });
+        let starts = starts.collect();
+        if is_nearer {
+            return Self {
+                expected: Some(outline),
+                setting,
+                found: FoundRoom { starts, ..found },
+                is_prior_left_out: true,
+            };
+        }
+        self.found.starts = starts;
+        self
+    }
+}
+
+/// What a pixel's normal is expected to be off by itself, radians.
+#[derive(Debug, Clone, Copy)]
+struct OwnError {
+    /// By what is left of its curve, and by what is clipped.
+    loose: f64,
+    /// By how far it is from the normals around it.
+    bent: f64,
+}
+
+impl OwnError {
+    fn whole(&self) -> f64 {
+        self.loose.hypot(self.bent)
+    }
+}
+
 /// All pixels under one light.
 struct Solver<'a> {
     curves: &'a TurnCurves,
@@ -289,7 +464,7 @@ impl Solver<'_> {
         let joint = Joint {
             moments: &moments,
             expected: expected.as_deref(),
-            unknowns: self.setting.unknowns(self.room.body),
+            unknowns: self.setting.unknowns_of(&self.room),
         };
         let near = search_all(&self.room, &moments, joint.expected, Some(&fits));
         (self.room, _) = joint.refined(self.room, near, ROBUST_STEPS);
@@ -329,8 +504,8 @@ impl Solver<'_> {
         self.curves.places().iter().map(at).collect()
     }
 
-    /// The error of each pixel by itself, and the one that all have in `common`.
-    fn expected_errors(&self, common: f64) -> Vec<f64> {
+    /// What each pixel's normal is expected to be off by itself.
+    fn own_errors(&self) -> Vec<OwnError> {
         let search = Search::new(&self.room);
         let surroundings = self.surroundings();
         (0..self.fits.len())
@@ -338,20 +513,33 @@ impl Solver<'_> {
             .map(|pixel| {
                 let moments = &self.moments[pixel];
                 if moments.is_dark() {
-                    return std::f64::consts::FRAC_PI_2;
+                    return OwnError {
+                        loose: FRAC_PI_2,
+                        bent: 0.0,
+                    };
                 }
                 let expected = self.expected.as_ref().map(|all| all[pixel]);
                 let fit = &self.fits[pixel];
-                let angle = search.looseness(moments, expected, fit, FREEDOM);
+                let loose = search.looseness(moments, expected, fit, FREEDOM);
                 let clipped = CLIPPED_ERROR * self.curves.clipped_at(pixel);
                 let bent = super::search::dot(surroundings[pixel], fit.normal);
-                angle
-                    .hypot(common)
-                    .hypot(clipped)
-                    .hypot(bent.clamp(-1.0, 1.0).acos())
-                    .min(std::f64::consts::FRAC_PI_2)
+                OwnError {
+                    loose: loose.hypot(clipped),
+                    bent: bent.clamp(-1.0, 1.0).acos(),
+                }
             })
             .collect()
+    }
+
+    /// The albedos, where normals are hardly to be believed by those around them. A bent surface is not to be doubted where the
+    /// turn is explained.
+    fn shared_albedo(&self, errors: &[OwnError]) -> Vec<[f64; 3]> {
+        let left = median(self.fits.iter().map(|fit| fit.residual));
+        let doubt = (left / UNEXPLAINED).min(1.0);
+        let error = |own: &OwnError| own.loose.hypot(doubt * own.bent);
+        let errors: Vec<f64> = errors.iter().map(error).collect();
+        let albedo: Vec<[f64; 3]> = self.fits.iter().map(|fit| fit.albedo).collect();
+        shared(self.curves, &albedo, &errors)
     }
 
     /// Brings the mean shading of each channel to 1.
@@ -430,11 +618,8 @@ pub(super) fn cost(fits: &[PixelFit], expected: Option<&[Expected]>) -> f64 {
 }
 
 /// The normals of the body in the outline, where nothing else is known of the shape.
-fn of_outline(curves: &TurnCurves) -> Vec<Expected> {
-    let normal = |normal| Expected {
-        normal,
-        weight: OUTLINE_WEIGHT,
-    };
+fn of_outline(curves: &TurnCurves, weight: f64) -> Vec<Expected> {
+    let normal = |normal| Expected { normal, weight };
     inflated(curves, 1.0).into_iter().map(normal).collect()
 }
 

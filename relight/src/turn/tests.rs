@@ -187,8 +187,36 @@ fn with_its_own_normals_as_the_prior_unknown_light_is_found_up_to_its_colour() {
             );
         }
     }
-    assert_eq!(found.starts().len(), 4);
+    // Four that lean on the prior, and three that lean on the outline alone.
+    assert_eq!(found.starts().len(), 7);
     assert_eq!(found.starts().iter().filter(|start| start.taken).count(), 1);
+    assert!(!found.is_prior_left_out());
+}
+
+#[test]
+fn a_table_that_turns_the_other_way_is_noticed() {
+    let (surface, light) = (ball(), room());
+    let mut builder = CurveBuilder::new(surface.extent(), mask(&surface).plane(0)).unwrap();
+    for k in 0..90 {
+        let angle = f64::from(k) * 4.0;
+        let image = frame(&surface, &light, -angle);
+        builder
+            .push(angle, surface.extent(), image.planes().planes())
+            .unwrap();
+    }
+    let curves = builder.finish().unwrap();
+    let unknown = TurnOptions {
+        elevation: elevation(),
+        prior: Some(surface.normals().clone()),
+        ..TurnOptions::default()
+    };
+    for options in [known(&light), unknown] {
+        let wrong = solve_turn(&curves, &options).unwrap().sense().unwrap();
+        assert!(wrong.is_doubted(), "{wrong:?}");
+        let right = solve_turn(&SOLVED.0.curves, &options).unwrap();
+        let right = right.sense().unwrap();
+        assert!(!right.is_doubted(), "{right:?}");
+    }
 }
 
 #[test]
@@ -246,6 +274,7 @@ fn read(surface: &Surface, light: &ShLight) -> ReadTurn {
             .collect(),
         first_angles,
         sources: Vec::new(),
+        origin: None,
         mask: mask(surface),
         has_angles: true,
         damage: Vec::new(),
@@ -355,14 +384,22 @@ fn metal_is_found_in_unknown_light_with_normals_to_lean_on() {
 }
 
 #[test]
-fn a_body_that_was_given_is_not_doubted_and_metal_has_no_labels() {
+fn a_body_that_was_given_is_taken_but_doubted_and_metal_has_no_labels() {
     let turn = read(&ball(), &room());
     let options = TurnOptions {
         body: Some(BodyKind::Metal),
         ..known(&room())
     };
     let found = solve_turn(&turn.curves, &options).unwrap();
-    assert_eq!((found.body(), found.bodies().len()), (BodyKind::Metal, 1));
+    assert_eq!((found.body(), found.bodies().len()), (BodyKind::Metal, 2));
+    assert_eq!(found.doubted_body(), Some(BodyKind::Diffuse));
+    let rightly = TurnOptions {
+        body: Some(BodyKind::Diffuse),
+        ..known(&room())
+    };
+    let right = solve_turn(&turn.curves, &rightly).unwrap();
+    assert_eq!(right.doubted_body(), None);
+    assert_eq!(SOLVED.1.doubted_body(), None);
     let labels = TurnLabels {
         turn: &turn,
         solution: &found,
@@ -372,6 +409,55 @@ fn a_body_that_was_given_is_not_doubted_and_metal_has_no_labels() {
     let out = folder.path().join("labels");
     assert!(matches!(labels.write(&out), Err(TurnError::NoMattPart)));
     assert!(!out.exists());
+}
+
+/// A room that is nearly the same all around.
+fn even_room() -> ShLight {
+    let mut even = ShLight::even(Order::TWO, [0.3; 3]);
+    even.coefficients_mut()[3] = [0.01; 3];
+    even
+}
+
+#[test]
+fn a_turn_that_tells_nothing_and_pixels_that_are_not_believed_have_no_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("labels");
+    let even = read(&ball(), &even_room());
+    let of_even = solve_turn(&even.curves, &known(&even_room())).unwrap();
+    let labels = TurnLabels {
+        turn: &even,
+        solution: &of_even,
+        least_confidence: 0.0,
+    };
+    assert!(matches!(labels.write(&out), Err(TurnError::NothingTold)));
+    let (turn, solution) = &*SOLVED;
+    let labels = TurnLabels {
+        turn,
+        solution,
+        least_confidence: 1.0,
+    };
+    let refused = labels.write(&out);
+    assert!(matches!(refused, Err(TurnError::NothingBelieved { .. })));
+    assert!(!out.exists());
+}
+
+#[test]
+fn an_even_light_is_not_trusted_though_it_was_given() {
+    // Of the turn that it lit, and of one that another light did.
+    for (light, is_at_odds) in [(even_room(), false), (room(), true)] {
+        let curves = film(&ball(), &light, TAKE);
+        let found = solve_turn(&curves, &known(&even_room())).unwrap();
+        let conditioning = found.conditioning();
+        assert_eq!(conditioning.verdict, RoomVerdict::TooEven);
+        assert_eq!(conditioning.is_given_at_odds(), is_at_odds);
+        let expected = found.expected_error_deg();
+        assert!(expected > 45.0, "{expected}");
+    }
+    let found = SOLVED.1.conditioning();
+    assert_eq!(found.verdict, RoomVerdict::Good);
+    assert!(!found.is_given_at_odds());
+    let ratio = found.given_modulation.unwrap() / found.modulation;
+    assert!((0.5..2.0).contains(&ratio), "{found:?}");
 }
 
 #[test]
@@ -411,10 +497,10 @@ fn film_of(turn: &ReadTurn, solution: &TurnSolution, out: &std::path::Path) -> V
         turn,
         solution,
         maps: &maps,
-        conditioning: Conditioning::of(&turn.curves),
         light_source: None,
         normals_source: None,
         strip: None,
+        asset: None,
         has_movie: true,
     };
     files.write(out).unwrap();
@@ -491,9 +577,7 @@ fn even_light_is_called_too_even() {
     let good = Conditioning::of(&film(&surface, &room(), TAKE));
     assert_eq!(good.verdict, RoomVerdict::Good);
     assert!(good.verdict.advice().is_none());
-    let mut even = ShLight::even(Order::TWO, [0.3; 3]);
-    even.coefficients_mut()[3] = [0.01; 3];
-    let bad = Conditioning::of(&film(&surface, &even, TAKE));
+    let bad = Conditioning::of(&film(&surface, &even_room(), TAKE));
     assert_eq!(bad.verdict, RoomVerdict::TooEven);
     let advice = bad.verdict.advice().unwrap();
     assert!(advice.contains("turn on one lamp"), "{advice}");
@@ -565,7 +649,7 @@ fn turns_that_tell_nothing_are_refused_by_what_is_wrong() {
 }
 
 #[test]
-fn a_dark_turn_and_a_white_one_have_no_light_and_a_prior_of_another_size_is_refused() {
+fn a_dark_turn_and_a_white_one_are_wrongly_exposed_and_a_prior_of_another_size_is_refused() {
     let extent = Extent::new(4, 4);
     let of = |level: f32| {
         let mut builder = CurveBuilder::new(extent, &[1.0; 16]).unwrap();
@@ -577,11 +661,16 @@ fn a_dark_turn_and_a_white_one_have_no_light_and_a_prior_of_another_size_is_refu
         }
         builder.finish().unwrap()
     };
-    for level in [0.0, 1.0] {
+    for (level, verdict, says) in [
+        (0.0, RoomVerdict::Underexposed, "the object is underexposed"),
+        (1.0, RoomVerdict::Overexposed, "the object is overexposed"),
+    ] {
         let curves = of(level);
-        let unknown = solve_turn(&curves, &TurnOptions::default());
-        assert!(matches!(unknown, Err(TurnError::NoLight)));
+        let unknown = solve_turn(&curves, &TurnOptions::default()).unwrap_err();
+        assert!(matches!(unknown, TurnError::Unfit(found) if found == verdict));
+        assert!(unknown.to_string().contains(says), "{unknown}");
         let found = solve_turn(&curves, &known(&room())).unwrap();
+        assert_eq!(found.conditioning().verdict, verdict);
         assert_eq!(found.albedo(&curves).planes().pixel(1, 1), [0.0; 3]);
         assert!(found.confidence(&curves).plane(0)[0] < 0.1);
     }
@@ -618,6 +707,37 @@ fn steps_of_the_exposure_are_found_and_taken_out() {
     assert!(off < 0.5, "{off}");
     assert!(albedo_off(&surface, &found.albedo(&curves), 1.0) < 0.02);
     assert!(SOLVED.0.curves.exposure_steps().is_empty());
+}
+
+#[test]
+fn missing_frames_of_a_coarse_turn_are_no_steps_of_the_exposure() {
+    let surface = ball();
+    let extent = surface.extent();
+    // Strong light from one side, of which the frames show much from one to the next.
+    let mut light = room();
+    for at in [1, 3] {
+        light.coefficients_mut()[at] = [0.55; 3];
+    }
+    let missing = [3, 10, 11, 24, 31, 43, 44, 58, 66, 67, 80];
+    let steps = |factor: f32| {
+        let mut builder = CurveBuilder::new(extent, mask(&surface).plane(0)).unwrap();
+        for k in (0..90).filter(|k| !missing.contains(k)) {
+            let angle = 4.0 * f64::from(k);
+            let exposure = if (20..70).contains(&k) { factor } else { 1.0 };
+            let image = frame(&surface, &light, angle).into_planes();
+            builder
+                .push(angle, extent, image.map(|v| exposure * v).planes())
+                .unwrap();
+        }
+        let curves = builder.finish().unwrap();
+        curves
+            .exposure_steps()
+            .iter()
+            .map(|step| step.angle_deg)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(steps(1.0), [0.0; 0]);
+    assert_eq!(steps(0.8), [80.0, 280.0]);
 }
 
 proptest! {

@@ -1,19 +1,15 @@
-//! `relight turn`: a whole turn into normals, albedo, light and what they leave over.
+//! What `relight turn` is told.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use relight::light::{Order, Panorama, ShLight};
 use relight::turn::{
-    BodyKind, Conditioning, Elevation, ElevationSource, Filmed, NormalsSource, Probe, ProbeBall,
-    ProbePlace, ReadTurn, RoomStrip, RoomVerdict, TableSense, TurnError, TurnFiles, TurnLabels,
-    TurnMaps, TurnOptions, film, prior_normals, read_curves, solve_turn,
+    BodyKind, Elevation, NormalsSource, Probe, ProbeBall, ProbePlace, ReadTurn, TableSense,
+    TurnOptions, prior_normals,
 };
-use serde_json::json;
 
-use crate::cli::console::{CommandResult, Console, Outcome};
 use crate::cli::values::YName;
 
 pub(in crate::cli) const EXAMPLES: &str = "\
@@ -29,10 +25,10 @@ Examples:
 pub(in crate::cli) struct Arguments {
     /// The shard of one turn (.tar), or a folder that holds one turn.
     #[arg(value_name = "SHARD")]
-    shard: PathBuf,
+    pub(super) shard: PathBuf,
     /// The folder for the results.
     #[arg(short, long, value_name = "DIR")]
-    output: PathBuf,
+    pub(super) output: PathBuf,
     /// How high the camera looks down on the table, degrees: 0 from the side, 90 from above [default: 18, and 8
     /// either way].
     #[arg(long, value_name = "DEGREES", value_parser = elevation, conflicts_with = "rim")]
@@ -44,18 +40,18 @@ pub(in crate::cli) struct Arguments {
     /// The light where it is known, in the viewer's frame at the table's angle 0: coefficients of spherical harmonics
     /// (nine lines of red, green and blue, or up to 49), or a panorama (.hdr, .exr).
     #[arg(long, value_name = "FILE")]
-    light: Option<PathBuf>,
+    pub(super) light: Option<PathBuf>,
     /// The session from which the shard was made, or its video: to see the room (room.png), and the ball of --probe. Needs the
     /// program ffmpeg.
     #[arg(long, value_name = "PATH")]
-    session: Option<PathBuf>,
+    pub(super) session: Option<PathBuf>,
     /// A ball on the table, matt grey or chrome, which measures the light: its middle and radius in the video, pixels. The light is
     /// then in units in which the ball's albedo is 1.
     #[arg(long, value_name = "X,Y,R", value_parser = probe, requires = "session", conflicts_with = "light")]
-    probe: Option<ProbePlace>,
+    pub(super) probe: Option<ProbePlace>,
     /// What the ball is made of: without it, what it looks like.
     #[arg(long, value_enum, value_name = "KIND", requires = "probe")]
-    probe_ball: Option<BallName>,
+    pub(super) probe_ball: Option<BallName>,
     /// Normals to start from: "shipped" (the network that comes with the program), "none", a network (.onnx, or weights
     /// of decompose: .safetensors, .pth), a map of normals (.png, .exr), or a folder with normal.png
     /// [default: shipped, and none with --light].
@@ -66,37 +62,47 @@ pub(in crate::cli) struct Arguments {
     normals_y: YName,
     /// How much these normals count beside what the turn says.
     #[arg(long, value_name = "WEIGHT", default_value_t = TurnOptions::default().prior_weight, value_parser = weight)]
-    normals_weight: f64,
+    pub(super) normals_weight: f64,
     /// What the object is made of: without it, what explains the turn.
     #[arg(long, value_enum, value_name = "KIND")]
-    body: Option<BodyName>,
+    pub(super) body: Option<BodyName>,
     /// Which way the table turns as its angle grows, seen from above.
     #[arg(long, value_enum, default_value_t = SenseName::CounterClockwise)]
     sense: SenseName,
     /// Write the object as one file that can be lit, object.relit.
     #[arg(long, value_name = "FILE")]
-    asset: Option<PathBuf>,
+    pub(super) asset: Option<PathBuf>,
     /// Write twelve frames with what was found as their truth, in the layout of synth, for train to read.
     #[arg(long, value_name = "DIR")]
-    labels: Option<PathBuf>,
+    pub(super) labels: Option<PathBuf>,
     /// The least confidence, 0 to 1, of pixels in the labels.
     #[arg(long, value_name = "PART", default_value_t = 0.3, value_parser = part, requires = "labels")]
-    labels_confidence: f32,
+    pub(super) labels_confidence: f32,
     /// Do not write the video, which needs the program ffmpeg.
     #[arg(long)]
-    no_video: bool,
+    pub(super) no_video: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum SenseName {
+pub(super) enum SenseName {
     /// The background moves to the right.
     CounterClockwise,
     /// The background moves to the left.
     Clockwise,
 }
 
+impl SenseName {
+    /// The name of the other one.
+    pub(super) const fn other(self) -> &'static str {
+        match self {
+            Self::CounterClockwise => "clockwise",
+            Self::Clockwise => "counter-clockwise",
+        }
+    }
+}
+
 #[derive(Clone, Copy, ValueEnum)]
-enum BallName {
+pub(super) enum BallName {
     /// It is matt.
     Grey,
     /// It mirrors.
@@ -113,7 +119,7 @@ impl From<BallName> for ProbeBall {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum BodyName {
+pub(super) enum BodyName {
     /// It scatters light, with gloss or without.
     Diffuse,
     /// It only reflects, in its own colour.
@@ -130,7 +136,11 @@ impl From<BodyName> for BodyKind {
 }
 
 impl Arguments {
-    fn sense(&self) -> TableSense {
+    pub(super) const fn sense_name(&self) -> SenseName {
+        self.sense
+    }
+
+    pub(super) fn sense(&self) -> TableSense {
         match self.sense {
             SenseName::CounterClockwise => TableSense::CounterClockwise,
             SenseName::Clockwise => TableSense::Clockwise,
@@ -138,7 +148,7 @@ impl Arguments {
     }
 
     /// The normals to start from, and how they are named.
-    fn normals(&self) -> Option<(NormalsSource, &str)> {
+    pub(super) fn normals(&self) -> Option<(NormalsSource, &str)> {
         match self.normals.as_deref() {
             None if self.light.is_some() || self.probe.is_some() => None,
             Some("none") => None,
@@ -147,7 +157,7 @@ impl Arguments {
         }
     }
 
-    fn probe(&self) -> Option<Probe> {
+    pub(super) fn probe(&self) -> Option<Probe> {
         self.probe.map(|place| Probe {
             place,
             ball: self.probe_ball.map(ProbeBall::from),
@@ -155,30 +165,13 @@ impl Arguments {
         })
     }
 
-    fn elevation(&self) -> Elevation {
+    pub(super) fn elevation(&self) -> Elevation {
         let given = self.elevation.or(self.rim);
         given.unwrap_or_else(Elevation::assumed)
     }
 
-    /// An asset takes the place of an earlier one, and of nothing else.
-    fn check_asset(&self) -> Result<(), String> {
-        let Some(path) = self.asset.as_deref() else {
-            return Ok(());
-        };
-        let is_asset = path
-            .extension()
-            .is_some_and(|ending| ending.eq_ignore_ascii_case("relit"));
-        if is_asset {
-            return Ok(());
-        }
-        Err(format!(
-            "--asset {}: give a name that ends in .relit",
-            path.display()
-        ))
-    }
-
     /// `measured` is the light by the ball.
-    fn options(
+    pub(super) fn options(
         &self,
         turn: &ReadTurn,
         measured: Option<ShLight>,
@@ -199,166 +192,10 @@ impl Arguments {
     }
 }
 
-pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let start = Instant::now();
-    arguments.check_asset()?;
-    let bar = console.progress(0, "frames");
-    let turn = read_curves(&arguments.shard, arguments.sense(), &|done, all| {
-        bar.set_length(all);
-        bar.set_position(done);
-    })?;
-    bar.finish_and_clear();
-    let read_seconds = start.elapsed().as_secs_f64();
-    let mut filmed = arguments
-        .session
-        .as_ref()
-        .map(|path| {
-            let bar = console.progress(0, "frames of the video");
-            film(path, &turn, arguments.probe(), &|done, all| {
-                bar.set_length(all);
-                bar.set_position(done);
-            })
-        })
-        .transpose()?;
-    let measured = filmed.as_mut().map(Filmed::light).transpose()?.flatten();
-    if let Some(measured) = measured.as_ref().filter(|found| found.ball != found.looks) {
-        let looks = ball_name(measured.looks);
-        let text = format!(
-            "the ball was called {}, but it looks {looks}",
-            ball_name(measured.ball)
-        );
-        console.warn(&text, &json!({ "event": "warning", "message": text }));
-    }
-    let ball = measured.as_ref().map(|measured| measured.ball);
-    let options = arguments.options(&turn, measured.map(|measured| measured.light))?;
-    let conditioning = Conditioning::of(&turn.curves);
-    let solution = solve_turn(&turn.curves, &options)?;
-    let maps = TurnMaps::new(&turn.curves, &solution);
-    let strip = filmed.as_ref().and_then(Filmed::strip);
-    let given = arguments
-        .light
-        .as_ref()
-        .map(|path| path.display().to_string());
-    let light_source = given.or_else(|| ball.map(|ball| format!("probe, {}", ball_name(ball))));
-    let figures = TurnFiles {
-        turn: &turn,
-        solution: &solution,
-        maps: &maps,
-        conditioning,
-        light_source: light_source.as_deref(),
-        normals_source: arguments.normals().map(|(_, name)| name),
-        strip,
-        has_movie: !arguments.no_video,
-    }
-    .write(&arguments.output)?;
-    if let Some(path) = &arguments.asset {
-        solution.asset(&turn)?.write(path)?;
-    }
-    let has_labels = solution.body() == BodyKind::Diffuse;
-    if let Some(folder) = arguments.labels.as_ref().filter(|_| has_labels) {
-        let labels = TurnLabels {
-            turn: &turn,
-            solution: &solution,
-            least_confidence: arguments.labels_confidence,
-        };
-        labels.write(folder)?;
-    }
-    let seconds = start.elapsed().as_secs_f64();
-    let text = format!(
-        "{}: {} frames in {read_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees (median), light {}, body {}",
-        arguments.output.display(),
-        turn.curves.frames(),
-        solution.expected_error_deg(),
-        match (&arguments.light, arguments.probe) {
-            (Some(_), _) => "given",
-            (None, Some(_)) => "measured",
-            (None, None) => "found",
-        },
-        match solution.body() {
-            BodyKind::Diffuse => "diffuse",
-            BodyKind::Metal => "metal",
-        },
-    );
-    let event = json!({
-        "event": "turned",
-        "output": arguments.output,
-        "seconds": seconds,
-        "reading_seconds": read_seconds,
-        "figures": figures,
-    });
-    console.say(&text, &event);
-    if arguments.session.is_some() {
-        warn_of_room(strip, arguments.sense, console);
-    }
-    let outcome = warn(&turn, &options, solution.body(), conditioning, console);
-    if arguments.labels.is_some() && !has_labels {
-        let text = TurnError::NoMattPart.to_string();
-        console.warn(&text, &json!({ "event": "warning", "message": text }));
-        return Ok(Outcome::Incomplete);
-    }
-    Ok(outcome)
-}
-
-fn ball_name(ball: ProbeBall) -> &'static str {
+pub(super) fn ball_name(ball: ProbeBall) -> &'static str {
     match ball {
         ProbeBall::Grey => "grey",
         ProbeBall::Chrome => "chrome",
-    }
-}
-
-/// Says where the room does not fit.
-fn warn_of_room(strip: Option<&RoomStrip>, sense: SenseName, console: Console) {
-    let text = match strip.map(|strip| strip.figures().sense) {
-        // Angles were negated for the other sense: with the right one they always grow counter-clockwise.
-        Some(TableSense::CounterClockwise) => return,
-        Some(TableSense::Clockwise) => {
-            let other = match sense {
-                SenseName::CounterClockwise => "clockwise",
-                SenseName::Clockwise => "counter-clockwise",
-            };
-            format!("the background moves the other way: the normals are mirrored, give --sense {other}")
-        }
-        None => "the two sides of the picture do not show the same room: there is no room.png, and the table's sense is not \
-                 checked"
-            .to_owned(),
-    };
-    console.warn(&text, &json!({ "event": "warning", "message": text }));
-}
-
-/// Says what a user should know; whether something was left out.
-fn warn(
-    turn: &ReadTurn,
-    options: &TurnOptions,
-    body: BodyKind,
-    conditioning: Conditioning,
-    console: Console,
-) -> Outcome {
-    let warn = |text: &str| console.warn(text, &json!({ "event": "warning", "message": text }));
-    if options.elevation.source() == ElevationSource::Assumed {
-        warn(&format!(
-            "the camera's elevation is not known and taken as {} degrees, {} either way: give --elevation or --rim",
-            options.elevation.degrees(),
-            options.elevation.uncertainty_deg(),
-        ));
-    }
-    if !turn.has_angles {
-        warn("the frames have no angles: they are taken for evenly spread over one turn");
-    }
-    for damage in &turn.damage {
-        warn(damage);
-    }
-    if let Some(advice) = conditioning.verdict.advice() {
-        warn(advice);
-    }
-    if body == BodyKind::Metal && options.body.is_none() && options.light.is_none() {
-        warn(
-            "the object is taken for metal, which in unknown light can be wrong: do not use its albedo, and give --body diffuse if it is not of metal",
-        );
-    }
-    if turn.damage.is_empty() && conditioning.verdict != RoomVerdict::TooEven {
-        Outcome::Whole
-    } else {
-        Outcome::Incomplete
     }
 }
 
