@@ -146,7 +146,7 @@ fn noisy(AlignSample(image): AlignSample, seed: u32) -> AlignSample {
                 i32::from(state.to_be_bytes()[0]) - 128
             })
             .sum();
-        (i32::from(level) + sum / 10).clamp(0, 255) as u8
+        (i32::from(level) + sum / 20).clamp(0, 255) as u8
     };
     let (width, height) = image.dimensions();
     let levels = image.into_raw().into_iter().map(noise).collect();
