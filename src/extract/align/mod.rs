@@ -114,6 +114,8 @@ struct Motion {
     /// Mean square of the distances from there beyond what is measuring error, square pixels; `None` before it is
     /// known.
     variance: Option<f64>,
+    /// Where the object is in the mask's frame, pixels.
+    origin: [f64; 2],
 }
 
 /// What a thread needs to measure shifts; it keeps its buffers from frame to frame.
@@ -200,7 +202,7 @@ impl Aligner {
         let registered = found.iter().filter(|found| found.shift.is_some());
         let usual = middle(registered.map(|found| found.confidence).collect());
         aligner.least_confidence = MIN_CONFIDENCE.max(LEAST_OF_MEDIAN * usual);
-        aligner.motion = Motion::of(&found);
+        aligner.motion = Motion::of(&found, reference);
         usable.then_some(aligner)
     }
 
@@ -226,7 +228,7 @@ impl Aligner {
         let uncertainty = fit.map_or(f64::INFINITY, |fit| in_pixels(fit.uncertainty));
         let shift = fit.map(|fit| fit.shift.map(in_pixels));
         Alignment {
-            shift: shift.map(|shift| self.motion.most_likely(shift, uncertainty)),
+            shift: shift.map(|shift| self.motion.against_mask(shift, uncertainty)),
             uncertainty,
             confidence,
             turned: fit.and_then(|fit| self.turned(gradients, fit)),
@@ -293,28 +295,40 @@ impl Aligner {
 }
 
 impl Motion {
-    fn of(found: &[Alignment]) -> Self {
+    /// From the frames that were learnt from; the mask was made on that of index `reference`.
+    fn of(found: &[Alignment], reference: usize) -> Self {
         let shifts: Vec<[f64; 2]> = found.iter().filter_map(|found| found.shift).collect();
-        // Where shifts count from the middle, it is at 0.
         let centre = middle_place(&shifts);
-        let centre = if centre[0].hypot(centre[1]) > SAME_PLACE {
-            centre
-        } else {
-            [0.0; 2]
-        };
         let beyond = |found: &Alignment| {
             let [x, y] = found.shift?;
             let (dx, dy) = (x - centre[0], y - centre[1]);
             Some(dx * dx + dy * dy - found.uncertainty * found.uncertainty)
         };
         let variance = found.iter().filter_map(beyond).sum::<f64>() / shifts.len().max(1) as f64;
-        Self {
+        let mut motion = Self {
             centre,
             variance: Some(variance.max(0.0)),
+            origin: [0.0; 2],
+        };
+        let of_mask = found.get(reference);
+        if let Some((shift, found)) = of_mask.and_then(|found| Some((found.shift?, found))) {
+            let away = (shift[0] - centre[0]).hypot(shift[1] - centre[1]);
+            motion.origin = if away > SAME_PLACE {
+                motion.most_likely(shift, found.uncertainty)
+            } else {
+                centre
+            };
         }
+        motion
     }
 
-    /// The most likely shift of a frame of this turn that shows this one. A measured value holds the error of its
+    /// The most likely shift against the mask's frame, of a frame that shows this one.
+    fn against_mask(&self, shift: [f64; 2], uncertainty: f64) -> [f64; 2] {
+        let found = self.most_likely(shift, uncertainty);
+        [0, 1].map(|axis| found[axis] - self.origin[axis])
+    }
+
+    /// The most likely place of a frame's object of this turn. A measured value holds the error of its
     /// measuring, which in a turn that hardly moves is most of it, and counts the less: as in the empirical Bayes
     /// estimate (Efron and Morris, "Stein's estimation rule and its competitors", 1973), but with the squares of the
     /// variances, because uncertainties are upper bounds that must not pull at an object that clearly moves. What

@@ -178,8 +178,8 @@ fn in_a_turn_that_stands_still_no_shift_is_found_in_noise_and_a_jolt_is() {
 #[test]
 fn what_is_measured_counts_as_far_as_the_turn_moves() {
     let shaken = Motion {
-        centre: [0.0; 2],
         variance: Some(4.0),
+        ..Motion::default()
     };
     let [dx, dy] = shaken.most_likely([1.5, -0.5], 0.05);
     assert!((dx - 1.5).hypot(dy + 0.5) < 0.001);
@@ -187,6 +187,7 @@ fn what_is_measured_counts_as_far_as_the_turn_moves() {
     let beside = Motion {
         centre: [2.0, 0.0],
         variance: Some(0.0),
+        ..Motion::default()
     };
     assert_eq!(beside.most_likely([2.1, 0.03], 0.08), [2.0, 0.0]);
     assert_eq!(beside.most_likely([0.0, 0.0], 0.08), [0.0, 0.0]);
@@ -196,6 +197,36 @@ fn what_is_measured_counts_as_far_as_the_turn_moves() {
     };
     let [dx, _] = trembling.most_likely([0.2, 0.0], 0.1);
     assert!((dx - 0.1).abs() < 1e-9);
+}
+
+#[test]
+fn the_masks_frame_is_no_other_place_than_the_rest_unless_it_surely_is() {
+    let found = |shift: [f64; 2]| Alignment {
+        shift: Some(shift),
+        uncertainty: 0.08,
+        confidence: 0.8,
+        turned: None,
+    };
+    let still = [
+        [0.0, 0.0],
+        [0.15, 0.05],
+        [0.16, 0.04],
+        [0.14, 0.05],
+        [0.15, 0.06],
+    ]
+    .map(found);
+    let motion = Motion::of(&still, 0);
+    assert_eq!(motion.against_mask([0.15, 0.05], 0.08), [0.0; 2]);
+    let pushed = [
+        [-2.0, 0.0],
+        [0.15, 0.05],
+        [0.15, 0.05],
+        [0.15, 0.05],
+        [0.15, 0.05],
+    ]
+    .map(found);
+    let [dx, dy] = Motion::of(&pushed, 0).against_mask([0.15, 0.05], 0.08);
+    assert!((dx - 2.15).hypot(dy - 0.05) < 0.01, "{dx} {dy}");
 }
 
 #[test]
