@@ -188,7 +188,9 @@ impl MaskCheck<'_> {
             let rest = turn.reduced(&self.mask);
             let around = rest.inverted();
             let rest = rest.map(|at, bit| bit && !part.bits()[at]);
-            turn.boundary(&part, &rest) <= turn.boundary(&part, &around)
+            let within = turn.boundary(&part, &rest);
+            let moves_with_rest = within.zip(turn.boundary(&part, &around));
+            moves_with_rest.is_some_and(|(within, outside)| within <= outside)
                 && turn.share_of_table(&part) <= ON_TABLE
         };
         let is_object: Vec<bool> = components.list.iter().enumerate().map(is_cut_off).collect();

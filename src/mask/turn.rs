@@ -177,11 +177,12 @@ impl TurnStatistics {
     /// the contrast there, 0..=1.
     pub(super) fn outline(&self, object: &Bitmap) -> f32 {
         let object = self.reduced(object);
-        self.boundary(&object, &object.inverted())
+        self.boundary(&object, &object.inverted()).unwrap_or(0.0)
     }
 
-    /// The same along the boundary between two parts, which have the size of the statistics.
-    pub(super) fn boundary(&self, one: &Bitmap, other: &Bitmap) -> f32 {
+    /// The same along the boundary between two parts, which have the size of the statistics; `None` where they do not
+    /// touch.
+    pub(super) fn boundary(&self, one: &Bitmap, other: &Bitmap) -> Option<f32> {
         let (columns, rows) = self.fine.size;
         let (one, other) = (one.bits(), other.bits());
         let scale = grab_cut::contrast_scale(&self.fine);
@@ -198,7 +199,7 @@ impl TurnStatistics {
                 }
             }
         }
-        sum / f32::max(edges, 1.0)
+        (edges > 0.0).then_some(sum / edges)
     }
 
     /// The share of a part, which has the size of the statistics, that is plain table, 0..=1.

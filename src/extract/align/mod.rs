@@ -329,9 +329,9 @@ impl Motion {
     }
 
     /// The most likely place of a frame's object of this turn. A measured value holds the error of its
-    /// measuring, which in a turn that hardly moves is most of it, and counts the less: as in the empirical Bayes
-    /// estimate (Efron and Morris, "Stein's estimation rule and its competitors", 1973), but with the squares of the
-    /// variances, because uncertainties are upper bounds that must not pull at an object that clearly moves. What
+    /// measuring, which in a turn that hardly moves is most of it, and counts the less: an empirical Bayes
+    /// estimate (Efron and Morris, "Stein's estimation rule and its competitors", 1973). Uncertainties are generous,
+    /// and must not pull at an object that clearly moves: it counts by the ratio of the variances, at most wholly. What
     /// neither the turn's motion nor an error explains is taken as it is.
     fn most_likely(&self, shift: [f64; 2], uncertainty: f64) -> [f64; 2] {
         let Some(variance) = self.variance else {
@@ -343,8 +343,7 @@ impl Motion {
         if spread <= 0.0 || square > JOLT * JOLT * spread {
             return shift;
         }
-        let (motion, noise) = (variance.powi(2), uncertainty.powi(4));
-        let part = motion / (motion + noise);
+        let part = (variance / uncertainty.powi(2)).min(1.0);
         [0, 1].map(|axis| self.centre[axis] + part * away[axis])
     }
 }
