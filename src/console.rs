@@ -10,11 +10,15 @@ use std::error::Error;
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use relit_data::causes::with_causes;
 use serde_json::Value;
+
+/// What first kept a line from being printed, other than that nobody reads any more.
+static LOST_LINE: OnceLock<io::Error> = OnceLock::new();
 
 /// The outcome of a command that ran to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,11 +121,18 @@ impl Console {
         }
     }
 
-    /// Prints the command's error, if there is one, and returns the exit code.
+    /// Prints the command's error, if there is one, and returns the exit code. Where lines could not be printed, the
+    /// outcome is not whole.
     pub fn finish<E: Error + 'static>(self, result: Result<Outcome, E>) -> ExitCode {
-        match result {
-            Ok(outcome) => outcome.into(),
-            Err(error) => {
+        match (result, LOST_LINE.get()) {
+            (Ok(Outcome::Whole), Some(fault)) => {
+                print_error_line(&format!(
+                    "error: standard output could not be written, lines are missing there: {fault}"
+                ));
+                Outcome::Lossy.into()
+            }
+            (Ok(outcome), _) => outcome.into(),
+            (Err(error), _) => {
                 self.error(&error);
                 ExitCode::FAILURE
             }
@@ -145,7 +156,11 @@ impl Console {
 
 /// Prints a line. If the output is closed, the work goes on without it.
 fn print_line(text: &str) {
-    let _ = writeln!(io::stdout(), "{text}");
+    if let Err(fault) = writeln!(io::stdout(), "{text}")
+        && fault.kind() != io::ErrorKind::BrokenPipe
+    {
+        let _ = LOST_LINE.set(fault);
+    }
 }
 
 fn print_error_line(text: &str) {

@@ -356,6 +356,24 @@ fn a_name_that_is_not_utf_8_is_refused_and_does_not_stop_the_others() {
 }
 
 #[test]
+fn lines_that_do_not_fit_onto_the_disk_are_told() {
+    let bench = Bench::new();
+    let output = Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+        .args("clip.mkv --mask mask.png --frames 30 --size 32 -o out".split(' '))
+        .current_dir(bench.folder.path())
+        .stdout(fs::File::create("/dev/full").unwrap())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        told.contains("standard output could not be written"),
+        "{told}"
+    );
+    bench.verified(0, "out");
+}
+
+#[test]
 fn resume_skips_what_is_intact_and_makes_again_what_is_damaged() {
     let bench = Bench::new();
     fs::copy(bench.path("clip.mkv"), bench.path("other.mkv")).unwrap();

@@ -483,6 +483,25 @@ fn relight(arguments: &[&str]) -> std::process::Output {
 }
 
 #[test]
+fn a_table_that_does_not_fit_onto_the_disk_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    write_set(&dir.path().join("truth"));
+    let full = fs::File::create("/dev/full").unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_relight"))
+        .args(["eval", "mit", "--count", "1", "--data"])
+        .arg(dir.path().join("truth"))
+        .stdout(full)
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(3), "{output:?}");
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        told.contains("standard output could not be written"),
+        "{told}"
+    );
+}
+
+#[test]
 fn the_program_prints_a_table_and_writes_it_as_json() {
     let dir = tempfile::tempdir().unwrap();
     write_set(&dir.path().join("truth"));

@@ -8,11 +8,15 @@
 use std::error::Error;
 use std::io::{self, Write};
 use std::process::ExitCode;
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use relit_data::causes::with_causes;
 use serde_json::{Value, json};
+
+/// What first kept a line from being printed, other than that nobody reads any more.
+static LOST_LINE: OnceLock<io::Error> = OnceLock::new();
 
 /// How a command that ran to its end came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,7 +60,11 @@ impl Console {
     pub(crate) fn say(self, text: &str, event: &Value) {
         let json = event.to_string();
         // Where nobody reads any more, the work goes on.
-        let _ = writeln!(io::stdout(), "{}", if self.json { &json } else { text });
+        if let Err(fault) = writeln!(io::stdout(), "{}", if self.json { &json } else { text })
+            && fault.kind() != io::ErrorKind::BrokenPipe
+        {
+            let _ = LOST_LINE.set(fault);
+        }
     }
 
     /// Something that was left out, while the rest goes on.
@@ -67,11 +75,19 @@ impl Console {
         let _ = writeln!(io::stderr(), "warning: {text}");
     }
 
-    /// The exit code of a command, after its error, if any, was told.
+    /// The exit code of a command, after its error, if any, was told. Where lines could not be printed, the outcome
+    /// is not whole.
     pub(crate) fn finish(self, result: CommandResult) -> ExitCode {
-        match result {
-            Ok(outcome) => outcome.into(),
-            Err(error) => {
+        match (result, LOST_LINE.get()) {
+            (Ok(Outcome::Whole), Some(fault)) => {
+                let _ = writeln!(
+                    io::stderr(),
+                    "error: standard output could not be written, lines are missing there: {fault}"
+                );
+                Outcome::Incomplete.into()
+            }
+            (Ok(outcome), _) => outcome.into(),
+            (Err(error), _) => {
                 let text = with_causes(error.as_ref());
                 if self.json {
                     self.say("", &json!({ "event": "error", "message": text }));

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tch::Tensor;
 
 use super::error::TrainError;
-use super::losses::{Mean, angular, gradient, scale_invariant, windowed};
+use super::losses::{Mean, chord, gradient, scale_invariant, windowed};
 use super::sample::TruthBatch;
 use super::terms::Terms;
 use crate::decompose::{HIGHLIGHT_OFFSET, LEAST_FACING, LOG_LUMINANCE, LOG_SHADING};
@@ -82,7 +82,7 @@ pub struct DecomposeWeights {
     pub windows: f64,
     /// Steps from pixel to pixel of log shading and log albedo.
     pub gradient: f64,
-    /// Angle of the normals.
+    /// Distance of the normals.
     pub normals: f64,
     /// Mean error of the highlights.
     pub highlight: f64,
@@ -97,7 +97,7 @@ impl Default for DecomposeWeights {
             quotient: 0.5,
             windows: 0.5,
             gradient: 0.2,
-            normals: 1.5,
+            normals: 1.0,
             highlight: 1.0,
             highlight_energy: 0.2,
         }
@@ -157,8 +157,8 @@ pub fn decompose_losses(
     for mean in steps {
         terms.add_mean("albedo_steps", weights.gradient * 0.5, mean);
     }
-    let angle = angular(&answer.normals, &batch.normals, mask)?;
-    terms.add_mean("normals", weights.normals, angle);
+    let distance = chord(&answer.normals, &batch.normals, mask)?;
+    terms.add_mean("normals", weights.normals, distance);
     let highlight = highlight_error(batch, answer)?;
     terms.add_mean("highlight", weights.highlight, highlight);
     let energy = highlight_energy_error(batch, answer)?;

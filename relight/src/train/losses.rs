@@ -9,6 +9,8 @@ use super::error::TrainError;
 
 /// Keeps a division by nothing from being one.
 const TINY: f64 = 1e-6;
+/// A chord so short counts as its square, for a gradient where it is 0.
+const CHORD_FLOOR: f64 = 0.02;
 
 /// A mean, and what it is a mean over: so that the mean over several parts of a batch can be made of theirs.
 #[derive(Debug)]
@@ -119,6 +121,24 @@ pub fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, 
     Ok(Mean { value, over })
 }
 
+/// Length of the chord between unit normals, `2 sin(angle / 2)`, mean under the weight. It grows as the angle does and not
+/// as its square: where two surfaces are possible, the likelier one costs least, and not the flat mean of both.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub fn chord(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, TrainError> {
+    let length = found
+        .f_sub(truth)?
+        .f_square()?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
+        .f_add_scalar(CHORD_FLOOR * CHORD_FLOOR)?
+        .f_sqrt()?
+        .f_add_scalar(-CHORD_FLOOR)?;
+    let over = weight.f_sum(None)?.f_add_scalar(TINY)?;
+    let value = length.f_mul(weight)?.f_sum(None)?.f_div(&over)?;
+    Ok(Mean { value, over })
+}
+
 /// Mean angle between unit normals under the weight, degrees.
 ///
 /// # Errors
@@ -135,4 +155,51 @@ pub fn angular_degrees(
     let angle = cosine.f_acos()?.f_rad2deg()?.f_mul(weight)?;
     let weights = weight.f_sum(None)?.f_add_scalar(TINY)?;
     Ok(angle.f_sum(None)?.f_div(&weights)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use tch::{Device, Kind};
+
+    use super::*;
+
+    /// One picture of a row of normals that are tilted to the right by so many degrees.
+    fn tilted(degrees: &[f64]) -> Tensor {
+        let rows = |value: fn(f64) -> f64| degrees.iter().map(move |d| value(d.to_radians()));
+        let values: Vec<f64> = rows(f64::sin)
+            .chain(rows(|_| 0.0))
+            .chain(rows(f64::cos))
+            .collect();
+        Tensor::from_slice(&values).view([1, 3, 1, degrees.len() as i64])
+    }
+
+    fn even(pixels: i64) -> Tensor {
+        Tensor::ones([1, 1, 1, pixels], (Kind::Double, Device::Cpu))
+    }
+
+    #[test]
+    fn the_likelier_of_two_surfaces_costs_less_than_their_flat_mean() {
+        let truth = tilted(&[40.0, 40.0, -40.0]);
+        let cost = |loss: fn(&Tensor, &Tensor, &Tensor) -> Result<Mean, TrainError>, tilt: f64| {
+            let found = tilted(&[tilt; 3]);
+            loss(&found, &truth, &even(3))
+                .unwrap()
+                .value
+                .double_value(&[])
+        };
+        assert!(cost(chord, 40.0) < cost(chord, 15.0));
+        assert!(cost(angular, 40.0) > cost(angular, 15.0));
+    }
+
+    #[test]
+    fn a_chord_is_as_long_as_the_angle_says_and_has_a_gradient_where_it_is_none() {
+        let (found, truth) = (tilted(&[30.0]), tilted(&[-30.0]));
+        let length = chord(&found, &truth, &even(1)).unwrap().value;
+        assert!((length.double_value(&[]) - 1.0).abs() < CHORD_FLOOR);
+        let exact = truth.set_requires_grad(true);
+        let none = chord(&exact, &tilted(&[-30.0]), &even(1)).unwrap().value;
+        none.backward();
+        assert!(none.double_value(&[]).abs() < 1e-12);
+        assert_eq!(exact.grad().abs().max().double_value(&[]), 0.0);
+    }
 }

@@ -44,12 +44,6 @@ impl Scene {
         &self.buffer
     }
 
-    /// The part of the sky that each covered pixel sees, 0..=1; none in an open scene.
-    #[must_use]
-    pub fn openness(&self) -> Option<&[f32]> {
-        self.shade.as_ref().map(|shade| shade.open.as_slice())
-    }
-
     /// Shading and highlight of a surface under a lighting. `seed` draws the rays.
     #[must_use]
     pub fn light(
