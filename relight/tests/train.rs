@@ -615,6 +615,20 @@ fn a_run_that_another_program_makes_is_left_alone() {
 }
 
 #[test]
+fn turns_are_refused_where_they_teach_nothing() {
+    let turns = PaperInputs {
+        turns: Some("turns".into()),
+        ..PaperInputs::default()
+    };
+    let (settings, resources) = (PaperSettings::default(), Resources::default());
+    let task = PaperTask::new(PaperPhase::Normal, settings, resources, &turns);
+    assert!(matches!(
+        task,
+        Err(TrainError::NotTaught { phase: "normal" })
+    ));
+}
+
+#[test]
 fn the_settings_that_come_with_relight_can_be_read() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights");
     let paper: PaperSettings = read_settings(&folder.join("paper.toml")).unwrap();

@@ -112,6 +112,14 @@ pub enum TrainError {
         /// The phase.
         phase: &'static str,
     },
+    /// Turns for a phase that learns nothing from them.
+    #[error(
+        "relight train {phase} learns from composed samples, not from turns: leave --turns away"
+    )]
+    NotTaught {
+        /// The phase.
+        phase: &'static str,
+    },
     /// The first of the labels cannot be read.
     #[error("the first of the labels")]
     Label(#[source] data::DamagedSample),

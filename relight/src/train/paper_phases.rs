@@ -61,10 +61,26 @@ impl PaperPhase {
         }
     }
 
+    /// The learning rate where settings name none: the paper's, 1e-6 for Normal-Net on turns and 1e-4 for what begins from
+    /// nothing.
+    #[must_use]
+    pub fn usual_rate(self) -> f64 {
+        match self {
+            Self::Joint => 1e-6,
+            Self::Spec | Self::Normal | Self::Light | Self::Specular => 1e-4,
+        }
+    }
+
     /// Whether there are figures of how well it does on turns.
     #[must_use]
     pub fn is_judged_by_turns(self) -> bool {
         matches!(self, Self::Spec | Self::Light | Self::Joint)
+    }
+
+    /// Whether turns teach it anything.
+    #[must_use]
+    pub fn learns_from_turns(self) -> bool {
+        self != Self::Normal
     }
 
     /// Whether it cannot do without turns.

@@ -102,6 +102,11 @@ impl PaperTask {
         if phase.needs_turns() && inputs.turns.is_none() {
             return Err(needed(phase, "--turns"));
         }
+        if inputs.turns.is_some() && !phase.learns_from_turns() {
+            return Err(TrainError::NotTaught {
+                phase: phase.name(),
+            });
+        }
         if inputs.held_out.is_some() && !phase.is_judged_by_turns() {
             return Err(TrainError::NotJudged {
                 phase: phase.name(),

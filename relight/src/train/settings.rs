@@ -11,13 +11,17 @@ use super::decompose::DecomposeWeights;
 use super::error::TrainError;
 use super::low_rank::LowRankForm;
 use super::model::ComputePrecision;
+use super::paper_phases::PaperPhase;
 use crate::synth::LightKind;
 
 // Nobody trains more: these keep a slip of the pen from filling the memory.
 const MOST_STEPS: u64 = 1_000_000_000;
 const MOST_SAMPLES: u64 = 1_000_000;
+const LARGEST_BATCH: u64 = 4096;
 const MOST_MINUTES: f64 = 1e6;
 const LARGEST_SIZE: u32 = 1024;
+/// Settings that a run may change when it goes on: what it learns does not depend on them.
+const HOW_OFTEN: [&str; 2] = ["run.log_every", "run.checkpoint_minutes"];
 
 /// How long and how fast a network learns: the table `[run]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -228,6 +232,26 @@ pub struct PaperSettings {
 }
 
 impl PaperSettings {
+    /// The settings of a phase: what the TOML file does not name has its default, the learning rate that of the phase.
+    ///
+    /// # Errors
+    /// As [`read_settings`].
+    pub fn of_phase(phase: PaperPhase, file: Option<&Path>) -> Result<Self, TrainError> {
+        let mut settings = Self::default();
+        let mut names_rate = false;
+        if let Some(file) = file {
+            settings = read_settings(file)?;
+            let table: toml::Table = read_settings(file)?;
+            names_rate = table
+                .get("run")
+                .is_some_and(|run| run.get("rate").is_some());
+        }
+        if !names_rate {
+            settings.run.rate = phase.usual_rate();
+        }
+        Ok(settings)
+    }
+
     /// Whether all numbers are in range.
     ///
     /// # Errors
@@ -324,7 +348,7 @@ pub fn read_settings<S: DeserializeOwned>(path: &Path) -> Result<S, TrainError> 
 }
 
 /// The first setting, such as `run.seed`, that another run's settings have otherwise, or why they are none; `None` where
-/// all are the same. What their text does not name has its default, as in a file.
+/// all that count are the same. What their text does not name has its default, as in a file.
 pub(super) fn first_difference<S: Serialize + DeserializeOwned>(
     own: &S,
     other: &str,
@@ -339,6 +363,9 @@ pub(super) fn first_difference<S: Serialize + DeserializeOwned>(
 fn differing_name(within: &str, one: &toml::Table, two: &toml::Table) -> Option<String> {
     one.keys().chain(two.keys()).find_map(|key| {
         let name = format!("{within}{key}");
+        if HOW_OFTEN.contains(&name.as_str()) {
+            return None;
+        }
         match (one.get(key), two.get(key)) {
             (Some(toml::Value::Table(one)), Some(toml::Value::Table(two))) => {
                 differing_name(&format!("{name}."), one, two)
@@ -365,9 +392,9 @@ impl RunSettings {
             ),
             (
                 "run.batch",
-                (1..=MOST_SAMPLES).contains(&self.batch),
+                (1..=LARGEST_BATCH).contains(&self.batch),
                 self.batch.to_string(),
-                "from 1 to a million",
+                "from 1 to 4096",
             ),
             (
                 "run.rate",
@@ -540,6 +567,23 @@ mod tests {
     }
 
     #[test]
+    fn a_phase_has_its_own_learning_rate_where_none_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("settings.toml");
+        let rate = |phase, text: &str| {
+            fs::write(&file, text).unwrap();
+            let settings = PaperSettings::of_phase(phase, Some(&file)).unwrap();
+            settings.run.rate
+        };
+        let longer = "[run]\nsteps = 7\n";
+        assert_eq!(rate(PaperPhase::Joint, longer), 1e-6);
+        assert_eq!(rate(PaperPhase::Normal, longer), 1e-4);
+        assert_eq!(rate(PaperPhase::Joint, "[run]\nrate = 1e-3\n"), 1e-3);
+        let without = PaperSettings::of_phase(PaperPhase::Light, None).unwrap();
+        assert_eq!(without.run.rate, 1e-4);
+    }
+
+    #[test]
     fn the_setting_that_differs_is_named() {
         let own = DecomposeSettings::default();
         let whole = toml::to_string(&own).unwrap();
@@ -551,6 +595,9 @@ mod tests {
         assert_eq!(first_difference(&own, &other).unwrap(), "run.seed");
         let meshes = format!("{}\nmeshes = \"m\"", "[data]");
         assert_eq!(first_difference(&own, &meshes).unwrap(), "data.meshes");
+        let often = whole.replace("log_every = 20\n", "log_every = 5\n");
+        assert_ne!(often, whole);
+        assert_eq!(first_difference(&own, &often), None);
         let unknown = "[run]\nspeed = 3";
         assert!(first_difference(&own, unknown).unwrap().contains("speed"));
     }

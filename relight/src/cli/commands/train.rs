@@ -18,7 +18,6 @@ use relight::train::{
     read_settings,
 };
 use serde::Serialize;
-use serde::de::DeserializeOwned;
 use serde_json::json;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -177,12 +176,13 @@ pub(in crate::cli) fn run(arguments: &Arguments, console: Console) -> CommandRes
 }
 
 fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
-    let settings: DecomposeSettings = arguments.settings()?;
+    let settings = arguments.settings.as_deref();
+    let settings = settings.map_or_else(|| Ok(DecomposeSettings::default()), read_settings)?;
     if arguments.print_settings {
         return print_settings(&settings, console);
     }
     let run = settings.run.clone();
-    let processes = arguments.join()?;
+    let processes = arguments.join(console)?;
     let weights = read_weights(arguments.weights.as_deref())?;
     let resources = processes.resources.clone();
     let mut task = DecomposeTask::new(settings, resources, weights.as_ref())?;
@@ -190,12 +190,12 @@ fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
 }
 
 fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> CommandResult {
-    let settings: PaperSettings = arguments.run.settings()?;
+    let settings = PaperSettings::of_phase(phase, arguments.run.settings.as_deref())?;
     if arguments.run.print_settings {
         return print_settings(&settings, console);
     }
     let run = settings.run.clone();
-    let processes = arguments.run.join()?;
+    let processes = arguments.run.join(console)?;
     let inputs = PaperInputs {
         turns: arguments.turns.clone(),
         held_out: arguments.held_out.clone(),
@@ -216,12 +216,6 @@ struct Processes {
 }
 
 impl RunArguments {
-    fn settings<S: DeserializeOwned + Default>(&self) -> Result<S, TrainError> {
-        self.settings
-            .as_deref()
-            .map_or_else(|| Ok(S::default()), read_settings)
-    }
-
     fn folder(&self) -> Result<&Path, &'static str> {
         self.output
             .as_deref()
@@ -229,12 +223,15 @@ impl RunArguments {
     }
 
     /// Meets the other processes that a launcher has started, if it has; sets the number of the network's threads.
-    fn join(&self) -> Result<Processes, Box<dyn Error>> {
+    fn join(&self, console: Console) -> Result<Processes, Box<dyn Error>> {
         let launch = Launch::from_variables(|name| env::var(name).ok())?;
         if let Some(threads) = self.threads {
             tch::set_num_threads(threads as i32);
         }
         let device = self.device.device(launch.as_ref())?;
+        if let Some(launch) = &launch {
+            tell_of_waiting(launch, console);
+        }
         let group = launch.as_ref().map(ProcessGroup::join).transpose()?;
         let resources = Resources {
             device,
@@ -244,6 +241,20 @@ impl RunArguments {
         };
         Ok(Processes { resources, group })
     }
+}
+
+/// Process 0 says whom it waits for: a process that was not started would keep it without a word.
+fn tell_of_waiting(launch: &Launch, console: Console) {
+    if launch.share.index() > 0 {
+        return;
+    }
+    let (others, place) = (
+        launch.share.of() - 1,
+        format!("{}:{}", launch.address, launch.port),
+    );
+    let text = format!("process 0 waits at {place} for the {others} others, five minutes at most");
+    let event = json!({ "event": "waiting", "others": others, "place": place });
+    console.say(&text, &event);
 }
 
 fn read_weights(path: Option<&Path>) -> Result<Option<Weights>, NetError> {
