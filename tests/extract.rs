@@ -617,3 +617,38 @@ fn shifts_of_a_shaken_turn_are_measured_and_corrected() {
             .exists()
     );
 }
+
+#[test]
+fn a_shaken_object_that_the_border_cuts_off_gets_no_black_pixels_and_only_what_was_seen_counts() {
+    let bench = Bench::new();
+    let session = Path::new(env!("CARGO_MANIFEST_DIR")).join(SHAKEN);
+    let cut = |from: &str, to: &str| {
+        let from = session.join(from);
+        let options = ["-vf", "crop=480:250:0:0", "-q:v", "2"];
+        let arguments = [&["-i", from.to_str().unwrap()][..], &options, &[to]].concat();
+        ffmpeg(bench.folder.path(), &arguments);
+    };
+    cut("video.mkv", "cut.avi");
+    cut("mask_gt.png", "cut.png");
+    bench.errors(
+        0,
+        "cut.avi --mask cut.png --frames 30 --size native --align correct -o out",
+    );
+    let whole = Dataset::read(&bench.path("out")).unwrap().sessions[0]
+        .mask
+        .px;
+    let records = bench.records("out/cut.tar");
+    assert!(records.iter().all(|record| record.shift_px.is_some()));
+    let seen = |record: &FrameRecord| record.mask_px;
+    assert_eq!(records.iter().map(seen).max(), Some(whole));
+    assert!(records.iter().any(|record| seen(record) < whole));
+    for sample in ShardReader::new(File::open(bench.path("out/cut.tar")).unwrap()) {
+        let sample = sample.unwrap();
+        let image = read(sample.member("png").unwrap()).into_rgb8();
+        let mask = read(sample.member("mask.png").unwrap()).into_luma8();
+        let pixels = image.pixels().zip(mask.pixels());
+        let black = pixels.filter(|(pixel, mask)| mask.0[0] == 255 && pixel.0 == [0; 3]);
+        assert_eq!(black.count(), 0, "{}", sample.key);
+    }
+    bench.verified(0, "out");
+}

@@ -4,6 +4,8 @@
 //! Everything is summed in integers, so the figures are exact and do not depend on the machine or on
 //! the order of the work: they can be compared for equality when a data set is read back.
 
+use std::ops::Range;
+
 use image::{GrayImage, RgbImage};
 
 /// The channel value from which a pixel counts as saturated, where nobody asks for another.
@@ -117,17 +119,54 @@ impl MaskSpans {
         let inner = (0..under.len())
             .map(|y| runs(&inner_row(&under, y)))
             .collect();
-        let pixels = rows
-            .iter()
-            .flatten()
-            .map(|span| (span.end - span.start) as u64)
-            .sum();
         Self {
             width,
             height,
+            pixels: pixels_of(&rows),
             rows,
             inner,
-            pixels,
+        }
+    }
+
+    /// The same mask over an image of which only these columns and rows show what was seen.
+    ///
+    /// ```
+    /// use image::{GrayImage, Luma, RgbImage};
+    /// use relit_data::image_stats::MaskSpans;
+    ///
+    /// let spans = MaskSpans::of(&GrayImage::from_pixel(9, 6, Luma([255])));
+    /// let seen = spans.within(0..9, 2..6);
+    /// assert_eq!(seen.measure(&RgbImage::new(9, 6), 250).unwrap().mask_px, 36);
+    /// ```
+    #[must_use]
+    pub fn within(&self, columns: Range<u32>, rows: Range<u32>) -> Self {
+        let inside = |all: &[Vec<Span>], by: usize| -> Vec<Vec<Span>> {
+            let seen = |range: &Range<u32>| {
+                range.start as usize + by..(range.end as usize).saturating_sub(by)
+            };
+            let (columns, rows) = (seen(&columns), seen(&rows));
+            let cut = |span: &Span| {
+                let (start, end) = (span.start.max(columns.start), span.end.min(columns.end));
+                (start < end).then_some(Span { start, end })
+            };
+            let row = |(y, spans): (usize, &Vec<Span>)| {
+                let spans = if rows.contains(&y) {
+                    spans.as_slice()
+                } else {
+                    &[]
+                };
+                spans.iter().filter_map(cut).collect()
+            };
+            all.iter().enumerate().map(row).collect()
+        };
+        let rows_under = inside(&self.rows, 0);
+        Self {
+            width: self.width,
+            height: self.height,
+            pixels: pixels_of(&rows_under),
+            rows: rows_under,
+            // The neighbours must have been seen, too.
+            inner: inside(&self.inner, 1),
         }
     }
 
@@ -210,6 +249,11 @@ impl MaskSpans {
             })
         }
     }
+}
+
+fn pixels_of(rows: &[Vec<Span>]) -> u64 {
+    let spans = rows.iter().flatten();
+    spans.map(|span| (span.end - span.start) as u64).sum()
 }
 
 /// The runs of true values in a row.

@@ -161,6 +161,7 @@
 //! ```
 
 pub mod causes;
+pub mod counts;
 pub mod durable;
 pub mod geometry;
 pub mod image_stats;

@@ -1,6 +1,6 @@
 //! The crop of a video, the same for all frames: the mask's bounding box with a margin, made square.
 
-use image::GrayImage;
+use image::{GrayImage, RgbaImage};
 
 use relit_data::geometry::Rect;
 
@@ -57,6 +57,37 @@ pub fn cut(mask: &GrayImage, crop: Rect) -> GrayImage {
     })
 }
 
+/// Repeats the frame's outermost pixels where the picture of `region` lies beyond the frame.
+pub(super) fn repeat_edge(picture: &mut RgbaImage, region: Rect, frame: (u32, u32)) {
+    let inside = region.clipped_to(frame.0, frame.1);
+    let Some(inside) = inside.filter(|&inside| inside != region) else {
+        return;
+    };
+    let (left, top) = (region.x.abs_diff(inside.x), region.y.abs_diff(inside.y));
+    let (left, top) = (left as usize, top as usize);
+    let (right, bottom) = (left + inside.w as usize, top + inside.h as usize);
+    let width = 4 * region.w as usize;
+    let bytes = picture.as_flat_samples_mut().samples;
+    for row in bytes.chunks_exact_mut(width.max(4)).take(bottom).skip(top) {
+        let (beyond, seen) = row.split_at_mut(4 * left);
+        let (seen, behind) = seen.split_at_mut(4 * (right - left));
+        for (pixels, edge) in [
+            (beyond, seen.first_chunk()),
+            (behind, seen.last_chunk::<4>()),
+        ] {
+            for pixel in pixels.chunks_exact_mut(4) {
+                pixel.copy_from_slice(edge.unwrap_or(&[0; 4]));
+            }
+        }
+    }
+    for y in 0..top {
+        bytes.copy_within(top * width..(top + 1) * width, y * width);
+    }
+    for y in bottom..region.h as usize {
+        bytes.copy_within((bottom - 1) * width..bottom * width, y * width);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -84,6 +115,27 @@ mod tests {
         let cut = cut(&mask, crop);
         assert_eq!(cut.get_pixel(330, 0).0, [0]);
         assert_eq!(cut.get_pixel(330, 330).0, [255]);
+    }
+
+    #[test]
+    fn beyond_the_frame_its_edge_is_repeated() {
+        use image::Rgba;
+        let level = |x: i32, y: i32| Rgba([(10 * x) as u8, (10 * y) as u8, 7, 255]);
+        let region = Rect::new(-2, 3, 9, 8);
+        let frame = (6, 8);
+        let mut picture = RgbaImage::new(9, 8);
+        let place = |x: u32, y: u32| (x as i32 + region.x, y as i32 + region.y);
+        for (x, y, pixel) in picture.enumerate_pixels_mut() {
+            let (x, y) = place(x, y);
+            if (0..6).contains(&x) && y < 8 {
+                *pixel = level(x, y);
+            }
+        }
+        repeat_edge(&mut picture, region, frame);
+        for (x, y, pixel) in picture.enumerate_pixels() {
+            let (x, y) = place(x, y);
+            assert_eq!(*pixel, level(x.clamp(0, 5), y.min(7)), "{x} {y}");
+        }
     }
 
     proptest! {

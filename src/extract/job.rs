@@ -5,6 +5,7 @@ use std::path::Path;
 use rayon::ThreadPool;
 
 use relit_data::causes::with_causes;
+use relit_data::counts::count_of;
 use relit_data::image_stats::MaskSpans;
 use relit_data::report::{self, Page};
 use relit_data::session::{INDEX_FILE, Notice, Recording, Status};
@@ -77,7 +78,8 @@ impl Job {
 
     /// What a few frames of the video say against the mask.
     fn doubts_about_the_mask(&self) -> Vec<Notice> {
-        let doubts = mask_doubts(&self.video, &self.mask.image).unwrap_or_else(|error| {
+        let looked = mask_doubts(&self.video, &self.mask.image, self.mask.frame);
+        let doubts = looked.unwrap_or_else(|error| {
             vec![format!(
                 "the mask could not be checked: {}",
                 with_causes(&error)
@@ -184,7 +186,9 @@ impl Job {
         steadiness.check()?;
         let mut collected = collected.sorted();
         notices.extend(notices_of_lost(&lost));
-        notices.extend(steadiness.notices());
+        if let Some(align) = &stage.align {
+            notices.extend(steadiness.notices(align.aligner.least_confidence()));
+        }
         let taken: Vec<_> = (0..samples).filter_map(|k| writer.sample(k)).collect();
         let findings = quality::findings(&taken, options.frames);
         for found in &findings {
@@ -264,6 +268,7 @@ impl Job {
         Ok(Stage {
             video: &self.video,
             crop,
+            object: self.mask.bounding_box,
             spans: MaskSpans::of(&crop_mask),
             scaler: Scaler::new(crop_mask, side)?,
             saturation_level: options.saturation_level,
@@ -354,7 +359,12 @@ impl Job {
         }
         if let Some(left_out) = plan.without_angle() {
             notices.push(Notice::Warning(format!(
-                "{left_out} frames have no angle although others have one, and are left out"
+                "{} no angle although others have one, and {} left out",
+                match left_out {
+                    1 => "1 frame has".to_owned(),
+                    n => format!("{n} frames have"),
+                },
+                if left_out == 1 { "is" } else { "are" },
             )));
         }
         if let Some(frame) = plan.runs_back_at() {
@@ -365,9 +375,13 @@ impl Job {
         let repeated = plan.repeated();
         if repeated > 0 {
             notices.push(Notice::Warning(format!(
-                "{repeated} of {} samples repeat a source frame and are flagged as duplicates: the video has {} usable frames",
-                plan.selection.frames.len(),
-                plan.usable(),
+                "{repeated} of {} {}: the video has {}",
+                count_of(plan.selection.frames.len() as u64, "sample"),
+                match repeated {
+                    1 => "repeats a source frame and is flagged as a duplicate",
+                    _ => "repeat a source frame and are flagged as duplicates",
+                },
+                count_of(plan.usable() as u64, "usable frame"),
             )));
         }
         if let Some(covered) = part_of_turn(plan) {
@@ -465,7 +479,8 @@ fn check_strict(plan: &Plan, notices: &[Notice]) -> Result<(), ExtractError> {
     match plan.repeated() {
         0 => Ok(()),
         n => Err(ExtractError::Strict(format!(
-            "{n} samples would repeat a source frame"
+            "{} would repeat a source frame",
+            count_of(n as u64, "sample")
         ))),
     }
 }
@@ -491,7 +506,8 @@ fn notices_of_lost(lost: &[LostFrame]) -> Vec<Notice> {
         let more = notices.len() - MAX_REPORTED;
         notices.truncate(MAX_REPORTED);
         notices.push(Notice::Loss(format!(
-            "frames cannot be decoded at {more} more positions"
+            "frames cannot be decoded at {} more",
+            count_of(more as u64, "position")
         )));
     }
     notices
@@ -525,7 +541,8 @@ fn differences(recording: &Recording, input: &SourceVideo) -> Vec<Notice> {
         && lines != found
     {
         notices.push(Notice::Loss(format!(
-            "{file} has {found} frames and {INDEX_FILE} has {lines}: they were matched by their time stamps"
+            "{file} has {} and {INDEX_FILE} has {lines}: they were matched by their time stamps",
+            count_of(found, "frame")
         )));
     }
     let Some(manifest) = &recording.manifest else {
@@ -536,7 +553,8 @@ fn differences(recording: &Recording, input: &SourceVideo) -> Vec<Notice> {
         && Some(recorded) != lines
     {
         notices.push(Notice::Loss(format!(
-            "{file} has {found} frames, but the manifest says {recorded}"
+            "{file} has {}, but the manifest says {recorded}",
+            count_of(found, "frame")
         )));
     }
     // Another file size was reported when the recording was opened.

@@ -40,7 +40,7 @@ use relit_data::shard::OutputFolder;
 use catalog::Catalog;
 use depot::{Depot, OnDisk};
 
-pub use align::{AlignBuffers, AlignSample, Aligner, Alignment, MIN_CONFIDENCE};
+pub use align::{AlignBuffers, AlignSample, Aligner, Alignment};
 pub use crop::{bounding_box, cut, square_around};
 pub use error::ExtractError;
 pub use observer::{Observer, RecordingOutcome};

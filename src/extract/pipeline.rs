@@ -1,6 +1,7 @@
 //! The streaming part: the assigned frames are read in order, turned into samples on all threads,
 //! and passed to the writer as they are finished. Every queue is bounded.
 
+use std::borrow::Cow;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
@@ -14,6 +15,7 @@ use relit_data::image_stats::{MaskSpans, Measures};
 use relit_data::shard;
 use relit_video::{DecodeFault, Pending, Reader, Video};
 
+use super::crop::repeat_edge;
 use super::plan::Assignments;
 use super::scale::APRON;
 use super::{
@@ -24,6 +26,8 @@ use super::{
 pub(super) struct Stage<'a> {
     pub(super) video: &'a Video,
     pub(super) crop: Rect,
+    /// The smallest rectangle around the mask in the frame.
+    pub(super) object: Rect,
     /// The mask under the crop.
     pub(super) spans: MaskSpans,
     pub(super) scaler: Scaler,
@@ -54,6 +58,16 @@ pub(super) struct ProcessedFrame {
     /// `None` if it was not measured.
     pub(super) alignment: Option<Alignment>,
     pub(super) shift_applied: bool,
+}
+
+/// A crop whose object is brought back to its place.
+#[derive(Clone, Copy)]
+struct Moved<'v> {
+    /// The crop, moved by whole pixels.
+    crop: View<'v>,
+    whole: [i32; 2],
+    /// The rest of the way.
+    part: [f64; 2],
 }
 
 /// What a thread keeps from frame to frame.
@@ -113,6 +127,7 @@ impl Stage<'_> {
             }
             Err(fault) => return Ok(Err(LostFrame { number, fault })),
         }
+        repeat_edge(&mut buffers.region, self.region(), self.frame());
         let Buffers {
             region,
             scale,
@@ -124,10 +139,16 @@ impl Stage<'_> {
             by.aligner.measure(&sample, align)
         });
         let moved = alignment.and_then(|alignment| self.moved(crop, alignment));
-        let mut measuring = self.spans.measuring(self.saturation_level);
+        let spans = match moved {
+            None => Cow::Borrowed(&self.spans),
+            Some(moved) => self.seen(moved.whole),
+        };
+        let mut measuring = spans.measuring(self.saturation_level);
         let image = match moved {
             None => self.scaler.scale(crop, scale, &mut measuring)?,
-            Some((crop, part)) => self.scaler.scale_moved(crop, part, scale, &mut measuring)?,
+            Some(Moved { crop, part, .. }) => {
+                self.scaler.scale_moved(crop, part, scale, &mut measuring)?
+            }
         };
         Ok(Ok(ProcessedFrame {
             number,
@@ -139,15 +160,44 @@ impl Stage<'_> {
         }))
     }
 
-    /// Where the crop's object went in whole pixels, and the rest of the way; `None` if it is not corrected.
-    fn moved<'v>(&self, crop: View<'v>, alignment: Alignment) -> Option<(View<'v>, [f64; 2])> {
-        let align = self.align.as_ref()?;
-        let correction = align.correction.as_ref()?;
-        let shift = align.aligner.to_correct(&alignment, correction.above)?;
-        let whole = shift.map(f64::round);
-        // None beyond the largest shift, with which the turn fails.
-        let crop = crop.moved(whole.map(|part| part as i32), APRON)?;
-        Some((crop, [shift[0] - whole[0], shift[1] - whole[1]]))
+    /// The crop where its object went; `None` if it is not corrected.
+    fn moved<'v>(&self, crop: View<'v>, alignment: Alignment) -> Option<Moved<'v>> {
+        let correction = self.align.as_ref()?.correction.as_ref()?;
+        let [dx, dy] = alignment.shift?;
+        if dx.hypot(dy) <= correction.above {
+            return None;
+        }
+        let whole = [dx, dy].map(|part| part.round() as i32);
+        Some(Moved {
+            // None beyond the largest shift, with which the turn fails.
+            crop: crop.moved(whole, APRON)?,
+            whole,
+            part: [dx - f64::from(whole[0]), dy - f64::from(whole[1])],
+        })
+    }
+
+    /// The part of the mask under which the frame shows the object, after this move of both: without what lies
+    /// beyond the frame.
+    fn seen(&self, [dx, dy]: [i32; 2]) -> Cow<'_, MaskSpans> {
+        let (width, height) = self.frame();
+        let moved = |rect: Rect| {
+            let (x, y) = (rect.x.saturating_add(dx), rect.y.saturating_add(dy));
+            Rect::new(x, y, rect.w, rect.h)
+        };
+        let (object, crop) = (moved(self.object), moved(self.crop));
+        if object.clipped_to(width, height) == Some(object) {
+            return Cow::Borrowed(&self.spans);
+        }
+        let seen = crop.clipped_to(width, height);
+        let seen = seen.unwrap_or(Rect::new(crop.x, crop.y, 0, 0));
+        let (left, top) = (crop.x.abs_diff(seen.x), crop.y.abs_diff(seen.y));
+        Cow::Owned(self.spans.within(left..left + seen.w, top..top + seen.h))
+    }
+
+    /// The frame's width and height, pixels.
+    fn frame(&self) -> (u32, u32) {
+        let facts = self.video.facts();
+        (facts.width, facts.height)
     }
 
     /// Pixels that are decoded around the crop, for objects that moved.
@@ -181,6 +231,7 @@ impl Stage<'_> {
         let sample = |crop: &mut RgbaImage, pending: Pending| {
             let number = pending.number();
             self.video.part(pending, self.crop, crop).ok()?;
+            repeat_edge(crop, self.crop, self.frame());
             Some((number, AlignSample::of(View::whole(crop))))
         };
         let mut samples: Vec<(u64, AlignSample)> = pool.install(|| {
@@ -202,6 +253,7 @@ impl Stage<'_> {
             left,
             top,
         );
+        repeat_edge(&mut crop, self.crop, self.frame());
         Some((frame, AlignSample::of(View::whole(&crop))))
     }
 }

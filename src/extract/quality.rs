@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 
+use relit_data::counts::count_of;
 use relit_data::session::Notice;
 use relit_data::shard::{Digest, FrameRecord, TurnFinding};
 use relit_data::srgb::to_linear;
@@ -57,7 +58,9 @@ pub(super) fn notices(findings: &[TurnFinding]) -> Vec<Notice> {
     if let Some(first) = twins().next() {
         let (count, index) = (twins().count(), first.index);
         notices.push(Notice::Warning(format!(
-            "{count} samples show the same picture as an earlier frame, pixel for pixel, the first is sample {index}: the camera repeats frames"
+            "{} {} the same picture as an earlier frame, pixel for pixel, the first is sample {index}: the camera repeats frames",
+            count_of(count as u64, "sample"),
+            if count == 1 { "shows" } else { "show" },
         )));
     }
     let steps = || {
@@ -68,14 +71,17 @@ pub(super) fn notices(findings: &[TurnFinding]) -> Vec<Notice> {
     if let Some((index, step)) = steps().next() {
         let count = steps().count();
         notices.push(Notice::Warning(format!(
-            "the exposure changes in steps that light cannot explain, at {count} samples, the first is sample {index} ({step:+.2} stops): switch the camera's automatic exposure and gain off"
+            "the exposure changes in steps that light cannot explain, at {}, the first is sample {index} ({step:+.2} stops): switch the camera's automatic exposure and gain off",
+            count_of(count as u64, "sample"),
         )));
     }
     let blurred = || findings.iter().filter_map(|f| Some((f.index, f.blur?)));
     if let Some((index, _)) = blurred().next() {
         let count = blurred().count();
         notices.push(Notice::Warning(format!(
-            "{count} samples are blurred in a way that light cannot explain, the first is sample {index}: does something shake camera or table?"
+            "{} {} blurred in a way that light cannot explain, the first is sample {index}: does something shake camera or table?",
+            count_of(count as u64, "sample"),
+            if count == 1 { "is" } else { "are" },
         )));
     }
     notices

@@ -1,9 +1,10 @@
 //! What the shifts of a turn's frames say as a whole.
 
+use relit_data::counts::count_of;
 use relit_data::session::Notice;
 
 use super::ExtractError;
-use super::align::{Alignment, MIN_CONFIDENCE};
+use super::align::Alignment;
 
 /// The shifts of a turn, frame by frame, in any order.
 #[derive(Debug, Default)]
@@ -61,18 +62,24 @@ impl Steadiness {
         }
     }
 
-    pub(super) fn notices(&self) -> Vec<Notice> {
+    /// What a user should know; frames below `least_confidence` were not registered.
+    pub(super) fn notices(&self, least_confidence: f64) -> Vec<Notice> {
         let mut notices = Vec::new();
         if let Some(first) = self.unregistered.iter().min() {
-            let (count, all) = (self.unregistered.len(), self.frames);
-            notices.push(Notice::Warning(format!(
-                "{count} of {all} frames could not be registered (their align_confidence is below {MIN_CONFIDENCE}) and are as they were taken, the first is frame {first}"
-            )));
+            let all = count_of(self.frames, "frame");
+            notices.push(Notice::Warning(match self.unregistered.len() {
+                1 => format!(
+                    "1 of {all} could not be registered (its align_confidence is below {least_confidence:.2}) and is as it was taken: frame {first}"
+                ),
+                count => format!(
+                    "{count} of {all} could not be registered (their align_confidence is below {least_confidence:.2}) and are as they were taken, the first is frame {first}"
+                ),
+            }));
         }
         if let Some((frame, (degrees, growth))) = self.turned {
-            let (count, percent) = (self.turned_frames, 100.0 * growth);
+            let (count, percent) = (count_of(self.turned_frames, "frame"), 100.0 * growth);
             notices.push(Notice::Warning(format!(
-                "in {count} frames the object is also turned or scaled against the mask, most in frame {frame}: by {degrees:.2} degrees and {percent:+.2} %; only its shift is corrected"
+                "in {count} the object is also turned or scaled against the mask, most in frame {frame}: by {degrees:.2} degrees and {percent:+.2} %; only its shift is corrected"
             )));
         }
         notices
@@ -110,7 +117,7 @@ mod tests {
     fn frames_that_cannot_be_registered_are_counted() {
         let mut steadiness = Steadiness::new(8.0);
         steadiness.add(1, &moved_by(0.2));
-        assert!(steadiness.notices().is_empty());
+        assert!(steadiness.notices(0.3).is_empty());
         let lost = Alignment {
             shift: None,
             uncertainty: f64::INFINITY,
@@ -118,10 +125,15 @@ mod tests {
             turned: None,
         };
         steadiness.add(6, &lost);
-        steadiness.add(5, &lost);
-        let text = steadiness.notices().remove(0).text().to_owned();
+        let text = steadiness.notices(0.5).remove(0).text().to_owned();
         assert!(
-            text.contains("2 of 3") && text.contains("frame 5"),
+            text.contains("1 of 2 frames") && text.contains("is as it was"),
+            "{text}"
+        );
+        steadiness.add(5, &lost);
+        let text = steadiness.notices(0.5).remove(0).text().to_owned();
+        assert!(
+            text.contains("2 of 3") && text.contains("frame 5") && text.contains("below 0.50"),
             "{text}"
         );
     }

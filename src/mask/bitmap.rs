@@ -1,5 +1,7 @@
 //! One bit per pixel: connected components, dilation, counting.
 
+use std::ops::Range;
+
 use relit_data::geometry::Rect;
 
 /// One bit for each pixel of an image. At least one pixel, sides below 2^31.
@@ -91,8 +93,8 @@ impl Bitmap {
             .chunks(self.width)
             .zip(across.bits.chunks_mut(self.width))
         {
-            for (x, _) in from.iter().enumerate().filter(|&(_, &bit)| bit) {
-                to[x.saturating_sub(radius)..(x + radius + 1).min(self.width)].fill(true);
+            for run in set_runs(from) {
+                to[run.start.saturating_sub(radius)..(run.end + radius).min(self.width)].fill(true);
             }
         }
         let mut dilated = across.bits.clone();
@@ -111,61 +113,102 @@ impl Bitmap {
 
     /// The connected components of the set pixels.
     pub(super) fn components(&self, connectivity: Connectivity) -> Components {
+        let mut runs = self.joined_runs(connectivity);
         let mut components = Components {
             label: vec![0; self.bits.len()],
             list: Vec::new(),
         };
-        for start in 0..self.bits.len() {
-            if self.bits[start] && components.label[start] == 0 {
-                let component = self.flood_fill(start, connectivity, &mut components);
-                components.list.push(component);
+        let mut bounds: Vec<Bounds> = Vec::new();
+        // The number of each run that is the first of its component.
+        let mut numbers = vec![0; runs.len()];
+        for index in 0..runs.len() {
+            let first = first_of(&mut runs, index);
+            if first == index {
+                components.list.push(Component {
+                    area: 0,
+                    bounds: Rect::new(0, 0, 0, 0),
+                });
+                bounds.push(Bounds::default());
+                numbers[index] = bounds.len();
             }
+            let (number, Run { y, columns, .. }) = (numbers[first], &runs[index]);
+            components.list[number - 1].area += columns.len() as u64;
+            bounds[number - 1].add(columns.start, *y);
+            bounds[number - 1].add(columns.end - 1, *y);
+            let row = y * self.width;
+            components.label[row + columns.start..row + columns.end].fill(number as u32);
+        }
+        for (component, bounds) in components.list.iter_mut().zip(bounds) {
+            component.bounds = bounds.rect();
         }
         components
     }
 
-    /// Labels the component that contains the pixel `start`.
-    fn flood_fill(
-        &self,
-        start: usize,
-        connectivity: Connectivity,
-        components: &mut Components,
-    ) -> Component {
-        let label = &mut components.label;
-        let number = components.list.len() as u32 + 1;
-        let mut bounds = Bounds::default();
-        let mut area = 0;
-        let mut pending = vec![start];
-        label[start] = number;
-        while let Some(at) = pending.pop() {
-            area += 1;
-            bounds.add(at % self.width, at / self.width);
-            for next in self.neighbours(at, connectivity) {
-                if self.bits[next] && label[next] == 0 {
-                    label[next] = number;
-                    pending.push(next);
+    /// The runs of set pixels from top to bottom, joined where they touch.
+    fn joined_runs(&self, connectivity: Connectivity) -> Vec<Run> {
+        let reach = usize::from(connectivity == Connectivity::Eight);
+        let mut runs: Vec<Run> = Vec::new();
+        let mut above = 0..0;
+        for (y, row) in self.bits.chunks(self.width.max(1)).enumerate() {
+            let first_of_row = runs.len();
+            for columns in set_runs(row) {
+                let index = runs.len();
+                let (from, to) = (columns.start, columns.end + reach);
+                let first = index;
+                runs.push(Run { y, columns, first });
+                for other in above.clone() {
+                    let near = &runs[other].columns;
+                    if near.start >= to {
+                        break;
+                    }
+                    if near.end + reach > from {
+                        join(&mut runs, index, other);
+                    } else {
+                        // It ends before all further runs of this row, too.
+                        above.start = other + 1;
+                    }
                 }
             }
+            above = first_of_row..runs.len();
         }
-        Component {
-            area,
-            bounds: bounds.rect(),
-        }
+        runs
     }
+}
 
-    fn neighbours(&self, at: usize, connectivity: Connectivity) -> impl Iterator<Item = usize> {
-        let (width, height) = (self.width, self.height);
-        let (x, y) = (at % width, at / width);
-        let rows = y.saturating_sub(1)..(y + 2).min(height);
-        rows.flat_map(move |row| {
-            let columns = x.saturating_sub(1)..(x + 2).min(width);
-            columns
-                .filter(move |&column| {
-                    connectivity == Connectivity::Eight || row == y || column == x
-                })
-                .map(move |column| row * width + column)
-        })
+/// A run of set pixels in row `y`.
+#[derive(Debug)]
+struct Run {
+    y: usize,
+    columns: Range<usize>,
+    /// An earlier run of the same component, or this one.
+    first: usize,
+}
+
+/// The first run of a run's component.
+fn first_of(runs: &mut [Run], index: usize) -> usize {
+    let mut at = index;
+    while runs[at].first != at {
+        runs[at].first = runs[runs[at].first].first;
+        at = runs[at].first;
     }
+    at
+}
+
+/// Makes one component of those of two runs.
+fn join(runs: &mut [Run], one: usize, other: usize) {
+    let (one, other) = (first_of(runs, one), first_of(runs, other));
+    runs[one.max(other)].first = one.min(other);
+}
+
+/// The runs of set pixels of a row.
+fn set_runs(row: &[bool]) -> impl Iterator<Item = Range<usize>> {
+    let mut end = 0;
+    std::iter::from_fn(move || {
+        let start = end + row[end..].iter().position(|&bit| bit)?;
+        let length = row[start..].iter().position(|&bit| !bit);
+        end = length.map_or(row.len(), |length| start + length);
+        Some(start..end)
+    })
 }
 
 impl Components {
@@ -248,6 +291,16 @@ mod tests {
         assert_eq!(components.largest(), Some(0));
         let at = [1, 2, 9, 99].map(|pixel| components.at(pixel));
         assert_eq!(at, [Some(0), None, Some(1), None]);
+    }
+
+    #[test]
+    fn branches_that_meet_further_down_are_one_component() {
+        let rows = ["#.#.#.", "#.#..#", "###.#.", "....#.", "#....#"];
+        let count = |connectivity| Bitmap::drawn(&rows).components(connectivity).list;
+        let px = |list: Vec<Component>| list.iter().map(|c| c.area).collect::<Vec<_>>();
+        assert_eq!(px(count(Connectivity::Four)), [7, 1, 1, 2, 1, 1]);
+        assert_eq!(px(count(Connectivity::Eight)), [7, 5, 1]);
+        assert_eq!(count(Connectivity::Eight)[1].bounds, Rect::new(4, 0, 2, 5));
     }
 
     #[test]

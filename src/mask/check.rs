@@ -5,6 +5,8 @@
 //! mask, compared with the average over the turn: paint and relief stay, light does not. The shape is
 //! compared with the mask that the turn alone gives ([`segment_turn`](crate::segment_turn)).
 
+use std::sync::OnceLock;
+
 use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
 use serde::Serialize;
@@ -20,6 +22,8 @@ const INSIDE_FROM: u8 = 128;
 const NARROW: usize = 2;
 /// Smaller differences of the shape, as a share of the mask's area, are not regions.
 const SMALL: f64 = 0.001;
+/// A part of the mask of which more than this share is table is no object that the frame's border cuts off.
+const ON_TABLE: f64 = 0.5;
 /// Most places of the outline at which distances are measured.
 const MOST_PLACES: usize = 2000;
 
@@ -68,7 +72,8 @@ pub struct MaskCheck<'a> {
     turn: &'a TurnStatistics,
     mask: Bitmap,
     size: (u32, u32),
-    reference: Reference,
+    /// Made when a place is asked for.
+    reference: OnceLock<Reference>,
 }
 
 impl<'a> MaskCheck<'a> {
@@ -89,12 +94,11 @@ impl<'a> MaskCheck<'a> {
         if mask.count() == 0 {
             return Err(MaskError::Empty);
         }
-        let reference = Reference::new(&turn.light(), &turn.reduced(&mask), turn.size());
         Ok(Self {
             turn,
             mask,
             size,
-            reference,
+            reference: OnceLock::new(),
         })
     }
 
@@ -111,7 +115,11 @@ impl<'a> MaskCheck<'a> {
         }
         let picture = small.as_ref().unwrap_or(frame);
         let light: Vec<f32> = picture.pixels().map(|pixel| luma(pixel.0)).collect();
-        let (shift, likeness) = self.reference.find(&light)?;
+        let turn = self.turn;
+        let reference = self
+            .reference
+            .get_or_init(|| Reference::new(&turn.light(), &turn.reduced(&self.mask), turn.size()));
+        let (shift, likeness) = reference.find(&light)?;
         let factor = self.turn.factor() as f32;
         Some(Place {
             shift: shift.map(|way| way * factor),
@@ -120,41 +128,73 @@ impl<'a> MaskCheck<'a> {
     }
 
     /// Compares the mask's shape with that which the turn shows on `frame`, the one on which the mask was
-    /// made. None where hardly anything moves: then the turn says nothing.
+    /// made, with this effort. None where hardly anything moves: then the turn says nothing.
     ///
     /// # Errors
     /// As [`segment_turn`](crate::segment_turn) without hints.
-    pub fn shape(&self, frame: &RgbImage) -> Result<Option<ShapeCheck>, MaskError> {
+    pub fn shape(&self, frame: &RgbImage, effort: Effort) -> Result<Option<ShapeCheck>, MaskError> {
         if !self.turn.moves() {
             return Ok(None);
         }
         let settings = SegmentSettings::default();
-        let own = segment_with(frame, Some(self.turn), None, &settings, Effort::Fine)?;
+        let own = segment_with(frame, Some(self.turn), None, &settings, effort)?;
         let own = own
             .image()
             .as_raw()
             .iter()
             .map(|&level| level >= INSIDE_FROM);
         let own = Bitmap::new(self.size, own);
-        let both = self.mask.map(|at, bit| bit && own.bits()[at]).count() as f64;
-        let either = self.mask.map(|at, bit| bit || own.bits()[at]).count() as f64;
+        let pairs = || self.mask.bits().iter().zip(own.bits());
+        let both = pairs().filter(|(mask, own)| **mask && **own).count() as f64;
+        let either = pairs().filter(|(mask, own)| **mask || **own).count() as f64;
         let in_hole = holes(&self.mask);
         let wide = NARROW * self.turn.factor();
         let least = self.mask.count() as f64 * SMALL;
-        let regions = |part: Bitmap| regions(&opened(&part, wide), least);
+        let wide_regions = |part: Bitmap| regions(&opened(&part, wide), least);
+        let leaks = opened(&self.mask.map(|at, bit| bit && !own.bits()[at]), wide);
         Ok(Some(ShapeCheck {
             area_px: self.mask.count(),
             outline: self.turn.outline(&self.mask),
             outline_of_turn: self.turn.outline(&own),
             iou: both / either.max(1.0),
             edge_px: distances(&self.mask, &own, self.size),
-            leaks: regions(self.mask.map(|at, bit| bit && !own.bits()[at])),
-            missing: regions(
+            leaks: regions(&self.without_cut_off(leaks), least),
+            missing: wide_regions(
                 self.mask
                     .map(|at, bit| !bit && own.bits()[at] && !in_hole.bits()[at]),
             ),
-            holes: regions(in_hole.map(|at, bit| bit && own.bits()[at])),
+            holes: wide_regions(in_hole.map(|at, bit| bit && own.bits()[at])),
         }))
+    }
+}
+
+impl MaskCheck<'_> {
+    /// What the turn takes for background in the mask, without the parts at the frame's border that are the object:
+    /// of an object that the border cuts off, the turn says nothing, because it takes the border for background.
+    /// Such a part is the object's if it moves with the rest of the mask rather than with what is around, and is not
+    /// table.
+    fn without_cut_off(&self, leaks: Bitmap) -> Bitmap {
+        let components = leaks.components(Connectivity::Eight);
+        let at_border = |bounds: &Rect| {
+            let (width, height) = (i64::from(self.size.0), i64::from(self.size.1));
+            bounds.x == 0 || bounds.y == 0 || bounds.right() == width || bounds.bottom() == height
+        };
+        let turn = self.turn;
+        let is_cut_off = |(index, component): (usize, &Component)| {
+            if !at_border(&component.bounds) {
+                return false;
+            }
+            let part = turn.reduced(&leaks.map(|at, _| components.at(at) == Some(index)));
+            let rest = turn.reduced(&self.mask);
+            let around = rest.inverted();
+            let rest = rest.map(|at, bit| bit && !part.bits()[at]);
+            let within = turn.boundary(&part, &rest);
+            let moves_with_rest = within.zip(turn.boundary(&part, &around));
+            moves_with_rest.is_some_and(|(within, outside)| within <= outside)
+                && turn.share_of_table(&part) <= ON_TABLE
+        };
+        let is_object: Vec<bool> = components.list.iter().enumerate().map(is_cut_off).collect();
+        leaks.map(|at, bit| bit && !components.at(at).is_some_and(|index| is_object[index]))
     }
 }
 

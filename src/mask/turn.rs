@@ -176,14 +176,22 @@ impl TurnStatistics {
     /// How well an outline follows what moves differently: the mean over its edges of the strength of
     /// the contrast there, 0..=1.
     pub(super) fn outline(&self, object: &Bitmap) -> f32 {
+        let object = self.reduced(object);
+        self.boundary(&object, &object.inverted()).unwrap_or(0.0)
+    }
+
+    /// The same along the boundary between two parts, which have the size of the statistics; `None` where they do not
+    /// touch.
+    pub(super) fn boundary(&self, one: &Bitmap, other: &Bitmap) -> Option<f32> {
         let (columns, rows) = self.fine.size;
-        let is_object = |at: usize| self.is_set(object, at);
+        let (one, other) = (one.bits(), other.bits());
         let scale = grab_cut::contrast_scale(&self.fine);
         let (mut sum, mut edges) = (0.0, 0.0);
         for at in 0..columns * rows {
             for direction in [4, 6] {
                 let next = neighbour(at, direction, self.fine.size);
-                if let Some(next) = next.filter(|&next| is_object(next) != is_object(at)) {
+                let is_edge = |next: &usize| one[at] && other[*next] || other[at] && one[*next];
+                if let Some(next) = next.filter(is_edge) {
                     // The edge may lie a pixel beside it.
                     let strongest = self.strongest_near(at).max(self.strongest_near(next));
                     sum += 1.0 - (-scale * strongest).exp();
@@ -191,7 +199,14 @@ impl TurnStatistics {
                 }
             }
         }
-        sum / f32::max(edges, 1.0)
+        (edges > 0.0).then_some(sum / edges)
+    }
+
+    /// The share of a part, which has the size of the statistics, that is plain table, 0..=1.
+    pub(super) fn share_of_table(&self, part: &Bitmap) -> f64 {
+        let table = self.fine.table.surface.bits();
+        let on_table = part.map(|at, bit| bit && table[at]).count();
+        on_table as f64 / part.count().max(1) as f64
     }
 
     fn strongest_near(&self, at: usize) -> f32 {

@@ -147,3 +147,24 @@ fn what_may_not_be_read_or_written_is_named_with_the_systems_reason() {
     );
     assert!(files(&closed).is_empty());
 }
+
+#[test]
+fn a_folder_that_may_not_be_looked_into_is_named_and_the_others_go_on() {
+    let workshop = Workshop::with(&["sessions/a/video.mkv"]);
+    let closed = workshop.path("sessions/b");
+    fs::create_dir(&closed).unwrap();
+    forbid(&closed);
+    let open = workshop.path("open");
+    fs::create_dir(&open).unwrap();
+    fs::set_permissions(&open, fs::Permissions::from_mode(0o777)).unwrap();
+    let Some((code, errors)) = as_nobody(&workshop, &format!("sessions {SETTINGS} -o open/out"))
+    else {
+        return;
+    };
+    assert_eq!(code, Some(3), "{errors}");
+    assert!(
+        errors.contains("sessions/b") && errors.contains("Permission denied"),
+        "{errors}"
+    );
+    assert!(open.join("out/a.tar").is_file());
+}

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use image::{GrayImage, Luma};
+use relit_test_support::ffmpeg;
 use serde_json::Value;
 
 use super::program::{code, relit_mask, said};
@@ -64,6 +65,41 @@ fn a_mask_that_fits_is_said_to_fit_and_its_page_is_written() {
     let page = fs::read_to_string(folder.path().join("mask-check.html")).unwrap();
     assert!(page.contains("The mask fits.") && page.contains("data:image/jpeg;base64,"));
     assert!(!page.contains("<script"));
+}
+
+#[test]
+fn a_mask_of_an_object_that_the_border_cuts_off_is_not_blamed_and_what_leaks_to_the_border_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let session = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/20261120T101500Z-cow-short");
+    for (from, to) in [("video.mkv", "turn.avi"), ("mask_gt.png", "mask.png")] {
+        let from = session.join(from);
+        let options = ["-vf", "crop=270:360:210:0", "-q:v", "2", to];
+        ffmpeg(
+            path,
+            &[&["-i", from.to_str().unwrap()][..], &options].concat(),
+        );
+    }
+    let checked = || {
+        let output = relit_mask(path, &["check", "turn.avi", "--mask", "mask.png", "--json"]);
+        let event: Value = serde_json::from_slice(&output.stdout).unwrap();
+        event["report"].clone()
+    };
+    let report = checked();
+    assert_eq!(report["verdict"], "fits", "{report}");
+    let mut mask = image::open(path.join("mask.png")).unwrap().into_luma8();
+    for (_, _, pixel) in mask
+        .enumerate_pixels_mut()
+        .filter(|(x, y, _)| *x >= 202 && *y < 90)
+    {
+        *pixel = Luma([255]);
+    }
+    mask.save(path.join("mask.png")).unwrap();
+    let report = checked();
+    assert_eq!(report["verdict"], "wrong", "{report}");
+    let leaks = report["shape"]["leaks"].as_array().unwrap();
+    assert_eq!(leaks.len(), 1, "{report}");
+    assert_eq!(leaks[0]["bounds"][0], 202);
 }
 
 #[test]

@@ -7,6 +7,7 @@ use indicatif::ProgressBar;
 use relit::console::{Console, Outcome};
 use relit::extract::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally, extract};
 use relit_data::causes::with_causes;
+use relit_data::counts::count_of;
 use relit_data::shard::SessionEntry;
 use serde_json::json;
 
@@ -106,10 +107,10 @@ impl Reporter<'_> {
         let report = self.out.join(format!("{}.html", entry.id));
         self.console.say(
             &format!(
-                "{}: {} samples ({} duplicates), Spec-Net on for {}, report {}",
+                "{}: {} ({}), Spec-Net on for {}, report {}",
                 entry.id,
-                entry.samples,
-                entry.duplicates,
+                count_of(u64::from(entry.samples), "sample"),
+                count_of(u64::from(entry.duplicates), "duplicate"),
                 entry.spec_net,
                 report.display()
             ),

@@ -5,6 +5,7 @@ use std::path::Path;
 use relit::console::{Console, Outcome};
 use relit::extract::ExtractError;
 use relit::extract::objects::merge;
+use relit_data::counts::count_of;
 use serde_json::json;
 
 pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError> {
@@ -24,8 +25,11 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
         .sum();
     console.say(
         &format!(
-            "{}: {sessions} sessions with {samples} samples, of {tasks} tasks",
-            out.display()
+            "{}: {} with {}, of {}",
+            out.display(),
+            count_of(sessions as u64, "session"),
+            count_of(samples, "sample"),
+            count_of(tasks.into(), "task")
         ),
         &json!({
             "event": "merged",

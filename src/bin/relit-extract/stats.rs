@@ -5,6 +5,7 @@ use std::path::Path;
 use relit::console::{Console, Outcome};
 use relit::extract::ExtractError;
 use relit::extract::objects::overview;
+use relit_data::counts::count_of;
 use relit_data::durable;
 use relit_data::report::render_overview;
 use relit_data::shard::{
@@ -40,7 +41,8 @@ pub(crate) fn run(
     }
     if let Some(more @ 1..) = overview.sessions.len().checked_sub(most) {
         console.warn(&format!(
-            "{more} more sessions: --html and --json have them all"
+            "{} not shown: --html and --json have them all",
+            count_of(more as u64, "session")
         ));
     }
     let totals = overview.totals();
@@ -108,7 +110,7 @@ impl Columns {
     fn heading(&self) -> String {
         let (session, object) = (self.session, self.object);
         format!(
-            "{:session$}  {:object$}  verdict  samples  Spec-Net  saturated  shift rms/max px  reasons",
+            "{:session$}  {:object$}  verdict     samples  Spec-Net  saturated  shift rms/max px  reasons",
             "session", "object"
         )
     }
@@ -120,14 +122,16 @@ impl Columns {
             _ => "-".to_owned(),
         };
         let text = format!(
-            "{:width$}  {:wide$}  {:7}  {:>7}  {:>6.1} %  {:>7.2} %  {shift:>16}  {}",
+            "{:width$}  {:wide$}  {:10}  {:>7}  {:>6.1} %  {:>7.2} %  {shift:>16}  {}",
             entry.id,
             entry.object,
-            quality.verdict,
+            session
+                .verdict()
+                .map_or(QualityVerdict::NONE, QualityVerdict::name),
             entry.samples,
             percent(u64::from(entry.spec_net), u64::from(entry.samples)),
             100.0 * quality.saturated_mean,
-            quality.reasons.join("; "),
+            session.reasons().join("; "),
             width = self.session,
             wide = self.object,
         );
@@ -142,6 +146,9 @@ fn percent(part: u64, whole: u64) -> f64 {
 /// One session for a machine.
 fn event(session: &SessionOverview) -> Value {
     let entry = &session.entry;
+    let mut quality = json!(session.quality);
+    quality["verdict"] = json!(session.verdict());
+    quality["reasons"] = json!(session.reasons());
     json!({
         "event": "session",
         "id": entry.id,
@@ -151,7 +158,7 @@ fn event(session: &SessionOverview) -> Value {
         "spec_net": entry.spec_net,
         "lossy": entry.lossy,
         "warnings": entry.warnings,
-        "quality": session.quality,
+        "quality": quality,
         "histogram": session.histogram,
     })
 }
@@ -182,16 +189,22 @@ fn histogram(totals: &OverviewTotals) -> String {
 }
 
 fn sums(out: &Path, overview: &Overview, totals: &OverviewTotals) -> String {
-    let counts = QualityVerdict::ALL.map(|v| format!("{} {v}", overview.count(v)));
+    let mut counts = QualityVerdict::ALL
+        .map(|verdict| format!("{} {verdict}", overview.count(Some(verdict))))
+        .to_vec();
+    match overview.count(None) {
+        0 => {}
+        unjudged => counts.push(format!("{unjudged} {}", QualityVerdict::NONE)),
+    }
     format!(
-        "{}: {} sessions ({}) of {} objects, {} samples, Spec-Net on for {} ({:.1} %)\n\
+        "{}: {} ({}) of {}, {}, Spec-Net on for {} ({:.1} %)\n\
          moved back {}, not registered {}, exposure steps {}, pictures repeated {}, frames used again {}, \
-         blurred {}; {} sessions with losses, {} warnings",
+         blurred {}; {} with losses, {}",
         out.display(),
-        overview.sessions.len(),
+        count_of(overview.sessions.len() as u64, "session"),
         counts.join(", "),
-        totals.objects,
-        totals.samples,
+        count_of(totals.objects as u64, "object"),
+        count_of(totals.samples, "sample"),
         totals.spec_net,
         percent(totals.spec_net, totals.samples),
         totals.moved,
@@ -200,15 +213,16 @@ fn sums(out: &Path, overview: &Overview, totals: &OverviewTotals) -> String {
         totals.identical,
         totals.duplicates,
         totals.blurred,
-        totals.lossy,
-        totals.warnings,
+        count_of(totals.lossy as u64, "session"),
+        count_of(totals.warnings as u64, "warning"),
     )
 }
 
 fn sums_event(out: &Path, overview: &Overview, totals: &OverviewTotals) -> Value {
     let verdicts: serde_json::Map<String, Value> = QualityVerdict::ALL
         .into_iter()
-        .map(|verdict| (verdict.to_string(), overview.count(verdict).into()))
+        .map(|verdict| (verdict.to_string(), overview.count(Some(verdict)).into()))
+        .chain([("not_judged".to_owned(), overview.count(None).into())])
         .collect();
     json!({
         "event": "stats",

@@ -5,6 +5,7 @@ use std::path::Path;
 use relit::console::{Console, Outcome};
 use relit::extract::ExtractError;
 use relit::extract::objects::{ObjectError, is_url};
+use relit_data::counts::count_of;
 use relit_data::shard::verify;
 use serde_json::json;
 
@@ -32,22 +33,21 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
     }
     if count > console.most_lines(MAX_PRINTED) {
         console.warn(&format!(
-            "{} more problems: --json lists them all",
-            count - MAX_PRINTED
+            "{} not shown: --json lists them all",
+            count_of((count - MAX_PRINTED) as u64, "problem")
         ));
     }
     let summary = match count {
         0 => "no problems".to_owned(),
-        1 => "1 problem".to_owned(),
-        n => format!("{n} problems"),
+        n => count_of(n as u64, "problem"),
     };
     console.say(
         &format!(
-            "{}: {} sessions, {} shards, {} samples read back: {summary}",
+            "{}: {}, {}, {} read back: {summary}",
             out.display(),
-            report.sessions,
-            report.shards,
-            report.samples
+            count_of(report.sessions as u64, "session"),
+            count_of(report.shards as u64, "shard"),
+            count_of(report.samples as u64, "sample")
         ),
         &json!({
             "event": "verified",

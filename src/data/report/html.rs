@@ -19,8 +19,11 @@ pub(super) fn document(title: &str, body: &str) -> String {
 }
 
 /// A verdict as a mark.
-pub(super) fn badge(verdict: QualityVerdict) -> String {
-    format!("<b class=\"badge {verdict}\">{verdict}</b>")
+pub(super) fn badge(verdict: Option<QualityVerdict>) -> String {
+    match verdict {
+        Some(verdict) => format!("<b class=\"badge {verdict}\">{verdict}</b>"),
+        None => format!("<b class=\"badge none\">{}</b>", QualityVerdict::NONE),
+    }
 }
 
 /// `text` for an element's content or a quoted attribute: markup is escaped, and characters that

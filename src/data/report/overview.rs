@@ -49,11 +49,15 @@ fn summary(overview: &Overview) -> String {
     )
 }
 
-/// How many sessions are good, usable, broken.
+/// How many sessions are good, usable, broken; and not judged, if there are any.
 fn verdicts(overview: &Overview) -> String {
-    let counts = QualityVerdict::ALL.map(|verdict| (verdict, overview.count(verdict)));
-    let marks = counts.map(|(verdict, count)| format!("<li>{} {count}</li>\n", badge(verdict)));
-    format!("<ul class=\"verdicts\">\n{}</ul>\n", marks.concat())
+    let unjudged = overview.count(None) > 0;
+    let verdicts = QualityVerdict::ALL.map(Some).into_iter();
+    let marks: String = verdicts
+        .chain(unjudged.then_some(None))
+        .map(|verdict| format!("<li>{} {}</li>\n", badge(verdict), overview.count(verdict)))
+        .collect();
+    format!("<ul class=\"verdicts\">\n{marks}</ul>\n")
 }
 
 fn sessions(overview: &Overview, beside: bool) -> String {
@@ -88,9 +92,11 @@ fn row(session: &SessionOverview, gate: f64, beside: bool) -> String {
         (Some(rms), Some(most)) => format!("{}, {} px", number(rms, 2), number(most, 2)),
         _ => "\u{2013}".to_owned(),
     };
-    let mut found = quality.reasons.clone();
-    if quality.moved > 0 {
-        found.push(format!("{} samples moved back", quality.moved));
+    let mut found = session.reasons().to_vec();
+    match quality.moved {
+        0 => {}
+        1 => found.push("1 sample moved back".to_owned()),
+        n => found.push(format!("{n} samples moved back")),
     }
     let warnings = match entry.warnings.len() {
         0 => None,
@@ -109,7 +115,7 @@ fn row(session: &SessionOverview, gate: f64, beside: bool) -> String {
          <td data-name=\"saturated\">{plot}<span class=\"kind\">{mean}</span></td>\
          <td data-name=\"shift\">{shift}</td><td data-name=\"found\">{found}</td></tr>\n",
         object = escape(&entry.object),
-        badge = badge(quality.verdict),
+        badge = badge(session.verdict()),
         samples = entry.samples,
         on = entry.spec_net,
         part = share(u64::from(entry.spec_net), u64::from(entry.samples)),

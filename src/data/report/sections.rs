@@ -52,7 +52,7 @@ fn quality(quality: &SessionQuality) -> String {
         [] => "nothing was found that speaks against its use".to_owned(),
         reasons => escape(&reasons.join("; ")),
     };
-    format!("<p>{}: {reasons}.</p>\n", badge(quality.verdict))
+    format!("<p>{}: {reasons}.</p>\n", badge(Some(quality.verdict)))
 }
 
 fn verdict(page: &Page<'_>) -> String {

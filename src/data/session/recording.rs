@@ -159,8 +159,8 @@ impl Recording {
 }
 
 /// The recordings at a path: the path itself for a session folder or a video file; for a folder of
-/// sessions each of them, sorted by name. A session folder that has lost its manifest or its video is
-/// listed too, so that opening it reports the loss.
+/// sessions each of them, sorted by name. A session folder that has lost its manifest or its video, and a folder
+/// that cannot be looked into, are listed too, so that opening them reports it.
 ///
 /// # Errors
 /// [`SessionError::NotThere`], [`SessionError::NoSession`], [`SessionError::VideoAmongSessions`], or [`SessionError::Io`].
@@ -177,7 +177,8 @@ pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, SessionError> {
     let mut inner = Vec::new();
     for entry in fs::read_dir(path).map_err(SessionError::io(path, "listed"))? {
         let folder = entry.map_err(SessionError::io(path, "listed"))?.path();
-        if folder.is_dir() && is_session_folder(&folder)? {
+        // One that cannot be listed may hold a session: opening it says why not, and the others go on.
+        if folder.is_dir() && is_session_folder(&folder).unwrap_or(true) {
             inner.push(folder);
         }
     }

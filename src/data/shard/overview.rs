@@ -38,7 +38,7 @@ pub struct Overview {
 pub struct SessionOverview {
     /// Its entry in the description.
     pub entry: SessionEntry,
-    /// The figures of its table, summed.
+    /// The figures of its table, summed. For the verdict, see [`SessionOverview::verdict`].
     pub quality: SessionQuality,
     /// Its samples by saturated fraction.
     pub histogram: SaturationHistogram,
@@ -138,15 +138,29 @@ impl Overview {
         totals
     }
 
-    /// Number of sessions with this verdict.
+    /// Number of sessions with this verdict; `None` counts those that were never judged.
     #[must_use]
-    pub fn count(&self, verdict: QualityVerdict) -> usize {
-        let verdicts = self.sessions.iter().map(|session| session.quality.verdict);
+    pub fn count(&self, verdict: Option<QualityVerdict>) -> usize {
+        let verdicts = self.sessions.iter().map(SessionOverview::verdict);
         verdicts.filter(|&found| found == verdict).count()
     }
 }
 
 impl SessionOverview {
+    /// The verdict in the description; `None` where an earlier version wrote none: the fields that it rests on
+    /// are missing in such a table, too.
+    #[must_use]
+    pub fn verdict(&self) -> Option<QualityVerdict> {
+        self.entry.quality.as_ref().map(|quality| quality.verdict)
+    }
+
+    /// Why the verdict is not good, one phrase each.
+    #[must_use]
+    pub fn reasons(&self) -> &[String] {
+        let judged = self.entry.quality.as_ref();
+        judged.map_or(&[], |quality| &quality.reasons)
+    }
+
     fn of(entry: SessionEntry, records: &[FrameRecord]) -> Self {
         let mut histogram = SaturationHistogram::default();
         for record in records {

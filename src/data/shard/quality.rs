@@ -5,6 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::record::FrameRecord;
+use crate::counts::count_of;
 
 /// Degrees of a whole turn.
 const TURN_DEG: f64 = 360.0;
@@ -34,6 +35,9 @@ pub enum QualityVerdict {
 impl QualityVerdict {
     /// All verdicts, from the best to the worst.
     pub const ALL: [Self; 3] = [Self::Good, Self::Usable, Self::Broken];
+
+    /// What is said of a session without a verdict.
+    pub const NONE: &'static str = "not judged";
 
     /// The word in `dataset.json`.
     #[must_use]
@@ -120,7 +124,8 @@ impl SessionQuality {
         }
         let over = count(records, |r| r.saturated_fraction > OVEREXPOSED);
         if 2 * over as usize > records.len() {
-            let reason = format!("more than half of the object is saturated in {over} samples");
+            let samples = count_of(u64::from(over), "sample");
+            let reason = format!("more than half of the object is saturated in {samples}");
             self.add(QualityVerdict::Broken, &reason);
         }
         let share = |limit: f64| limit * records.len() as f64;
@@ -155,8 +160,8 @@ impl SessionQuality {
                 } else {
                     QualityVerdict::Broken
                 };
-                let at = if samples == 1 { "sample" } else { "samples" };
-                self.add(verdict, &format!("{what} in {samples} {at}"));
+                let samples = count_of(u64::from(samples), "sample");
+                self.add(verdict, &format!("{what} in {samples}"));
             }
         }
         match covered_deg {

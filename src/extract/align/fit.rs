@@ -105,14 +105,12 @@ impl Template {
         for (dx, dy) in places {
             let mut sums = Sums::default();
             for pixel in self.pixels.iter().step_by(every) {
-                let x = usize::try_from(i64::from(pixel.x) + i64::from(dx));
-                let y = usize::try_from(i64::from(pixel.y) + i64::from(dy));
-                if let (Ok(x), Ok(y)) = (x, y)
-                    && x < frame.width
-                    && let Some(found) = frame.values.get(y * frame.width + x)
-                {
-                    sums.compare(pixel, *found);
-                }
+                // What lies beyond the picture agrees with nothing, so that the rest cannot win alone.
+                let found = frame.at(
+                    pixel.x.wrapping_add_signed(dx),
+                    pixel.y.wrapping_add_signed(dy),
+                );
+                sums.compare(pixel, found.unwrap_or_default());
             }
             if sums.correlation() > best.0 {
                 best = (sums.correlation(), [f64::from(dx), f64::from(dy)]);

@@ -20,7 +20,9 @@ use structure::{Extractor, Gradients, Plane, half, half_luma, luma};
 use template::Template;
 
 /// A fit whose correlation is less is none.
-pub const MIN_CONFIDENCE: f64 = 0.3;
+const MIN_CONFIDENCE: f64 = 0.3;
+/// Nor is one of less than this share of the turn's median: a part of an object that is turned fits somewhere, too.
+const LEAST_OF_MEDIAN: f64 = 0.6;
 /// Larger crops are halved until their longer side is at most this, pixels: what is gained beyond is little.
 const FINEST_SIDE: u32 = 640;
 /// Pictures are halved until their longer side is at most this, pixels.
@@ -42,8 +44,9 @@ const LOOK_BEYOND: f64 = 1.5;
 const LITTLE: f64 = 0.75;
 /// Scales, from the finest on, that are compared with the next coarser one.
 const COMPARED: usize = 2;
-/// Standard deviations from which on a shift of an object that stands still is one.
-const SURE: f64 = 2.5;
+/// A shift that lies further from the turn's middle, in standard deviations of what the turn and the measuring explain,
+/// is a jolt.
+const JOLT: f64 = 2.5;
 /// Shifts that change by less stand still, pixels, at the finest scale and at the others.
 const STILL: [f64; 2] = [0.01, 0.05];
 /// Further than this, pixels at the object's mean distance from its centre, a rotation or growth counts.
@@ -76,9 +79,10 @@ fn halvings((width, height): (u32, u32)) -> u32 {
 /// Where the object of a frame is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
-    /// To the right and down of its place in the mask, pixels; `None` where the frame cannot be registered.
+    /// To the right and down of its place in the mask, pixels: what is most likely, given what the frame shows and
+    /// how far the object moves in its turn. `None` where the frame cannot be registered.
     pub shift: Option<[f64; 2]>,
-    /// Standard deviation of the shift, pixels, as far as the frame itself shows it: by how differently parts of
+    /// Standard deviation of what the frame shows, pixels: by how differently parts of
     /// the object and neighbouring scales say it, of which light that moves pulls more at the coarser.
     /// Infinite where there is no shift.
     pub uncertainty: f64,
@@ -98,8 +102,20 @@ pub struct Aligner {
     reach: f64,
     /// Pixels of a frame in one of the finest template.
     unit: f64,
-    /// Whether the object moved in the frames that it was learnt from: by more in the mean than is uncertain.
-    moves: bool,
+    least_confidence: f64,
+    motion: Motion,
+}
+
+/// How the object moves in its turn, by the frames that it was learnt from.
+#[derive(Debug, Default)]
+struct Motion {
+    /// The middle place, pixels.
+    centre: [f64; 2],
+    /// Mean square of the distances from there beyond what is measuring error, square pixels; `None` before it is
+    /// known.
+    variance: Option<f64>,
+    /// Where the object is in the mask's frame, pixels.
+    origin: [f64; 2],
 }
 
 /// What a thread needs to measure shifts; it keeps its buffers from frame to frame.
@@ -173,7 +189,8 @@ impl Aligner {
             templates,
             reach,
             unit,
-            moves: false,
+            least_confidence: MIN_CONFIDENCE,
+            motion: Motion::default(),
         };
         let found: Vec<Alignment> = samples
             .par_iter()
@@ -181,27 +198,18 @@ impl Aligner {
                 aligner.measure(sample, buffers)
             })
             .collect();
-        let square = |found: &Alignment| {
-            let [dx, dy] = found.shift?;
-            Some(dx * dx + dy * dy - found.uncertainty * found.uncertainty)
-        };
-        aligner.moves = found.iter().filter_map(square).sum::<f64>() > 0.0;
         let usable = found.get(reference)?.shift.is_some();
+        let registered = found.iter().filter(|found| found.shift.is_some());
+        let usual = middle(registered.map(|found| found.confidence).collect());
+        aligner.least_confidence = MIN_CONFIDENCE.max(LEAST_OF_MEDIAN * usual);
+        aligner.motion = Motion::of(&found, reference);
         usable.then_some(aligner)
     }
 
-    /// The shift of a frame, if it is more than `tolerance` pixels and is one: in a turn that stands still, what
-    /// is uncertain is taken for none.
+    /// The confidence below which a frame of this turn is not registered, 0..=1.
     #[must_use]
-    pub fn to_correct(&self, frame: &Alignment, tolerance: f64) -> Option<[f64; 2]> {
-        let sure = if self.moves {
-            0.0
-        } else {
-            SURE * frame.uncertainty
-        };
-        frame
-            .shift
-            .filter(|[dx, dy]| dx.hypot(*dy) > tolerance.max(sure))
+    pub fn least_confidence(&self) -> f64 {
+        self.least_confidence
     }
 
     /// Where the object is in a frame, in pixels of the frame.
@@ -209,7 +217,7 @@ impl Aligner {
     pub fn measure(&self, frame: &AlignSample, buffers: &mut AlignBuffers) -> Alignment {
         self.take(frame, buffers);
         let gradients = &buffers.gradients;
-        let sure = |fit: &Fit| fit.correlation >= MIN_CONFIDENCE;
+        let sure = |fit: &Fit| fit.correlation >= self.least_confidence;
         let coarsest = self.templates.len() - 1;
         let reach = self.reach / (1_u32 << coarsest) as f64;
         let start = self.templates[coarsest].search(&gradients[coarsest], reach);
@@ -217,9 +225,11 @@ impl Aligner {
         let confidence = fit.map_or(0.0, |fit| fit.correlation.clamp(0.0, 1.0));
         let fit = fit.filter(sure);
         let in_pixels = |length: f64| self.unit * length;
+        let uncertainty = fit.map_or(f64::INFINITY, |fit| in_pixels(fit.uncertainty));
+        let shift = fit.map(|fit| fit.shift.map(in_pixels));
         Alignment {
-            shift: fit.map(|fit| fit.shift.map(in_pixels)),
-            uncertainty: fit.map_or(f64::INFINITY, |fit| in_pixels(fit.uncertainty)),
+            shift: shift.map(|shift| self.motion.against_mask(shift, uncertainty)),
+            uncertainty,
             confidence,
             turned: fit.and_then(|fit| self.turned(gradients, fit)),
         }
@@ -284,15 +294,76 @@ impl Aligner {
     }
 }
 
+impl Motion {
+    /// From the frames that were learnt from; the mask was made on that of index `reference`.
+    fn of(found: &[Alignment], reference: usize) -> Self {
+        let shifts: Vec<[f64; 2]> = found.iter().filter_map(|found| found.shift).collect();
+        let centre = middle_place(&shifts);
+        let beyond = |found: &Alignment| {
+            let [x, y] = found.shift?;
+            let (dx, dy) = (x - centre[0], y - centre[1]);
+            Some(dx * dx + dy * dy - found.uncertainty * found.uncertainty)
+        };
+        let variance = found.iter().filter_map(beyond).sum::<f64>() / shifts.len().max(1) as f64;
+        let mut motion = Self {
+            centre,
+            variance: Some(variance.max(0.0)),
+            origin: [0.0; 2],
+        };
+        let of_mask = found.get(reference);
+        if let Some((shift, found)) = of_mask.and_then(|found| Some((found.shift?, found))) {
+            let away = (shift[0] - centre[0]).hypot(shift[1] - centre[1]);
+            motion.origin = if away > SAME_PLACE {
+                motion.most_likely(shift, found.uncertainty)
+            } else {
+                centre
+            };
+        }
+        motion
+    }
+
+    /// The most likely shift against the mask's frame, of a frame that shows this one.
+    fn against_mask(&self, shift: [f64; 2], uncertainty: f64) -> [f64; 2] {
+        let found = self.most_likely(shift, uncertainty);
+        [0, 1].map(|axis| found[axis] - self.origin[axis])
+    }
+
+    /// The most likely place of a frame's object of this turn. A measured value holds the error of its
+    /// measuring, which in a turn that hardly moves is most of it, and counts the less: an empirical Bayes
+    /// estimate (Efron and Morris, "Stein's estimation rule and its competitors", 1973). Uncertainties are generous,
+    /// and must not pull at an object that clearly moves: it counts by the ratio of the variances, at most wholly. What
+    /// neither the turn's motion nor an error explains is taken as it is.
+    fn most_likely(&self, shift: [f64; 2], uncertainty: f64) -> [f64; 2] {
+        let Some(variance) = self.variance else {
+            return shift;
+        };
+        let away = [shift[0] - self.centre[0], shift[1] - self.centre[1]];
+        let spread = variance + uncertainty * uncertainty;
+        let square = away[0] * away[0] + away[1] * away[1];
+        if spread <= 0.0 || square > JOLT * JOLT * spread {
+            return shift;
+        }
+        let part = (variance / uncertainty.powi(2)).min(1.0);
+        [0, 1].map(|axis| self.centre[axis] + part * away[axis])
+    }
+}
+
 /// Where shifts count from in the end.
 fn final_origin(reference: Option<[f64; 2]>, shifts: &[[f64; 2]], near: f64) -> [f64; 2] {
-    let middle = [0, 1].map(|axis| {
-        let mut parts: Vec<f64> = shifts.iter().map(|shift| shift[axis]).collect();
-        parts.sort_unstable_by(f64::total_cmp);
-        parts.get(parts.len() / 2).copied().unwrap_or_default()
-    });
+    let middle = middle_place(shifts);
     let far = |[x, y]: &[f64; 2]| (x - middle[0]).hypot(y - middle[1]) > near;
     reference.filter(far).unwrap_or(middle)
+}
+
+/// The median shift to the right, and that down.
+fn middle_place(shifts: &[[f64; 2]]) -> [f64; 2] {
+    [0, 1].map(|axis| middle(shifts.iter().map(|shift| shift[axis]).collect()))
+}
+
+/// The upper median; 0 of nothing.
+fn middle(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or_default()
 }
 
 fn fit_all(

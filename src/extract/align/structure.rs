@@ -130,6 +130,14 @@ impl WithSimd for Structure<'_> {
 }
 
 impl Gradients {
+    /// The gradient of a pixel; `None` beyond the picture.
+    pub(super) fn at(&self, x: u32, y: u32) -> Option<[f32; 2]> {
+        let (x, y) = (x as usize, y as usize);
+        let inside = x < self.width && y < self.height;
+        let found = inside.then(|| self.values.get(y * self.width + x))?;
+        found.copied()
+    }
+
     /// Replaces these by the gradients of `plane`; 0 at its border.
     pub(super) fn take(&mut self, plane: &Plane) {
         (self.width, self.height) = (plane.width, plane.height);

@@ -144,6 +144,7 @@ fn band(
         .collect();
     let mut across = Vec::with_capacity(planes.len());
     let mut down = Vec::with_capacity(planes.len());
+    let mut scratch = Vec::with_capacity(planes.len());
     for (at, (row, needed)) in found.iter_mut().zip(needed).enumerate() {
         for x in needed {
             across.clear();
@@ -153,7 +154,10 @@ fn band(
                 across.push(0.5 * (here[x + 1] - here[x - 1]));
                 down.push(0.5 * (below[x] - above[x]));
             }
-            let (mid_x, mid_y) = (middle(&mut across.clone()), middle(&mut down.clone()));
+            let (mid_x, mid_y) = (
+                middle_of(&across, &mut scratch),
+                middle_of(&down, &mut scratch),
+            );
             for (a, d) in across.iter_mut().zip(&down) {
                 let (x, y) = (*a - mid_x, d - mid_y);
                 *a = (x * x + y * y).sqrt();
@@ -191,11 +195,25 @@ fn moved_row(plane: &Plane, [dx, dy]: [f64; 2], y: isize) -> Vec<f32> {
     let last = plane.width as isize - 1;
     for (weight, step) in weights_x.into_iter().zip(-1..) {
         let by = whole_x as isize + step;
-        for (x, to) in (0..).zip(&mut moved) {
-            *to += weight * line[(x + by).clamp(0, last) as usize];
-        }
+        // Columns whose values lie in the picture; beyond, its edge is repeated.
+        let from = (-by).clamp(0, last + 1) as usize;
+        let to = (last + 1 - by).clamp(from as isize, last + 1) as usize;
+        let source = from.saturating_add_signed(by).min(plane.width);
+        add_scaled(&mut moved[from..to], &line[source..], weight);
+        let (first, last) = (line[0], line[plane.width - 1]);
+        moved[..from]
+            .iter_mut()
+            .for_each(|to| *to += weight * first);
+        moved[to..].iter_mut().for_each(|to| *to += weight * last);
     }
     moved
+}
+
+/// The median of values that keep their order.
+fn middle_of(values: &[f32], scratch: &mut Vec<f32>) -> f32 {
+    scratch.clear();
+    scratch.extend_from_slice(values);
+    middle(scratch)
 }
 
 /// The median, for an even number the upper one; 0 of nothing.
@@ -205,4 +223,24 @@ fn middle(values: &mut [f32]) -> f32 {
         return 0.0;
     }
     *values.select_nth_unstable_by(at, f32::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_moved_row_repeats_the_edge_on_both_sides() {
+        let values: Vec<f32> = (0..7).map(|x| (x * x) as f32).collect();
+        let plane = Plane {
+            width: 7,
+            height: 1,
+            values: values.clone(),
+        };
+        for dx in [-30.0, -3.0, 0.0, 2.0, 6.0, 9.0] {
+            let moved = moved_row(&plane, [dx, 0.0], 0);
+            let wanted = (0..7).map(|x| values[(x + dx as i32).clamp(0, 6) as usize]);
+            assert_eq!(moved, wanted.collect::<Vec<f32>>(), "{dx}");
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use image::{GrayImage, Luma, Rgba, RgbaImage};
 
-use super::{AlignBuffers, AlignSample, Aligner, Alignment};
+use super::{AlignBuffers, AlignSample, Aligner, Alignment, Motion};
 use crate::extract::View;
 
 const SIDE: u32 = 150;
@@ -109,14 +109,10 @@ fn an_object_without_structure_cannot_be_learnt() {
     assert!(Aligner::learn(&samples, 0, &mask(), 8.0).is_none());
 }
 
-#[test]
-fn a_rotation_is_reported_where_it_is_significant_and_not_else() {
-    let aligner = learnt(|_| [0.0; 2]);
-    assert_eq!(measured(&aligner, &frame([1.3, 0.4], 0.7)).turned, None);
-    let AlignSample(still) = frame([0.0; 2], 0.7);
-    let degrees = 1.5_f64;
+/// A picture turned about its middle.
+fn turned(still: &GrayImage, degrees: f64) -> GrayImage {
     let (sin, cos) = degrees.to_radians().sin_cos();
-    let turned = GrayImage::from_fn(SIDE, SIDE, |x, y| {
+    GrayImage::from_fn(SIDE, SIDE, |x, y| {
         let (x, y) = (f64::from(x) - 74.5, f64::from(y) - 74.5);
         let (u, v) = (74.5 + cos * x + sin * y, 74.5 - sin * x + cos * y);
         let (left, top) = (u.floor().clamp(0.0, 148.0), v.floor().clamp(0.0, 148.0));
@@ -125,28 +121,121 @@ fn a_rotation_is_reported_where_it_is_significant_and_not_else() {
         let (across, down) = ((u - left).clamp(0.0, 1.0), (v - top).clamp(0.0, 1.0));
         let line = |dy| (1.0 - across) * at(0, dy) + across * at(1, dy);
         Luma([((1.0 - down) * line(0) + down * line(1)).round() as u8])
-    });
+    })
+}
+
+#[test]
+fn a_rotation_is_reported_where_it_is_significant_and_not_else() {
+    let aligner = learnt(|_| [0.0; 2]);
+    assert_eq!(measured(&aligner, &frame([1.3, 0.4], 0.7)).turned, None);
+    let AlignSample(still) = frame([0.0; 2], 0.7);
+    let degrees = 1.5;
+    let turned = turned(&still, degrees);
     let found = measured(&aligner, &AlignSample(turned)).turned.unwrap();
     assert!((found.0 - degrees).abs() < 0.4, "{found:?}");
     assert!(found.1.abs() < 0.01, "{found:?}");
 }
 
+/// The same picture with noise, different for each `seed`.
+fn noisy(AlignSample(image): AlignSample, seed: u32) -> AlignSample {
+    let mut state = seed.wrapping_mul(2_654_435_761) | 1;
+    let noise = |level: u8| {
+        let sum: i32 = (0..4)
+            .map(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                i32::from(state.to_be_bytes()[0]) - 128
+            })
+            .sum();
+        (i32::from(level) + sum / 20).clamp(0, 255) as u8
+    };
+    let (width, height) = image.dimensions();
+    let levels = image.into_raw().into_iter().map(noise).collect();
+    AlignSample(GrayImage::from_raw(width, height, levels).unwrap())
+}
+
 #[test]
-fn in_a_turn_that_stands_still_only_a_sure_shift_is_corrected() {
-    let aligner = learnt(|_| [0.0; 2]);
-    let unsure = Alignment {
-        shift: Some([0.12, 0.05]),
+fn in_a_turn_that_stands_still_no_shift_is_found_in_noise_and_a_jolt_is() {
+    let samples: Vec<AlignSample> = (0..24)
+        .map(|at| noisy(frame([0.0; 2], angle(at, 24)), at as u32))
+        .collect();
+    let aligner = Aligner::learn(&samples, 0, &mask(), 8.0).unwrap();
+    let (mut noise, mut found) = (0.0, 0.0);
+    for at in 0..30 {
+        let frame = noisy(frame([0.0; 2], angle(at, 30)), 100 + at as u32);
+        let Alignment {
+            shift, uncertainty, ..
+        } = measured(&aligner, &frame);
+        let [dx, dy] = shift.unwrap();
+        noise += uncertainty * uncertainty / 30.0;
+        found += (dx * dx + dy * dy) / 30.0;
+    }
+    assert!(found < noise / 9.0, "{} {}", found.sqrt(), noise.sqrt());
+    let jolt = measured(&aligner, &noisy(frame([1.2, -0.8], angle(3, 24)), 77));
+    let [dx, dy] = jolt.shift.unwrap();
+    assert!((dx - 1.2).hypot(dy + 0.8) < 0.15, "{jolt:?}");
+}
+
+#[test]
+fn what_is_measured_counts_as_far_as_the_turn_moves() {
+    let shaken = Motion {
+        variance: Some(4.0),
+        ..Motion::default()
+    };
+    assert_eq!(shaken.most_likely([1.5, -0.5], 0.3), [1.5, -0.5]);
+    // All frames but the mask's lie to the right.
+    let beside = Motion {
+        centre: [2.0, 0.0],
+        variance: Some(0.0),
+        ..Motion::default()
+    };
+    assert_eq!(beside.most_likely([2.1, 0.03], 0.08), [2.0, 0.0]);
+    assert_eq!(beside.most_likely([0.0, 0.0], 0.08), [0.0, 0.0]);
+    let trembling = Motion {
+        variance: Some(0.01),
+        ..Motion::default()
+    };
+    let [dx, _] = trembling.most_likely([0.2, 0.0], 0.2);
+    assert!((dx - 0.05).abs() < 1e-9);
+}
+
+#[test]
+fn the_masks_frame_is_no_other_place_than_the_rest_unless_it_surely_is() {
+    let found = |shift: [f64; 2]| Alignment {
+        shift: Some(shift),
         uncertainty: 0.08,
         confidence: 0.8,
         turned: None,
     };
-    assert_eq!(aligner.to_correct(&unsure, 0.1), None);
-    let jolt = measured(&aligner, &frame([1.2, -0.8], angle(3, 24)));
-    assert!(jolt.uncertainty < 0.5, "{jolt:?}");
-    assert_eq!(aligner.to_correct(&jolt, 0.1), jolt.shift);
-    assert_eq!(aligner.to_correct(&jolt, 2.0), None);
-    let shaken = learnt(|at| [0.1 * at as f64, 0.3 * (at as f64).sin()]);
-    assert_eq!(shaken.to_correct(&unsure, 0.1), unsure.shift);
+    let still = [
+        [0.0, 0.0],
+        [0.15, 0.05],
+        [0.16, 0.04],
+        [0.14, 0.05],
+        [0.15, 0.06],
+    ]
+    .map(found);
+    let motion = Motion::of(&still, 0);
+    assert_eq!(motion.against_mask([0.15, 0.05], 0.08), [0.0; 2]);
+    let pushed = [
+        [-2.0, 0.0],
+        [0.15, 0.05],
+        [0.15, 0.05],
+        [0.15, 0.05],
+        [0.15, 0.05],
+    ]
+    .map(found);
+    let [dx, dy] = Motion::of(&pushed, 0).against_mask([0.15, 0.05], 0.08);
+    assert!((dx - 2.15).hypot(dy - 0.05) < 0.01, "{dx} {dy}");
+}
+
+#[test]
+fn a_turned_object_that_a_shift_does_not_bring_back_is_not_registered() {
+    let aligner = learnt(|_| [0.0; 2]);
+    let AlignSample(still) = frame([0.0; 2], 0.7);
+    for degrees in [4.0, -4.0] {
+        let found = measured(&aligner, &AlignSample(turned(&still, degrees)));
+        assert_eq!(found.shift, None, "{found:?}");
+    }
 }
 
 #[test]

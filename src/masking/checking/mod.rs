@@ -9,7 +9,7 @@ use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
 use relit_data::session::{MASK_FILE, Recording};
 use relit_mask::{
-    MaskCheck, MaskError, MaskRecord, Place, ShapeCheck, TURN_FRAMES, Turn, TurnStatistics,
+    Effort, MaskCheck, MaskError, MaskRecord, Place, ShapeCheck, TURN_FRAMES, Turn, TurnStatistics,
 };
 use relit_video::Video;
 use serde::Serialize;
@@ -136,7 +136,7 @@ fn check_recording(
     let places = places(&video, &check, image.dimensions(), advanced)?;
     let drifts = drifts(&places, origin);
     let drift = summary(&drifts, video.frames().len());
-    let shape = shape(&check, &frame)?;
+    let shape = shape(&check, &frame, Effort::Fine)?;
     let (verdict, reasons) = verdict(drift.as_ref(), shape.as_ref(), MOST_REGION);
     let report = MaskReport {
         verdict,
@@ -152,11 +152,16 @@ fn check_recording(
 }
 
 /// What is worth a warning before a mask is used for a whole data set, by a few frames of the video.
-/// Empty if the video says nothing about the mask.
+/// Empty if the video says nothing about the mask. `frame` is the one on which the mask was made, if that is known:
+/// in others the object may lie elsewhere.
 ///
 /// # Errors
 /// [`MaskingError::Video`] or [`MaskingError::Mask`].
-pub fn mask_doubts(video: &Video, mask: &GrayImage) -> Result<Vec<String>, MaskingError> {
+pub fn mask_doubts(
+    video: &Video,
+    mask: &GrayImage,
+    frame: Option<u64>,
+) -> Result<Vec<String>, MaskingError> {
     let numbers = quick_frames(video);
     let statistics = statistics(video, mask.dimensions(), &numbers)?;
     let check = match MaskCheck::new(mask, &statistics) {
@@ -164,10 +169,14 @@ pub fn mask_doubts(video: &Video, mask: &GrayImage) -> Result<Vec<String>, Maski
         Err(MaskError::FewFrames { .. } | MaskError::Empty) => return Ok(Vec::new()),
         Err(error) => return Err(error.into()),
     };
-    let Some(&middle) = numbers.get(numbers.len() / 2) else {
-        return Ok(Vec::new());
+    let of_mask = frame.and_then(|number| video.frame(number).ok());
+    let frame = match (of_mask, numbers.get(numbers.len() / 2)) {
+        (Some(frame), _) => frame,
+        (None, Some(&middle)) => video.frame(middle)?,
+        (None, None) => return Ok(Vec::new()),
     };
-    let shape = shape(&check, &video.frame(middle)?)?;
+    // What is a region is wide: an edge that is blocky in a large frame changes none.
+    let shape = shape(&check, &frame, Effort::Draft)?;
     let (verdict, reasons) = verdict(None, shape.as_ref(), MOST_REGION_OF_A_LOOK);
     Ok(match verdict {
         Verdict::Wrong => reasons,
@@ -190,8 +199,12 @@ fn quick_frames(video: &Video) -> Vec<u64> {
 }
 
 /// The comparison of the shapes; none where the turn alone shows no object.
-fn shape(check: &MaskCheck<'_>, frame: &RgbImage) -> Result<Option<ShapeCheck>, MaskingError> {
-    match check.shape(frame) {
+fn shape(
+    check: &MaskCheck<'_>,
+    frame: &RgbImage,
+    effort: Effort,
+) -> Result<Option<ShapeCheck>, MaskingError> {
+    match check.shape(frame, effort) {
         Err(MaskError::Empty | MaskError::Everything | MaskError::FrameTooSmall { .. }) => Ok(None),
         shape => Ok(shape?),
     }

@@ -22,6 +22,12 @@ fn two_sessions() -> tempfile::TempDir {
             }
         });
     }
+    let mut dataset = Dataset::read(dir.path()).unwrap();
+    let sessions = Overview::read(dir.path()).unwrap().sessions;
+    for (entry, summed) in dataset.sessions.iter_mut().zip(sessions) {
+        entry.quality = Some(summed.quality);
+    }
+    dataset.write(dir.path()).unwrap();
     dir
 }
 
@@ -40,7 +46,8 @@ fn sessions_are_summed_from_their_tables_alone() {
     );
     assert_eq!(totals.histogram.iter().sum::<u64>(), totals.samples);
     assert_eq!(totals.blurred, u64::from(SAMPLES));
-    assert_eq!(overview.count(QualityVerdict::Broken), 1);
+    assert_eq!(overview.count(Some(QualityVerdict::Broken)), 1);
+    assert_eq!(overview.count(None), 0);
     assert_eq!(overview.sessions[1].quality.shift_max_px, Some(0.5));
     // Sample 0 has no highlight, later ones more and more.
     let profile = &overview.sessions[0].profile;
@@ -109,6 +116,7 @@ fn the_page_shows_every_session_and_leads_to_their_pages_only_from_beside_them()
     assert!(html.contains("<a href=\"a.html\">") && html.contains("&lt;mug&gt;"));
     assert_eq!(html.matches("class=\"small\"").count(), 2);
     assert!(html.contains("<b class=\"badge broken\">broken</b> 1"));
+    assert!(!html.contains("not judged"));
     assert!(html.contains("the picture is blurred in 14 samples"));
     let elsewhere = render_overview("out", &overview, false);
     for outside in [
@@ -122,14 +130,22 @@ fn the_page_shows_every_session_and_leads_to_their_pages_only_from_beside_them()
 
 /// Written before records had `blur`, tables its column, and descriptions `quality`.
 #[test]
-fn a_data_set_of_an_earlier_version_is_read_verified_and_summed() {
+fn a_data_set_of_an_earlier_version_is_read_verified_and_summed_and_not_judged() {
     let earlier = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/earlier");
     sample_set::assert_intact(&earlier);
     let overview = Overview::read(&earlier).unwrap();
     assert_eq!(overview.problems, Vec::<String>::new());
     assert_eq!(overview.sessions[0].entry.quality, None);
-    assert_eq!(overview.sessions[0].quality.verdict, QualityVerdict::Good);
+    assert_eq!(overview.sessions[0].verdict(), None);
+    assert_eq!(overview.count(None), 1);
+    assert_eq!(overview.count(Some(QualityVerdict::Good)), 0);
     assert_eq!(overview.totals().samples, 12);
+    let html = render_overview("out", &overview, false);
+    assert_eq!(
+        html.matches("<b class=\"badge none\">not judged</b>")
+            .count(),
+        2
+    );
 }
 
 #[test]

@@ -103,7 +103,8 @@ fn record_problems(
             ),
         ),
         (
-            r.mask_px == session.mask.px,
+            // Of an object that moved beyond the frame, less than the mask was seen.
+            r.mask_px == session.mask.px || r.shift_applied && r.mask_px < session.mask.px,
             format!(
                 "mask_px is {}, dataset.json says {} pixels under the mask",
                 r.mask_px, session.mask.px
