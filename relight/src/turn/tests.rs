@@ -392,7 +392,14 @@ fn a_body_that_was_given_is_taken_but_doubted_and_metal_has_no_labels() {
     };
     let found = solve_turn(&turn.curves, &options).unwrap();
     assert_eq!((found.body(), found.bodies().len()), (BodyKind::Metal, 2));
-    assert_eq!(found.doubted_body(), Some(BodyKind::Diffuse));
+    let (_, light, curves) = metal_ball();
+    let wrongly = TurnOptions {
+        body: Some(BodyKind::Diffuse),
+        ..known(&light)
+    };
+    let wrong = solve_turn(&curves, &wrongly).unwrap();
+    assert_eq!(wrong.body(), BodyKind::Diffuse);
+    assert_eq!(wrong.doubted_body(), Some(BodyKind::Metal));
     let rightly = TurnOptions {
         body: Some(BodyKind::Diffuse),
         ..known(&room())
