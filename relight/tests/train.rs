@@ -620,7 +620,7 @@ fn turns_are_refused_where_they_teach_nothing() {
         turns: Some("turns".into()),
         ..PaperInputs::default()
     };
-    let (settings, resources) = (PaperSettings::default(), Resources::default());
+    let (settings, resources) = (PaperSettings::default(), resources());
     let task = PaperTask::new(PaperPhase::Normal, settings, resources, &turns);
     assert!(matches!(
         task,

@@ -14,8 +14,7 @@ use indicatif::ProgressBar;
 use relight::nets::{NetError, Weights};
 use relight::train::{
     DecomposeSettings, DecomposeTask, Launch, PaperInputs, PaperPhase, PaperSettings, PaperTask,
-    ProcessGroup, Resources, Run, RunOutcome, RunSettings, Task, TrainError, TrainObserver,
-    read_settings,
+    ProcessGroup, Resources, Run, RunOutcome, RunSettings, Task, TrainObserver, read_settings,
 };
 use serde::Serialize;
 use serde_json::json;
