@@ -347,6 +347,10 @@ fn every_phase_of_the_paper_makes_its_steps_and_goes_on_where_it_was_stopped() {
         PaperPhase::Joint,
         PaperPhase::Specular,
     ] {
+        let inputs = PaperInputs {
+            turns: inputs.turns.clone().filter(|_| phase.learns_from_turns()),
+            ..inputs.clone()
+        };
         let task = || PaperTask::new(phase, paper_settings(3), resources(), &inputs).unwrap();
         let run = paper_settings(3).run;
         let (whole, parted) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
