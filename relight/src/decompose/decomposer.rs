@@ -10,7 +10,7 @@ use super::gloss::{FittedGloss, fit_gloss};
 use super::other::OtherNormals;
 use super::region::{Region, Window, cut_out, enlarged, inside};
 use crate::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
-use crate::light::{Normals, ShLight, YUp};
+use crate::light::{LightError, Normals, ShLight, YUp};
 use crate::nets::{Inference, InferenceEngine, NetError, Weights, decomposer};
 use crate::render::{DiffuseForm, DiffuseLayer, NormalsFrame, fit_light};
 
@@ -23,6 +23,11 @@ pub const WORKING_SIDE: usize = 256;
 const SATURATED_PART: f64 = 0.05;
 /// Keeps the light from behind, which normals hardly show, small: see [`fit_light`].
 const STIFFNESS: f64 = 1e-3;
+/// Longest band 1 of a light, in parts of its mean. A single lamp has √3; far above it, the fit follows cast shadows to
+/// a light that is negative in most directions.
+const MOST_ONE_SIDED: f64 = 2.5;
+/// How often the light is fitted with four times the stiffness, at most.
+const STIFFER_FITS: usize = 8;
 
 /// At which size a picture is decomposed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -323,7 +328,7 @@ impl Decomposer {
         let normals = others.unwrap_or(maps.normals);
         let shading = normalised(maps.shading, &known);
         let target = Rgb::new(in_colour(shading.clone()));
-        let light = fit_light(&normals, &target, &known, STIFFNESS)?;
+        let light = fit_possible_light(&normals, &target, &known)?;
         let lit = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&normals);
         let gloss = if is_glossy {
             let highlight = possible_highlight(&whole.picture, &known, maps.highlight);
@@ -338,6 +343,30 @@ impl Decomposer {
             gloss,
         })
     }
+}
+
+/// The light of a shading, as stiff as it has to be to be one that there can be.
+fn fit_possible_light(
+    normals: &Normals<YUp>,
+    shading: &Rgb<Linear>,
+    known: &[bool],
+) -> Result<ShLight, LightError> {
+    let mut stiffness = STIFFNESS;
+    let mut light = fit_light(normals, shading, known, stiffness)?;
+    for _ in 0..STIFFER_FITS {
+        if !is_too_one_sided(&light) {
+            break;
+        }
+        stiffness *= 4.0;
+        light = fit_light(normals, shading, known, stiffness)?;
+    }
+    Ok(light)
+}
+
+/// Whether band 1 is longer than that of any light; it is grey, so that one channel says it.
+fn is_too_one_sided(light: &ShLight) -> bool {
+    let [mean, a, b, c] = [0, 1, 2, 3].map(|at: usize| light.coefficients()[at][1]);
+    (a * a + b * b + c * c).sqrt() > MOST_ONE_SIDED * mean
 }
 
 /// An object cut out of its photograph.
@@ -445,5 +474,26 @@ fn relative_difference(a: &[f32], b: &[f32]) -> f64 {
         (difference / all).sqrt()
     } else {
         0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shading_with_hard_shadows_has_a_light_that_there_can_be() {
+        let normals = Normals::sphere(33);
+        // Bright where the surface turns far to the right, and black elsewhere.
+        let shadowed = normals.planes().plane(0).iter();
+        let plane: Vec<f32> = shadowed.map(|x| if *x > 0.6 { 3.0 } else { 0.0 }).collect();
+        let planes =
+            Planes::from_planes(Extent::new(33, 33), [plane.clone(), plane.clone(), plane])
+                .unwrap();
+        let (shading, known) = (Rgb::new(planes), vec![true; 33 * 33]);
+        let nearest = fit_light(&normals, &shading, &known, STIFFNESS).unwrap();
+        assert!(is_too_one_sided(&nearest), "{nearest:?}");
+        let possible = fit_possible_light(&normals, &shading, &known).unwrap();
+        assert!(!is_too_one_sided(&possible), "{possible:?}");
     }
 }
