@@ -240,8 +240,9 @@ impl PaperSettings {
         let mut settings = Self::default();
         let mut names_rate = false;
         if let Some(file) = file {
-            settings = read_settings(file)?;
-            let table: toml::Table = read_settings(file)?;
+            let text = read_text(file)?;
+            settings = parse(file, &text)?;
+            let table: toml::Table = parse(file, &text)?;
             names_rate = table
                 .get("run")
                 .is_some_and(|run| run.get("rate").is_some());
@@ -336,12 +337,19 @@ fn check_weight(name: &'static str, weight: f64) -> Result<(), TrainError> {
 /// # Errors
 /// [`TrainError::Io`] or [`TrainError::Settings`].
 pub fn read_settings<S: DeserializeOwned>(path: &Path) -> Result<S, TrainError> {
-    let text = fs::read_to_string(path).map_err(|source| TrainError::Io {
+    parse(path, &read_text(path)?)
+}
+
+fn read_text(path: &Path) -> Result<String, TrainError> {
+    fs::read_to_string(path).map_err(|source| TrainError::Io {
         path: path.to_owned(),
         doing: "read",
         source,
-    })?;
-    toml::from_str(&text).map_err(|error| TrainError::Settings {
+    })
+}
+
+fn parse<S: DeserializeOwned>(path: &Path, text: &str) -> Result<S, TrainError> {
+    toml::from_str(text).map_err(|error| TrainError::Settings {
         path: path.to_owned(),
         fault: error.to_string(),
     })

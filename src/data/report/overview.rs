@@ -2,6 +2,7 @@
 
 use super::axis::{number, percent};
 use super::html::{self, badge, counted, escape, table, warnings};
+use crate::counts::count_of;
 use crate::shard::{Overview, QualityVerdict, SATURATION_BOUNDS, SessionOverview};
 
 /// Size of a session's small plot, in its own units.
@@ -93,10 +94,9 @@ fn row(session: &SessionOverview, gate: f64, beside: bool) -> String {
         _ => "\u{2013}".to_owned(),
     };
     let mut found = session.reasons().to_vec();
-    match quality.moved {
-        0 => {}
-        1 => found.push("1 sample moved back".to_owned()),
-        n => found.push(format!("{n} samples moved back")),
+    if quality.moved > 0 {
+        let moved = count_of(u64::from(quality.moved), "sample");
+        found.push(format!("{moved} moved back"));
     }
     let warnings = match entry.warnings.len() {
         0 => None,
