@@ -9,6 +9,7 @@
 //! | [`relit_web`] | `src/web/` | what the programs' pages share: tokens, who gets in, limits | |
 //! | [`relit_mask`] | `src/mask/` | GrabCut on an image | OpenCV |
 //! | [`relit_video`] | `src/video/` | decoding and muxing | FFmpeg |
+//! | [`relit_console`] | `src/console/` | the output of the programs: text, JSON lines, progress, exit codes | |
 //! | [`relit_data`] | `src/data/` | sessions, data sets, reports on disk | none |
 //!
 //! The modules of this crate bring them together:
@@ -17,7 +18,6 @@
 //! | --- | --- |
 //! | [`extract`] | recordings and masks to data sets, as one streaming pipeline |
 //! | [`masking`] | the mask of a recording: a frame of its video, three files |
-//! | [`console`] | the output of the programs: text, JSON lines, progress, exit codes |
 //!
 //! The programs `relit-capture`, `relit-mask` and `relit-extract` in `src/bin/` parse arguments, call
 //! the library and report. The downstream crate `relight` trains on the data sets and depends on
@@ -72,6 +72,5 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod console;
 pub mod extract;
 pub mod masking;

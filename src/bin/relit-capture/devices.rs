@@ -8,7 +8,7 @@ use relit_rig::clock::Clock;
 use relit_rig::turntable::{TurntableError, find_serial};
 use serde_json::{Value, json};
 
-use relit::console::{Console, Outcome};
+use relit_console::{Console, Outcome};
 
 pub(crate) fn run(console: Console) -> ExitCode {
     let cameras = camera::list();

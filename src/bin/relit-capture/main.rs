@@ -14,7 +14,7 @@ mod turntable;
 use std::process::ExitCode;
 
 use arguments::Command;
-use relit::console::Console;
+use relit_console::Console;
 
 fn main() -> ExitCode {
     let arguments = arguments::parse();

@@ -16,7 +16,7 @@ use serde_json::json;
 
 use crate::arguments::Record;
 use crate::environment::at_end;
-use relit::console::{Console, Outcome};
+use relit_console::{Console, Outcome};
 
 /// How often progress is looked at.
 const UPDATE: Duration = Duration::from_millis(100);
@@ -112,7 +112,7 @@ fn while_reporting<T>(console: Console, monitor: &Monitor, work: impl FnOnce() -
 /// What was reported of a capture so far.
 struct Reporter {
     console: Console,
-    bar: indicatif::ProgressBar,
+    bar: relit_console::ProgressBar,
     version: u64,
     phase: Phase,
     checks: usize,
@@ -123,7 +123,7 @@ impl Reporter {
     fn new(console: Console) -> Self {
         Self {
             console,
-            bar: indicatif::ProgressBar::hidden(),
+            bar: relit_console::ProgressBar::hidden(),
             version: 0,
             phase: Phase::Idle,
             checks: 0,
@@ -162,7 +162,7 @@ impl Reporter {
                 let label = state.session.clone().unwrap_or_default();
                 self.console.progress(state.frames_wanted, &label)
             }
-            _ => indicatif::ProgressBar::hidden(),
+            _ => relit_console::ProgressBar::hidden(),
         };
         self.console.say_phase(
             &state.phase.to_string(),
@@ -190,8 +190,11 @@ fn report(console: Console, captured: &Captured, folder: &str) -> Outcome {
 fn judgement(captured: &Captured) -> (&'static str, Outcome) {
     match captured.take.verdict {
         Verdict::Clean if captured.repeated == 0 => ("clean", Outcome::Whole),
-        Verdict::Clean => ("clean, after a take that is not usable", Outcome::Lossy),
-        Verdict::Tolerated => ("whole, with remarks", Outcome::Lossy),
+        Verdict::Clean => (
+            "clean, after a take that is not usable",
+            Outcome::Incomplete,
+        ),
+        Verdict::Tolerated => ("whole, with remarks", Outcome::Incomplete),
         Verdict::Aborted => ("not usable, kept as aborted", Outcome::Wrong),
     }
 }
@@ -206,9 +209,9 @@ mod tests {
     fn only_a_clean_first_take_ends_without_a_remark() {
         for (verdict, repeated, outcome) in [
             (Verdict::Clean, 0, Outcome::Whole),
-            (Verdict::Clean, 1, Outcome::Lossy),
-            (Verdict::Tolerated, 0, Outcome::Lossy),
-            (Verdict::Tolerated, 1, Outcome::Lossy),
+            (Verdict::Clean, 1, Outcome::Incomplete),
+            (Verdict::Tolerated, 0, Outcome::Incomplete),
+            (Verdict::Tolerated, 1, Outcome::Incomplete),
             (Verdict::Aborted, 0, Outcome::Wrong),
             (Verdict::Aborted, 1, Outcome::Wrong),
         ] {

@@ -13,7 +13,7 @@ use serde_json::json;
 
 use crate::arguments::Serve;
 use crate::environment::{at_end, heartbeat, notify_service};
-use relit::console::{Console, Outcome};
+use relit_console::{Console, Outcome};
 
 /// Why the rig is not served.
 #[derive(Debug, thiserror::Error)]

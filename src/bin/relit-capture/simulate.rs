@@ -13,7 +13,7 @@ use serde_json::json;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::table_arguments::SimulateArguments;
-use relit::console::{Console, Outcome};
+use relit_console::{Console, Outcome};
 
 /// Interval at which the end conditions are checked.
 const LOOK: Duration = Duration::from_millis(50);

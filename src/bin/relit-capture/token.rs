@@ -5,7 +5,7 @@ use std::path::Path;
 use relit_rig::serve::{Token, TokenFileError};
 use serde_json::json;
 
-use relit::console::{Console, Outcome};
+use relit_console::{Console, Outcome};
 
 pub(crate) fn run(console: Console, file: &Path) -> Result<Outcome, TokenFileError> {
     let token = Token::from_file(file)?;

@@ -10,7 +10,7 @@ use serde_json::json;
 
 use crate::environment::at_end;
 use crate::table_arguments::{Action, TurntableArguments};
-use relit::console::{Console, Outcome};
+use relit_console::{Console, Outcome};
 
 pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcome, TurntableError> {
     let port = match &asked.turntable {

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use indicatif::ProgressBar;
-use relit::console::{Console, Outcome};
 use relit::extract::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally, extract};
+use relit_console::ProgressBar;
+use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
 use relit_data::counts::count_of;
 use relit_data::shard::SessionEntry;
@@ -64,7 +64,7 @@ pub(crate) fn run(
     Ok(match (tally.failed, tally.lossy + tally.left_out) {
         (0, 0) => Outcome::Whole,
         (1.., _) if nothing_came_out => Outcome::Wrong,
-        _ => Outcome::Lossy,
+        _ => Outcome::Incomplete,
     })
 }
 

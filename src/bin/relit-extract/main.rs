@@ -10,7 +10,7 @@ mod verifying;
 use std::process::ExitCode;
 
 use arguments::Command;
-use relit::console::Console;
+use relit_console::Console;
 
 fn main() -> ExitCode {
     let arguments = arguments::parse();

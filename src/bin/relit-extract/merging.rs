@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use relit::console::{Console, Outcome};
 use relit::extract::ExtractError;
 use relit::extract::objects::merge;
+use relit_console::{Console, Outcome};
 use relit_data::counts::count_of;
 use serde_json::json;
 
@@ -41,7 +41,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
     );
     let lossy = merged.dataset.sessions.iter().any(|session| session.lossy);
     Ok(match lossy || !merged.left_out.is_empty() {
-        true => Outcome::Lossy,
+        true => Outcome::Incomplete,
         false => Outcome::Whole,
     })
 }

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use relit::console::{Console, Outcome};
 use relit::extract::ExtractError;
 use relit::extract::objects::overview;
+use relit_console::{Console, Outcome};
 use relit_data::counts::count_of;
 use relit_data::durable;
 use relit_data::report::render_overview;
@@ -53,7 +53,7 @@ pub(crate) fn run(
     );
     Ok(match overview.problems.is_empty() {
         true => Outcome::Whole,
-        false => Outcome::Lossy,
+        false => Outcome::Incomplete,
     })
 }
 

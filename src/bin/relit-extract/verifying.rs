@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use relit::console::{Console, Outcome};
 use relit::extract::ExtractError;
 use relit::extract::objects::{ObjectError, is_url};
+use relit_console::{Console, Outcome};
 use relit_data::counts::count_of;
 use relit_data::shard::verify;
 use serde_json::json;

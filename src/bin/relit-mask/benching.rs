@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use relit::console::{Console, Outcome};
 use relit::masking::{BenchRow, MaskingError, Prompt, bench_image, bench_images};
+use relit_console::{Console, Outcome};
 use relit_mask::MaskScore;
 use serde_json::{Value, json};
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use relit::console::{Console, Outcome};
 use relit::masking::{CheckOutput, MaskingError, Verdict, check_mask};
+use relit_console::{Console, Outcome};
 use relit_data::session::recordings;
 use serde_json::json;
 

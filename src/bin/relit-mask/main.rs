@@ -9,7 +9,7 @@ mod report;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser};
-use relit::console::Console;
+use relit_console::Console;
 
 use arguments::{CommandLine, Verb};
 

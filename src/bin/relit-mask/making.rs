@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use relit::console::{Console, Outcome};
 use relit::masking::{MaskingError, edit, make_mask};
+use relit_console::{Console, Outcome};
 use relit_data::session::recordings;
 use relit_web::Announcement;
 
@@ -69,6 +69,6 @@ fn make(
     Ok(match failed {
         0 => Outcome::Whole,
         all if all == paths.len() => Outcome::Wrong,
-        _ => Outcome::Lossy,
+        _ => Outcome::Incomplete,
     })
 }

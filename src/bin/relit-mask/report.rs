@@ -1,7 +1,7 @@
 //! What `relit-mask` prints about a mask.
 
-use relit::console::Console;
 use relit::masking::MaskOutput;
+use relit_console::Console;
 use relit_web::Announcement;
 use serde_json::json;
 

@@ -1,9 +1,23 @@
 //! The output of the programs, for a person or a machine: lines on the terminal, JSON lines, progress,
-//! exit codes. Nothing else in the toolkit prints.
+//! exit codes. Nothing else in the workspace prints.
+//!
+//! One rule for all programs:
+//!
+//! | | without `--json` | with `--json` |
+//! | --- | --- | --- |
+//! | results | text on standard output | JSON lines on standard output |
+//! | what is being done | text on standard error | JSON lines on standard output |
+//! | warnings and errors | text on standard error | JSON lines on standard output, and the same text on standard error |
+//! | progress | a bar on standard error, where that is a terminal | none |
+//!
+//! So standard output alone tells a machine everything, and standard error alone, which a cluster keeps as
+//! the log of a job, tells a person what went wrong.
+//!
+//! The exit code is an [`Outcome`], 1 for an error, or 2 for wrong arguments (which `clap` reports).
 #![allow(
     clippy::print_stdout,
     clippy::print_stderr,
-    reason = "printing is the purpose of this module"
+    reason = "printing is the purpose of this crate"
 )]
 
 use std::error::Error;
@@ -13,9 +27,11 @@ use std::process::ExitCode;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressStyle;
 use relit_data::causes::with_causes;
-use serde_json::Value;
+use serde_json::{Value, json};
+
+pub use indicatif::ProgressBar;
 
 /// What first kept a line from being printed, other than that nobody reads any more.
 static LOST_LINE: OnceLock<io::Error> = OnceLock::new();
@@ -28,7 +44,7 @@ pub enum Outcome {
     /// Finished, but nothing came out, or a check failed: exit code 1.
     Wrong,
     /// Finished, but something was left out or lost: exit code 3.
-    Lossy,
+    Incomplete,
 }
 
 impl From<Outcome> for ExitCode {
@@ -36,7 +52,7 @@ impl From<Outcome> for ExitCode {
         match outcome {
             Outcome::Whole => Self::SUCCESS,
             Outcome::Wrong => Self::from(1),
-            Outcome::Lossy => Self::from(3),
+            Outcome::Incomplete => Self::from(3),
         }
     }
 }
@@ -51,6 +67,12 @@ impl Console {
     /// A console that prints JSON lines (`json`) or text on standard output.
     pub fn new(json: bool) -> Self {
         Self { json }
+    }
+
+    /// Whether a machine reads the lines.
+    #[must_use]
+    pub fn is_json(self) -> bool {
+        self.json
     }
 
     /// A result: `text` for a person, `event` as one JSON line for a machine.
@@ -89,13 +111,17 @@ impl Console {
         if self.json { usize::MAX } else { for_people }
     }
 
-    /// A warning: on standard error for a person, as a JSON line for a machine.
+    /// A warning.
     pub fn warn(self, text: &str) {
+        self.warn_with(text, &json!({ "event": "warning", "message": text }));
+    }
+
+    /// A warning that is an event of its own for a machine.
+    pub fn warn_with(self, text: &str, event: &Value) {
         if self.json {
-            print_line(&serde_json::json!({ "event": "warning", "message": text }).to_string());
-        } else {
-            print_error_line(&format!("warning: {text}"));
+            print_line(&event.to_string());
         }
+        print_error_line(&format!("warning: {text}"));
     }
 
     /// An error, with its causes, as one sentence.
@@ -110,7 +136,7 @@ impl Console {
 
     fn print_error(self, text: &str, input: Option<&Path>) {
         if self.json {
-            let event = serde_json::json!({ "event": "error", "message": text, "input": input.map(Path::to_string_lossy) });
+            let event = json!({ "event": "error", "message": text, "input": input.map(Path::to_string_lossy) });
             print_line(&event.to_string());
         }
         match input {
@@ -123,17 +149,17 @@ impl Console {
 
     /// Prints the command's error, if there is one, and returns the exit code. Where lines could not be printed, the
     /// outcome is not whole.
-    pub fn finish<E: Error + 'static>(self, result: Result<Outcome, E>) -> ExitCode {
+    pub fn finish<E: Into<Box<dyn Error>>>(self, result: Result<Outcome, E>) -> ExitCode {
         match (result, LOST_LINE.get()) {
             (Ok(Outcome::Whole), Some(fault)) => {
                 print_error_line(&format!(
                     "error: standard output could not be written, lines are missing there: {fault}"
                 ));
-                Outcome::Lossy.into()
+                Outcome::Incomplete.into()
             }
             (Ok(outcome), _) => outcome.into(),
             (Err(error), _) => {
-                self.error(&error);
+                self.error(error.into().as_ref());
                 ExitCode::FAILURE
             }
         }
