@@ -39,36 +39,45 @@ setup: ## Install the system packages that are missing
 setup-train: ## Install libtorch, which relight's training is built with (544 MB, once)
 	@.ci/setup-train
 
+# Cargo builds the programs before it runs the first test: those of the package relit-tests run several.
 test: setup ## Run all tests
 	@if rig-firmware/build --can && [[ -e /usr/include/simavr/sim_avr.h ]]; then \
 	    $(MAKE) --no-print-directory firmware emulator; \
 	else \
 	    echo "the firmware's tests on the emulated chip are skipped: 'make setup' printed why"; \
 	fi
-	cargo test --locked $$(.ci/setup-train --features)
+	cargo test --locked --workspace --exclude relit-fuzz $$(.ci/setup-train --features)
 
 test-rig: setup ## Capture with the kernel's camera drivers and a real tty, in a virtual machine
 	@tests/rig-vm/run
 
 test-slurm: setup ## Extract as an array job on a real Slurm, started on this machine for it
-	cargo build --locked -p relit --bin relit-extract
+	cargo build --locked -p relit-extract
 	@tests/slurm/run $(TARGET)/debug/relit-extract
 
 test-objects: setup $(OBJECTS_VENV)/ready ## Extract from and to object stores, with an S3 server on this machine
-	cargo test --locked -p relit --features object-store --lib objects
-	cargo test --locked -p relit --features object-store --test objects
-	cargo build --locked -p relit --features object-store --bin relit-extract
+	cargo test --locked -p relit-extract --features object-store --lib objects
+	cargo test --locked -p relit-extract --features object-store --test objects
+	cargo build --locked -p relit-extract --features object-store
 	tests/objects/s3 $(TARGET)/debug/relit-extract $(abspath $(OBJECTS_VENV))/bin/python
 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check
 	cargo clippy --locked --workspace --all-targets $$(.ci/setup-train --features) -- -D warnings
 	cargo clippy --locked -p relight -- -D warnings
-	cargo clippy --locked -p relit --features object-store --all-targets -- -D warnings
+	cargo clippy --locked -p relit-extract --features object-store --all-targets -- -D warnings
+	cargo clippy --locked -p relit-mask --no-default-features --all-targets -- -D warnings
+	cargo clippy --locked -p relit-data --no-default-features -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps
 	@if cargo tree --locked -p relight -e normal --prefix none \
 	    | grep -E '^(ffmpeg|opencv|axum|hyper|tokio|relit-(video|mask|rig))'; then \
 	    echo "relight must not depend on these"; exit 1; fi
+	@if cargo tree --locked -p relit-extract -e normal --prefix none \
+	    | grep -E '^(opencv|v4l|axum|hyper|tokio|relit-(mask|rig|web))'; then \
+	    echo "relit-extract must not depend on these"; exit 1; fi
+	@if cargo tree --locked -p relit-grabcut -e normal --prefix none \
+	    | grep -E '^(opencv|rayon|rustix|parquet|tar|clap|indicatif|relit-(video|web|mask))'; then \
+	    echo "relit-grabcut must not depend on these"; exit 1; fi
 	cargo fmt --manifest-path rig-firmware/uno/Cargo.toml --check
 	@if rig-firmware/build --can; then rig-firmware/build --clippy; fi
 
@@ -82,7 +91,7 @@ flash: firmware ## Flash the firmware to the Arduino at PORT (/dev/ttyACM0)
 	    -U flash:w:$(FIRMWARE)/rig-firmware-uno.hex:i
 
 demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of it, list the results
-	cargo build --locked --release -p relit --bins
+	cargo build --locked --release -p relit-capture -p relit-mask -p relit-extract --bins
 	rm -rf $(DEMO)
 	$(TARGET)/release/relit-capture record --yes --object cow --root $(DEMO)/sessions \
 	    --camera 'replay:fixtures/$(SESSION)?loop=1' --turntable sim:
@@ -98,24 +107,24 @@ demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of 
 	echo "The shard of 1500 samples:        $$(echo $(DEMO)/out/*-cow.tar)"
 
 bench: setup $(BENCH_VENV)/ready ## Measure relit-extract at 1080p against ffmpeg and Python OpenCV
-	cargo build --locked --release -p relit --bins --example stages
+	cargo build --locked --release -p relit-extract --bins --example stages
 	$(BENCH_VENV)/bin/python tests/bench/bench.py --program $(TARGET)/release/relit-extract \
 	    --stages $(TARGET)/release/examples/stages \
 	    --video $(BENCH_VIDEO) --mask $(BENCH_MASK) --runs $(BENCH_RUNS) --work $(TARGET)/bench
 
 bench-reader: setup $(DEMO)/mask.png $(BENCH_VENV)/ready ## Measure relight's reader of shards against Python webdataset
-	cargo build --locked --release -p relight --example read_turns
+	cargo build --locked --release -p relight-reader --example read_turns
 	$(BENCH_VENV)/bin/python tests/bench/reader.py --reader $(TARGET)/release/examples/read_turns \
 	    --runs $(BENCH_RUNS) $(DEMO)/out
 
 bench-network: setup-train $(BENCH_VENV)/torch-ready ## Measure relight's training against PyTorch's
-	cargo build --locked --release -p relight --features train --example network_speed
+	cargo build --locked --release -p relight-train --example network_speed
 	$(BENCH_VENV)/bin/python tests/bench/network.py --program $(TARGET)/release/examples/network_speed \
 	    --runs $(BENCH_RUNS)
 
-docs: setup ## Build the library's reference
+docs: setup ## Build the libraries' reference
 	cargo doc --locked --no-deps
-	@echo "$(TARGET)/doc/relit/index.html"
+	@echo "$(TARGET)/doc/relit_data/index.html"
 
 fuzz: setup ## Run each fuzz target for FUZZ_SECONDS (60)
 	cargo fuzz --version >/dev/null 2>&1 || cargo install --locked cargo-fuzz

@@ -15,11 +15,11 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use relit::extract::{ExtractOptions, extract};
 use relit_data::session::{
     CameraFacts, FrameClock, FrameIndex, Manifest, Recording, SoftwareFacts, Status, VideoFacts,
 };
 use relit_data::shard::{Dataset, ImageSize};
+use relit_extract::{ExtractOptions, extract};
 use relit_rig::camera::{
     Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
     Mode, ModeRequest, Rates, open,
@@ -134,7 +134,8 @@ const SIZE: (u32, u32) = (480, 360);
 
 /// The JPEGs of a fixture, which are the packets of its video.
 fn jpegs() -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/20261120T101500Z-cow-short");
+    let folder =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/20261120T101500Z-cow-short");
     let bytes = fs::read(folder.join("video.mkv")).unwrap();
     let places = packets(&folder, "video.mkv");
     let found = places.iter().map(|place| {
@@ -615,7 +616,8 @@ fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -
 #[test]
 fn a_replayed_session_is_recorded_again_packet_for_packet() {
     let root = tempfile::tempdir().unwrap();
-    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/20261120T101500Z-cow-short");
+    let fixture =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/20261120T101500Z-cow-short");
     let take = record_replay(root.path(), &fixture, 33_333.3, 0.0, 150.0);
     take.check_verdict(Verdict::Clean);
     assert_eq!(take.counts(), (150, 0));
@@ -755,7 +757,7 @@ fn child_that_records_until_it_is_killed() {
 /// `relit-extract` takes the session, and warns of the loss.
 fn extracts(folder: &Path, out: &Path) {
     let mask = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("fixtures/20261120T101500Z-cow-short/mask_gt.png");
+        .join("../fixtures/20261120T101500Z-cow-short/mask_gt.png");
     let options = ExtractOptions {
         frames: 4,
         size: ImageSize::Pixels(32),
@@ -874,7 +876,7 @@ fn a_recording_killed_before_its_first_frame_is_salvaged_as_such() {
     assert!(reason.contains("before its first frame"), "{reason}");
 
     // It is left out of a batch, with its reason, and is no failure.
-    let output = Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+    let output = Command::new(relit_tests::program("relit-extract"))
         .arg(root.path())
         .arg("-o")
         .arg(root.path().join("out"))

@@ -16,11 +16,10 @@ use std::process::{Command, Output};
 const TAUGHT: &str = "20261120T101500Z-cow-short";
 const HELD_OUT: &str = "20261120T102000Z-bust-short";
 
-/// The program relight, which cargo builds beside this package's programs; none where it was not built, or without
+/// The program relight, which cargo builds beside this test; none where it was not built, or without
 /// training.
 fn relight() -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_BIN_EXE_relit-extract"));
-    let program = beside.with_file_name("relight");
+    let program = relit_tests::beside_this_test("relight").unwrap();
     let answer = Command::new(&program).args(["train", "--help"]).output();
     match answer {
         Ok(output) if output.status.success() => Some(program),
@@ -42,9 +41,9 @@ fn success(output: &Output) {
 
 fn extract(session: &str, out: &Path) {
     let session = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("fixtures")
+        .join("../fixtures")
         .join(session);
-    let output = Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+    let output = Command::new(relit_tests::program("relit-extract"))
         .arg(&session)
         .arg("--out")
         .arg(out)
@@ -69,7 +68,8 @@ impl Bench {
 
     /// Trains by `phase` into the folder of its name, or into `out`.
     fn train(&self, phase: &str, out: &str, more: &str) {
-        let settings = Path::new(env!("CARGO_MANIFEST_DIR")).join("relight/weights/fixtures.toml");
+        let settings =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../relight/weights/fixtures.toml");
         let output = Command::new(&self.relight)
             .args(["train", phase, "--threads", "1", "-o", out, "--settings"])
             .arg(settings)

@@ -559,7 +559,7 @@ fn names_in(folder: &Path) -> Vec<String> {
     names
 }
 
-const SHAKEN: &str = "fixtures/20261120T102000Z-bust-short";
+const SHAKEN: &str = "../../fixtures/20261120T102000Z-bust-short";
 
 /// The true shifts of the frames of [`SHAKEN`], pixels.
 fn true_shifts() -> Vec<[f64; 2]> {

@@ -16,6 +16,10 @@
 //! | [`naming`] | the names that a session may have |
 //! | [`durable`] | files that appear whole or not at all |
 //! | [`causes`] | errors as text, with their causes |
+//! | [`counts`] | numbers of things in sentences |
+//!
+//! Without the feature `files`, which is on by default, only what needs no operating system is there: all
+//! modules but `session`, `shard`, `report` and `durable`.
 //!
 //! `shard` knows `geometry`, `image_stats`, `naming` and `durable`; `report` knows the records of `shard`
 //! and `image_stats`; `session` and `shard` do not know each other. `docs/formats.md` describes every
@@ -162,12 +166,16 @@
 
 pub mod causes;
 pub mod counts;
+#[cfg(feature = "files")]
 pub mod durable;
 pub mod geometry;
 pub mod image_stats;
 pub mod naming;
+#[cfg(feature = "files")]
 pub mod report;
+#[cfg(feature = "files")]
 pub mod session;
+#[cfg(feature = "files")]
 pub mod shard;
 pub mod srgb;
 pub mod turn_light;

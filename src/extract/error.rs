@@ -61,6 +61,9 @@ pub enum ExtractError {
         /// The decoder's error.
         source: image::ImageError,
     },
+    /// The mask cannot be held against the video.
+    #[error(transparent)]
+    MaskDoubts(#[from] relit_grabcut::MaskError),
     /// Mask and frames differ in size.
     #[error(
         "the mask {path} is {} x {} pixels and the frames are {} x {}: make the mask on a frame of this video",

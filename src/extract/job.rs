@@ -16,6 +16,7 @@ use relit_data::shard::{
 use relit_video::Video;
 
 use super::collected::Collected;
+use super::mask_doubts::mask_doubts;
 use super::object::ObjectMask;
 use super::pipeline::{self, LostFrame, ProcessedFrame, Stage};
 use super::plan::{Assignment, Plan};
@@ -23,7 +24,6 @@ use super::quality;
 use super::select::{TURN_DEG, TURN_TOLERANCE_DEG};
 use super::steadiness::Steadiness;
 use super::{Aligner, ExtractError, ExtractOptions, Observer, Scaler, cut, square_around};
-use crate::masking::mask_doubts;
 
 /// Number of runs of damaged frames that are reported one by one.
 const MAX_REPORTED: usize = 8;

@@ -1,131 +1,114 @@
-//! The errors of making a mask.
+//! The errors of making the mask of a recording.
 
 use std::io;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use relit_data::geometry::Rect;
+use relit_data::session;
 
-use super::StrokesFault;
-use super::settings::{MAX_PIXELS, MIN_SIDE};
-
-/// Why no mask could be made.
+/// Why the mask of a recording could not be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum MaskError {
-    /// A side of the frame is shorter than [`MIN_SIDE`].
-    #[error(
-        "the frame is {width} x {height} pixels, too small to segment: at least {MIN_SIDE} a side are needed"
-    )]
-    FrameTooSmall {
-        /// The frame's width, pixels.
-        width: u32,
-        /// The frame's height, pixels.
-        height: u32,
-    },
-    /// The frame has more than [`MAX_PIXELS`].
-    #[error(
-        "the frame is {width} x {height} pixels, more than the {MAX_PIXELS} that can be segmented: scale the video down"
-    )]
-    FrameTooLarge {
-        /// The frame's width, pixels.
-        width: u32,
-        /// The frame's height, pixels.
-        height: u32,
-    },
-    /// The rectangle is outside the frame.
-    #[error(
-        "the rectangle {rect} is outside the frame of {width} x {height} pixels: give one that contains the object"
-    )]
-    RectOutside {
-        /// The rectangle as given.
-        rect: Rect,
-        /// The frame's width, pixels.
-        width: u32,
-        /// The frame's height, pixels.
-        height: u32,
-    },
-    /// No pixel could be background.
-    #[error(
-        "the hints leave no background in the frame of {width} x {height} pixels: draw the rectangle smaller than the frame, or mark background black in the seeds"
-    )]
-    NoBackground {
-        /// The frame's width, pixels.
-        width: u32,
-        /// The frame's height, pixels.
-        height: u32,
-    },
-    /// The seeds mark the whole rectangle as background.
-    #[error(
-        "the seeds leave no pixel of the rectangle {rect} that could be the object: mark some of the object white"
-    )]
-    NoObject {
-        /// The rectangle as given.
-        rect: Rect,
-    },
-    /// A turn with too few frames.
-    #[error(
-        "the video has only {found} usable frame(s), too few to see what moves: give a rectangle or seeds"
-    )]
-    FewFrames {
-        /// Number of frames.
-        found: usize,
-    },
-    /// There are neither a rectangle nor seeds.
-    #[error("there is no hint where the object is: give a rectangle, seeds, or both")]
-    NoHints,
-    /// There is no rectangle, and the seeds mark no object.
-    #[error(
-        "the seeds mark no pixel as the object and there is no rectangle: paint white on the object, or give --rect too"
-    )]
-    NothingMarked,
-    /// Seeds and frame differ in size.
-    #[error(
-        "the seeds are {} x {} pixels and the frame is {} x {}: paint them on an image of the frame's size", .seeds.0, .seeds.1, .frame.0, .frame.1
-    )]
-    SeedsSize {
-        /// Width and height of the seeds, pixels.
-        seeds: (u32, u32),
-        /// Width and height of the frame, pixels.
-        frame: (u32, u32),
-    },
+pub enum MaskingError {
+    /// The frame cannot be segmented with these hints.
+    #[error(transparent)]
+    Mask(#[from] relit_grabcut::MaskError),
     /// An image that cannot be used as seeds.
     #[error("the seeds {path} cannot be used: {fault}")]
     Seeds {
         /// The image.
         path: PathBuf,
         /// What is wrong with it.
-        fault: SeedsFault,
+        fault: relit_grabcut::SeedsFault,
     },
-    /// Strokes that cannot be painted.
+    /// A name for the mask that does not end in `.png`.
+    #[error("{0} cannot be the mask's name: give one that ends in .png")]
+    OutputName(PathBuf),
+    /// A mask that differs from its record, or has none.
+    #[error(
+        "{0} was not made by this program, or was changed since: it may have been painted by hand and is kept; give --force to replace it, or another name with -o"
+    )]
+    Handmade(PathBuf),
+    /// Another file has the name of the record.
+    #[error(
+        "{path} would be overwritten, but is not a mask's record ({why}): move it away, or give another name with -o"
+    )]
+    ForeignFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// A record that cannot be used as a recipe.
+    #[error("{path} cannot be used as a recipe: {why}")]
+    Recipe {
+        /// The record.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// The frame is not the one on which the recipe was recorded.
+    #[error(
+        "frame {frame} of {video} is not the frame on which {recipe} was recorded: give other hints, or --force to use the recorded ones"
+    )]
+    OtherFrame {
+        /// The frame's number.
+        frame: u64,
+        /// The video.
+        video: PathBuf,
+        /// The record.
+        recipe: PathBuf,
+    },
+    /// The recipe was followed on the same frame and gave another mask.
+    #[error(
+        "the mask made with {recipe} differs from the recorded one, although the frame is the same (made by {made_by}, now {now}): nothing was written; give --force to accept the new mask"
+    )]
+    NotReproduced {
+        /// The record.
+        recipe: PathBuf,
+        /// The software that made the recorded mask.
+        made_by: String,
+        /// This software.
+        now: String,
+    },
+    /// A mask that cannot be checked.
+    #[error("the mask {path} cannot be checked: {why}")]
+    Check {
+        /// The mask.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// A folder or file that cannot be measured with.
+    #[error("{path} cannot be measured: {why}")]
+    Bench {
+        /// The folder or file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// OpenCV's GrabCut reported an error.
+    #[cfg(feature = "opencv")]
+    #[error("OpenCV's GrabCut failed")]
+    OpenCv(#[source] opencv::Error),
+    /// The editor cannot be served: the address is taken or not this machine's, or there are no threads or no
+    /// random numbers.
+    #[error(
+        "the editor cannot be served at {address}: {source}; give another address or port with --listen"
+    )]
+    Serve {
+        /// The address.
+        address: SocketAddr,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// The recording cannot be opened.
     #[error(transparent)]
-    Strokes(#[from] StrokesFault),
-    /// GrabCut classified every pixel as background.
-    #[error(
-        "no object was found: it does not differ enough from its background for this hint; draw the rectangle closer, or mark the object white in seeds"
-    )]
-    Empty,
-    /// GrabCut classified every pixel as object.
-    #[error(
-        "the whole frame was classified as the object: mark background black in the seeds, or give a rectangle"
-    )]
-    Everything,
-    /// OpenCV reported an error.
-    #[error("OpenCV failed while {doing}")]
-    OpenCv {
-        /// What was being done, as in "cutting the object out".
-        doing: &'static str,
-        /// OpenCV's error.
-        source: opencv::Error,
-    },
-    /// An image could not be encoded as PNG.
-    #[error("{what} could not be encoded as PNG")]
-    Encode {
-        /// The image, as in "the mask".
-        what: &'static str,
-        /// The encoder's error.
-        source: image::ImageError,
-    },
-    /// A file could not be read.
+    Session(#[from] session::SessionError),
+    /// The video cannot be read.
+    #[error(transparent)]
+    Video(#[from] relit_video::VideoError),
+    /// A file could not be read or written.
     #[error("{path} could not be {doing}")]
     Io {
         /// The file.
@@ -135,9 +118,25 @@ pub enum MaskError {
         /// The system's error.
         source: io::Error,
     },
+    /// The mask of one recording cannot be checked.
+    #[error("{recording}: {source}")]
+    Checked {
+        /// The recording's id.
+        recording: String,
+        /// What went wrong.
+        source: Box<Self>,
+    },
+    /// Any of the others, with the recording's id.
+    #[error("no mask for {recording}: {source}")]
+    Recording {
+        /// The recording's id.
+        recording: String,
+        /// What went wrong.
+        source: Box<Self>,
+    },
 }
 
-impl MaskError {
+impl MaskingError {
     pub(super) fn io(
         path: impl Into<PathBuf>,
         doing: &'static str,
@@ -149,28 +148,4 @@ impl MaskError {
             source,
         }
     }
-
-    pub(super) fn opencv(doing: &'static str) -> impl FnOnce(opencv::Error) -> Self {
-        move |source| Self::OpenCv { doing, source }
-    }
-}
-
-/// Why an image cannot be used as seeds.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SeedsFault {
-    /// Not a PNG. A lossy format would blur the marks.
-    #[error("it is not a PNG file; save the seeds as PNG")]
-    NotPng,
-    /// A PNG that cannot be decoded.
-    #[error("it cannot be decoded as PNG ({0}); save it again")]
-    Damaged(image::ImageError),
-    /// No pixel marks anything.
-    #[error(
-        "no pixel of it is white (object) or black (background): paint with a hard brush, nearly white is unknown"
-    )]
-    WithoutMark,
-    /// A recorded seeds image has an invalid grey level.
-    #[error("it has the grey level {0}, but only 0, 128 and 255 are valid")]
-    Level(u8),
 }

@@ -1,99 +1,64 @@
-//! Which pixels of an image are the object: hints from a person or what a turn shows, GrabCut, clean-up.
+//! The mask of a recording or a photograph: which of its pixels are the object.
 //!
-//! Camera and object ride on the same turntable, so one mask fits all frames of a turn. [`segment`]
-//! makes it from one image and hints, [`segment_turn`] from what a whole [`Turn`] shows, with or without
-//! hints; [`preview`] shows it for a person to check; a [`MaskRecord`] is what is written beside a mask to
-//! make it again. [`score`] measures a mask against the truth.
+//! `NAME.png` is the mask, `NAME.json` its record, `NAME-preview.png` the image for checking it, and on
+//! request `NAME-alpha.png` (`alpha.png` beside `mask.png`) its soft form. An
+//! existing mask is replaced only if its record has its hash, because then it can be made again.
 //!
-//! The crate needs OpenCV (core and imgproc) for comparison and for soft edges, and nothing else: neither
-//! FFmpeg nor a session. It knows nothing of videos, session folders and shards, nor of how masks are
-//! used.
+//! [`make_mask`] makes a mask from hints that are known; [`edit`] lets a person draw them in a browser;
+//! [`check_mask`] holds a mask against all frames.
 //!
-//! # Cut an object out by a rectangle
+//! This crate brings frames and folders to [`relit_grabcut`], and is the program `relit-mask` (in `cli/`).
+//! It knows nothing of data sets and the rig. OpenCV is linked with the feature `opencv` alone, for
+//! comparison.
+//!
+//! # Mask the object of a recording
 //!
 //! ```
-//! use image::{Rgb, RgbImage};
+//! use std::path::Path;
+//!
 //! use relit_data::geometry::Rect;
-//! use relit_mask::{Hints, SegmentSettings, segment};
+//! use relit_grabcut::{Hints, SegmentSettings};
+//! use relit_mask::{MaskFiles, MaskRequest, make_mask};
 //!
-//! // A yellow disc of radius 18 on a dark ground. From a file: image::open(path)?.into_rgb8()
-//! let inside = |x: u32, y: u32| (f64::from(x) - 48.0).hypot(f64::from(y) - 32.0) <= 18.0;
-//! let image = RgbImage::from_fn(96, 64, |x, y| {
-//!     Rgb(if inside(x, y) { [220, 180, 40] } else { [20, (x % 7) as u8, 60] })
-//! });
+//! let recording = Path::new("../../fixtures/20261120T102000Z-bust-short");
+//! let folder = tempfile::tempdir()?;
+//! let files = MaskFiles::of(&folder.path().join("mask.png"))?;
 //!
-//! // The object lies inside the rectangle; what is outside is background.
-//! let hints = Hints::Rect(Rect::new(24, 8, 50, 48));
-//! let mask = segment(&image, &hints, &SegmentSettings::default())?;
+//! // On the first frame, by a rectangle that contains the object.
+//! let hints = Hints::Rect(Rect::new(170, 20, 325, 390));
+//! let request = MaskRequest::new(0, hints, SegmentSettings::default());
+//! let mask = make_mask(recording, Some(files), &request)?;
 //!
-//! assert_eq!(mask.image().get_pixel(48, 32).0, [255]);
-//! assert_eq!(mask.image().get_pixel(10, 10).0, [0]);
-//! assert_eq!(mask.statistics().bounding_box, Rect::new(30, 14, 37, 37));
-//! assert!(mask.warnings().is_empty());
-//! # Ok::<(), relit_mask::MaskError>(())
+//! assert!(mask.files.mask.is_file() && mask.files.preview.is_file());
+//! println!("{} pixels, {:?}", mask.record.result.area_px, mask.record.warnings);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//!
-//! # How it decides
-//!
-//! With a rectangle, pixels outside are background, and the half of those inside that looks most like the
-//! outside starts as background too; seeds overrule both. With seeds alone, the colours of the marked
-//! pixels decide first; if no background is marked, unmarked pixels start as probable background. Colour
-//! models of both sides and minimum cuts then take turns at a small size, and at each larger size a band
-//! along the edge is decided again.
-//!
-//! With a turn, a pixel's colour is its average over the frames, how much it changes counts too, and
-//! neighbours that change together belong together. What equals the ends of its row is background: the
-//! room passes through the whole row. So are the table and its rim.
-//!
-//! Of the result the largest 8-connected component is kept, and those that have three tenths of its area.
-//! Small holes are filled, except those in which seeds mark background.
 
-mod alpha;
-mod backdrop;
-mod bitmap;
-mod check;
-mod cleanup;
-mod drawing;
-mod encode;
+#[cfg(feature = "opencv")]
+mod bench;
+mod checking;
+mod editor;
 mod error;
-mod grab_cut;
-mod hints;
-mod initial;
-mod lab;
-mod max_flow;
-mod mixture;
+mod files;
+mod making;
+#[cfg(feature = "opencv")]
 mod opencv_grab_cut;
-mod outline;
-mod preview;
-mod pyramid;
 mod record;
-mod registration;
-mod rim;
-mod score;
-mod segment;
-mod settings;
-mod strokes;
-mod table;
-mod turn;
-mod warning;
+mod request;
+mod sampling;
+mod seeds;
 
-pub use alpha::alpha;
-pub use check::{MaskCheck, Place, Region, ShapeCheck};
-pub use drawing::Drawing;
-pub use encode::{grey_png, rgb_png};
-pub use error::{MaskError, SeedsFault};
-pub use hints::{Hints, Mark, Seeds};
+#[cfg(feature = "opencv")]
+pub use bench::{BenchImage, BenchRow, Prompt, bench_image, bench_images};
+pub use checking::{CheckOutput, DriftCheck, FrameDrift, MaskReport, Verdict, check_mask};
+pub use editor::edit;
+pub use error::MaskingError;
+pub use files::MaskFiles;
+pub use making::{MaskOutput, make_mask};
+#[cfg(feature = "opencv")]
 pub use opencv_grab_cut::opencv_grab_cut;
-pub use outline::outline;
-pub use preview::preview;
 pub use record::{
     MASK_SCHEMA, MaskRecord, MaskSoftware, RecordFault, RecordedHints, RecordedResult, SourceFrame,
 };
-pub use score::{BOUNDARY_TOLERANCE_PX, MaskScore, ScoreFault, score};
-pub use segment::{Mask, MaskStatistics, segment, segment_turn, segment_with};
-pub use settings::{
-    Effort, Feather, Iterations, MAX_PIXELS, MIN_SIDE, SegmentSettings, SettingsFault,
-};
-pub use strokes::{Brush, Stroke, Strokes, StrokesFault};
-pub use turn::{MIN_TURN_FRAMES, TURN_FRAMES, Turn, TurnStatistics};
-pub use warning::{Side, Warning};
+pub use request::MaskRequest;
+pub use seeds::read_seeds;

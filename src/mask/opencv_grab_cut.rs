@@ -4,8 +4,9 @@ use image::{GrayImage, RgbImage};
 use opencv::core::{self, Mat, Vec3b};
 use opencv::imgproc;
 use relit_data::geometry::Rect;
+use relit_grabcut::{Hints, Iterations, Mark, MaskError};
 
-use super::{Hints, Iterations, Mark, MaskError};
+use super::MaskingError;
 
 /// Seed of OpenCV's random numbers, from which GrabCut draws its first clusters; any fixed number.
 const RNG_SEED: i32 = 1;
@@ -15,20 +16,19 @@ const RNG_SEED: i32 = 1;
 /// probable background.
 ///
 /// # Errors
-/// [`MaskError::OpenCv`]; [`MaskError::SeedsSize`].
+/// [`MaskingError::OpenCv`]; [`MaskError::SeedsSize`].
 pub fn opencv_grab_cut(
     image: &RgbImage,
     hints: &Hints,
     iterations: Iterations,
-) -> Result<GrayImage, MaskError> {
+) -> Result<GrayImage, MaskingError> {
     let (width, height) = image.dimensions();
     let mut labels = initial(hints, (width, height))?;
     let pixels: Vec<Vec3b> = image
         .pixels()
         .map(|pixel| Vec3b::from([pixel.0[2], pixel.0[1], pixel.0[0]]))
         .collect();
-    run(&pixels, (width, height), &mut labels, iterations)
-        .map_err(MaskError::opencv("running OpenCV's GrabCut"))?;
+    run(&pixels, (width, height), &mut labels, iterations).map_err(MaskingError::OpenCv)?;
     let is_object =
         |label: u8| i32::from(label) == imgproc::GC_FGD || i32::from(label) == imgproc::GC_PR_FGD;
     let levels = labels

@@ -3,11 +3,11 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use relit_data::geometry::Rect;
+use relit_grabcut::{
+    Drawing, MaskError, MaskStatistics, Seeds, SeedsFault, SegmentSettings, Strokes,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-
-use super::error::SeedsFault;
-use super::{Drawing, MaskError, MaskStatistics, Seeds, SegmentSettings, Strokes};
 
 /// The schema that this version writes and reads.
 pub const MASK_SCHEMA: &str = "relit.mask/1";
@@ -38,8 +38,9 @@ pub struct MaskRecord {
 pub struct MaskSoftware {
     /// Version of relit.
     pub version: String,
-    /// Version of OpenCV.
-    pub opencv: String,
+    /// Version of OpenCV, where it was linked; masks do not depend on it any more.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub opencv: Option<String>,
 }
 
 /// The frame on which a mask was made.
@@ -154,14 +155,21 @@ impl MaskSoftware {
     pub fn current() -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            opencv: opencv::core::get_version_string().unwrap_or_else(|_| "unknown".to_owned()),
+            #[cfg(feature = "opencv")]
+            opencv: opencv::core::get_version_string().ok(),
+            #[cfg(not(feature = "opencv"))]
+            opencv: None,
         }
     }
 }
 
 impl std::fmt::Display for MaskSoftware {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "relit {} with OpenCV {}", self.version, self.opencv)
+        write!(f, "relit {}", self.version)?;
+        match &self.opencv {
+            Some(opencv) => write!(f, " with OpenCV {opencv}"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -172,7 +180,7 @@ impl RecordedHints {
     /// [`MaskError::Encode`].
     pub fn new(drawing: &Drawing, turn_frames: &[u64]) -> Result<Self, MaskError> {
         let seeds = drawing.seeds.as_ref();
-        let png = seeds.map(Seeds::to_record).transpose()?;
+        let png = seeds.map(Seeds::to_marks_png).transpose()?;
         Ok(Self {
             rect: drawing.rect,
             strokes: drawing.strokes.clone(),
@@ -191,7 +199,7 @@ impl RecordedHints {
             None => None,
             Some(text) => {
                 let png = STANDARD.decode(text)?;
-                Some(Seeds::from_record(&png, self.seeds_coloured_px)?)
+                Some(Seeds::from_marks_png(&png, self.seeds_coloured_px)?)
             }
         };
         let drawing = Drawing {
@@ -224,7 +232,7 @@ impl RecordedResult {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Brush, Hints, Stroke};
+    use relit_grabcut::{Brush, Hints, Stroke};
 
     fn record() -> MaskRecord {
         let statistics = MaskStatistics {

@@ -57,6 +57,7 @@ mod part;
 mod picture;
 mod raw;
 mod reader;
+mod sampling;
 mod scan;
 mod seek;
 

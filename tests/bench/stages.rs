@@ -8,13 +8,13 @@ use std::time::Duration;
 
 use image::{GrayImage, RgbaImage};
 use rayon::ThreadPoolBuilder;
-use relit::extract::{
+use relit_data::image_stats::MaskSpans;
+use relit_data::shard::{Digest, encode_rgb};
+use relit_extract::mask_doubts;
+use relit_extract::{
     AlignBuffers, AlignSample, Aligner, ScaleBuffers, Scaler, View, bounding_box, cut,
     square_around,
 };
-use relit::masking::mask_doubts;
-use relit_data::image_stats::MaskSpans;
-use relit_data::shard::{Digest, encode_rgb};
 use relit_video::Video;
 use rustix::time::{ClockId, clock_gettime};
 

@@ -71,7 +71,8 @@ fn a_mask_that_fits_is_said_to_fit_and_its_page_is_written() {
 fn a_mask_of_an_object_that_the_border_cuts_off_is_not_blamed_and_what_leaks_to_the_border_is() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let session = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/20261120T101500Z-cow-short");
+    let session =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/20261120T101500Z-cow-short");
     for (from, to) in [("video.mkv", "turn.avi"), ("mask_gt.png", "mask.png")] {
         let from = session.join(from);
         let options = ["-vf", "crop=270:360:210:0", "-q:v", "2", to];

@@ -1,4 +1,4 @@
-//! The program `relit-mask`. Masks of images alone are tested in `images.rs`, by the crate relit-mask.
+//! The program `relit-mask`. Masks of images alone are tested in `tests/grabcut`.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,

@@ -252,6 +252,7 @@ fn auto_needs_no_hint_and_its_recipe_makes_the_same_files_again() {
     }
 }
 
+#[cfg(feature = "opencv")]
 #[test]
 fn bench_measures_every_hint_and_names_what_is_wrong() {
     let folder = tempfile::tempdir().unwrap();

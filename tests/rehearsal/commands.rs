@@ -10,7 +10,7 @@ use crate::support::{SHORT, fixture};
 /// Records a turn of ten seconds without a table, as fast as it is read.
 fn record(root: &Path, camera: &str, arguments: &[&str]) -> Output {
     let address = format!("replay:{}?loop=1&speed=0{camera}", fixture(SHORT).display());
-    let mut command = Command::new(env!("CARGO_BIN_EXE_relit-capture"));
+    let mut command = Command::new(relit_tests::program("relit-capture"));
     command.args(["record", "--object", "mug", "--turntable", "none", "--json"]);
     command.args(["--degrees-per-second", "36", "--camera", &address]);
     command.arg("--root").arg(root).args(arguments);

@@ -6,9 +6,9 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
-use relit::extract::{ExtractOptions, extract};
 use relit_data::session::{FrameEntry, Recording, Status, recordings};
 use relit_data::shard::{Dataset, ImageSize};
+use relit_extract::{ExtractOptions, extract};
 use relit_rig::capture::salvage;
 use relit_rig::clock::Clock;
 
@@ -41,7 +41,7 @@ fn only_session(root: &Path) -> (Recording, Vec<FrameEntry>) {
 fn end_while_it_turns_back(signal: &str, milliseconds: u64) {
     let root = tempfile::tempdir().unwrap();
     let camera = format!("replay:{}?loop=1", fixture(SHORT).display());
-    let mut child = Command::new(env!("CARGO_BIN_EXE_relit-capture"))
+    let mut child = Command::new(relit_tests::program("relit-capture"))
         .args([
             "record", "--yes", "--json", "--object", "mug", "--camera", &camera,
         ])

@@ -22,7 +22,7 @@ fn serve(root: &Path, mode: u32) -> Command {
     let token = root.join("token");
     fs::write(&token, format!("{TOKEN}\n")).unwrap();
     fs::set_permissions(&token, Permissions::from_mode(mode)).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_relit-capture"));
+    let mut command = Command::new(relit_tests::program("relit-capture"));
     command
         .args(["serve", "--json", "--turntable", "none", "--listen"])
         .args(["127.0.0.1:0", "--camera"])
@@ -128,7 +128,7 @@ fn a_tokens_file_is_made_at_the_first_start_and_shown_again() {
     let output = running.0.stdout.take().unwrap();
     BufReader::new(output).read_line(&mut line).unwrap();
     let serving: Value = serde_json::from_str(&line).unwrap();
-    let shown = Command::new(env!("CARGO_BIN_EXE_relit-capture"))
+    let shown = Command::new(relit_tests::program("relit-capture"))
         .args(["token", "--token-file"])
         .arg(&file)
         .output()

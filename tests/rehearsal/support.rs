@@ -19,7 +19,7 @@ pub(crate) const SHORT: &str = "20261120T101500Z-cow-short";
 
 pub(crate) fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("fixtures")
+        .join("../fixtures")
         .join(name)
 }
 

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use relit::extract::{ExtractOptions, extract};
 use relit_data::session::Status;
 use relit_data::shard::ImageSize;
+use relit_extract::{ExtractOptions, extract};
 use relit_rig::state::Verdict;
 use relit_video::{Muxer, PixelFormat, StreamFormat, Video};
 

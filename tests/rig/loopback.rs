@@ -9,7 +9,7 @@ use relit_video::Video;
 use crate::program::{Running, sessions};
 
 /// What the machine plays into `/dev/video10`, over and over.
-const PLAYED: &str = "fixtures/20261120T101500Z-cow-short/video.mkv";
+const PLAYED: &str = "../fixtures/20261120T101500Z-cow-short/video.mkv";
 
 /// The coded frames of a video.
 fn coded(video: &Path) -> Vec<Vec<u8>> {

@@ -16,7 +16,6 @@
 mod camera;
 mod faults;
 mod loopback;
-#[cfg(feature = "nokhwa")]
 mod portable;
 mod program;
 mod table;

@@ -29,11 +29,11 @@ const ALWAYS: [&str; 7] = [
     "0",
 ];
 
-/// A program of this package: from the folder `RIG_PROGRAMS`, else where cargo put it.
-fn program(name: &str, built: &str) -> PathBuf {
+/// A program: from the folder `RIG_PROGRAMS`, else where cargo put it.
+fn program(name: &str) -> PathBuf {
     match env::var_os("RIG_PROGRAMS") {
         Some(folder) => Path::new(&folder).join(name),
-        None => built.into(),
+        None => relit_tests::program(name),
     }
 }
 
@@ -64,7 +64,7 @@ pub(crate) struct Running {
 
 impl Running {
     pub(crate) fn start(root: &Path, arguments: &[&str]) -> Self {
-        let name = program("relit-capture", env!("CARGO_BIN_EXE_relit-capture"));
+        let name = program("relit-capture");
         let mut child = Command::new(name)
             .args(ALWAYS)
             .arg("--root")
@@ -212,7 +212,7 @@ impl Ended {
 
 /// Runs `relit-extract` on a session, and gives its exit code and what it printed.
 pub(crate) fn extract(session: &Path, arguments: &[&str]) -> (Option<i32>, String) {
-    let name = program("relit-extract", env!("CARGO_BIN_EXE_relit-extract"));
+    let name = program("relit-extract");
     let output = Command::new(name)
         .arg(session)
         .args(arguments)

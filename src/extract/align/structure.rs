@@ -7,7 +7,7 @@
 use image::GrayImage;
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::extract::View;
+use crate::View;
 
 /// Added to the brightness before the logarithm, 8-bit levels: dark pixels are mostly noise.
 const DARK: f32 = 8.0;

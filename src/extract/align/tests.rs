@@ -3,7 +3,7 @@
 use image::{GrayImage, Luma, Rgba, RgbaImage};
 
 use super::{AlignBuffers, AlignSample, Aligner, Alignment, Motion};
-use crate::extract::View;
+use crate::View;
 
 const SIDE: u32 = 150;
 

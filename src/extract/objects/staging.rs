@@ -13,12 +13,10 @@ use tempfile::TempDir;
 
 use super::bucket::Bucket;
 use super::{ObjectError, check, is_url};
-use crate::extract::depot::Depot;
-use crate::extract::{
-    ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally, extract_recordings,
-};
+use crate::depot::Depot;
+use crate::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally, extract_recordings};
 
-/// As [`extract`](crate::extract::extract), where some of the inputs or `out` are URLs.
+/// As [`extract`](crate::extract), where some of the inputs or `out` are URLs.
 pub(super) fn extract(
     inputs: &[PathBuf],
     out: &Path,

@@ -12,7 +12,7 @@ use pulp::{Arch, Simd, WithSimd};
 use super::filter::Axis;
 use super::light::linear;
 use super::{APRON, Scaler};
-use crate::extract::View;
+use crate::View;
 use relit_data::image_stats::Measuring;
 
 /// Red, green, blue and the mask's share.

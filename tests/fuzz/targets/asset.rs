@@ -4,7 +4,7 @@
 #![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]
 
 use libfuzzer_sys::fuzz_target;
-use relight::asset::Asset;
+use relight_core::asset::Asset;
 
 fuzz_target!(|bytes: &[u8]| {
     let Ok(asset) = Asset::from_bytes(bytes) else {

@@ -4,7 +4,8 @@
 #![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]
 
 use libfuzzer_sys::fuzz_target;
-use relit_mask::{Drawing, Mark, RecordedHints, Seeds};
+use relit_grabcut::{Drawing, Mark, Seeds};
+use relit_mask::RecordedHints;
 
 fuzz_target!(|bytes: &[u8]| {
     let Ok(seeds) = Seeds::from_png(bytes) else {

@@ -1,0 +1,111 @@
+//! The command line of `relight`.
+
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+use clap::{ArgMatches, CommandFactory, Error, FromArgMatches, Parser, Subcommand};
+
+#[cfg(feature = "train")]
+use crate::commands::train;
+use crate::commands::{decompose, eval, insert, relight, render, synth, turn, weights};
+use crate::console::Console;
+
+/// Single-view relighting: photographs taken apart, light, rendering, data with truth, measures of the results.
+#[derive(Parser)]
+#[command(
+    name = "relight",
+    version,
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost."
+)]
+struct CommandLine {
+    #[command(subcommand)]
+    verb: Verb,
+    /// Print one JSON line an event on standard output.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Take photographs apart: normals, albedo, shading, highlight and light.
+    #[command(after_help = decompose::EXAMPLES)]
+    Decompose(decompose::Arguments),
+    /// Show the objects of photographs in another light: a picture, or a video in which the light turns.
+    #[command(after_help = relight::EXAMPLES)]
+    Relight(Box<relight::Arguments>),
+    /// Put the objects of photographs into another picture, a panorama or a video.
+    #[command(after_help = insert::EXAMPLES)]
+    Insert(Box<insert::Arguments>),
+    /// Light an object that is given by its maps: an image, a turn, or a sweep of materials.
+    #[command(after_help = render::EXAMPLES)]
+    Render(render::Arguments),
+    /// Measure estimates, and baselines beside them, by the protocols of the paper's tables.
+    #[command(after_help = eval::EXAMPLES)]
+    Eval(eval::Arguments),
+    /// Make pictures of objects together with their truth: samples, whole turns, panoramas.
+    #[command(after_help = synth::EXAMPLES)]
+    Synth(synth::Arguments),
+    /// Train networks (built with the feature `train`).
+    #[cfg(feature = "train")]
+    #[command(after_help = train::EXAMPLES)]
+    Train(train::Arguments),
+    /// Take a whole turn apart: normals, albedo and light from the angle that the light turns by.
+    #[command(after_help = turn::EXAMPLES)]
+    Turn(turn::Arguments),
+    /// Convert weights of networks.
+    #[command(after_help = weights::EXAMPLES)]
+    Weights(weights::Arguments),
+}
+
+impl Verb {
+    /// What is wrong with the arguments together: wrong usage, exit code 2.
+    fn fault(&self) -> Option<String> {
+        match self {
+            Self::Decompose(arguments) => arguments.fault(),
+            Self::Relight(arguments) => arguments.fault(),
+            Self::Insert(arguments) => arguments.fault(),
+            Self::Render(arguments) => arguments.fault(),
+            Self::Eval(arguments) => arguments.fault(),
+            Self::Synth(arguments) => arguments.fault(),
+            #[cfg(feature = "train")]
+            Self::Train(_) => None,
+            Self::Turn(_) => None,
+            Self::Weights(arguments) => arguments.fault(),
+        }
+    }
+}
+
+/// Runs the verb that the command line names; its exit code.
+pub(crate) fn run() -> ExitCode {
+    let matches = CommandLine::command().get_matches();
+    let line = CommandLine::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    if let Some(fault) = line.verb.fault() {
+        wrong_usage(&matches, fault).exit();
+    }
+    let console = Console::new(line.json);
+    console.finish(match line.verb {
+        Verb::Decompose(arguments) => decompose::run(&arguments, console),
+        Verb::Relight(arguments) => relight::run(&arguments, console),
+        Verb::Insert(arguments) => insert::run(&arguments, console),
+        Verb::Render(arguments) => render::run(&arguments, console),
+        Verb::Eval(arguments) => eval::run(&arguments, console),
+        Verb::Synth(arguments) => synth::run(&arguments, console),
+        #[cfg(feature = "train")]
+        Verb::Train(arguments) => train::run(&arguments, console),
+        Verb::Turn(arguments) => turn::run(&arguments, console),
+        Verb::Weights(arguments) => weights::run(&arguments, console),
+    })
+}
+
+/// What is wrong with the arguments of the verb that was given, with the verb's own usage.
+fn wrong_usage(matches: &ArgMatches, fault: String) -> Error {
+    let mut command = CommandLine::command();
+    command.build();
+    let mut matches = matches;
+    while let Some((name, inner)) = matches.subcommand()
+        && let Some(verb) = command.find_subcommand(name).cloned()
+    {
+        (command, matches) = (verb, inner);
+    }
+    command.error(ErrorKind::ValueValidation, fault)
+}

@@ -1,0 +1,357 @@
+//! `relight decompose`: photographs into normals, albedo, shading, highlight and light.
+
+use std::env;
+use std::error::Error;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::builder::RangedU64ValueParser;
+use clap::{Args, ValueEnum};
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
+use relight_nets::{InferenceEngine, NetError, OnnxRuntime, Weights};
+use relight_photo::decompose::{
+    DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, SpecularGate,
+    WORKING_SIDE, WorkingSize,
+};
+use relight_photo::files::{DecompositionFigures, DecompositionFiles, PhotoInput, PhotoReading};
+use relit_data::causes::with_causes;
+use serde_json::{Value, json};
+
+use crate::console::{CommandResult, Console, Outcome};
+use crate::shipped;
+use crate::values::{TransferName, YName};
+
+/// Each photograph takes its memory, gigabytes where it is large.
+const MOST_SIDE_BY_SIDE: usize = 4;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  relight decompose mug.jpg --mask mug-mask.png -o mug
+      a photograph and its mask: mug/normal.png, albedo.png, shading.png, light.txt, contact.png ...
+  relight decompose cut-out.png --size native -o cut-out
+      a photograph whose alpha is the mask, at its own size
+  relight decompose photos --mask masks -o out
+      a folder of photographs, with masks of the same names: out/<name>/
+  relight decompose turn.tar --count 12 -o out
+      twelve frames of a shard, spread over the turn: out/<session>/<index>/";
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Photographs (.png, .jpg, .exr, .hdr), folders of them, or shards (.tar).
+    #[arg(required = true, value_name = "PHOTO")]
+    photos: Vec<PathBuf>,
+    /// The folder for the results; several photographs have a folder each in it.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// A grey image as large as the photograph, white on the object; or a folder of such, <photo's name>.png
+    /// [default: the photograph's alpha, or what is not black before a black background].
+    #[arg(long, value_name = "FILE|DIR")]
+    mask: Option<PathBuf>,
+    /// A rectangle around the object, pixels. Where nothing else says where the object is, it is all of it.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = rectangle, conflicts_with = "mask")]
+    rect: Option<Rectangle>,
+    /// The network's weights (.safetensors or .pth) [default: those that come with the program].
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// The size at which the object is decomposed.
+    #[arg(long, value_enum, default_value_t = SizeName::S256)]
+    size: SizeName,
+    /// Separate highlights.
+    #[arg(long, value_enum, default_value_t = GateName::Auto)]
+    specular: GateName,
+    /// Leave out the mirror image: faster, and a little worse.
+    #[arg(long)]
+    no_mirror: bool,
+    /// Another network's normals: 1 x 3 x 256 x 256 in, (x - 0.5) / 0.5 of sRGB values; 1 x 3 x 256 x 256
+    /// (vectors) or 1 x 2 x 256 x 256 (slopes) out.
+    #[arg(long, value_name = "FILE.onnx")]
+    normals: Option<PathBuf>,
+    /// Which way y points in that network's normals.
+    #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up, requires = "normals")]
+    normals_y: YName,
+    /// What computes the network.
+    #[arg(long, value_enum, default_value_t = EngineName::Tract)]
+    engine: EngineName,
+    /// How PNG and JPEG files are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
+    #[arg(long, value_enum)]
+    transfer: Option<TransferName>,
+    /// Of each shard the first so many samples, which are spread over the turn.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    count: Option<u32>,
+    /// How many photographs are decomposed side by side [default: as many as there are cores, at most 4].
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
+    threads: Option<usize>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum SizeName {
+    /// At 256 x 256 pixels.
+    #[value(name = "256")]
+    S256,
+    /// At 256 x 256 pixels, and finer by tiles of the photograph at its own size.
+    Native,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum EngineName {
+    /// A part of this program.
+    Tract,
+    /// The library of ONNX Runtime at ORT_DYLIB_PATH, or where the system finds it: faster.
+    Onnxruntime,
+    /// ONNX Runtime where it is installed, else tract.
+    Auto,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum GateName {
+    /// Where more than 5 % of the object's pixels are saturated.
+    Auto,
+    /// Always.
+    On,
+    /// Never.
+    Off,
+}
+
+impl Arguments {
+    /// What is wrong with the combination of arguments, if anything is.
+    pub(crate) fn fault(&self) -> Option<String> {
+        self.frames_fault().or_else(|| self.mask_fault())
+    }
+
+    fn frames_fault(&self) -> Option<String> {
+        let Some(frames) = self.photos.iter().find(|path| PhotoInput::has_frames(path)) else {
+            let given = self.count.is_some();
+            return given.then(|| "--count is for shards, and there is none".to_owned());
+        };
+        let given = [
+            ("--mask", self.mask.is_some()),
+            ("--rect", self.rect.is_some()),
+            ("--transfer", self.transfer.is_some()),
+        ];
+        let (option, _) = given.into_iter().find(|(_, is_given)| *is_given)?;
+        let frames = frames.display();
+        Some(format!(
+            "{option} is for photographs: the frames of {frames} have masks of their own and are sRGB"
+        ))
+    }
+
+    fn mask_fault(&self) -> Option<String> {
+        let mask = self.mask.as_ref().filter(|mask| !mask.is_dir())?;
+        let is_one = matches!(self.photos.as_slice(), [photo] if !photo.is_dir());
+        (!is_one).then(|| {
+            let mask = mask.display();
+            format!("--mask {mask}: one mask belongs to one photograph; give a folder of masks")
+        })
+    }
+
+    /// Whether one of the inputs is a folder or a shard.
+    fn has_set(&self) -> bool {
+        self.photos
+            .iter()
+            .any(|path| path.is_dir() || path.extension().is_some_and(|e| e == "tar"))
+    }
+
+    fn options(&self) -> DecomposeOptions {
+        DecomposeOptions {
+            size: match self.size {
+                SizeName::S256 => WorkingSize::Network,
+                SizeName::Native => WorkingSize::Native,
+            },
+            mirror: !self.no_mirror,
+            specular: match self.specular {
+                GateName::Auto => SpecularGate::Auto,
+                GateName::On => SpecularGate::On,
+                GateName::Off => SpecularGate::Off,
+            },
+            ..DecomposeOptions::default()
+        }
+    }
+
+    fn reading(&self) -> PhotoReading {
+        PhotoReading {
+            mask: self.mask.clone(),
+            rectangle: self.rect,
+            transfer: self.transfer.map(Into::into),
+        }
+    }
+
+    /// The network, and how its weights are named.
+    fn decomposer(&self, console: Console) -> Result<(Decomposer, String), DecomposeError> {
+        let (weights, name) = match &self.weights {
+            None => (shipped::weights()?, "shipped".to_owned()),
+            Some(path) => {
+                let name = path.file_name().unwrap_or(path.as_os_str());
+                (Weights::read(path)?, name.to_string_lossy().into_owned())
+            }
+        };
+        let engine = self.engine.engine(console)?;
+        let mut decomposer = Decomposer::with_engine(&weights, WORKING_SIDE, engine)?;
+        if let Some(path) = &self.normals {
+            decomposer.read_normals(path, self.normals_y.into())?;
+        }
+        Ok((decomposer, name))
+    }
+}
+
+impl EngineName {
+    fn engine(self, console: Console) -> Result<InferenceEngine, NetError> {
+        let named = env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty());
+        let load = || {
+            let path = named
+                .clone()
+                .unwrap_or_else(|| OnnxRuntime::library().into());
+            OnnxRuntime::load(path.as_ref()).map(InferenceEngine::OnnxRuntime)
+        };
+        match self {
+            Self::Tract => Ok(InferenceEngine::Tract),
+            Self::Onnxruntime => load(),
+            Self::Auto => Ok(load().unwrap_or_else(|fault| {
+                // Nobody asked for a library that is not installed.
+                if named.is_some() || !matches!(fault, NetError::NoLibrary { .. }) {
+                    let text = with_causes(&fault);
+                    let event = json!({ "event": "engine", "message": text });
+                    console.warn(&format!("tract is used: {text}"), &event);
+                }
+                InferenceEngine::Tract
+            })),
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
+    let inputs = PhotoInput::find(&arguments.photos, arguments.count)?;
+    let own_folders = inputs.len() > 1 || arguments.has_set();
+    let run = Run::new(arguments, own_folders, console)?;
+    if !run.own_folders
+        && let [input] = inputs.as_slice()
+    {
+        let done = run.decompose(input)?;
+        console.say(&done.text, &done.event);
+        return Ok(Outcome::Whole);
+    }
+    let bar = console.progress(inputs.len() as u64, "photographs");
+    let decompose = |input: &PhotoInput| {
+        let result = run.decompose(input);
+        bar.suspend(|| match &result {
+            Ok(done) => console.say(&done.text, &done.event),
+            Err(error) => {
+                let message = with_causes(error);
+                let text = format!("{}: {message}", input.place());
+                let event =
+                    json!({ "event": "failed", "photo": input.place(), "message": message });
+                console.warn(&text, &event);
+            }
+        });
+        bar.inc(1);
+        result.is_err()
+    };
+    let side_by_side = arguments
+        .threads
+        .unwrap_or_else(|| rayon::current_num_threads().min(MOST_SIDE_BY_SIDE));
+    let threads = ThreadPoolBuilder::new().num_threads(side_by_side).build()?;
+    let lost = threads.install(|| inputs.par_iter().filter(|&input| decompose(input)).count());
+    bar.finish_and_clear();
+    match lost {
+        0 => Ok(Outcome::Whole),
+        _ if lost == inputs.len() => Err("no photograph could be decomposed".into()),
+        _ => Ok(Outcome::Incomplete),
+    }
+}
+
+/// What is said of a photograph.
+struct Decomposed {
+    text: String,
+    event: Value,
+}
+
+/// All that is the same for every photograph.
+struct Run {
+    decomposer: Decomposer,
+    weights: String,
+    options: DecomposeOptions,
+    reading: PhotoReading,
+    output: PathBuf,
+    own_folders: bool,
+}
+
+impl Run {
+    fn new(
+        arguments: &Arguments,
+        own_folders: bool,
+        console: Console,
+    ) -> Result<Self, Box<dyn Error>> {
+        let (decomposer, weights) = arguments.decomposer(console)?;
+        Ok(Self {
+            decomposer,
+            weights,
+            options: arguments.options(),
+            reading: arguments.reading(),
+            output: arguments.output.clone(),
+            own_folders,
+        })
+    }
+
+    fn decompose(&self, input: &PhotoInput) -> Result<Decomposed, DecomposeError> {
+        let photo = input.load(&self.reading)?;
+        let out = if self.own_folders {
+            self.output.join(&photo.name)
+        } else {
+            self.output.clone()
+        };
+        DecompositionFiles::check(&out)?;
+        let options = photo.options(&self.options);
+        let start = Instant::now();
+        let found = self
+            .decomposer
+            .decompose(&photo.picture, &photo.mask, &options)?;
+        let seconds = start.elapsed().as_secs_f64();
+        let files = DecompositionFiles {
+            photo: &photo,
+            found: &found,
+            options: &options,
+            weights: &self.weights,
+        };
+        let figures: DecompositionFigures = files.write(&out)?;
+        let source = match photo.mask_source {
+            MaskSource::BlackBackground => "; the object is what is not black",
+            MaskSource::Rectangle => "; the object is the whole rectangle",
+            MaskSource::File | MaskSource::Alpha | MaskSource::Shard => "",
+        };
+        let highlights = if found.is_glossy {
+            "separated"
+        } else {
+            "not separated"
+        };
+        let text = format!(
+            "{}: {seconds:.2} s; {:.1} % saturated, highlights {highlights}; {:.1} % of the picture left over{source}",
+            out.display(),
+            100.0 * found.saturated_fraction,
+            100.0 * found.residual,
+        );
+        let event = json!({
+            "event": "decomposed",
+            "photo": input.place(),
+            "output": out,
+            "seconds": seconds,
+            "engine": self.decomposer.engine().name(),
+            "figures": figures,
+        });
+        Ok(Decomposed { text, event })
+    }
+}
+
+pub(crate) fn rectangle(text: &str) -> Result<Rectangle, String> {
+    let numbers: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, width, height]) if width > 0 && height > 0 => Ok(Rectangle {
+            x,
+            y,
+            width,
+            height,
+        }),
+        _ => {
+            Err("give X,Y,W,H: column and row of a corner, width and height, in pixels".to_owned())
+        }
+    }
+}

@@ -1,0 +1,470 @@
+//! `relight eval`: the protocols of the paper's tables.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand, ValueEnum};
+use relight_core::files::write_png;
+use relight_core::image::{Depth, Planes};
+use relight_core::render::{DiffuseForm, SpecularForm};
+use relight_eval::{
+    EvalError, HighlightMethod, InsertionRecipe, IntrinsicBaseline, IntrinsicInput,
+    IntrinsicMethod, LightMethod, NormalMethod, OrdinalMethod, Predictions, RelightMethod,
+    RelightingRecipe, RelightingSet, ScoreTable, evaluate_highlights, evaluate_insertion,
+    evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal, evaluate_relighting,
+    evaluate_trust, make_relighting,
+};
+use relight_nets::Weights;
+use relight_photo::decompose::Decomposer;
+use relight_reader::{JudgedImages, TruthLayout, TruthSet};
+use relight_synth::{Folders, Library};
+use relit_data::durable::write_whole;
+use serde::Serialize;
+use serde_json::json;
+
+use crate::console::{CommandResult, Console, Outcome};
+use crate::folder::make_folder;
+use crate::shipped;
+use crate::values::{TransferName, YName};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  relight eval mit --data MIT-intrinsic
+      albedo and shading of the baselines, by both conventions
+  relight eval mit --data MIT-intrinsic --predictions out/net -o mit.json
+      the same beside the estimates out/net/<object>/{albedo,shading}.png
+  relight eval normals --layout janner --data intrinsics --count 500 --predictions out/net
+      estimates out/net/<name>/normal.png on 500 images, spread over the set
+  relight eval relighting --data relighting --make
+      100 objects under 30 lights each, made by the renderer of `relight synth`
+  relight eval insertion --panoramas hdri -o insertion.json
+      24 objects in other pictures, with and without shadow, edge colours and relighting
+  relight eval trust --data MIT-intrinsic
+      errors of the most trusted pixels";
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    protocol: Protocol,
+}
+
+#[derive(Subcommand)]
+enum Protocol {
+    /// Albedo and shading: SMSE and LMSE.
+    Mit {
+        #[command(flatten)]
+        set: SetArguments,
+        /// The image that baselines decompose.
+        #[arg(long, value_enum, default_value_t = InputName::Diffuse)]
+        input: InputName,
+    },
+    /// Normals: MSE, DSSIM and angles.
+    Normals {
+        #[command(flatten)]
+        set: SetArguments,
+    },
+    /// Light: MSE, SMSE and SSIM of the shading that it makes on the true normals.
+    Light {
+        #[command(flatten)]
+        set: SetArguments,
+        /// How shading follows from coefficients.
+        #[arg(long, value_enum, default_value_t = DiffuseName::Irradiance)]
+        diffuse: DiffuseName,
+    },
+    /// Highlights: MSE and DSSIM of the highlight and of what it leaves.
+    Highlight {
+        #[command(flatten)]
+        set: SetArguments,
+    },
+    /// Relighting: MSE and DSSIM of an object under many lights, from its image under one.
+    Relighting(RelightingArguments),
+    /// Insertion: MSE and DSSIM of objects in other pictures, with and without each part of `relight insert`.
+    Insertion(InsertionArguments),
+    /// Trust: whether what is said to be doubtful is wrong.
+    Trust {
+        #[command(flatten)]
+        set: SetArguments,
+        /// The network's weights [default: those that come with the program].
+        #[arg(long, value_name = "FILE")]
+        weights: Option<PathBuf>,
+    },
+    /// Albedo as people judge it: WHDR on the folder of Intrinsic Images in the Wild.
+    Whdr(CommonArguments),
+}
+
+#[derive(Args)]
+struct CommonArguments {
+    /// The folder of the truth.
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// What the table calls these images [default: the folder's name].
+    #[arg(long, value_name = "TEXT")]
+    split: Option<String>,
+    /// A folder of estimates, with a folder for each image. May be given several times.
+    #[arg(long, value_name = "DIR")]
+    predictions: Vec<PathBuf>,
+    /// How PNG files of colour among the estimates are encoded; EXR is linear.
+    #[arg(long, value_enum, value_name = "SPACE", default_value_t = TransferName::Linear)]
+    transfer: TransferName,
+    /// Which way y points in estimated normals.
+    #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up)]
+    normals_y: YName,
+    /// Write the table as JSON, with the scores of each image, to this file.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct SetArguments {
+    #[command(flatten)]
+    common: CommonArguments,
+    /// How the folder of the truth is laid out.
+    #[arg(long, value_name = "LAYOUT", default_value_t = TruthLayout::Mit)]
+    layout: TruthLayout,
+    /// Compare so many images only, spread evenly over the set.
+    #[arg(long, value_name = "N")]
+    count: Option<usize>,
+}
+
+#[derive(Args)]
+struct RelightingArguments {
+    #[command(flatten)]
+    common: CommonArguments,
+    /// Make the set first, in the folder --data; objects that are there are kept.
+    #[arg(long)]
+    make: bool,
+    /// How many objects to make.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=999))]
+    objects: u16,
+    /// Under how many lights.
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u16).range(2..=99))]
+    lights: u16,
+    /// Width and height of the images.
+    #[arg(long, value_name = "PIXELS", default_value_t = 128, value_parser = clap::value_parser!(u32).range(16..=2048))]
+    size: u32,
+    /// What objects, materials and lights are drawn from.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Make objects that cast no shadows on themselves.
+    #[arg(long, requires = "make")]
+    no_shadows: bool,
+    /// Meshes to draw from besides procedural shapes (.obj, .gltf, .glb).
+    #[arg(long, value_name = "DIR", requires = "make")]
+    meshes: Option<PathBuf>,
+    /// Panoramas (.hdr, .exr) in place of those that are made.
+    #[arg(long, value_name = "DIR", requires = "make")]
+    panoramas: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct InsertionArguments {
+    /// How many objects to make, each with one new picture.
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    objects: u64,
+    /// Width and height of the pictures.
+    #[arg(long, value_name = "PIXELS", default_value_t = 192, value_parser = clap::value_parser!(u32).range(32..=1024))]
+    size: u32,
+    /// What objects, materials and lights are drawn from.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Meshes to draw from besides procedural shapes (.obj, .gltf, .glb).
+    #[arg(long, value_name = "DIR")]
+    meshes: Option<PathBuf>,
+    /// Panoramas (.hdr, .exr) in place of those that are made.
+    #[arg(long, value_name = "DIR")]
+    panoramas: Option<PathBuf>,
+    /// The network's weights [default: those that come with the program].
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// Write a sheet for each object: photograph, new picture, truth, and each method's result.
+    #[arg(long, value_name = "DIR")]
+    sheets: Option<PathBuf>,
+    /// Write the table as JSON, with the scores of each image, to this file.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum InputName {
+    /// Without highlights.
+    Diffuse,
+    /// As it was taken.
+    Original,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum DiffuseName {
+    /// The light that arrives at the surface.
+    Irradiance,
+    /// As the paper's released code has it.
+    Released,
+}
+
+impl Arguments {
+    /// What is wrong with the arguments together.
+    pub(crate) fn fault(&self) -> Option<String> {
+        match &self.protocol {
+            Protocol::Mit { set, .. }
+            | Protocol::Normals { set }
+            | Protocol::Light { set, .. }
+            | Protocol::Trust { set, .. }
+            | Protocol::Highlight { set } => {
+                (set.count == Some(0)).then(|| "--count 0 leaves no image to compare".to_owned())
+            }
+            Protocol::Relighting(_) | Protocol::Insertion(_) | Protocol::Whdr(_) => None,
+        }
+    }
+
+    /// The file for the table.
+    fn output(&self) -> Option<&Path> {
+        let common = match &self.protocol {
+            Protocol::Insertion(arguments) => return arguments.output.as_deref(),
+            Protocol::Mit { set, .. }
+            | Protocol::Normals { set }
+            | Protocol::Light { set, .. }
+            | Protocol::Trust { set, .. }
+            | Protocol::Highlight { set } => &set.common,
+            Protocol::Relighting(arguments) => &arguments.common,
+            Protocol::Whdr(common) => common,
+        };
+        common.output.as_deref()
+    }
+}
+
+impl CommonArguments {
+    /// What the table calls the images.
+    fn split(&self, which: &str) -> String {
+        let name = self.data.file_name().unwrap_or(self.data.as_os_str());
+        let named = || format!("{which} {}", name.to_string_lossy());
+        self.split.clone().unwrap_or_else(named)
+    }
+
+    fn predictions(&self) -> impl Iterator<Item = Predictions> {
+        let folder = |path: &PathBuf| {
+            Predictions::new(path.clone(), self.transfer.into(), self.normals_y.into())
+        };
+        self.predictions.iter().map(folder)
+    }
+}
+
+impl SetArguments {
+    fn open(&self) -> Result<(TruthSet, String), Box<dyn Error>> {
+        let set = TruthSet::open(&self.common.data, self.layout)?;
+        let all = set.names().len();
+        let set = set.spread(self.count.unwrap_or(all));
+        let count = set.names().len();
+        let split = if count == all {
+            self.common.split("all of")
+        } else {
+            self.common.split(&format!("{count} spread over"))
+        };
+        Ok((set, split))
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
+    let table = match &arguments.protocol {
+        Protocol::Mit { set, input } => mit(set, *input, console),
+        Protocol::Normals { set } => normals(set, console),
+        Protocol::Light { set, diffuse } => light(set, *diffuse, console),
+        Protocol::Highlight { set } => highlight(set, console),
+        Protocol::Relighting(arguments) => relighting(arguments, console),
+        Protocol::Whdr(common) => ordinal(common, console),
+        Protocol::Insertion(arguments) => insertion(arguments, console),
+        Protocol::Trust { set, weights } => return trust(set, weights.as_deref(), console),
+    }?;
+    report(&table, arguments.output(), console)
+}
+
+type Evaluated = Result<ScoreTable, Box<dyn Error>>;
+
+fn mit(arguments: &SetArguments, input: InputName, console: Console) -> Evaluated {
+    let (set, split) = arguments.open()?;
+    let input = match input {
+        InputName::Diffuse => IntrinsicInput::Diffuse,
+        InputName::Original => IntrinsicInput::Original,
+    };
+    let baselines = IntrinsicBaseline::all().map(IntrinsicMethod::Baseline);
+    let methods = with_predictions(baselines, &arguments.common, IntrinsicMethod::Predictions);
+    let steps = set.names().len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
+        evaluate_intrinsic(&set, &split, input, &methods, progress)
+    })
+}
+
+fn normals(arguments: &SetArguments, console: Console) -> Evaluated {
+    let (set, split) = arguments.open()?;
+    let baselines = [NormalMethod::Viewer];
+    let methods = with_predictions(baselines, &arguments.common, NormalMethod::Predictions);
+    let steps = set.names().len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
+        evaluate_normals(&set, &split, &methods, progress)
+    })
+}
+
+fn light(arguments: &SetArguments, diffuse: DiffuseName, console: Console) -> Evaluated {
+    let (set, split) = arguments.open()?;
+    let form = match diffuse {
+        DiffuseName::Irradiance => DiffuseForm::Irradiance,
+        DiffuseName::Released => DiffuseForm::Released,
+    };
+    let baselines = [LightMethod::Even, LightMethod::Oracle];
+    let methods = with_predictions(baselines, &arguments.common, LightMethod::Predictions);
+    let steps = set.names().len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
+        evaluate_light(&set, &split, form, &methods, progress)
+    })
+}
+
+fn highlight(arguments: &SetArguments, console: Console) -> Evaluated {
+    let (set, split) = arguments.open()?;
+    let baselines = [HighlightMethod::Nothing];
+    let methods = with_predictions(baselines, &arguments.common, HighlightMethod::Predictions);
+    let steps = set.names().len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
+        evaluate_highlights(&set, &split, &methods, progress)
+    })
+}
+
+fn relighting(arguments: &RelightingArguments, console: Console) -> Evaluated {
+    if arguments.make {
+        make(arguments, console)?;
+    }
+    let common = &arguments.common;
+    let set = RelightingSet::open(&common.data)?;
+    let baselines = [
+        RelightMethod::Naive,
+        RelightMethod::Oracle(SpecularForm::Power),
+        RelightMethod::Oracle(SpecularForm::Lobe),
+    ];
+    let methods = with_predictions(baselines, common, |folder| {
+        RelightMethod::Predictions(folder, SpecularForm::Lobe)
+    });
+    let steps = set.objects() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
+        evaluate_relighting(&set, &common.split("all of"), &methods, progress)
+    })
+}
+
+fn make(arguments: &RelightingArguments, console: Console) -> Result<(), Box<dyn Error>> {
+    let recipe = RelightingRecipe {
+        objects: arguments.objects.into(),
+        lights: arguments.lights.into(),
+        size: arguments.size,
+        seed: arguments.seed,
+        shadows: !arguments.no_shadows,
+    };
+    let library = Library::read(&Folders {
+        meshes: arguments.meshes.clone(),
+        textures: None,
+        panoramas: arguments.panoramas.clone(),
+    })?;
+    with_progress(recipe.objects, "making objects", console, |progress| {
+        make_relighting(&recipe, &library, &arguments.common.data, progress)
+    })
+}
+
+fn insertion(arguments: &InsertionArguments, console: Console) -> Evaluated {
+    let recipe = InsertionRecipe {
+        objects: arguments.objects,
+        size: arguments.size,
+        seed: arguments.seed,
+    };
+    let library = Library::read(&Folders {
+        meshes: arguments.meshes.clone(),
+        textures: None,
+        panoramas: arguments.panoramas.clone(),
+    })?;
+    let network = network(arguments.weights.as_deref())?;
+    if let Some(folder) = &arguments.sheets {
+        make_folder(folder)?;
+    }
+    let mut show = |name: &str, tiles: &[Planes<3>]| match &arguments.sheets {
+        None => Ok(()),
+        Some(folder) => {
+            let sheet = Planes::sheet(tiles, tiles.len())?;
+            Ok::<(), EvalError>(write_png(
+                &folder.join(format!("{name}.png")),
+                &sheet,
+                Depth::Eight,
+            )?)
+        }
+    };
+    with_progress(
+        arguments.objects as usize,
+        "inserting",
+        console,
+        |progress| evaluate_insertion(&recipe, &library, &network, &mut show, progress),
+    )
+}
+
+fn trust(arguments: &SetArguments, weights: Option<&Path>, console: Console) -> CommandResult {
+    let (set, split) = arguments.open()?;
+    let network = network(weights)?;
+    let table = with_progress(set.names().len(), "looking again", console, |progress| {
+        evaluate_trust(&set, &split, &network, progress)
+    })?;
+    write_json(&table, arguments.common.output.as_deref())?;
+    let event = json!({ "event": "table", "table": table });
+    console.say(table.to_string().trim_end(), &event);
+    Ok(Outcome::Whole)
+}
+
+fn network(weights: Option<&Path>) -> Result<Decomposer, Box<dyn Error>> {
+    Ok(match weights {
+        None => shipped::decomposer()?,
+        Some(path) => Decomposer::new(&Weights::read(path)?)?,
+    })
+}
+
+fn ordinal(common: &CommonArguments, console: Console) -> Evaluated {
+    let images = JudgedImages::open(&common.data)?;
+    let baselines = [
+        OrdinalMethod::ConstantAlbedo,
+        OrdinalMethod::ConstantShading,
+    ];
+    let methods = with_predictions(baselines, common, OrdinalMethod::Predictions);
+    let steps = images.len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
+        evaluate_ordinal(&images, &common.split("all of"), &methods, progress)
+    })
+}
+
+/// The baselines, and the folders of predictions as methods.
+fn with_predictions<M, const N: usize>(
+    baselines: [M; N],
+    common: &CommonArguments,
+    method: impl Fn(Predictions) -> M,
+) -> Vec<M> {
+    let predicted = common.predictions().map(method);
+    baselines.into_iter().chain(predicted).collect()
+}
+
+fn with_progress<T, E: Error + 'static>(
+    steps: usize,
+    label: &'static str,
+    console: Console,
+    work: impl FnOnce(&(dyn Fn() + Sync)) -> Result<T, E>,
+) -> Result<T, Box<dyn Error>> {
+    let bar = console.progress(steps as u64, label);
+    let result = work(&|| bar.inc(1));
+    bar.finish_and_clear();
+    Ok(result?)
+}
+
+fn write_json(table: &impl Serialize, output: Option<&Path>) -> Result<(), Box<dyn Error>> {
+    if let Some(path) = output {
+        let mut bytes = serde_json::to_vec_pretty(table)?;
+        bytes.push(b'\n');
+        write_whole(path, &bytes)
+            .map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
+    }
+    Ok(())
+}
+
+fn report(table: &ScoreTable, output: Option<&Path>, console: Console) -> CommandResult {
+    write_json(table, output)?;
+    let event = json!({ "event": "table", "table": table });
+    console.say(table.to_string().trim_end(), &event);
+    Ok(Outcome::Whole)
+}

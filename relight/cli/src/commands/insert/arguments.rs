@@ -1,0 +1,282 @@
+//! What `relight insert` is told: its arguments, and the scene that they describe.
+
+use std::error::Error;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::{ArgAction, Args};
+use relight_photo::insert::{LightDescription, ObjectDescription, SceneDescription};
+
+use super::work::is_captured;
+use crate::commands::relight::{degrees, gloss_numbers, tint};
+use crate::photos::{Bits, NetworkArguments, OutputKind, own_mask};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  relight insert cup.jpg --mask cup-mask.png --into room.jpg --at 0.4,0.9 --height 0.3 -o out.png
+      the cup in another photograph, in the light that is taken from it
+  relight insert bear.jpg cup.jpg --mask masks --into room.hdr --at 0.6,0.85 --height 0.5 \\
+      --at 0.35,0.95 --height 0.3 -o out.png
+      two objects, from back to front, in a panorama; their masks are masks/bear.png and masks/cup.png
+  relight insert cup.jpg --mask cup-mask.png --into room.jpg --lamp 60,30 -o out.exr
+      in the light of a lamp
+  relight insert object.relit --into room.hdr -o out.png
+      an object that relight turn --asset has written
+  relight insert --scene scene.toml -o out.png
+      all of it from a file (docs/insert.md)";
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Photographs of the objects, from back to front.
+    #[arg(
+        value_name = "PHOTO",
+        required_unless_present = "scene",
+        conflicts_with = "scene"
+    )]
+    photos: Vec<PathBuf>,
+    /// A scene: background, light and objects in a TOML file.
+    #[arg(long, value_name = "FILE.toml")]
+    scene: Option<PathBuf>,
+    /// The picture (.png, .exr), or a video (.mp4, .webm).
+    #[arg(short, long, value_name = "OUT")]
+    pub(super) output: PathBuf,
+    /// The background: a photograph, a panorama (HDR or EXR, twice as wide as high), or a video.
+    #[arg(
+        long,
+        value_name = "FILE",
+        required_unless_present = "scene",
+        conflicts_with = "scene"
+    )]
+    into: Option<PathBuf>,
+    #[command(flatten)]
+    object: ObjectArguments,
+    #[command(flatten)]
+    light: LightArguments,
+    /// Width and height of the picture that shows a part of a panorama.
+    #[arg(long, value_name = "W,H", value_parser = size, conflicts_with = "scene")]
+    size: Option<[u32; 2]>,
+    /// How many degrees the picture's longer side shows [default: 60].
+    #[arg(long, value_name = "DEGREES", value_parser = number, conflicts_with = "scene")]
+    field: Option<f64>,
+    /// How many degrees the camera looks down into a panorama [default: 10].
+    #[arg(long, value_name = "DEGREES", value_parser = number, allow_hyphen_values = true, conflicts_with = "scene")]
+    down: Option<f64>,
+    /// How many degrees the camera looks down on the ground of the objects [default: 20, in a panorama as it is seen there].
+    #[arg(long, value_name = "DEGREES", value_parser = number, conflicts_with = "scene")]
+    tilt: Option<f64>,
+    /// Leave brightness, white balance and grain of the objects as they are.
+    #[arg(long, conflicts_with = "scene")]
+    no_match: bool,
+    /// Brightness of a panorama and its light in stops.
+    #[arg(long, value_name = "STOPS", value_parser = number, allow_hyphen_values = true, conflicts_with = "scene")]
+    exposure: Option<f64>,
+    /// Turn a panorama and its light by so many degrees about the vertical, in a video.
+    #[arg(long, value_name = "DEGREES", value_parser = degrees, allow_hyphen_values = true)]
+    pub(super) turn: Option<f64>,
+    /// How long the turn takes, seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = number, default_value_t = 10.0, requires = "turn")]
+    pub(super) seconds: f64,
+    /// Frames a second of a turn.
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240))]
+    pub(super) fps: u32,
+    /// Bits a channel of a PNG.
+    #[arg(long, value_enum, default_value = "8")]
+    pub(super) bits: Bits,
+    #[command(flatten)]
+    pub(super) network: NetworkArguments,
+}
+
+/// What is said of the objects; what is given once holds for all, what is given as often as there are objects for one each.
+#[derive(Args)]
+struct ObjectArguments {
+    /// A mask, white on the object, or a folder of masks, <photo's name>.png.
+    #[arg(long, value_name = "FILE|DIR", action = ArgAction::Append, conflicts_with = "scene")]
+    mask: Vec<PathBuf>,
+    /// The middle of the object's lower edge in the picture, in parts of its width and height from the upper left corner.
+    #[arg(long, value_name = "X,Y", value_parser = place, action = ArgAction::Append, conflicts_with = "scene")]
+    at: Vec<[f64; 2]>,
+    /// The object's height in parts of the picture's.
+    #[arg(long, value_name = "PART", value_parser = number, action = ArgAction::Append, conflicts_with = "scene")]
+    height: Vec<f64>,
+    /// Turn the object in the plane, counter-clockwise.
+    #[arg(long, value_name = "DEGREES", value_parser = number, allow_hyphen_values = true, action = ArgAction::Append, conflicts_with = "scene")]
+    rotate: Vec<f64>,
+    /// Multiply the object's albedo with a colour, linear.
+    #[arg(long, value_name = "R,G,B", value_parser = tint, action = ArgAction::Append, conflicts_with = "scene")]
+    tint: Vec<[f32; 3]>,
+    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is matt.
+    #[arg(long, value_name = "PART,SMOOTHNESS", value_parser = gloss_numbers, action = ArgAction::Append, conflicts_with = "scene")]
+    gloss: Vec<[f32; 2]>,
+    /// The object's brightness in stops.
+    #[arg(long, value_name = "STOPS", value_parser = number, allow_hyphen_values = true, action = ArgAction::Append, conflicts_with = "scene")]
+    brighter: Vec<f64>,
+    /// How much of the object's shadow is seen, 0 to 1.
+    #[arg(long, value_name = "PART", value_parser = number, action = ArgAction::Append, conflicts_with = "scene")]
+    shadow: Vec<f64>,
+}
+
+/// The light; without any it is taken from the background.
+#[derive(Args)]
+#[group(multiple = false)]
+struct LightArguments {
+    /// The light: a panorama, or a text file of coefficients [default: taken from the background].
+    #[arg(long, value_name = "FILE", conflicts_with = "scene")]
+    light: Option<PathBuf>,
+    /// The light: a lamp (see relight relight --help).
+    #[arg(
+        long,
+        value_name = "AZIMUTH,ELEVATION[,COLOUR][,SIZE]",
+        allow_hyphen_values = true,
+        conflicts_with = "scene"
+    )]
+    lamp: Option<String>,
+    /// The light that falls on an object of the background, of which this is the mask.
+    #[arg(long, value_name = "MASK", conflicts_with = "scene")]
+    light_object: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// What is wrong with the combination of arguments, if anything is.
+    pub(crate) fn fault(&self) -> Option<String> {
+        let count = self.photos.len();
+        let object = &self.object;
+        let lists = [
+            ("--mask", object.mask.len()),
+            ("--at", object.at.len()),
+            ("--height", object.height.len()),
+            ("--rotate", object.rotate.len()),
+            ("--tint", object.tint.len()),
+            ("--gloss", object.gloss.len()),
+            ("--brighter", object.brighter.len()),
+            ("--shadow", object.shadow.len()),
+        ];
+        let odd = lists
+            .into_iter()
+            .find(|&(_, given)| given > 1 && given != count);
+        if let Some((name, given)) = odd {
+            return Some(format!(
+                "{name} is given {given} times for {count} photographs: give it once, or for each"
+            ));
+        }
+        if let [mask] = object.mask.as_slice()
+            && count > 1
+            && !mask.is_dir()
+        {
+            return Some(format!(
+                "--mask {}: give a folder of masks, or one for each photograph",
+                mask.display()
+            ));
+        }
+        if OutputKind::of(&self.output).is_none() {
+            return Some(format!(
+                "--output {}: give .png, .exr, .mp4 or .webm",
+                self.output.display()
+            ));
+        }
+        let is_movie = matches!(OutputKind::of(&self.output), Some(OutputKind::Movie(_)));
+        (self.turn.is_some() && !is_movie).then(|| {
+            format!(
+                "--output {}: give .mp4 or .webm for --turn",
+                self.output.display()
+            )
+        })
+    }
+
+    /// The scene that is asked for, and the folder that its paths are relative to.
+    pub(super) fn description(&self) -> Result<(SceneDescription, PathBuf), Box<dyn Error>> {
+        if let Some(path) = &self.scene {
+            let text = fs::read_to_string(path)
+                .map_err(|error| format!("{} cannot be read: {error}", path.display()))?;
+            let scene = SceneDescription::parse(&text)
+                .map_err(|error| format!("{}: {error}", path.display()))?;
+            let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+            return Ok((scene, folder));
+        }
+        let objects = (0..self.photos.len())
+            .map(|number| self.object.describe(&self.photos, number))
+            .collect();
+        let is_text = |path: &Path| {
+            path.extension()
+                .is_some_and(|e| e.eq_ignore_ascii_case("txt"))
+        };
+        let (coefficients, panorama) = match &self.light.light {
+            Some(path) if is_text(path) => (Some(path.clone()), None),
+            other => (None, other.clone()),
+        };
+        let scene = SceneDescription {
+            background: self.into.clone().unwrap_or_default(),
+            size: self.size.unwrap_or([1280, 960]),
+            field: self.field.unwrap_or(60.0),
+            down: self.down.unwrap_or(10.0),
+            tilt: self.tilt,
+            light: LightDescription {
+                panorama,
+                lamp: self.light.lamp.clone(),
+                ambient: None,
+                coefficients,
+                object: self.light.light_object.clone(),
+            },
+            matches: !self.no_match,
+            exposure: self.exposure.unwrap_or(0.0) as f32,
+            objects,
+        };
+        scene.check()?;
+        Ok((scene, PathBuf::new()))
+    }
+}
+
+impl ObjectArguments {
+    fn describe(&self, photos: &[PathBuf], number: usize) -> ObjectDescription {
+        let photo = photos[number].clone();
+        // Beside each other, where nothing is said.
+        let across = (number as f64 + 0.5) / photos.len() as f64;
+        ObjectDescription {
+            mask: of(&self.mask, number)
+                // A folder of masks is for the photographs.
+                .filter(|mask| !(is_captured(&photo) && mask.is_dir()))
+                .map(|mask| {
+                    let name = photo.file_stem().unwrap_or_default();
+                    own_mask(&mask, &name.to_string_lossy())
+                }),
+            at: of(&self.at, number).unwrap_or([across, 0.9]),
+            height: of(&self.height, number).unwrap_or(0.4),
+            rotation: of(&self.rotate, number).unwrap_or(0.0),
+            tint: of(&self.tint, number).unwrap_or([1.0; 3]),
+            gloss: of(&self.gloss, number),
+            exposure: of(&self.brighter, number).unwrap_or(0.0) as f32,
+            shadow: of(&self.shadow, number).unwrap_or(1.0) as f32,
+            photo,
+        }
+    }
+}
+
+/// What is said of an object: for it alone, or for all.
+fn of<T: Clone>(given: &[T], number: usize) -> Option<T> {
+    match given {
+        [one] => Some(one.clone()),
+        many => many.get(number).cloned(),
+    }
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
+    number.ok_or_else(|| "give a number".to_owned())
+}
+
+fn pair<T: std::str::FromStr>(text: &str) -> Option<[T; 2]> {
+    let numbers: Vec<T> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok())
+        .collect::<Option<_>>()?;
+    numbers.try_into().ok()
+}
+
+fn place(text: &str) -> Result<[f64; 2], String> {
+    pair(text).ok_or_else(|| {
+        "give X,Y: parts of the picture's width and height, such as 0.5,0.9".to_owned()
+    })
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    pair(text).ok_or_else(|| "give W,H in pixels".to_owned())
+}

@@ -1,0 +1,488 @@
+//! `relight relight`: objects of photographs in another light.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use rayon::prelude::*;
+use relight_core::files::write_png;
+use relight_core::files::{MovieFormat, MovieWriter};
+use relight_core::image::{Depth, Linear, Planes, Rgb};
+use relight_photo::decompose::Rectangle;
+use relight_photo::files::{PhotoInput, PhotoReading};
+use relight_photo::insert::{
+    Backdrop, InsertError, LightSource, MaterialChange, ObjectGloss, PanoramaView, Shot, TrustMap,
+    likeness,
+};
+use relit_data::causes::with_causes;
+use serde_json::json;
+
+use super::decompose::rectangle;
+use crate::console::{CommandResult, Console, Outcome};
+use crate::folder::make_folder;
+use crate::light::NewLightArguments;
+use crate::photos::{
+    Bits, Network, NetworkArguments, OutputKind, at_most, globbed, not_an_input, own_mask,
+    write_picture,
+};
+use crate::values::TransferName;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  relight relight mug.jpg --mask mug-mask.png --light studio.hdr -o relit.png
+      the mug in the light of a panorama, and before it
+  relight relight mug.jpg --mask mug-mask.png --lamp 60,30,3200K --keep-background -o relit.png
+      in the light of a warm lamp from the right, at its own place
+  relight relight mug.jpg --mask mug-mask.png --light studio.hdr --turn 360 --seconds 10 -o turn.mp4
+      a video in which the light turns once
+  relight relight 'photos/*.jpg' --mask masks --lamp -45,40 --compare -o relit
+      many photographs: relit/<name>.png, each beside the photograph and naive insertion";
+
+/// The longest side of a video's frames where nothing is said.
+const MOVIE_SIDE: usize = 1080;
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Photographs (.png, .jpg, .exr, .hdr), folders of them, patterns such as 'photos/*.jpg', or shards (.tar).
+    #[arg(required = true, value_name = "PHOTO")]
+    photos: Vec<PathBuf>,
+    /// The picture (.png, .exr), or for --turn a video (.mp4, .webm); of several photographs a folder.
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// A grey image as large as the photograph, white on the object; or a folder of such, <photo's name>.png
+    /// [default: the photograph's alpha, or what is not black before a black background].
+    #[arg(long, value_name = "FILE|DIR")]
+    mask: Option<PathBuf>,
+    /// A rectangle around the object, pixels. Where nothing else says where the object is, it is all of it.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = rectangle, conflicts_with = "mask")]
+    rect: Option<Rectangle>,
+    #[command(flatten)]
+    light: NewLightArguments,
+    /// Keep the photograph's own light, as it was estimated, to change its exposure or the material.
+    #[arg(long, conflicts_with_all = ["light", "lamp"])]
+    own_light: bool,
+    /// Turn the light about the vertical first, from the viewer to the right.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = degrees, allow_hyphen_values = true)]
+    turned: f64,
+    /// Turn the light by so many degrees, in a video.
+    #[arg(long, value_name = "DEGREES", value_parser = degrees, allow_hyphen_values = true)]
+    turn: Option<f64>,
+    /// How long the turn takes.
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, requires = "turn")]
+    seconds: f64,
+    /// Frames a second of a video.
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240))]
+    fps: u32,
+    /// What is behind the object [default: the panorama that lights it; grey where there is none].
+    #[arg(long, value_enum, conflicts_with = "keep_background")]
+    background: Option<BackgroundName>,
+    /// Leave the object where it is, before what its photograph shows.
+    #[arg(long)]
+    keep_background: bool,
+    /// How many degrees of a panorama the picture's longer side shows.
+    #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = field)]
+    field: f64,
+    /// How far the camera looks down into a panorama.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = tilt, allow_hyphen_values = true)]
+    down: f64,
+    /// Put the photograph beside the result.
+    #[arg(long)]
+    beside: bool,
+    /// Put the photograph and naive insertion beside the result.
+    #[arg(long, conflicts_with = "beside")]
+    compare: bool,
+    /// Brightness in stops. With 0 the strongest light is as strong as in the photograph.
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = stops, allow_hyphen_values = true)]
+    exposure: f32,
+    /// Multiply the object's albedo with a colour, linear.
+    #[arg(long, value_name = "R,G,B", value_parser = tint)]
+    tint: Option<[f32; 3]>,
+    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is matt.
+    #[arg(long, value_name = "PART,SMOOTHNESS", value_parser = gloss)]
+    gloss: Option<ObjectGloss>,
+    /// The longest side of the result, pixels [default: the photograph's; of a video at most 1080].
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=16_384))]
+    size: Option<u32>,
+    /// Write how far the result can be trusted as a picture, beside what --json says: blue is good, red is not.
+    #[arg(long, value_name = "FILE.png")]
+    trust: Option<PathBuf>,
+    /// Bits a channel of a PNG.
+    #[arg(long, value_enum, default_value = "8")]
+    bits: Bits,
+    #[command(flatten)]
+    network: NetworkArguments,
+    /// How PNG and JPEG photographs are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
+    #[arg(long, value_enum)]
+    transfer: Option<TransferName>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum BackgroundName {
+    /// The panorama that lights it.
+    Light,
+    /// What the photograph shows.
+    Photo,
+    /// Grey of 18 %.
+    Grey,
+    /// Black.
+    Black,
+    /// White.
+    White,
+}
+
+impl Arguments {
+    /// What is wrong with the combination of arguments, if anything is.
+    pub(crate) fn fault(&self) -> Option<String> {
+        if self.light.light.is_none() && self.light.lamp.is_none() && !self.own_light {
+            return Some(
+                "give the new light by --light FILE or --lamp AZIMUTH,ELEVATION".to_owned(),
+            );
+        }
+        let has_panorama = self.light.light.is_some();
+        if matches!(self.background, Some(BackgroundName::Light)) && !has_panorama {
+            return Some(
+                "--background light: there is no panorama; give one by --light".to_owned(),
+            );
+        }
+        if let Some(trust) = &self.trust {
+            if self.is_set() {
+                return Some("--trust: give one photograph".to_owned());
+            }
+            if *trust == self.output || OutputKind::of(trust) != Some(OutputKind::Png) {
+                let trust = trust.display();
+                return Some(format!("--trust {trust}: give a .png that is not --output"));
+            }
+        }
+        if self.is_set() {
+            return None;
+        }
+        let wanted = match OutputKind::of(&self.output) {
+            Some(OutputKind::Movie(_)) if self.turn.is_none() => ".png or .exr, or --turn DEGREES",
+            Some(OutputKind::Png | OutputKind::Exr) if self.turn.is_some() => {
+                ".mp4 or .webm for --turn"
+            }
+            None if self.turn.is_some() => ".mp4 or .webm",
+            None => ".png or .exr",
+            Some(_) => return None,
+        };
+        Some(format!("--output {}: give {wanted}", self.output.display()))
+    }
+
+    /// Whether results go into a folder.
+    fn is_set(&self) -> bool {
+        let is_many = |path: &PathBuf| {
+            let text = path.to_string_lossy();
+            path.is_dir()
+                || path.extension().is_some_and(|e| e == "tar")
+                || (!path.exists() && text.contains(['*', '?', '[']))
+        };
+        self.photos.len() > 1 || self.photos.iter().any(is_many)
+    }
+
+    fn reading(&self) -> PhotoReading {
+        PhotoReading {
+            mask: self.mask.clone(),
+            rectangle: self.rect,
+            transfer: self.transfer.map(Into::into),
+        }
+    }
+
+    fn change(&self) -> MaterialChange {
+        MaterialChange {
+            tint: self.tint.unwrap_or([1.0; 3]),
+            gloss: self.gloss,
+        }
+    }
+
+    fn longest(&self) -> Option<usize> {
+        match (self.size, self.turn) {
+            (Some(size), _) => Some(size as usize),
+            (None, Some(_)) => Some(MOVIE_SIDE),
+            (None, None) => None,
+        }
+    }
+
+    fn output_of(&self, name: &str) -> PathBuf {
+        if !self.is_set() {
+            return self.output.clone();
+        }
+        let ending = if self.turn.is_some() { "mp4" } else { "png" };
+        self.output.join(format!("{name}.{ending}"))
+    }
+}
+
+/// All that is the same for every photograph.
+struct Run<'a> {
+    arguments: &'a Arguments,
+    /// Read when the first photograph is there: it takes its time.
+    network: OnceLock<Network>,
+    light: Option<LightSource>,
+    reading: PhotoReading,
+    /// The files of all photographs.
+    photos: Vec<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
+    let inputs = PhotoInput::find(&globbed(&arguments.photos)?, None)?;
+    let run = Run {
+        arguments,
+        light: arguments.light.read()?,
+        network: OnceLock::new(),
+        reading: arguments.reading(),
+        photos: inputs.iter().filter_map(file_of).collect(),
+    };
+    if !arguments.is_set()
+        && let [input] = inputs.as_slice()
+    {
+        run.relight(input, console)?;
+        return Ok(Outcome::Whole);
+    }
+    let mut lost = 0;
+    for input in &inputs {
+        if let Err(error) = run.relight(input, console) {
+            lost += 1;
+            let message = with_causes(error.as_ref());
+            let text = format!("{}: {message}", input.place());
+            console.warn(
+                &text,
+                &json!({ "event": "failed", "photo": input.place(), "message": message }),
+            );
+        }
+    }
+    match lost {
+        0 => Ok(Outcome::Whole),
+        _ if lost == inputs.len() => Err("no photograph could be relit".into()),
+        _ => Ok(Outcome::Incomplete),
+    }
+}
+
+impl Run<'_> {
+    fn relight(&self, input: &PhotoInput, console: Console) -> Result<(), Box<dyn Error>> {
+        let arguments = self.arguments;
+        let photo = at_most(input.load(&self.reading)?, arguments.longest());
+        let output = arguments.output_of(&photo.name);
+        self.check_outputs(&output, &photo.name)?;
+        let network = match self.network.get() {
+            Some(network) => network,
+            None => {
+                let network = arguments.network.read()?;
+                self.network.get_or_init(|| network)
+            }
+        };
+        let start = Instant::now();
+        let subject = network.subject(&photo)?;
+        let decomposed = start.elapsed().as_secs_f64();
+        let own = LightSource::Coefficients(subject.light().clone());
+        let source = self.light.as_ref().unwrap_or(&own);
+        let light = source.light()?;
+        let backdrop = self.backdrop(photo.picture.planes().extent());
+        let exposure = arguments.exposure.exp2();
+        let shot = Shot::new(
+            &photo.picture,
+            &subject,
+            &light,
+            arguments.change(),
+            backdrop,
+            exposure,
+        )?;
+        let trust = TrustMap::of(
+            &subject,
+            &network.decomposer,
+            &photo.options(&network.options),
+        )?;
+        let figures = trust.figures();
+        if let Some(parent) = output.parent().filter(|_| arguments.is_set()) {
+            make_folder(parent)?;
+        }
+        let start = Instant::now();
+        let frames = match OutputKind::of(&output) {
+            Some(OutputKind::Movie(format)) => self.film(&shot, &output, format, console)?,
+            _ => {
+                let picture = self.sheet(&shot, arguments.turned.to_radians())?;
+                write_picture(&output, &picture, arguments.bits)?;
+                1
+            }
+        };
+        if let Some(path) = &arguments.trust {
+            write_png(path, &subject.in_photo(&trust.picture()), Depth::Eight)?;
+        }
+        let seconds = start.elapsed().as_secs_f64();
+        let text = format!(
+            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposing; trust {:.2}, {:.0} % of the object in doubt",
+            output.display(),
+            figures.mean,
+            100.0 * figures.doubtful
+        );
+        let event = json!({
+            "event": "relit",
+            "photo": input.place(),
+            "output": output,
+            "frames": frames,
+            "seconds": seconds,
+            "decompose_seconds": decomposed,
+            "likeness": likeness(subject.light(), &light),
+            "trust": figures,
+        });
+        console.say(&text, &event);
+        Ok(())
+    }
+
+    /// Nothing that is read may be overwritten, and nothing is written where the map of trust cannot be.
+    fn check_outputs(&self, output: &Path, name: &str) -> Result<(), String> {
+        let arguments = self.arguments;
+        let mask = arguments.mask.as_deref().map(|mask| own_mask(mask, name));
+        let mut inputs: Vec<PathBuf> = mask.into_iter().collect();
+        inputs.extend(self.photos.iter().cloned());
+        inputs.extend(arguments.light.light.clone());
+        let trust = arguments.trust.as_deref();
+        for output in [Some(output), trust].into_iter().flatten() {
+            not_an_input(output, &inputs)?;
+        }
+        let folder = trust.and_then(Path::parent);
+        match folder.filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
+            Some(folder) => Err(format!("--trust: {} is no folder", folder.display())),
+            None => Ok(()),
+        }
+    }
+
+    fn backdrop(&self, extent: relight_core::image::Extent) -> Backdrop {
+        let arguments = self.arguments;
+        let grey = Backdrop::Even([0.18; 3]);
+        let panorama = || match &self.light {
+            Some(LightSource::Panorama(panorama)) => {
+                let view = PanoramaView::new(extent, arguments.field, arguments.down);
+                Some(Backdrop::Panorama(view, panorama.clone()))
+            }
+            _ => None,
+        };
+        match arguments.background {
+            _ if arguments.keep_background => Backdrop::Photo,
+            None if arguments.own_light => Backdrop::Photo,
+            None | Some(BackgroundName::Light) => panorama().unwrap_or(grey),
+            Some(BackgroundName::Photo) => Backdrop::Photo,
+            Some(BackgroundName::Grey) => grey,
+            Some(BackgroundName::Black) => Backdrop::Even([0.0; 3]),
+            Some(BackgroundName::White) => Backdrop::Even([1.0; 3]),
+        }
+    }
+
+    /// The picture, beside others where that is asked for.
+    fn sheet(&self, shot: &Shot<'_>, turn: f64) -> Result<Rgb<Linear>, InsertError> {
+        let relit = shot.picture(turn)?;
+        let arguments = self.arguments;
+        if !arguments.beside && !arguments.compare {
+            return Ok(relit);
+        }
+        let mut tiles = vec![shot.photo().planes().clone()];
+        if arguments.compare {
+            tiles.push(shot.naive(turn).into_planes());
+        }
+        tiles.push(relit.into_planes());
+        Ok(Rgb::new(Planes::sheet(&tiles, tiles.len())?))
+    }
+
+    /// Writes the turn; how many frames it has.
+    fn film(
+        &self,
+        shot: &Shot<'_>,
+        output: &Path,
+        format: MovieFormat,
+        console: Console,
+    ) -> Result<u32, Box<dyn Error>> {
+        let arguments = self.arguments;
+        let frames = (arguments.seconds * f64::from(arguments.fps))
+            .round()
+            .max(1.0) as u32;
+        let all = arguments.turn.unwrap_or(360.0);
+        let bar = console.progress(frames.into(), "frames");
+        // A few at a time, side by side; they are encoded in order.
+        let together = rayon::current_num_threads() as u32 * 2;
+        let mut movie: Option<MovieWriter> = None;
+        for first in (0..frames).step_by(together as usize) {
+            let some: Vec<_> = (first..frames.min(first + together))
+                .into_par_iter()
+                .map(|frame| {
+                    let part = f64::from(frame) / f64::from(frames);
+                    let turn = (arguments.turned + all * part).to_radians();
+                    Ok(self.sheet(shot, turn)?.encode())
+                })
+                .collect::<Result<_, InsertError>>()?;
+            for frame in &some {
+                let movie = match &mut movie {
+                    Some(movie) => movie,
+                    none => {
+                        let extent = Rgb::planes(frame).extent();
+                        none.insert(MovieWriter::create(output, format, extent, arguments.fps)?)
+                    }
+                };
+                movie.push(frame)?;
+                bar.inc(1);
+            }
+        }
+        if let Some(movie) = movie {
+            movie.finish()?;
+        }
+        bar.finish_and_clear();
+        Ok(frames)
+    }
+}
+
+fn file_of(input: &PhotoInput) -> Option<PathBuf> {
+    match input {
+        PhotoInput::File(path) => Some(path.clone()),
+        _ => None,
+    }
+}
+
+fn ranged<T: std::str::FromStr + PartialOrd>(text: &str, least: T, most: T) -> Option<T> {
+    text.parse()
+        .ok()
+        .filter(|value| (least..=most).contains(value))
+}
+
+pub(crate) fn degrees(text: &str) -> Result<f64, String> {
+    ranged(text, -36_000.0, 36_000.0).ok_or_else(|| "give degrees from -36000 to 36000".to_owned())
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    ranged(text, 0.01, 3600.0).ok_or_else(|| "give seconds from 0.01 to 3600".to_owned())
+}
+
+fn field(text: &str) -> Result<f64, String> {
+    ranged(text, 1.0, 150.0).ok_or_else(|| "give degrees from 1 to 150".to_owned())
+}
+
+fn tilt(text: &str) -> Result<f64, String> {
+    ranged(text, -89.0, 89.0).ok_or_else(|| "give degrees from -89 to 89".to_owned())
+}
+
+fn stops(text: &str) -> Result<f32, String> {
+    ranged(text, -20.0, 20.0).ok_or_else(|| "give stops from -20 to 20".to_owned())
+}
+
+fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
+    let numbers: Vec<f32> = text
+        .split(',')
+        .map(|part| ranged(part.trim(), 0.0, 1000.0))
+        .collect::<Option<_>>()?;
+    numbers.try_into().ok()
+}
+
+pub(crate) fn tint(text: &str) -> Result<[f32; 3], String> {
+    numbers(text).ok_or_else(|| "give R,G,B: three factors that are not negative".to_owned())
+}
+
+fn gloss(text: &str) -> Result<ObjectGloss, String> {
+    let [part, smoothness] = gloss_numbers(text)?;
+    Ok(ObjectGloss::of_part(part, smoothness))
+}
+
+/// The part of even light that is reflected, and the smoothness.
+pub(crate) fn gloss_numbers(text: &str) -> Result<[f32; 2], String> {
+    match numbers(text) {
+        Some([part, smoothness]) if part <= 1.0 && smoothness > 0.0 => Ok([part, smoothness]),
+        _ => Err("give PART,SMOOTHNESS: a part from 0 to 1, and α above 0".to_owned()),
+    }
+}

@@ -1,0 +1,224 @@
+//! `relight synth`.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use clap::builder::RangedU64ValueParser;
+use clap::{Args, ValueEnum};
+use rayon::ThreadPoolBuilder;
+use relight_synth::{
+    Folders, Library, LightKind, Recipe, SynthTally, TurnRecipe, made_panoramas, write_preview,
+    write_samples, write_turns,
+};
+use serde_json::json;
+
+use crate::console::{CommandResult, Console, Outcome};
+use crate::folder::make_folder;
+
+/// Objects on one sheet, at most.
+const LARGEST_SHEET: u64 = 500;
+
+/// What a mode returns from rayon's threads.
+type ModeResult = Result<(), Box<dyn Error + Send + Sync>>;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  relight synth --count 50000 -o warmup
+      procedural objects under random light, each with its truth
+  relight synth --count 50000 --meshes meshes --panoramas hdri --textures photos -o warmup
+      with files of one's own
+  relight synth --turn --count 20 --panoramas hdri -o turns
+      whole turns as shards, with their truth beside them
+  relight synth --preview -o look
+      look/preview.png: a sheet of pictures beside their truth
+  relight synth --write-panoramas -o panoramas
+      the panoramas that are used where none are given, as EXR";
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// The folder to write into; made where it is missing.
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// How many samples, turns or objects [default: 1000; with --turn 1, with --preview 24].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    count: Option<u64>,
+    /// The same seed gives the same bytes.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Width and height of the pictures, pixels [default: 256; with --preview 128].
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=2048))]
+    size: Option<u32>,
+    /// What light there is.
+    #[arg(long, value_enum, default_value_t = LightName::Mixed)]
+    light: LightName,
+    /// Let light pass through objects: neither cast shadows nor dark hollows.
+    #[arg(long)]
+    no_shadows: bool,
+    /// An sRGB camera without noise, clipping on purpose, or compression.
+    #[arg(long)]
+    plain_camera: bool,
+    /// Views of each object.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    views: u32,
+    /// Materials and lightings of each view.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    lightings: u32,
+    /// Objects of one's own: .obj, .gltf, .glb.
+    #[arg(long, value_name = "FOLDER")]
+    meshes: Option<PathBuf>,
+    /// Pictures to lay onto objects: .png, .jpg.
+    #[arg(long, value_name = "FOLDER")]
+    textures: Option<PathBuf>,
+    /// Light: .hdr, .exr [default: panoramas that are made on the spot].
+    #[arg(long, value_name = "FOLDER")]
+    panoramas: Option<PathBuf>,
+    /// Threads that work side by side [default: as many as there are cores].
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
+    threads: Option<usize>,
+    /// Write whole turns as shards, as relit-extract does: the object stands still, the light turns.
+    #[arg(long, group = "mode")]
+    turn: bool,
+    /// Frames a turn.
+    #[arg(long, value_name = "N", default_value_t = 1500, requires = "turn", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    frames: u32,
+    /// Write a sheet of pictures beside their truth, OUT/preview.png, and nothing else.
+    #[arg(long, group = "mode")]
+    preview: bool,
+    /// Write the panoramas that are made on the spot, and nothing else.
+    #[arg(long, group = "mode")]
+    write_panoramas: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum LightName {
+    /// Lamps mostly, panoramas else, with ambient and bounced light.
+    Mixed,
+    /// One to three lamps, with ambient and bounced light.
+    Lamps,
+    /// A panorama by its nine coefficients.
+    Sh,
+    /// A panorama by rays.
+    MonteCarlo,
+}
+
+impl From<LightName> for LightKind {
+    fn from(name: LightName) -> Self {
+        match name {
+            LightName::Mixed => Self::Mixed,
+            LightName::Lamps => Self::Lamps,
+            LightName::Sh => Self::Sh,
+            LightName::MonteCarlo => Self::MonteCarlo,
+        }
+    }
+}
+
+impl Arguments {
+    /// What is wrong with the arguments together.
+    pub(crate) fn fault(&self) -> Option<String> {
+        let is_too_long = self.preview && self.count.is_some_and(|count| count > LARGEST_SHEET);
+        is_too_long.then(|| format!("--count: a sheet has at most {LARGEST_SHEET} objects"))
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
+    let mut builder = ThreadPoolBuilder::new();
+    if let Some(threads) = arguments.threads {
+        builder = builder.num_threads(threads);
+    }
+    let pool = builder.build()?;
+    if arguments.write_panoramas {
+        return panoramas(&arguments.output, console);
+    }
+    let library = Library::read(&Folders {
+        meshes: arguments.meshes.clone(),
+        textures: arguments.textures.clone(),
+        panoramas: arguments.panoramas.clone(),
+    })?;
+    let result = pool.install(|| {
+        if arguments.preview {
+            preview(arguments, &library, console)
+        } else if arguments.turn {
+            turns(arguments, &library, console)
+        } else {
+            samples(arguments, &library, console)
+        }
+    });
+    match result {
+        Ok(()) => Ok(Outcome::Whole),
+        Err(error) => Err(error),
+    }
+}
+
+fn recipe(arguments: &Arguments, size: u32) -> Recipe {
+    Recipe {
+        seed: arguments.seed,
+        size: arguments.size.unwrap_or(size),
+        light: arguments.light.into(),
+        shadows: !arguments.no_shadows,
+        views: arguments.views,
+        lightings: arguments.lightings,
+        random_camera: !arguments.plain_camera,
+    }
+}
+
+fn samples(arguments: &Arguments, library: &Library, console: Console) -> ModeResult {
+    let count = arguments.count.unwrap_or(1000);
+    let bar = console.progress(count, "samples");
+    let recipe = recipe(arguments, 256);
+    let written = write_samples(&recipe, library, count, &arguments.output, &|| bar.inc(1));
+    bar.finish_and_clear();
+    report(arguments, console, "samples", written?);
+    Ok(())
+}
+
+fn turns(arguments: &Arguments, library: &Library, console: Console) -> ModeResult {
+    let count = arguments.count.unwrap_or(1);
+    let bar = console.progress(count * u64::from(arguments.frames), "frames");
+    let turns = TurnRecipe {
+        recipe: recipe(arguments, 256),
+        frames: arguments.frames,
+    };
+    let written = write_turns(&turns, library, count, &arguments.output, &|| bar.inc(1));
+    bar.finish_and_clear();
+    report(arguments, console, "turns", written?);
+    Ok(())
+}
+
+fn report(arguments: &Arguments, console: Console, what: &str, written: SynthTally) {
+    let SynthTally { new, kept } = written;
+    let out = &arguments.output;
+    console.say(
+        &format!("{}: {new} {what} written, {kept} were there", out.display()),
+        &json!({ "event": what, "out": out, "new": new, "kept": kept }),
+    );
+}
+
+fn preview(arguments: &Arguments, library: &Library, console: Console) -> ModeResult {
+    let count = u32::try_from(arguments.count.unwrap_or(24))?;
+    make_folder(&arguments.output)?;
+    let path = arguments.output.join("preview.png");
+    write_preview(&recipe(arguments, 128), library, count, &path)?;
+    console.say(
+        &format!(
+            "{}: picture, albedo, shading, highlight and normals of {count} objects",
+            path.display()
+        ),
+        &json!({ "event": "preview", "file": path, "objects": count }),
+    );
+    Ok(())
+}
+
+fn panoramas(out: &Path, console: Console) -> CommandResult {
+    make_folder(out)?;
+    let made = made_panoramas()?;
+    for (name, panorama) in &made {
+        panorama
+            .image()
+            .write_exr(&out.join(format!("{name}.exr")))?;
+    }
+    console.say(
+        &format!("{}: {} panoramas", out.display(), made.len()),
+        &json!({ "event": "panoramas", "out": out, "count": made.len() }),
+    );
+    Ok(Outcome::Whole)
+}

@@ -1,0 +1,402 @@
+//! `relight train`.
+
+use std::collections::BTreeMap;
+use std::env;
+use std::error::Error;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use clap::builder::RangedU64ValueParser;
+use clap::{Args, Subcommand};
+use indicatif::ProgressBar;
+use relight_nets::{NetError, Weights};
+use relight_train::{
+    DecomposeSettings, DecomposeTask, Launch, PaperInputs, PaperPhase, PaperSettings, PaperTask,
+    ProcessGroup, Resources, Run, RunOutcome, RunSettings, Task, TrainObserver, read_settings,
+};
+use serde::Serialize;
+use serde_json::json;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+use tch::Device;
+
+use crate::console::{CommandResult, Console, Outcome};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  relight train decompose -o run
+      the network of relight decompose, on samples that are made while it trains
+  relight train decompose --settings relight/weights/decompose.toml -o run
+      as the weights that come with relight were trained, from the folders meshes and panoramas of what
+      relight/weights/README.md names
+  relight train decompose --settings my.toml -o run --resume
+      goes on with a run that was stopped, to the same losses
+  relight train normal -o normal
+  relight train light --turns shards --normal normal/normal-net.safetensors -o light
+  relight train joint --turns shards --light light/light-net.safetensors \
+      --weights normal/normal-net.safetensors -o joint
+      the paper's phases: a warm-up, and two rounds on turns
+  torchrun --no-python --nproc-per-node 4 relight train decompose --threads 2 -o run
+      four processes of one machine, each with its part of every batch; also by RANK, WORLD_SIZE, MASTER_ADDR,
+      MASTER_PORT and LOCAL_RANK, as scripts of Slurm and operators of Kubernetes set them
+
+In the folder of a run: checkpoint.safetensors, losses.csv, event files for TensorBoard, validation.png, and at
+the end the averaged weights. Ctrl-C ends a run with a checkpoint (exit code 3).";
+
+/// The exit code of a run that a second signal ends without a checkpoint, as the shell has it for SIGINT.
+const ENDED_BY_SIGNAL: i32 = 130;
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    task: TaskName,
+}
+
+#[derive(Subcommand)]
+enum TaskName {
+    /// The network of `relight decompose`: albedo, shading, normals and highlight of a photograph.
+    Decompose(RunArguments),
+    /// Spec-Net: highlights, on composed samples and by chromaticity on turns.
+    Spec(PaperArguments),
+    /// Normal-Net's warm-up, on composed samples.
+    Normal(PaperArguments),
+    /// Light-Net from nothing, on turns; Normal-Net stays as it is.
+    Light(PaperArguments),
+    /// Normal-Net, on turns; Light-Net stays as it is.
+    Joint(PaperArguments),
+    /// The net for specular reflectance and smoothness, on the highlights of turns.
+    Specular(PaperArguments),
+}
+
+#[derive(Args)]
+struct PaperArguments {
+    #[command(flatten)]
+    run: RunArguments,
+    /// Turns: a shard, or a folder that relit-extract has written.
+    #[arg(long, value_name = "SHARDS")]
+    turns: Option<PathBuf>,
+    /// Turns that are not trained on: validations say how near to rank one their reflectance is.
+    #[arg(long, value_name = "SHARDS")]
+    held_out: Option<PathBuf>,
+    /// Frames with labels, as relight turn --labels and relight synth write them, beside turns and composed samples.
+    #[arg(long, value_name = "FOLDER")]
+    labels: Option<PathBuf>,
+    /// Spec-Net's weights, for light, joint and specular.
+    #[arg(long, value_name = "FILE")]
+    spec: Option<PathBuf>,
+    /// Normal-Net's weights, for light and specular.
+    #[arg(long, value_name = "FILE")]
+    normal: Option<PathBuf>,
+    /// Light-Net's weights, for joint and specular.
+    #[arg(long, value_name = "FILE")]
+    light: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct RunArguments {
+    /// The folder of the run; made where it is missing.
+    #[arg(
+        short,
+        long,
+        value_name = "RUN",
+        required_unless_present = "print_settings"
+    )]
+    output: Option<PathBuf>,
+    /// Settings, a TOML file; what it does not name has its default.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Go on with the run in the folder; where there is none, one begins.
+    #[arg(long)]
+    resume: bool,
+    /// Begin with these weights.
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// Threads of the network [default: one a core].
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
+    threads: Option<usize>,
+    /// Threads that compose samples.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
+    composers: usize,
+    /// Where the network is computed: cpu, cuda:N, or cuda: of several processes on a machine, a GPU for each.
+    #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
+    device: DeviceName,
+    /// Print the settings with all defaults, and do nothing.
+    #[arg(long)]
+    print_settings: bool,
+}
+
+#[derive(Clone, Copy)]
+enum DeviceName {
+    Cpu,
+    /// The one of the process's number on its machine.
+    Cuda,
+    CudaNumber(usize),
+}
+
+fn device(text: &str) -> Result<DeviceName, String> {
+    match text {
+        "cpu" => return Ok(DeviceName::Cpu),
+        "cuda" => return Ok(DeviceName::Cuda),
+        _ => {}
+    }
+    let number = text.strip_prefix("cuda:").and_then(|n| n.parse().ok());
+    let number = number.ok_or_else(|| "cpu, cuda or cuda:N".to_owned())?;
+    Ok(DeviceName::CudaNumber(number))
+}
+
+impl DeviceName {
+    fn device(self, launch: Option<&Launch>) -> Result<Device, String> {
+        let number = match self {
+            Self::Cpu => return Ok(Device::Cpu),
+            Self::Cuda => launch.and_then(|launch| launch.local).unwrap_or(0),
+            Self::CudaNumber(number) => number,
+        };
+        if (number as i64) < tch::Cuda::device_count() {
+            Ok(Device::Cuda(number))
+        } else {
+            Err(format!(
+                "--device cuda:{number}: libtorch finds no such device here"
+            ))
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
+    match &arguments.task {
+        TaskName::Decompose(arguments) => decompose(arguments, console),
+        TaskName::Spec(arguments) => paper(PaperPhase::Spec, arguments, console),
+        TaskName::Normal(arguments) => paper(PaperPhase::Normal, arguments, console),
+        TaskName::Light(arguments) => paper(PaperPhase::Light, arguments, console),
+        TaskName::Joint(arguments) => paper(PaperPhase::Joint, arguments, console),
+        TaskName::Specular(arguments) => paper(PaperPhase::Specular, arguments, console),
+    }
+}
+
+fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
+    let settings = arguments.settings.as_deref();
+    let settings = settings.map_or_else(|| Ok(DecomposeSettings::default()), read_settings)?;
+    if arguments.print_settings {
+        return print_settings(&settings, console);
+    }
+    let run = settings.run.clone();
+    let processes = arguments.join(console)?;
+    let weights = read_weights(arguments.weights.as_deref())?;
+    let resources = processes.resources.clone();
+    let mut task = DecomposeTask::new(settings, resources, weights.as_ref())?;
+    train(&mut task, &run, (arguments, processes), console)
+}
+
+fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> CommandResult {
+    let settings = PaperSettings::of_phase(phase, arguments.run.settings.as_deref())?;
+    if arguments.run.print_settings {
+        return print_settings(&settings, console);
+    }
+    let run = settings.run.clone();
+    let processes = arguments.run.join(console)?;
+    let inputs = PaperInputs {
+        turns: arguments.turns.clone(),
+        held_out: arguments.held_out.clone(),
+        labels: arguments.labels.clone(),
+        weights: read_weights(arguments.run.weights.as_deref())?,
+        spec: read_weights(arguments.spec.as_deref())?,
+        normal: read_weights(arguments.normal.as_deref())?,
+        light: read_weights(arguments.light.as_deref())?,
+    };
+    let mut task = PaperTask::new(phase, settings, processes.resources.clone(), &inputs)?;
+    train(&mut task, &run, (&arguments.run, processes), console)
+}
+
+/// The processes of the run, and what this one has.
+struct Processes {
+    resources: Resources,
+    group: Option<ProcessGroup>,
+}
+
+impl RunArguments {
+    fn folder(&self) -> Result<&Path, &'static str> {
+        self.output
+            .as_deref()
+            .ok_or("--output RUN is missing: where the run is kept")
+    }
+
+    /// Meets the other processes that a launcher has started, if it has; sets the number of the network's threads.
+    fn join(&self, console: Console) -> Result<Processes, Box<dyn Error>> {
+        let launch = Launch::from_variables(|name| env::var(name).ok())?;
+        if let Some(threads) = self.threads {
+            tch::set_num_threads(threads as i32);
+        }
+        let device = self.device.device(launch.as_ref())?;
+        if let Some(launch) = &launch {
+            tell_of_waiting(launch, console);
+        }
+        let group = launch.as_ref().map(ProcessGroup::join).transpose()?;
+        let resources = Resources {
+            device,
+            composers: self.composers,
+            // While processes wait for each other, signals end them: there is nothing to save.
+            stop: stop_at_signals(group.is_some())?,
+        };
+        Ok(Processes { resources, group })
+    }
+}
+
+/// Process 0 says whom it waits for: a process that was not started would keep it without a word.
+fn tell_of_waiting(launch: &Launch, console: Console) {
+    if launch.share.index() > 0 {
+        return;
+    }
+    let (others, place) = (
+        launch.share.of() - 1,
+        format!("{}:{}", launch.address, launch.port),
+    );
+    let text = format!("process 0 waits at {place} for the {others} others, five minutes at most");
+    let event = json!({ "event": "waiting", "others": others, "place": place });
+    console.say(&text, &event);
+}
+
+fn read_weights(path: Option<&Path>) -> Result<Option<Weights>, NetError> {
+    path.map(Weights::read).transpose()
+}
+
+fn print_settings(settings: &impl Serialize, console: Console) -> CommandResult {
+    let event = json!({ "event": "settings", "settings": settings });
+    console.say(toml::to_string(settings)?.trim_end(), &event);
+    Ok(Outcome::Whole)
+}
+
+/// Makes the run, and tells how it came out.
+fn train(
+    task: &mut dyn Task,
+    settings: &RunSettings,
+    (arguments, processes): (&RunArguments, Processes),
+    console: Console,
+) -> CommandResult {
+    let stop = processes.resources.stop;
+    let group = processes.group;
+    let process = group.as_ref().map_or(0, |group| group.share().index());
+    let folder = arguments.folder()?;
+    let run = Run::open_among(task, settings, folder, arguments.resume, group)?;
+    if process > 0 {
+        let outcome = run.finish(&stop, &mut OtherProcess { console, process })?;
+        return Ok(outcome_of(&outcome));
+    }
+    let made = run.steps_made();
+    let mut view = View {
+        console,
+        bar: console.progress(settings.steps, "train"),
+    };
+    view.bar.set_position(made);
+    view.bar.reset_eta();
+    let outcome = run.finish(&stop, &mut view)?;
+    view.bar.finish_and_clear();
+    report(&outcome, console);
+    Ok(outcome_of(&outcome))
+}
+
+/// The flag that Ctrl-C and SIGTERM set. Where no launcher has started the program, the second signal ends it at once; launchers
+/// repeat signals themselves.
+fn stop_at_signals(is_launched: bool) -> io::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        if !is_launched {
+            // In this order: the first signal finds the flag not set yet.
+            flag::register_conditional_shutdown(signal, ENDED_BY_SIGNAL, Arc::clone(&stop))?;
+        }
+        flag::register(signal, Arc::clone(&stop))?;
+    }
+    Ok(stop)
+}
+
+fn outcome_of(outcome: &RunOutcome) -> Outcome {
+    if outcome.stopped || outcome.damaged {
+        Outcome::Incomplete
+    } else {
+        Outcome::Whole
+    }
+}
+
+fn report(outcome: &RunOutcome, console: Console) {
+    let files: Vec<String> = outcome
+        .weights
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
+    let end = if outcome.stopped {
+        "stopped; go on with --resume"
+    } else {
+        "done"
+    };
+    console.say(
+        &format!("{} steps, {end}: {}", outcome.steps, files.join(", ")),
+        &json!({
+            "event": "trained", "steps": outcome.steps, "stopped": outcome.stopped,
+            "validation": outcome.figures, "weights": files,
+        }),
+    );
+}
+
+/// Any process but the first says only what it alone knows.
+struct OtherProcess {
+    console: Console,
+    process: u32,
+}
+
+impl TrainObserver for OtherProcess {
+    fn step(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
+
+    fn damaged(&mut self, step: u64, what: &str) {
+        let process = self.process;
+        let event =
+            json!({ "event": "damaged", "step": step, "process": process, "message": what });
+        let line = format!("step {step}, process {process}: left out: {what}");
+        self.console.warn(&line, &event);
+    }
+
+    fn validated(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
+
+    fn saved(&mut self, _: u64, _: &Path) {}
+}
+
+/// Shows a run on the terminal.
+struct View {
+    console: Console,
+    bar: ProgressBar,
+}
+
+impl TrainObserver for View {
+    fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>) {
+        if let Some(loss) = losses.get("loss") {
+            self.bar.set_message(format!("train, loss {loss:.3}"));
+        }
+        self.bar.set_position(step);
+    }
+
+    fn damaged(&mut self, step: u64, what: &str) {
+        let event = json!({ "event": "damaged", "step": step, "message": what });
+        let line = format!("step {step}: left out: {what}");
+        self.bar.suspend(|| self.console.warn(&line, &event));
+    }
+
+    fn validated(&mut self, step: u64, figures: &BTreeMap<String, f64>) {
+        if figures.is_empty() {
+            return;
+        }
+        let text: Vec<String> = figures
+            .iter()
+            .map(|(name, value)| format!("{name} {value:.4}"))
+            .collect();
+        let event = json!({ "event": "validated", "step": step, "figures": figures });
+        let line = format!("step {step}: {}", text.join(", "));
+        self.bar.suspend(|| self.console.say(&line, &event));
+    }
+
+    fn saved(&mut self, step: u64, path: &Path) {
+        if self.console.is_json() {
+            let path = path.display().to_string();
+            let event = json!({ "event": "saved", "step": step, "path": path });
+            self.console.say("", &event);
+        }
+    }
+}

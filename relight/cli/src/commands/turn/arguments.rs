@@ -1,0 +1,256 @@
+//! What `relight turn` is told.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use relight_core::light::{Order, Panorama, ShLight};
+use relight_turn::{
+    BodyKind, Elevation, NormalsSource, Probe, ProbeBall, ProbePlace, ReadTurn, TableSense,
+    TurnOptions, prior_normals,
+};
+
+use crate::shipped;
+use crate::values::YName;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  relight turn 20261120T093015Z-mug.tar --elevation 18 -o mug
+      a turn in unknown light: mug/normal.png, albedo.png, light.json, contact.png, relit.mp4 ...
+  relight turn mug.tar --elevation 18 --light light.txt -o mug
+      the light was measured: coefficients in the viewer's frame at the table's angle 0, or a panorama
+  relight turn mug.tar --rim 812,251 --normals none -o mug
+      the table's rim is an ellipse of 812 x 251 pixels; no network, but the outline to start from";
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// The shard of one turn (.tar), or a folder that holds one turn.
+    #[arg(value_name = "SHARD")]
+    pub(super) shard: PathBuf,
+    /// The folder for the results.
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
+    /// How high the camera looks down on the table, degrees: 0 from the side, 90 from above [default: 18, and 8
+    /// either way].
+    #[arg(long, value_name = "DEGREES", value_parser = elevation, conflicts_with = "rim")]
+    elevation: Option<Elevation>,
+    /// Width and height, pixels, of the ellipse that the table's rim is in the video: another way to say the
+    /// elevation.
+    #[arg(long, value_name = "W,H", value_parser = rim)]
+    rim: Option<Elevation>,
+    /// The light where it is known, in the viewer's frame at the table's angle 0: coefficients of spherical harmonics
+    /// (nine lines of red, green and blue, or up to 49), or a panorama (.hdr, .exr).
+    #[arg(long, value_name = "FILE")]
+    pub(super) light: Option<PathBuf>,
+    /// The session from which the shard was made, or its video: to see the room (room.png), and the ball of --probe. Needs the
+    /// program ffmpeg.
+    #[arg(long, value_name = "PATH")]
+    pub(super) session: Option<PathBuf>,
+    /// A ball on the table, matt grey or chrome, which measures the light: its middle and radius in the video, pixels. The light is
+    /// then in units in which the ball's albedo is 1.
+    #[arg(long, value_name = "X,Y,R", value_parser = probe, requires = "session", conflicts_with = "light")]
+    pub(super) probe: Option<ProbePlace>,
+    /// What the ball is made of: without it, what it looks like.
+    #[arg(long, value_enum, value_name = "KIND", requires = "probe")]
+    pub(super) probe_ball: Option<BallName>,
+    /// Normals to start from: "shipped" (the network that comes with the program), "none", a network (.onnx, or weights
+    /// of decompose: .safetensors, .pth), a map of normals (.png, .exr), or a folder with normal.png
+    /// [default: shipped, and none with --light].
+    #[arg(long, value_name = "FROM")]
+    normals: Option<String>,
+    /// Which way y points in these normals.
+    #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up)]
+    normals_y: YName,
+    /// How much these normals count beside what the turn says.
+    #[arg(long, value_name = "WEIGHT", default_value_t = TurnOptions::default().prior_weight, value_parser = weight)]
+    pub(super) normals_weight: f64,
+    /// What the object is made of: without it, what explains the turn.
+    #[arg(long, value_enum, value_name = "KIND")]
+    pub(super) body: Option<BodyName>,
+    /// Which way the table turns as its angle grows, seen from above.
+    #[arg(long, value_enum, default_value_t = SenseName::CounterClockwise)]
+    sense: SenseName,
+    /// Write the object as one file that can be lit, object.relit.
+    #[arg(long, value_name = "FILE")]
+    pub(super) asset: Option<PathBuf>,
+    /// Write twelve frames with what was found as their truth, in the layout of synth, for train to read.
+    #[arg(long, value_name = "DIR")]
+    pub(super) labels: Option<PathBuf>,
+    /// The least confidence, 0 to 1, of pixels in the labels.
+    #[arg(long, value_name = "PART", default_value_t = 0.3, value_parser = part, requires = "labels")]
+    pub(super) labels_confidence: f32,
+    /// Do not write the video, which needs the program ffmpeg.
+    #[arg(long)]
+    pub(super) no_video: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(super) enum SenseName {
+    /// The background moves to the right.
+    CounterClockwise,
+    /// The background moves to the left.
+    Clockwise,
+}
+
+impl SenseName {
+    /// The name of the other one.
+    pub(super) const fn other(self) -> &'static str {
+        match self {
+            Self::CounterClockwise => "clockwise",
+            Self::Clockwise => "counter-clockwise",
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(super) enum BallName {
+    /// It is matt.
+    Grey,
+    /// It mirrors.
+    Chrome,
+}
+
+impl From<BallName> for ProbeBall {
+    fn from(name: BallName) -> Self {
+        match name {
+            BallName::Grey => Self::Grey,
+            BallName::Chrome => Self::Chrome,
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(super) enum BodyName {
+    /// It scatters light, with gloss or without.
+    Diffuse,
+    /// It only reflects, in its own colour.
+    Metal,
+}
+
+impl From<BodyName> for BodyKind {
+    fn from(name: BodyName) -> Self {
+        match name {
+            BodyName::Diffuse => Self::Diffuse,
+            BodyName::Metal => Self::Metal,
+        }
+    }
+}
+
+impl Arguments {
+    pub(super) const fn sense_name(&self) -> SenseName {
+        self.sense
+    }
+
+    pub(super) fn sense(&self) -> TableSense {
+        match self.sense {
+            SenseName::CounterClockwise => TableSense::CounterClockwise,
+            SenseName::Clockwise => TableSense::Clockwise,
+        }
+    }
+
+    /// The normals to start from, and how they are named.
+    pub(super) fn normals(&self) -> Option<(NormalsSource, &str)> {
+        match self.normals.as_deref() {
+            None if self.light.is_some() || self.probe.is_some() => None,
+            Some("none") => None,
+            None | Some("shipped") => Some((NormalsSource::Own, "shipped")),
+            Some(path) => Some((NormalsSource::of(Path::new(path)), path)),
+        }
+    }
+
+    pub(super) fn probe(&self) -> Option<Probe> {
+        self.probe.map(|place| Probe {
+            place,
+            ball: self.probe_ball.map(ProbeBall::from),
+            elevation: self.elevation(),
+        })
+    }
+
+    pub(super) fn elevation(&self) -> Elevation {
+        let given = self.elevation.or(self.rim);
+        given.unwrap_or_else(Elevation::assumed)
+    }
+
+    /// `measured` is the light by the ball.
+    pub(super) fn options(
+        &self,
+        turn: &ReadTurn,
+        measured: Option<ShLight>,
+    ) -> Result<TurnOptions, Box<dyn Error>> {
+        let prior = self.normals().map(|(source, _)| {
+            prior_normals(
+                &source,
+                shipped::weights,
+                self.normals_y.into(),
+                &turn.first,
+                &turn.mask,
+            )
+        });
+        Ok(TurnOptions {
+            elevation: self.elevation(),
+            light: match &self.light {
+                Some(path) => Some(read_light(path)?),
+                None => measured,
+            },
+            prior: prior.transpose()?,
+            prior_weight: self.normals_weight,
+            body: self.body.map(BodyKind::from),
+        })
+    }
+}
+
+pub(super) fn ball_name(ball: ProbeBall) -> &'static str {
+    match ball {
+        ProbeBall::Grey => "grey",
+        ProbeBall::Chrome => "chrome",
+    }
+}
+
+/// The order to which a panorama is taken up: gloss shows more of it than a matt surface.
+const KNOWN_ORDER: usize = 6;
+
+fn read_light(path: &Path) -> Result<ShLight, Box<dyn Error>> {
+    let is_panorama = path.extension().is_some_and(|ending| {
+        ending.eq_ignore_ascii_case("hdr") || ending.eq_ignore_ascii_case("exr")
+    });
+    if is_panorama {
+        let order = Order::new(KNOWN_ORDER).unwrap_or(Order::TWO);
+        return Ok(Panorama::read(path)?.project(order));
+    }
+    Ok(ShLight::read(path)?)
+}
+
+fn elevation(text: &str) -> Result<Elevation, String> {
+    let degrees = text.parse().map_err(|_| "give degrees".to_owned())?;
+    Elevation::given(degrees).map_err(|error| error.to_string())
+}
+
+fn rim(text: &str) -> Result<Elevation, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(str::parse).collect();
+    match numbers.as_deref() {
+        Ok(&[width, height]) => Elevation::of_rim(width, height).map_err(|error| error.to_string()),
+        _ => Err("give W,H: width and height of the ellipse, pixels".to_owned()),
+    }
+}
+
+fn probe(text: &str) -> Result<ProbePlace, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(str::parse).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, radius]) => ProbePlace::new([x, y], radius).map_err(|error| error.to_string()),
+        _ => Err("give X,Y,R: middle and radius of the ball, pixels".to_owned()),
+    }
+}
+
+fn weight(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(weight) if (0.0..=100.0).contains(&weight) => Ok(weight),
+        _ => Err("give a number from 0 to 100".to_owned()),
+    }
+}
+
+fn part(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(part) if (0.0..=1.0).contains(&part) => Ok(part),
+        _ => Err("give a number from 0 to 1".to_owned()),
+    }
+}

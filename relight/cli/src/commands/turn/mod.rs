@@ -1,0 +1,181 @@
+//! `relight turn`: a whole turn into normals, albedo, light and what they leave over.
+
+mod arguments;
+mod places;
+mod warnings;
+
+use std::error::Error;
+use std::time::Instant;
+
+use relight_turn::{
+    BodyKind, Filmed, ProbeLight, ReadTurn, TurnError, TurnFigures, TurnFiles, TurnLabels,
+    TurnMaps, TurnSolution, film, read_curves, solve_turn,
+};
+use serde_json::json;
+
+use self::arguments::ball_name;
+pub(crate) use self::arguments::{Arguments, EXAMPLES};
+use self::places::{AssetPlace, check_places};
+use self::warnings::{warn, warn_of, warn_of_room, warn_of_sense};
+use crate::console::{CommandResult, Console, Outcome};
+
+pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
+    let start = Instant::now();
+    let asset = check_places(arguments)?;
+    let turn = read(arguments, console)?;
+    let read_seconds = start.elapsed().as_secs_f64();
+    let mut filmed = film_room(arguments, &turn, console)?;
+    let measured = filmed.as_mut().map(Filmed::light).transpose()?.flatten();
+    if let Some(measured) = &measured {
+        warn_of_ball(measured, console);
+    }
+    let light_source = light_source(arguments, measured.as_ref());
+    let options = arguments.options(&turn, measured.map(|measured| measured.light))?;
+    let solution = solve_turn(&turn.curves, &options)?;
+    let strip = filmed.as_ref().and_then(Filmed::strip);
+    let object = match asset {
+        AssetPlace::None => None,
+        AssetPlace::Inside | AssetPlace::Beside(_) => Some(solution.asset(&turn)?),
+    };
+    let figures = TurnFiles {
+        turn: &turn,
+        solution: &solution,
+        maps: &TurnMaps::new(&turn.curves, &solution),
+        light_source: light_source.as_deref(),
+        normals_source: arguments.normals().map(|(_, name)| name),
+        strip,
+        asset: object.as_ref().filter(|_| asset == AssetPlace::Inside),
+        has_movie: !arguments.no_video,
+    }
+    .write(&arguments.output)?;
+    if let (AssetPlace::Beside(path), Some(object)) = (asset, &object) {
+        object.write(path).map_err(TurnError::from)?;
+    }
+    let refused = write_labels(arguments, &turn, &solution)?;
+    say(
+        arguments,
+        &figures,
+        &solution,
+        [start.elapsed().as_secs_f64(), read_seconds],
+        console,
+    );
+    if arguments.session.is_some() {
+        warn_of_room(strip, arguments.sense_name(), console);
+    }
+    // The background, where it was seen, says more.
+    if strip.is_none() {
+        warn_of_sense(&solution, arguments.sense_name(), console);
+    }
+    let outcome = warn_of(&turn, &options, &solution, console);
+    let Some(refused) = refused else {
+        return Ok(outcome);
+    };
+    warn(&refused.to_string(), console);
+    Ok(Outcome::Incomplete)
+}
+
+fn read(arguments: &Arguments, console: Console) -> Result<ReadTurn, TurnError> {
+    let bar = console.progress(0, "frames");
+    let turn = read_curves(&arguments.shard, arguments.sense(), &|done, all| {
+        bar.set_length(all);
+        bar.set_position(done);
+    })?;
+    bar.finish_and_clear();
+    Ok(turn)
+}
+
+/// What the session's video shows, where there is one.
+fn film_room(
+    arguments: &Arguments,
+    turn: &ReadTurn,
+    console: Console,
+) -> Result<Option<Filmed>, TurnError> {
+    let Some(path) = &arguments.session else {
+        return Ok(None);
+    };
+    let bar = console.progress(0, "frames of the video");
+    film(path, turn, arguments.probe(), &|done, all| {
+        bar.set_length(all);
+        bar.set_position(done);
+    })
+    .map(Some)
+}
+
+fn warn_of_ball(measured: &ProbeLight, console: Console) {
+    if measured.ball != measured.looks {
+        let text = format!(
+            "the ball was called {}, but it looks {}",
+            ball_name(measured.ball),
+            ball_name(measured.looks)
+        );
+        warn(&text, console);
+    }
+    if measured.is_doubtful() {
+        let text = format!(
+            "the light by the ball leaves {:.0} % of what varies in it: measure its middle and radius in the video again, and see that nothing shades it",
+            100.0 * measured.left
+        );
+        warn(&text, console);
+    }
+}
+
+/// Where the light is from; none where it is to be found.
+fn light_source(arguments: &Arguments, measured: Option<&ProbeLight>) -> Option<String> {
+    let given = arguments.light.as_ref();
+    let given = given.map(|path| path.display().to_string());
+    given.or_else(|| measured.map(|measured| format!("probe, {}", ball_name(measured.ball))))
+}
+
+/// Writes the labels that are asked for; why there are none.
+fn write_labels(
+    arguments: &Arguments,
+    turn: &ReadTurn,
+    solution: &TurnSolution,
+) -> Result<Option<TurnError>, Box<dyn Error>> {
+    let Some(folder) = &arguments.labels else {
+        return Ok(None);
+    };
+    let labels = TurnLabels {
+        turn,
+        solution,
+        least_confidence: arguments.labels_confidence,
+    };
+    let refused = labels.refusal();
+    if refused.is_none() {
+        labels.write(folder)?;
+    }
+    Ok(refused)
+}
+
+/// Says how it came out.
+fn say(
+    arguments: &Arguments,
+    figures: &TurnFigures,
+    solution: &TurnSolution,
+    [seconds, read_seconds]: [f64; 2],
+    console: Console,
+) {
+    let text = format!(
+        "{}: {} frames in {read_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees (median), light {}, body {}",
+        arguments.output.display(),
+        figures.frames(),
+        solution.expected_error_deg(),
+        match (&arguments.light, arguments.probe) {
+            (Some(_), _) => "given",
+            (None, Some(_)) => "measured",
+            (None, None) => "found",
+        },
+        match solution.body() {
+            BodyKind::Diffuse => "diffuse",
+            BodyKind::Metal => "metal",
+        },
+    );
+    let event = json!({
+        "event": "turned",
+        "output": arguments.output,
+        "seconds": seconds,
+        "reading_seconds": read_seconds,
+        "figures": figures,
+    });
+    console.say(&text, &event);
+}

@@ -1,0 +1,57 @@
+//! Options of new light, which several verbs take.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use relight_core::light::{Panorama, ShLight};
+use relight_photo::insert::{Lamp, LightSource};
+
+/// The new light.
+#[derive(Args)]
+pub(crate) struct NewLightArguments {
+    /// The light: an HDR or EXR panorama, whose middle is what the viewer sees behind the object, or a text file of
+    /// coefficients as relight writes them.
+    #[arg(long, value_name = "FILE", conflicts_with = "lamp")]
+    pub(crate) light: Option<PathBuf>,
+    /// The light: a lamp at so many degrees about the vertical (0 at the viewer's side, 90 on the right, 180 behind) and above
+    /// the horizon, in a colour (#ffd9b0 or 3200K), so many degrees large [default: white, 30].
+    #[arg(
+        long,
+        value_name = "AZIMUTH,ELEVATION[,COLOUR][,SIZE]",
+        allow_hyphen_values = true
+    )]
+    pub(crate) lamp: Option<Lamp>,
+    /// Even light beside a lamp, as a part of it.
+    #[arg(long, value_name = "PART", default_value_t = 0.15, value_parser = part, requires = "lamp")]
+    pub(crate) ambient: f64,
+}
+
+impl NewLightArguments {
+    /// The light that is asked for, if any is.
+    pub(crate) fn read(&self) -> Result<Option<LightSource>, Box<dyn std::error::Error>> {
+        if let Some(lamp) = self.lamp {
+            let ambient = self.ambient;
+            return Ok(Some(LightSource::Lamp(Lamp { ambient, ..lamp })));
+        }
+        self.light.as_deref().map(read_light).transpose()
+    }
+}
+
+/// A panorama, or a text file of coefficients.
+pub(crate) fn read_light(path: &Path) -> Result<LightSource, Box<dyn std::error::Error>> {
+    let is_text = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("txt"));
+    Ok(if is_text {
+        LightSource::Coefficients(ShLight::read(path)?)
+    } else {
+        LightSource::Panorama(Panorama::read(path)?)
+    })
+}
+
+fn part(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(part) if (0.0..=10.0).contains(&part) => Ok(part),
+        _ => Err("give a part from 0 to 10".to_owned()),
+    }
+}

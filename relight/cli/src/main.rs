@@ -1,0 +1,16 @@
+//! `relight`: one verb a file under `commands`; the libraries do the work.
+
+mod command_line;
+mod commands;
+mod console;
+mod folder;
+mod light;
+mod photos;
+mod shipped;
+mod values;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    command_line::run()
+}

@@ -1,0 +1,27 @@
+//! The weights that come with the program.
+
+use relight_nets::{NetError, Weights};
+use relight_photo::decompose::{DecomposeError, Decomposer};
+
+/// Where they stand in the repository.
+const NAME: &str = "relight/cli/weights/decompose.safetensors";
+const BYTES: &[u8] = include_bytes!("../weights/decompose.safetensors");
+
+/// The weights of the decomposing network.
+///
+/// # Errors
+/// [`NetError::File`] where the program was built with a damaged file.
+pub(crate) fn weights() -> Result<Weights, NetError> {
+    Weights::from_bytes(BYTES).map_err(|fault| NetError::File {
+        path: NAME.into(),
+        fault,
+    })
+}
+
+/// The decomposing network with these weights.
+///
+/// # Errors
+/// As [`weights`].
+pub(crate) fn decomposer() -> Result<Decomposer, DecomposeError> {
+    Decomposer::new(&weights()?)
+}

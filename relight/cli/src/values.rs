@@ -1,0 +1,44 @@
+//! Values of options that several verbs take.
+
+use clap::ValueEnum;
+use relight_core::image::Transfer;
+use relight_core::light::NormalsFrame;
+
+/// How integers in files of colour are encoded.
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum TransferName {
+    /// The transfer function of sRGB.
+    Srgb,
+    /// The power 1 / 2.2.
+    Gamma22,
+    /// In proportion to light.
+    Linear,
+}
+
+impl From<TransferName> for Transfer {
+    fn from(name: TransferName) -> Self {
+        match name {
+            TransferName::Srgb => Self::Srgb,
+            TransferName::Gamma22 => Self::Gamma22,
+            TransferName::Linear => Self::Linear,
+        }
+    }
+}
+
+/// Which way y points in maps of normals.
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum YName {
+    /// As relight writes them.
+    Up,
+    /// As in the paper's figures and released code and data.
+    Down,
+}
+
+impl From<YName> for NormalsFrame {
+    fn from(name: YName) -> Self {
+        match name {
+            YName::Up => Self::YUp,
+            YName::Down => Self::YDown,
+        }
+    }
+}

@@ -1,0 +1,520 @@
+//! `relight relight` and `relight insert` from outside: what it writes, and what it refuses. The network is not trained.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
+use std::fs::{self, File};
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use image::{GrayImage, Luma, Rgb, RgbImage};
+use relight_core::asset::Asset;
+use relight_core::files::{read_planes, write_exr};
+use relight_core::image::{ColourSpace, Extent, Planes, Rgb as Picture, Srgb};
+use relight_core::light::{Normals, Order, Panorama, ShLight};
+use relight_core::render::Surface;
+use relight_nets::{WeightPrecision, Weights, decomposer};
+
+const WIDTH: u32 = 64;
+const HEIGHT: u32 = 48;
+
+fn is_inside(x: u32, y: u32) -> bool {
+    (f64::from(x) - 32.0).hypot(f64::from(y) - 24.0) < 18.0
+}
+
+fn photo() -> RgbImage {
+    RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        if is_inside(x, y) {
+            Rgb([110 + x as u8, 100, 60 + 2 * y as u8])
+        } else {
+            Rgb([70, 120, 200])
+        }
+    })
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    /// Two photographs, a folder of their masks, a panorama, and weights.
+    fn new() -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        for name in ["photos", "masks"] {
+            fs::create_dir(folder.path(name)).unwrap();
+        }
+        let mask = GrayImage::from_fn(WIDTH, HEIGHT, |x, y| {
+            Luma([if is_inside(x, y) { 255 } else { 0 }])
+        });
+        for name in ["one", "two"] {
+            photo()
+                .save(folder.path(&format!("photos/{name}.png")))
+                .unwrap();
+            mask.save(folder.path(&format!("masks/{name}.png")))
+                .unwrap();
+        }
+        let light = ShLight::even(Order::TWO, [0.5, 1.0, 2.0]);
+        let panorama = Panorama::of_light(&light, Extent::new(32, 16));
+        panorama.image().write_exr(&folder.path("sky.exr")).unwrap();
+        let weights = Weights::initial(&decomposer(), 3);
+        weights
+            .write(&folder.path("w.safetensors"), WeightPrecision::Half)
+            .unwrap();
+        folder
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn run(&self, arguments: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_relight"))
+            .args(arguments.split(' '))
+            .current_dir(self.0.path())
+            .output()
+            .unwrap()
+    }
+
+    /// Exit code and what was written on standard error.
+    fn told(&self, arguments: &str) -> (i32, String) {
+        let output = self.run(arguments);
+        let errors = String::from_utf8(output.stderr).unwrap();
+        (output.status.code().unwrap(), errors)
+    }
+
+    fn names_in(&self, name: &str) -> Vec<String> {
+        let entries = fs::read_dir(self.path(name)).unwrap();
+        let mut names: Vec<String> = entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+#[test]
+fn photographs_of_a_pattern_are_relit_before_the_panorama_and_what_has_no_mask_is_named() {
+    let folder = Folder::new();
+    photo().save(folder.path("photos/three.png")).unwrap();
+    let (code, errors) = folder
+        .told("relight photos/*.png --mask masks --light sky.exr --compare --weights w.safetensors -o out");
+    assert_eq!(code, 3, "{errors}");
+    assert!(
+        errors.contains("photos/three.png: there is no mask"),
+        "{errors}"
+    );
+    assert_eq!(folder.names_in("out"), ["one.png", "two.png"]);
+    let (sheet, _) = read_planes(&folder.path("out/one.png")).unwrap();
+    assert_eq!(
+        sheet.extent(),
+        Extent::new(3 * WIDTH as usize, HEIGHT as usize)
+    );
+    // The photograph, naive insertion before the sky, and the object in that light.
+    assert!((sheet.pixel(2, 2)[2] - 200.0 / 255.0).abs() < 1e-3);
+    assert_ne!(sheet.pixel(2 + WIDTH as usize, 2), sheet.pixel(2, 2));
+    let pixel = |tile: usize| sheet.pixel(32 + tile * WIDTH as usize, 24);
+    assert_eq!(pixel(0), pixel(1));
+    assert!(pixel(2)[2] > pixel(0)[2]);
+}
+
+#[test]
+fn the_photograph_s_own_light_gives_the_photograph_back_and_exr_is_linear() {
+    let folder = Folder::new();
+    let command = "relight photos/one.png --mask masks/one.png --own-light --weights w.safetensors";
+    let (code, errors) = folder.told(&format!("{command} -o same.png"));
+    assert_eq!((code, errors.as_str()), (0, ""));
+    let same = image::open(folder.path("same.png")).unwrap().into_rgb8();
+    for (a, b) in same.pixels().zip(photo().pixels()) {
+        assert!((0..3).all(|c| a.0[c].abs_diff(b.0[c]) <= 1), "{a:?} {b:?}");
+    }
+    assert_eq!(
+        folder
+            .told(&format!("{command} --exposure 1 -o twice.exr"))
+            .0,
+        0
+    );
+    let (twice, _) = read_planes(&folder.path("twice.exr")).unwrap();
+    let sky = Srgb::to_linear(200.0 / 255.0);
+    assert!((twice.pixel(0, 0)[2] - sky).abs() < 1e-4);
+}
+
+#[test]
+fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
+    let folder = Folder::new();
+    GrayImage::new(WIDTH, HEIGHT)
+        .save(folder.path("empty.png"))
+        .unwrap();
+    GrayImage::new(9, 9).save(folder.path("small.png")).unwrap();
+    let extent = Extent::new(WIDTH as usize, HEIGHT as usize);
+    let odd = Planes::from_fn(extent, |x, _| [if x == 5 { f32::NAN } else { 0.5 }; 3]);
+    write_exr(&folder.path("odd.exr"), &odd).unwrap();
+    let sky = Planes::from_fn(Extent::new(32, 16), |x, _| {
+        [if x == 5 { f32::NAN } else { 0.5 }; 3]
+    });
+    write_exr(&folder.path("odd-sky.exr"), &sky).unwrap();
+    let black = Panorama::of_light(&ShLight::dark(Order::TWO), Extent::new(32, 16));
+    black.image().write_exr(&folder.path("black.exr")).unwrap();
+    fs::write(folder.path("text.txt"), "1 2 3\n1 2\n").unwrap();
+    huge(&folder.path("huge.png"));
+    let one = "relight photos/one.png";
+    for (command, code, expected) in [
+        (
+            format!("{one} --lamp 30,40 -o o.png"),
+            1,
+            "does not say where the object is",
+        ),
+        (
+            format!("{one} --mask empty.png --lamp 30,40 -o o.png"),
+            1,
+            "the mask is empty",
+        ),
+        (
+            format!("{one} --mask small.png --lamp 30,40 -o o.png"),
+            1,
+            "the mask has 9 x 9 pixels, and the photograph 64 x 48",
+        ),
+        (
+            format!("{one} --mask masks/one.png --light photos/two.png -o o.png"),
+            1,
+            "a panorama is an HDR or EXR file",
+        ),
+        (
+            format!("{one} --mask masks/one.png --light odd.exr -o o.png"),
+            1,
+            "odd.exr has 64 x 48 pixels; a panorama is twice as wide as high",
+        ),
+        (
+            format!("{one} --mask masks/one.png --light odd-sky.exr -o o.png"),
+            1,
+            "odd-sky.exr is no panorama: the light has a value that is infinite or not a number",
+        ),
+        (
+            format!(
+                "{one} --mask masks/one.png --light black.exr --weights w.safetensors -o o.png"
+            ),
+            1,
+            "the light is dark",
+        ),
+        (
+            format!("{one} --mask masks/one.png --light text.txt -o o.png"),
+            1,
+            "line 2 of the coefficients",
+        ),
+        (
+            "relight odd.exr --mask masks/one.png --lamp 0,0 --weights w.safetensors -o o.png"
+                .to_owned(),
+            1,
+            "not a number at column 5, row 0",
+        ),
+        (
+            "relight huge.png --mask masks/one.png --lamp 0,0 -o o.png".to_owned(),
+            1,
+            "20000 x 20000 pixels, and at most",
+        ),
+        (
+            "relight none.png --lamp 0,0 -o o.png".to_owned(),
+            1,
+            "none.png cannot be read",
+        ),
+        (
+            "relight none*.png --lamp 0,0 -o o".to_owned(),
+            1,
+            "none*.png names no file",
+        ),
+        (format!("{one} -o o.png"), 2, "--lamp AZIMUTH,ELEVATION"),
+        (
+            format!("{one} --lamp 30 -o o.png"),
+            2,
+            "give AZIMUTH,ELEVATION",
+        ),
+        (
+            format!("{one} --lamp 30,40 -o o.mp4"),
+            2,
+            "give .png or .exr, or --turn DEGREES",
+        ),
+        (
+            format!("{one} --lamp 30,40 --turn 360 -o o.png"),
+            2,
+            "give .mp4 or .webm",
+        ),
+        (
+            format!("{one} --lamp 30,40 -o o.bmp"),
+            2,
+            "give .png or .exr",
+        ),
+        (
+            format!("{one} --lamp 30,40 --background light -o o.png"),
+            2,
+            "there is no panorama",
+        ),
+        (
+            format!("{one} --lamp 30,40 --gloss 2,5 -o o.png"),
+            2,
+            "a part from 0 to 1",
+        ),
+        (
+            format!("{one} --lamp 30,40 -o o.png --trust o.jpg"),
+            2,
+            "--trust o.jpg: give a .png",
+        ),
+        (
+            format!("{one} --lamp 30,40 -o o.png --trust o.png"),
+            2,
+            "that is not --output",
+        ),
+        (
+            format!(
+                "{one} --mask masks/one.png --lamp 30,40 --weights w.safetensors -o o.png --trust none/t.png"
+            ),
+            1,
+            "none is no folder",
+        ),
+    ] {
+        let (found, errors) = folder.told(&command);
+        assert_eq!(found, code, "{command}: {errors}");
+        assert!(errors.contains(expected), "{command}: {errors}");
+    }
+    for name in ["o.png", "o.mp4", "o.bmp", "o"] {
+        assert!(!folder.path(name).exists(), "{name}");
+    }
+}
+
+#[test]
+fn no_file_that_is_read_is_overwritten() {
+    let folder = Folder::new();
+    let files = [
+        "photos/one.png",
+        "masks/one.png",
+        "photos/two.png",
+        "sky.exr",
+    ];
+    let before = files.map(|name| fs::read(folder.path(name)).unwrap());
+    let given =
+        "relight photos/one.png --mask masks/one.png --weights w.safetensors --light sky.exr";
+    let inserted = "insert photos/one.png --mask masks/one.png --weights w.safetensors --into";
+    for command in [
+        format!("{given} -o photos/one.png"),
+        format!("{given} -o ./masks/one.png"),
+        format!("{given} -o sky.exr"),
+        format!("{given} -o o.png --trust masks/one.png"),
+        "relight photos --mask masks --weights w.safetensors --lamp 30,40 -o masks".to_owned(),
+        format!("{inserted} photos/two.png -o photos/two.png"),
+        format!("{inserted} sky.exr -o masks/one.png"),
+    ] {
+        let (code, errors) = folder.told(&command);
+        assert_eq!(code, 1, "{command}: {errors}");
+        assert!(errors.contains("is read as well"), "{command}: {errors}");
+        let after = files.map(|name| fs::read(folder.path(name)).unwrap());
+        assert!(before == after, "{command}");
+    }
+    assert!(!folder.path("o.png").exists());
+}
+
+/// On a full disk, ffmpeg says so and ends without an error.
+#[cfg(unix)]
+#[test]
+fn a_video_of_which_ffmpeg_says_that_it_failed_is_not_left() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = Folder::new();
+    fs::create_dir(folder.path("bin")).unwrap();
+    let script = "#!/bin/sh\ncat > /dev/null\nfor last; do :; done\necho part > \"$last\"\n\
+                  echo 'Error writing trailer: No space left on device' >&2\n";
+    fs::write(folder.path("bin/ffmpeg"), script).unwrap();
+    fs::set_permissions(folder.path("bin/ffmpeg"), fs::Permissions::from_mode(0o755)).unwrap();
+    let path = format!(
+        "{}:{}",
+        folder.path("bin").display(),
+        std::env::var("PATH").unwrap()
+    );
+    let command = "relight photos/one.png --mask masks/one.png --weights w.safetensors \
+                   --lamp 30,40 --turn 90 --seconds 0.1 -o turn.mp4";
+    let output = Command::new(env!("CARGO_BIN_EXE_relight"))
+        .args(command.split_whitespace())
+        .env("PATH", path)
+        .current_dir(folder.0.path())
+        .output()
+        .unwrap();
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(errors.contains("No space left on device"), "{errors}");
+    let names = folder.names_in(".");
+    assert!(!names.iter().any(|name| name.contains("turn")), "{names:?}");
+}
+
+/// A PNG that says it has 20 000 x 20 000 pixels, and holds none.
+fn huge(path: &std::path::Path) {
+    let mut encoder = png::Encoder::new(File::create(path).unwrap(), 20_000, 20_000);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    let mut writer = encoder.write_header().unwrap();
+    writer
+        .write_chunk(png::chunk::IDAT, &[0x78, 0x9c, 0x03, 0x00])
+        .unwrap();
+}
+
+#[test]
+fn a_turn_is_a_video_of_as_many_frames() {
+    if Command::new("ffmpeg").arg("-version").output().is_err() {
+        eprintln!("skipped: the program ffmpeg is not installed");
+        return;
+    }
+    let folder = Folder::new();
+    let command = "relight photos/one.png --mask masks/one.png --light sky.exr --turn 360 --seconds 0.5 --fps 12 \
+                   --size 32 --weights w.safetensors --json -o turn.mp4";
+    let output = folder.run(&command.split_whitespace().collect::<Vec<_>>().join(" "));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let event: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(event["frames"], 6);
+    let probed = Command::new("ffprobe")
+        .args([
+            "-v",
+            "error",
+            "-count_frames",
+            "-of",
+            "csv=p=0",
+            "-show_entries",
+            "stream=width,height,nb_read_frames",
+        ])
+        .arg(folder.path("turn.mp4"))
+        .output()
+        .unwrap();
+    assert_eq!(String::from_utf8_lossy(&probed.stdout).trim(), "32,24,6");
+}
+
+#[test]
+fn objects_are_inserted_from_back_to_front_by_options_and_by_a_scene_file() {
+    let folder = Folder::new();
+    let common = "--weights w.safetensors -o";
+    let options = "insert photos/one.png photos/two.png --mask masks --into sky.exr --size 96,64 --at 0.3,0.9 --at 0.7,0.9 --height 0.5";
+    let (code, errors) = folder.told(&format!("{options} {common} options.png"));
+    assert_eq!((code, errors.as_str()), (0, ""));
+    let scene = "background = \"sky.exr\"\nsize = [96, 64]\n\
+                 [[object]]\nphoto = \"photos/one.png\"\nmask = \"masks/one.png\"\nat = [0.3, 0.9]\nheight = 0.5\n\
+                 [[object]]\nphoto = \"photos/two.png\"\nmask = \"masks/two.png\"\nat = [0.7, 0.9]\nheight = 0.5\n";
+    fs::write(folder.path("scene.toml"), scene).unwrap();
+    assert_eq!(
+        folder
+            .told(&format!("insert --scene scene.toml {common} file.png"))
+            .0,
+        0
+    );
+    let [a, b] = ["options.png", "file.png"].map(|name| read_planes(&folder.path(name)).unwrap().0);
+    assert_eq!(a, b);
+    assert_eq!(a.extent(), Extent::new(96, 64));
+    // The sky is blue, what stands before it is not as blue.
+    assert!(a.pixel(2, 2)[2] > 1.3 * a.pixel(2, 2)[0]);
+    assert_ne!(a.pixel(29, 44), a.pixel(2, 44));
+    // Into a photograph, 16 bits.
+    let command = format!(
+        "insert photos/one.png --mask masks/one.png --into photos/two.png --bits 16 {common} deep.png"
+    );
+    assert_eq!(folder.told(&command).0, 0);
+    assert_eq!(
+        image::open(folder.path("deep.png")).unwrap().color(),
+        image::ColorType::Rgb16
+    );
+}
+
+#[test]
+fn a_captured_object_is_inserted_beside_photographs_and_needs_no_mask() {
+    let folder = Folder::new();
+    let normals = Normals::sphere(40);
+    let full = Planes::filled(normals.extent(), [1.0]);
+    let albedo = Picture::new(Planes::filled(normals.extent(), [0.7, 0.1, 0.1]));
+    let surface = Surface::new(normals, albedo, None).unwrap();
+    let asset = Asset::new("red", surface, full.clone(), full).unwrap();
+    asset.write(&folder.path("red.relit")).unwrap();
+    let common = "--into sky.exr --size 96,64 --height 0.5 --weights w.safetensors -o";
+    let command = format!("insert photos/one.png red.relit --mask masks {common} both.png");
+    assert_eq!(folder.told(&command), (0, String::new()));
+    let (picture, _) = read_planes(&folder.path("both.png")).unwrap();
+    let red = picture.pixel(72, 42);
+    // In light as blue as this, paper would be blue.
+    assert!(red[0] > red[2], "{red:?}");
+
+    let command = format!("insert red.relit --mask masks/one.png {common} none.png");
+    let (code, errors) = folder.told(&command);
+    assert!(code == 1 && errors.contains("its own mask"), "{errors}");
+    fs::write(folder.path("red.relit"), b"PK").unwrap();
+    let (code, errors) = folder.told(&format!("insert red.relit {common} none.png"));
+    assert!(code == 1 && errors.contains("red.relit"), "{errors}");
+    assert!(!folder.path("none.png").exists());
+}
+
+#[test]
+fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
+    let folder = Folder::new();
+    fs::write(
+        folder.path("odd.toml"),
+        "background = \"sky.exr\"\nhight = 3\n",
+    )
+    .unwrap();
+    fs::write(folder.path("none.toml"), "background = \"none.exr\"\n[[object]]\nphoto = \"photos/one.png\"\nmask = \"masks/one.png\"\n").unwrap();
+    let one = "insert photos/one.png --mask masks/one.png";
+    for (command, code, expected) in [
+        (
+            "insert --scene odd.toml -o o.png".to_owned(),
+            1,
+            "unknown field `hight`",
+        ),
+        (
+            "insert --scene none.toml -o o.png".to_owned(),
+            1,
+            "none.exr cannot be read",
+        ),
+        (
+            "insert --scene missing.toml -o o.png".to_owned(),
+            1,
+            "missing.toml cannot be read",
+        ),
+        (
+            format!("{one} --into sky.exr --height 9 -o o.png"),
+            1,
+            "object 1: height is 9",
+        ),
+        (
+            format!("{one} --into sky.exr --lamp 5 -o o.png"),
+            1,
+            "light.lamp: give AZIMUTH,ELEVATION",
+        ),
+        (
+            format!("{one} --into photos/two.png -o o.mp4"),
+            1,
+            "a photograph does not move",
+        ),
+        (
+            format!("{one} --into sky.exr -o o.mp4"),
+            1,
+            "a panorama moves with --turn DEGREES",
+        ),
+        (
+            format!("{one} --into sky.exr --at 0.1,0.2 --at 0.3,0.4 -o o.png"),
+            2,
+            "--at is given 2 times for 1 photographs",
+        ),
+        (
+            "insert photos/one.png photos/two.png --mask masks/one.png --into sky.exr -o o.png"
+                .to_owned(),
+            2,
+            "give a folder of masks",
+        ),
+        (
+            format!("{one} --into sky.exr -o o.bmp"),
+            2,
+            "give .png, .exr, .mp4 or .webm",
+        ),
+    ] {
+        let (found, errors) = folder.told(&command);
+        assert_eq!(found, code, "{command}: {errors}");
+        assert!(errors.contains(expected), "{command}: {errors}");
+    }
+    for name in ["o.png", "o.mp4", "o.bmp"] {
+        assert!(!folder.path(name).exists(), "{name}");
+    }
+}

@@ -1,0 +1,194 @@
+//! `relight render` from outside: files in, files out, exit codes.
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test fails by a panic, in its helpers too"
+)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use relight_core::image::{Depth, Rgb, Transfer};
+use relight_core::light::{Normals, Order, ShLight};
+
+/// A folder with a ball's normals, y up and y down, and light from above.
+struct Scene {
+    folder: tempfile::TempDir,
+}
+
+impl Scene {
+    fn new() -> Self {
+        let scene = Self {
+            folder: tempfile::tempdir().unwrap(),
+        };
+        let normals = Normals::sphere(24);
+        normals
+            .write_png(&scene.path("up.png"), Depth::Sixteen)
+            .unwrap();
+        let down = normals.flipped();
+        down.write_png(&scene.path("down.png"), Depth::Sixteen)
+            .unwrap();
+        let mut light = ShLight::even(Order::TWO, [1.0; 3]);
+        light.coefficients_mut()[1] = [1.5; 3];
+        light.write(&scene.path("light.txt")).unwrap();
+        scene
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Runs `relight render` in the folder.
+    fn render(&self, arguments: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_relight"))
+            .arg("render")
+            .args(arguments.split(' '))
+            .current_dir(self.folder.path())
+            .output()
+            .unwrap()
+    }
+
+    fn image(&self, name: &str) -> Rgb<relight_core::image::Linear> {
+        Rgb::read(&self.path(name), Transfer::Srgb).unwrap()
+    }
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().unwrap()
+}
+
+fn errors(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+fn names_in(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<_> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn light_from_above_lights_the_upper_half_whichever_way_y_points_in_the_file() {
+    let scene = Scene::new();
+    for (map, way) in [("up.png", "up"), ("down.png", "down")] {
+        let output = scene.render(&format!(
+            "--normals {map} --normals-y {way} --light light.txt -o {way}-lit.png"
+        ));
+        assert_eq!(code(&output), 0, "{}", errors(&output));
+        let image = scene.image(&format!("{way}-lit.png"));
+        let [above, below] = [3, 20].map(|y| image.planes().pixel(12, y)[0]);
+        assert!(above > 1.5 * below, "{way}: {above} {below}");
+        assert_eq!(image.planes().pixel(0, 0), [0.0; 3]);
+    }
+}
+
+#[test]
+fn a_turn_into_a_folder_has_a_numbered_frame_for_each_step() {
+    let scene = Scene::new();
+    let output = scene.render("--normals up.png --light light.txt --turn 5 --json -o turn");
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    let expected: Vec<_> = (0..5).map(|frame| format!("{frame:04}.png")).collect();
+    assert_eq!(names_in(&scene.path("turn")), expected);
+    let event: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(event["event"], "rendered");
+    assert_eq!(event["frames"], 5);
+}
+
+#[test]
+fn an_exr_holds_light_in_the_exposure_that_was_asked_for() {
+    let scene = Scene::new();
+    let red = |stops: &str| {
+        let output = scene.render(&format!(
+            "--normals up.png --albedo 1 --light light.txt --exposure {stops} -o lit.exr"
+        ));
+        assert_eq!(code(&output), 0, "{}", errors(&output));
+        scene.image("lit.exr").planes().pixel(12, 2)[0]
+    };
+    let ratio = red("2") / red("-1");
+    assert!((ratio - 8.0).abs() < 1e-4, "{ratio}");
+}
+
+#[test]
+fn a_sweep_is_one_sheet_of_six_by_four() {
+    let scene = Scene::new();
+    let output = scene.render("--normals up.png --light light.txt --sweep -o sheet.png");
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    let extent = scene.image("sheet.png").planes().extent();
+    assert_eq!((extent.width, extent.height), (6 * 24, 4 * 24));
+}
+
+#[test]
+fn the_light_that_is_saved_gives_the_same_picture() {
+    let scene = Scene::new();
+    let first = scene.render(
+        "--normals up.png --light light.txt --turned 70 --save-light turned.txt -o first.png",
+    );
+    let second = scene.render("--normals up.png --light turned.txt -o second.png");
+    assert_eq!((code(&first), code(&second)), (0, 0));
+    let [first, second] =
+        ["first.png", "second.png"].map(|name| fs::read(scene.path(name)).unwrap());
+    assert_eq!(first, second);
+}
+
+#[test]
+fn a_file_that_is_missing_or_wrong_is_named_in_one_line_and_the_code_is_1() {
+    let scene = Scene::new();
+    fs::write(scene.path("short.txt"), "1 2 3\n4 5\n").unwrap();
+    fs::write(scene.path("taken"), "a file").unwrap();
+    let cases = [
+        (
+            "--normals none.png --light light.txt -o a.png",
+            "none.png cannot be read",
+        ),
+        (
+            "--normals up.png --light short.txt -o a.png",
+            "short.txt holds no light: line 2",
+        ),
+        (
+            "--normals up.png --panorama up.png -o a.png",
+            "up.png holds 8- or 16-bit integers",
+        ),
+        (
+            "--normals up.png --light light.txt -o none/a.png",
+            "none/a.png cannot be written",
+        ),
+        (
+            "--normals up.png --light light.txt --turn 2 -o taken",
+            "taken cannot be made",
+        ),
+        (
+            "--normals up.png --light light.txt --turn 2 -o .",
+            ". is not empty",
+        ),
+    ];
+    for (arguments, expected) in cases {
+        let output = scene.render(arguments);
+        let errors = errors(&output);
+        assert_eq!(code(&output), 1, "{arguments}");
+        assert!(errors.contains(expected), "{errors}");
+        assert_eq!(errors.lines().count(), 1, "{errors}");
+    }
+    assert!(!scene.path("a.png").exists());
+}
+
+#[test]
+fn wrong_usage_is_told_with_code_2() {
+    let scene = Scene::new();
+    for arguments in [
+        "--normals up.png -o a.png",
+        "--normals up.png --light light.txt --turn 5 -o a.png",
+        "--normals up.png --light light.txt -o folder",
+        "--normals up.png --light light.txt --albedo 1,2 -o a.png",
+        "--normals up.png --light light.txt --turned nan -o a.png",
+        "--normals up.png --light light.txt --panorama a.hdr -o a.png",
+        "--normals up.png --light light.txt --sweep --turn 4 -o a.mp4",
+        "--normals up.png --light light.txt --turn 4 -o a.gif",
+        "--normals up.png --light light.txt --smoothness 5,6,7 -o a.png",
+    ] {
+        let output = scene.render(arguments);
+        assert_eq!(code(&output), 2, "{arguments}: {}", errors(&output));
+    }
+}

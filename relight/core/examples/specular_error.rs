@@ -1,0 +1,121 @@
+//! The specular layers' errors against Monte Carlo integration of Blinn and Phong's highlight, on a
+//! sphere under each panorama of a folder, as a table in Markdown.
+//!
+//!     cargo run --release -p relight --example specular_error -- FOLDER [SAMPLES]
+#![allow(clippy::print_stdout, reason = "it prints a table")]
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use relight_core::image::{Linear, Rgb};
+use relight_core::light::{Normals, Order, Panorama, YUp};
+use relight_core::render::{Gloss, Horizon, LobeLayer, MonteCarlo, PowerLayer};
+
+const SMOOTHNESSES: [f32; 6] = [5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
+
+/// Pixels of the sphere's picture, across.
+const SIDE: usize = 16;
+
+/// The columns of the table, apart from the smoothness.
+const COLUMNS: [&str; 8] = [
+    "Monte Carlo's own",
+    "paper's formula",
+    "the same, best scale",
+    "lobe, order 2",
+    "lobe, order 8",
+    "lobe, order 24",
+    "lobe, order 48",
+    "closed horizon",
+];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let folder = arguments.next().ok_or("give a folder of panoramas")?;
+    let samples = arguments.next().map_or(Ok(4096), |text| text.parse())?;
+    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)?
+        .map(|entry| entry.map(|entry| entry.path()))
+        .collect::<Result<_, _>>()?;
+    paths.retain(|path| path.extension().is_some_and(|e| e == "hdr" || e == "exr"));
+    paths.sort();
+
+    let normals = Normals::sphere(SIDE);
+    let mut errors = vec![Vec::new(); SMOOTHNESSES.len()];
+    for path in &paths {
+        let panorama = Panorama::read(path)?;
+        for (errors, smoothness) in errors.iter_mut().zip(SMOOTHNESSES) {
+            errors.push(row(&panorama, &normals, smoothness, samples)?);
+        }
+    }
+
+    println!("{} panoramas, {samples} samples a normal.", paths.len());
+    println!(
+        "Root mean square error over that of the truth, mean (and largest) over the panoramas.\n"
+    );
+    println!("| α | {} |", COLUMNS.join(" | "));
+    println!("| ---{} |", " | ---".repeat(COLUMNS.len()));
+    for (rows, smoothness) in errors.iter().zip(SMOOTHNESSES) {
+        let cells = (0..COLUMNS.len()).map(|column| {
+            let mean = rows.iter().map(|row| row[column]).sum::<f64>() / rows.len() as f64;
+            let most = rows.iter().map(|row| row[column]).fold(0.0, f64::max);
+            format!("{} ({})", percent(mean), percent(most))
+        });
+        println!(
+            "| {smoothness} | {} |",
+            cells.collect::<Vec<_>>().join(" | ")
+        );
+    }
+    Ok(())
+}
+
+/// The errors under one panorama, in the order of the columns.
+fn row(
+    panorama: &Panorama,
+    normals: &Normals<YUp>,
+    smoothness: f32,
+    samples: u32,
+) -> Result<[f64; COLUMNS.len()], Box<dyn Error>> {
+    let gloss = Gloss::even(normals.extent(), [1.0; 3], smoothness);
+    let integrator = MonteCarlo::new(panorama, samples);
+    let [truth, standard] = integrator.highlights(normals, &gloss, 1)?;
+    let integrator = integrator.with_horizon(Horizon::Closed);
+    let [closed, _] = integrator.highlights(normals, &gloss, 1)?;
+
+    let all = panorama.project(Order::new(48)?);
+    let lobe = |order: usize| -> Result<f64, Box<dyn Error>> {
+        let layer = LobeLayer::new(&all.with_order(Order::new(order)?));
+        Ok(error(&layer.highlight(normals, &gloss)?, &truth, 1.0))
+    };
+    let power = PowerLayer::new(&all).highlight(normals, &gloss)?;
+    let scale = inner(&power, &truth) / inner(&power, &power);
+    Ok([
+        (inner(&standard, &standard) / inner(&truth, &truth)).sqrt(),
+        error(&power, &truth, 1.0),
+        error(&power, &truth, scale),
+        lobe(2)?,
+        lobe(8)?,
+        lobe(24)?,
+        lobe(48)?,
+        error(&closed, &truth, 1.0),
+    ])
+}
+
+/// The root mean square of `scale * ours - truth`, over that of `truth`.
+fn error(ours: &Rgb<Linear>, truth: &Rgb<Linear>, scale: f64) -> f64 {
+    let squares = scale * scale * inner(ours, ours) - 2.0 * scale * inner(ours, truth);
+    (squares / inner(truth, truth) + 1.0).max(0.0).sqrt()
+}
+
+fn inner(a: &Rgb<Linear>, b: &Rgb<Linear>) -> f64 {
+    let planes = a.planes().planes().into_iter().zip(b.planes().planes());
+    let values = planes.flat_map(|(a, b)| a.iter().zip(b));
+    values.map(|(&a, &b)| f64::from(a) * f64::from(b)).sum()
+}
+
+/// Three figures; percent up to a hundredfold.
+fn percent(part: f64) -> String {
+    match part {
+        part if part < 0.1 => format!("{:.2} %", 100.0 * part),
+        part if part < 100.0 => format!("{:.1} %", 100.0 * part),
+        part => format!("{part:.0} ×"),
+    }
+}

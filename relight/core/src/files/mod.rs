@@ -1,0 +1,11 @@
+//! Everything that knows paths: pictures and light in files, an object's maps, videos, folders of results.
+
+mod maps;
+mod movie;
+mod pictures;
+mod result_folder;
+
+pub use maps::{Map, MapFiles};
+pub use movie::{MovieError, MovieFormat, MovieReader, MovieWriter};
+pub use pictures::{read_planes, write_exr, write_png};
+pub use result_folder::{FolderFault, ResultFolder};

@@ -1,0 +1,283 @@
+//! Pictures, panoramas, maps of normals, coefficients of light and captured objects in files.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
+
+use relit_data::durable::{Partial, write_whole};
+
+use crate::asset::{Asset, AssetError};
+use crate::image::{
+    Depth, Gamma22, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
+    encode_exr, encode_png,
+};
+use crate::light::{LightFileError, Normals, Panorama, PanoramaError, ShLight, YAxis};
+
+/// Writes values of 0 to 1 as integers; others are clipped.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn write_png(path: &Path, planes: &Planes<3>, depth: Depth) -> Result<(), ImageError> {
+    write(path, &encode_png(path, planes, depth)?)
+}
+
+/// Writes the values as they are, 32-bit floating point.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn write_exr(path: &Path, planes: &Planes<3>) -> Result<(), ImageError> {
+    write(path, &encode_exr(path, planes)?)
+}
+
+/// Reads the colours of an image as [`StoredImage::read`], and says what its numbers were.
+///
+/// # Errors
+/// Where the file cannot be read or is no image of a known format.
+pub fn read_planes(path: &Path) -> Result<(Planes<3>, Samples), ImageError> {
+    let image = StoredImage::read(path)?;
+    Ok((image.planes, image.samples))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
+    write_whole(path, bytes).map_err(|source| ImageError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+impl StoredImage {
+    /// Reads an image; see [`StoredImage::from_bytes`].
+    ///
+    /// # Errors
+    /// Where the file cannot be read or is no image of a known format.
+    pub fn read(path: &Path) -> Result<Self, ImageError> {
+        let bytes = fs::read(path).map_err(|source| ImageError::Open {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::from_bytes(path, &bytes)
+    }
+}
+
+impl Rgb<Linear> {
+    /// Reads a PNG or JPEG, whose values are encoded as `transfer` says, or an EXR or HDR, which are
+    /// linear. Alpha is left out; grey becomes three equal channels.
+    ///
+    /// # Errors
+    /// Where the file cannot be read or is no image of these formats.
+    pub fn read(path: &Path, transfer: Transfer) -> Result<Self, ImageError> {
+        let (planes, samples) = read_planes(path)?;
+        Ok(match (samples, transfer) {
+            (Samples::Float, _) | (Samples::Integer, Transfer::Linear) => Self::new(planes),
+            (Samples::Integer, Transfer::Srgb) => Rgb::<Srgb>::new(planes).to_linear(),
+            (Samples::Integer, Transfer::Gamma22) => Rgb::<Gamma22>::new(planes).to_linear(),
+        })
+    }
+
+    /// Writes the light as it is, in 32-bit floating point values.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn write_exr(&self, path: &Path) -> Result<(), ImageError> {
+        write_exr(path, self.planes())
+    }
+}
+
+impl Rgb<Srgb> {
+    /// Writes an 8-bit PNG; values beyond 0 to 1 are clipped.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn write_png(&self, path: &Path) -> Result<(), ImageError> {
+        write_png(path, self.planes(), Depth::Eight)
+    }
+}
+
+impl Panorama {
+    /// Reads an HDR (Radiance) or EXR file.
+    ///
+    /// # Errors
+    /// Where it cannot be read, is of integers, is not twice as wide as high, or has values that are not finite.
+    pub fn read(path: &Path) -> Result<Self, PanoramaError> {
+        let bytes = fs::read(path).map_err(|source| ImageError::Open {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::from_bytes(path, &bytes)
+    }
+}
+
+impl<Y: YAxis> Normals<Y> {
+    /// Reads a PNG, 8 or 16 bits, of colours `(n + 1) / 2`, or an EXR of the vectors themselves. No
+    /// file says which way y points: the caller does, by `Y`.
+    ///
+    /// # Errors
+    /// Where the file cannot be read or is no image.
+    pub fn read(path: &Path) -> Result<Self, ImageError> {
+        let (planes, samples) = read_planes(path)?;
+        Ok(match samples {
+            Samples::Integer => Self::from_colours(planes),
+            Samples::Float => Self::new(planes),
+        })
+    }
+
+    /// Writes a PNG of colours `(n + 1) / 2`.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn write_png(&self, path: &Path, depth: Depth) -> Result<(), ImageError> {
+        write_png(path, &self.to_colours(), depth)
+    }
+}
+
+impl ShLight {
+    /// Reads the text form.
+    ///
+    /// # Errors
+    /// Where the file cannot be read or holds something else.
+    pub fn read(path: &Path) -> Result<Self, LightFileError> {
+        let path = path.to_owned();
+        match fs::read_to_string(&path) {
+            Err(source) => Err(LightFileError::Read { path, source }),
+            Ok(text) => text
+                .parse()
+                .map_err(|source| LightFileError::Light { path, source }),
+        }
+    }
+
+    /// Writes the text form.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), LightFileError> {
+        write_whole(path, self.to_string().as_bytes()).map_err(|source| LightFileError::Write {
+            path: path.to_owned(),
+            source,
+        })
+    }
+}
+
+impl Asset {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// Where it cannot be read or is no asset that this program knows.
+    pub fn read(path: &Path) -> Result<Self, AssetError> {
+        let read = |source| AssetError::Read {
+            path: path.to_owned(),
+            source,
+        };
+        let mut content = Vec::new();
+        let mut file = File::open(path).map_err(read)?.take(Self::MOST_BYTES + 1);
+        file.read_to_end(&mut content).map_err(read)?;
+        Self::from_bytes(&content).map_err(|source| AssetError::File {
+            path: path.to_owned(),
+            source: Box::new(source),
+        })
+    }
+
+    /// Whether a file can be written at a path.
+    ///
+    /// # Errors
+    /// Where its folder is not there or cannot be written, or it is a folder itself.
+    pub fn check(path: &Path) -> Result<(), AssetError> {
+        let write = |source| AssetError::Write {
+            path: path.to_owned(),
+            source,
+        };
+        if path.is_dir() {
+            return Err(write(io::ErrorKind::IsADirectory.into()));
+        }
+        // Such a file is gone when it is dropped.
+        Partial::create(path).map(drop).map_err(write)
+    }
+
+    /// Writes the file, whole or not at all.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), AssetError> {
+        let write = |source| AssetError::Write {
+            path: path.to_owned(),
+            source,
+        };
+        write_whole(path, &self.to_bytes()?).map_err(write)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Extent;
+
+    fn ramp() -> Planes<3> {
+        Planes::from_fn(Extent::new(7, 3), |x, y| {
+            [x as f32 / 6.0, y as f32 / 2.0, (x * y) as f32 / 12.0]
+        })
+    }
+
+    fn largest_difference(a: &Planes<3>, b: &Planes<3>) -> f32 {
+        let pairs = a.planes().into_iter().zip(b.planes());
+        pairs
+            .flat_map(|(a, b)| a.iter().zip(b))
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn a_png_comes_back_within_its_depth() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ramp.png");
+        for (depth, step) in [(Depth::Eight, 255.0), (Depth::Sixteen, 65535.0)] {
+            write_png(&path, &ramp(), depth).unwrap();
+            let (back, samples) = read_planes(&path).unwrap();
+            assert_eq!(samples, Samples::Integer);
+            assert!(
+                largest_difference(&back, &ramp()) <= 0.51 / step,
+                "{depth:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_exr_comes_back_bit_for_bit_and_is_known_to_be_linear() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ramp.exr");
+        let bright = ramp().map(|v| v * 1000.0 - 1.0);
+        write_exr(&path, &bright).unwrap();
+        assert_eq!(read_planes(&path).unwrap(), (bright, Samples::Float));
+    }
+
+    #[test]
+    fn a_file_that_is_no_image_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("notes.png");
+        std::fs::write(&path, "not an image").unwrap();
+        let error = read_planes(&path).unwrap_err();
+        assert!(error.to_string().contains("notes.png"), "{error}");
+    }
+
+    #[test]
+    fn an_image_that_claims_too_many_pixels_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("vast.png");
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 20_000, 20_000);
+        encoder.set_color(png::ColorType::Rgb);
+        // There is no pixel behind the header.
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_chunk(png::chunk::IDAT, &[]).unwrap();
+        drop(writer);
+        std::fs::write(&path, bytes).unwrap();
+        let error = read_planes(&path).unwrap_err();
+        assert!(matches!(error, ImageError::TooLarge { .. }), "{error}");
+    }
+
+    #[test]
+    fn an_image_without_pixels_is_not_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("empty.exr");
+        assert!(write_exr(&path, &Planes::zeros(Extent::new(0, 0))).is_err());
+        assert!(!path.exists());
+    }
+}

@@ -1,0 +1,199 @@
+//! Encoded pictures: PNG, JPEG, EXR and HDR in, PNG and EXR out. Knows bytes only: a path is how errors name a picture.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::metadata::Orientation;
+use image::{
+    DynamicImage, ImageBuffer, ImageDecoder, ImageEncoder, ImageFormat, ImageReader, Limits, Pixel,
+    Rgb,
+};
+
+use super::{Extent, ImageError, Planes};
+
+/// How exactly a PNG holds values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Depth {
+    /// 8 bits a channel.
+    Eight,
+    /// 16 bits a channel.
+    Sixteen,
+}
+
+/// What the numbers in a file were.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Samples {
+    /// Integers, scaled to 0 to 1.
+    Integer,
+    /// Floating point values, as they stood.
+    Float,
+}
+
+/// Values of 0 to 1 as integers in a PNG; others are clipped.
+///
+/// # Errors
+/// Where the picture, called `path`, cannot be encoded.
+pub fn encode_png(path: &Path, planes: &Planes<3>, depth: Depth) -> Result<Vec<u8>, ImageError> {
+    let encode = |source| ImageError::Encode {
+        path: path.to_owned(),
+        source,
+    };
+    let mut bytes = Vec::new();
+    // The default level takes twenty times as long, and files are no smaller.
+    let encoder =
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
+    let (pixels, colour) = match depth {
+        Depth::Eight => (planes.to_bytes(), image::ExtendedColorType::Rgb8),
+        Depth::Sixteen => (
+            interleaved(planes, |v| (to_integer(v, 65535.0) as u16).to_ne_bytes()),
+            image::ExtendedColorType::Rgb16,
+        ),
+    };
+    let [width, height] = sides(planes.extent());
+    encoder
+        .write_image(&pixels, width, height, colour)
+        .map_err(encode)?;
+    Ok(bytes)
+}
+
+/// The values as they are, 32-bit floating point, in an EXR.
+///
+/// # Errors
+/// Where the picture, called `path`, cannot be encoded.
+pub fn encode_exr(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageError> {
+    let [width, height] = sides(planes.extent());
+    let values: Vec<f32> = interleaved(planes, |v| [v]);
+    let mut bytes = Cursor::new(Vec::new());
+    // An image of no pixels makes no buffer; it is refused by the encoder.
+    let buffer = ImageBuffer::<Rgb<f32>, _>::from_raw(width, height, values).unwrap_or_default();
+    DynamicImage::ImageRgb32F(buffer)
+        .write_to(&mut bytes, ImageFormat::OpenExr)
+        .map_err(|source| ImageError::Encode {
+            path: path.to_owned(),
+            source,
+        })?;
+    Ok(bytes.into_inner())
+}
+
+impl Planes<3> {
+    /// The pixels as 8-bit integers, red, green and blue in turn; values beyond 0 to 1 are clipped.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        interleaved(self, |v| [to_integer(v, 255.0) as u8])
+    }
+}
+
+/// An image as it is stored, without any conversion of colour.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredImage {
+    /// The colours: integers scaled to 0 to 1, floating point values as they are. Grey is three equal
+    /// channels.
+    pub planes: Planes<3>,
+    /// Alpha, 0 to 1, where the file has it and it is not 1 everywhere.
+    pub alpha: Option<Planes<1>>,
+    /// What the numbers were.
+    pub samples: Samples,
+}
+
+impl StoredImage {
+    /// Decodes the content of a file, turned as its Exif orientation says. Colours of an EXR with alpha, which that
+    /// format holds multiplied with it, are divided by it. Errors name it as `path`.
+    ///
+    /// # Errors
+    /// Where it is no image of a known format, or too large.
+    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, ImageError> {
+        let image = decode(path, bytes)?;
+        let samples = match image {
+            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => Samples::Float,
+            _ => Samples::Integer,
+        };
+        if !image.color().has_alpha() {
+            return Ok(Self {
+                planes: split(&image.into_rgb32f()),
+                alpha: None,
+                samples,
+            });
+        }
+        let with_alpha: Planes<4> = split(&image.into_rgba32f());
+        let extent = with_alpha.extent();
+        let [mut red, mut green, mut blue, alpha] = with_alpha.into_planes();
+        if samples == Samples::Float {
+            for plane in [&mut red, &mut green, &mut blue] {
+                for (value, &alpha) in plane.iter_mut().zip(&alpha) {
+                    *value /= if alpha > 0.0 { alpha } else { 1.0 };
+                }
+            }
+        }
+        let is_opaque = alpha.iter().all(|&alpha| alpha >= 1.0);
+        Ok(Self {
+            planes: Planes::from_planes(extent, [red, green, blue])?,
+            alpha: if is_opaque {
+                None
+            } else {
+                Some(Planes::from_planes(extent, [alpha])?)
+            },
+            samples,
+        })
+    }
+}
+
+fn decode(path: &Path, bytes: &[u8]) -> Result<DynamicImage, ImageError> {
+    let open = |source| ImageError::Open {
+        path: path.to_owned(),
+        source,
+    };
+    let decode = |source| {
+        let path = path.to_owned();
+        match source {
+            ::image::ImageError::Limits(_) => ImageError::TooLarge { path },
+            source => ImageError::Decode { path, source },
+        }
+    };
+    let mut decoder = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(open)?
+        .into_decoder()
+        .map_err(decode)?;
+    let mut limits = Limits::default();
+    limits.reserve(decoder.total_bytes()).map_err(decode)?;
+    // A file whose orientation cannot be read is shown as it is stored.
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let mut image = DynamicImage::from_decoder(decoder).map_err(decode)?;
+    image.apply_orientation(orientation);
+    Ok(image)
+}
+
+fn split<P: Pixel<Subpixel = f32>, const C: usize>(image: &ImageBuffer<P, Vec<f32>>) -> Planes<C> {
+    let extent = Extent::new(image.width() as usize, image.height() as usize);
+    let mut planes = Planes::zeros(extent);
+    for (channel, plane) in planes.planes_mut().into_iter().enumerate() {
+        for (value, pixel) in plane.iter_mut().zip(image.as_raw().chunks_exact(C)) {
+            *value = pixel[channel];
+        }
+    }
+    planes
+}
+
+fn interleaved<T: Copy, const N: usize>(
+    planes: &Planes<3>,
+    pack: impl Fn(f32) -> [T; N],
+) -> Vec<T> {
+    let [red, green, blue] = planes.planes();
+    red.iter()
+        .zip(green)
+        .zip(blue)
+        .flat_map(|((&r, &g), &b)| [r, g, b])
+        .flat_map(pack)
+        .collect()
+}
+
+/// The nearest integer of 0 to `most`; what is not a number becomes 0.
+fn to_integer(value: f32, most: f32) -> f32 {
+    (value.clamp(0.0, 1.0) * most).round()
+}
+
+fn sides(extent: Extent) -> [u32; 2] {
+    let side = |pixels| u32::try_from(pixels).unwrap_or(u32::MAX);
+    [side(extent.width), side(extent.height)]
+}

@@ -1,0 +1,13 @@
+//! Images as plain planes of `f32`, and the files that hold them. Knows nothing of light.
+
+mod codec;
+mod colour;
+mod error;
+mod planes;
+mod resize;
+
+pub use codec::{Depth, Samples, StoredImage, encode_exr, encode_png};
+pub use colour::{ColourSpace, Gamma22, Linear, Rgb, Srgb, Transfer};
+pub use error::ImageError;
+pub use planes::{Extent, Planes};
+pub use resize::{Part, area_shares, beside};

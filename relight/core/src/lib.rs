@@ -1,0 +1,29 @@
+//! What all of relight rests on: light, render layers, measures, and the captured object's file. It knows nothing of
+//! networks, data sets and terminals, and builds for a browser (`wasm32-unknown-unknown`).
+//!
+//! One frame holds for directions, light and normals everywhere: x to the right, y **up**, z out of
+//! the image to the viewer (right-handed). Rows of images count downwards all the same.
+//!
+//! | module | concern |
+//! | --- | --- |
+//! | [`image`] | planes of `f32`, colours that know their space, encoded pictures |
+//! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
+//! | [`render`] | diffuse and specular layers on normals, their derivatives, Monte Carlo as the reference |
+//! | [`metrics`] | how far an estimate is from the ground truth |
+//! | [`asset`] | a captured object in one file, ready to be lit |
+//! | [`parallel`] | rows and parts side by side, where there are threads |
+#![cfg_attr(
+    feature = "files",
+    doc = "| [`files`] | pictures, light, maps, videos and results in files |"
+)]
+//!
+//! Without features it takes bytes and gives bytes, on one thread. The feature `files` reads and writes files, and
+//! `threads` works on rayon's threads; results are the same bits with and without.
+pub mod asset;
+#[cfg(feature = "files")]
+pub mod files;
+pub mod image;
+pub mod light;
+pub mod metrics;
+pub mod parallel;
+pub mod render;

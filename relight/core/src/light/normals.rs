@@ -1,0 +1,260 @@
+//! Normal maps that know which way y points.
+
+use crate::image::{Extent, ImageError, Planes};
+use std::fmt::Debug;
+use std::marker::PhantomData;
+
+/// Vectors shorter than this stand for no surface: a map's background, however it was encoded.
+const SHORTEST: f32 = 0.1;
+
+/// Which way y points in a normal map. Implemented by [`YUp`] and [`YDown`] only.
+pub trait YAxis: sealed::Sealed + Copy + Debug + Send + Sync + 'static {
+    /// The other way.
+    type Opposite: YAxis<Opposite = Self>;
+}
+
+/// x to the right, y up, z to the viewer: the frame of everything that renders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum YUp {}
+
+/// x to the right, y down, z to the viewer: the paper's colour figure and its released data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum YDown {}
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for super::YUp {}
+    impl Sealed for super::YDown {}
+}
+
+impl YAxis for YUp {
+    type Opposite = YDown;
+}
+
+impl YAxis for YDown {
+    type Opposite = YUp;
+}
+
+/// A map of unit normals, one a pixel; the zero vector where there is no surface.
+///
+/// Only [`Normals<YUp>`] can be lit. The other kind has to be turned over:
+///
+/// ```
+/// use relight_core::image::{Extent, Planes};
+/// use relight_core::light::{Normals, YDown, YUp};
+///
+/// let tilted = Planes::filled(Extent::new(2, 2), [0.0, 3.0, 4.0]);
+/// let up: Normals<YUp> = Normals::<YDown>::new(tilted).flipped();
+/// assert_eq!(up.planes().pixel(0, 0), [0.0, -0.6, 0.8]);
+/// ```
+///
+/// A mix-up does not compile:
+///
+/// ```compile_fail
+/// use relight_core::image::{Extent, Planes};
+/// use relight_core::light::{Normals, YDown, YUp};
+///
+/// let up: Normals<YUp> = Normals::<YDown>::new(Planes::zeros(Extent::new(2, 2)));
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Normals<Y> {
+    planes: Planes<3>,
+    axis: PhantomData<Y>,
+}
+
+impl<Y: YAxis> Normals<Y> {
+    /// The map of these vectors, each brought to length 1; those shorter than 0.1, or that are not
+    /// numbers, stand for no surface.
+    #[must_use]
+    pub fn new(mut planes: Planes<3>) -> Self {
+        let [x, y, z] = planes.planes_mut();
+        for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+            let length = (*x * *x + *y * *y + *z * *z).sqrt();
+            let is_surface = length >= SHORTEST && length.is_finite();
+            [*x, *y, *z] = [*x, *y, *z].map(|v| if is_surface { v / length } else { 0.0 });
+        }
+        Self {
+            planes,
+            axis: PhantomData,
+        }
+    }
+
+    /// The map whose colours `(n + 1) / 2`, 0 to 1, these are; black stands for no surface.
+    #[must_use]
+    pub fn from_colours(mut colours: Planes<3>) -> Self {
+        let [red, green, blue] = colours.planes_mut();
+        for ((r, g), b) in red.iter_mut().zip(green).zip(blue) {
+            let is_black = *r == 0.0 && *g == 0.0 && *b == 0.0;
+            [*r, *g, *b] = [*r, *g, *b].map(|v| if is_black { 0.0 } else { 2.0 * v - 1.0 });
+        }
+        Self::new(colours)
+    }
+
+    /// The colours `(n + 1) / 2` that a file holds; black where there is no surface.
+    #[must_use]
+    pub fn to_colours(&self) -> Planes<3> {
+        let mut colours = self.planes.clone();
+        let [x, y, z] = colours.planes_mut();
+        for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+            let is_surface = *x != 0.0 || *y != 0.0 || *z != 0.0;
+            [*x, *y, *z] = [*x, *y, *z].map(|v| if is_surface { v.midpoint(1.0) } else { 0.0 });
+        }
+        colours
+    }
+
+    /// The same surface with y the other way.
+    #[must_use]
+    pub fn flipped(self) -> Normals<Y::Opposite> {
+        let mut planes = self.planes;
+        let [_, y, _] = planes.planes_mut();
+        for value in y {
+            // A plain 0 stays one.
+            *value = 0.0 - *value;
+        }
+        Normals {
+            planes,
+            axis: PhantomData,
+        }
+    }
+
+    /// The same map with no surface where the mask is below one half.
+    ///
+    /// # Errors
+    /// Where the mask has another size.
+    pub fn masked(mut self, mask: &Planes<1>) -> Result<Self, ImageError> {
+        if mask.extent() != self.extent() {
+            return Err(ImageError::Extent {
+                what: "mask",
+                found: mask.extent(),
+                expected: self.extent(),
+            });
+        }
+        for plane in self.planes.planes_mut() {
+            for (value, mask) in plane.iter_mut().zip(mask.plane(0)) {
+                *value = if *mask < 0.5 { 0.0 } else { *value };
+            }
+        }
+        Ok(self)
+    }
+
+    /// The same map with the normal of the nearest surface where the mask is true and there is none.
+    ///
+    /// # Panics
+    /// Where the mask is not as long as the map has pixels.
+    #[must_use]
+    pub fn completed(&self, mask: &[bool]) -> Self {
+        let [x, y, z] = self.planes.planes();
+        let known: Vec<bool> = (0..self.extent().pixels())
+            .map(|at| (x[at], y[at], z[at]) != (0.0, 0.0, 0.0))
+            .collect();
+        Self {
+            planes: self.planes.clone().extended(&known, mask),
+            axis: PhantomData,
+        }
+    }
+
+    /// Whether there is no surface anywhere.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.planes
+            .planes()
+            .into_iter()
+            .flatten()
+            .all(|&v| v == 0.0)
+    }
+
+    /// x, y and z.
+    #[must_use]
+    pub const fn planes(&self) -> &Planes<3> {
+        &self.planes
+    }
+
+    /// x, y and z themselves.
+    #[must_use]
+    pub fn into_planes(self) -> Planes<3> {
+        self.planes
+    }
+
+    /// Width and height.
+    #[must_use]
+    pub const fn extent(&self) -> Extent {
+        self.planes.extent()
+    }
+}
+
+/// Which way y points in a file of normals, where that is known only at run time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum NormalsFrame {
+    /// As in [`YUp`]: what relight writes.
+    #[default]
+    YUp,
+    /// As in [`YDown`].
+    YDown,
+}
+
+impl Normals<YUp> {
+    /// The front of a sphere that fills a square image of `side` pixels, seen from far away.
+    #[must_use]
+    pub fn sphere(side: usize) -> Self {
+        let place = |at: usize| (2.0 * (at as f32 + 0.5)) / side as f32 - 1.0;
+        Self::new(Planes::from_fn(Extent::new(side, side), |x, y| {
+            let [x, y] = [place(x), -place(y)];
+            let rest = 1.0 - x * x - y * y;
+            if rest >= 0.0 {
+                [x, y, rest.sqrt()]
+            } else {
+                [0.0; 3]
+            }
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn three() -> Normals<YUp> {
+        let vectors = [[0.0, 0.6, 0.8], [0.0; 3], [-1.0, 0.0, 0.0]];
+        Normals::new(Planes::from_fn(Extent::new(3, 1), |x, _| vectors[x]))
+    }
+
+    #[test]
+    fn a_written_map_is_read_back_and_its_background_stays_empty() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("normal.png");
+        three()
+            .write_png(&path, crate::image::Depth::Sixteen)
+            .unwrap();
+        let back = Normals::<YUp>::read(&path).unwrap();
+        assert_eq!(back.planes().pixel(1, 0), [0.0; 3]);
+        let pairs = back
+            .planes()
+            .planes()
+            .into_iter()
+            .zip(three().planes.into_planes());
+        for (a, b) in pairs {
+            assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 3e-5));
+        }
+    }
+
+    #[test]
+    fn a_map_of_vectors_is_read_as_it_stands() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("normal.exr");
+        crate::files::write_exr(&path, three().planes()).unwrap();
+        assert_eq!(Normals::<YUp>::read(&path).unwrap(), three());
+    }
+
+    #[test]
+    fn turned_over_twice_it_is_the_same() {
+        assert_eq!(three().flipped().flipped(), three());
+    }
+
+    #[test]
+    fn mid_grey_and_not_a_number_are_background() {
+        let grey = Normals::<YUp>::from_colours(Planes::filled(Extent::new(1, 1), [0.502; 3]));
+        assert_eq!(grey.planes().pixel(0, 0), [0.0; 3]);
+        let nan = Normals::<YUp>::new(Planes::filled(Extent::new(1, 1), [f32::NAN; 3]));
+        assert_eq!(nan.planes().pixel(0, 0), [0.0; 3]);
+    }
+}

@@ -1,0 +1,119 @@
+//! Highlights of single images: the table on highlight separation.
+
+use super::run::{Scored, add_method, cut_out, largest, measured, need, object};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
+use relight_core::image::{Linear, Planes, Rgb, Srgb};
+use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
+use relight_reader::{TruthSample, TruthSet};
+
+/// Where highlights come from.
+#[derive(Debug, Clone)]
+pub enum HighlightMethod {
+    /// There are none.
+    Nothing,
+    /// They were predicted: part `highlight`, in the image's units.
+    Predictions(Predictions),
+}
+
+impl HighlightMethod {
+    fn name(&self) -> String {
+        match self {
+            Self::Nothing => "no highlight".to_owned(),
+            Self::Predictions(predictions) => predictions.name(),
+        }
+    }
+
+    fn highlight(&self, sample: &TruthSample) -> Result<Rgb<Linear>, EvalError> {
+        let extent = sample.extent();
+        match self {
+            Self::Nothing => Ok(Rgb::new(Planes::zeros(extent))),
+            Self::Predictions(predictions) => predictions.colour(&sample.name, "highlight", extent),
+        }
+    }
+}
+
+/// MSE and DSSIM of the highlight, and of the image without it, for each method. Images are brought
+/// to a maximum of 1 and encoded as sRGB, in which highlights are seen.
+///
+/// # Errors
+/// Where the truth or a prediction cannot be read or measured.
+pub fn evaluate_highlights(
+    set: &TruthSet,
+    split: &str,
+    methods: &[HighlightMethod],
+    progress: EvalProgress<'_>,
+) -> Result<ScoreTable, EvalError> {
+    let mut table = ScoreTable {
+        protocol: "highlights".to_owned(),
+        notes: vec![
+            "highlight: against the true one; diffuse: the image less the highlight, not below 0, \
+             against the image less the true one"
+                .to_owned(),
+            format!("SSIM by {}", Ssim::Gaussian.name()),
+        ],
+        lines: Vec::new(),
+        images: Vec::new(),
+    };
+    for method in methods {
+        add_method(
+            &mut table,
+            (set, split),
+            &method.name(),
+            progress,
+            |sample| score(sample, &method.highlight(sample)?),
+        )?;
+    }
+    Ok(table)
+}
+
+fn score(sample: &TruthSample, found: &Rgb<Linear>) -> Result<Vec<Scored>, EvalError> {
+    let image = need(sample, "image", &sample.image)?;
+    let truth = need(sample, "highlight", &sample.highlight)?;
+    let mask = object(sample);
+    let whole = vec![true; mask.len()];
+    let gain = 1.0 / largest(image, &mask);
+    let shown = |light: &Rgb<Linear>| {
+        let scaled = Rgb::<Linear>::new(light.planes().clone().map(|value| value * gain));
+        cut_out(scaled.encode::<Srgb>().planes(), &mask)
+    };
+    let parts = [
+        ("highlight", shown(truth), shown(found)),
+        (
+            "diffuse",
+            shown(&less(image, truth)),
+            shown(&less(image, found)),
+        ),
+    ];
+    let mut lines = Vec::new();
+    for (part, truth, found) in &parts {
+        for (mask, rule) in [(&mask, MaskRule::Object), (&whole, MaskRule::WholeImage)] {
+            let (truth, found) = (truth.planes(), found.planes());
+            let pair = Comparison::new(sample.extent(), &truth, &found, mask);
+            let pair = measured(sample, pair)?;
+            let ssim = measured(sample, pair.ssim(Ssim::Gaussian, 1.0))?;
+            lines.push(Scored {
+                part,
+                measures: vec![("MSE", pair.mse(ScaleFit::None)), ("DSSIM", dssim(ssim))],
+                colour: "sRGB, image's maximum 1",
+                scale: ScaleFit::None.name(),
+                mask: rule,
+            });
+        }
+    }
+    Ok(lines)
+}
+
+/// The image without a highlight; not below 0.
+fn less(image: &Rgb<Linear>, highlight: &Rgb<Linear>) -> Rgb<Linear> {
+    let mut planes = image.planes().clone();
+    let pairs = planes
+        .planes_mut()
+        .into_iter()
+        .zip(highlight.planes().planes());
+    for (plane, highlight) in pairs {
+        for (value, &highlight) in plane.iter_mut().zip(highlight) {
+            *value = (*value - highlight).max(0.0);
+        }
+    }
+    Rgb::new(planes)
+}

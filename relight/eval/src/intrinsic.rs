@@ -1,0 +1,256 @@
+//! Albedo and shading of single images: the table on MIT Intrinsic Images.
+
+use super::retinex::{IntrinsicImages, Retinex, divided};
+use super::run::{Scored, add_method, grey, measured, need, object, of_grey};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
+use relight_core::image::{Linear, Rgb};
+use relight_core::metrics::{Convention, IntrinsicError, Windows, intrinsic_error};
+use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
+use relight_reader::{TruthSample, TruthSet};
+
+/// Which image is decomposed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum IntrinsicInput {
+    /// The one without highlights.
+    Diffuse,
+    /// What the camera saw.
+    Original,
+}
+
+/// A decomposition that needs no learning, or that looks at the truth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum IntrinsicBaseline {
+    /// Albedo 1; the shading is the mean of the image's channels.
+    ConstantAlbedo,
+    /// Shading 1; the albedo is the image.
+    ConstantShading,
+    /// The shading is the mean of the image's channels, the albedo what is left: its colour.
+    LuminanceShading,
+    /// The shading is the square root of that mean.
+    RootShading,
+    /// Colour Retinex.
+    Retinex(Retinex),
+    /// Not a baseline but a bound: the true normals under the light of order 2 that fits the true
+    /// shading best. The shading is at least a fifth of its mean.
+    Oracle,
+}
+
+impl IntrinsicBaseline {
+    /// All of them, with their usual settings.
+    #[must_use]
+    pub fn all() -> [Self; 6] {
+        [
+            Self::ConstantAlbedo,
+            Self::ConstantShading,
+            Self::LuminanceShading,
+            Self::RootShading,
+            Self::Retinex(Retinex::default()),
+            Self::Oracle,
+        ]
+    }
+
+    /// How a table names it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::ConstantAlbedo => "constant albedo",
+            Self::ConstantShading => "constant shading",
+            Self::LuminanceShading => "shading = luminance",
+            Self::RootShading => "shading = root of luminance",
+            Self::Retinex(_) => "colour Retinex",
+            Self::Oracle => "oracle: true normals, fitted light",
+        }
+    }
+
+    fn decompose(
+        self,
+        sample: &TruthSample,
+        image: &Rgb<Linear>,
+        mask: &[bool],
+    ) -> Result<IntrinsicImages, EvalError> {
+        let extent = image.planes().extent();
+        let ones = || of_grey(extent, vec![1.0; extent.pixels()]);
+        let shaded_by = |shading: Vec<f32>| {
+            Ok(IntrinsicImages {
+                albedo: divided(image, &shading),
+                shading: of_grey(extent, shading)?,
+            })
+        };
+        match self {
+            Self::ConstantAlbedo => Ok(IntrinsicImages {
+                albedo: ones()?,
+                shading: of_grey(extent, grey(image))?,
+            }),
+            Self::ConstantShading => Ok(IntrinsicImages {
+                albedo: image.clone(),
+                shading: ones()?,
+            }),
+            Self::LuminanceShading => shaded_by(grey(image)),
+            Self::RootShading => shaded_by(grey(image).into_iter().map(f32::sqrt).collect()),
+            Self::Retinex(settings) => settings.decompose(image, mask),
+            Self::Oracle => shaded_by(fitted_shading(sample, mask)?),
+        }
+    }
+}
+
+/// The grey shading of the true normals under the light that fits the true shading best.
+fn fitted_shading(sample: &TruthSample, mask: &[bool]) -> Result<Vec<f32>, EvalError> {
+    let normals = need(sample, "normals", &sample.normals)?.completed(mask);
+    let shading = need(sample, "shading", &sample.shading)?;
+    let light = fit_light(&normals, shading, mask, 0.0).map_err(|source| EvalError::Unlit {
+        sample: sample.name.clone(),
+        source,
+    })?;
+    let mut found = grey(&DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&normals));
+    let (count, sum) = found
+        .iter()
+        .zip(mask)
+        .filter(|(_, inside)| **inside)
+        .fold((0, 0.0_f64), |(count, sum), (&value, _)| {
+            (count + 1, sum + f64::from(value))
+        });
+    let least = (sum / f64::from(count.max(1)) * LEAST_SHADING) as f32;
+    for value in &mut found {
+        *value = value.max(least);
+    }
+    Ok(found)
+}
+
+/// The least shading of the oracle, as a fraction of the mean.
+const LEAST_SHADING: f64 = 0.2;
+
+/// Where a decomposition comes from.
+#[derive(Debug, Clone)]
+pub enum IntrinsicMethod {
+    /// It is made here.
+    Baseline(IntrinsicBaseline),
+    /// It was made elsewhere: parts `albedo` and `shading`.
+    Predictions(Predictions),
+}
+
+impl IntrinsicMethod {
+    fn name(&self) -> String {
+        match self {
+            Self::Baseline(baseline) => baseline.name().to_owned(),
+            Self::Predictions(predictions) => predictions.name(),
+        }
+    }
+
+    fn decompose(
+        &self,
+        sample: &TruthSample,
+        input: IntrinsicInput,
+        mask: &[bool],
+    ) -> Result<IntrinsicImages, EvalError> {
+        match self {
+            Self::Baseline(baseline) => {
+                let image = match input {
+                    IntrinsicInput::Diffuse => {
+                        need(sample, "image without highlights", &sample.diffuse)
+                    }
+                    IntrinsicInput::Original => need(sample, "image", &sample.image),
+                };
+                baseline.decompose(sample, image?, mask)
+            }
+            Self::Predictions(predictions) => {
+                let read = |part| predictions.colour(&sample.name, part, sample.extent());
+                Ok(IntrinsicImages {
+                    albedo: read("albedo")?,
+                    shading: read("shading")?,
+                })
+            }
+        }
+    }
+}
+
+/// SMSE and LMSE of albedo and shading, and their means, by both conventions, for each method.
+///
+/// # Errors
+/// Where the truth or a prediction cannot be read or measured.
+pub fn evaluate_intrinsic(
+    set: &TruthSet,
+    split: &str,
+    input: IntrinsicInput,
+    methods: &[IntrinsicMethod],
+    progress: EvalProgress<'_>,
+) -> Result<ScoreTable, EvalError> {
+    let mut table = ScoreTable {
+        protocol: "intrinsic images".to_owned(),
+        notes: notes(input),
+        lines: Vec::new(),
+        images: Vec::new(),
+    };
+    for method in methods {
+        add_method(
+            &mut table,
+            (set, split),
+            &method.name(),
+            progress,
+            |sample| {
+                let mask = object(sample);
+                let found = method.decompose(sample, input, &mask)?;
+                score(sample, &found, &mask)
+            },
+        )?;
+    }
+    Ok(table)
+}
+
+fn notes(input: IntrinsicInput) -> Vec<String> {
+    let input = match input {
+        IntrinsicInput::Diffuse => "the image without highlights",
+        IntrinsicInput::Original => "the image as it was taken",
+    };
+    vec![
+        format!("input of the baselines: {input}"),
+        "SMSE: squared error after the fitted scale, mean over pixels; LMSE: windows of 20 at step 10, \
+         error and energy summed over windows"
+            .to_owned(),
+    ]
+}
+
+fn score(
+    sample: &TruthSample,
+    found: &IntrinsicImages,
+    mask: &[bool],
+) -> Result<Vec<Scored>, EvalError> {
+    let albedo = need(sample, "albedo", &sample.albedo)?;
+    let shading = need(sample, "shading", &sample.shading)?;
+    let mut lines = Vec::new();
+    for convention in Convention::ALL {
+        let compare = |truth: &Rgb<Linear>, estimate: &Rgb<Linear>| {
+            let (truth, estimate) = (truth.planes().planes(), estimate.planes().planes());
+            let extent = sample.extent();
+            let error =
+                intrinsic_error(convention, extent, &truth, &estimate, mask, Windows::GROSSE);
+            measured(sample, error)
+        };
+        let of_albedo = compare(albedo, &found.albedo)?;
+        let of_shading = compare(shading, &found.shading)?;
+        let mean = IntrinsicError {
+            smse: f64::midpoint(of_albedo.smse, of_shading.smse),
+            lmse: f64::midpoint(of_albedo.lmse, of_shading.lmse),
+        };
+        for (part, error) in [
+            ("albedo", of_albedo),
+            ("shading", of_shading),
+            ("mean", mean),
+        ] {
+            lines.push(Scored {
+                part,
+                measures: vec![("SMSE", error.smse), ("LMSE", error.lmse)],
+                colour: values_of(convention),
+                scale: convention.fit().name(),
+                mask: MaskRule::Object,
+            });
+        }
+    }
+    Ok(lines)
+}
+
+const fn values_of(convention: Convention) -> &'static str {
+    match convention {
+        Convention::Strict => "strict: linear grey, truth's maximum 1",
+        Convention::FileUnits => "file units: linear RGB as in the file",
+    }
+}

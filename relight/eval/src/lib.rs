@@ -1,0 +1,46 @@
+//! The protocols of the paper's tables, run over a folder of predictions or over a baseline.
+//!
+//! | protocol | truth | asks for | measures |
+//! | --- | --- | --- | --- |
+//! | [`evaluate_intrinsic`] | albedo and shading | both | SMSE, LMSE by each [`Convention`](relight_core::metrics::Convention) |
+//! | [`evaluate_normals`] | normals | normals | MSE, DSSIM, angles |
+//! | [`evaluate_light`] | normals and shading | light as coefficients | MSE, SMSE, SSIM of the shading that it makes |
+//! | [`evaluate_highlights`] | image, highlight | highlight | MSE, DSSIM of the highlight and of what it leaves |
+//! | [`evaluate_ordinal`] | what people judged of points | albedo | WHDR |
+//! | [`evaluate_insertion`] | an object rendered in another picture | nothing: it runs `insert` | MSE, DSSIM |
+//! | [`evaluate_trust`] | normals | nothing: it runs `decompose` | errors ordered by trust |
+//! | [`evaluate_relighting`] | an object's maps, images under many lights | maps, or images | MSE, DSSIM |
+//!
+//! Each line of a [`ScoreTable`] says what was compared and how: numbers under one name differ by a
+//! factor of two and more between conventions, and published tables rarely say which is theirs. What
+//! cannot be read or measured is an error that names the image; no image is left out.
+
+mod error;
+mod highlights;
+mod insertion;
+mod intrinsic;
+mod light;
+mod normals;
+mod ordinal;
+mod predictions;
+mod relighting;
+mod retinex;
+mod run;
+mod table;
+mod trust;
+
+pub use error::EvalError;
+pub use highlights::{HighlightMethod, evaluate_highlights};
+pub use insertion::{InsertionMethod, InsertionRecipe, SheetWriter, evaluate_insertion};
+pub use intrinsic::{IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, evaluate_intrinsic};
+pub use light::{LightMethod, evaluate_light};
+pub use normals::{NormalMethod, evaluate_normals};
+pub use ordinal::{OrdinalMethod, evaluate_ordinal};
+pub use predictions::Predictions;
+pub use relighting::{
+    RelightMethod, RelightingRecipe, RelightingSet, evaluate_relighting, make_relighting,
+};
+pub use retinex::{IntrinsicImages, Retinex};
+pub use run::EvalProgress;
+pub use table::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
+pub use trust::{TrustCurve, TrustTable, evaluate_trust};

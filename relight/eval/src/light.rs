@@ -1,0 +1,124 @@
+//! Light of single images: the table on Light-Net.
+
+use super::normals::known;
+use super::run::{Scored, add_method, largest, measured, need};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
+use relight_core::image::{Linear, Rgb};
+use relight_core::light::{Order, ShLight};
+use relight_core::metrics::{Comparison, ScaleFit, Ssim};
+use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
+use relight_reader::{TruthSample, TruthSet};
+
+/// Where light comes from.
+#[derive(Debug, Clone)]
+pub enum LightMethod {
+    /// The same from everywhere.
+    Even,
+    /// Fitted to the true shading on the true normals: the best that light of order 2 can do.
+    Oracle,
+    /// It was predicted: `light.txt`.
+    Predictions(Predictions),
+}
+
+impl LightMethod {
+    fn name(&self) -> String {
+        match self {
+            Self::Even => "even light".to_owned(),
+            Self::Oracle => "oracle: fitted to the truth".to_owned(),
+            Self::Predictions(predictions) => predictions.name(),
+        }
+    }
+
+    fn light(&self, sample: &TruthSample, known: &[bool]) -> Result<ShLight, EvalError> {
+        match self {
+            Self::Even => Ok(ShLight::even(Order::TWO, [1.0; 3])),
+            Self::Oracle => {
+                let normals = need(sample, "normals", &sample.normals)?;
+                let shading = need(sample, "shading", &sample.shading)?;
+                fit_light(normals, shading, known, 0.0).map_err(|source| EvalError::Unlit {
+                    sample: sample.name.clone(),
+                    source,
+                })
+            }
+            Self::Predictions(predictions) => predictions.light(&sample.name),
+        }
+    }
+}
+
+/// MSE, SMSE and SSIM of the shading that light makes on the true normals, for each method. `form`
+/// says how shading follows from the coefficients.
+///
+/// # Errors
+/// Where the truth or a prediction cannot be read or measured.
+pub fn evaluate_light(
+    set: &TruthSet,
+    split: &str,
+    form: DiffuseForm,
+    methods: &[LightMethod],
+    progress: EvalProgress<'_>,
+) -> Result<ScoreTable, EvalError> {
+    let mut table = ScoreTable {
+        protocol: "light".to_owned(),
+        notes: vec![
+            "the shading that the light makes on the true normals, against the true shading"
+                .to_owned(),
+            format!(
+                "MSE and SSIM after both were brought to a maximum of 1; SSIM by {}",
+                Ssim::Gaussian.name()
+            ),
+        ],
+        lines: Vec::new(),
+        images: Vec::new(),
+    };
+    for method in methods {
+        add_method(
+            &mut table,
+            (set, split),
+            &method.name(),
+            progress,
+            |sample| {
+                let normals = need(sample, "normals", &sample.normals)?;
+                let known = known(sample, normals);
+                let light = method.light(sample, &known)?;
+                let found = DiffuseLayer::new(&light, form).shading(normals);
+                score(sample, &found, &known)
+            },
+        )?;
+    }
+    Ok(table)
+}
+
+fn score(
+    sample: &TruthSample,
+    found: &Rgb<Linear>,
+    known: &[bool],
+) -> Result<Vec<Scored>, EvalError> {
+    let truth = to_maximum_one(need(sample, "shading", &sample.shading)?, known);
+    let found = to_maximum_one(found, known);
+    let (truth, found) = (truth.planes().planes(), found.planes().planes());
+    let pair = measured(
+        sample,
+        Comparison::new(sample.extent(), &truth, &found, known),
+    )?;
+    let ssim = measured(sample, pair.ssim(Ssim::Gaussian, 1.0))?;
+    let line = |measures, scale: ScaleFit| Scored {
+        part: "shading",
+        measures,
+        colour: "linear RGB, both maxima 1",
+        scale: scale.name(),
+        mask: MaskRule::Known,
+    };
+    Ok(vec![
+        line(
+            vec![("MSE", pair.mse(ScaleFit::None)), ("SSIM", ssim)],
+            ScaleFit::None,
+        ),
+        line(vec![("SMSE", pair.mse(ScaleFit::Image))], ScaleFit::Image),
+    ])
+}
+
+/// The image with its largest value under the mask brought to 1; unchanged where all is dark.
+fn to_maximum_one(image: &Rgb<Linear>, mask: &[bool]) -> Rgb<Linear> {
+    let most = largest(image, mask);
+    Rgb::new(image.planes().clone().map(|value| value / most))
+}

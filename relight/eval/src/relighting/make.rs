@@ -1,0 +1,305 @@
+//! Making an evaluation set with the renderer of `synth`.
+
+use std::f64::consts::TAU;
+use std::fs;
+use std::io;
+use std::path::Path;
+use std::process;
+
+use glam::Vec3;
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+use rayon::prelude::*;
+use relit_data::durable::write_whole;
+use serde::{Deserialize, Serialize};
+
+use super::method::shown;
+use super::set::{FILE, Index, ObjectEntry, Part, SCHEMA, light_file, object_folder};
+use crate::{EvalError, EvalProgress};
+use relight_core::files::write_png;
+use relight_core::image::{Depth, Rgb};
+use relight_core::light::{Direction, Rotation};
+use relight_synth::{
+    BlinnPhong, Environment, GBuffer, Library, Lighting, Material, Method, Recipe, Shaded, stream,
+};
+
+/// Mean irradiance over all normals under each light: white then has half the value that clips.
+const IRRADIANCE: f32 = 0.5;
+/// What `Recipe` draws, and what is drawn here: numbers of streams that it does not use.
+const LIGHT_STREAM: u64 = 101;
+const OBJECT_STREAM: u64 = 102;
+
+/// What an evaluation set consists of. The same recipe and library make the same set.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RelightingRecipe {
+    /// How many objects; the paper has 100.
+    pub objects: usize,
+    /// Under how many lights each; the paper has 30.
+    pub lights: usize,
+    /// Width and height of the images, 16..=2048 pixels.
+    pub size: u32,
+    /// What all is drawn from.
+    pub seed: u64,
+    /// Whether objects cast shadows on themselves.
+    pub shadows: bool,
+}
+
+impl Default for RelightingRecipe {
+    fn default() -> Self {
+        Self {
+            objects: 100,
+            lights: 30,
+            size: 128,
+            seed: 0,
+            shadows: true,
+        }
+    }
+}
+
+impl RelightingRecipe {
+    fn synth(&self) -> Recipe {
+        Recipe {
+            seed: self.seed,
+            size: self.size,
+            shadows: self.shadows,
+            views: 1,
+            lightings: 1,
+            ..Recipe::default()
+        }
+    }
+
+    /// The lights: the panoramas one after the other, each time at a random angle about the vertical.
+    fn lightings(&self, library: &Library) -> Vec<(String, Lighting)> {
+        let lighting = |number: usize| {
+            let mut random =
+                Pcg64::seed_from_u64(stream(stream(self.seed, LIGHT_STREAM), number as u64));
+            let panorama = number % library.panoramas.len();
+            let turn = Rotation::about(Direction::UP, TAU * unit(&mut random));
+            let environment = Environment {
+                panorama,
+                rotation: *turn.matrix(),
+                irradiance: Vec3::splat(IRRADIANCE),
+                method: Method::MonteCarlo,
+            };
+            let name = library.panoramas.name(panorama).unwrap_or_default();
+            let lighting = Lighting {
+                environment: Some(environment),
+                has_shadows: self.shadows,
+                ..Lighting::default()
+            };
+            (name.to_owned(), lighting)
+        };
+        (0..self.lights).map(lighting).collect()
+    }
+
+    fn about(&self, library: &Library) -> String {
+        format!(
+            "made by relight {}: {} objects of {} meshes and procedural shapes, {} lights of {} \
+             panoramas, Blinn-Phong by Monte Carlo, {}cast shadows, {}x{} pixels, seed {}",
+            env!("CARGO_PKG_VERSION"),
+            self.objects,
+            library.meshes.len(),
+            self.lights,
+            library.panoramas.len(),
+            if self.shadows { "" } else { "no " },
+            self.size,
+            self.size,
+            self.seed
+        )
+    }
+}
+
+/// What all objects of a folder were made of.
+#[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Origin {
+    lights: usize,
+    size: u32,
+    seed: u64,
+    shadows: bool,
+    meshes: Vec<String>,
+    panoramas: Vec<String>,
+}
+
+impl Origin {
+    /// The description of a set that is being made.
+    const FILE: &str = "recipe.json";
+
+    fn of(recipe: &RelightingRecipe, library: &Library) -> Self {
+        let panoramas = &library.panoramas;
+        let names = (0..panoramas.len()).filter_map(|number| panoramas.name(number));
+        Self {
+            lights: recipe.lights,
+            size: recipe.size,
+            seed: recipe.seed,
+            shadows: recipe.shadows,
+            meshes: library
+                .meshes
+                .iter()
+                .map(|(file, _)| file.clone())
+                .collect(),
+            panoramas: names.map(str::to_owned).collect(),
+        }
+    }
+
+    /// Writes itself into the folder, or compares itself with what is there.
+    fn describe(&self, out: &Path) -> Result<(), EvalError> {
+        let path = out.join(Self::FILE);
+        match fs::read(&path) {
+            Ok(bytes) if serde_json::from_slice(&bytes).is_ok_and(|there: Self| there == *self) => {
+                Ok(())
+            }
+            Err(error)
+                if error.kind() == io::ErrorKind::NotFound
+                    && !out.join(object_folder(0)).exists() =>
+            {
+                write_json(&path, self)
+            }
+            _ => Err(EvalError::OtherSettings {
+                path: out.to_owned(),
+            }),
+        }
+    }
+}
+
+/// Writes an evaluation set into the folder `out`, objects side by side on rayon's threads;
+/// `progress` is told each object. Objects that are there are kept: a call that was interrupted can be
+/// repeated, also for more objects. `relighting.json` is written last.
+///
+/// # Errors
+/// Where the folder holds objects of another recipe, a setting is out of range or a file cannot be written.
+pub fn make_relighting(
+    recipe: &RelightingRecipe,
+    library: &Library,
+    out: &Path,
+    progress: EvalProgress<'_>,
+) -> Result<(), EvalError> {
+    recipe.synth().check()?;
+    let lightings = recipe.lightings(library);
+    make_folder(out)?;
+    Origin::of(recipe, library).describe(out)?;
+    make_folder(&out.join("lights"))?;
+    for (number, (_, lighting)) in lightings.iter().enumerate() {
+        let path = light_file(out, number);
+        let text = lighting.coefficients(&library.panoramas).to_string();
+        write_whole(&path, text.as_bytes()).map_err(EvalError::write(&path))?;
+    }
+    let objects = (0..recipe.objects)
+        .into_par_iter()
+        .map(|number| {
+            let entry = make_object(recipe, library, &lightings, out, number)?;
+            progress();
+            Ok(entry)
+        })
+        .collect::<Result<_, EvalError>>()?;
+    let index = Index {
+        schema: SCHEMA.to_owned(),
+        about: recipe.about(library),
+        lights: lightings.into_iter().map(|(name, _)| name).collect(),
+        objects,
+    };
+    write_json(&out.join(FILE), &index)
+}
+
+fn write_json(path: &Path, content: &impl Serialize) -> Result<(), EvalError> {
+    let bytes = serde_json::to_vec_pretty(content).map_err(|source| EvalError::Description {
+        path: path.to_owned(),
+        source,
+    })?;
+    write_whole(path, &bytes).map_err(EvalError::write(path))
+}
+
+fn make_object(
+    recipe: &RelightingRecipe,
+    library: &Library,
+    lightings: &[(String, Lighting)],
+    out: &Path,
+    number: usize,
+) -> Result<ObjectEntry, EvalError> {
+    let synth = recipe.synth();
+    let own = stream(stream(recipe.seed, OBJECT_STREAM), number as u64);
+    let mut random = Pcg64::seed_from_u64(own);
+    let (object, mesh) = synth.object(library, number as u64);
+    let input = (unit(&mut random) * lightings.len() as f64) as usize;
+    let gloss = draw_gloss(&mut random);
+    let entry = ObjectEntry {
+        name: object.name(),
+        input,
+        reflectance: gloss.reflectance.to_array(),
+        smoothness: gloss.exponent,
+    };
+    let place = out.join(object_folder(number));
+    if place.is_dir() {
+        return Ok(entry);
+    }
+    let view = synth.view(&object, &mesh, number as u64);
+    let (_, material) = synth.material(library, &view, number as u64);
+    let material = Material {
+        gloss: Some(gloss),
+        ..material
+    };
+    let partial = out.join(format!(".{number:03}.{}.partial", process::id()));
+    make_folder(&partial)?;
+    write_truth(view.scene.buffer(), &material, &partial)?;
+    for (light, (_, lighting)) in lightings.iter().enumerate() {
+        let seed = stream(own, light as u64);
+        let shaded = view
+            .scene
+            .light(&material, lighting, &library.panoramas, seed);
+        write_images(view.scene.buffer(), &material, &shaded, light, &partial)?;
+    }
+    fs::rename(&partial, &place).map_err(EvalError::write(&place))?;
+    Ok(entry)
+}
+
+/// White highlights of every width; a sharper one is brighter, as it gathers the same light.
+fn draw_gloss(random: &mut Pcg64) -> BlinnPhong {
+    let exponent = (5.0_f64.ln() + (150.0_f64 / 5.0).ln() * unit(random)).exp();
+    let strength = (0.05 + 0.45 * unit(random)) * ((exponent + 8.0) / 16.0).min(4.0);
+    BlinnPhong {
+        reflectance: Vec3::splat(strength as f32),
+        exponent: exponent as f32,
+    }
+}
+
+fn write_truth(buffer: &GBuffer, material: &Material, folder: &Path) -> Result<(), EvalError> {
+    let extent = buffer.mask().extent();
+    let mask = relight_core::image::Planes::from_planes(
+        extent,
+        [0, 1, 2].map(|_| buffer.mask().plane(0).to_vec()),
+    )?;
+    write_png(&folder.join("mask.png"), &mask, Depth::Eight)?;
+    buffer
+        .normal_map(&material.normals)
+        .write_png(&folder.join("normal.png"), Depth::Sixteen)?;
+    let albedo = buffer.planes(&material.albedo);
+    write_png(&folder.join("albedo.png"), &albedo, Depth::Sixteen)?;
+    Ok(())
+}
+
+fn write_images(
+    buffer: &GBuffer,
+    material: &Material,
+    shaded: &Shaded,
+    light: usize,
+    folder: &Path,
+) -> Result<(), EvalError> {
+    let full = shaded.image(&material.albedo);
+    let products = material.albedo.iter().zip(&shaded.shading);
+    let diffuse: Vec<Vec3> = products
+        .map(|(albedo, shading)| *albedo * *shading)
+        .collect();
+    for (part, values) in [(Part::Diffuse, diffuse), (Part::Full, full)] {
+        let image = shown(Rgb::new(buffer.planes(&values)));
+        write_png(&folder.join(part.file(light)), &image, Depth::Eight)?;
+    }
+    Ok(())
+}
+
+fn make_folder(path: &Path) -> Result<(), EvalError> {
+    fs::create_dir_all(path).map_err(EvalError::write(path))
+}
+
+/// Uniform in 0..1, 1 left out.
+fn unit(random: &mut Pcg64) -> f64 {
+    (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}

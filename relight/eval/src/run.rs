@@ -1,0 +1,170 @@
+//! What all protocols share: going through the images of a set, and means over them.
+
+use rayon::prelude::*;
+
+use super::{EvalError, ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
+use relight_core::image::{Extent, Linear, Planes, Rgb};
+use relight_core::metrics::MetricError;
+use relight_reader::{TruthSample, TruthSet};
+
+/// Told after each image, from many threads.
+pub type EvalProgress<'a> = &'a (dyn Fn() + Sync);
+
+/// A measure of one image that becomes part of a line.
+pub(super) struct Scored {
+    /// What was compared.
+    pub(super) part: &'static str,
+    /// The measures, in the table's order.
+    pub(super) measures: Vec<(&'static str, f64)>,
+    pub(super) colour: &'static str,
+    pub(super) scale: &'static str,
+    pub(super) mask: MaskRule,
+}
+
+/// Measures each image of the set with `score`, which gives the same lines for each, and adds the
+/// lines of means to the table.
+pub(super) fn add_method(
+    table: &mut ScoreTable,
+    (set, split): (&TruthSet, &str),
+    method: &str,
+    progress: EvalProgress<'_>,
+    score: impl Fn(&TruthSample) -> Result<Vec<Scored>, EvalError> + Sync,
+) -> Result<(), EvalError> {
+    let scored: Vec<(String, Vec<Scored>)> = (0..set.names().len())
+        .into_par_iter()
+        .map(|index| {
+            let sample = set.load(index)?;
+            let scored = score(&sample)?;
+            progress();
+            Ok((sample.name, scored))
+        })
+        .collect::<Result<_, EvalError>>()?;
+    add_lines(table, method, split, 1, scored);
+    Ok(())
+}
+
+/// Adds the lines of means, and the scores of each sample, which are of `images` images each.
+pub(super) fn add_lines(
+    table: &mut ScoreTable,
+    method: &str,
+    split: &str,
+    images: usize,
+    scored: Vec<(String, Vec<Scored>)>,
+) {
+    table.lines.extend(lines(method, split, images, &scored));
+    table
+        .images
+        .extend(scored.into_iter().map(|(image, scored)| ImageScores {
+            method: method.to_owned(),
+            image,
+            measures: scored.iter().flat_map(named_by_part).collect(),
+        }));
+}
+
+fn lines(
+    method: &str,
+    split: &str,
+    each: usize,
+    samples: &[(String, Vec<Scored>)],
+) -> Vec<ScoreLine> {
+    let Some((_, first)) = samples.first() else {
+        return Vec::new();
+    };
+    let mean = |line: usize, measure: usize| {
+        let values = samples
+            .iter()
+            .map(|(_, scored)| scored[line].measures[measure].1);
+        values.sum::<f64>() / samples.len() as f64
+    };
+    let line = |(at, scored): (usize, &Scored)| ScoreLine {
+        method: method.to_owned(),
+        part: scored.part.to_owned(),
+        measures: (0..scored.measures.len())
+            .map(|measure| Measured {
+                name: scored.measures[measure].0.to_owned(),
+                value: mean(at, measure),
+            })
+            .collect(),
+        terms: MeasureTerms {
+            colour: scored.colour.to_owned(),
+            scale: scored.scale.to_owned(),
+            mask: scored.mask,
+            images: samples.len() * each,
+            split: split.to_owned(),
+        },
+    };
+    first.iter().enumerate().map(line).collect()
+}
+
+fn named_by_part(scored: &Scored) -> impl Iterator<Item = Measured> {
+    scored.measures.iter().map(|(name, value)| Measured {
+        name: format!("{} {name}, {}, {}", scored.part, scored.scale, scored.mask),
+        value: *value,
+    })
+}
+
+/// The part of a sample that the protocol needs.
+pub(super) fn need<'a, T>(
+    sample: &TruthSample,
+    part: &'static str,
+    found: &'a Option<T>,
+) -> Result<&'a T, EvalError> {
+    found.as_ref().ok_or_else(|| EvalError::Lacks {
+        sample: sample.name.clone(),
+        part,
+    })
+}
+
+/// What is measured of a sample, with the sample's name in an error.
+pub(super) fn measured<T>(
+    sample: &TruthSample,
+    result: Result<T, MetricError>,
+) -> Result<T, EvalError> {
+    result.map_err(|source| EvalError::Metric {
+        sample: sample.name.clone(),
+        source,
+    })
+}
+
+/// Where the mask is 1.
+pub(super) fn object(sample: &TruthSample) -> Vec<bool> {
+    let mask = sample.mask.plane(0);
+    mask.iter().map(|&value| value >= 0.5).collect()
+}
+
+/// The mean of the channels of each pixel.
+pub(super) fn grey(image: &Rgb<Linear>) -> Vec<f32> {
+    let [red, green, blue] = image.planes().planes();
+    let channels = red.iter().zip(green).zip(blue);
+    channels.map(|((r, g), b)| (r + g + b) / 3.0).collect()
+}
+
+/// An image of which all channels are this plane.
+pub(super) fn of_grey(extent: Extent, plane: Vec<f32>) -> Result<Rgb<Linear>, EvalError> {
+    let planes = Planes::from_planes(extent, [plane.clone(), plane.clone(), plane])?;
+    Ok(Rgb::new(planes))
+}
+
+/// The planes with 0 outside the mask.
+pub(super) fn cut_out<const C: usize>(planes: &Planes<C>, mask: &[bool]) -> Planes<C> {
+    let mut planes = planes.clone();
+    for plane in planes.planes_mut() {
+        for (value, &inside) in plane.iter_mut().zip(mask) {
+            if !inside {
+                *value = 0.0;
+            }
+        }
+    }
+    planes
+}
+
+/// The largest value under the mask, or 1 where all is dark.
+pub(super) fn largest(image: &Rgb<Linear>, mask: &[bool]) -> f32 {
+    let planes = image.planes().planes();
+    let values = planes
+        .iter()
+        .flat_map(|plane| plane.iter().zip(mask))
+        .filter(|(_, inside)| **inside);
+    let most = values.fold(0.0_f32, |most, (&value, _)| most.max(value));
+    if most > 0.0 { most } else { 1.0 }
+}

@@ -1,0 +1,129 @@
+//! Weights as bytes: safetensors in and out, PyTorch's `.pth` in.
+
+use std::collections::HashMap;
+
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+
+use super::error::NetError;
+use super::pickle;
+use super::weights::{Tensor, Weights};
+
+/// How numbers are kept in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WeightPrecision {
+    /// 32 bits.
+    Single,
+    /// 16 bits, IEEE half.
+    Half,
+}
+
+impl Weights {
+    /// Weights out of the bytes of a safetensors file, or of a state dict that PyTorch saved (`.pth`, `.pt`); the first
+    /// bytes show which of them it is. Half precision becomes single.
+    ///
+    /// # Errors
+    /// A sentence that says what is wrong.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
+        match bytes {
+            [b'P', b'K', ..] => pickle::read_state_dict(bytes),
+            _ => from_safetensors(bytes),
+        }
+    }
+
+    /// The bytes of a safetensors file, with facts about them in its header.
+    ///
+    /// # Errors
+    /// A sentence: where a value is too large for the precision, or what the format's writer answers.
+    pub fn to_safetensors(
+        &self,
+        precision: WeightPrecision,
+        facts: Option<HashMap<String, String>>,
+    ) -> Result<Vec<u8>, String> {
+        self.check_range(precision)
+            .map_err(|error| error.to_string())?;
+        let encoded: Vec<_> = self
+            .iter()
+            .map(|(name, tensor)| (name, tensor.shape().to_vec(), encode(tensor, precision)))
+            .collect();
+        let kind = match precision {
+            WeightPrecision::Single => Dtype::F32,
+            WeightPrecision::Half => Dtype::F16,
+        };
+        let mut views = Vec::with_capacity(encoded.len());
+        for (name, shape, bytes) in &encoded {
+            let view = TensorView::new(kind, shape.clone(), bytes);
+            views.push((*name, view.map_err(|error| error.to_string())?));
+        }
+        safetensors::serialize(views, facts).map_err(|error| error.to_string())
+    }
+
+    /// Whether every finite value stays finite at this precision.
+    pub(super) fn check_range(&self, precision: WeightPrecision) -> Result<(), NetError> {
+        if precision == WeightPrecision::Single {
+            return Ok(());
+        }
+        let overflows = |value: &f32| value.is_finite() && !half::f16::from_f32(*value).is_finite();
+        for (name, tensor) in self.iter() {
+            if let Some(&value) = tensor.values().iter().find(|value| overflows(value)) {
+                return Err(NetError::TooLarge {
+                    name: name.to_owned(),
+                    value,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn encode(tensor: &Tensor, precision: WeightPrecision) -> Vec<u8> {
+    let values = tensor.values().iter();
+    match precision {
+        WeightPrecision::Single => values.flat_map(|value| value.to_le_bytes()).collect(),
+        WeightPrecision::Half => values
+            .flat_map(|&value| half::f16::from_f32(value).to_le_bytes())
+            .collect(),
+    }
+}
+
+fn from_safetensors(bytes: &[u8]) -> Result<Weights, String> {
+    let file = SafeTensors::deserialize(bytes)
+        .map_err(|error| format!("it is no safetensors file and no state dict ({error})"))?;
+    file.iter()
+        .map(|(name, view)| {
+            let values = decode(view.dtype(), view.data())
+                .ok_or_else(|| format!("{name} holds {:?}, which is not read", view.dtype()))?;
+            let tensor = Tensor::new(view.shape().to_vec(), values)
+                .ok_or_else(|| format!("{name} is not as long as its shape says"))?;
+            Ok((name.to_owned(), tensor))
+        })
+        .collect()
+}
+
+fn decode(kind: Dtype, bytes: &[u8]) -> Option<Vec<f32>> {
+    let halves = || bytes.chunks_exact(2).map(|pair| [pair[0], pair[1]]);
+    Some(match kind {
+        Dtype::F32 => bytes
+            .chunks_exact(4)
+            .map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]]))
+            .collect(),
+        Dtype::F16 => halves()
+            .map(|pair| half::f16::from_le_bytes(pair).to_f32())
+            .collect(),
+        Dtype::BF16 => halves()
+            .map(|pair| half::bf16::from_le_bytes(pair).to_f32())
+            .collect(),
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_file_of_weights_is_an_error() {
+        for bytes in [&b""[..], b"hello", b"PK\x03\x04", &[0xff; 100]] {
+            assert!(Weights::from_bytes(bytes).is_err());
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! From the network's maps to layers that give the picture back.
+
+use super::encoding::AnsweredMaps;
+use relight_core::image::Planes;
+use relight_core::light::{Normals, YUp};
+
+/// How much the albedo follows the network's own where there is little light: what is added to the
+/// square of the shading, whose mean is 1.
+const RIDGE: f64 = 0.1;
+
+/// Layers of a picture I: I = R S + H up to the ridge. All are 0 outside the mask.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ComposedLayers {
+    /// The network's normals.
+    pub(super) normals: Normals<YUp>,
+    /// R.
+    pub(super) albedo: Planes<3>,
+    /// S, mean 1 under the mask.
+    pub(super) shading: Planes<1>,
+    /// H, in no channel more than the picture.
+    pub(super) highlight: Planes<1>,
+    /// R S.
+    pub(super) diffuse: Planes<3>,
+    /// The root mean square of I - R S - H under the mask, over that of I; 0 for a black picture.
+    pub(super) residual: f64,
+}
+
+impl ComposedLayers {
+    /// The layers of a picture, without a highlight where `with_highlight` is false.
+    ///
+    /// H is the network's highlight, as far as the picture's darkest channel allows, and I_d = I - H. S is
+    /// the network's shading over its mean. R = (I_d S + 0.1 R_h) / (S² + 0.1), where R_h is the
+    /// network's albedo, scaled so that R_h S is nearest to I_d: the albedo is I_d / S where there is
+    /// light, and the network's where there is hardly any.
+    ///
+    /// Everything is computed in the memory of the picture and the maps: those of a large photograph take gigabytes.
+    pub(super) fn new(
+        picture: Planes<3>,
+        mask: &[bool],
+        maps: AnsweredMaps,
+        with_highlight: bool,
+    ) -> Self {
+        let highlight = if with_highlight {
+            possible_highlight(&picture, mask, maps.highlight)
+        } else {
+            maps.highlight.map(|_| 0.0)
+        };
+        let shading = normalised(maps.shading, mask);
+        let (s, h) = (shading.plane(0), highlight.plane(0));
+        let scale = albedo_scale(&picture, h, &maps.albedo, s);
+        let (mut albedo, mut diffuse) = (maps.albedo, picture);
+        let (mut left, mut all) = (0.0_f64, 0.0_f64);
+        let layers = albedo.planes_mut().into_iter().zip(diffuse.planes_mut());
+        for (albedo, diffuse) in layers {
+            for at in 0..mask.len() {
+                if !mask[at] {
+                    [albedo[at], diffuse[at]] = [0.0; 2];
+                    continue;
+                }
+                let light = diffuse[at];
+                let (shading, matt) = (f64::from(s[at]), f64::from(matt(light, h[at])));
+                let answered = scale * f64::from(albedo[at]);
+                let r = (matt * shading + RIDGE * answered) / (shading * shading + RIDGE);
+                albedo[at] = r as f32;
+                diffuse[at] = (r * shading) as f32;
+                left += f64::from(light - diffuse[at] - h[at]).powi(2);
+                all += f64::from(light).powi(2);
+            }
+        }
+        Self {
+            normals: maps.normals,
+            albedo,
+            shading,
+            highlight,
+            diffuse,
+            residual: if all > 0.0 { (left / all).sqrt() } else { 0.0 },
+        }
+    }
+}
+
+/// The highlight under the mask, in no channel more than the picture.
+pub(super) fn possible_highlight(
+    picture: &Planes<3>,
+    mask: &[bool],
+    mut highlight: Planes<1>,
+) -> Planes<1> {
+    let [red, green, blue] = picture.planes();
+    for (at, value) in highlight.planes_mut()[0].iter_mut().enumerate() {
+        let least = red[at].min(green[at]).min(blue[at]);
+        *value = if mask[at] {
+            value.min(least).max(0.0)
+        } else {
+            0.0
+        };
+    }
+    highlight
+}
+
+/// The shading over its mean under the mask.
+pub(super) fn normalised(mut shading: Planes<1>, mask: &[bool]) -> Planes<1> {
+    let inside = shading.plane(0).iter().zip(mask).filter(|(_, m)| **m);
+    let (sum, count) = inside.fold((0.0_f64, 0_u64), |(sum, count), (&value, _)| {
+        (sum + f64::from(value), count + 1)
+    });
+    let mean = sum / count.max(1) as f64;
+    let scale = if mean > 0.0 { (1.0 / mean) as f32 } else { 0.0 };
+    for (value, &inside) in shading.planes_mut()[0].iter_mut().zip(mask) {
+        *value = if inside { *value * scale } else { 0.0 };
+    }
+    shading
+}
+
+/// Light less its highlight.
+fn matt(light: f32, highlight: f32) -> f32 {
+    (light - highlight).max(0.0)
+}
+
+/// The factor that brings albedo, 0 outside the mask, times shading nearest to the picture less its highlight, by
+/// least squares.
+fn albedo_scale(
+    picture: &Planes<3>,
+    highlight: &[f32],
+    albedo: &Planes<3>,
+    shading: &[f32],
+) -> f64 {
+    let (mut product, mut square) = (0.0_f64, 0.0_f64);
+    for (light, albedo) in picture.planes().into_iter().zip(albedo.planes()) {
+        for at in 0..shading.len() {
+            let answered = f64::from(albedo[at]) * f64::from(shading[at]);
+            product += answered * f64::from(matt(light[at], highlight[at]));
+            square += answered * answered;
+        }
+    }
+    if square > 0.0 { product / square } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relight_core::image::Extent;
+    use relight_core::light::Normals;
+
+    const EXTENT: Extent = Extent::new(16, 12);
+
+    /// A picture that is exactly albedo times shading and a highlight, and those.
+    fn scene() -> (Planes<3>, AnsweredMaps) {
+        let albedo = Planes::from_fn(EXTENT, |x, _| {
+            if x < 8 {
+                [0.6, 0.3, 0.2]
+            } else {
+                [0.2, 0.5, 0.7]
+            }
+        });
+        let shading = Planes::from_fn(EXTENT, |x, y| [0.2 + 0.1 * (x + y) as f32]);
+        let highlight = Planes::from_fn(EXTENT, |x, y| [if (x, y) == (3, 3) { 0.05 } else { 0.0 }]);
+        let picture = Planes::from_fn(EXTENT, |x, y| {
+            let [s] = shading.pixel(x, y);
+            let [h] = highlight.pixel(x, y);
+            albedo.pixel(x, y).map(|a| a * s + h)
+        });
+        let maps = AnsweredMaps {
+            normals: Normals::new(Planes::filled(EXTENT, [0.0, 0.0, 1.0])),
+            albedo,
+            shading,
+            highlight,
+        };
+        (picture, maps)
+    }
+
+    #[test]
+    fn maps_that_are_right_give_the_picture_back_and_the_shading_has_mean_one() {
+        let (picture, maps) = scene();
+        let mask = vec![true; EXTENT.pixels()];
+        let layers = ComposedLayers::new(picture, &mask, maps.clone(), true);
+        assert!(layers.residual < 1e-6);
+        let mean = layers.shading.plane(0).iter().sum::<f32>() / EXTENT.pixels() as f32;
+        assert!((mean - 1.0).abs() < 1e-5);
+        assert_eq!(layers.highlight, maps.highlight);
+        let ratio = |x, y| layers.albedo.pixel(x, y)[0] / maps.albedo.pixel(x, y)[0];
+        assert!((ratio(1, 1) / ratio(14, 9) - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn wrong_maps_give_the_picture_back_up_to_the_ridge() {
+        let (picture, mut maps) = scene();
+        maps.albedo = Planes::filled(EXTENT, [0.5; 3]);
+        let mask = vec![true; EXTENT.pixels()];
+        let layers = ComposedLayers::new(picture.clone(), &mask, maps.clone(), false);
+        let none = vec![0.0; EXTENT.pixels()];
+        let scale = albedo_scale(&picture, &none, &maps.albedo, layers.shading.plane(0)) as f32;
+        for at in 0..EXTENT.pixels() {
+            let s = layers.shading.plane(0)[at];
+            let rest = picture.plane(1)[at] - layers.diffuse.plane(1)[at];
+            let ridge = 0.1 * (picture.plane(1)[at] - scale * 0.5 * s) / (s * s + 0.1);
+            assert!((rest - ridge).abs() < 1e-5, "{rest} {ridge}");
+        }
+        assert!(layers.residual < 0.1);
+    }
+
+    #[test]
+    fn a_highlight_takes_no_more_than_the_picture_has() {
+        let (picture, mut maps) = scene();
+        maps.highlight = Planes::filled(EXTENT, [9.0]);
+        let mask: Vec<bool> = (0..EXTENT.pixels()).map(|at| at != 5).collect();
+        let layers = ComposedLayers::new(picture.clone(), &mask, maps, true);
+        for at in 0..EXTENT.pixels() {
+            let least = [0, 1, 2].map(|c| picture.plane(c)[at]);
+            let least = least.into_iter().fold(f32::INFINITY, f32::min);
+            let expected = if at == 5 { 0.0 } else { least };
+            assert_eq!(layers.highlight.plane(0)[at], expected);
+        }
+        assert_eq!(layers.albedo.plane(2)[5], 0.0);
+    }
+
+    #[test]
+    fn a_black_picture_has_black_layers() {
+        let (_, maps) = scene();
+        let mask = vec![true; EXTENT.pixels()];
+        let black = Planes::zeros(EXTENT);
+        let layers = ComposedLayers::new(black, &mask, maps, true);
+        assert!(
+            layers
+                .albedo
+                .planes()
+                .into_iter()
+                .flatten()
+                .all(|&v| v == 0.0)
+        );
+        assert_eq!(layers.residual, 0.0);
+    }
+}

@@ -1,0 +1,487 @@
+//! From a picture under a mask to its layers and its light.
+
+use std::path::Path;
+
+use super::answer::{Engine, Fields, MapsNet, Scales, Whole, details, to_maps};
+use super::compose::{ComposedLayers, normalised, possible_highlight};
+use super::encoding::AnsweredMaps;
+use super::error::DecomposeError;
+use super::gloss::{FittedGloss, fit_gloss};
+use super::other::OtherNormals;
+use super::region::{Region, Window, cut_out, enlarged, inside};
+use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
+use relight_core::light::NormalsFrame;
+use relight_core::light::{LightError, Normals, ShLight, YUp};
+use relight_core::parallel;
+use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
+use relight_nets::{Inference, InferenceEngine, NetError, Weights, decomposer};
+
+/// Most pixels of a photograph, and with [`WorkingSize::Native`] of the square around the object: 24 million take 2.5 GB of
+/// memory, so these more than 6 GB.
+pub const MOST_PIXELS: usize = 64_000_000;
+/// Width and height of the picture that the network sees.
+pub const WORKING_SIDE: usize = 256;
+/// Highlights are separated where a larger part of the object's pixels is saturated, as in the paper.
+const SATURATED_PART: f64 = 0.05;
+/// Keeps the light from behind, which normals hardly show, small: see [`fit_light`].
+const STIFFNESS: f64 = 1e-3;
+/// Longest band 1 of a light, in parts of its mean. A single lamp has √3; far above it, the fit follows cast shadows to
+/// a light that is negative in most directions.
+const MOST_ONE_SIDED: f64 = 2.5;
+/// How often the light is fitted with four times the stiffness, at most.
+const STIFFER_FITS: usize = 8;
+
+/// At which size a picture is decomposed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum WorkingSize {
+    /// At the network's: its maps are enlarged to the picture's size.
+    #[default]
+    Network,
+    /// At the network's, and what is finer by tiles of the picture at its own size.
+    Native,
+}
+
+/// Whether highlights are separated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SpecularGate {
+    /// Where more than 5 % of the object's pixels are saturated.
+    #[default]
+    Auto,
+    /// Always.
+    On,
+    /// Never.
+    Off,
+}
+
+/// How a picture is decomposed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DecomposeOptions {
+    /// At which size.
+    pub size: WorkingSize,
+    /// Whether the network sees the mirror image too, and the mean of both answers is taken: at the coarse scale, and of
+    /// tiles.
+    pub mirror: bool,
+    /// Whether highlights are separated.
+    pub specular: SpecularGate,
+    /// Light from which on a channel counts as saturated; a pixel is, where all three are.
+    pub saturated_from: f32,
+    /// The part of the object's pixels that are saturated, where it is known from a larger picture;
+    /// else it is counted.
+    pub saturated_fraction: Option<f64>,
+}
+
+impl Default for DecomposeOptions {
+    fn default() -> Self {
+        Self {
+            size: WorkingSize::default(),
+            mirror: true,
+            specular: SpecularGate::default(),
+            saturated_from: Srgb::to_linear(SATURATED_VALUE),
+            saturated_fraction: None,
+        }
+    }
+}
+
+/// The value in a file from which on a channel counts as saturated: 250 of 255, less rounding.
+pub(super) const SATURATED_VALUE: f32 = 249.5 / 255.0;
+
+/// A picture in layers, I = R S + H, with its normals and light. Everything is as large as the picture
+/// and 0 outside the mask.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decomposition {
+    /// The normals.
+    pub normals: Normals<YUp>,
+    /// The albedo R, in such units that the mean shading is 1.
+    pub albedo: Rgb<Linear>,
+    /// The shading S, grey, mean 1 under the mask.
+    pub shading: Planes<1>,
+    /// R S.
+    pub diffuse: Rgb<Linear>,
+    /// The highlight H, grey; 0 where none was separated.
+    pub highlight: Planes<1>,
+    /// The light of order 2 whose irradiance on the normals is nearest to the shading: grey, as the
+    /// shading is. The colour of the light is part of the albedo.
+    pub light: ShLight,
+    /// The gloss of the whole object, where a highlight was separated and the light explains it.
+    pub gloss: Option<FittedGloss>,
+    /// The square of the picture that the network saw.
+    pub region: Region,
+    /// Whether highlights were separated.
+    pub is_glossy: bool,
+    /// The part of the object's pixels that are saturated.
+    pub saturated_fraction: f64,
+    /// How far R S + H is from the picture: the root mean square of the rest over that of the picture.
+    pub residual: f64,
+    /// How far the light's irradiance is from the shading, in the same way.
+    pub light_residual: f64,
+}
+
+/// Decomposes pictures: the network, ready to be run.
+///
+/// ```
+/// use relight_photo::decompose::{DecomposeOptions, Decomposer};
+/// use relight_core::image::{Extent, Planes, Rgb};
+/// use relight_nets::{Weights, decomposer};
+///
+/// let weights = Weights::initial(&decomposer(), 1); // not trained
+/// let decomposer = Decomposer::with_side(&weights, 32)?;
+/// let picture = Rgb::new(Planes::filled(Extent::new(60, 40), [0.5, 0.4, 0.3]));
+/// let mask = Planes::filled(Extent::new(60, 40), [1.0]);
+/// let found = decomposer.decompose(&picture, &mask, &DecomposeOptions::default())?;
+/// assert_eq!(found.normals.extent(), Extent::new(60, 40));
+/// assert!(found.residual < 0.5);
+/// # Ok::<(), relight_photo::decompose::DecomposeError>(())
+/// ```
+pub struct Decomposer {
+    scales: Scales,
+    normals: Option<OtherNormals>,
+    engine: InferenceEngine,
+}
+
+impl std::fmt::Debug for Decomposer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Decomposer")
+            .field("side", &self.side())
+            .field("normals", &self.normals)
+            .field("engine", &self.engine)
+            .finish()
+    }
+}
+
+impl Decomposer {
+    /// The network with these weights, for pictures of [`WORKING_SIDE`].
+    ///
+    /// # Errors
+    /// Where the weights are not this network's.
+    pub fn new(weights: &Weights) -> Result<Self, DecomposeError> {
+        Self::with_side(weights, WORKING_SIDE)
+    }
+
+    /// The network with these weights, for pictures of `side` x `side` pixels, a multiple of 32.
+    ///
+    /// # Errors
+    /// Where the weights are not this network's, or it cannot take such pictures.
+    pub fn with_side(weights: &Weights, side: usize) -> Result<Self, DecomposeError> {
+        Self::with_engine(weights, side, InferenceEngine::default())
+    }
+
+    /// The same, computed by an engine; so is another network for normals.
+    ///
+    /// # Errors
+    /// Where the weights are not this network's, or it cannot take such pictures.
+    pub fn with_engine(
+        weights: &Weights,
+        side: usize,
+        engine: InferenceEngine,
+    ) -> Result<Self, DecomposeError> {
+        let graph = decomposer();
+        let net = |side: usize| -> Result<Box<dyn MapsNet>, NetError> {
+            let inference = Inference::with_engine(&graph, weights, (side, side), &engine)?;
+            Ok(Box::new(Engine { inference, side }))
+        };
+        let has_coarse = side.is_multiple_of(2 * graph.multiple());
+        let coarse = || has_coarse.then(|| net(side / 2)).transpose();
+        let (fine, coarse) = parallel::join(|| net(side), coarse);
+        let found = Self::of(fine?, coarse?);
+        Ok(Self { engine, ..found })
+    }
+
+    pub(super) fn of(fine: Box<dyn MapsNet>, coarse: Option<Box<dyn MapsNet>>) -> Self {
+        Self {
+            scales: Scales { fine, coarse },
+            normals: None,
+            engine: InferenceEngine::default(),
+        }
+    }
+
+    /// What computes its networks.
+    #[must_use]
+    pub fn engine(&self) -> &InferenceEngine {
+        &self.engine
+    }
+
+    /// Takes the normals of another network from now on, the content of an ONNX file that errors name as `path`. It takes one picture,
+    /// 1 x 3 x side x side, (x - 0.5) / 0.5 of the sRGB values x, 0 outside the mask; and answers with
+    /// 1 x 3 x side x side, vectors of any length, or with 1 x 2 x side x side, slopes (p, q) of normals
+    /// (p, q, 1).
+    ///
+    /// # Errors
+    /// Where it cannot be run, or answers something else; then all stays as it was.
+    pub fn set_normals(
+        &mut self,
+        path: &Path,
+        onnx: &[u8],
+        frame: NormalsFrame,
+    ) -> Result<(), DecomposeError> {
+        let side = self.side();
+        self.normals = Some(OtherNormals::new(path, onnx, side, frame, &self.engine)?);
+        Ok(())
+    }
+
+    /// Width and height of what the network sees, pixels.
+    #[must_use]
+    pub fn side(&self) -> usize {
+        self.scales.fine.side()
+    }
+
+    /// Decomposes a picture under a mask, which is the object where it is at least one half. Values
+    /// of the picture that are negative or no numbers count as black.
+    ///
+    /// # Errors
+    /// Where the mask has another size or is empty, the picture is black under it or has more than [`MOST_PIXELS`], or the
+    /// network fails.
+    pub fn decompose(
+        &self,
+        picture: &Rgb<Linear>,
+        mask: &Planes<1>,
+        options: &DecomposeOptions,
+    ) -> Result<Decomposition, DecomposeError> {
+        let (extent, expected) = (mask.extent(), picture.planes().extent());
+        if extent != expected {
+            return Err(DecomposeError::MaskSize {
+                found: extent,
+                expected,
+            });
+        }
+        let object = CutObject::new(picture, mask, options.size)?;
+        let saturated_fraction = options
+            .saturated_fraction
+            .unwrap_or_else(|| object.saturated(options.saturated_from));
+        let is_glossy = match options.specular {
+            SpecularGate::Auto => saturated_fraction > SATURATED_PART,
+            SpecularGate::On => true,
+            SpecularGate::Off => false,
+        };
+        let (region, window) = (object.region, object.window);
+        let part = region.part(&window);
+        let whole = Whole::new(
+            &self.scales,
+            &object.picture,
+            &object.mask,
+            &part,
+            options.mirror,
+        )?;
+        let explained = self.explain(&whole, is_glossy)?;
+        let mut maps = self.maps(&whole, &object, options)?;
+        if self.normals.is_some() {
+            let known = inside(&whole.mask);
+            let vectors = enlarged(explained.normals.planes(), &known, &part);
+            maps.normals = Normals::new(cut_out(vectors, &object.mask));
+        }
+        let layers = ComposedLayers::new(object.picture, &object.inside, maps, is_glossy);
+        let normals = window.put_back(layers.normals.into_planes(), extent);
+        Ok(Decomposition {
+            normals: Normals::new(normals),
+            albedo: Rgb::new(window.put_back(layers.albedo, extent)),
+            shading: window.put_back(layers.shading, extent),
+            diffuse: Rgb::new(window.put_back(layers.diffuse, extent)),
+            highlight: window.put_back(layers.highlight, extent),
+            light: explained.light,
+            gloss: explained.gloss,
+            region,
+            is_glossy,
+            saturated_fraction,
+            residual: layers.residual,
+            light_residual: explained.light_residual,
+        })
+    }
+
+    /// The maps at the picture's own size.
+    fn maps(
+        &self,
+        whole: &Whole,
+        object: &CutObject,
+        options: &DecomposeOptions,
+    ) -> Result<AnsweredMaps, DecomposeError> {
+        let part = object.region.part(&object.window);
+        let mut fields = enlarged(&whole.fields, &inside(&whole.mask), &part);
+        if options.size == WorkingSize::Native && part.extent.width > self.side() {
+            let net = self.scales.fine.as_ref();
+            add(
+                &mut fields,
+                &details(net, &object.picture, &object.mask, options.mirror)?,
+            );
+        }
+        Ok(to_maps(fields, &object.inside)?)
+    }
+
+    /// Fits light and gloss to the maps at the network's size.
+    fn explain(&self, whole: &Whole, is_glossy: bool) -> Result<Explained, DecomposeError> {
+        let known = inside(&whole.mask);
+        let maps = to_maps(whole.fields.clone(), &known)?;
+        let others = match &self.normals {
+            Some(other) => other.run(&whole.picture, &known)?,
+            None => None,
+        };
+        let normals = others.unwrap_or(maps.normals);
+        let shading = normalised(maps.shading, &known);
+        let target = Rgb::new(in_colour(shading.clone()));
+        let light = fit_possible_light(&normals, &target, &known)?;
+        let lit = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&normals);
+        let gloss = if is_glossy {
+            let highlight = possible_highlight(&whole.picture, &known, maps.highlight);
+            fit_gloss(&light, &normals, &highlight)?
+        } else {
+            None
+        };
+        Ok(Explained {
+            light_residual: relative_difference(lit.planes().plane(0), shading.plane(0)),
+            normals,
+            light,
+            gloss,
+        })
+    }
+}
+
+/// The light of a shading, as stiff as it has to be to be one that there can be.
+fn fit_possible_light(
+    normals: &Normals<YUp>,
+    shading: &Rgb<Linear>,
+    known: &[bool],
+) -> Result<ShLight, LightError> {
+    let mut stiffness = STIFFNESS;
+    let mut light = fit_light(normals, shading, known, stiffness)?;
+    for _ in 0..STIFFER_FITS {
+        if !is_too_one_sided(&light) {
+            break;
+        }
+        stiffness *= 4.0;
+        light = fit_light(normals, shading, known, stiffness)?;
+    }
+    Ok(light)
+}
+
+/// Whether band 1 is longer than that of any light; it is grey, so that one channel says it.
+fn is_too_one_sided(light: &ShLight) -> bool {
+    let [mean, a, b, c] = [0, 1, 2, 3].map(|at: usize| light.coefficients()[at][1]);
+    (a * a + b * b + c * c).sqrt() > MOST_ONE_SIDED * mean
+}
+
+/// An object cut out of its photograph.
+struct CutObject {
+    /// The square that the network sees.
+    region: Region,
+    /// Where in the photograph these pixels are.
+    window: Window,
+    /// Light, 0 outside the mask.
+    picture: Planes<3>,
+    /// 0 or 1.
+    mask: Planes<1>,
+    /// The same.
+    inside: Vec<bool>,
+}
+
+impl CutObject {
+    fn new(
+        picture: &Rgb<Linear>,
+        mask: &Planes<1>,
+        size: WorkingSize,
+    ) -> Result<Self, DecomposeError> {
+        let region = Region::around(mask).ok_or(DecomposeError::EmptyMask)?;
+        let window = match size {
+            WorkingSize::Network => Window::around(mask).ok_or(DecomposeError::EmptyMask)?,
+            // Tiles cover a square.
+            WorkingSize::Native => region.window(),
+        };
+        check_size("photograph", mask.extent())?;
+        check_size("square around the object", window.extent)?;
+        let mask = window.cut(mask).map(|m| f32::from(u8::from(m >= 0.5)));
+        let picture = cut_out(window.cut(picture.planes()).map(usable), &mask);
+        if !picture.planes().into_iter().flatten().any(|&v| v > 0.0) {
+            return Err(DecomposeError::Unlit);
+        }
+        Ok(Self {
+            region,
+            window,
+            picture,
+            inside: inside(&mask),
+            mask,
+        })
+    }
+
+    /// The part of the pixels under the mask of which all channels have at least so much light.
+    fn saturated(&self, from: f32) -> f64 {
+        let [red, green, blue] = self.picture.planes();
+        let (mut all, mut full) = (0_u64, 0_u64);
+        for at in (0..self.inside.len()).filter(|&at| self.inside[at]) {
+            all += 1;
+            full += u64::from(red[at].min(green[at]).min(blue[at]) >= from);
+        }
+        full as f64 / all.max(1) as f64
+    }
+}
+
+/// Whether there is memory for the layers of so many pixels.
+pub(super) fn check_size(what: &'static str, extent: Extent) -> Result<(), DecomposeError> {
+    if extent.width.saturating_mul(extent.height) > MOST_PIXELS {
+        return Err(DecomposeError::TooLarge { what, extent });
+    }
+    Ok(())
+}
+
+/// Normals, light and gloss at the network's size.
+struct Explained {
+    normals: Normals<YUp>,
+    light: ShLight,
+    light_residual: f64,
+    gloss: Option<FittedGloss>,
+}
+
+/// A value as light: black where it is negative or no number.
+fn usable(value: f32) -> f32 {
+    if value.is_finite() {
+        value.max(0.0)
+    } else {
+        0.0
+    }
+}
+
+fn add(fields: &mut Fields, details: &Fields) {
+    for (to, from) in fields.planes_mut().into_iter().zip(details.planes()) {
+        for (to, from) in to.iter_mut().zip(from) {
+            *to += from;
+        }
+    }
+}
+
+/// A grey image as three equal channels.
+pub(crate) fn in_colour(grey: Planes<1>) -> Planes<3> {
+    let mut colour = Planes::zeros(grey.extent());
+    for plane in colour.planes_mut() {
+        plane.copy_from_slice(grey.plane(0));
+    }
+    colour
+}
+
+/// The root mean square of the difference over that of `b`.
+fn relative_difference(a: &[f32], b: &[f32]) -> f64 {
+    let square = |v: f32| f64::from(v).powi(2);
+    let difference: f64 = a.iter().zip(b).map(|(&a, &b)| square(a - b)).sum();
+    let all: f64 = b.iter().map(|&b| square(b)).sum();
+    if all > 0.0 {
+        (difference / all).sqrt()
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shading_with_hard_shadows_has_a_light_that_there_can_be() {
+        let normals = Normals::sphere(33);
+        // Bright where the surface turns far to the right, and black elsewhere.
+        let shadowed = normals.planes().plane(0).iter();
+        let plane: Vec<f32> = shadowed.map(|x| if *x > 0.6 { 3.0 } else { 0.0 }).collect();
+        let planes =
+            Planes::from_planes(Extent::new(33, 33), [plane.clone(), plane.clone(), plane])
+                .unwrap();
+        let (shading, known) = (Rgb::new(planes), vec![true; 33 * 33]);
+        let nearest = fit_light(&normals, &shading, &known, STIFFNESS).unwrap();
+        assert!(is_too_one_sided(&nearest), "{nearest:?}");
+        let possible = fit_possible_light(&normals, &shading, &known).unwrap();
+        assert!(!is_too_one_sided(&possible), "{possible:?}");
+    }
+}

@@ -1,0 +1,219 @@
+//! Why a photograph cannot be decomposed.
+
+use std::io;
+#[cfg(feature = "files")]
+use std::path::Path;
+use std::path::PathBuf;
+
+use super::decomposer::MOST_PIXELS;
+#[cfg(feature = "files")]
+use relight_core::files::FolderFault;
+use relight_core::image::{Extent, ImageError};
+use relight_core::light::{LightError, LightFileError};
+use relight_nets::NetError;
+#[cfg(feature = "files")]
+use relight_reader::{DamagedSample, OpenError};
+
+/// Why a photograph cannot be decomposed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DecomposeError {
+    /// The network cannot be used.
+    #[error(transparent)]
+    Net(#[from] NetError),
+    /// An image cannot be read or written.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// A mask belongs to another picture.
+    #[error("the mask has {} x {} pixels, and the photograph {} x {}", found.width, found.height, expected.width, expected.height)]
+    MaskSize {
+        /// The mask's size.
+        found: Extent,
+        /// The photograph's.
+        expected: Extent,
+    },
+    /// There is nothing under the mask.
+    #[error("the mask is empty: it is nowhere at least one half")]
+    EmptyMask,
+    /// There are more pixels than are decomposed.
+    #[error(
+        "the {what} has {} x {} pixels, and at most {MOST_PIXELS} are decomposed: make the photograph smaller",
+        extent.width, extent.height
+    )]
+    TooLarge {
+        /// What is too large.
+        what: &'static str,
+        /// Its size.
+        extent: Extent,
+    },
+    /// There is no light on the object.
+    #[error("the picture is black all over the object: nothing is lit")]
+    Unlit,
+    /// A rectangle has nothing of the object.
+    #[error(
+        "in the rectangle {x},{y},{width},{height} there is nothing of the object: by the photograph's alpha or black \
+         background it lies elsewhere"
+    )]
+    EmptyRectangle {
+        /// Column of its left edge.
+        x: u32,
+        /// Row of its upper edge.
+        y: u32,
+        /// Its width.
+        width: u32,
+        /// Its height.
+        height: u32,
+    },
+    /// A rectangle lies beside the photograph.
+    #[error("the rectangle {x},{y},{width},{height} does not touch the photograph of {} x {} pixels", photo.width, photo.height)]
+    Rectangle {
+        /// Column of its left edge.
+        x: u32,
+        /// Row of its upper edge.
+        y: u32,
+        /// Its width.
+        width: u32,
+        /// Its height.
+        height: u32,
+        /// The photograph's size.
+        photo: Extent,
+    },
+    /// A photograph without light.
+    #[error("{} is black all over: there is no object to be seen", path.display())]
+    Black {
+        /// The photograph.
+        path: PathBuf,
+    },
+    /// Nothing says where the object is.
+    #[error(
+        "{} does not say where the object is: it has no alpha, and its background is not black. \
+         Make a mask with `relit-mask` and give it by --mask, or the rectangle around the object by --rect",
+        path.display()
+    )]
+    NoMask {
+        /// The photograph.
+        path: PathBuf,
+    },
+    /// No mask in the folder of masks belongs to a photograph.
+    #[error("there is no mask {}", path.display())]
+    MaskMissing {
+        /// Where it should be.
+        path: PathBuf,
+    },
+    /// A file says that its values are encoded in a way that is not known here.
+    #[error(
+        "{} says that its values are encoded by the power 1 / {gamma}: say by --transfer how to read them",
+        path.display()
+    )]
+    UnknownGamma {
+        /// The photograph.
+        path: PathBuf,
+        /// The gamma of its file.
+        gamma: f32,
+    },
+    /// A file says that its values are encoded by a transfer function that is not read.
+    #[error(
+        "{} says that its values are encoded by {transfer}: convert it to sRGB or EXR, or say by --transfer how to read it",
+        path.display()
+    )]
+    UnknownTransfer {
+        /// The photograph.
+        path: PathBuf,
+        /// The transfer function's name.
+        transfer: String,
+    },
+    /// There are no photographs.
+    #[error("{} holds no photographs (.png, .jpg, .exr, .hdr) and no shards (.tar)", path.display())]
+    NoPhotos {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Two photographs, or two turns, would be written into one folder.
+    #[error(
+        "{} and {} would both be written to {name}: decompose them into different folders, one after the other",
+        first.display(), second.display()
+    )]
+    SameName {
+        /// One photograph or data set.
+        first: PathBuf,
+        /// Another.
+        second: PathBuf,
+        /// The folder of both.
+        name: String,
+    },
+    /// A data set cannot be opened.
+    #[cfg(feature = "files")]
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// A sample of a shard is damaged.
+    #[cfg(feature = "files")]
+    #[error("a sample is damaged")]
+    Damage(#[from] DamagedSample),
+    /// No light can be fitted.
+    #[error("no light can be fitted")]
+    Light(#[from] LightError),
+    /// The light cannot be written.
+    #[error(transparent)]
+    LightFile(#[from] LightFileError),
+    /// A folder for results holds something that is no file of a decomposition.
+    #[error(
+        "{} holds {name}, which is no file of a decomposition: give a folder that is new, empty, or holds an earlier \
+         decomposition and nothing else",
+        path.display()
+    )]
+    Foreign {
+        /// The folder.
+        path: PathBuf,
+        /// What it holds.
+        name: String,
+    },
+    /// A path for results cannot be a folder.
+    #[error("{} cannot be the folder for the results: give the name of a folder, not of a file", path.display())]
+    NoFolder {
+        /// The path.
+        path: PathBuf,
+    },
+    /// A file or folder cannot be read.
+    #[error("{} could not be read", path.display())]
+    Read {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// A file or folder cannot be written.
+    #[error("{} could not be written", path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+}
+
+#[cfg(feature = "files")]
+impl DecomposeError {
+    /// Puts the path to an operating system's reason.
+    pub(crate) fn read(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        |source| Self::Read { path, source }
+    }
+
+    /// Puts the path to an operating system's reason.
+    pub(crate) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        |source| Self::Write { path, source }
+    }
+}
+
+#[cfg(feature = "files")]
+impl From<FolderFault> for DecomposeError {
+    fn from(fault: FolderFault) -> Self {
+        match fault {
+            FolderFault::Foreign(path, name) => Self::Foreign { path, name },
+            FolderFault::NoFolder(path) => Self::NoFolder { path },
+            FolderFault::Read(path, source) => Self::Read { path, source },
+            FolderFault::Write(path, source) => Self::Write { path, source },
+        }
+    }
+}

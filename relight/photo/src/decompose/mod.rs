@@ -1,0 +1,34 @@
+//! From one photograph to normals, albedo, shading, highlight and light.
+//!
+//! [`Decomposer`] does it for a picture in memory; [`Photo`] is a picture with its mask out of the
+//! content of a file.
+
+mod answer;
+mod compose;
+mod decomposer;
+mod encoding;
+mod error;
+mod gloss;
+mod mask;
+mod other;
+mod photo;
+mod region;
+#[cfg(test)]
+mod tests;
+
+#[cfg(feature = "files")]
+pub(crate) use decomposer::in_colour;
+pub use decomposer::{
+    DecomposeOptions, Decomposer, Decomposition, MOST_PIXELS, SpecularGate, WORKING_SIDE,
+    WorkingSize,
+};
+pub use encoding::{AnsweredMaps, EncodedPicture};
+pub use encoding::{HIGHLIGHT_OFFSET, LEAST_FACING, LOG_LUMINANCE, LOG_SHADING, MASK};
+pub use error::DecomposeError;
+pub use gloss::FittedGloss;
+pub use gloss::fit_gloss;
+pub use mask::{MaskSource, Rectangle};
+#[cfg(feature = "files")]
+pub(crate) use photo::stem;
+pub use photo::{Photo, PhotoHints};
+pub use region::Region;

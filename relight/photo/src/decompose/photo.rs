@@ -1,0 +1,244 @@
+//! A photograph with its mask, out of the content of its file.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use super::decomposer::{DecomposeOptions, SATURATED_VALUE, check_size};
+use super::error::DecomposeError;
+use super::mask::{MaskSource, NoObject, Rectangle, find_mask, is_empty, mask_of};
+use relight_core::image::{
+    ColourSpace, Extent, Gamma22, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
+};
+
+/// The transfer function of ITU-T H.273 that says nothing.
+const UNSPECIFIED: u8 = 2;
+/// How far a gamma may be from one that is known.
+const SAME_GAMMA: f32 = 0.02;
+
+/// A picture with its mask.
+#[derive(Debug, Clone)]
+pub struct Photo {
+    /// Its name: the file's without ending, or a frame's key `<session>/<index>`.
+    pub name: String,
+    /// The light.
+    pub picture: Rgb<Linear>,
+    /// 1 on the object, else 0.
+    pub mask: Planes<1>,
+    /// What said so.
+    pub mask_source: MaskSource,
+    /// The alpha that its file has, 0 to 1, as it stands there.
+    pub alpha: Option<Planes<1>>,
+    saturated_from: f32,
+    saturated_fraction: Option<f64>,
+}
+
+/// What is told of a photograph beside its file.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PhotoHints<'a> {
+    /// A picture of the mask.
+    pub mask: Option<&'a StoredImage>,
+    /// A rectangle around the object.
+    pub rectangle: Option<Rectangle>,
+    /// How integers are encoded, where the file is not to be asked.
+    pub transfer: Option<Transfer>,
+}
+
+impl Photo {
+    /// Decodes the content of a file, and finds its mask: that of `hints`, or its alpha, or what is not black before a
+    /// black background, or the rectangle. Errors name it as `path`, and its stem is the photograph's name.
+    ///
+    /// # Errors
+    /// Where it is no picture, too large or encoded in an unknown way, or nothing says where the object is.
+    pub fn from_bytes(
+        path: &Path,
+        bytes: &[u8],
+        hints: &PhotoHints<'_>,
+    ) -> Result<Self, DecomposeError> {
+        if let Some(extent) = stated_extent(bytes) {
+            check_size("photograph", extent)?;
+        }
+        let image = StoredImage::from_bytes(path, bytes)?;
+        let transfer = match (image.samples, hints.transfer) {
+            (Samples::Float, _) => None,
+            (Samples::Integer, Some(transfer)) => Some(transfer),
+            (Samples::Integer, None) => Some(stated_transfer(path, bytes)?),
+        };
+        let (mask, mask_source) = match hints.mask {
+            Some(mask) => (
+                mask_of(mask.clone(), image.planes.extent())?,
+                MaskSource::File,
+            ),
+            None => {
+                let encoded = shown(&image.planes, transfer);
+                find_mask(&encoded, image.alpha.as_ref(), hints.rectangle).map_err(|why| {
+                    let path = path.to_owned();
+                    match why {
+                        NoObject::Background => DecomposeError::NoMask { path },
+                        NoObject::Black => DecomposeError::Black { path },
+                    }
+                })?
+            }
+        };
+        check_mask(&mask, hints.rectangle)?;
+        Ok(Self {
+            name: stem(path),
+            picture: Rgb::new(image.planes.map(to_linear(transfer))),
+            mask,
+            mask_source,
+            alpha: image.alpha,
+            saturated_from: match transfer {
+                // There is no largest value in floating point: what a screen shows as white counts.
+                None => Srgb::to_linear(SATURATED_VALUE),
+                Some(_) => to_linear(transfer)(SATURATED_VALUE),
+            },
+            saturated_fraction: None,
+        })
+    }
+
+    /// A frame of a data set, which has its mask and what is known of its saturation.
+    ///
+    /// # Errors
+    /// Where the mask is empty.
+    pub fn of_frame(
+        name: String,
+        picture: Rgb<Linear>,
+        mask: Planes<1>,
+        saturated_fraction: Option<f64>,
+    ) -> Result<Self, DecomposeError> {
+        check_mask(&mask, None)?;
+        Ok(Self {
+            name,
+            picture,
+            mask,
+            mask_source: MaskSource::Shard,
+            alpha: None,
+            saturated_from: Srgb::to_linear(SATURATED_VALUE),
+            saturated_fraction,
+        })
+    }
+
+    /// These options with what is known of the photograph's saturation.
+    #[must_use]
+    pub fn options(&self, options: &DecomposeOptions) -> DecomposeOptions {
+        DecomposeOptions {
+            saturated_from: self.saturated_from,
+            saturated_fraction: self.saturated_fraction,
+            ..*options
+        }
+    }
+}
+
+/// What a photograph is called: its file's name without ending.
+pub(crate) fn stem(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or(path.as_os_str());
+    stem.to_string_lossy().into_owned()
+}
+
+/// The size that a file says it has; none where it cannot be read.
+fn stated_extent(bytes: &[u8]) -> Option<Extent> {
+    let reader = ::image::ImageReader::new(Cursor::new(bytes));
+    let sides = reader.with_guessed_format().ok()?.into_dimensions().ok()?;
+    Some(Extent::new(sides.0 as usize, sides.1 as usize))
+}
+
+fn check_mask(mask: &Planes<1>, rectangle: Option<Rectangle>) -> Result<(), DecomposeError> {
+    match rectangle {
+        _ if !is_empty(mask) => Ok(()),
+        None => Err(DecomposeError::EmptyMask),
+        Some(
+            rectangle @ Rectangle {
+                x,
+                y,
+                width,
+                height,
+            },
+        ) if rectangle.touches(mask.extent()) => Err(DecomposeError::EmptyRectangle {
+            x,
+            y,
+            width,
+            height,
+        }),
+        Some(Rectangle {
+            x,
+            y,
+            width,
+            height,
+        }) => Err(DecomposeError::Rectangle {
+            x,
+            y,
+            width,
+            height,
+            photo: mask.extent(),
+        }),
+    }
+}
+
+/// What turns a file's values into light.
+fn to_linear(transfer: Option<Transfer>) -> fn(f32) -> f32 {
+    match transfer {
+        None | Some(Transfer::Linear) => Linear::to_linear,
+        Some(Transfer::Srgb) => Srgb::to_linear,
+        Some(Transfer::Gamma22) => Gamma22::to_linear,
+    }
+}
+
+/// The picture's values as a screen takes them.
+fn shown(planes: &Planes<3>, transfer: Option<Transfer>) -> Planes<3> {
+    match transfer {
+        None | Some(Transfer::Linear) => planes.clone().map(Srgb::from_linear),
+        Some(_) => planes.clone(),
+    }
+}
+
+/// How a file of integers says that they are encoded; sRGB where it says nothing.
+///
+/// A PNG says it by the chunks cICP, sRGB or gAMA. 1 / 2.2 in gAMA is what programs write for sRGB.
+fn stated_transfer(path: &Path, bytes: &[u8]) -> Result<Transfer, DecomposeError> {
+    // What is no PNG says nothing.
+    let Ok(reader) = png::Decoder::new(Cursor::new(bytes)).read_info() else {
+        return Ok(Transfer::Srgb);
+    };
+    let info = reader.info();
+    if let Some(points) = info.coding_independent_code_points
+        && points.transfer_function != UNSPECIFIED
+    {
+        return transfer_of_points(points.transfer_function).map_err(|transfer| {
+            DecomposeError::UnknownTransfer {
+                path: path.to_owned(),
+                transfer,
+            }
+        });
+    }
+    let gamma = match info.gama_chunk {
+        Some(gamma) if info.srgb.is_none() => gamma.into_value(),
+        _ => return Ok(Transfer::Srgb),
+    };
+    let near = |known: f32| (gamma / known - 1.0).abs() < SAME_GAMMA;
+    if near(1.0) {
+        Ok(Transfer::Linear)
+    } else if near(1.0 / 2.2) {
+        Ok(Transfer::Srgb)
+    } else {
+        Err(DecomposeError::UnknownGamma {
+            path: path.to_owned(),
+            gamma: 1.0 / gamma,
+        })
+    }
+}
+
+/// What a transfer function of ITU-T H.273 is read as, or its name where it is not read. Those of BT.709 and its like
+/// are shown as sRGB is.
+fn transfer_of_points(function: u8) -> Result<Transfer, String> {
+    let name = match function {
+        8 => return Ok(Transfer::Linear),
+        4 => return Ok(Transfer::Gamma22),
+        1 | 6 | 7 | 11..=15 => return Ok(Transfer::Srgb),
+        5 => "the power 1 / 2.8",
+        9 | 10 => "a logarithm",
+        16 => "PQ",
+        17 => "SMPTE ST 428-1",
+        18 => "HLG",
+        _ => "an unknown function",
+    };
+    Err(format!("{name} (transfer function {function} in cICP)"))
+}

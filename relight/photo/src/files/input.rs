@@ -1,0 +1,255 @@
+//! Photographs in files, folders and shards.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
+
+use relight_core::image::{Extent, ImageError, Planes, Rgb, StoredImage, Transfer};
+use relight_reader::{Encoding, SampleId, Source, Turns};
+use relit_data::shard::Dataset;
+
+use crate::decompose::{DecomposeError, Photo, PhotoHints, Rectangle, stem};
+
+/// How the files of photographs end.
+const PHOTOS: [&str; 5] = ["png", "jpg", "jpeg", "exr", "hdr"];
+/// How photographs are read.
+#[derive(Debug, Clone, Default)]
+pub struct PhotoReading {
+    /// A file with the mask, or a folder with one of the photograph's name, `<name>.png`.
+    pub mask: Option<PathBuf>,
+    /// A rectangle around the object.
+    pub rectangle: Option<Rectangle>,
+    /// How integers are encoded, where the file is not to be asked.
+    pub transfer: Option<Transfer>,
+}
+
+/// Where a photograph is.
+#[derive(Clone)]
+pub enum PhotoInput {
+    /// In a file.
+    File(PathBuf),
+    /// In a shard.
+    Frame(Arc<Turns>, SampleId),
+}
+
+impl PhotoInput {
+    /// The photographs of files, of folders of photographs or shards, and of shards (`*.tar`), of each
+    /// turn the first `most`.
+    ///
+    /// # Errors
+    /// Where a folder cannot be read or holds none, a shard cannot be opened, or two photographs would
+    /// be written to one folder.
+    pub fn find(paths: &[PathBuf], most: Option<u32>) -> Result<Vec<Self>, DecomposeError> {
+        let mut found = Vec::new();
+        for path in paths {
+            if path.is_dir() {
+                add_folder(&mut found, path, most)?;
+            } else if has_ending(path, &["tar"]) {
+                add_turns(&mut found, path, most)?;
+            } else {
+                found.push((path.clone(), Self::File(path.clone())));
+            }
+        }
+        check_names(&found)?;
+        Ok(found.into_iter().map(|(_, input)| input).collect())
+    }
+
+    /// Whether a path is a shard, or a folder with shards or another data set of turns: their frames have
+    /// masks of their own.
+    #[must_use]
+    pub fn has_frames(path: &Path) -> bool {
+        if !path.is_dir() {
+            return has_ending(path, &["tar"]);
+        }
+        let is_shard = |path: PathBuf| is_visible(&path) && has_ending(&path, &["tar"]);
+        let entries = fs::read_dir(path).into_iter().flatten().flatten();
+        path.join(Dataset::FILE).is_file() || entries.map(|entry| entry.path()).any(is_shard)
+    }
+
+    /// How an error names it.
+    #[must_use]
+    pub fn place(&self) -> String {
+        match self {
+            Self::File(path) => path.display().to_string(),
+            Self::Frame(turns, id) => {
+                let turn = turns.names().nth(id.turn as usize).unwrap_or_default();
+                format!("{turn}, sample {}", id.position)
+            }
+        }
+    }
+
+    /// Reads the photograph, and its mask: that of `reading`, or its alpha, or what is not black before a
+    /// black background, or the rectangle. A frame of a shard has its own.
+    ///
+    /// # Errors
+    /// Where a file cannot be read or does not fit, or nothing says where the object is.
+    pub fn load(&self, reading: &PhotoReading) -> Result<Photo, DecomposeError> {
+        match self {
+            Self::File(path) => read_file(path, reading),
+            Self::Frame(turns, id) => read_frame(turns, *id),
+        }
+    }
+}
+
+/// Photographs, each with the path under which it was found: its own, or that of its data set.
+type Found = Vec<(PathBuf, PhotoInput)>;
+
+fn add_folder(found: &mut Found, folder: &Path, most: Option<u32>) -> Result<(), DecomposeError> {
+    let mut photos = Vec::new();
+    for entry in fs::read_dir(folder).map_err(DecomposeError::read(folder))? {
+        let path = entry.map_err(DecomposeError::read(folder))?.path();
+        if is_visible(&path) && path.is_file() && has_ending(&path, &PHOTOS) {
+            photos.push(path);
+        }
+    }
+    let has_frames = PhotoInput::has_frames(folder);
+    if photos.is_empty() && !has_frames {
+        return Err(DecomposeError::NoPhotos {
+            path: folder.to_owned(),
+        });
+    }
+    photos.sort();
+    found.extend(
+        photos
+            .into_iter()
+            .map(|path| (path.clone(), PhotoInput::File(path))),
+    );
+    if has_frames {
+        add_turns(found, folder, most)?;
+    }
+    Ok(())
+}
+
+fn add_turns(found: &mut Found, path: &Path, most: Option<u32>) -> Result<(), DecomposeError> {
+    let turns = Arc::new(Turns::open(path, Encoding::Linear)?);
+    for (turn, samples) in (0..).zip(turns.turns()) {
+        for position in 0..samples.min(most.unwrap_or(u32::MAX)) {
+            let id = SampleId { turn, position };
+            found.push((path.to_owned(), PhotoInput::Frame(Arc::clone(&turns), id)));
+        }
+    }
+    Ok(())
+}
+
+fn is_visible(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default();
+    !name.as_encoded_bytes().starts_with(b".")
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    path.extension().is_some_and(|found| {
+        endings
+            .iter()
+            .any(|known| found.eq_ignore_ascii_case(known))
+    })
+}
+
+/// Whether every file and every turn has a folder of its own for its results.
+fn check_names(inputs: &Found) -> Result<(), DecomposeError> {
+    let mut names = BTreeMap::new();
+    let mut last_turn = None;
+    for (path, input) in inputs {
+        let name = match input {
+            PhotoInput::File(path) => Some(stem(path)),
+            PhotoInput::Frame(turns, id) => {
+                let turn = (Arc::as_ptr(turns), id.turn);
+                if last_turn.replace(turn) == Some(turn) {
+                    continue;
+                }
+                session_of(turns, id.turn)
+            }
+        };
+        let Some(name) = name else { continue };
+        if let Some(first) = names.insert(name.clone(), path) {
+            return Err(DecomposeError::SameName {
+                first: first.clone(),
+                second: path.clone(),
+                name,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The folder of a turn's results: the first part of its frames' keys, by the first frame that can be read.
+fn session_of(turns: &Turns, turn: u32) -> Option<String> {
+    let samples = *turns.turns().get(turn as usize)?;
+    let key = |position| {
+        let (batch, _) = turns.batch(&[SampleId { turn, position }], None);
+        batch.frames.first().map(|frame| within(&frame.key))
+    };
+    let key = (0..samples).find_map(key)?;
+    key.split('/').next().map(str::to_owned)
+}
+
+fn read_file(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeError> {
+    let bytes = fs::read(path).map_err(|source| ImageError::Open {
+        path: path.to_owned(),
+        source,
+    })?;
+    let mask = match &reading.mask {
+        Some(file) => Some(StoredImage::read(&mask_file(file, &stem(path))?)?),
+        None => None,
+    };
+    let hints = PhotoHints {
+        mask: mask.as_ref(),
+        rectangle: reading.rectangle,
+        transfer: reading.transfer,
+    };
+    Photo::from_bytes(path, &bytes, &hints)
+}
+
+fn mask_file(given: &Path, name: &str) -> Result<PathBuf, DecomposeError> {
+    if !given.is_dir() {
+        return Ok(given.to_owned());
+    }
+    let path = given.join(format!("{name}.png"));
+    if path.is_file() {
+        Ok(path)
+    } else {
+        Err(DecomposeError::MaskMissing { path })
+    }
+}
+
+/// A frame's key as a path that leads nowhere else.
+fn within(key: &str) -> String {
+    let parts = Path::new(key).components().filter_map(|part| match part {
+        Component::Normal(name) => Some(name.to_string_lossy()),
+        _ => None,
+    });
+    parts.collect::<Vec<_>>().join("/")
+}
+
+fn read_frame(turns: &Turns, id: SampleId) -> Result<Photo, DecomposeError> {
+    let (batch, mut damage) = turns.batch(&[id], None);
+    if let Some(damage) = damage.pop() {
+        return Err(damage.into());
+    }
+    let Extent { width, height } = batch.extent;
+    let pixels = width * height;
+    let [red, green, blue] = [0, 1, 2].map(|c| batch.images[c * pixels..][..pixels].to_vec());
+    let frame = batch.frames.first();
+    let record = frame.and_then(|frame| frame.record.as_ref());
+    Photo::of_frame(
+        frame.map(|frame| within(&frame.key)).unwrap_or_default(),
+        Rgb::new(Planes::from_planes(batch.extent, [red, green, blue])?),
+        Planes::from_planes(batch.extent, [batch.masks])?,
+        record.map(|record| record.saturated_fraction),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_key_of_a_frame_leads_nowhere_but_into_the_folder_for_results() {
+        assert_eq!(
+            within("20261120T093015Z-mug/0007"),
+            "20261120T093015Z-mug/0007"
+        );
+        assert_eq!(within("../../etc/./passwd"), "etc/passwd");
+        assert_eq!(within("/tmp/x"), "tmp/x");
+    }
+}

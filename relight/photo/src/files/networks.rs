@@ -1,0 +1,24 @@
+//! Networks for a decomposer in files.
+
+use std::fs;
+use std::path::Path;
+
+use relight_core::light::NormalsFrame;
+use relight_nets::NetError;
+
+use crate::decompose::{DecomposeError, Decomposer};
+
+impl Decomposer {
+    /// Takes the normals of another network from now on: see [`Decomposer::set_normals`].
+    ///
+    /// # Errors
+    /// Where the file cannot be read or run, or answers something else; then all stays as it was.
+    pub fn read_normals(&mut self, path: &Path, frame: NormalsFrame) -> Result<(), DecomposeError> {
+        let onnx = fs::read(path).map_err(|source| NetError::Io {
+            path: path.to_owned(),
+            doing: "read",
+            source,
+        })?;
+        self.set_normals(path, &onnx, frame)
+    }
+}

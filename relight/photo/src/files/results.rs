@@ -1,0 +1,300 @@
+//! What is written of a decomposition: a folder that appears when it is whole.
+
+use std::path::Path;
+
+use relit_data::durable::write_whole;
+use serde::Serialize;
+
+use crate::decompose::{
+    DecomposeError, DecomposeOptions, Decomposition, MaskSource, Photo, Region, SpecularGate,
+    WorkingSize, in_colour,
+};
+use relight_core::files::ResultFolder;
+use relight_core::files::write_png;
+use relight_core::image::{ColourSpace, Depth, Extent, ImageError, Linear, Planes, Rgb, Srgb};
+use relight_core::light::{Normals, Panorama};
+use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
+
+/// The file of figures.
+const FIGURES: &str = "decomposition.json";
+/// All files of a decomposition.
+const FILES: [&str; 11] = [
+    "normal.png",
+    "albedo.png",
+    "shading.png",
+    "diffuse.png",
+    "specular.png",
+    "light.txt",
+    "light-sphere.png",
+    "light-panorama.exr",
+    "mask.png",
+    "contact.png",
+    FIGURES,
+];
+const RESULTS: ResultFolder = ResultFolder {
+    marker: FIGURES,
+    holds: |name| FILES.contains(&name),
+};
+/// What it says it is.
+const SCHEMA: &str = "relight.decomposition/1";
+/// Width and height of the lit ball, and of the pictures of the sheet, pixels.
+const TILE: usize = 256;
+/// The panorama's size, pixels.
+const PANORAMA: Extent = Extent::new(256, 128);
+/// Pictures in a row of the sheet.
+const COLUMNS: usize = 4;
+/// On the sheet, the part of the values that is brighter than white.
+const BEYOND_WHITE: f64 = 0.005;
+
+/// The figures of a decomposition, as `decomposition.json` holds them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DecompositionFigures {
+    schema: &'static str,
+    software: String,
+    photo: String,
+    weights: String,
+    size: [usize; 2],
+    region: Region,
+    working_size: &'static str,
+    mirrored: bool,
+    mask: FigureMask,
+    specular: FigureSpecular,
+    white: FigureWhites,
+    light: FigureLight,
+    residual: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct FigureMask {
+    source: MaskSource,
+    pixels: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct FigureSpecular {
+    setting: &'static str,
+    saturated_fraction: f64,
+    separated: bool,
+    reflectance: Option<f32>,
+    smoothness: Option<f32>,
+    residual: Option<f64>,
+}
+
+/// The light that the largest value of a file stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct FigureWhites {
+    albedo: f32,
+    shading: f32,
+    diffuse: f32,
+    specular: f32,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct FigureLight {
+    order: usize,
+    coefficients: Vec<[f64; 3]>,
+    residual: f64,
+}
+
+/// A decomposition together with what it was made of, ready to be written.
+#[derive(Debug, Clone, Copy)]
+pub struct DecompositionFiles<'a> {
+    /// The photograph.
+    pub photo: &'a Photo,
+    /// What was found.
+    pub found: &'a Decomposition,
+    /// How.
+    pub options: &'a DecomposeOptions,
+    /// How the weights are named.
+    pub weights: &'a str,
+}
+
+impl DecompositionFiles<'_> {
+    /// Writes all files into the folder `out`, which appears when they are there. An earlier
+    /// decomposition in it is replaced.
+    ///
+    /// # Errors
+    /// As [`Self::check`], or where a file cannot be written: then the folder is as it was.
+    pub fn write(&self, out: &Path) -> Result<DecompositionFigures, DecomposeError> {
+        RESULTS.write(out, |folder| self.write_files(folder))
+    }
+
+    /// Whether a decomposition may be written to the folder `out`: it is not there, empty, or holds the files of an
+    /// earlier decomposition and nothing else.
+    ///
+    /// # Errors
+    /// [`DecomposeError::Foreign`] or [`DecomposeError::NoFolder`], or where the folder cannot be read.
+    pub fn check(out: &Path) -> Result<(), DecomposeError> {
+        Ok(RESULTS.check(out)?)
+    }
+
+    fn write_files(&self, folder: &Path) -> Result<DecompositionFigures, DecomposeError> {
+        let found = self.found;
+        let path = |name: &str| folder.join(name);
+        found
+            .normals
+            .write_png(&path("normal.png"), Depth::Sixteen)?;
+        let white = FigureWhites {
+            albedo: write_light(&path("albedo.png"), &found.albedo)?,
+            shading: write_grey(&path("shading.png"), &found.shading)?,
+            diffuse: write_light(&path("diffuse.png"), &found.diffuse)?,
+            specular: write_grey(&path("specular.png"), &found.highlight)?,
+        };
+        found.light.write(&path("light.txt"))?;
+        ball(found)
+            .encode::<Srgb>()
+            .write_png(&path("light-sphere.png"))?;
+        let panorama = Panorama::of_light(&found.light, PANORAMA);
+        let radiance = panorama
+            .image()
+            .planes()
+            .clone()
+            .map(|value| value.max(0.0));
+        Rgb::<Linear>::new(radiance).write_exr(&path("light-panorama.exr"))?;
+        let mask = in_colour(self.photo.mask.clone());
+        write_png(&path("mask.png"), &mask, Depth::Eight)?;
+        drop(mask);
+        write_png(&path("contact.png"), &self.sheet()?, Depth::Eight)?;
+        let figures = self.figures(white);
+        let mut json = serde_json::to_vec_pretty(&figures).unwrap_or_default();
+        json.push(b'\n');
+        let file = path(FIGURES);
+        write_whole(&file, &json).map_err(DecomposeError::write(&file))?;
+        Ok(figures)
+    }
+
+    fn figures(&self, white: FigureWhites) -> DecompositionFigures {
+        let Self {
+            photo,
+            found,
+            options,
+            weights,
+        } = *self;
+        let gloss = found.gloss;
+        let Extent { width, height } = found.normals.extent();
+        DecompositionFigures {
+            schema: SCHEMA,
+            software: format!("relight {}", env!("CARGO_PKG_VERSION")),
+            photo: photo.name.clone(),
+            weights: weights.to_owned(),
+            size: [width, height],
+            region: found.region,
+            working_size: match options.size {
+                WorkingSize::Network => "network",
+                WorkingSize::Native => "native",
+            },
+            mirrored: options.mirror,
+            mask: FigureMask {
+                source: photo.mask_source,
+                pixels: photo.mask.plane(0).iter().filter(|&&m| m >= 0.5).count(),
+            },
+            specular: FigureSpecular {
+                setting: match options.specular {
+                    SpecularGate::Auto => "auto",
+                    SpecularGate::On => "on",
+                    SpecularGate::Off => "off",
+                },
+                saturated_fraction: found.saturated_fraction,
+                separated: found.is_glossy,
+                reflectance: gloss.map(|gloss| gloss.reflectance),
+                smoothness: gloss.map(|gloss| gloss.smoothness),
+                residual: gloss.map(|gloss| gloss.residual),
+            },
+            white,
+            light: FigureLight {
+                order: found.light.order().get(),
+                coefficients: found.light.coefficients().to_vec(),
+                residual: found.light_residual,
+            },
+            residual: found.residual,
+        }
+    }
+
+    /// One sheet: the photograph, normals, albedo and shading; the diffuse part, the highlight, a ball in
+    /// the light, and the shading that this light makes on the normals.
+    fn sheet(&self) -> Result<Planes<3>, DecomposeError> {
+        let (found, mask) = (self.found, &self.photo.mask);
+        let picture = self.photo.picture.planes();
+        let (albedo, diffuse) = (found.albedo.planes(), found.diffuse.planes());
+        let region = &found.region;
+        let lit = {
+            let layer = DiffuseLayer::new(&found.light, DiffuseForm::Irradiance);
+            region.resized(layer.shading(&found.normals).planes(), square())
+        };
+        // The layers are shown as bright as the photograph, whose values are light of a screen.
+        let own = bright(picture, mask).max(1.0);
+        let white = bright(&found.shading, mask);
+        let shown = |tile: Planes<3>, white: f32| {
+            tile.map(|value| Srgb::from_linear((value / white).clamp(0.0, 1.0)))
+        };
+        let colour = |planes: &Planes<3>, white| shown(region.resized(planes, square()), white);
+        let grey =
+            |planes: &Planes<1>, white| shown(in_colour(region.resized(planes, square())), white);
+        let tiles = [
+            colour(picture, own),
+            region.resized(&found.normals.to_colours(), square()),
+            colour(albedo, bright(albedo, mask)),
+            grey(&found.shading, white),
+            colour(diffuse, own),
+            grey(&found.highlight, own),
+            ball(found).encode::<Srgb>().into_planes(),
+            shown(lit, white),
+        ];
+        Ok(Planes::sheet(&tiles, COLUMNS)?)
+    }
+}
+
+fn square() -> Extent {
+    Extent::new(TILE, TILE)
+}
+
+/// A white ball in the light, as bright as the light allows.
+fn ball(found: &Decomposition) -> Rgb<Linear> {
+    let layer = DiffuseLayer::new(&found.light, DiffuseForm::Irradiance);
+    let exposure = exposure_for(&found.light);
+    let shading = layer.shading(&Normals::sphere(TILE)).into_planes();
+    Rgb::new(shading.map(|value| value * exposure))
+}
+
+/// Writes light as a PNG of 16 bits, sRGB; the light that its largest value stands for.
+pub fn write_light(path: &Path, light: &Rgb<Linear>) -> Result<f32, ImageError> {
+    let (encoded, white) = encoded(light.planes());
+    write_png(path, &encoded, Depth::Sixteen)?;
+    Ok(white)
+}
+
+/// The same of grey light.
+fn write_grey(path: &Path, light: &Planes<1>) -> Result<f32, ImageError> {
+    let (encoded, white) = encoded(light);
+    write_png(path, &in_colour(encoded), Depth::Sixteen)?;
+    Ok(white)
+}
+
+/// Light as sRGB over its largest value, and that value. What fits in stays as it is, so that files can be
+/// compared.
+fn encoded<const C: usize>(light: &Planes<C>) -> (Planes<C>, f32) {
+    let values = light.planes().into_iter().flatten();
+    let white = values.fold(1.0_f32, |a, &b| a.max(b));
+    let encoded = light.clone();
+    (encoded.map(|value| Srgb::from_linear(value / white)), white)
+}
+
+/// The value that one in two hundred under the mask exceeds; 1 where all is dark.
+pub fn bright<const C: usize>(planes: &Planes<C>, mask: &Planes<1>) -> f32 {
+    let channels = planes.planes();
+    let brightest = |at: usize| {
+        channels
+            .iter()
+            .fold(0.0_f32, |most, plane| most.max(plane[at]))
+    };
+    let mut values: Vec<f32> = (0..mask.extent().pixels())
+        .filter(|&at| mask.plane(0)[at] >= 0.5)
+        .map(brightest)
+        .collect();
+    let place = (values.len() as f64 * (1.0 - BEYOND_WHITE)) as usize;
+    if place >= values.len() {
+        return 1.0;
+    }
+    let (_, &mut value, _) = values.select_nth_unstable_by(place, f32::total_cmp);
+    if value > 0.0 { value } else { 1.0 }
+}

@@ -1,0 +1,388 @@
+//! A scene as a text in TOML. Names files and opens none.
+
+use std::path::PathBuf;
+
+use serde::Deserialize;
+
+use super::{Lamp, LampFault, MaterialChange, ObjectGloss, Placement};
+
+/// The largest picture, pixels a side.
+const LARGEST_SIDE: u32 = 16_384;
+/// The most objects of a scene.
+const MOST_OBJECTS: usize = 100;
+
+/// A picture that objects are put into, and all about them.
+///
+/// ```
+/// use relight_photo::insert::SceneDescription;
+///
+/// let scene = SceneDescription::parse(r##"
+///     background = "room.hdr"
+///     light.lamp = "60,30,3200K"
+///
+///     [[object]]
+///     photo = "cup.jpg"
+///     mask = "cup-mask.png"
+///     at = [0.4, 0.9]
+///     height = 0.35
+/// "##)?;
+/// assert_eq!(scene.objects[0].height, 0.35);
+/// assert!(SceneDescription::parse("background = 1").is_err());
+/// # Ok::<(), relight_photo::insert::SceneFault>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneDescription {
+    /// A photograph, a panorama or a video.
+    pub background: PathBuf,
+    /// Width and height of the picture that shows a part of a panorama, pixels.
+    #[serde(default = "default_size")]
+    pub size: [u32; 2],
+    /// How many degrees the picture's longer side shows.
+    #[serde(default = "default_field")]
+    pub field: f64,
+    /// How many degrees the camera looks down into a panorama.
+    #[serde(default = "default_down")]
+    pub down: f64,
+    /// How many degrees the camera looks down on the ground where the objects stand.
+    #[serde(default)]
+    pub tilt: Option<f64>,
+    /// The light; without any it is taken from the background.
+    #[serde(default)]
+    pub light: LightDescription,
+    /// Whether brightness, white balance and grain of the objects follow the background.
+    #[serde(default = "default_true", rename = "match")]
+    pub matches: bool,
+    /// The brightness of a panorama and its light in stops.
+    #[serde(default)]
+    pub exposure: f32,
+    /// From back to front.
+    #[serde(rename = "object")]
+    pub objects: Vec<ObjectDescription>,
+}
+
+/// Where the light comes from: at most one of these.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightDescription {
+    /// A panorama.
+    pub panorama: Option<PathBuf>,
+    /// A lamp: `AZIMUTH,ELEVATION[,COLOUR][,SIZE]`.
+    pub lamp: Option<String>,
+    /// Even light beside the lamp, as a part of it.
+    pub ambient: Option<f64>,
+    /// A text file of coefficients.
+    pub coefficients: Option<PathBuf>,
+    /// The mask of an object in the background, from which its light is estimated.
+    pub object: Option<PathBuf>,
+}
+
+/// An object of a scene.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectDescription {
+    /// Its photograph, or a captured object (`.relit`).
+    pub photo: PathBuf,
+    /// Its mask in it.
+    #[serde(default)]
+    pub mask: Option<PathBuf>,
+    /// The middle of its lower edge in the picture, in parts of its width and height from the upper left corner.
+    #[serde(default = "default_at")]
+    pub at: [f64; 2],
+    /// Its height in parts of the picture's.
+    #[serde(default = "default_height")]
+    pub height: f64,
+    /// Degrees by which it is turned in the plane, counter-clockwise.
+    #[serde(default)]
+    pub rotation: f64,
+    /// What its albedo is multiplied with.
+    #[serde(default = "default_tint")]
+    pub tint: [f32; 3],
+    /// The part of even light that it reflects, and its smoothness, in place of the gloss that was found.
+    #[serde(default)]
+    pub gloss: Option<[f32; 2]>,
+    /// Its brightness in stops.
+    #[serde(default)]
+    pub exposure: f32,
+    /// How much of its shadow is seen, 0 to 1.
+    #[serde(default = "default_shadow")]
+    pub shadow: f32,
+}
+
+/// Why a text describes no scene.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneFault {
+    /// It is no TOML, or has fields that a scene has not.
+    #[error("it is no scene: {}", .0.to_string().trim_end())]
+    Text(#[from] toml::de::Error),
+    /// A number is out of its range.
+    #[error("{what} is {value}, it has to be {allowed}")]
+    Number {
+        /// Which number.
+        what: String,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// There is more than one light.
+    #[error("light has both {0} and {1}: give one")]
+    Lights(&'static str, &'static str),
+    /// The lamp is none.
+    #[error("light.lamp: {0}")]
+    Lamp(LampFault),
+    /// There is a number of objects that cannot be.
+    #[error("there are {0} objects: give [[object]] 1 to {MOST_OBJECTS} times")]
+    Objects(usize),
+}
+
+impl SceneDescription {
+    /// Reads a description, and checks its numbers.
+    ///
+    /// # Errors
+    /// Where the text is no TOML, or says what a scene cannot be.
+    pub fn parse(text: &str) -> Result<Self, SceneFault> {
+        let scene: Self = toml::from_str(text)?;
+        scene.check()?;
+        Ok(scene)
+    }
+
+    /// Whether all that is said can be.
+    ///
+    /// # Errors
+    /// [`SceneFault`] names the first number that is out of its range.
+    pub fn check(&self) -> Result<(), SceneFault> {
+        if !(1..=MOST_OBJECTS).contains(&self.objects.len()) {
+            return Err(SceneFault::Objects(self.objects.len()));
+        }
+        for side in self.size {
+            within(
+                "size",
+                f64::from(side),
+                16.0,
+                f64::from(LARGEST_SIDE),
+                "16 to 16384 pixels",
+            )?;
+        }
+        within("field", self.field, 1.0, 150.0, "1 to 150 degrees")?;
+        within("down", self.down, -89.0, 89.0, "-89 to 89 degrees")?;
+        within(
+            "tilt",
+            self.tilt.unwrap_or(20.0),
+            0.0,
+            90.0,
+            "0 to 90 degrees",
+        )?;
+        within(
+            "exposure",
+            f64::from(self.exposure),
+            -20.0,
+            20.0,
+            "-20 to 20 stops",
+        )?;
+        self.light.check()?;
+        for (number, object) in self.objects.iter().enumerate() {
+            object.check(number + 1)?;
+        }
+        Ok(())
+    }
+}
+
+impl LightDescription {
+    /// The lamp, if the light is one.
+    ///
+    /// # Errors
+    /// Where its text is none.
+    pub fn lamp(&self) -> Result<Option<Lamp>, SceneFault> {
+        let Some(text) = &self.lamp else {
+            return Ok(None);
+        };
+        let lamp: Lamp = text.parse().map_err(SceneFault::Lamp)?;
+        let ambient = self.ambient.unwrap_or(lamp.ambient);
+        Ok(Some(Lamp { ambient, ..lamp }))
+    }
+
+    fn check(&self) -> Result<(), SceneFault> {
+        let given: Vec<&'static str> = [
+            ("panorama", self.panorama.is_some()),
+            ("lamp", self.lamp.is_some()),
+            ("coefficients", self.coefficients.is_some()),
+            ("object", self.object.is_some()),
+        ]
+        .into_iter()
+        .filter_map(|(name, is_given)| is_given.then_some(name))
+        .collect();
+        if let [first, second, ..] = given.as_slice() {
+            return Err(SceneFault::Lights(first, second));
+        }
+        within(
+            "light.ambient",
+            self.ambient.unwrap_or(0.0),
+            0.0,
+            10.0,
+            "0 to 10",
+        )?;
+        self.lamp().map(|_| ())
+    }
+}
+
+impl ObjectDescription {
+    /// Where it stands.
+    #[must_use]
+    pub fn placement(&self) -> Placement {
+        Placement {
+            at: self.at,
+            height: self.height,
+            rotation: self.rotation,
+        }
+    }
+
+    /// What its material becomes.
+    #[must_use]
+    pub fn change(&self) -> MaterialChange {
+        MaterialChange {
+            tint: self.tint,
+            gloss: self
+                .gloss
+                .map(|[part, smoothness]| ObjectGloss::of_part(part, smoothness)),
+        }
+    }
+
+    fn check(&self, number: usize) -> Result<(), SceneFault> {
+        let name = |what: &str| format!("object {number}: {what}");
+        within(&name("at"), self.at[0], -0.5, 1.5, "-0.5 to 1.5 across")?;
+        within(&name("at"), self.at[1], -0.5, 2.0, "-0.5 to 2 down")?;
+        within(&name("height"), self.height, 0.001, 4.0, "0.001 to 4")?;
+        within(
+            &name("rotation"),
+            self.rotation,
+            -3600.0,
+            3600.0,
+            "-3600 to 3600 degrees",
+        )?;
+        within(
+            &name("exposure"),
+            f64::from(self.exposure),
+            -20.0,
+            20.0,
+            "-20 to 20 stops",
+        )?;
+        within(&name("shadow"), f64::from(self.shadow), 0.0, 1.0, "0 to 1")?;
+        for tint in self.tint {
+            within(&name("tint"), f64::from(tint), 0.0, 1000.0, "0 to 1000")?;
+        }
+        if let Some([part, smoothness]) = self.gloss {
+            within(
+                &name("gloss"),
+                f64::from(part),
+                0.0,
+                1.0,
+                "a part from 0 to 1",
+            )?;
+            within(
+                &name("gloss"),
+                f64::from(smoothness),
+                0.01,
+                1000.0,
+                "a smoothness from 0.01 to 1000",
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// A number that is none lies in no range.
+fn within(
+    what: &str,
+    value: f64,
+    least: f64,
+    most: f64,
+    allowed: &'static str,
+) -> Result<(), SceneFault> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(SceneFault::Number {
+        what: what.to_owned(),
+        value,
+        allowed,
+    })
+}
+
+fn default_size() -> [u32; 2] {
+    [1280, 960]
+}
+
+fn default_field() -> f64 {
+    60.0
+}
+
+fn default_down() -> f64 {
+    10.0
+}
+
+fn default_true() -> bool {
+    true
+}
+
+fn default_at() -> [f64; 2] {
+    [0.5, 0.9]
+}
+
+fn default_height() -> f64 {
+    0.4
+}
+
+fn default_tint() -> [f32; 3] {
+    [1.0; 3]
+}
+
+fn default_shadow() -> f32 {
+    1.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fault(more: &str) -> String {
+        let text = format!("background = \"a.jpg\"\n{more}\n");
+        SceneDescription::parse(&text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_is_not_said_has_a_default() {
+        let scene =
+            SceneDescription::parse("background = \"a.hdr\"\n[[object]]\nphoto = \"b.jpg\"")
+                .unwrap();
+        assert_eq!(scene.objects[0].at, [0.5, 0.9]);
+        assert_eq!(scene.objects[0].change(), MaterialChange::default());
+        assert!(scene.matches && scene.light == LightDescription::default());
+    }
+
+    #[test]
+    fn what_cannot_be_is_named() {
+        let object = "[[object]]\nphoto = \"b.jpg\"\n";
+        assert!(fault("").contains("missing field `object`"));
+        assert!(fault("object = []").contains("there are 0 objects"));
+        assert!(fault(&format!("feild = 3\n{object}")).contains("unknown field `feild`"));
+        assert!(
+            fault(&format!("field = nan\n{object}"))
+                .contains("field is NaN, it has to be 1 to 150 degrees")
+        );
+        assert!(fault(&format!("size = [1, 1]\n{object}")).contains("size is 1"));
+        assert!(
+            fault(&format!("light = {{ lamp = \"1\" }}\n{object}"))
+                .contains("light.lamp: give AZIMUTH")
+        );
+        let both = "light = { lamp = \"1,2\", panorama = \"c.hdr\" }";
+        assert!(fault(&format!("{both}\n{object}")).contains("both panorama and lamp"));
+        assert!(fault(&format!("{object}height = 0")).contains("object 1: height is 0"));
+        assert!(
+            fault(&format!("{object}gloss = [2, 5]"))
+                .contains("object 1: gloss is 2, it has to be a part")
+        );
+        assert!(fault(&format!("{object}shadow = -1")).contains("object 1: shadow is -1"));
+        assert!(fault("= 3").contains("it is no scene"));
+    }
+}

@@ -1,0 +1,139 @@
+//! Where an object stands in a picture, and how its pixels get there: another size, turned, moved.
+
+use super::Subject;
+use relight_core::image::{Extent, Planes};
+
+/// Where an object stands in a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement {
+    /// The middle of its lower edge, in parts of the picture's width and height, from the upper left corner.
+    pub at: [f64; 2],
+    /// Its height in parts of the picture's.
+    pub height: f64,
+    /// Degrees by which it is turned in the plane, counter-clockwise.
+    pub rotation: f64,
+}
+
+impl Placement {
+    /// Where an object stood in its own photograph.
+    #[must_use]
+    pub fn in_photo(subject: &Subject) -> Self {
+        let alpha = &subject.matte().alpha;
+        let (rows, photo) = (rows(alpha), subject.photo_extent());
+        let [left, top] = subject.place().map(|at| at as f64);
+        Self {
+            at: [
+                (left + middle(alpha)) / photo.width as f64,
+                (top + rows.end as f64) / photo.height as f64,
+            ],
+            height: rows.len() as f64 / photo.height as f64,
+            rotation: 0.0,
+        }
+    }
+}
+
+/// From an object's own pixels to those of a scene: another size, and turned about the middle.
+pub(super) struct Fit {
+    reduced: Extent,
+    pub(super) angle: f64,
+}
+
+impl Fit {
+    pub(super) fn new(alpha: &Planes<1>, placement: Placement, scene: Extent) -> Self {
+        let own = alpha.extent();
+        let angle = placement.rotation.to_radians();
+        let wanted = placement.height * scene.height as f64;
+        // Turning does not change the size.
+        let height = rows(alpha).len().max(1) as f64;
+        let scale = wanted / height;
+        let side = |pixels: usize| ((pixels as f64 * scale).round() as usize).max(1);
+        Self {
+            reduced: Extent::new(side(own.width), side(own.height)),
+            angle,
+        }
+    }
+
+    pub(super) fn apply<const C: usize>(&self, image: &Planes<C>) -> Planes<C> {
+        rotated(&image.resized(self.reduced), self.angle)
+    }
+}
+
+/// The image turned counter-clockwise about its middle, in as large a rectangle as it needs; 0 where there is nothing.
+fn rotated<const C: usize>(image: &Planes<C>, angle: f64) -> Planes<C> {
+    if angle == 0.0 {
+        return image.clone();
+    }
+    let Extent { width, height } = image.extent();
+    let (sin, cos) = angle.sin_cos();
+    let (w, h) = (width as f64, height as f64);
+    let side = |a: f64, b: f64| (a.abs() + b.abs()).ceil() as usize;
+    let extent = Extent::new(side(w * cos, h * sin), side(w * sin, h * cos));
+    let mut result = Planes::zeros(extent);
+    let planes = image.planes();
+    result.fill_rows(|row, lines| {
+        let y = row as f64 + 0.5 - extent.height as f64 / 2.0;
+        for (line, plane) in lines.into_iter().zip(planes) {
+            for (column, value) in line.iter_mut().enumerate() {
+                let x = column as f64 + 0.5 - extent.width as f64 / 2.0;
+                let place = [
+                    cos * x - sin * y + w / 2.0 - 0.5,
+                    sin * x + cos * y + h / 2.0 - 0.5,
+                ];
+                *value = between(plane, image.extent(), place);
+            }
+        }
+    });
+    result
+}
+
+/// The value at a place between pixels; 0 outside.
+fn between(plane: &[f32], extent: Extent, [x, y]: [f64; 2]) -> f32 {
+    let (left, top) = (x.floor(), y.floor());
+    let at = |column: f64, row: f64| {
+        let inside = column >= 0.0
+            && row >= 0.0
+            && column < extent.width as f64
+            && row < extent.height as f64;
+        if inside {
+            plane[row as usize * extent.width + column as usize]
+        } else {
+            0.0
+        }
+    };
+    let (u, v) = ((x - left) as f32, (y - top) as f32);
+    let line = |row: f64| at(left, row) * (1.0 - u) + at(left + 1.0, row) * u;
+    line(top) * (1.0 - v) + line(top + 1.0) * v
+}
+
+/// The rows in which an object covers at least half of a pixel.
+pub(super) fn rows(alpha: &Planes<1>) -> std::ops::Range<usize> {
+    let width = alpha.extent().width.max(1);
+    let covers = |line: &[f32]| line.iter().any(|&a| a >= 0.5);
+    let lines = || alpha.plane(0).chunks_exact(width);
+    let first = lines().position(covers);
+    let last = lines().rposition(covers);
+    match (first, last) {
+        (Some(first), Some(last)) => first..last + 1,
+        _ => 0..0,
+    }
+}
+
+/// Where the first pixel of a layer lies, so that its lower edge is where it is wanted.
+pub(super) fn placed(alpha: &Planes<1>, placement: Placement, scene: Extent) -> [i64; 2] {
+    let base = rows(alpha).end;
+    [
+        (placement.at[0] * scene.width as f64 - middle(alpha)).round() as i64,
+        (placement.at[1] * scene.height as f64 - base as f64).round() as i64,
+    ]
+}
+
+/// The middle of the columns in which an object covers at least half of a pixel.
+fn middle(alpha: &Planes<1>) -> f64 {
+    let Extent { width, height } = alpha.extent();
+    let covers = |&x: &usize| (0..height).any(|y| alpha.pixel(x, y)[0] >= 0.5);
+    let (first, last) = ((0..width).find(covers), (0..width).rfind(covers));
+    match (first, last) {
+        (Some(first), Some(last)) => (first + last + 1) as f64 / 2.0,
+        _ => width as f64 / 2.0,
+    }
+}

@@ -1,0 +1,154 @@
+//! The shape of an object out of its normals, as far as its shadow needs it. Knows nothing of light.
+
+use relight_core::image::{Extent, Planes};
+use relight_core::light::{Normals, YUp};
+
+/// The longest side of the grid on which heights are found, cells.
+const LONGEST: usize = 72;
+/// Normals that face the viewer less than this count as if they did so much: the rim is as steep as can be told.
+const LEAST_FACING: f32 = 0.2;
+/// Rounds of successive over-relaxation. A round reaches all cells; so many join the ends of a grid.
+const ROUNDS: usize = 300;
+/// Its factor, for grids of this size.
+const RELAXATION: f32 = 1.9;
+/// Half the thickness that the flattest object has, cells.
+const LEAST_THICKNESS: f32 = 0.75;
+
+/// How far an object reaches towards the viewer, cell by cell. What is behind is not seen: it is taken to be the front,
+/// mirrored at the plane of the rim.
+#[derive(Debug, Clone)]
+pub(super) struct Relief {
+    pub(super) extent: Extent,
+    /// Cells of a pixel's side of the picture.
+    pub(super) scale: f64,
+    /// Half the thickness, cells; 0 where there is nothing.
+    pub(super) half: Vec<f32>,
+    /// The most of it.
+    pub(super) thickest: f32,
+}
+
+impl Relief {
+    /// The shape whose normals these are, where alpha is at least one half; none where that is nowhere.
+    ///
+    /// Heights are those whose differences from cell to cell are nearest to the slopes that the normals have, by least squares.
+    pub(super) fn new(normals: &Normals<YUp>, alpha: &Planes<1>) -> Option<Self> {
+        let picture = normals.extent();
+        let longest = picture.width.max(picture.height);
+        let scale = (LONGEST as f64 / longest as f64).min(1.0);
+        let side = |pixels: usize| ((pixels as f64 * scale).round() as usize).max(1);
+        let extent = Extent::new(side(picture.width), side(picture.height));
+        let inside: Vec<bool> = alpha
+            .resized(extent)
+            .plane(0)
+            .iter()
+            .map(|&a| a >= 0.5)
+            .collect();
+        if !inside.contains(&true) {
+            return None;
+        }
+        let vectors = Normals::<YUp>::new(normals.planes().resized(extent)).completed(&inside);
+        let heights = integrated(&vectors, &inside);
+        let rim = rim_height(&heights, &inside, extent);
+        let half = heights.iter().zip(&inside).map(|(&height, &inside)| {
+            if inside {
+                (height - rim).max(LEAST_THICKNESS)
+            } else {
+                0.0
+            }
+        });
+        let half: Vec<f32> = half.collect();
+        Some(Self {
+            extent,
+            scale,
+            thickest: half.iter().fold(0.0, |a, &b| a.max(b)),
+            half,
+        })
+    }
+}
+
+/// Heights of the cells inside, up to a constant.
+fn integrated(normals: &Normals<YUp>, inside: &[bool]) -> Vec<f32> {
+    let extent = normals.extent();
+    let [x, y, z] = normals.planes().planes();
+    let slope = |at: usize| {
+        let facing = z[at].max(LEAST_FACING);
+        // Rows go down, y goes up.
+        [-x[at] / facing, y[at] / facing]
+    };
+    let slopes: Vec<[f32; 2]> = (0..inside.len()).map(slope).collect();
+    let mut heights = vec![0.0_f32; inside.len()];
+    for _ in 0..ROUNDS {
+        for at in (0..inside.len()).filter(|&at| inside[at]) {
+            let (column, row) = (at % extent.width, at / extent.width);
+            let (mut sum, mut count) = (0.0, 0.0);
+            let mut add = |other: usize, axis: usize, sign: f32| {
+                if inside[other] {
+                    let step = (slopes[at][axis] + slopes[other][axis]) / 2.0;
+                    sum += heights[other] - sign * step;
+                    count += 1.0;
+                }
+            };
+            if column > 0 {
+                add(at - 1, 0, -1.0);
+            }
+            if column + 1 < extent.width {
+                add(at + 1, 0, 1.0);
+            }
+            if row > 0 {
+                add(at - extent.width, 1, -1.0);
+            }
+            if row + 1 < extent.height {
+                add(at + extent.width, 1, 1.0);
+            }
+            if count > 0.0 {
+                heights[at] += RELAXATION * (sum / count - heights[at]);
+            }
+        }
+    }
+    heights
+}
+
+/// The mean height of the cells that have one outside beside them.
+fn rim_height(heights: &[f32], inside: &[bool], extent: Extent) -> f32 {
+    let is_rim = |at: usize| {
+        inside[at]
+            && relight_core::image::beside(extent, at)
+                .into_iter()
+                .any(|other| other.is_none_or(|other| !inside[other]))
+    };
+    let rim: Vec<f32> = (0..inside.len())
+        .filter(|&at| is_rim(at))
+        .map(|at| heights[at])
+        .collect();
+    rim.iter().sum::<f32>() / rim.len().max(1) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ball_is_half_as_thick_as_it_is_wide() {
+        let normals = Normals::sphere(160);
+        let alpha = Planes::from_fn(normals.extent(), |x, y| {
+            [f32::from(u8::from(normals.planes().pixel(x, y)[2] > 0.0))]
+        });
+        let relief = Relief::new(&normals, &alpha).unwrap();
+        assert_eq!(relief.extent, Extent::new(LONGEST, LONGEST));
+        let radius = LONGEST as f32 / 2.0;
+        let middle = relief.half[LONGEST / 2 * LONGEST + LONGEST / 2];
+        assert!((middle / radius - 0.85).abs() < 0.15, "{middle}");
+        let beside = relief.half[LONGEST / 2 * LONGEST + LONGEST / 2 + LONGEST / 4];
+        assert!(beside < middle && beside > 0.6 * middle, "{beside}");
+        assert_eq!(relief.half[0], 0.0);
+    }
+
+    #[test]
+    fn what_faces_the_viewer_is_thin_and_nothing_has_no_shape() {
+        let extent = Extent::new(50, 80);
+        let flat = Normals::<YUp>::new(Planes::filled(extent, [0.0, 0.0, 1.0]));
+        let relief = Relief::new(&flat, &Planes::filled(extent, [1.0])).unwrap();
+        assert!(relief.half.iter().all(|&half| half == LEAST_THICKNESS));
+        assert!(Relief::new(&flat, &Planes::zeros(extent)).is_none());
+    }
+}

@@ -1,0 +1,576 @@
+//! Objects in a new picture: where they stand, their shadows, and all of it on the background.
+
+use super::matching::{grain, noise};
+use super::placement::{Fit, placed, rows};
+use super::relief::Relief;
+use super::shadow::Shadow;
+use super::{
+    InsertError, LightSource, Matching, MaterialChange, Placement, Subject, exposure_between,
+};
+use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
+use relight_core::light::{Direction, Normals, Panorama, Rotation, ShLight, YUp};
+
+/// How much an object may be enlarged.
+const MOST_GROWTH: f64 = 64.0;
+
+/// An object of a scene.
+#[derive(Debug, Clone, Copy)]
+pub struct SceneObject<'a> {
+    /// The object.
+    pub subject: &'a Subject,
+    /// Where it stands.
+    pub placement: Placement,
+    /// What its material becomes.
+    pub change: MaterialChange,
+    /// Its brightness in stops.
+    pub exposure: f32,
+    /// How much of its shadow is seen, 0 to 1.
+    pub shadow: f32,
+    /// Whether it is shown in the scene's light; else in that of its photograph.
+    pub relit: bool,
+}
+
+/// A picture that objects are put into.
+#[derive(Debug)]
+pub struct Scene<'a> {
+    extent: Extent,
+    light: ShLight,
+    /// The same light, as shadows are drawn from it.
+    panorama: Panorama,
+    tilt: f64,
+    matching: Matching,
+    objects: Vec<SceneObject<'a>>,
+}
+
+/// An object as it is seen in a scene, ready to be put on any background.
+#[derive(Debug, Clone)]
+pub struct SceneLayer {
+    /// Column and row of its first pixel; it may begin outside.
+    place: [i64; 2],
+    alpha: Planes<1>,
+    /// Times alpha.
+    colours: Planes<3>,
+    shadow: Option<GroundShadow>,
+    /// The grain that it lacks.
+    grain: f32,
+}
+
+#[derive(Debug, Clone)]
+struct GroundShadow {
+    place: [i64; 2],
+    /// The part of the light that arrives.
+    arriving: Planes<3>,
+}
+
+impl<'a> Scene<'a> {
+    /// A picture of a size in this light, whose ground the camera looks down on by `tilt` degrees (0 to 90), with objects from back to
+    /// front.
+    ///
+    /// # Errors
+    /// Where the light is dark, or an object would lie outside, or be larger than can be.
+    pub fn new(
+        extent: Extent,
+        source: &LightSource,
+        tilt: f64,
+        matching: Matching,
+        objects: Vec<SceneObject<'a>>,
+    ) -> Result<Self, InsertError> {
+        for (number, object) in objects.iter().enumerate() {
+            object.check(extent, number + 1)?;
+        }
+        let balance = matching.balance.map(|b| f64::from(b * matching.level));
+        Ok(Self {
+            extent,
+            light: source.light()?.tinted(balance),
+            panorama: source.panorama(),
+            tilt: tilt.to_radians(),
+            matching,
+            objects,
+        })
+    }
+
+    /// All objects as they are seen after the light has turned about the vertical by so many radians, from back to front.
+    ///
+    /// # Errors
+    /// Those of the render layers.
+    pub fn layers(&self, turn: f64) -> Result<Vec<SceneLayer>, InsertError> {
+        let (light, panorama) = if turn == 0.0 {
+            (self.light.clone(), self.panorama.clone())
+        } else {
+            let columns = self.panorama.extent().width;
+            let part = (turn / std::f64::consts::TAU).rem_euclid(1.0);
+            let rotation = Rotation::about(Direction::UP, turn);
+            (
+                self.light.rotated(&rotation),
+                self.panorama
+                    .turned((part * columns as f64).round() as usize),
+            )
+        };
+        self.objects
+            .iter()
+            .map(|object| self.layer(object, &light, &panorama))
+            .collect()
+    }
+
+    /// A background of the scene's size with the layers on it: first all shadows, then the objects. `frame` is the number of a
+    /// video's frame, whose grain it draws.
+    ///
+    /// # Panics
+    /// Where the background has another size.
+    #[must_use]
+    pub fn compose(
+        &self,
+        background: &Rgb<Linear>,
+        layers: &[SceneLayer],
+        frame: u64,
+    ) -> Rgb<Linear> {
+        assert_eq!(
+            background.planes().extent(),
+            self.extent,
+            "size of the background"
+        );
+        let mut picture = background.clone();
+        for shadow in layers.iter().filter_map(|layer| layer.shadow.as_ref()) {
+            over(
+                picture.planes_mut(),
+                &shadow.arriving,
+                shadow.place,
+                |at, value, channel| value * shadow.arriving.plane(channel)[at],
+            );
+        }
+        for layer in layers {
+            let alpha = layer.alpha.plane(0);
+            over(
+                picture.planes_mut(),
+                &layer.colours,
+                layer.place,
+                |at, value, channel| {
+                    if alpha[at] <= 0.0 {
+                        return value;
+                    }
+                    let covered = value * (1.0 - alpha[at]) + layer.colours.plane(channel)[at];
+                    if layer.grain <= 0.0 {
+                        return covered;
+                    }
+                    let noise = layer.grain * alpha[at] * noise(frame, at * 3 + channel);
+                    Srgb::to_linear(Srgb::from_linear(covered) + noise).max(0.0)
+                },
+            );
+        }
+        picture
+    }
+
+    fn layer(
+        &self,
+        object: &SceneObject<'_>,
+        light: &ShLight,
+        panorama: &Panorama,
+    ) -> Result<SceneLayer, InsertError> {
+        let subject = object.subject;
+        let angle = object.placement.rotation.to_radians();
+        let gain = object.exposure.exp2();
+        let colours = if object.relit {
+            let scale = exposure_between(subject.light(), &self.level_light());
+            // The object is turned back, and the light with it.
+            let turned = light.rotated(&Rotation::about(Direction::VIEWER, -angle));
+            subject.relit(&turned.tinted([f64::from(scale); 3]), &object.change)?
+        } else {
+            subject.matte().foreground.clone()
+        };
+        let alpha = &subject.matte().alpha;
+        let fit = Fit::new(alpha, object.placement, self.extent);
+        let mut premultiplied = colours.map(|v| v * gain);
+        for plane in premultiplied.planes_mut() {
+            plane
+                .iter_mut()
+                .zip(alpha.plane(0))
+                .for_each(|(v, a)| *v *= a);
+        }
+        let (alpha, colours) = (fit.apply(alpha), fit.apply(&premultiplied));
+        let place = placed(&alpha, object.placement, self.extent);
+        let shadow = (object.shadow > 0.0)
+            .then(|| self.shadow(object, &fit, &alpha, panorama))
+            .flatten()
+            .map(|(from, arriving)| GroundShadow {
+                place: [place[0] + from[0], place[1] + from[1]],
+                arriving,
+            });
+        let own = grain(&colours, Some(&alpha));
+        let lacking = (self.matching.grain.powi(2) - own.powi(2)).max(0.0).sqrt();
+        Ok(SceneLayer {
+            place,
+            alpha,
+            colours,
+            shadow,
+            grain: lacking,
+        })
+    }
+
+    /// The light as strong as if the background asked for nothing.
+    fn level_light(&self) -> ShLight {
+        let level = f64::from(self.matching.level.max(f32::MIN_POSITIVE));
+        self.light.clone().tinted([1.0 / level; 3])
+    }
+
+    /// The shadow of an object, from its layer's first pixel.
+    fn shadow(
+        &self,
+        object: &SceneObject<'_>,
+        fit: &Fit,
+        alpha: &Planes<1>,
+        panorama: &Panorama,
+    ) -> Option<([i64; 2], Planes<3>)> {
+        let normals = fit.apply(object.subject.normals().planes());
+        let (sin, cos) = (fit.angle.sin() as f32, fit.angle.cos() as f32);
+        let mut turned = normals.clone();
+        let [x, y, _] = turned.planes_mut();
+        for (x, y) in x.iter_mut().zip(y) {
+            [*x, *y] = [cos * *x - sin * *y, sin * *x + cos * *y];
+        }
+        let relief = Relief::new(&Normals::<YUp>::new(turned), alpha)?;
+        let shadow = Shadow::cast(&relief, self.tilt, panorama);
+        let pixels = |cells: f64| cells / relief.scale;
+        let extent = shadow.arriving.extent();
+        let side = |cells: usize| (pixels(cells as f64).round() as usize).max(1);
+        let seen = shadow
+            .arriving
+            .resized(Extent::new(side(extent.width), side(extent.height)));
+        let part = object.shadow.min(1.0);
+        let arriving = seen.map(|arriving| 1.0 - part * (1.0 - arriving));
+        Some((
+            shadow.from.map(|cells| pixels(cells as f64).round() as i64),
+            arriving,
+        ))
+    }
+}
+
+impl SceneObject<'_> {
+    fn check(&self, extent: Extent, number: usize) -> Result<(), InsertError> {
+        let Placement {
+            at,
+            height,
+            rotation,
+        } = self.placement;
+        let bounds = [
+            ("place", at[0], -0.5..=1.5),
+            ("place", at[1], -0.5..=2.0),
+            ("height", height, 1e-3..=4.0),
+            ("rotation", rotation, -3600.0..=3600.0),
+            ("shadow", f64::from(self.shadow), 0.0..=1.0),
+            ("exposure", f64::from(self.exposure), -20.0..=20.0),
+        ];
+        for (what, value, range) in bounds {
+            if !range.contains(&value) {
+                return Err(InsertError::Placement {
+                    object: number,
+                    what,
+                    value,
+                    least: *range.start(),
+                    most: *range.end(),
+                });
+            }
+        }
+        let growth =
+            height * extent.height as f64 / rows(&self.subject.matte().alpha).len().max(1) as f64;
+        if growth > MOST_GROWTH {
+            return Err(InsertError::Growth {
+                object: number,
+                growth,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Changes the pixels of a picture that lie under an image of which the first pixel is at `place`; `change` is told the pixel of the
+/// image, the value and the channel.
+fn over(
+    picture: &mut Planes<3>,
+    image: &Planes<3>,
+    place: [i64; 2],
+    change: impl Fn(usize, f32, usize) -> f32 + Sync,
+) {
+    let Extent { width, height } = image.extent();
+    picture.fill_rows(|y, row| {
+        let Some(line) = usize::try_from(y as i64 - place[1])
+            .ok()
+            .filter(|&line| line < height)
+        else {
+            return;
+        };
+        for (channel, values) in row.into_iter().enumerate() {
+            for (x, value) in values.iter_mut().enumerate() {
+                let column = usize::try_from(x as i64 - place[0]).ok();
+                if let Some(column) = column.filter(|&column| column < width) {
+                    *value = change(line * width + column, *value, channel);
+                }
+            }
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decompose::{DecomposeOptions, Decomposer};
+    use crate::insert::Lamp;
+    use relight_nets::{Weights, decomposer};
+
+    const PHOTO: Extent = Extent::new(60, 50);
+
+    fn is_object(x: usize, y: usize) -> bool {
+        (20..44).contains(&x) && (10..40).contains(&y)
+    }
+
+    fn photo() -> Rgb<Linear> {
+        Rgb::new(Planes::from_fn(PHOTO, |x, y| {
+            if is_object(x, y) {
+                [0.5, 0.3, 0.2]
+            } else {
+                [0.1; 3]
+            }
+        }))
+    }
+
+    fn subject() -> Subject {
+        let decomposer = Decomposer::with_side(&Weights::initial(&decomposer(), 3), 32).unwrap();
+        let mask = Planes::from_fn(PHOTO, |x, y| [f32::from(u8::from(is_object(x, y)))]);
+        Subject::new(
+            &photo(),
+            &mask,
+            None,
+            &decomposer,
+            &DecomposeOptions::default(),
+        )
+        .unwrap()
+    }
+
+    fn object(subject: &Subject, placement: Placement) -> SceneObject<'_> {
+        SceneObject {
+            subject,
+            placement,
+            change: MaterialChange::default(),
+            exposure: 0.0,
+            shadow: 1.0,
+            relit: false,
+        }
+    }
+
+    fn lamp() -> LightSource {
+        LightSource::Lamp(Lamp {
+            azimuth: 90.0,
+            elevation: 45.0,
+            ..Lamp::default()
+        })
+    }
+
+    fn composed(extent: Extent, objects: Vec<SceneObject<'_>>) -> Rgb<Linear> {
+        let white = Rgb::new(Planes::filled(extent, [0.8; 3]));
+        let scene = Scene::new(extent, &lamp(), 25.0, Matching::default(), objects).unwrap();
+        scene.compose(&white, &scene.layers(0.0).unwrap(), 0)
+    }
+
+    /// The columns and rows of the pixels that are as red as the object.
+    fn bounds(picture: &Rgb<Linear>) -> [usize; 4] {
+        let Extent { width, height } = picture.planes().extent();
+        let is_red = |x: usize, y: usize| {
+            let [red, green, _] = picture.planes().pixel(x, y);
+            red > 1.4 * green
+        };
+        let places: Vec<[usize; 2]> = (0..height)
+            .flat_map(|y| (0..width).map(move |x| [x, y]))
+            .filter(|&[x, y]| is_red(x, y))
+            .collect();
+        let line = |axis: usize| places.iter().map(move |place| place[axis]);
+        [line(0).min(), line(0).max(), line(1).min(), line(1).max()].map(Option::unwrap)
+    }
+
+    #[test]
+    fn an_object_stands_where_it_is_wanted_and_as_high() {
+        let subject = subject();
+        let placement = Placement {
+            at: [0.25, 0.75],
+            height: 0.5,
+            rotation: 0.0,
+        };
+        let picture = composed(Extent::new(160, 120), vec![object(&subject, placement)]);
+        let [left, right, top, bottom] = bounds(&picture);
+        assert!(
+            bottom.abs_diff(89) <= 1 && top.abs_diff(30) <= 1,
+            "{top} {bottom}"
+        );
+        assert!(
+            (left + right).abs_diff(79) <= 2 && (right - left).abs_diff(47) <= 2,
+            "{left} {right}"
+        );
+    }
+
+    #[test]
+    fn at_its_own_place_it_covers_itself() {
+        let subject = subject();
+        let placement = Placement::in_photo(&subject);
+        let scene = Scene::new(
+            PHOTO,
+            &lamp(),
+            25.0,
+            Matching::default(),
+            vec![SceneObject {
+                shadow: 0.0,
+                ..object(&subject, placement)
+            }],
+        );
+        let scene = scene.unwrap();
+        let picture = scene.compose(&photo(), &scene.layers(0.0).unwrap(), 0);
+        for y in 0..PHOTO.height {
+            for x in 0..PHOTO.width {
+                let (a, b) = (picture.planes().pixel(x, y), photo().planes().pixel(x, y));
+                assert!((a[0] - b[0]).abs() < 0.1, "{x} {y} {a:?} {b:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn turned_by_a_right_angle_it_is_as_wide_as_it_was_high() {
+        let subject = subject();
+        let placement = Placement {
+            at: [0.5, 0.9],
+            height: 0.4,
+            rotation: 90.0,
+        };
+        let [left, right, top, bottom] = bounds(&composed(
+            Extent::new(160, 120),
+            vec![object(&subject, placement)],
+        ));
+        let (width, height) = ((right - left + 1) as f64, (bottom - top + 1) as f64);
+        assert!(
+            (width - 48.0).abs() <= 2.0 && (width / height - 30.0 / 24.0).abs() < 0.08,
+            "{width} {height}"
+        );
+    }
+
+    #[test]
+    fn the_front_covers_the_back_and_shadows_fall_on_the_ground() {
+        let subject = subject();
+        let place = |x| Placement {
+            at: [x, 0.9],
+            height: 0.5,
+            rotation: 0.0,
+        };
+        let black = MaterialChange {
+            tint: [0.0; 3],
+            gloss: None,
+        };
+        let front = SceneObject {
+            change: black,
+            relit: true,
+            ..object(&subject, place(0.5))
+        };
+        let picture = composed(
+            Extent::new(160, 120),
+            vec![object(&subject, place(0.5)), front],
+        );
+        assert!(picture.planes().pixel(80, 80)[0] < 0.05);
+        // The lamp is on the right: the shadow lies on the left.
+        let [left, right] = [40, 120].map(|x| picture.planes().pixel(x, 104)[0]);
+        assert!(left < 0.7 && right > 0.75, "{left} {right}");
+    }
+
+    #[test]
+    fn a_dark_background_with_grain_makes_the_object_so() {
+        let subject = subject();
+        let placement = Placement {
+            at: [0.5, 0.9],
+            height: 0.7,
+            rotation: 0.0,
+        };
+        let relit = SceneObject {
+            relit: true,
+            shadow: 0.0,
+            ..object(&subject, placement)
+        };
+        let extent = Extent::new(160, 120);
+        let black = Rgb::new(Planes::zeros(extent));
+        let brightness = |matching: Matching, object: SceneObject<'_>| {
+            let scene = Scene::new(extent, &lamp(), 25.0, matching, vec![object]).unwrap();
+            let picture = scene.compose(&black, &scene.layers(0.0).unwrap(), 0);
+            let middle: Vec<f32> = (70..90)
+                .map(|x| Srgb::from_linear(picture.planes().pixel(x, 70)[1]))
+                .collect();
+            let mean = middle.iter().sum::<f32>() / middle.len() as f32;
+            let noise = middle
+                .windows(2)
+                .map(|pair| (pair[0] - pair[1]).abs())
+                .sum::<f32>()
+                / 19.0;
+            (mean, noise)
+        };
+        let plain = brightness(Matching::default(), relit);
+        let dark = brightness(
+            Matching {
+                level: 0.25,
+                ..Matching::default()
+            },
+            relit,
+        );
+        assert!((Srgb::to_linear(dark.0) / Srgb::to_linear(plain.0) - 0.25).abs() < 0.05);
+        // What the photograph shows there has no grain.
+        let even = SceneObject {
+            relit: false,
+            ..relit
+        };
+        let grainy = brightness(
+            Matching {
+                grain: 0.05,
+                ..Matching::default()
+            },
+            even,
+        );
+        let plain = brightness(Matching::default(), even);
+        assert!(grainy.1 > plain.1 + 0.02, "{grainy:?} {plain:?}");
+    }
+
+    #[test]
+    fn what_cannot_stand_is_named() {
+        let subject = subject();
+        let refused = |placement| {
+            let objects = vec![
+                object(&subject, Placement::in_photo(&subject)),
+                object(&subject, placement),
+            ];
+            Scene::new(PHOTO, &lamp(), 25.0, Matching::default(), objects)
+                .unwrap_err()
+                .to_string()
+        };
+        let good = Placement::in_photo(&subject);
+        assert_eq!(
+            refused(Placement {
+                height: 0.0,
+                ..good
+            }),
+            "object 2: its height is 0, it has to be from 0.001 to 4"
+        );
+        assert!(
+            refused(Placement {
+                at: [f64::NAN, 0.5],
+                ..good
+            })
+            .contains("its place is NaN")
+        );
+        let objects = vec![object(
+            &subject,
+            Placement {
+                height: 4.0,
+                ..good
+            },
+        )];
+        let error = Scene::new(
+            Extent::new(4000, 4000),
+            &lamp(),
+            25.0,
+            Matching::default(),
+            objects,
+        )
+        .unwrap_err();
+        assert!(error.to_string().contains("would be enlarged"), "{error}");
+    }
+}

@@ -1,0 +1,269 @@
+//! The shadow that an object casts on the ground on which it stands: all light that it keeps from there, so that
+//! cast shadow and contact shadow are one.
+
+use std::f64::consts::{PI, TAU};
+
+use super::relief::Relief;
+use relight_core::image::{Extent, Planes};
+use relight_core::light::{Direction, LightSampler, Panorama};
+
+/// The size to which panoramas are brought for shadows.
+const DRAWN: Extent = Extent::new(128, 64);
+/// Neighbouring pixels look in different directions, in squares of this side, over which the mean is taken.
+const PATTERN: usize = 4;
+/// Directions of one pixel, by the light and as many by the cosine.
+const RAYS: usize = 24;
+/// How many times its width the object's shadow is looked for to both sides, and its height above and below.
+const REACH: f64 = 1.5;
+/// The part of the object's lowest points that may lie below the ground: normals at the rim are rough.
+const BELOW_GROUND: f64 = 0.03;
+/// Ground that is seen more edge-on than this is as if it were seen so, radians.
+const LEAST_TILT: f64 = 0.08;
+
+/// The ground's shadow around an object, in parts of the light that arrives there without it.
+#[derive(Debug, Clone)]
+pub(super) struct Shadow {
+    /// What arrives, 0 to 1.
+    pub(super) arriving: Planes<3>,
+    /// Column and row of the first pixel, from the relief's, cells.
+    pub(super) from: [i64; 2],
+}
+
+/// A direction with the light from there that falls on the ground.
+#[derive(Clone, Copy)]
+struct Ray {
+    towards: [f64; 3],
+    light: [f32; 3],
+}
+
+/// The ground: points p with p · up = level.
+struct Ground {
+    up: [f64; 3],
+    level: f64,
+}
+
+impl Shadow {
+    /// The shadow of a shape on ground that the camera looks down on by `tilt` radians, in the light of a panorama.
+    pub(super) fn cast(relief: &Relief, tilt: f64, light: &Panorama) -> Self {
+        let ground = Ground::under(relief, tilt);
+        let patterns = rays(&ground, &light.resized(DRAWN));
+        let Extent { width, height } = relief.extent;
+        let (beside, beyond) = (
+            (width.max(height) as f64 * REACH) as usize,
+            (height as f64 * REACH) as usize,
+        );
+        let extent = Extent::new(width + 2 * beside, height + beyond);
+        // Ground that is higher in the picture than the object's top is far behind it.
+        let from = [-(beside as i64), 0];
+        let mut arriving = Planes::filled(extent, [1.0; 3]);
+        arriving.fill_rows(|y, [red, green, blue]| {
+            for x in 0..extent.width {
+                let rays = &patterns[y % PATTERN * PATTERN + x % PATTERN];
+                let place = [x as f64 + 0.5 + from[0] as f64, -(y as f64 + 0.5)];
+                [red[x], green[x], blue[x]] = ground.arriving(relief, place, rays);
+            }
+        });
+        // Every square of the pattern holds all directions.
+        let smooth = super::smooth::blurred(&arriving, PATTERN / 2);
+        Self {
+            arriving: smooth,
+            from,
+        }
+    }
+}
+
+impl Ground {
+    /// The ground that the shape stands on.
+    fn under(relief: &Relief, tilt: f64) -> Self {
+        let (sin, cos) = tilt.clamp(LEAST_TILT, PI / 2.0).sin_cos();
+        let up = [0.0, cos, sin];
+        let width = relief.extent.width;
+        let mut lowest: Vec<f64> = (0..relief.half.len())
+            .filter(|&at| relief.half[at] > 0.0)
+            .map(|at| {
+                // The back is lower than the front.
+                let y = -((at / width) as f64 + 1.0);
+                y * cos - f64::from(relief.half[at]) * sin
+            })
+            .collect();
+        lowest.sort_by(f64::total_cmp);
+        let place = (lowest.len() as f64 * BELOW_GROUND) as usize;
+        Self {
+            up,
+            level: lowest.get(place).copied().unwrap_or(0.0),
+        }
+    }
+
+    /// The part of the light that arrives at the ground that is seen at a place.
+    fn arriving(&self, relief: &Relief, [x, y]: [f64; 2], rays: &[Ray]) -> [f32; 3] {
+        let z = (self.level - y * self.up[1]) / self.up[2];
+        let (mut all, mut open) = ([0.0_f32; 3], [0.0_f32; 3]);
+        for ray in rays {
+            let arrives = !relief.blocks([x, y, z], ray.towards);
+            for c in 0..3 {
+                all[c] += ray.light[c];
+                open[c] += if arrives { ray.light[c] } else { 0.0 };
+            }
+        }
+        [0, 1, 2].map(|c| if all[c] > 0.0 { open[c] / all[c] } else { 1.0 })
+    }
+}
+
+impl Relief {
+    /// Whether the shape is in the way from a point in a direction. Its cells are 1 wide; rows lie below y = 0.
+    fn blocks(&self, from: [f64; 3], towards: [f64; 3]) -> bool {
+        let Extent { width, height } = self.extent;
+        let thickest = f64::from(self.thickest);
+        let low = [0.0, -(height as f64), -thickest];
+        let high = [width as f64, 0.0, thickest];
+        let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+        for axis in 0..3 {
+            if towards[axis].abs() < 1e-9 {
+                if from[axis] < low[axis] || from[axis] > high[axis] {
+                    return false;
+                }
+                continue;
+            }
+            let ends = [low[axis], high[axis]].map(|end| (end - from[axis]) / towards[axis]);
+            enter = enter.max(ends[0].min(ends[1]));
+            leave = leave.min(ends[0].max(ends[1]));
+        }
+        // Steps of less than a cell; the first is a little above the ground.
+        let mut along = enter + 0.4;
+        while along < leave {
+            let [x, y, z] = [0, 1, 2].map(|axis| from[axis] + along * towards[axis]);
+            let (column, row) = (x as usize, (-y) as usize);
+            if x >= 0.0 && y <= 0.0 && column < width && row < height {
+                let half = f64::from(self.half[row * width + column]);
+                if half > 0.0 && z.abs() <= half {
+                    return true;
+                }
+            }
+            along += 0.8;
+        }
+        false
+    }
+}
+
+/// Directions for each place of the pattern, half of them drawn by the light and half by the cosine to the ground, weighted by
+/// Veach's balance heuristic.
+fn rays(ground: &Ground, light: &Panorama) -> Vec<Vec<Ray>> {
+    let positive = light.image().planes().clone().map(|v| v.max(0.0));
+    let light =
+        Panorama::new(relight_core::image::Rgb::new(positive)).unwrap_or_else(|_| light.clone());
+    let sampler = LightSampler::new(&light);
+    let [right, forward] = [[1.0, 0.0, 0.0], [0.0, ground.up[2], -ground.up[1]]];
+    let of = |direction: Direction| {
+        let towards = direction.components();
+        let cosine: f64 = (0..3).map(|axis| towards[axis] * ground.up[axis]).sum();
+        if cosine <= 1e-3 {
+            return None;
+        }
+        let density = sampler.density(direction) + cosine / PI;
+        let light = sampler.panorama().radiance(direction);
+        Some(Ray {
+            towards,
+            light: light.map(|l| l * (cosine / density) as f32),
+        })
+    };
+    let pattern = |number: usize| {
+        let (mut drawn, count) = (Vec::with_capacity(2 * RAYS), RAYS * PATTERN * PATTERN);
+        for ray in 0..RAYS {
+            // A lattice of all pixels of the pattern, whose parts are spread over it.
+            let at = (ray * PATTERN * PATTERN + number * 7 % (PATTERN * PATTERN)) as f64 + 0.5;
+            let place = [at / count as f64, (at * 0.618_033_988_75).fract()];
+            drawn.extend(of(sampler.draw(place).direction));
+            let (radius, height) = (place[0].sqrt(), (1.0 - place[0]).sqrt());
+            let (sin, cos) = (TAU * place[1]).sin_cos();
+            let [x, y, z] = [0, 1, 2].map(|axis| {
+                radius * (cos * right[axis] + sin * forward[axis]) + height * ground.up[axis]
+            });
+            drawn.extend(Direction::new(x, y, z).and_then(of));
+        }
+        drawn
+    };
+    (0..PATTERN * PATTERN).map(pattern).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::insert::Lamp;
+    use relight_core::light::Normals;
+
+    fn ball() -> Relief {
+        let normals = Normals::sphere(60);
+        let alpha = Planes::from_fn(normals.extent(), |x, y| {
+            [f32::from(u8::from(normals.planes().pixel(x, y)[2] > 0.0))]
+        });
+        Relief::new(&normals, &alpha).unwrap()
+    }
+
+    fn lamp(azimuth: f64, ambient: f64) -> Panorama {
+        let lamp = Lamp {
+            azimuth,
+            elevation: 40.0,
+            ambient,
+            size: 10.0,
+            ..Lamp::default()
+        };
+        lamp.panorama(Extent::new(128, 64))
+    }
+
+    /// The mean of what arrives on the left and on the right of the object.
+    fn sides(shadow: &Shadow, relief: &Relief) -> [f32; 2] {
+        let extent = shadow.arriving.extent();
+        let first = (-shadow.from[0]) as usize;
+        let mut sums = [0.0_f32; 2];
+        for y in 0..extent.height {
+            for x in 0..first {
+                sums[0] += 1.0 - shadow.arriving.pixel(x, y)[0];
+                sums[1] += 1.0 - shadow.arriving.pixel(first + relief.extent.width + x, y)[0];
+            }
+        }
+        sums
+    }
+
+    #[test]
+    fn a_shadow_lies_on_the_side_away_from_the_lamp() {
+        let relief = ball();
+        let [left, right] = sides(&Shadow::cast(&relief, 0.4, &lamp(90.0, 0.0)), &relief);
+        assert!(left > 50.0 && right < 0.1 * left, "{left} {right}");
+        let [left, right] = sides(&Shadow::cast(&relief, 0.4, &lamp(-90.0, 0.0)), &relief);
+        assert!(right > 50.0 && left < 0.1 * right, "{left} {right}");
+    }
+
+    #[test]
+    fn even_light_leaves_a_shadow_at_the_contact_and_hardly_any_far_away() {
+        let relief = ball();
+        let even = Panorama::of_light(
+            &relight_core::light::ShLight::even(relight_core::light::Order::TWO, [1.0; 3]),
+            Extent::new(64, 32),
+        );
+        let shadow = Shadow::cast(&relief, 0.4, &even);
+        let first = (-shadow.from[0]) as usize;
+        let below = shadow
+            .arriving
+            .pixel(first + relief.extent.width / 2, relief.extent.height)[0];
+        let beside = shadow.arriving.pixel(4, relief.extent.height)[0];
+        assert!(below < 0.8 && beside > 0.95, "{below} {beside}");
+        let [left, right] = sides(&shadow, &relief);
+        assert!((left / right - 1.0).abs() < 0.15, "{left} {right}");
+    }
+
+    #[test]
+    fn without_any_light_there_is_no_shadow() {
+        let dark = Panorama::of_light(
+            &relight_core::light::ShLight::dark(relight_core::light::Order::TWO),
+            Extent::new(64, 32),
+        );
+        let shadow = Shadow::cast(&ball(), 0.4, &dark);
+        assert!(
+            shadow
+                .arriving
+                .plane(1)
+                .iter()
+                .all(|&v| (v - 1.0).abs() < 1e-6)
+        );
+    }
+}

@@ -1,0 +1,18 @@
+//! Photographs: an object's normals, albedo, shading, highlight and light out of one picture, and the object in another
+//! light or another picture. It knows the networks' engines and no terminal, and builds for a browser
+//! (`wasm32-unknown-unknown`).
+//!
+//! | module | concern |
+//! | --- | --- |
+//! | [`decompose`] | a photograph into normals, albedo, shading, highlight and light |
+//! | [`insert`] | objects of photographs in another light and in other pictures |
+#![cfg_attr(
+    feature = "files",
+    doc = "| [`files`] | photographs and decompositions in files and shards |"
+)]
+//!
+//! The feature `files` reads photographs from files and shards and writes results, `threads` works on rayon's threads.
+pub mod decompose;
+#[cfg(feature = "files")]
+pub mod files;
+pub mod insert;

@@ -1,0 +1,73 @@
+//! Pictures of objects together with the truth that they were made of: data to warm networks up with,
+//! and to judge them by.
+//!
+//! | module | concern |
+//! | --- | --- |
+//! | `mesh`, `shape` | triangles from files, and out of nothing but a seed |
+//! | `view`, `geometry`, `object` | what a camera sees of them, which light is blocked |
+//! | `paint`, `finish` | albedo, relief and gloss |
+//! | `lighting` | lamps and panoramas on what is seen |
+//! | `studio` | panoramas out of nothing but a seed |
+//! | `camera` | from light to 8-bit values |
+//! | `library`, `recipe` | what there is to draw from, and what is drawn |
+//! | `sample`, `folder`, `preview` | one sample; a folder, a sheet of them |
+//! | `turn` | whole turns as shards |
+//!
+//! All of it follows from a seed: the same seed gives the same bytes on any number of threads. What is
+//! slow is kept apart from what is cheap: a [`Scene`] is made once for an object in a pose, and then
+//! lit as often as one likes.
+//!
+//! ```
+//! use relight_synth::{Folders, Library, Recipe};
+//!
+//! let library = Library::read(&Folders::default())?;
+//! let recipe = Recipe { size: 32, ..Recipe::default() };
+//! let (object, mesh) = recipe.object(&library, 0);
+//! let view = recipe.view(&object, &mesh, 1);
+//! let sample = recipe.sample(&library, &view, 2);
+//! assert_eq!(sample.image().width(), 32);
+//! # Ok::<(), relight_synth::SynthError>(())
+//! ```
+
+mod camera;
+mod error;
+mod finish;
+mod folder;
+mod geometry;
+mod library;
+mod lighting;
+mod mesh;
+mod noise;
+mod object;
+mod paint;
+mod png;
+mod preview;
+mod random;
+mod recipe;
+mod sample;
+mod shape;
+mod studio;
+mod turn;
+mod view;
+
+pub use camera::{CameraModel, Response};
+pub use error::SynthError;
+pub use finish::Finish;
+pub use folder::{SynthTally, write_samples};
+pub use geometry::{GBuffer, Occluder};
+pub use library::{Folders, Library, PANORAMA_EXTENT, made_panoramas};
+pub use lighting::{
+    BlinnPhong, Emitter, Environment, Lamp, LampShadows, LightKind, Lighting, Material, Method,
+    Panoramas, Scene, Shaded,
+};
+pub use mesh::{Mesh, MeshFault};
+pub use object::{ObjectSource, View};
+pub use paint::{AlbedoKind, Paint, Relief, TextureImage};
+pub use preview::write_preview;
+pub use random::stream;
+pub use recipe::Recipe;
+pub use sample::{Description, SynthSample, Whites};
+pub use shape::ShapeKind;
+pub use studio::Surroundings;
+pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};
+pub use view::{Pose, Projection};

@@ -1,0 +1,104 @@
+//! Light on what a geometry buffer shows: lamps with attached and cast shadows, panoramas, ambient and
+//! bounced light. Knows neither meshes nor cameras.
+//!
+//! A picture is `albedo x shading + highlight`, as the paper has it: shading is irradiance (even light
+//! of radiance 1 gives pi), a highlight is Blinn and Phong's without a cosine.
+//!
+//! | file | concern |
+//! | --- | --- |
+//! | `lamp` | one lamp: its rays, its shadows |
+//! | `environment` | light from all around: by order-2 coefficients, or by rays |
+//! | `shaded` | what light makes of a surface; each kind of light is added by itself |
+//! | `scene` | a buffer with what blocks its light; whole lightings |
+//! | `draw` | random lightings |
+
+mod draw;
+mod environment;
+mod lamp;
+mod scene;
+mod shaded;
+#[cfg(test)]
+mod tests;
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+pub use draw::LightKind;
+pub use environment::{Environment, Method, Panoramas};
+pub use lamp::{Emitter, Lamp, LampShadows};
+pub use scene::Scene;
+pub use shaded::{BlinnPhong, Material, Shaded};
+
+use relight_core::light::{Direction, Order, Rotation, ShLight};
+
+/// All light on an object. Colours are linear red, green and blue.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Lighting {
+    /// Lamps, each with its shadows.
+    pub lamps: Vec<Lamp>,
+    /// A panorama around the object.
+    pub environment: Option<Environment>,
+    /// Irradiance of even light from all around.
+    pub ambient: Vec3,
+    /// Light that comes from the object's own lit parts to its hollows.
+    pub bounce: Vec3,
+    /// Whether the object blocks light: without, there are neither cast shadows nor dark hollows.
+    pub has_shadows: bool,
+}
+
+impl Lighting {
+    /// All light but what bounces, as coefficients of order 2: where nothing is in the way, their
+    /// diffuse layer is the shading, smoothed where lamps are.
+    #[must_use]
+    pub fn coefficients(&self, panoramas: &Panoramas) -> ShLight {
+        let even = self
+            .ambient
+            .to_array()
+            .map(|e| f64::from(e) / std::f64::consts::PI);
+        let mut sum = ShLight::even(Order::TWO, even);
+        for lamp in &self.lamps {
+            add(&mut sum, &lamp.coefficients());
+        }
+        if let Some(environment) = &self.environment {
+            add(&mut sum, &environment.coefficients(panoramas));
+        }
+        sum
+    }
+
+    /// All light, turned about the origin.
+    #[must_use]
+    pub fn turned(&self, turn: &Rotation) -> Self {
+        Self {
+            lamps: self.lamps.iter().map(|lamp| lamp.turned(turn)).collect(),
+            environment: self.environment.as_ref().map(|around| around.turned(turn)),
+            ..self.clone()
+        }
+    }
+
+    /// The same light with every lamp above the horizon of this vertical: lamps below are mirrored.
+    pub(super) fn above(mut self, vertical: Vec3) -> Self {
+        for lamp in &mut self.lamps {
+            lamp.emitter = lamp.emitter.above(vertical);
+        }
+        self
+    }
+}
+
+fn add(sum: &mut ShLight, more: &ShLight) {
+    let pairs = sum.coefficients_mut().iter_mut().zip(more.coefficients());
+    for (sum, more) in pairs {
+        for (sum, more) in sum.iter_mut().zip(more) {
+            *sum += more;
+        }
+    }
+}
+
+/// The direction of a vector that has a length; to the viewer where it has none.
+fn direction(vector: Vec3) -> Direction {
+    let [x, y, z] = vector.to_array().map(f64::from);
+    Direction::new(x, y, z).unwrap_or(Direction::VIEWER)
+}
+
+fn vector(direction: Direction) -> Vec3 {
+    Vec3::from_array(direction.components().map(|c| c as f32))
+}

@@ -1,0 +1,403 @@
+//! glTF 2.0 files: JSON with its buffers beside it or inside, or one binary file. Only positions
+//! and texture coordinates of triangles are read, placed as the scene's nodes say.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use glam::{Mat4, Vec2, Vec3};
+use gltf::accessor::{DataType, Dimensions};
+use gltf::mesh::Mode;
+use gltf::{Accessor, Gltf, Node, Primitive, Semantic};
+
+use super::Raw;
+use crate::SynthError;
+
+/// Deepest nesting of nodes that is followed.
+const DEEPEST: usize = 64;
+/// Most nodes that are visited; more are a circle.
+const MOST_NODES: usize = 100_000;
+
+/// All triangles of the default scene as one surface.
+pub(super) fn read(path: &Path) -> Result<Raw, SynthError> {
+    let bytes = std::fs::read(path).map_err(SynthError::read(path))?;
+    let damaged = |reason: String| SynthError::Mesh {
+        path: path.to_owned(),
+        reason,
+    };
+    let file = Gltf::from_slice(&bytes).map_err(|fault| damaged(fault.to_string()))?;
+    let buffers = buffers(path, &file)?;
+    let mut reader = Reader {
+        buffers: &buffers,
+        raw: Raw::default(),
+        all_textured: true,
+        visited: 0,
+    };
+    let scene = file.default_scene().or_else(|| file.scenes().next());
+    for node in scene.iter().flat_map(gltf::Scene::nodes) {
+        reader.node(&node, Mat4::IDENTITY, 0).map_err(damaged)?;
+    }
+    if !reader.all_textured {
+        reader.raw.texture.clear();
+    }
+    Ok(reader.raw)
+}
+
+/// The bytes of each buffer.
+fn buffers<'a>(path: &Path, file: &'a Gltf) -> Result<Vec<Cow<'a, [u8]>>, SynthError> {
+    let damaged = |reason: String| SynthError::Mesh {
+        path: path.to_owned(),
+        reason,
+    };
+    let one = |buffer: gltf::Buffer<'a>| {
+        let bytes = match buffer.source() {
+            gltf::buffer::Source::Bin => {
+                let blob = file.blob.as_deref();
+                Cow::Borrowed(blob.ok_or_else(|| damaged("it has no binary part".to_owned()))?)
+            }
+            gltf::buffer::Source::Uri(uri) => Cow::Owned(linked(path, uri)?),
+        };
+        if bytes.len() < buffer.length() {
+            let (number, length) = (buffer.index(), buffer.length());
+            let found = bytes.len();
+            return Err(damaged(format!(
+                "buffer {number} has {found} bytes of {length}"
+            )));
+        }
+        Ok(bytes)
+    };
+    file.buffers().map(one).collect()
+}
+
+/// What a buffer's address stands for: data within it, or a file in the folder of the mesh.
+fn linked(path: &Path, uri: &str) -> Result<Vec<u8>, SynthError> {
+    let damaged = |reason: String| SynthError::Mesh {
+        path: path.to_owned(),
+        reason,
+    };
+    if let Some(data) = uri.strip_prefix("data:") {
+        let (_, text) = data
+            .split_once(";base64,")
+            .ok_or_else(|| damaged("a buffer's data is not in base64".to_owned()))?;
+        return STANDARD
+            .decode(text)
+            .map_err(|fault| damaged(format!("a buffer's data is damaged: {fault}")));
+    }
+    let plain = !uri.contains(['/', '\\', ':']) && uri != "..";
+    if !plain {
+        let reason = format!("its buffer {uri:?} does not lie in the folder of the mesh");
+        return Err(damaged(reason));
+    }
+    let beside = path.with_file_name(uri.replace("%20", " "));
+    std::fs::read(&beside).map_err(SynthError::read(&beside))
+}
+
+struct Reader<'a> {
+    buffers: &'a [Cow<'a, [u8]>],
+    raw: Raw,
+    all_textured: bool,
+    visited: usize,
+}
+
+impl Reader<'_> {
+    fn node(&mut self, node: &Node<'_>, parent: Mat4, depth: usize) -> Result<(), String> {
+        self.visited += 1;
+        if depth > DEEPEST || self.visited > MOST_NODES {
+            return Err("its nodes go in a circle, or there are too many".to_owned());
+        }
+        let placed = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
+        if let Some(mesh) = node.mesh() {
+            for primitive in mesh.primitives() {
+                self.primitive(&primitive, placed)?;
+            }
+        }
+        node.children()
+            .try_for_each(|child| self.node(&child, placed, depth + 1))
+    }
+
+    fn primitive(&mut self, primitive: &Primitive<'_>, placed: Mat4) -> Result<(), String> {
+        if !matches!(
+            primitive.mode(),
+            Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
+        ) {
+            return Ok(());
+        }
+        let positions = primitive
+            .get(&Semantic::Positions)
+            .ok_or("a part of it has no positions")?;
+        let positions = self.floats::<3>(&positions, Dimensions::Vec3)?;
+        let count = positions.len();
+        let order = match primitive.indices() {
+            Some(accessor) => self.indices(&accessor)?,
+            None => (0..count as u32).collect(),
+        };
+        let triangles = triangles(primitive.mode(), &order);
+        if let Some(&vertex) = order.iter().find(|&&vertex| vertex as usize >= count) {
+            return Err(format!("a triangle names vertex {vertex} of {count}"));
+        }
+        let first = self.raw.positions.len() as u32;
+        let moved = positions
+            .iter()
+            .map(|&p| placed.transform_point3(Vec3::from(p)));
+        self.raw.positions.extend(moved);
+        self.texture(primitive, &triangles)?;
+        let shifted = |corners: [u32; 3]| corners.map(|vertex| vertex.saturating_add(first));
+        self.raw
+            .triangles
+            .extend(triangles.into_iter().map(shifted));
+        Ok(())
+    }
+
+    /// Adds the texture coordinates of these triangles, where the part has them as numbers.
+    fn texture(&mut self, part: &Primitive<'_>, triangles: &[[u32; 3]]) -> Result<(), String> {
+        let accessor = part
+            .get(&Semantic::TexCoords(0))
+            .filter(|accessor| accessor.data_type() == DataType::F32);
+        let Some(accessor) = accessor else {
+            self.all_textured = false;
+            return Ok(());
+        };
+        let pairs = self.floats::<2>(&accessor, Dimensions::Vec2)?;
+        // In glTF, v runs downwards.
+        let at = |vertex: u32| {
+            pairs
+                .get(vertex as usize)
+                .map(|&[u, v]| Vec2::new(u, 1.0 - v))
+        };
+        for corners in triangles {
+            match corners.map(at) {
+                [Some(a), Some(b), Some(c)] if (a + b + c).is_finite() => {
+                    self.raw.texture.push([a, b, c]);
+                }
+                _ => self.all_textured = false,
+            }
+        }
+        Ok(())
+    }
+
+    fn floats<const N: usize>(
+        &self,
+        accessor: &Accessor<'_>,
+        dimensions: Dimensions,
+    ) -> Result<Vec<[f32; N]>, String> {
+        if (accessor.data_type(), accessor.dimensions()) != (DataType::F32, dimensions) {
+            let number = accessor.index();
+            return Err(format!("accessor {number} holds numbers of another kind"));
+        }
+        let items = self.items(accessor, 4 * N)?;
+        Ok(items
+            .map(|item| {
+                std::array::from_fn(|k| {
+                    f32::from_le_bytes([
+                        item[4 * k],
+                        item[4 * k + 1],
+                        item[4 * k + 2],
+                        item[4 * k + 3],
+                    ])
+                })
+            })
+            .collect())
+    }
+
+    fn indices(&self, accessor: &Accessor<'_>) -> Result<Vec<u32>, String> {
+        let bytes = match (accessor.data_type(), accessor.dimensions()) {
+            (DataType::U8, Dimensions::Scalar) => 1,
+            (DataType::U16, Dimensions::Scalar) => 2,
+            (DataType::U32, Dimensions::Scalar) => 4,
+            _ => {
+                let number = accessor.index();
+                return Err(format!("accessor {number} holds no indices"));
+            }
+        };
+        let items = self.items(accessor, bytes)?;
+        let value = |item: &[u8]| {
+            item.iter()
+                .rev()
+                .fold(0, |sum, &byte| (sum << 8) | u32::from(byte))
+        };
+        Ok(items.map(value).collect())
+    }
+
+    /// The items of an accessor, each of `size` bytes; all of them lie within their buffer.
+    fn items<'b>(
+        &'b self,
+        accessor: &Accessor<'_>,
+        size: usize,
+    ) -> Result<impl Iterator<Item = &'b [u8]> + use<'b>, String> {
+        let number = accessor.index();
+        if accessor.sparse().is_some() {
+            return Err(format!("accessor {number} is sparse, which is not read"));
+        }
+        let beyond = || format!("accessor {number} reaches beyond its buffer");
+        let view = accessor.view().ok_or_else(beyond)?;
+        let stride = view.stride().unwrap_or(size).max(size);
+        let count = accessor.count();
+        // The last item need not be followed by its padding.
+        let length = stride.checked_mul(count.saturating_sub(1));
+        let length = length.and_then(|length| length.checked_add(size.min(size * count)));
+        let bytes = length.and_then(|length| {
+            let buffer = self.buffers.get(view.buffer().index())?;
+            let end = view.offset().checked_add(view.length())?;
+            let within = buffer.get(view.offset()..end)?;
+            let start = accessor.offset();
+            within.get(start..start.checked_add(length)?)
+        });
+        let bytes = bytes.ok_or_else(beyond)?;
+        Ok(bytes
+            .chunks(stride)
+            .filter_map(move |item| item.get(..size)))
+    }
+}
+
+fn triangles(mode: Mode, order: &[u32]) -> Vec<[u32; 3]> {
+    match mode {
+        Mode::TriangleStrip => (0..)
+            .zip(order.windows(3))
+            .map(|(k, w)| {
+                if k % 2 == 0 {
+                    [w[0], w[1], w[2]]
+                } else {
+                    [w[1], w[0], w[2]]
+                }
+            })
+            .collect(),
+        Mode::TriangleFan => order
+            .get(1..)
+            .unwrap_or_default()
+            .windows(2)
+            .map(|w| [order[0], w[0], w[1]])
+            .collect(),
+        _ => order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Mesh;
+    use serde_json::{Value, json};
+
+    /// A square of two triangles in the plane z = 0, in a node that stretches it by 2 along x.
+    fn square() -> (Value, Vec<u8>) {
+        let positions = [
+            [0.0_f32, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [0.0, 1.0, 0.0],
+        ];
+        let mut bytes: Vec<u8> = positions
+            .iter()
+            .flatten()
+            .flat_map(|v| v.to_le_bytes())
+            .collect();
+        bytes.extend([0_u16, 1, 2, 0, 2, 3].iter().flat_map(|v| v.to_le_bytes()));
+        let document = json!({
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0, "scale": [2.0, 1.0, 1.0]}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+            "buffers": [{"byteLength": bytes.len()}],
+            "bufferViews": [
+                {"buffer": 0, "byteOffset": 0, "byteLength": 48},
+                {"buffer": 0, "byteOffset": 48, "byteLength": 12}],
+            "accessors": [
+                {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+                 "min": [0.0, 0.0, 0.0], "max": [1.0, 1.0, 0.0]},
+                {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}],
+        });
+        (document, bytes)
+    }
+
+    fn read(document: &Value, binary: &[u8]) -> Result<Mesh, SynthError> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.bin"), binary).unwrap();
+        let path = folder.path().join("a.gltf");
+        std::fs::write(&path, document.to_string()).unwrap();
+        Mesh::read(&path)
+    }
+
+    #[test]
+    fn a_buffer_may_lie_in_a_file_in_the_text_or_in_the_binary_part() {
+        let (mut document, bytes) = square();
+        let mut shapes = Vec::new();
+        document["buffers"][0]["uri"] = json!("a.bin");
+        shapes.push(read(&document, &bytes).unwrap());
+        let data = format!(
+            "data:application/octet-stream;base64,{}",
+            STANDARD.encode(&bytes)
+        );
+        document["buffers"][0]["uri"] = json!(data);
+        shapes.push(read(&document, &[]).unwrap());
+        let (document, bytes) = square();
+        let glb = gltf::binary::Glb {
+            header: gltf::binary::Header {
+                magic: *b"glTF",
+                version: 2,
+                length: 0,
+            },
+            json: document.to_string().into_bytes().into(),
+            bin: Some(bytes.into()),
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.GLB");
+        std::fs::write(&path, glb.to_vec().unwrap()).unwrap();
+        shapes.push(Mesh::read(&path).unwrap());
+        for shape in shapes {
+            assert_eq!((shape.triangles().len(), shape.positions().len()), (2, 4));
+            let widest = shape.positions().iter().map(|p| p.x).fold(0.0, f32::max);
+            let highest = shape.positions().iter().map(|p| p.y).fold(0.0, f32::max);
+            assert!((widest - 2.0 * highest).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn what_points_outside_its_buffer_or_folder_is_an_error() {
+        let changes: [(&str, Value); 8] = [
+            ("/accessors/0/count", json!(5)),
+            ("/accessors/1/byteOffset", json!(2)),
+            ("/accessors/0/componentType", json!(5123)),
+            ("/accessors/0/type", json!("VEC2")),
+            ("/bufferViews/1/byteOffset", json!(u32::MAX)),
+            ("/buffers/0/byteLength", json!(61)),
+            ("/buffers/0/uri", json!("../a.bin")),
+            ("/buffers/0/uri", json!("data:text/plain,abc")),
+        ];
+        for (place, value) in changes {
+            let (mut document, bytes) = square();
+            document["buffers"][0]["uri"] = json!("a.bin");
+            document["accessors"][1]["byteOffset"] = json!(0);
+            *document.pointer_mut(place).unwrap() = value;
+            let error = read(&document, &bytes).unwrap_err().to_string();
+            assert!(error.contains("a.gltf"), "{place}: {error}");
+        }
+    }
+
+    #[test]
+    fn nodes_that_go_in_a_circle_are_an_error() {
+        let (mut document, bytes) = square();
+        document["buffers"][0]["uri"] = json!("a.bin");
+        document["nodes"][0]["children"] = json!([0, 0]);
+        let error = read(&document, &bytes).unwrap_err().to_string();
+        assert!(error.contains("circle"), "{error}");
+    }
+
+    #[test]
+    fn strips_and_fans_are_read_as_triangles() {
+        let strip = triangles(Mode::TriangleStrip, &[0, 1, 2, 3]);
+        assert_eq!(strip, [[0, 1, 2], [2, 1, 3]]);
+        assert_eq!(
+            triangles(Mode::TriangleFan, &[0, 1, 2, 3]),
+            [[0, 1, 2], [0, 2, 3]]
+        );
+        assert!(triangles(Mode::TriangleFan, &[]).is_empty());
+    }
+
+    #[test]
+    fn an_index_beyond_the_vertices_is_an_error() {
+        let (mut document, mut bytes) = square();
+        document["buffers"][0]["uri"] = json!("a.bin");
+        bytes[48] = 9;
+        let error = read(&document, &bytes).unwrap_err().to_string();
+        assert!(error.contains("vertex 9 of 4"), "{error}");
+    }
+}

@@ -1,0 +1,380 @@
+//! Triangle meshes with a normal for each corner. Knows nothing of cameras or light; `obj` and
+//! `glb` read files.
+
+mod glb;
+mod obj;
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::{Vec2, Vec3};
+
+use super::SynthError;
+
+/// Most triangles that a mesh may have.
+const MOST_TRIANGLES: usize = 20_000_000;
+
+/// Faces that meet at a larger angle than this, radians, have an edge between them: 50 degrees.
+pub(super) const CREASE: f32 = 50.0 * std::f32::consts::PI / 180.0;
+
+/// A surface of triangles, with a normal for each corner.
+#[derive(Debug, Clone)]
+pub struct Mesh {
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    /// One for each corner of each triangle, unit length.
+    normals: Vec<[Vec3; 3]>,
+    texture: Option<Vec<[Vec2; 3]>>,
+}
+
+/// What a file or a generator gives: positions, triangles by index, and texture coordinates for
+/// each corner where there are any.
+#[derive(Debug, Default)]
+pub(super) struct Raw {
+    pub(super) positions: Vec<Vec3>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) texture: Vec<[Vec2; 3]>,
+}
+
+/// Why numbers are no mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum MeshFault {
+    /// No triangle, or none with an area.
+    #[error("it has no triangle with an area")]
+    Empty,
+    /// A position is infinite or not a number.
+    #[error("vertex {0} is not at a finite place")]
+    NotFinite(usize),
+    /// A triangle names a vertex that is not there.
+    #[error("triangle {triangle} names vertex {vertex} of {count}")]
+    NoSuchVertex {
+        /// The triangle.
+        triangle: usize,
+        /// The vertex it names.
+        vertex: u32,
+        /// How many there are.
+        count: usize,
+    },
+    /// More than memory should hold.
+    #[error("it has {0} triangles, more than {MOST_TRIANGLES}")]
+    TooLarge(usize),
+}
+
+impl Mesh {
+    /// Reads a mesh: Wavefront (`.obj`) or glTF 2.0 (`.gltf`, `.glb`). All its parts become one
+    /// surface; its own normals are not used, those of faces within 50 degrees are blended.
+    ///
+    /// # Errors
+    /// [`SynthError::Mesh`] where the file is damaged or holds no surface, [`SynthError::Read`] where it
+    /// cannot be read, [`SynthError::MeshKind`] where it is of another kind.
+    pub fn read(path: &Path) -> Result<Self, SynthError> {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let raw = match extension.to_str() {
+            Some("obj") => obj::read(path)?,
+            Some("gltf" | "glb") => glb::read(path)?,
+            _ => {
+                return Err(SynthError::MeshKind {
+                    path: path.to_owned(),
+                });
+            }
+        };
+        Self::new(raw, CREASE).map_err(|fault| SynthError::Mesh {
+            path: path.to_owned(),
+            reason: fault.to_string(),
+        })
+    }
+
+    /// A mesh of these triangles, moved and scaled into the unit sphere; normals are blended
+    /// between faces that meet at less than `crease` radians. Triangles without an area are left
+    /// out, vertices at one place are joined.
+    pub(super) fn new(raw: Raw, crease: f32) -> Result<Self, MeshFault> {
+        check(&raw)?;
+        let mut raw = weld(raw);
+        into_unit_sphere(&mut raw.positions);
+        drop_flat(&mut raw);
+        if raw.triangles.is_empty() {
+            return Err(MeshFault::Empty);
+        }
+        let normals = corner_normals(&raw.positions, &raw.triangles, crease);
+        Ok(Self {
+            positions: raw.positions,
+            triangles: raw.triangles,
+            normals,
+            texture: (!raw.texture.is_empty()).then_some(raw.texture),
+        })
+    }
+
+    /// The vertices; the farthest is at distance 1 from the origin.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// The triangles, by their vertices.
+    pub(super) fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// A normal for each corner of each triangle.
+    pub(super) fn normals(&self) -> &[[Vec3; 3]] {
+        &self.normals
+    }
+
+    /// Texture coordinates for each corner of each triangle, where the mesh has them.
+    pub(super) fn texture(&self) -> Option<&[[Vec2; 3]]> {
+        self.texture.as_deref()
+    }
+}
+
+fn check(raw: &Raw) -> Result<(), MeshFault> {
+    if raw.triangles.len() > MOST_TRIANGLES {
+        return Err(MeshFault::TooLarge(raw.triangles.len()));
+    }
+    if let Some(vertex) = raw.positions.iter().position(|p| !p.is_finite()) {
+        return Err(MeshFault::NotFinite(vertex));
+    }
+    let count = raw.positions.len();
+    for (triangle, corners) in raw.triangles.iter().enumerate() {
+        if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= count) {
+            return Err(MeshFault::NoSuchVertex {
+                triangle,
+                vertex,
+                count,
+            });
+        }
+    }
+    if raw.triangles.is_empty() {
+        return Err(MeshFault::Empty);
+    }
+    Ok(())
+}
+
+/// Joins vertices at one place, so that faces know their neighbours, and leaves out those that no
+/// triangle uses.
+fn weld(raw: Raw) -> Raw {
+    let mut places: HashMap<[u32; 3], u32> = HashMap::with_capacity(raw.positions.len());
+    let mut positions = Vec::with_capacity(raw.positions.len());
+    let mut joined = |vertex: u32| {
+        // Adding 0 makes -0 and 0 one place.
+        let position = raw.positions[vertex as usize] + Vec3::ZERO;
+        let key = position.to_array().map(f32::to_bits);
+        *places.entry(key).or_insert_with(|| {
+            positions.push(position);
+            positions.len() as u32 - 1
+        })
+    };
+    let triangles = raw
+        .triangles
+        .iter()
+        .map(|corners| corners.map(&mut joined))
+        .collect();
+    Raw {
+        positions,
+        triangles,
+        texture: raw.texture,
+    }
+}
+
+/// Moves the middle of the bounding box to the origin and the farthest vertex to distance 1.
+fn into_unit_sphere(positions: &mut [Vec3]) {
+    let low = positions.iter().copied().reduce(Vec3::min);
+    let high = positions.iter().copied().reduce(Vec3::max);
+    let middle = low.zip(high).map_or(Vec3::ZERO, |(l, h)| l * 0.5 + h * 0.5);
+    let largest = positions
+        .iter()
+        .map(|&p| (p - middle).abs().max_element())
+        .fold(0.0, f32::max);
+    if largest == 0.0 {
+        return;
+    }
+    // In two steps: squares of huge or tiny coordinates are not numbers.
+    let mut farthest = 0.0_f32;
+    for position in positions.iter_mut() {
+        *position = (*position - middle) / largest;
+        farthest = farthest.max(position.length());
+    }
+    for position in positions {
+        *position /= farthest;
+    }
+}
+
+fn drop_flat(raw: &mut Raw) {
+    let has_area: Vec<bool> = raw
+        .triangles
+        .iter()
+        .map(|corners| {
+            let [a, b, c] = corners.map(|v| raw.positions[v as usize]);
+            (b - a).cross(c - a).length_squared() > 1e-20
+        })
+        .collect();
+    let mut keep = has_area.iter();
+    raw.triangles
+        .retain(|_| keep.next().copied().unwrap_or(true));
+    let mut keep = has_area.iter();
+    raw.texture.retain(|_| keep.next().copied().unwrap_or(true));
+}
+
+/// For each corner, the mean normal of the faces around its vertex, each weighted by its angle there,
+/// of those that meet the corner's own face at less than `crease` radians.
+fn corner_normals(positions: &[Vec3], triangles: &[[u32; 3]], crease: f32) -> Vec<[Vec3; 3]> {
+    let faces: Vec<Face> = triangles
+        .iter()
+        .map(|corners| Face::of(corners.map(|v| positions[v as usize])))
+        .collect();
+    let around = CornersAround::of(positions.len(), triangles);
+    let least_cosine = crease.cos();
+    triangles
+        .iter()
+        .zip(&faces)
+        .map(|(corners, own)| {
+            corners.map(|vertex| {
+                let near = around
+                    .vertex(vertex)
+                    .map(|(face, corner)| (&faces[face], corner));
+                let blended: Vec3 = near
+                    .filter(|(other, _)| own.normal.dot(other.normal) > least_cosine)
+                    .map(|(other, corner)| other.normal * other.angles[corner])
+                    .sum();
+                blended.try_normalize().unwrap_or(own.normal)
+            })
+        })
+        .collect()
+}
+
+struct Face {
+    normal: Vec3,
+    /// At each corner, radians.
+    angles: [f32; 3],
+}
+
+impl Face {
+    fn of(corners: [Vec3; 3]) -> Self {
+        let [a, b, c] = corners;
+        let angles = [0, 1, 2].map(|k| {
+            let [here, next, last] = [k, (k + 1) % 3, (k + 2) % 3].map(|i| corners[i]);
+            (next - here).angle_between(last - here)
+        });
+        Self {
+            normal: (b - a).cross(c - a).normalize_or_zero(),
+            angles,
+        }
+    }
+}
+
+/// Which corners of which faces meet at each vertex.
+struct CornersAround {
+    starts: Vec<u32>,
+    /// Three times the face, plus the corner.
+    corners: Vec<u32>,
+}
+
+impl CornersAround {
+    fn of(vertices: usize, triangles: &[[u32; 3]]) -> Self {
+        let mut starts = vec![0_u32; vertices + 1];
+        for vertex in triangles.iter().flatten() {
+            starts[*vertex as usize + 1] += 1;
+        }
+        for vertex in 0..vertices {
+            starts[vertex + 1] += starts[vertex];
+        }
+        let mut next = starts.clone();
+        let mut corners = vec![0; triangles.len() * 3];
+        for (corner, vertex) in (0_u32..).zip(triangles.iter().flatten()) {
+            let place = &mut next[*vertex as usize];
+            corners[*place as usize] = corner;
+            *place += 1;
+        }
+        Self { starts, corners }
+    }
+
+    /// Face and corner.
+    fn vertex(&self, vertex: u32) -> impl Iterator<Item = (usize, usize)> {
+        let [start, end] = [vertex, vertex + 1].map(|v| self.starts[v as usize] as usize);
+        let corners = self.corners[start..end].iter();
+        corners.map(|&corner| (corner as usize / 3, corner as usize % 3))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cube of two triangles a side, each with its own vertices.
+    fn cube() -> Raw {
+        let mut raw = Raw::default();
+        for axis in 0..3 {
+            for sign in [-1.0, 1.0] {
+                let corner = |u: f32, v: f32| {
+                    let mut p = [0.0; 3];
+                    p[axis] = sign;
+                    p[(axis + 1) % 3] = u * sign;
+                    p[(axis + 2) % 3] = v;
+                    Vec3::from_array(p) * 3.0 + Vec3::new(5.0, 0.0, -2.0)
+                };
+                let first = raw.positions.len() as u32;
+                let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+                raw.positions.extend(corners.map(|(u, v)| corner(u, v)));
+                raw.triangles.push([first, first + 1, first + 2]);
+                raw.triangles.push([first, first + 2, first + 3]);
+            }
+        }
+        raw
+    }
+
+    #[test]
+    fn a_mesh_is_moved_into_the_unit_sphere_and_its_vertices_joined() {
+        let mesh = Mesh::new(cube(), CREASE).unwrap();
+        assert_eq!(mesh.positions().len(), 8);
+        for position in mesh.positions() {
+            assert!((position.length() - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn edges_stay_sharp_below_the_crease_angle_and_are_blended_above_it() {
+        let sharp = Mesh::new(cube(), CREASE).unwrap();
+        for normal in sharp.normals().iter().flatten() {
+            assert!((normal.abs().max_element() - 1.0).abs() < 1e-6, "{normal}");
+        }
+        let smooth = Mesh::new(cube(), 2.0).unwrap();
+        for (normals, corners) in smooth.normals().iter().zip(smooth.triangles()) {
+            for (normal, &vertex) in normals.iter().zip(corners) {
+                assert!(normal.dot(smooth.positions()[vertex as usize]) > 0.9);
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_that_are_no_mesh_are_refused_and_named() {
+        let mut raw = cube();
+        raw.positions[3].y = f32::NAN;
+        assert_eq!(Mesh::new(raw, CREASE).unwrap_err(), MeshFault::NotFinite(3));
+        let mut raw = cube();
+        raw.triangles[2][1] = 99;
+        let fault = MeshFault::NoSuchVertex {
+            triangle: 2,
+            vertex: 99,
+            count: 24,
+        };
+        assert_eq!(Mesh::new(raw, CREASE).unwrap_err(), fault);
+        let mut raw = cube();
+        for position in &mut raw.positions {
+            position.x = 0.0;
+            position.y = 1.0;
+        }
+        assert_eq!(Mesh::new(raw, CREASE).unwrap_err(), MeshFault::Empty);
+        let empty = Mesh::new(Raw::default(), CREASE);
+        assert_eq!(empty.unwrap_err(), MeshFault::Empty);
+    }
+
+    #[test]
+    fn huge_and_tiny_meshes_are_scaled_without_losing_them() {
+        for scale in [1e30, 1e-30] {
+            let mut raw = cube();
+            for position in &mut raw.positions {
+                *position *= scale;
+            }
+            let mesh = Mesh::new(raw, CREASE).unwrap();
+            assert_eq!(mesh.triangles().len(), 12);
+        }
+    }
+}

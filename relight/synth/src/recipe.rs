@@ -1,0 +1,309 @@
+//! Which objects, views, materials, lights and cameras are drawn: every number of a seed. The chances are
+//! those of the recipe that trained best.
+
+use std::borrow::Cow;
+
+use serde::{Deserialize, Serialize};
+
+use super::SynthError;
+use super::camera::CameraModel;
+use super::finish::Finish;
+use super::geometry::{GBuffer, Occluder};
+use super::library::Library;
+use super::lighting::{LightKind, Lighting, Material, Scene};
+use super::mesh::Mesh;
+use super::object::{ObjectSource, View};
+use super::random::{Random, stream};
+use super::sample::{Description, SynthSample};
+use super::shape::ShapeKind;
+use super::view::{Pose, Projection};
+
+/// Rays a pixel by which a scene learns how much of the sky it sees.
+pub(super) const AMBIENT_RAYS: u32 = 16;
+/// Part of the objects that are meshes, where there are any.
+const MESHES: f32 = 0.25;
+/// Least part of the picture that an object covers, where another view of it covers more.
+const LEAST_COVER: f32 = 0.12;
+
+/// How samples are made. The same recipe and library give the same samples.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Recipe {
+    /// What all is drawn from.
+    pub seed: u64,
+    /// Width and height of the pictures, 16..=2048 pixels.
+    pub size: u32,
+    /// What light there is.
+    pub light: LightKind,
+    /// Whether objects block light.
+    pub shadows: bool,
+    /// Views of each object, 1 and above.
+    pub views: u32,
+    /// Materials and lightings of each view, 1 and above.
+    pub lightings: u32,
+    /// Whether the camera is a random one; else it is [`CameraModel::plain`].
+    pub random_camera: bool,
+}
+
+impl Default for Recipe {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            size: 256,
+            light: LightKind::Mixed,
+            shadows: true,
+            views: 4,
+            lightings: 4,
+            random_camera: true,
+        }
+    }
+}
+
+impl Recipe {
+    /// Whether all numbers are in range.
+    ///
+    /// # Errors
+    /// [`SynthError::Setting`] names the first that is not.
+    pub fn check(&self) -> Result<(), SynthError> {
+        let checks = [
+            ("the size", self.size, 16..=2048, "16 to 2048 pixels"),
+            (
+                "the number of views",
+                self.views,
+                1..=u32::MAX,
+                "at least 1",
+            ),
+            (
+                "the number of lightings",
+                self.lightings,
+                1..=u32::MAX,
+                "at least 1",
+            ),
+        ];
+        match checks
+            .into_iter()
+            .find(|(_, value, range, _)| !range.contains(value))
+        {
+            None => Ok(()),
+            Some((name, value, _, allowed)) => Err(SynthError::Setting {
+                name,
+                value: u64::from(value),
+                allowed,
+            }),
+        }
+    }
+
+    /// How many samples each object gives.
+    #[must_use]
+    pub fn samples_an_object(&self) -> u64 {
+        u64::from(self.views) * u64::from(self.lightings)
+    }
+
+    /// The object of a number.
+    #[must_use]
+    pub fn object<'a>(&self, library: &'a Library, number: u64) -> (ObjectSource, Cow<'a, Mesh>) {
+        let mut random = Random::new(stream(stream(self.seed, 1), number));
+        if random.chance(MESHES)
+            && let Some((file, mesh)) = library.meshes.get(random.index(library.meshes.len()))
+        {
+            return (
+                ObjectSource::Mesh { file: file.clone() },
+                Cow::Borrowed(mesh),
+            );
+        }
+        let kind = random.weighted(ShapeKind::WEIGHTS);
+        let seed = random.seed();
+        (
+            ObjectSource::Shape { kind, seed },
+            Cow::Owned(kind.build(seed)),
+        )
+    }
+
+    /// The view of a number of an object: of several draws the first that covers enough of the picture.
+    #[must_use]
+    pub fn view(&self, object: &ObjectSource, mesh: &Mesh, number: u64) -> View {
+        let mut random = Random::new(stream(stream(self.seed, 3), number));
+        let kind = match object {
+            ObjectSource::Mesh { .. } => None,
+            ObjectSource::Shape { kind, .. } => Some(*kind),
+        };
+        let least = (LEAST_COVER * (self.size * self.size) as f32) as usize;
+        let mut best: Option<(Pose, Projection, GBuffer)> = None;
+        for _ in 0..4 {
+            let pose = Pose::draw(&mut random, kind);
+            let projection = Projection::draw(&mut random);
+            let placement = pose.place(mesh, projection);
+            let buffer = GBuffer::render(mesh, placement, projection, self.size);
+            let covers = buffer.len();
+            if best
+                .as_ref()
+                .is_none_or(|(_, _, other)| covers > other.len())
+            {
+                best = Some((pose, projection, buffer));
+            }
+            if covers >= least {
+                break;
+            }
+        }
+        let (pose, projection, buffer) = best.unwrap_or_else(|| {
+            let (pose, projection) = (Pose::upright(0.3, 0.0, 0.9), Projection::Orthographic);
+            let placement = pose.place(mesh, projection);
+            (
+                pose,
+                projection,
+                GBuffer::render(mesh, placement, projection, self.size),
+            )
+        });
+        let scene = if self.shadows {
+            let occluder = Occluder::new(mesh, pose.place(mesh, projection));
+            Scene::shaded(buffer, occluder, AMBIENT_RAYS, random.seed())
+        } else {
+            Scene::open(buffer)
+        };
+        View {
+            object: object.clone(),
+            pose,
+            projection,
+            scene,
+        }
+    }
+
+    /// The material of a number on what a view shows: paint, relief on a third, gloss on a third.
+    #[must_use]
+    pub fn material(&self, library: &Library, view: &View, number: u64) -> (Finish, Material) {
+        let mut random = Random::new(stream(stream(self.seed, 5), number));
+        let finish = Finish::draw(&mut random, view.scene.buffer(), library, 0.35);
+        let material = finish.apply(view.scene.buffer(), library);
+        (finish, material)
+    }
+
+    /// The sample of a number: a view in a random material, under a random light, by a random camera.
+    #[must_use]
+    pub fn sample<'a>(&self, library: &Library, view: &'a View, number: u64) -> SynthSample<'a> {
+        let seed = stream(stream(self.seed, 2), number);
+        let mut random = Random::new(seed);
+        let (finish, material) = self.material(library, view, number);
+        let buffer = view.scene.buffer();
+        let lighting = Lighting {
+            has_shadows: self.shadows,
+            ..Lighting::draw(&mut random, self.light, buffer, &library.panoramas)
+        };
+        let shaded = view
+            .scene
+            .light(&material, &lighting, &library.panoramas, random.seed());
+        let (camera, level) = self.camera(&mut random);
+        let camera = camera.exposed(&shaded.image(&material.albedo), level);
+        let description = Description {
+            number,
+            seed,
+            object: view.object.clone(),
+            pose: view.pose,
+            projection: view.projection,
+            finish,
+            panorama: lighting.panorama_name(&library.panoramas),
+            coefficients: lighting.seen_coefficients(&library.panoramas, camera.gain),
+            lighting,
+            camera,
+        };
+        SynthSample::new(view, material, shaded, description, random.seed())
+    }
+
+    /// A camera without its exposure, and the level to which bright pixels are to be exposed: some
+    /// pictures clip.
+    fn camera(&self, random: &mut Random) -> (CameraModel, f32) {
+        let level = random.uniform(0.6..1.1);
+        if !self.random_camera {
+            return (CameraModel::plain(), level);
+        }
+        let level = if random.chance(0.15) {
+            random.uniform(1.1..1.8)
+        } else {
+            level
+        };
+        (CameraModel::draw(random), level)
+    }
+}
+
+impl Projection {
+    fn draw(random: &mut Random) -> Self {
+        if random.chance(0.5) {
+            Self::Orthographic
+        } else {
+            Self::Perspective {
+                distance: random.log_uniform(3.0..12.0),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::library::Folders;
+
+    fn small() -> Recipe {
+        Recipe {
+            size: 48,
+            ..Recipe::default()
+        }
+    }
+
+    #[test]
+    fn a_number_out_of_range_is_named() {
+        let recipe = Recipe {
+            size: 8,
+            ..Recipe::default()
+        };
+        assert!(recipe.check().unwrap_err().to_string().contains("size"));
+        let recipe = Recipe {
+            views: 0,
+            ..Recipe::default()
+        };
+        assert!(recipe.check().unwrap_err().to_string().contains("views"));
+        assert!(Recipe::default().check().is_ok());
+    }
+
+    #[test]
+    fn every_view_shows_its_object() {
+        let library = Library::default();
+        for number in 0..12 {
+            let (object, mesh) = small().object(&library, number);
+            let view = small().view(&object, &mesh, number);
+            assert!(view.scene.buffer().len() > 48 * 48 / 20, "{object:?}");
+        }
+    }
+
+    #[test]
+    fn meshes_are_drawn_where_there_are_any() {
+        let mesh = ShapeKind::Plane.build(0);
+        let library = Library {
+            meshes: vec![("plane.obj".to_owned(), mesh)],
+            ..Library::default()
+        };
+        let is_mesh = |&number: &u64| {
+            let (object, _) = small().object(&library, number);
+            matches!(object, ObjectSource::Mesh { .. })
+        };
+        let count = (0..60).filter(is_mesh).count();
+        assert!((5..30).contains(&count), "{count}");
+    }
+
+    #[test]
+    fn pictures_are_well_exposed_and_not_all_alike() {
+        let library = Library::read(&Folders::default()).unwrap();
+        let mut means = Vec::new();
+        for number in 0..10 {
+            let (object, mesh) = small().object(&library, number);
+            let view = small().view(&object, &mesh, number);
+            let sample = small().sample(&library, &view, number);
+            let bright = sample
+                .image()
+                .pixels()
+                .filter(|p| p.0.iter().any(|&v| v > 120));
+            assert!(bright.count() > 8, "{number}");
+            let sum: u64 = sample.image().as_raw().iter().map(|&v| u64::from(v)).sum();
+            means.push(sum);
+        }
+        means.dedup();
+        assert_eq!(means.len(), 10);
+    }
+}

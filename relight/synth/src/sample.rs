@@ -1,0 +1,220 @@
+//! One sample: a picture, its truth, and every number that it was made of.
+
+use glam::Vec3;
+use image::{GrayImage, Luma, Rgb, RgbImage};
+use serde::{Deserialize, Serialize};
+
+use super::SynthError;
+use super::camera::CameraModel;
+use super::finish::Finish;
+use super::geometry::GBuffer;
+use super::lighting::{Lighting, Material, Panoramas, Shaded};
+use super::object::{ObjectSource, View};
+use super::png::{Sixteen, encode_sixteen};
+use super::view::{Pose, Projection};
+use relight_core::light::ShLight;
+
+/// All that a sample was made of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Description {
+    /// The sample's number.
+    pub number: u64,
+    /// What it was drawn from.
+    pub seed: u64,
+    /// The object.
+    pub object: ObjectSource,
+    /// How it stands.
+    pub pose: Pose,
+    /// How it is seen.
+    pub projection: Projection,
+    /// What it is made of.
+    pub finish: Finish,
+    /// The name of the panorama that the lighting has.
+    pub panorama: Option<String>,
+    /// All light but what bounces, as nine coefficients in the viewer's frame, times the camera's gain:
+    /// their diffuse layer is the shading where nothing is in the way.
+    pub coefficients: [[f64; 3]; 9],
+    /// The light.
+    pub lighting: Lighting,
+    /// The camera.
+    pub camera: CameraModel,
+}
+
+impl Lighting {
+    /// The name of its panorama.
+    pub(super) fn panorama_name(&self, panoramas: &Panoramas) -> Option<String> {
+        let environment = self.environment.as_ref()?;
+        panoramas.name(environment.panorama).map(str::to_owned)
+    }
+
+    /// The coefficients as a camera of this gain sees them.
+    pub(super) fn seen_coefficients(&self, panoramas: &Panoramas, gain: Vec3) -> [[f64; 3]; 9] {
+        let light = self
+            .coefficients(panoramas)
+            .tinted(gain.to_array().map(f64::from));
+        let mut coefficients = [[0.0; 3]; 9];
+        for (to, from) in coefficients.iter_mut().zip(light.coefficients()) {
+            *to = *from;
+        }
+        coefficients
+    }
+}
+
+/// A picture with its truth.
+pub struct SynthSample<'a> {
+    view: &'a View,
+    material: Material,
+    /// With the camera's gain.
+    shaded: Shaded,
+    image: RgbImage,
+    description: Description,
+}
+
+/// What the largest value in a file of 16 bits stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Whites {
+    /// In `shading.png`.
+    pub shading: f32,
+    /// In `highlight.png`.
+    pub highlight: f32,
+}
+
+/// The files of a sample, by name.
+pub(super) struct Files(pub(super) Vec<(&'static str, Vec<u8>)>);
+
+impl<'a> SynthSample<'a> {
+    /// Takes the picture: `shaded` is still without the gain of the description's camera; `seed` draws
+    /// the noise.
+    pub(super) fn new(
+        view: &'a View,
+        material: Material,
+        mut shaded: Shaded,
+        description: Description,
+        seed: u64,
+    ) -> Self {
+        shaded.scale(description.camera.gain);
+        let buffer = view.scene.buffer();
+        let image = photograph(buffer, &description.camera, &material, &shaded, seed);
+        Self {
+            view,
+            material,
+            shaded,
+            image,
+            description,
+        }
+    }
+
+    /// The view that is shown.
+    #[must_use]
+    pub fn view(&self) -> &View {
+        self.view
+    }
+
+    /// The picture: the camera's 8-bit values, 0 outside the object.
+    #[must_use]
+    pub fn image(&self) -> &RgbImage {
+        &self.image
+    }
+
+    /// Albedo, normals and gloss at the covered pixels.
+    #[must_use]
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+
+    /// Shading and highlight at the covered pixels, with the camera's gain: the picture is the camera's
+    /// response to `albedo x shading + highlight`.
+    #[must_use]
+    pub fn shaded(&self) -> &Shaded {
+        &self.shaded
+    }
+
+    /// All that the sample was made of.
+    #[must_use]
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// The sample as files.
+    pub(super) fn files(&self) -> Result<Files, SynthError> {
+        let buffer = self.view.scene.buffer();
+        let shading = Sixteen::up_to_largest(&self.shaded.shading);
+        let highlight = Sixteen::up_to_largest(&self.shaded.highlight);
+        let whites = Whites {
+            shading: shading.white,
+            highlight: highlight.white,
+        };
+        let light = ShLight::new(self.description.coefficients.to_vec())?;
+        Ok(Files(vec![
+            ("image.png", relit_data::shard::encode_rgb(&self.image)?),
+            ("mask.png", relit_data::shard::encode_mask(&mask(buffer))?),
+            (
+                "normal.png",
+                encode_sixteen(buffer, &Sixteen::normals(&self.material.normals))?,
+            ),
+            (
+                "albedo.png",
+                encode_sixteen(buffer, &Sixteen::up_to(&self.material.albedo, 1.0))?,
+            ),
+            ("shading.png", encode_sixteen(buffer, &shading)?),
+            ("highlight.png", encode_sixteen(buffer, &highlight)?),
+            ("light.txt", light.to_string().into_bytes()),
+            ("sample.json", self.json(whites)),
+        ]))
+    }
+
+    fn json(&self, white: Whites) -> Vec<u8> {
+        #[derive(Serialize)]
+        struct Record<'a> {
+            white: Whites,
+            #[serde(flatten)]
+            description: &'a Description,
+        }
+        let record = Record {
+            white,
+            description: &self.description,
+        };
+        // All numbers are finite and all keys are texts: this cannot fail.
+        serde_json::to_vec_pretty(&record).unwrap_or_default()
+    }
+}
+
+/// The mask of what a buffer covers, 0 and 255.
+pub(super) fn mask(buffer: &GBuffer) -> GrayImage {
+    let mut mask = GrayImage::new(buffer.size(), buffer.size());
+    for &pixel in buffer.pixels() {
+        mask.put_pixel(pixel % buffer.size(), pixel / buffer.size(), Luma([255]));
+    }
+    mask
+}
+
+/// The camera's picture of light that already has its gain.
+pub(super) fn photograph(
+    buffer: &GBuffer,
+    camera: &CameraModel,
+    material: &Material,
+    shaded: &Shaded,
+    seed: u64,
+) -> RgbImage {
+    let values = camera.values(&shaded.image(&material.albedo), seed);
+    let picture = picture_of(buffer, &values);
+    if camera.jpeg.is_none() {
+        return picture;
+    }
+    let compressed = camera.compressed(picture);
+    let size = buffer.size();
+    let inside = buffer
+        .pixels()
+        .iter()
+        .map(|&pixel| compressed.get_pixel(pixel % size, pixel / size).0);
+    picture_of(buffer, &inside.collect::<Vec<_>>())
+}
+
+/// A picture with these colours at the covered pixels and black elsewhere.
+pub(super) fn picture_of(buffer: &GBuffer, values: &[[u8; 3]]) -> RgbImage {
+    let mut picture = RgbImage::new(buffer.size(), buffer.size());
+    for (&pixel, &value) in buffer.pixels().iter().zip(values) {
+        picture.put_pixel(pixel % buffer.size(), pixel / buffer.size(), Rgb(value));
+    }
+    picture
+}

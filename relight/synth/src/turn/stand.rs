@@ -1,0 +1,82 @@
+//! How an object stands on the turntable.
+
+use std::borrow::Cow;
+
+use glam::{Affine3A, Vec3};
+
+use crate::geometry::Disc;
+use crate::library::Library;
+use crate::mesh::Mesh;
+use crate::object::ObjectSource;
+use crate::random::Random;
+use crate::recipe::Recipe;
+use crate::view::{Pose, Projection};
+
+/// The plate's radius, in halves of the picture's width.
+const PLATE: f32 = 2.5;
+
+/// How an object stands on the table.
+pub(super) struct Stand {
+    pub(super) pose: Pose,
+    pub(super) projection: Projection,
+    /// Of the camera over the plate, radians.
+    elevation: f32,
+}
+
+impl Stand {
+    pub(super) fn draw(random: &mut Random) -> Self {
+        let elevation = random.uniform(8.0..30.0_f32).to_radians();
+        let azimuth = random.uniform(0.0..std::f32::consts::TAU);
+        Self {
+            pose: Pose::upright(elevation, azimuth, random.uniform(0.85..0.95)),
+            projection: Projection::Perspective {
+                distance: random.uniform(4.0..8.0),
+            },
+            elevation,
+        }
+    }
+
+    /// Of the table in the viewer's frame, upwards.
+    pub(super) fn axis(&self) -> Vec3 {
+        Vec3::new(0.0, self.elevation.cos(), self.elevation.sin())
+    }
+
+    /// The map from the mesh's own frame into the viewer's.
+    pub(super) fn placement(&self, mesh: &Mesh) -> Affine3A {
+        self.pose.place(mesh, self.projection)
+    }
+
+    /// The plate on which the object stands.
+    pub(super) fn plate(&self, mesh: &Mesh) -> Disc {
+        let placement = self.placement(mesh);
+        let points = mesh
+            .positions()
+            .iter()
+            .map(|&p| placement.transform_point3(p));
+        let lowest = points
+            .map(|p| p.dot(self.axis()))
+            .fold(f32::INFINITY, f32::min);
+        let middle = placement.transform_point3(Vec3::ZERO);
+        let down = middle.dot(self.axis()) - lowest;
+        Disc {
+            centre: middle - self.axis() * (down + 2e-3),
+            normal: self.axis(),
+            radius: PLATE,
+        }
+    }
+}
+
+/// An object that can stand: sheets do not.
+pub(super) fn standing_object<'a>(
+    recipe: &Recipe,
+    library: &'a Library,
+    random: &mut Random,
+) -> (ObjectSource, Cow<'a, Mesh>) {
+    loop {
+        let (object, mesh) = recipe.object(library, random.seed());
+        match object {
+            ObjectSource::Shape { kind, .. } if kind.is_open() => {}
+            _ => return (object, mesh),
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! The run that trains the decomposing network on composed samples.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use tch::{Device, Kind, Tensor};
+
+use super::composed::{ComposedBatches, composition, window_settings};
+use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
+use super::error::TrainError;
+use super::held_out::{HeldOutSamples, highlight_figures};
+use super::learner::{Learner, LearnerSettings};
+use super::losses::{angular_degrees, scale_invariant, windowed};
+use super::model::{ComputePrecision, Model};
+use super::process_group::ProcessGroup;
+use super::run::{StepLosses, Task, Validation};
+use super::sample::TruthBatch;
+use super::settings::{DecomposeSettings, PrecisionChoice, first_difference};
+use super::sheet::validation_sheet;
+use relight_nets::{Weights, decomposer};
+
+/// Samples that are shown.
+const SHOWN: usize = 10;
+
+/// Where and with how many threads.
+#[derive(Debug, Clone)]
+pub struct Resources {
+    /// Where networks are computed.
+    pub device: Device,
+    /// Threads that compose samples.
+    pub composers: usize,
+    /// Set to end a run early, also while its first samples are being composed.
+    pub stop: Arc<AtomicBool>,
+}
+
+/// Training of the decomposing network.
+#[derive(Debug)]
+pub struct DecomposeTask {
+    settings: DecomposeSettings,
+    resources: Resources,
+    learner: Learner,
+    composed: ComposedBatches,
+    validation: HeldOutSamples,
+}
+
+impl DecomposeTask {
+    /// Reads what samples are composed of, composes the validation, and begins with `weights`, or with random ones.
+    ///
+    /// # Errors
+    /// Settings out of range, files that cannot be read, weights that do not fit.
+    pub fn new(
+        settings: DecomposeSettings,
+        resources: Resources,
+        weights: Option<&Weights>,
+    ) -> Result<Self, TrainError> {
+        settings.check()?;
+        let composition = Arc::new(composition(&settings.data, settings.run.seed)?);
+        composition.recipe.check()?;
+        let validation = HeldOutSamples::new(&composition, settings.data.validation);
+        let graph = decomposer();
+        let initial = || Weights::initial(&graph, settings.run.seed);
+        let weights = weights.cloned().unwrap_or_else(initial);
+        let device = resources.device;
+        let precision = match settings.run.precision.named() {
+            Some(precision) => precision,
+            None => fastest(&weights, &validation.first(Kind::Float, device)?, device)?,
+        };
+        let learner = Learner::new(
+            graph,
+            &weights,
+            LearnerSettings {
+                adam: settings.run.adam(),
+                average: settings.run.average,
+                precision,
+                device: resources.device,
+            },
+        )?;
+        Ok(Self {
+            composed: ComposedBatches::new(
+                composition,
+                window_settings(&settings.data, &settings.run),
+                precision.kind(),
+                resources.clone(),
+            ),
+            settings,
+            resources,
+            learner,
+            validation,
+        })
+    }
+
+    /// Takes the precision that was the faster one in most of the processes.
+    fn choose_precision(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
+        let is_mixed = self.learner.model.precision() == ComputePrecision::Mixed;
+        let mut votes = [f64::from(u8::from(is_mixed))];
+        group.sum(&mut votes)?;
+        let mixed = 2.0 * votes[0] > f64::from(group.share().of());
+        self.learner.model.set_precision(if mixed {
+            ComputePrecision::Mixed
+        } else {
+            ComputePrecision::Single
+        });
+        Ok(())
+    }
+}
+
+impl Task for DecomposeTask {
+    fn name(&self) -> &'static str {
+        "decompose"
+    }
+
+    fn settings(&self) -> String {
+        // Numbers, names and paths: all of them can be written.
+        toml::to_string(&self.settings).unwrap_or_default()
+    }
+
+    fn differing_setting(&self, other: &str) -> Option<String> {
+        first_difference(&self.settings, other)
+    }
+
+    fn learners(&mut self) -> Vec<&mut Learner> {
+        vec![&mut self.learner]
+    }
+
+    fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
+        self.composed.take_share(group.share())?;
+        if self.settings.run.precision == PrecisionChoice::Fastest {
+            self.choose_precision(group)?;
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
+        let batch = self.composed.batch(step)?;
+        let answer = self.learner.model.forward(&batch.input)?;
+        let answer = AnsweredTensors::new(&batch.input, &answer[0])?;
+        Ok(StepLosses {
+            terms: decompose_losses(&batch, &answer, &self.settings.loss)?,
+            spreads: head_spreads(&batch, &answer)?,
+            batch: batch.named(),
+            damage: None,
+        })
+    }
+
+    fn place(&self) -> String {
+        self.learner.model.precision().name().to_owned()
+    }
+
+    fn go_to(&mut self, place: &str) -> Result<(), String> {
+        // What was the faster one at the start need not be now, and other losses would come of it.
+        let precision = ComputePrecision::of_name(place);
+        let precision = precision.ok_or_else(|| format!("its precision is {place:?}"))?;
+        self.learner.model.set_precision(precision);
+        Ok(())
+    }
+
+    fn validate(&mut self) -> Result<Validation, TrainError> {
+        let (model, device) = (self.learner.averaged_model()?, self.resources.device);
+        let (kind, mut sheet) = (model.precision().kind(), None);
+        let figures = self.validation.figures(kind, device, |batch| {
+            let answer = AnsweredTensors::new(&batch.input, &model.forward(&batch.input)?[0])?;
+            if sheet.is_none() {
+                sheet = Some(validation_sheet(batch, &answer, SHOWN)?);
+            }
+            figures(batch, &answer)
+        })?;
+        Ok(Validation {
+            figures,
+            sheet,
+            damage: None,
+        })
+    }
+}
+
+/// How far the answers are from the truth, means over the batch.
+fn figures(
+    batch: &TruthBatch,
+    answer: &AnsweredTensors,
+) -> Result<Vec<(&'static str, f64)>, TrainError> {
+    let mask = &batch.mask;
+    let grey = |of: &Tensor| of.f_mean_dim([1_i64].as_slice(), true, None);
+    let diffuse = batch.picture.f_sub(&batch.highlight)?.f_clamp_min(0.0)?;
+    let quotient = grey(&diffuse)?.f_div(&answer.shading.f_clamp_min(0.03)?)?;
+    let albedo = grey(&batch.albedo)?;
+    let window = (mask.size()[2] / 16).max(4);
+    let mut figures = highlight_figures(&answer.highlight, batch)?.to_vec();
+    let errors = [
+        (
+            "shading",
+            scale_invariant(&answer.shading, &batch.shading, mask)?,
+        ),
+        ("albedo", scale_invariant(&quotient, &albedo, mask)?),
+        (
+            "shading_windows",
+            windowed(&answer.shading, &batch.shading, mask, window)?,
+        ),
+        (
+            "albedo_windows",
+            windowed(&quotient, &albedo, mask, window)?,
+        ),
+        (
+            "normals_deg",
+            angular_degrees(&answer.normals, &batch.normals, mask)?,
+        ),
+    ];
+    for (name, error) in errors {
+        figures.push((name, f64::try_from(error)?));
+    }
+    Ok(figures)
+}
+
+/// The precision in which a step takes less time here, by the best of three steps each on a few samples.
+fn fastest(
+    weights: &Weights,
+    batch: &TruthBatch,
+    device: Device,
+) -> Result<ComputePrecision, TrainError> {
+    let seconds = |precision| -> Result<f64, TrainError> {
+        let model = Model::new(decomposer(), weights, device, precision)?;
+        let mut best = f64::INFINITY;
+        for _ in 0..3 {
+            let start = Instant::now();
+            model.forward(&batch.input)?[0]
+                .f_square()?
+                .f_mean(None)?
+                .f_backward()?;
+            best = best.min(start.elapsed().as_secs_f64());
+        }
+        Ok(best)
+    };
+    Ok(
+        if seconds(ComputePrecision::Mixed)? < seconds(ComputePrecision::Single)? {
+            ComputePrecision::Mixed
+        } else {
+            ComputePrecision::Single
+        },
+    )
+}

@@ -1,0 +1,187 @@
+//! What networks are judged by while they train: turns and composed samples on which none of them trains.
+
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use tch::{Device, Kind, Tensor, no_grad};
+
+use super::composer::Composition;
+use super::error::TrainError;
+use super::low_rank::{first_singular_values, rank_one};
+use super::paper_phases::equal_rows;
+use super::sample::{DrawnSample, TruthArrays, TruthBatch};
+use super::turn_reader::{TurnReader, TurnTensors};
+use relight_synth::{Recipe, stream};
+
+/// Batches of turns that are kept.
+const TURN_BATCHES: usize = 4;
+/// Samples of a batch of composed samples.
+const SAMPLE_BATCH: usize = 16;
+/// A highlight is there from this part of white on.
+const SEEN_HIGHLIGHT: f64 = 0.05;
+
+/// Figures by name, each a mean over what was looked at.
+pub(super) type Figures = BTreeMap<String, f64>;
+
+/// Batches of 12 frames of turns: the first of a fixed order, so that runs can be compared.
+#[derive(Debug)]
+pub(super) struct HeldOutTurns {
+    batches: Vec<TurnTensors>,
+    /// What of them was damaged, until it was said.
+    damage: Option<String>,
+}
+
+impl HeldOutTurns {
+    /// Reads the batches of a data set.
+    pub(super) fn read(path: &Path, kind: Kind, device: Device) -> Result<Self, TrainError> {
+        let mut reader = TurnReader::open(path, stream(0x74_75_72_6e, 23))?;
+        let (mut batches, mut damage) = (Vec::with_capacity(TURN_BATCHES), Vec::new());
+        while batches.len() < TURN_BATCHES && reader.place().epoch == 0 {
+            let group = reader.next_group(kind, device)?;
+            batches.extend(group.frames);
+            damage.extend(group.damage);
+        }
+        if batches.is_empty() {
+            return Err(TrainError::NoFrames);
+        }
+        let damage = (!damage.is_empty()).then(|| format!("held out: {}", damage.join("; ")));
+        Ok(Self { batches, damage })
+    }
+
+    /// What was damaged, once.
+    pub(super) fn take_damage(&mut self) -> Option<String> {
+        self.damage.take()
+    }
+
+    /// The mean of each figure over the batches that have it.
+    pub(super) fn figures(
+        &self,
+        of: impl Fn(&TurnTensors) -> Result<Vec<(&'static str, f64)>, TrainError>,
+    ) -> Result<Figures, TrainError> {
+        let mut sums: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
+        for batch in &self.batches {
+            for (name, value) in no_grad(|| of(batch))? {
+                let sum = sums.entry(name).or_default();
+                *sum = (sum.0 + value, sum.1 + 1.0);
+            }
+        }
+        let mean = |(name, (sum, count)): (&str, (f64, f64))| (name.to_owned(), sum / count);
+        Ok(sums.into_iter().map(mean).collect())
+    }
+}
+
+/// Composed samples of objects that are never trained on: their shapes are made, none of them is a mesh.
+#[derive(Debug)]
+pub(super) struct HeldOutSamples {
+    composition: Composition,
+    count: u64,
+    /// Composed when they are needed first: only one process of several looks at them.
+    samples: OnceCell<Vec<TruthArrays>>,
+}
+
+impl HeldOutSamples {
+    /// One sample each of `count` objects. Neither their seed nor their light depends on the run's, so that runs can be
+    /// compared.
+    pub(super) fn new(composition: &Composition, count: u64) -> Self {
+        let composition = Composition {
+            recipe: Recipe {
+                seed: stream(0x76_61_6c, 23),
+                size: composition.recipe.size,
+                views: 1,
+                lightings: 1,
+                ..Recipe::default()
+            },
+            library: composition.library.without_meshes(),
+            plain_share: composition.plain_share,
+        };
+        Self {
+            composition,
+            count,
+            samples: OnceCell::new(),
+        }
+    }
+
+    fn samples(&self) -> &[TruthArrays] {
+        let compose = |view| self.composition.samples_of(view);
+        self.samples
+            .get_or_init(|| (0..self.count).flat_map(compose).collect())
+    }
+
+    /// A batch of the first of them, at most as many as are taken at once.
+    pub(super) fn first(&self, kind: Kind, device: Device) -> Result<TruthBatch, TrainError> {
+        let views = 0..self.count.min(SAMPLE_BATCH as u64);
+        let samples: Vec<TruthArrays> = views
+            .flat_map(|view| self.composition.samples_of(view))
+            .collect();
+        batch_of(&samples, kind, device)
+    }
+
+    /// The mean of each figure over the samples.
+    pub(super) fn figures(
+        &self,
+        kind: Kind,
+        device: Device,
+        mut of: impl FnMut(&TruthBatch) -> Result<Vec<(&'static str, f64)>, TrainError>,
+    ) -> Result<Figures, TrainError> {
+        let mut sums = Figures::new();
+        for samples in self.samples().chunks(SAMPLE_BATCH) {
+            let share = samples.len() as f64 / self.samples().len() as f64;
+            let batch = batch_of(samples, kind, device)?;
+            for (name, value) in no_grad(|| of(&batch))? {
+                *sums.entry(name.to_owned()).or_default() += share * value;
+            }
+        }
+        Ok(sums)
+    }
+}
+
+/// A batch of samples as they are.
+fn batch_of(samples: &[TruthArrays], kind: Kind, device: Device) -> Result<TruthBatch, TrainError> {
+    let plain = |arrays| DrawnSample {
+        arrays,
+        mirrored: false,
+    };
+    let samples: Vec<DrawnSample<'_>> = samples.iter().map(plain).collect();
+    TruthBatch::new(&samples, kind, device)
+}
+
+/// How far pictures of one reflectance, `frames x channels x height x width`, are from being multiples of one: the
+/// part of their energy that the best matrix of rank one leaves, and their second singular value over the first.
+/// Frames are brought to one length first.
+pub(super) fn rank_figures(of: &Tensor, mask: &Tensor) -> Result<(f64, f64), TrainError> {
+    let rows = equal_rows(of, mask)?;
+    let energy = |of: &Tensor| of.f_square()?.f_sum(Kind::Double);
+    let rest = energy(&rows.f_sub(&rank_one(&rows)?)?)?;
+    let residual = rest.f_div(&energy(&rows)?.f_clamp_min(1e-12)?)?;
+    let values = first_singular_values(&rows)?;
+    let ratio = values
+        .f_narrow(1, 1, 1)?
+        .f_div(&values.f_narrow(1, 0, 1)?)?;
+    Ok((
+        f64::try_from(residual)?,
+        f64::try_from(ratio.f_mean(None)?)?,
+    ))
+}
+
+/// How well highlights are found: the energy of the error as a part of theirs, and which part of the pixels that were
+/// found and of those that there are is right.
+pub(super) fn highlight_figures(
+    found: &Tensor,
+    batch: &TruthBatch,
+) -> Result<[(&'static str, f64); 3], TrainError> {
+    let (truth, mask) = (&batch.highlight, &batch.mask);
+    let energy = |of: &Tensor| f64::try_from(of.f_mul(mask)?.f_square()?.f_sum(Kind::Double)?);
+    let seen = |of: &Tensor| of.f_mul(mask)?.f_gt(SEEN_HIGHLIGHT);
+    let (found_there, truly_there) = (seen(found)?, seen(truth)?);
+    let count = |of: &Tensor| f64::try_from(of.f_sum(Kind::Double)?);
+    let right = count(&found_there.f_logical_and(&truly_there)?)?;
+    Ok([
+        (
+            "highlight",
+            energy(&found.f_sub(truth)?)? / energy(truth)?.max(1e-9),
+        ),
+        ("highlight_precision", right / count(&found_there)?.max(1.0)),
+        ("highlight_recall", right / count(&truly_there)?.max(1.0)),
+    ])
+}

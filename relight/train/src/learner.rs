@@ -1,0 +1,121 @@
+//! A network that learns: its parameters, its optimiser and its average.
+
+use tch::Device;
+
+use super::adam::{Adam, AdamSettings};
+use super::average::Average;
+use super::error::TrainError;
+use super::model::{ComputePrecision, Model};
+use relight_nets::{Graph, Weights};
+
+/// A network in training.
+#[derive(Debug)]
+pub struct Learner {
+    name: &'static str,
+    /// The network.
+    pub model: Model,
+    adam: Adam,
+    average: Average,
+}
+
+/// How a network learns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LearnerSettings {
+    /// Of the optimiser.
+    pub adam: AdamSettings,
+    /// Part of the average that is kept at each step, 0..1.
+    pub average: f64,
+    /// In which precision its layers are computed.
+    pub precision: ComputePrecision,
+    /// Where it is computed.
+    pub device: Device,
+}
+
+impl Learner {
+    /// A network that begins with these weights.
+    ///
+    /// # Errors
+    /// Those of [`Model::new`].
+    pub fn new(
+        graph: Graph,
+        weights: &Weights,
+        settings: LearnerSettings,
+    ) -> Result<Self, TrainError> {
+        let name = graph.name();
+        let model = Model::new(graph, weights, settings.device, settings.precision)?;
+        Ok(Self {
+            name,
+            adam: Adam::new(settings.adam, model.parameters())?,
+            average: Average::new(model.parameters(), settings.average)?,
+            model,
+        })
+    }
+
+    /// The network's name.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// One step along the gradients; their length before it was cut to `longest`.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub fn learn(&mut self, rate: f64, longest: f64) -> Result<f64, TrainError> {
+        let length = self.adam.step(self.model.parameters(), rate, longest)?;
+        self.average
+            .update(self.model.parameters(), self.adam.steps())?;
+        Ok(length)
+    }
+
+    /// The averaged weights: what is shipped.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub fn averaged(&self) -> Result<Weights, TrainError> {
+        self.average.weights()
+    }
+
+    /// The network with its averaged weights, without gradients.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub fn averaged_model(&self) -> Result<Model, TrainError> {
+        let weights = self.averaged()?;
+        let mut model = self.model.with_weights(&weights)?;
+        model.set_trainable(false)?;
+        Ok(model)
+    }
+
+    /// All that is needed to go on: `<name>.model.*`, `<name>.average.*`, `<name>.first.*`, `<name>.second.*`,
+    /// `<name>.steps`.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub fn state(&self) -> Result<Weights, TrainError> {
+        let (model, average) = (self.model.weights()?, self.averaged()?);
+        let memory = self.adam.memory()?;
+        let named = |part: &str, weights: &Weights| -> Vec<_> {
+            let prefix = format!("{}.{part}", self.name);
+            weights
+                .iter()
+                .map(|(name, tensor)| (format!("{prefix}{name}"), tensor.clone()))
+                .collect()
+        };
+        let mut all = named("model.", &model);
+        all.extend(named("average.", &average));
+        all.extend(named("", &memory));
+        Ok(all.into_iter().collect())
+    }
+
+    /// Goes on from a state that was saved.
+    ///
+    /// # Errors
+    /// [`TrainError::Memory`] where it is another network's.
+    pub fn recall(&mut self, state: &Weights) -> Result<(), TrainError> {
+        let own = state.under(&format!("{}.", self.name));
+        self.model.recall(&own.under("model."))?;
+        self.average.recall(&own.under("average."))?;
+        self.adam.recall(&own)
+    }
+}

@@ -1,0 +1,558 @@
+//! A run: steps, one after the other, with what is logged, validated and saved on the way. Knows nothing of
+//! what is trained.
+//!
+//! Several processes make a run together as one would: each computes its part of every batch, the gradients are
+//! summed, and all make the same step. Process 0 validates, and writes the run's files.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use relit_data::causes::with_causes;
+use tch::Tensor;
+
+use super::agreement::{Fact, agree, fingerprint};
+use super::checkpoint::Checkpoint;
+use super::error::TrainError;
+use super::guard::Guard;
+use super::joint::JointLosses;
+use super::journal::Journal;
+use super::learner::Learner;
+use super::model::to_weights;
+use super::process_group::ProcessGroup;
+use super::settings::RunSettings;
+use super::terms::Terms;
+use relight_nets::{WeightPrecision, Weights};
+
+/// How long a process waits for process 0 to write its checkpoint and end, where the run ends early. No longer, as process 0 can
+/// itself be waiting for this one: only the neighbours of a lost process notice at once. Launchers kill after 30 seconds.
+const SUCCESSION: Duration = Duration::from_secs(3);
+
+/// What is trained.
+pub trait Task {
+    /// Its name, as on the command line.
+    fn name(&self) -> &'static str;
+
+    /// The settings that make the run what it is, as TOML.
+    fn settings(&self) -> String;
+
+    /// The first setting that another run's settings have otherwise.
+    fn differing_setting(&self, other: &str) -> Option<String>;
+
+    /// What it was given beside its settings and what learns, as text that is the same where that is.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    fn inputs(&self) -> Result<String, TrainError> {
+        Ok(String::new())
+    }
+
+    /// Takes this process's part of the work from now on. Called before the first step.
+    ///
+    /// # Errors
+    /// [`TrainError::Indivisible`] where the settings leave no equal parts.
+    fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError>;
+
+    /// The networks that learn.
+    fn learners(&mut self) -> Vec<&mut Learner>;
+
+    /// The losses of a step, from 0, on this process's part of its batch; always the same ones, in the same order. Steps
+    /// are asked for one after the other.
+    ///
+    /// # Errors
+    /// Whatever keeps the step from being computed.
+    fn step(&mut self, step: u64) -> Result<StepLosses, TrainError>;
+
+    /// Figures of the averaged networks on what they are not trained on.
+    ///
+    /// # Errors
+    /// Whatever keeps them from being computed.
+    fn validate(&mut self) -> Result<Validation, TrainError>;
+
+    /// Where it stands in data that are read one after the other, to go on from; empty where there are none.
+    fn place(&self) -> String {
+        String::new()
+    }
+
+    /// Goes on from such a place.
+    ///
+    /// # Errors
+    /// A sentence that says why it cannot.
+    fn go_to(&mut self, _place: &str) -> Result<(), String> {
+        Ok(())
+    }
+}
+
+/// What a step gives.
+#[derive(Debug, Default)]
+pub struct StepLosses {
+    /// The losses.
+    pub terms: Terms,
+    /// How much each head's answers vary, in parts of the truth's variation.
+    pub spreads: BTreeMap<&'static str, f64>,
+    /// The batch, to be saved where something is wrong with it. They share their numbers.
+    pub batch: BTreeMap<String, Tensor>,
+    /// What was damaged in the data, and is not in the batch.
+    pub damage: Option<String>,
+}
+
+impl StepLosses {
+    /// Adds what was damaged in a part of the data.
+    pub(super) fn add_damage(&mut self, damage: &[String]) {
+        if !damage.is_empty() {
+            let earlier = self.damage.take();
+            let all: Vec<&str> = earlier.iter().chain(damage).map(String::as_str).collect();
+            self.damage = Some(all.join("; "));
+        }
+    }
+}
+
+/// What a validation gives.
+#[derive(Debug, Default)]
+pub struct Validation {
+    /// Figures by name.
+    pub figures: BTreeMap<String, f64>,
+    /// A sheet of answers beside the truth, a PNG file, with its size.
+    pub sheet: Option<(Vec<u8>, (usize, usize))>,
+    /// What was damaged in the data, and is not in the figures.
+    pub damage: Option<String>,
+}
+
+/// What a run says while it goes on.
+pub trait TrainObserver {
+    /// A step was made. `losses` have their weights.
+    fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>);
+    /// Something in the data of a step is damaged, and was left out.
+    fn damaged(&mut self, step: u64, what: &str);
+    /// The networks were validated.
+    fn validated(&mut self, step: u64, figures: &BTreeMap<String, f64>);
+    /// The run was saved.
+    fn saved(&mut self, step: u64, path: &Path);
+}
+
+/// How a run came out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunOutcome {
+    /// Steps made in all.
+    pub steps: u64,
+    /// Whether it was asked to stop before its last step.
+    pub stopped: bool,
+    /// Whether something in the data was damaged, and left out.
+    pub damaged: bool,
+    /// Figures of the last validation; none in other processes than the first.
+    pub figures: BTreeMap<String, f64>,
+    /// The files of weights, which the first process writes.
+    pub weights: Vec<PathBuf>,
+}
+
+/// A run in its folder.
+pub struct Run<'a> {
+    task: &'a mut dyn Task,
+    settings: &'a RunSettings,
+    folder: &'a Path,
+    group: Option<ProcessGroup>,
+    /// Of the first process.
+    journal: Option<Journal>,
+    guard: Guard,
+    step: u64,
+    /// What the task was given beside its settings.
+    inputs: String,
+    /// Where the task stands after that step.
+    place: String,
+    /// Whether something in the data was left out.
+    damaged: bool,
+}
+
+impl<'a> Run<'a> {
+    /// Begins a run in a folder, or goes on with the one that is there (`resume`).
+    ///
+    /// # Errors
+    /// [`TrainError::Occupied`], [`TrainError::Checkpoint`] where it is another run's, [`TrainError::Io`].
+    pub fn open(
+        task: &'a mut dyn Task,
+        settings: &'a RunSettings,
+        folder: &'a Path,
+        resume: bool,
+    ) -> Result<Self, TrainError> {
+        Self::open_among(task, settings, folder, resume, None)
+    }
+
+    /// The same among the processes of a group, all of which open the run, with the same arguments.
+    ///
+    /// # Errors
+    /// Those of [`Self::open`]; [`TrainError::Disagreement`], [`TrainError::Indivisible`], [`TrainError::ProcessLost`].
+    pub fn open_among(
+        task: &'a mut dyn Task,
+        settings: &'a RunSettings,
+        folder: &'a Path,
+        resume: bool,
+        group: Option<ProcessGroup>,
+    ) -> Result<Self, TrainError> {
+        settings.check()?;
+        fs::create_dir_all(folder).map_err(|source| TrainError::Io {
+            path: folder.to_owned(),
+            doing: "made",
+            source,
+        })?;
+        let inputs = task.inputs()?;
+        let step = match Checkpoint::read(folder)? {
+            None => 0,
+            Some(_) if !resume => {
+                return Err(TrainError::Occupied {
+                    path: folder.to_owned(),
+                });
+            }
+            Some(checkpoint) => recall(task, &inputs, &checkpoint, folder)?,
+        };
+        if let Some(group) = &group {
+            agree(group, &facts(task, &inputs, step)?)?;
+            task.join(group)?;
+        }
+        let is_first = group.as_ref().is_none_or(ProcessGroup::is_first);
+        Ok(Self {
+            inputs,
+            place: task.place(),
+            task,
+            settings,
+            folder,
+            group,
+            journal: is_first.then(|| Journal::open(folder, step)).transpose()?,
+            guard: Guard::default(),
+            step,
+            damaged: false,
+        })
+    }
+
+    /// Steps made so far.
+    #[must_use]
+    pub fn steps_made(&self) -> u64 {
+        self.step
+    }
+
+    /// Makes all steps that are left, or those until `stop` is set in one of the processes; saves the run and the averaged
+    /// weights at the end.
+    ///
+    /// # Errors
+    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::EndedEarly`] where another process is lost: the
+    /// run is saved.
+    pub fn finish(
+        mut self,
+        stop: &AtomicBool,
+        observer: &mut dyn TrainObserver,
+    ) -> Result<RunOutcome, TrainError> {
+        let figures = match self.make_steps(stop, observer) {
+            Ok(figures) => figures,
+            Err(lost @ TrainError::ProcessLost { .. }) => {
+                return Err(self.end_early(lost, observer));
+            }
+            Err(fault) => return Err(fault),
+        };
+        let mut weights = Vec::new();
+        if self.journal.is_some() {
+            self.save(observer)?;
+            weights = self.write_weights()?;
+        }
+        // Only now: launchers end all processes as soon as one has ended with another code than 0.
+        if let Some(group) = self.group.take() {
+            group.leave();
+        }
+        Ok(RunOutcome {
+            steps: self.step,
+            stopped: self.step < self.settings.steps,
+            damaged: self.damaged,
+            figures,
+            weights,
+        })
+    }
+
+    /// Figures of the last validation.
+    fn make_steps(
+        &mut self,
+        stop: &AtomicBool,
+        observer: &mut dyn TrainObserver,
+    ) -> Result<BTreeMap<String, f64>, TrainError> {
+        let between = Duration::from_secs_f64(60.0 * self.settings.checkpoint_minutes);
+        let mut saved = Instant::now();
+        // Where training begins, so that it shows what it has changed.
+        let mut figures = if self.step == 0 {
+            self.validate(observer)?
+        } else {
+            BTreeMap::new()
+        };
+        let mut stopped = false;
+        while self.step < self.settings.steps && !stopped {
+            let asked = stop.load(Ordering::Relaxed);
+            if asked && self.group.is_none() {
+                break;
+            }
+            // Processes of a group stop after the same step, the one in which the first of them is asked to.
+            stopped = match self.make_step(asked, observer) {
+                Err(TrainError::Stopped) => break,
+                made => made?,
+            };
+            if self.journal.is_none() {
+                continue;
+            }
+            if self.step.is_multiple_of(self.settings.validate_every)
+                || self.step == self.settings.steps
+            {
+                figures = self.validate(observer)?;
+            }
+            if saved.elapsed() >= between {
+                self.save(observer)?;
+                saved = Instant::now();
+            }
+        }
+        Ok(figures)
+    }
+
+    /// Makes a step; whether one of the processes was asked to stop.
+    fn make_step(
+        &mut self,
+        stop: bool,
+        observer: &mut dyn TrainObserver,
+    ) -> Result<bool, TrainError> {
+        let rate = self.settings.rate_at(self.step);
+        let losses = self.task.step(self.step)?;
+        if let Some(damage) = &losses.damage {
+            self.damaged = true;
+            observer.damaged(self.step, damage);
+        }
+        let joint = match &self.group {
+            Some(group) => JointLosses::of(&losses, stop, group)?,
+            None => JointLosses::alone(&losses)?,
+        };
+        // Of some batches nothing can be learned, as of those for which the gate of saturation is closed.
+        if !joint.values.is_empty() {
+            self.check(&losses, &joint)?;
+            let length = self.descend(&losses, &joint, rate)?;
+            self.log(&joint, rate, length, observer)?;
+        }
+        self.step += 1;
+        self.place = self.task.place();
+        Ok(joint.stop)
+    }
+
+    /// Ends the run where something is wrong with the losses of a step.
+    fn check(&mut self, losses: &StepLosses, joint: &JointLosses) -> Result<(), TrainError> {
+        let (step, folder) = (self.step, self.folder);
+        let process = match &self.group {
+            Some(group) => format!("-process-{}", group.share().index()),
+            None => String::new(),
+        };
+        self.guard.check(step, &joint.values, &joint.spreads, || {
+            let path = folder.join(format!("bad-batch-{step}{process}.safetensors"));
+            to_weights(&losses.batch)?.write(&path, WeightPrecision::Single)?;
+            Ok(path)
+        })
+    }
+
+    /// Goes down the joint loss; the length of its gradient.
+    fn descend(
+        &mut self,
+        losses: &StepLosses,
+        joint: &JointLosses,
+        rate: f64,
+    ) -> Result<f64, TrainError> {
+        match joint.part(losses)? {
+            Some(part) => part.f_backward()?,
+            None => {
+                for learner in self.task.learners() {
+                    learner.model.add_zero_gradients()?;
+                }
+            }
+        }
+        if let Some(group) = &self.group {
+            for learner in self.task.learners() {
+                group.sum_gradients(learner.model.parameters())?;
+            }
+        }
+        let mut length = 0.0_f64;
+        for learner in self.task.learners() {
+            length = length.hypot(learner.learn(rate, self.settings.longest_gradient)?);
+        }
+        Ok(length)
+    }
+
+    fn log(
+        &mut self,
+        joint: &JointLosses,
+        rate: f64,
+        gradient: f64,
+        observer: &mut dyn TrainObserver,
+    ) -> Result<(), TrainError> {
+        let step = self.step + 1;
+        observer.step(step, &joint.values);
+        let Some(journal) = &mut self.journal else {
+            return Ok(());
+        };
+        if !step.is_multiple_of(self.settings.log_every) {
+            return Ok(());
+        }
+        let mut values = joint.values.clone();
+        values.insert("rate".to_owned(), rate);
+        values.insert("gradient".to_owned(), gradient);
+        for (head, spread) in &joint.spreads {
+            values.insert(format!("spread/{head}"), *spread);
+        }
+        journal.scalars(step, &values)
+    }
+
+    /// Ends the run of which another process is lost: the first of those that are left saves it.
+    fn end_early(&mut self, lost: TrainError, observer: &mut dyn TrainObserver) -> TrainError {
+        let path = Checkpoint::path(self.folder);
+        let path = path.display();
+        let saved = match self.save_as_successor(observer) {
+            Ok(()) => format!("its checkpoint is {path}: start all processes again with --resume"),
+            Err(fault) => format!("it could not be saved: {}", with_causes(&fault)),
+        };
+        TrainError::EndedEarly {
+            lost: Box::new(lost),
+            step: self.step,
+            saved,
+        }
+    }
+
+    /// Saves the run in process 0, and in others where that has ended and has not.
+    fn save_as_successor(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
+        if self.journal.is_none() {
+            let begun = Instant::now();
+            while Journal::is_open(self.folder) && begun.elapsed() < SUCCESSION {
+                if self.is_saved() {
+                    return Ok(());
+                }
+                std::thread::sleep(Duration::from_millis(500));
+            }
+            if self.is_saved() {
+                return Ok(());
+            }
+        }
+        self.save(observer)
+    }
+
+    /// Whether a checkpoint has this process's steps. One that cannot be read does not.
+    fn is_saved(&self) -> bool {
+        let found = Checkpoint::read(self.folder).ok().flatten();
+        found.is_some_and(|checkpoint| checkpoint.step >= self.step)
+    }
+
+    fn validate(
+        &mut self,
+        observer: &mut dyn TrainObserver,
+    ) -> Result<BTreeMap<String, f64>, TrainError> {
+        let Some(journal) = &mut self.journal else {
+            return Ok(BTreeMap::new());
+        };
+        let Validation {
+            figures,
+            sheet,
+            damage,
+        } = self.task.validate()?;
+        if let Some(damage) = damage {
+            self.damaged = true;
+            observer.damaged(self.step, &damage);
+        }
+        let named: BTreeMap<String, f64> = figures
+            .iter()
+            .map(|(name, value)| (format!("validation/{name}"), *value))
+            .collect();
+        journal.scalars(self.step, &named)?;
+        if let Some((png, size)) = sheet {
+            let path = self.folder.join("validation.png");
+            relit_data::durable::write_whole(&path, &png).map_err(|source| TrainError::Io {
+                path,
+                doing: "written",
+                source,
+            })?;
+            journal.picture(self.step, "validation", size, png)?;
+        }
+        observer.validated(self.step, &figures);
+        Ok(figures)
+    }
+
+    fn save(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
+        let mut state = Weights::default();
+        for learner in self.task.learners() {
+            state.extend(learner.state()?);
+        }
+        Checkpoint {
+            task: self.task.name().to_owned(),
+            step: self.step,
+            settings: self.task.settings(),
+            inputs: self.inputs.clone(),
+            place: self.place.clone(),
+            state,
+        }
+        .write(self.folder)?;
+        observer.saved(self.step, &Checkpoint::path(self.folder));
+        Ok(())
+    }
+
+    /// The averaged weights, half precision, a file a network.
+    fn write_weights(&mut self) -> Result<Vec<PathBuf>, TrainError> {
+        let folder = self.folder;
+        self.task
+            .learners()
+            .into_iter()
+            .map(|learner| {
+                let path = folder.join(format!("{}.safetensors", learner.name()));
+                learner.averaged()?.write(&path, WeightPrecision::Half)?;
+                Ok(path)
+            })
+            .collect()
+    }
+}
+
+/// What has to be the same in all processes.
+fn facts(task: &mut dyn Task, inputs: &str, step: u64) -> Result<Vec<Fact>, TrainError> {
+    let version = format!("{} {}", env!("CARGO_PKG_VERSION"), task.name());
+    let mut weights = String::new();
+    for learner in task.learners() {
+        weights += &fingerprint(learner.model.parameters())?;
+    }
+    Ok(vec![
+        ("version and task", version),
+        ("the settings", task.settings()),
+        (
+            "the turns and the networks that are given",
+            inputs.to_owned(),
+        ),
+        ("the steps made before", step.to_string()),
+        ("the weights", weights),
+    ])
+}
+
+/// Brings a task to a checkpoint; its step.
+fn recall(
+    task: &mut dyn Task,
+    inputs: &str,
+    checkpoint: &Checkpoint,
+    folder: &Path,
+) -> Result<u64, TrainError> {
+    let other = |fault: String| TrainError::Checkpoint {
+        path: Checkpoint::path(folder),
+        fault,
+    };
+    if checkpoint.task != task.name() {
+        return Err(other(format!(
+            "it trains {}, not {}",
+            checkpoint.task,
+            task.name()
+        )));
+    }
+    if let Some(setting) = task.differing_setting(&checkpoint.settings) {
+        return Err(other(format!("its settings are others: {setting}")));
+    }
+    if checkpoint.inputs != inputs {
+        let fault =
+            "it was trained on other turns, or with other networks beside the one that learns";
+        return Err(other(fault.to_owned()));
+    }
+    task.go_to(&checkpoint.place).map_err(other)?;
+    for learner in task.learners() {
+        learner.recall(&checkpoint.state)?;
+    }
+    Ok(checkpoint.step)
+}

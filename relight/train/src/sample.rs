@@ -1,0 +1,299 @@
+//! One made picture with its truth, as the arrays that a batch is made of.
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+use half::f16;
+use rayon::prelude::*;
+use tch::{Device, Kind, Tensor};
+
+use super::error::TrainError;
+use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
+use relight_nets::INPUTS;
+use relight_photo::decompose::EncodedPicture;
+use relight_reader::TruthSample;
+use relight_synth::SynthSample;
+
+/// Planes of a sample: the input, the linear picture, shading, albedo, normals, highlight.
+const PLANES: usize = INPUTS + 3 + 1 + 3 + 3 + 1;
+
+/// How the values of a made picture are taken for light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Linearisation {
+    /// By the response of the camera that made it: the picture is exactly albedo times shading plus highlight.
+    Exact,
+    /// As sRGB, as a photograph is taken whose camera nobody knows.
+    AsSrgb,
+}
+
+/// A picture as the decomposing network sees it, and its truth. Light is in parts of the picture's white; shading
+/// has the mean 1 under the mask. Half precision, as many are kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TruthArrays {
+    extent: Extent,
+    values: Vec<f16>,
+}
+
+/// A sample in a batch.
+#[derive(Debug, Clone, Copy)]
+pub struct DrawnSample<'a> {
+    /// The sample.
+    pub arrays: &'a TruthArrays,
+    /// Whether it is turned from right to left, normals and all.
+    pub mirrored: bool,
+}
+
+/// A batch of them on a device, `batch x channels x height x width`.
+#[derive(Debug)]
+pub struct TruthBatch {
+    /// What the network sees.
+    pub input: Tensor,
+    /// 1 inside the mask, 1 channel.
+    pub mask: Tensor,
+    /// Linear picture, in whites.
+    pub picture: Tensor,
+    /// Shading, 1 channel, of mean 1 under the mask.
+    pub shading: Tensor,
+    /// Linear albedo.
+    pub albedo: Tensor,
+    /// Unit normals, y up.
+    pub normals: Tensor,
+    /// Highlight, 1 channel, in whites: what of it the picture shows.
+    pub highlight: Tensor,
+}
+
+impl TruthArrays {
+    /// The arrays of a sample.
+    #[must_use]
+    pub fn new(sample: &SynthSample<'_>, linearisation: Linearisation) -> Self {
+        let (picture, mask) = (
+            linear(sample, linearisation),
+            sample.view().scene.buffer().mask(),
+        );
+        let encoded = EncodedPicture::new(&picture, &mask);
+        let extent = encoded.extent();
+        let pixels = extent.pixels();
+        let mut values = Vec::with_capacity(PLANES * pixels);
+        values.extend(encoded.values().iter().map(|&v| f16::from_f32(v)));
+        let white = encoded.white();
+        for plane in picture.planes() {
+            values.extend(plane.iter().map(|v| f16::from_f32(v / white)));
+        }
+        values.resize(PLANES * pixels, f16::ZERO);
+        fill_truth(sample, white, &mut values[(INPUTS + 3) * pixels..], pixels);
+        Self { extent, values }
+    }
+
+    /// The arrays of a picture whose truth was found otherwise. Its colours are taken for light as they stand.
+    ///
+    /// # Errors
+    /// The name of a part of the truth that is missing.
+    pub fn of_truth(sample: &TruthSample) -> Result<Self, &'static str> {
+        let picture = sample.image.as_ref().ok_or("image")?.planes();
+        let normals = sample.normals.as_ref().ok_or("normals")?;
+        let albedo = sample.albedo.as_ref().ok_or("albedo")?.planes();
+        let shading = grey(sample.shading.as_ref().ok_or("shading")?.planes());
+        let highlight = grey(sample.highlight.as_ref().ok_or("highlight")?.planes());
+        let encoded = EncodedPicture::new(picture, &sample.mask);
+        let white = encoded.white();
+        let covered = |at: usize| sample.mask.plane(0)[at] > 0.0;
+        let pixels = encoded.extent().pixels();
+        let lit = (0..pixels).filter(|&at| covered(at));
+        let total: f32 = lit.clone().map(|at| shading[at]).sum();
+        let mean = (total / lit.count().max(1) as f32).max(1e-6);
+
+        let mut planes: Vec<(Vec<f32>, f32)> = Vec::with_capacity(PLANES - INPUTS);
+        let whole = |planes: &Planes<3>| planes.planes().map(<[f32]>::to_vec);
+        planes.extend(whole(picture).map(|plane| (plane, 1.0 / white)));
+        planes.push((shading, 1.0 / mean));
+        planes.extend(whole(albedo).map(|plane| (plane, 1.0)));
+        planes.extend(whole(normals.planes()).map(|plane| (plane, 1.0)));
+        planes.push((highlight, 1.0 / white));
+
+        let mut values: Vec<f16> = encoded.values().iter().map(|&v| f16::from_f32(v)).collect();
+        for (plane, (truth, scale)) in planes.into_iter().enumerate() {
+            let is_truth = plane >= 3;
+            values.extend(truth.into_iter().enumerate().map(|(at, value)| {
+                let counts = !is_truth || covered(at);
+                f16::from_f32(if counts { value * scale } else { 0.0 })
+            }));
+        }
+        Ok(Self {
+            extent: encoded.extent(),
+            values,
+        })
+    }
+
+    /// Width and height.
+    #[must_use]
+    pub fn extent(&self) -> Extent {
+        self.extent
+    }
+}
+
+fn grey(light: &Planes<3>) -> Vec<f32> {
+    let [red, green, blue] = light.planes();
+    let channels = red.iter().zip(green).zip(blue);
+    channels.map(|((r, g), b)| (r + g + b) / 3.0).collect()
+}
+
+/// The truth at the covered pixels.
+fn fill_truth(sample: &SynthSample<'_>, white: f32, values: &mut [f16], pixels: usize) {
+    let grey = |light: &Vec3| light.element_sum() / 3.0;
+    let (shaded, material) = (sample.shaded(), sample.material());
+    let buffer = sample.view().scene.buffer();
+    let total: f32 = shaded.shading.iter().map(grey).sum();
+    // Of an object on which no light falls, shading is 0.
+    let mean = (total / buffer.len().max(1) as f32).max(1e-6);
+    for (at, &pixel) in buffer.pixels().iter().enumerate() {
+        let (albedo, normal) = (material.albedo[at], material.normals[at]);
+        let truth = [
+            grey(&shaded.shading[at]) / mean,
+            albedo.x,
+            albedo.y,
+            albedo.z,
+            normal.x,
+            normal.y,
+            normal.z,
+            visible_highlight(albedo * shaded.shading[at], shaded.highlight[at]) / white,
+        ];
+        for (plane, value) in truth.into_iter().enumerate() {
+            values[plane * pixels + pixel as usize] = f16::from_f32(value);
+        }
+    }
+}
+
+/// What a highlight adds to a picture that is clipped at 1, mean over the channels: the picture less this is the
+/// diffuse light that it shows, also where it is clipped.
+fn visible_highlight(diffuse: Vec3, highlight: Vec3) -> f32 {
+    let shown = (diffuse + highlight).min(Vec3::ONE) - diffuse.min(Vec3::ONE);
+    shown.element_sum() / 3.0
+}
+
+/// The picture's light.
+fn linear(sample: &SynthSample<'_>, linearisation: Linearisation) -> Planes<3> {
+    let response = sample.description().camera.response;
+    let level = |level: usize| {
+        let value = level as f32 / 255.0;
+        match linearisation {
+            Linearisation::Exact => response.decode(value),
+            Linearisation::AsSrgb => Srgb::to_linear(value),
+        }
+    };
+    let levels: [f32; 256] = std::array::from_fn(level);
+    let image = sample.image();
+    let extent = Extent::new(image.width() as usize, image.height() as usize);
+    Planes::from_fn(extent, |x, y| {
+        image
+            .get_pixel(x as u32, y as u32)
+            .0
+            .map(|value| levels[usize::from(value)])
+    })
+}
+
+impl TruthBatch {
+    /// A batch of samples of one size, on a device, in 32 or 64 bits.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub fn new(
+        samples: &[DrawnSample<'_>],
+        kind: Kind,
+        device: Device,
+    ) -> Result<Self, TrainError> {
+        let extent = samples
+            .first()
+            .map_or(Extent::new(0, 0), |first| first.arrays.extent);
+        let each = PLANES * extent.pixels();
+        let mut bytes = vec![0_u8; 2 * each * samples.len()];
+        bytes
+            .par_chunks_exact_mut(2 * each.max(1))
+            .zip(samples)
+            .for_each(|(to, sample)| sample.write(to));
+        let shape = [samples.len(), PLANES, extent.height, extent.width].map(|n| n as i64);
+        let all = Tensor::f_from_data_size(&bytes, &shape, Kind::Half)?
+            .f_to_device(device)?
+            .f_to_kind(kind)?;
+        let part = |from: usize, count: usize| all.f_narrow(1, from as i64, count as i64);
+        Ok(Self {
+            input: part(0, INPUTS)?,
+            mask: part(relight_photo::decompose::MASK, 1)?,
+            picture: part(INPUTS, 3)?,
+            shading: part(INPUTS + 3, 1)?,
+            albedo: part(INPUTS + 4, 3)?,
+            normals: part(INPUTS + 7, 3)?,
+            highlight: part(INPUTS + 10, 1)?,
+        })
+    }
+}
+
+impl TruthBatch {
+    /// The tensors by name. They share their numbers.
+    #[must_use]
+    pub fn named(&self) -> BTreeMap<String, Tensor> {
+        [
+            ("input", &self.input),
+            ("picture", &self.picture),
+            ("shading", &self.shading),
+            ("albedo", &self.albedo),
+            ("normals", &self.normals),
+            ("highlight", &self.highlight),
+        ]
+        .map(|(name, tensor)| (name.to_owned(), tensor.shallow_clone()))
+        .into()
+    }
+}
+
+/// The plane of the normals' x.
+const NORMAL_X: usize = INPUTS + 7;
+
+impl DrawnSample<'_> {
+    /// Writes the planes one after the other, two bytes a value.
+    fn write(&self, to: &mut [u8]) {
+        let Extent { width, .. } = self.arrays.extent;
+        let pixels = self.arrays.extent.pixels();
+        let rows = self.arrays.values.chunks_exact(width.max(1));
+        for (row, (to, from)) in to.chunks_exact_mut(2 * width.max(1)).zip(rows).enumerate() {
+            let (to, _) = to.as_chunks_mut::<2>();
+            let is_x = row * width / pixels == NORMAL_X;
+            match (self.mirrored, is_x) {
+                (false, _) => fill(to, from.iter().copied()),
+                (true, false) => fill(to, from.iter().rev().copied()),
+                (true, true) => fill(to, from.iter().rev().map(|&x| -x)),
+            }
+        }
+    }
+}
+
+fn fill(to: &mut [[u8; 2]], from: impl Iterator<Item = f16>) {
+    for (to, value) in to.iter_mut().zip(from) {
+        *to = value.to_le_bytes();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mirrored_sample_is_turned_from_right_to_left_and_x_of_its_normals_changes_sign() {
+        let extent = Extent::new(3, 2);
+        let values = (0..PLANES * 6).map(|value| f16::from_f32(value as f32));
+        let arrays = TruthArrays {
+            extent,
+            values: values.collect(),
+        };
+        let batch = |mirrored: bool| {
+            let arrays = &arrays;
+            let sample = DrawnSample { arrays, mirrored };
+            TruthBatch::new(&[sample], Kind::Float, Device::Cpu).unwrap()
+        };
+        let (plain, mirrored) = (batch(false), batch(true));
+        let flipped = |of: &Tensor| of.flip([3]);
+        assert_eq!(mirrored.input, flipped(&plain.input));
+        assert_eq!(mirrored.highlight, flipped(&plain.highlight));
+        let (normals, found) = (flipped(&plain.normals), mirrored.normals);
+        assert_eq!(found.narrow(1, 0, 1), -normals.narrow(1, 0, 1));
+        assert_eq!(found.narrow(1, 1, 2), normals.narrow(1, 1, 2));
+    }
+}

@@ -1,0 +1,168 @@
+//! Batches of real turns on tensors: frames of one object under different light.
+
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::sync::Arc;
+
+use tch::{Device, Kind, Tensor};
+
+use super::error::TrainError;
+use relight_reader::{
+    DrawPlan, Encoding, Place, Share, Source, Stream, Streaming, TurnBatch, Turns,
+};
+
+/// Batches that are decoded ahead of the network.
+const AHEAD: usize = 3;
+
+/// Reads a data set again and again, in an order that a seed shuffles.
+pub struct TurnReader {
+    turns: Arc<Turns>,
+    stream: Stream<Turns>,
+    plan: DrawPlan,
+    place: Place,
+    /// The epoch of the last group of which frames could be read.
+    readable: u64,
+}
+
+impl std::fmt::Debug for TurnReader {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("TurnReader")
+            .field("plan", &self.plan)
+            .field("place", &self.place)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Frames of one turn on a device.
+#[derive(Debug)]
+pub struct TurnTensors {
+    /// `frames x 3 x height x width`, linear, 0..=1, 0 outside the mask.
+    pub picture: Tensor,
+    /// `frames x 1 x height x width`, 0 or 1.
+    pub mask: Tensor,
+    /// Which frames the gate of saturation opens Spec-Net for.
+    pub spec_net: Vec<bool>,
+}
+
+/// What is left of a group of frames.
+#[derive(Debug)]
+pub struct TurnGroup {
+    /// Its frames; none where fewer than two can be read.
+    pub frames: Option<TurnTensors>,
+    /// What of it was damaged.
+    pub damage: Option<String>,
+}
+
+impl TurnReader {
+    /// Opens a data set: batches of 12 neighbours in an order that `seed` shuffles.
+    ///
+    /// # Errors
+    /// [`TrainError::Data`].
+    pub fn open(path: &Path, seed: u64) -> Result<Self, TrainError> {
+        let turns = Arc::new(Turns::open(path, Encoding::Linear)?);
+        let (plan, place) = (DrawPlan::of_turns(seed), Place::default());
+        Ok(Self {
+            stream: start(&turns, plan, place)?,
+            turns,
+            plan,
+            place,
+            readable: place.epoch,
+        })
+    }
+
+    /// Leaves all but each so many groups to other processes, which go on from the same places.
+    ///
+    /// # Errors
+    /// [`TrainError::Data`].
+    pub fn take_share(&mut self, share: Share) -> Result<(), TrainError> {
+        self.plan.share = share;
+        self.go_to(self.place)
+    }
+
+    /// Text that tells data sets apart: of each turn its name, the number of its samples, and the bytes that they are stored
+    /// in.
+    #[must_use]
+    pub fn identity(&self) -> String {
+        let turns = self
+            .turns
+            .names()
+            .zip(self.turns.turns())
+            .zip(self.turns.bytes());
+        turns
+            .map(|((name, samples), bytes)| format!("{name}: {samples} samples, {bytes} bytes\n"))
+            .collect()
+    }
+
+    /// Where the next batch stands.
+    #[must_use]
+    pub fn place(&self) -> Place {
+        self.place
+    }
+
+    /// Goes on from a place.
+    ///
+    /// # Errors
+    /// [`TrainError::Data`].
+    pub fn go_to(&mut self, place: Place) -> Result<(), TrainError> {
+        self.stream = start(&self.turns, self.plan, place)?;
+        self.place = place;
+        self.readable = place.epoch;
+        Ok(())
+    }
+
+    /// The next group of this process's share, in 32 or 64 bits.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`]; [`TrainError::NoFrames`] where a whole epoch has no group with two frames.
+    pub fn next_group(&mut self, kind: Kind, device: Device) -> Result<TurnGroup, TrainError> {
+        let (drawn, damage) = match self.stream.next() {
+            Some(Ok(drawn)) => (drawn, None),
+            Some(Err(damaged)) => {
+                let damage = relit_data::causes::with_causes(&damaged);
+                (damaged.rest, Some(damage))
+            }
+            None => return Err(TrainError::NoFrames),
+        };
+        self.place = drawn.next;
+        let frames = if drawn.batch.frames.len() >= 2 {
+            self.readable = self.place.epoch;
+            Some(tensors(&drawn.batch, kind, device)?)
+        } else {
+            None
+        };
+        self.stream.give_back(drawn.batch);
+        if self.place.epoch > self.readable + 1 {
+            return Err(TrainError::NoFrames);
+        }
+        Ok(TurnGroup { frames, damage })
+    }
+}
+
+fn start(turns: &Arc<Turns>, plan: DrawPlan, from: Place) -> Result<Stream<Turns>, TrainError> {
+    let streaming = Streaming {
+        plan,
+        from,
+        until_epoch: u64::MAX,
+        threads: NonZeroUsize::MIN,
+        ahead: AHEAD,
+    };
+    Ok(Stream::start(turns, streaming)?)
+}
+
+fn tensors(batch: &TurnBatch, kind: Kind, device: Device) -> Result<TurnTensors, TrainError> {
+    let (frames, extent) = (batch.frames.len(), batch.extent);
+    let shape = |channels: usize| [frames, channels, extent.height, extent.width].map(|n| n as i64);
+    let tensor = |values: &[f32], channels: usize| {
+        Tensor::f_from_slice(values)?
+            .f_reshape(shape(channels))?
+            .f_to_device(device)?
+            .f_to_kind(kind)
+    };
+    let opens =
+        |frame: &relight_reader::TurnFrame| frame.record.as_ref().is_none_or(|r| r.spec_net);
+    Ok(TurnTensors {
+        picture: tensor(&batch.images, 3)?,
+        mask: tensor(&batch.masks, 1)?,
+        spec_net: batch.frames.iter().map(opens).collect(),
+    })
+}

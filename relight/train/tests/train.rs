@@ -1,0 +1,643 @@
+//! Training held against inference, and the optimiser against itself.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use relight_core::image::{Extent, Planes};
+use relight_nets::paper::{Head, light_net, normal_net, spec_net};
+use relight_nets::{Graph, Inference, Weights, decomposer};
+use relight_photo::decompose::EncodedPicture;
+use relight_reader::Share;
+use relight_synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
+use relight_train::{
+    Adam, AdamSettings, AnsweredTensors, Checkpoint, Composer, Composition, ComputePrecision,
+    DataSettings, DecomposeSettings, DecomposeTask, Journal, Learner, LearnerSettings, Model,
+    PaperInputs, PaperLosses, PaperPhase, PaperSettings, PaperTask, PrecisionChoice, ProcessGroup,
+    Resources, Run, RunOutcome, RunSettings, StepLosses, TABLE, Task, TrainError, TrainObserver,
+    TruthArrays, Validation, read_settings,
+};
+use tch::{Device, Kind, Tensor};
+
+const SIDE: i64 = 64;
+
+fn input(channels: usize) -> Tensor {
+    tch::manual_seed(5);
+    Tensor::randn([1, channels as i64, SIDE, SIDE], (Kind::Float, Device::Cpu))
+}
+
+fn model(graph: Graph, precision: ComputePrecision) -> Model {
+    let weights = Weights::initial(&graph, 3);
+    Model::new(graph, &weights, Device::Cpu, precision).unwrap()
+}
+
+#[test]
+fn what_is_trained_answers_as_what_is_shipped() {
+    for graph in [decomposer(), normal_net(), light_net(Head::Pooled)] {
+        let weights = Weights::initial(&graph, 3);
+        let picture = input(graph.input_channels());
+        let flat = Vec::<f32>::try_from(picture.flatten(0, -1)).unwrap();
+        let side = SIDE as usize;
+        let shipped = Inference::new(&graph, &weights, (side, side)).unwrap();
+        let shipped = shipped.run(&flat).unwrap();
+        let model = Model::new(graph, &weights, Device::Cpu, ComputePrecision::Single).unwrap();
+        let trained = &model.forward(&picture).unwrap()[0];
+        let trained = Vec::<f32>::try_from(trained.flatten(0, -1)).unwrap();
+        let largest = trained
+            .iter()
+            .fold(1.0_f32, |most, value| most.max(value.abs()));
+        for (a, b) in trained.iter().zip(shipped[0].values()) {
+            assert!(
+                (a - b).abs() < 1e-4 * largest,
+                "{}: {a} {b}",
+                model.graph().name()
+            );
+        }
+        assert_eq!(model.weights().unwrap(), weights);
+    }
+}
+
+/// Steps towards a constant output; the losses.
+fn descend(model: &Model, adam: &mut Adam, steps: usize) -> Vec<f64> {
+    let picture = input(model.graph().input_channels());
+    (0..steps)
+        .map(|_| {
+            let output = &model.forward(&picture).unwrap()[0];
+            let loss = (output - 0.5).square().mean(None);
+            loss.backward();
+            adam.step(model.parameters(), 1e-3, 1.0).unwrap();
+            loss.double_value(&[])
+        })
+        .collect()
+}
+
+#[test]
+fn steps_lower_the_loss_in_both_precisions() {
+    for precision in [ComputePrecision::Single, ComputePrecision::Mixed] {
+        let model = model(decomposer(), precision);
+        let mut adam = Adam::new(AdamSettings::default(), model.parameters()).unwrap();
+        let losses = descend(&model, &mut adam, 6);
+        assert!(losses[5] < 0.8 * losses[0], "{losses:?}");
+    }
+}
+
+#[test]
+fn a_run_that_was_saved_goes_on_to_the_same_losses() {
+    tch::set_num_threads(1);
+    let first = model(light_net(Head::Pooled), ComputePrecision::Single);
+    let mut adam = Adam::new(AdamSettings::default(), first.parameters()).unwrap();
+    descend(&first, &mut adam, 3);
+    let (weights, memory) = (first.weights().unwrap(), adam.memory().unwrap());
+    let undisturbed = descend(&first, &mut adam, 3);
+
+    let graph = light_net(Head::Pooled);
+    let second = Model::new(graph, &weights, Device::Cpu, ComputePrecision::Single).unwrap();
+    let mut adam = Adam::new(AdamSettings::default(), second.parameters()).unwrap();
+    adam.recall(&memory).unwrap();
+    assert_eq!(descend(&second, &mut adam, 3), undisturbed);
+}
+
+#[test]
+fn the_memory_of_another_network_is_refused() {
+    let light = model(light_net(Head::Pooled), ComputePrecision::Single);
+    let memory = Adam::new(AdamSettings::default(), light.parameters())
+        .unwrap()
+        .memory()
+        .unwrap();
+    let other = model(decomposer(), ComputePrecision::Single);
+    let mut adam = Adam::new(AdamSettings::default(), other.parameters()).unwrap();
+    assert!(adam.recall(&memory).is_err());
+}
+
+/// Small settings: a run of seconds.
+fn small_run(steps: u64) -> RunSettings {
+    RunSettings {
+        steps,
+        batch: 4,
+        precision: PrecisionChoice::Single,
+        log_every: 1,
+        validate_every: 3,
+        ..RunSettings::default()
+    }
+}
+
+fn small_data() -> DataSettings {
+    DataSettings {
+        size: 32,
+        views: 1,
+        lightings: 2,
+        window: 6,
+        reuse: 2.0,
+        validation: 2,
+        ..DataSettings::default()
+    }
+}
+
+fn decompose_task(steps: u64) -> (DecomposeTask, RunSettings) {
+    let settings = DecomposeSettings {
+        run: small_run(steps),
+        data: small_data(),
+        ..DecomposeSettings::default()
+    };
+    let run = settings.run.clone();
+    (
+        DecomposeTask::new(settings, resources(), None).unwrap(),
+        run,
+    )
+}
+
+fn resources() -> Resources {
+    Resources {
+        device: Device::Cpu,
+        composers: 2,
+        stop: Arc::default(),
+    }
+}
+
+/// Stops a run after so many steps.
+struct StopAfter<'a> {
+    steps: u64,
+    stop: &'a AtomicBool,
+    damage: Vec<String>,
+}
+
+impl TrainObserver for StopAfter<'_> {
+    fn step(&mut self, step: u64, _: &BTreeMap<String, f64>) {
+        self.stop.store(step >= self.steps, Ordering::Relaxed);
+    }
+    fn damaged(&mut self, _: u64, what: &str) {
+        self.damage.push(what.to_owned());
+    }
+    fn validated(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
+    fn saved(&mut self, _: u64, _: &Path) {}
+}
+
+fn make_run(
+    task: &mut dyn Task,
+    settings: &RunSettings,
+    folder: &Path,
+    (resume, until): (bool, u64),
+) -> Result<RunOutcome, TrainError> {
+    let stop = AtomicBool::new(false);
+    let mut observer = StopAfter {
+        steps: until,
+        stop: &stop,
+        damage: Vec::new(),
+    };
+    Run::open(task, settings, folder, resume)?.finish(&stop, &mut observer)
+}
+
+/// The lines of a run's table, without the header.
+fn table(folder: &Path) -> Vec<String> {
+    let text = fs::read_to_string(folder.join(TABLE)).unwrap();
+    text.lines().skip(1).map(str::to_owned).collect()
+}
+
+#[test]
+fn a_run_that_was_stopped_goes_on_to_the_same_losses_and_weights() {
+    tch::set_num_threads(1);
+    let (whole, parted) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (mut task, settings) = decompose_task(4);
+    let undisturbed = make_run(&mut task, &settings, whole.path(), (false, u64::MAX)).unwrap();
+    assert!(!undisturbed.stopped);
+
+    let (mut task, settings) = decompose_task(4);
+    let stopped = make_run(&mut task, &settings, parted.path(), (false, 2)).unwrap();
+    assert!(stopped.stopped);
+    let (mut task, settings) = decompose_task(4);
+    make_run(&mut task, &settings, parted.path(), (true, u64::MAX)).unwrap();
+
+    assert_eq!(table(parted.path()), table(whole.path()));
+    let weights = |folder: &Path| Weights::read(&folder.join("decomposer.safetensors")).unwrap();
+    assert_eq!(weights(parted.path()), weights(whole.path()));
+    assert!(whole.path().join("validation.png").is_file());
+}
+
+#[test]
+fn a_folder_with_a_run_is_not_overwritten_and_another_runs_checkpoint_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut task, settings) = decompose_task(1);
+    make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap();
+    let again = make_run(&mut task, &settings, folder.path(), (false, u64::MAX));
+    assert!(
+        matches!(again, Err(TrainError::Occupied { .. })),
+        "{again:?}"
+    );
+    let (mut other, settings) = decompose_task(2);
+    let error = make_run(&mut other, &settings, folder.path(), (true, u64::MAX)).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("its settings are others: run.steps"),
+        "{error}"
+    );
+}
+
+#[test]
+fn samples_are_the_same_on_any_number_of_threads() {
+    let composition = Arc::new(Composition {
+        recipe: Recipe {
+            size: 32,
+            views: 1,
+            lightings: 3,
+            ..Recipe::default()
+        },
+        library: Library::read(&Folders::default()).unwrap(),
+        plain_share: 0.5,
+    });
+    let first = |threads: usize| -> Vec<TruthArrays> {
+        let composition = Arc::clone(&composition);
+        let mut composer = Composer::start(composition, Share::ALL, 1, threads).unwrap();
+        let mut next = || composer.next_sample().unwrap();
+        (3..12)
+            .map(|number| {
+                let (found, sample) = next();
+                assert_eq!(found, number);
+                sample
+            })
+            .collect()
+    };
+    assert_eq!(first(1), first(3));
+}
+
+#[test]
+fn answers_mean_the_same_on_tensors_as_one_by_one() {
+    let side = SIDE as usize;
+    let picture = Planes::from_fn(Extent::new(side, side), |x, y| {
+        [x, y, x + y].map(|v| (v as f32 / 90.0).powi(2))
+    });
+    let mask = Planes::from_fn(Extent::new(side, side), |x, _| [f32::from(u8::from(x > 9))]);
+    let encoded = EncodedPicture::new(&picture, &mask);
+    tch::manual_seed(4);
+    let answer = Tensor::randn([1, 9, SIDE, SIDE], (Kind::Float, Device::Cpu)) * 2.0;
+    let flat = Vec::<f32>::try_from(answer.flatten(0, -1)).unwrap();
+    let plain = encoded.decode(&flat);
+    let input = Tensor::from_slice(encoded.values()).view([1, 7, SIDE, SIDE]);
+    let tensors = AnsweredTensors::new(&input, &answer).unwrap();
+    let inside = input.narrow(1, 3, 1);
+    let largest = |tensor: &Tensor, planes: Vec<&[f32]>, scale: f64| {
+        let values = Vec::<f32>::try_from((tensor * &inside * scale).flatten(0, -1)).unwrap();
+        let plain = planes.concat();
+        let pairs = values.iter().zip(&plain);
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    };
+    assert!(
+        largest(
+            &tensors.normals,
+            plain.normals.planes().planes().to_vec(),
+            1.0
+        ) < 1e-5
+    );
+    assert!(largest(&tensors.albedo, plain.albedo.planes().to_vec(), 1.0) < 1e-5);
+    assert!(largest(&tensors.shading, plain.shading.planes().to_vec(), 1.0) < 1e-4);
+    let white = f64::from(encoded.white());
+    assert!(largest(&tensors.highlight, plain.highlight.planes().to_vec(), white) < 1e-5);
+}
+
+fn turns() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let recipe = TurnRecipe {
+        recipe: Recipe {
+            size: 32,
+            ..Recipe::default()
+        },
+        frames: 24,
+    };
+    let library = Library::read(&Folders::default()).unwrap();
+    write_turns(&recipe, &library, 2, folder.path(), &|| {}).unwrap();
+    folder
+}
+
+fn paper_settings(steps: u64) -> PaperSettings {
+    PaperSettings {
+        run: RunSettings {
+            rate: 1e-4,
+            ..small_run(steps)
+        },
+        data: small_data(),
+        ..PaperSettings::default()
+    }
+}
+
+#[test]
+fn every_phase_of_the_paper_makes_its_steps_and_goes_on_where_it_was_stopped() {
+    tch::set_num_threads(1);
+    let turns = turns();
+    let inputs = PaperInputs {
+        turns: Some(turns.path().to_owned()),
+        spec: Some(Weights::initial(&spec_net(), 1)),
+        normal: Some(Weights::initial(&normal_net(), 2)),
+        light: Some(Weights::initial(&light_net(Head::Pooled), 3)),
+        ..PaperInputs::default()
+    };
+    for phase in [
+        PaperPhase::Spec,
+        PaperPhase::Normal,
+        PaperPhase::Light,
+        PaperPhase::Joint,
+        PaperPhase::Specular,
+    ] {
+        let inputs = PaperInputs {
+            turns: inputs.turns.clone().filter(|_| phase.learns_from_turns()),
+            ..inputs.clone()
+        };
+        let task = || PaperTask::new(phase, paper_settings(3), resources(), &inputs).unwrap();
+        let run = paper_settings(3).run;
+        let (whole, parted) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let outcome = make_run(&mut task(), &run, whole.path(), (false, u64::MAX)).unwrap();
+        assert_eq!((outcome.steps, outcome.weights.len()), (3, 1), "{phase:?}");
+        make_run(&mut task(), &run, parted.path(), (false, 1)).unwrap();
+        make_run(&mut task(), &run, parted.path(), (true, u64::MAX)).unwrap();
+        assert_eq!(table(parted.path()), table(whole.path()), "{phase:?}");
+    }
+}
+
+#[test]
+fn turns_that_are_held_out_are_judged_at_the_start_and_at_the_end() {
+    tch::set_num_threads(1);
+    let turns = turns();
+    let inputs = PaperInputs {
+        turns: Some(turns.path().to_owned()),
+        held_out: Some(turns.path().to_owned()),
+        normal: Some(Weights::initial(&normal_net(), 2)),
+        ..PaperInputs::default()
+    };
+    let settings = PaperSettings {
+        run: RunSettings {
+            rate: 2e-5,
+            average: 0.0,
+            ..paper_settings(12).run
+        },
+        loss: PaperLosses {
+            anchor: 0.0,
+            ..PaperLosses::default()
+        },
+        ..paper_settings(12)
+    };
+    let run = settings.run.clone();
+    let mut task = PaperTask::new(PaperPhase::Light, settings, resources(), &inputs).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    make_run(&mut task, &run, folder.path(), (false, u64::MAX)).unwrap();
+    let read = |step: &str, name: &str| -> f64 {
+        let start = format!("{step},validation/{name},");
+        let table = table(folder.path());
+        let line = table.iter().find_map(|line| line.strip_prefix(&start));
+        line.unwrap_or_else(|| panic!("{start}")).parse().unwrap()
+    };
+    assert_eq!(
+        read("0", "pictures_residual"),
+        read("12", "pictures_residual")
+    );
+    assert!(read("12", "residual") < read("0", "residual"));
+    assert!((0.0..1.0).contains(&read("12", "sigma_ratio")));
+    assert!(read("12", "shading") > 0.0);
+}
+
+#[test]
+fn a_phase_says_what_it_needs() {
+    for (phase, option) in [
+        (PaperPhase::Light, "--turns"),
+        (PaperPhase::Joint, "--turns"),
+        (PaperPhase::Specular, "--turns"),
+    ] {
+        let inputs = PaperInputs::default();
+        let error = PaperTask::new(phase, paper_settings(1), resources(), &inputs).unwrap_err();
+        assert!(error.to_string().contains(option), "{error}");
+    }
+    let turns = turns();
+    let inputs = PaperInputs {
+        turns: Some(turns.path().to_owned()),
+        ..PaperInputs::default()
+    };
+    for (phase, option) in [
+        (PaperPhase::Light, "--normal"),
+        (PaperPhase::Joint, "--light"),
+    ] {
+        let error = PaperTask::new(phase, paper_settings(1), resources(), &inputs).unwrap_err();
+        assert!(error.to_string().contains(option), "{error}");
+    }
+}
+
+#[test]
+fn a_damaged_sample_of_a_turn_is_told_and_the_run_goes_on() {
+    let turns = turns();
+    let shard = fs::read_dir(turns.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .find(|path| path.extension().is_some_and(|e| e == "tar"))
+        .unwrap();
+    let mut bytes = fs::read(&shard).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle..middle + 3000].fill(0x5a);
+    fs::write(&shard, bytes).unwrap();
+    let inputs = PaperInputs {
+        turns: Some(turns.path().to_owned()),
+        ..PaperInputs::default()
+    };
+    let mut task =
+        PaperTask::new(PaperPhase::Spec, paper_settings(6), resources(), &inputs).unwrap();
+    let (folder, run) = (tempfile::tempdir().unwrap(), paper_settings(6).run);
+    let stop = AtomicBool::new(false);
+    let mut observer = StopAfter {
+        steps: u64::MAX,
+        stop: &stop,
+        damage: Vec::new(),
+    };
+    let outcome = Run::open(&mut task, &run, folder.path(), false)
+        .unwrap()
+        .finish(&stop, &mut observer)
+        .unwrap();
+    assert_eq!(outcome.steps, 6);
+    assert!(!observer.damage.is_empty());
+    assert!(outcome.damaged);
+}
+
+/// A network of which every second step has nothing to learn from, as where the gate of saturation is closed.
+struct EverySecondStep {
+    learner: Learner,
+}
+
+impl EverySecondStep {
+    fn new() -> Self {
+        let settings = LearnerSettings {
+            adam: AdamSettings::default(),
+            average: 0.9,
+            precision: ComputePrecision::Single,
+            device: Device::Cpu,
+        };
+        let graph = light_net(Head::Pooled);
+        let weights = Weights::initial(&graph, 5);
+        Self {
+            learner: Learner::new(graph, &weights, settings).unwrap(),
+        }
+    }
+}
+
+impl Task for EverySecondStep {
+    fn name(&self) -> &'static str {
+        "every second step"
+    }
+    fn settings(&self) -> String {
+        String::new()
+    }
+    fn differing_setting(&self, _: &str) -> Option<String> {
+        None
+    }
+    fn join(&mut self, _: &ProcessGroup) -> Result<(), TrainError> {
+        Ok(())
+    }
+    fn learners(&mut self) -> Vec<&mut Learner> {
+        vec![&mut self.learner]
+    }
+    fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
+        let mut losses = StepLosses::default();
+        if step.is_multiple_of(2) {
+            let input = Tensor::full(
+                [1, 3, SIDE, SIDE],
+                0.1 * step as f64,
+                (Kind::Float, Device::Cpu),
+            );
+            let answer = &self.learner.model.forward(&input)?[0];
+            losses
+                .terms
+                .add("square", 1.0, answer.square().mean(None))?;
+        }
+        Ok(losses)
+    }
+    fn validate(&mut self) -> Result<Validation, TrainError> {
+        Ok(Validation::default())
+    }
+}
+
+#[test]
+fn a_run_goes_on_to_the_same_losses_after_steps_that_taught_nothing() {
+    tch::set_num_threads(1);
+    let run = small_run(9);
+    let (whole, parted) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let make = |folder: &tempfile::TempDir, resume, until| {
+        make_run(
+            &mut EverySecondStep::new(),
+            &run,
+            folder.path(),
+            (resume, until),
+        )
+        .unwrap()
+    };
+    make(&whole, false, u64::MAX);
+    make(&parted, false, 5);
+    make(&parted, true, u64::MAX);
+    assert_eq!(table(parted.path()), table(whole.path()));
+    let saved = |folder: &tempfile::TempDir| Checkpoint::read(folder.path()).unwrap().unwrap();
+    assert_eq!(saved(&parted), saved(&whole));
+}
+
+#[test]
+fn a_run_does_not_go_on_with_other_turns_or_another_network_beside_it() {
+    tch::set_num_threads(1);
+    let (turns, others) = (turns(), turns());
+    let shards = fs::read_dir(others.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let shard = shards
+        .into_iter()
+        .find(|path| path.extension().is_some_and(|e| e == "tar"));
+    // The same number of samples, of one turn twice.
+    let shard = shard.unwrap();
+    let twice = fs::read_dir(others.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    for path in twice.filter(|path| path.extension().is_some_and(|e| e == "tar") && *path != shard)
+    {
+        fs::copy(&shard, path).unwrap();
+    }
+    let task = |turns: &tempfile::TempDir, seed| {
+        let inputs = PaperInputs {
+            turns: Some(turns.path().to_owned()),
+            normal: Some(Weights::initial(&normal_net(), seed)),
+            ..PaperInputs::default()
+        };
+        PaperTask::new(PaperPhase::Light, paper_settings(2), resources(), &inputs).unwrap()
+    };
+    let (folder, run) = (tempfile::tempdir().unwrap(), paper_settings(2).run);
+    make_run(&mut task(&turns, 1), &run, folder.path(), (false, 1)).unwrap();
+    for mut other in [task(&others, 1), task(&turns, 2)] {
+        let error = make_run(&mut other, &run, folder.path(), (true, u64::MAX)).unwrap_err();
+        assert!(error.to_string().contains("other turns"), "{error}");
+    }
+    make_run(&mut task(&turns, 1), &run, folder.path(), (true, u64::MAX)).unwrap();
+}
+
+#[test]
+fn a_run_that_is_asked_to_stop_while_its_first_samples_are_composed_stops_then() {
+    let settings = DecomposeSettings {
+        run: small_run(4),
+        data: DataSettings {
+            window: 1_000_000,
+            ..small_data()
+        },
+        ..DecomposeSettings::default()
+    };
+    let (resources, folder) = (resources(), tempfile::tempdir().unwrap());
+    let stop = Arc::clone(&resources.stop);
+    let mut task = DecomposeTask::new(settings.clone(), resources, None).unwrap();
+    let asked = Arc::clone(&stop);
+    let later = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        asked.store(true, Ordering::Relaxed);
+    });
+    let mut observer = StopAfter {
+        steps: u64::MAX,
+        stop: &AtomicBool::new(false),
+        damage: Vec::new(),
+    };
+    let run = Run::open(&mut task, &settings.run, folder.path(), false).unwrap();
+    let outcome = run.finish(&stop, &mut observer).unwrap();
+    later.join().unwrap();
+    assert_eq!((outcome.steps, outcome.stopped), (0, true));
+    assert!(Checkpoint::path(folder.path()).is_file());
+}
+
+#[test]
+fn a_run_that_another_program_makes_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut task, settings) = decompose_task(1);
+    let open = Journal::open(folder.path(), 0).unwrap();
+    let error = make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap_err();
+    assert!(matches!(error, TrainError::Running { .. }), "{error}");
+    drop(open);
+    make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap();
+}
+
+#[test]
+fn turns_are_refused_where_they_teach_nothing() {
+    let turns = PaperInputs {
+        turns: Some("turns".into()),
+        ..PaperInputs::default()
+    };
+    let (settings, resources) = (PaperSettings::default(), resources());
+    let task = PaperTask::new(PaperPhase::Normal, settings, resources, &turns);
+    assert!(matches!(
+        task,
+        Err(TrainError::NotTaught { phase: "normal" })
+    ));
+}
+
+#[test]
+fn the_settings_that_come_with_relight_can_be_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights");
+    let paper: PaperSettings = read_settings(&folder.join("paper.toml")).unwrap();
+    paper.check().unwrap();
+    assert_eq!((paper.run.rate, paper.run.batch), (1e-6, 12));
+    for ours in ["decompose.toml", "refine.toml"] {
+        let ours: DecomposeSettings = read_settings(&folder.join(ours)).unwrap();
+        ours.check().unwrap();
+    }
+}

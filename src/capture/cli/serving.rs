@@ -1,0 +1,79 @@
+//! `relit-capture serve`: the daemon and its page.
+
+use std::fs;
+use std::sync::Arc;
+
+use relit_rig::capture::CaptureError;
+use relit_rig::daemon::Daemon;
+use relit_rig::serve::{
+    Announcement, ServeError, ServeOptions, Shutdown, Token, TokenFileError, serve,
+};
+use sd_notify::NotifyState;
+use serde_json::json;
+
+use crate::arguments::Serve;
+use crate::environment::{at_end, heartbeat, notify_service};
+use relit_console::{Console, Outcome};
+
+/// Why the rig is not served.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Error {
+    /// The rig.
+    #[error(transparent)]
+    Rig(#[from] CaptureError),
+    /// The server.
+    #[error(transparent)]
+    Serve(#[from] ServeError),
+    /// The token's file.
+    #[error(transparent)]
+    Token(#[from] TokenFileError),
+}
+
+pub(crate) fn run(console: Console, asked: Serve) -> Result<Outcome, Error> {
+    let root = &asked.settings.root;
+    let failed = |what: String, doing| {
+        move |source| CaptureError::System {
+            what,
+            doing,
+            source,
+        }
+    };
+    let token = match &asked.token_file {
+        Some(path) => Some(Token::from_file_or_new(path)?),
+        None => asked.token,
+    };
+    fs::create_dir_all(root).map_err(failed(root.display().to_string(), "made"))?;
+    let shutdown = Shutdown::new();
+    let ending = shutdown.clone();
+    let end = move || {
+        notify_service(&[NotifyState::Stopping]);
+        ending.cancel();
+    };
+    at_end(end).map_err(failed("the signals".to_owned(), "listened to"))?;
+    let rig = Arc::new(Daemon::start(asked.settings)?);
+    let options = ServeOptions {
+        token,
+        names: asked.names,
+        heartbeat: heartbeat(),
+        ..ServeOptions::at(asked.address)
+    };
+    serve(rig.clone(), options, &shutdown, |announcement| {
+        let status = format!("Serving on {}", announcement.address);
+        notify_service(&[NotifyState::Ready, NotifyState::Status(&status)]);
+        announce(console, announcement);
+    })?;
+    // Threads of the server may hold the rig a moment longer: its end does not wait for them.
+    rig.end();
+    Ok(Outcome::Whole)
+}
+
+fn announce(console: Console, announcement: &Announcement) {
+    let mut text = format!("The rig is at {}", announcement.url);
+    if let Some(qr) = &announcement.qr {
+        text = format!("{qr}\n{text}");
+    }
+    console.say(
+        &text,
+        &json!({ "event": "serving", "url": announcement.url, "address": announcement.address.to_string() }),
+    );
+}

@@ -1,0 +1,90 @@
+//! `relit-capture simulate`: a turntable without hardware, at a port that any program can open.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use relit_rig::clock::Clock;
+use relit_rig::simulator::{
+    Simulator, SimulatorCounts, SimulatorError, SimulatorOptions, TableFaults, WireCounts,
+};
+use serde_json::json;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
+use crate::table_arguments::SimulateArguments;
+use relit_console::{Console, Outcome};
+
+/// Interval at which the end conditions are checked.
+const LOOK: Duration = Duration::from_millis(50);
+
+pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome, SimulatorError> {
+    let options = SimulatorOptions {
+        clock: match asked.speed {
+            1.0 => Clock::monotonic(),
+            factor => Clock::paced(factor),
+        },
+        faults: asked.fault.join(",").parse::<TableFaults>()?,
+        seed: asked.seed,
+        start_angle: asked.start_angle,
+        index_at: asked.index_at,
+        battery: asked.battery,
+        drift_ppm: asked.drift_ppm,
+        reset_on_open: !asked.no_reset,
+        ..SimulatorOptions::default()
+    };
+    let simulator = Simulator::start(&options, asked.link.as_deref())?;
+    let port = asked.link.as_deref().unwrap_or(simulator.path());
+    console.say(
+        &format!(
+            "a simulated turntable is at {}; end it with Ctrl-C",
+            port.display()
+        ),
+        &json!({ "event": "ready", "port": port, "speed": asked.speed }),
+    );
+    wait(console, asked.for_seconds);
+    report(console, &simulator.stop());
+    Ok(Outcome::Whole)
+}
+
+/// Waits until the given time is over or a signal arrives.
+fn wait(console: Console, for_seconds: Option<f64>) {
+    let ended = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM, SIGHUP] {
+        if let Err(error) = signal_hook::flag::register(signal, Arc::clone(&ended)) {
+            console.warn(&format!(
+                "signal {signal} ends the simulator without its summary: {error}"
+            ));
+        }
+    }
+    let limit = for_seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    let began = Instant::now();
+    while !ended.load(Ordering::Relaxed) && limit.is_none_or(|limit| began.elapsed() < limit) {
+        thread::sleep(LOOK);
+    }
+}
+
+fn report(console: Console, counts: &SimulatorCounts) {
+    let text = format!(
+        "opened {} times; restarted by faults {} times{}\nto the table:   {}\nfrom the table: {}",
+        counts.opened,
+        counts.resets,
+        if counts.stalled { ", stalled" } else { "" },
+        of_the_wire(&counts.to_chip),
+        of_the_wire(&counts.from_chip),
+    );
+    console.say(&text, &json!({ "event": "ended", "counts": counts }));
+}
+
+fn of_the_wire(counts: &WireCounts) -> String {
+    format!(
+        "{} lines, {} bytes, {} lost, {} flipped, {} late; {} lines doubled, {} merged",
+        counts.lines,
+        counts.bytes,
+        counts.dropped,
+        counts.flipped,
+        counts.delayed,
+        counts.duplicated,
+        counts.merged,
+    )
+}

@@ -1,0 +1,194 @@
+//! The output of the programs, for a person or a machine: lines on the terminal, JSON lines, progress,
+//! exit codes. Nothing else in the workspace prints.
+//!
+//! One rule for all programs:
+//!
+//! | | without `--json` | with `--json` |
+//! | --- | --- | --- |
+//! | results | text on standard output | JSON lines on standard output |
+//! | what is being done | text on standard error | JSON lines on standard output |
+//! | warnings and errors | text on standard error | JSON lines on standard output, and the same text on standard error |
+//! | progress | a bar on standard error, where that is a terminal | none |
+//!
+//! So standard output alone tells a machine everything, and standard error alone, which a cluster keeps as
+//! the log of a job, tells a person what went wrong.
+//!
+//! The exit code is an [`Outcome`], 1 for an error, or 2 for wrong arguments (which `clap` reports).
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "printing is the purpose of this crate"
+)]
+
+use std::error::Error;
+use std::io::{self, Write};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use indicatif::ProgressStyle;
+use relit_data::causes::with_causes;
+use serde_json::{Value, json};
+
+pub use indicatif::ProgressBar;
+
+/// What first kept a line from being printed, other than that nobody reads any more.
+static LOST_LINE: OnceLock<io::Error> = OnceLock::new();
+
+/// The outcome of a command that ran to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Everything was done: exit code 0.
+    Whole,
+    /// Finished, but nothing came out, or a check failed: exit code 1.
+    Wrong,
+    /// Finished, but something was left out or lost: exit code 3.
+    Incomplete,
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> Self {
+        match outcome {
+            Outcome::Whole => Self::SUCCESS,
+            Outcome::Wrong => Self::from(1),
+            Outcome::Incomplete => Self::from(3),
+        }
+    }
+}
+
+/// The output of one program, for a person or, with `--json`, for a machine.
+#[derive(Debug, Clone, Copy)]
+pub struct Console {
+    json: bool,
+}
+
+impl Console {
+    /// A console that prints JSON lines (`json`) or text on standard output.
+    pub fn new(json: bool) -> Self {
+        Self { json }
+    }
+
+    /// Whether a machine reads the lines.
+    #[must_use]
+    pub fn is_json(self) -> bool {
+        self.json
+    }
+
+    /// A result: `text` for a person, `event` as one JSON line for a machine.
+    pub fn say(self, text: &str, event: &Value) {
+        if self.json {
+            print_line(&event.to_string());
+        } else {
+            print_line(text);
+        }
+    }
+
+    /// Text for a person; nothing for a machine.
+    pub fn say_to_people(self, text: &str) {
+        if !self.json {
+            print_line(text);
+        }
+    }
+
+    /// What is being done: on standard error for a person, as a JSON line for a machine.
+    pub fn say_phase(self, text: &str, event: &Value) {
+        if self.json {
+            print_line(&event.to_string());
+        } else {
+            print_error_line(text);
+        }
+    }
+
+    /// A question to a person at the terminal, on standard error.
+    pub fn ask(self, question: &str) {
+        let _ = write!(io::stderr(), "{question}");
+        let _ = io::stderr().flush();
+    }
+
+    /// Largest number of lines of a long list: `for_people`, or all for a machine.
+    pub fn most_lines(self, for_people: usize) -> usize {
+        if self.json { usize::MAX } else { for_people }
+    }
+
+    /// A warning.
+    pub fn warn(self, text: &str) {
+        self.warn_with(text, &json!({ "event": "warning", "message": text }));
+    }
+
+    /// A warning that is an event of its own for a machine.
+    pub fn warn_with(self, text: &str, event: &Value) {
+        if self.json {
+            print_line(&event.to_string());
+        }
+        print_error_line(&format!("warning: {text}"));
+    }
+
+    /// An error, with its causes, as one sentence.
+    pub fn error(self, error: &(dyn Error + 'static)) {
+        self.print_error(&with_causes(error), None);
+    }
+
+    /// An error that concerns one of several inputs.
+    pub fn error_in(self, input: &Path, error: &(dyn Error + 'static)) {
+        self.print_error(&with_causes(error), Some(input));
+    }
+
+    fn print_error(self, text: &str, input: Option<&Path>) {
+        if self.json {
+            let event = json!({ "event": "error", "message": text, "input": input.map(Path::to_string_lossy) });
+            print_line(&event.to_string());
+        }
+        match input {
+            Some(input) if !text.contains(&*input.to_string_lossy()) => {
+                print_error_line(&format!("error: {}: {text}", input.display()));
+            }
+            _ => print_error_line(&format!("error: {text}")),
+        }
+    }
+
+    /// Prints the command's error, if there is one, and returns the exit code. Where lines could not be printed, the
+    /// outcome is not whole.
+    pub fn finish<E: Into<Box<dyn Error>>>(self, result: Result<Outcome, E>) -> ExitCode {
+        match (result, LOST_LINE.get()) {
+            (Ok(Outcome::Whole), Some(fault)) => {
+                print_error_line(&format!(
+                    "error: standard output could not be written, lines are missing there: {fault}"
+                ));
+                Outcome::Incomplete.into()
+            }
+            (Ok(outcome), _) => outcome.into(),
+            (Err(error), _) => {
+                self.error(error.into().as_ref());
+                ExitCode::FAILURE
+            }
+        }
+    }
+
+    /// A progress bar of `length` steps; hidden with `--json` or if standard error is not a terminal.
+    pub fn progress(self, length: u64, label: &str) -> ProgressBar {
+        if self.json {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(length).with_message(label.to_owned());
+        let template = "{msg:.bold} {wide_bar} {pos}/{len} {per_sec} {eta}";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(200));
+        bar
+    }
+}
+
+/// Prints a line. If the output is closed, the work goes on without it.
+fn print_line(text: &str) {
+    if let Err(fault) = writeln!(io::stdout(), "{text}")
+        && fault.kind() != io::ErrorKind::BrokenPipe
+    {
+        let _ = LOST_LINE.set(fault);
+    }
+}
+
+fn print_error_line(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
+}

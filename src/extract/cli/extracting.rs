@@ -1,0 +1,144 @@
+//! `relit-extract INPUT... -o OUT`: progress and results of the extraction.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use relit_console::ProgressBar;
+use relit_console::{Console, Outcome};
+use relit_data::causes::with_causes;
+use relit_data::counts::count_of;
+use relit_data::shard::SessionEntry;
+use relit_extract::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally, extract};
+use serde_json::json;
+
+pub(crate) fn run(
+    console: Console,
+    inputs: &[PathBuf],
+    out: &Path,
+    options: &ExtractOptions,
+) -> Result<Outcome, ExtractError> {
+    let reporter = Reporter {
+        console,
+        out,
+        bar: Mutex::new(ProgressBar::hidden()),
+    };
+    if let Some(task) = options.task {
+        // It may be the scheduler's variables that say so.
+        console.say_phase(
+            &format!(
+                "task {task}: every {}th recording is this one's",
+                task.count()
+            ),
+            &json!({ "event": "task", "task": task.to_string() }),
+        );
+    }
+    let tally = extract(inputs, out, options, &reporter)?;
+    if let Some(task) = options.task
+        && tally == Tally::default()
+    {
+        console.warn(&format!(
+            "task {task} has none of the recordings: name all of them to each task, or give --task-id 0 --task-count 1 for all that are named"
+        ));
+    }
+    console.say(
+        &format!(
+            "{}: {} extracted ({} with losses), {} skipped, {} left out, {} failed",
+            out.display(),
+            tally.extracted,
+            tally.lossy,
+            tally.skipped,
+            tally.left_out,
+            tally.failed
+        ),
+        &json!({
+            "event": "done",
+            "out": out.to_string_lossy(),
+            "extracted": tally.extracted,
+            "lossy": tally.lossy,
+            "skipped": tally.skipped,
+            "left_out": tally.left_out,
+            "failed": tally.failed,
+        }),
+    );
+    let nothing_came_out = tally.extracted + tally.skipped == 0;
+    Ok(match (tally.failed, tally.lossy + tally.left_out) {
+        (0, 0) => Outcome::Whole,
+        (1.., _) if nothing_came_out => Outcome::Wrong,
+        _ => Outcome::Incomplete,
+    })
+}
+
+/// Prints the progress and the outcome of each recording.
+struct Reporter<'a> {
+    console: Console,
+    out: &'a Path,
+    bar: Mutex<ProgressBar>,
+}
+
+impl Reporter<'_> {
+    fn bar(&self) -> std::sync::MutexGuard<'_, ProgressBar> {
+        self.bar.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn skipped(&self, entry: &SessionEntry) {
+        let lossy = if entry.lossy {
+            "; something of it is lost, see its report"
+        } else {
+            ""
+        };
+        self.console.say(
+            &format!("{}: already extracted, skipped{lossy}", entry.id),
+            &json!({ "event": "skipped", "id": entry.id, "lossy": entry.lossy }),
+        );
+    }
+
+    fn left_out(&self, recording: &Path, error: &ExtractError) {
+        let (input, why) = (recording.to_string_lossy(), with_causes(error));
+        self.console.say(
+            &format!("{input}: left out: {why}"),
+            &json!({ "event": "left_out", "input": input, "message": why }),
+        );
+    }
+
+    fn extracted(&self, entry: &SessionEntry) {
+        for warning in &entry.warnings {
+            self.console.warn(&format!("{}: {warning}", entry.id));
+        }
+        let report = self.out.join(format!("{}.html", entry.id));
+        self.console.say(
+            &format!(
+                "{}: {} ({}), Spec-Net on for {}, report {}",
+                entry.id,
+                count_of(u64::from(entry.samples), "sample"),
+                count_of(u64::from(entry.duplicates), "duplicate"),
+                entry.spec_net,
+                report.display()
+            ),
+            &json!({ "event": "extracted", "session": entry }),
+        );
+    }
+}
+
+impl Observer for Reporter<'_> {
+    fn started(&self, recording: &Path, samples: u32) {
+        let name = recording
+            .file_name()
+            .unwrap_or(recording.as_os_str())
+            .to_string_lossy();
+        *self.bar() = self.console.progress(u64::from(samples), &name);
+    }
+
+    fn advanced(&self) {
+        self.bar().inc(1);
+    }
+
+    fn ended(&self, recording: &Path, outcome: &RecordingOutcome) {
+        self.bar().finish_and_clear();
+        match outcome {
+            RecordingOutcome::Extracted(entry) => self.extracted(entry),
+            RecordingOutcome::Skipped(entry) => self.skipped(entry),
+            RecordingOutcome::LeftOut(error) => self.left_out(recording, error),
+            RecordingOutcome::Failed(error) => self.console.error_in(recording, error),
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! `relit-extract`: turns recordings into training shards of masked frames, joins, verifies and
+//! sums them up.
+
+mod arguments;
+mod extracting;
+mod merging;
+mod stats;
+mod verifying;
+
+use std::process::ExitCode;
+
+use arguments::Command;
+use relit_console::Console;
+
+fn main() -> ExitCode {
+    let arguments = arguments::parse();
+    let console = Console::new(arguments.json);
+    match arguments.command {
+        Command::Extract {
+            inputs,
+            out,
+            options,
+        } => console.finish(extracting::run(console, &inputs, &out, &options)),
+        Command::Merge { out } => console.finish(merging::run(console, &out)),
+        Command::Stats { out, html } => console.finish(stats::run(console, &out, html.as_deref())),
+        Command::Verify { out } => console.finish(verifying::run(console, &out)),
+    }
+}

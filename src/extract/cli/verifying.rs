@@ -1,0 +1,66 @@
+//! `relit-extract verify OUT`: the problems of a data set.
+
+use std::path::Path;
+
+use relit_console::{Console, Outcome};
+use relit_data::counts::count_of;
+use relit_data::shard::verify;
+use relit_extract::ExtractError;
+use relit_extract::objects::{ObjectError, is_url};
+use serde_json::json;
+
+/// Number of problems that are printed for a person.
+const MAX_PRINTED: usize = 50;
+
+pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError> {
+    if is_url(out) {
+        let url = out.display().to_string();
+        return Err(ObjectError::FolderOnly(url).into());
+    }
+    let bar = console.progress(0, "verify");
+    let report = verify(out, &|done, total| {
+        bar.set_length(total);
+        bar.set_position(done);
+    })?;
+    bar.finish_and_clear();
+    let count = report.problems.len();
+    for problem in &report.problems[..count.min(console.most_lines(MAX_PRINTED))] {
+        let (file, sample, what) = (&problem.file, &problem.sample, &problem.what);
+        console.say(
+            &problem.to_string(),
+            &json!({ "event": "problem", "file": file, "sample": sample, "message": what }),
+        );
+    }
+    if count > console.most_lines(MAX_PRINTED) {
+        console.warn(&format!(
+            "{} not shown: --json lists them all",
+            count_of((count - MAX_PRINTED) as u64, "problem")
+        ));
+    }
+    let summary = match count {
+        0 => "no problems".to_owned(),
+        n => count_of(n as u64, "problem"),
+    };
+    console.say(
+        &format!(
+            "{}: {}, {}, {} read back: {summary}",
+            out.display(),
+            count_of(report.sessions as u64, "session"),
+            count_of(report.shards as u64, "shard"),
+            count_of(report.samples as u64, "sample")
+        ),
+        &json!({
+            "event": "verified",
+            "out": out.to_string_lossy(),
+            "sessions": report.sessions,
+            "shards": report.shards,
+            "samples": report.samples,
+            "problems": count,
+        }),
+    );
+    Ok(if count == 0 {
+        Outcome::Whole
+    } else {
+        Outcome::Wrong
+    })
+}

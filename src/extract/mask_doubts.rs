@@ -1,0 +1,46 @@
+//! A look at the mask before it is used for a whole data set, by a few frames of the video.
+
+use image::GrayImage;
+use relit_grabcut::{Effort, MaskCheck, MaskError, ShapeCheck, Turn, TurnStatistics};
+use relit_video::Video;
+
+use super::ExtractError;
+
+/// Frames that are looked at.
+const FRAMES: usize = 12;
+
+/// What is worth a warning about a mask; empty if the video says nothing about it. `frame` is the one on which the
+/// mask was made, if that is known: in others the object may lie elsewhere.
+///
+/// # Errors
+/// [`ExtractError::Video`] or [`ExtractError::MaskDoubts`].
+pub fn mask_doubts(
+    video: &Video,
+    mask: &GrayImage,
+    frame: Option<u64>,
+) -> Result<Vec<String>, ExtractError> {
+    let numbers = video.quick_spread(FRAMES);
+    let size = mask.dimensions();
+    let mut turn = Turn::new(size.0, size.1);
+    for (_, picture) in video.pictures(&numbers, size)? {
+        turn.push(&picture);
+    }
+    let statistics = TurnStatistics::new(&turn);
+    let check = match MaskCheck::new(mask, &statistics) {
+        Ok(check) => check,
+        Err(MaskError::FewFrames { .. } | MaskError::Empty) => return Ok(Vec::new()),
+        Err(error) => return Err(error.into()),
+    };
+    let of_mask = frame.and_then(|number| video.frame(number).ok());
+    let frame = match (of_mask, numbers.get(numbers.len() / 2)) {
+        (Some(frame), _) => frame,
+        (None, Some(&middle)) => video.frame(middle)?,
+        (None, None) => return Ok(Vec::new()),
+    };
+    // What is a region is wide: an edge that is blocky in a large frame changes none.
+    let shape = check.shape(&frame, Effort::Draft)?;
+    Ok(shape
+        .as_ref()
+        .map(ShapeCheck::faults_at_a_look)
+        .unwrap_or_default())
+}

@@ -1,0 +1,94 @@
+//! Which pixels of an image are the object: hints from a person or what a turn shows, GrabCut, clean-up.
+//!
+//! Camera and object ride on the same turntable, so one mask fits all frames of a turn. [`segment`]
+//! makes it from one image and hints, [`segment_turn`] from what a whole [`Turn`] shows, with or without
+//! hints; [`preview`] shows it for a person to check; [`MaskCheck`] holds a mask against a turn, and [`score`]
+//! measures it against the truth.
+//!
+//! Everything is computed from images and bytes in memory: the crate knows no files, videos or threads, links
+//! no native library, and also runs in a browser.
+//!
+//! # Cut an object out by a rectangle
+//!
+//! ```
+//! use image::{Rgb, RgbImage};
+//! use relit_data::geometry::Rect;
+//! use relit_grabcut::{Hints, SegmentSettings, segment};
+//!
+//! // A yellow disc of radius 18 on a dark ground. From a file: image::open(path)?.into_rgb8()
+//! let inside = |x: u32, y: u32| (f64::from(x) - 48.0).hypot(f64::from(y) - 32.0) <= 18.0;
+//! let image = RgbImage::from_fn(96, 64, |x, y| {
+//!     Rgb(if inside(x, y) { [220, 180, 40] } else { [20, (x % 7) as u8, 60] })
+//! });
+//!
+//! // The object lies inside the rectangle; what is outside is background.
+//! let hints = Hints::Rect(Rect::new(24, 8, 50, 48));
+//! let mask = segment(&image, &hints, &SegmentSettings::default())?;
+//!
+//! assert_eq!(mask.image().get_pixel(48, 32).0, [255]);
+//! assert_eq!(mask.image().get_pixel(10, 10).0, [0]);
+//! assert_eq!(mask.statistics().bounding_box, Rect::new(30, 14, 37, 37));
+//! assert!(mask.warnings().is_empty());
+//! # Ok::<(), relit_grabcut::MaskError>(())
+//! ```
+//!
+//! # How it decides
+//!
+//! With a rectangle, pixels outside are background, and the half of those inside that looks most like the
+//! outside starts as background too; seeds overrule both. With seeds alone, the colours of the marked
+//! pixels decide first; if no background is marked, unmarked pixels start as probable background. Colour
+//! models of both sides and minimum cuts then take turns at a small size, and at each larger size a band
+//! along the edge is decided again.
+//!
+//! With a turn, a pixel's colour is its average over the frames, how much it changes counts too, and
+//! neighbours that change together belong together. What equals the ends of its row is background: the
+//! room passes through the whole row. So are the table and its rim.
+//!
+//! Of the result the largest 8-connected component is kept, and those that have three tenths of its area.
+//! Small holes are filled, except those in which seeds mark background.
+
+mod alpha;
+mod backdrop;
+mod bitmap;
+mod blur;
+mod check;
+mod cleanup;
+mod drawing;
+mod encode;
+mod error;
+mod grab_cut;
+mod hints;
+mod initial;
+mod lab;
+mod max_flow;
+mod mixture;
+mod outline;
+mod preview;
+mod pyramid;
+mod registration;
+mod rim;
+mod score;
+mod segment;
+mod settings;
+mod shape_faults;
+mod strokes;
+mod table;
+mod turn;
+mod warning;
+
+pub use alpha::alpha;
+pub use check::{MaskCheck, Place, Region, ShapeCheck};
+pub use drawing::Drawing;
+pub use encode::{grey_png, rgb_png};
+pub use error::{MaskError, SeedsFault};
+pub use hints::{Hints, Mark, Seeds};
+pub use outline::outline;
+pub use preview::preview;
+pub use score::{BOUNDARY_TOLERANCE_PX, MaskScore, ScoreFault, score};
+pub use segment::{Mask, MaskStatistics, segment, segment_turn, segment_with};
+pub use settings::{
+    Effort, Feather, Iterations, MAX_PIXELS, MIN_SIDE, SegmentSettings, SettingsFault,
+};
+pub use strokes::{Brush, Stroke, Strokes, StrokesFault};
+pub use turn::{MIN_TURN_FRAMES, TURN_FRAMES, Turn, TurnStatistics};
+pub use warning::{Side, Warning};

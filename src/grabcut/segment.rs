@@ -1,0 +1,205 @@
+//! From a frame and hints to a mask.
+
+use image::{GrayImage, RgbImage};
+use relit_data::geometry::Rect;
+
+use super::bitmap::Bitmap;
+use super::initial::InitialLabels;
+use super::settings::{MAX_PIXELS, MIN_SIDE};
+use super::turn::{self, TurnStatistics};
+use super::{Effort, Hints, MaskError, SegmentSettings, Warning, cleanup, pyramid, warning};
+
+/// On one frame a hole of this share of the object may be a highlight, and is filled.
+const FILLED_OF_FRAME: f64 = 0.01;
+/// The turn's outline has at least this share of the strength of the hints' one.
+const LEAST_OF_HINTS: f32 = 0.85;
+/// Over a turn highlights move: only specks are filled.
+const FILLED_OF_TURN: f64 = 0.001;
+
+/// An object's mask on one frame.
+#[derive(Debug, Clone)]
+pub struct Mask {
+    image: GrayImage,
+    statistics: MaskStatistics,
+    warnings: Vec<Warning>,
+}
+
+/// Numbers about a mask.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MaskStatistics {
+    /// Pixels of the object (at or above 128), at least 1.
+    pub area_px: u64,
+    /// The smallest rectangle around them.
+    pub bounding_box: Rect,
+    /// Connected components before the clean-up, at least 1.
+    pub components: usize,
+    /// Connected components that were kept.
+    pub components_kept: usize,
+    /// Pixels of the holes that were filled.
+    pub holes_filled_px: u64,
+}
+
+impl Mask {
+    fn with_warning(mut self, warning: Option<Warning>) -> Self {
+        self.warnings.extend(warning);
+        self
+    }
+
+    /// The mask, in the size of the frame: 255 object, 0 background; with a feather also values
+    /// between.
+    #[must_use]
+    pub fn image(&self) -> &GrayImage {
+        &self.image
+    }
+
+    /// Area, bounding box and components.
+    #[must_use]
+    pub fn statistics(&self) -> MaskStatistics {
+        self.statistics
+    }
+
+    /// What its user should check.
+    #[must_use]
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+}
+
+/// Finds the object in `frame`. The same input gives the same mask.
+///
+/// # Errors
+/// [`MaskError::FrameTooSmall`], [`MaskError::FrameTooLarge`]; hints that do not fit the frame
+/// ([`MaskError::RectOutside`], [`MaskError::NoBackground`], [`MaskError::NoObject`], [`MaskError::SeedsSize`]);
+/// a result without object or without background ([`MaskError::Empty`], [`MaskError::Everything`]).
+pub fn segment(
+    frame: &RgbImage,
+    hints: &Hints,
+    settings: &SegmentSettings,
+) -> Result<Mask, MaskError> {
+    by_hints(frame, hints, settings, Effort::Fine)
+}
+
+/// Finds the object in `frame` by what a turn shows, with or without hints. `turn` was made from frames of
+/// the same recording. The same input gives the same mask.
+///
+/// With a rectangle there is a guard against a turn that misleads: if its mask has an outline along which less
+/// moves differently than along that of the hints alone, the hints alone decide, and a warning says so; so it is
+/// with any hints if there are too few frames.
+///
+/// # Errors
+/// [`MaskError::FewFrames`] without hints; otherwise as [`segment`].
+pub fn segment_turn(
+    frame: &RgbImage,
+    turn: &TurnStatistics,
+    hints: Option<&Hints>,
+    settings: &SegmentSettings,
+) -> Result<Mask, MaskError> {
+    segment_with(frame, Some(turn), hints, settings, Effort::Fine)
+}
+
+/// [`segment_turn`], or [`segment`] without a turn, with more or less effort.
+///
+/// # Errors
+/// As these; [`MaskError::NoHints`] with neither turn nor hints.
+pub fn segment_with(
+    frame: &RgbImage,
+    turn: Option<&TurnStatistics>,
+    hints: Option<&Hints>,
+    settings: &SegmentSettings,
+    effort: Effort,
+) -> Result<Mask, MaskError> {
+    let Some(turn) = turn else {
+        let hints = hints.ok_or(MaskError::NoHints)?;
+        return by_hints(frame, hints, settings, effort);
+    };
+    let size = frame.dimensions();
+    check_size(size)?;
+    let by_turn = match turn::segment(frame, turn, hints, settings.iterations, effort) {
+        Ok(by_turn) => by_turn,
+        Err(error) => {
+            let Some(hints) = hints else {
+                return Err(error);
+            };
+            let why = error.to_string();
+            let mask = by_hints(frame, hints, settings, effort)?;
+            return Ok(mask.with_warning(Some(Warning::TurnDropped { why })));
+        }
+    };
+    let rect = hints
+        .and_then(Hints::rect)
+        .and_then(|rect| rect.clipped_to(size.0, size.1));
+    if let (Some(hints), Some(_)) = (hints, rect)
+        && let Ok(other) = by_hints(frame, hints, settings, effort)
+        && let Some(why) = misled(turn, &by_turn, &other)
+    {
+        return Ok(other.with_warning(Some(Warning::TurnDropped { why })));
+    }
+    let still = (!turn.moves()).then_some(Warning::NothingMoves);
+    let mask = finish(&by_turn, size, hints, rect, settings, FILLED_OF_TURN)?;
+    Ok(mask.with_warning(still))
+}
+
+fn by_hints(
+    frame: &RgbImage,
+    hints: &Hints,
+    settings: &SegmentSettings,
+    effort: Effort,
+) -> Result<Mask, MaskError> {
+    let size = frame.dimensions();
+    check_size(size)?;
+    let InitialLabels {
+        mut labels,
+        first,
+        rect,
+    } = InitialLabels::new(hints, size)?;
+    pyramid::segment(frame, &mut labels, first, settings.iterations, effort)?;
+    let raw = Bitmap::new(size, labels.iter().map(|label| label.is_object()));
+    drop(labels);
+    finish(&raw, size, Some(hints), rect, settings, FILLED_OF_FRAME)
+}
+
+/// Why the turn's mask is worse than that of the hints alone; none if it is not.
+fn misled(turn: &TurnStatistics, by_turn: &Bitmap, by_hints: &Mask) -> Option<String> {
+    let size = by_hints.image.dimensions();
+    let object = by_hints.image.as_raw().iter().map(|&level| level >= 128);
+    let object = Bitmap::new(size, object);
+    let (of_turn, of_hints) = (turn.outline(by_turn), turn.outline(&object));
+    (of_turn < LEAST_OF_HINTS * of_hints).then(|| {
+        format!(
+            "its outline follows what moves less well ({of_turn:.2}) than that of the hints alone ({of_hints:.2})"
+        )
+    })
+}
+
+fn finish(
+    raw: &Bitmap,
+    size: (u32, u32),
+    hints: Option<&Hints>,
+    rect: Option<Rect>,
+    settings: &SegmentSettings,
+    fill_to: f64,
+) -> Result<Mask, MaskError> {
+    let seeds = hints.and_then(Hints::seeds);
+    let cleaned = cleanup::clean(raw, seeds, settings.keep_all, fill_to);
+    Ok(Mask {
+        image: cleanup::soften(&cleaned.mask, size, settings.feather),
+        statistics: MaskStatistics {
+            area_px: cleaned.mask.count(),
+            bounding_box: cleaned.mask.bounds(),
+            components: cleaned.components,
+            components_kept: cleaned.kept,
+            holes_filled_px: cleaned.holes.iter().map(|hole| hole.area).sum(),
+        },
+        warnings: warning::warnings(hints, rect, &cleaned, size),
+    })
+}
+
+fn check_size((width, height): (u32, u32)) -> Result<(), MaskError> {
+    if width.min(height) < MIN_SIDE {
+        return Err(MaskError::FrameTooSmall { width, height });
+    }
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return Err(MaskError::FrameTooLarge { width, height });
+    }
+    Ok(())
+}

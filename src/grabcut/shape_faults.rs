@@ -1,0 +1,77 @@
+//! What is wrong with a mask's shape, as sentences.
+
+use super::{Region, ShapeCheck};
+
+/// Parts of the mask that are background, of the object that are not in it, or holes in it may have this
+/// share of its area, where all of the turn is looked at.
+const MOST_REGION: f64 = 0.01;
+/// The same of a look at a few frames, which takes shadows for parts of the object.
+const MOST_REGION_OF_A_LOOK: f64 = 0.03;
+/// The mask's outline follows what moves at least so well, compared with the turn's own.
+const LEAST_OUTLINE: f32 = 0.85;
+/// Where it follows it better than the turn's own, differences are the turn's mistakes.
+const BETTER_OUTLINE: f32 = 1.05;
+/// Regions that are named.
+const NAMED: usize = 3;
+
+impl ShapeCheck {
+    /// Why the mask is not that of the object, one sentence each; empty if it is. For a turn that was looked
+    /// at as a whole.
+    #[must_use]
+    pub fn faults(&self) -> Vec<String> {
+        faults(self, MOST_REGION)
+    }
+
+    /// [`Self::faults`] of a turn of which only a few frames were looked at.
+    #[must_use]
+    pub fn faults_at_a_look(&self) -> Vec<String> {
+        faults(self, MOST_REGION_OF_A_LOOK)
+    }
+}
+
+fn faults(shape: &ShapeCheck, most_region: f64) -> Vec<String> {
+    if shape.outline > BETTER_OUTLINE * shape.outline_of_turn {
+        return Vec::new();
+    }
+    let mut faults = Vec::new();
+    if shape.outline < LEAST_OUTLINE * shape.outline_of_turn {
+        faults.push(format!(
+            "the mask's outline does not follow what moves differently ({:.2}; the turn's own {:.2}): make it again, with --auto or --edit",
+            shape.outline, shape.outline_of_turn
+        ));
+    }
+    let area = shape.area_px as f64;
+    let named = [
+        (&shape.leaks, "background in the mask", "mark it black"),
+        (&shape.missing, "object outside the mask", "mark it white"),
+        (
+            &shape.holes,
+            "holes in the mask where there is object",
+            "mark them white",
+        ),
+    ];
+    for (regions, what, remedy) in named {
+        let px: u64 = regions.iter().map(|region| region.px).sum();
+        if px as f64 > most_region * area {
+            faults.push(format!(
+                "{what}, {px} pixels ({:.1} % of it), at {}: {remedy}, in --edit or in seeds",
+                100.0 * px as f64 / area,
+                places(regions)
+            ));
+        }
+    }
+    faults
+}
+
+fn places(regions: &[Region]) -> String {
+    let named: Vec<String> = regions
+        .iter()
+        .take(NAMED)
+        .map(|region| region.bounds.to_string())
+        .collect();
+    let more = regions.len().saturating_sub(NAMED);
+    match more {
+        0 => named.join(" and "),
+        _ => format!("{} and {more} more", named.join(", ")),
+    }
+}

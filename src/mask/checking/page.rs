@@ -1,0 +1,180 @@
+//! The page about a mask: verdict, figures, the drift over the turn, and the worst frames. One file without
+//! scripts that loads nothing.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use image::GrayImage;
+use image::codecs::jpeg::JpegEncoder;
+use relit_grabcut::{MaskError, preview};
+use relit_video::Video;
+
+use super::super::{MaskFiles, MaskingError};
+use super::{FrameDrift, MaskReport, Verdict, cropped, surroundings};
+
+/// JPEG quality of the frames, 1 to 100.
+const QUALITY: u8 = 85;
+/// Size of the plot, units.
+const PLOT: (f32, f32) = (800.0, 160.0);
+/// The plot reaches at least so high, pixels of drift.
+const LEAST_HEIGHT: f32 = 2.0;
+
+const STYLE: &str = "body{font:16px/1.4 system-ui,sans-serif;max-width:56rem;margin:1rem auto;padding:0 1rem;color:#1b1e24}\
+h1{font-size:1.2rem}.verdict{font-weight:700}.fits{color:#13703a}.drifts,.unknown{color:#96550a}.wrong{color:#b3261e}\
+table{border-collapse:collapse}td{padding:.1rem 1rem .1rem 0;font-variant-numeric:tabular-nums}\
+svg{width:100%;height:auto;background:#f4f5f7}figure{display:inline-block;margin:.3rem;vertical-align:top}img{max-width:26rem;width:100%}";
+
+/// Where the page about a mask is written.
+pub(super) fn path(files: &MaskFiles) -> PathBuf {
+    let mut name = files.mask.file_stem().unwrap_or_default().to_owned();
+    name.push("-check.html");
+    files.mask.with_file_name(name)
+}
+
+pub(super) fn page(
+    id: &str,
+    report: &MaskReport,
+    drifts: &[FrameDrift],
+    shown: &[u64],
+    video: &Video,
+    mask: &GrayImage,
+) -> Result<String, MaskingError> {
+    let (word, class) = match report.verdict {
+        Verdict::Fits => ("The mask fits.", "fits"),
+        Verdict::Drifts => ("The object moves beside the mask.", "drifts"),
+        Verdict::Wrong => ("The mask is not that of the object.", "wrong"),
+        Verdict::Unknown => ("Nothing can be said about the mask.", "unknown"),
+    };
+    let id = escaped(id);
+    let reasons: String = report
+        .reasons
+        .iter()
+        .map(|reason| format!("<li>{}</li>", escaped(reason)))
+        .collect();
+    let frames = figures(drifts, shown, video, mask)?;
+    Ok(format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
+         <title>The mask of {id}</title><style>{STYLE}</style></head><body>\n<h1>The mask of {id}</h1>\n\
+         <p class=\"verdict {class}\">{word}</p>\n<ul>{reasons}</ul>\n<table>{}</table>\n\
+         <h2>Drift over the turn, pixels</h2>\n{}\n<h2>The mask's own frame, and the worst ones</h2>\n{frames}</body></html>\n",
+        table(report),
+        plot(drifts, video.frames().len()),
+    ))
+}
+
+fn escaped(text: &str) -> String {
+    let text = text.replace('&', "&amp;");
+    text.replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+fn table(report: &MaskReport) -> String {
+    let mut rows = Vec::new();
+    if let Some(drift) = &report.drift {
+        let most = drift.most;
+        rows.push(("Drift, median", format!("{:.2} px", drift.median_px)));
+        rows.push((
+            "Drift, 95 % of frames below",
+            format!("{:.2} px", drift.p95_px),
+        ));
+        rows.push((
+            "Drift, largest",
+            format!("{:.2} px in frame {}", most.px(), most.frame),
+        ));
+        rows.push((
+            "Frames",
+            format!(
+                "{}, and {} in which the object was not found",
+                drift.frames, drift.unsure
+            ),
+        ));
+    }
+    if let Some(shape) = &report.shape {
+        let sum =
+            |regions: &[relit_grabcut::Region]| regions.iter().map(|region| region.px).sum::<u64>();
+        rows.push((
+            "The turn's own mask, intersection over union",
+            format!("{:.3}", shape.iou),
+        ));
+        rows.push((
+            "Distance of the outlines, median and 95 %",
+            format!("{:.1} and {:.1} px", shape.edge_px[0], shape.edge_px[1]),
+        ));
+        rows.push((
+            "Outline along what moves, this and the turn's",
+            format!("{:.2} and {:.2}", shape.outline, shape.outline_of_turn),
+        ));
+        rows.push((
+            "Background in the mask",
+            format!("{} px", sum(&shape.leaks)),
+        ));
+        rows.push((
+            "Object outside the mask",
+            format!("{} px", sum(&shape.missing)),
+        ));
+        rows.push(("Holes in the object", format!("{} px", sum(&shape.holes))));
+    }
+    let row = |(name, value): (&str, String)| format!("<tr><td>{name}</td><td>{value}</td></tr>");
+    rows.into_iter().map(row).collect()
+}
+
+/// Drift over the frames as a line.
+fn plot(drifts: &[FrameDrift], frames: usize) -> String {
+    let (width, height) = PLOT;
+    let most = drifts
+        .iter()
+        .map(FrameDrift::px)
+        .fold(LEAST_HEIGHT, f32::max);
+    let last = frames.saturating_sub(1).max(1) as f32;
+    let mut points = String::new();
+    for drift in drifts {
+        let (x, y) = (
+            drift.frame as f32 / last * width,
+            height - drift.px() / most * height,
+        );
+        // Writing to a string does not fail.
+        let _ = write!(points, "{x:.1},{y:.1} ");
+    }
+    let level = height - height / most;
+    format!(
+        "<svg viewBox=\"0 -4 {width} {}\" role=\"img\" aria-label=\"Drift over the frames\">\
+         <path d=\"M0 {level:.1}H{width}\" stroke=\"#9aa3b2\" stroke-dasharray=\"4 4\"/>\
+         <text x=\"4\" y=\"{:.1}\" font-size=\"12\" fill=\"#5a6270\">1 px</text>\
+         <polyline points=\"{points}\" fill=\"none\" stroke=\"#b3261e\" stroke-width=\"1.2\"/></svg>",
+        height + 8.0,
+        level - 4.0,
+    )
+}
+
+fn figures(
+    drifts: &[FrameDrift],
+    shown: &[u64],
+    video: &Video,
+    mask: &GrayImage,
+) -> Result<String, MaskingError> {
+    let part = surroundings(mask);
+    let mut figures = String::new();
+    for &number in shown {
+        let picture = cropped(&preview(&video.frame(number)?, mask), part);
+        let mut jpeg = Vec::new();
+        JpegEncoder::new_with_quality(&mut jpeg, QUALITY)
+            .encode_image(&picture)
+            .map_err(|source| MaskError::Encode {
+                what: "a frame",
+                source,
+            })?;
+        let drift = drifts.iter().find(|drift| drift.frame == number);
+        let drift = drift.map_or("object not found".to_owned(), |drift| {
+            format!("{:.2} px", drift.px())
+        });
+        let _ = writeln!(
+            figures,
+            "<figure><img alt=\"Frame {number} with the mask's outline\" src=\"data:image/jpeg;base64,{}\"><figcaption>Frame {number}: {drift}</figcaption></figure>",
+            STANDARD.encode(jpeg)
+        );
+    }
+    Ok(figures)
+}

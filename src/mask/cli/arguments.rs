@@ -1,0 +1,210 @@
+//! The command line of relit-mask.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::error::ErrorKind;
+use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand};
+use relit_data::geometry::Rect;
+use relit_grabcut::{Drawing, Feather, Iterations, SegmentSettings};
+use relit_mask::{MaskFiles, MaskRequest, MaskingError, read_seeds};
+
+const EXAMPLES: &str = "\
+Examples:
+  relit-mask 20261120T093015Z-mug --auto
+  relit-mask 20261120T093015Z-mug --rect 610,240,420,380
+  relit-mask 20261120T093015Z-mug --edit
+  relit-mask clip.mp4 --seeds seeds.png --frame 30 -o masks/mug.png
+  relit-mask sessions/ --rect 610,240,420,380 --keep-all
+  relit-mask check 20261120T093015Z-mug
+  relit-mask bench images/
+
+Check mask-preview.png afterwards. Exit codes: 0 all masks made, 1 none, 2 wrong usage, \
+3 some recordings have no mask.";
+
+/// Find the object in one frame of a recording; writes mask.png, mask.json and mask-preview.png.
+#[derive(Debug, Parser)]
+#[command(
+    name = "relit-mask",
+    version,
+    after_help = EXAMPLES,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true
+)]
+pub(crate) struct CommandLine {
+    #[command(subcommand)]
+    pub(crate) verb: Option<Verb>,
+    #[command(flatten)]
+    pub(crate) mask: Option<MaskArguments>,
+}
+
+/// What is done other than making masks.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Verb {
+    /// Hold the mask of a recording against all its frames; writes NAME-check.html beside it
+    #[command(
+        after_help = "Example:\n  relit-mask check 20261120T093015Z-mug\n\nExit codes: 0 the mask fits, 1 it does not or could not be checked."
+    )]
+    Check {
+        /// A session folder, a folder of sessions, or a video
+        #[arg(value_name = "SESSION")]
+        input: PathBuf,
+        /// The mask [default: mask.png in the session folder, or here]
+        #[arg(long, value_name = "PNG")]
+        mask: Option<PathBuf>,
+        /// Print one JSON line per event on standard output
+        #[arg(long)]
+        json: bool,
+    },
+    #[cfg(feature = "opencv")]
+    /// Measure masks of images with truth, and OpenCV's GrabCut beside them
+    #[command(after_help = "Example:\n  relit-mask bench images/")]
+    Bench {
+        /// A folder with NAME.jpg, NAME.gt.png, and NAME.box.txt or NAME.scribble.png for each image
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+        /// Measure also our masks cut at each image's own size, which coarse to fine comes close to
+        #[arg(long)]
+        whole: bool,
+        /// Print one JSON line per event on standard output
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// What mask is to be made.
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("hint").args(["rect", "seeds", "auto", "edit", "recipe"]).required(true).multiple(true))]
+pub(crate) struct MaskArguments {
+    /// A session folder, a folder of sessions (each gets a mask with the same hints), or a video
+    #[arg(value_name = "INPUT")]
+    pub(crate) input: PathBuf,
+
+    /// A rectangle that contains the whole object, in pixels of the frame
+    #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true)]
+    rect: Option<Rect>,
+
+    /// An image of the frame's size: white is object, black is background, the rest is unknown
+    #[arg(long, value_name = "PNG")]
+    seeds: Option<PathBuf>,
+
+    /// Find the object by what stands still while the turntable turns; alone or with --rect or --seeds
+    #[arg(long)]
+    auto: bool,
+
+    /// Draw the hints on a page in the browser, which begins with the other hints
+    #[arg(long)]
+    pub(crate) edit: bool,
+
+    /// Address and port at which the page is served; port 0 is any free one
+    #[arg(
+        long,
+        value_name = "ADDRESS:PORT",
+        default_value = "127.0.0.1:0",
+        requires = "edit"
+    )]
+    pub(crate) listen: SocketAddr,
+
+    /// The number of the frame to make the mask on, from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    frame: u64,
+
+    /// Number of GrabCut's iterations
+    #[arg(long, value_name = "N", default_value = "5", value_parser = iterations)]
+    iterations: Iterations,
+
+    /// Keep every connected part, not only the largest
+    #[arg(long)]
+    keep_all: bool,
+
+    /// Width of a soft edge in pixels; 0 is a hard edge
+    #[arg(long, value_name = "PX", default_value = "0", value_parser = feather)]
+    feather: Feather,
+
+    /// Write also how much of each pixel is object: alpha.png beside mask.png
+    #[arg(long)]
+    alpha: bool,
+
+    /// The mask's file name, ending in .png [default: mask.png in the session folder, or here]
+    #[arg(short, long, value_name = "PNG", value_parser = output)]
+    pub(crate) output: Option<MaskFiles>,
+
+    /// Replace a mask that was painted or changed by hand
+    #[arg(long)]
+    force: bool,
+
+    /// Make the mask again that this mask.json describes, to the same bytes
+    #[arg(long, value_name = "JSON", conflicts_with_all =
+        ["rect", "seeds", "auto", "frame", "iterations", "keep_all", "feather", "alpha"])]
+    recipe: Option<PathBuf>,
+
+    /// Print one JSON line per event on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl MaskArguments {
+    /// The requested mask.
+    ///
+    /// # Errors
+    /// If seeds or recipe cannot be read.
+    pub(crate) fn request(&self) -> Result<MaskRequest, MaskingError> {
+        let request = match &self.recipe {
+            Some(path) => MaskRequest::from_recipe(path)?,
+            None => {
+                let drawing = Drawing {
+                    rect: self.rect,
+                    seeds: self.seeds.as_deref().map(read_seeds).transpose()?,
+                    ..Drawing::default()
+                };
+                match self.auto {
+                    true => MaskRequest::auto(self.frame, drawing, self.settings()),
+                    false => MaskRequest::new(self.frame, drawing, self.settings()),
+                }
+            }
+        };
+        Ok(request.with_force(self.force))
+    }
+
+    /// Refuses one name, or one page, for the masks of several recordings.
+    ///
+    /// # Errors
+    /// A usage error, ready to be printed.
+    pub(crate) fn check_recordings(&self, recordings: usize) -> Result<(), clap::Error> {
+        let input = self.input.display();
+        let text = match (self.edit, &self.output) {
+            _ if recordings == 1 => return Ok(()),
+            (true, _) => format!(
+                "--edit shows one recording, but {input} holds {recordings}: name one of them"
+            ),
+            (false, Some(_)) => format!(
+                "-o names one mask, but {input} holds {recordings} recordings: leave it out, and each gets its mask.png"
+            ),
+            (false, None) => return Ok(()),
+        };
+        Err(CommandLine::command().error(ErrorKind::ArgumentConflict, text))
+    }
+
+    fn settings(&self) -> SegmentSettings {
+        SegmentSettings {
+            iterations: self.iterations,
+            keep_all: self.keep_all,
+            feather: self.feather,
+            alpha: self.alpha,
+        }
+    }
+}
+
+fn iterations(text: &str) -> Result<Iterations, String> {
+    let count = text.parse().map_err(|_| "not a whole number".to_owned())?;
+    Iterations::new(count).map_err(|error| error.to_string())
+}
+
+fn feather(text: &str) -> Result<Feather, String> {
+    let px = text.parse().map_err(|_| "not a whole number".to_owned())?;
+    Feather::new(px).map_err(|error| error.to_string())
+}
+
+fn output(text: &str) -> Result<MaskFiles, MaskingError> {
+    MaskFiles::of(text.as_ref())
+}

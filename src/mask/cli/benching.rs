@@ -1,0 +1,145 @@
+//! `relit-mask bench`: figures over a folder of images with truth, as a table or JSON lines.
+
+use std::path::Path;
+
+use relit_console::{Console, Outcome};
+use relit_grabcut::MaskScore;
+use relit_mask::{BenchRow, MaskingError, Prompt, bench_image, bench_images};
+use serde_json::{Value, json};
+
+/// An image counts as worse if its IoU is lower by more than this.
+const WORSE_BY: f64 = 0.02;
+
+/// Measures every image, and prints a line for each and one for the average.
+pub(crate) fn run(console: Console, folder: &Path, whole: bool) -> Result<Outcome, MaskingError> {
+    let images = bench_images(folder)?;
+    let bar = console.progress(images.len() as u64, "images");
+    bar.suspend(|| print_head(console));
+    let mut rows = Vec::new();
+    for image in &images {
+        for row in bench_image(image, whole)? {
+            bar.suspend(|| print_row(console, &row));
+            rows.push(row);
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    for prompt in [Prompt::Box, Prompt::Scribble] {
+        print_average(console, prompt, &rows);
+    }
+    Ok(match rows.is_empty() {
+        true => Outcome::Wrong,
+        false => Outcome::Whole,
+    })
+}
+
+fn print_head(console: Console) {
+    let text = format!(
+        "{:<24} {:<8}  {:^26}  {:^26}\n{:<24} {:<8}  {:>8} {:>8} {:>8}  {:>8} {:>8} {:>8}",
+        "",
+        "",
+        "relit-mask",
+        "OpenCV's GrabCut",
+        "image",
+        "hint",
+        "error %",
+        "IoU",
+        "F 2 px",
+        "error %",
+        "IoU",
+        "F 2 px",
+    );
+    console.say(
+        &text,
+        &json!({ "event": "bench", "tolerance_px": relit_grabcut::BOUNDARY_TOLERANCE_PX }),
+    );
+}
+
+fn print_row(console: Console, row: &BenchRow) {
+    let mut text = line(&row.image, row.prompt, &row.ours, &row.opencv);
+    if let Some(whole) = &row.whole {
+        text += &format!("  cut whole: IoU {:.3}", whole.iou);
+    }
+    let event = json!({
+        "event": "image",
+        "image": row.image,
+        "hint": row.prompt.name(),
+        "ours": figures(&row.ours),
+        "opencv": figures(&row.opencv),
+        "whole": row.whole.as_ref().map(figures),
+    });
+    console.say(&text, &event);
+}
+
+fn print_average(console: Console, prompt: Prompt, rows: &[BenchRow]) {
+    let rows: Vec<&BenchRow> = rows.iter().filter(|row| row.prompt == prompt).collect();
+    if rows.is_empty() {
+        return;
+    }
+    let ours = average(rows.iter().map(|row| row.ours));
+    let opencv = average(rows.iter().map(|row| row.opencv));
+    let is_worse = |row: &&&BenchRow| row.ours.iou < row.opencv.iou - WORSE_BY;
+    let worse: Vec<&str> = rows
+        .iter()
+        .filter(is_worse)
+        .map(|row| &*row.image)
+        .collect();
+    let ratio = ours.error / opencv.error.max(f64::MIN_POSITIVE);
+    let mut text = line("average", prompt, &ours, &opencv);
+    text += &format!(
+        "\n{:<24} {:<8}  error {ratio:.2} x OpenCV's; ",
+        "",
+        prompt.name()
+    );
+    text += &match worse.len() {
+        0 => "no image is worse by more than 2 points of IoU".to_owned(),
+        _ => format!("worse by more than 2 points of IoU: {}", worse.join(", ")),
+    };
+    let whole: Vec<MaskScore> = rows.iter().filter_map(|row| row.whole).collect();
+    let whole = (!whole.is_empty()).then(|| average(whole.iter().copied()));
+    if let Some(whole) = &whole {
+        let points = 100.0 * (ours.iou - whole.iou);
+        text += &format!(
+            "\n{:<24} {:<8}  {points:+.2} points of IoU against masks cut whole",
+            "",
+            prompt.name()
+        );
+    }
+    let event = json!({
+        "event": "average",
+        "hint": prompt.name(),
+        "images": rows.len(),
+        "ours": figures(&ours),
+        "opencv": figures(&opencv),
+        "whole": whole.as_ref().map(figures),
+        "error_ratio": ratio,
+        "worse": worse,
+    });
+    console.say(&text, &event);
+}
+
+fn line(name: &str, prompt: Prompt, ours: &MaskScore, opencv: &MaskScore) -> String {
+    let [ours, opencv] = [ours, opencv].map(|score| {
+        format!(
+            "{:>8.2} {:>8.3} {:>8.3}",
+            100.0 * score.error,
+            score.iou,
+            score.boundary_f
+        )
+    });
+    format!("{name:<24} {:<8}  {ours}  {opencv}", prompt.name())
+}
+
+fn figures(score: &MaskScore) -> Value {
+    json!({ "error": score.error, "iou": score.iou, "boundary_f": score.boundary_f })
+}
+
+fn average(scores: impl ExactSizeIterator<Item = MaskScore> + Clone) -> MaskScore {
+    let count = scores.len() as f64;
+    let mean = |of: fn(&MaskScore) -> f64| scores.clone().map(|s| of(&s)).sum::<f64>() / count;
+    MaskScore {
+        error: mean(|score| score.error),
+        iou: mean(|score| score.iou),
+        boundary_f: mean(|score| score.boundary_f),
+    }
+}

@@ -1,0 +1,69 @@
+//! `relit-mask check`: a mask against all frames of its recording.
+
+use std::path::Path;
+
+use relit_console::{Console, Outcome};
+use relit_data::session::recordings;
+use relit_mask::{CheckOutput, MaskingError, Verdict, check_mask};
+use serde_json::json;
+
+/// Checks the mask of every recording, and prints a line and the reasons for each.
+pub(crate) fn run(
+    console: Console,
+    input: &Path,
+    mask: Option<&Path>,
+) -> Result<Outcome, MaskingError> {
+    let mut outcome = Outcome::Whole;
+    let paths = recordings(input)?;
+    for path in &paths {
+        let bar = console.progress(0, "frames");
+        let checked = check_mask(path, mask, &|done, all| {
+            bar.set_length(all);
+            bar.set_position(done);
+        });
+        bar.finish_and_clear();
+        match checked {
+            Ok(output) => {
+                print(&output, console);
+                if output.report.verdict != Verdict::Fits {
+                    outcome = Outcome::Wrong;
+                }
+            }
+            Err(error) if paths.len() == 1 => return Err(error),
+            Err(error) => {
+                console.error(&error);
+                outcome = Outcome::Wrong;
+            }
+        }
+    }
+    Ok(outcome)
+}
+
+fn print(output: &CheckOutput, console: Console) {
+    let (id, report) = (&output.recording, &output.report);
+    let word = match report.verdict {
+        Verdict::Fits => "the mask fits",
+        Verdict::Drifts => "the object moves beside the mask",
+        Verdict::Wrong => "the mask is not that of the object",
+        Verdict::Unknown => "nothing can be said about the mask",
+    };
+    let drift = report.drift.as_ref().map_or(String::new(), |drift| {
+        format!(
+            "; drift {:.2} px in the median, {:.2} px at most (frame {})",
+            drift.median_px,
+            drift.most.px(),
+            drift.most.frame
+        )
+    });
+    let mut text = format!("{id}: {word}{drift}; see {}", output.page.display());
+    for reason in &report.reasons {
+        text += &format!("\n  {reason}");
+    }
+    let event = json!({
+        "event": "check",
+        "recording": id,
+        "page": output.page.to_string_lossy(),
+        "report": report,
+    });
+    console.say(&text, &event);
+}

@@ -1,0 +1,43 @@
+//! `relit-mask`: finds the object in recordings.
+
+mod arguments;
+#[cfg(feature = "opencv")]
+mod benching;
+mod checking;
+mod making;
+mod report;
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser};
+use relit_console::Console;
+
+use arguments::{CommandLine, Verb};
+
+fn main() -> ExitCode {
+    let line = CommandLine::parse();
+    match (line.verb, line.mask) {
+        (Some(Verb::Check { input, mask, json }), _) => {
+            let console = Console::new(json);
+            console.finish(checking::run(console, &input, mask.as_deref()))
+        }
+        #[cfg(feature = "opencv")]
+        (
+            Some(Verb::Bench {
+                folder,
+                whole,
+                json,
+            }),
+            _,
+        ) => {
+            let console = Console::new(json);
+            console.finish(benching::run(console, &folder, whole))
+        }
+        (None, Some(arguments)) => making::run(&arguments),
+        (None, None) => {
+            // Nothing can be done if standard output is closed.
+            let _ = CommandLine::command().print_help();
+            ExitCode::from(2)
+        }
+    }
+}

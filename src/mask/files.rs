@@ -1,0 +1,185 @@
+//! The files of a mask: their names, and which of those that exist may be replaced.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use relit_data::durable;
+
+use super::{MaskRecord, MaskingError};
+
+/// The paths of a mask's three files.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MaskFiles {
+    /// The mask.
+    pub mask: PathBuf,
+    /// Its record.
+    pub record: PathBuf,
+    /// The preview.
+    pub preview: PathBuf,
+    /// The share of the object in each pixel; written only if the settings ask for it.
+    pub alpha: PathBuf,
+}
+
+impl MaskFiles {
+    /// The files of the mask `mask`, whose name must end in `.png`.
+    ///
+    /// # Errors
+    /// [`MaskingError::OutputName`].
+    pub fn of(mask: &Path) -> Result<Self, MaskingError> {
+        let is_png = mask
+            .extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
+        match mask.file_stem() {
+            Some(stem) if is_png => {
+                let mut preview = stem.to_owned();
+                preview.push("-preview.png");
+                let mut alpha = stem.to_owned();
+                alpha.push("-alpha.png");
+                if stem == "mask" {
+                    alpha = "alpha.png".into();
+                }
+                Ok(Self {
+                    mask: mask.to_owned(),
+                    record: mask.with_extension("json"),
+                    preview: mask.with_file_name(preview),
+                    alpha: mask.with_file_name(alpha),
+                })
+            }
+            _ => Err(MaskingError::OutputName(mask.to_owned())),
+        }
+    }
+}
+
+/// Checks that existing files may be replaced; `with_alpha`: also the soft mask.
+pub(super) fn check_replaceable(
+    files: &MaskFiles,
+    force: bool,
+    with_alpha: bool,
+) -> Result<(), MaskingError> {
+    check_folder(&files.mask)?;
+    let record = read_record(files)?;
+    if force {
+        return Ok(());
+    }
+    let made_alpha = record.as_ref().is_some_and(|record| record.settings.alpha);
+    if with_alpha && !made_alpha && files.alpha.exists() {
+        return Err(MaskingError::Handmade(files.alpha.clone()));
+    }
+    let Some(mask) = read_if_exists(&files.mask)? else {
+        return Ok(());
+    };
+    let found = blake3::hash(&mask).to_hex();
+    match record {
+        Some(record) if record.result.mask_blake3 == found.as_str() => Ok(()),
+        _ => Err(MaskingError::Handmade(files.mask.clone())),
+    }
+}
+
+/// Said before anybody works on a mask that cannot be kept.
+fn check_folder(mask: &Path) -> Result<(), MaskingError> {
+    match mask.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => {
+            fs::read_dir(folder).map_err(MaskingError::io(folder, "written to"))?;
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+fn read_record(files: &MaskFiles) -> Result<Option<MaskRecord>, MaskingError> {
+    let Some(bytes) = read_if_exists(&files.record)? else {
+        return Ok(None);
+    };
+    let record = MaskRecord::from_json(&bytes).map_err(|fault| MaskingError::ForeignFile {
+        path: files.record.clone(),
+        why: fault.to_string(),
+    })?;
+    Ok(Some(record))
+}
+
+/// Whether the mask that is there was written with its soft form, which belongs to no other mask.
+pub(super) fn has_alpha(files: &MaskFiles) -> Result<bool, MaskingError> {
+    Ok(read_record(files)?.is_some_and(|record| record.settings.alpha))
+}
+
+/// Removes a file if it is there.
+pub(super) fn remove(path: &Path) -> Result<(), MaskingError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(MaskingError::io(path, "removed")(error))
+        }
+        _ => Ok(()),
+    }
+}
+
+pub(super) fn read_if_exists(path: &Path) -> Result<Option<Vec<u8>>, MaskingError> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(MaskingError::io(path, "read")(error)),
+    }
+}
+
+pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), MaskingError> {
+    durable::write_whole(path, bytes).map_err(MaskingError::io(path, "written"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn record_and_preview_are_named_after_the_mask() {
+        let files = MaskFiles::of(Path::new("a/mug.v2.PNG")).unwrap();
+        assert_eq!(files.record, Path::new("a/mug.v2.json"));
+        assert_eq!(files.preview, Path::new("a/mug.v2-preview.png"));
+        assert_eq!(files.alpha, Path::new("a/mug.v2-alpha.png"));
+        let files = MaskFiles::of(Path::new("a/mask.png")).unwrap();
+        assert_eq!(files.alpha, Path::new("a/alpha.png"));
+    }
+
+    #[test]
+    fn the_name_of_a_mask_must_end_in_png() {
+        for name in ["mask", "mask.jpg", "session.json", ".png", ""] {
+            let files = MaskFiles::of(Path::new(name));
+            assert!(matches!(files, Err(MaskingError::OutputName(_))), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_not_a_record_is_never_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = MaskFiles::of(&folder.path().join("session.png")).unwrap();
+        fs::write(&files.record, r#"{"schema": "relit.session/1"}"#).unwrap();
+        let result = check_replaceable(&files, true, false);
+        assert!(matches!(result, Err(MaskingError::ForeignFile { .. })));
+    }
+
+    #[test]
+    fn a_mask_without_record_is_replaced_only_with_force() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = MaskFiles::of(&folder.path().join("mask.png")).unwrap();
+        assert!(check_replaceable(&files, false, false).is_ok());
+        fs::write(&files.mask, "painted").unwrap();
+        assert!(matches!(
+            check_replaceable(&files, false, false),
+            Err(MaskingError::Handmade(_))
+        ));
+        assert!(check_replaceable(&files, true, false).is_ok());
+    }
+
+    #[test]
+    fn a_soft_mask_that_no_record_tells_of_is_replaced_only_with_force() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = MaskFiles::of(&folder.path().join("mask.png")).unwrap();
+        assert!(check_replaceable(&files, false, true).is_ok());
+        fs::write(&files.alpha, "painted").unwrap();
+        assert!(check_replaceable(&files, false, false).is_ok());
+        assert!(matches!(
+            check_replaceable(&files, false, true),
+            Err(MaskingError::Handmade(path)) if path == files.alpha
+        ));
+        assert!(check_replaceable(&files, true, true).is_ok());
+    }
+}

@@ -1,0 +1,357 @@
+//! Masks of images.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test fails by a panic, in its helpers too"
+)]
+
+#[path = "../mask/scene.rs"]
+mod scene;
+
+use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage};
+use proptest::prelude::*;
+use relit_data::geometry::Rect;
+use relit_grabcut::{
+    Feather, Hints, Iterations, MaskError, Seeds, SegmentSettings, Turn, TurnStatistics, Warning,
+    alpha, segment, segment_turn,
+};
+
+use scene::{AROUND, HEIGHT, WIDTH, disc_share, in_disc, seeds_image, strokes};
+
+/// A bright disc of radius 18 around (48, 32) on a dark ground, both with some texture.
+fn disc() -> RgbImage {
+    RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        let noise = ((x * 7 + y * 13) % 11) as u8;
+        if in_disc(x, y) {
+            Rgb([200 + noise, 150 + noise, 60])
+        } else {
+            Rgb([20 + noise, 30, 40 + noise])
+        }
+    })
+}
+
+fn around() -> Hints {
+    Hints::Rect(AROUND.parse().unwrap())
+}
+
+fn seeds(marks: impl Fn(u32, u32) -> u8) -> Seeds {
+    Seeds::from_image(&DynamicImage::from(seeds_image(marks))).unwrap()
+}
+
+#[test]
+fn a_rectangle_finds_the_object_in_it() {
+    let mask = segment(&disc(), &around(), &SegmentSettings::default()).unwrap();
+    assert!(disc_share(mask.image()) > 0.98);
+    assert!(mask.image().pixels().all(|p| p.0[0] == 0 || p.0[0] == 255));
+    assert_eq!(mask.warnings(), []);
+    let figures = mask.statistics();
+    let set = mask.image().pixels().filter(|p| p.0[0] == 255).count();
+    assert_eq!(figures.area_px, set as u64);
+    assert_eq!(figures.components_kept, 1);
+}
+
+#[test]
+fn strokes_alone_find_the_object() {
+    let hints = Hints::Seeds(seeds(strokes));
+    let mask = segment(&disc(), &hints, &SegmentSettings::default()).unwrap();
+    assert!(disc_share(mask.image()) > 0.98);
+}
+
+#[test]
+fn a_stroke_on_the_object_alone_is_enough_on_a_plain_background() {
+    let hints = Hints::Seeds(seeds(|x, y| strokes(x, y).max(128)));
+    let mask = segment(&disc(), &hints, &SegmentSettings::default()).unwrap();
+    assert!(disc_share(mask.image()) > 0.9);
+}
+
+#[test]
+fn seeds_overrule_the_rectangle() {
+    let rect = AROUND.parse().unwrap();
+    let marks = |x, y| {
+        if (30..36).contains(&x) && (20..44).contains(&y) {
+            0
+        } else {
+            strokes(x, y)
+        }
+    };
+    let hints = Hints::Both {
+        rect,
+        seeds: seeds(marks),
+    };
+    let mask = segment(&disc(), &hints, &SegmentSettings::default()).unwrap();
+    assert!((20..44).all(|y| mask.image().get_pixel(33, y).0[0] == 0));
+    assert_eq!(mask.image().get_pixel(48, 31).0[0], 255);
+}
+
+#[test]
+fn the_same_input_gives_the_same_mask() {
+    let make = || {
+        let hints = [around(), Hints::Seeds(seeds(strokes))];
+        hints.map(|hints| {
+            segment(&noisy(), &hints, &SegmentSettings::default())
+                .unwrap()
+                .image()
+                .clone()
+        })
+    };
+    let first = make();
+    for _ in 0..4 {
+        assert_eq!(make(), first);
+    }
+}
+
+/// The disc with noise that makes GrabCut's clusters a matter of chance.
+fn noisy() -> RgbImage {
+    let mut state = 1u32;
+    let mut image = disc();
+    for channel in image.iter_mut() {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        *channel = channel.saturating_add((state >> 26) as u8);
+    }
+    image
+}
+
+#[test]
+fn a_feathered_mask_gives_the_hard_one_back_at_half() {
+    let feathered = SegmentSettings {
+        feather: Feather::new(8).unwrap(),
+        ..SegmentSettings::default()
+    };
+    let hard = segment(&disc(), &around(), &SegmentSettings::default()).unwrap();
+    let soft = segment(&disc(), &around(), &feathered).unwrap();
+    assert!(soft.image().pixels().any(|p| (1..255).contains(&p.0[0])));
+    for (soft, hard) in soft.image().pixels().zip(hard.image().pixels()) {
+        assert_eq!(soft.0[0] >= 128, hard.0[0] == 255);
+    }
+    assert_eq!(soft.statistics(), hard.statistics());
+}
+
+#[test]
+fn hints_that_do_not_fit_the_frame_are_refused_with_a_sentence() {
+    let refused = |hints: Hints| {
+        let error = segment(&disc(), &hints, &SegmentSettings::default()).unwrap_err();
+        assert!(error.to_string().contains(": "), "{error}");
+        error
+    };
+    let rect = |x, y, w, h| Hints::Rect(Rect::new(x, y, w, h));
+    assert!(matches!(
+        refused(rect(96, 0, 5, 5)),
+        MaskError::RectOutside { .. }
+    ));
+    assert!(matches!(
+        refused(rect(-9, -9, 9, 9)),
+        MaskError::RectOutside { .. }
+    ));
+    assert!(matches!(
+        refused(rect(5, 5, 0, 9)),
+        MaskError::RectOutside { .. }
+    ));
+    assert!(matches!(
+        refused(rect(0, 0, 96, 64)),
+        MaskError::NoBackground { .. }
+    ));
+    assert!(matches!(
+        refused(rect(-1, -1, 999, 999)),
+        MaskError::NoBackground { .. }
+    ));
+    assert!(matches!(
+        refused(Hints::Seeds(seeds(|_, _| 255))),
+        MaskError::NoBackground { .. }
+    ));
+    let other = GrayImage::from_pixel(9, 7, Luma([255]));
+    let other = Seeds::from_image(&other.into()).unwrap();
+    let error = refused(Hints::Seeds(other));
+    assert!(error.to_string().contains("9 x 7") && error.to_string().contains("96 x 64"));
+}
+
+#[test]
+fn frames_that_cannot_be_segmented_are_refused() {
+    let tiny = RgbImage::new(15, 400);
+    let result = segment(&tiny, &around(), &SegmentSettings::default());
+    assert!(matches!(
+        result,
+        Err(MaskError::FrameTooSmall { width: 15, .. })
+    ));
+}
+
+#[test]
+fn a_frame_of_one_colour_yields_a_mask_with_a_warning_or_a_refusal() {
+    for level in [0, 128, 255] {
+        let plain = RgbImage::from_pixel(WIDTH, HEIGHT, Rgb([level; 3]));
+        match segment(&plain, &around(), &SegmentSettings::default()) {
+            Ok(mask) => assert!(!mask.warnings().is_empty()),
+            Err(error) => assert!(matches!(error, MaskError::Empty), "{error}"),
+        }
+    }
+}
+
+/// Frame `at` of a turn: the disc on a dark table, before a striped room that passes from left to right,
+/// in a light that changes. Two of the room's colours are the disc's.
+fn turn_frame(at: u32) -> RgbImage {
+    let light = 0.6 + 0.1 * f64::from(at % 5);
+    RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        let room = [[200, 150, 60], [90, 120, 160], [230, 180, 70], [40, 60, 50]];
+        let noise = ((x * 7 + y * 13 + at * 5) % 4) as u8;
+        let lit = |rgb: [u8; 3]| Rgb(rgb.map(|v| (f64::from(v) * light) as u8 + noise));
+        if in_disc(x, y) {
+            lit([210, 160, 60])
+        } else if y >= 44 {
+            lit([22, 22, 24])
+        } else {
+            lit(room[((x + 6 * at) / 12 % 4) as usize])
+        }
+    })
+}
+
+fn statistics(frames: u32) -> TurnStatistics {
+    let mut turn = Turn::new(WIDTH, HEIGHT);
+    (0..frames).for_each(|at| turn.push(&turn_frame(at)));
+    TurnStatistics::new(&turn)
+}
+
+#[test]
+fn a_turn_alone_finds_the_object_before_a_room_of_its_colours() {
+    let settings = SegmentSettings::default();
+    let mask = segment_turn(&turn_frame(0), &statistics(16), None, &settings).unwrap();
+    assert!(
+        disc_share(mask.image()) > 0.95,
+        "{}",
+        disc_share(mask.image())
+    );
+    assert_eq!(mask.warnings(), []);
+}
+
+#[test]
+fn a_turn_of_too_few_frames_leaves_the_decision_to_the_hints_and_says_so() {
+    let settings = SegmentSettings::default();
+    let alone = segment_turn(&turn_frame(0), &statistics(2), None, &settings);
+    assert!(matches!(alone, Err(MaskError::FewFrames { found: 2 })));
+    let mask = segment_turn(&disc(), &statistics(2), Some(&around()), &settings).unwrap();
+    assert!(disc_share(mask.image()) > 0.98);
+    let dropped = |warning: &Warning| matches!(warning, Warning::TurnDropped { .. });
+    assert!(mask.warnings().iter().any(dropped));
+}
+
+#[test]
+fn a_turn_without_any_frame_is_refused() {
+    let settings = SegmentSettings::default();
+    let alone = segment_turn(&turn_frame(0), &statistics(0), None, &settings);
+    assert!(matches!(alone, Err(MaskError::FewFrames { found: 0 })));
+    let other = TurnStatistics::new(&Turn::new(0, 0));
+    assert_eq!(other.frames(), 0);
+}
+
+#[test]
+fn a_video_in_which_nothing_moves_gives_a_warning() {
+    let mut still = Turn::new(WIDTH, HEIGHT);
+    (0..8).for_each(|_| still.push(&disc()));
+    let settings = SegmentSettings::default();
+    let mask = segment_turn(
+        &disc(),
+        &TurnStatistics::new(&still),
+        Some(&around()),
+        &settings,
+    )
+    .unwrap();
+    assert!(disc_share(mask.image()) > 0.95);
+    let nothing = |warning: &Warning| matches!(warning, Warning::NothingMoves);
+    assert!(mask.warnings().iter().any(nothing));
+}
+
+#[test]
+fn a_large_frame_is_cut_along_the_same_edge_as_a_small_one() {
+    let large = image::imageops::resize(
+        &disc(),
+        WIDTH * 8,
+        HEIGHT * 8,
+        image::imageops::FilterType::Nearest,
+    );
+    let hints = Hints::Rect(Rect::new(24 * 8, 8 * 8, 50 * 8, 48 * 8));
+    let mask = segment(&large, &hints, &SegmentSettings::default()).unwrap();
+    let small = GrayImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        *mask.image().get_pixel(8 * x + 4, 8 * y + 4)
+    });
+    assert!(disc_share(&small) > 0.97);
+}
+
+#[test]
+fn the_soft_mask_equals_the_hard_one_away_from_the_edge() {
+    let mask = segment(&disc(), &around(), &SegmentSettings::default()).unwrap();
+    let soft = alpha(&disc(), mask.image());
+    assert_eq!(soft.get_pixel(48, 32).0, [255]);
+    assert_eq!(soft.get_pixel(5, 5).0, [0]);
+}
+
+#[test]
+fn an_object_at_the_border_gives_warnings() {
+    let frame = RgbImage::from_fn(64, 64, |x, y| {
+        let object = x < 30 && (20..40).contains(&y);
+        Rgb(if object {
+            [220, 180, 40]
+        } else {
+            [20, (x % 5) as u8, 60]
+        })
+    });
+    let hints = Hints::Rect(Rect::new(-10, 15, 50, 30));
+    let mask = segment(&frame, &hints, &SegmentSettings::default()).unwrap();
+    let is_border = |w: &Warning| matches!(w, Warning::TouchesBorder { .. });
+    let is_clipped = |w: &Warning| matches!(w, Warning::RectClipped { .. });
+    assert!(mask.warnings().iter().any(is_border));
+    assert!(mask.warnings().iter().any(is_clipped));
+}
+
+prop_compose! {
+    fn any_frame()(width in 1u32..40, height in 1u32..40)
+        (pixels in any_pixels(width * height), width in Just(width), height in Just(height))
+        -> RgbImage {
+        RgbImage::from_raw(width, height, pixels).unwrap()
+    }
+}
+
+/// Noise, or few colours, which make models without spread.
+fn any_pixels(count: u32) -> impl Strategy<Value = Vec<u8>> {
+    let bytes = count as usize * 3;
+    prop_oneof![
+        prop::collection::vec(any::<u8>(), bytes),
+        prop::collection::vec(prop_oneof![Just(0u8), Just(255u8)], bytes),
+        any::<u8>().prop_map(move |level| vec![level; bytes]),
+    ]
+}
+
+fn any_hints(width: u32, height: u32) -> impl Strategy<Value = Option<Hints>> {
+    let rect = (-10i32..50, -10i32..50, 0u32..60, 0u32..60);
+    let rect = prop::option::of(rect.prop_map(Rect::from));
+    let mark = prop_oneof![8 => Just(128u8), 1 => Just(0u8), 1 => Just(255u8)];
+    let marks = prop::collection::vec(mark, (width * height) as usize);
+    (rect, prop::option::of(marks)).prop_map(move |(rect, marks)| {
+        let image = marks.and_then(|marks| GrayImage::from_raw(width, height, marks));
+        let seeds = image.and_then(|image| Seeds::from_image(&image.into()).ok());
+        Hints::from_parts(rect, seeds).ok()
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn no_frame_and_no_hint_make_it_panic(
+        (frame, hints) in any_frame().prop_flat_map(|frame| {
+            let hints = any_hints(frame.width(), frame.height());
+            (Just(frame), hints)
+        }),
+        count in 1u32..4,
+        feather in 0u32..20,
+        keep_all in any::<bool>(),
+    ) {
+        let settings = SegmentSettings {
+            iterations: Iterations::new(count).unwrap(),
+            feather: Feather::new(feather).unwrap(),
+            keep_all,
+            alpha: false,
+        };
+        if let Some(hints) = hints
+            && let Ok(mask) = segment(&frame, &hints, &settings)
+        {
+            prop_assert!(mask.statistics().area_px > 0);
+        }
+    }
+}
