@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::thread::available_parallelism;
 
-use relit_data::image_stats::SATURATION_LEVEL;
+use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{Align, ExtractionSettings, ImageSize, Layout, Task};
 
 use super::{ExtractError, scale};
@@ -27,8 +27,7 @@ pub struct ExtractOptions {
     pub margin: f64,
     /// The 8-bit value from which a channel is saturated.
     pub saturation_level: u8,
-    /// The saturated fraction above which `spec_net` is set, 0..=1 (the paper: 5 %, section on
-    /// Spec-Net).
+    /// The saturated fraction above which `spec_net` is set, 0..=1: [`SPEC_NET_GATE`] by default.
     pub gate: f64,
     /// How samples are stored.
     pub layout: Layout,
@@ -65,7 +64,7 @@ impl Default for ExtractOptions {
             size: ImageSize::Pixels(256),
             margin: 0.05,
             saturation_level: SATURATION_LEVEL,
-            gate: 0.05,
+            gate: SPEC_NET_GATE,
             layout: Layout::Webdataset,
             align: Align::Correct,
             align_tolerance: 0.1,

@@ -66,6 +66,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Once;
 
 use ffmpeg_next::format::context::Input;
+use relit_data::disk::DISK_FULL;
 
 pub use format::{BayerPattern, PixelFormat};
 pub use live::LiveDecoder;
@@ -132,7 +133,7 @@ pub enum VideoError {
     },
     /// The disk is full.
     #[error(
-        "the disk is full: {missing} bytes of what was recorded could not be written to {path}; free some space in {folder}, or record elsewhere",
+        "{DISK_FULL}: {missing} bytes of what was recorded could not be written to {path}; free some space in {folder}, or record elsewhere",
         folder = folder_of(path).display()
     )]
     DiskFull {

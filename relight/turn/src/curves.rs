@@ -1,6 +1,7 @@
 //! Light over the table's angle, one curve a pixel and channel.
 
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
+use relit_data::image_stats::SATURATED_VALUE;
 
 use super::TurnError;
 use super::exposure::{ExposureStep, ExposureWatch};
@@ -9,8 +10,6 @@ use super::light::{HARMONICS, WAVES};
 /// Into how many parts the turn is divided. A part is narrow beside the second harmonic, and its own mean of
 /// the harmonics is known, so that dividing loses nothing.
 const PARTS: usize = 72;
-/// A value from which a channel counts as clipped: 250 of 255, less rounding.
-const CLIPPED_VALUE: f32 = 249.5 / 255.0;
 /// A part of the turn counts for a pixel's channel where at least this part of its frames is not clipped: the mean of
 /// the others would be that of the darker ones.
 const LEAST_SEEN: f32 = 0.95;
@@ -77,7 +76,7 @@ impl CurveBuilder {
         Ok(Self {
             extent,
             places,
-            clipped: Srgb::to_linear(CLIPPED_VALUE),
+            clipped: Srgb::to_linear(SATURATED_VALUE),
             parts: vec![Part::default(); PARTS],
             sums: vec![[0.0; 3]; cells],
             counts: vec![[0; 3]; cells],
@@ -255,7 +254,7 @@ impl TurnCurves {
 
     /// The light from which a channel counts as clipped.
     pub(super) fn clipped_value(&self) -> f64 {
-        f64::from(Srgb::to_linear(CLIPPED_VALUE))
+        f64::from(Srgb::to_linear(SATURATED_VALUE))
     }
 
     /// The part of a pixel's light, 0 to 1, that is left out because it is clipped.

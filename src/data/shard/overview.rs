@@ -11,13 +11,15 @@ use super::settings::ExtractionSettings;
 use super::table::read_table;
 use super::task::read_pieces;
 use crate::causes::with_causes;
+use crate::image_stats::SPEC_NET_GATE;
 
 /// Places of the turn at which a session's saturation is kept.
 const PLACES: usize = 90;
 
 /// The bounds of the classes of `saturated_fraction`: the first class holds exactly 0, each further one what
 /// is above the bound before it and not above its own, the last one what is above the last bound.
-pub const SATURATION_BOUNDS: [f64; 9] = [0.0, 0.001, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
+pub const SATURATION_BOUNDS: [f64; 9] =
+    [0.0, 0.001, 0.005, 0.01, 0.02, SPEC_NET_GATE, 0.1, 0.2, 0.5];
 
 /// Numbers of samples by class of `saturated_fraction`: see [`SATURATION_BOUNDS`].
 pub type SaturationHistogram = [u64; SATURATION_BOUNDS.len() + 1];

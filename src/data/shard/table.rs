@@ -23,7 +23,6 @@ use super::digest::{Digest, HashingReader};
 use super::file::{FileEntry, compare};
 use super::record::FrameRecord;
 use super::{MAX_SAMPLES, ShardError, names};
-use crate::geometry::Rect;
 
 /// One row: the record of a sample and the digests of its files, which allow to attribute damage to
 /// the sample.
@@ -37,94 +36,161 @@ pub struct TableRow {
     pub mask_blake3: Digest,
 }
 
-/// How a column gets its value from a row.
-enum Column {
-    Text(fn(&TableRow) -> String),
-    U32(fn(&TableRow) -> u32),
-    I32(fn(&TableRow) -> i32),
-    U64(fn(&TableRow) -> u64),
-    I64(fn(&TableRow) -> i64),
-    Real(fn(&TableRow) -> f64),
-    MaybeReal(fn(&TableRow) -> Option<f64>),
-    MaybeU64(fn(&TableRow) -> Option<u64>),
-    Flag(fn(&TableRow) -> bool),
+/// A column: its name, and how its value is taken from a row and put into one.
+struct Column {
+    name: &'static str,
+    /// True if tables of earlier versions lack it. It is null then.
+    is_later: bool,
+    kind: Kind,
 }
+
+/// The type of a column's values, and where in a row they are.
+enum Kind {
+    Text(Access<String>),
+    Hash(Access<Digest>),
+    U32(Access<u32>),
+    I32(Access<i32>),
+    U64(Access<u64>),
+    I64(Access<i64>),
+    Real(Access<f64>),
+    MaybeReal(Access<Option<f64>>),
+    MaybeU64(Access<Option<u64>>),
+    Flag(Access<bool>),
+}
+
+/// How a value is taken from a row, and how one is put into it: false where it contradicts what the row has already.
+struct Access<T> {
+    get: fn(&TableRow) -> T,
+    set: fn(&mut TableRow, T) -> bool,
+}
+
+/// `column!(KIND "name": PLACE)` is the column of the value at that place of a row; `KIND?` is one that tables of earlier
+/// versions lack.
+macro_rules! column {
+    ($kind:ident $name:literal: $($place:tt)+) => {
+        column!($kind, $name, false, $($place)+)
+    };
+    ($kind:ident? $name:literal: $($place:tt)+) => {
+        column!($kind, $name, true, $($place)+)
+    };
+    ($kind:ident, $name:literal, $is_later:literal, $($place:tt)+) => {
+        Column {
+            name: $name,
+            is_later: $is_later,
+            kind: Kind::$kind(Access {
+                get: |row| row.$($place)+.to_owned(),
+                set: |row, value| {
+                    row.$($place)+ = value;
+                    true
+                },
+            }),
+        }
+    };
+}
+
+/// All columns, in the order of the file, for writing and for reading.
+const COLUMNS: [Column; 31] = [
+    column!(Text "session": record.session),
+    column!(Text "object": record.object),
+    column!(U32 "index": record.index),
+    column!(U64 "source_frame": record.source_frame),
+    column!(I64 "t_us": record.t_us),
+    column!(MaybeReal "angle_deg": record.angle_deg),
+    column!(Flag "duplicate": record.duplicate),
+    column!(I32 "crop_x": record.crop.x),
+    column!(I32 "crop_y": record.crop.y),
+    column!(U32 "crop_w": record.crop.w),
+    column!(U32 "crop_h": record.crop.h),
+    column!(U32 "size_w": record.size[0]),
+    column!(U32 "size_h": record.size[1]),
+    Column {
+        name: "shift_dx",
+        is_later: false,
+        kind: Kind::MaybeReal(Access {
+            get: |row| row.record.shift_px.map(|[dx, _]| dx),
+            set: |row, dx| {
+                row.record.shift_px = dx.map(|dx| [dx, 0.0]);
+                true
+            },
+        }),
+    },
+    Column {
+        name: "shift_dy",
+        is_later: false,
+        kind: Kind::MaybeReal(Access {
+            get: |row| row.record.shift_px.map(|[_, dy]| dy),
+            set: |row, dy| match (&mut row.record.shift_px, dy) {
+                (Some(shift), Some(dy)) => {
+                    shift[1] = dy;
+                    true
+                }
+                (shift, dy) => shift.is_none() && dy.is_none(),
+            },
+        }),
+    },
+    column!(Flag "shift_applied": record.shift_applied),
+    column!(MaybeReal? "align_confidence": record.align_confidence),
+    column!(U64 "mask_px": record.mask_px),
+    column!(U64 "saturated_px": record.saturated_px),
+    column!(Real "saturated_fraction": record.saturated_fraction),
+    column!(U64 "saturated_any_px": record.saturated_any_px),
+    column!(Flag "spec_net": record.spec_net),
+    column!(Real "mean_r": record.mean_rgb[0]),
+    column!(Real "mean_g": record.mean_rgb[1]),
+    column!(Real "mean_b": record.mean_rgb[2]),
+    column!(Real "sharpness": record.sharpness),
+    column!(MaybeReal? "exposure_step": record.exposure_step),
+    column!(MaybeU64? "identical_to": record.identical_to),
+    column!(MaybeReal? "blur": record.blur),
+    column!(Hash "png_blake3": png_blake3),
+    column!(Hash "mask_blake3": mask_blake3),
+];
 
 impl Column {
     /// The column's line in the schema.
-    fn declaration(&self, name: &str) -> String {
-        match self {
-            Self::Text(_) => format!("required binary {name} (string);"),
-            Self::U32(_) => format!("required int32 {name} (integer(32,false));"),
-            Self::I32(_) => format!("required int32 {name} (integer(32,true));"),
-            Self::U64(_) => format!("required int64 {name} (integer(64,false));"),
-            Self::I64(_) => format!("required int64 {name} (integer(64,true));"),
-            Self::Real(_) => format!("required double {name};"),
-            Self::MaybeReal(_) => format!("optional double {name};"),
-            Self::MaybeU64(_) => format!("optional int64 {name} (integer(64,false));"),
-            Self::Flag(_) => format!("required boolean {name};"),
+    fn declaration(&self) -> String {
+        let name = self.name;
+        match self.kind {
+            Kind::Text(_) | Kind::Hash(_) => format!("required binary {name} (string);"),
+            Kind::U32(_) => format!("required int32 {name} (integer(32,false));"),
+            Kind::I32(_) => format!("required int32 {name} (integer(32,true));"),
+            Kind::U64(_) => format!("required int64 {name} (integer(64,false));"),
+            Kind::I64(_) => format!("required int64 {name} (integer(64,true));"),
+            Kind::Real(_) => format!("required double {name};"),
+            Kind::MaybeReal(_) => format!("optional double {name};"),
+            Kind::MaybeU64(_) => format!("optional int64 {name} (integer(64,false));"),
+            Kind::Flag(_) => format!("required boolean {name};"),
+        }
+    }
+
+    /// Puts the value of a field of a table into the row; false if there is no valid one.
+    fn read(&self, field: Option<&Field>, row: &mut TableRow) -> bool {
+        let Some(field) = field else {
+            return self.is_later;
+        };
+        match (&self.kind, field) {
+            (Kind::Text(at), Field::Str(text)) => (at.set)(row, text.clone()),
+            (Kind::Hash(at), Field::Str(text)) => {
+                text.parse().is_ok_and(|digest| (at.set)(row, digest))
+            }
+            (Kind::U32(at), &Field::UInt(value)) => (at.set)(row, value),
+            (Kind::I32(at), &Field::Int(value)) => (at.set)(row, value),
+            (Kind::U64(at), &Field::ULong(value)) => (at.set)(row, value),
+            (Kind::I64(at), &Field::Long(value)) => (at.set)(row, value),
+            (Kind::Real(at), &Field::Double(value)) => (at.set)(row, value),
+            (Kind::MaybeReal(at), &Field::Double(value)) => (at.set)(row, Some(value)),
+            (Kind::MaybeReal(at), Field::Null) => (at.set)(row, None),
+            (Kind::MaybeU64(at), &Field::ULong(value)) => (at.set)(row, Some(value)),
+            (Kind::MaybeU64(at), Field::Null) => (at.set)(row, None),
+            (Kind::Flag(at), &Field::Bool(value)) => (at.set)(row, value),
+            _ => false,
         }
     }
 }
 
-const COLUMNS: [(&str, Column); 31] = [
-    ("session", Column::Text(|r| r.record.session.clone())),
-    ("object", Column::Text(|r| r.record.object.clone())),
-    ("index", Column::U32(|r| r.record.index)),
-    ("source_frame", Column::U64(|r| r.record.source_frame)),
-    ("t_us", Column::I64(|r| r.record.t_us)),
-    ("angle_deg", Column::MaybeReal(|r| r.record.angle_deg)),
-    ("duplicate", Column::Flag(|r| r.record.duplicate)),
-    ("crop_x", Column::I32(|r| r.record.crop.x)),
-    ("crop_y", Column::I32(|r| r.record.crop.y)),
-    ("crop_w", Column::U32(|r| r.record.crop.w)),
-    ("crop_h", Column::U32(|r| r.record.crop.h)),
-    ("size_w", Column::U32(|r| r.record.size[0])),
-    ("size_h", Column::U32(|r| r.record.size[1])),
-    (
-        "shift_dx",
-        Column::MaybeReal(|r| r.record.shift_px.map(|shift| shift[0])),
-    ),
-    (
-        "shift_dy",
-        Column::MaybeReal(|r| r.record.shift_px.map(|shift| shift[1])),
-    ),
-    ("shift_applied", Column::Flag(|r| r.record.shift_applied)),
-    (
-        "align_confidence",
-        Column::MaybeReal(|r| r.record.align_confidence),
-    ),
-    ("mask_px", Column::U64(|r| r.record.mask_px)),
-    ("saturated_px", Column::U64(|r| r.record.saturated_px)),
-    (
-        "saturated_fraction",
-        Column::Real(|r| r.record.saturated_fraction),
-    ),
-    (
-        "saturated_any_px",
-        Column::U64(|r| r.record.saturated_any_px),
-    ),
-    ("spec_net", Column::Flag(|r| r.record.spec_net)),
-    ("mean_r", Column::Real(|r| r.record.mean_rgb[0])),
-    ("mean_g", Column::Real(|r| r.record.mean_rgb[1])),
-    ("mean_b", Column::Real(|r| r.record.mean_rgb[2])),
-    ("sharpness", Column::Real(|r| r.record.sharpness)),
-    (
-        "exposure_step",
-        Column::MaybeReal(|r| r.record.exposure_step),
-    ),
-    ("identical_to", Column::MaybeU64(|r| r.record.identical_to)),
-    ("blur", Column::MaybeReal(|r| r.record.blur)),
-    ("png_blake3", Column::Text(|r| r.png_blake3.to_string())),
-    ("mask_blake3", Column::Text(|r| r.mask_blake3.to_string())),
-];
-
 /// Writes the rows to `out` in the given order.
 pub(super) fn write_rows(out: &mut (impl Write + Send), rows: &[TableRow]) -> ParquetResult<()> {
-    let lines: String = COLUMNS
-        .iter()
-        .map(|(name, column)| column.declaration(name))
-        .collect();
+    let lines: String = COLUMNS.iter().map(Column::declaration).collect();
     let schema = Arc::new(parse_message_type(&format!(
         "message frames {{ {lines} }}"
     ))?);
@@ -134,11 +200,11 @@ pub(super) fn write_rows(out: &mut (impl Write + Send), rows: &[TableRow]) -> Pa
         .build();
     let mut file = SerializedFileWriter::new(out, schema, Arc::new(properties))?;
     let mut group = file.next_row_group()?;
-    for (_, column) in &COLUMNS {
+    for column in &COLUMNS {
         let mut writer = group
             .next_column()?
             .ok_or_else(|| ParquetError::General("the schema lost a column".to_owned()))?;
-        write_column(writer.untyped(), column, rows)?;
+        write_column(writer.untyped(), &column.kind, rows)?;
         writer.close()?;
     }
     group.close()?;
@@ -148,44 +214,53 @@ pub(super) fn write_rows(out: &mut (impl Write + Send), rows: &[TableRow]) -> Pa
 
 fn write_column(
     writer: &mut ColumnWriter<'_>,
-    column: &Column,
+    kind: &Kind,
     rows: &[TableRow],
 ) -> ParquetResult<()> {
     fn all<T>(rows: &[TableRow], value: impl Fn(&TableRow) -> T) -> Vec<T> {
         rows.iter().map(value).collect()
     }
-    match (writer, column) {
-        (ColumnWriter::ByteArrayColumnWriter(w), Column::Text(get)) => {
-            let values = all(rows, |r| ByteArray::from(get(r).into_bytes()));
-            w.write_batch(&values, None, None)
+    let text = |value: String| ByteArray::from(value.into_bytes());
+    match (writer, kind) {
+        (ColumnWriter::ByteArrayColumnWriter(w), Kind::Text(at)) => {
+            w.write_batch(&all(rows, |row| text((at.get)(row))), None, None)
         }
-        (ColumnWriter::Int32ColumnWriter(w), Column::U32(get)) => {
-            w.write_batch(&all(rows, |r| get(r).cast_signed()), None, None)
+        (ColumnWriter::ByteArrayColumnWriter(w), Kind::Hash(at)) => w.write_batch(
+            &all(rows, |row| text((at.get)(row).to_string())),
+            None,
+            None,
+        ),
+        (ColumnWriter::Int32ColumnWriter(w), Kind::U32(at)) => {
+            w.write_batch(&all(rows, |row| (at.get)(row).cast_signed()), None, None)
         }
-        (ColumnWriter::Int32ColumnWriter(w), Column::I32(get)) => {
-            w.write_batch(&all(rows, get), None, None)
+        (ColumnWriter::Int32ColumnWriter(w), Kind::I32(at)) => {
+            w.write_batch(&all(rows, at.get), None, None)
         }
-        (ColumnWriter::Int64ColumnWriter(w), Column::U64(get)) => {
-            w.write_batch(&all(rows, |r| get(r).cast_signed()), None, None)
+        (ColumnWriter::Int64ColumnWriter(w), Kind::U64(at)) => {
+            w.write_batch(&all(rows, |row| (at.get)(row).cast_signed()), None, None)
         }
-        (ColumnWriter::Int64ColumnWriter(w), Column::I64(get)) => {
-            w.write_batch(&all(rows, get), None, None)
+        (ColumnWriter::Int64ColumnWriter(w), Kind::I64(at)) => {
+            w.write_batch(&all(rows, at.get), None, None)
         }
-        (ColumnWriter::DoubleColumnWriter(w), Column::Real(get)) => {
-            w.write_batch(&all(rows, get), None, None)
+        (ColumnWriter::DoubleColumnWriter(w), Kind::Real(at)) => {
+            w.write_batch(&all(rows, at.get), None, None)
         }
-        (ColumnWriter::DoubleColumnWriter(w), Column::MaybeReal(get)) => {
-            let values: Vec<f64> = rows.iter().filter_map(get).collect();
-            let present = all(rows, |r| i16::from(get(r).is_some()));
+        (ColumnWriter::DoubleColumnWriter(w), Kind::MaybeReal(at)) => {
+            let values: Vec<f64> = rows.iter().filter_map(at.get).collect();
+            let present = all(rows, |row| i16::from((at.get)(row).is_some()));
             w.write_batch(&values, Some(&present), None)
         }
-        (ColumnWriter::Int64ColumnWriter(w), Column::MaybeU64(get)) => {
-            let values: Vec<i64> = rows.iter().filter_map(get).map(u64::cast_signed).collect();
-            let present = all(rows, |r| i16::from(get(r).is_some()));
+        (ColumnWriter::Int64ColumnWriter(w), Kind::MaybeU64(at)) => {
+            let values: Vec<i64> = rows
+                .iter()
+                .filter_map(at.get)
+                .map(u64::cast_signed)
+                .collect();
+            let present = all(rows, |row| i16::from((at.get)(row).is_some()));
             w.write_batch(&values, Some(&present), None)
         }
-        (ColumnWriter::BoolColumnWriter(w), Column::Flag(get)) => {
-            w.write_batch(&all(rows, get), None, None)
+        (ColumnWriter::BoolColumnWriter(w), Kind::Flag(at)) => {
+            w.write_batch(&all(rows, at.get), None, None)
         }
         _ => Err(ParquetError::General(
             "a column has another type in the schema".to_owned(),
@@ -237,201 +312,66 @@ fn parse_rows(file: File, path: &Path) -> Result<Vec<TableRow>, ShardError> {
     let mut found = Vec::new();
     for (number, row) in rows.enumerate().take(MAX_SAMPLES as usize) {
         let fields = row.map_err(failed)?.into_columns().into_iter().collect();
-        found.push(
-            Fields {
-                path,
-                number,
-                fields,
-            }
-            .row()?,
-        );
+        let row = row_of(&fields).map_err(|column| ShardError::TableValue {
+            path: path.to_owned(),
+            row: number,
+            column,
+        })?;
+        found.push(row);
     }
     Ok(found)
 }
 
-/// The values of one row by column.
-struct Fields<'a> {
-    path: &'a Path,
-    number: usize,
-    fields: HashMap<String, Field>,
-}
-
-impl Fields<'_> {
-    fn row(&self) -> Result<TableRow, ShardError> {
-        let record = FrameRecord {
-            session: self.text("session")?,
-            object: self.text("object")?,
-            index: self.u32("index")?,
-            source_frame: self.u64("source_frame")?,
-            t_us: self.i64("t_us")?,
-            angle_deg: self.maybe_real("angle_deg")?,
-            duplicate: self.flag("duplicate")?,
-            crop: Rect::new(
-                self.i32("crop_x")?,
-                self.i32("crop_y")?,
-                self.u32("crop_w")?,
-                self.u32("crop_h")?,
-            ),
-            size: [self.u32("size_w")?, self.u32("size_h")?],
-            shift_px: match (self.maybe_real("shift_dx")?, self.maybe_real("shift_dy")?) {
-                (Some(dx), Some(dy)) => Some([dx, dy]),
-                (None, None) => None,
-                _ => return Err(self.invalid("shift_dx")),
-            },
-            shift_applied: self.flag("shift_applied")?,
-            align_confidence: self.later_real("align_confidence")?,
-            mask_px: self.u64("mask_px")?,
-            saturated_px: self.u64("saturated_px")?,
-            saturated_fraction: self.real("saturated_fraction")?,
-            saturated_any_px: self.u64("saturated_any_px")?,
-            spec_net: self.flag("spec_net")?,
-            mean_rgb: [
-                self.real("mean_r")?,
-                self.real("mean_g")?,
-                self.real("mean_b")?,
-            ],
-            sharpness: self.real("sharpness")?,
-            exposure_step: self.later_real("exposure_step")?,
-            identical_to: self.later_u64("identical_to")?,
-            blur: self.later_real("blur")?,
-        };
-        let png_blake3 = self.digest("png_blake3")?;
-        let mask_blake3 = self.digest("mask_blake3")?;
-        Ok(TableRow {
-            record,
-            png_blake3,
-            mask_blake3,
-        })
-    }
-
-    fn get<T>(
-        &self,
-        column: &'static str,
-        read: impl FnOnce(&Field) -> Option<T>,
-    ) -> Result<T, ShardError> {
-        self.fields
-            .get(column)
-            .and_then(read)
-            .ok_or_else(|| self.invalid(column))
-    }
-
-    fn invalid(&self, column: &'static str) -> ShardError {
-        ShardError::TableValue {
-            path: self.path.to_owned(),
-            row: self.number,
-            column,
+/// The row with these values, or the column without a valid one.
+fn row_of(fields: &HashMap<String, Field>) -> Result<TableRow, &'static str> {
+    let mut row = TableRow {
+        record: FrameRecord::empty(),
+        png_blake3: Digest::of(&[]),
+        mask_blake3: Digest::of(&[]),
+    };
+    for column in &COLUMNS {
+        if !column.read(fields.get(column.name), &mut row) {
+            return Err(column.name);
         }
     }
-
-    fn text(&self, column: &'static str) -> Result<String, ShardError> {
-        self.get(column, |field| match field {
-            Field::Str(text) => Some(text.clone()),
-            _ => None,
-        })
-    }
-
-    fn digest(&self, column: &'static str) -> Result<Digest, ShardError> {
-        self.text(column)?.parse().map_err(|_| self.invalid(column))
-    }
-
-    fn u32(&self, column: &'static str) -> Result<u32, ShardError> {
-        self.get(column, |field| match field {
-            Field::UInt(value) => Some(*value),
-            _ => None,
-        })
-    }
-
-    fn i32(&self, column: &'static str) -> Result<i32, ShardError> {
-        self.get(column, |field| match field {
-            Field::Int(value) => Some(*value),
-            _ => None,
-        })
-    }
-
-    fn u64(&self, column: &'static str) -> Result<u64, ShardError> {
-        self.get(column, |field| match field {
-            Field::ULong(value) => Some(*value),
-            _ => None,
-        })
-    }
-
-    fn i64(&self, column: &'static str) -> Result<i64, ShardError> {
-        self.get(column, |field| match field {
-            Field::Long(value) => Some(*value),
-            _ => None,
-        })
-    }
-
-    fn real(&self, column: &'static str) -> Result<f64, ShardError> {
-        self.get(column, |field| match field {
-            Field::Double(value) => Some(*value),
-            _ => None,
-        })
-    }
-
-    fn maybe_real(&self, column: &'static str) -> Result<Option<f64>, ShardError> {
-        self.get(column, |field| match field {
-            Field::Double(value) => Some(Some(*value)),
-            Field::Null => Some(None),
-            _ => None,
-        })
-    }
-
-    /// A value that tables of earlier versions do not have.
-    fn later_real(&self, column: &'static str) -> Result<Option<f64>, ShardError> {
-        match self.fields.contains_key(column) {
-            true => self.maybe_real(column),
-            false => Ok(None),
-        }
-    }
-
-    /// As [`later_real`](Self::later_real).
-    fn later_u64(&self, column: &'static str) -> Result<Option<u64>, ShardError> {
-        match self.fields.get(column) {
-            None | Some(Field::Null) => Ok(None),
-            Some(Field::ULong(value)) => Ok(Some(*value)),
-            Some(_) => Err(self.invalid(column)),
-        }
-    }
-
-    fn flag(&self, column: &'static str) -> Result<bool, ShardError> {
-        self.get(column, |field| match field {
-            Field::Bool(value) => Some(*value),
-            _ => None,
-        })
-    }
+    Ok(row)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Rect;
+    use crate::image_stats::{Measures, SPEC_NET_GATE};
 
     fn row(index: u32) -> TableRow {
         let even = index.is_multiple_of(2);
+        let crop = Rect::new(-3, i32::MIN, u32::MAX, 7);
+        let measures = Measures {
+            mask_px: 1 << 40,
+            saturated_px: 3,
+            saturated_any_px: 4,
+            mean_rgb: [1.1, 2.2, 1e-300],
+            sharpness: 12.5,
+        };
         TableRow {
             record: FrameRecord {
-                session: "s".to_owned(),
-                object: "mug \"ö\"".to_owned(),
-                index,
-                source_frame: u64::MAX - u64::from(index),
-                t_us: -5 - i64::from(index),
-                angle_deg: even.then_some(0.1 * f64::from(index)),
                 duplicate: even,
-                crop: Rect::new(-3, i32::MIN, u32::MAX, 7),
-                size: [256, 255],
-                shift_px: (!even).then_some([0.25, -1.0 / 3.0]),
-                shift_applied: !even,
-                align_confidence: (!even).then_some(0.75),
-                mask_px: 1 << 40,
-                saturated_px: 3,
-                saturated_fraction: 3.0 / 7.0,
-                saturated_any_px: 4,
                 spec_net: even,
-                mean_rgb: [1.1, 2.2, 1e-300],
-                sharpness: 12.5,
                 exposure_step: even.then_some(-0.5),
                 identical_to: even.then_some(u64::MAX),
                 blur: (!even).then_some(1.25),
+                ..FrameRecord::new("s", "mug \"ö\"", index, crop, &measures, SPEC_NET_GATE)
+                    .of_frame(
+                        u64::MAX - u64::from(index),
+                        -5 - i64::from(index),
+                        even.then_some(0.1 * f64::from(index)),
+                    )
+                    .scaled_to([256, 255])
+                    .aligned(
+                        (!even).then_some([0.25, -1.0 / 3.0]),
+                        !even,
+                        (!even).then_some(0.75),
+                    )
             },
             png_blake3: Digest::of(&index.to_le_bytes()),
             mask_blake3: Digest::of(b"mask"),
@@ -465,6 +405,46 @@ mod tests {
         assert_eq!(bytes, written(&rows));
         let (dir, entry) = on_disk(&bytes);
         assert_eq!(read_table(dir.path(), &entry).unwrap(), rows);
+    }
+
+    #[test]
+    fn a_shift_of_which_one_number_is_missing_is_refused() {
+        let mut fields: HashMap<String, Field> = HashMap::new();
+        let mut read = |name: &str, field| {
+            fields.insert(name.to_owned(), field);
+            row_of(&fields)
+        };
+        for column in &COLUMNS {
+            let field = match column.kind {
+                Kind::Text(_) => Field::Str("s".to_owned()),
+                Kind::Hash(_) => Field::Str(Digest::of(b"x").to_string()),
+                Kind::U32(_) => Field::UInt(1),
+                Kind::I32(_) => Field::Int(1),
+                Kind::U64(_) | Kind::MaybeU64(_) => Field::ULong(1),
+                Kind::I64(_) => Field::Long(1),
+                Kind::Real(_) | Kind::MaybeReal(_) => Field::Double(0.5),
+                Kind::Flag(_) => Field::Bool(true),
+            };
+            let _ = read(column.name, field);
+        }
+        assert_eq!(
+            read("mean_r", Field::Double(0.5)).unwrap().record.shift_px,
+            Some([0.5; 2])
+        );
+        assert_eq!(read("shift_dy", Field::Null), Err("shift_dy"));
+        assert!(read("shift_dx", Field::Null).is_ok());
+        assert_eq!(read("shift_dy", Field::Double(0.5)), Err("shift_dy"));
+    }
+
+    #[test]
+    fn only_a_column_that_later_versions_added_may_be_missing() {
+        let needed: Vec<&str> = COLUMNS
+            .iter()
+            .filter(|column| !column.read(None, &mut row(0)))
+            .map(|column| column.name)
+            .collect();
+        assert_eq!(needed.len(), COLUMNS.len() - 4);
+        assert!(needed.contains(&"angle_deg") && !needed.contains(&"blur"));
     }
 
     #[test]

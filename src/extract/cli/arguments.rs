@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::builder::RangedU64ValueParser;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{Align, ImageSize, Layout, MAX_TASKS, Task};
 use relit_extract::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
 
@@ -126,10 +127,10 @@ struct ExtractArguments {
     #[arg(long, value_name = "FRACTION", default_value_t = 0.05, value_parser = margin)]
     margin: f64,
     /// A channel is saturated from this 8-bit value on.
-    #[arg(long, value_name = "0-255", default_value_t = 250)]
+    #[arg(long, value_name = "0-255", default_value_t = SATURATION_LEVEL)]
     saturation_level: u8,
     /// Spec-Net should run above this fraction of saturated pixels.
-    #[arg(long, value_name = "FRACTION", default_value_t = 0.05, value_parser = fraction)]
+    #[arg(long, value_name = "FRACTION", default_value_t = SPEC_NET_GATE, value_parser = fraction)]
     gate: f64,
     /// How samples are stored.
     #[arg(long, value_enum, default_value_t = LayoutName::Webdataset)]

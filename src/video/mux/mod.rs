@@ -20,6 +20,8 @@ use ffmpeg_next::{Packet, packet};
 use self::container::{end_cluster, open};
 use self::file::{Refusal, Sink};
 
+use relit_data::disk::is_full;
+
 use super::nal::{self, ParameterSets};
 use super::{PixelFormat, VideoError, initialise, lossless};
 
@@ -292,7 +294,7 @@ impl Muxer {
     /// The error for a write that the system refused.
     fn refused(&self, source: io::Error) -> VideoError {
         let path = self.path.clone();
-        if is_no_room(&source) {
+        if is_full(&source) {
             let kept = self.file.metadata().map_or(0, |data| data.len());
             let missing = self.taken.saturating_sub(kept).max(1);
             return VideoError::DiskFull {
@@ -303,10 +305,4 @@ impl Muxer {
         }
         VideoError::Write { path, source }
     }
-}
-
-/// True if a write failed because the disk, a quota or a limit on file sizes is exhausted.
-fn is_no_room(error: &io::Error) -> bool {
-    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
-    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
 }

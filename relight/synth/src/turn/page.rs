@@ -1,10 +1,11 @@
 //! The page of a turn.
 
 use image::imageops::{FilterType, resize};
+use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::report::{self, Page, THUMBNAIL_SIDE, Thumbnail};
 use relit_data::shard::{FrameRecord, Sample};
 
-use super::{GATE, SATURATION_LEVEL, Turn};
+use super::Turn;
 use crate::SynthError;
 
 /// Thumbnails on a page.
@@ -62,7 +63,7 @@ impl TurnPage {
             facts: &facts,
             warnings: &[],
             quality: None,
-            gate: GATE,
+            gate: SPEC_NET_GATE,
             saturation_level: SATURATION_LEVEL,
         })?)
     }
