@@ -23,23 +23,10 @@ use self::file::{Refusal, Sink};
 use relit_data::disk::is_full;
 
 use super::nal::{self, ParameterSets};
-use super::{PixelFormat, VideoError, initialise, lossless};
+use super::{PixelFormat, StreamFormat, VideoError, initialise, lossless};
 
 /// Bytes that are buffered before they are written.
 const BUFFER: usize = 1 << 15;
-
-/// What a camera was set to deliver.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StreamFormat {
-    /// How its frames are coded.
-    pub format: PixelFormat,
-    /// Frame width, pixels.
-    pub width: u32,
-    /// Frame height, pixels.
-    pub height: u32,
-    /// Nominal frames a second.
-    pub fps: f64,
-}
 
 /// What became of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
