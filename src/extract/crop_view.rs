@@ -4,7 +4,7 @@ use image::RgbaImage;
 
 /// A rectangle of a picture whose pixels are four bytes: red, green, blue, and one that does not count.
 #[derive(Debug, Clone, Copy)]
-pub struct View<'a> {
+pub struct CropView<'a> {
     picture: &'a RgbaImage,
     left: u32,
     top: u32,
@@ -12,7 +12,7 @@ pub struct View<'a> {
     height: u32,
 }
 
-impl<'a> View<'a> {
+impl<'a> CropView<'a> {
     /// The whole picture.
     #[must_use]
     pub fn whole(picture: &'a RgbaImage) -> Self {
@@ -98,7 +98,7 @@ mod tests {
     #[test]
     fn a_moved_view_shows_the_pixels_there() {
         let picture = picture();
-        let view = View::within(&picture, 3);
+        let view = CropView::within(&picture, 3);
         assert_eq!(view.dimensions(), (3, 2));
         assert_eq!(view.row(0, 0)[..2], [3, 3]);
         let moved = view.moved([1, -1], 2).unwrap();
@@ -111,12 +111,12 @@ mod tests {
     #[test]
     fn what_the_picture_does_not_have_is_not_shown() {
         let picture = picture();
-        let view = View::within(&picture, 3);
+        let view = CropView::within(&picture, 3);
         assert!(view.moved([2, 0], 2).is_none());
         assert!(view.moved([-4, 0], 0).is_none());
         assert!(view.row(5, 0).is_empty());
         assert!(view.row(0, 4).is_empty());
-        assert_eq!(View::within(&picture, 5).rows().count(), 0);
-        assert_eq!(View::whole(&picture).row(7, 0).len(), 36);
+        assert_eq!(CropView::within(&picture, 5).rows().count(), 0);
+        assert_eq!(CropView::whole(&picture).row(7, 0).len(), 36);
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::thread::available_parallelism;
 
 use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
-use relit_data::shard::{Align, ExtractionSettings, ImageSize, Layout, Task};
+use relit_data::shard::{Align, ArrayTask, ExtractionSettings, ImageSize, Layout};
 
 use super::{ExtractError, scale};
 
@@ -49,7 +49,7 @@ pub struct ExtractOptions {
     /// Replace sessions of the same name that were made from another video.
     pub replace: bool,
     /// The task whose part of the recordings is extracted; `None` extracts all of them.
-    pub task: Option<Task>,
+    pub task: Option<ArrayTask>,
     /// The folder through which recordings and data sets of object stores pass; `None` is the system's folder
     /// for temporary files.
     pub cache: Option<PathBuf>,

@@ -7,7 +7,7 @@ use relit_data::shard::Dataset;
 use super::ExtractError;
 
 /// Brings recordings to the local disk, and takes sessions away from there.
-pub(super) trait Depot {
+pub(super) trait StorageBackend {
     /// The recording as a file or folder on the local disk.
     fn fetch(&self, recording: &Path) -> Result<PathBuf, ExtractError>;
 
@@ -26,9 +26,9 @@ pub(super) trait Depot {
 }
 
 /// Everything is on the local disk, and stays there.
-pub(super) struct OnDisk;
+pub(super) struct LocalDisk;
 
-impl Depot for OnDisk {
+impl StorageBackend for LocalDisk {
     fn fetch(&self, recording: &Path) -> Result<PathBuf, ExtractError> {
         Ok(recording.to_owned())
     }

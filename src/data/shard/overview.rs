@@ -5,11 +5,11 @@ use std::path::Path;
 
 use super::ShardError;
 use super::dataset::{Dataset, SessionEntry};
+use super::parquet_table::read_table;
+use super::pieces::read_pieces;
 use super::quality::{QualityVerdict, SessionQuality};
 use super::record::FrameRecord;
 use super::settings::ExtractionSettings;
-use super::table::read_table;
-use super::task::read_pieces;
 use crate::causes::with_causes;
 use crate::image_stats::SPEC_NET_GATE;
 
@@ -26,6 +26,7 @@ pub type SaturationHistogram = [u64; SATURATION_BOUNDS.len() + 1];
 
 /// A data set at a glance.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Overview {
     /// How all sessions were extracted.
     pub settings: ExtractionSettings,
@@ -37,6 +38,7 @@ pub struct Overview {
 
 /// A session at a glance.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct SessionOverview {
     /// Its entry in the description.
     pub entry: SessionEntry,
@@ -50,6 +52,7 @@ pub struct SessionOverview {
 
 /// Sums over the sessions of an [`Overview`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct OverviewTotals {
     /// Different objects.
     pub objects: usize,

@@ -4,62 +4,19 @@
 //! `tasks/<task>-of-<count>.json`. [`merge`] joins the pieces to `dataset.json`.
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::fs;
 use std::io;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::array_task::{ArrayTask, file_of};
 use super::dataset::Dataset;
 use super::output::{self, OutputFolder};
 use super::{ShardError, names};
 
 /// The schema that this version writes and reads.
 const SCHEMA: &str = "relit.task/1";
-/// Largest number of tasks.
-pub const MAX_TASKS: u32 = 100_000;
-
-/// One of several tasks that write a data set together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Task {
-    index: u32,
-    count: u32,
-}
-
-impl Task {
-    /// Task `index` (from 0) of `count`; `None` if there is none, or if there are more than
-    /// [`MAX_TASKS`].
-    #[must_use]
-    pub fn new(index: u32, count: u32) -> Option<Self> {
-        (index < count && count <= MAX_TASKS).then_some(Self { index, count })
-    }
-
-    /// How many tasks there are.
-    #[must_use]
-    pub fn count(self) -> u32 {
-        self.count
-    }
-
-    /// Whether the recording at this position of the list of all is this task's.
-    #[must_use]
-    pub fn takes(self, position: usize) -> bool {
-        position % self.count as usize == self.index as usize
-    }
-
-    /// The file of its piece, relative to the data set.
-    #[must_use]
-    pub fn file(self) -> String {
-        format!("{}/{self}.json", names::TASKS)
-    }
-}
-
-impl fmt::Display for Task {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}-of-{}", self.index, self.count)
-    }
-}
-
 /// What became of a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "outcome")]
@@ -98,11 +55,11 @@ pub struct TaskPiece {
 impl TaskPiece {
     /// A piece without outcomes.
     #[must_use]
-    pub fn new(task: Task, recordings: Vec<String>, dataset: Dataset) -> Self {
+    pub fn new(task: ArrayTask, recordings: Vec<String>, dataset: Dataset) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
-            task: task.index,
-            count: task.count,
+            task: task.index(),
+            count: task.count(),
             recordings,
             outcomes: BTreeMap::new(),
             dataset,
@@ -113,7 +70,7 @@ impl TaskPiece {
     ///
     /// # Errors
     /// [`ShardError::Description`] or [`ShardError::Schema`] if it cannot be read, [`ShardError::Io`].
-    pub fn read(out: &Path, task: Task) -> Result<Option<Self>, ShardError> {
+    pub fn read(out: &Path, task: ArrayTask) -> Result<Option<Self>, ShardError> {
         let path = out.join(task.file());
         match fs::read(&path) {
             Ok(bytes) => Self::parse(&path, &bytes).map(Some),
@@ -127,16 +84,13 @@ impl TaskPiece {
     /// # Errors
     /// [`ShardError::Json`] if a number is not finite, [`ShardError::Io`].
     pub fn write(&self, out: &Path) -> Result<(), ShardError> {
-        let task = Task {
-            index: self.task,
-            count: self.count,
-        };
+        let file = file_of(self.task, self.count);
         let mut bytes = serde_json::to_vec_pretty(self).map_err(|source| ShardError::Json {
-            what: task.file(),
+            what: file.clone(),
             source,
         })?;
         bytes.push(b'\n');
-        output::write_whole(out, &task.file(), &bytes).map(|_| ())
+        output::write_whole(out, &file, &bytes).map(|_| ())
     }
 
     /// Number of tasks that write the data set together.
@@ -164,6 +118,7 @@ impl TaskPiece {
 
 /// What was joined.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Merged {
     /// The description, as it was written.
     pub dataset: Dataset,
@@ -327,20 +282,4 @@ fn not_of_a_task(out: &Path, dataset: &Dataset) -> Result<Vec<String>, ShardErro
         format!("dataset.json also has session {id}, which is no task's: use a folder of its own")
     };
     Ok(others.map(|session| problem(&session.id)).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_recording_is_one_tasks() {
-        for count in [1, 3, 7] {
-            for position in 0..20 {
-                let takers = (0..count).filter_map(|index| Task::new(index, count));
-                assert_eq!(takers.filter(|task| task.takes(position)).count(), 1);
-            }
-        }
-        assert!(Task::new(3, 3).is_none() && Task::new(0, 0).is_none());
-    }
 }

@@ -7,7 +7,7 @@ use relit_data::geometry::Rect;
 use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{
     Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
-    OutputFolder, Problem, Sample, SamplingBasis, SessionEntry, ShardWriter, SourceVideo,
+    OutputFolder, Sample, SamplingBasis, SessionEntry, ShardWriter, SourceVideo, VerifyProblem,
     VerifyReport, verify,
 };
 
@@ -174,6 +174,6 @@ pub(crate) fn assert_names(out: &Path, file: &str, sample: Option<u32>, says: &s
     );
 }
 
-pub(crate) fn texts(problems: &[Problem]) -> Vec<String> {
+pub(crate) fn texts(problems: &[VerifyProblem]) -> Vec<String> {
     problems.iter().map(ToString::to_string).collect()
 }
