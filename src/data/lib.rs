@@ -26,6 +26,9 @@
 //! and `image_stats`; `session` and `shard` do not know each other. `docs/formats.md` describes every
 //! file and field.
 //!
+//! The folder `examples/` has programs: `session_angles` prints the angle of each frame of a session, `shard_arrays`
+//! reads a shard as arrays, `write_shard` writes a small data set, and `verify_dataset` checks one.
+//!
 //! # Read a session
 //!
 //! ```
