@@ -15,7 +15,7 @@ pub struct ArrayTask {
 }
 
 impl ArrayTask {
-    /// ArrayTask `index` (from 0) of `count`; `None` if there is none, or if there are more than
+    /// Task `index` (from 0) of `count`; `None` if there is none, or if there are more than
     /// [`MAX_TASKS`].
     #[must_use]
     pub fn new(index: u32, count: u32) -> Option<Self> {
