@@ -63,6 +63,7 @@ test-objects: setup $(OBJECTS_VENV)/ready ## Extract from and to object stores, 
 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check
+	cargo run -q --locked -p relit-house
 	cargo clippy --locked --workspace --all-targets $$(.ci/setup-train --features) -- -D warnings
 	cargo clippy --locked -p relight -- -D warnings
 	cargo clippy --locked -p relit-extract --features object-store --all-targets -- -D warnings
