@@ -64,7 +64,7 @@ impl PaperPhase {
     /// The learning rate where settings name none: the paper's, 1e-6 for Normal-Net on turns and 1e-4 for what begins from
     /// nothing.
     #[must_use]
-    pub fn usual_rate(self) -> f64 {
+    pub fn default_learning_rate(self) -> f64 {
         match self {
             Self::Joint => 1e-6,
             Self::Spec | Self::Normal | Self::Light | Self::Specular => 1e-4,
@@ -204,7 +204,7 @@ pub struct TruthLoss {
     pub mean: Mean,
     /// What is answered.
     pub head: &'static str,
-    /// How much it varies, as a part of the truth's variation.
+    /// How much it varies, as a part of the ground truth's variation.
     pub spread: f64,
 }
 
