@@ -5,7 +5,7 @@ use relight_reader::Rank;
 
 use super::error::TrainError;
 
-/// The place of this process among those of a run, and where they meet.
+/// The rank of this process among those of a run, and where they meet.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Launch {
     /// Which process this is, and how many there are.

@@ -1,4 +1,4 @@
-//! Training, on libtorch (feature `train`). The one module that knows it.
+//! Training, on libtorch: the one crate of relight that knows it.
 //!
 //! | module | concern |
 //! | --- | --- |
