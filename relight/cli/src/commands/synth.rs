@@ -185,7 +185,7 @@ fn turns(arguments: &Arguments, library: &Library, console: Console) -> ModeResu
 }
 
 fn report(arguments: &Arguments, console: Console, what: &str, written: SynthTally) {
-    let SynthTally { new, kept } = written;
+    let SynthTally { new, kept, .. } = written;
     let out = &arguments.output;
     console.say(
         &format!("{}: {new} {what} written, {kept} were there", out.display()),
