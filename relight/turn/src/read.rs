@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::{CurveBuilder, TurnCurves, TurnError};
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_reader::{
-    Draw, DrawPlan, Encoding, Cursor, Rank, Source, Stream, Streaming, TurnBatch, TurnFrame, Turns,
+    Cursor, Draw, DrawPlan, Encoding, Rank, Source, Stream, Streaming, TurnBatch, TurnFrame, Turns,
 };
 
 /// Frames that are drawn at a time: in a shard they cover the whole turn.
