@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::{CurveBuilder, TurnCurves, TurnError};
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_reader::{
-    Draw, DrawPlan, Encoding, Place, Share, Source, Stream, Streaming, TurnBatch, TurnFrame, Turns,
+    Cursor, Draw, DrawPlan, Encoding, Rank, Source, Stream, Streaming, TurnBatch, TurnFrame, Turns,
 };
 
 /// Frames that are drawn at a time: in a shard they cover the whole turn.
@@ -85,9 +85,9 @@ pub fn read_curves(
             batch: BATCH,
             draw: Draw::Neighbours,
             seed: None,
-            share: Share::ALL,
+            rank: Rank::ONLY,
         },
-        from: Place::default(),
+        from: Cursor::default(),
         until_epoch: 1,
         threads: available_parallelism().unwrap_or(NonZeroUsize::MIN),
         ahead: 2,

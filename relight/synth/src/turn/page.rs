@@ -5,7 +5,7 @@ use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::report::{self, Page, THUMBNAIL_SIDE, Thumbnail};
 use relit_data::shard::{FrameRecord, Sample};
 
-use super::Turn;
+use super::simulated::SimulatedTurn;
 use crate::SynthError;
 
 /// Thumbnails on a page.
@@ -38,7 +38,7 @@ impl TurnPage {
         self.thumbnails.push(Thumbnail { index, image });
     }
 
-    pub(super) fn render(&self, turn: &Turn<'_>) -> Result<String, SynthError> {
+    pub(super) fn render(&self, turn: &SimulatedTurn<'_>) -> Result<String, SynthError> {
         let pair = |name: &str, value: String| (name.to_owned(), value);
         let description = &turn.description;
         let facts = [

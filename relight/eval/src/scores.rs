@@ -7,10 +7,11 @@ use serde::Serialize;
 /// Which pixels a measure is taken over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum MaskRule {
     /// Those of the object.
     Object,
-    /// Those of the object at which the truth is known.
+    /// Those of the object at which the ground truth is known.
     Known,
     /// All of the image; both images are 0 outside the object.
     WholeImage,
@@ -31,6 +32,7 @@ impl fmt::Display for MaskRule {
 
 /// How the numbers of a line were taken.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct MeasureTerms {
     /// Colour space and units of the values that were compared.
     pub colour: String,
@@ -55,6 +57,7 @@ pub struct Measured {
 
 /// One line of a table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ScoreLine {
     /// What made the estimate.
     pub method: String,
@@ -69,6 +72,7 @@ pub struct ScoreLine {
 
 /// What a method scored on one image.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ImageScores {
     /// What made the estimate.
     pub method: String,
@@ -81,6 +85,7 @@ pub struct ImageScores {
 /// The result of a protocol. [`Display`](fmt::Display) writes it for a terminal; as JSON it holds the
 /// scores of each image as well.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ScoreTable {
     /// The protocol's name.
     pub protocol: String,

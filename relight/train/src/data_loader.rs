@@ -1,4 +1,4 @@
-//! Samples composed while a network trains: threads make them ahead of it, in the order of their numbers.
+//! The data loader: its workers compose samples ahead of the network that trains on them, in the order of their numbers.
 //!
 //! Sample n is a pure function of the recipe, the library and n, whatever the number of threads: a run that
 //! is resumed sees the samples that it would have seen.
@@ -13,7 +13,7 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 
 use super::error::TrainError;
 use super::sample::{Linearisation, TruthArrays};
-use relight_reader::Share;
+use relight_reader::Rank;
 use relight_synth::{Library, Recipe, stream};
 
 /// Part of the pictures whose values are taken for sRGB, whatever the camera's response: the user of a photograph
@@ -37,36 +37,36 @@ pub struct Composition {
 /// The samples of one view, by the view's number; none where composing them panicked.
 type Batch = (u64, Option<Vec<TruthArrays>>);
 
-/// Threads that compose samples.
+/// Workers that compose samples.
 #[derive(Debug)]
-pub struct Composer {
+pub struct DataLoader {
     views: Receiver<Batch>,
     /// Views that came before their turn.
     early: BTreeMap<u64, Vec<TruthArrays>>,
     next_view: u64,
-    /// From one view of the share to the next.
+    /// From one view of this process to the next.
     stride: u64,
     /// Of the view that is being handed out, with their numbers, last first.
     current: Vec<(u64, TruthArrays)>,
     threads: Vec<JoinHandle<()>>,
 }
 
-impl Composer {
-    /// Threads that compose the views of a share, view n being that of process n modulo their number, from the view
+impl DataLoader {
+    /// Threads that compose one process's views, view n being that of rank n modulo the world size, from the view
     /// `first_view` on.
     ///
     /// # Errors
     /// [`TrainError::Synth`] where the recipe is out of range, [`TrainError::Threads`].
     pub fn start(
         composition: Arc<Composition>,
-        share: Share,
+        rank: Rank,
         first_view: u64,
         threads: usize,
     ) -> Result<Self, TrainError> {
         composition.recipe.check()?;
         let threads = threads.max(1);
         let (sender, views) = bounded(AHEAD * threads);
-        let (index, stride) = (u64::from(share.index()), u64::from(share.of()));
+        let (index, stride) = (u64::from(rank.index()), u64::from(rank.world_size()));
         let next_view = first_view + (index + stride - first_view % stride) % stride;
         let next = Arc::new(AtomicU64::new(next_view));
         let spawn = |number: usize| {
@@ -80,7 +80,7 @@ impl Composer {
                         // The one that waits for this view has to learn of a panic: the other threads go on.
                         let made = AssertUnwindSafe(|| composition.samples_of(view));
                         let samples = panic::catch_unwind(made).ok();
-                        // Nobody takes views any more once the composer is dropped.
+                        // Nobody takes views any more once the loader is dropped.
                         if sender.send((view, samples)).is_err() {
                             return;
                         }
@@ -102,7 +102,7 @@ impl Composer {
     /// The next sample, with its number.
     ///
     /// # Errors
-    /// [`TrainError::Composer`] where composing panicked: a fault of the program.
+    /// [`TrainError::DataLoader`] where composing panicked: a fault of the program.
     pub fn next_sample(&mut self) -> Result<(u64, TruthArrays), TrainError> {
         loop {
             if let Some(sample) = self.current.pop() {
@@ -115,14 +115,14 @@ impl Composer {
                 self.next_view += self.stride;
                 continue;
             }
-            let (view, samples) = self.views.recv().map_err(|_| TrainError::Composer)?;
+            let (view, samples) = self.views.recv().map_err(|_| TrainError::DataLoader)?;
             self.early
-                .insert(view, samples.ok_or(TrainError::Composer)?);
+                .insert(view, samples.ok_or(TrainError::DataLoader)?);
         }
     }
 }
 
-impl Drop for Composer {
+impl Drop for DataLoader {
     fn drop(&mut self) {
         // Without a receiver, threads end after the view they are at.
         self.views = bounded(0).1;

@@ -1,47 +1,32 @@
-//! What is true of a turn, beside its shard.
+//! The ground truth of a turn, beside its shard.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process;
 
 use relit_data::durable::publish;
-use serde::{Deserialize, Serialize};
 
-use super::{Frame, Turn};
+use super::simulated::{RenderedFrame, SimulatedTurn};
 use crate::SynthError;
 use crate::png::{Sixteen, encode_sixteen};
-use crate::sample::Whites;
 
-/// The folder of the truth of all turns.
+/// The folder of the ground truth of all turns.
 const TRUTH: &str = "truth";
 
-/// What is true of one frame, a line of `frames.jsonl`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FrameTruth {
-    /// The sample's index.
-    pub index: u32,
-    /// The table's angle, degrees.
-    pub angle_deg: f64,
-    /// What 65535 stands for in the frame's `shading` and `highlight`.
-    pub white: Whites,
-    /// All light but what bounces, as nine coefficients in the viewer's frame, with the camera's gain.
-    pub coefficients: [[f64; 3]; 9],
-}
-
-/// Where the truth of a session lies in a data set.
-pub(super) fn place(out: &Path, session: &str) -> PathBuf {
+/// Where the ground truth of a session lies in a data set.
+pub(super) fn ground_truth_of(out: &Path, session: &str) -> PathBuf {
     out.join(TRUTH).join(session)
 }
 
-/// The truth of a turn, written under another name until it is whole.
-pub(super) struct TruthFolder {
+/// The ground truth of a turn, written under another name until it is whole.
+pub(super) struct GroundTruthFolder {
     partial: PathBuf,
     place: PathBuf,
 }
 
-impl TruthFolder {
+impl GroundTruthFolder {
     pub(super) fn create(out: &Path, session: &str) -> Result<Self, SynthError> {
-        let place = place(out, session);
+        let place = ground_truth_of(out, session);
         let partial = place.with_file_name(format!(".{session}.{}.partial", process::id()));
         // What a killed process of this number left.
         let _ = fs::remove_dir_all(&partial);
@@ -58,7 +43,7 @@ impl TruthFolder {
     }
 
     /// What all frames share.
-    pub(super) fn write_object(&self, turn: &Turn<'_>) -> Result<(), SynthError> {
+    pub(super) fn write_object(&self, turn: &SimulatedTurn<'_>) -> Result<(), SynthError> {
         let (buffer, material) = (turn.scene.buffer(), &turn.material);
         self.write("turn.json", &turn.json())?;
         let albedo = encode_sixteen(buffer, &Sixteen::up_to(&material.albedo, 1.0))?;
@@ -67,13 +52,13 @@ impl TruthFolder {
         self.write("normal.png", &normals)
     }
 
-    pub(super) fn write_frame(&self, frame: &Frame) -> Result<(), SynthError> {
+    pub(super) fn write_frame(&self, frame: &RenderedFrame) -> Result<(), SynthError> {
         let index = frame.truth.index;
         self.write(&format!("shading/{index:04}.png"), &frame.shading)?;
         self.write(&format!("highlight/{index:04}.png"), &frame.highlight)
     }
 
-    /// Gives the truth its name, in place of an older one.
+    /// Gives the ground truth its name, in place of an older one.
     pub(super) fn publish(&self) -> Result<(), SynthError> {
         match fs::remove_dir_all(&self.place) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
@@ -85,7 +70,7 @@ impl TruthFolder {
     }
 }
 
-impl Drop for TruthFolder {
+impl Drop for GroundTruthFolder {
     fn drop(&mut self) {
         // After publishing there is nothing under this name.
         let _ = fs::remove_dir_all(&self.partial);

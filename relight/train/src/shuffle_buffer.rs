@@ -1,7 +1,7 @@
-//! The samples that a network is being trained on: a window that moves on over the composed ones.
+//! The shuffle buffer: the samples that batches are drawn from. It moves on over the composed ones.
 //!
 //! Composing costs more than looking at a sample again. Each stays for a while, batches draw from the
-//! whole window, and on the way each is seen `reuse` times in the mean.
+//! whole buffer, and on the way each is seen `reuse` times in the mean.
 //!
 //! The samples of a batch come from different views: view n is of class n modulo the number of classes, and so is each
 //! draw. Where several processes share the batches, each has some of the classes, composes their views only, and makes
@@ -11,16 +11,16 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::composer::{Composer, Composition, unit};
-use super::decompose_task::Resources;
+use super::data_loader::{Composition, DataLoader, unit};
 use super::error::TrainError;
+use super::resources::Resources;
 use super::sample::{DrawnSample, TruthArrays};
-use relight_reader::Share;
+use relight_reader::Rank;
 use relight_synth::stream;
 
 /// How samples are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SampleWindowSettings {
+pub struct ShuffleBufferSettings {
     /// Samples that are kept.
     pub capacity: u64,
     /// Samples of a view, at least 1.
@@ -40,53 +40,56 @@ struct SampleDraw {
     mirrored: bool,
 }
 
-/// The window.
+/// The buffer.
 #[derive(Debug)]
-pub struct SampleWindow {
-    settings: SampleWindowSettings,
-    share: Share,
-    composer: Composer,
+pub struct ShuffleBuffer {
+    settings: ShuffleBufferSettings,
+    rank: Rank,
+    loader: DataLoader,
     samples: BTreeMap<u64, TruthArrays>,
-    /// The sample behind the window.
+    /// The sample behind the buffer.
     next: Option<(u64, TruthArrays)>,
 }
 
-impl SampleWindow {
-    /// The window of the batch `step`: the samples before it are composed, which takes a while.
+impl ShuffleBuffer {
+    /// The buffer of the batch `step`: the samples before it are composed, which takes a while.
     ///
     /// # Errors
-    /// Those of the composer; [`TrainError::Stopped`] where a run of one process is asked to stop meanwhile.
+    /// Those of the loader; [`TrainError::Stopped`] where a run of one process is asked to stop meanwhile.
     pub fn open(
-        settings: SampleWindowSettings,
-        share: Share,
+        settings: ShuffleBufferSettings,
+        rank: Rank,
         composition: &Arc<Composition>,
         resources: &Resources,
         step: u64,
     ) -> Result<Self, TrainError> {
         let view = settings.taken_before(step) / settings.lightings;
-        let mut window = Self {
+        let mut buffer = Self {
             settings,
-            share,
-            composer: Composer::start(Arc::clone(composition), share, view, resources.composers)?,
+            rank,
+            loader: DataLoader::start(Arc::clone(composition), rank, view, resources.workers)?,
             samples: BTreeMap::new(),
             next: None,
         };
         // The other processes of a group wait for this one's first step.
-        let stop = (share == Share::ALL).then_some(resources.stop.as_ref());
-        window.move_to(step, stop)?;
-        Ok(window)
+        let stop = (rank == Rank::ONLY).then_some(resources.stop.as_ref());
+        buffer.move_to(step, stop)?;
+        Ok(buffer)
     }
 
     /// This process's samples of the batch `step`; batches are asked for one after the other.
     ///
     /// # Errors
-    /// Those of the composer.
+    /// Those of the loader.
     pub fn batch(&mut self, step: u64) -> Result<Vec<DrawnSample<'_>>, TrainError> {
         self.move_to(step, None)?;
-        let draws = self.settings.draws(step, self.share);
+        let draws = self.settings.draws(step, self.rank);
         draws
             .map(|draw| {
-                let arrays = self.samples.get(&draw.number).ok_or(TrainError::Composer)?;
+                let arrays = self
+                    .samples
+                    .get(&draw.number)
+                    .ok_or(TrainError::DataLoader)?;
                 let mirrored = draw.mirrored;
                 Ok(DrawnSample { arrays, mirrored })
             })
@@ -101,7 +104,7 @@ impl SampleWindow {
             }
             let (number, sample) = match self.next.take() {
                 Some(next) => next,
-                None => self.composer.next_sample()?,
+                None => self.loader.next_sample()?,
             };
             if number >= oldest + self.settings.capacity {
                 self.next = Some((number, sample));
@@ -114,13 +117,13 @@ impl SampleWindow {
     }
 }
 
-impl SampleWindowSettings {
+impl ShuffleBufferSettings {
     /// Whether batches can be divided so.
     ///
     /// # Errors
     /// [`TrainError::Indivisible`].
-    pub fn check(self, share: Share) -> Result<(), TrainError> {
-        let of = share.of();
+    pub fn check(self, rank: Rank) -> Result<(), TrainError> {
+        let of = rank.world_size();
         let indivisible = |name, value, needed| TrainError::Indivisible {
             name,
             value,
@@ -134,25 +137,25 @@ impl SampleWindowSettings {
         if !self.classes().is_multiple_of(u64::from(of)) {
             let least = self.batch * self.lightings;
             let needed = format!("at least run.batch x data.lightings, {least}");
-            return Err(indivisible("data.window", self.capacity, needed));
+            return Err(indivisible("data.shuffle_buffer", self.capacity, needed));
         }
         Ok(())
     }
 
-    /// How many samples the window has moved on before a step.
+    /// How many samples the buffer has moved on before a step.
     fn taken_before(self, step: u64) -> u64 {
         (step as f64 * self.batch as f64 / self.reuse) as u64
     }
 
-    /// As many as samples of a batch, but no more than views that are always in the window.
+    /// As many as samples of a batch, but no more than views that are always in the buffer.
     fn classes(self) -> u64 {
         self.batch.min(self.capacity / self.lightings).max(1)
     }
 
-    /// A share's part of a batch, in the order of the whole batch.
-    fn draws(self, step: u64, share: Share) -> impl Iterator<Item = SampleDraw> {
-        let own = u64::from(share.index())..self.batch;
-        own.step_by(share.of() as usize).map(move |place| {
+    /// A process's part of a batch, in the order of the whole batch.
+    fn draws(self, step: u64, rank: Rank) -> impl Iterator<Item = SampleDraw> {
+        let own = u64::from(rank.index())..self.batch;
+        own.step_by(rank.world_size() as usize).map(move |place| {
             let hash = stream(stream(self.seed, step), place);
             SampleDraw {
                 number: self.pick(step, place % self.classes(), unit(hash)),
@@ -162,7 +165,7 @@ impl SampleWindowSettings {
         })
     }
 
-    /// The sample of a class at a part, 0..1, of those in the window.
+    /// The sample of a class at a part, 0..1, of those in the buffer.
     fn pick(self, step: u64, class: u64, part: f64) -> u64 {
         let (oldest, lightings) = (self.taken_before(step), self.lightings);
         let behind = oldest + self.capacity;
@@ -193,7 +196,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    const SETTINGS: SampleWindowSettings = SampleWindowSettings {
+    const SETTINGS: ShuffleBufferSettings = ShuffleBufferSettings {
         capacity: 53,
         lightings: 3,
         reuse: 2.5,
@@ -201,38 +204,38 @@ mod tests {
         seed: 7,
     };
 
-    fn draws(settings: SampleWindowSettings, step: u64, share: Share) -> Vec<SampleDraw> {
-        settings.draws(step, share).collect()
+    fn draws(settings: ShuffleBufferSettings, step: u64, rank: Rank) -> Vec<SampleDraw> {
+        settings.draws(step, rank).collect()
     }
 
     #[test]
     fn what_processes_draw_together_one_draws_alone() {
         for step in 0..200 {
-            let whole = draws(SETTINGS, step, Share::ALL);
+            let whole = draws(SETTINGS, step, Rank::ONLY);
             for of in [2, 3, 4, 6, 12] {
-                let mut joint = vec![None; whole.len()];
+                let mut merged = vec![None; whole.len()];
                 for index in 0..of {
-                    let share = Share::new(index, of).unwrap();
-                    let own = draws(SETTINGS, step, share);
+                    let rank = Rank::new(index, of).unwrap();
+                    let own = draws(SETTINGS, step, rank);
                     assert_eq!(own.len(), whole.len() / of as usize);
                     for (at, draw) in own.into_iter().enumerate() {
                         let view = draw.number / SETTINGS.lightings;
                         assert_eq!(view % u64::from(of), u64::from(index));
-                        joint[index as usize + at * of as usize] = Some(draw);
+                        merged[index as usize + at * of as usize] = Some(draw);
                     }
                 }
-                let joint: Vec<SampleDraw> = joint.into_iter().flatten().collect();
-                assert_eq!(joint, whole);
+                let merged: Vec<SampleDraw> = merged.into_iter().flatten().collect();
+                assert_eq!(merged, whole);
             }
         }
     }
 
     #[test]
-    fn batches_are_of_different_views_in_the_window_and_see_all_samples_as_often() {
+    fn batches_are_of_different_views_in_the_buffer_and_see_all_samples_as_often() {
         let mut seen = BTreeMap::new();
         for step in 0..4000 {
             let oldest = SETTINGS.taken_before(step);
-            let drawn = draws(SETTINGS, step, Share::ALL);
+            let drawn = draws(SETTINGS, step, Rank::ONLY);
             let views: BTreeSet<u64> = drawn.iter().map(|d| d.number / 3).collect();
             assert_eq!(views.len(), 12);
             for draw in drawn {
@@ -249,18 +252,18 @@ mod tests {
 
     #[test]
     fn what_cannot_be_divided_is_named() {
-        let check = |settings: SampleWindowSettings, of| settings.check(Share::new(0, of).unwrap());
+        let check = |settings: ShuffleBufferSettings, of| settings.check(Rank::new(0, of).unwrap());
         assert!(check(SETTINGS, 4).is_ok());
         let error = check(SETTINGS, 5).unwrap_err().to_string();
         assert!(error.contains("run.batch is 12"), "{error}");
-        let narrow = SampleWindowSettings {
+        let narrow = ShuffleBufferSettings {
             capacity: 20,
             ..SETTINGS
         };
-        assert!(narrow.check(Share::ALL).is_ok());
+        assert!(narrow.check(Rank::ONLY).is_ok());
         let error = check(narrow, 4).unwrap_err().to_string();
         assert!(
-            error.contains("data.window is 20") && error.contains("36"),
+            error.contains("data.shuffle_buffer is 20") && error.contains("36"),
             "{error}"
         );
     }

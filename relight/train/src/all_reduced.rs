@@ -1,8 +1,8 @@
-//! The losses of a step of all processes together, as if one of them had the whole batch.
+//! All-reduced losses: those of a step over all processes, as if one of them had the whole batch.
 //!
 //! Each loss is a mean over what its process has of the batch, be it samples or pixels. The mean over all of it
-//! is theirs, weighted by how much each has. The gradient of what [`JointLosses::part`] answers, summed over the
-//! processes, is that of the joint loss.
+//! is theirs, weighted by how much each has. The gradient of what [`AllReducedLosses::part`] answers, summed over the
+//! processes, is that of the all-reduced loss.
 
 use std::collections::BTreeMap;
 
@@ -10,12 +10,12 @@ use tch::Tensor;
 
 use super::error::TrainError;
 use super::process_group::ProcessGroup;
-use super::run::StepLosses;
+use super::task::StepLosses;
 
 /// The losses of a step, the same in every process.
 #[derive(Debug)]
-pub(super) struct JointLosses {
-    /// By name, with their weights; the sum of all is `loss`. Empty where no process has anything to learn from.
+pub(super) struct AllReducedLosses {
+    /// By name, with their coefficients; the sum of all is `loss`. Empty where no process has anything to learn from.
     pub(super) values: BTreeMap<String, f64>,
     /// How much each head's answers vary, the mean over the processes.
     pub(super) spreads: BTreeMap<&'static str, f64>,
@@ -25,7 +25,7 @@ pub(super) struct JointLosses {
     parts: Vec<f64>,
 }
 
-impl JointLosses {
+impl AllReducedLosses {
     /// Those of one process.
     ///
     /// # Errors
@@ -59,10 +59,10 @@ impl JointLosses {
         group.sum(&mut sums)?;
         let (overs, rest) = sums.split_at(means.len());
         let (products, rest) = rest.split_at(means.len());
-        let joint = |(over, product): (&f64, &f64)| (*over > 0.0).then(|| product / over);
-        let values: Vec<_> = overs.iter().zip(products).map(joint).collect();
+        let reduced = |(over, product): (&f64, &f64)| (*over > 0.0).then(|| product / over);
+        let values: Vec<_> = overs.iter().zip(products).map(reduced).collect();
         let part = |((own, _), all): (&(f64, f64), &f64)| if *all > 0.0 { own / all } else { 0.0 };
-        let processes = f64::from(group.share().of());
+        let processes = f64::from(group.rank().world_size());
         let spreads = losses.spreads.keys().zip(rest);
         Ok(Self {
             values: losses.terms.named(&values),
@@ -74,7 +74,7 @@ impl JointLosses {
         })
     }
 
-    /// What this process adds to the joint loss, to be descended; none where it has nothing.
+    /// What this process adds to the all-reduced loss, to be descended; none where it has nothing.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
