@@ -1,18 +1,20 @@
 //! Why a turn cannot be solved.
 
+use crate::setting_error::SettingError;
+use relight_core::files::MovieError;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use relit_data::session::SessionError;
-
-use super::{ProbePlace, RoomVerdict};
 use relight_core::asset::AssetError;
 use relight_core::files::FolderFault;
-use relight_core::files::MovieError;
 use relight_core::image::{Extent, ImageError};
 use relight_core::light::{LightError, LightFileError};
 use relight_photo::decompose::DecomposeError;
 use relight_reader::OpenError;
+use relit_data::session::SessionError;
+
+use crate::observe::probe_place::ProbePlace;
+use crate::observe::verdict::RoomVerdict;
 
 /// Why a turn cannot be solved, or what was found cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -61,15 +63,8 @@ pub enum TurnError {
         needed: usize,
     },
     /// A setting cannot be.
-    #[error("{what} is {value}: it has to be {allowed}")]
-    Setting {
-        /// Which.
-        what: &'static str,
-        /// What was given.
-        value: f64,
-        /// What may be given.
-        allowed: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// No light explains the curves.
     #[error("no light explains the turn: all of it is dark, or all of it is clipped")]
     NoLight,
@@ -213,7 +208,7 @@ pub enum TurnError {
 
 impl TurnError {
     /// Puts the path to an operating system's reason.
-    pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
+    pub(crate) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         |source| Self::Write { path, source }
     }

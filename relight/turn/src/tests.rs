@@ -4,11 +4,12 @@ use std::sync::LazyLock;
 
 use proptest::prelude::*;
 
-use super::gloss::{GlossLight, MIRROR};
-use super::light::basis_at;
-use super::robust::lit;
-use super::search::Room;
-use super::*;
+use crate::fit::residuals::lit;
+use crate::model::gloss::GlossLight;
+use crate::model::harmonics::basis_at;
+use crate::model::metal::MIRROR;
+use crate::model::shading::Room;
+use crate::*;
 use relight_core::files::MovieReader;
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_core::light::{Direction, Normals, Order, Rotation, ShLight, YUp};

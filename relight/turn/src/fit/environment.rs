@@ -1,0 +1,297 @@
+//! The light of the room, matt and as gloss shows it, that explains the curves of all pixels best.
+
+use relight_core::image::Planes;
+use relight_core::light::{NormalEquations, ShLight};
+use relight_core::render::Surface;
+
+use crate::error::TurnError;
+use crate::fit::curve_statistics::Moments;
+use crate::model::directions::reflected;
+use crate::model::frame::TableFrame;
+use crate::model::gloss::{GLOSS_TERMS, GlossLight, gloss_terms};
+use crate::model::harmonics::WaveTerm;
+use crate::model::lighting::{TERMS, TableLight, wave_terms};
+use crate::model::material::BodyKind;
+use crate::model::metal::{MIRROR, mirror_terms};
+use crate::model::shading::Room;
+use crate::observe::curves::TurnCurves;
+
+/// Rounds of albedo and light in turn.
+const ROUNDS: usize = 3;
+
+/// Keeps light that the normals hardly tell small.
+const STIFFNESS: f64 = 1e-5;
+
+/// The same for gloss, in parts of the matt light.
+const GLOSS_STIFFNESS: f64 = 1e-4;
+
+/// A surface of which light without gloss leaves no more than this part of the curves' energy is matt.
+const MATT_LEFT: f64 = 1e-3;
+
+/// The least part of the light that counts as shown by gloss.
+const LEAST_GLOSS: f64 = 0.01;
+
+/// The light that explains the curves of a known surface best: of a ball whose albedo is known, say, or of an object
+/// with its truth. Pixels without a normal do not count. It is in the viewer's frame at the table's angle 0. Bands beyond the
+/// second, which a matt surface does not show, are those that gloss shows, where there is any: as if it blurred them no
+/// more than band 2.
+///
+/// # Errors
+/// Where a map has another size, or no light explains the curves.
+pub fn fit_turn_light(
+    curves: &TurnCurves,
+    surface: &Surface,
+    body: BodyKind,
+    frame: &TableFrame,
+) -> Result<ShLight, TurnError> {
+    if surface.extent() != curves.extent() {
+        return Err(TurnError::PriorSize {
+            found: surface.extent(),
+            expected: curves.extent(),
+        });
+    }
+    let (normals, albedo) = (surface.normals().planes(), surface.albedo().planes());
+    let width = curves.extent().width;
+    let (mut moments, mut known, mut colours) = (Vec::new(), Vec::new(), Vec::new());
+    for (pixel, &place) in curves.places().iter().enumerate() {
+        let at = |planes: &Planes<3>| planes.pixel(place % width, place / width).map(f64::from);
+        if at(normals) != [0.0; 3] {
+            moments.push(Moments::new(curves, pixel, None));
+            known.push(at(normals));
+            colours.push(at(albedo));
+        }
+    }
+    if body == BodyKind::Metal {
+        let room = fit_reflection(&moments, &known, &colours, frame, GLOSS_TERMS);
+        let light = room
+            .ok_or(TurnError::NoLight)?
+            .gloss
+            .times([1.0 / MIRROR; 3])
+            .light()?;
+        return Ok(light.rotated(&frame.rotation().inverse()));
+    }
+    let pixels = pixels(&moments, &known, frame);
+    let (matt, none) = fit_light(&pixels, &colours, Finish::Matt).ok_or(TurnError::NoLight)?;
+    let light = if left(&pixels, &colours, (&matt, &none)) < MATT_LEFT {
+        matt.coefficients()?
+    } else {
+        let (light, gloss) =
+            fit_light(&pixels, &colours, Finish::Glossy).ok_or(TurnError::NoLight)?;
+        with_higher_bands(light.coefficients()?, &gloss)?
+    };
+    Ok(light.rotated(&frame.rotation().inverse()))
+}
+
+/// A light of order 2 with the higher bands that gloss shows of it.
+fn with_higher_bands(light: ShLight, gloss: &GlossLight) -> Result<ShLight, TurnError> {
+    let shown = gloss.light()?;
+    let second = GlossLight::bands(&light).split_off(2);
+    let factor = gloss.share_of(&second[0]);
+    if factor <= LEAST_GLOSS {
+        return Ok(light);
+    }
+    let mut coefficients = light.coefficients().to_vec();
+    let higher = shown.coefficients().iter().skip(coefficients.len());
+    coefficients.extend(higher.map(|values| values.map(|value| value / factor)));
+    Ok(ShLight::new(coefficients)?)
+}
+
+/// The room in which a matt object with these normals explains the curves best, in turns with the albedo, which is
+/// brought along.
+pub(crate) fn fit_matt_room(
+    moments: &[Moments],
+    normals: &[[f64; 3]],
+    albedo: &mut [[f64; 3]],
+    frame: &TableFrame,
+) -> Option<Room> {
+    let pixels = pixels(moments, normals, frame);
+    let mut found = None;
+    for _ in 0..ROUNDS {
+        let (light, gloss) = fit_light(&pixels, albedo, Finish::Matt)?;
+        let room = Room {
+            frame: *frame,
+            light,
+            gloss,
+            body: BodyKind::Diffuse,
+        };
+        follow(&room, moments, normals, albedo);
+        found = Some(room);
+    }
+    found
+}
+
+/// The same for metal that shows so many bands of its light.
+pub(crate) fn fit_metal_room(
+    moments: &[Moments],
+    normals: &[[f64; 3]],
+    albedo: &mut [[f64; 3]],
+    frame: &TableFrame,
+    bands: usize,
+) -> Option<Room> {
+    let mut found = None;
+    for _ in 0..ROUNDS {
+        let room = fit_reflection(moments, normals, albedo, frame, bands * bands)?;
+        follow(&room, moments, normals, albedo);
+        found = Some(room);
+    }
+    found
+}
+
+/// Gives every pixel the albedo that explains it best.
+fn follow(room: &Room, moments: &[Moments], normals: &[[f64; 3]], albedo: &mut [[f64; 3]]) {
+    for ((moments, &normal), albedo) in moments.iter().zip(normals).zip(albedo) {
+        *albedo = moments.albedo(&room.waves(normal));
+    }
+}
+
+/// The room of which metal with these normals and albedos shows this, with so many terms of its light.
+fn fit_reflection(
+    moments: &[Moments],
+    normals: &[[f64; 3]],
+    albedo: &[[f64; 3]],
+    frame: &TableFrame,
+    count: usize,
+) -> Option<Room> {
+    let mut shown = [[0.0; GLOSS_TERMS]; 3];
+    for (channel, shown) in shown.iter_mut().enumerate() {
+        let mut equations = NormalEquations::new(count);
+        for ((moments, &normal), albedo) in moments.iter().zip(normals).zip(albedo) {
+            let mut terms = mirror_terms(frame.to_table(reflected(normal)));
+            for part in terms.iter_mut().flat_map(|term| &mut term.parts) {
+                *part *= albedo[channel];
+            }
+            add(&mut equations, (moments, channel), &terms[..count]);
+        }
+        equations.add_ridge(1, STIFFNESS);
+        for (term, [value, ..]) in shown.iter_mut().zip(equations.solve()?) {
+            *term = value;
+        }
+    }
+    let gloss = GlossLight::new(shown);
+    Some(Room {
+        frame: *frame,
+        light: TableLight::of_mirror(&gloss).ok()?,
+        gloss,
+        body: BodyKind::Metal,
+    })
+}
+
+/// A pixel with what each term of the room contributes to it, for an albedo of 1.
+struct LitPixel<'a> {
+    moments: &'a Moments,
+    matt: [WaveTerm; TERMS],
+    gloss: [WaveTerm; GLOSS_TERMS],
+}
+
+fn pixels<'a>(
+    moments: impl IntoIterator<Item = &'a Moments>,
+    normals: &[[f64; 3]],
+    frame: &TableFrame,
+) -> Vec<LitPixel<'a>> {
+    let pixel = |(moments, &normal): (&'a Moments, &[f64; 3])| LitPixel {
+        moments,
+        matt: wave_terms(frame.to_table(normal)),
+        gloss: gloss_terms(normal[2], frame.to_table(reflected(normal))),
+    };
+    moments.into_iter().zip(normals).map(pixel).collect()
+}
+
+/// What the light leaves that explains an evenly coloured matt body of these normals best, over what an even light leaves; none
+/// where nothing varies.
+pub(crate) fn unexplained<'a>(
+    moments: impl IntoIterator<Item = &'a Moments>,
+    normals: &[[f64; 3]],
+    frame: &TableFrame,
+) -> Option<f64> {
+    let pixels = pixels(moments, normals, frame);
+    let white = vec![[1.0; 3]; pixels.len()];
+    let (light, gloss) = fit_light(&pixels, &white, Finish::Matt)?;
+    let constant = WaveTerm {
+        wave: 0,
+        parts: [1.0, 0.0],
+    };
+    let (mut by_even, mut all) = (0.0, 0.0);
+    for channel in 0..3 {
+        let (mut along, mut own) = (0.0, 0.0);
+        for pixel in &pixels {
+            along += pixel.moments.term_along(channel, &constant);
+            own += pixel.moments.term_product(channel, &constant, &constant);
+            all += pixel.moments.energy(channel);
+        }
+        if own > 0.0 {
+            by_even += along * along / own;
+        }
+    }
+    let varying = all - by_even;
+    (varying > 1e-9 * all).then(|| left(&pixels, &white, (&light, &gloss)) * all / varying)
+}
+
+/// What a surface is taken for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Finish {
+    /// It has no gloss.
+    Matt,
+    /// Its gloss shows any light.
+    Glossy,
+}
+
+/// Light and gloss by least squares, for pixels of known albedo.
+fn fit_light(
+    pixels: &[LitPixel<'_>],
+    albedo: &[[f64; 3]],
+    finish: Finish,
+) -> Option<(TableLight, GlossLight)> {
+    let free = match finish {
+        Finish::Matt => 0,
+        Finish::Glossy => GLOSS_TERMS,
+    };
+    let mut light = [[0.0; TERMS]; 3];
+    let mut gloss = [[0.0; GLOSS_TERMS]; 3];
+    for channel in 0..3 {
+        let mut equations = NormalEquations::new(TERMS + free);
+        for (pixel, albedo) in pixels.iter().zip(albedo) {
+            let matt = pixel.matt.iter().map(|term| WaveTerm {
+                wave: term.wave,
+                parts: term.parts.map(|part| albedo[channel] * part),
+            });
+            let terms: Vec<WaveTerm> = matt.chain(pixel.gloss[..free].iter().copied()).collect();
+            add(&mut equations, (pixel.moments, channel), &terms);
+        }
+        equations.add_ridge(1, STIFFNESS);
+        equations.add_ridge(TERMS, GLOSS_STIFFNESS);
+        let found = equations.solve()?;
+        let all = light[channel].iter_mut().chain(&mut gloss[channel]);
+        for (term, [value, ..]) in all.zip(found) {
+            *term = value;
+        }
+    }
+    Some((TableLight::new(light), GlossLight::new(gloss)))
+}
+
+/// What a light and its gloss leave of the curves, over their energy.
+fn left(
+    pixels: &[LitPixel<'_>],
+    albedo: &[[f64; 3]],
+    (light, gloss): (&TableLight, &GlossLight),
+) -> f64 {
+    let (mut rest, mut all) = (0.0, 0.0);
+    for (pixel, albedo) in pixels.iter().zip(albedo) {
+        let mut waves = gloss.waves_of(&pixel.gloss);
+        for channel in 0..3 {
+            for (light, term) in light.terms()[channel].iter().zip(&pixel.matt) {
+                let wanted = waves[channel][term.wave..].iter_mut().zip(term.parts);
+                wanted.for_each(|(wave, part)| *wave += albedo[channel] * light * part);
+            }
+            rest += pixel.moments.left(channel, &waves[channel]);
+            all += pixel.moments.energy(channel);
+        }
+    }
+    rest / f64::max(all, f64::MIN_POSITIVE)
+}
+
+/// Adds what a pixel says of a channel's light and gloss; bright pixels, whose curves stand out of the noise, count more.
+fn add(equations: &mut NormalEquations, (moments, channel): (&Moments, usize), terms: &[WaveTerm]) {
+    let product = |i: usize, j: usize| moments.term_product(channel, &terms[i], &terms[j]);
+    let right = |i: usize| [moments.term_along(channel, &terms[i]), 0.0, 0.0];
+    equations.add_sums(product, right);
+}

@@ -1,0 +1,220 @@
+//! Whether a ball is where it is said to be: the light that it shows has to explain what it shows, and no circle beside it
+//! explains clearly more. Knows nothing of what the light is used for.
+
+use crate::error::TurnError;
+use crate::fit::curve_statistics::Moments;
+use crate::fit::environment::unexplained;
+use crate::model::frame::{Elevation, TableFrame};
+use crate::observe::curves::TurnCurves;
+use crate::observe::mirror_panorama::Mirrored;
+use crate::observe::probe::ProbeBall;
+use crate::observe::surroundings::{ACROSS, Surroundings, middle_of};
+
+/// The part of a circle's radius that counts: the rim of a ball shows what is behind it too.
+const PART: f64 = 0.92;
+
+/// Circles that are tried first: middles in either direction, and radii, in parts of the radius that was given.
+const SHIFTS: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
+
+const SCALES: [f64; 5] = [0.7, 0.84, 1.0, 1.19, 1.42];
+
+/// The best of them is improved by half of their distances either way, and half of that, so many times over.
+const STEPS: [f64; 3] = [-1.0, 0.0, 1.0];
+
+const REFINED: i32 = 3;
+
+/// A circle whose own light leaves more than this part of what an even light leaves shows no ball: a matt one, and one that
+/// mirrors, of whose small windows a panorama keeps less. Half of it is doubtful.
+const NO_GREY: f64 = 0.3;
+
+const NO_CHROME: f64 = 0.6;
+
+/// Another circle is the ball where it leaves less than this part of what the first one leaves, and less by this.
+const CLEARLY: f64 = 0.6;
+
+const LESS: f64 = 0.02;
+
+/// How far it is from the first one then at least, in radii: nearer ones measure nearly the same light.
+const APART: f64 = 0.08;
+
+/// A circle, in radii from the middle that was given: to the right and up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Circle {
+    middle: [f64; 2],
+    radius: f64,
+}
+
+/// A ball's pixels, each as a curve, and where they are.
+struct Shown {
+    curves: TurnCurves,
+    moments: Vec<Moments>,
+    at: Vec<[f64; 2]>,
+    frame: TableFrame,
+    ball: ProbeBall,
+}
+
+impl Surroundings {
+    /// How much of what varies the ball's own light leaves, 0 to 1.
+    ///
+    /// # Errors
+    /// [`TurnError::NoBall`] where that is most of it, [`TurnError::Misplaced`] where another circle leaves clearly less.
+    pub(crate) fn check(self, ball: ProbeBall, elevation: Elevation) -> Result<f64, TurnError> {
+        let (place, side) = (self.place, self.side);
+        let curves = self.builder.finish()?;
+        let shown = Shown {
+            moments: (0..curves.pixels())
+                .map(|pixel| Moments::new(&curves, pixel, None))
+                .collect(),
+            at: curves
+                .places()
+                .iter()
+                .map(|&at| middle_of(side, at))
+                .collect(),
+            curves,
+            frame: TableFrame::new(elevation),
+            ball,
+        };
+        let given = Circle {
+            middle: [0.0; 2],
+            radius: 1.0,
+        };
+        let left = shown.left(given).unwrap_or(1.0);
+        let (best, least) = shown.best(given, left);
+        let [x, y] = best.middle;
+        let apart = x.hypot(y).max((best.radius - 1.0).abs());
+        let most = most_left(ball);
+        if least < CLEARLY * left && least < left - LESS && apart > APART && least < most {
+            let [x, y] = place.in_picture(best.middle);
+            return Err(TurnError::Misplaced {
+                given: place,
+                better: [x, y, best.radius * place.radius].map(f64::round),
+                explained: [left, least].map(|left| 100.0 * (1.0 - left).max(0.0)),
+            });
+        }
+        if left > most {
+            return Err(TurnError::NoBall {
+                given: place,
+                explained: 100.0 * (1.0 - left).max(0.0),
+            });
+        }
+        Ok(left)
+    }
+}
+
+/// The most that the light of a ball leaves of what it shows.
+pub(crate) const fn most_left(ball: ProbeBall) -> f64 {
+    match ball {
+        ProbeBall::Grey => NO_GREY,
+        ProbeBall::Chrome => NO_CHROME,
+    }
+}
+
+impl Shown {
+    /// The circle that explains most, and what it leaves.
+    fn best(&self, given: Circle, left: f64) -> (Circle, f64) {
+        let mut best = (given, left);
+        let tries = SHIFTS.iter().flat_map(|&x| {
+            SHIFTS.iter().flat_map(move |&y| {
+                SCALES.iter().map(move |&radius| Circle {
+                    middle: [x, y],
+                    radius,
+                })
+            })
+        });
+        self.try_all(tries, &mut best);
+        for round in 1..=REFINED {
+            let part = 0.5_f64.powi(round);
+            let around = best.0;
+            let tries = STEPS.iter().flat_map(|x| {
+                STEPS.iter().flat_map(move |y| {
+                    STEPS.iter().map(move |scale| Circle {
+                        middle: [
+                            around.middle[0] + 0.25 * part * x,
+                            around.middle[1] + 0.25 * part * y,
+                        ],
+                        radius: around.radius * SCALES[3].powf(part * scale),
+                    })
+                })
+            });
+            self.try_all(tries, &mut best);
+        }
+        best
+    }
+
+    fn try_all(&self, circles: impl Iterator<Item = Circle>, best: &mut (Circle, f64)) {
+        for circle in circles {
+            if let Some(left) = self.left(circle)
+                && left < best.1
+            {
+                *best = (circle, left);
+            }
+        }
+    }
+
+    /// What the light that a ball in a circle shows leaves, over what an even light leaves; none where the circle is not in the
+    /// picture, or nothing varies in it.
+    fn left(&self, circle: Circle) -> Option<f64> {
+        let wanted = std::f64::consts::PI * (PART * circle.radius * ACROSS as f64 / 2.0).powi(2);
+        let (pixels, normals): (Vec<usize>, Vec<[f64; 3]>) = self
+            .at
+            .iter()
+            .enumerate()
+            .filter_map(|(pixel, &at)| Some((pixel, circle.normal(at)?)))
+            .unzip();
+        if (pixels.len() as f64) < 0.9 * wanted {
+            return None;
+        }
+        match self.ball {
+            ProbeBall::Grey => {
+                let moments = pixels.iter().map(|&pixel| &self.moments[pixel]);
+                unexplained(moments, &normals, &self.frame)
+            }
+            ProbeBall::Chrome => self.left_by_mirror(&pixels, &normals),
+        }
+    }
+
+    /// The same for a ball that mirrors the room.
+    fn left_by_mirror(&self, pixels: &[usize], normals: &[[f64; 3]]) -> Option<f64> {
+        let mut mirrored = Mirrored::new(self.frame);
+        self.each_value(pixels, normals, |normal, angle, value| {
+            mirrored.add(angle, normal, value);
+        });
+        let all = mirrored.all()?;
+        let (mut rest, mut energy) = (0.0, 0.0);
+        self.each_value(pixels, normals, |normal, angle, value| {
+            let seen = mirrored.seen(angle, normal).unwrap_or(all);
+            for c in 0..3 {
+                rest += (value[c] - seen[c]).powi(2);
+                energy += (value[c] - all[c]).powi(2);
+            }
+        });
+        (energy > 0.0).then(|| rest / energy)
+    }
+
+    /// Every value that is not clipped, with its normal and the table's angle, radians.
+    fn each_value(
+        &self,
+        pixels: &[usize],
+        normals: &[[f64; 3]],
+        mut take: impl FnMut([f64; 3], f64, [f64; 3]),
+    ) {
+        for (&pixel, &normal) in pixels.iter().zip(normals) {
+            let values = self.curves.values(pixel).iter();
+            let parts = values.zip(self.curves.weights(pixel));
+            for ((value, weight), &angle) in parts.zip(self.curves.angles()) {
+                if weight.iter().all(|&weight| weight > 0.5) {
+                    take(normal, angle, value.map(f64::from));
+                }
+            }
+        }
+    }
+}
+
+impl Circle {
+    /// The normal of the ball in it at a place, where that is well inside.
+    fn normal(self, at: [f64; 2]) -> Option<[f64; 3]> {
+        let [x, y] = [0, 1].map(|i| (at[i] - self.middle[i]) / self.radius);
+        let square = x * x + y * y;
+        (square < PART * PART).then(|| [x, y, (1.0 - square).sqrt()])
+    }
+}

@@ -1,0 +1,138 @@
+//! The normal equations of a joint step.
+
+use relight_core::light::NormalEquations;
+
+use crate::fit::curve_statistics::Moments;
+use crate::fit::normal_step::{Expected, Slope};
+use crate::fit::search::Search;
+use crate::fit::unknowns::Columns;
+use crate::model::directions::tangents;
+use crate::model::harmonics::WAVES;
+
+/// The normal equations of the unknowns, without what the pixels do by themselves.
+pub(crate) struct Sums {
+    count: usize,
+    /// The lower triangle, row by row, in a square.
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+}
+
+impl Sums {
+    pub(crate) fn new(count: usize) -> Self {
+        Self {
+            count,
+            matrix: vec![0.0; count * count],
+            right: vec![0.0; count],
+        }
+    }
+
+    pub(crate) fn plus(mut self, other: Self) -> Self {
+        let all = self.matrix.iter_mut().chain(&mut self.right);
+        all.zip(other.matrix.into_iter().chain(other.right))
+            .for_each(|(sum, value)| *sum += value);
+        self
+    }
+
+    pub(crate) fn add_pixel(
+        &mut self,
+        search: &Search<'_>,
+        columns: &Columns<'_>,
+        (moments, expected, normal): (&Moments, Option<Expected>, [f64; 3]),
+        weight: f64,
+    ) {
+        let axes = tangents(normal);
+        let leaning = search.leaning(moments, normal, axes);
+        let mut slope = Slope::default();
+        let mut couplings = vec![[0.0; 2]; self.count];
+        let all = columns.of(normal, leaning.albedo);
+        for (channel, mut columns) in all.into_iter().enumerate() {
+            let (body, ways) = (&leaning.body[channel], &leaning.ways[channel]);
+            slope.add(moments, channel, ways, &leaning.seen[channel]);
+            let along = moments.times(channel, body);
+            let own = dot(body, &along);
+            let rest = moments.rest(channel, &leaning.seen[channel]);
+            if own > 1e-12 && leaning.albedo[channel] > 0.0 {
+                // The albedo follows.
+                for (_, waves) in &mut columns {
+                    let share = dot(waves, &along) / own;
+                    waves
+                        .iter_mut()
+                        .zip(body)
+                        .for_each(|(wave, body)| *wave -= share * body);
+                }
+            }
+            for (k, (at, waves)) in columns.iter().enumerate() {
+                let image = moments.times(channel, waves);
+                self.right[*at] += weight * dot(waves, &rest);
+                for (coupling, way) in couplings[*at].iter_mut().zip(ways) {
+                    *coupling += dot(way, &image);
+                }
+                for (other, waves) in &columns[..=k] {
+                    self.matrix[at * self.count + other] += weight * dot(waves, &image);
+                }
+            }
+        }
+        slope.scale(moments.unit());
+        couplings
+            .iter_mut()
+            .flatten()
+            .for_each(|value| *value *= moments.unit());
+        if let Some(expected) = expected {
+            slope.lean(expected, normal, axes);
+        }
+        self.take_out(&slope, &couplings, weight / moments.unit());
+    }
+
+    /// Takes out what the normal could do as well.
+    pub(crate) fn take_out(&mut self, slope: &Slope, couplings: &[[f64; 2]], weight: f64) {
+        let [uu, uv, vv] = slope.bend;
+        let more = 1e-6 * (uu + vv) + 1e-12;
+        let (uu, vv) = (uu + more, vv + more);
+        let determinant = uu * vv - uv * uv;
+        let inverse = |[a, b]: [f64; 2]| {
+            [
+                weight * (vv * a - uv * b) / determinant,
+                weight * (uu * b - uv * a) / determinant,
+            ]
+        };
+        // The slope is half the gradient: a step goes against it.
+        let by_slope = inverse(slope.gradient);
+        for (i, row) in couplings.iter().enumerate() {
+            let by_row = inverse(*row);
+            self.right[i] += row[0] * by_slope[0] + row[1] * by_slope[1];
+            for (j, other) in couplings[..=i].iter().enumerate() {
+                self.matrix[i * self.count + j] -= by_row[0] * other[0] + by_row[1] * other[1];
+            }
+        }
+    }
+
+    /// The unknowns' change; each is held by this part of what holds it already.
+    pub(crate) fn solve(self, damping: f64) -> Option<Vec<f64>> {
+        let Self {
+            count,
+            matrix,
+            right,
+        } = self;
+        // In units of what holds each: they are of very different sizes.
+        let largest = (0..count)
+            .map(|i| matrix[i * count + i])
+            .fold(0.0, f64::max);
+        let least = 1e-12 * largest + f64::MIN_POSITIVE;
+        let units: Vec<f64> = (0..count)
+            .map(|i| matrix[i * count + i].max(least).sqrt())
+            .collect();
+        let mut equations = NormalEquations::new(count);
+        let product = |i: usize, j: usize| {
+            let more = if i == j { damping } else { 0.0 };
+            matrix[i * count + j] / (units[i] * units[j]) + more
+        };
+        equations.add_sums(product, |i| [right[i] / units[i], 0.0, 0.0]);
+        let solution = equations.solve()?;
+        let pairs = solution.into_iter().zip(units);
+        Some(pairs.map(|([value, ..], unit)| value / unit).collect())
+    }
+}
+
+fn dot(a: &[f64; WAVES], b: &[f64; WAVES]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,274 @@
+//! What of a room is to be found, and what each unknown does to a curve.
+
+use crate::model::directions::reflected;
+use crate::model::frame::TableFrame;
+use crate::model::gloss::{GLOSS_TERMS, GlossLight, gloss_terms};
+use crate::model::harmonics::{WAVES, WaveTerm};
+use crate::model::known_light::KnownLight;
+use crate::model::lighting::{MATT_BANDS, MATT_IN_GLOSS, TERMS, TableLight, wave_terms};
+use crate::model::material::BodyKind;
+use crate::model::metal::mirror_terms;
+use crate::model::shading::Room;
+
+/// The most that gloss shows of a band, over what a smooth dielectric shows of it: light by a dark grey ball is in small units.
+const MOST_SHARE: f64 = 20.0;
+
+/// The most that metal shows of a band, over the first.
+const MOST_METAL_SHARE: f64 = 1.2;
+
+/// The least share of the first band by which those of metal are divided.
+const LEAST_FIRST_SHARE: f64 = 0.05;
+
+/// How much gloss shows of the bands of a light that a matt surface shows too.
+pub(crate) type Shares = [f64; MATT_BANDS];
+
+/// What of a room is to be found.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Unknowns<'a> {
+    /// How much gloss shows of the bands of a light that is known.
+    Gloss(&'a KnownLight),
+    /// Light, and gloss that shows so many bands of it; 0 for a matt object.
+    Light {
+        /// Those from the fourth on are free, the others are shares of the light.
+        bands: usize,
+    },
+    /// How much metal shows of the bands of a light that is known.
+    Mirror(&'a KnownLight),
+    /// What metal shows of an unknown light: all terms are free.
+    Reflection,
+}
+
+/// A room by its unknowns.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Guess {
+    pub(crate) light: TableLight,
+    pub(crate) shares: Vec<f64>,
+    /// Bands of the gloss that a matt surface does not show, in an unknown light.
+    pub(crate) higher: GlossLight,
+}
+
+impl Guess {
+    pub(crate) fn of(room: &Room, unknowns: Unknowns<'_>) -> Self {
+        let shares = match unknowns {
+            Unknowns::Gloss(known) | Unknowns::Mirror(known) => {
+                let share = |band| room.gloss.share_of(band);
+                unknowns.known_bands(known).iter().map(share).collect()
+            }
+            Unknowns::Light { bands } => shares(room)[..bands.min(MATT_BANDS)].to_vec(),
+            Unknowns::Reflection => Vec::new(),
+        };
+        let layout = unknowns.layout();
+        Self {
+            light: room.light,
+            shares,
+            higher: room.gloss.beyond(layout.first.isqrt()),
+        }
+    }
+
+    pub(crate) fn room(&self, frame: &TableFrame, unknowns: Unknowns<'_>) -> Room {
+        let mut parts = unknowns.bands(self).unwrap_or_default();
+        let mut factors = self.shares.clone();
+        if unknowns.layout().higher > 0 {
+            parts.truncate(factors.len());
+            parts.push(self.higher);
+            factors.push(1.0);
+        }
+        let gloss = GlossLight::sum(&parts, &factors);
+        let light = match unknowns {
+            Unknowns::Reflection => TableLight::of_mirror(&gloss).unwrap_or(self.light),
+            _ => self.light,
+        };
+        Room {
+            frame: *frame,
+            light,
+            gloss,
+            body: unknowns.body(),
+        }
+    }
+
+    pub(crate) fn moved(&self, step: &[f64], unknowns: Unknowns<'_>) -> Self {
+        let layout = unknowns.layout();
+        let mut terms = *self.light.terms();
+        let mut higher = self.higher;
+        for (channel, terms) in terms.iter_mut().enumerate() {
+            let own = &step[layout.of_channel(channel)..][..layout.light + layout.higher];
+            let (light, rest) = own.split_at(layout.light);
+            terms
+                .iter_mut()
+                .zip(light)
+                .for_each(|(term, by)| *term += by);
+            for (at, by) in rest.iter().enumerate() {
+                higher = higher.moved(channel, layout.first + at, *by);
+            }
+        }
+        let by = &step[layout.of_channel(3)..];
+        let shares = self.shares.iter().zip(by);
+        let mut shares: Vec<f64> = shares
+            .map(|(share, by)| (share + by).clamp(0.0, MOST_SHARE))
+            .collect();
+        if let (Unknowns::Mirror(_), Some(&first)) = (unknowns, shares.first()) {
+            // Of an even light metal shows its albedo's part, whatever its lobe is.
+            let first = first.max(LEAST_FIRST_SHARE);
+            for share in &mut shares {
+                *share = (*share / first).min(MOST_METAL_SHARE);
+            }
+        }
+        Self {
+            light: TableLight::new(terms),
+            shares,
+            higher,
+        }
+    }
+
+    /// The shares of the bands of a light, which a matt surface shows too.
+    pub(crate) fn matt_shares(&self) -> Shares {
+        [0, 1, 2].map(|l| self.shares.get(l).copied().unwrap_or(0.0))
+    }
+}
+
+impl Unknowns<'_> {
+    /// What the object is taken for.
+    pub(crate) const fn body(&self) -> BodyKind {
+        match self {
+            Self::Gloss(_) | Self::Light { .. } => BodyKind::Diffuse,
+            Self::Mirror(_) | Self::Reflection => BodyKind::Metal,
+        }
+    }
+
+    /// What the object would show of each band of a light if it blurred nothing.
+    pub(crate) fn known_bands<'a>(&self, known: &'a KnownLight) -> &'a [GlossLight] {
+        match self.body() {
+            BodyKind::Diffuse => known.bands(),
+            BodyKind::Metal => known.mirror(),
+        }
+    }
+
+    /// The same of each band of the light that the object has shares of.
+    pub(crate) fn bands(&self, guess: &Guess) -> Option<Vec<GlossLight>> {
+        match self {
+            Self::Gloss(known) | Self::Mirror(known) => Some(self.known_bands(known).to_vec()),
+            Self::Light { .. } => Some(GlossLight::bands(&guess.light.coefficients().ok()?)),
+            Self::Reflection => Some(Vec::new()),
+        }
+    }
+
+    pub(crate) fn layout(&self) -> Layout {
+        match *self {
+            Self::Gloss(known) | Self::Mirror(known) => Layout {
+                light: 0,
+                first: TERMS,
+                higher: 0,
+                shares: known.bands().len(),
+            },
+            Self::Light { bands } => Layout {
+                light: TERMS,
+                first: TERMS,
+                higher: (bands * bands).clamp(TERMS, GLOSS_TERMS) - TERMS,
+                shares: bands.min(MATT_BANDS),
+            },
+            Self::Reflection => Layout {
+                light: 0,
+                first: 0,
+                higher: GLOSS_TERMS,
+                shares: 0,
+            },
+        }
+    }
+}
+
+/// Where the unknowns stand: of each channel terms of the light and of the higher bands of its gloss, then the shares.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Layout {
+    pub(crate) light: usize,
+    /// The first term of the gloss that is free, and how many are.
+    pub(crate) first: usize,
+    pub(crate) higher: usize,
+    pub(crate) shares: usize,
+}
+
+impl Layout {
+    pub(crate) const fn of_channel(&self, channel: usize) -> usize {
+        channel * (self.light + self.higher)
+    }
+
+    pub(crate) const fn count(&self) -> usize {
+        self.of_channel(3) + self.shares
+    }
+}
+
+/// What each unknown does to the curve of a pixel.
+pub(crate) struct Columns<'a> {
+    pub(crate) guess: &'a Guess,
+    pub(crate) bands: Vec<GlossLight>,
+    pub(crate) layout: Layout,
+    pub(crate) room: &'a Room,
+}
+
+impl Columns<'_> {
+    /// The unknowns that act on a channel of a pixel, and its waves for each.
+    pub(crate) fn of(&self, normal: [f64; 3], albedo: [f64; 3]) -> [Vec<(usize, [f64; WAVES])>; 3] {
+        let frame = &self.room.frame;
+        let matt = wave_terms(frame.to_table(normal));
+        let reflected = frame.to_table(reflected(normal));
+        // What gloss shows does not depend on the albedo, and what metal shows is times it.
+        let (gloss, colour) = match self.room.body {
+            BodyKind::Diffuse => (gloss_terms(normal[2], reflected), [1.0; 3]),
+            BodyKind::Metal => (mirror_terms(reflected), albedo),
+        };
+        let matt_shares = self.guess.matt_shares();
+        let bands: Vec<_> = self.bands[..self.layout.shares]
+            .iter()
+            .map(|band| band.waves_of(&gloss))
+            .collect();
+        [0, 1, 2].map(|channel| {
+            let first = self.layout.of_channel(channel);
+            let mut columns = Vec::with_capacity(self.layout.count());
+            let light = matt.iter().zip(MATT_IN_GLOSS).take(self.layout.light);
+            for (term, (at, factor)) in light {
+                let share = matt_shares[band(at)] / factor;
+                let mut waves = spread(term, albedo[channel]);
+                add(&mut waves, &spread(&gloss[at], share));
+                columns.push((first + columns.len(), waves));
+            }
+            for term in &gloss[self.layout.first..][..self.layout.higher] {
+                columns.push((first + columns.len(), spread(term, colour[channel])));
+            }
+            let shares = self.layout.of_channel(3);
+            let bands = bands.iter().enumerate();
+            columns.extend(bands.map(|(l, waves)| {
+                (
+                    shares + l,
+                    waves[channel].map(|wave| colour[channel] * wave),
+                )
+            }));
+            columns
+        })
+    }
+}
+
+/// The band of a term of gloss.
+pub(crate) const fn band(at: usize) -> usize {
+    at.isqrt()
+}
+
+/// How much gloss shows of the first bands of a light that was found.
+pub(crate) fn shares(room: &Room) -> Shares {
+    let Ok(light) = room.light.coefficients() else {
+        return [0.0; MATT_BANDS];
+    };
+    let mut bands = GlossLight::bands(&light).into_iter();
+    [0; MATT_BANDS].map(|_| bands.next().map_or(0.0, |band| room.gloss.share_of(&band)))
+}
+
+/// A term times a factor, among all waves.
+fn spread(term: &WaveTerm, factor: f64) -> [f64; WAVES] {
+    let mut waves = [0.0; WAVES];
+    for (wave, part) in waves[term.wave..].iter_mut().zip(term.parts) {
+        *wave = factor * part;
+    }
+    waves
+}
+
+fn add(waves: &mut [f64; WAVES], others: &[f64; WAVES]) {
+    waves.iter_mut().zip(others).for_each(|(a, b)| *a += b);
+}

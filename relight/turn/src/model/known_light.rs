@@ -1,0 +1,72 @@
+//! A light that was given or measured, band by band.
+
+use relight_core::light::ShLight;
+
+use crate::model::frame::TableFrame;
+use crate::model::gloss::GlossLight;
+use crate::model::lighting::TableLight;
+use crate::model::metal::MIRROR;
+
+/// A light that was measured.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct KnownLight {
+    pub(crate) matt: TableLight,
+    bands: Vec<GlossLight>,
+    mirror: Vec<GlossLight>,
+}
+
+impl KnownLight {
+    pub(crate) fn new(light: &ShLight, frame: &TableFrame) -> Self {
+        let bands = GlossLight::bands(&light.rotated(&frame.rotation()));
+        let mirror = bands.iter().map(|band| band.times([MIRROR; 3]));
+        Self {
+            matt: TableLight::from_viewer(light, frame),
+            mirror: mirror.collect(),
+            bands,
+        }
+    }
+
+    /// What metal of albedo 1 shows of each of its bands that blurs nothing: as bright as a matt white surface in even light.
+    pub(crate) fn mirror(&self) -> &[GlossLight] {
+        &self.mirror
+    }
+
+    /// What gloss shows of each of its bands that blurs nothing.
+    pub(crate) fn bands(&self) -> &[GlossLight] {
+        &self.bands
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::model::shading::Room;
+    use crate::{BodyKind, Elevation};
+    use relight_core::light::Order;
+
+    #[test]
+    fn white_metal_is_as_bright_as_a_matt_white_surface_in_even_light() {
+        let frame = TableFrame::new(Elevation::assumed());
+        let known = KnownLight::new(&ShLight::even(Order::TWO, [1.0; 3]), &frame);
+        let normal = [0.48, 0.36, 0.8];
+        let room = |body| Room {
+            frame,
+            light: known.matt,
+            gloss: GlossLight::sum(known.mirror(), &[1.0; 3]),
+            body,
+        };
+        for body in [BodyKind::Diffuse, BodyKind::Metal] {
+            let shown = room(body).waves(normal).body[1];
+            assert!((shown[0] - PI).abs() < 1e-6, "{body:?} {shown:?}");
+        }
+        let back = TableLight::of_mirror(&room(BodyKind::Metal).gloss).unwrap();
+        let pairs = back
+            .terms()
+            .iter()
+            .flatten()
+            .zip(known.matt.terms().iter().flatten());
+        assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-9));
+    }
+}

@@ -1,0 +1,160 @@
+//! Whether the room's light is fit for this.
+
+use crate::model::harmonics::WAVES;
+use rayon::prelude::*;
+use relight_core::light::NormalEquations;
+use relight_core::statistics::median;
+use relit_data::turn_light::LEAST_MODULATION;
+use serde::Serialize;
+
+use crate::model::directions::half_sphere;
+use crate::model::harmonics::MATT_WAVES;
+use crate::model::shading::Room;
+use crate::observe::curves::TurnCurves;
+use crate::observe::verdict::RoomVerdict;
+
+/// Above this part beyond the second harmonic, the modulation is not that of a matt surface.
+const MOST_BEYOND: f64 = 0.3;
+
+/// The least part of the pixels whose curves have to tell something: else the exposure was wrong.
+const LEAST_TOLD: f64 = 0.1;
+
+/// The least mean of a pixel's light that tells something.
+const LEAST_LIGHT: f64 = 1e-5;
+
+/// Normals on which the modulation of a light is measured.
+const NORMALS: usize = 100;
+
+/// How much the light of the turn tells.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Conditioning {
+    /// The median over the pixels of the effective value of the first and second harmonic, over the mean.
+    pub modulation: f64,
+    /// The median over the pixels of the part of a curve's variation that lies beyond the second harmonic.
+    pub beyond: f64,
+    /// The effective value of the harmonics over the mean in a light that was given: the median over the normals that face the
+    /// viewer.
+    pub given_modulation: Option<f64>,
+    /// What follows.
+    pub verdict: RoomVerdict,
+}
+
+impl Conditioning {
+    /// That of a turn.
+    #[must_use]
+    pub fn of(curves: &TurnCurves) -> Self {
+        let pixels: Vec<Told> = (0..curves.pixels())
+            .into_par_iter()
+            .map(|pixel| of_pixel(curves, pixel))
+            .collect();
+        let figures = pixels.iter().filter_map(|told| match told {
+            Told::Curve { modulation, beyond } => Some((*modulation, *beyond)),
+            Told::Clipped | Told::Black => None,
+        });
+        let modulation = median(figures.clone().map(|(modulation, _)| modulation)).unwrap_or(0.0);
+        let beyond = median(figures.clone().map(|(_, beyond)| beyond)).unwrap_or(0.0);
+        let told = figures.count();
+        let clipped = pixels.iter().filter(|told| matches!(told, Told::Clipped));
+        let verdict = if (told as f64) < LEAST_TOLD * pixels.len() as f64 {
+            if 2 * clipped.count() >= pixels.len() - told {
+                RoomVerdict::Overexposed
+            } else {
+                RoomVerdict::Underexposed
+            }
+        } else if modulation < LEAST_MODULATION {
+            RoomVerdict::TooEven
+        } else if beyond > MOST_BEYOND {
+            RoomVerdict::NotMatt
+        } else {
+            RoomVerdict::Good
+        };
+        Self {
+            modulation,
+            beyond,
+            given_modulation: None,
+            verdict,
+        }
+    }
+
+    /// Whether a light was given that is too even while the turn is not.
+    #[must_use]
+    pub fn is_given_at_odds(&self) -> bool {
+        let is_even = self
+            .given_modulation
+            .is_some_and(|given| given < LEAST_MODULATION);
+        is_even && self.modulation >= LEAST_MODULATION
+    }
+
+    /// The same where the light was given, as an object shows it in this room that blurs nothing: one that is too even tells no more
+    /// than an even turn.
+    pub(crate) fn in_given(self, room: &Room) -> Self {
+        let modulations = half_sphere(NORMALS).map(|normal| {
+            let waves = room.waves(normal).body;
+            let sum = |wave: usize| waves.iter().map(|waves| waves[wave]).sum::<f64>();
+            let harmonics: f64 = (1..WAVES).map(|wave| sum(wave).powi(2)).sum();
+            let mean = sum(0);
+            if mean > 0.0 {
+                (harmonics / 2.0).sqrt() / mean
+            } else {
+                0.0
+            }
+        });
+        let modulation = median(modulations).unwrap_or(0.0);
+        let is_even = modulation < LEAST_MODULATION && self.verdict.is_fit();
+        Self {
+            given_modulation: Some(modulation),
+            verdict: if is_even {
+                RoomVerdict::TooEven
+            } else {
+                self.verdict
+            },
+            ..self
+        }
+    }
+}
+
+/// What the light of a pixel tells, all channels together.
+enum Told {
+    /// Modulation, and the part beyond the second harmonic.
+    Curve { modulation: f64, beyond: f64 },
+    /// Nothing: a channel is clipped over most of the turn.
+    Clipped,
+    /// Nothing: it is black.
+    Black,
+}
+
+fn of_pixel(curves: &TurnCurves, pixel: usize) -> Told {
+    let mut equations = NormalEquations::new(MATT_WAVES);
+    let mut seen = Vec::new();
+    let parts = curves.values(pixel).iter().zip(curves.weights(pixel));
+    for ((value, weight), waves) in parts.zip(curves.waves()) {
+        if weight.iter().all(|&weight| weight > 0.5) {
+            let grey = value.iter().map(|&v| f64::from(v)).sum::<f64>();
+            equations.add(&waves[..MATT_WAVES], [grey, 0.0, 0.0]);
+            seen.push((grey, waves));
+        }
+    }
+    if 2 * seen.len() < curves.parts() {
+        return Told::Clipped;
+    }
+    let Some(solution) = equations.solve() else {
+        return Told::Clipped;
+    };
+    let solution: Vec<f64> = solution.into_iter().map(|[value, ..]| value).collect();
+    let mean = seen.iter().map(|(grey, _)| grey).sum::<f64>() / seen.len() as f64;
+    let (mut all, mut rest) = (0.0, 0.0);
+    for (grey, waves) in seen {
+        let model: f64 = waves.iter().zip(&solution).map(|(a, b)| a * b).sum();
+        all += (grey - mean).powi(2);
+        rest += (grey - model).powi(2);
+    }
+    let harmonics: f64 = solution[1..].iter().map(|value| value * value).sum();
+    let constant = solution[0];
+    if constant <= LEAST_LIGHT {
+        return Told::Black;
+    }
+    Told::Curve {
+        modulation: (harmonics / 2.0).sqrt() / constant,
+        beyond: if all > 0.0 { rest / all } else { 0.0 },
+    }
+}

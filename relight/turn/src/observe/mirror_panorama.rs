@@ -1,0 +1,100 @@
+//! The panorama that a chrome ball shows.
+
+use std::f64::consts::{FRAC_1_PI, PI, TAU};
+
+use relight_core::light::{Direction, Order, ShLight, basis};
+
+use crate::error::TurnError;
+use crate::model::directions::reflected;
+use crate::model::frame::TableFrame;
+
+/// Rows and columns of the panorama that a chrome ball shows.
+const ROWS: usize = 32;
+
+const COLUMNS: usize = 2 * ROWS;
+
+/// The order of the light by a chrome ball: as much as gloss is fitted with.
+const CHROME_ORDER: usize = 6;
+
+/// The panorama that a chrome ball shows of the room while it turns, in the table's frame at its angle 0.
+#[derive(Debug)]
+pub(crate) struct Mirrored {
+    frame: TableFrame,
+    sums: Vec<[f64; 3]>,
+    counts: Vec<f64>,
+}
+
+impl Mirrored {
+    pub(crate) fn new(frame: TableFrame) -> Self {
+        Self {
+            frame,
+            sums: vec![[0.0; 3]; ROWS * COLUMNS],
+            counts: vec![0.0; ROWS * COLUMNS],
+        }
+    }
+
+    /// Adds what a normal of the ball shows at an angle of the table, radians.
+    pub(crate) fn add(&mut self, angle: f64, normal: [f64; 3], light: [f64; 3]) {
+        let cell = self.cell(angle, normal);
+        for (sum, light) in self.sums[cell].iter_mut().zip(light) {
+            *sum += light;
+        }
+        self.counts[cell] += 1.0;
+    }
+
+    /// What the same direction of the room showed in the mean; none where it was never added.
+    pub(crate) fn seen(&self, angle: f64, normal: [f64; 3]) -> Option<[f64; 3]> {
+        let cell = self.cell(angle, normal);
+        mean(&self.sums[cell..=cell], &self.counts[cell..=cell])
+    }
+
+    /// The mean of all that was added.
+    pub(crate) fn all(&self) -> Option<[f64; 3]> {
+        mean(&self.sums, &self.counts)
+    }
+
+    /// Where the direction is that a normal of the ball shows.
+    pub(crate) fn cell(&self, angle: f64, normal: [f64; 3]) -> usize {
+        let [x, y, z] = self.frame.to_table(reflected(normal));
+        let azimuth = y.atan2(x) + angle;
+        let column = (azimuth.rem_euclid(TAU) / TAU * COLUMNS as f64) as usize % COLUMNS;
+        let row = ((z.clamp(-1.0, 1.0).acos() / PI * ROWS as f64) as usize).min(ROWS - 1);
+        row * COLUMNS + column
+    }
+
+    /// What it shows, as coefficients; directions that it never shows are as bright as their row, or as all.
+    pub(crate) fn light(&self) -> Result<ShLight, TurnError> {
+        let all = self.all().ok_or(TurnError::NoLight)?;
+        let order = Order::new(CHROME_ORDER).unwrap_or(Order::TWO);
+        let mut light = ShLight::even(order, [0.0; 3]);
+        for row in 0..ROWS {
+            let cells = row * COLUMNS..(row + 1) * COLUMNS;
+            let of_row = mean(&self.sums[cells.clone()], &self.counts[cells]).unwrap_or(all);
+            let polar = PI * (row as f64 + 0.5) / ROWS as f64;
+            let edges = [row, row + 1].map(|edge| (PI * edge as f64 / ROWS as f64).cos());
+            let area = (edges[0] - edges[1]) * TAU / COLUMNS as f64;
+            for column in 0..COLUMNS {
+                let cell = row * COLUMNS + column;
+                let shown = mean(&self.sums[cell..=cell], &self.counts[cell..=cell]);
+                let azimuth = TAU * (column as f64 + 0.5) / COLUMNS as f64;
+                let (sin, cos) = azimuth.sin_cos();
+                let to = Direction::new(polar.sin() * cos, polar.sin() * sin, polar.cos());
+                let Some(to) = to else { continue };
+                let values = basis(order, to);
+                for (coefficient, value) in light.coefficients_mut().iter_mut().zip(values) {
+                    for (sum, shown) in coefficient.iter_mut().zip(shown.unwrap_or(of_row)) {
+                        *sum += FRAC_1_PI * area * value * shown;
+                    }
+                }
+            }
+        }
+        Ok(light)
+    }
+}
+
+/// The mean of all cells that were seen.
+fn mean(sums: &[[f64; 3]], counts: &[f64]) -> Option<[f64; 3]> {
+    let count: f64 = counts.iter().sum();
+    let sum = |channel: usize| sums.iter().map(|sum| sum[channel]).sum::<f64>();
+    (count > 0.0).then(|| [0, 1, 2].map(|channel| sum(channel) / count))
+}

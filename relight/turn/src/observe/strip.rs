@@ -1,0 +1,394 @@
+//! A strip of the room's panorama, out of the background of a turn's video.
+//!
+//! Camera and object turn together, so that the camera looks all around the room. Two columns of the picture, near its
+//! sides, see the same room one after the other: by how much later the second does follows the angle between them, and which of them
+//! is first says which way the table turns.
+
+use relight_core::image::ColourSpace;
+use std::path::Path;
+
+use relight_core::files::write_png;
+use relight_core::image::{Depth, Extent, Linear, Planes, Rgb, Srgb};
+use serde::Serialize;
+
+use crate::error::TurnError;
+use crate::observe::reading::TableSense;
+
+/// Columns of the strip: four a degree.
+const COLUMNS: usize = 1440;
+
+/// Where the two columns are, in parts of the width from either side, and how wide they are.
+const INSET: f64 = 0.03;
+
+const WIDTH: f64 = 0.012;
+
+/// The part of the picture's height, from the top, that shows the room: below is the table.
+const HEIGHT: f64 = 0.5;
+
+/// The two columns are compared at every so many columns of the strip, and at so many rows.
+const COARSE: usize = 4;
+
+const ROWS: usize = 24;
+
+/// Largest angle between the two columns that is looked for, degrees, and the least.
+const MOST_FIELD_DEG: usize = 100;
+
+const LEAST_FIELD_DEG: usize = 4;
+
+/// What the columns see is the same room from this correlation on.
+const LEAST_CORRELATION: f64 = 0.5;
+
+/// Gathers the background of a turn's frames, in any order.
+#[derive(Debug)]
+pub struct StripBuilder {
+    extent: Extent,
+    rows: usize,
+    sides: [Side; 2],
+}
+
+/// What one column of the picture saw, over the table's angle.
+#[derive(Debug)]
+struct Side {
+    /// Where it begins, and how wide it is, pixels.
+    from: usize,
+    width: usize,
+    /// Light by angle, in it row by row.
+    light: Vec<[f32; 3]>,
+    frames: Vec<u32>,
+}
+
+/// The room around the table.
+#[derive(Debug, Clone)]
+pub struct RoomStrip {
+    image: Rgb<Linear>,
+    figures: StripFigures,
+}
+
+/// What the strip tells.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StripFigures {
+    /// Which way the table turns as its angle grows.
+    pub sense: TableSense,
+    /// The angle between the two columns, degrees.
+    pub field_deg: f64,
+    /// How alike the two columns' views are, the one turned by that angle: 0 to 1.
+    pub correlation: f64,
+    /// From where more light comes, by the first harmonic of the strip: the azimuth in the table's frame at angle 0, from x
+    /// towards y, degrees. Clipped windows and the ceiling, which no frame shows, are not in it.
+    pub bright_azimuth_deg: f64,
+    /// The size of that harmonic over the mean.
+    pub bright_part: f64,
+}
+
+impl StripBuilder {
+    /// For frames of this size.
+    ///
+    /// # Errors
+    /// [`TurnError::Empty`] where they are too small for two columns.
+    pub fn new(extent: Extent) -> Result<Self, TurnError> {
+        let width = ((WIDTH * extent.width as f64) as usize).max(1);
+        let inset = (INSET * extent.width as f64) as usize;
+        let rows = ((HEIGHT * extent.height as f64) as usize).min(extent.height);
+        if rows == 0 || extent.width < 2 * (inset + width) {
+            return Err(TurnError::Empty);
+        }
+        let side = |from| Side {
+            from,
+            width,
+            light: vec![[0.0; 3]; COLUMNS * rows],
+            frames: vec![0; COLUMNS],
+        };
+        Ok(Self {
+            extent,
+            rows,
+            sides: [side(inset), side(extent.width - inset - width)],
+        })
+    }
+
+    /// Takes up a frame at an angle of the table, degrees.
+    ///
+    /// # Errors
+    /// [`TurnError::FrameSize`] where it has another size.
+    pub fn push(&mut self, angle_deg: f64, frame: &Rgb<Srgb>) -> Result<(), TurnError> {
+        if frame.planes().extent() != self.extent {
+            return Err(TurnError::FrameSize {
+                found: frame.planes().extent(),
+                expected: self.extent,
+            });
+        }
+        if angle_deg.is_finite() {
+            let column = (angle_deg.rem_euclid(360.0) / 360.0 * COLUMNS as f64) as usize % COLUMNS;
+            for side in &mut self.sides {
+                side.push(column, self.rows, frame);
+            }
+        }
+        Ok(())
+    }
+
+    /// The strip; none where the two columns do not show the same room, or frames are missing.
+    #[must_use]
+    pub fn finish(self) -> Option<RoomStrip> {
+        let rows = self.rows;
+        let [left, right] = &self.sides;
+        let (left, right) = (left.filled(rows)?, right.filled(rows)?);
+        let (lag, correlation) = best_lag(&grey(&left, rows), &grey(&right, rows))?;
+        if correlation < LEAST_CORRELATION {
+            return None;
+        }
+        let sense = if lag > 0 {
+            TableSense::CounterClockwise
+        } else {
+            TableSense::Clockwise
+        };
+        let lag = lag * COARSE as isize;
+        let field_deg = lag.unsigned_abs() as f64 * 360.0 / COLUMNS as f64;
+        let around =
+            |from: usize, by: isize| (from as isize + by).rem_euclid(COLUMNS as isize) as usize;
+        // At angle t the middle of the picture shows what the left column saw half the lag before, and the right one sees later.
+        let seen = |angle: usize, row: usize| {
+            let early = left[around(angle, -lag / 2) * rows + row];
+            let late = right[around(angle, lag - lag / 2) * rows + row];
+            [0, 1, 2].map(|c| (early[c] + late[c]) / 2.0)
+        };
+        let (bright_azimuth_deg, bright_part) = first_harmonic(sense, |angle| {
+            let sum: f32 = (0..rows).flat_map(|row| seen(angle, row)).sum();
+            f64::from(sum) / (3 * rows) as f64
+        });
+        // Columns by what is to the right in the picture; what the camera sees at angle 0 is in the middle.
+        let angle_of = |x: usize| {
+            let by = x as isize - (COLUMNS / 2) as isize;
+            around(0, if lag > 0 { -by } else { by })
+        };
+        let wide = Planes::from_fn(Extent::new(COLUMNS, rows), |x, y| seen(angle_of(x), y));
+        let between = self.sides[1].from - self.sides[0].from;
+        let pixels_a_degree = between as f64 / field_deg;
+        let height = rows as f64 / pixels_a_degree * COLUMNS as f64 / 360.0;
+        let image = wide.resized(Extent::new(COLUMNS, (height.round() as usize).max(1)));
+        Some(RoomStrip {
+            image: Rgb::new(image),
+            figures: StripFigures {
+                sense,
+                field_deg,
+                correlation,
+                bright_azimuth_deg,
+                bright_part,
+            },
+        })
+    }
+}
+
+impl Side {
+    fn push(&mut self, column: usize, rows: usize, frame: &Rgb<Srgb>) {
+        let width = frame.planes().extent().width;
+        let planes = frame.planes().planes();
+        for (row, light) in self.light[column * rows..][..rows].iter_mut().enumerate() {
+            for (light, plane) in light.iter_mut().zip(planes) {
+                let pixels = &plane[row * width + self.from..][..self.width];
+                let sum: f32 = pixels.iter().map(|&value| Srgb::to_linear(value)).sum();
+                *light += sum / self.width as f32;
+            }
+        }
+        self.frames[column] += 1;
+    }
+
+    /// The mean at every angle; angles without a frame are like the one before. None where more than a tenth of the turn
+    /// is missing at once.
+    fn filled(&self, rows: usize) -> Option<Vec<[f32; 3]>> {
+        let mut light = self.light.clone();
+        let first = self.frames.iter().position(|&frames| frames > 0)?;
+        let mut last = first;
+        for at in (first..first + COLUMNS).map(|at| at % COLUMNS) {
+            if self.frames[at] == 0 {
+                if (at + COLUMNS - last) % COLUMNS > COLUMNS / 10 {
+                    return None;
+                }
+                light.copy_within(last * rows..(last + 1) * rows, at * rows);
+                continue;
+            }
+            last = at;
+            let frames = self.frames[at] as f32;
+            for value in light[at * rows..][..rows].as_flattened_mut() {
+                *value /= frames;
+            }
+        }
+        Some(light)
+    }
+}
+
+impl RoomStrip {
+    /// What it tells.
+    #[must_use]
+    pub const fn figures(&self) -> &StripFigures {
+        &self.figures
+    }
+
+    /// The strip itself: what is to the right in the room is to the right in it, and what the camera sees at the table's angle 0
+    /// is in its middle.
+    #[must_use]
+    pub const fn image(&self) -> &Rgb<Linear> {
+        &self.image
+    }
+
+    /// Writes it as a picture.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn write_png(&self, path: &Path) -> Result<(), TurnError> {
+        let picture = self.image.clone().encode::<Srgb>();
+        Ok(write_png(path, picture.planes(), Depth::Eight)?)
+    }
+}
+
+/// The grey of a few rows at every few angles, each row less its mean.
+fn grey(light: &[[f32; 3]], rows: usize) -> Vec<Vec<f64>> {
+    let taken = ROWS.min(rows);
+    (0..taken)
+        .map(|at| {
+            let row = at * rows / taken;
+            let values = (0..COLUMNS / COARSE).map(|column| {
+                let part = (0..COARSE).map(|k| light[(column * COARSE + k) * rows + row]);
+                part.map(|value| f64::from(value.iter().sum::<f32>()))
+                    .sum::<f64>()
+            });
+            let values: Vec<f64> = values.collect();
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            values.into_iter().map(|value| value - mean).collect()
+        })
+        .collect()
+}
+
+/// By how many coarse columns the second view has to be turned to be most like the first, and how like it is then.
+fn best_lag(first: &[Vec<f64>], second: &[Vec<f64>]) -> Option<(isize, f64)> {
+    let count = COLUMNS / COARSE;
+    let a_degree = count as f64 / 360.0;
+    let energy = |rows: &[Vec<f64>]| rows.iter().flatten().map(|v| v * v).sum::<f64>();
+    let unit = (energy(first) * energy(second)).sqrt();
+    if unit <= 0.0 {
+        return None;
+    }
+    let least = (LEAST_FIELD_DEG as f64 * a_degree) as isize;
+    let most = (MOST_FIELD_DEG as f64 * a_degree) as isize;
+    let like = |lag: isize| {
+        let turn = lag.rem_euclid(count as isize) as usize;
+        let rows = first.iter().zip(second);
+        let sum: f64 = rows
+            .map(|(a, b)| {
+                let turned = b[turn..].iter().chain(&b[..turn]);
+                a.iter().zip(turned).map(|(a, b)| a * b).sum::<f64>()
+            })
+            .sum();
+        (lag, sum / unit)
+    };
+    (least..=most)
+        .flat_map(|lag| [lag, -lag])
+        .map(like)
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Azimuth and relative size of the first harmonic of what the camera sees over the table's angle.
+fn first_harmonic(sense: TableSense, light: impl Fn(usize) -> f64) -> (f64, f64) {
+    let (mut re, mut im, mut sum) = (0.0, 0.0, 0.0);
+    for at in 0..COLUMNS {
+        let turned = (at as f64 + 0.5) / COLUMNS as f64 * std::f64::consts::TAU;
+        // The camera looks along y, 90 degrees from x, and turns with the table.
+        let azimuth = std::f64::consts::FRAC_PI_2
+            + match sense {
+                TableSense::CounterClockwise => turned,
+                TableSense::Clockwise => -turned,
+            };
+        let light = light(at);
+        re += light * azimuth.cos();
+        im += light * azimuth.sin();
+        sum += light;
+    }
+    let part = if sum > 0.0 {
+        2.0 * re.hypot(im) / sum
+    } else {
+        0.0
+    };
+    (im.atan2(re).to_degrees(), part)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The grey of a room at an azimuth, radians: a lamp, a dark door, and a wall.
+    fn room(azimuth: f64) -> f32 {
+        let spot = |at: f64, size: f64| {
+            let apart = (azimuth - at).sin().hypot((azimuth - at).cos() - 1.0);
+            (-(apart / size).powi(2)).exp()
+        };
+        (0.3 + 0.5 * spot(0.7, 0.2) - 0.2 * spot(2.9, 0.1) + 0.1 * spot(4.4, 0.3)) as f32
+    }
+
+    /// What a camera with this field sees when the table stands at an angle, degrees.
+    fn frame(angle_deg: f64, field_deg: f64) -> Rgb<Srgb> {
+        let extent = Extent::new(100, 20);
+        Rgb::new(Planes::from_fn(extent, |x, _| {
+            // To the right is clockwise.
+            let aside = (x as f64 + 0.5) / 100.0 - 0.5;
+            let azimuth = 90.0 + angle_deg - aside * field_deg;
+            [Srgb::from_linear(room(azimuth.to_radians())); 3]
+        }))
+    }
+
+    fn strip(sense: f64) -> RoomStrip {
+        let mut builder = StripBuilder::new(Extent::new(100, 20)).unwrap();
+        for k in 0..360 {
+            let angle = f64::from(k);
+            builder.push(angle, &frame(sense * angle, 40.0)).unwrap();
+        }
+        builder.finish().unwrap()
+    }
+
+    #[test]
+    fn the_field_the_sense_and_the_bright_side_of_a_room_are_found() {
+        for (sense, expected) in [
+            (1.0, TableSense::CounterClockwise),
+            (-1.0, TableSense::Clockwise),
+        ] {
+            let strip = strip(sense);
+            let figures = strip.figures();
+            assert_eq!(figures.sense, expected);
+            // The columns are 94 of 100 pixels apart.
+            assert!((figures.field_deg - 37.6).abs() < 1.5, "{figures:?}");
+            assert!(figures.correlation > 0.95, "{figures:?}");
+            // The door and the other lamp draw the first harmonic from the lamp's 40 degrees to 19.8.
+            assert!(
+                (figures.bright_azimuth_deg - 19.8).abs() < 1.5,
+                "{figures:?}"
+            );
+            assert!((figures.bright_part - 0.156).abs() < 0.01, "{figures:?}");
+            // The lamp at azimuth 40 degrees is 50 degrees to the right of what the camera sees first.
+            let picture = strip.image().planes();
+            let light = |x: &usize| picture.pixel(*x, 0)[0];
+            let brightest = (0..COLUMNS).max_by(|a, b| light(a).total_cmp(&light(b)));
+            let right = (brightest.unwrap() as f64 - 720.0) / 4.0;
+            assert!((right - 50.0).abs() < 2.0, "{right}");
+        }
+    }
+
+    #[test]
+    fn an_even_room_and_half_a_turn_make_no_strip() {
+        let extent = Extent::new(100, 20);
+        let even = Rgb::<Srgb>::new(Planes::filled(extent, [0.5; 3]));
+        let mut builder = StripBuilder::new(extent).unwrap();
+        for k in 0..360 {
+            builder.push(f64::from(k), &even).unwrap();
+        }
+        assert!(builder.finish().is_none());
+        let mut half = StripBuilder::new(extent).unwrap();
+        for k in 0..180 {
+            let angle = f64::from(k);
+            half.push(angle, &frame(angle, 40.0)).unwrap();
+        }
+        assert!(half.finish().is_none());
+        let other = Rgb::<Srgb>::new(Planes::zeros(Extent::new(3, 3)));
+        let mut builder = StripBuilder::new(extent).unwrap();
+        assert!(matches!(
+            builder.push(0.0, &other),
+            Err(TurnError::FrameSize { .. })
+        ));
+    }
+}
