@@ -11,29 +11,40 @@ use crate::fit::unknowns::Unknowns;
 use crate::model::material::BodyKind;
 use crate::model::shading::Room;
 
-/// Rounds of light and normals in turn, for an object without gloss, with which an unknown light begins.
-const ROUNDS: usize = 8;
+/// Parameters of the fit of an unknown light.
+pub(crate) struct AlternationParameters {
+    /// Rounds that alternate between light and normals. By hand.
+    pub(crate) rounds: usize,
+    /// Bands of the light that metal shows in the first round; one more every other round. By hand.
+    pub(crate) first_bands: usize,
+    /// Gauss-Newton steps of the joint optimisation in each of its rounds. By hand.
+    pub(crate) joint_steps: usize,
+    /// Its rounds: before each, the normals are searched anywhere. By hand.
+    pub(crate) joint_rounds: usize,
+    /// Smoothing of the normals in the first round, standard deviation in widths of the frame. By hand.
+    pub(crate) first_blur: f64,
+    /// Factor of that standard deviation from round to round. By hand.
+    pub(crate) blur_fall: f64,
+    /// Least standard deviation, pixels. By hand.
+    pub(crate) least_blur: f64,
+    /// Standard deviation below which nothing is smoothed, blocks. Numerical.
+    no_blur: f64,
+    /// Residual up to which a diffuse object in unknown light has no gloss, over the energy of the variation. By hand:
+    /// with gloss, other light and shape explain as much.
+    pub(crate) lambertian_residual: f64,
+}
 
-/// Bands of the light that metal is taken to show in these rounds, at first and in the end: one more every other round.
-const FIRST_BANDS: usize = 3;
-
-/// Then all that is unknown is refined together, in so many steps; after that the best normals are looked for anywhere,
-/// and so on for so many rounds.
-pub(crate) const JOINT_STEPS: usize = 8;
-
-pub(crate) const JOINT_ROUNDS: usize = 2;
-
-/// How smooth the normals are that an unknown light is fitted to: the deviation in the first round, in parts of
-/// the frame's width, by how much it falls with each round, and the least, pixels.
-const FIRST_BLUR: f64 = 6.0 / 256.0;
-
-const BLUR_FALL: f64 = 0.8;
-
-const LEAST_BLUR: f64 = 0.6;
-
-/// A matt object in an unknown light that leaves no more than this of the curves has no gloss: with it, light and shape could be
-/// others and explain as much.
-const MATT_LEAVES: f64 = 0.005;
+pub(crate) const ALTERNATION_PARAMETERS: AlternationParameters = AlternationParameters {
+    rounds: 8,
+    first_bands: 3,
+    joint_steps: 8,
+    joint_rounds: 2,
+    first_blur: 6.0 / 256.0,
+    blur_fall: 0.8,
+    least_blur: 0.6,
+    no_blur: 0.3,
+    lambertian_residual: 0.005,
+};
 
 /// An unknown light from one start.
 pub(crate) struct Alternation<'a> {
@@ -49,7 +60,7 @@ impl Alternation<'_> {
         let mut normals = start;
         let mut albedo = self.first_albedo();
         let mut room = None;
-        for round in 0..ROUNDS {
+        for round in 0..ALTERNATION_PARAMETERS.rounds {
             let found = self.room_of(&normals, &mut albedo, round)?;
             let fits = coarse.fits(&found);
             for (albedo, fit) in albedo.iter_mut().zip(&fits) {
@@ -60,22 +71,30 @@ impl Alternation<'_> {
         }
         if self.body == BodyKind::Metal {
             let all = coarse.joint(self.setting.unknowns(self.body));
-            return Some(all.found(room?, JOINT_ROUNDS, JOINT_STEPS));
+            return Some(all.found(
+                room?,
+                ALTERNATION_PARAMETERS.joint_rounds,
+                ALTERNATION_PARAMETERS.joint_steps,
+            ));
         }
         let matt = coarse.joint(Unknowns::Light { bands: 0 });
-        Some(matt.found(room?, 1, JOINT_STEPS))
+        Some(matt.found(room?, 1, ALTERNATION_PARAMETERS.joint_steps))
     }
 
     /// The same with gloss.
     pub(crate) fn with_gloss(&self, room: Room) -> (f64, Room) {
         let all = self.coarse.joint(self.setting.unknowns(self.body));
-        all.found(room, JOINT_ROUNDS, JOINT_STEPS)
+        all.found(
+            room,
+            ALTERNATION_PARAMETERS.joint_rounds,
+            ALTERNATION_PARAMETERS.joint_steps,
+        )
     }
 
     /// Whether a room without gloss explains the curves.
     pub(crate) fn is_matt(&self, room: &Room) -> bool {
         let fits = self.coarse.fits(room);
-        BodyFigure::new(self.body, &fits).residual <= MATT_LEAVES
+        BodyFigure::new(self.body, &fits).residual <= ALTERNATION_PARAMETERS.lambertian_residual
     }
 
     /// The room that goes with normals, in turns with the albedo.
@@ -89,7 +108,7 @@ impl Alternation<'_> {
         match self.body {
             BodyKind::Diffuse => fit_matt_room(moments, normals, albedo, frame),
             BodyKind::Metal => {
-                let bands = (FIRST_BANDS + round / 2).min(GLOSS_BANDS);
+                let bands = (ALTERNATION_PARAMETERS.first_bands + round / 2).min(GLOSS_BANDS);
                 fit_metal_room(moments, normals, albedo, frame, bands)
             }
         }
@@ -108,10 +127,11 @@ impl Alternation<'_> {
         let deviation = if self.setting.has_shape {
             0.0
         } else {
-            let fall = BLUR_FALL.powi(round as i32);
-            (FIRST_BLUR * across * fall).max(LEAST_BLUR / self.coarse.side as f64)
+            let fall = ALTERNATION_PARAMETERS.blur_fall.powi(round as i32);
+            (ALTERNATION_PARAMETERS.first_blur * across * fall)
+                .max(ALTERNATION_PARAMETERS.least_blur / self.coarse.side as f64)
         };
-        if deviation < 0.3 {
+        if deviation < ALTERNATION_PARAMETERS.no_blur {
             return fits.iter().map(|fit| fit.normal).collect();
         }
         smoothed_normals(&self.coarse.curves, deviation, |pixel| fits[pixel].normal)

@@ -9,8 +9,13 @@ use crate::model::directions::unit;
 use crate::model::shading::Room;
 use crate::observe::curves::TurnCurves;
 
-/// Pixels on which a room is looked for: more are averaged in blocks first.
-pub(crate) const COARSE_PIXELS: usize = 2500;
+/// Parameters of the blocks.
+pub(crate) struct BlockParameters {
+    /// Number of blocks, or of pixels, on which the environment light is fitted. By hand.
+    pub(crate) pixels: usize,
+}
+
+pub(crate) const BLOCK_PARAMETERS: BlockParameters = BlockParameters { pixels: 2500 };
 
 /// A turn on blocks of pixels.
 pub(crate) struct Coarse {
@@ -22,7 +27,7 @@ pub(crate) struct Coarse {
 
 impl Coarse {
     pub(crate) fn new(curves: &TurnCurves, expected: Option<&[Expected]>) -> Self {
-        let pixels = curves.pixels() as f64 / COARSE_PIXELS as f64;
+        let pixels = curves.pixels() as f64 / BLOCK_PARAMETERS.pixels as f64;
         let side = (pixels.sqrt().ceil() as usize).max(1);
         let coarse = curves.reduced(side);
         Self {

@@ -15,33 +15,42 @@ use crate::model::directions::dot;
 use crate::model::shading::Room;
 use crate::observe::curves::TurnCurves;
 
-/// The least smoothing of a map of normals, pixels.
-const LEAST_BLUR: f64 = 0.6;
+/// Parameters of the expected errors.
+pub(crate) struct ErrorParameters {
+    /// Least smoothing of a map of normals, standard deviation in pixels. By hand.
+    pub(crate) least_blur: f64,
+    /// Standard deviation of a pixel's surroundings, in widths of the frame. By hand.
+    pub(crate) surroundings: f64,
+    /// Degrees of freedom of the residual of a curve. Measured: fitted to the angles that the standard deviation stands
+    /// for.
+    pub(crate) freedom: f64,
+    /// Median residual from which differences to the surroundings are doubted in full, over the energy of the
+    /// variation. By hand.
+    pub(crate) unexplained: f64,
+    /// Error that all normals have in common in unknown light with a prior, radians: light makes up for it, and no
+    /// residual shows it. By hand: 14 degrees.
+    pub(crate) common_with_prior: f64,
+    /// The same with the outline alone, radians. By hand: 20 degrees.
+    pub(crate) common_alone: f64,
+    /// The same in known light, radians, by shade in hollows and bounced light. By hand: 5 degrees.
+    pub(crate) common_in_known_light: f64,
+    /// Error of normals where the turn does not determine them, radians. By hand.
+    pub(crate) unobservable: f64,
+    /// Error of a normal nearly all of whose light is clipped, radians. By hand.
+    pub(crate) clipped: f64,
+}
 
-/// How far the surroundings of a pixel reach, in parts of the frame's width: a normal that differs from theirs is not to be
-/// believed as far.
-const SURROUNDINGS: f64 = 1.0 / 40.0;
-
-/// Degrees of freedom of what is left of a curve: fitted to the angles that its looseness stands for.
-pub(crate) const FREEDOM: f64 = 3.0;
-
-/// A turn of which the median pixel leaves this much is not explained so well that bends of the surface are real.
-const UNEXPLAINED: f64 = 0.005;
-
-/// How far normals are off as a whole in unknown light, radians: a bend that light makes up for, which no residual
-/// shows. With a prior, and without.
-const BENT_WITH_PRIOR: f64 = 0.25;
-
-const BENT_ALONE: f64 = 0.35;
-
-/// What shade in hollows and bounced light do to normals in known light, radians.
-const BENT_IN_KNOWN_LIGHT: f64 = 0.08;
-
-/// How far normals are off where the turn does not tell them, radians.
-const UNTOLD: f64 = 1.0;
-
-/// How far a normal is off where nearly all of its light is clipped, radians.
-const CLIPPED_ERROR: f64 = 0.8;
+pub(crate) const ERROR_PARAMETERS: ErrorParameters = ErrorParameters {
+    least_blur: 0.6,
+    surroundings: 1.0 / 40.0,
+    freedom: 3.0,
+    unexplained: 0.005,
+    common_with_prior: 0.25,
+    common_alone: 0.35,
+    common_in_known_light: 0.08,
+    unobservable: 1.0,
+    clipped: 0.8,
+};
 
 /// The pixels of a turn as they are fitted.
 #[derive(Debug, Clone, Copy)]
@@ -72,11 +81,15 @@ impl OwnError {
 /// What all normals of a turn are expected to be off, radians.
 pub(crate) fn common_error(options: &TurnOptions, has_prior: bool, is_fit: bool) -> f64 {
     let common = match &options.light {
-        Some(_) => BENT_IN_KNOWN_LIGHT,
-        None if has_prior => BENT_WITH_PRIOR,
-        None => BENT_ALONE,
+        Some(_) => ERROR_PARAMETERS.common_in_known_light,
+        None if has_prior => ERROR_PARAMETERS.common_with_prior,
+        None => ERROR_PARAMETERS.common_alone,
     };
-    let untold = if is_fit { 0.0 } else { UNTOLD };
+    let untold = if is_fit {
+        0.0
+    } else {
+        ERROR_PARAMETERS.unobservable
+    };
     common
         .hypot(options.elevation.uncertainty_deg().to_radians())
         .hypot(untold)
@@ -92,10 +105,12 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
         fits,
     } = pixels;
     let search = Search::new(room);
-    let deviation = SURROUNDINGS * curves.extent().width as f64;
-    let surroundings = smoothed_normals(curves, deviation.max(LEAST_BLUR), |pixel| {
-        fits[pixel].normal
-    });
+    let deviation = ERROR_PARAMETERS.surroundings * curves.extent().width as f64;
+    let surroundings = smoothed_normals(
+        curves,
+        deviation.max(ERROR_PARAMETERS.least_blur),
+        |pixel| fits[pixel].normal,
+    );
     (0..fits.len())
         .into_par_iter()
         .map(|pixel| {
@@ -108,8 +123,8 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
             }
             let expected = expected.map(|all| all[pixel]);
             let fit = &fits[pixel];
-            let loose = search.looseness(moments, expected, fit, FREEDOM);
-            let clipped = CLIPPED_ERROR * curves.clipped_at(pixel);
+            let loose = search.looseness(moments, expected, fit, ERROR_PARAMETERS.freedom);
+            let clipped = ERROR_PARAMETERS.clipped * curves.clipped_at(pixel);
             let bent = dot(surroundings[pixel], fit.normal);
             OwnError {
                 loose: loose.hypot(clipped),
@@ -127,7 +142,7 @@ pub(crate) fn shared_albedo(
     errors: &[OwnError],
 ) -> Vec<[f64; 3]> {
     let left = median(fits.iter().map(|fit| fit.residual)).unwrap_or(0.0);
-    let doubt = (left / UNEXPLAINED).min(1.0);
+    let doubt = (left / ERROR_PARAMETERS.unexplained).min(1.0);
     let error = |own: &OwnError| own.loose.hypot(doubt * own.bent);
     let errors: Vec<f64> = errors.iter().map(error).collect();
     let albedo: Vec<[f64; 3]> = fits.iter().map(|fit| fit.albedo).collect();

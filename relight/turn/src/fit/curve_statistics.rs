@@ -9,15 +9,23 @@ use crate::observe::curves::TurnCurves;
 /// Products of two waves.
 pub(crate) const PAIRS: usize = WAVES * (WAVES + 1) / 2;
 
-/// How much the mean of a curve counts beside how it varies: shade in hollows and bounced light change the
-/// mean more than they change the harmonics.
-const MEAN_SHARE: f64 = 0.1;
+/// Parameters of the least-squares fit of a curve.
+struct StatisticsParameters {
+    /// Weight of the mean of a curve beside its variation, 0 to 1. By hand: shade in hollows and bounced light change
+    /// the mean more than the harmonics.
+    mean_weight: f64,
+    /// Share of a curve's energy that counts as variation in any case, 0 to 1. Numerical: it keeps residuals of even
+    /// curves finite.
+    variation_floor: f64,
+}
 
-/// Part of a curve's energy that counts as variation in any case.
-const FLOOR: f64 = 0.01;
+const PARAMETERS: StatisticsParameters = StatisticsParameters {
+    mean_weight: 0.1,
+    variation_floor: 0.01,
+};
 
 /// The sums that the fit of a pixel needs: with weights w, waves b and values v, those of w b v, of w b b and of
-/// w v v for each channel, where the mean of the curve counts by [`MEAN_SHARE`].
+/// w v v for each channel, where the mean of the curve counts by `mean_weight`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Moments {
     right: [[f64; WAVES]; 3],
@@ -159,10 +167,10 @@ impl Moments {
                 continue;
             }
             // What the mean contributes, by Schur's complement of the constant.
-            let part = 1.0 - MEAN_SHARE;
+            let part = 1.0 - PARAMETERS.mean_weight;
             let mean = right[0] / count;
             let centred = self.energy[channel] - mean * right[0];
-            variation += centred.max(0.0) + FLOOR * self.energy[channel];
+            variation += centred.max(0.0) + PARAMETERS.variation_floor * self.energy[channel];
             self.energy[channel] -= part * mean * right[0];
             for j in 0..WAVES {
                 let first = products[pair(0, j)];

@@ -16,20 +16,28 @@ use crate::model::metal::{MIRROR, mirror_terms};
 use crate::model::shading::Room;
 use crate::observe::curves::TurnCurves;
 
-/// Rounds of albedo and light in turn.
-const ROUNDS: usize = 3;
+/// Parameters of the fit of the light.
+struct EnvironmentParameters {
+    /// Rounds that alternate between albedo and light. By hand.
+    rounds: usize,
+    /// Ridge of the light's terms, relative to the normal equations. Numerical: light that the normals hardly show
+    /// stays small.
+    ridge: f64,
+    /// The same of the terms of gloss, in parts of the diffuse light. Numerical.
+    gloss_ridge: f64,
+    /// Residual up to which a known surface has no gloss, over the curves' energy. By hand.
+    lambertian_residual: f64,
+    /// Least part of band 2 that gloss shows if its higher bands are to tell of the light. By hand.
+    least_gloss: f64,
+}
 
-/// Keeps light that the normals hardly tell small.
-const STIFFNESS: f64 = 1e-5;
-
-/// The same for gloss, in parts of the matt light.
-const GLOSS_STIFFNESS: f64 = 1e-4;
-
-/// A surface of which light without gloss leaves no more than this part of the curves' energy is matt.
-const MATT_LEFT: f64 = 1e-3;
-
-/// The least part of the light that counts as shown by gloss.
-const LEAST_GLOSS: f64 = 0.01;
+const PARAMETERS: EnvironmentParameters = EnvironmentParameters {
+    rounds: 3,
+    ridge: 1e-5,
+    gloss_ridge: 1e-4,
+    lambertian_residual: 1e-3,
+    least_gloss: 0.01,
+};
 
 /// The light that explains the curves of a known surface best: of a ball whose albedo is known, say, or of an object
 /// with its truth. Pixels without a normal do not count. It is in the viewer's frame at the table's angle 0. Bands beyond the
@@ -72,7 +80,7 @@ pub fn fit_turn_light(
     }
     let pixels = pixels(&moments, &known, frame);
     let (matt, none) = fit_light(&pixels, &colours, Finish::Matt).ok_or(TurnError::NoLight)?;
-    let light = if left(&pixels, &colours, (&matt, &none)) < MATT_LEFT {
+    let light = if left(&pixels, &colours, (&matt, &none)) < PARAMETERS.lambertian_residual {
         matt.coefficients()?
     } else {
         let (light, gloss) =
@@ -87,7 +95,7 @@ fn with_higher_bands(light: ShLight, gloss: &GlossLight) -> Result<ShLight, Turn
     let shown = gloss.light()?;
     let second = GlossLight::bands(&light).split_off(2);
     let factor = gloss.share_of(&second[0]);
-    if factor <= LEAST_GLOSS {
+    if factor <= PARAMETERS.least_gloss {
         return Ok(light);
     }
     let mut coefficients = light.coefficients().to_vec();
@@ -106,7 +114,7 @@ pub(crate) fn fit_matt_room(
 ) -> Option<Room> {
     let pixels = pixels(moments, normals, frame);
     let mut found = None;
-    for _ in 0..ROUNDS {
+    for _ in 0..PARAMETERS.rounds {
         let (light, gloss) = fit_light(&pixels, albedo, Finish::Matt)?;
         let room = Room {
             frame: *frame,
@@ -129,7 +137,7 @@ pub(crate) fn fit_metal_room(
     bands: usize,
 ) -> Option<Room> {
     let mut found = None;
-    for _ in 0..ROUNDS {
+    for _ in 0..PARAMETERS.rounds {
         let room = fit_reflection(moments, normals, albedo, frame, bands * bands)?;
         follow(&room, moments, normals, albedo);
         found = Some(room);
@@ -162,7 +170,7 @@ fn fit_reflection(
             }
             add(&mut equations, (moments, channel), &terms[..count]);
         }
-        equations.add_ridge(1, STIFFNESS);
+        equations.add_ridge(1, PARAMETERS.ridge);
         for (term, [value, ..]) in shown.iter_mut().zip(equations.solve()?) {
             *term = value;
         }
@@ -257,8 +265,8 @@ fn fit_light(
             let terms: Vec<WaveTerm> = matt.chain(pixel.gloss[..free].iter().copied()).collect();
             add(&mut equations, (pixel.moments, channel), &terms);
         }
-        equations.add_ridge(1, STIFFNESS);
-        equations.add_ridge(TERMS, GLOSS_STIFFNESS);
+        equations.add_ridge(1, PARAMETERS.ridge);
+        equations.add_ridge(TERMS, PARAMETERS.gloss_ridge);
         let found = equations.solve()?;
         let all = light[channel].iter_mut().chain(&mut gloss[channel]);
         for (term, [value, ..]) in all.zip(found) {

@@ -6,8 +6,14 @@ use crate::fit::smoothing::blurred;
 use crate::model::directions::unit;
 use crate::observe::curves::TurnCurves;
 
-/// Steps of relaxation for each pixel of the longer side: over-relaxation needs so many in proportion to it.
-const STEPS_A_PIXEL: usize = 4;
+/// Parameters of the inflation.
+struct InflationParameters {
+    /// Steps of relaxation for each pixel of the longer side. Derived: over-relaxation needs a number in proportion to
+    /// it.
+    steps_a_pixel: usize,
+}
+
+const PARAMETERS: InflationParameters = InflationParameters { steps_a_pixel: 4 };
 
 /// The normals of a round body in the outline of the mask, one a pixel: the height is the root of the solution
 /// of Poisson's equation that is 0 at the outline, times `height`. At the outline the normals lie in the image
@@ -23,7 +29,7 @@ pub(crate) fn inflated(curves: &TurnCurves, height: f64) -> Vec<[f64; 3]> {
     let poisson = relaxed(
         &inside,
         wide,
-        STEPS_A_PIXEL * extent.width.max(extent.height),
+        PARAMETERS.steps_a_pixel * extent.width.max(extent.height),
     );
     let surface = Planes::from_fn(wide, |x, y| [poisson[y * wide.width + x].sqrt() as f32]);
     let surface = blurred(&surface, &vec![true; wide.pixels()], 1.0);

@@ -1,7 +1,7 @@
 //! The room of a turn, on blocks of pixels: what the object is made of, and an unknown light from several starts.
 
 use crate::error::TurnError;
-use crate::fit::alternation::{Alternation, JOINT_ROUNDS, JOINT_STEPS};
+use crate::fit::alternation::{ALTERNATION_PARAMETERS, Alternation};
 use crate::fit::blocks::Coarse;
 use crate::fit::figures::{BodyFigure, SenseFigure, StartFigure};
 use crate::fit::inflation::inflated;
@@ -14,15 +14,22 @@ use crate::model::material::BodyKind;
 use crate::model::shading::Room;
 use crate::observe::curves::TurnCurves;
 
-/// How round the bodies are that an unknown light is started from.
-const HEIGHTS: [(&str, f64); 3] = [
-    ("outline", 1.0),
-    ("outline, flatter", 0.6),
-    ("outline, rounder", 1.6),
-];
+/// Parameters of the initialisation.
+struct InitialisationParameters {
+    /// The inflated shapes that initialise an unknown light, by name and height, over that of the round shape. By hand.
+    heights: [(&'static str, f64); 3],
+    /// What metal shows of band l at first: this to the power of l. By hand.
+    metal_attenuation: f64,
+}
 
-/// What metal is taken to show of band l of a light at first: this to the power of l.
-const METAL_FALL: f64 = 0.9;
+const PARAMETERS: InitialisationParameters = InitialisationParameters {
+    heights: [
+        ("outline", 1.0),
+        ("outline, flatter", 0.6),
+        ("outline, rounder", 1.6),
+    ],
+    metal_attenuation: 0.9,
+};
 
 /// A room that was found.
 #[derive(Debug, Clone)]
@@ -151,14 +158,18 @@ impl Setting {
     /// A room of known light.
     fn find_in(&self, coarse: &Coarse, known: &KnownLight, body: BodyKind) -> (f64, Room) {
         let joint = coarse.joint(self.unknowns(body));
-        joint.found(self.unblurred(known, body), JOINT_ROUNDS, JOINT_STEPS)
+        joint.found(
+            self.unblurred(known, body),
+            ALTERNATION_PARAMETERS.joint_rounds,
+            ALTERNATION_PARAMETERS.joint_steps,
+        )
     }
 
     /// A room of known light to begin with: without gloss, or with metal that is hardly rough.
     pub(crate) fn unblurred(&self, known: &KnownLight, body: BodyKind) -> Room {
         let mirror = known.mirror();
         let shares: Vec<f64> = (0..mirror.len())
-            .map(|l| METAL_FALL.powi(l as i32))
+            .map(|l| PARAMETERS.metal_attenuation.powi(l as i32))
             .collect();
         let gloss = match body {
             BodyKind::Diffuse => GlossLight::NONE,
@@ -179,7 +190,11 @@ impl Setting {
             let normals = expected.iter().map(|expected| expected.normal).collect();
             starts.push(("prior", normals));
         }
-        starts.extend(HEIGHTS.map(|(name, height)| (name, inflated(&coarse.curves, height))));
+        starts.extend(
+            PARAMETERS
+                .heights
+                .map(|(name, height)| (name, inflated(&coarse.curves, height))),
+        );
         starts
     }
 

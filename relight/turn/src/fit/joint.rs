@@ -14,22 +14,36 @@ use crate::fit::search::{PixelFit, Search, cost, search_all};
 use crate::fit::unknowns::{Columns, Guess, Unknowns};
 use crate::model::shading::Room;
 
-/// The damping at first, and where it ends.
-const DAMPING: f64 = 1e-3;
+/// Parameters of the joint optimisation.
+struct JointParameters {
+    /// Damping of the first step, relative to the diagonal (Levenberg-Marquardt). Numerical.
+    damping: f64,
+    /// Factor of the damping after a step that lowers the cost. Numerical.
+    damping_fall: f64,
+    /// Factor of the damping after one that does not. Numerical.
+    damping_rise: f64,
+    /// Damping at which the steps end. Numerical.
+    most_damping: f64,
+    /// Relative gain of a step below which the steps end. Numerical.
+    settled: f64,
+    /// Pixels that one task adds up. Fixed, so that sums do not depend on the number of threads.
+    chunk: usize,
+    /// Residual at which a pixel counts one quarter, in medians. By hand.
+    outlier: f64,
+    /// Least residual that is taken for the median, over the energy of the variation. Numerical.
+    least_median: f64,
+}
 
-const MOST_DAMPING: f64 = 1e3;
-
-/// The steps end where one improves the cost by less than this part of it.
-const SETTLED: f64 = 2e-3;
-
-/// Pixels added up by one task.
-const CHUNK: usize = 128;
-
-/// How much a pixel counts falls to a quarter where it leaves this many times the median of what pixels leave.
-const OUTLIER: f64 = 4.0;
-
-/// The least residual that is taken for the median.
-const LEAST_MEDIAN: f64 = 1e-3;
+const PARAMETERS: JointParameters = JointParameters {
+    damping: 1e-3,
+    damping_fall: 0.2,
+    damping_rise: 10.0,
+    most_damping: 1e3,
+    settled: 2e-3,
+    chunk: 128,
+    outlier: 4.0,
+    least_median: 1e-3,
+};
 
 /// Pixels whose room is to be found.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +77,7 @@ impl Joint<'_> {
         steps: usize,
     ) -> (Room, Vec<PixelFit>) {
         let (mut guess, mut fits) = (Guess::of(&room, self.unknowns), fits);
-        let (frame, mut damping) = (room.frame, DAMPING);
+        let (frame, mut damping) = (room.frame, PARAMETERS.damping);
         let mut least = cost(&fits, self.expected);
         for _ in 0..steps {
             let room = guess.room(&frame, self.unknowns);
@@ -77,13 +91,13 @@ impl Joint<'_> {
             if reached < least {
                 let gain = (least - reached) / least;
                 (guess, fits, least) = (other, found, reached);
-                damping *= 0.2;
-                if gain < SETTLED {
+                damping *= PARAMETERS.damping_fall;
+                if gain < PARAMETERS.settled {
                     break;
                 }
             } else {
-                damping *= 10.0;
-                if damping > MOST_DAMPING {
+                damping *= PARAMETERS.damping_rise;
+                if damping > PARAMETERS.most_damping {
                     break;
                 }
             }
@@ -107,11 +121,12 @@ impl Joint<'_> {
             room,
         };
         let search = Search::new(room);
-        let sums = (0..fits.len().div_ceil(CHUNK))
+        let sums = (0..fits.len().div_ceil(PARAMETERS.chunk))
             .into_par_iter()
             .map(|chunk| {
                 let mut sums = Sums::new(columns.layout.count());
-                let pixels = chunk * CHUNK..((chunk + 1) * CHUNK).min(fits.len());
+                let pixels =
+                    chunk * PARAMETERS.chunk..((chunk + 1) * PARAMETERS.chunk).min(fits.len());
                 for pixel in pixels.filter(|&pixel| !self.moments[pixel].is_dark()) {
                     let expected = self.expected.map(|all| all[pixel]);
                     let one = (&self.moments[pixel], expected, fits[pixel].normal);
@@ -129,9 +144,9 @@ impl Joint<'_> {
 fn weights(fits: &[PixelFit]) -> Vec<f64> {
     let median = median(fits.iter().map(|fit| fit.residual))
         .unwrap_or(0.0)
-        .max(LEAST_MEDIAN);
+        .max(PARAMETERS.least_median);
     let weight = |fit: &PixelFit| {
-        let size = fit.residual / (OUTLIER * median);
+        let size = fit.residual / (PARAMETERS.outlier * median);
         1.0 / (1.0 + size).powi(2)
     };
     fits.iter().map(weight).collect()

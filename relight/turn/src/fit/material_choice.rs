@@ -3,24 +3,31 @@
 use crate::fit::figures::BodyFigure;
 use crate::model::material::BodyKind;
 
-/// A diffuse body that leaves no more than this of a curve, over the energy of its variation, explains the turn.
-const EXPLAINED: f64 = 0.03;
+/// Parameters of the choice of the material.
+struct MaterialParameters {
+    /// Residual up to which a diffuse material explains the turn, over the energy of the variation. By hand.
+    explained: f64,
+    /// Largest part of the diffuse residual with which metal is taken: its light has many more terms. Measured: the
+    /// rendered sessions of docs/results/turns.md have 0.53 (bronze) and 0.63 (plastic).
+    metal_part: f64,
+    /// Residual up to which metal explains the turn, over the energy of the variation. By hand.
+    explained_by_metal: f64,
+}
 
-/// The part of what a diffuse body leaves that a metal has to leave at most to be taken for what the object is: its light
-/// has many more terms.
-const METAL_LEAVES: f64 = 0.58;
-
-/// Metal that leaves no more than this explains the turn too.
-const LITTLE: f64 = 0.01;
+const PARAMETERS: MaterialParameters = MaterialParameters {
+    explained: 0.03,
+    metal_part: 0.58,
+    explained_by_metal: 0.01,
+};
 
 /// Whether what a diffuse body leaves lets the object be metal.
 pub(crate) fn may_be_metal(diffuse: f64) -> bool {
-    diffuse > EXPLAINED
+    diffuse > PARAMETERS.explained
 }
 
 /// Whether what both kinds leave says that the object is metal.
 pub(crate) fn is_metal(diffuse: f64, metal: f64) -> bool {
-    may_be_metal(diffuse) && metal < METAL_LEAVES * diffuse
+    may_be_metal(diffuse) && metal < PARAMETERS.metal_part * diffuse
 }
 
 /// The other kind, where it explains clearly more than the one that was given, whose figure is the first.
@@ -32,10 +39,10 @@ pub(crate) fn doubted(bodies: &[BodyFigure]) -> Option<BodyKind> {
         BodyKind::Metal => is_metal(given.residual, other.residual),
         // It has fewer terms: that it leaves less says enough, where both leave much.
         BodyKind::Diffuse => {
-            let part = if given.residual > LITTLE {
+            let part = if given.residual > PARAMETERS.explained_by_metal {
                 1.0
             } else {
-                METAL_LEAVES
+                PARAMETERS.metal_part
             };
             other.residual < part * given.residual
         }

@@ -5,7 +5,13 @@ use crate::fit::curve_statistics::sum_of_products;
 use crate::model::directions::dot;
 use crate::model::harmonics::WAVES;
 
-const LONGEST_STEP: f64 = 0.2;
+/// Parameters of a step of a normal.
+struct NormalStepParameters {
+    /// Longest step of a normal, radians. By hand.
+    longest_step: f64,
+}
+
+const PARAMETERS: NormalStepParameters = NormalStepParameters { longest_step: 0.2 };
 
 /// A normal of the viewer's frame, where a network or a shape expects it, and how much that counts:
 /// `weight (1 - cos)` is added to the residual.
@@ -81,8 +87,8 @@ impl Slope {
             (uv * a - uu * b) / determinant,
         ];
         let length = step[0].hypot(step[1]);
-        if length > LONGEST_STEP {
-            step.map(|value| value * LONGEST_STEP / length)
+        if length > PARAMETERS.longest_step {
+            step.map(|value| value * PARAMETERS.longest_step / length)
         } else {
             step
         }

@@ -8,34 +8,47 @@ use crate::model::frame::{Elevation, TableFrame};
 use crate::observe::curves::TurnCurves;
 use crate::observe::mirror_panorama::Mirrored;
 use crate::observe::probe::ProbeBall;
-use crate::observe::surroundings::{ACROSS, Surroundings, middle_of};
+use crate::observe::surroundings::{SURROUNDINGS_PARAMETERS, Surroundings, middle_of};
 
-/// The part of a circle's radius that counts: the rim of a ball shows what is behind it too.
-const PART: f64 = 0.92;
+/// Parameters of the check of a ball's place.
+struct ProbeCheckParameters {
+    /// Share of a circle's radius that counts, 0 to 1. By hand: the rim also shows what is behind it.
+    radius_share: f64,
+    /// Middles that are tried first, in either direction, in given radii. By hand.
+    shifts: [f64; 5],
+    /// Radii that are tried first, in given radii. By hand: steps of a fourth root of 2.
+    scales: [f64; 5],
+    /// Steps around the best, in parts of half their distances. Derived: either way and none.
+    steps: [f64; 3],
+    /// How often the best is improved, each time by half the steps. By hand.
+    refined: i32,
+    /// Largest residual of a grey ball by its own light, over that by an even light. By hand.
+    most_of_grey: f64,
+    /// The same of a chrome ball, of whose small windows the panorama keeps less. By hand.
+    most_of_chrome: f64,
+    /// Largest part of the given circle's residual with which another one is the ball. By hand.
+    clearly: f64,
+    /// By how much its residual has to be less. By hand.
+    less: f64,
+    /// Least distance to the given circle, in radii. By hand: nearer ones measure nearly the same light.
+    apart: f64,
+    /// Least share of a circle, 0 to 1, that has to be in the picture. By hand.
+    least_inside: f64,
+}
 
-/// Circles that are tried first: middles in either direction, and radii, in parts of the radius that was given.
-const SHIFTS: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
-
-const SCALES: [f64; 5] = [0.7, 0.84, 1.0, 1.19, 1.42];
-
-/// The best of them is improved by half of their distances either way, and half of that, so many times over.
-const STEPS: [f64; 3] = [-1.0, 0.0, 1.0];
-
-const REFINED: i32 = 3;
-
-/// A circle whose own light leaves more than this part of what an even light leaves shows no ball: a matt one, and one that
-/// mirrors, of whose small windows a panorama keeps less. Half of it is doubtful.
-const NO_GREY: f64 = 0.3;
-
-const NO_CHROME: f64 = 0.6;
-
-/// Another circle is the ball where it leaves less than this part of what the first one leaves, and less by this.
-const CLEARLY: f64 = 0.6;
-
-const LESS: f64 = 0.02;
-
-/// How far it is from the first one then at least, in radii: nearer ones measure nearly the same light.
-const APART: f64 = 0.08;
+const PARAMETERS: ProbeCheckParameters = ProbeCheckParameters {
+    radius_share: 0.92,
+    shifts: [-0.5, -0.25, 0.0, 0.25, 0.5],
+    scales: [0.7, 0.84, 1.0, 1.19, 1.42],
+    steps: [-1.0, 0.0, 1.0],
+    refined: 3,
+    most_of_grey: 0.3,
+    most_of_chrome: 0.6,
+    clearly: 0.6,
+    less: 0.02,
+    apart: 0.08,
+    least_inside: 0.9,
+};
 
 /// A circle, in radii from the middle that was given: to the right and up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,7 +96,11 @@ impl Surroundings {
         let [x, y] = best.middle;
         let apart = x.hypot(y).max((best.radius - 1.0).abs());
         let most = most_left(ball);
-        if least < CLEARLY * left && least < left - LESS && apart > APART && least < most {
+        if least < PARAMETERS.clearly * left
+            && least < left - PARAMETERS.less
+            && apart > PARAMETERS.apart
+            && least < most
+        {
             let [x, y] = place.in_picture(best.middle);
             return Err(TurnError::Misplaced {
                 given: place,
@@ -104,8 +121,8 @@ impl Surroundings {
 /// The most that the light of a ball leaves of what it shows.
 pub(crate) const fn most_left(ball: ProbeBall) -> f64 {
     match ball {
-        ProbeBall::Grey => NO_GREY,
-        ProbeBall::Chrome => NO_CHROME,
+        ProbeBall::Grey => PARAMETERS.most_of_grey,
+        ProbeBall::Chrome => PARAMETERS.most_of_chrome,
     }
 }
 
@@ -113,26 +130,26 @@ impl Shown {
     /// The circle that explains most, and what it leaves.
     fn best(&self, given: Circle, left: f64) -> (Circle, f64) {
         let mut best = (given, left);
-        let tries = SHIFTS.iter().flat_map(|&x| {
-            SHIFTS.iter().flat_map(move |&y| {
-                SCALES.iter().map(move |&radius| Circle {
+        let tries = PARAMETERS.shifts.iter().flat_map(|&x| {
+            PARAMETERS.shifts.iter().flat_map(move |&y| {
+                PARAMETERS.scales.iter().map(move |&radius| Circle {
                     middle: [x, y],
                     radius,
                 })
             })
         });
         self.try_all(tries, &mut best);
-        for round in 1..=REFINED {
+        for round in 1..=PARAMETERS.refined {
             let part = 0.5_f64.powi(round);
             let around = best.0;
-            let tries = STEPS.iter().flat_map(|x| {
-                STEPS.iter().flat_map(move |y| {
-                    STEPS.iter().map(move |scale| Circle {
+            let tries = PARAMETERS.steps.iter().flat_map(|x| {
+                PARAMETERS.steps.iter().flat_map(move |y| {
+                    PARAMETERS.steps.iter().map(move |scale| Circle {
                         middle: [
                             around.middle[0] + 0.25 * part * x,
                             around.middle[1] + 0.25 * part * y,
                         ],
-                        radius: around.radius * SCALES[3].powf(part * scale),
+                        radius: around.radius * PARAMETERS.scales[3].powf(part * scale),
                     })
                 })
             });
@@ -154,14 +171,17 @@ impl Shown {
     /// What the light that a ball in a circle shows leaves, over what an even light leaves; none where the circle is not in the
     /// picture, or nothing varies in it.
     fn left(&self, circle: Circle) -> Option<f64> {
-        let wanted = std::f64::consts::PI * (PART * circle.radius * ACROSS as f64 / 2.0).powi(2);
+        let wanted = std::f64::consts::PI
+            * (PARAMETERS.radius_share * circle.radius * SURROUNDINGS_PARAMETERS.across as f64
+                / 2.0)
+                .powi(2);
         let (pixels, normals): (Vec<usize>, Vec<[f64; 3]>) = self
             .at
             .iter()
             .enumerate()
             .filter_map(|(pixel, &at)| Some((pixel, circle.normal(at)?)))
             .unzip();
-        if (pixels.len() as f64) < 0.9 * wanted {
+        if (pixels.len() as f64) < PARAMETERS.least_inside * wanted {
             return None;
         }
         match self.ball {
@@ -215,6 +235,7 @@ impl Circle {
     fn normal(self, at: [f64; 2]) -> Option<[f64; 3]> {
         let [x, y] = [0, 1].map(|i| (at[i] - self.middle[i]) / self.radius);
         let square = x * x + y * y;
-        (square < PART * PART).then(|| [x, y, (1.0 - square).sqrt()])
+        (square < PARAMETERS.radius_share * PARAMETERS.radius_share)
+            .then(|| [x, y, (1.0 - square).sqrt()])
     }
 }

@@ -13,8 +13,13 @@ use crate::observe::conditioning::Conditioning;
 use crate::observe::film::Filmed;
 use crate::observe::probe::{ProbeBall, ProbeBuilder};
 
-/// A ball looks like chrome where more than this part of what varies over the turn lies beyond the second harmonic.
-const SHARP: f64 = 0.06;
+/// Parameters of the light by a ball.
+struct ProbeLightParameters {
+    /// Share of the variation beyond the second harmonic from which a ball looks like chrome, 0 to 1. By hand.
+    sharp: f64,
+}
+
+const PARAMETERS: ProbeLightParameters = ProbeLightParameters { sharp: 0.06 };
 
 /// The light that a ball measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,7 +54,7 @@ impl ProbeBuilder {
     pub fn finish(self) -> Result<ProbeLight, TurnError> {
         let frame = TableFrame::new(self.probe.elevation);
         let curves = self.builder.finish()?;
-        let looks = if Conditioning::of(&curves).beyond > SHARP {
+        let looks = if Conditioning::of(&curves).beyond > PARAMETERS.sharp {
             ProbeBall::Chrome
         } else {
             ProbeBall::Grey

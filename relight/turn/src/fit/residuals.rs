@@ -6,8 +6,13 @@ use crate::model::harmonics::WAVES;
 use crate::model::shading::{PixelWaves, Room};
 use crate::observe::curves::TurnCurves;
 
-/// The least part of what is seen that the model is taken to explain.
-const LEAST_MODEL: f64 = 0.1;
+/// Parameters of the residuals.
+struct ResidualParameters {
+    /// Least share of what is seen that the model is taken to explain, 0 to 1. By hand.
+    least_model: f64,
+}
+
+const PARAMETERS: ResidualParameters = ResidualParameters { least_model: 0.1 };
 
 /// The light by which what is left of a pixel is measured: the model's mean over the turn, or a tenth of what is
 /// seen where that is more.
@@ -15,7 +20,7 @@ pub(crate) fn reference(curves: &TurnCurves, pixel: usize, fit: &PixelFit, room:
     let waves = room.waves(fit.normal);
     let model: f64 = (0..3).map(|c| fit.albedo[c] * waves.body[c][0]).sum();
     let seen: f64 = Moments::mean(curves, pixel).iter().sum();
-    (model.max(LEAST_MODEL * seen) / 3.0).max(1e-6)
+    (model.max(PARAMETERS.least_model * seen) / 3.0).max(1e-6)
 }
 
 /// How much more light than the fit's each part of the turn has, the mean of the channels, over the

@@ -7,11 +7,18 @@ use crate::model::shading::Room;
 use crate::observe::curves::TurnCurves;
 use relight_core::statistics::upper_median;
 
-/// Residuals of so many deviations count a quarter.
-const WIDTH: f64 = 2.0;
+/// Parameters of the robust weights.
+struct RobustParameters {
+    /// Residual whose weight is one quarter, in standard deviations. By hand.
+    width: f64,
+    /// Least standard deviation, in parts of the pixel's mean light. By hand.
+    least_deviation: f64,
+}
 
-/// The least deviation, as a part of the pixel's mean light.
-const LEAST_DEVIATION: f64 = 0.01;
+const PARAMETERS: RobustParameters = RobustParameters {
+    width: 2.0,
+    least_deviation: 0.01,
+};
 
 /// How far each part of the turn is to be believed for a pixel, 0 to 1: near 0 where the fit is far from what
 /// is seen, measured by the median of how far it is elsewhere.
@@ -21,9 +28,9 @@ pub(crate) fn trust(curves: &TurnCurves, pixel: usize, fit: &PixelFit, room: &Ro
     let Some(median) = upper_median(sizes) else {
         return vec![1.0; rest.len()];
     };
-    let deviation = 1.4826 * median + LEAST_DEVIATION;
+    let deviation = 1.4826 * median + PARAMETERS.least_deviation;
     let trust = |rest: &Option<f64>| {
-        let size = rest.unwrap_or(0.0) / (WIDTH * deviation);
+        let size = rest.unwrap_or(0.0) / (PARAMETERS.width * deviation);
         (1.0 / (1.0 + size * size).powi(2)) as f32
     };
     rest.iter().map(trust).collect()

@@ -9,25 +9,45 @@ use crate::model::directions::{LEAST_FACING, dot, half_sphere, leant, tangents};
 use crate::model::harmonics::WAVES;
 use crate::model::shading::{PixelWaves, Room};
 
-/// How many normals are tried first, evenly over the half sphere that faces the viewer: about 7 degrees apart.
-const TRIED: usize = 400;
+/// Parameters of the search for a normal.
+struct SearchParameters {
+    /// Candidates over the visible half sphere. By hand: about 7 degrees apart.
+    candidates: usize,
+    /// How many of the best candidates are refined. By hand.
+    refined: usize,
+    /// Gauss-Newton steps of each of them before the best is taken. By hand.
+    first_steps: usize,
+    /// Largest number of Gauss-Newton steps. By hand.
+    steps: usize,
+    /// Length of a step at which the refinement ends, radians. Numerical.
+    last_step: f64,
+    /// Step of the finite differences of the gradient, radians. Numerical.
+    gradient_step: f64,
+    /// Step of the finite differences of the Hessian, radians. By hand.
+    hessian_step: f64,
+    /// Damping of the first step, relative to the trace of the Hessian (Levenberg-Marquardt). Numerical.
+    damping: f64,
+    /// Factor of the damping after a step that lowers the cost. Numerical.
+    damping_fall: f64,
+    /// Factor of the damping after one that does not. Numerical.
+    damping_rise: f64,
+    /// Least eigenvalue of the Hessian: at a border of what is allowed it need not be positive. Numerical.
+    least_curvature: f64,
+}
 
-/// How many of them are refined: the best ones.
-const STARTS: usize = 3;
-
-/// Steps by which each of these is refined before the best is taken.
-const FIRST_STEPS: usize = 4;
-
-/// Most steps of the refinement, the one at which it ends, radians, and the longest.
-const STEPS: usize = 16;
-
-const LAST_STEP: f64 = 1e-4;
-
-/// The step by which a slope is measured, radians.
-const SLOPE_STEP: f64 = 1e-4;
-
-/// The step by which a residual's bend is measured, radians.
-const BEND_STEP: f64 = 0.06;
+const PARAMETERS: SearchParameters = SearchParameters {
+    candidates: 400,
+    refined: 3,
+    first_steps: 4,
+    steps: 16,
+    last_step: 1e-4,
+    gradient_step: 1e-4,
+    hessian_step: 0.06,
+    damping: 1e-3,
+    damping_fall: 0.2,
+    damping_rise: 8.0,
+    least_curvature: 1e-3,
+};
 
 /// A pixel's answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,7 +73,7 @@ struct Tried {
 
 impl<'a> Search<'a> {
     pub(crate) fn new(room: &'a Room) -> Self {
-        let tried = half_sphere(TRIED).map(|normal| {
+        let tried = half_sphere(PARAMETERS.candidates).map(|normal| {
             let waves = room.waves(normal);
             Tried {
                 normal,
@@ -69,15 +89,16 @@ impl<'a> Search<'a> {
 
     /// The best normal anywhere.
     pub(crate) fn anywhere(&self, moments: &Moments, expected: Option<Expected>) -> PixelFit {
-        let mut best = [(f64::INFINITY, [0.0, 0.0, 1.0]); STARTS];
+        let mut best = [(f64::INFINITY, [0.0, 0.0, 1.0]); PARAMETERS.refined];
         for tried in &self.tried {
             let cost =
                 moments.residual(&tried.waves, &tried.products) + bias(expected, tried.normal);
-            if cost < best[STARTS - 1].0 {
+            if cost < best[PARAMETERS.refined - 1].0 {
                 insert(&mut best, (cost, tried.normal));
             }
         }
-        let refined = best.map(|(_, start)| self.downhill(moments, expected, start, FIRST_STEPS));
+        let refined =
+            best.map(|(_, start)| self.downhill(moments, expected, start, PARAMETERS.first_steps));
         let [first, rest @ ..] = refined;
         let (start, _) = rest.into_iter().fold(
             first,
@@ -95,7 +116,7 @@ impl<'a> Search<'a> {
         expected: Option<Expected>,
         start: [f64; 3],
     ) -> PixelFit {
-        let (normal, _) = self.downhill(moments, expected, start, STEPS);
+        let (normal, _) = self.downhill(moments, expected, start, PARAMETERS.steps);
         PixelFit {
             normal,
             albedo: moments.albedo(&self.room.waves(normal)),
@@ -115,7 +136,7 @@ impl<'a> Search<'a> {
         let cost = |normal| self.residual(moments, normal) + bias(expected, normal);
         let mut normal = start;
         let mut least = cost(normal);
-        let mut damping = 1e-3;
+        let mut damping = PARAMETERS.damping;
         for _ in 0..steps {
             let axes = tangents(normal);
             let slope = self.slope(moments, expected, normal, axes);
@@ -125,11 +146,11 @@ impl<'a> Search<'a> {
             let length = step[0].hypot(step[1]);
             if other[2] >= LEAST_FACING && found < least {
                 (normal, least) = (other, found);
-                damping *= 0.2;
+                damping *= PARAMETERS.damping_fall;
             } else {
-                damping *= 8.0;
+                damping *= PARAMETERS.damping_rise;
             }
-            if length < LAST_STEP {
+            if length < PARAMETERS.last_step {
                 break;
             }
         }
@@ -165,8 +186,11 @@ impl<'a> Search<'a> {
     ) -> Leaning {
         let here = self.room.waves(normal);
         let albedo = moments.albedo(&here);
-        let there = [[SLOPE_STEP, 0.0], [0.0, SLOPE_STEP]]
-            .map(|step| self.room.waves(leant(normal, [u, v], step)));
+        let there = [
+            [PARAMETERS.gradient_step, 0.0],
+            [0.0, PARAMETERS.gradient_step],
+        ]
+        .map(|step| self.room.waves(leant(normal, [u, v], step)));
         let body = here.body;
         let seen: [_; 3] = std::array::from_fn(|c| sum(&body[c], albedo[c], &here.gloss[c]));
         let ways = std::array::from_fn(|c| {
@@ -175,7 +199,7 @@ impl<'a> Search<'a> {
             there.map(|there| {
                 let moved = sum(&there.body[c], albedo[c], &there.gloss[c]);
                 let mut way: [f64; WAVES] =
-                    std::array::from_fn(|i| (moved[i] - seen[c][i]) / SLOPE_STEP);
+                    std::array::from_fn(|i| (moved[i] - seen[c][i]) / PARAMETERS.gradient_step);
                 // The albedo follows the normal.
                 if own > 1e-12 && albedo[c] > 0.0 {
                     let share = sum_of_products(&way, &along) / own;
@@ -214,7 +238,7 @@ impl<'a> Search<'a> {
             let normal = leant(fit.normal, [u, v], [a, b]);
             self.residual(moments, normal) + bias(expected, normal)
         };
-        let h = BEND_STEP;
+        let h = PARAMETERS.hessian_step;
         let middle = cost(0.0, 0.0);
         let uu = (cost(h, 0.0) + cost(-h, 0.0) - 2.0 * middle) / (h * h);
         let vv = (cost(0.0, h) + cost(0.0, -h) - 2.0 * middle) / (h * h);
@@ -226,7 +250,7 @@ impl<'a> Search<'a> {
         );
         let inverse: f64 = [half + rest, half - rest]
             .into_iter()
-            .map(|bend| 1.0 / bend.max(1e-3))
+            .map(|bend| 1.0 / bend.max(PARAMETERS.least_curvature))
             .sum();
         (2.0 * fit.residual / freedom * inverse).sqrt()
     }
@@ -237,8 +261,8 @@ fn sum(body: &[f64; WAVES], albedo: f64, gloss: &[f64; WAVES]) -> [f64; WAVES] {
 }
 
 /// Puts one of less cost in its place, and the last one out.
-fn insert(best: &mut [(f64, [f64; 3]); STARTS], one: (f64, [f64; 3])) {
-    best[STARTS - 1] = one;
+fn insert(best: &mut [(f64, [f64; 3]); PARAMETERS.refined], one: (f64, [f64; 3])) {
+    best[PARAMETERS.refined - 1] = one;
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
 }
 

@@ -14,8 +14,13 @@ use crate::model::shading::Room;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
 
-/// The expected error at which the confidence is one half, radians.
-const HALF_CONFIDENCE: f64 = 0.2;
+/// Parameters of the confidence.
+struct ConfidenceParameters {
+    /// Expected error at which the confidence is one half, radians. By convention of the files.
+    half_error: f64,
+}
+
+const PARAMETERS: ConfidenceParameters = ConfidenceParameters { half_error: 0.2 };
 
 /// Normals, albedo and light.
 #[derive(Debug, Clone)]
@@ -144,5 +149,5 @@ impl TurnSolution {
 }
 
 pub(crate) fn confidence(expected_error: f64) -> f64 {
-    1.0 / (1.0 + (expected_error / HALF_CONFIDENCE).powi(2))
+    1.0 / (1.0 + (expected_error / PARAMETERS.half_error).powi(2))
 }

@@ -6,9 +6,9 @@ use rayon::prelude::*;
 use relight_core::light::{Normals, YUp};
 
 use crate::error::TurnError;
-use crate::fit::blocks::COARSE_PIXELS;
+use crate::fit::blocks::BLOCK_PARAMETERS;
 use crate::fit::confidence::{
-    FREEDOM, FittedPixels, OwnError, common_error, own_errors, shared_albedo,
+    ERROR_PARAMETERS, FittedPixels, OwnError, common_error, own_errors, shared_albedo,
 };
 use crate::fit::curve_statistics::{Moments, all_moments};
 use crate::fit::figures::StartFigure;
@@ -30,19 +30,28 @@ use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
 use crate::observe::verdict::RoomVerdict;
 
-/// Steps for those whose highlights and shadows are left out.
-const ROBUST_STEPS: usize = 3;
+/// Parameters of the solver.
+struct SolveParameters {
+    /// Gauss-Newton steps of the joint optimisation in each robust round. By hand.
+    robust_steps: usize,
+    /// Weight of the inflated shape as the prior mean, as `TurnOptions::prior_weight`. By hand.
+    outline_weight: f64,
+    /// Rounds of robust weights. By hand.
+    robust_rounds: usize,
+    /// Quantile of the distances that measures the spread of albedos. By hand: spots of another colour count, a few
+    /// pixels that went wrong do not.
+    spread_quantile: f64,
+    /// Where that quantile is, in standard deviations. Derived: of the absolute value of a normal distribution.
+    spread_deviations: f64,
+}
 
-/// How much the normals of a body inflated out of the outline count where there is no prior.
-const OUTLINE_WEIGHT: f64 = 0.15;
-
-/// Rounds in which what does not fit is left out.
-const ROBUST_ROUNDS: usize = 3;
-
-/// Nine tenths of normally distributed values are within so many deviations.
-const NINTH_TENTH: f64 = 0.9;
-
-const DEVIATIONS: f64 = 1.645;
+const PARAMETERS: SolveParameters = SolveParameters {
+    robust_steps: 3,
+    outline_weight: 0.15,
+    robust_rounds: 3,
+    spread_quantile: 0.9,
+    spread_deviations: 1.645,
+};
 
 /// Finds the normals, albedo and light that explain the curves of a turn best.
 ///
@@ -85,7 +94,7 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         fits: Vec::new(),
     };
     solver.fits = solver.search(None);
-    for _ in 0..ROBUST_ROUNDS {
+    for _ in 0..PARAMETERS.robust_rounds {
         solver.refine();
     }
     solver.draw_albedo();
@@ -134,7 +143,7 @@ impl Led {
             .transpose()?;
         let has_shape = prior.is_some();
         let expected = match &known {
-            None => Some(prior.unwrap_or_else(|| of_outline(curves, OUTLINE_WEIGHT))),
+            None => Some(prior.unwrap_or_else(|| of_outline(curves, PARAMETERS.outline_weight))),
             Some(_) => prior,
         };
         let setting = Setting {
@@ -219,7 +228,7 @@ impl Solver<'_> {
                 Moments::new(curves, pixel, Some(&trust))
             })
             .collect();
-        let every = self.moments.len().div_ceil(COARSE_PIXELS).max(1);
+        let every = self.moments.len().div_ceil(BLOCK_PARAMETERS.pixels).max(1);
         let moments: Vec<Moments> = self.moments.iter().step_by(every).copied().collect();
         let fits: Vec<PixelFit> = self.fits.iter().step_by(every).copied().collect();
         let expected = self.expected.as_ref();
@@ -231,7 +240,7 @@ impl Solver<'_> {
             unknowns: self.setting.unknowns_of(&self.room),
         };
         let near = search_all(&self.room, &moments, joint.expected, Some(&fits));
-        (self.room, _) = joint.refined(self.room, near, ROBUST_STEPS);
+        (self.room, _) = joint.refined(self.room, near, PARAMETERS.robust_steps);
         self.fits = self.search(Some(&self.fits));
     }
 
@@ -243,7 +252,8 @@ impl Solver<'_> {
         // By the ninth tenth of the distances: spots of another colour count, a few pixels that went wrong do not.
         let spread = [0, 1, 2].map(|c| {
             let distances = of_channel(c).map(|one| (one - middle[c]).abs());
-            quantile(distances, NINTH_TENTH).unwrap_or(0.0) / DEVIATIONS
+            quantile(distances, PARAMETERS.spread_quantile).unwrap_or(0.0)
+                / PARAMETERS.spread_deviations
         });
         let room = &self.room;
         self.fits
@@ -252,7 +262,8 @@ impl Solver<'_> {
             .filter(|(_, moments)| !moments.is_dark())
             .for_each(|(fit, moments)| {
                 let waves = room.waves(fit.normal);
-                fit.albedo = moments.drawn_albedo(&waves, (middle, spread), FREEDOM);
+                fit.albedo =
+                    moments.drawn_albedo(&waves, (middle, spread), ERROR_PARAMETERS.freedom);
             });
     }
 

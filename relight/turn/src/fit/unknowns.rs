@@ -10,14 +10,22 @@ use crate::model::material::BodyKind;
 use crate::model::metal::mirror_terms;
 use crate::model::shading::Room;
 
-/// The most that gloss shows of a band, over what a smooth dielectric shows of it: light by a dark grey ball is in small units.
-const MOST_SHARE: f64 = 20.0;
+/// Parameters of the bands' attenuations.
+struct AttenuationParameters {
+    /// Largest attenuation of a band by gloss, over that of a smooth dielectric. By hand: light by a dark grey ball is
+    /// in small units.
+    most_gloss: f64,
+    /// Largest attenuation of a band by metal, over that of band 0. By hand: physically 1.
+    most_metal: f64,
+    /// Least attenuation of band 0 by which the others of metal are divided. Numerical.
+    least_first: f64,
+}
 
-/// The most that metal shows of a band, over the first.
-const MOST_METAL_SHARE: f64 = 1.2;
-
-/// The least share of the first band by which those of metal are divided.
-const LEAST_FIRST_SHARE: f64 = 0.05;
+const PARAMETERS: AttenuationParameters = AttenuationParameters {
+    most_gloss: 20.0,
+    most_metal: 1.2,
+    least_first: 0.05,
+};
 
 /// How much gloss shows of the bands of a light that a matt surface shows too.
 pub(crate) type Shares = [f64; MATT_BANDS];
@@ -104,13 +112,13 @@ impl Guess {
         let by = &step[layout.of_channel(3)..];
         let shares = self.shares.iter().zip(by);
         let mut shares: Vec<f64> = shares
-            .map(|(share, by)| (share + by).clamp(0.0, MOST_SHARE))
+            .map(|(share, by)| (share + by).clamp(0.0, PARAMETERS.most_gloss))
             .collect();
         if let (Unknowns::Mirror(_), Some(&first)) = (unknowns, shares.first()) {
             // Of an even light metal shows its albedo's part, whatever its lobe is.
-            let first = first.max(LEAST_FIRST_SHARE);
+            let first = first.max(PARAMETERS.least_first);
             for share in &mut shares {
-                *share = (*share / first).min(MOST_METAL_SHARE);
+                *share = (*share / first).min(PARAMETERS.most_metal);
             }
         }
         Self {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-/// A surface that is seen faces the viewer by at least this.
+/// Least cosine between the normal of a visible surface and the direction to the viewer. Numerical.
 pub(crate) const LEAST_FACING: f64 = 0.02;
 
 /// Where the viewer's direction is reflected to.

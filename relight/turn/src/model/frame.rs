@@ -5,17 +5,24 @@ use serde::Serialize;
 
 use crate::setting_error::SettingError;
 
-/// The elevation that is taken where none is known, degrees.
-const USUAL_DEG: f64 = 18.0;
+/// Parameters of the elevation.
+struct ElevationParameters {
+    /// Elevation where none is known, degrees. By convention of the rig.
+    usual_deg: f64,
+    /// Uncertainty of that one, degrees. By hand.
+    usual_uncertainty_deg: f64,
+    /// Uncertainty of one that was given, degrees. By hand.
+    given_uncertainty_deg: f64,
+    /// Uncertainty of a length that was measured in a picture, in heights of the rim. By hand.
+    rim_uncertainty: f64,
+}
 
-/// How far it may be off then, degrees.
-const USUAL_UNCERTAINTY_DEG: f64 = 8.0;
-
-/// How far one that was given may be off, degrees.
-const GIVEN_UNCERTAINTY_DEG: f64 = 1.0;
-
-/// How far off a length measured in a picture may be, as a part of the rim's height.
-const RIM_UNCERTAINTY: f64 = 0.03;
+const PARAMETERS: ElevationParameters = ElevationParameters {
+    usual_deg: 18.0,
+    usual_uncertainty_deg: 8.0,
+    given_uncertainty_deg: 1.0,
+    rim_uncertainty: 0.03,
+};
 
 /// Where an elevation comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -42,8 +49,8 @@ impl Elevation {
     #[must_use]
     pub const fn assumed() -> Self {
         Self {
-            degrees: USUAL_DEG,
-            uncertainty_deg: USUAL_UNCERTAINTY_DEG,
+            degrees: PARAMETERS.usual_deg,
+            uncertainty_deg: PARAMETERS.usual_uncertainty_deg,
             source: ElevationSource::Assumed,
         }
     }
@@ -62,7 +69,7 @@ impl Elevation {
         }
         Ok(Self {
             degrees,
-            uncertainty_deg: GIVEN_UNCERTAINTY_DEG,
+            uncertainty_deg: PARAMETERS.given_uncertainty_deg,
             source: ElevationSource::Given,
         })
     }
@@ -85,7 +92,9 @@ impl Elevation {
         let slope = 1.0 / elevation.cos();
         Ok(Self {
             degrees: elevation.to_degrees(),
-            uncertainty_deg: (RIM_UNCERTAINTY * sine * slope).to_degrees().max(0.5),
+            uncertainty_deg: (PARAMETERS.rim_uncertainty * sine * slope)
+                .to_degrees()
+                .max(0.5),
             source: ElevationSource::Rim,
         })
     }

@@ -9,7 +9,8 @@ use crate::model::harmonics::{GLOSS_ORDER, WAVES, WaveTerm};
 /// Terms of a channel's gloss.
 pub(crate) const GLOSS_TERMS: usize = (GLOSS_ORDER + 1) * (GLOSS_ORDER + 1);
 
-/// The part of the light that a dielectric reflects head-on; at a glancing angle it is all.
+/// Reflectance of a dielectric at normal incidence, 0 to 1; at a glancing angle it is 1. By convention, for an index of
+/// refraction of 1.5.
 const HEAD_ON: f64 = 0.04;
 
 /// The room's light as the object's gloss shows it. A pixel whose normal is n reflects the viewer's direction to

@@ -13,17 +13,26 @@ use crate::model::shading::Room;
 use crate::observe::curves::TurnCurves;
 use crate::observe::verdict::RoomVerdict;
 
-/// Above this part beyond the second harmonic, the modulation is not that of a matt surface.
-const MOST_BEYOND: f64 = 0.3;
+/// Parameters of the judgement of a turn.
+struct ConditioningParameters {
+    /// Largest share of the variation beyond the second harmonic, 0 to 1. By hand: above it the modulation is not that
+    /// of a Lambertian surface.
+    most_beyond: f64,
+    /// Least share of the pixels whose curves can be used, 0 to 1; with fewer the exposure was wrong. By hand.
+    least_observable: f64,
+    /// Least mean light of a pixel that can be used, linear, of the three channels together. By hand: what is less is
+    /// black.
+    least_light: f64,
+    /// Normals on which the modulation of a given light is measured. By hand.
+    normals: usize,
+}
 
-/// The least part of the pixels whose curves have to tell something: else the exposure was wrong.
-const LEAST_TOLD: f64 = 0.1;
-
-/// The least mean of a pixel's light that tells something.
-const LEAST_LIGHT: f64 = 1e-5;
-
-/// Normals on which the modulation of a light is measured.
-const NORMALS: usize = 100;
+const PARAMETERS: ConditioningParameters = ConditioningParameters {
+    most_beyond: 0.3,
+    least_observable: 0.1,
+    least_light: 1e-5,
+    normals: 100,
+};
 
 /// How much the light of the turn tells.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -55,7 +64,7 @@ impl Conditioning {
         let beyond = median(figures.clone().map(|(_, beyond)| beyond)).unwrap_or(0.0);
         let told = figures.count();
         let clipped = pixels.iter().filter(|told| matches!(told, Told::Clipped));
-        let verdict = if (told as f64) < LEAST_TOLD * pixels.len() as f64 {
+        let verdict = if (told as f64) < PARAMETERS.least_observable * pixels.len() as f64 {
             if 2 * clipped.count() >= pixels.len() - told {
                 RoomVerdict::Overexposed
             } else {
@@ -63,7 +72,7 @@ impl Conditioning {
             }
         } else if modulation < LEAST_MODULATION {
             RoomVerdict::TooEven
-        } else if beyond > MOST_BEYOND {
+        } else if beyond > PARAMETERS.most_beyond {
             RoomVerdict::NotMatt
         } else {
             RoomVerdict::Good
@@ -88,7 +97,7 @@ impl Conditioning {
     /// The same where the light was given, as an object shows it in this room that blurs nothing: one that is too even tells no more
     /// than an even turn.
     pub(crate) fn in_given(self, room: &Room) -> Self {
-        let modulations = half_sphere(NORMALS).map(|normal| {
+        let modulations = half_sphere(PARAMETERS.normals).map(|normal| {
             let waves = room.waves(normal).body;
             let sum = |wave: usize| waves.iter().map(|waves| waves[wave]).sum::<f64>();
             let harmonics: f64 = (1..WAVES).map(|wave| sum(wave).powi(2)).sum();
@@ -150,7 +159,7 @@ fn of_pixel(curves: &TurnCurves, pixel: usize) -> Told {
     }
     let harmonics: f64 = solution[1..].iter().map(|value| value * value).sum();
     let constant = solution[0];
-    if constant <= LEAST_LIGHT {
+    if constant <= PARAMETERS.least_light {
         return Told::Black;
     }
     Told::Curve {

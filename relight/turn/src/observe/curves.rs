@@ -2,27 +2,40 @@
 
 use relight_core::image::ColourSpace;
 use relight_core::image::{Extent, Planes, Srgb};
+use relit_data::image_stats::SATURATION_LEVEL;
 
 use crate::error::TurnError;
 use crate::model::harmonics::{HARMONICS, WAVES};
 use crate::observe::exposure::{ExposureStep, ExposureWatch};
 
-/// Into how many parts the turn is divided. A part is narrow beside the second harmonic, and its own mean of
-/// the harmonics is known, so that dividing loses nothing.
-const PARTS: usize = 72;
+/// Parameters of the curves.
+struct CurveParameters {
+    /// Parts into which the turn is divided. Derived: a part of 5 degrees is narrow beside the harmonics, and its own
+    /// mean of them is kept, so that dividing loses nothing.
+    parts: usize,
+    /// Encoded value, 0 to 1, from which a channel counts as clipped. Derived: the saturation level of the data, less
+    /// rounding.
+    clipped_value: f32,
+    /// Least share of the frames of a part, 0 to 1, in which a channel is not clipped. By hand: the mean of fewer would
+    /// be that of the darker ones.
+    least_unclipped: f32,
+    /// Relative difference up to which exposures of the frames of a part count as equal. By hand.
+    same_exposure: f64,
+    /// Least number of parts with frames. Derived: five Fourier coefficients of a Lambertian curve, and three to spare.
+    least_parts: usize,
+    /// Least share of the pixels of a block, 0 to 1, that have to be unclipped. By hand: the mean of fewer would be too
+    /// dark.
+    least_of_block: f32,
+}
 
-/// A value from which a channel counts as clipped: 250 of 255, less rounding.
-const CLIPPED_VALUE: f32 = 249.5 / 255.0;
-
-/// A part of the turn counts for a pixel's channel where at least this part of its frames is not clipped: the mean of
-/// the others would be that of the darker ones.
-const LEAST_SEEN: f32 = 0.95;
-
-/// Exposures of the frames of a part that differ by more than this part are not the same.
-const SAME_EXPOSURE: f64 = 0.01;
-
-/// Angles that are needed for five terms with something left over.
-const LEAST_ANGLES: usize = 8;
+const PARAMETERS: CurveParameters = CurveParameters {
+    parts: 72,
+    clipped_value: (SATURATION_LEVEL as f32 - 0.5) / 255.0,
+    least_unclipped: 0.95,
+    same_exposure: 0.01,
+    least_parts: 8,
+    least_of_block: 0.9,
+};
 
 /// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Of each frame it keeps the light of a few pixels, about a
 /// kilobyte; beyond that its memory does not grow with the number of frames.
@@ -78,12 +91,12 @@ impl CurveBuilder {
         if places.is_empty() {
             return Err(TurnError::Empty);
         }
-        let cells = places.len() * PARTS;
+        let cells = places.len() * PARAMETERS.parts;
         Ok(Self {
             extent,
             places,
-            clipped: Srgb::to_linear(CLIPPED_VALUE),
-            parts: vec![Part::default(); PARTS],
+            clipped: Srgb::to_linear(PARAMETERS.clipped_value),
+            parts: vec![Part::default(); PARAMETERS.parts],
             sums: vec![[0.0; 3]; cells],
             counts: vec![[0; 3]; cells],
             watch: ExposureWatch::default(),
@@ -111,13 +124,14 @@ impl CurveBuilder {
         if !angle_deg.is_finite() {
             return Ok(());
         }
-        let part = (angle_deg.rem_euclid(360.0) / 360.0 * PARTS as f64) as usize % PARTS;
+        let part = (angle_deg.rem_euclid(360.0) / 360.0 * PARAMETERS.parts as f64) as usize
+            % PARAMETERS.parts;
         self.watch
             .push(angle_deg, &self.places, planes, self.clipped);
         self.parts[part].add(angle_deg.to_radians(), self.frames);
         self.frames += 1;
         for (pixel, &at) in self.places.iter().enumerate() {
-            let cell = pixel * PARTS + part;
+            let cell = pixel * PARAMETERS.parts + part;
             for (channel, plane) in planes.iter().enumerate() {
                 if plane[at] < self.clipped {
                     self.sums[cell][channel] += plane[at];
@@ -134,11 +148,13 @@ impl CurveBuilder {
     /// # Errors
     /// [`TurnError::TooFewAngles`] where the frames do not tell two harmonics.
     pub fn finish(self) -> Result<TurnCurves, TurnError> {
-        let seen: Vec<usize> = (0..PARTS).filter(|&at| self.parts[at].frames > 0).collect();
-        if seen.len() < LEAST_ANGLES {
+        let seen: Vec<usize> = (0..PARAMETERS.parts)
+            .filter(|&at| self.parts[at].frames > 0)
+            .collect();
+        if seen.len() < PARAMETERS.least_parts {
             return Err(TurnError::TooFewAngles {
                 angles: seen.len(),
-                needed: LEAST_ANGLES,
+                needed: PARAMETERS.least_parts,
             });
         }
         let (steps, exposures) = self.watch.finish();
@@ -151,20 +167,20 @@ impl CurveBuilder {
             self.places
                 .iter()
                 .enumerate()
-                .flat_map(|(pixel, _)| seen.iter().map(move |part| pixel * PARTS + part))
+                .flat_map(|(pixel, _)| seen.iter().map(move |part| pixel * PARAMETERS.parts + part))
         };
         let mean = |cell: usize| {
-            let exposure = exposures[cell % PARTS].unwrap_or(1.0) as f32;
+            let exposure = exposures[cell % PARAMETERS.parts].unwrap_or(1.0) as f32;
             [0, 1, 2]
                 .map(|c| self.sums[cell][c] / f32::from(self.counts[cell][c].max(1)) / exposure)
         };
         let values = cells().map(mean).collect();
         let weights = cells()
             .map(|cell| {
-                let frames = self.parts[cell % PARTS].frames as f32;
+                let frames = self.parts[cell % PARAMETERS.parts].frames as f32;
                 self.counts[cell].map(|count| {
-                    let is_seen = f32::from(count) >= LEAST_SEEN * frames
-                        && exposures[cell % PARTS].is_some();
+                    let is_seen = f32::from(count) >= PARAMETERS.least_unclipped * frames
+                        && exposures[cell % PARAMETERS.parts].is_some();
                     f32::from(u8::from(is_seen))
                 })
             })
@@ -176,7 +192,7 @@ impl CurveBuilder {
             waves: seen.iter().map(|&at| self.parts[at].waves()).collect(),
             angles: seen
                 .iter()
-                .map(|&at| (at as f64 + 0.5) / PARTS as f64 * std::f64::consts::TAU)
+                .map(|&at| (at as f64 + 0.5) / PARAMETERS.parts as f64 * std::f64::consts::TAU)
                 .collect(),
             values,
             weights,
@@ -203,7 +219,7 @@ impl Part {
             all().fold(f64::INFINITY, f64::min),
             all().fold(0.0, f64::max),
         );
-        (most <= least * (1.0 + SAME_EXPOSURE)).then_some(most)
+        (most <= least * (1.0 + PARAMETERS.same_exposure)).then_some(most)
     }
 
     fn waves(&self) -> [f64; WAVES] {
@@ -260,7 +276,7 @@ impl TurnCurves {
 
     /// The light from which a channel counts as clipped.
     pub(crate) fn clipped_value(&self) -> f64 {
-        f64::from(Srgb::to_linear(CLIPPED_VALUE))
+        f64::from(Srgb::to_linear(PARAMETERS.clipped_value))
     }
 
     /// The part of a pixel's light, 0 to 1, that is left out because it is clipped.
@@ -377,7 +393,7 @@ impl TurnCurves {
             }
         }
         // A block of which a pixel clips is too dark by the mean of the others: it does not count.
-        let least = 0.9 * pixels.len() as f32;
+        let least = PARAMETERS.least_of_block * pixels.len() as f32;
         let mean = [0, 1, 2].map(|c| sum[c] / weights[c].max(f32::MIN_POSITIVE));
         let weight = weights.map(|weight| if weight >= least { 1.0 } else { 0.0 });
         (mean, weight)

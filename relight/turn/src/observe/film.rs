@@ -16,15 +16,23 @@ use crate::observe::probe_place::ProbePlace;
 use crate::observe::reading::{ReadTurn, TurnOrigin};
 use crate::observe::strip::{RoomStrip, StripBuilder};
 
-/// The most of a ball that the object's mask may cover: edges are not exact.
-const MOST_COVERED: f64 = 0.05;
+/// Parameters of the comparison of a video with its shard.
+struct FilmParameters {
+    /// Largest share of a ball that the mask may cover, 0 to 1. By hand: edges are not exact.
+    most_covered: f64,
+    /// Side of the blocks in which frames are compared, pixels of the shard. By hand: shifts of a few pixels hardly
+    /// change them.
+    block: usize,
+    /// Relative difference of the light of blocks from which frames show something else. Measured: those of their own
+    /// video differ by 0.01 to 0.02, by JPEG and scaling.
+    most_different: f64,
+}
 
-/// Frames are compared in blocks of so many pixels of the shard, which shifts of a few pixels and noise hardly change.
-const BLOCK: usize = 16;
-
-/// Frames whose blocks differ by more than this part of their light show something else: those of their own video differ by 0.01 to
-/// 0.02, by JPEG and scaling.
-const DIFFERENT: f64 = 0.12;
+const PARAMETERS: FilmParameters = FilmParameters {
+    most_covered: 0.05,
+    block: 16,
+    most_different: 0.12,
+};
 
 /// What was seen beside the object.
 #[derive(Debug)]
@@ -130,7 +138,7 @@ fn check_mask(given: ProbePlace, turn: &ReadTurn) -> Result<(), TurnError> {
         .map(|_| f64::from(crop.w) * f64::from(crop.h) / (width * height) as f64)
         .sum();
     let part = covered / (std::f64::consts::PI * given.radius * given.radius);
-    if part <= MOST_COVERED {
+    if part <= PARAMETERS.most_covered {
         return Ok(());
     }
     Err(TurnError::BallInMask {
@@ -164,15 +172,15 @@ impl<'a> Likeness<'a> {
         };
         let shard = self.turn.first[at].planes();
         let Extent { width, height } = shard.extent();
-        let across = width.div_ceil(BLOCK);
-        let mut sums = vec![[[0.0; 3]; 2]; across * height.div_ceil(BLOCK)];
+        let across = width.div_ceil(PARAMETERS.block);
+        let mut sums = vec![[[0.0; 3]; 2]; across * height.div_ceil(PARAMETERS.block)];
         let mask = self.turn.mask.plane(0);
         for at in (0..mask.len()).filter(|&at| mask[at] >= 0.5) {
             let (x, y) = (at % width, at / width);
             let Some(seen) = light_at(frame.planes(), origin.crop, (x, y), shard.extent()) else {
                 continue;
             };
-            let block = &mut sums[y / BLOCK * across + x / BLOCK];
+            let block = &mut sums[y / PARAMETERS.block * across + x / PARAMETERS.block];
             for c in 0..3 {
                 block[0][c] += shard.plane(c)[at];
                 block[1][c] += seen[c];
@@ -192,7 +200,7 @@ impl<'a> Likeness<'a> {
 
     /// Whether at least half of the frames are alike; where none can be compared, nothing speaks against it.
     fn is_same(&self) -> bool {
-        median(self.differences.iter().copied()).unwrap_or(0.0) < DIFFERENT
+        median(self.differences.iter().copied()).unwrap_or(0.0) < PARAMETERS.most_different
     }
 }
 

@@ -1,5 +1,6 @@
 //! The panorama that a chrome ball shows.
 
+use crate::model::harmonics::GLOSS_ORDER;
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
 use relight_core::light::{Direction, Order, ShLight, basis};
@@ -8,13 +9,22 @@ use crate::error::TurnError;
 use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
 
-/// Rows and columns of the panorama that a chrome ball shows.
-const ROWS: usize = 32;
+/// Parameters of the panorama.
+struct PanoramaParameters {
+    /// Rows of the panorama, from the table's axis upwards to downwards. By hand: about 6 degrees, finer than order 6
+    /// shows.
+    rows: usize,
+    /// Columns of the panorama. Derived: twice the rows, so that cells are square at the equator.
+    columns: usize,
+    /// Order of the light. Derived: as much as gloss is fitted with.
+    order: usize,
+}
 
-const COLUMNS: usize = 2 * ROWS;
-
-/// The order of the light by a chrome ball: as much as gloss is fitted with.
-const CHROME_ORDER: usize = 6;
+const PARAMETERS: PanoramaParameters = PanoramaParameters {
+    rows: 32,
+    columns: 64,
+    order: GLOSS_ORDER,
+};
 
 /// The panorama that a chrome ball shows of the room while it turns, in the table's frame at its angle 0.
 #[derive(Debug)]
@@ -28,8 +38,8 @@ impl Mirrored {
     pub(crate) fn new(frame: TableFrame) -> Self {
         Self {
             frame,
-            sums: vec![[0.0; 3]; ROWS * COLUMNS],
-            counts: vec![0.0; ROWS * COLUMNS],
+            sums: vec![[0.0; 3]; PARAMETERS.rows * PARAMETERS.columns],
+            counts: vec![0.0; PARAMETERS.rows * PARAMETERS.columns],
         }
     }
 
@@ -57,26 +67,29 @@ impl Mirrored {
     pub(crate) fn cell(&self, angle: f64, normal: [f64; 3]) -> usize {
         let [x, y, z] = self.frame.to_table(reflected(normal));
         let azimuth = y.atan2(x) + angle;
-        let column = (azimuth.rem_euclid(TAU) / TAU * COLUMNS as f64) as usize % COLUMNS;
-        let row = ((z.clamp(-1.0, 1.0).acos() / PI * ROWS as f64) as usize).min(ROWS - 1);
-        row * COLUMNS + column
+        let column = (azimuth.rem_euclid(TAU) / TAU * PARAMETERS.columns as f64) as usize
+            % PARAMETERS.columns;
+        let row = ((z.clamp(-1.0, 1.0).acos() / PI * PARAMETERS.rows as f64) as usize)
+            .min(PARAMETERS.rows - 1);
+        row * PARAMETERS.columns + column
     }
 
     /// What it shows, as coefficients; directions that it never shows are as bright as their row, or as all.
     pub(crate) fn light(&self) -> Result<ShLight, TurnError> {
         let all = self.all().ok_or(TurnError::NoLight)?;
-        let order = Order::new(CHROME_ORDER).unwrap_or(Order::TWO);
+        let order = Order::new(PARAMETERS.order).unwrap_or(Order::TWO);
         let mut light = ShLight::even(order, [0.0; 3]);
-        for row in 0..ROWS {
-            let cells = row * COLUMNS..(row + 1) * COLUMNS;
+        for row in 0..PARAMETERS.rows {
+            let cells = row * PARAMETERS.columns..(row + 1) * PARAMETERS.columns;
             let of_row = mean(&self.sums[cells.clone()], &self.counts[cells]).unwrap_or(all);
-            let polar = PI * (row as f64 + 0.5) / ROWS as f64;
-            let edges = [row, row + 1].map(|edge| (PI * edge as f64 / ROWS as f64).cos());
-            let area = (edges[0] - edges[1]) * TAU / COLUMNS as f64;
-            for column in 0..COLUMNS {
-                let cell = row * COLUMNS + column;
+            let polar = PI * (row as f64 + 0.5) / PARAMETERS.rows as f64;
+            let edges =
+                [row, row + 1].map(|edge| (PI * edge as f64 / PARAMETERS.rows as f64).cos());
+            let area = (edges[0] - edges[1]) * TAU / PARAMETERS.columns as f64;
+            for column in 0..PARAMETERS.columns {
+                let cell = row * PARAMETERS.columns + column;
                 let shown = mean(&self.sums[cell..=cell], &self.counts[cell..=cell]);
-                let azimuth = TAU * (column as f64 + 0.5) / COLUMNS as f64;
+                let azimuth = TAU * (column as f64 + 0.5) / PARAMETERS.columns as f64;
                 let (sin, cos) = azimuth.sin_cos();
                 let to = Direction::new(polar.sin() * cos, polar.sin() * sin, polar.cos());
                 let Some(to) = to else { continue };

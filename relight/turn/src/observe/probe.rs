@@ -11,11 +11,19 @@ use crate::observe::mirror_panorama::Mirrored;
 use crate::observe::probe_place::ProbePlace;
 use crate::observe::surroundings::Surroundings;
 
-/// The side of the square to which the ball is brought, pixels.
-const SIDE: usize = 48;
+/// Parameters of the picture of a ball.
+struct ProbeParameters {
+    /// Side of the square to which the ball is brought, pixels. By hand.
+    side: usize,
+    /// Share of the ball's radius that is looked at, 0 to 1. By hand: the rim also shows the background and reflects
+    /// it.
+    radius_share: f32,
+}
 
-/// The part of the ball's radius that is looked at: its rim shows the background too, and reflects it.
-const PART: f32 = 0.92;
+const PARAMETERS: ProbeParameters = ProbeParameters {
+    side: 48,
+    radius_share: 0.92,
+};
 
 /// What a ball is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,15 +62,15 @@ impl ProbeBuilder {
     /// # Errors
     /// None for a ball.
     pub fn new(probe: Probe) -> Result<Self, TurnError> {
-        let extent = Extent::new(SIDE, SIDE);
+        let extent = Extent::new(PARAMETERS.side, PARAMETERS.side);
         let mask = Planes::from_fn(extent, |x, y| {
-            let from_middle = |at: usize| 2.0 * (at as f32 + 0.5) / SIDE as f32 - 1.0;
-            let inside = from_middle(x).hypot(from_middle(y)) < PART;
+            let from_middle = |at: usize| 2.0 * (at as f32 + 0.5) / PARAMETERS.side as f32 - 1.0;
+            let inside = from_middle(x).hypot(from_middle(y)) < PARAMETERS.radius_share;
             [f32::from(u8::from(inside))]
         });
         Ok(Self {
             probe,
-            normals: Normals::sphere(SIDE).masked(&mask)?,
+            normals: Normals::sphere(PARAMETERS.side).masked(&mask)?,
             builder: CurveBuilder::new(extent, mask.plane(0))?,
             mirrored: Mirrored::new(TableFrame::new(probe.elevation)),
             surroundings: None,
@@ -88,7 +96,7 @@ impl ProbeBuilder {
             none => none.insert(Surroundings::new(place, planes.extent())?),
         };
         surroundings.push(angle_deg, planes)?;
-        let ball = Planes::from_fn(Extent::new(SIDE, SIDE), |x, y| {
+        let ball = Planes::from_fn(Extent::new(PARAMETERS.side, PARAMETERS.side), |x, y| {
             light_at(place, planes, x, y)
         });
         self.add_mirrored(angle_deg, &ball);
@@ -111,7 +119,7 @@ impl ProbeBuilder {
 
 /// The light at a pixel of the square that the ball fills.
 fn light_at(place: ProbePlace, planes: &Planes<3>, x: usize, y: usize) -> [f32; 3] {
-    let from = |at: usize| (2 * at + 1) as f64 / SIDE as f64 - 1.0;
-    let pixel = 2.0 * place.radius / SIDE as f64;
+    let from = |at: usize| (2 * at + 1) as f64 / PARAMETERS.side as f64 - 1.0;
+    let pixel = 2.0 * place.radius / PARAMETERS.side as f64;
     place.mean_light(planes, place.in_picture([from(x), -from(y)]), pixel)
 }

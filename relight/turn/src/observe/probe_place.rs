@@ -7,8 +7,13 @@ use relight_core::image::{Extent, Planes, Srgb};
 
 use crate::setting_error::SettingError;
 
-/// The least part of a pixel that counts as covered.
-const TOUCHED: f64 = 1e-6;
+/// Parameters of a ball's place.
+struct ProbePlaceParameters {
+    /// Least width of a pixel that counts as covered, pixels. Numerical: one that is only touched, by rounding, is not.
+    least_cover: f64,
+}
+
+const PARAMETERS: ProbePlaceParameters = ProbePlaceParameters { least_cover: 1e-6 };
 
 /// Where a ball is in the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,8 +69,11 @@ impl ProbePlace {
     pub(crate) fn mean_light(&self, planes: &Planes<3>, [x, y]: [f64; 2], size: f64) -> [f32; 3] {
         let range = |middle: f64| {
             // A pixel that is only touched, by rounding, is not covered.
-            let from = (middle - size / 2.0 + TOUCHED).max(0.0) as usize;
-            from..((middle + size / 2.0 - TOUCHED).ceil().max(0.0) as usize).max(from + 1)
+            let from = (middle - size / 2.0 + PARAMETERS.least_cover).max(0.0) as usize;
+            from..((middle + size / 2.0 - PARAMETERS.least_cover)
+                .ceil()
+                .max(0.0) as usize)
+                .max(from + 1)
         };
         let Extent { width, height } = planes.extent();
         let (mut sum, mut count) = ([0.0; 3], 0.0);

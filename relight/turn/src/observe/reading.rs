@@ -17,8 +17,13 @@ use serde::Serialize;
 use crate::error::TurnError;
 use crate::observe::curves::{CurveBuilder, TurnCurves};
 
-/// Frames that are drawn at a time: in a shard they cover the whole turn.
-const BATCH: u32 = 12;
+/// Parameters of the reading.
+struct ReadingParameters {
+    /// Frames that are drawn at a time. By convention of the shards: twelve neighbours cover the whole turn.
+    batch: u32,
+}
+
+const PARAMETERS: ReadingParameters = ReadingParameters { batch: 12 };
 
 /// Which way the table turns as its angle grows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -84,7 +89,7 @@ pub fn read_curves(
     let frames = turns.turns().iter().sum::<u32>();
     let streaming = Streaming {
         plan: DrawPlan {
-            batch: BATCH,
+            batch: PARAMETERS.batch,
             draw: Draw::Neighbours,
             seed: None,
             share: Share::ALL,
@@ -117,7 +122,7 @@ pub fn read_curves(
             damaged.rest
         });
         reader.take(&drawn.batch)?;
-        done += u64::from(BATCH);
+        done += u64::from(PARAMETERS.batch);
         progress(done.min(frames.into()), frames.into());
         stream.give_back(drawn.batch);
     }
@@ -160,7 +165,7 @@ impl Reader {
                 });
             }
             self.builder(extent, mask)?.push(angle, extent, planes)?;
-            if self.first.len() < BATCH as usize {
+            if self.first.len() < PARAMETERS.batch as usize {
                 let planes = planes.map(<[f32]>::to_vec);
                 self.first_angles.push(angle);
                 self.first

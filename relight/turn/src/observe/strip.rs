@@ -14,29 +14,39 @@ use serde::Serialize;
 use crate::error::TurnError;
 use crate::observe::reading::TableSense;
 
-/// Columns of the strip: four a degree.
-const COLUMNS: usize = 1440;
+/// Parameters of the strip.
+struct StripParameters {
+    /// Columns of the strip. By convention: four a degree.
+    columns: usize,
+    /// Distance of the two columns of the picture from its sides, in widths. By hand.
+    inset: f64,
+    /// Their width, in widths of the picture. By hand.
+    width: f64,
+    /// Share of the picture's height, from the top, that shows the surroundings; below is the table. By hand.
+    height: f64,
+    /// Columns of the strip that are compared as one. By hand: one degree.
+    coarse_columns: usize,
+    /// Rows that are compared. By hand.
+    coarse_rows: usize,
+    /// Largest angle between the two columns, degrees. By hand.
+    most_field_deg: usize,
+    /// Least angle between them, degrees. By hand.
+    least_field_deg: usize,
+    /// Correlation from which the columns see the same surroundings, 0 to 1. By hand.
+    least_correlation: f64,
+}
 
-/// Where the two columns are, in parts of the width from either side, and how wide they are.
-const INSET: f64 = 0.03;
-
-const WIDTH: f64 = 0.012;
-
-/// The part of the picture's height, from the top, that shows the room: below is the table.
-const HEIGHT: f64 = 0.5;
-
-/// The two columns are compared at every so many columns of the strip, and at so many rows.
-const COARSE: usize = 4;
-
-const ROWS: usize = 24;
-
-/// Largest angle between the two columns that is looked for, degrees, and the least.
-const MOST_FIELD_DEG: usize = 100;
-
-const LEAST_FIELD_DEG: usize = 4;
-
-/// What the columns see is the same room from this correlation on.
-const LEAST_CORRELATION: f64 = 0.5;
+const PARAMETERS: StripParameters = StripParameters {
+    columns: 1440,
+    inset: 0.03,
+    width: 0.012,
+    height: 0.5,
+    coarse_columns: 4,
+    coarse_rows: 24,
+    most_field_deg: 100,
+    least_field_deg: 4,
+    least_correlation: 0.5,
+};
 
 /// Gathers the background of a turn's frames, in any order.
 #[derive(Debug)]
@@ -86,17 +96,17 @@ impl StripBuilder {
     /// # Errors
     /// [`TurnError::Empty`] where they are too small for two columns.
     pub fn new(extent: Extent) -> Result<Self, TurnError> {
-        let width = ((WIDTH * extent.width as f64) as usize).max(1);
-        let inset = (INSET * extent.width as f64) as usize;
-        let rows = ((HEIGHT * extent.height as f64) as usize).min(extent.height);
+        let width = ((PARAMETERS.width * extent.width as f64) as usize).max(1);
+        let inset = (PARAMETERS.inset * extent.width as f64) as usize;
+        let rows = ((PARAMETERS.height * extent.height as f64) as usize).min(extent.height);
         if rows == 0 || extent.width < 2 * (inset + width) {
             return Err(TurnError::Empty);
         }
         let side = |from| Side {
             from,
             width,
-            light: vec![[0.0; 3]; COLUMNS * rows],
-            frames: vec![0; COLUMNS],
+            light: vec![[0.0; 3]; PARAMETERS.columns * rows],
+            frames: vec![0; PARAMETERS.columns],
         };
         Ok(Self {
             extent,
@@ -117,7 +127,8 @@ impl StripBuilder {
             });
         }
         if angle_deg.is_finite() {
-            let column = (angle_deg.rem_euclid(360.0) / 360.0 * COLUMNS as f64) as usize % COLUMNS;
+            let column = (angle_deg.rem_euclid(360.0) / 360.0 * PARAMETERS.columns as f64) as usize
+                % PARAMETERS.columns;
             for side in &mut self.sides {
                 side.push(column, self.rows, frame);
             }
@@ -132,7 +143,7 @@ impl StripBuilder {
         let [left, right] = &self.sides;
         let (left, right) = (left.filled(rows)?, right.filled(rows)?);
         let (lag, correlation) = best_lag(&grey(&left, rows), &grey(&right, rows))?;
-        if correlation < LEAST_CORRELATION {
+        if correlation < PARAMETERS.least_correlation {
             return None;
         }
         let sense = if lag > 0 {
@@ -140,10 +151,11 @@ impl StripBuilder {
         } else {
             TableSense::Clockwise
         };
-        let lag = lag * COARSE as isize;
-        let field_deg = lag.unsigned_abs() as f64 * 360.0 / COLUMNS as f64;
-        let around =
-            |from: usize, by: isize| (from as isize + by).rem_euclid(COLUMNS as isize) as usize;
+        let lag = lag * PARAMETERS.coarse_columns as isize;
+        let field_deg = lag.unsigned_abs() as f64 * 360.0 / PARAMETERS.columns as f64;
+        let around = |from: usize, by: isize| {
+            (from as isize + by).rem_euclid(PARAMETERS.columns as isize) as usize
+        };
         // At angle t the middle of the picture shows what the left column saw half the lag before, and the right one sees later.
         let seen = |angle: usize, row: usize| {
             let early = left[around(angle, -lag / 2) * rows + row];
@@ -156,14 +168,19 @@ impl StripBuilder {
         });
         // Columns by what is to the right in the picture; what the camera sees at angle 0 is in the middle.
         let angle_of = |x: usize| {
-            let by = x as isize - (COLUMNS / 2) as isize;
+            let by = x as isize - (PARAMETERS.columns / 2) as isize;
             around(0, if lag > 0 { -by } else { by })
         };
-        let wide = Planes::from_fn(Extent::new(COLUMNS, rows), |x, y| seen(angle_of(x), y));
+        let wide = Planes::from_fn(Extent::new(PARAMETERS.columns, rows), |x, y| {
+            seen(angle_of(x), y)
+        });
         let between = self.sides[1].from - self.sides[0].from;
         let pixels_a_degree = between as f64 / field_deg;
-        let height = rows as f64 / pixels_a_degree * COLUMNS as f64 / 360.0;
-        let image = wide.resized(Extent::new(COLUMNS, (height.round() as usize).max(1)));
+        let height = rows as f64 / pixels_a_degree * PARAMETERS.columns as f64 / 360.0;
+        let image = wide.resized(Extent::new(
+            PARAMETERS.columns,
+            (height.round() as usize).max(1),
+        ));
         Some(RoomStrip {
             image: Rgb::new(image),
             figures: StripFigures {
@@ -197,9 +214,9 @@ impl Side {
         let mut light = self.light.clone();
         let first = self.frames.iter().position(|&frames| frames > 0)?;
         let mut last = first;
-        for at in (first..first + COLUMNS).map(|at| at % COLUMNS) {
+        for at in (first..first + PARAMETERS.columns).map(|at| at % PARAMETERS.columns) {
             if self.frames[at] == 0 {
-                if (at + COLUMNS - last) % COLUMNS > COLUMNS / 10 {
+                if (at + PARAMETERS.columns - last) % PARAMETERS.columns > PARAMETERS.columns / 10 {
                     return None;
                 }
                 light.copy_within(last * rows..(last + 1) * rows, at * rows);
@@ -241,12 +258,13 @@ impl RoomStrip {
 
 /// The grey of a few rows at every few angles, each row less its mean.
 fn grey(light: &[[f32; 3]], rows: usize) -> Vec<Vec<f64>> {
-    let taken = ROWS.min(rows);
+    let taken = PARAMETERS.coarse_rows.min(rows);
     (0..taken)
         .map(|at| {
             let row = at * rows / taken;
-            let values = (0..COLUMNS / COARSE).map(|column| {
-                let part = (0..COARSE).map(|k| light[(column * COARSE + k) * rows + row]);
+            let values = (0..PARAMETERS.columns / PARAMETERS.coarse_columns).map(|column| {
+                let part = (0..PARAMETERS.coarse_columns)
+                    .map(|k| light[(column * PARAMETERS.coarse_columns + k) * rows + row]);
                 part.map(|value| f64::from(value.iter().sum::<f32>()))
                     .sum::<f64>()
             });
@@ -259,15 +277,15 @@ fn grey(light: &[[f32; 3]], rows: usize) -> Vec<Vec<f64>> {
 
 /// By how many coarse columns the second view has to be turned to be most like the first, and how like it is then.
 fn best_lag(first: &[Vec<f64>], second: &[Vec<f64>]) -> Option<(isize, f64)> {
-    let count = COLUMNS / COARSE;
+    let count = PARAMETERS.columns / PARAMETERS.coarse_columns;
     let a_degree = count as f64 / 360.0;
     let energy = |rows: &[Vec<f64>]| rows.iter().flatten().map(|v| v * v).sum::<f64>();
     let unit = (energy(first) * energy(second)).sqrt();
     if unit <= 0.0 {
         return None;
     }
-    let least = (LEAST_FIELD_DEG as f64 * a_degree) as isize;
-    let most = (MOST_FIELD_DEG as f64 * a_degree) as isize;
+    let least = (PARAMETERS.least_field_deg as f64 * a_degree) as isize;
+    let most = (PARAMETERS.most_field_deg as f64 * a_degree) as isize;
     let like = |lag: isize| {
         let turn = lag.rem_euclid(count as isize) as usize;
         let rows = first.iter().zip(second);
@@ -288,8 +306,8 @@ fn best_lag(first: &[Vec<f64>], second: &[Vec<f64>]) -> Option<(isize, f64)> {
 /// Azimuth and relative size of the first harmonic of what the camera sees over the table's angle.
 fn first_harmonic(sense: TableSense, light: impl Fn(usize) -> f64) -> (f64, f64) {
     let (mut re, mut im, mut sum) = (0.0, 0.0, 0.0);
-    for at in 0..COLUMNS {
-        let turned = (at as f64 + 0.5) / COLUMNS as f64 * std::f64::consts::TAU;
+    for at in 0..PARAMETERS.columns {
+        let turned = (at as f64 + 0.5) / PARAMETERS.columns as f64 * std::f64::consts::TAU;
         // The camera looks along y, 90 degrees from x, and turns with the table.
         let azimuth = std::f64::consts::FRAC_PI_2
             + match sense {
@@ -363,7 +381,7 @@ mod tests {
             // The lamp at azimuth 40 degrees is 50 degrees to the right of what the camera sees first.
             let picture = strip.image().planes();
             let light = |x: &usize| picture.pixel(*x, 0)[0];
-            let brightest = (0..COLUMNS).max_by(|a, b| light(a).total_cmp(&light(b)));
+            let brightest = (0..PARAMETERS.columns).max_by(|a, b| light(a).total_cmp(&light(b)));
             let right = (brightest.unwrap() as f64 - 720.0) / 4.0;
             assert!((right - 50.0).abs() < 2.0, "{right}");
         }

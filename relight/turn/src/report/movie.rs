@@ -9,18 +9,27 @@ use relight_core::render::{DiffuseForm, Look, SpecularForm, Surface, exposure_fo
 
 use crate::error::TurnError;
 
-/// Frames of the video, and frames a second.
-const MOVIE_FRAMES: u32 = 90;
+/// Parameters of the video.
+struct MovieParameters {
+    /// Number of frames. By convention: three seconds.
+    frames: u32,
+    /// Frames a second. By convention.
+    rate: u32,
+    /// Order of the lamp's light. By hand.
+    lamp_order: usize,
+    /// Width of the lamp, radians. Derived: a smaller one has rings in this order.
+    lamp_spread: f64,
+    /// Height of the lamp above the line of sight, radians. By hand.
+    lamp_height: f64,
+}
 
-const MOVIE_RATE: u32 = 30;
-
-/// Order of the lamp that goes around the object in the video, how wide it is, radians: a smaller one would have rings in this
-/// order, and how high it stands, radians.
-const LAMP_ORDER: usize = 8;
-
-const LAMP_SPREAD: f64 = 0.3;
-
-const LAMP_HEIGHT: f64 = 0.6;
+const PARAMETERS: MovieParameters = MovieParameters {
+    frames: 90,
+    rate: 30,
+    lamp_order: 8,
+    lamp_spread: 0.3,
+    lamp_height: 0.6,
+};
 
 /// The object while a lamp goes around it once; `white`: the albedo that is shown as white.
 pub(crate) fn write_movie(path: &Path, surface: &Surface, white: f32) -> Result<(), TurnError> {
@@ -31,9 +40,9 @@ pub(crate) fn write_movie(path: &Path, surface: &Surface, white: f32) -> Result<
         exposure: exposure_for(&lamp) / white,
     };
     let extent = surface.extent();
-    let mut movie = MovieWriter::create(path, MovieFormat::Mp4, extent, MOVIE_RATE)?;
-    for frame in 0..MOVIE_FRAMES {
-        let part = f64::from(frame) / f64::from(MOVIE_FRAMES);
+    let mut movie = MovieWriter::create(path, MovieFormat::Mp4, extent, PARAMETERS.rate)?;
+    for frame in 0..PARAMETERS.frames {
+        let part = f64::from(frame) / f64::from(PARAMETERS.frames);
         movie.push(&look.turned(surface, &lamp, part)?.encode())?;
     }
     Ok(movie.finish()?)
@@ -41,14 +50,14 @@ pub(crate) fn write_movie(path: &Path, surface: &Surface, white: f32) -> Result<
 
 /// A lamp high before the object, and weak light from everywhere.
 fn lamp() -> ShLight {
-    let order = Order::new(LAMP_ORDER).unwrap_or(Order::TWO);
-    let from = Direction::from_angles(LAMP_HEIGHT, FRAC_PI_2);
+    let order = Order::new(PARAMETERS.lamp_order).unwrap_or(Order::TWO);
+    let from = Direction::from_angles(PARAMETERS.lamp_height, FRAC_PI_2);
     let mut light = ShLight::even(order, [0.15; 3]);
     let values = basis(order, from);
     let pairs = light.coefficients_mut().iter_mut().zip(values);
     for (at, (coefficient, value)) in pairs.enumerate() {
         let l = at.isqrt() as f64;
-        let blur = (-0.5 * l * (l + 1.0) * LAMP_SPREAD * LAMP_SPREAD).exp();
+        let blur = (-0.5 * l * (l + 1.0) * PARAMETERS.lamp_spread * PARAMETERS.lamp_spread).exp();
         for channel in coefficient {
             *channel += TAU * blur * value;
         }

@@ -21,11 +21,21 @@ use crate::observe::reading::ReadTurn;
 /// Angles of the table at which the gloss is looked at: all that lies between shows nothing new.
 const ANGLES: [f64; 4] = [0.0, FRAC_PI_2, 2.0 * FRAC_PI_2, 3.0 * FRAC_PI_2];
 
-/// The smoothness that metal in an unknown light is taken to have.
-const METAL_SMOOTHNESS: f32 = 60.0;
+/// Parameters of the object as a file.
+struct ObjectParameters {
+    /// Smoothness (exponent of the lobe) of metal in unknown light, which no turn determines. By convention.
+    metal_smoothness: f32,
+    /// Standard deviation of the coverage at the edge of the mask, pixels. By hand.
+    edge: f64,
+    /// Coverage below which a pixel is not part of the object, 0 to 1. By hand.
+    least_alpha: f32,
+}
 
-/// How far the coverage of a pixel reaches beyond the edge of the mask, pixels.
-const EDGE: f64 = 0.6;
+const PARAMETERS: ObjectParameters = ObjectParameters {
+    metal_smoothness: 60.0,
+    edge: 0.6,
+    least_alpha: 0.02,
+};
 
 impl TurnSolution {
     /// The light in the viewer's frame when the table stands at an angle, radians.
@@ -88,8 +98,8 @@ impl TurnSolution {
         if self.body() == BodyKind::Metal && self.measured.is_none() {
             // What it shows is all that is known of the light: it may be blurred or not.
             return Ok(Some(FittedGloss {
-                reflectance: (METAL_SMOOTHNESS + 2.0) / 8.0,
-                smoothness: METAL_SMOOTHNESS,
+                reflectance: (PARAMETERS.metal_smoothness + 2.0) / 8.0,
+                smoothness: PARAMETERS.metal_smoothness,
                 residual: 1.0,
             }));
         }
@@ -130,7 +140,7 @@ impl TurnSolution {
         let curves = &turn.curves;
         let extent = curves.extent();
         let mask = curves.mask();
-        let alpha = blurred_mask(&turn.mask, EDGE);
+        let alpha = blurred_mask(&turn.mask, PARAMETERS.edge);
         let inner: Vec<bool> = (0..mask.len())
             .map(|at| {
                 mask[at]
@@ -155,5 +165,11 @@ impl TurnSolution {
 /// The part of each pixel under the mask, were its edge as soft as a lens makes it; what is hardly anything is nothing.
 fn blurred_mask(mask: &Planes<1>, deviation: f64) -> Planes<1> {
     let everywhere = vec![true; mask.extent().pixels()];
-    blurred(mask, &everywhere, deviation).map(|alpha| if alpha < 0.02 { 0.0 } else { alpha })
+    blurred(mask, &everywhere, deviation).map(|alpha| {
+        if alpha < PARAMETERS.least_alpha {
+            0.0
+        } else {
+            alpha
+        }
+    })
 }

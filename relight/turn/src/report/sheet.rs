@@ -12,10 +12,18 @@ use crate::observe::reading::ReadTurn;
 use crate::report::encoding::grey;
 use crate::report::maps::TurnMaps;
 
-/// Width and height of the pictures of the sheet, pixels, and how many stand in a row.
-const TILE: usize = 256;
+/// Parameters of the contact sheet.
+struct SheetParameters {
+    /// Height of its pictures, pixels. By convention.
+    tile: usize,
+    /// Pictures in a row. By convention.
+    columns: usize,
+}
 
-const COLUMNS: usize = 4;
+const PARAMETERS: SheetParameters = SheetParameters {
+    tile: 256,
+    columns: 4,
+};
 
 /// One sheet: a frame, normals, albedo and shading; highlight, shadow, confidence, and a ball in the light.
 pub(crate) fn contact_sheet(
@@ -57,11 +65,14 @@ pub(crate) fn contact_sheet(
         plain(grey(&solution.confidence(curves)).planes()),
         ball_tile,
     ];
-    Ok(Planes::sheet(&tiles, COLUMNS)?)
+    Ok(Planes::sheet(&tiles, PARAMETERS.columns)?)
 }
 
-/// The size of the sheet's pictures: the frame's shape, [`TILE`] high.
+/// The size of the sheet's pictures: the frame's shape, `tile` high.
 fn tile(curves: &TurnCurves) -> Extent {
     let Extent { width, height } = curves.extent();
-    Extent::new((TILE * width / height.max(1)).clamp(1, 8 * TILE), TILE)
+    Extent::new(
+        (PARAMETERS.tile * width / height.max(1)).clamp(1, 8 * PARAMETERS.tile),
+        PARAMETERS.tile,
+    )
 }
