@@ -10,7 +10,7 @@
 //! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (Lambertian), `gloss`, `metal`, `shading` (one of them) |
 //! | `observe` | what the frames show: `reading`, `curves`, `exposure`, `conditioning`; `film`, `strip` and `probe` for what the video has beside the object |
 //! | `fit` | `search` and `normal_step` (one pixel), `joint`, `unknowns` and `schur` (all of them with the light), `initialisation`, `prior`, `robust`, `albedo`, `confidence`, `solve` |
-//! | `report` | `files`, `figures`, `maps`, `labels`, `object`: what is written |
+//! | `report` | `files`, `figures`, `maps`, `labels`, `object`: what is written; `warnings` and `destinations`: what a user should know after and before |
 //!
 //! A folder knows those above it in this table. Each module has its parameters in one struct, with unit and source:
 //! *derived*, *measured*, *by convention*, *numerical* (a guard on which results hardly depend), or *by hand*, of which
@@ -28,7 +28,8 @@ mod tests;
 
 pub use error::TurnError;
 pub use fit::environment::fit_turn_light;
-pub use fit::figures::{BodyFigure, SenseFigure, StartFigure};
+pub use fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure};
+pub use fit::given_light::read_given_light;
 pub use fit::options::TurnOptions;
 pub use fit::prior::{NormalsSource, prior_normals};
 pub use fit::probe_light::ProbeLight;
@@ -36,18 +37,20 @@ pub use fit::solution::TurnSolution;
 pub use fit::solve::solve_turn;
 pub use model::frame::{Elevation, ElevationSource, TableFrame};
 pub use model::lighting::TableLight;
-pub use model::material::BodyKind;
+pub use model::material::MaterialKind;
 pub use observe::conditioning::Conditioning;
 pub use observe::curves::{CurveBuilder, TurnCurves};
 pub use observe::exposure::ExposureStep;
 pub use observe::film::{Filmed, film};
 pub use observe::probe::{Probe, ProbeBall, ProbeBuilder};
 pub use observe::probe_place::ProbePlace;
-pub use observe::reading::{ReadTurn, TableSense, TurnOrigin, read_curves};
-pub use observe::strip::{RoomStrip, StripBuilder, StripFigures};
-pub use observe::verdict::RoomVerdict;
+pub use observe::reading::{ReadTurn, RotationDirection, TurnOrigin, read_curves};
+pub use observe::strip::{PanoramaStrip, StripBuilder, StripFigures};
+pub use observe::verdict::LightVerdict;
+pub use report::destinations::{AssetDestination, DestinationError, Destinations};
 pub use report::figures::TurnFigures;
 pub use report::files::TurnFiles;
 pub use report::labels::TurnLabels;
 pub use report::maps::TurnMaps;
+pub use report::warnings::TurnWarning;
 pub use setting_error::SettingError;

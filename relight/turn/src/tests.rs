@@ -8,7 +8,7 @@ use crate::fit::residuals::lit;
 use crate::model::gloss::GlossLight;
 use crate::model::harmonics::basis_at;
 use crate::model::metal::MIRROR;
-use crate::model::shading::Room;
+use crate::model::shading::ShadingModel;
 use crate::*;
 use relight_core::files::MovieReader;
 use relight_core::image::{Extent, Linear, Planes, Rgb};
@@ -20,8 +20,8 @@ use relight_reader::{TruthLayout, TruthSet};
 const SIDE: usize = 24;
 const ELEVATION: f64 = 22.0;
 
-/// A room with a bright side: its coefficients at the table's angle 0.
-fn room() -> ShLight {
+/// An environment light with a bright side: its coefficients at the table's angle 0.
+fn environment() -> ShLight {
     let values = [1.1, 0.3, 0.24, 0.36, 0.07, -0.06, 0.03, 0.12, 0.09];
     ShLight::new(values.map(|v| [v, 0.9 * v, 0.8 * v + 0.02]).to_vec()).unwrap()
 }
@@ -135,8 +135,8 @@ fn albedo_off(surface: &Surface, albedo: &Rgb<Linear>, gain: f32) -> f32 {
 
 /// The ball's turn, and what is found of it in known light.
 static SOLVED: LazyLock<(ReadTurn, TurnSolution)> = LazyLock::new(|| {
-    let turn = read(&ball(), &room());
-    let solution = solve_turn(&turn.curves, &known(&room())).unwrap();
+    let turn = read(&ball(), &environment());
+    let solution = solve_turn(&turn.curves, &known(&environment())).unwrap();
     (turn, solution)
 });
 
@@ -154,9 +154,9 @@ fn a_matt_ball_in_known_light_is_found_as_it_is() {
 
 #[test]
 fn the_light_of_a_known_surface_is_found_as_it_is() {
-    let (surface, light) = (ball(), room());
+    let (surface, light) = (ball(), environment());
     let frame = TableFrame::new(elevation());
-    let found = fit_turn_light(&SOLVED.0.curves, &surface, BodyKind::Diffuse, &frame).unwrap();
+    let found = fit_turn_light(&SOLVED.0.curves, &surface, MaterialKind::Diffuse, &frame).unwrap();
     let largest = 1.1;
     for (a, b) in found.coefficients().iter().zip(light.coefficients()) {
         for (a, b) in a.iter().zip(b) {
@@ -167,7 +167,7 @@ fn the_light_of_a_known_surface_is_found_as_it_is() {
 
 #[test]
 fn with_its_own_normals_as_the_prior_unknown_light_is_found_up_to_its_colour() {
-    let (surface, light) = (ball(), room());
+    let (surface, light) = (ball(), environment());
     let curves = film(&surface, &light, TAKE);
     let options = TurnOptions {
         elevation: elevation(),
@@ -189,14 +189,21 @@ fn with_its_own_normals_as_the_prior_unknown_light_is_found_up_to_its_colour() {
         }
     }
     // Four that lean on the prior, and three that lean on the outline alone.
-    assert_eq!(found.starts().len(), 7);
-    assert_eq!(found.starts().iter().filter(|start| start.taken).count(), 1);
+    assert_eq!(found.initialisations().len(), 7);
+    assert_eq!(
+        found
+            .initialisations()
+            .iter()
+            .filter(|start| start.taken)
+            .count(),
+        1
+    );
     assert!(!found.is_prior_left_out());
 }
 
 #[test]
 fn a_table_that_turns_the_other_way_is_noticed() {
-    let (surface, light) = (ball(), room());
+    let (surface, light) = (ball(), environment());
     let mut builder = CurveBuilder::new(surface.extent(), mask(&surface).plane(0)).unwrap();
     for k in 0..90 {
         let angle = f64::from(k) * 4.0;
@@ -212,17 +219,17 @@ fn a_table_that_turns_the_other_way_is_noticed() {
         ..TurnOptions::default()
     };
     for options in [known(&light), unknown] {
-        let wrong = solve_turn(&curves, &options).unwrap().sense().unwrap();
+        let wrong = solve_turn(&curves, &options).unwrap().direction().unwrap();
         assert!(wrong.is_doubted(), "{wrong:?}");
         let right = solve_turn(&SOLVED.0.curves, &options).unwrap();
-        let right = right.sense().unwrap();
+        let right = right.direction().unwrap();
         assert!(!right.is_doubted(), "{right:?}");
     }
 }
 
 #[test]
 fn in_unknown_light_the_outline_alone_tells_a_ball_roughly() {
-    let (surface, light) = (ball(), room());
+    let (surface, light) = (ball(), environment());
     let curves = film(&surface, &light, TAKE);
     let options = TurnOptions {
         elevation: elevation(),
@@ -239,7 +246,7 @@ fn in_unknown_light_the_outline_alone_tells_a_ball_roughly() {
 
 #[test]
 fn clipped_light_is_left_out() {
-    let (surface, light) = (ball(), room());
+    let (surface, light) = (ball(), environment());
     let take = Take { gain: 4.0, ..TAKE };
     let curves = film(&surface, &light, take);
     assert!(
@@ -254,7 +261,7 @@ fn clipped_light_is_left_out() {
 
 #[test]
 fn a_turn_of_which_a_third_is_missing_tells_the_same() {
-    let (surface, light) = (ball(), room());
+    let (surface, light) = (ball(), environment());
     let curves = film(&surface, &light, Take { part: 0.67, ..TAKE });
     let found = solve_turn(&curves, &known(&light)).unwrap();
     let off = off(&surface, &found.normals(&curves));
@@ -282,8 +289,8 @@ fn read(surface: &Surface, light: &ShLight) -> ReadTurn {
     }
 }
 
-/// The curves of the ball in a room.
-fn film_in(room: &Room, surface: &Surface) -> TurnCurves {
+/// The curves of the ball in an environment.
+fn film_in(environment: &ShadingModel, surface: &Surface) -> TurnCurves {
     let extent = surface.extent();
     let mut builder = CurveBuilder::new(extent, mask(surface).plane(0)).unwrap();
     for k in 0..90 {
@@ -291,9 +298,9 @@ fn film_in(room: &Room, surface: &Surface) -> TurnCurves {
         let basis = basis_at(angle.to_radians());
         let image = Planes::from_fn(extent, |x, y| {
             let normal = surface.normals().planes().pixel(x, y).map(f64::from);
-            let [body, gloss] = lit(room, normal, &basis);
+            let [base, gloss] = lit(environment, normal, &basis);
             let albedo = surface.albedo().planes().pixel(x, y).map(f64::from);
-            [0, 1, 2].map(|c| (albedo[c] * body[c] + gloss[c]) as f32)
+            [0, 1, 2].map(|c| (albedo[c] * base[c] + gloss[c]) as f32)
         });
         builder.push(angle, extent, image.planes()).unwrap();
     }
@@ -302,18 +309,18 @@ fn film_in(room: &Room, surface: &Surface) -> TurnCurves {
 
 #[test]
 fn gloss_beside_the_matt_part_is_found_in_known_light() {
-    let (surface, light) = (ball(), room());
+    let (surface, light) = (ball(), environment());
     let table = TableFrame::new(elevation());
     let shown = GlossLight::bands(&light.rotated(&table.rotation()));
-    let glossy = Room {
+    let glossy = ShadingModel {
         frame: table,
         light: TableLight::from_viewer(&light, &table),
         gloss: GlossLight::sum(&shown, &[0.5, 0.4, 0.3]),
-        body: BodyKind::Diffuse,
+        material: MaterialKind::Diffuse,
     };
     let curves = film_in(&glossy, &surface);
     let found = solve_turn(&curves, &known(&light)).unwrap();
-    assert_eq!(found.body(), BodyKind::Diffuse);
+    assert_eq!(found.material(), MaterialKind::Diffuse);
     let off = off(&surface, &found.normals(&curves));
     assert!(off < 1.0, "{off}");
     let gloss = found.gloss(&curves).unwrap().unwrap();
@@ -322,9 +329,9 @@ fn gloss_beside_the_matt_part_is_found_in_known_light() {
     assert!(maps.highlight.pixel(SIDE / 2, SIDE / 2)[0] > 0.002);
 }
 
-/// A room with so much in its higher bands that it has small bright windows.
+/// An environment with so much in its higher bands that it has small bright windows.
 fn windows() -> ShLight {
-    let mut light = room().with_order(Order::new(4).unwrap());
+    let mut light = environment().with_order(Order::new(4).unwrap());
     for (at, values) in light.coefficients_mut().iter_mut().enumerate().skip(9) {
         let value = 0.15 * (1.7 * at as f64).sin();
         *values = [value, 0.9 * value, 0.8 * value];
@@ -332,17 +339,17 @@ fn windows() -> ShLight {
     light
 }
 
-/// A ball of metal in a room, whose lobe leaves less of each band.
+/// A ball of metal in an environment, whose lobe attenuates each band.
 fn metal_ball() -> (Surface, ShLight, TurnCurves) {
     let (surface, light) = (ball(), windows());
     let table = TableFrame::new(elevation());
     let shown = GlossLight::bands(&light.rotated(&table.rotation()));
     let factors = [1.0, 0.95, 0.9, 0.8, 0.7].map(|factor| MIRROR * factor);
-    let metal = Room {
+    let metal = ShadingModel {
         frame: table,
         light: TableLight::from_viewer(&light, &table),
         gloss: GlossLight::sum(&shown, &factors),
-        body: BodyKind::Metal,
+        material: MaterialKind::Metal,
     };
     let curves = film_in(&metal, &surface);
     (surface, light, curves)
@@ -352,9 +359,9 @@ fn metal_ball() -> (Surface, ShLight, TurnCurves) {
 fn metal_is_told_by_what_it_leaves_and_found_in_known_light() {
     let (surface, light, curves) = metal_ball();
     let found = solve_turn(&curves, &known(&light)).unwrap();
-    assert_eq!(found.body(), BodyKind::Metal);
-    let [diffuse, metal] = found.bodies() else {
-        panic!("{:?}", found.bodies());
+    assert_eq!(found.material(), MaterialKind::Metal);
+    let [diffuse, metal] = found.materials() else {
+        panic!("{:?}", found.materials());
     };
     assert!(
         diffuse.residual > 10.0 * metal.residual,
@@ -379,35 +386,38 @@ fn metal_is_found_in_unknown_light_with_normals_to_lean_on() {
         ..TurnOptions::default()
     };
     let found = solve_turn(&curves, &options).unwrap();
-    assert_eq!(found.body(), BodyKind::Metal);
+    assert_eq!(found.material(), MaterialKind::Metal);
     let off = off(&surface, &found.normals(&curves));
     assert!(off < 1.0, "{off}");
 }
 
 #[test]
 fn a_body_that_was_given_is_taken_but_doubted_and_metal_has_no_labels() {
-    let turn = read(&ball(), &room());
+    let turn = read(&ball(), &environment());
     let options = TurnOptions {
-        body: Some(BodyKind::Metal),
-        ..known(&room())
+        material: Some(MaterialKind::Metal),
+        ..known(&environment())
     };
     let found = solve_turn(&turn.curves, &options).unwrap();
-    assert_eq!((found.body(), found.bodies().len()), (BodyKind::Metal, 2));
+    assert_eq!(
+        (found.material(), found.materials().len()),
+        (MaterialKind::Metal, 2)
+    );
     let (_, light, curves) = metal_ball();
     let wrongly = TurnOptions {
-        body: Some(BodyKind::Diffuse),
+        material: Some(MaterialKind::Diffuse),
         ..known(&light)
     };
     let wrong = solve_turn(&curves, &wrongly).unwrap();
-    assert_eq!(wrong.body(), BodyKind::Diffuse);
-    assert_eq!(wrong.doubted_body(), Some(BodyKind::Metal));
+    assert_eq!(wrong.material(), MaterialKind::Diffuse);
+    assert_eq!(wrong.doubted_material(), Some(MaterialKind::Metal));
     let rightly = TurnOptions {
-        body: Some(BodyKind::Diffuse),
-        ..known(&room())
+        material: Some(MaterialKind::Diffuse),
+        ..known(&environment())
     };
     let right = solve_turn(&turn.curves, &rightly).unwrap();
-    assert_eq!(right.doubted_body(), None);
-    assert_eq!(SOLVED.1.doubted_body(), None);
+    assert_eq!(right.doubted_material(), None);
+    assert_eq!(SOLVED.1.doubted_material(), None);
     let labels = TurnLabels {
         turn: &turn,
         solution: &found,
@@ -415,12 +425,12 @@ fn a_body_that_was_given_is_taken_but_doubted_and_metal_has_no_labels() {
     };
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("labels");
-    assert!(matches!(labels.write(&out), Err(TurnError::NoMattPart)));
+    assert!(matches!(labels.write(&out), Err(TurnError::NoDiffusePart)));
     assert!(!out.exists());
 }
 
-/// A room that is nearly the same all around.
-fn even_room() -> ShLight {
+/// An environment that is nearly the same all around.
+fn even_environment() -> ShLight {
     let mut even = ShLight::even(Order::TWO, [0.3; 3]);
     even.coefficients_mut()[3] = [0.01; 3];
     even
@@ -430,14 +440,14 @@ fn even_room() -> ShLight {
 fn a_turn_that_tells_nothing_and_pixels_that_are_not_believed_have_no_labels() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("labels");
-    let even = read(&ball(), &even_room());
-    let of_even = solve_turn(&even.curves, &known(&even_room())).unwrap();
+    let even = read(&ball(), &even_environment());
+    let of_even = solve_turn(&even.curves, &known(&even_environment())).unwrap();
     let labels = TurnLabels {
         turn: &even,
         solution: &of_even,
         least_confidence: 0.0,
     };
-    assert!(matches!(labels.write(&out), Err(TurnError::NothingTold)));
+    assert!(matches!(labels.write(&out), Err(TurnError::NotObservable)));
     let (turn, solution) = &*SOLVED;
     let labels = TurnLabels {
         turn,
@@ -445,24 +455,24 @@ fn a_turn_that_tells_nothing_and_pixels_that_are_not_believed_have_no_labels() {
         least_confidence: 1.0,
     };
     let refused = labels.write(&out);
-    assert!(matches!(refused, Err(TurnError::NothingBelieved { .. })));
+    assert!(matches!(refused, Err(TurnError::NotConfident { .. })));
     assert!(!out.exists());
 }
 
 #[test]
 fn an_even_light_is_not_trusted_though_it_was_given() {
     // Of the turn that it lit, and of one that another light did.
-    for (light, is_at_odds) in [(even_room(), false), (room(), true)] {
+    for (light, is_at_odds) in [(even_environment(), false), (environment(), true)] {
         let curves = film(&ball(), &light, TAKE);
-        let found = solve_turn(&curves, &known(&even_room())).unwrap();
+        let found = solve_turn(&curves, &known(&even_environment())).unwrap();
         let conditioning = found.conditioning();
-        assert_eq!(conditioning.verdict, RoomVerdict::TooEven);
+        assert_eq!(conditioning.verdict, LightVerdict::TooEven);
         assert_eq!(conditioning.is_given_at_odds(), is_at_odds);
         let expected = found.expected_error_deg();
         assert!(expected > 45.0, "{expected}");
     }
     let found = SOLVED.1.conditioning();
-    assert_eq!(found.verdict, RoomVerdict::Good);
+    assert_eq!(found.verdict, LightVerdict::Good);
     assert!(!found.is_given_at_odds());
     let ratio = found.given_modulation.unwrap() / found.modulation;
     assert!((0.5..2.0).contains(&ratio), "{found:?}");
@@ -483,15 +493,15 @@ fn labels_of_a_turn_are_read_as_samples_with_truth() {
     let set = TruthSet::open(&out, TruthLayout::Synth).unwrap();
     assert_eq!(set.names().len(), 3);
     let sample = set.load(1).unwrap();
-    let believed = sample.normals.unwrap();
-    let believed = believed.completed(
+    let confident = sample.normals.unwrap();
+    let confident = confident.completed(
         &mask(&surface)
             .plane(0)
             .iter()
             .map(|&m| m >= 0.5)
             .collect::<Vec<_>>(),
     );
-    assert!(off(&surface, &believed) < 1.0);
+    assert!(off(&surface, &confident) < 1.0);
     let at = |image: &Rgb<Linear>| image.planes().pixel(SIDE / 2, SIDE / 3)[1];
     let (image, diffuse) = (sample.image.unwrap(), sample.diffuse.unwrap());
     assert!((at(&image) - at(&diffuse)).abs() < 0.005);
@@ -549,10 +559,10 @@ fn the_film_shows_the_object_while_a_lamp_goes_around_it() {
         let frames = film_of(turn, solution, &folder.path().join(name));
         assert_eq!(frames.len(), 90);
         let [left, right] = [2..SIDE / 3, 2 * SIDE / 3..SIDE - 2];
-        let leaning =
+        let derivatives =
             |frame: &Planes<3>| columns(frame, right.clone()) - columns(frame, left.clone());
-        let most = frames.iter().map(leaning).fold(f32::MIN, f32::max);
-        let least = frames.iter().map(leaning).fold(f32::MAX, f32::min);
+        let most = frames.iter().map(derivatives).fold(f32::MIN, f32::max);
+        let least = frames.iter().map(derivatives).fold(f32::MAX, f32::min);
         assert!(most > 0.02 && least < -0.02, "{name}: {least} to {most}");
         let middle = |frame: &Planes<3>| columns(frame, SIDE / 3..2 * SIDE / 3);
         assert!(
@@ -582,18 +592,18 @@ fn a_turn_becomes_an_object_whose_edge_has_its_own_colour() {
 #[test]
 fn even_light_is_called_too_even() {
     let surface = ball();
-    let good = Conditioning::of(&film(&surface, &room(), TAKE));
-    assert_eq!(good.verdict, RoomVerdict::Good);
+    let good = Conditioning::of(&film(&surface, &environment(), TAKE));
+    assert_eq!(good.verdict, LightVerdict::Good);
     assert!(good.verdict.advice().is_none());
-    let bad = Conditioning::of(&film(&surface, &even_room(), TAKE));
-    assert_eq!(bad.verdict, RoomVerdict::TooEven);
+    let bad = Conditioning::of(&film(&surface, &even_environment(), TAKE));
+    assert_eq!(bad.verdict, LightVerdict::TooEven);
     let advice = bad.verdict.advice().unwrap();
     assert!(advice.contains("turn on one lamp"), "{advice}");
 }
 
 #[test]
 fn shadows_and_highlights_of_some_frames_are_left_out_and_shown() {
-    let (surface, light) = (ball(), room());
+    let (surface, light) = (ball(), environment());
     let extent = surface.extent();
     let mut builder = CurveBuilder::new(extent, mask(&surface).plane(0)).unwrap();
     for k in 0..90 {
@@ -670,14 +680,18 @@ fn a_dark_turn_and_a_white_one_are_wrongly_exposed_and_a_prior_of_another_size_i
         builder.finish().unwrap()
     };
     for (level, verdict, says) in [
-        (0.0, RoomVerdict::Underexposed, "the object is underexposed"),
-        (1.0, RoomVerdict::Overexposed, "the object is overexposed"),
+        (
+            0.0,
+            LightVerdict::Underexposed,
+            "the object is underexposed",
+        ),
+        (1.0, LightVerdict::Overexposed, "the object is overexposed"),
     ] {
         let curves = of(level);
         let unknown = solve_turn(&curves, &TurnOptions::default()).unwrap_err();
         assert!(matches!(unknown, TurnError::Unfit(found) if found == verdict));
         assert!(unknown.to_string().contains(says), "{unknown}");
-        let found = solve_turn(&curves, &known(&room())).unwrap();
+        let found = solve_turn(&curves, &known(&environment())).unwrap();
         assert_eq!(found.conditioning().verdict, verdict);
         assert_eq!(found.albedo(&curves).planes().pixel(1, 1), [0.0; 3]);
         assert!(found.confidence(&curves).plane(0)[0] < 0.1);
@@ -692,7 +706,7 @@ fn a_dark_turn_and_a_white_one_are_wrongly_exposed_and_a_prior_of_another_size_i
 
 #[test]
 fn steps_of_the_exposure_are_found_and_taken_out() {
-    let (surface, light) = (ball(), room());
+    let (surface, light) = (ball(), environment());
     let extent = surface.extent();
     let mut builder = CurveBuilder::new(extent, mask(&surface).plane(0)).unwrap();
     for k in 0..180 {
@@ -722,7 +736,7 @@ fn missing_frames_of_a_coarse_turn_are_no_steps_of_the_exposure() {
     let surface = ball();
     let extent = surface.extent();
     // Strong light from one side, of which the frames show much from one to the next.
-    let mut light = room();
+    let mut light = environment();
     for at in [1, 3] {
         light.coefficients_mut()[at] = [0.55; 3];
     }
@@ -753,7 +767,7 @@ proptest! {
 
     #[test]
     fn where_the_turn_starts_changes_nothing_but_the_light_s_angle(first_deg in -400.0_f64..400.0) {
-        let (surface, light) = (ball(), room());
+        let (surface, light) = (ball(), environment());
         let curves = film(&surface, &light, Take { first_deg, ..TAKE });
         // At the angle 0 the light is as it was when the table still had `first_deg` to go.
         let (sin, cos) = ELEVATION.to_radians().sin_cos();
@@ -766,7 +780,7 @@ proptest! {
 
     #[test]
     fn brighter_frames_make_a_brighter_albedo_and_the_same_normals(gain in 0.05_f64..1.2) {
-        let (surface, light) = (ball(), room());
+        let (surface, light) = (ball(), environment());
         let curves = film(&surface, &light, Take { gain, ..TAKE });
         let found = solve_turn(&curves, &known(&light)).unwrap();
         prop_assert!(off(&surface, &found.normals(&curves)) < 0.3);

@@ -1,11 +1,11 @@
-//! The albedo of pixels whose normals are hardly to be believed: by those around them that are. Knows nothing of light.
+//! The albedo of pixels whose normals are hardly to be trusted: by those around them that are. Knows nothing of light.
 //!
 //! A wrong normal has a wrong shading, and so its pixel a wrong albedo. Albedos of one surface are alike where its colour is, and the
-//! chromaticity of a pixel's mean light tells that without any normal.
+//! chromaticity of a pixel's mean light shows that without any normal.
 
 use rayon::prelude::*;
 
-use crate::fit::curve_statistics::Moments;
+use crate::fit::curve_statistics::CurveStatistics;
 use crate::observe::curves::TurnCurves;
 
 /// Parameters of the smoothed albedo.
@@ -27,7 +27,7 @@ const PARAMETERS: AlbedoParameters = AlbedoParameters {
     same_colour: 0.05,
 };
 
-/// The albedo of each pixel, drawn to those of the same colour around it as far as its normal is expected to be off, radians.
+/// The albedo of each pixel, shrunk toward those of the same colour around it as far as its normal is expected to be off, radians.
 pub(crate) fn shared(curves: &TurnCurves, albedo: &[[f64; 3]], errors: &[f64]) -> Vec<[f64; 3]> {
     let extent = curves.extent();
     let mut at = vec![None; extent.pixels()];
@@ -35,9 +35,9 @@ pub(crate) fn shared(curves: &TurnCurves, albedo: &[[f64; 3]], errors: &[f64]) -
         at[place] = Some(pixel);
     }
     let colours: Vec<[f64; 3]> = (0..curves.pixels())
-        .map(|pixel| chromaticity(Moments::mean(curves, pixel)))
+        .map(|pixel| chromaticity(CurveStatistics::mean(curves, pixel)))
         .collect();
-    let trust: Vec<f64> = errors
+    let confidence: Vec<f64> = errors
         .iter()
         .map(|error| 1.0 / (1.0 + (error / PARAMETERS.half_error).powi(2)))
         .collect();
@@ -70,13 +70,13 @@ pub(crate) fn shared(curves: &TurnCurves, albedo: &[[f64; 3]], errors: &[f64]) -
                     .sum();
                 let alike =
                     (-0.5 * apart / (PARAMETERS.same_colour * PARAMETERS.same_colour)).exp();
-                let weight = near * alike * trust[other] * trust[other];
+                let weight = near * alike * confidence[other] * confidence[other];
                 for (sum, albedo) in sum.iter_mut().zip(albedo[other]) {
                     *sum += weight * albedo;
                 }
                 weights += weight;
             }
-            let own = trust[pixel];
+            let own = confidence[pixel];
             std::array::from_fn(|c| own * albedo[pixel][c] + (1.0 - own) * sum[c] / weights)
         })
         .collect()

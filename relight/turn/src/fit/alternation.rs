@@ -1,15 +1,15 @@
-//! An unknown light from one start.
+//! An unknown light from one initialisation.
 
-use crate::fit::blocks::Coarse;
-use crate::fit::curve_statistics::Moments;
-use crate::fit::environment::{fit_matt_room, fit_metal_room};
-use crate::fit::figures::BodyFigure;
+use crate::fit::blocks::Blocks;
+use crate::fit::curve_statistics::CurveStatistics;
+use crate::fit::environment::{fit_lambertian, fit_metal};
+use crate::fit::figures::MaterialFigure;
 use crate::fit::search::PixelFit;
 use crate::fit::setting::{GLOSS_BANDS, Setting};
 use crate::fit::smoothing::smoothed_normals;
 use crate::fit::unknowns::Unknowns;
-use crate::model::material::BodyKind;
-use crate::model::shading::Room;
+use crate::model::material::MaterialKind;
+use crate::model::shading::ShadingModel;
 
 /// Parameters of the fit of an unknown light.
 pub(crate) struct AlternationParameters {
@@ -30,7 +30,7 @@ pub(crate) struct AlternationParameters {
     /// Standard deviation below which nothing is smoothed, blocks. Numerical.
     no_blur: f64,
     /// Residual up to which a diffuse object in unknown light has no gloss, over the energy of the variation. By hand:
-    /// with gloss, other light and shape explain as much.
+    /// with gloss, other light and shape fit as well.
     pub(crate) lambertian_residual: f64,
 }
 
@@ -46,20 +46,21 @@ pub(crate) const ALTERNATION_PARAMETERS: AlternationParameters = AlternationPara
     lambertian_residual: 0.005,
 };
 
-/// An unknown light from one start.
+/// An unknown light from one initialisation.
 pub(crate) struct Alternation<'a> {
-    pub(crate) coarse: &'a Coarse,
+    pub(crate) coarse: &'a Blocks,
     pub(crate) setting: &'a Setting,
-    pub(crate) body: BodyKind,
+    pub(crate) material: MaterialKind,
 }
 
 impl Alternation<'_> {
-    /// What is left in the end, and the room: light and normals in turns, then both together. A diffuse object has no gloss yet.
-    pub(crate) fn run(&self, start: Vec<[f64; 3]>) -> Option<(f64, Room)> {
+    /// The final residual and shading model: light and normals in alternation, then a joint optimisation. A diffuse object
+    /// has no gloss yet.
+    pub(crate) fn run(&self, start: Vec<[f64; 3]>) -> Option<(f64, ShadingModel)> {
         let coarse = self.coarse;
         let mut normals = start;
         let mut albedo = self.first_albedo();
-        let mut room = None;
+        let mut model = None;
         for round in 0..ALTERNATION_PARAMETERS.rounds {
             let found = self.room_of(&normals, &mut albedo, round)?;
             let fits = coarse.fits(&found);
@@ -67,49 +68,50 @@ impl Alternation<'_> {
                 *albedo = fit.albedo;
             }
             normals = self.smoothed(&fits, round);
-            room = Some(found);
+            model = Some(found);
         }
-        if self.body == BodyKind::Metal {
-            let all = coarse.joint(self.setting.unknowns(self.body));
+        if self.material == MaterialKind::Metal {
+            let all = coarse.joint(self.setting.unknowns(self.material));
             return Some(all.found(
-                room?,
+                model?,
                 ALTERNATION_PARAMETERS.joint_rounds,
                 ALTERNATION_PARAMETERS.joint_steps,
             ));
         }
-        let matt = coarse.joint(Unknowns::Light { bands: 0 });
-        Some(matt.found(room?, 1, ALTERNATION_PARAMETERS.joint_steps))
+        let diffuse = coarse.joint(Unknowns::Light { bands: 0 });
+        Some(diffuse.found(model?, 1, ALTERNATION_PARAMETERS.joint_steps))
     }
 
     /// The same with gloss.
-    pub(crate) fn with_gloss(&self, room: Room) -> (f64, Room) {
-        let all = self.coarse.joint(self.setting.unknowns(self.body));
+    pub(crate) fn with_gloss(&self, model: ShadingModel) -> (f64, ShadingModel) {
+        let all = self.coarse.joint(self.setting.unknowns(self.material));
         all.found(
-            room,
+            model,
             ALTERNATION_PARAMETERS.joint_rounds,
             ALTERNATION_PARAMETERS.joint_steps,
         )
     }
 
-    /// Whether a room without gloss explains the curves.
-    pub(crate) fn is_matt(&self, room: &Room) -> bool {
-        let fits = self.coarse.fits(room);
-        BodyFigure::new(self.body, &fits).residual <= ALTERNATION_PARAMETERS.lambertian_residual
+    /// Whether a shading model without gloss fits the curves.
+    pub(crate) fn is_lambertian(&self, model: &ShadingModel) -> bool {
+        let fits = self.coarse.fits(model);
+        MaterialFigure::new(self.material, &fits).residual
+            <= ALTERNATION_PARAMETERS.lambertian_residual
     }
 
-    /// The room that goes with normals, in turns with the albedo.
+    /// The shading model that fits given normals, in alternation with the albedo.
     pub(crate) fn room_of(
         &self,
         normals: &[[f64; 3]],
         albedo: &mut [[f64; 3]],
         round: usize,
-    ) -> Option<Room> {
-        let (moments, frame) = (&self.coarse.moments, &self.setting.frame);
-        match self.body {
-            BodyKind::Diffuse => fit_matt_room(moments, normals, albedo, frame),
-            BodyKind::Metal => {
+    ) -> Option<ShadingModel> {
+        let (statistics, frame) = (&self.coarse.statistics, &self.setting.frame);
+        match self.material {
+            MaterialKind::Diffuse => fit_lambertian(statistics, normals, albedo, frame),
+            MaterialKind::Metal => {
                 let bands = (ALTERNATION_PARAMETERS.first_bands + round / 2).min(GLOSS_BANDS);
-                fit_metal_room(moments, normals, albedo, frame, bands)
+                fit_metal(statistics, normals, albedo, frame, bands)
             }
         }
     }
@@ -118,7 +120,7 @@ impl Alternation<'_> {
     pub(crate) fn first_albedo(&self) -> Vec<[f64; 3]> {
         let curves = &self.coarse.curves;
         (0..curves.pixels())
-            .map(|pixel| Moments::mean(curves, pixel).map(|mean| mean.max(1e-6)))
+            .map(|pixel| CurveStatistics::mean(curves, pixel).map(|mean| mean.max(1e-6)))
             .collect()
     }
 

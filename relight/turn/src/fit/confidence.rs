@@ -6,13 +6,13 @@ use rayon::prelude::*;
 use relight_core::statistics::median;
 
 use crate::fit::albedo::shared;
-use crate::fit::curve_statistics::Moments;
-use crate::fit::normal_step::Expected;
+use crate::fit::curve_statistics::CurveStatistics;
+use crate::fit::normal_step::PriorNormal;
 use crate::fit::options::TurnOptions;
 use crate::fit::search::{PixelFit, Search};
 use crate::fit::smoothing::smoothed_normals;
 use crate::model::directions::dot;
-use crate::model::shading::Room;
+use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
 
 /// Parameters of the expected errors.
@@ -26,7 +26,7 @@ pub(crate) struct ErrorParameters {
     pub(crate) freedom: f64,
     /// Median residual from which differences to the surroundings are doubted in full, over the energy of the
     /// variation. By hand.
-    pub(crate) unexplained: f64,
+    pub(crate) relative_residual: f64,
     /// Error that all normals have in common in unknown light with a prior, radians: light makes up for it, and no
     /// residual shows it. By hand: 14 degrees.
     pub(crate) common_with_prior: f64,
@@ -44,7 +44,7 @@ pub(crate) const ERROR_PARAMETERS: ErrorParameters = ErrorParameters {
     least_blur: 0.6,
     surroundings: 1.0 / 40.0,
     freedom: 3.0,
-    unexplained: 0.005,
+    relative_residual: 0.005,
     common_with_prior: 0.25,
     common_alone: 0.35,
     common_in_known_light: 0.08,
@@ -56,9 +56,9 @@ pub(crate) const ERROR_PARAMETERS: ErrorParameters = ErrorParameters {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FittedPixels<'a> {
     pub(crate) curves: &'a TurnCurves,
-    pub(crate) moments: &'a [Moments],
-    pub(crate) expected: Option<&'a [Expected]>,
-    pub(crate) room: &'a Room,
+    pub(crate) statistics: &'a [CurveStatistics],
+    pub(crate) prior: Option<&'a [PriorNormal]>,
+    pub(crate) model: &'a ShadingModel,
     pub(crate) fits: &'a [PixelFit],
 }
 
@@ -66,15 +66,18 @@ pub(crate) struct FittedPixels<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OwnError {
     /// By what is left of its curve, and by what is clipped.
-    loose: f64,
+    deviation: f64,
     /// By how far it is from the normals around it.
-    bent: f64,
+    inconsistency: f64,
 }
 
 impl OwnError {
     /// With what all pixels have in common.
     pub(crate) fn with(&self, common: f64) -> f64 {
-        self.loose.hypot(self.bent).hypot(common).min(FRAC_PI_2)
+        self.deviation
+            .hypot(self.inconsistency)
+            .hypot(common)
+            .min(FRAC_PI_2)
     }
 }
 
@@ -99,12 +102,12 @@ pub(crate) fn common_error(options: &TurnOptions, has_prior: bool, is_fit: bool)
 pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
     let FittedPixels {
         curves,
-        moments,
-        expected,
-        room,
+        statistics,
+        prior,
+        model,
         fits,
     } = pixels;
-    let search = Search::new(room);
+    let search = Search::new(model);
     let deviation = ERROR_PARAMETERS.surroundings * curves.extent().width as f64;
     let surroundings = smoothed_normals(
         curves,
@@ -114,36 +117,37 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
     (0..fits.len())
         .into_par_iter()
         .map(|pixel| {
-            let moments = &moments[pixel];
-            if moments.is_dark() {
+            let statistics = &statistics[pixel];
+            if statistics.is_dark() {
                 return OwnError {
-                    loose: FRAC_PI_2,
-                    bent: 0.0,
+                    deviation: FRAC_PI_2,
+                    inconsistency: 0.0,
                 };
             }
-            let expected = expected.map(|all| all[pixel]);
+            let prior = prior.map(|all| all[pixel]);
             let fit = &fits[pixel];
-            let loose = search.looseness(moments, expected, fit, ERROR_PARAMETERS.freedom);
+            let deviation =
+                search.standard_deviation(statistics, prior, fit, ERROR_PARAMETERS.freedom);
             let clipped = ERROR_PARAMETERS.clipped * curves.clipped_at(pixel);
-            let bent = dot(surroundings[pixel], fit.normal);
+            let inconsistency = dot(surroundings[pixel], fit.normal);
             OwnError {
-                loose: loose.hypot(clipped),
-                bent: bent.clamp(-1.0, 1.0).acos(),
+                deviation: deviation.hypot(clipped),
+                inconsistency: inconsistency.clamp(-1.0, 1.0).acos(),
             }
         })
         .collect()
 }
 
-/// The albedos, where normals are hardly to be believed by those around them. A bent surface is not to be doubted where the
+/// The albedos, where normals are hardly to be trusted by those around them. A bent surface is not to be doubted where the
 /// turn is explained.
 pub(crate) fn shared_albedo(
     curves: &TurnCurves,
     fits: &[PixelFit],
     errors: &[OwnError],
 ) -> Vec<[f64; 3]> {
-    let left = median(fits.iter().map(|fit| fit.residual)).unwrap_or(0.0);
-    let doubt = (left / ERROR_PARAMETERS.unexplained).min(1.0);
-    let error = |own: &OwnError| own.loose.hypot(doubt * own.bent);
+    let residual = median(fits.iter().map(|fit| fit.residual)).unwrap_or(0.0);
+    let doubt = (residual / ERROR_PARAMETERS.relative_residual).min(1.0);
+    let error = |own: &OwnError| own.deviation.hypot(doubt * own.inconsistency);
     let errors: Vec<f64> = errors.iter().map(error).collect();
     let albedo: Vec<[f64; 3]> = fits.iter().map(|fit| fit.albedo).collect();
     shared(curves, &albedo, &errors)

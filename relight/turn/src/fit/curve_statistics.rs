@@ -1,13 +1,13 @@
-//! What a curve comes down to for a least-squares fit of its waves.
+//! The sufficient statistics of a curve for a least-squares fit of its Fourier coefficients.
 
 use rayon::prelude::*;
 
-use crate::model::harmonics::{WAVES, WaveTerm};
-use crate::model::shading::PixelWaves;
+use crate::model::harmonics::{COEFFICIENTS, HarmonicTerm};
+use crate::model::shading::PixelHarmonics;
 use crate::observe::curves::TurnCurves;
 
-/// Products of two waves.
-pub(crate) const PAIRS: usize = WAVES * (WAVES + 1) / 2;
+/// Products of two harmonics.
+pub(crate) const PAIRS: usize = COEFFICIENTS * (COEFFICIENTS + 1) / 2;
 
 /// Parameters of the least-squares fit of a curve.
 struct StatisticsParameters {
@@ -24,11 +24,11 @@ const PARAMETERS: StatisticsParameters = StatisticsParameters {
     variation_floor: 0.01,
 };
 
-/// The sums that the fit of a pixel needs: with weights w, waves b and values v, those of w b v, of w b b and of
+/// The normal equations of a pixel: with weights w, harmonics b and values v, the sums of w b v, of w b b and of
 /// w v v for each channel, where the mean of the curve counts by `mean_weight`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Moments {
-    right: [[f64; WAVES]; 3],
+pub(crate) struct CurveStatistics {
+    right: [[f64; COEFFICIENTS]; 3],
     products: [[f64; PAIRS]; 3],
     energy: [f64; 3],
     /// One over the energy of the curve's variation: what a residual is measured by.
@@ -37,35 +37,35 @@ pub(crate) struct Moments {
 
 /// Products of [`PixelWaves`] with themselves and each other, as [`Moments`] take them.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct WaveProducts {
-    body: [[f64; PAIRS]; 3],
-    /// How many products of the body there are.
+pub(crate) struct HarmonicProducts {
+    base: [[f64; PAIRS]; 3],
+    /// How many products of the base layer there are.
     count: usize,
     /// Of both, and of the gloss with itself; none without gloss.
     gloss: Option<[[[f64; PAIRS]; 2]; 3]>,
 }
 
-/// The place of the product of waves `i` and `j`.
+/// The place of the product of harmonics `i` and `j`.
 const fn pair(i: usize, j: usize) -> usize {
     let (low, high) = if i < j { (i, j) } else { (j, i) };
     high * (high + 1) / 2 + low
 }
 
-impl WaveProducts {
-    pub(crate) fn of(waves: &PixelWaves) -> Self {
+impl HarmonicProducts {
+    pub(crate) fn of(harmonics: &PixelHarmonics) -> Self {
         let mut products = Self {
-            body: [[0.0; PAIRS]; 3],
-            count: waves.count * (waves.count + 1) / 2,
+            base: [[0.0; PAIRS]; 3],
+            count: harmonics.count * (harmonics.count + 1) / 2,
             gloss: None,
         };
-        for (products, own) in products.body.iter_mut().zip(&waves.body) {
-            symmetric(products, &own[..waves.count], &own[..waves.count]);
+        for (products, own) in products.base.iter_mut().zip(&harmonics.base) {
+            symmetric(products, &own[..harmonics.count], &own[..harmonics.count]);
         }
-        if waves.gloss != [[0.0; WAVES]; 3] {
+        if harmonics.gloss != [[0.0; COEFFICIENTS]; 3] {
             products.gloss = Some([0, 1, 2].map(|channel| {
-                let gloss = &waves.gloss[channel];
+                let gloss = &harmonics.gloss[channel];
                 let mut both = [[0.0; PAIRS]; 2];
-                symmetric(&mut both[0], &waves.body[channel], gloss);
+                symmetric(&mut both[0], &harmonics.base[channel], gloss);
                 symmetric(&mut both[1], gloss, gloss);
                 both
             }));
@@ -74,7 +74,7 @@ impl WaveProducts {
     }
 }
 
-/// The factors of each pair in the product of two lists of waves.
+/// The factors of each pair in the product of two lists of harmonics.
 fn symmetric(products: &mut [f64], a: &[f64], b: &[f64]) {
     let mut at = 0;
     for j in 0..a.len() {
@@ -87,18 +87,18 @@ fn symmetric(products: &mut [f64], a: &[f64], b: &[f64]) {
     }
 }
 
-/// What a channel's curve has to do with a pixel's waves: products of the body's waves with what the gloss leaves of the curve,
-/// of the body's waves with themselves, and the energy that the gloss leaves.
+/// The projection of a channel's curve on a pixel's harmonics: products of the base layer's harmonics with the residual of the
+/// gloss, of the base layer's harmonics with themselves, and the energy of that residual.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Share {
+pub(crate) struct Projection {
     along: f64,
     own: f64,
     rest: f64,
 }
 
-impl Share {
-    /// The albedo that is drawn to another one, by this much beside what the curve says.
-    fn drawn(self, to: f64, by: f64) -> f64 {
+impl Projection {
+    /// The albedo that is shrunk toward another one, by this much beside what the curve says.
+    fn shrunk(self, to: f64, by: f64) -> f64 {
         if self.own + by > 1e-12 {
             ((self.along + by * to) / (self.own + by)).max(0.0)
         } else {
@@ -114,44 +114,44 @@ impl Share {
         }
     }
 
-    /// What the best albedo leaves.
-    fn left(self) -> f64 {
+    /// The residual of the best albedo.
+    fn residual(self) -> f64 {
         let albedo = self.albedo();
         self.rest - albedo * (2.0 * self.along - albedo * self.own)
     }
 }
 
-impl Moments {
-    /// Those of a pixel; `trust` says for each part of the turn how far it is to be believed, 0 to 1.
-    pub(crate) fn new(curves: &TurnCurves, pixel: usize, trust: Option<&[f32]>) -> Self {
-        let mut moments = Self {
-            right: [[0.0; WAVES]; 3],
+impl CurveStatistics {
+    /// Those of a pixel; `robust` has the robust weight of each part of the turn, 0 to 1.
+    pub(crate) fn new(curves: &TurnCurves, pixel: usize, robust: Option<&[f32]>) -> Self {
+        let mut statistics = Self {
+            right: [[0.0; COEFFICIENTS]; 3],
             products: [[0.0; PAIRS]; 3],
             energy: [0.0; 3],
             unit: 0.0,
         };
         let parts = curves.values(pixel).iter().zip(curves.weights(pixel));
         for (part, (value, weight)) in parts.enumerate() {
-            let trust = trust.map_or(1.0, |trust| f64::from(trust[part]));
-            let waves = &curves.waves()[part];
+            let robust = robust.map_or(1.0, |robust| f64::from(robust[part]));
+            let harmonics = &curves.harmonics()[part];
             for channel in 0..3 {
-                let weight = f64::from(weight[channel]) * trust;
+                let weight = f64::from(weight[channel]) * robust;
                 if weight > 0.0 {
-                    moments.add(channel, weight, f64::from(value[channel]), waves);
+                    statistics.add(channel, weight, f64::from(value[channel]), harmonics);
                 }
             }
         }
-        moments.mixed()
+        statistics.mixed()
     }
 
-    fn add(&mut self, channel: usize, weight: f64, value: f64, waves: &[f64; WAVES]) {
+    fn add(&mut self, channel: usize, weight: f64, value: f64, harmonics: &[f64; COEFFICIENTS]) {
         self.energy[channel] += weight * value * value;
         let mut at = 0;
-        for j in 0..WAVES {
-            self.right[channel][j] += weight * value * waves[j];
-            let weighted = weight * waves[j];
-            for wave in &waves[..=j] {
-                self.products[channel][at] += weighted * wave;
+        for j in 0..COEFFICIENTS {
+            self.right[channel][j] += weight * value * harmonics[j];
+            let weighted = weight * harmonics[j];
+            for coefficient in &harmonics[..=j] {
+                self.products[channel][at] += weighted * coefficient;
                 at += 1;
             }
         }
@@ -166,13 +166,13 @@ impl Moments {
             if count <= 0.0 {
                 continue;
             }
-            // What the mean contributes, by Schur's complement of the constant.
+            // What the mean contributes, by the Schur complement of the constant.
             let part = 1.0 - PARAMETERS.mean_weight;
             let mean = right[0] / count;
             let centred = self.energy[channel] - mean * right[0];
             variation += centred.max(0.0) + PARAMETERS.variation_floor * self.energy[channel];
             self.energy[channel] -= part * mean * right[0];
-            for j in 0..WAVES {
+            for j in 0..COEFFICIENTS {
                 let first = products[pair(0, j)];
                 self.right[channel][j] -= part * first * mean;
                 for i in 0..=j {
@@ -199,73 +199,89 @@ impl Moments {
         self.unit
     }
 
-    fn share(&self, channel: usize, waves: &PixelWaves, products: &WaveProducts) -> Share {
+    fn share(
+        &self,
+        channel: usize,
+        harmonics: &PixelHarmonics,
+        products: &HarmonicProducts,
+    ) -> Projection {
         let own = &self.products[channel];
-        let mut share = Share {
-            along: sum_of_products(&self.right[channel], &waves.body[channel][..waves.count]),
-            own: sum_of_products(own, &products.body[channel][..products.count]),
+        let mut share = Projection {
+            along: sum_of_products(
+                &self.right[channel],
+                &harmonics.base[channel][..harmonics.count],
+            ),
+            own: sum_of_products(own, &products.base[channel][..products.count]),
             rest: self.energy[channel],
         };
         if let Some(gloss) = &products.gloss {
             let [both, gloss] = &gloss[channel];
             share.along -= sum_of_products(own, both);
             share.rest += sum_of_products(own, gloss)
-                - 2.0 * sum_of_products(&self.right[channel], &waves.gloss[channel]);
+                - 2.0 * sum_of_products(&self.right[channel], &harmonics.gloss[channel]);
         }
         share
     }
 
-    /// What the best albedo leaves of the curve, over the energy of its variation.
-    pub(crate) fn residual(&self, waves: &PixelWaves, products: &WaveProducts) -> f64 {
+    /// The residual of the best albedo, over the energy of the curve's variation.
+    pub(crate) fn residual(&self, harmonics: &PixelHarmonics, products: &HarmonicProducts) -> f64 {
         let rest: f64 = (0..3)
-            .map(|channel| self.share(channel, waves, products).left())
+            .map(|channel| self.share(channel, harmonics, products).residual())
             .sum();
         (rest * self.unit).max(0.0)
     }
 
-    /// The albedo that explains the curve best.
-    pub(crate) fn albedo(&self, waves: &PixelWaves) -> [f64; 3] {
-        let products = WaveProducts::of(waves);
-        [0, 1, 2].map(|channel| self.share(channel, waves, &products).albedo())
+    /// The albedo that fits the curve best.
+    pub(crate) fn albedo(&self, harmonics: &PixelHarmonics) -> [f64; 3] {
+        let products = HarmonicProducts::of(harmonics);
+        [0, 1, 2].map(|channel| self.share(channel, harmonics, &products).albedo())
     }
 
-    /// The albedo that explains the curve best, drawn to one from which albedos of an object are `spread` away: as far as what is
+    /// The albedo that fits the curve best, shrunk toward one from which albedos of an object are `spread` away: as far as what is
     /// left of the curve, taken for noise of `freedom` degrees of freedom, lets it be any other.
-    pub(crate) fn drawn_albedo(
+    pub(crate) fn shrunk_albedo(
         &self,
-        waves: &PixelWaves,
+        harmonics: &PixelHarmonics,
         (to, spread): ([f64; 3], [f64; 3]),
         freedom: f64,
     ) -> [f64; 3] {
-        let products = WaveProducts::of(waves);
+        let products = HarmonicProducts::of(harmonics);
         [0, 1, 2].map(|channel| {
-            let share = self.share(channel, waves, &products);
-            let noise = share.left().max(0.0) / freedom;
+            let share = self.share(channel, harmonics, &products);
+            let noise = share.residual().max(0.0) / freedom;
             let by = noise / spread[channel].powi(2).max(1e-12);
-            share.drawn(to[channel], by)
+            share.shrunk(to[channel], by)
         })
     }
 
-    /// The products of each wave with a list of waves.
-    pub(crate) fn times(&self, channel: usize, waves: &[f64; WAVES]) -> [f64; WAVES] {
-        let mut all = [0.0; WAVES];
+    /// The products of each harmonic with a curve of such Fourier coefficients.
+    pub(crate) fn times(
+        &self,
+        channel: usize,
+        harmonics: &[f64; COEFFICIENTS],
+    ) -> [f64; COEFFICIENTS] {
+        let mut all = [0.0; COEFFICIENTS];
         let mut at = 0;
-        for j in 0..WAVES {
+        for j in 0..COEFFICIENTS {
             for i in 0..j {
                 let product = self.products[channel][at];
-                all[i] += product * waves[j];
-                all[j] += product * waves[i];
+                all[i] += product * harmonics[j];
+                all[j] += product * harmonics[i];
                 at += 1;
             }
-            all[j] += self.products[channel][at] * waves[j];
+            all[j] += self.products[channel][at] * harmonics[j];
             at += 1;
         }
         all
     }
 
-    /// The products of each wave with what such waves leave of the curve.
-    pub(crate) fn rest(&self, channel: usize, waves: &[f64; WAVES]) -> [f64; WAVES] {
-        let seen = self.times(channel, waves);
+    /// The products of each harmonic with the residual of such Fourier coefficients.
+    pub(crate) fn residual_products(
+        &self,
+        channel: usize,
+        harmonics: &[f64; COEFFICIENTS],
+    ) -> [f64; COEFFICIENTS] {
+        let seen = self.times(channel, harmonics);
         std::array::from_fn(|i| self.right[channel][i] - seen[i])
     }
 
@@ -274,29 +290,29 @@ impl Moments {
         self.energy[channel]
     }
 
-    /// How much of it such waves leave.
-    pub(crate) fn left(&self, channel: usize, waves: &[f64; WAVES]) -> f64 {
-        let rest = self.rest(channel, waves);
+    /// The residual energy of such Fourier coefficients.
+    pub(crate) fn residual_energy(&self, channel: usize, harmonics: &[f64; COEFFICIENTS]) -> f64 {
+        let rest = self.residual_products(channel, harmonics);
         self.energy[channel]
-            - sum_of_products(waves, &self.right[channel])
-            - sum_of_products(waves, &rest)
+            - sum_of_products(harmonics, &self.right[channel])
+            - sum_of_products(harmonics, &rest)
     }
 
     /// The product of two terms of a light.
-    pub(crate) fn term_product(&self, channel: usize, a: &WaveTerm, b: &WaveTerm) -> f64 {
+    pub(crate) fn term_product(&self, channel: usize, a: &HarmonicTerm, b: &HarmonicTerm) -> f64 {
         let own = &self.products[channel];
-        let at = |i: usize, j: usize| own[pair(a.wave + i, b.wave + j)];
+        let at = |i: usize, j: usize| own[pair(a.coefficient + i, b.coefficient + j)];
         a.parts[0] * (b.parts[0] * at(0, 0) + b.parts[1] * at(0, 1))
             + a.parts[1] * (b.parts[0] * at(1, 0) + b.parts[1] * at(1, 1))
     }
 
     /// The product of a term with the curve.
-    pub(crate) fn term_along(&self, channel: usize, term: &WaveTerm) -> f64 {
-        let right = &self.right[channel][term.wave..];
+    pub(crate) fn term_along(&self, channel: usize, term: &HarmonicTerm) -> f64 {
+        let right = &self.right[channel][term.coefficient..];
         term.parts[0] * right[0] + term.parts[1] * right[1]
     }
 
-    /// The constant wave's share of the curve, channel by channel: its mean light.
+    /// The mean light of a curve, channel by channel.
     pub(crate) fn mean(curves: &TurnCurves, pixel: usize) -> [f64; 3] {
         let (mut sum, mut weights) = ([0.0; 3], [0.0; 3]);
         for (value, weight) in curves.values(pixel).iter().zip(curves.weights(pixel)) {
@@ -329,9 +345,9 @@ pub(crate) fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest.map(|(a, b)| a * b).sum::<f64>()
 }
 
-pub(crate) fn all_moments(curves: &TurnCurves) -> Vec<Moments> {
+pub(crate) fn all_statistics(curves: &TurnCurves) -> Vec<CurveStatistics> {
     (0..curves.pixels())
         .into_par_iter()
-        .map(|pixel| Moments::new(curves, pixel, None))
+        .map(|pixel| CurveStatistics::new(curves, pixel, None))
         .collect()
 }

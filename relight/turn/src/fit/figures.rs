@@ -4,31 +4,33 @@ use relight_core::statistics::median;
 use serde::Serialize;
 
 use crate::fit::search::PixelFit;
-use crate::model::material::BodyKind;
+use crate::model::material::MaterialKind;
 
-/// How well a kind of body explains a turn.
+/// How well a material fits a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct BodyFigure {
+pub struct MaterialFigure {
     /// The kind.
-    pub body: BodyKind,
-    /// What it leaves of a curve, over the energy of its variation: the median over blocks of pixels.
+    #[serde(rename = "body")]
+    pub material: MaterialKind,
+    /// The residual of a curve, over the energy of its variation: the median over blocks of pixels.
     pub residual: f64,
 }
 
-impl BodyFigure {
-    pub(crate) fn new(body: BodyKind, fits: &[PixelFit]) -> Self {
+impl MaterialFigure {
+    pub(crate) fn new(material: MaterialKind, fits: &[PixelFit]) -> Self {
         Self {
-            body,
+            material,
             residual: median(fits.iter().map(|fit| fit.residual)).unwrap_or(0.0),
         }
     }
 }
 
-/// How a start ended.
+/// How an initialisation ended.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct StartFigure {
+pub struct InitialisationFigure {
     /// Its name.
-    pub start: String,
+    #[serde(rename = "start")]
+    pub name: String,
     /// What it left of the curves, with what its normals are off the prior.
     pub residual: f64,
     /// Whether its light was taken.
@@ -49,17 +51,17 @@ const PARAMETERS: DirectionParameters = DirectionParameters {
     clearly: 0.75,
 };
 
-/// How well both senses in which the table can turn explain the curves.
+/// How well both rotation directions fit the curves.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct SenseFigure {
-    /// What the one that was taken leaves of the curves of blocks of pixels, with what the normals are off the prior.
+pub struct DirectionFigure {
+    /// The residual of the one that was taken on blocks of pixels, with what the normals are off the prior mean.
     pub residual: f64,
     /// The same of the other one.
     pub other_residual: f64,
 }
 
-impl SenseFigure {
-    /// Whether the other sense explains clearly more.
+impl DirectionFigure {
+    /// Whether the other rotation direction fits clearly better.
     #[must_use]
     pub fn is_doubted(&self) -> bool {
         self.residual > PARAMETERS.explained

@@ -1,4 +1,4 @@
-//! Normals to begin with where nothing is known but the object's outline.
+//! Normals that initialise where nothing is known but the object's outline.
 
 use relight_core::image::{Extent, Planes};
 
@@ -15,9 +15,9 @@ struct InflationParameters {
 
 const PARAMETERS: InflationParameters = InflationParameters { steps_a_pixel: 4 };
 
-/// The normals of a round body in the outline of the mask, one a pixel: the height is the root of the solution
+/// The normals of a round shape in the outline of the mask, one a pixel: the height is the root of the solution
 /// of Poisson's equation that is 0 at the outline, times `height`. At the outline the normals lie in the image
-/// plane, as those of every smooth body do.
+/// plane, as those of every smooth shape do.
 pub(crate) fn inflated(curves: &TurnCurves, height: f64) -> Vec<[f64; 3]> {
     let extent = curves.extent();
     let wide = Extent::new(extent.width + 2, extent.height + 2);

@@ -1,17 +1,17 @@
-//! The room of a turn, on blocks of pixels: what the object is made of, and an unknown light from several starts.
+//! The environment light of a turn, on blocks of pixels: what the object is made of, and an unknown light from several initialisations.
 
 use crate::error::TurnError;
 use crate::fit::alternation::{ALTERNATION_PARAMETERS, Alternation};
-use crate::fit::blocks::Coarse;
-use crate::fit::figures::{BodyFigure, SenseFigure, StartFigure};
+use crate::fit::blocks::Blocks;
+use crate::fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure};
 use crate::fit::inflation::inflated;
 use crate::fit::material_choice::{is_metal, may_be_metal};
-use crate::fit::normal_step::Expected;
+use crate::fit::normal_step::PriorNormal;
 use crate::fit::setting::Setting;
 use crate::model::gloss::GlossLight;
 use crate::model::known_light::KnownLight;
-use crate::model::material::BodyKind;
-use crate::model::shading::Room;
+use crate::model::material::MaterialKind;
+use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
 
 /// Parameters of the initialisation.
@@ -31,210 +31,217 @@ const PARAMETERS: InitialisationParameters = InitialisationParameters {
     metal_attenuation: 0.9,
 };
 
-/// A room that was found.
+/// A shading model that was fitted.
 #[derive(Debug, Clone)]
-pub(crate) struct FoundRoom {
-    pub(crate) room: Room,
-    pub(crate) starts: Vec<StartFigure>,
-    /// One a kind that was tried, at least one; that of the room first where it was given.
-    pub(crate) bodies: Vec<BodyFigure>,
+pub(crate) struct FittedLight {
+    pub(crate) model: ShadingModel,
+    pub(crate) initialisations: Vec<InitialisationFigure>,
+    /// One a kind that was tried, at least one; that of the environment first where it was given.
+    pub(crate) materials: Vec<MaterialFigure>,
     /// For each of them, what is left of the blocks' curves, with what their normals are off those that are expected.
     pub(crate) costs: Vec<f64>,
 }
 
 impl Setting {
-    /// The room in which an object of this kind explains the curves best; where the kind is not known, one of the kind that does.
+    /// The shading model that fits the curves best: of this material, or of the material that fits them where it is not
+    /// known.
     pub(crate) fn find(
         &self,
         curves: &TurnCurves,
-        expected: Option<&[Expected]>,
-        body: Option<BodyKind>,
-    ) -> Result<FoundRoom, TurnError> {
-        let coarse = Coarse::new(curves, expected);
-        let run = |body| self.find_of(&coarse, body);
-        if let Some(body) = body {
-            let mut given = run(body)?;
-            if let Some(other) = self.other_kind(given.bodies[0]) {
+        prior: Option<&[PriorNormal]>,
+        material: Option<MaterialKind>,
+    ) -> Result<FittedLight, TurnError> {
+        let coarse = Blocks::new(curves, prior);
+        let run = |material| self.find_of(&coarse, material);
+        if let Some(material) = material {
+            let mut given = run(material)?;
+            if let Some(other) = self.other_kind(given.materials[0]) {
                 // What was given is taken, whatever comes of the other.
                 if let Ok(found) = run(other) {
-                    given.bodies.extend(found.bodies);
+                    given.materials.extend(found.materials);
                     given.costs.extend(found.costs);
                 }
             }
             return Ok(given);
         }
-        let diffuse = run(BodyKind::Diffuse)?;
-        if !may_be_metal(diffuse.bodies[0].residual) {
+        let diffuse = run(MaterialKind::Diffuse)?;
+        if !may_be_metal(diffuse.materials[0].residual) {
             return Ok(diffuse);
         }
-        let metal = run(BodyKind::Metal)?;
-        let bodies = [&diffuse, &metal].map(|found| found.bodies[0]);
+        let metal = run(MaterialKind::Metal)?;
+        let materials = [&diffuse, &metal].map(|found| found.materials[0]);
         let costs = [&diffuse, &metal].map(|found| found.costs[0]);
-        let [of_diffuse, of_metal] = bodies.map(|figure| figure.residual);
+        let [of_diffuse, of_metal] = materials.map(|figure| figure.residual);
         let taken = if is_metal(of_diffuse, of_metal) {
             metal
         } else {
             diffuse
         };
-        Ok(FoundRoom {
-            bodies: bodies.to_vec(),
+        Ok(FittedLight {
+            materials: materials.to_vec(),
             costs: costs.to_vec(),
             ..taken
         })
     }
 
-    /// The other kind, where what the given one leaves does not settle that it is right. Without gloss a diffuse body is not to
+    /// The other kind, where the residual of the given one does not settle that it is right. Without gloss a diffuse material is not to
     /// be compared with metal.
-    fn other_kind(&self, given: BodyFigure) -> Option<BodyKind> {
+    fn other_kind(&self, given: MaterialFigure) -> Option<MaterialKind> {
         let has_gloss = self.has_shape || self.known.is_some();
-        match given.body {
-            BodyKind::Diffuse => {
-                (has_gloss && may_be_metal(given.residual)).then_some(BodyKind::Metal)
+        match given.material {
+            MaterialKind::Diffuse => {
+                (has_gloss && may_be_metal(given.residual)).then_some(MaterialKind::Metal)
             }
-            BodyKind::Metal => Some(BodyKind::Diffuse),
+            MaterialKind::Metal => Some(MaterialKind::Diffuse),
         }
     }
 
-    /// How well the other sense of turning explains the curves, beside that of a room that was found: for the first kind of body
+    /// How well the other rotation direction fits the curves, beside that of a shading model that was fitted: for the first material
     /// of which it is doubted, else the last that was tried.
-    pub(crate) fn sense(
+    pub(crate) fn direction(
         &self,
         curves: &TurnCurves,
-        expected: Option<&[Expected]>,
-        found: &FoundRoom,
-    ) -> Option<SenseFigure> {
-        let coarse = Coarse::new(curves, expected).with_other_sense();
+        prior: Option<&[PriorNormal]>,
+        found: &FittedLight,
+    ) -> Option<DirectionFigure> {
+        let coarse = Blocks::new(curves, prior).with_other_direction();
         let mut told = None;
-        for (figure, &residual) in found.bodies.iter().zip(&found.costs) {
-            // Metal in the wrong sense can seem to explain a diffuse body, so that both are compared.
-            let other_residual = self.cost_in(&coarse, figure.body)?;
-            let sense = SenseFigure {
+        for (figure, &residual) in found.materials.iter().zip(&found.costs) {
+            // Metal in the wrong rotation direction can seem to fit a diffuse material, so that both are compared.
+            let other_residual = self.cost_in(&coarse, figure.material)?;
+            let direction = DirectionFigure {
                 residual,
                 other_residual,
             };
-            told = Some(sense);
-            if sense.is_doubted() {
+            told = Some(direction);
+            if direction.is_doubted() {
                 break;
             }
         }
         told
     }
 
-    /// What an object leaves: in unknown light, from the best start that is at hand.
-    fn cost_in(&self, coarse: &Coarse, body: BodyKind) -> Option<f64> {
+    /// The residual of a material: in unknown light, from the best initialisation at hand.
+    fn cost_in(&self, coarse: &Blocks, material: MaterialKind) -> Option<f64> {
         if let Some(known) = &self.known {
-            return Some(self.find_in(coarse, known, body).0);
+            return Some(self.find_in(coarse, known, material).0);
         }
         let alternation = Alternation {
             coarse,
             setting: self,
-            body,
+            material,
         };
-        let (_, start) = self.starts(coarse).swap_remove(0);
-        let (cost, room) = alternation.run(start)?;
-        if !self.has_shape || body == BodyKind::Metal || alternation.is_matt(&room) {
+        let (_, start) = self.initialisations(coarse).swap_remove(0);
+        let (cost, model) = alternation.run(start)?;
+        if !self.has_shape || material == MaterialKind::Metal || alternation.is_lambertian(&model) {
             return Some(cost);
         }
-        Some(alternation.with_gloss(room).0)
+        Some(alternation.with_gloss(model).0)
     }
 
-    fn find_of(&self, coarse: &Coarse, body: BodyKind) -> Result<FoundRoom, TurnError> {
-        let (cost, room, starts) = match &self.known {
+    fn find_of(&self, coarse: &Blocks, material: MaterialKind) -> Result<FittedLight, TurnError> {
+        let (cost, model, initialisations) = match &self.known {
             Some(known) => {
-                let (cost, room) = self.find_in(coarse, known, body);
-                (cost, room, Vec::new())
+                let (cost, model) = self.find_in(coarse, known, material);
+                (cost, model, Vec::new())
             }
-            None => self.find_light(coarse, body)?,
+            None => self.find_light(coarse, material)?,
         };
-        let fits = coarse.fits(&room);
-        Ok(FoundRoom {
-            room,
-            starts,
-            bodies: vec![BodyFigure::new(body, &fits)],
+        let fits = coarse.fits(&model);
+        Ok(FittedLight {
+            model,
+            initialisations,
+            materials: vec![MaterialFigure::new(material, &fits)],
             costs: vec![cost],
         })
     }
 
-    /// A room of known light.
-    fn find_in(&self, coarse: &Coarse, known: &KnownLight, body: BodyKind) -> (f64, Room) {
-        let joint = coarse.joint(self.unknowns(body));
+    /// A shading model in known light.
+    fn find_in(
+        &self,
+        coarse: &Blocks,
+        known: &KnownLight,
+        material: MaterialKind,
+    ) -> (f64, ShadingModel) {
+        let joint = coarse.joint(self.unknowns(material));
         joint.found(
-            self.unblurred(known, body),
+            self.unblurred(known, material),
             ALTERNATION_PARAMETERS.joint_rounds,
             ALTERNATION_PARAMETERS.joint_steps,
         )
     }
 
-    /// A room of known light to begin with: without gloss, or with metal that is hardly rough.
-    pub(crate) fn unblurred(&self, known: &KnownLight, body: BodyKind) -> Room {
+    /// The shading model that initialises a fit in known light: without gloss, or of metal that is hardly rough.
+    pub(crate) fn unblurred(&self, known: &KnownLight, material: MaterialKind) -> ShadingModel {
         let mirror = known.mirror();
-        let shares: Vec<f64> = (0..mirror.len())
+        let attenuations: Vec<f64> = (0..mirror.len())
             .map(|l| PARAMETERS.metal_attenuation.powi(l as i32))
             .collect();
-        let gloss = match body {
-            BodyKind::Diffuse => GlossLight::NONE,
-            BodyKind::Metal => GlossLight::sum(mirror, &shares),
+        let gloss = match material {
+            MaterialKind::Diffuse => GlossLight::NONE,
+            MaterialKind::Metal => GlossLight::sum(mirror, &attenuations),
         };
-        Room {
+        ShadingModel {
             frame: self.frame,
-            light: known.matt,
+            light: known.diffuse,
             gloss,
-            body,
+            material,
         }
     }
 
     /// Normals to start an unknown light from, the best ones first.
-    fn starts(&self, coarse: &Coarse) -> Vec<(&'static str, Vec<[f64; 3]>)> {
-        let mut starts = Vec::new();
-        if let Some(expected) = coarse.expected.as_ref().filter(|_| self.has_shape) {
-            let normals = expected.iter().map(|expected| expected.normal).collect();
-            starts.push(("prior", normals));
+    fn initialisations(&self, coarse: &Blocks) -> Vec<(&'static str, Vec<[f64; 3]>)> {
+        let mut initialisations = Vec::new();
+        if let Some(prior) = coarse.prior.as_ref().filter(|_| self.has_shape) {
+            let normals = prior.iter().map(|prior| prior.normal).collect();
+            initialisations.push(("prior", normals));
         }
-        starts.extend(
+        initialisations.extend(
             PARAMETERS
                 .heights
                 .map(|(name, height)| (name, inflated(&coarse.curves, height))),
         );
-        starts
+        initialisations
     }
 
-    /// An unknown light, from all starts.
+    /// An unknown light, from all initialisations.
     fn find_light(
         &self,
-        coarse: &Coarse,
-        body: BodyKind,
-    ) -> Result<(f64, Room, Vec<StartFigure>), TurnError> {
+        coarse: &Blocks,
+        material: MaterialKind,
+    ) -> Result<(f64, ShadingModel, Vec<InitialisationFigure>), TurnError> {
         let alternation = Alternation {
             coarse,
             setting: self,
-            body,
+            material,
         };
-        let mut ended: Vec<(&str, Option<(f64, Room)>)> = self
-            .starts(coarse)
+        let mut ended: Vec<(&str, Option<(f64, ShadingModel)>)> = self
+            .initialisations(coarse)
             .into_iter()
             .map(|(name, normals)| (name, alternation.run(normals)))
             .collect();
-        let (_, room) = best(&ended).ok_or(TurnError::NoLight)?;
-        if self.has_shape && body == BodyKind::Diffuse && !alternation.is_matt(&room) {
+        let (_, model) = best(&ended).ok_or(TurnError::NoLight)?;
+        if self.has_shape && material == MaterialKind::Diffuse && !alternation.is_lambertian(&model)
+        {
             for (_, ended) in &mut ended {
-                *ended = ended.map(|(_, room)| alternation.with_gloss(room));
+                *ended = ended.map(|(_, model)| alternation.with_gloss(model));
             }
         }
-        let (least, room) = best(&ended).ok_or(TurnError::NoLight)?;
-        let figures = ended.into_iter().map(|(start, ended)| {
+        let (least, model) = best(&ended).ok_or(TurnError::NoLight)?;
+        let figures = ended.into_iter().map(|(name, ended)| {
             let residual = ended.map_or(1.0, |(residual, _)| residual);
-            StartFigure {
-                start: start.to_owned(),
+            InitialisationFigure {
+                name: name.to_owned(),
                 residual,
                 taken: residual <= least,
             }
         });
-        Ok((least, room, figures.collect()))
+        Ok((least, model, figures.collect()))
     }
 }
 
-/// The end that leaves least.
-fn best(ended: &[(&str, Option<(f64, Room)>)]) -> Option<(f64, Room)> {
+/// The end of the smallest residual.
+fn best(ended: &[(&str, Option<(f64, ShadingModel)>)]) -> Option<(f64, ShadingModel)> {
     let ended = ended.iter().filter_map(|(_, ended)| *ended);
     ended.min_by(|a, b| a.0.total_cmp(&b.0))
 }

@@ -1,18 +1,18 @@
-//! Light, gloss, normals and albedo at once: Gauss and Newton's steps for the room, in which every pixel follows.
+//! Joint optimisation of light, gloss, normals and albedo by Gauss-Newton steps, in which every pixel follows the light.
 //!
-//! To fit the room and the pixels in turns takes many rounds, for each is held by the other. A step here takes from what the
-//! room's unknowns do to a curve that part which the pixel's own normal and albedo could do as well (Schur's complement of
-//! their equations); what is left tells of the room alone.
+//! Alternation between light and pixels takes many rounds, for each is held by the other. A step here takes out of what
+//! the light's unknowns do to a curve the part that the pixel's own normal and albedo could do as well: the Schur
+//! complement of the normal equations.
 
 use rayon::prelude::*;
 use relight_core::statistics::median;
 
-use crate::fit::curve_statistics::Moments;
-use crate::fit::normal_step::Expected;
+use crate::fit::curve_statistics::CurveStatistics;
+use crate::fit::normal_step::PriorNormal;
 use crate::fit::schur::Sums;
 use crate::fit::search::{PixelFit, Search, cost, search_all};
-use crate::fit::unknowns::{Columns, Guess, Unknowns};
-use crate::model::shading::Room;
+use crate::fit::unknowns::{Columns, Estimate, Unknowns};
+use crate::model::shading::ShadingModel;
 
 /// Parameters of the joint optimisation.
 struct JointParameters {
@@ -45,52 +45,57 @@ const PARAMETERS: JointParameters = JointParameters {
     least_median: 1e-3,
 };
 
-/// Pixels whose room is to be found.
+/// Pixels whose shading model is fitted.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Joint<'a> {
-    pub(crate) moments: &'a [Moments],
-    pub(crate) expected: Option<&'a [Expected]>,
+pub(crate) struct JointOptimisation<'a> {
+    pub(crate) statistics: &'a [CurveStatistics],
+    pub(crate) prior: Option<&'a [PriorNormal]>,
     pub(crate) unknowns: Unknowns<'a>,
 }
 
-impl Joint<'_> {
-    /// What is left in the end, and the room: its normals are looked for anywhere, then all is refined, and so on.
-    pub(crate) fn found(&self, start: Room, rounds: usize, steps: usize) -> (f64, Room) {
-        let mut room = start;
-        let mut left = f64::INFINITY;
+impl JointOptimisation<'_> {
+    /// The final residual and shading model. Each round searches the normals anywhere, then refines all unknowns.
+    pub(crate) fn found(
+        &self,
+        start: ShadingModel,
+        rounds: usize,
+        steps: usize,
+    ) -> (f64, ShadingModel) {
+        let mut model = start;
+        let mut residual = f64::INFINITY;
         for _ in 0..rounds {
-            let fits = search_all(&room, self.moments, self.expected, None);
-            let (found, fits) = self.refined(room, fits, steps);
-            let reached = cost(&fits, self.expected);
-            if reached < left {
-                (room, left) = (found, reached);
+            let fits = search_all(&model, self.statistics, self.prior, None);
+            let (found, fits) = self.refined(model, fits, steps);
+            let reached = cost(&fits, self.prior);
+            if reached < residual {
+                (model, residual) = (found, reached);
             }
         }
-        (left, room)
+        (residual, model)
     }
 
-    /// Room and pixels after at most so many steps from these.
+    /// Shading model and pixels after at most so many steps from these.
     pub(crate) fn refined(
         &self,
-        room: Room,
+        model: ShadingModel,
         fits: Vec<PixelFit>,
         steps: usize,
-    ) -> (Room, Vec<PixelFit>) {
-        let (mut guess, mut fits) = (Guess::of(&room, self.unknowns), fits);
-        let (frame, mut damping) = (room.frame, PARAMETERS.damping);
-        let mut least = cost(&fits, self.expected);
+    ) -> (ShadingModel, Vec<PixelFit>) {
+        let (mut estimate, mut fits) = (Estimate::of(&model, self.unknowns), fits);
+        let (frame, mut damping) = (model.frame, PARAMETERS.damping);
+        let mut least = cost(&fits, self.prior);
         for _ in 0..steps {
-            let room = guess.room(&frame, self.unknowns);
-            let Some(step) = self.step(&guess, &room, &fits, damping) else {
+            let model = estimate.model(&frame, self.unknowns);
+            let Some(step) = self.step(&estimate, &model, &fits, damping) else {
                 break;
             };
-            let other = guess.moved(&step, self.unknowns);
-            let room = other.room(&frame, self.unknowns);
-            let found = search_all(&room, self.moments, self.expected, Some(&fits));
-            let reached = cost(&found, self.expected);
+            let other = estimate.moved(&step, self.unknowns);
+            let model = other.model(&frame, self.unknowns);
+            let found = search_all(&model, self.statistics, self.prior, Some(&fits));
+            let reached = cost(&found, self.prior);
             if reached < least {
                 let gain = (least - reached) / least;
-                (guess, fits, least) = (other, found, reached);
+                (estimate, fits, least) = (other, found, reached);
                 damping *= PARAMETERS.damping_fall;
                 if gain < PARAMETERS.settled {
                     break;
@@ -102,34 +107,34 @@ impl Joint<'_> {
                 }
             }
         }
-        (guess.room(&frame, self.unknowns), fits)
+        (estimate.model(&frame, self.unknowns), fits)
     }
 
     /// How the unknowns should change.
     fn step(
         &self,
-        guess: &Guess,
-        room: &Room,
+        estimate: &Estimate,
+        model: &ShadingModel,
         fits: &[PixelFit],
         damping: f64,
     ) -> Option<Vec<f64>> {
         let weights = weights(fits);
         let columns = Columns {
-            guess,
-            bands: self.unknowns.bands(guess)?,
+            estimate,
+            bands: self.unknowns.bands(estimate)?,
             layout: self.unknowns.layout(),
-            room,
+            model,
         };
-        let search = Search::new(room);
+        let search = Search::new(model);
         let sums = (0..fits.len().div_ceil(PARAMETERS.chunk))
             .into_par_iter()
             .map(|chunk| {
                 let mut sums = Sums::new(columns.layout.count());
                 let pixels =
                     chunk * PARAMETERS.chunk..((chunk + 1) * PARAMETERS.chunk).min(fits.len());
-                for pixel in pixels.filter(|&pixel| !self.moments[pixel].is_dark()) {
-                    let expected = self.expected.map(|all| all[pixel]);
-                    let one = (&self.moments[pixel], expected, fits[pixel].normal);
+                for pixel in pixels.filter(|&pixel| !self.statistics[pixel].is_dark()) {
+                    let prior = self.prior.map(|all| all[pixel]);
+                    let one = (&self.statistics[pixel], prior, fits[pixel].normal);
                     sums.add_pixel(&search, &columns, one, weights[pixel]);
                 }
                 sums

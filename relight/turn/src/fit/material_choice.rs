@@ -1,16 +1,16 @@
 //! What an object is made of, as far as its curves tell it.
 
-use crate::fit::figures::BodyFigure;
-use crate::model::material::BodyKind;
+use crate::fit::figures::MaterialFigure;
+use crate::model::material::MaterialKind;
 
 /// Parameters of the choice of the material.
 struct MaterialParameters {
-    /// Residual up to which a diffuse material explains the turn, over the energy of the variation. By hand.
+    /// Residual up to which a diffuse material fits the turn, over the energy of the variation. By hand.
     explained: f64,
     /// Largest part of the diffuse residual with which metal is taken: its light has many more terms. Measured: the
     /// rendered sessions of docs/results/turns.md have 0.53 (bronze) and 0.63 (plastic).
     metal_part: f64,
-    /// Residual up to which metal explains the turn, over the energy of the variation. By hand.
+    /// Residual up to which metal fits the turn, over the energy of the variation. By hand.
     explained_by_metal: f64,
 }
 
@@ -20,7 +20,7 @@ const PARAMETERS: MaterialParameters = MaterialParameters {
     explained_by_metal: 0.01,
 };
 
-/// Whether what a diffuse body leaves lets the object be metal.
+/// Whether the residual of a diffuse material lets the object be metal.
 pub(crate) fn may_be_metal(diffuse: f64) -> bool {
     diffuse > PARAMETERS.explained
 }
@@ -30,15 +30,15 @@ pub(crate) fn is_metal(diffuse: f64, metal: f64) -> bool {
     may_be_metal(diffuse) && metal < PARAMETERS.metal_part * diffuse
 }
 
-/// The other kind, where it explains clearly more than the one that was given, whose figure is the first.
-pub(crate) fn doubted(bodies: &[BodyFigure]) -> Option<BodyKind> {
-    let [given, other] = bodies else {
+/// The other kind, where it fits clearly better than the one that was given, whose figure is the first.
+pub(crate) fn doubted(materials: &[MaterialFigure]) -> Option<MaterialKind> {
+    let [given, other] = materials else {
         return None;
     };
-    let is_better = match other.body {
-        BodyKind::Metal => is_metal(given.residual, other.residual),
-        // It has fewer terms: that it leaves less says enough, where both leave much.
-        BodyKind::Diffuse => {
+    let is_better = match other.material {
+        MaterialKind::Metal => is_metal(given.residual, other.residual),
+        // It has fewer terms: a smaller residual says enough, where both are large.
+        MaterialKind::Diffuse => {
             let part = if given.residual > PARAMETERS.explained_by_metal {
                 1.0
             } else {
@@ -47,7 +47,7 @@ pub(crate) fn doubted(bodies: &[BodyFigure]) -> Option<BodyKind> {
             other.residual < part * given.residual
         }
     };
-    is_better.then_some(other.body)
+    is_better.then_some(other.material)
 }
 
 #[cfg(test)]
@@ -64,10 +64,10 @@ mod tests {
     #[test]
     fn a_kind_that_was_given_is_doubted_where_the_other_explains_clearly_more() {
         let figures = |given, other| {
-            let figure = |(body, residual)| BodyFigure { body, residual };
+            let figure = |(material, residual)| MaterialFigure { material, residual };
             doubted(&[given, other].map(figure))
         };
-        let (diffuse, metal) = (BodyKind::Diffuse, BodyKind::Metal);
+        let (diffuse, metal) = (MaterialKind::Diffuse, MaterialKind::Metal);
         assert_eq!(figures((diffuse, 0.11), (metal, 0.04)), Some(metal));
         assert_eq!(figures((diffuse, 0.11), (metal, 0.10)), None);
         assert_eq!(figures((metal, 0.05), (diffuse, 0.03)), Some(diffuse));

@@ -1,4 +1,4 @@
-//! Normals, albedo and light that explain the curves.
+//! Normals, albedo and light that fit the curves.
 
 pub(crate) mod albedo;
 pub(crate) mod alternation;
@@ -7,6 +7,7 @@ pub(crate) mod confidence;
 pub(crate) mod curve_statistics;
 pub(crate) mod environment;
 pub(crate) mod figures;
+pub(crate) mod given_light;
 pub(crate) mod inflation;
 pub(crate) mod initialisation;
 pub(crate) mod joint;

@@ -3,7 +3,7 @@
 use relight_core::light::{Normals, ShLight, YUp};
 
 use crate::model::frame::Elevation;
-use crate::model::material::BodyKind;
+use crate::model::material::MaterialKind;
 
 /// What is known of a turn beforehand.
 #[derive(Debug, Clone)]
@@ -13,13 +13,13 @@ pub struct TurnOptions {
     /// The light, in the viewer's frame at the table's angle 0, where it was measured; bands up to 6
     /// count, those beyond 2 for gloss alone.
     pub light: Option<ShLight>,
-    /// Normals to start from, where there are any.
+    /// Normals that initialise, where there are any.
     pub prior: Option<Normals<YUp>>,
-    /// How much these count: `weight (1 - cos)` is added to what is left of a pixel's curve, over the energy
+    /// How much these count: `weight (1 - cos)` is added to the residual of a pixel's curve, over the energy
     /// of its variation.
     pub prior_weight: f64,
-    /// What the object is made of; what explains the curves where it is not known.
-    pub body: Option<BodyKind>,
+    /// The material; the one that fits the curves where it is not known.
+    pub material: Option<MaterialKind>,
 }
 
 impl Default for TurnOptions {
@@ -29,7 +29,7 @@ impl Default for TurnOptions {
             light: None,
             prior: None,
             prior_weight: 0.15,
-            body: None,
+            material: None,
         }
     }
 }

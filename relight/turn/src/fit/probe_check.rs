@@ -1,12 +1,12 @@
-//! Whether a ball is where it is said to be: the light that it shows has to explain what it shows, and no circle beside it
-//! explains clearly more. Knows nothing of what the light is used for.
+//! Whether a ball is where it is said to be: the light that is fitted to it has to fit it, and no circle beside it
+//! has a clearly smaller residual. Knows nothing of what the light is used for.
 
 use crate::error::TurnError;
-use crate::fit::curve_statistics::Moments;
-use crate::fit::environment::unexplained;
+use crate::fit::curve_statistics::CurveStatistics;
+use crate::fit::environment::relative_residual;
 use crate::model::frame::{Elevation, TableFrame};
 use crate::observe::curves::TurnCurves;
-use crate::observe::mirror_panorama::Mirrored;
+use crate::observe::mirror_panorama::MirrorPanorama;
 use crate::observe::probe::ProbeBall;
 use crate::observe::surroundings::{SURROUNDINGS_PARAMETERS, Surroundings, middle_of};
 
@@ -60,23 +60,23 @@ struct Circle {
 /// A ball's pixels, each as a curve, and where they are.
 struct Shown {
     curves: TurnCurves,
-    moments: Vec<Moments>,
+    statistics: Vec<CurveStatistics>,
     at: Vec<[f64; 2]>,
     frame: TableFrame,
     ball: ProbeBall,
 }
 
 impl Surroundings {
-    /// How much of what varies the ball's own light leaves, 0 to 1.
+    /// The residual of the ball's own light, over the variation, 0 to 1.
     ///
     /// # Errors
-    /// [`TurnError::NoBall`] where that is most of it, [`TurnError::Misplaced`] where another circle leaves clearly less.
+    /// [`TurnError::NoBall`] where that is most of it, [`TurnError::Misplaced`] where another circle has a clearly smaller one.
     pub(crate) fn check(self, ball: ProbeBall, elevation: Elevation) -> Result<f64, TurnError> {
         let (place, side) = (self.place, self.side);
         let curves = self.builder.finish()?;
         let shown = Shown {
-            moments: (0..curves.pixels())
-                .map(|pixel| Moments::new(&curves, pixel, None))
+            statistics: (0..curves.pixels())
+                .map(|pixel| CurveStatistics::new(&curves, pixel, None))
                 .collect(),
             at: curves
                 .places()
@@ -91,13 +91,13 @@ impl Surroundings {
             middle: [0.0; 2],
             radius: 1.0,
         };
-        let left = shown.left(given).unwrap_or(1.0);
-        let (best, least) = shown.best(given, left);
+        let residual = shown.residual(given).unwrap_or(1.0);
+        let (best, least) = shown.best(given, residual);
         let [x, y] = best.middle;
         let apart = x.hypot(y).max((best.radius - 1.0).abs());
-        let most = most_left(ball);
-        if least < PARAMETERS.clearly * left
-            && least < left - PARAMETERS.less
+        let most = most_residual(ball);
+        if least < PARAMETERS.clearly * residual
+            && least < residual - PARAMETERS.less
             && apart > PARAMETERS.apart
             && least < most
         {
@@ -105,21 +105,21 @@ impl Surroundings {
             return Err(TurnError::Misplaced {
                 given: place,
                 better: [x, y, best.radius * place.radius].map(f64::round),
-                explained: [left, least].map(|left| 100.0 * (1.0 - left).max(0.0)),
+                explained: [residual, least].map(|residual| 100.0 * (1.0 - residual).max(0.0)),
             });
         }
-        if left > most {
+        if residual > most {
             return Err(TurnError::NoBall {
                 given: place,
-                explained: 100.0 * (1.0 - left).max(0.0),
+                explained: 100.0 * (1.0 - residual).max(0.0),
             });
         }
-        Ok(left)
+        Ok(residual)
     }
 }
 
-/// The most that the light of a ball leaves of what it shows.
-pub(crate) const fn most_left(ball: ProbeBall) -> f64 {
+/// The largest residual of a ball by its own light.
+pub(crate) const fn most_residual(ball: ProbeBall) -> f64 {
     match ball {
         ProbeBall::Grey => PARAMETERS.most_of_grey,
         ProbeBall::Chrome => PARAMETERS.most_of_chrome,
@@ -127,9 +127,9 @@ pub(crate) const fn most_left(ball: ProbeBall) -> f64 {
 }
 
 impl Shown {
-    /// The circle that explains most, and what it leaves.
-    fn best(&self, given: Circle, left: f64) -> (Circle, f64) {
-        let mut best = (given, left);
+    /// The circle of the smallest residual, and that residual.
+    fn best(&self, given: Circle, residual: f64) -> (Circle, f64) {
+        let mut best = (given, residual);
         let tries = PARAMETERS.shifts.iter().flat_map(|&x| {
             PARAMETERS.shifts.iter().flat_map(move |&y| {
                 PARAMETERS.scales.iter().map(move |&radius| Circle {
@@ -160,17 +160,17 @@ impl Shown {
 
     fn try_all(&self, circles: impl Iterator<Item = Circle>, best: &mut (Circle, f64)) {
         for circle in circles {
-            if let Some(left) = self.left(circle)
-                && left < best.1
+            if let Some(residual) = self.residual(circle)
+                && residual < best.1
             {
-                *best = (circle, left);
+                *best = (circle, residual);
             }
         }
     }
 
-    /// What the light that a ball in a circle shows leaves, over what an even light leaves; none where the circle is not in the
+    /// The residual of the light fitted to a ball in a circle, over that of an even light; none where the circle is not in the
     /// picture, or nothing varies in it.
-    fn left(&self, circle: Circle) -> Option<f64> {
+    fn residual(&self, circle: Circle) -> Option<f64> {
         let wanted = std::f64::consts::PI
             * (PARAMETERS.radius_share * circle.radius * SURROUNDINGS_PARAMETERS.across as f64
                 / 2.0)
@@ -186,23 +186,23 @@ impl Shown {
         }
         match self.ball {
             ProbeBall::Grey => {
-                let moments = pixels.iter().map(|&pixel| &self.moments[pixel]);
-                unexplained(moments, &normals, &self.frame)
+                let statistics = pixels.iter().map(|&pixel| &self.statistics[pixel]);
+                relative_residual(statistics, &normals, &self.frame)
             }
-            ProbeBall::Chrome => self.left_by_mirror(&pixels, &normals),
+            ProbeBall::Chrome => self.residual_by_mirror(&pixels, &normals),
         }
     }
 
-    /// The same for a ball that mirrors the room.
-    fn left_by_mirror(&self, pixels: &[usize], normals: &[[f64; 3]]) -> Option<f64> {
-        let mut mirrored = Mirrored::new(self.frame);
+    /// The same for a ball that mirrors its surroundings.
+    fn residual_by_mirror(&self, pixels: &[usize], normals: &[[f64; 3]]) -> Option<f64> {
+        let mut panorama = MirrorPanorama::new(self.frame);
         self.each_value(pixels, normals, |normal, angle, value| {
-            mirrored.add(angle, normal, value);
+            panorama.add(angle, normal, value);
         });
-        let all = mirrored.all()?;
+        let all = panorama.all()?;
         let (mut rest, mut energy) = (0.0, 0.0);
         self.each_value(pixels, normals, |normal, angle, value| {
-            let seen = mirrored.seen(angle, normal).unwrap_or(all);
+            let seen = panorama.seen(angle, normal).unwrap_or(all);
             for c in 0..3 {
                 rest += (value[c] - seen[c]).powi(2);
                 energy += (value[c] - all[c]).powi(2);

@@ -6,9 +6,9 @@ use relight_core::render::Surface;
 
 use crate::error::TurnError;
 use crate::fit::environment::fit_turn_light;
-use crate::fit::probe_check::most_left;
+use crate::fit::probe_check::most_residual;
 use crate::model::frame::TableFrame;
-use crate::model::material::BodyKind;
+use crate::model::material::MaterialKind;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::film::Filmed;
 use crate::observe::probe::{ProbeBall, ProbeBuilder};
@@ -25,7 +25,7 @@ const PARAMETERS: ProbeLightParameters = ProbeLightParameters { sharp: 0.06 };
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProbeLight {
     /// In the viewer's frame at the table's angle 0: of order 2 by a grey ball, in units in which the ball's albedo is 1; of order 6
-    /// by a chrome one, in units in which it reflects everything and a white matt surface has albedo 1.
+    /// by a chrome one, in units in which it reflects everything and a white Lambertian surface has albedo 1.
     pub light: ShLight,
     /// How many frames it was measured in.
     pub frames: u32,
@@ -33,15 +33,15 @@ pub struct ProbeLight {
     pub ball: ProbeBall,
     /// What it looks like.
     pub looks: ProbeBall,
-    /// The part of what varies in the ball, over the turn and from place to place, that this light does not explain, 0 to 1.
-    pub left: f64,
+    /// The part of what varies in the ball, over the turn and from place to place, that this light does not fit, 0 to 1.
+    pub residual: f64,
 }
 
 impl ProbeLight {
-    /// Whether the light explains so little of the ball that its place is to be checked.
+    /// Whether the light fits the ball so badly that its place is to be checked.
     #[must_use]
     pub fn is_doubtful(&self) -> bool {
-        self.left > most_left(self.ball) / 2.0
+        self.residual > most_residual(self.ball) / 2.0
     }
 }
 
@@ -60,12 +60,12 @@ impl ProbeBuilder {
             ProbeBall::Grey
         };
         let ball = self.probe.ball.unwrap_or(looks);
-        let left = match self.surroundings {
+        let residual = match self.surroundings {
             Some(surroundings) => {
                 surroundings
                     .check(ball, self.probe.elevation)
                     .map_err(|error| match error {
-                        // Of a ball of the other kind, where it is cannot be told.
+                        // Of a ball of the other kind, its place is not observable.
                         TurnError::Misplaced {
                             given, explained, ..
                         } if ball != looks => TurnError::NoBall {
@@ -81,10 +81,10 @@ impl ProbeBuilder {
             ProbeBall::Grey => {
                 let albedo = Rgb::<Linear>::new(Planes::filled(self.normals.extent(), [1.0; 3]));
                 let surface = Surface::new(self.normals, albedo, None)?;
-                fit_turn_light(&curves, &surface, BodyKind::Diffuse, &frame)?
+                fit_turn_light(&curves, &surface, MaterialKind::Diffuse, &frame)?
             }
             ProbeBall::Chrome => {
-                let light = self.mirrored.light()?;
+                let light = self.panorama.light()?;
                 light.rotated(&frame.rotation().inverse())
             }
         };
@@ -93,7 +93,7 @@ impl ProbeBuilder {
             frames: curves.frames(),
             ball,
             looks,
-            left,
+            residual,
         })
     }
 }
@@ -129,8 +129,8 @@ mod tests {
         }
     }
 
-    /// A room with windows: beyond band 2 too.
-    fn room() -> ShLight {
+    /// An environment with windows: beyond band 2 too.
+    fn environment() -> ShLight {
         let values = [2.0, 0.3, 0.24, 0.36, 0.07, -0.06, 0.03, 0.12, 0.09];
         let light = ShLight::new(values.map(|v| [v, 0.9 * v, 0.8 * v]).to_vec()).unwrap();
         let mut light = light.with_order(Order::new(4).unwrap());
@@ -140,7 +140,7 @@ mod tests {
         light
     }
 
-    /// What is seen beside the ball: above, a room that moves past, and below, the table.
+    /// What is seen beside the ball: above, an environment that moves past, and below, the table.
     fn behind(angle_deg: f64, x: usize, y: usize) -> [f32; 3] {
         if y > 50 {
             return [0.5, 0.45, 0.4];
@@ -170,7 +170,7 @@ mod tests {
         let axis = Direction::new(x, y, z).unwrap();
         for k in 0..60 {
             let angle = 6.0 * f64::from(k);
-            let turned = room().rotated(&Rotation::about(axis, -angle.to_radians()));
+            let turned = environment().rotated(&Rotation::about(axis, -angle.to_radians()));
             let light = shown(&turned, &normals);
             let picture = Planes::from_fn(Extent::new(120, 90), |x, y| {
                 let (at_x, at_y) = (x.wrapping_sub(31), y.wrapping_sub(10));
@@ -207,7 +207,7 @@ mod tests {
     }
 
     fn check(found: &ShLight, factor: f64, count: usize) {
-        let wanted = room();
+        let wanted = environment();
         assert!(found.coefficients().len() >= count);
         for (found, light) in found
             .coefficients()
@@ -265,7 +265,7 @@ mod tests {
             (ProbeBall::Chrome, chrome as Shown),
         ] {
             let there = measure(Some(ball), shown);
-            assert!(there.left < 0.05 && !there.is_doubtful(), "{there:?}");
+            assert!(there.residual < 0.05 && !there.is_doubtful(), "{there:?}");
             for (middle, radius) in [
                 ([69.0, 40.0], 30.0),
                 ([61.0, 34.0], 30.0),

@@ -1,9 +1,9 @@
 //! Which parts of the turn a pixel's fit may believe: not those in which it is in another's shadow or shows
 //! a highlight.
 
-use crate::fit::residuals::rest;
+use crate::fit::residuals::residuals;
 use crate::fit::search::PixelFit;
-use crate::model::shading::Room;
+use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
 use relight_core::statistics::upper_median;
 
@@ -20,18 +20,23 @@ const PARAMETERS: RobustParameters = RobustParameters {
     least_deviation: 0.01,
 };
 
-/// How far each part of the turn is to be believed for a pixel, 0 to 1: near 0 where the fit is far from what
+/// The robust weight of each part of the turn for a pixel, 0 to 1: near 0 where the fit is far from what
 /// is seen, measured by the median of how far it is elsewhere.
-pub(crate) fn trust(curves: &TurnCurves, pixel: usize, fit: &PixelFit, room: &Room) -> Vec<f32> {
-    let rest = rest(curves, pixel, fit, room);
-    let sizes = rest.iter().flatten().map(|rest| rest.abs());
+pub(crate) fn robust_weights(
+    curves: &TurnCurves,
+    pixel: usize,
+    fit: &PixelFit,
+    model: &ShadingModel,
+) -> Vec<f32> {
+    let residuals = residuals(curves, pixel, fit, model);
+    let sizes = residuals.iter().flatten().map(|residuals| residuals.abs());
     let Some(median) = upper_median(sizes) else {
-        return vec![1.0; rest.len()];
+        return vec![1.0; residuals.len()];
     };
     let deviation = 1.4826 * median + PARAMETERS.least_deviation;
-    let trust = |rest: &Option<f64>| {
-        let size = rest.unwrap_or(0.0) / (PARAMETERS.width * deviation);
+    let robust_weights = |residuals: &Option<f64>| {
+        let size = residuals.unwrap_or(0.0) / (PARAMETERS.width * deviation);
         (1.0 / (1.0 + size * size).powi(2)) as f32
     };
-    rest.iter().map(trust).collect()
+    residuals.iter().map(robust_weights).collect()
 }

@@ -2,12 +2,12 @@
 
 use relight_core::light::NormalEquations;
 
-use crate::fit::curve_statistics::Moments;
-use crate::fit::normal_step::{Expected, Slope};
+use crate::fit::curve_statistics::CurveStatistics;
+use crate::fit::normal_step::{PriorNormal, QuadraticCost};
 use crate::fit::search::Search;
 use crate::fit::unknowns::Columns;
 use crate::model::directions::tangents;
-use crate::model::harmonics::WAVES;
+use crate::model::harmonics::COEFFICIENTS;
 
 /// The normal equations of the unknowns, without what the pixels do by themselves.
 pub(crate) struct Sums {
@@ -37,55 +37,60 @@ impl Sums {
         &mut self,
         search: &Search<'_>,
         columns: &Columns<'_>,
-        (moments, expected, normal): (&Moments, Option<Expected>, [f64; 3]),
+        (statistics, prior, normal): (&CurveStatistics, Option<PriorNormal>, [f64; 3]),
         weight: f64,
     ) {
         let axes = tangents(normal);
-        let leaning = search.leaning(moments, normal, axes);
-        let mut slope = Slope::default();
+        let derivatives = search.derivatives(statistics, normal, axes);
+        let mut quadratic = QuadraticCost::default();
         let mut couplings = vec![[0.0; 2]; self.count];
-        let all = columns.of(normal, leaning.albedo);
+        let all = columns.of(normal, derivatives.albedo);
         for (channel, mut columns) in all.into_iter().enumerate() {
-            let (body, ways) = (&leaning.body[channel], &leaning.ways[channel]);
-            slope.add(moments, channel, ways, &leaning.seen[channel]);
-            let along = moments.times(channel, body);
-            let own = dot(body, &along);
-            let rest = moments.rest(channel, &leaning.seen[channel]);
-            if own > 1e-12 && leaning.albedo[channel] > 0.0 {
+            let (base, jacobian) = (&derivatives.base[channel], &derivatives.jacobian[channel]);
+            quadratic.add(statistics, channel, jacobian, &derivatives.seen[channel]);
+            let along = statistics.times(channel, base);
+            let own = dot(base, &along);
+            let rest = statistics.residual_products(channel, &derivatives.seen[channel]);
+            if own > 1e-12 && derivatives.albedo[channel] > 0.0 {
                 // The albedo follows.
-                for (_, waves) in &mut columns {
-                    let share = dot(waves, &along) / own;
-                    waves
+                for (_, harmonics) in &mut columns {
+                    let share = dot(harmonics, &along) / own;
+                    harmonics
                         .iter_mut()
-                        .zip(body)
-                        .for_each(|(wave, body)| *wave -= share * body);
+                        .zip(base)
+                        .for_each(|(coefficient, base)| *coefficient -= share * base);
                 }
             }
-            for (k, (at, waves)) in columns.iter().enumerate() {
-                let image = moments.times(channel, waves);
-                self.right[*at] += weight * dot(waves, &rest);
-                for (coupling, way) in couplings[*at].iter_mut().zip(ways) {
-                    *coupling += dot(way, &image);
+            for (k, (at, harmonics)) in columns.iter().enumerate() {
+                let image = statistics.times(channel, harmonics);
+                self.right[*at] += weight * dot(harmonics, &rest);
+                for (coupling, column) in couplings[*at].iter_mut().zip(jacobian) {
+                    *coupling += dot(column, &image);
                 }
-                for (other, waves) in &columns[..=k] {
-                    self.matrix[at * self.count + other] += weight * dot(waves, &image);
+                for (other, harmonics) in &columns[..=k] {
+                    self.matrix[at * self.count + other] += weight * dot(harmonics, &image);
                 }
             }
         }
-        slope.scale(moments.unit());
+        quadratic.scale(statistics.unit());
         couplings
             .iter_mut()
             .flatten()
-            .for_each(|value| *value *= moments.unit());
-        if let Some(expected) = expected {
-            slope.lean(expected, normal, axes);
+            .for_each(|value| *value *= statistics.unit());
+        if let Some(prior) = prior {
+            quadratic.add_prior(prior, normal, axes);
         }
-        self.take_out(&slope, &couplings, weight / moments.unit());
+        self.take_out(&quadratic, &couplings, weight / statistics.unit());
     }
 
     /// Takes out what the normal could do as well.
-    pub(crate) fn take_out(&mut self, slope: &Slope, couplings: &[[f64; 2]], weight: f64) {
-        let [uu, uv, vv] = slope.bend;
+    pub(crate) fn take_out(
+        &mut self,
+        quadratic: &QuadraticCost,
+        couplings: &[[f64; 2]],
+        weight: f64,
+    ) {
+        let [uu, uv, vv] = quadratic.hessian;
         let more = 1e-6 * (uu + vv) + 1e-12;
         let (uu, vv) = (uu + more, vv + more);
         let determinant = uu * vv - uv * uv;
@@ -95,8 +100,8 @@ impl Sums {
                 weight * (uu * b - uv * a) / determinant,
             ]
         };
-        // The slope is half the gradient: a step goes against it.
-        let by_slope = inverse(slope.gradient);
+        // What is kept is half the gradient: a step goes against it.
+        let by_slope = inverse(quadratic.gradient);
         for (i, row) in couplings.iter().enumerate() {
             let by_row = inverse(*row);
             self.right[i] += row[0] * by_slope[0] + row[1] * by_slope[1];
@@ -133,6 +138,6 @@ impl Sums {
     }
 }
 
-fn dot(a: &[f64; WAVES], b: &[f64; WAVES]) -> f64 {
+fn dot(a: &[f64; COEFFICIENTS], b: &[f64; COEFFICIENTS]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

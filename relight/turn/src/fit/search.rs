@@ -3,11 +3,11 @@
 use crate::fit::curve_statistics::sum_of_products;
 use rayon::prelude::*;
 
-use crate::fit::curve_statistics::{Moments, WaveProducts};
-use crate::fit::normal_step::{Expected, Leaning, Slope};
-use crate::model::directions::{LEAST_FACING, dot, half_sphere, leant, tangents};
-use crate::model::harmonics::WAVES;
-use crate::model::shading::{PixelWaves, Room};
+use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts};
+use crate::fit::normal_step::{NormalDerivatives, PriorNormal, QuadraticCost};
+use crate::model::directions::{LEAST_FACING, dot, half_sphere, tangents, tilted};
+use crate::model::harmonics::COEFFICIENTS;
+use crate::model::shading::{PixelHarmonics, ShadingModel};
 
 /// Parameters of the search for a normal.
 struct SearchParameters {
@@ -59,46 +59,50 @@ pub(crate) struct PixelFit {
     pub(crate) residual: f64,
 }
 
-/// The normals that are tried in a room.
+/// Candidate normals under a shading model.
 pub(crate) struct Search<'a> {
-    room: &'a Room,
+    model: &'a ShadingModel,
     tried: Vec<Tried>,
 }
 
 struct Tried {
     normal: [f64; 3],
-    waves: PixelWaves,
-    products: WaveProducts,
+    harmonics: PixelHarmonics,
+    products: HarmonicProducts,
 }
 
 impl<'a> Search<'a> {
-    pub(crate) fn new(room: &'a Room) -> Self {
+    pub(crate) fn new(model: &'a ShadingModel) -> Self {
         let tried = half_sphere(PARAMETERS.candidates).map(|normal| {
-            let waves = room.waves(normal);
+            let harmonics = model.harmonics(normal);
             Tried {
                 normal,
-                waves,
-                products: WaveProducts::of(&waves),
+                harmonics,
+                products: HarmonicProducts::of(&harmonics),
             }
         });
         Self {
-            room,
+            model,
             tried: tried.collect(),
         }
     }
 
     /// The best normal anywhere.
-    pub(crate) fn anywhere(&self, moments: &Moments, expected: Option<Expected>) -> PixelFit {
+    pub(crate) fn anywhere(
+        &self,
+        statistics: &CurveStatistics,
+        prior: Option<PriorNormal>,
+    ) -> PixelFit {
         let mut best = [(f64::INFINITY, [0.0, 0.0, 1.0]); PARAMETERS.refined];
         for tried in &self.tried {
             let cost =
-                moments.residual(&tried.waves, &tried.products) + bias(expected, tried.normal);
+                statistics.residual(&tried.harmonics, &tried.products) + bias(prior, tried.normal);
             if cost < best[PARAMETERS.refined - 1].0 {
                 insert(&mut best, (cost, tried.normal));
             }
         }
         let refined =
-            best.map(|(_, start)| self.downhill(moments, expected, start, PARAMETERS.first_steps));
+            best.map(|(_, start)| self.downhill(statistics, prior, start, PARAMETERS.first_steps));
         let [first, rest @ ..] = refined;
         let (start, _) = rest.into_iter().fold(
             first,
@@ -106,42 +110,42 @@ impl<'a> Search<'a> {
                 if other.1 < best.1 { other } else { best }
             },
         );
-        self.near(moments, expected, start)
+        self.near(statistics, prior, start)
     }
 
     /// The best normal that is reached from `start` downhill.
     pub(crate) fn near(
         &self,
-        moments: &Moments,
-        expected: Option<Expected>,
+        statistics: &CurveStatistics,
+        prior: Option<PriorNormal>,
         start: [f64; 3],
     ) -> PixelFit {
-        let (normal, _) = self.downhill(moments, expected, start, PARAMETERS.steps);
+        let (normal, _) = self.downhill(statistics, prior, start, PARAMETERS.steps);
         PixelFit {
             normal,
-            albedo: moments.albedo(&self.room.waves(normal)),
-            residual: self.residual(moments, normal),
+            albedo: statistics.albedo(&self.model.harmonics(normal)),
+            residual: self.residual(statistics, normal),
         }
     }
 
-    /// Where so many steps lead, and what it costs there: Gauss and Newton's steps, damped as Levenberg and Marquardt do,
+    /// Where so many steps lead, and what it costs there: Gauss-Newton steps, damped as by Levenberg-Marquardt,
     /// with the albedo at its best for each normal.
     fn downhill(
         &self,
-        moments: &Moments,
-        expected: Option<Expected>,
+        statistics: &CurveStatistics,
+        prior: Option<PriorNormal>,
         start: [f64; 3],
         steps: usize,
     ) -> ([f64; 3], f64) {
-        let cost = |normal| self.residual(moments, normal) + bias(expected, normal);
+        let cost = |normal| self.residual(statistics, normal) + bias(prior, normal);
         let mut normal = start;
         let mut least = cost(normal);
         let mut damping = PARAMETERS.damping;
         for _ in 0..steps {
             let axes = tangents(normal);
-            let slope = self.slope(moments, expected, normal, axes);
-            let step = slope.step(damping);
-            let other = leant(normal, axes, step);
+            let quadratic = self.quadratic(statistics, prior, normal, axes);
+            let step = quadratic.step(damping);
+            let other = tilted(normal, axes, step);
             let found = cost(other);
             let length = step[0].hypot(step[1]);
             if other[2] >= LEAST_FACING && found < least {
@@ -158,106 +162,111 @@ impl<'a> Search<'a> {
     }
 
     /// How the cost changes as a normal leans.
-    fn slope(
+    fn quadratic(
         &self,
-        moments: &Moments,
-        expected: Option<Expected>,
+        statistics: &CurveStatistics,
+        prior: Option<PriorNormal>,
         normal: [f64; 3],
         axes: [[f64; 3]; 2],
-    ) -> Slope {
-        let leaning = self.leaning(moments, normal, axes);
-        let mut slope = Slope::default();
-        for (channel, ways) in leaning.ways.iter().enumerate() {
-            slope.add(moments, channel, ways, &leaning.seen[channel]);
+    ) -> QuadraticCost {
+        let derivatives = self.derivatives(statistics, normal, axes);
+        let mut quadratic = QuadraticCost::default();
+        for (channel, jacobian) in derivatives.jacobian.iter().enumerate() {
+            quadratic.add(statistics, channel, jacobian, &derivatives.seen[channel]);
         }
-        slope.scale(moments.unit());
-        if let Some(expected) = expected {
-            slope.lean(expected, normal, axes);
+        quadratic.scale(statistics.unit());
+        if let Some(prior) = prior {
+            quadratic.add_prior(prior, normal, axes);
         }
-        slope
+        quadratic
     }
 
-    /// How the waves of a pixel change as its normal leans.
-    pub(crate) fn leaning(
+    /// How the harmonics of a pixel change as its normal leans.
+    pub(crate) fn derivatives(
         &self,
-        moments: &Moments,
+        statistics: &CurveStatistics,
         normal: [f64; 3],
         [u, v]: [[f64; 3]; 2],
-    ) -> Leaning {
-        let here = self.room.waves(normal);
-        let albedo = moments.albedo(&here);
+    ) -> NormalDerivatives {
+        let here = self.model.harmonics(normal);
+        let albedo = statistics.albedo(&here);
         let there = [
             [PARAMETERS.gradient_step, 0.0],
             [0.0, PARAMETERS.gradient_step],
         ]
-        .map(|step| self.room.waves(leant(normal, [u, v], step)));
-        let body = here.body;
-        let seen: [_; 3] = std::array::from_fn(|c| sum(&body[c], albedo[c], &here.gloss[c]));
-        let ways = std::array::from_fn(|c| {
-            let along = moments.times(c, &body[c]);
-            let own = sum_of_products(&body[c], &along);
+        .map(|step| self.model.harmonics(tilted(normal, [u, v], step)));
+        let base = here.base;
+        let seen: [_; 3] = std::array::from_fn(|c| sum(&base[c], albedo[c], &here.gloss[c]));
+        let jacobian = std::array::from_fn(|c| {
+            let along = statistics.times(c, &base[c]);
+            let own = sum_of_products(&base[c], &along);
             there.map(|there| {
-                let moved = sum(&there.body[c], albedo[c], &there.gloss[c]);
-                let mut way: [f64; WAVES] =
+                let moved = sum(&there.base[c], albedo[c], &there.gloss[c]);
+                let mut column: [f64; COEFFICIENTS] =
                     std::array::from_fn(|i| (moved[i] - seen[c][i]) / PARAMETERS.gradient_step);
                 // The albedo follows the normal.
                 if own > 1e-12 && albedo[c] > 0.0 {
-                    let share = sum_of_products(&way, &along) / own;
-                    way.iter_mut()
-                        .zip(&body[c])
-                        .for_each(|(way, body)| *way -= share * body);
+                    let share = sum_of_products(&column, &along) / own;
+                    column
+                        .iter_mut()
+                        .zip(&base[c])
+                        .for_each(|(column, base)| *column -= share * base);
                 }
-                way
+                column
             })
         });
-        Leaning {
+        NormalDerivatives {
             albedo,
-            body,
+            base,
             seen,
-            ways,
+            jacobian,
         }
     }
 
-    /// What a normal leaves of a curve.
-    pub(crate) fn residual(&self, moments: &Moments, normal: [f64; 3]) -> f64 {
-        let waves = self.room.waves(normal);
-        moments.residual(&waves, &WaveProducts::of(&waves))
+    /// The residual of a normal.
+    pub(crate) fn residual(&self, statistics: &CurveStatistics, normal: [f64; 3]) -> f64 {
+        let harmonics = self.model.harmonics(normal);
+        statistics.residual(&harmonics, &HarmonicProducts::of(&harmonics))
     }
 
     /// How far the normal may lean before the residual grows by as much as it is: the standard deviation of
-    /// the angle, radians, were what is left of the curve noise of `freedom` degrees of freedom.
-    pub(crate) fn looseness(
+    /// the angle, radians, were the residual of the curve noise of `freedom` degrees of freedom.
+    pub(crate) fn standard_deviation(
         &self,
-        moments: &Moments,
-        expected: Option<Expected>,
+        statistics: &CurveStatistics,
+        prior: Option<PriorNormal>,
         fit: &PixelFit,
         freedom: f64,
     ) -> f64 {
         let [u, v] = tangents(fit.normal);
         let cost = |a: f64, b: f64| {
-            let normal = leant(fit.normal, [u, v], [a, b]);
-            self.residual(moments, normal) + bias(expected, normal)
+            let normal = tilted(fit.normal, [u, v], [a, b]);
+            self.residual(statistics, normal) + bias(prior, normal)
         };
         let h = PARAMETERS.hessian_step;
         let middle = cost(0.0, 0.0);
         let uu = (cost(h, 0.0) + cost(-h, 0.0) - 2.0 * middle) / (h * h);
         let vv = (cost(0.0, h) + cost(0.0, -h) - 2.0 * middle) / (h * h);
         let uv = (cost(h, h) - cost(h, -h) - cost(-h, h) + cost(-h, -h)) / (4.0 * h * h);
-        // The eigenvalues of the bend, which at a border of what is allowed need not be positive.
+        // The eigenvalues of the Hessian, which at a border of what is allowed need not be positive.
         let (half, rest) = (
             (uu + vv) / 2.0,
             (((uu - vv) / 2.0).powi(2) + uv * uv).sqrt(),
         );
         let inverse: f64 = [half + rest, half - rest]
             .into_iter()
-            .map(|bend| 1.0 / bend.max(PARAMETERS.least_curvature))
+            .map(|hessian| 1.0 / hessian.max(PARAMETERS.least_curvature))
             .sum();
         (2.0 * fit.residual / freedom * inverse).sqrt()
     }
 }
 
-fn sum(body: &[f64; WAVES], albedo: f64, gloss: &[f64; WAVES]) -> [f64; WAVES] {
-    std::array::from_fn(|i| albedo * body[i] + gloss[i])
+fn sum(
+    base: &[f64; COEFFICIENTS],
+    albedo: f64,
+    gloss: &[f64; COEFFICIENTS],
+) -> [f64; COEFFICIENTS] {
+    std::array::from_fn(|i| albedo * base[i] + gloss[i])
 }
 
 /// Puts one of less cost in its place, and the last one out.
@@ -266,49 +275,49 @@ fn insert(best: &mut [(f64, [f64; 3]); PARAMETERS.refined], one: (f64, [f64; 3])
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
 }
 
-fn bias(expected: Option<Expected>, normal: [f64; 3]) -> f64 {
-    expected.map_or(0.0, |expected| {
-        expected.weight * (1.0 - dot(expected.normal, normal))
+fn bias(prior: Option<PriorNormal>, normal: [f64; 3]) -> f64 {
+    prior.map_or(0.0, |prior| {
+        prior.weight * (1.0 - dot(prior.normal, normal))
     })
 }
 
 /// The best normals of all pixels: near those of other fits, or anywhere.
 pub(crate) fn search_all(
-    room: &Room,
-    moments: &[Moments],
-    expected: Option<&[Expected]>,
+    model: &ShadingModel,
+    statistics: &[CurveStatistics],
+    prior: Option<&[PriorNormal]>,
     near: Option<&[PixelFit]>,
 ) -> Vec<PixelFit> {
-    let search = Search::new(room);
-    moments
+    let search = Search::new(model);
+    statistics
         .par_iter()
         .enumerate()
-        .map(|(pixel, moments)| {
-            let expected = expected.map(|all| all[pixel]);
-            if moments.is_dark() {
+        .map(|(pixel, statistics)| {
+            let prior = prior.map(|all| all[pixel]);
+            if statistics.is_dark() {
                 return PixelFit {
-                    normal: expected.map_or([0.0, 0.0, 1.0], |expected| expected.normal),
+                    normal: prior.map_or([0.0, 0.0, 1.0], |prior| prior.normal),
                     albedo: [0.0; 3],
                     residual: 1.0,
                 };
             }
             match near {
-                Some(fits) => search.near(moments, expected, fits[pixel].normal),
-                None => search.anywhere(moments, expected),
+                Some(fits) => search.near(statistics, prior, fits[pixel].normal),
+                None => search.anywhere(statistics, prior),
             }
         })
         .collect()
 }
 
 /// What is left of the curves, with what normals are off those that are expected, the mean over the pixels.
-pub(crate) fn cost(fits: &[PixelFit], expected: Option<&[Expected]>) -> f64 {
+pub(crate) fn cost(fits: &[PixelFit], prior: Option<&[PriorNormal]>) -> f64 {
     let sum: f64 = fits
         .iter()
         .enumerate()
         .map(|(pixel, fit)| {
-            let off = expected.map_or(0.0, |all| {
-                let expected = all[pixel];
-                expected.weight * (1.0 - dot(expected.normal, fit.normal))
+            let off = prior.map_or(0.0, |all| {
+                let prior = all[pixel];
+                prior.weight * (1.0 - dot(prior.normal, fit.normal))
             });
             fit.residual.min(1.0) + off
         })

@@ -1,16 +1,16 @@
-//! What is known of a turn's room.
+//! What is known of a turn's environment light.
 
 use crate::fit::unknowns::Unknowns;
 use crate::model::frame::TableFrame;
 use crate::model::harmonics::GLOSS_ORDER;
 use crate::model::known_light::KnownLight;
-use crate::model::material::BodyKind;
-use crate::model::shading::Room;
+use crate::model::material::MaterialKind;
+use crate::model::shading::ShadingModel;
 
-/// Bands of the room's light that gloss is fitted with, of order 0 and up.
+/// Bands of the environment light that gloss is fitted with, of order 0 and up.
 pub(crate) const GLOSS_BANDS: usize = GLOSS_ORDER + 1;
 
-/// What is known of a turn's room.
+/// What is known of a turn's environment light beforehand.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Setting {
     pub(crate) frame: TableFrame,
@@ -20,22 +20,22 @@ pub(crate) struct Setting {
 }
 
 impl Setting {
-    /// What is to be found of the room of such an object. Where nothing is known of the shape but its outline, light and gloss
-    /// together could explain any shape: a diffuse object is taken for one without gloss.
-    pub(crate) fn unknowns(&self, body: BodyKind) -> Unknowns<'_> {
+    /// The unknowns of an object of such a material. Where nothing is known of the shape but its outline, light and gloss
+    /// together could fit any shape: a diffuse object is taken for one without gloss.
+    pub(crate) fn unknowns(&self, material: MaterialKind) -> Unknowns<'_> {
         let bands = if self.has_shape { GLOSS_BANDS } else { 0 };
-        match (body, &self.known) {
-            (BodyKind::Diffuse, Some(known)) => Unknowns::Gloss(known),
-            (BodyKind::Diffuse, None) => Unknowns::Light { bands },
-            (BodyKind::Metal, Some(known)) => Unknowns::Mirror(known),
-            (BodyKind::Metal, None) => Unknowns::Reflection,
+        match (material, &self.known) {
+            (MaterialKind::Diffuse, Some(known)) => Unknowns::Gloss(known),
+            (MaterialKind::Diffuse, None) => Unknowns::Light { bands },
+            (MaterialKind::Metal, Some(known)) => Unknowns::Mirror(known),
+            (MaterialKind::Metal, None) => Unknowns::Reflection,
         }
     }
 
-    /// What is still to be found of a room.
-    pub(crate) fn unknowns_of(&self, room: &Room) -> Unknowns<'_> {
-        match self.unknowns(room.body) {
-            Unknowns::Light { .. } if room.gloss.is_none() => Unknowns::Light { bands: 0 },
+    /// The unknowns of a shading model that was fitted before.
+    pub(crate) fn unknowns_of(&self, model: &ShadingModel) -> Unknowns<'_> {
+        match self.unknowns(model.material) {
+            Unknowns::Light { .. } if model.gloss.is_none() => Unknowns::Light { bands: 0 },
             unknowns => unknowns,
         }
     }

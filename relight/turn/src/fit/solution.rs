@@ -4,13 +4,13 @@ use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{Normals, ShLight, YUp};
 use relight_core::statistics::median;
 
-use crate::fit::figures::{BodyFigure, SenseFigure, StartFigure};
+use crate::fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure};
 use crate::fit::material_choice::doubted;
 use crate::fit::search::PixelFit;
 use crate::model::frame::{Elevation, TableFrame};
 use crate::model::lighting::TableLight;
-use crate::model::material::BodyKind;
-use crate::model::shading::Room;
+use crate::model::material::MaterialKind;
+use crate::model::shading::ShadingModel;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
 
@@ -27,20 +27,20 @@ const PARAMETERS: ConfidenceParameters = ConfidenceParameters { half_error: 0.2 
 pub struct TurnSolution {
     /// One a pixel under the mask.
     pub(crate) fits: Vec<PixelFit>,
-    /// The albedo of each pixel, which is that of its fit where its normal is to be believed.
+    /// The albedo of each pixel, which is that of its fit where its normal is to be trusted.
     pub(crate) albedo: Vec<[f64; 3]>,
     /// The angle that each normal is expected to be off, radians.
     pub(crate) expected_errors: Vec<f64>,
-    pub(crate) room: Room,
+    pub(crate) model: ShadingModel,
     pub(crate) elevation: Elevation,
     /// The light, where it was measured.
     pub(crate) measured: Option<ShLight>,
-    pub(crate) starts: Vec<StartFigure>,
-    pub(crate) bodies: Vec<BodyFigure>,
+    pub(crate) initialisations: Vec<InitialisationFigure>,
+    pub(crate) materials: Vec<MaterialFigure>,
     pub(crate) has_prior: bool,
     pub(crate) is_prior_left_out: bool,
-    pub(crate) sense: Option<SenseFigure>,
-    pub(crate) given_body: Option<BodyKind>,
+    pub(crate) direction: Option<DirectionFigure>,
+    pub(crate) given_material: Option<MaterialKind>,
     pub(crate) conditioning: Conditioning,
 }
 
@@ -52,7 +52,7 @@ impl TurnSolution {
     }
 
     /// The albedo: in the light's units where that was known, else in such units that the mean shading of the
-    /// object over the turn is 1 in each channel. Where a normal is hardly to be believed, it is that of the same colour around.
+    /// object over the turn is 1 in each channel. Where a normal is hardly to be trusted, it is that of the same colour around.
     #[must_use]
     pub fn albedo(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| self.albedo[pixel].map(|v| v as f32)))
@@ -68,12 +68,12 @@ impl TurnSolution {
     #[must_use]
     pub fn shading(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| {
-            let waves = self.room.waves(self.fits[pixel].normal);
-            waves.body.map(|waves| waves[0].max(0.0) as f32)
+            let harmonics = self.model.harmonics(self.fits[pixel].normal);
+            harmonics.base.map(|harmonics| harmonics[0].max(0.0) as f32)
         }))
     }
 
-    /// How far each normal is to be believed, 0 to 1: one half where it is expected to be off by 11.5 degrees.
+    /// How far each normal is to be trusted, 0 to 1: one half where it is expected to be off by 11.5 degrees.
     #[must_use]
     pub fn confidence(&self, curves: &TurnCurves) -> Planes<1> {
         curves.map(|pixel| [confidence(self.expected_errors[pixel]) as f32])
@@ -82,25 +82,25 @@ impl TurnSolution {
     /// The light.
     #[must_use]
     pub const fn light(&self) -> &TableLight {
-        &self.room.light
+        &self.model.light
     }
 
     /// The camera over the table.
     #[must_use]
     pub const fn frame(&self) -> &TableFrame {
-        &self.room.frame
+        &self.model.frame
     }
 
     /// What the object is taken for.
     #[must_use]
-    pub const fn body(&self) -> BodyKind {
-        self.room.body
+    pub const fn material(&self) -> MaterialKind {
+        self.model.material
     }
 
-    /// What each kind of body that was tried leaves of the curves.
+    /// The residual of each material that was tried.
     #[must_use]
-    pub fn bodies(&self) -> &[BodyFigure] {
-        &self.bodies
+    pub fn materials(&self) -> &[MaterialFigure] {
+        &self.materials
     }
 
     /// Whether the light, of the turn and where it was given, is fit for this.
@@ -109,31 +109,31 @@ impl TurnSolution {
         self.conditioning
     }
 
-    /// The other kind, where one was given and the other explains clearly more.
+    /// The other kind, where one was given and the other fits clearly better.
     #[must_use]
-    pub fn doubted_body(&self) -> Option<BodyKind> {
-        self.given_body.and_then(|_| doubted(&self.bodies))
+    pub fn doubted_material(&self) -> Option<MaterialKind> {
+        self.given_material.and_then(|_| doubted(&self.materials))
     }
 
-    /// How well both senses of turning explain the curves; none where that is not told.
+    /// How well both rotation directions fit the curves; none where that is not observable.
     #[must_use]
-    pub const fn sense(&self) -> Option<SenseFigure> {
-        self.sense
+    pub const fn direction(&self) -> Option<DirectionFigure> {
+        self.direction
     }
 
-    /// Whether the normals to start from were left out: a body inflated out of the outline agrees with the turn better.
+    /// Whether the given normals were left out: a shape inflated out of the outline fits the turn better.
     #[must_use]
     pub const fn is_prior_left_out(&self) -> bool {
         self.is_prior_left_out
     }
 
-    /// How each start of an unknown light ended; none where it was known.
+    /// How each initialisation of an unknown light ended; none where it was known.
     #[must_use]
-    pub fn starts(&self) -> &[StartFigure] {
-        &self.starts
+    pub fn initialisations(&self) -> &[InitialisationFigure] {
+        &self.initialisations
     }
 
-    /// The median over the pixels of what is left of a curve, over the energy of its variation.
+    /// The median over the pixels of the residual of a curve, over the energy of its variation.
     #[must_use]
     pub fn residual(&self) -> f64 {
         median(self.fits.iter().map(|fit| fit.residual)).unwrap_or(0.0)

@@ -10,25 +10,25 @@ use crate::fit::blocks::BLOCK_PARAMETERS;
 use crate::fit::confidence::{
     ERROR_PARAMETERS, FittedPixels, OwnError, common_error, own_errors, shared_albedo,
 };
-use crate::fit::curve_statistics::{Moments, all_moments};
-use crate::fit::figures::StartFigure;
+use crate::fit::curve_statistics::{CurveStatistics, all_statistics};
+use crate::fit::figures::InitialisationFigure;
 use crate::fit::inflation::inflated;
-use crate::fit::initialisation::FoundRoom;
-use crate::fit::joint::Joint;
-use crate::fit::normal_step::Expected;
+use crate::fit::initialisation::FittedLight;
+use crate::fit::joint::JointOptimisation;
+use crate::fit::normal_step::PriorNormal;
 use crate::fit::options::TurnOptions;
-use crate::fit::robust::trust;
+use crate::fit::robust::robust_weights;
 use crate::fit::search::{PixelFit, search_all};
 use crate::fit::setting::Setting;
 use crate::fit::solution::TurnSolution;
 use crate::model::directions::unit;
 use crate::model::frame::TableFrame;
 use crate::model::known_light::KnownLight;
-use crate::model::material::BodyKind;
-use crate::model::shading::Room;
+use crate::model::material::MaterialKind;
+use crate::model::shading::ShadingModel;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
-use crate::observe::verdict::RoomVerdict;
+use crate::observe::verdict::LightVerdict;
 
 /// Parameters of the solver.
 struct SolveParameters {
@@ -53,51 +53,52 @@ const PARAMETERS: SolveParameters = SolveParameters {
     spread_deviations: 1.645,
 };
 
-/// Finds the normals, albedo and light that explain the curves of a turn best.
+/// Finds the normals, albedo and light that fit the curves of a turn best.
 ///
 /// With a known light every pixel is solved by itself. With an unknown one, light and normals are found in
-/// turns, from several starts, on blocks of pixels; the start with the least residual is taken. Then
-/// parts of the turn that a pixel's fit does not explain, shadows and highlights, are left out for that pixel,
-/// and it is fitted again.
+/// turns, from several initialisations, on blocks of pixels; the initialisation with the least residual is taken. Then
+/// parts of the turn with a large residual, shadows and highlights, count less for that pixel, and it is fitted again.
 ///
 /// # Errors
-/// Where the prior has another size, or no light explains the curves: [`TurnError::Unfit`] where the exposure is why.
+/// Where the prior has another size, or no light fits the curves: [`TurnError::Unfit`] where the exposure is why.
 pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolution, TurnError> {
     let of_turn = Conditioning::of(curves);
-    let led = Led::find(curves, options).map_err(|error| match (error, of_turn.verdict) {
-        (TurnError::NoLight, verdict @ (RoomVerdict::Overexposed | RoomVerdict::Underexposed)) => {
-            TurnError::Unfit(verdict)
-        }
-        (error, _) => error,
-    })?;
-    let Led {
-        expected,
+    let initialised =
+        Initialised::find(curves, options).map_err(|error| match (error, of_turn.verdict) {
+            (
+                TurnError::NoLight,
+                verdict @ (LightVerdict::Overexposed | LightVerdict::Underexposed),
+            ) => TurnError::Unfit(verdict),
+            (error, _) => error,
+        })?;
+    let Initialised {
+        prior,
         setting,
         found,
         is_prior_left_out,
-    } = led;
+    } = initialised;
     let conditioning = match &setting.known {
-        Some(known) => of_turn.in_given(&setting.unblurred(known, found.room.body)),
+        Some(known) => of_turn.in_given(&setting.unblurred(known, found.model.material)),
         None => of_turn,
     };
-    let sense = if conditioning.verdict.is_fit() {
-        setting.sense(curves, expected.as_deref(), &found)
+    let direction = if conditioning.verdict.is_fit() {
+        setting.direction(curves, prior.as_deref(), &found)
     } else {
         None
     };
     let mut solver = Solver {
         curves,
-        expected,
-        room: found.room,
+        prior,
+        model: found.model,
         setting,
-        moments: all_moments(curves),
+        statistics: all_statistics(curves),
         fits: Vec::new(),
     };
     solver.fits = solver.search(None);
     for _ in 0..PARAMETERS.robust_rounds {
         solver.refine();
     }
-    solver.draw_albedo();
+    solver.shrink_albedo();
     let has_prior = options.prior.is_some() && !is_prior_left_out;
     let common = common_error(options, has_prior, conditioning.verdict.is_fit());
     let own_errors = solver.own_errors();
@@ -109,29 +110,29 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
     Ok(TurnSolution {
         has_prior,
         is_prior_left_out,
-        sense,
-        given_body: options.body,
+        direction,
+        given_material: options.material,
         albedo,
         fits: solver.fits,
         expected_errors,
-        room: solver.room,
+        model: solver.model,
         elevation: options.elevation,
         measured: options.light.clone(),
-        starts: found.starts,
-        bodies: found.bodies,
+        initialisations: found.initialisations,
+        materials: found.materials,
         conditioning,
     })
 }
 
-/// Normals to lean on, and the room on blocks of pixels that goes with them.
-struct Led {
-    expected: Option<Vec<Expected>>,
+/// The prior normals, and the shading model on blocks of pixels that goes with them.
+struct Initialised {
+    prior: Option<Vec<PriorNormal>>,
     setting: Setting,
-    found: FoundRoom,
+    found: FittedLight,
     is_prior_left_out: bool,
 }
 
-impl Led {
+impl Initialised {
     fn find(curves: &TurnCurves, options: &TurnOptions) -> Result<Self, TurnError> {
         let frame = TableFrame::new(options.elevation);
         let known = options.light.as_ref();
@@ -139,10 +140,10 @@ impl Led {
         let prior = options
             .prior
             .as_ref()
-            .map(|prior| expected(curves, prior, options.prior_weight))
+            .map(|prior| prior_of(curves, prior, options.prior_weight))
             .transpose()?;
         let has_shape = prior.is_some();
-        let expected = match &known {
+        let prior = match &known {
             None => Some(prior.unwrap_or_else(|| of_outline(curves, PARAMETERS.outline_weight))),
             Some(_) => prior,
         };
@@ -151,21 +152,26 @@ impl Led {
             known,
             has_shape,
         };
-        let found = setting.find(curves, expected.as_deref(), options.body)?;
-        let led = Self {
-            expected,
+        let found = setting.find(curves, prior.as_deref(), options.material)?;
+        let initialised = Self {
+            prior,
             setting,
             found,
             is_prior_left_out: false,
         };
-        Ok(led.or_outline(curves, options.prior_weight))
+        Ok(initialised.or_outline(curves, options.prior_weight))
     }
 
-    /// Where a matt body explains the turn, light and shape that go with the prior explain it as well as others do: then the
-    /// outline leads if what it expects is nearer to what explains the turn.
+    /// Where a Lambertian material fits the turn, light and shape that go with the prior mean fit it as well as others do. Then
+    /// the shape inflated out of the outline becomes the prior mean, if it is nearer to what fits the turn.
     fn or_outline(mut self, curves: &TurnCurves, weight: f64) -> Self {
-        let is_matt = self.found.room.body == BodyKind::Diffuse && self.found.room.gloss.is_none();
-        if self.setting.known.is_some() || !self.setting.has_shape || !is_matt || weight <= 0.0 {
+        let is_lambertian =
+            self.found.model.material == MaterialKind::Diffuse && self.found.model.gloss.is_none();
+        if self.setting.known.is_some()
+            || !self.setting.has_shape
+            || !is_lambertian
+            || weight <= 0.0
+        {
             return self;
         }
         let setting = Setting {
@@ -173,31 +179,38 @@ impl Led {
             ..self.setting.clone()
         };
         let outline = of_outline(curves, weight);
-        let Ok(found) = setting.find(curves, Some(&outline), Some(BodyKind::Diffuse)) else {
+        let Ok(found) = setting.find(curves, Some(&outline), Some(MaterialKind::Diffuse)) else {
             return self;
         };
         let is_nearer = found.costs[0] < self.found.costs[0];
         let groups = [
-            (&self.found.starts, "", !is_nearer),
-            (&found.starts, " alone", is_nearer),
+            (&self.found.initialisations, "", !is_nearer),
+            (&found.initialisations, " alone", is_nearer),
         ];
-        let starts = groups.into_iter().flat_map(|(starts, ending, counts)| {
-            starts.iter().map(move |start| StartFigure {
-                start: format!("{}{ending}", start.start),
-                residual: start.residual,
-                taken: start.taken && counts,
-            })
-        });
-        let starts = starts.collect();
+        let initialisations = groups
+            .into_iter()
+            .flat_map(|(initialisations, ending, counts)| {
+                initialisations
+                    .iter()
+                    .map(move |start| InitialisationFigure {
+                        name: format!("{}{ending}", start.name),
+                        residual: start.residual,
+                        taken: start.taken && counts,
+                    })
+            });
+        let initialisations = initialisations.collect();
         if is_nearer {
             return Self {
-                expected: Some(outline),
+                prior: Some(outline),
                 setting,
-                found: FoundRoom { starts, ..found },
+                found: FittedLight {
+                    initialisations,
+                    ..found
+                },
                 is_prior_left_out: true,
             };
         }
-        self.found.starts = starts;
+        self.found.initialisations = initialisations;
         self
     }
 }
@@ -205,47 +218,52 @@ impl Led {
 /// All pixels under one light.
 struct Solver<'a> {
     curves: &'a TurnCurves,
-    expected: Option<Vec<Expected>>,
-    room: Room,
+    prior: Option<Vec<PriorNormal>>,
+    model: ShadingModel,
     setting: Setting,
-    moments: Vec<Moments>,
+    statistics: Vec<CurveStatistics>,
     fits: Vec<PixelFit>,
 }
 
 impl Solver<'_> {
     /// The best normals near others, or anywhere.
     fn search(&self, near: Option<&[PixelFit]>) -> Vec<PixelFit> {
-        search_all(&self.room, &self.moments, self.expected.as_deref(), near)
+        search_all(&self.model, &self.statistics, self.prior.as_deref(), near)
     }
 
-    /// Leaves out what does not fit, fits the room again, and then every pixel.
+    /// Weights parts of the turn by their residuals, fits the light again, and then every pixel.
     fn refine(&mut self) {
-        let (curves, room) = (self.curves, &self.room);
-        self.moments = (0..curves.pixels())
+        let (curves, model) = (self.curves, &self.model);
+        self.statistics = (0..curves.pixels())
             .into_par_iter()
             .map(|pixel| {
-                let trust = trust(curves, pixel, &self.fits[pixel], room);
-                Moments::new(curves, pixel, Some(&trust))
+                let robust_weights = robust_weights(curves, pixel, &self.fits[pixel], model);
+                CurveStatistics::new(curves, pixel, Some(&robust_weights))
             })
             .collect();
-        let every = self.moments.len().div_ceil(BLOCK_PARAMETERS.pixels).max(1);
-        let moments: Vec<Moments> = self.moments.iter().step_by(every).copied().collect();
+        let every = self
+            .statistics
+            .len()
+            .div_ceil(BLOCK_PARAMETERS.pixels)
+            .max(1);
+        let statistics: Vec<CurveStatistics> =
+            self.statistics.iter().step_by(every).copied().collect();
         let fits: Vec<PixelFit> = self.fits.iter().step_by(every).copied().collect();
-        let expected = self.expected.as_ref();
-        let expected: Option<Vec<Expected>> =
-            expected.map(|all| all.iter().step_by(every).copied().collect());
-        let joint = Joint {
-            moments: &moments,
-            expected: expected.as_deref(),
-            unknowns: self.setting.unknowns_of(&self.room),
+        let prior = self.prior.as_ref();
+        let prior: Option<Vec<PriorNormal>> =
+            prior.map(|all| all.iter().step_by(every).copied().collect());
+        let joint = JointOptimisation {
+            statistics: &statistics,
+            prior: prior.as_deref(),
+            unknowns: self.setting.unknowns_of(&self.model),
         };
-        let near = search_all(&self.room, &moments, joint.expected, Some(&fits));
-        (self.room, _) = joint.refined(self.room, near, PARAMETERS.robust_steps);
+        let near = search_all(&self.model, &statistics, joint.prior, Some(&fits));
+        (self.model, _) = joint.refined(self.model, near, PARAMETERS.robust_steps);
         self.fits = self.search(Some(&self.fits));
     }
 
-    /// Draws the albedo of pixels that hardly see light, or of whose curve much is left, to the median of all.
-    fn draw_albedo(&mut self) {
+    /// Shrinks the albedo of pixels that hardly see light, or whose residual is large, toward the median of all.
+    fn shrink_albedo(&mut self) {
         let fits = &self.fits;
         let of_channel = |c: usize| fits.iter().map(move |fit| fit.albedo[c]);
         let middle = [0, 1, 2].map(|c| median(of_channel(c)).unwrap_or(0.0));
@@ -255,15 +273,18 @@ impl Solver<'_> {
             quantile(distances, PARAMETERS.spread_quantile).unwrap_or(0.0)
                 / PARAMETERS.spread_deviations
         });
-        let room = &self.room;
+        let model = &self.model;
         self.fits
             .par_iter_mut()
-            .zip(&self.moments)
-            .filter(|(_, moments)| !moments.is_dark())
-            .for_each(|(fit, moments)| {
-                let waves = room.waves(fit.normal);
-                fit.albedo =
-                    moments.drawn_albedo(&waves, (middle, spread), ERROR_PARAMETERS.freedom);
+            .zip(&self.statistics)
+            .filter(|(_, statistics)| !statistics.is_dark())
+            .for_each(|(fit, statistics)| {
+                let harmonics = model.harmonics(fit.normal);
+                fit.albedo = statistics.shrunk_albedo(
+                    &harmonics,
+                    (middle, spread),
+                    ERROR_PARAMETERS.freedom,
+                );
             });
     }
 
@@ -271,9 +292,9 @@ impl Solver<'_> {
     fn own_errors(&self) -> Vec<OwnError> {
         own_errors(FittedPixels {
             curves: self.curves,
-            moments: &self.moments,
-            expected: self.expected.as_deref(),
-            room: &self.room,
+            statistics: &self.statistics,
+            prior: self.prior.as_deref(),
+            model: &self.model,
             fits: &self.fits,
         })
     }
@@ -282,9 +303,9 @@ impl Solver<'_> {
     fn normalise(&mut self) {
         let mut sums = [0.0; 3];
         for fit in &self.fits {
-            let waves = self.room.waves(fit.normal);
-            for (sum, waves) in sums.iter_mut().zip(waves.body) {
-                *sum += waves[0];
+            let harmonics = self.model.harmonics(fit.normal);
+            for (sum, harmonics) in sums.iter_mut().zip(harmonics.base) {
+                *sum += harmonics[0];
             }
         }
         let factors = sums.map(|sum| {
@@ -292,9 +313,9 @@ impl Solver<'_> {
             if mean > 1e-12 { mean } else { 1.0 }
         });
         let parts = factors.map(|factor| 1.0 / factor);
-        self.room.light = self.room.light.times(parts);
-        if self.room.body == BodyKind::Metal {
-            self.room.gloss = self.room.gloss.times(parts);
+        self.model.light = self.model.light.times(parts);
+        if self.model.material == MaterialKind::Metal {
+            self.model.gloss = self.model.gloss.times(parts);
         }
         for fit in &mut self.fits {
             fit.albedo = [0, 1, 2].map(|c| fit.albedo[c] * factors[c]);
@@ -302,18 +323,18 @@ impl Solver<'_> {
     }
 }
 
-/// The normals of the body in the outline, where nothing else is known of the shape.
-fn of_outline(curves: &TurnCurves, weight: f64) -> Vec<Expected> {
-    let normal = |normal| Expected { normal, weight };
+/// The normals of the shape inflated out of the outline, where nothing else is known of the shape.
+fn of_outline(curves: &TurnCurves, weight: f64) -> Vec<PriorNormal> {
+    let normal = |normal| PriorNormal { normal, weight };
     inflated(curves, 1.0).into_iter().map(normal).collect()
 }
 
 /// The prior at each pixel under the mask.
-fn expected(
+fn prior_of(
     curves: &TurnCurves,
     prior: &Normals<YUp>,
     weight: f64,
-) -> Result<Vec<Expected>, TurnError> {
+) -> Result<Vec<PriorNormal>, TurnError> {
     if prior.extent() != curves.extent() {
         return Err(TurnError::PriorSize {
             found: prior.extent(),
@@ -322,7 +343,7 @@ fn expected(
     }
     let whole = prior.completed(&curves.mask());
     let [x, y, z] = whole.planes().planes();
-    let at = |&place: &usize| Expected {
+    let at = |&place: &usize| PriorNormal {
         normal: unit([x, y, z].map(|plane| f64::from(plane[place]))),
         weight,
     };

@@ -1,14 +1,16 @@
-//! What of a room is to be found, and what each unknown does to a curve.
+//! The unknowns of a joint optimisation, and the derivative of a curve to each.
 
 use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
 use crate::model::gloss::{GLOSS_TERMS, GlossLight, gloss_terms};
-use crate::model::harmonics::{WAVES, WaveTerm};
+use crate::model::harmonics::{COEFFICIENTS, HarmonicTerm};
 use crate::model::known_light::KnownLight;
-use crate::model::lighting::{MATT_BANDS, MATT_IN_GLOSS, TERMS, TableLight, wave_terms};
-use crate::model::material::BodyKind;
+use crate::model::lighting::{
+    LAMBERTIAN_BANDS, LAMBERTIAN_IN_GLOSS, TERMS, TableLight, lambertian_terms,
+};
+use crate::model::material::MaterialKind;
 use crate::model::metal::mirror_terms;
-use crate::model::shading::Room;
+use crate::model::shading::ShadingModel;
 
 /// Parameters of the bands' attenuations.
 struct AttenuationParameters {
@@ -27,15 +29,15 @@ const PARAMETERS: AttenuationParameters = AttenuationParameters {
     least_first: 0.05,
 };
 
-/// How much gloss shows of the bands of a light that a matt surface shows too.
-pub(crate) type Shares = [f64; MATT_BANDS];
+/// How much gloss shows of the bands of a light that a Lambertian surface shows too.
+pub(crate) type Attenuations = [f64; LAMBERTIAN_BANDS];
 
-/// What of a room is to be found.
+/// The unknowns of a joint optimisation.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Unknowns<'a> {
     /// How much gloss shows of the bands of a light that is known.
     Gloss(&'a KnownLight),
-    /// Light, and gloss that shows so many bands of it; 0 for a matt object.
+    /// Light, and gloss that shows so many bands of it; 0 for a Lambertian object.
     Light {
         /// Those from the fourth on are free, the others are shares of the light.
         bands: usize,
@@ -46,36 +48,38 @@ pub(crate) enum Unknowns<'a> {
     Reflection,
 }
 
-/// A room by its unknowns.
+/// A shading model by its unknowns.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Guess {
+pub(crate) struct Estimate {
     pub(crate) light: TableLight,
-    pub(crate) shares: Vec<f64>,
-    /// Bands of the gloss that a matt surface does not show, in an unknown light.
+    pub(crate) attenuations: Vec<f64>,
+    /// Bands of the gloss that a Lambertian surface does not show, in an unknown light.
     pub(crate) higher: GlossLight,
 }
 
-impl Guess {
-    pub(crate) fn of(room: &Room, unknowns: Unknowns<'_>) -> Self {
-        let shares = match unknowns {
+impl Estimate {
+    pub(crate) fn of(model: &ShadingModel, unknowns: Unknowns<'_>) -> Self {
+        let attenuations = match unknowns {
             Unknowns::Gloss(known) | Unknowns::Mirror(known) => {
-                let share = |band| room.gloss.share_of(band);
+                let share = |band| model.gloss.attenuation_of(band);
                 unknowns.known_bands(known).iter().map(share).collect()
             }
-            Unknowns::Light { bands } => shares(room)[..bands.min(MATT_BANDS)].to_vec(),
+            Unknowns::Light { bands } => {
+                attenuations(model)[..bands.min(LAMBERTIAN_BANDS)].to_vec()
+            }
             Unknowns::Reflection => Vec::new(),
         };
         let layout = unknowns.layout();
         Self {
-            light: room.light,
-            shares,
-            higher: room.gloss.beyond(layout.first.isqrt()),
+            light: model.light,
+            attenuations,
+            higher: model.gloss.beyond(layout.first.isqrt()),
         }
     }
 
-    pub(crate) fn room(&self, frame: &TableFrame, unknowns: Unknowns<'_>) -> Room {
+    pub(crate) fn model(&self, frame: &TableFrame, unknowns: Unknowns<'_>) -> ShadingModel {
         let mut parts = unknowns.bands(self).unwrap_or_default();
-        let mut factors = self.shares.clone();
+        let mut factors = self.attenuations.clone();
         if unknowns.layout().higher > 0 {
             parts.truncate(factors.len());
             parts.push(self.higher);
@@ -86,11 +90,11 @@ impl Guess {
             Unknowns::Reflection => TableLight::of_mirror(&gloss).unwrap_or(self.light),
             _ => self.light,
         };
-        Room {
+        ShadingModel {
             frame: *frame,
             light,
             gloss,
-            body: unknowns.body(),
+            material: unknowns.material(),
         }
     }
 
@@ -110,52 +114,52 @@ impl Guess {
             }
         }
         let by = &step[layout.of_channel(3)..];
-        let shares = self.shares.iter().zip(by);
-        let mut shares: Vec<f64> = shares
+        let attenuations = self.attenuations.iter().zip(by);
+        let mut attenuations: Vec<f64> = attenuations
             .map(|(share, by)| (share + by).clamp(0.0, PARAMETERS.most_gloss))
             .collect();
-        if let (Unknowns::Mirror(_), Some(&first)) = (unknowns, shares.first()) {
+        if let (Unknowns::Mirror(_), Some(&first)) = (unknowns, attenuations.first()) {
             // Of an even light metal shows its albedo's part, whatever its lobe is.
             let first = first.max(PARAMETERS.least_first);
-            for share in &mut shares {
+            for share in &mut attenuations {
                 *share = (*share / first).min(PARAMETERS.most_metal);
             }
         }
         Self {
             light: TableLight::new(terms),
-            shares,
+            attenuations,
             higher,
         }
     }
 
-    /// The shares of the bands of a light, which a matt surface shows too.
-    pub(crate) fn matt_shares(&self) -> Shares {
-        [0, 1, 2].map(|l| self.shares.get(l).copied().unwrap_or(0.0))
+    /// The shares of the bands of a light, which a Lambertian surface shows too.
+    pub(crate) fn diffuse_attenuations(&self) -> Attenuations {
+        [0, 1, 2].map(|l| self.attenuations.get(l).copied().unwrap_or(0.0))
     }
 }
 
 impl Unknowns<'_> {
     /// What the object is taken for.
-    pub(crate) const fn body(&self) -> BodyKind {
+    pub(crate) const fn material(&self) -> MaterialKind {
         match self {
-            Self::Gloss(_) | Self::Light { .. } => BodyKind::Diffuse,
-            Self::Mirror(_) | Self::Reflection => BodyKind::Metal,
+            Self::Gloss(_) | Self::Light { .. } => MaterialKind::Diffuse,
+            Self::Mirror(_) | Self::Reflection => MaterialKind::Metal,
         }
     }
 
     /// What the object would show of each band of a light if it blurred nothing.
     pub(crate) fn known_bands<'a>(&self, known: &'a KnownLight) -> &'a [GlossLight] {
-        match self.body() {
-            BodyKind::Diffuse => known.bands(),
-            BodyKind::Metal => known.mirror(),
+        match self.material() {
+            MaterialKind::Diffuse => known.bands(),
+            MaterialKind::Metal => known.mirror(),
         }
     }
 
     /// The same of each band of the light that the object has shares of.
-    pub(crate) fn bands(&self, guess: &Guess) -> Option<Vec<GlossLight>> {
+    pub(crate) fn bands(&self, estimate: &Estimate) -> Option<Vec<GlossLight>> {
         match self {
             Self::Gloss(known) | Self::Mirror(known) => Some(self.known_bands(known).to_vec()),
-            Self::Light { .. } => Some(GlossLight::bands(&guess.light.coefficients().ok()?)),
+            Self::Light { .. } => Some(GlossLight::bands(&estimate.light.coefficients().ok()?)),
             Self::Reflection => Some(Vec::new()),
         }
     }
@@ -166,19 +170,19 @@ impl Unknowns<'_> {
                 light: 0,
                 first: TERMS,
                 higher: 0,
-                shares: known.bands().len(),
+                attenuations: known.bands().len(),
             },
             Self::Light { bands } => Layout {
                 light: TERMS,
                 first: TERMS,
                 higher: (bands * bands).clamp(TERMS, GLOSS_TERMS) - TERMS,
-                shares: bands.min(MATT_BANDS),
+                attenuations: bands.min(LAMBERTIAN_BANDS),
             },
             Self::Reflection => Layout {
                 light: 0,
                 first: 0,
                 higher: GLOSS_TERMS,
-                shares: 0,
+                attenuations: 0,
             },
         }
     }
@@ -191,7 +195,7 @@ pub(crate) struct Layout {
     /// The first term of the gloss that is free, and how many are.
     pub(crate) first: usize,
     pub(crate) higher: usize,
-    pub(crate) shares: usize,
+    pub(crate) attenuations: usize,
 }
 
 impl Layout {
@@ -200,53 +204,60 @@ impl Layout {
     }
 
     pub(crate) const fn count(&self) -> usize {
-        self.of_channel(3) + self.shares
+        self.of_channel(3) + self.attenuations
     }
 }
 
 /// What each unknown does to the curve of a pixel.
 pub(crate) struct Columns<'a> {
-    pub(crate) guess: &'a Guess,
+    pub(crate) estimate: &'a Estimate,
     pub(crate) bands: Vec<GlossLight>,
     pub(crate) layout: Layout,
-    pub(crate) room: &'a Room,
+    pub(crate) model: &'a ShadingModel,
 }
 
 impl Columns<'_> {
-    /// The unknowns that act on a channel of a pixel, and its waves for each.
-    pub(crate) fn of(&self, normal: [f64; 3], albedo: [f64; 3]) -> [Vec<(usize, [f64; WAVES])>; 3] {
-        let frame = &self.room.frame;
-        let matt = wave_terms(frame.to_table(normal));
+    /// The unknowns that act on a channel of a pixel, and its harmonics for each.
+    pub(crate) fn of(
+        &self,
+        normal: [f64; 3],
+        albedo: [f64; 3],
+    ) -> [Vec<(usize, [f64; COEFFICIENTS])>; 3] {
+        let frame = &self.model.frame;
+        let diffuse = lambertian_terms(frame.to_table(normal));
         let reflected = frame.to_table(reflected(normal));
         // What gloss shows does not depend on the albedo, and what metal shows is times it.
-        let (gloss, colour) = match self.room.body {
-            BodyKind::Diffuse => (gloss_terms(normal[2], reflected), [1.0; 3]),
-            BodyKind::Metal => (mirror_terms(reflected), albedo),
+        let (gloss, colour) = match self.model.material {
+            MaterialKind::Diffuse => (gloss_terms(normal[2], reflected), [1.0; 3]),
+            MaterialKind::Metal => (mirror_terms(reflected), albedo),
         };
-        let matt_shares = self.guess.matt_shares();
-        let bands: Vec<_> = self.bands[..self.layout.shares]
+        let diffuse_attenuations = self.estimate.diffuse_attenuations();
+        let bands: Vec<_> = self.bands[..self.layout.attenuations]
             .iter()
-            .map(|band| band.waves_of(&gloss))
+            .map(|band| band.harmonics_of(&gloss))
             .collect();
         [0, 1, 2].map(|channel| {
             let first = self.layout.of_channel(channel);
             let mut columns = Vec::with_capacity(self.layout.count());
-            let light = matt.iter().zip(MATT_IN_GLOSS).take(self.layout.light);
+            let light = diffuse
+                .iter()
+                .zip(LAMBERTIAN_IN_GLOSS)
+                .take(self.layout.light);
             for (term, (at, factor)) in light {
-                let share = matt_shares[band(at)] / factor;
-                let mut waves = spread(term, albedo[channel]);
-                add(&mut waves, &spread(&gloss[at], share));
-                columns.push((first + columns.len(), waves));
+                let share = diffuse_attenuations[band(at)] / factor;
+                let mut harmonics = spread(term, albedo[channel]);
+                add(&mut harmonics, &spread(&gloss[at], share));
+                columns.push((first + columns.len(), harmonics));
             }
             for term in &gloss[self.layout.first..][..self.layout.higher] {
                 columns.push((first + columns.len(), spread(term, colour[channel])));
             }
-            let shares = self.layout.of_channel(3);
+            let attenuations = self.layout.of_channel(3);
             let bands = bands.iter().enumerate();
-            columns.extend(bands.map(|(l, waves)| {
+            columns.extend(bands.map(|(l, harmonics)| {
                 (
-                    shares + l,
-                    waves[channel].map(|wave| colour[channel] * wave),
+                    attenuations + l,
+                    harmonics[channel].map(|coefficient| colour[channel] * coefficient),
                 )
             }));
             columns
@@ -260,23 +271,27 @@ pub(crate) const fn band(at: usize) -> usize {
 }
 
 /// How much gloss shows of the first bands of a light that was found.
-pub(crate) fn shares(room: &Room) -> Shares {
-    let Ok(light) = room.light.coefficients() else {
-        return [0.0; MATT_BANDS];
+pub(crate) fn attenuations(model: &ShadingModel) -> Attenuations {
+    let Ok(light) = model.light.coefficients() else {
+        return [0.0; LAMBERTIAN_BANDS];
     };
     let mut bands = GlossLight::bands(&light).into_iter();
-    [0; MATT_BANDS].map(|_| bands.next().map_or(0.0, |band| room.gloss.share_of(&band)))
+    [0; LAMBERTIAN_BANDS].map(|_| {
+        bands
+            .next()
+            .map_or(0.0, |band| model.gloss.attenuation_of(&band))
+    })
 }
 
-/// A term times a factor, among all waves.
-fn spread(term: &WaveTerm, factor: f64) -> [f64; WAVES] {
-    let mut waves = [0.0; WAVES];
-    for (wave, part) in waves[term.wave..].iter_mut().zip(term.parts) {
-        *wave = factor * part;
+/// A term times a factor, among all harmonics.
+fn spread(term: &HarmonicTerm, factor: f64) -> [f64; COEFFICIENTS] {
+    let mut harmonics = [0.0; COEFFICIENTS];
+    for (coefficient, part) in harmonics[term.coefficient..].iter_mut().zip(term.parts) {
+        *coefficient = factor * part;
     }
-    waves
+    harmonics
 }
 
-fn add(waves: &mut [f64; WAVES], others: &[f64; WAVES]) {
-    waves.iter_mut().zip(others).for_each(|(a, b)| *a += b);
+fn add(harmonics: &mut [f64; COEFFICIENTS], others: &[f64; COEFFICIENTS]) {
+    harmonics.iter_mut().zip(others).for_each(|(a, b)| *a += b);
 }

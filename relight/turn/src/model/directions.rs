@@ -32,7 +32,7 @@ pub(crate) fn tangents(normal: [f64; 3]) -> [[f64; 3]; 2] {
     [u, cross(normal, u)]
 }
 
-pub(crate) fn leant(normal: [f64; 3], [u, v]: [[f64; 3]; 2], [a, b]: [f64; 2]) -> [f64; 3] {
+pub(crate) fn tilted(normal: [f64; 3], [u, v]: [[f64; 3]; 2], [a, b]: [f64; 2]) -> [f64; 3] {
     unit([0, 1, 2].map(|i| normal[i] + a * u[i] + b * v[i]))
 }
 

@@ -89,10 +89,10 @@ impl Elevation {
             });
         }
         let elevation = sine.asin();
-        let slope = 1.0 / elevation.cos();
+        let quadratic = 1.0 / elevation.cos();
         Ok(Self {
             degrees: elevation.to_degrees(),
-            uncertainty_deg: (PARAMETERS.rim_uncertainty * sine * slope)
+            uncertainty_deg: (PARAMETERS.rim_uncertainty * sine * quadratic)
                 .to_degrees()
                 .max(0.5),
             source: ElevationSource::Rim,

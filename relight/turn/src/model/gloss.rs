@@ -1,10 +1,10 @@
-//! What a shining surface shows of the room beside its matt part, as it acts on the curve of a pixel.
+//! What a shining surface shows of the environment light beside its diffuse part, as it acts on the curve of a pixel.
 
 use std::sync::LazyLock;
 
 use relight_core::light::{LightError, ShLight};
 
-use crate::model::harmonics::{GLOSS_ORDER, WAVES, WaveTerm};
+use crate::model::harmonics::{COEFFICIENTS, GLOSS_ORDER, HarmonicTerm};
 
 /// Terms of a channel's gloss.
 pub(crate) const GLOSS_TERMS: usize = (GLOSS_ORDER + 1) * (GLOSS_ORDER + 1);
@@ -13,13 +13,13 @@ pub(crate) const GLOSS_TERMS: usize = (GLOSS_ORDER + 1) * (GLOSS_ORDER + 1);
 /// refraction of 1.5.
 const HEAD_ON: f64 = 0.04;
 
-/// The room's light as the object's gloss shows it. A pixel whose normal is n reflects the viewer's direction to
+/// The environment light as the object's gloss shows it. A pixel whose normal is n reflects the viewer's direction to
 /// r = 2 (n·v) n - v; over the table's angle t it shows, in the frame of the table, with q = r_x + i r_y,
 ///
 /// `S(t) = F(n·v) Re Σ_lm s_lm P_lm(r_z) q^m e^(i m t)`.
 ///
 /// F is the reflectance by Schlick's formula, `P_lm` the m-th derivative of Legendre's polynomial l, with the factor that
-/// makes it a spherical harmonic. What the s_lm are of the room's light is a factor for each l: the blur of the lobe.
+/// makes it a spherical harmonic. What the s_lm are of the environment light is a factor for each l: the blur of the lobe.
 /// Of each channel, the terms of band l are Re s_l0, Re s_l1, Im s_l1, Re s_l2 and so on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct GlossLight {
@@ -27,7 +27,7 @@ pub(crate) struct GlossLight {
 }
 
 impl GlossLight {
-    /// That of a matt object.
+    /// That of a Lambertian object.
     pub(crate) const NONE: Self = Self {
         terms: [[0.0; GLOSS_TERMS]; 3],
     };
@@ -112,7 +112,7 @@ impl GlossLight {
     }
 
     /// The factor by which it is nearest to another.
-    pub(crate) fn share_of(&self, other: &Self) -> f64 {
+    pub(crate) fn attenuation_of(&self, other: &Self) -> f64 {
         let dot = |a: &Self, b: &Self| -> f64 {
             let pairs = a.terms.iter().flatten().zip(b.terms.iter().flatten());
             pairs.map(|(a, b)| a * b).sum()
@@ -125,29 +125,32 @@ impl GlossLight {
         }
     }
 
-    /// Whether it is that of a matt object.
+    /// Whether it is that of a Lambertian object.
     pub(crate) fn is_none(&self) -> bool {
         *self == Self::NONE
     }
 
-    /// What a pixel shows of it, as factors of the waves. `facing` is n·v, and `reflected` r in the table's frame.
-    pub(crate) fn waves(&self, facing: f64, reflected: [f64; 3]) -> [[f64; WAVES]; 3] {
+    /// What a pixel shows of it, as factors of the harmonics. `facing` is n·v, and `reflected` r in the table's frame.
+    pub(crate) fn harmonics(&self, facing: f64, reflected: [f64; 3]) -> [[f64; COEFFICIENTS]; 3] {
         if self.is_none() {
-            return [[0.0; WAVES]; 3];
+            return [[0.0; COEFFICIENTS]; 3];
         }
-        self.waves_of(&gloss_terms(facing, reflected))
+        self.harmonics_of(&gloss_terms(facing, reflected))
     }
 
     /// The same for a pixel's terms.
-    pub(crate) fn waves_of(&self, terms: &[WaveTerm; GLOSS_TERMS]) -> [[f64; WAVES]; 3] {
-        let mut waves = [[0.0; WAVES]; 3];
+    pub(crate) fn harmonics_of(
+        &self,
+        terms: &[HarmonicTerm; GLOSS_TERMS],
+    ) -> [[f64; COEFFICIENTS]; 3] {
+        let mut harmonics = [[0.0; COEFFICIENTS]; 3];
         for (at, term) in terms.iter().enumerate() {
-            for (waves, terms) in waves.iter_mut().zip(&self.terms) {
-                waves[term.wave] += terms[at] * term.parts[0];
-                waves[term.wave + 1] += terms[at] * term.parts[1];
+            for (harmonics, terms) in harmonics.iter_mut().zip(&self.terms) {
+                harmonics[term.coefficient] += terms[at] * term.parts[0];
+                harmonics[term.coefficient + 1] += terms[at] * term.parts[1];
             }
         }
-        waves
+        harmonics
     }
 }
 
@@ -166,15 +169,15 @@ pub(crate) fn reflectance(facing: f64) -> f64 {
     HEAD_ON + (1.0 - HEAD_ON) * (1.0 - facing.clamp(0.0, 1.0)).powi(5)
 }
 
-/// What each term of the gloss contributes to the waves of a pixel.
-pub(crate) fn gloss_terms(facing: f64, reflected: [f64; 3]) -> [WaveTerm; GLOSS_TERMS] {
+/// What each term of the gloss contributes to the harmonics of a pixel.
+pub(crate) fn gloss_terms(facing: f64, reflected: [f64; 3]) -> [HarmonicTerm; GLOSS_TERMS] {
     terms_of(reflectance(facing), reflected)
 }
 
-pub(crate) fn terms_of(part: f64, [x, y, z]: [f64; 3]) -> [WaveTerm; GLOSS_TERMS] {
+pub(crate) fn terms_of(part: f64, [x, y, z]: [f64; 3]) -> [HarmonicTerm; GLOSS_TERMS] {
     let legendre = derivatives(z);
-    let mut terms = [WaveTerm {
-        wave: 0,
+    let mut terms = [HarmonicTerm {
+        coefficient: 0,
         parts: [0.0; 2],
     }; GLOSS_TERMS];
     let (mut re, mut im) = (1.0, 0.0);
@@ -185,13 +188,13 @@ pub(crate) fn terms_of(part: f64, [x, y, z]: [f64; 3]) -> [WaveTerm; GLOSS_TERMS
             if m == 0 {
                 terms[l * l].parts = [a, 0.0];
             } else {
-                let wave = 2 * m - 1;
-                terms[l * l + 2 * m - 1] = WaveTerm {
-                    wave,
+                let coefficient = 2 * m - 1;
+                terms[l * l + 2 * m - 1] = HarmonicTerm {
+                    coefficient,
                     parts: [a, b],
                 };
-                terms[l * l + 2 * m] = WaveTerm {
-                    wave,
+                terms[l * l + 2 * m] = HarmonicTerm {
+                    coefficient,
                     parts: [-b, a],
                 };
             }
@@ -252,7 +255,7 @@ mod tests {
                     let sum: f64 = terms[l * l..(l + 1) * (l + 1)]
                         .iter()
                         .map(|term| {
-                            let m = term.wave.div_ceil(2) as f64;
+                            let m = term.coefficient.div_ceil(2) as f64;
                             let (sin, cos) = (m * angle).sin_cos();
                             (term.parts[0] * cos - term.parts[1] * sin).powi(2)
                         })
@@ -267,13 +270,13 @@ mod tests {
     #[test]
     fn a_matt_object_shows_nothing_and_a_glancing_one_all() {
         assert_eq!(
-            GlossLight::NONE.waves(0.5, [0.0, 0.6, 0.8]),
-            [[0.0; WAVES]; 3]
+            GlossLight::NONE.harmonics(0.5, [0.0, 0.6, 0.8]),
+            [[0.0; COEFFICIENTS]; 3]
         );
         let mut terms = [[0.0; GLOSS_TERMS]; 3];
         terms[1][0] = 2.0;
         let gloss = GlossLight::new(terms);
-        assert!((gloss.waves(0.0, [1.0, 0.0, 0.0])[1][0] - 2.0).abs() < 1e-12);
-        assert!((gloss.waves(1.0, [1.0, 0.0, 0.0])[1][0] - 0.08).abs() < 1e-12);
+        assert!((gloss.harmonics(0.0, [1.0, 0.0, 0.0])[1][0] - 2.0).abs() < 1e-12);
+        assert!((gloss.harmonics(1.0, [1.0, 0.0, 0.0])[1][0] - 0.08).abs() < 1e-12);
     }
 }

@@ -10,7 +10,7 @@ use crate::model::metal::MIRROR;
 /// A light that was measured.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct KnownLight {
-    pub(crate) matt: TableLight,
+    pub(crate) diffuse: TableLight,
     bands: Vec<GlossLight>,
     mirror: Vec<GlossLight>,
 }
@@ -20,13 +20,13 @@ impl KnownLight {
         let bands = GlossLight::bands(&light.rotated(&frame.rotation()));
         let mirror = bands.iter().map(|band| band.times([MIRROR; 3]));
         Self {
-            matt: TableLight::from_viewer(light, frame),
+            diffuse: TableLight::from_viewer(light, frame),
             mirror: mirror.collect(),
             bands,
         }
     }
 
-    /// What metal of albedo 1 shows of each of its bands that blurs nothing: as bright as a matt white surface in even light.
+    /// What metal of albedo 1 shows of each of its bands that blurs nothing: as bright as a Lambertian white surface in even light.
     pub(crate) fn mirror(&self) -> &[GlossLight] {
         &self.mirror
     }
@@ -42,8 +42,8 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::model::shading::Room;
-    use crate::{BodyKind, Elevation};
+    use crate::model::shading::ShadingModel;
+    use crate::{Elevation, MaterialKind};
     use relight_core::light::Order;
 
     #[test]
@@ -51,22 +51,22 @@ mod tests {
         let frame = TableFrame::new(Elevation::assumed());
         let known = KnownLight::new(&ShLight::even(Order::TWO, [1.0; 3]), &frame);
         let normal = [0.48, 0.36, 0.8];
-        let room = |body| Room {
+        let model = |material| ShadingModel {
             frame,
-            light: known.matt,
+            light: known.diffuse,
             gloss: GlossLight::sum(known.mirror(), &[1.0; 3]),
-            body,
+            material,
         };
-        for body in [BodyKind::Diffuse, BodyKind::Metal] {
-            let shown = room(body).waves(normal).body[1];
-            assert!((shown[0] - PI).abs() < 1e-6, "{body:?} {shown:?}");
+        for material in [MaterialKind::Diffuse, MaterialKind::Metal] {
+            let shown = model(material).harmonics(normal).base[1];
+            assert!((shown[0] - PI).abs() < 1e-6, "{material:?} {shown:?}");
         }
-        let back = TableLight::of_mirror(&room(BodyKind::Metal).gloss).unwrap();
+        let back = TableLight::of_mirror(&model(MaterialKind::Metal).gloss).unwrap();
         let pairs = back
             .terms()
             .iter()
             .flatten()
-            .zip(known.matt.terms().iter().flatten());
+            .zip(known.diffuse.terms().iter().flatten());
         assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-9));
     }
 }

@@ -1,18 +1,18 @@
 //! Light of order 2 in the table's frame, as it acts on the curve of a pixel.
 
-use crate::model::harmonics::MATT_WAVES;
+use crate::model::harmonics::LAMBERTIAN_COEFFICIENTS;
 use std::f64::consts::PI;
 
 use relight_core::light::{LightError, Order, ShLight};
 
 use crate::model::frame::TableFrame;
-use crate::model::harmonics::{WAVES, WaveTerm};
+use crate::model::harmonics::{COEFFICIENTS, HarmonicTerm};
 
 /// Terms of a channel's light.
 pub(crate) const TERMS: usize = 9;
 
-/// Bands of the light that a matt surface shows.
-pub(crate) const MATT_BANDS: usize = 3;
+/// Bands of the light that a Lambertian surface shows.
+pub(crate) const LAMBERTIAN_BANDS: usize = 3;
 
 /// What each term of [`TableLight`] is of a coefficient of the spherical harmonics: its index and factor.
 /// The factors are those of the cosine lobe, pi, 2 pi / 3 and pi / 4, times those of the polynomials.
@@ -37,9 +37,9 @@ pub(crate) const OF_COEFFICIENTS: [(usize, f64); TERMS] = {
     ]
 };
 
-/// Which term of the gloss shows the same part of the room's light as each term of [`TableLight`], and how many times as
+/// Which term of the gloss shows the same part of the environment light as each term of [`TableLight`], and how many times as
 /// large the latter is: the factor of its cosine lobe and polynomial.
-pub(crate) const MATT_IN_GLOSS: [(usize, f64); TERMS] = {
+pub(crate) const LAMBERTIAN_IN_GLOSS: [(usize, f64); TERMS] = {
     const AT: [usize; TERMS] = [0, 1, 4, 2, 3, 5, 6, 7, 8];
     let mut all = [(0, 0.0); TERMS];
     let mut term = 0;
@@ -50,7 +50,7 @@ pub(crate) const MATT_IN_GLOSS: [(usize, f64); TERMS] = {
     all
 };
 
-/// The irradiance of the room's light on a normal, while the table turns: with the normal (x, y, z) in the
+/// The irradiance of the environment light on a normal, while the table turns: with the normal (x, y, z) in the
 /// table's frame and q = x + i y,
 ///
 /// `E(t) = e + f z + g (3 z² - 1) + Re((a + b z) q e^(i t)) + Re(d q² e^(2 i t))`.
@@ -123,7 +123,7 @@ impl TableLight {
 
     /// The irradiance on a normal in the table's frame, as factors of 1, cos t, -sin t, cos 2t, -sin 2t, and
     /// 0 for the other harmonics.
-    pub(crate) fn waves(&self, normal: [f64; 3]) -> [[f64; WAVES]; 3] {
+    pub(crate) fn harmonics(&self, normal: [f64; 3]) -> [[f64; COEFFICIENTS]; 3] {
         let [x, y, z] = normal;
         let (x2, y2) = (x * x - y * y, 2.0 * x * y);
         let square = 3.0 * z * z - 1.0;
@@ -131,24 +131,24 @@ impl TableLight {
             .each_ref()
             .map(|[e, f, g, ar, ai, br, bi, dr, di]| {
                 let (re, im) = (ar + br * z, ai + bi * z);
-                let mut waves = [0.0; WAVES];
-                waves[..MATT_WAVES].copy_from_slice(&[
+                let mut harmonics = [0.0; COEFFICIENTS];
+                harmonics[..LAMBERTIAN_COEFFICIENTS].copy_from_slice(&[
                     e + f * z + g * square,
                     re * x - im * y,
                     re * y + im * x,
                     dr * x2 - di * y2,
                     dr * y2 + di * x2,
                 ]);
-                waves
+                harmonics
             })
     }
 }
 
-/// What each term of the light contributes to the waves of a normal in the table's frame.
-pub(crate) fn wave_terms([x, y, z]: [f64; 3]) -> [WaveTerm; TERMS] {
+/// What each term of the light contributes to the harmonics of a normal in the table's frame.
+pub(crate) fn lambertian_terms([x, y, z]: [f64; 3]) -> [HarmonicTerm; TERMS] {
     let (x2, y2) = (x * x - y * y, 2.0 * x * y);
-    let term = |wave, a, b| WaveTerm {
-        wave,
+    let term = |coefficient, a, b| HarmonicTerm {
+        coefficient,
         parts: [a, b],
     };
     [
@@ -184,7 +184,7 @@ mod tests {
         let (sin, cos) = 23.0_f64.to_radians().sin_cos();
         let axis = Direction::new(0.0, cos, sin).unwrap();
         let normal = Direction::new(0.3, -0.2, 0.7).unwrap().components();
-        let waves = table.waves(frame.to_table(normal));
+        let harmonics = table.harmonics(frame.to_table(normal));
         for angle in [0.0_f64, 0.4, 1.9, 4.4] {
             let turned = light().rotated(&Rotation::about(axis, -angle));
             let map = Normals::new(Planes::filled(Extent::new(1, 1), normal.map(|v| v as f32)));
@@ -197,8 +197,8 @@ mod tests {
                 (2.0 * angle).cos(),
                 -(2.0 * angle).sin(),
             ];
-            for (shading, waves) in shading.into_iter().zip(waves) {
-                let value: f64 = basis.iter().zip(waves).map(|(a, b)| a * b).sum();
+            for (shading, harmonics) in shading.into_iter().zip(harmonics) {
+                let value: f64 = basis.iter().zip(harmonics).map(|(a, b)| a * b).sum();
                 assert!(
                     (value - f64::from(shading)).abs() < 1e-4,
                     "{value} {shading}"
@@ -229,8 +229,8 @@ mod tests {
         }
     }
 
-    fn part(term: WaveTerm, wave: usize) -> f64 {
-        let at = wave.checked_sub(term.wave);
+    fn part(term: HarmonicTerm, coefficient: usize) -> f64 {
+        let at = coefficient.checked_sub(term.coefficient);
         at.and_then(|at| term.parts.get(at).copied()).unwrap_or(0.0)
     }
 
@@ -238,11 +238,13 @@ mod tests {
     fn waves_are_the_sum_of_their_terms() {
         let table = TableLight::from_viewer(&light(), &TableFrame::new(Elevation::assumed()));
         let normal = [0.48, -0.6, 0.64];
-        let terms = wave_terms(normal);
-        for (channel, waves) in table.waves(normal).iter().enumerate() {
-            for (wave, value) in waves.iter().enumerate() {
+        let terms = lambertian_terms(normal);
+        for (channel, harmonics) in table.harmonics(normal).iter().enumerate() {
+            for (coefficient, value) in harmonics.iter().enumerate() {
                 let parts = table.terms()[channel].iter().zip(terms);
-                let sum: f64 = parts.map(|(light, term)| light * part(term, wave)).sum();
+                let sum: f64 = parts
+                    .map(|(light, term)| light * part(term, coefficient))
+                    .sum();
                 assert!((sum - value).abs() < 1e-12);
             }
         }

@@ -1,17 +1,17 @@
-//! What metal shows of the room.
+//! What metal shows of the environment light.
 
 use relight_core::light::LightError;
 
 use crate::model::gloss::{GLOSS_TERMS, GlossLight, terms_of};
-use crate::model::harmonics::WaveTerm;
+use crate::model::harmonics::HarmonicTerm;
 use crate::model::lighting::{OF_COEFFICIENTS, TableLight};
 
-/// What white metal shows of a light, over the sum of its terms times the light's coefficients: as bright as a matt white surface in
+/// What white metal shows of a light, over the sum of its terms times the light's coefficients: as bright as a Lambertian white surface in
 /// even light, π times it, and the terms are √(4π) times the harmonics.
 pub(crate) const MIRROR: f64 = 0.886_226_925_452_758;
 
 /// The same where all light is reflected.
-pub(crate) fn mirror_terms(reflected: [f64; 3]) -> [WaveTerm; GLOSS_TERMS] {
+pub(crate) fn mirror_terms(reflected: [f64; 3]) -> [HarmonicTerm; GLOSS_TERMS] {
     terms_of(1.0, reflected)
 }
 

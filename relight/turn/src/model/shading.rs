@@ -1,46 +1,46 @@
-//! What a pixel shows of the room.
+//! What a pixel shows of the environment light.
 
 use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
 use crate::model::gloss::GlossLight;
-use crate::model::harmonics::{MATT_WAVES, WAVES};
+use crate::model::harmonics::{COEFFICIENTS, LAMBERTIAN_COEFFICIENTS};
 use crate::model::lighting::TableLight;
-use crate::model::material::BodyKind;
+use crate::model::material::MaterialKind;
 use crate::model::metal::mirror_terms;
 
-/// The light of the room, as a pixel shows it.
+/// The shading model: environment light and material, as a pixel shows them.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Room {
+pub(crate) struct ShadingModel {
     pub(crate) frame: TableFrame,
     pub(crate) light: TableLight,
-    /// What gloss shows of it beside the matt part; of metal, what a white one shows.
+    /// What gloss shows of it beside the diffuse part; of metal, what a white one shows.
     pub(crate) gloss: GlossLight,
-    pub(crate) body: BodyKind,
+    pub(crate) material: MaterialKind,
 }
 
-/// The waves of a body of albedo 1, and those that gloss adds whatever the albedo is, for each channel.
+/// The harmonics of a base layer of albedo 1, and those that gloss adds whatever the albedo is, for each channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PixelWaves {
-    pub(crate) body: [[f64; WAVES]; 3],
-    /// How many waves of the body there are: the others are 0.
+pub(crate) struct PixelHarmonics {
+    pub(crate) base: [[f64; COEFFICIENTS]; 3],
+    /// How many harmonics of the base layer there are: the others are 0.
     pub(crate) count: usize,
-    pub(crate) gloss: [[f64; WAVES]; 3],
+    pub(crate) gloss: [[f64; COEFFICIENTS]; 3],
 }
 
-impl Room {
-    /// The waves of a normal in the viewer's frame.
-    pub(crate) fn waves(&self, normal: [f64; 3]) -> PixelWaves {
+impl ShadingModel {
+    /// The harmonics of a normal in the viewer's frame.
+    pub(crate) fn harmonics(&self, normal: [f64; 3]) -> PixelHarmonics {
         let reflected = self.frame.to_table(reflected(normal));
-        match self.body {
-            BodyKind::Diffuse => PixelWaves {
-                body: self.light.waves(self.frame.to_table(normal)),
-                count: MATT_WAVES,
-                gloss: self.gloss.waves(normal[2], reflected),
+        match self.material {
+            MaterialKind::Diffuse => PixelHarmonics {
+                base: self.light.harmonics(self.frame.to_table(normal)),
+                count: LAMBERTIAN_COEFFICIENTS,
+                gloss: self.gloss.harmonics(normal[2], reflected),
             },
-            BodyKind::Metal => PixelWaves {
-                body: self.gloss.waves_of(&mirror_terms(reflected)),
-                count: WAVES,
-                gloss: [[0.0; WAVES]; 3],
+            MaterialKind::Metal => PixelHarmonics {
+                base: self.gloss.harmonics_of(&mirror_terms(reflected)),
+                count: COEFFICIENTS,
+                gloss: [[0.0; COEFFICIENTS]; 3],
             },
         }
     }

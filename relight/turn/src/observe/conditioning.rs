@@ -1,6 +1,6 @@
-//! Whether the room's light is fit for this.
+//! Whether normals and albedo are observable in the environment light.
 
-use crate::model::harmonics::WAVES;
+use crate::model::harmonics::COEFFICIENTS;
 use rayon::prelude::*;
 use relight_core::light::NormalEquations;
 use relight_core::statistics::median;
@@ -8,10 +8,10 @@ use relit_data::turn_light::LEAST_MODULATION;
 use serde::Serialize;
 
 use crate::model::directions::half_sphere;
-use crate::model::harmonics::MATT_WAVES;
-use crate::model::shading::Room;
+use crate::model::harmonics::LAMBERTIAN_COEFFICIENTS;
+use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
-use crate::observe::verdict::RoomVerdict;
+use crate::observe::verdict::LightVerdict;
 
 /// Parameters of the judgement of a turn.
 struct ConditioningParameters {
@@ -34,7 +34,7 @@ const PARAMETERS: ConditioningParameters = ConditioningParameters {
     normals: 100,
 };
 
-/// How much the light of the turn tells.
+/// How well the light of the turn determines normals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Conditioning {
     /// The median over the pixels of the effective value of the first and second harmonic, over the mean.
@@ -45,37 +45,39 @@ pub struct Conditioning {
     /// viewer.
     pub given_modulation: Option<f64>,
     /// What follows.
-    pub verdict: RoomVerdict,
+    pub verdict: LightVerdict,
 }
 
 impl Conditioning {
     /// That of a turn.
     #[must_use]
     pub fn of(curves: &TurnCurves) -> Self {
-        let pixels: Vec<Told> = (0..curves.pixels())
+        let pixels: Vec<PixelLight> = (0..curves.pixels())
             .into_par_iter()
             .map(|pixel| of_pixel(curves, pixel))
             .collect();
-        let figures = pixels.iter().filter_map(|told| match told {
-            Told::Curve { modulation, beyond } => Some((*modulation, *beyond)),
-            Told::Clipped | Told::Black => None,
+        let figures = pixels.iter().filter_map(|observable| match observable {
+            PixelLight::Curve { modulation, beyond } => Some((*modulation, *beyond)),
+            PixelLight::Clipped | PixelLight::Black => None,
         });
         let modulation = median(figures.clone().map(|(modulation, _)| modulation)).unwrap_or(0.0);
         let beyond = median(figures.clone().map(|(_, beyond)| beyond)).unwrap_or(0.0);
-        let told = figures.count();
-        let clipped = pixels.iter().filter(|told| matches!(told, Told::Clipped));
-        let verdict = if (told as f64) < PARAMETERS.least_observable * pixels.len() as f64 {
-            if 2 * clipped.count() >= pixels.len() - told {
-                RoomVerdict::Overexposed
+        let observable = figures.count();
+        let clipped = pixels
+            .iter()
+            .filter(|observable| matches!(observable, PixelLight::Clipped));
+        let verdict = if (observable as f64) < PARAMETERS.least_observable * pixels.len() as f64 {
+            if 2 * clipped.count() >= pixels.len() - observable {
+                LightVerdict::Overexposed
             } else {
-                RoomVerdict::Underexposed
+                LightVerdict::Underexposed
             }
         } else if modulation < LEAST_MODULATION {
-            RoomVerdict::TooEven
+            LightVerdict::TooEven
         } else if beyond > PARAMETERS.most_beyond {
-            RoomVerdict::NotMatt
+            LightVerdict::NotLambertian
         } else {
-            RoomVerdict::Good
+            LightVerdict::Good
         };
         Self {
             modulation,
@@ -94,13 +96,20 @@ impl Conditioning {
         is_even && self.modulation >= LEAST_MODULATION
     }
 
-    /// The same where the light was given, as an object shows it in this room that blurs nothing: one that is too even tells no more
+    /// The same where the light was given, as an object shows it in this environment that blurs nothing: one that is too even determines no more
     /// than an even turn.
-    pub(crate) fn in_given(self, room: &Room) -> Self {
+    pub(crate) fn in_given(self, model: &ShadingModel) -> Self {
         let modulations = half_sphere(PARAMETERS.normals).map(|normal| {
-            let waves = room.waves(normal).body;
-            let sum = |wave: usize| waves.iter().map(|waves| waves[wave]).sum::<f64>();
-            let harmonics: f64 = (1..WAVES).map(|wave| sum(wave).powi(2)).sum();
+            let harmonics = model.harmonics(normal).base;
+            let sum = |coefficient: usize| {
+                harmonics
+                    .iter()
+                    .map(|harmonics| harmonics[coefficient])
+                    .sum::<f64>()
+            };
+            let harmonics: f64 = (1..COEFFICIENTS)
+                .map(|coefficient| sum(coefficient).powi(2))
+                .sum();
             let mean = sum(0);
             if mean > 0.0 {
                 (harmonics / 2.0).sqrt() / mean
@@ -113,7 +122,7 @@ impl Conditioning {
         Self {
             given_modulation: Some(modulation),
             verdict: if is_even {
-                RoomVerdict::TooEven
+                LightVerdict::TooEven
             } else {
                 self.verdict
             },
@@ -122,8 +131,8 @@ impl Conditioning {
     }
 }
 
-/// What the light of a pixel tells, all channels together.
-enum Told {
+/// What is observable in the light of a pixel, all channels together.
+enum PixelLight {
     /// Modulation, and the part beyond the second harmonic.
     Curve { modulation: f64, beyond: f64 },
     /// Nothing: a channel is clipped over most of the turn.
@@ -132,37 +141,37 @@ enum Told {
     Black,
 }
 
-fn of_pixel(curves: &TurnCurves, pixel: usize) -> Told {
-    let mut equations = NormalEquations::new(MATT_WAVES);
+fn of_pixel(curves: &TurnCurves, pixel: usize) -> PixelLight {
+    let mut equations = NormalEquations::new(LAMBERTIAN_COEFFICIENTS);
     let mut seen = Vec::new();
     let parts = curves.values(pixel).iter().zip(curves.weights(pixel));
-    for ((value, weight), waves) in parts.zip(curves.waves()) {
+    for ((value, weight), harmonics) in parts.zip(curves.harmonics()) {
         if weight.iter().all(|&weight| weight > 0.5) {
             let grey = value.iter().map(|&v| f64::from(v)).sum::<f64>();
-            equations.add(&waves[..MATT_WAVES], [grey, 0.0, 0.0]);
-            seen.push((grey, waves));
+            equations.add(&harmonics[..LAMBERTIAN_COEFFICIENTS], [grey, 0.0, 0.0]);
+            seen.push((grey, harmonics));
         }
     }
     if 2 * seen.len() < curves.parts() {
-        return Told::Clipped;
+        return PixelLight::Clipped;
     }
     let Some(solution) = equations.solve() else {
-        return Told::Clipped;
+        return PixelLight::Clipped;
     };
     let solution: Vec<f64> = solution.into_iter().map(|[value, ..]| value).collect();
     let mean = seen.iter().map(|(grey, _)| grey).sum::<f64>() / seen.len() as f64;
     let (mut all, mut rest) = (0.0, 0.0);
-    for (grey, waves) in seen {
-        let model: f64 = waves.iter().zip(&solution).map(|(a, b)| a * b).sum();
+    for (grey, harmonics) in seen {
+        let model: f64 = harmonics.iter().zip(&solution).map(|(a, b)| a * b).sum();
         all += (grey - mean).powi(2);
         rest += (grey - model).powi(2);
     }
     let harmonics: f64 = solution[1..].iter().map(|value| value * value).sum();
     let constant = solution[0];
     if constant <= PARAMETERS.least_light {
-        return Told::Black;
+        return PixelLight::Black;
     }
-    Told::Curve {
+    PixelLight::Curve {
         modulation: (harmonics / 2.0).sqrt() / constant,
         beyond: if all > 0.0 { rest / all } else { 0.0 },
     }

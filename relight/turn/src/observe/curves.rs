@@ -5,7 +5,7 @@ use relight_core::image::{Extent, Planes, Srgb};
 use relit_data::image_stats::SATURATION_LEVEL;
 
 use crate::error::TurnError;
-use crate::model::harmonics::{HARMONICS, WAVES};
+use crate::model::harmonics::{COEFFICIENTS, HARMONICS};
 use crate::observe::exposure::{ExposureStep, ExposureWatch};
 
 /// Parameters of the curves.
@@ -59,7 +59,7 @@ struct Part {
     frames: u32,
     /// Which frames, in the order in which they came.
     members: Vec<usize>,
-    waves: [f64; WAVES - 1],
+    harmonics: [f64; COEFFICIENTS - 1],
 }
 
 /// Light over the table's angle. The turn is divided into parts; of each part a pixel has the mean of its
@@ -71,7 +71,7 @@ pub struct TurnCurves {
     frames: u32,
     steps: Vec<ExposureStep>,
     /// The mean of 1, cos t, -sin t, cos 2t, -sin 2t and so on over each part's frames.
-    waves: Vec<[f64; WAVES]>,
+    harmonics: Vec<[f64; COEFFICIENTS]>,
     /// The middle of each part, radians.
     angles: Vec<f64>,
     /// Pixel by pixel, in it part by part.
@@ -189,7 +189,7 @@ impl CurveBuilder {
             extent: self.extent,
             frames: self.frames as u32,
             steps,
-            waves: seen.iter().map(|&at| self.parts[at].waves()).collect(),
+            harmonics: seen.iter().map(|&at| self.parts[at].harmonics()).collect(),
             angles: seen
                 .iter()
                 .map(|&at| (at as f64 + 0.5) / PARAMETERS.parts as f64 * std::f64::consts::TAU)
@@ -207,8 +207,8 @@ impl Part {
         self.members.push(frame);
         for harmonic in 1..=HARMONICS {
             let (sin, cos) = (harmonic as f64 * angle).sin_cos();
-            self.waves[2 * harmonic - 2] += cos;
-            self.waves[2 * harmonic - 1] -= sin;
+            self.harmonics[2 * harmonic - 2] += cos;
+            self.harmonics[2 * harmonic - 1] -= sin;
         }
     }
 
@@ -222,12 +222,12 @@ impl Part {
         (most <= least * (1.0 + PARAMETERS.same_exposure)).then_some(most)
     }
 
-    fn waves(&self) -> [f64; WAVES] {
-        let mut waves = [1.0; WAVES];
-        for (wave, sum) in waves[1..].iter_mut().zip(self.waves) {
-            *wave = sum / f64::from(self.frames.max(1));
+    fn harmonics(&self) -> [f64; COEFFICIENTS] {
+        let mut harmonics = [1.0; COEFFICIENTS];
+        for (coefficient, sum) in harmonics[1..].iter_mut().zip(self.harmonics) {
+            *coefficient = sum / f64::from(self.frames.max(1));
         }
-        waves
+        harmonics
     }
 }
 
@@ -259,7 +259,7 @@ impl TurnCurves {
     /// In how many parts of the turn there are frames.
     #[must_use]
     pub fn parts(&self) -> usize {
-        self.waves.len()
+        self.harmonics.len()
     }
 
     /// The part of the light, 0 to 1, that is left out because it is clipped in the same part of the turn.
@@ -298,8 +298,8 @@ impl TurnCurves {
     }
 
     /// The mean of 1, cos t, -sin t, cos 2t, -sin 2t and so on over each part.
-    pub(crate) fn waves(&self) -> &[[f64; WAVES]] {
-        &self.waves
+    pub(crate) fn harmonics(&self) -> &[[f64; COEFFICIENTS]] {
+        &self.harmonics
     }
 
     /// The middle of each part, radians.
@@ -331,10 +331,10 @@ impl TurnCurves {
     }
 
     /// The curves as they are if the table turns the other way as its angle grows.
-    pub(crate) fn with_other_sense(&self) -> Self {
+    pub(crate) fn with_other_direction(&self) -> Self {
         let mut other = self.clone();
-        for waves in &mut other.waves {
-            for sine in waves.iter_mut().skip(2).step_by(2) {
+        for harmonics in &mut other.harmonics {
+            for sine in harmonics.iter_mut().skip(2).step_by(2) {
                 *sine = -*sine;
             }
         }
@@ -366,14 +366,14 @@ impl TurnCurves {
             extent,
             frames: self.frames,
             steps: self.steps.clone(),
-            waves: self.waves.clone(),
+            harmonics: self.harmonics.clone(),
             angles: self.angles.clone(),
             values: Vec::with_capacity(places.len() * self.parts()),
             weights: Vec::with_capacity(places.len() * self.parts()),
             places,
         };
         for &block in &reduced.places {
-            for part in 0..self.waves.len() {
+            for part in 0..self.harmonics.len() {
                 let (value, weight) = self.mean(&members[block], part);
                 reduced.values.push(value);
                 reduced.weights.push(weight);

@@ -75,9 +75,9 @@ impl ExposureWatch {
         let light = |&at: &usize| {
             let channels = planes.map(|plane| plane[at]);
             let sum: f32 = channels.iter().sum();
-            let tells =
+            let is_usable =
                 channels.iter().all(|&value| value < clipped) && sum > PARAMETERS.least_light;
-            tells.then_some(sum)
+            is_usable.then_some(sum)
         };
         self.frames.push(Seen {
             angle_deg: angle_deg.rem_euclid(360.0),
@@ -137,13 +137,13 @@ impl ExposureWatch {
                 .least_step
                 .max(PARAMETERS.outlier_factor * usual * spans[at].powi(2).max(1.0))
         };
-        let is_told =
+        let is_observable =
             |at: usize| spans[at] < PARAMETERS.wide_span || gaps[at] < PARAMETERS.wide_gap_deg;
         let steps: Vec<(usize, f64)> = jumps
             .iter()
             .copied()
             .enumerate()
-            .filter(|&(at, jump)| is_told(at) && jump.abs() > least(at))
+            .filter(|&(at, jump)| is_observable(at) && jump.abs() > least(at))
             .collect();
         let sum: f64 = steps.iter().map(|(_, jump)| jump).sum();
         if steps.is_empty() || sum.abs() > PARAMETERS.closure * steps.len() as f64 {
@@ -170,7 +170,7 @@ impl ExposureWatch {
     }
 }
 
-/// The logarithm of by how much the pixels are brighter, the median; 0 where none tells.
+/// The logarithm of by how much the pixels are brighter, the median; 0 where none is usable.
 fn change(before: &Seen, after: &Seen) -> f64 {
     let pairs = before.light.iter().zip(&after.light);
     let changes = pairs.filter_map(|pair| match pair {

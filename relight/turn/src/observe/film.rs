@@ -1,4 +1,4 @@
-//! What the video of a turn shows beside the object: the room, and a ball that measures its light.
+//! What the video of a turn shows beside the object: the surroundings, and a ball that measures its light.
 
 use relight_core::image::ColourSpace;
 use relight_core::statistics::median;
@@ -14,7 +14,7 @@ use crate::error::TurnError;
 use crate::observe::probe::{Probe, ProbeBuilder};
 use crate::observe::probe_place::ProbePlace;
 use crate::observe::reading::{ReadTurn, TurnOrigin};
-use crate::observe::strip::{RoomStrip, StripBuilder};
+use crate::observe::strip::{PanoramaStrip, StripBuilder};
 
 /// Parameters of the comparison of a video with its shard.
 struct FilmParameters {
@@ -37,7 +37,7 @@ const PARAMETERS: FilmParameters = FilmParameters {
 /// What was seen beside the object.
 #[derive(Debug)]
 pub struct Filmed {
-    pub(crate) strip: Option<RoomStrip>,
+    pub(crate) strip: Option<PanoramaStrip>,
     pub(crate) probe: Option<ProbeBuilder>,
 }
 
@@ -222,9 +222,9 @@ pub(crate) fn light_at(
 }
 
 impl Filmed {
-    /// The room around the table; none where its sides do not show the same room one after the other.
+    /// The surroundings of the table; none where its sides do not show the same surroundings one after the other.
     #[must_use]
-    pub const fn strip(&self) -> Option<&RoomStrip> {
+    pub const fn strip(&self) -> Option<&PanoramaStrip> {
         self.strip.as_ref()
     }
 }
@@ -248,8 +248,8 @@ mod tests {
     fn picture(number: u64) -> Rgb<Srgb> {
         let angle = number as f32 / 12.0 * std::f32::consts::TAU;
         Rgb::new(Planes::from_fn(Extent::new(120, 80), |x, y| {
-            let lean = (x as f32 - 52.0) * angle.cos() + (y as f32 - 40.0) * angle.sin();
-            [0.5 + 0.01 * lean, 0.5, 0.5 - 0.005 * lean]
+            let add_prior = (x as f32 - 52.0) * angle.cos() + (y as f32 - 40.0) * angle.sin();
+            [0.5 + 0.01 * add_prior, 0.5, 0.5 - 0.005 * add_prior]
         }))
     }
 

@@ -26,15 +26,15 @@ const PARAMETERS: PanoramaParameters = PanoramaParameters {
     order: GLOSS_ORDER,
 };
 
-/// The panorama that a chrome ball shows of the room while it turns, in the table's frame at its angle 0.
+/// The panorama that a chrome ball shows of the environment light while it turns, in the table's frame at its angle 0.
 #[derive(Debug)]
-pub(crate) struct Mirrored {
+pub(crate) struct MirrorPanorama {
     frame: TableFrame,
     sums: Vec<[f64; 3]>,
     counts: Vec<f64>,
 }
 
-impl Mirrored {
+impl MirrorPanorama {
     pub(crate) fn new(frame: TableFrame) -> Self {
         Self {
             frame,
@@ -52,7 +52,7 @@ impl Mirrored {
         self.counts[cell] += 1.0;
     }
 
-    /// What the same direction of the room showed in the mean; none where it was never added.
+    /// What the same direction showed in the mean; none where it was never added.
     pub(crate) fn seen(&self, angle: f64, normal: [f64; 3]) -> Option<[f64; 3]> {
         let cell = self.cell(angle, normal);
         mean(&self.sums[cell..=cell], &self.counts[cell..=cell])

@@ -1,4 +1,6 @@
-//! A ball on the table, matt grey or chrome, which measures the light.
+//! A ball on the table, diffuse grey or chrome, which measures the light.
+
+use std::fmt;
 
 use crate::setting_error::SettingError;
 use relight_core::image::{Extent, Planes, Rgb, Srgb};
@@ -7,7 +9,7 @@ use relight_core::light::{Normals, YUp};
 use crate::error::TurnError;
 use crate::model::frame::{Elevation, TableFrame};
 use crate::observe::curves::CurveBuilder;
-use crate::observe::mirror_panorama::Mirrored;
+use crate::observe::mirror_panorama::MirrorPanorama;
 use crate::observe::probe_place::ProbePlace;
 use crate::observe::surroundings::Surroundings;
 
@@ -28,7 +30,7 @@ const PARAMETERS: ProbeParameters = ProbeParameters {
 /// What a ball is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProbeBall {
-    /// Matt grey.
+    /// Diffuse grey.
     Grey,
     /// It mirrors.
     Chrome,
@@ -51,7 +53,7 @@ pub struct ProbeBuilder {
     pub(crate) probe: Probe,
     pub(crate) normals: Normals<YUp>,
     pub(crate) builder: CurveBuilder,
-    pub(crate) mirrored: Mirrored,
+    pub(crate) panorama: MirrorPanorama,
     /// From the first frame on.
     pub(crate) surroundings: Option<Surroundings>,
 }
@@ -72,7 +74,7 @@ impl ProbeBuilder {
             probe,
             normals: Normals::sphere(PARAMETERS.side).masked(&mask)?,
             builder: CurveBuilder::new(extent, mask.plane(0))?,
-            mirrored: Mirrored::new(TableFrame::new(probe.elevation)),
+            panorama: MirrorPanorama::new(TableFrame::new(probe.elevation)),
             surroundings: None,
         })
     }
@@ -99,12 +101,12 @@ impl ProbeBuilder {
         let ball = Planes::from_fn(Extent::new(PARAMETERS.side, PARAMETERS.side), |x, y| {
             light_at(place, planes, x, y)
         });
-        self.add_mirrored(angle_deg, &ball);
+        self.add_to_panorama(angle_deg, &ball);
         self.builder.push(angle_deg, ball.extent(), ball.planes())
     }
 
     /// Adds what the ball shows were it a mirror.
-    fn add_mirrored(&mut self, angle_deg: f64, ball: &Planes<3>) {
+    fn add_to_panorama(&mut self, angle_deg: f64, ball: &Planes<3>) {
         if !angle_deg.is_finite() {
             return;
         }
@@ -112,7 +114,7 @@ impl ProbeBuilder {
         for at in (0..z.len()).filter(|&at| z[at] > 0.0) {
             let normal = [x[at], y[at], z[at]].map(f64::from);
             let value = ball.planes().map(|plane| f64::from(plane[at]));
-            self.mirrored.add(angle_deg.to_radians(), normal, value);
+            self.panorama.add(angle_deg.to_radians(), normal, value);
         }
     }
 }
@@ -122,4 +124,13 @@ fn light_at(place: ProbePlace, planes: &Planes<3>, x: usize, y: usize) -> [f32; 
     let from = |at: usize| (2 * at + 1) as f64 / PARAMETERS.side as f64 - 1.0;
     let pixel = 2.0 * place.radius / PARAMETERS.side as f64;
     place.mean_light(planes, place.in_picture([from(x), -from(y)]), pixel)
+}
+
+impl fmt::Display for ProbeBall {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Grey => "grey",
+            Self::Chrome => "chrome",
+        })
+    }
 }

@@ -28,7 +28,7 @@ const PARAMETERS: ReadingParameters = ReadingParameters { batch: 12 };
 /// Which way the table turns as its angle grows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum TableSense {
+pub enum RotationDirection {
     /// Counter-clockwise, seen from above: the background moves to the right.
     #[default]
     CounterClockwise,
@@ -62,7 +62,7 @@ pub struct ReadTurn {
     pub origin: Option<TurnOrigin>,
     /// 1 on the object, else 0.
     pub mask: Planes<1>,
-    /// Whether frames told their angles; else they are taken for evenly spread over one turn.
+    /// Whether frames have their angles; else they are taken for evenly spread over one turn.
     pub has_angles: bool,
     /// What is wrong with frames that are left out.
     pub damage: Vec<String>,
@@ -72,10 +72,10 @@ pub struct ReadTurn {
 /// frames are done, and how many there are.
 ///
 /// # Errors
-/// Where it cannot be opened, holds several turns, or tells too little.
+/// Where it cannot be opened, holds several turns, or shows too little.
 pub fn read_curves(
     path: &Path,
-    sense: TableSense,
+    direction: RotationDirection,
     progress: &dyn Fn(u64, u64),
 ) -> Result<ReadTurn, TurnError> {
     let turns = Arc::new(Turns::open(path, Encoding::Linear)?);
@@ -101,7 +101,7 @@ pub fn read_curves(
     };
     let mut reader = Reader {
         frames,
-        sense,
+        direction,
         builder: None,
         first: Vec::new(),
         first_angles: Vec::new(),
@@ -114,24 +114,24 @@ pub fn read_curves(
     };
     let mut stream = Stream::start(&turns, streaming)?;
     let mut done = 0;
-    while let Some(drawn) = stream.next() {
-        let drawn = drawn.unwrap_or_else(|damaged| {
+    while let Some(shrunk) = stream.next() {
+        let shrunk = shrunk.unwrap_or_else(|damaged| {
             reader
                 .damage
                 .extend(damaged.damage.iter().map(|one| with_causes(one)));
             damaged.rest
         });
-        reader.take(&drawn.batch)?;
+        reader.take(&shrunk.batch)?;
         done += u64::from(PARAMETERS.batch);
         progress(done.min(frames.into()), frames.into());
-        stream.give_back(drawn.batch);
+        stream.give_back(shrunk.batch);
     }
     reader.finish((*name).to_owned())
 }
 
 struct Reader {
     frames: u32,
-    sense: TableSense,
+    direction: RotationDirection,
     builder: Option<CurveBuilder>,
     first: Vec<Rgb<Linear>>,
     first_angles: Vec<f64>,
@@ -186,20 +186,21 @@ impl Reader {
 
     /// The angle of a frame in degrees; `None` if others have one and it has none, or the other way around.
     fn angle(&mut self, frame: &TurnFrame) -> Option<f64> {
-        let told = frame.record.as_ref().and_then(|record| record.angle_deg);
-        if *self.has_angles.get_or_insert(told.is_some()) != told.is_some() {
+        let recorded = frame.record.as_ref().and_then(|record| record.angle_deg);
+        if *self.has_angles.get_or_insert(recorded.is_some()) != recorded.is_some() {
             let key = &frame.key;
-            self.damage.push(match told {
+            self.damage.push(match recorded {
                 Some(_) => format!("{key} has an angle and others have none: it is left out"),
                 None => format!("{key} has no angle and others do: it is left out"),
             });
             return None;
         }
         self.last_index = self.last_index.max(index(frame));
-        let degrees = told.unwrap_or_else(|| 360.0 * index(frame) / f64::from(self.frames.max(1)));
-        Some(match self.sense {
-            TableSense::CounterClockwise => degrees,
-            TableSense::Clockwise => -degrees,
+        let degrees =
+            recorded.unwrap_or_else(|| 360.0 * index(frame) / f64::from(self.frames.max(1)));
+        Some(match self.direction {
+            RotationDirection::CounterClockwise => degrees,
+            RotationDirection::Clockwise => -degrees,
         })
     }
 

@@ -1,7 +1,7 @@
-//! A strip of the room's panorama, out of the background of a turn's video.
+//! A strip of a panorama of the surroundings, out of the background of a turn's video.
 //!
-//! Camera and object turn together, so that the camera looks all around the room. Two columns of the picture, near its
-//! sides, see the same room one after the other: by how much later the second does follows the angle between them, and which of them
+//! Camera and object turn together, so that the camera looks all around. Two columns of the picture, near its
+//! sides, see the same surroundings one after the other: by how much later the second does follows the angle between them, and which of them
 //! is first says which way the table turns.
 
 use relight_core::image::ColourSpace;
@@ -12,7 +12,7 @@ use relight_core::image::{Depth, Extent, Linear, Planes, Rgb, Srgb};
 use serde::Serialize;
 
 use crate::error::TurnError;
-use crate::observe::reading::TableSense;
+use crate::observe::reading::RotationDirection;
 
 /// Parameters of the strip.
 struct StripParameters {
@@ -67,18 +67,19 @@ struct Side {
     frames: Vec<u32>,
 }
 
-/// The room around the table.
+/// The surroundings of the table.
 #[derive(Debug, Clone)]
-pub struct RoomStrip {
+pub struct PanoramaStrip {
     image: Rgb<Linear>,
     figures: StripFigures,
 }
 
-/// What the strip tells.
+/// The figures of the strip.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StripFigures {
     /// Which way the table turns as its angle grows.
-    pub sense: TableSense,
+    #[serde(rename = "sense")]
+    pub direction: RotationDirection,
     /// The angle between the two columns, degrees.
     pub field_deg: f64,
     /// How alike the two columns' views are, the one turned by that angle: 0 to 1.
@@ -136,9 +137,9 @@ impl StripBuilder {
         Ok(())
     }
 
-    /// The strip; none where the two columns do not show the same room, or frames are missing.
+    /// The strip; none where the two columns do not show the same surroundings, or frames are missing.
     #[must_use]
-    pub fn finish(self) -> Option<RoomStrip> {
+    pub fn finish(self) -> Option<PanoramaStrip> {
         let rows = self.rows;
         let [left, right] = &self.sides;
         let (left, right) = (left.filled(rows)?, right.filled(rows)?);
@@ -146,10 +147,10 @@ impl StripBuilder {
         if correlation < PARAMETERS.least_correlation {
             return None;
         }
-        let sense = if lag > 0 {
-            TableSense::CounterClockwise
+        let direction = if lag > 0 {
+            RotationDirection::CounterClockwise
         } else {
-            TableSense::Clockwise
+            RotationDirection::Clockwise
         };
         let lag = lag * PARAMETERS.coarse_columns as isize;
         let field_deg = lag.unsigned_abs() as f64 * 360.0 / PARAMETERS.columns as f64;
@@ -162,7 +163,7 @@ impl StripBuilder {
             let late = right[around(angle, lag - lag / 2) * rows + row];
             [0, 1, 2].map(|c| (early[c] + late[c]) / 2.0)
         };
-        let (bright_azimuth_deg, bright_part) = first_harmonic(sense, |angle| {
+        let (bright_azimuth_deg, bright_part) = first_harmonic(direction, |angle| {
             let sum: f32 = (0..rows).flat_map(|row| seen(angle, row)).sum();
             f64::from(sum) / (3 * rows) as f64
         });
@@ -181,10 +182,10 @@ impl StripBuilder {
             PARAMETERS.columns,
             (height.round() as usize).max(1),
         ));
-        Some(RoomStrip {
+        Some(PanoramaStrip {
             image: Rgb::new(image),
             figures: StripFigures {
-                sense,
+                direction,
                 field_deg,
                 correlation,
                 bright_azimuth_deg,
@@ -232,14 +233,14 @@ impl Side {
     }
 }
 
-impl RoomStrip {
-    /// What it tells.
+impl PanoramaStrip {
+    /// Its figures.
     #[must_use]
     pub const fn figures(&self) -> &StripFigures {
         &self.figures
     }
 
-    /// The strip itself: what is to the right in the room is to the right in it, and what the camera sees at the table's angle 0
+    /// The strip itself: what is to the right in the surroundings is to the right in it, and what the camera sees at the table's angle 0
     /// is in its middle.
     #[must_use]
     pub const fn image(&self) -> &Rgb<Linear> {
@@ -304,15 +305,15 @@ fn best_lag(first: &[Vec<f64>], second: &[Vec<f64>]) -> Option<(isize, f64)> {
 }
 
 /// Azimuth and relative size of the first harmonic of what the camera sees over the table's angle.
-fn first_harmonic(sense: TableSense, light: impl Fn(usize) -> f64) -> (f64, f64) {
+fn first_harmonic(direction: RotationDirection, light: impl Fn(usize) -> f64) -> (f64, f64) {
     let (mut re, mut im, mut sum) = (0.0, 0.0, 0.0);
     for at in 0..PARAMETERS.columns {
         let turned = (at as f64 + 0.5) / PARAMETERS.columns as f64 * std::f64::consts::TAU;
         // The camera looks along y, 90 degrees from x, and turns with the table.
         let azimuth = std::f64::consts::FRAC_PI_2
-            + match sense {
-                TableSense::CounterClockwise => turned,
-                TableSense::Clockwise => -turned,
+            + match direction {
+                RotationDirection::CounterClockwise => turned,
+                RotationDirection::Clockwise => -turned,
             };
         let light = light(at);
         re += light * azimuth.cos();
@@ -331,8 +332,8 @@ fn first_harmonic(sense: TableSense, light: impl Fn(usize) -> f64) -> (f64, f64)
 mod tests {
     use super::*;
 
-    /// The grey of a room at an azimuth, radians: a lamp, a dark door, and a wall.
-    fn room(azimuth: f64) -> f32 {
+    /// The grey of an environment at an azimuth, radians: a lamp, a dark door, and a wall.
+    fn environment(azimuth: f64) -> f32 {
         let spot = |at: f64, size: f64| {
             let apart = (azimuth - at).sin().hypot((azimuth - at).cos() - 1.0);
             (-(apart / size).powi(2)).exp()
@@ -347,28 +348,30 @@ mod tests {
             // To the right is clockwise.
             let aside = (x as f64 + 0.5) / 100.0 - 0.5;
             let azimuth = 90.0 + angle_deg - aside * field_deg;
-            [Srgb::from_linear(room(azimuth.to_radians())); 3]
+            [Srgb::from_linear(environment(azimuth.to_radians())); 3]
         }))
     }
 
-    fn strip(sense: f64) -> RoomStrip {
+    fn strip(direction: f64) -> PanoramaStrip {
         let mut builder = StripBuilder::new(Extent::new(100, 20)).unwrap();
         for k in 0..360 {
             let angle = f64::from(k);
-            builder.push(angle, &frame(sense * angle, 40.0)).unwrap();
+            builder
+                .push(angle, &frame(direction * angle, 40.0))
+                .unwrap();
         }
         builder.finish().unwrap()
     }
 
     #[test]
     fn the_field_the_sense_and_the_bright_side_of_a_room_are_found() {
-        for (sense, expected) in [
-            (1.0, TableSense::CounterClockwise),
-            (-1.0, TableSense::Clockwise),
+        for (direction, expected) in [
+            (1.0, RotationDirection::CounterClockwise),
+            (-1.0, RotationDirection::Clockwise),
         ] {
-            let strip = strip(sense);
+            let strip = strip(direction);
             let figures = strip.figures();
-            assert_eq!(figures.sense, expected);
+            assert_eq!(figures.direction, expected);
             // The columns are 94 of 100 pixels apart.
             assert!((figures.field_deg - 37.6).abs() < 1.5, "{figures:?}");
             assert!(figures.correlation > 0.95, "{figures:?}");

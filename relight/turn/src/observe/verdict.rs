@@ -5,24 +5,25 @@ use serde::Serialize;
 /// Whether normals and albedo are to be expected from the turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum RoomVerdict {
+pub enum LightVerdict {
     /// The light has a bright side.
     Good,
     /// The light is nearly the same from everywhere.
     TooEven,
     /// Most of what varies is shadows or highlights.
-    NotMatt,
+    #[serde(rename = "not_matt")]
+    NotLambertian,
     /// Nearly all of the object is clipped over half of the turn or more.
     Overexposed,
     /// Nearly all of the object is black.
     Underexposed,
 }
 
-impl RoomVerdict {
-    /// Whether the turn tells normals and albedo at all.
+impl LightVerdict {
+    /// Whether normals and albedo are observable at all.
     #[must_use]
     pub const fn is_fit(self) -> bool {
-        matches!(self, Self::Good | Self::NotMatt)
+        matches!(self, Self::Good | Self::NotLambertian)
     }
 
     /// What to do about it, in one sentence; none where all is well.
@@ -31,9 +32,9 @@ impl RoomVerdict {
         match self {
             Self::Good => None,
             Self::TooEven => Some(
-                "the room is too even for normals and albedo: turn on one lamp at the side, and capture the turn again",
+                "the environment light is too even for normals and albedo: turn on one lamp at the side, and capture the turn again",
             ),
-            Self::NotMatt => Some(
+            Self::NotLambertian => Some(
                 "most of what varies over the turn is shadows or highlights, which the normals do not explain: \
                  do not trust them where the confidence is low",
             ),

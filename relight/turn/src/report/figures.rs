@@ -6,13 +6,13 @@ use serde::Serialize;
 use crate::error::TurnError;
 use crate::fit::solution::TurnSolution;
 
-use crate::fit::figures::{BodyFigure, SenseFigure, StartFigure};
+use crate::fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure};
 use crate::model::frame::Elevation;
 use crate::model::lighting::{TERMS, TableLight};
-use crate::model::material::BodyKind;
+use crate::model::material::MaterialKind;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::exposure::ExposureStep;
-use crate::observe::strip::{RoomStrip, StripFigures};
+use crate::observe::strip::{PanoramaStrip, StripFigures};
 use crate::report::maps::AngleFigure;
 
 /// The figures of a turn, as `turn.json` holds them.
@@ -31,32 +31,36 @@ pub struct TurnFigures {
     pub(crate) conditioning: Conditioning,
     pub(crate) advice: Option<&'static str>,
     pub(crate) normals: Option<String>,
-    /// Whether these normals were left out: a body inflated out of the outline agrees with the turn better.
+    /// Whether these normals were left out: a shape inflated out of the outline fits the turn better.
     pub(crate) normals_left_out: bool,
     pub(crate) light: FigureLight,
-    /// What the object is taken for, and what each kind that was tried leaves.
-    pub(crate) body: BodyKind,
-    pub(crate) bodies: Vec<BodyFigure>,
-    /// How well both senses of turning explain the turn; none where that is not told.
-    pub(crate) sense: Option<SenseFigure>,
-    /// What is left of a curve, over the energy of its variation, the median.
+    /// What the object is taken for, and the residual of each kind that was tried.
+    #[serde(rename = "body")]
+    pub(crate) material: MaterialKind,
+    #[serde(rename = "bodies")]
+    pub(crate) materials: Vec<MaterialFigure>,
+    /// How well both rotation directions fit the turn; none where that is not observable.
+    #[serde(rename = "sense")]
+    pub(crate) direction: Option<DirectionFigure>,
+    /// The residual of a curve, over the energy of its variation, the median.
     pub(crate) residual: f64,
     /// The angle that normals are expected to be off, degrees, the median.
     pub(crate) expected_error_deg: f64,
-    /// Specular reflectance and smoothness of the whole object, as `relight render` takes them; none for a matt one.
+    /// Specular reflectance and smoothness of the whole object, as `relight render` takes them; none for a Lambertian one.
     pub(crate) gloss: Option<FigureGloss>,
     /// Which ambiguity nothing broke.
     pub(crate) ambiguity: Option<&'static str>,
     pub(crate) exposure_steps: Vec<ExposureStep>,
-    /// What the room's strip says; none where the video was not read, or its sides do not show the same room.
-    pub(crate) room: Option<FigureRoom>,
+    /// What the panorama strip says; none where the video was not read, or its sides do not show the same environment.
+    #[serde(rename = "room")]
+    pub(crate) panorama: Option<FigurePanorama>,
     pub(crate) white: FigureWhites,
     pub(crate) over_angle: Vec<AngleFigure>,
 }
 
-/// The room by the background of the video, beside the light that was found.
+/// The surroundings by the background of the video, beside the light that was fitted.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(crate) struct FigureRoom {
+pub(crate) struct FigurePanorama {
     #[serde(flatten)]
     strip: StripFigures,
     /// The light's bright side, as that of the strip.
@@ -65,8 +69,8 @@ pub(crate) struct FigureRoom {
     apart_deg: f64,
 }
 
-impl FigureRoom {
-    pub(crate) fn new(strip: &RoomStrip, light: &TableLight) -> Self {
+impl FigurePanorama {
+    pub(crate) fn new(strip: &PanoramaStrip, light: &TableLight) -> Self {
         let strip = *strip.figures();
         let light_azimuth_deg = light.bright_azimuth_deg();
         let apart = (strip.bright_azimuth_deg - light_azimuth_deg).rem_euclid(360.0);
@@ -82,14 +86,15 @@ impl FigureRoom {
 pub(crate) struct FigureGloss {
     pub(crate) reflectance: f32,
     pub(crate) smoothness: f32,
-    /// What no such gloss explains of the one that was found, as a part of it, effective value.
+    /// What no such gloss fits of the one that was found, as a part of it, effective value.
     pub(crate) residual: f64,
 }
 
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct FigureLight {
     pub(crate) source: Option<String>,
-    pub(crate) starts: Vec<StartFigure>,
+    #[serde(rename = "starts")]
+    pub(crate) initialisations: Vec<InitialisationFigure>,
 }
 
 /// The light that the largest value of a file stands for.

@@ -10,10 +10,10 @@ use relight_photo::files::{bright, write_light};
 use crate::error::TurnError;
 use crate::fit::solution::TurnSolution;
 use crate::observe::reading::ReadTurn;
-use crate::observe::strip::RoomStrip;
+use crate::observe::strip::PanoramaStrip;
 use crate::report::encoding::{grey, write_json};
 use crate::report::figures::{
-    FigureGloss, FigureLight, FigureRoom, FigureWhites, LightFile, TurnFigures,
+    FigureGloss, FigureLight, FigurePanorama, FigureWhites, LightFile, TurnFigures,
 };
 use crate::report::maps::TurnMaps;
 use crate::report::movie::write_movie;
@@ -23,7 +23,7 @@ use crate::report::sheet::contact_sheet;
 const FIGURES: &str = "turn.json";
 
 /// The object as a file that can be lit.
-const ASSET: &str = "object.relit";
+pub(crate) const ASSET: &str = "object.relit";
 
 /// What is written beside it.
 const FILES: [&str; 13] = [
@@ -57,14 +57,14 @@ pub struct TurnFiles<'a> {
     pub turn: &'a ReadTurn,
     /// What was found.
     pub solution: &'a TurnSolution,
-    /// What it leaves over.
+    /// Its residuals.
     pub maps: &'a TurnMaps,
     /// Where the light is from: a file's name, or none where it was found.
     pub light_source: Option<&'a str>,
-    /// Where the normals to start from are from.
+    /// Where the normals that initialise are from.
     pub normals_source: Option<&'a str>,
-    /// The room, where the video was read.
-    pub strip: Option<&'a RoomStrip>,
+    /// The panorama strip, where the video was read.
+    pub strip: Option<&'a PanoramaStrip>,
     /// The object, where it is to be among the files, as `object.relit`.
     pub asset: Option<&'a Asset>,
     /// Whether to write the video.
@@ -162,11 +162,11 @@ impl TurnFiles<'_> {
             normals_left_out: solution.is_prior_left_out(),
             light: FigureLight {
                 source: self.light_source.map(str::to_owned),
-                starts: solution.starts().to_vec(),
+                initialisations: solution.initialisations().to_vec(),
             },
-            body: solution.body(),
-            bodies: solution.bodies().to_vec(),
-            sense: solution.sense(),
+            material: solution.material(),
+            materials: solution.materials().to_vec(),
+            direction: solution.direction(),
             residual: solution.residual(),
             expected_error_deg: solution.expected_error_deg(),
             gloss,
@@ -175,9 +175,9 @@ impl TurnFiles<'_> {
                  but how steep it is as a whole is open",
             ),
             exposure_steps: turn.curves.exposure_steps().to_vec(),
-            room: self
+            panorama: self
                 .strip
-                .map(|strip| FigureRoom::new(strip, solution.light())),
+                .map(|strip| FigurePanorama::new(strip, solution.light())),
             white,
             over_angle: self.maps.over_angle.clone(),
         })

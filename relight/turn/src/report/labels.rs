@@ -11,7 +11,7 @@ use crate::error::TurnError;
 use crate::fit::residuals::lit;
 use crate::fit::solution::TurnSolution;
 use crate::model::harmonics::basis_at;
-use crate::model::material::BodyKind;
+use crate::model::material::MaterialKind;
 use crate::observe::reading::ReadTurn;
 use crate::report::encoding::write_json;
 
@@ -27,7 +27,7 @@ const RESULTS: ResultFolder = ResultFolder {
 /// What it says it is.
 const SCHEMA: &str = "relight.labels/1";
 
-/// The first frames of a turn with what was found as their truth, where it is to be believed.
+/// The first frames of a turn with what was found as their truth, where it is to be trusted.
 #[derive(Debug, Clone, Copy)]
 pub struct TurnLabels<'a> {
     /// What was read.
@@ -43,7 +43,7 @@ struct About<'a> {
     schema: &'static str,
     turn: &'a str,
     least_confidence: f32,
-    /// The part of the object that is believed.
+    /// The part of the object whose confidence suffices.
     part: f64,
 }
 
@@ -77,18 +77,18 @@ impl TurnLabels<'_> {
         Ok(RESULTS.check(out)?)
     }
 
-    /// Why there is nothing to write: the turn tells too little, the object is metal, or no pixel is believed.
+    /// Why there is nothing to write: normals are not observable, the object is metal, or no pixel is confident.
     #[must_use]
     pub fn refusal(&self) -> Option<TurnError> {
         if !self.solution.conditioning().verdict.is_fit() {
-            return Some(TurnError::NothingTold);
+            return Some(TurnError::NotObservable);
         }
-        if self.solution.body() == BodyKind::Metal {
-            return Some(TurnError::NoMattPart);
+        if self.solution.material() == MaterialKind::Metal {
+            return Some(TurnError::NoDiffusePart);
         }
         let confidence = self.solution.confidence(&self.turn.curves);
         let most = confidence.plane(0).iter().copied().fold(0.0, f32::max);
-        (most < self.least_confidence).then_some(TurnError::NothingBelieved {
+        (most < self.least_confidence).then_some(TurnError::NotConfident {
             least: self.least_confidence,
             most,
         })
@@ -110,14 +110,14 @@ impl TurnLabels<'_> {
         let curves = &self.turn.curves;
         let confidence = self.solution.confidence(curves);
         let object = self.turn.mask.plane(0).iter();
-        let believed: Vec<f32> = object
+        let confident: Vec<f32> = object
             .zip(confidence.plane(0))
             .map(|(&mask, &found)| {
                 f32::from(u8::from(mask >= 0.5 && found >= self.least_confidence))
             })
             .collect();
-        let part = f64::from(believed.iter().sum::<f32>()) / curves.pixels() as f64;
-        let mask = Planes::from_planes(curves.extent(), [believed])?;
+        let part = f64::from(confident.iter().sum::<f32>()) / curves.pixels() as f64;
+        let mask = Planes::from_planes(curves.extent(), [confident])?;
         let albedo = masked(self.solution.fitted_albedo(curves).planes(), &mask);
         // Files of albedo end at 1: what is larger is given to the light.
         let most = largest(&albedo).max(1.0);
@@ -145,7 +145,7 @@ impl TurnLabels<'_> {
         Ok(self.turn.first.len())
     }
 
-    /// Shading by the matt part of the light, and as highlight what the frame has beyond it.
+    /// Shading by the diffuse part of the light, and as highlight what the frame has beyond it.
     fn label(
         &self,
         frame: &Rgb<Linear>,
@@ -154,10 +154,10 @@ impl TurnLabels<'_> {
         (albedo, most): (&Planes<3>, f32),
     ) -> Label {
         let basis = basis_at(angle);
-        let room = &self.solution.room;
+        let model = &self.solution.model;
         let shading = self.turn.curves.map(|pixel| {
-            let [matt, _] = lit(room, self.solution.fits[pixel].normal, &basis);
-            matt.map(|value| value.max(0.0) as f32 * most)
+            let [diffuse, _] = lit(model, self.solution.fits[pixel].normal, &basis);
+            diffuse.map(|value| value.max(0.0) as f32 * most)
         });
         let shading = masked(&shading, mask);
         let image = masked(frame.planes(), mask);

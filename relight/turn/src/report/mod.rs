@@ -1,5 +1,6 @@
-//! What is told and written of a solved turn.
+//! What is written of a solved turn.
 
+pub(crate) mod destinations;
 pub(crate) mod encoding;
 pub(crate) mod figures;
 pub(crate) mod files;
@@ -8,3 +9,4 @@ pub(crate) mod maps;
 pub(crate) mod movie;
 pub(crate) mod object;
 pub(crate) mod sheet;
+pub(crate) mod warnings;

@@ -13,8 +13,8 @@ use crate::fit::residuals::lit;
 use crate::fit::smoothing::blurred;
 use crate::fit::solution::TurnSolution;
 use crate::model::harmonics::basis_at;
-use crate::model::material::BodyKind;
-use crate::model::shading::Room;
+use crate::model::material::MaterialKind;
+use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
 use crate::observe::reading::ReadTurn;
 
@@ -71,8 +71,8 @@ impl TurnSolution {
         let extent = curves.extent();
         let (normals, albedo) = (self.normals(curves), self.albedo(curves));
         let gloss = self.gloss(curves)?;
-        Ok(match (self.body(), gloss) {
-            (BodyKind::Metal, Some(gloss)) => {
+        Ok(match (self.material(), gloss) {
+            (MaterialKind::Metal, Some(gloss)) => {
                 let colour = albedo.into_planes().map(|value| value * gloss.reflectance);
                 let smoothness = Planes::filled(extent, [gloss.smoothness]);
                 let black = Rgb::new(Planes::zeros(extent));
@@ -92,10 +92,10 @@ impl TurnSolution {
     /// # Errors
     /// Where a term of the light is not finite.
     pub fn gloss(&self, curves: &TurnCurves) -> Result<Option<FittedGloss>, TurnError> {
-        if self.room.gloss.is_none() {
+        if self.model.gloss.is_none() {
             return Ok(None);
         }
-        if self.body() == BodyKind::Metal && self.measured.is_none() {
+        if self.material() == MaterialKind::Metal && self.measured.is_none() {
             // What it shows is all that is known of the light: it may be blurred or not.
             return Ok(Some(FittedGloss {
                 reflectance: (PARAMETERS.metal_smoothness + 2.0) / 8.0,
@@ -104,21 +104,21 @@ impl TurnSolution {
             }));
         }
         let normals = self.normals(curves);
-        let shown = Room {
+        let shown = ShadingModel {
             gloss: self
-                .room
+                .model
                 .gloss
                 .within(self.gloss_light()?.order().get() + 1),
-            ..self.room
+            ..self.model
         };
         let mut best: Option<FittedGloss> = None;
         for angle in ANGLES {
             let basis = basis_at(angle);
             let highlight = curves.map(|pixel| {
-                let [body, gloss] = lit(&shown, self.fits[pixel].normal, &basis);
-                let gloss = match self.body() {
-                    BodyKind::Diffuse => gloss,
-                    BodyKind::Metal => body,
+                let [base, gloss] = lit(&shown, self.fits[pixel].normal, &basis);
+                let gloss = match self.material() {
+                    MaterialKind::Diffuse => gloss,
+                    MaterialKind::Metal => base,
                 };
                 [(gloss.iter().sum::<f64>() / 3.0).max(0.0) as f32]
             });
