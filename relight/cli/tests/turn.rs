@@ -269,7 +269,7 @@ fn an_even_light_makes_no_labels_but_all_else() {
         said[0]["figures"]["conditioning"]["verdict"], "too_even",
         "{said:?}"
     );
-    for sentence in ["the room is too even", "no labels are written"] {
+    for sentence in ["the environment light is too even", "no labels are written"] {
         let has = |line: &serde_json::Value| {
             let message = line["message"].as_str();
             line["event"] == "warning" && message.is_some_and(|said| said.starts_with(sentence))
@@ -367,6 +367,17 @@ fn wrong_usage_and_several_turns_are_refused() {
     assert!(text(&run.stderr).contains("0 to 89 degrees"));
     let run = relight(&["turn", "a.tar", "--rim", "100,200", "-o", "out"]);
     assert_eq!(run.status.code(), Some(2));
+    // The names of before are still taken: it is the shard that is missing.
+    for [direction, material] in [["--direction", "--material"], ["--sense", "--body"]] {
+        let options = [direction, "clockwise", material, "metal", "--no-video"];
+        let run = relight(&[&["turn", "missing.tar", "-o", "missing"], &options[..]].concat());
+        assert_eq!(run.status.code(), Some(1), "{}", text(&run.stderr));
+        assert!(
+            text(&run.stderr).contains("missing.tar"),
+            "{}",
+            text(&run.stderr)
+        );
+    }
     let folder = tempfile::tempdir().unwrap();
     let (shard, _) = turn(folder.path(), 12);
     fs::copy(&shard, folder.path().join("again.tar")).unwrap();
@@ -383,7 +394,7 @@ fn untrained() -> Result<Weights, NetError> {
 }
 
 #[test]
-fn normals_to_start_from_are_read_from_a_folder_of_maps() {
+fn initial_normals_are_read_from_a_folder_of_maps() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("normal.png");
     let sphere = Normals::sphere(16);

@@ -24,7 +24,7 @@ mod report;
 mod setting_error;
 
 #[cfg(test)]
-mod tests;
+mod test_turns;
 
 pub use error::TurnError;
 pub use fit::environment::fit_turn_light;

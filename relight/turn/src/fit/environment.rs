@@ -319,3 +319,6 @@ fn add(
     let right = |i: usize| [statistics.term_along(channel, &terms[i]), 0.0, 0.0];
     equations.add_sums(product, right);
 }
+
+#[cfg(test)]
+mod tests;

@@ -245,3 +245,6 @@ fn best(ended: &[(&str, Option<(f64, ShadingModel)>)]) -> Option<(f64, ShadingMo
     let ended = ended.iter().filter_map(|(_, ended)| *ended);
     ended.min_by(|a, b| a.0.total_cmp(&b.0))
 }
+
+#[cfg(test)]
+mod tests;

@@ -55,14 +55,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn metal_has_to_explain_clearly_more() {
+    fn metal_has_to_fit_clearly_better() {
         assert!(is_metal(0.11, 0.04));
         assert!(!is_metal(0.11, 0.10));
         assert!(!is_metal(0.02, 0.001));
     }
 
     #[test]
-    fn a_kind_that_was_given_is_doubted_where_the_other_explains_clearly_more() {
+    fn a_kind_that_was_given_is_doubted_where_the_other_fits_clearly_better() {
         let figures = |given, other| {
             let figure = |(material, residual)| MaterialFigure { material, residual };
             doubted(&[given, other].map(figure))

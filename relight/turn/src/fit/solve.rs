@@ -349,3 +349,6 @@ fn prior_of(
     };
     Ok(curves.places().iter().map(at).collect())
 }
+
+#[cfg(test)]
+mod tests;

@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_matt_object_shows_nothing_and_a_glancing_one_all() {
+    fn a_lambertian_object_shows_nothing_and_a_glancing_one_all() {
         assert_eq!(
             GlossLight::NONE.harmonics(0.5, [0.0, 0.6, 0.8]),
             [[0.0; COEFFICIENTS]; 3]

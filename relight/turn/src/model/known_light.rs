@@ -47,7 +47,7 @@ mod tests {
     use relight_core::light::Order;
 
     #[test]
-    fn white_metal_is_as_bright_as_a_matt_white_surface_in_even_light() {
+    fn white_metal_is_as_bright_as_a_lambertian_white_surface_in_even_light() {
         let frame = TableFrame::new(Elevation::assumed());
         let known = KnownLight::new(&ShLight::even(Order::TWO, [1.0; 3]), &frame);
         let normal = [0.48, 0.36, 0.8];

@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn waves_are_the_sum_of_their_terms() {
+    fn harmonics_are_the_sum_of_their_terms() {
         let table = TableLight::from_viewer(&light(), &TableFrame::new(Elevation::assumed()));
         let normal = [0.48, -0.6, 0.64];
         let terms = lambertian_terms(normal);

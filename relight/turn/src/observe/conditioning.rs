@@ -176,3 +176,6 @@ fn of_pixel(curves: &TurnCurves, pixel: usize) -> PixelLight {
         beyond: if all > 0.0 { rest / all } else { 0.0 },
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -399,3 +399,6 @@ impl TurnCurves {
         (mean, weight)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -179,3 +179,6 @@ fn change(before: &Seen, after: &Seen) -> f64 {
     });
     median(changes).unwrap_or(0.0)
 }
+
+#[cfg(test)]
+mod tests;

@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn the_field_the_sense_and_the_bright_side_of_a_room_are_found() {
+    fn the_field_the_direction_and_the_bright_side_of_a_room_are_found() {
         for (direction, expected) in [
             (1.0, RotationDirection::CounterClockwise),
             (-1.0, RotationDirection::Clockwise),

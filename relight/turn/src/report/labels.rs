@@ -226,3 +226,6 @@ fn masked(planes: &Planes<3>, mask: &Planes<1>) -> Planes<3> {
     }
     masked
 }
+
+#[cfg(test)]
+mod tests;

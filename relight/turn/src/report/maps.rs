@@ -92,3 +92,6 @@ pub(crate) fn over_angle(curves: &TurnCurves, residuals: &[Vec<Option<f64>>]) ->
     };
     curves.angles().iter().enumerate().map(at).collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -64,3 +64,6 @@ fn lamp() -> ShLight {
     }
     light
 }
+
+#[cfg(test)]
+mod tests;

@@ -173,3 +173,6 @@ fn blurred_mask(mask: &Planes<1>, deviation: f64) -> Planes<1> {
         }
     })
 }
+
+#[cfg(test)]
+mod tests;
