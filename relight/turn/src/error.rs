@@ -1,12 +1,10 @@
 //! Why a turn cannot be solved.
 
-use crate::setting_error::SettingError;
-use relight_core::files::MovieError;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use relight_core::asset::AssetError;
-use relight_core::files::FolderFault;
+use relight_core::files::{FolderFault, MovieError};
 use relight_core::image::{Extent, ImageError};
 use relight_core::light::{LightError, LightFileError, PanoramaError};
 use relight_photo::decompose::DecomposeError;
@@ -15,6 +13,7 @@ use relit_data::session::SessionError;
 
 use crate::observe::probe_place::ProbePlace;
 use crate::observe::verdict::LightVerdict;
+use crate::setting_error::SettingError;
 
 /// Why a turn cannot be solved, or what was found cannot be written.
 #[derive(Debug, thiserror::Error)]

@@ -1,5 +1,12 @@
 //! Turns of a ball whose frames follow from the model itself: what is fitted has to be what they were made of.
 
+use std::sync::LazyLock;
+
+use relight_core::image::{Linear, Planes, Rgb};
+use relight_core::light::{Direction, Normals, Order, Rotation, ShLight, YUp};
+use relight_core::metrics::angular_error;
+use relight_core::render::{DiffuseForm, DiffuseLayer, Surface};
+
 use crate::fit::residuals::lit;
 use crate::model::gloss::GlossLight;
 use crate::model::harmonics::basis_at;
@@ -9,11 +16,6 @@ use crate::{
     CurveBuilder, Elevation, MaterialKind, ReadTurn, TableFrame, TableLight, TurnCurves,
     TurnOptions, TurnSolution, solve_turn,
 };
-use relight_core::image::{Linear, Planes, Rgb};
-use relight_core::light::{Direction, Normals, Order, Rotation, ShLight, YUp};
-use relight_core::metrics::angular_error;
-use relight_core::render::{DiffuseForm, DiffuseLayer, Surface};
-use std::sync::LazyLock;
 
 pub(crate) const SIDE: usize = 24;
 

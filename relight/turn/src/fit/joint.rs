@@ -9,7 +9,7 @@ use relight_core::statistics::median;
 
 use crate::fit::curve_statistics::CurveStatistics;
 use crate::fit::normal_step::PriorNormal;
-use crate::fit::schur::Sums;
+use crate::fit::schur::JointEquations;
 use crate::fit::search::{PixelFit, Search, cost, search_all};
 use crate::fit::unknowns::{Columns, Estimate, Unknowns};
 use crate::model::shading::ShadingModel;
@@ -129,7 +129,7 @@ impl JointOptimisation<'_> {
         let sums = (0..fits.len().div_ceil(PARAMETERS.chunk))
             .into_par_iter()
             .map(|chunk| {
-                let mut sums = Sums::new(columns.layout.count());
+                let mut sums = JointEquations::new(columns.layout.count());
                 let pixels =
                     chunk * PARAMETERS.chunk..((chunk + 1) * PARAMETERS.chunk).min(fits.len());
                 for pixel in pixels.filter(|&pixel| !self.statistics[pixel].is_dark()) {
@@ -139,7 +139,10 @@ impl JointOptimisation<'_> {
                 }
                 sums
             })
-            .reduce(|| Sums::new(columns.layout.count()), Sums::plus);
+            .reduce(
+                || JointEquations::new(columns.layout.count()),
+                JointEquations::plus,
+            );
         sums.solve(damping)
     }
 }

@@ -1,7 +1,6 @@
 //! How the cost of a normal changes as it leans.
 
-use crate::fit::curve_statistics::CurveStatistics;
-use crate::fit::curve_statistics::sum_of_products;
+use crate::fit::curve_statistics::{CurveStatistics, sum_of_products};
 use crate::model::directions::dot;
 use crate::model::harmonics::COEFFICIENTS;
 

@@ -1,11 +1,12 @@
 //! Which parts of the turn a pixel's fit may believe: not those in which it is in another's shadow or shows
 //! a highlight.
 
+use relight_core::statistics::upper_median;
+
 use crate::fit::residuals::residuals;
 use crate::fit::search::PixelFit;
 use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
-use relight_core::statistics::upper_median;
 
 /// Parameters of the robust weights.
 struct RobustParameters {

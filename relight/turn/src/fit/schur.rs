@@ -1,4 +1,4 @@
-//! The normal equations of a joint step.
+//! The normal equations of a joint step, with every pixel's normal and albedo eliminated.
 
 use relight_core::light::NormalEquations;
 
@@ -10,14 +10,14 @@ use crate::model::directions::tangents;
 use crate::model::harmonics::COEFFICIENTS;
 
 /// The normal equations of the unknowns, without what the pixels do by themselves.
-pub(crate) struct Sums {
+pub(crate) struct JointEquations {
     count: usize,
     /// The lower triangle, row by row, in a square.
     matrix: Vec<f64>,
     right: Vec<f64>,
 }
 
-impl Sums {
+impl JointEquations {
     pub(crate) fn new(count: usize) -> Self {
         Self {
             count,
@@ -80,11 +80,11 @@ impl Sums {
         if let Some(prior) = prior {
             quadratic.add_prior(prior, normal, axes);
         }
-        self.take_out(&quadratic, &couplings, weight / statistics.unit());
+        self.eliminate_normal(&quadratic, &couplings, weight / statistics.unit());
     }
 
-    /// Takes out what the normal could do as well.
-    pub(crate) fn take_out(
+    /// Eliminates the normal: what it could do as well is taken out (the Schur complement).
+    pub(crate) fn eliminate_normal(
         &mut self,
         quadratic: &QuadraticCost,
         couplings: &[[f64; 2]],
@@ -101,10 +101,10 @@ impl Sums {
             ]
         };
         // What is kept is half the gradient: a step goes against it.
-        let by_slope = inverse(quadratic.gradient);
+        let by_gradient = inverse(quadratic.gradient);
         for (i, row) in couplings.iter().enumerate() {
             let by_row = inverse(*row);
-            self.right[i] += row[0] * by_slope[0] + row[1] * by_slope[1];
+            self.right[i] += row[0] * by_gradient[0] + row[1] * by_gradient[1];
             for (j, other) in couplings[..=i].iter().enumerate() {
                 self.matrix[i * self.count + j] -= by_row[0] * other[0] + by_row[1] * other[1];
             }

@@ -1,9 +1,8 @@
 //! The normal of one pixel: the one whose curve is nearest to what was seen.
 
-use crate::fit::curve_statistics::sum_of_products;
 use rayon::prelude::*;
 
-use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts};
+use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts, sum_of_products};
 use crate::fit::normal_step::{NormalDerivatives, PriorNormal, QuadraticCost};
 use crate::model::directions::{LEAST_FACING, dot, half_sphere, tangents, tilted};
 use crate::model::harmonics::COEFFICIENTS;
@@ -255,7 +254,7 @@ impl<'a> Search<'a> {
         );
         let inverse: f64 = [half + rest, half - rest]
             .into_iter()
-            .map(|hessian| 1.0 / hessian.max(PARAMETERS.least_curvature))
+            .map(|eigenvalue| 1.0 / eigenvalue.max(PARAMETERS.least_curvature))
             .sum();
         (2.0 * fit.residual / freedom * inverse).sqrt()
     }

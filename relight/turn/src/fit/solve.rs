@@ -1,9 +1,8 @@
 //! Normals, albedo and light of a whole turn.
 
-use relight_core::statistics::{median, quantile};
-
 use rayon::prelude::*;
 use relight_core::light::{Normals, YUp};
+use relight_core::statistics::{median, quantile};
 
 use crate::error::TurnError;
 use crate::fit::blocks::BLOCK_PARAMETERS;

@@ -1,12 +1,11 @@
 //! Light of order 2 in the table's frame, as it acts on the curve of a pixel.
 
-use crate::model::harmonics::LAMBERTIAN_COEFFICIENTS;
 use std::f64::consts::PI;
 
 use relight_core::light::{LightError, Order, ShLight};
 
 use crate::model::frame::TableFrame;
-use crate::model::harmonics::{COEFFICIENTS, HarmonicTerm};
+use crate::model::harmonics::{COEFFICIENTS, HarmonicTerm, LAMBERTIAN_COEFFICIENTS};
 
 /// Terms of a channel's light.
 pub(crate) const TERMS: usize = 9;

@@ -1,6 +1,5 @@
 //! Whether normals and albedo are observable in the environment light.
 
-use crate::model::harmonics::COEFFICIENTS;
 use rayon::prelude::*;
 use relight_core::light::NormalEquations;
 use relight_core::statistics::median;
@@ -8,7 +7,7 @@ use relit_data::turn_light::LEAST_MODULATION;
 use serde::Serialize;
 
 use crate::model::directions::half_sphere;
-use crate::model::harmonics::LAMBERTIAN_COEFFICIENTS;
+use crate::model::harmonics::{COEFFICIENTS, LAMBERTIAN_COEFFICIENTS};
 use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
 use crate::observe::verdict::LightVerdict;

@@ -1,7 +1,6 @@
 //! Light over the table's angle, one curve a pixel and channel.
 
-use relight_core::image::ColourSpace;
-use relight_core::image::{Extent, Planes, Srgb};
+use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
 use relit_data::image_stats::SATURATION_LEVEL;
 
 use crate::error::TurnError;

@@ -1,12 +1,11 @@
 //! What the video of a turn shows beside the object: the surroundings, and a ball that measures its light.
 
-use relight_core::image::ColourSpace;
-use relight_core::statistics::median;
 use std::collections::HashMap;
 use std::path::Path;
 
 use relight_core::files::MovieReader;
-use relight_core::image::{Extent, Planes, Rgb, Srgb};
+use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
+use relight_core::statistics::median;
 use relit_data::geometry::Rect;
 use relit_data::session::Recording;
 

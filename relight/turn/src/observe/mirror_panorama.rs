@@ -1,6 +1,5 @@
 //! The panorama that a chrome ball shows.
 
-use crate::model::harmonics::GLOSS_ORDER;
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
 use relight_core::light::{Direction, Order, ShLight, basis};
@@ -8,6 +7,7 @@ use relight_core::light::{Direction, Order, ShLight, basis};
 use crate::error::TurnError;
 use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
+use crate::model::harmonics::GLOSS_ORDER;
 
 /// Parameters of the panorama.
 struct PanoramaParameters {

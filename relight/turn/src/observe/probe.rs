@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use crate::setting_error::SettingError;
 use relight_core::image::{Extent, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, YUp};
 
@@ -12,6 +11,7 @@ use crate::observe::curves::CurveBuilder;
 use crate::observe::mirror_panorama::MirrorPanorama;
 use crate::observe::probe_place::ProbePlace;
 use crate::observe::surroundings::Surroundings;
+use crate::setting_error::SettingError;
 
 /// Parameters of the picture of a ball.
 struct ProbeParameters {

@@ -1,9 +1,8 @@
 //! Where a ball is in the picture.
 
-use relight_core::image::ColourSpace;
 use std::fmt;
 
-use relight_core::image::{Extent, Planes, Srgb};
+use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
 
 use crate::setting_error::SettingError;
 

@@ -1,6 +1,5 @@
 //! A turn's frames, once through, into curves.
 
-use relight_reader::{Share, Source};
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::Arc;
@@ -8,7 +7,7 @@ use std::thread::available_parallelism;
 
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_reader::{
-    Draw, DrawPlan, Encoding, Place, Stream, Streaming, TurnBatch, TurnFrame, Turns,
+    Draw, DrawPlan, Encoding, Place, Share, Source, Stream, Streaming, TurnBatch, TurnFrame, Turns,
 };
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;

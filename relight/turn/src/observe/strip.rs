@@ -4,11 +4,10 @@
 //! sides, see the same surroundings one after the other: by how much later the second does follows the angle between them, and which of them
 //! is first says which way the table turns.
 
-use relight_core::image::ColourSpace;
 use std::path::Path;
 
 use relight_core::files::write_png;
-use relight_core::image::{Depth, Extent, Linear, Planes, Rgb, Srgb};
+use relight_core::image::{ColourSpace, Depth, Extent, Linear, Planes, Rgb, Srgb};
 use serde::Serialize;
 
 use crate::error::TurnError;

@@ -4,9 +4,8 @@ use relight_core::light::Order;
 use serde::Serialize;
 
 use crate::error::TurnError;
-use crate::fit::solution::TurnSolution;
-
 use crate::fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure};
+use crate::fit::solution::TurnSolution;
 use crate::model::frame::Elevation;
 use crate::model::lighting::{TERMS, TableLight};
 use crate::model::material::MaterialKind;

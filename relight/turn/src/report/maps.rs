@@ -1,11 +1,10 @@
 //! The residuals of the model: highlights and cast shadows.
 
-use crate::fit::residuals::{reference, residuals};
 use rayon::prelude::*;
 use relight_core::image::Planes;
 use serde::Serialize;
 
-use crate::fit::residuals::lit;
+use crate::fit::residuals::{lit, reference, residuals};
 use crate::fit::solution::TurnSolution;
 use crate::observe::curves::TurnCurves;
 

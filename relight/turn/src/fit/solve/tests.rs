@@ -1,3 +1,7 @@
+use proptest::prelude::*;
+use relight_core::image::Extent;
+use relight_core::light::{Direction, Normals, Rotation};
+
 use crate::model::gloss::GlossLight;
 use crate::model::shading::ShadingModel;
 use crate::test_turns::{
@@ -8,9 +12,6 @@ use crate::{
     CurveBuilder, LightVerdict, MaterialKind, TableFrame, TableLight, TurnError, TurnMaps,
     TurnOptions, solve_turn,
 };
-use proptest::prelude::*;
-use relight_core::image::Extent;
-use relight_core::light::{Direction, Normals, Rotation};
 
 #[test]
 fn a_lambertian_ball_in_known_light_is_found_as_it_is() {

@@ -1,5 +1,6 @@
-use crate::{CurveBuilder, TurnError};
 use relight_core::image::Extent;
+
+use crate::{CurveBuilder, TurnError};
 
 #[test]
 fn turns_without_frames_or_angles_are_refused_by_what_is_wrong() {

@@ -1,7 +1,8 @@
-use crate::test_turns::{SIDE, SOLVED, ball, even_environment, known, mask, off, read};
-use crate::{TurnError, TurnLabels, solve_turn};
 use relight_core::image::{Linear, Rgb};
 use relight_reader::{TruthLayout, TruthSet};
+
+use crate::test_turns::{SIDE, SOLVED, ball, even_environment, known, mask, off, read};
+use crate::{TurnError, TurnLabels, solve_turn};
 
 #[test]
 fn without_observable_normals_or_confident_pixels_there_are_no_labels() {

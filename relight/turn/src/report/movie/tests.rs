@@ -1,7 +1,8 @@
-use crate::test_turns::{SIDE, SOLVED, known, metal_ball, read};
-use crate::{ReadTurn, TurnFiles, TurnMaps, TurnSolution, solve_turn};
 use relight_core::files::MovieReader;
 use relight_core::image::Planes;
+
+use crate::test_turns::{SIDE, SOLVED, known, metal_ball, read};
+use crate::{ReadTurn, TurnFiles, TurnMaps, TurnSolution, solve_turn};
 
 /// The frames of the video that is written of a turn, as planes of sRGB.
 fn film_of(turn: &ReadTurn, solution: &TurnSolution, out: &std::path::Path) -> Vec<Planes<3>> {
