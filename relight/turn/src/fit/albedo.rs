@@ -1,7 +1,7 @@
 //! The albedo of pixels whose normals are hardly to be trusted: by those around them that are. Knows nothing of light.
 //!
-//! A wrong normal has a wrong shading, and so its pixel a wrong albedo. Albedos of one surface are alike where its colour is, and the
-//! chromaticity of a pixel's mean light shows that without any normal.
+//! A wrong normal has a wrong shading, and so its pixel a wrong albedo. Albedos of one surface are alike where its
+//! colour is, and the chromaticity of a pixel's mean light shows that without any normal.
 
 use rayon::prelude::*;
 
@@ -27,7 +27,8 @@ const PARAMETERS: AlbedoParameters = AlbedoParameters {
     same_colour: 0.05,
 };
 
-/// The albedo of each pixel, shrunk toward those of the same colour around it as far as its normal is expected to be off, radians.
+/// The albedo of each pixel, shrunk toward those of the same colour around it as far as its normal is expected to be
+/// off, radians.
 pub(crate) fn shared(curves: &TurnCurves, albedo: &[[f64; 3]], errors: &[f64]) -> Vec<[f64; 3]> {
     let extent = curves.extent();
     let mut at = vec![None; extent.pixels()];

@@ -54,8 +54,8 @@ pub(crate) struct Alternation<'a> {
 }
 
 impl Alternation<'_> {
-    /// The final residual and shading model: light and normals in alternation, then a joint optimisation. A diffuse object
-    /// has no gloss yet.
+    /// The final residual and shading model: light and normals in alternation, then a joint optimisation. A diffuse
+    /// object has no gloss yet.
     pub(crate) fn run(&self, start: Vec<[f64; 3]>) -> Option<(f64, ShadingModel)> {
         let coarse = self.coarse;
         let mut normals = start;

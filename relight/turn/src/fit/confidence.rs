@@ -138,8 +138,8 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
         .collect()
 }
 
-/// The albedos, where normals are hardly to be trusted by those around them. A bent surface is not to be doubted where the
-/// turn is explained.
+/// The albedos, where normals are hardly to be trusted by those around them. A bent surface is not to be doubted where
+/// the turn is explained.
 pub(crate) fn shared_albedo(
     curves: &TurnCurves,
     fits: &[PixelFit],

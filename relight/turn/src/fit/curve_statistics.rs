@@ -87,8 +87,8 @@ fn symmetric(products: &mut [f64], a: &[f64], b: &[f64]) {
     }
 }
 
-/// The projection of a channel's curve on a pixel's harmonics: products of the base layer's harmonics with the residual of the
-/// gloss, of the base layer's harmonics with themselves, and the energy of that residual.
+/// The projection of a channel's curve on a pixel's harmonics: products of the base layer's harmonics with the residual
+/// of the gloss, of the base layer's harmonics with themselves, and the energy of that residual.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Projection {
     along: f64,
@@ -237,8 +237,8 @@ impl CurveStatistics {
         [0, 1, 2].map(|channel| self.share(channel, harmonics, &products).albedo())
     }
 
-    /// The albedo that fits the curve best, shrunk toward one from which albedos of an object are `spread` away: as far as what is
-    /// left of the curve, taken for noise of `freedom` degrees of freedom, lets it be any other.
+    /// The albedo that fits the curve best, shrunk toward one from which albedos of an object are `spread` away: as far
+    /// as what is left of the curve, taken for noise of `freedom` degrees of freedom, lets it be any other.
     pub(crate) fn shrunk_albedo(
         &self,
         harmonics: &PixelHarmonics,

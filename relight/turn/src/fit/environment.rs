@@ -39,10 +39,10 @@ const PARAMETERS: EnvironmentParameters = EnvironmentParameters {
     least_gloss: 0.01,
 };
 
-/// The light that fits the curves of a known surface best: of a ball whose albedo is known, say, or of an object
-/// with its truth. Pixels without a normal do not count. It is in the viewer's frame at the table's angle 0. Bands beyond the
-/// second, which a Lambertian surface does not show, are those that gloss shows, where there is any: as if it blurred them no
-/// more than band 2.
+/// The light that fits the curves of a known surface best: of a ball whose albedo is known, say, or of an object with
+/// its truth. Pixels without a normal do not count. It is in the viewer's frame at the table's angle 0. Bands beyond
+/// the second, which a Lambertian surface does not show, are those that gloss shows, where there is any: as if it
+/// blurred them no more than band 2.
 ///
 /// # Errors
 /// Where a map has another size, or no light fits the curves.
@@ -105,8 +105,8 @@ fn with_higher_bands(light: ShLight, gloss: &GlossLight) -> Result<ShLight, Turn
     Ok(ShLight::new(coefficients)?)
 }
 
-/// The shading model of a Lambertian object with these normals that fits the curves best, in alternation with the albedo, which is
-/// brought along.
+/// The shading model of a Lambertian object with these normals that fits the curves best, in alternation with the
+/// albedo, which is brought along.
 pub(crate) fn fit_lambertian(
     statistics: &[CurveStatistics],
     normals: &[[f64; 3]],
@@ -210,8 +210,8 @@ fn pixels<'a>(
     statistics.into_iter().zip(normals).map(pixel).collect()
 }
 
-/// The residual of the light that fits an evenly coloured Lambertian object of these normals best, over that of an even light; none
-/// where nothing varies.
+/// The residual of the light that fits an evenly coloured Lambertian object of these normals best, over that of an even
+/// light; none where nothing varies.
 pub(crate) fn relative_residual<'a>(
     statistics: impl IntoIterator<Item = &'a CurveStatistics>,
     normals: &[[f64; 3]],
@@ -309,7 +309,8 @@ fn residual(
     rest / f64::max(all, f64::MIN_POSITIVE)
 }
 
-/// Adds what a pixel says of a channel's light and gloss; bright pixels, whose curves stand out of the noise, count more.
+/// Adds what a pixel says of a channel's light and gloss; bright pixels, whose curves stand out of the noise, count
+/// more.
 fn add(
     equations: &mut NormalEquations,
     (statistics, channel): (&CurveStatistics, usize),

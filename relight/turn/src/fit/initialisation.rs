@@ -1,4 +1,5 @@
-//! The environment light of a turn, on blocks of pixels: what the object is made of, and an unknown light from several initialisations.
+//! The environment light of a turn, on blocks of pixels: what the object is made of, and an unknown light from several
+//! initialisations.
 
 use crate::error::TurnError;
 use crate::fit::alternation::{ALTERNATION_PARAMETERS, Alternation};
@@ -84,8 +85,8 @@ impl Setting {
         })
     }
 
-    /// The other kind, where the residual of the given one does not settle that it is right. Without gloss a diffuse material is not to
-    /// be compared with metal.
+    /// The other kind, where the residual of the given one does not settle that it is right. Without gloss a diffuse
+    /// material is not to be compared with metal.
     fn other_kind(&self, given: MaterialFigure) -> Option<MaterialKind> {
         let has_gloss = self.has_shape || self.known.is_some();
         match given.material {
@@ -96,8 +97,8 @@ impl Setting {
         }
     }
 
-    /// How well the other rotation direction fits the curves, beside that of a shading model that was fitted: for the first material
-    /// of which it is doubted, else the last that was tried.
+    /// How well the other rotation direction fits the curves, beside that of a shading model that was fitted: for the
+    /// first material of which it is doubted, else the last that was tried.
     pub(crate) fn direction(
         &self,
         curves: &TurnCurves,

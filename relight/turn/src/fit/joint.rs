@@ -1,4 +1,5 @@
-//! Joint optimisation of light, gloss, normals and albedo by Gauss-Newton steps, in which every pixel follows the light.
+//! Joint optimisation of light, gloss, normals and albedo by Gauss-Newton steps, in which every pixel follows the
+//! light.
 //!
 //! Alternation between light and pixels takes many rounds, for each is held by the other. A step here takes out of what
 //! the light's unknowns do to a curve the part that the pixel's own normal and albedo could do as well: the Schur
@@ -147,8 +148,8 @@ impl JointOptimisation<'_> {
     }
 }
 
-/// How much the energy that is left of each pixel's curve counts, so that bright pixels, which stand out of the noise, count
-/// more: less where the model does not explain it.
+/// How much the energy that is left of each pixel's curve counts, so that bright pixels, which stand out of the noise,
+/// count more: less where the model does not explain it.
 fn weights(fits: &[PixelFit]) -> Vec<f64> {
     let median = median(fits.iter().map(|fit| fit.residual))
         .unwrap_or(0.0)

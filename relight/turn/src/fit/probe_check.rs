@@ -70,7 +70,8 @@ impl Surroundings {
     /// The residual of the ball's own light, over the variation, 0 to 1.
     ///
     /// # Errors
-    /// [`TurnError::NoBall`] where that is most of it, [`TurnError::Misplaced`] where another circle has a clearly smaller one.
+    /// [`TurnError::NoBall`] where that is most of it, [`TurnError::Misplaced`] where another circle has a clearly
+    /// smaller one.
     pub(crate) fn check(self, ball: ProbeBall, elevation: Elevation) -> Result<f64, TurnError> {
         let (place, side) = (self.place, self.side);
         let curves = self.builder.finish()?;
@@ -168,8 +169,8 @@ impl Shown {
         }
     }
 
-    /// The residual of the light fitted to a ball in a circle, over that of an even light; none where the circle is not in the
-    /// picture, or nothing varies in it.
+    /// The residual of the light fitted to a ball in a circle, over that of an even light; none where the circle is not
+    /// in the picture, or nothing varies in it.
     fn residual(&self, circle: Circle) -> Option<f64> {
         let wanted = std::f64::consts::PI
             * (PARAMETERS.radius_share * circle.radius * SURROUNDINGS_PARAMETERS.across as f64

@@ -24,8 +24,9 @@ const PARAMETERS: ProbeLightParameters = ProbeLightParameters { sharp: 0.06 };
 /// The light that a ball measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProbeLight {
-    /// In the viewer's frame at the table's angle 0: of order 2 by a grey ball, in units in which the ball's albedo is 1; of order 6
-    /// by a chrome one, in units in which it reflects everything and a white Lambertian surface has albedo 1.
+    /// In the viewer's frame at the table's angle 0: of order 2 by a grey ball, in units in which the ball's albedo is
+    /// 1; of order 6 by a chrome one, in units in which it reflects everything and a white Lambertian surface has
+    /// albedo 1.
     pub light: ShLight,
     /// How many frames it was measured in.
     pub frames: u32,
@@ -33,7 +34,8 @@ pub struct ProbeLight {
     pub ball: ProbeBall,
     /// What it looks like.
     pub looks: ProbeBall,
-    /// The part of what varies in the ball, over the turn and from place to place, that this light does not fit, 0 to 1.
+    /// The part of what varies in the ball, over the turn and from place to place, that this light does not fit, 0 to
+    /// 1.
     pub residual: f64,
 }
 

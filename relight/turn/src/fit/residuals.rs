@@ -65,7 +65,8 @@ fn predicted(
     all.sum()
 }
 
-/// What a pixel shows at an angle: its base layer at an albedo of 1, which of a Lambertian one is its irradiance, and its gloss.
+/// What a pixel shows at an angle: its base layer at an albedo of 1, which of a Lambertian one is its irradiance, and
+/// its gloss.
 pub(crate) fn lit(
     model: &ShadingModel,
     normal: [f64; 3],

@@ -20,8 +20,8 @@ pub(crate) struct Setting {
 }
 
 impl Setting {
-    /// The unknowns of an object of such a material. Where nothing is known of the shape but its outline, light and gloss
-    /// together could fit any shape: a diffuse object is taken for one without gloss.
+    /// The unknowns of an object of such a material. Where nothing is known of the shape but its outline, light and
+    /// gloss together could fit any shape: a diffuse object is taken for one without gloss.
     pub(crate) fn unknowns(&self, material: MaterialKind) -> Unknowns<'_> {
         let bands = if self.has_shape { GLOSS_BANDS } else { 0 };
         match (material, &self.known) {

@@ -51,8 +51,9 @@ impl TurnSolution {
         Normals::new(curves.map(|pixel| self.fits[pixel].normal.map(|v| v as f32)))
     }
 
-    /// The albedo: in the light's units where that was known, else in such units that the mean shading of the
-    /// object over the turn is 1 in each channel. Where a normal is hardly to be trusted, it is that of the same colour around.
+    /// The albedo: in the light's units where that was known, else in such units that the mean shading of the object
+    /// over the turn is 1 in each channel. Where a normal is hardly to be trusted, it is that of the same colour
+    /// around.
     #[must_use]
     pub fn albedo(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| self.albedo[pixel].map(|v| v as f32)))

@@ -161,8 +161,8 @@ impl Initialised {
         Ok(initialised.or_outline(curves, options.prior_weight))
     }
 
-    /// Where a Lambertian material fits the turn, light and shape that go with the prior mean fit it as well as others do. Then
-    /// the shape inflated out of the outline becomes the prior mean, if it is nearer to what fits the turn.
+    /// Where a Lambertian material fits the turn, light and shape that go with the prior mean fit it as well as others
+    /// do. Then the shape inflated out of the outline becomes the prior mean, if it is nearer to what fits the turn.
     fn or_outline(mut self, curves: &TurnCurves, weight: f64) -> Self {
         let is_lambertian =
             self.found.model.material == MaterialKind::Diffuse && self.found.model.gloss.is_none();

@@ -18,9 +18,9 @@ const HEAD_ON: f64 = 0.04;
 ///
 /// `S(t) = F(n·v) Re Σ_lm s_lm P_lm(r_z) q^m e^(i m t)`.
 ///
-/// F is the reflectance by Schlick's formula, `P_lm` the m-th derivative of Legendre's polynomial l, with the factor that
-/// makes it a spherical harmonic. What the s_lm are of the environment light is a factor for each l: the blur of the lobe.
-/// Of each channel, the terms of band l are Re s_l0, Re s_l1, Im s_l1, Re s_l2 and so on.
+/// F is the reflectance by Schlick's formula, `P_lm` the m-th derivative of Legendre's polynomial l, with the factor
+/// that makes it a spherical harmonic. What the s_lm are of the environment light is a factor for each l: the blur of
+/// the lobe. Of each channel, the terms of band l are Re s_l0, Re s_l1, Im s_l1, Re s_l2 and so on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct GlossLight {
     terms: [[f64; GLOSS_TERMS]; 3],

@@ -15,7 +15,8 @@ const LAMBERTIAN_HARMONICS: usize = 2;
 /// Terms of a Lambertian pixel's curve, the first of them.
 pub(crate) const LAMBERTIAN_COEFFICIENTS: usize = 2 * LAMBERTIAN_HARMONICS + 1;
 
-/// What a term of the light contributes to a curve: these values to two Fourier coefficients, the first of them `coefficient`.
+/// What a term of the light contributes to a curve: these values to two Fourier coefficients, the first of them
+/// `coefficient`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct HarmonicTerm {
     pub(crate) coefficient: usize,

@@ -26,7 +26,8 @@ impl KnownLight {
         }
     }
 
-    /// What metal of albedo 1 shows of each of its bands that blurs nothing: as bright as a Lambertian white surface in even light.
+    /// What metal of albedo 1 shows of each of its bands that blurs nothing: as bright as a Lambertian white surface in
+    /// even light.
     pub(crate) fn mirror(&self) -> &[GlossLight] {
         &self.mirror
     }

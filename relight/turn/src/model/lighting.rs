@@ -36,8 +36,8 @@ pub(crate) const OF_COEFFICIENTS: [(usize, f64); TERMS] = {
     ]
 };
 
-/// Which term of the gloss shows the same part of the environment light as each term of [`TableLight`], and how many times as
-/// large the latter is: the factor of its cosine lobe and polynomial.
+/// Which term of the gloss shows the same part of the environment light as each term of [`TableLight`], and how many
+/// times as large the latter is: the factor of its cosine lobe and polynomial.
 pub(crate) const LAMBERTIAN_IN_GLOSS: [(usize, f64); TERMS] = {
     const AT: [usize; TERMS] = [0, 1, 4, 2, 3, 5, 6, 7, 8];
     let mut all = [(0, 0.0); TERMS];
@@ -97,8 +97,8 @@ impl TableLight {
         Ok(self.coefficients()?.rotated(&frame.rotation().inverse()))
     }
 
-    /// From where more light comes, by the first harmonic of a level normal's curve: the azimuth in the table's frame at angle
-    /// 0, from x towards y, degrees.
+    /// From where more light comes, by the first harmonic of a level normal's curve: the azimuth in the table's frame
+    /// at angle 0, from x towards y, degrees.
     #[must_use]
     pub fn bright_azimuth_deg(&self) -> f64 {
         let sum = |at: usize| self.terms.iter().map(|terms| terms[at]).sum::<f64>();

@@ -6,8 +6,8 @@ use crate::model::gloss::{GLOSS_TERMS, GlossLight, terms_of};
 use crate::model::harmonics::HarmonicTerm;
 use crate::model::lighting::{OF_COEFFICIENTS, TableLight};
 
-/// What white metal shows of a light, over the sum of its terms times the light's coefficients: as bright as a Lambertian white surface in
-/// even light, π times it, and the terms are √(4π) times the harmonics.
+/// What white metal shows of a light, over the sum of its terms times the light's coefficients: as bright as a
+/// Lambertian white surface in even light, π times it, and the terms are √(4π) times the harmonics.
 pub(crate) const MIRROR: f64 = 0.886_226_925_452_758;
 
 /// The same where all light is reflected.

@@ -40,8 +40,8 @@ pub struct Conditioning {
     pub modulation: f64,
     /// The median over the pixels of the part of a curve's variation that lies beyond the second harmonic.
     pub beyond: f64,
-    /// The effective value of the harmonics over the mean in a light that was given: the median over the normals that face the
-    /// viewer.
+    /// The effective value of the harmonics over the mean in a light that was given: the median over the normals that
+    /// face the viewer.
     pub given_modulation: Option<f64>,
     /// What follows.
     pub verdict: LightVerdict,
@@ -95,8 +95,8 @@ impl Conditioning {
         is_even && self.modulation >= LEAST_MODULATION
     }
 
-    /// The same where the light was given, as an object shows it in this environment that blurs nothing: one that is too even determines no more
-    /// than an even turn.
+    /// The same where the light was given, as an object shows it in this environment that blurs nothing: one that is
+    /// too even determines no more than an even turn.
     pub(crate) fn in_given(self, model: &ShadingModel) -> Self {
         let modulations = half_sphere(PARAMETERS.normals).map(|normal| {
             let harmonics = model.harmonics(normal).base;

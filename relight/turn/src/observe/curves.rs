@@ -36,8 +36,8 @@ const PARAMETERS: CurveParameters = CurveParameters {
     least_of_block: 0.9,
 };
 
-/// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Of each frame it keeps the light of a few pixels, about a
-/// kilobyte; beyond that its memory does not grow with the number of frames.
+/// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Of each frame it keeps the light of a few pixels,
+/// about a kilobyte; beyond that its memory does not grow with the number of frames.
 #[derive(Debug)]
 pub struct CurveBuilder {
     extent: Extent,

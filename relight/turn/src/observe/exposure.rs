@@ -85,7 +85,8 @@ impl ExposureWatch {
         });
     }
 
-    /// The steps in order of the angle, and the exposure of each frame in the order in which they came, over that of most.
+    /// The steps in order of the angle, and the exposure of each frame in the order in which they came, over that of
+    /// most.
     pub(crate) fn finish(&self) -> (Vec<ExposureStep>, Vec<f64>) {
         let even = vec![1.0; self.frames.len()];
         let mut order: Vec<usize> = (0..self.frames.len()).collect();

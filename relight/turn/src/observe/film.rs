@@ -40,8 +40,8 @@ pub struct Filmed {
     pub(crate) probe: Option<ProbeBuilder>,
 }
 
-/// Reads the video of a turn: a session's folder, or the video file. `progress` is told how many of the turn's frames are
-/// done, and how many there are.
+/// Reads the video of a turn: a session's folder, or the video file. `progress` is told how many of the turn's frames
+/// are done, and how many there are.
 ///
 /// # Errors
 /// Where the video cannot be read, is not that of the turn, or the ball is not in it or under the object's mask.

@@ -1,4 +1,5 @@
-//! What the frames show: curves over the table's angle, the background of the video, and a ball that measures the light.
+//! What the frames show: curves over the table's angle, the background of the video, and a ball that measures the
+//! light.
 
 pub(crate) mod conditioning;
 pub(crate) mod curves;

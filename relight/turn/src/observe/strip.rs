@@ -1,8 +1,8 @@
 //! A strip of a panorama of the surroundings, out of the background of a turn's video.
 //!
-//! Camera and object turn together, so that the camera looks all around. Two columns of the picture, near its
-//! sides, see the same surroundings one after the other: by how much later the second does follows the angle between them, and which of them
-//! is first says which way the table turns.
+//! Camera and object turn together, so that the camera looks all around. Two columns of the picture, near its sides,
+//! see the same surroundings one after the other: by how much later the second does follows the angle between them, and
+//! which of them is first says which way the table turns.
 
 use std::path::Path;
 
@@ -83,8 +83,8 @@ pub struct StripFigures {
     pub field_deg: f64,
     /// How alike the two columns' views are, the one turned by that angle: 0 to 1.
     pub correlation: f64,
-    /// From where more light comes, by the first harmonic of the strip: the azimuth in the table's frame at angle 0, from x
-    /// towards y, degrees. Clipped windows and the ceiling, which no frame shows, are not in it.
+    /// From where more light comes, by the first harmonic of the strip: the azimuth in the table's frame at angle 0,
+    /// from x towards y, degrees. Clipped windows and the ceiling, which no frame shows, are not in it.
     pub bright_azimuth_deg: f64,
     /// The size of that harmonic over the mean.
     pub bright_part: f64,
@@ -156,7 +156,8 @@ impl StripBuilder {
         let around = |from: usize, by: isize| {
             (from as isize + by).rem_euclid(PARAMETERS.columns as isize) as usize
         };
-        // At angle t the middle of the picture shows what the left column saw half the lag before, and the right one sees later.
+        // At angle t the middle of the picture shows what the left column saw half the lag before, and the right one
+        // sees later.
         let seen = |angle: usize, row: usize| {
             let early = left[around(angle, -lag / 2) * rows + row];
             let late = right[around(angle, lag - lag / 2) * rows + row];
@@ -208,8 +209,8 @@ impl Side {
         self.frames[column] += 1;
     }
 
-    /// The mean at every angle; angles without a frame are like the one before. None where more than a tenth of the turn
-    /// is missing at once.
+    /// The mean at every angle; angles without a frame are like the one before. None where more than a tenth of the
+    /// turn is missing at once.
     fn filled(&self, rows: usize) -> Option<Vec<[f32; 3]>> {
         let mut light = self.light.clone();
         let first = self.frames.iter().position(|&frames| frames > 0)?;
@@ -239,8 +240,8 @@ impl PanoramaStrip {
         &self.figures
     }
 
-    /// The strip itself: what is to the right in the surroundings is to the right in it, and what the camera sees at the table's angle 0
-    /// is in its middle.
+    /// The strip itself: what is to the right in the surroundings is to the right in it, and what the camera sees at
+    /// the table's angle 0 is in its middle.
     #[must_use]
     pub const fn image(&self) -> &Rgb<Linear> {
         &self.image

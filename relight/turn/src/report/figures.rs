@@ -45,7 +45,8 @@ pub struct TurnFigures {
     pub(crate) residual: f64,
     /// The angle that normals are expected to be off, degrees, the median.
     pub(crate) expected_error_deg: f64,
-    /// Specular reflectance and smoothness of the whole object, as `relight render` takes them; none for a Lambertian one.
+    /// Specular reflectance and smoothness of the whole object, as `relight render` takes them; none for a Lambertian
+    /// one.
     pub(crate) gloss: Option<FigureGloss>,
     /// Which ambiguity nothing broke.
     pub(crate) ambiguity: Option<&'static str>,

@@ -72,7 +72,8 @@ pub struct TurnFiles<'a> {
 }
 
 impl TurnFiles<'_> {
-    /// Whether results may be written to the folder `out`: it is not there, empty, or holds earlier results and nothing else.
+    /// Whether results may be written to the folder `out`: it is not there, empty, or holds earlier results and nothing
+    /// else.
     ///
     /// # Errors
     /// Where it holds something else, or cannot be read or written.

@@ -69,7 +69,8 @@ struct Label {
 }
 
 impl TurnLabels<'_> {
-    /// Whether labels may be written to the folder `out`: it is not there, empty, or holds earlier labels and nothing else.
+    /// Whether labels may be written to the folder `out`: it is not there, empty, or holds earlier labels and nothing
+    /// else.
     ///
     /// # Errors
     /// Where it holds something else or cannot be read.
@@ -98,7 +99,8 @@ impl TurnLabels<'_> {
     /// labels in it are replaced. Returns how many samples there are.
     ///
     /// # Errors
-    /// For a [`Self::refusal`], or where the folder holds something else or a file cannot be written: then the folder is as it was.
+    /// For a [`Self::refusal`], or where the folder holds something else or a file cannot be written: then the folder
+    /// is as it was.
     pub fn write(&self, out: &Path) -> Result<usize, TurnError> {
         if let Some(refusal) = self.refusal() {
             return Err(refusal);

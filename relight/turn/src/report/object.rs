@@ -62,8 +62,8 @@ impl TurnSolution {
         }
     }
 
-    /// The object as the render layers take it, with the gloss of [`TurnSolution::gloss`]. Metal is black with a gloss of its own
-    /// colour.
+    /// The object as the render layers take it, with the gloss of [`TurnSolution::gloss`]. Metal is black with a gloss
+    /// of its own colour.
     ///
     /// # Errors
     /// None for maps of one size.
@@ -86,8 +86,8 @@ impl TurnSolution {
         })
     }
 
-    /// Specular reflectance and smoothness of the whole object: those whose highlight in the light is nearest to the gloss
-    /// that was found. Of metal, the reflectance is that of an albedo of 1. None for an object without gloss.
+    /// Specular reflectance and smoothness of the whole object: those whose highlight in the light is nearest to the
+    /// gloss that was found. Of metal, the reflectance is that of an albedo of 1. None for an object without gloss.
     ///
     /// # Errors
     /// Where a term of the light is not finite.
@@ -131,8 +131,8 @@ impl TurnSolution {
         Ok(best)
     }
 
-    /// The object as a file that can be lit. Pixels at the edge of the mask, which show some of the background, get colour
-    /// and normal of the nearest pixel inside.
+    /// The object as a file that can be lit. Pixels at the edge of the mask, which show some of the background, get
+    /// colour and normal of the nearest pixel inside.
     ///
     /// # Errors
     /// Where the maps are too large for a file.

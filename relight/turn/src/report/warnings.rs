@@ -18,7 +18,8 @@ struct WarningParameters {
 
 const PARAMETERS: WarningParameters = WarningParameters { most_residual: 0.4 };
 
-/// Something that a user should know of a result. As text it says what was found; how to change it is for the program to say.
+/// Something that a user should know of a result. As text it says what was found; how to change it is for the program
+/// to say.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TurnWarning {

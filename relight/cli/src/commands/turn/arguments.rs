@@ -1,4 +1,4 @@
-//! What `relight turn` is told.
+//! The arguments of `relight turn`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -42,20 +42,20 @@ pub(crate) struct Arguments {
     /// (nine lines of red, green and blue, or up to 49), or a panorama (.hdr, .exr).
     #[arg(long, value_name = "FILE")]
     pub(super) light: Option<PathBuf>,
-    /// The session from which the shard was made, or its video: to see the surroundings (room.png), and the ball of --probe. Needs the
-    /// program ffmpeg.
+    /// The session from which the shard was made, or its video: to see the surroundings (room.png), and the ball of
+    /// --probe. Needs the program ffmpeg.
     #[arg(long, value_name = "PATH")]
     pub(super) session: Option<PathBuf>,
-    /// A ball on the table, diffuse grey or chrome, which measures the light: its middle and radius in the video, pixels. The light is
-    /// then in units in which the ball's albedo is 1.
+    /// A ball on the table, diffuse grey or chrome, which measures the light: its middle and radius in the video,
+    /// pixels. The light is then in units in which the ball's albedo is 1.
     #[arg(long, value_name = "X,Y,R", value_parser = probe, requires = "session", conflicts_with = "light")]
     pub(super) probe: Option<ProbePlace>,
     /// What the ball is made of: without it, what it looks like.
     #[arg(long, value_enum, value_name = "KIND", requires = "probe")]
     pub(super) probe_ball: Option<BallName>,
-    /// Normals that initialise: "shipped" (the network that comes with the program), "none", a network (.onnx, or weights
-    /// of decompose: .safetensors, .pth), a map of normals (.png, .exr), or a folder with normal.png
-    /// [default: shipped, and none with --light].
+    /// Normals that initialise: "shipped" (the network that comes with the program), "none", a network (.onnx, or
+    /// weights of decompose: .safetensors, .pth), a map of normals (.png, .exr), or a folder with normal.png [default:
+    /// shipped, and none with --light].
     #[arg(long, value_name = "FROM")]
     normals: Option<String>,
     /// Which way y points in these normals.
@@ -73,7 +73,7 @@ pub(crate) struct Arguments {
     /// Write the object as one file that can be lit, object.relit.
     #[arg(long, value_name = "FILE")]
     pub(super) asset: Option<PathBuf>,
-    /// Write twelve frames with what was found as their truth, in the layout of synth, for train to read.
+    /// Write twelve frames with what was fitted as labels, in the layout of synth, for train to read.
     #[arg(long, value_name = "DIR")]
     pub(super) labels: Option<PathBuf>,
     /// The least confidence, 0 to 1, of pixels in the labels.
@@ -104,7 +104,7 @@ impl DirectionName {
 
 #[derive(Clone, Copy, ValueEnum)]
 pub(super) enum BallName {
-    /// It is Lambertian.
+    /// It is diffuse.
     Grey,
     /// It mirrors.
     Chrome,

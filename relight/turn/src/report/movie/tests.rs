@@ -51,7 +51,7 @@ fn the_film_shows_the_object_while_a_lamp_goes_around_it() {
     };
     let of_metal = solve_turn(&metal.curves, &known(&light)).unwrap();
     let (turn, solution) = &*SOLVED;
-    for (name, turn, solution) in [("matt", turn, solution), ("metal", &metal, &of_metal)] {
+    for (name, turn, solution) in [("diffuse", turn, solution), ("metal", &metal, &of_metal)] {
         let frames = film_of(turn, solution, &folder.path().join(name));
         assert_eq!(frames.len(), 90);
         let [left, right] = [2..SIDE / 3, 2 * SIDE / 3..SIDE - 2];
