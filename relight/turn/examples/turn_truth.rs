@@ -148,7 +148,11 @@ impl Truth {
             found.residual(),
             found.expected_error_deg(),
         );
-        println!("    material {:?}, {:?}", found.material(), found.materials());
+        println!(
+            "    material {:?}, {:?}",
+            found.material(),
+            found.materials()
+        );
         for start in found.initialisations() {
             println!("    start {start:?}");
         }

@@ -10,11 +10,13 @@ pub(crate) mod figures;
 pub(crate) mod given_light;
 pub(crate) mod inflation;
 pub(crate) mod initialisation;
+
 pub(crate) mod joint;
 pub(crate) mod material_choice;
 pub(crate) mod normal_step;
 pub(crate) mod options;
 pub(crate) mod prior;
+pub(crate) mod prior_mean;
 pub(crate) mod probe_check;
 pub(crate) mod probe_light;
 pub(crate) mod residuals;

@@ -1,7 +1,6 @@
 //! Normals, albedo and light of a whole turn.
 
 use rayon::prelude::*;
-use relight_core::light::{Normals, YUp};
 use relight_core::statistics::{median, quantile};
 
 use crate::error::TurnError;
@@ -10,19 +9,14 @@ use crate::fit::confidence::{
     ERROR_PARAMETERS, FittedPixels, OwnError, common_error, own_errors, shared_albedo,
 };
 use crate::fit::curve_statistics::{CurveStatistics, all_statistics};
-use crate::fit::figures::InitialisationFigure;
-use crate::fit::inflation::inflated;
-use crate::fit::initialisation::FittedLight;
 use crate::fit::joint::JointOptimisation;
 use crate::fit::normal_step::PriorNormal;
 use crate::fit::options::TurnOptions;
+use crate::fit::prior_mean::Initialised;
 use crate::fit::robust::robust_weights;
 use crate::fit::search::{PixelFit, search_all};
 use crate::fit::setting::Setting;
 use crate::fit::solution::TurnSolution;
-use crate::model::directions::unit;
-use crate::model::frame::TableFrame;
-use crate::model::known_light::KnownLight;
 use crate::model::material::MaterialKind;
 use crate::model::shading::ShadingModel;
 use crate::observe::conditioning::Conditioning;
@@ -33,8 +27,6 @@ use crate::observe::verdict::LightVerdict;
 struct SolveParameters {
     /// Gauss-Newton steps of the joint optimisation in each robust round. By hand.
     robust_steps: usize,
-    /// Weight of the inflated shape as the prior mean, as `TurnOptions::prior_weight`. By hand.
-    outline_weight: f64,
     /// Rounds of robust weights. By hand.
     robust_rounds: usize,
     /// Quantile of the distances that measures the spread of albedos. By hand: spots of another colour count, a few
@@ -46,7 +38,6 @@ struct SolveParameters {
 
 const PARAMETERS: SolveParameters = SolveParameters {
     robust_steps: 3,
-    outline_weight: 0.15,
     robust_rounds: 3,
     spread_quantile: 0.9,
     spread_deviations: 1.645,
@@ -121,97 +112,6 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         materials: found.materials,
         conditioning,
     })
-}
-
-/// The prior normals, and the shading model on blocks of pixels that goes with them.
-struct Initialised {
-    prior: Option<Vec<PriorNormal>>,
-    setting: Setting,
-    found: FittedLight,
-    is_prior_left_out: bool,
-}
-
-impl Initialised {
-    fn find(curves: &TurnCurves, options: &TurnOptions) -> Result<Self, TurnError> {
-        let frame = TableFrame::new(options.elevation);
-        let known = options.light.as_ref();
-        let known = known.map(|light| KnownLight::new(light, &frame));
-        let prior = options
-            .prior
-            .as_ref()
-            .map(|prior| prior_of(curves, prior, options.prior_weight))
-            .transpose()?;
-        let has_shape = prior.is_some();
-        let prior = match &known {
-            None => Some(prior.unwrap_or_else(|| of_outline(curves, PARAMETERS.outline_weight))),
-            Some(_) => prior,
-        };
-        let setting = Setting {
-            frame,
-            known,
-            has_shape,
-        };
-        let found = setting.find(curves, prior.as_deref(), options.material)?;
-        let initialised = Self {
-            prior,
-            setting,
-            found,
-            is_prior_left_out: false,
-        };
-        Ok(initialised.or_outline(curves, options.prior_weight))
-    }
-
-    /// Where a Lambertian material fits the turn, light and shape that go with the prior mean fit it as well as others
-    /// do. Then the shape inflated out of the outline becomes the prior mean, if it is nearer to what fits the turn.
-    fn or_outline(mut self, curves: &TurnCurves, weight: f64) -> Self {
-        let is_lambertian =
-            self.found.model.material == MaterialKind::Diffuse && self.found.model.gloss.is_none();
-        if self.setting.known.is_some()
-            || !self.setting.has_shape
-            || !is_lambertian
-            || weight <= 0.0
-        {
-            return self;
-        }
-        let setting = Setting {
-            has_shape: false,
-            ..self.setting.clone()
-        };
-        let outline = of_outline(curves, weight);
-        let Ok(found) = setting.find(curves, Some(&outline), Some(MaterialKind::Diffuse)) else {
-            return self;
-        };
-        let is_nearer = found.costs[0] < self.found.costs[0];
-        let groups = [
-            (&self.found.initialisations, "", !is_nearer),
-            (&found.initialisations, " alone", is_nearer),
-        ];
-        let initialisations = groups
-            .into_iter()
-            .flat_map(|(initialisations, ending, counts)| {
-                initialisations
-                    .iter()
-                    .map(move |start| InitialisationFigure {
-                        name: format!("{}{ending}", start.name),
-                        residual: start.residual,
-                        taken: start.taken && counts,
-                    })
-            });
-        let initialisations = initialisations.collect();
-        if is_nearer {
-            return Self {
-                prior: Some(outline),
-                setting,
-                found: FittedLight {
-                    initialisations,
-                    ..found
-                },
-                is_prior_left_out: true,
-            };
-        }
-        self.found.initialisations = initialisations;
-        self
-    }
 }
 
 /// All pixels under one light.
@@ -320,33 +220,6 @@ impl Solver<'_> {
             fit.albedo = [0, 1, 2].map(|c| fit.albedo[c] * factors[c]);
         }
     }
-}
-
-/// The normals of the shape inflated out of the outline, where nothing else is known of the shape.
-fn of_outline(curves: &TurnCurves, weight: f64) -> Vec<PriorNormal> {
-    let normal = |normal| PriorNormal { normal, weight };
-    inflated(curves, 1.0).into_iter().map(normal).collect()
-}
-
-/// The prior at each pixel under the mask.
-fn prior_of(
-    curves: &TurnCurves,
-    prior: &Normals<YUp>,
-    weight: f64,
-) -> Result<Vec<PriorNormal>, TurnError> {
-    if prior.extent() != curves.extent() {
-        return Err(TurnError::PriorSize {
-            found: prior.extent(),
-            expected: curves.extent(),
-        });
-    }
-    let whole = prior.completed(&curves.mask());
-    let [x, y, z] = whole.planes().planes();
-    let at = |&place: &usize| PriorNormal {
-        normal: unit([x, y, z].map(|plane| f64::from(plane[place]))),
-        weight,
-    };
-    Ok(curves.places().iter().map(at).collect())
 }
 
 #[cfg(test)]
