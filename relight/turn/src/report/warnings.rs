@@ -197,3 +197,6 @@ impl TurnSolution {
         turn.damage.is_empty() && self.conditioning().verdict.is_fit()
     }
 }
+
+#[cfg(test)]
+mod tests;
