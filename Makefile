@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-train test test-rig test-slurm test-objects lint demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-train test test-rig test-slurm test-objects lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -79,8 +79,12 @@ lint: setup ## Check formatting, lints and documentation
 	@if cargo tree --locked -p relit-grabcut -e normal --prefix none \
 	    | grep -E '^(opencv|rayon|rustix|parquet|tar|clap|indicatif|relit-(video|web|mask))'; then \
 	    echo "relit-grabcut must not depend on these"; exit 1; fi
+	@.ci/wasm --check
 	cargo fmt --manifest-path rig-firmware/uno/Cargo.toml --check
 	@if rig-firmware/build --can; then rig-firmware/build --clippy; fi
+
+wasm: ## Build for WebAssembly the crates that a page in a browser is made of
+	@.ci/wasm
 
 firmware: ## Build the turntable's firmware for Arduino Uno and Nano
 	@rig-firmware/build $(FIRMWARE)
