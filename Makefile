@@ -79,6 +79,7 @@ lint: setup ## Check formatting, lints and documentation
 	@if cargo tree --locked -p relit-grabcut -e normal --prefix none \
 	    | grep -E '^(opencv|rayon|rustix|parquet|tar|clap|indicatif|relit-(video|web|mask))'; then \
 	    echo "relit-grabcut must not depend on these"; exit 1; fi
+	@.ci/dependencies
 	@.ci/wasm --check
 	cargo fmt --manifest-path rig-firmware/uno/Cargo.toml --check
 	@if rig-firmware/build --can; then rig-firmware/build --clippy; fi
