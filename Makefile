@@ -46,7 +46,7 @@ test: setup ## Run all tests
 	else \
 	    echo "the firmware's tests on the emulated chip are skipped: 'make setup' printed why"; \
 	fi
-	cargo test --locked --workspace --exclude relit-fuzz $$(.ci/setup-train --features)
+	cargo test --locked --workspace --exclude relit-fuzz $$(.ci/setup-train --features) --features relit-mask/opencv
 
 test-rig: setup ## Capture with the kernel's camera drivers and a real tty, in a virtual machine
 	@tests/rig-vm/run
@@ -64,10 +64,10 @@ test-objects: setup $(OBJECTS_VENV)/ready ## Extract from and to object stores, 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check
 	cargo run -q --locked -p relit-house
-	cargo clippy --locked --workspace --all-targets $$(.ci/setup-train --features) -- -D warnings
+	cargo clippy --locked --workspace --all-targets $$(.ci/setup-train --features) --features relit-mask/opencv -- -D warnings
 	cargo clippy --locked -p relight -- -D warnings
 	cargo clippy --locked -p relit-extract --features object-store --all-targets -- -D warnings
-	cargo clippy --locked -p relit-mask --no-default-features --all-targets -- -D warnings
+	cargo clippy --locked -p relit-mask --all-targets -- -D warnings
 	cargo clippy --locked -p relit-data --no-default-features -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps
 	@if cargo tree --locked -p relight -e normal --prefix none \

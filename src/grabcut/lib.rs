@@ -85,7 +85,9 @@ pub use hints::{Hints, Mark, Seeds};
 pub use outline::outline;
 pub use preview::preview;
 pub use score::{BOUNDARY_TOLERANCE_PX, MaskScore, ScoreFault, score};
-pub use segment::{Mask, MaskStatistics, segment, segment_turn, segment_with};
+pub use segment::{
+    Mask, MaskStatistics, check_hints, clean_cut, segment, segment_turn, segment_with,
+};
 pub use settings::{
     Effort, Feather, Iterations, MAX_PIXELS, MIN_SIDE, SegmentSettings, SettingsFault,
 };

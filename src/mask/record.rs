@@ -9,6 +9,9 @@ use relit_grabcut::{
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::MaskEngine;
+use super::engine::opencv_version;
+
 /// The schema that this version writes and reads.
 pub const MASK_SCHEMA: &str = "relit.mask/1";
 
@@ -24,6 +27,9 @@ pub struct MaskRecord {
     pub source: SourceFrame,
     /// The hints.
     pub hints: RecordedHints,
+    /// What cut the object out; in older records relit's GrabCut.
+    #[serde(default)]
+    pub engine: MaskEngine,
     /// The settings.
     pub settings: SegmentSettings,
     /// The result.
@@ -38,7 +44,7 @@ pub struct MaskRecord {
 pub struct MaskSoftware {
     /// Version of relit.
     pub version: String,
-    /// Version of OpenCV, where it was linked; masks do not depend on it any more.
+    /// Version of OpenCV, if that cut the mask; older records have it wherever it was linked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub opencv: Option<String>,
 }
@@ -150,15 +156,15 @@ impl MaskRecord {
 }
 
 impl MaskSoftware {
-    /// The versions of this program.
+    /// The versions on which a mask depends that this program makes by an engine.
     #[must_use]
-    pub fn current() -> Self {
+    pub fn of(engine: MaskEngine) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            #[cfg(feature = "opencv")]
-            opencv: opencv::core::get_version_string().ok(),
-            #[cfg(not(feature = "opencv"))]
-            opencv: None,
+            opencv: match engine {
+                MaskEngine::Relit => None,
+                MaskEngine::OpenCv => opencv_version(),
+            },
         }
     }
 }
@@ -244,7 +250,7 @@ mod tests {
         };
         MaskRecord {
             schema: MASK_SCHEMA.to_owned(),
-            software: MaskSoftware::current(),
+            software: MaskSoftware::of(MaskEngine::Relit),
             source: SourceFrame {
                 video: "video.mkv".to_owned(),
                 frame: 3,
@@ -254,6 +260,7 @@ mod tests {
                 frame_blake3: "00".to_owned(),
             },
             hints: RecordedHints::new(&Hints::Rect(Rect::new(-1, 2, 30, 40)).into(), &[]).unwrap(),
+            engine: MaskEngine::OpenCv,
             settings: SegmentSettings::default(),
             result: RecordedResult::new(statistics, b"png"),
             warnings: vec!["look".to_owned()],
@@ -264,6 +271,15 @@ mod tests {
     fn a_record_is_read_back_as_it_was_written() {
         let bytes = record().to_json().unwrap();
         assert_eq!(MaskRecord::from_json(&bytes).unwrap(), record());
+    }
+
+    #[test]
+    fn a_record_that_names_no_engine_is_of_relits_own() {
+        let text = String::from_utf8(record().to_json().unwrap()).unwrap();
+        let older = text.replace("  \"engine\": \"opencv\",\n", "");
+        assert_ne!(older, text);
+        let read = MaskRecord::from_json(older.as_bytes()).unwrap();
+        assert_eq!(read.engine, MaskEngine::Relit);
     }
 
     #[test]

@@ -11,5 +11,6 @@ mod chromium;
 mod degenerate;
 mod editing;
 mod editor;
+mod engine;
 mod program;
 mod scene;

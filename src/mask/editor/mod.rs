@@ -28,7 +28,7 @@ const THREADS: usize = 2;
 
 /// Serves the editor at `address`, whose port may be 0 for any free one, for the recording at `input`, a session folder or a video file, until a person accepts a
 /// mask or discards it. The request says what is drawn at the beginning, and may be empty. `announce` is called
-/// once, when a browser can connect. The files are those of [`make_mask`](super::make_mask), and none is
+/// once, when a browser can connect. relit's engine cuts, whichever the request names. The files are those of [`make_mask`](super::make_mask), and none is
 /// written before the mask is accepted; the result is `None` if it was discarded.
 ///
 /// # Errors
