@@ -51,7 +51,7 @@ mod sampling;
 mod seeds;
 
 pub use bench::{BenchImage, BenchRow, Prompt, bench_image, bench_images};
-pub use checking::{CheckOutput, DriftCheck, FrameDrift, MaskReport, Verdict, check_mask};
+pub use checking::{CheckOutput, DriftCheck, FrameDrift, MaskReport, MaskVerdict, check_mask};
 pub use editor::edit;
 pub use engine::{MaskEngine, opencv_grab_cut};
 pub use error::MaskingError;
