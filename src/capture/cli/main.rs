@@ -7,7 +7,7 @@ mod environment;
 mod recording;
 mod serving;
 mod simulate;
-mod table_arguments;
+mod turntable_arguments;
 mod token;
 mod turntable;
 
