@@ -43,6 +43,7 @@ impl Prompt {
 
 /// The figures of one image with one hint.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct BenchRow {
     /// The image's name, without folder and ending.
     pub image: String,

@@ -18,6 +18,7 @@ use super::{
 
 /// A mask that was written.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct MaskOutput {
     /// The recording's id.
     pub recording: String,

@@ -18,6 +18,7 @@ pub const MASK_SCHEMA: &str = "relit.mask/1";
 /// The content of `mask.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct MaskRecord {
     /// [`MASK_SCHEMA`].
     pub schema: String,
@@ -41,6 +42,7 @@ pub struct MaskRecord {
 /// The versions on which a mask's bytes depend.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct MaskSoftware {
     /// Version of relit.
     pub version: String,
@@ -52,6 +54,7 @@ pub struct MaskSoftware {
 /// The frame on which a mask was made.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct SourceFrame {
     /// File name of the video, without folders.
     pub video: String,
@@ -70,6 +73,7 @@ pub struct SourceFrame {
 /// A [`Drawing`] as it is recorded, and the turn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct RecordedHints {
     /// The rectangle as given; null without one.
     pub rect: Option<Rect>,
@@ -89,6 +93,7 @@ pub struct RecordedHints {
 /// [`MaskStatistics`] and hash of a mask as they are recorded.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct RecordedResult {
     /// BLAKE3 of the mask's file, in hexadecimal.
     pub mask_blake3: String,

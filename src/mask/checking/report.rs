@@ -10,6 +10,7 @@ use super::verdict::MaskVerdict;
 
 /// Everything that was found about a mask.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct MaskReport {
     /// Whether it fits.
     pub verdict: MaskVerdict,
@@ -23,6 +24,7 @@ pub struct MaskReport {
 
 /// A report that was written.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct CheckOutput {
     /// The recording's id.
     pub recording: String,

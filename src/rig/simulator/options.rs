@@ -47,6 +47,7 @@ impl Default for SimulatorOptions {
 
 /// Counters since power-on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[non_exhaustive]
 pub struct SimulatorCounts {
     /// On the way to the chip.
     pub to_chip: WireCounts,
