@@ -73,7 +73,7 @@ lint: setup ## Check formatting, lints and documentation
 	cargo clippy --locked --workspace --all-targets $(EXTRAS) $$(.ci/setup-train --features) -- -D warnings
 	cargo clippy --locked -p relight -- -D warnings
 	cargo clippy --locked -p relit-extract --features object-store --all-targets -- -D warnings
-	cargo clippy --locked -p relit-mask --no-default-features --all-targets -- -D warnings
+	cargo clippy --locked -p relit-mask -p relit-capture --all-targets -- -D warnings
 	cargo clippy --locked -p relit-data --no-default-features -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps
 	@if cargo tree --locked -p relight -e normal --prefix none \

@@ -9,6 +9,7 @@ mod check;
 mod degenerate;
 mod editing;
 mod editor;
+mod engine;
 mod program;
 mod scene;
 mod support;

@@ -202,7 +202,6 @@ fn auto_needs_no_hint_and_its_recipe_makes_the_same_files_again() {
     }
 }
 
-#[cfg(feature = "opencv")]
 #[test]
 fn bench_measures_every_hint_and_names_what_is_wrong() {
     let folder = tempfile::tempdir().unwrap();
@@ -230,6 +229,8 @@ fn bench_measures_every_hint_and_names_what_is_wrong() {
     assert_eq!(average["event"], "average");
     assert_eq!(average["hint"], "box");
     assert!(average["ours"]["iou"].as_f64().unwrap() > 0.97);
+    let opencv = average["opencv"]["iou"].as_f64();
+    assert_eq!(opencv.is_some(), cfg!(feature = "opencv"), "{average}");
     fs::write(path.join("disc.box.txt"), "24 8 73").unwrap();
     let output = relit_mask(path, &["bench", "."]);
     assert_eq!(code(&output), 1);
