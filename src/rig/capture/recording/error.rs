@@ -10,6 +10,7 @@ use relit_video::VideoError;
 /// Why a recording could not begin, be finished, or be salvaged. What ends a recording early is no
 /// such error: see [`super::End`].
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RecordingError {
     /// The system refused a thread.
     #[error("a thread for the {what} could not be started: close other programs")]

@@ -7,7 +7,6 @@ use super::TableOptions;
 use super::codes::Alarm;
 use super::error::TurntableError;
 use super::greeting;
-use super::homing::Homed;
 use super::identity::Identity;
 use super::link::{IoThread, Link};
 use super::owner::{Claim, Server};
@@ -284,18 +283,6 @@ impl Table {
         self.clear_emergency_stop()?;
         self.command("$X")?;
         self.status()
-    }
-
-    /// Brings the table back after an alarm of any kind: resets the controller, unlocks and homes it.
-    ///
-    /// # Errors
-    /// [`TurntableError::EmergencyStop`] while the emergency stop is pressed, and the errors of
-    /// [`Table::stop`] and [`Table::home`].
-    pub fn reset(&self) -> Result<Homed, TurntableError> {
-        require_released(&self.status()?)?;
-        self.link.reset()?;
-        self.unlock()?;
-        self.home()
     }
 
     /// Resets a controller that is locked since an emergency stop: it takes neither `$X` nor `$H`

@@ -5,9 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::chip::{IndexInput, Pins};
+use super::ground_truth::StepEdge;
 use super::model::Model;
-use super::truth::StepEdge;
-use super::{SimulatorCounts, SimulatorOptions};
+use super::options::{SimulatorCounts, SimulatorOptions};
 use crate::clock::Clock;
 use crate::turntable::Port;
 
@@ -56,12 +56,12 @@ impl SimulatedTable {
     /// The table's true angle at a time of its clock, degrees; not reduced to one turn. After the
     /// present, the table counts as standing still.
     pub fn angle_at(&self, us: i64) -> f64 {
-        self.now().truth().angle_at(us)
+        self.now().ground_truth().angle_at(us)
     }
 
     /// All steps so far, at most the last two million.
     pub fn edges(&self) -> Vec<StepEdge> {
-        self.now().truth().edges()
+        self.now().ground_truth().edges()
     }
 
     /// Counters since power-on.

@@ -19,18 +19,18 @@ pub struct StepEdge {
 }
 
 /// The steps so far.
-pub(super) struct Truth {
+pub(super) struct GroundTruth {
     start_angle: f64,
     edges: VecDeque<StepEdge>,
 }
 
-impl Truth {
-    pub(super) fn new(start_angle: f64, start_us: i64) -> Truth {
+impl GroundTruth {
+    pub(super) fn new(start_angle: f64, start_us: i64) -> GroundTruth {
         let start = StepEdge {
             t_us: start_us,
             steps: 0,
         };
-        Truth {
+        GroundTruth {
             start_angle,
             edges: VecDeque::from([start]),
         }
@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn between_steps_the_angle_grows_with_time_and_in_a_rest_it_stands() {
-        let mut truth = Truth::new(10.0, 1000);
+        let mut truth = GroundTruth::new(10.0, 1000);
         assert_eq!(truth.angle_at(5000), 10.0);
         let edges = [(2_001_000, 1), (2_003_000, 2), (5_000_000, 3)];
         truth.extend(

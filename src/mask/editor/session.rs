@@ -56,7 +56,7 @@ struct Frame {
 
 /// A recording on which a mask is drawn.
 #[derive(Debug)]
-pub(super) struct Desk {
+pub(super) struct EditorSession {
     recording: String,
     video: Video,
     files: MaskFiles,
@@ -66,13 +66,13 @@ pub(super) struct Desk {
     turn: Mutex<Option<Arc<SampledTurn>>>,
 }
 
-impl Desk {
+impl EditorSession {
     pub(super) fn new(
         recording: &Recording,
         files: MaskFiles,
         request: MaskRequest,
     ) -> Result<Self, MaskingError> {
-        let desk = Self {
+        let session = Self {
             recording: recording.id.clone(),
             video: Video::open(&recording.video)?,
             files,
@@ -81,8 +81,8 @@ impl Desk {
             frame: Mutex::default(),
             turn: Mutex::default(),
         };
-        desk.frame(desk.request.frame)?;
-        Ok(desk)
+        session.frame(session.request.frame)?;
+        Ok(session)
     }
 
     pub(super) fn description(&self) -> Description {

@@ -29,7 +29,7 @@ const SHADOW_REACH: f64 = 0.08;
 
 /// The table, as far as it is seen.
 #[derive(Debug)]
-pub(super) struct Table {
+pub(super) struct Turntable {
     /// Its plain surface.
     pub(super) surface: Bitmap,
     /// Darker pixels of the same colour beside it: where the object shadows it all the time.
@@ -41,7 +41,11 @@ pub(super) struct Table {
 /// The table, from the features of a turn (average L, a, b, changes of light and colour)
 /// and the largest contrast of each pixel to its neighbours. Empty if none is
 /// found.
-pub(super) fn table(features: &[[f32; 5]], contrast: &[f32], size: (usize, usize)) -> Table {
+pub(super) fn find_turntable(
+    features: &[[f32; 5]],
+    contrast: &[f32],
+    size: (usize, usize),
+) -> Turntable {
     let (width, height) = size;
     let dark = |at: usize| {
         let [light, a, b, change, _] = features[at];
@@ -77,7 +81,7 @@ pub(super) fn table(features: &[[f32; 5]], contrast: &[f32], size: (usize, usize
     let is_table = |at: usize, _| lowest.is_some() && components.at(at) == lowest;
     let surface = inner.map(is_table).dilated(1);
     let shadow = shadow(features, contrast, structure, &surface, size);
-    Table {
+    Turntable {
         surface,
         shadow,
         plain,
@@ -169,7 +173,7 @@ mod tests {
     #[test]
     fn the_table_is_found_and_the_dark_object_on_it_is_not() {
         let (features, contrast) = scene();
-        let table = table(&features, &contrast, SIZE);
+        let table = find_turntable(&features, &contrast, SIZE);
         let at = |x: usize, y: usize| table.surface.bits()[y * 40 + x];
         assert!(at(8, 24) && at(30, 28) && at(20, 27));
         assert!(!at(20, 12) && !at(20, 20) && !at(2, 2));
@@ -182,6 +186,6 @@ mod tests {
             .iter()
             .map(|f| [f[0] + 20.0, f[1], f[2], f[3], f[4]])
             .collect();
-        assert_eq!(table(&bright, &contrast, SIZE).surface.count(), 0);
+        assert_eq!(find_turntable(&bright, &contrast, SIZE).surface.count(), 0);
     }
 }
