@@ -40,7 +40,7 @@ fn the_film_shows_the_object_while_a_lamp_goes_around_it() {
         .arg("-version")
         .output();
     if run.is_err() {
-        eprintln!("skipped: the program ffmpeg is not installed");
+        relit_test_support::say_skipped("the program ffmpeg is not installed");
         return;
     }
     let folder = tempfile::tempdir().unwrap();
