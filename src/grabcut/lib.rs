@@ -1,9 +1,9 @@
 //! Which pixels of an image are the object: hints from a person or what a turn shows, GrabCut, clean-up.
 //!
 //! Camera and object ride on the same turntable, so one mask fits all frames of a turn. [`segment`]
-//! makes it from one image and hints, [`segment_turn`] from what the frames of a whole turn show ([`TurnFrames`]), with or without
-//! hints; [`preview`] shows it for a person to check; [`MaskCheck`] holds a mask against a turn, and [`score`]
-//! measures it against the truth.
+//! makes it from one image and hints, [`segment_turn`] from what the frames of a whole turn show
+//! ([`TurnFrames`]), with or without hints. [`preview`] shows it for a person to check; [`MaskCheck`] holds a mask
+//! against a turn, and [`score`] measures it against the ground truth.
 //!
 //! Everything is computed from images and bytes in memory: the crate knows no files, videos or threads, links
 //! no native library, and also runs in a browser.

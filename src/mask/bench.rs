@@ -1,6 +1,6 @@
-//! Masks of a folder of images with truth, ours and those of OpenCV's GrabCut, measured in one run.
+//! Masks of a folder of images with ground truth, ours and those of OpenCV's GrabCut, measured in one run.
 //!
-//! The folder has the form of the GrabCut data set: for an image `NAME.jpg` (or .png, .bmp), the truth
+//! The folder has the form of the GrabCut data set: for an image `NAME.jpg` (or .png, .bmp), the ground truth
 //! `NAME.gt.png` (0 background, 255 object, 128 does not count), and as hints `NAME.box.txt` with the
 //! numbers `x1 y1 x2 y2`, corners included, or `NAME.scribble.png` (black unknown, red background, any light
 //! colour object), or both.
@@ -64,7 +64,7 @@ pub struct BenchImage {
     path: PathBuf,
 }
 
-/// The images of a folder that have a truth, in the order of their names.
+/// The images of a folder that have a ground truth, in the order of their names.
 ///
 /// # Errors
 /// [`MaskingError::Io`]; [`MaskingError::Bench`] if there is none.
@@ -85,7 +85,8 @@ pub fn bench_images(folder: &Path) -> Result<Vec<BenchImage>, MaskingError> {
     }
     images.sort_by(|a, b| a.name.cmp(&b.name));
     if images.is_empty() {
-        let why = "it holds no image with its truth, as in mug.jpg and mug.gt.png".to_owned();
+        let why =
+            "it holds no image with its ground truth, as in mug.jpg and mug.gt.png".to_owned();
         return Err(bench_error(folder, why));
     }
     Ok(images)

@@ -74,7 +74,6 @@ pub enum Verdict {
 
 /// The last take, or the one before the present one.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-#[non_exhaustive]
 pub struct TakeSummary {
     /// The session's name.
     pub session: String,

@@ -1,4 +1,4 @@
-//! `relit-mask bench`: figures over a folder of images with truth, as a table or JSON lines.
+//! `relit-mask bench`: figures over a folder of images with ground truth, as a table or JSON lines.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Whether the room's light changes enough over the turn, from a small sample of its frames.
+//! Whether the environment light changes enough over the turn, from a small sample of its frames.
 
 use image::RgbImage;
 use relit_data::geometry::Rect;
@@ -15,7 +15,7 @@ const MOST_FRAMES: usize = 64;
 const FIRST_STEP: usize = 8;
 
 /// Looks at a frame now and then, about evenly spread over the turn.
-pub(super) struct RoomLight {
+pub(super) struct EnvironmentLight {
     stream: StreamFormat,
     decoder: Option<LiveDecoder>,
     /// Linear light by an 8-bit value.
@@ -32,7 +32,7 @@ struct Sample {
     blocks: Vec<Option<f64>>,
 }
 
-impl RoomLight {
+impl EnvironmentLight {
     pub(super) fn new(stream: StreamFormat) -> Self {
         Self {
             stream,
@@ -133,13 +133,13 @@ mod tests {
     }
 
     /// The modulation of a turn in which all of the picture is so bright, by the part of the turn.
-    fn of_turn(frames: usize, light: impl Fn(f64) -> f64) -> Option<f64> {
-        let mut room = RoomLight::new(stream());
+    fn of_turn(frames: usize, level: impl Fn(f64) -> f64) -> Option<f64> {
+        let mut light = EnvironmentLight::new(stream());
         for frame in 0..frames {
-            let value = light(frame as f64 / frames as f64);
-            room.add(frame, &vec![value as u8; (SIDE * SIDE) as usize]);
+            let value = level(frame as f64 / frames as f64);
+            light.add(frame, &vec![value as u8; (SIDE * SIDE) as usize]);
         }
-        room.modulation(frames)
+        light.modulation(frames)
     }
 
     #[test]
@@ -152,24 +152,24 @@ mod tests {
 
     #[test]
     fn however_long_a_turn_is_a_few_frames_are_kept() {
-        let mut room = RoomLight::new(stream());
+        let mut light = EnvironmentLight::new(stream());
         for frame in 0..5000 {
-            room.add(frame, &[100; (SIDE * SIDE) as usize]);
+            light.add(frame, &[100; (SIDE * SIDE) as usize]);
         }
-        assert!((MOST_FRAMES / 2..MOST_FRAMES).contains(&room.samples.len()));
-        let steps = room.samples.windows(2);
+        assert!((MOST_FRAMES / 2..MOST_FRAMES).contains(&light.samples.len()));
+        let steps = light.samples.windows(2);
         assert!(
             steps
                 .into_iter()
-                .all(|pair| pair[1].frame - pair[0].frame == room.every)
+                .all(|pair| pair[1].frame - pair[0].frame == light.every)
         );
     }
 
     #[test]
     fn a_picture_that_clips_and_one_that_is_damaged_say_nothing() {
         assert_eq!(of_turn(300, |_| 255.0), None);
-        let mut room = RoomLight::new(stream());
-        (0..300).for_each(|frame| room.add(frame, &[1, 2, 3]));
-        assert_eq!(room.modulation(300), None);
+        let mut light = EnvironmentLight::new(stream());
+        (0..300).for_each(|frame| light.add(frame, &[1, 2, 3]));
+        assert_eq!(light.modulation(300), None);
     }
 }
