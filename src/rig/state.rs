@@ -130,7 +130,7 @@ pub struct CameraState {
     pub fps: Option<f64>,
     /// Exposure, gain, white balance, focus and power-line filter as read back.
     pub controls: Vec<(String, i64)>,
-    /// Pixels of the newest frame with all channels >= 250, as a fraction 0 to 1.
+    /// Pixels of the newest frame with all channels saturated, as a fraction 0 to 1.
     pub clipped: Option<f64>,
     /// Variance of the Laplacian of luma in the middle of the newest frame: greater is sharper.
     pub focus: Option<f64>,

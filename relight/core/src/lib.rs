@@ -11,6 +11,7 @@
 //! | [`render`] | diffuse and specular layers on normals, their derivatives, Monte Carlo as the reference |
 //! | [`metrics`] | how far an estimate is from the ground truth |
 //! | [`asset`] | a captured object in one file, ready to be lit |
+//! | [`statistics`] | median and quantiles of samples |
 //! | [`parallel`] | rows and parts side by side, where there are threads |
 #![cfg_attr(
     feature = "files",
@@ -27,3 +28,4 @@ pub mod light;
 pub mod metrics;
 pub mod parallel;
 pub mod render;
+pub mod statistics;

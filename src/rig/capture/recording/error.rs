@@ -3,6 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
+use relit_data::disk::is_full;
 use relit_data::session;
 use relit_video::VideoError;
 
@@ -56,12 +57,9 @@ impl RecordingError {
     /// True where a disk, quota or file size limit is exhausted.
     #[must_use]
     pub fn is_out_of_space(&self) -> bool {
-        use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
         match self {
             Self::Video(VideoError::DiskFull { .. }) => true,
-            Self::Session(session::SessionError::Io { source, .. }) => {
-                matches!(source.kind(), StorageFull | QuotaExceeded | FileTooLarge)
-            }
+            Self::Session(session::SessionError::Io { source, .. }) => is_full(source),
             _ => false,
         }
     }
