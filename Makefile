@@ -7,6 +7,9 @@ SHELL := /bin/bash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
+# The programs from the rig to the shards.
+PROGRAMS := -p relit-capture -p relit-mask -p relit-extract
+
 # Parts of the programs that nobody needs to make shards; lint and tests look at them too.
 EXTRAS := --features relit-rig/nokhwa,relit-mask/opencv
 
@@ -70,12 +73,12 @@ test-objects: setup $(OBJECTS_VENV)/ready ## Extract from and to object stores, 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check
 	cargo run -q --locked -p relit-house
-	cargo clippy --locked --workspace --all-targets $(EXTRAS) $$(.ci/setup-train --features) -- -D warnings
+	cargo clippy --locked --workspace --all-targets $(EXTRAS),relit-extract/object-store \
+	    $$(.ci/setup-train --features) -- -D warnings
 	cargo clippy --locked -p relight -- -D warnings
-	cargo clippy --locked -p relit-extract --features object-store --all-targets -- -D warnings
-	cargo clippy --locked -p relit-mask -p relit-capture --all-targets -- -D warnings
+	cargo clippy --locked $(PROGRAMS) --all-targets -- -D warnings
 	cargo clippy --locked -p relit-data --no-default-features -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps $(EXTRAS)
 	@if cargo tree --locked -p relight -e normal --prefix none \
 	    | grep -E '^(ffmpeg|opencv|axum|hyper|tokio|relit-(video|mask|rig))'; then \
 	    echo "relight must not depend on these"; exit 1; fi
@@ -103,7 +106,7 @@ flash: firmware ## Flash the firmware to the Arduino at PORT (/dev/ttyACM0)
 	    -U flash:w:$(FIRMWARE)/rig-firmware-uno.hex:i
 
 demo: setup-programs ## Record the turn in fixtures/ on a simulated rig, make a shard of it, list the results
-	cargo build --locked --release -p relit-capture -p relit-mask -p relit-extract --bins
+	cargo build --locked --release $(PROGRAMS) --bins
 	rm -rf $(DEMO)
 	$(TARGET)/release/relit-capture record --yes --object cow --root $(DEMO)/sessions \
 	    --camera 'replay:fixtures/$(SESSION)?loop=1' --turntable sim:

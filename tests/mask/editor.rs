@@ -81,6 +81,7 @@ fn without_the_token_or_under_another_name_nothing_is_shown_and_nothing_done() {
     let editing = Editing::start(folder.path(), &["clip.y4m"]);
     assert!(editing.address.starts_with("127.0.0.1:"));
     assert_eq!(editing.token.len(), 32);
+    assert!(editing.url.contains(&editing.address), "{}", editing.url);
     let body = sketch().to_string();
     let json = "Content-Type: application/json";
     for (method, path) in [
