@@ -61,7 +61,7 @@ impl Bench {
     /// Trains by `phase` into the folder of its name, or into `out`.
     fn train(&self, phase: &str, out: &str, more: &str) {
         let settings =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../relight/weights/fixtures.toml");
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../relight/cli/weights/fixtures.toml");
         let output = Command::new(&self.relight)
             .args(["train", phase, "--threads", "1", "-o", out, "--settings"])
             .arg(settings)
