@@ -32,7 +32,7 @@ pub enum TurnWarning {
         looks: ProbeBall,
     },
     /// The light by the ball fits the ball badly.
-    #[error("the light by the ball leaves {:.0} % of what varies in it: measure its middle and radius in the video again, and see that nothing shades it", 100.0 * residual)]
+    #[error("the residual of the light by the ball is {:.0} % of what varies in it: measure its middle and radius in the video again, and see that nothing shades it", 100.0 * residual)]
     BallResidual {
         /// The residual over the variation.
         residual: f64,
@@ -46,7 +46,7 @@ pub enum TurnWarning {
     )]
     NoPanoramaStrip,
     /// The other rotation direction fits the turn clearly better.
-    #[error("the turn is explained clearly better if the table turns the other way, with {:.0} % left instead of {:.0} %", 100.0 * other_residual, 100.0 * residual)]
+    #[error("the other rotation direction fits the turn clearly better, with a residual of {:.0} % instead of {:.0} %", 100.0 * other_residual, 100.0 * residual)]
     OtherDirection {
         /// The residual of the given direction, over the energy of the variation.
         residual: f64,
@@ -78,7 +78,7 @@ pub enum TurnWarning {
     )]
     GivenLightIsEven,
     /// The other material fits the turn clearly better than the given one.
-    #[error("the other material explains the turn clearly better, with {:.0} % of what varies left instead of {:.0} %", 100.0 * other_residual, 100.0 * residual)]
+    #[error("the other material fits the turn clearly better, with a residual of {:.0} % of what varies instead of {:.0} %", 100.0 * other_residual, 100.0 * residual)]
     OtherMaterial {
         /// The other one.
         material: MaterialKind,
@@ -88,7 +88,7 @@ pub enum TurnWarning {
         other_residual: f64,
     },
     /// The given light fits the turn badly.
-    #[error("the light that was given leaves {:.0} % of what varies over the turn: see that it is this turn's, in the viewer's frame at the table's angle 0", 100.0 * residual)]
+    #[error("the residual in the light that was given is {:.0} % of what varies over the turn: see that it is this turn's, in the viewer's frame at the table's angle 0", 100.0 * residual)]
     GivenLightResidual {
         /// The residual over the energy of the variation.
         residual: f64,
