@@ -4,11 +4,11 @@ use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{ArgMatches, CommandFactory, Error, FromArgMatches, Parser, Subcommand};
+use relit_console::Console;
 
 #[cfg(feature = "train")]
 use crate::commands::train;
 use crate::commands::{decompose, eval, insert, relight, render, synth, turn, weights};
-use crate::console::Console;
 
 /// Single-view relighting: photographs taken apart, light, rendering, data with truth, measures of the results.
 #[derive(Parser)]

@@ -15,10 +15,11 @@ use relight_photo::decompose::{
     WORKING_SIDE, WorkingSize,
 };
 use relight_photo::files::{DecompositionFigures, DecompositionFiles, PhotoInput, PhotoReading};
+use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
 use serde_json::{Value, json};
 
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 use crate::shipped;
 use crate::values::{TransferName, YName};
 
@@ -211,7 +212,7 @@ impl EngineName {
                 if named.is_some() || !matches!(fault, NetError::NoLibrary { .. }) {
                     let text = with_causes(&fault);
                     let event = json!({ "event": "engine", "message": text });
-                    console.warn(&format!("tract is used: {text}"), &event);
+                    console.warn_with(&format!("tract is used: {text}"), &event);
                 }
                 InferenceEngine::Tract
             })),
@@ -240,7 +241,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
                 let text = format!("{}: {message}", input.place());
                 let event =
                     json!({ "event": "failed", "photo": input.place(), "message": message });
-                console.warn(&text, &event);
+                console.warn_with(&text, &event);
             }
         });
         bar.inc(1);

@@ -16,11 +16,12 @@ use relight_photo::insert::{
     Backdrop, InsertError, LightSource, MaterialChange, ObjectGloss, PanoramaView, Shot, TrustMap,
     likeness,
 };
+use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
 use serde_json::json;
 
 use super::decompose::rectangle;
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::light::NewLightArguments;
 use crate::photos::{
@@ -245,7 +246,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             lost += 1;
             let message = with_causes(error.as_ref());
             let text = format!("{}: {message}", input.place());
-            console.warn(
+            console.warn_with(
                 &text,
                 &json!({ "event": "failed", "photo": input.place(), "message": message }),
             );

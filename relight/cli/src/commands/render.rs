@@ -11,9 +11,10 @@ use relight_core::files::{MovieFormat, MovieWriter};
 use relight_core::image::{Linear, Rgb, Srgb};
 use relight_core::light::{Direction, Order, Panorama, Rotation, ShLight};
 use relight_core::render::{DiffuseForm, Look, SpecularForm, Surface, exposure_for};
+use relit_console::{Console, Outcome};
 use serde_json::json;
 
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 use crate::folder::make_empty_folder;
 use crate::values::{TransferName, YName};
 

@@ -10,19 +10,19 @@ use std::sync::atomic::AtomicBool;
 
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand};
-use indicatif::ProgressBar;
 use relight_nets::{NetError, Weights};
 use relight_train::{
     DecomposeSettings, DecomposeTask, Launch, PaperInputs, PaperPhase, PaperSettings, PaperTask,
     ProcessGroup, Resources, Run, RunOutcome, RunSettings, Task, TrainObserver, read_settings,
 };
+use relit_console::{Console, Outcome, ProgressBar};
 use serde::Serialize;
 use serde_json::json;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use tch::Device;
 
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -351,7 +351,7 @@ impl TrainObserver for OtherProcess {
         let event =
             json!({ "event": "damaged", "step": step, "process": process, "message": what });
         let line = format!("step {step}, process {process}: left out: {what}");
-        self.console.warn(&line, &event);
+        self.console.warn_with(&line, &event);
     }
 
     fn validated(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
@@ -376,7 +376,7 @@ impl TrainObserver for View {
     fn damaged(&mut self, step: u64, what: &str) {
         let event = json!({ "event": "damaged", "step": step, "message": what });
         let line = format!("step {step}: left out: {what}");
-        self.bar.suspend(|| self.console.warn(&line, &event));
+        self.bar.suspend(|| self.console.warn_with(&line, &event));
     }
 
     fn validated(&mut self, step: u64, figures: &BTreeMap<String, f64>) {

@@ -7,11 +7,12 @@ use std::iter;
 use std::path::{Path, PathBuf};
 
 use relight_photo::insert::{Scene, SceneDescription, SceneObject, TrustFigures};
+use relit_console::{Console, Outcome};
 use serde_json::json;
 
 pub(crate) use self::arguments::{Arguments, EXAMPLES};
 use self::work::{Background, Work, load, read_background};
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 use crate::photos::{OutputKind, not_an_input};
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {

@@ -14,9 +14,9 @@ use relight_photo::insert::{
     LightSource, Matching, ObjectDescription, PanoramaView, Scene, SceneDescription, Subject,
     TrustFigures, TrustMap,
 };
+use relit_console::Console;
 
 use super::Arguments;
-use crate::console::Console;
 use crate::light::read_light;
 use crate::photos::{Network, NetworkArguments, OutputKind, at_most, write_picture};
 

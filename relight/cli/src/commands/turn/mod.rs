@@ -11,13 +11,14 @@ use relight_turn::{
     BodyKind, Filmed, ProbeLight, ReadTurn, TurnError, TurnFigures, TurnFiles, TurnLabels,
     TurnMaps, TurnSolution, film, read_curves, solve_turn,
 };
+use relit_console::{Console, Outcome};
 use serde_json::json;
 
 use self::arguments::ball_name;
 pub(crate) use self::arguments::{Arguments, EXAMPLES};
 use self::places::{AssetPlace, check_places};
 use self::warnings::{warn, warn_of, warn_of_room, warn_of_sense};
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let start = Instant::now();

@@ -4,16 +4,15 @@ use relight_turn::{
     BodyKind, Conditioning, ElevationSource, ReadTurn, RoomStrip, SenseFigure, TableSense,
     TurnOptions, TurnSolution,
 };
-use serde_json::json;
+use relit_console::{Console, Outcome};
 
 use super::arguments::SenseName;
-use crate::console::{Console, Outcome};
 
 /// A given light that leaves more than this part of what varies is not that of the turn.
 const MOST_LEFT: f64 = 0.4;
 
 pub(super) fn warn(text: &str, console: Console) {
-    console.warn(text, &json!({ "event": "warning", "message": text }));
+    console.warn(text);
 }
 
 /// Says where the room does not fit.
