@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::files::{read_planes, write_exr};
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb as Picture, Srgb};
 use relight_core::light::{Normals, Order, Panorama, ShLight};
@@ -428,7 +428,7 @@ fn a_captured_object_is_inserted_beside_photographs_and_needs_no_mask() {
     let full = Planes::filled(normals.extent(), [1.0]);
     let albedo = Picture::new(Planes::filled(normals.extent(), [0.7, 0.1, 0.1]));
     let surface = Surface::new(normals, albedo, None).unwrap();
-    let asset = Asset::new("red", surface, full.clone(), full).unwrap();
+    let asset = CapturedObject::new("red", surface, full.clone(), full).unwrap();
     asset.write(&folder.path("red.relit")).unwrap();
     let common = "--into sky.exr --size 96,64 --height 0.5 --weights w.safetensors -o";
     let command = format!("insert photos/one.png red.relit --mask masks {common} both.png");

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use relit_data::session::SessionError;
 
 use super::{ProbePlace, RoomVerdict};
-use relight_core::asset::AssetError;
+use relight_core::captured_object::CapturedObjectError;
 use relight_core::files::FolderFault;
 use relight_core::files::MovieError;
 use relight_core::image::{Extent, ImageError};
@@ -92,7 +92,7 @@ pub enum TurnError {
     Image(#[from] ImageError),
     /// The object cannot be made a file.
     #[error("the object cannot be written as a file that can be lit")]
-    Asset(#[source] Box<AssetError>),
+    Asset(#[source] Box<CapturedObjectError>),
     /// Metal has no matt part that a network could learn from.
     #[error(
         "the object is taken for metal, which has no albedo and shading apart: there are no labels of it"
@@ -219,8 +219,8 @@ impl TurnError {
     }
 }
 
-impl From<AssetError> for TurnError {
-    fn from(error: AssetError) -> Self {
+impl From<CapturedObjectError> for TurnError {
+    fn from(error: CapturedObjectError) -> Self {
         Self::Asset(Box::new(error))
     }
 }

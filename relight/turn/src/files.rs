@@ -12,7 +12,7 @@ use super::{
     BodyFigure, BodyKind, Conditioning, Elevation, ExposureStep, ReadTurn, RoomStrip, SenseFigure,
     StartFigure, StripFigures, TableLight, TurnCurves, TurnError, TurnMaps, TurnSolution,
 };
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::files::ResultFolder;
 use relight_core::files::write_png;
 use relight_core::files::{MovieFormat, MovieWriter};
@@ -75,7 +75,7 @@ pub struct TurnFiles<'a> {
     /// The room, where the video was read.
     pub strip: Option<&'a RoomStrip>,
     /// The object, where it is to be among the files, as `object.relit`.
-    pub asset: Option<&'a Asset>,
+    pub asset: Option<&'a CapturedObject>,
     /// Whether to write the video.
     pub has_movie: bool,
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::files::{Map, MapFiles};
 use relight_core::files::{MovieFormat, MovieWriter};
 use relight_core::image::{Linear, Rgb, Srgb};
@@ -205,7 +205,7 @@ impl Arguments {
 impl ObjectArguments {
     fn read(&self) -> Result<Surface, Box<dyn Error>> {
         match (&self.asset, &self.normals) {
-            (Some(path), _) => Ok(Asset::read(path)?.surface().clone()),
+            (Some(path), _) => Ok(CapturedObject::read(path)?.surface().clone()),
             (None, Some(normals)) => Ok(self.files(normals).read()?),
             (None, None) => Err("give an object (.relit), or --normals".into()),
         }

@@ -7,7 +7,7 @@ use super::source::likeness;
 use crate::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, Decomposition, Region, WORKING_SIDE,
 };
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_core::light::{Normals, Order, ShLight, YUp};
 use relight_core::render::{
@@ -171,7 +171,7 @@ impl Subject {
     ///
     /// # Errors
     /// Where it covers no pixel by a half.
-    pub fn of_asset(asset: &Asset) -> Result<Self, InsertError> {
+    pub fn of_captured(asset: &CapturedObject) -> Result<Self, InsertError> {
         let (extent, surface) = (asset.extent(), asset.surface());
         let mask = asset.alpha().clone().map(|a| f32::from(u8::from(a >= 0.5)));
         let covered: Vec<usize> = (0..extent.pixels())

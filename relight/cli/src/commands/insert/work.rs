@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::files::{MovieFormat, MovieReader, MovieWriter};
 use relight_core::image::{Extent, Linear, Planes, Rgb, StoredImage, Transfer};
 use relight_core::light::Panorama;
@@ -46,7 +46,7 @@ pub(super) enum Background {
 /// What an object is made of.
 pub(super) enum Source {
     Photo(Box<Photo>),
-    Captured(Box<Asset>),
+    Captured(Box<CapturedObject>),
 }
 
 /// An object taken apart, and how far that can be trusted where somebody asks.
@@ -61,7 +61,7 @@ pub(super) fn load(object: &ObjectDescription, folder: &Path) -> Result<Source, 
         if object.mask.is_some() {
             return Err(format!("{}: it has its own mask, give none", path.display()).into());
         }
-        return Ok(Source::Captured(Box::new(Asset::read(&path)?)));
+        return Ok(Source::Captured(Box::new(CapturedObject::read(&path)?)));
     }
     let reading = PhotoReading {
         mask: object.mask.as_ref().map(|mask| folder.join(mask)),
@@ -199,7 +199,7 @@ impl Work {
                 // It was measured, and not estimated.
                 Source::Captured(asset) => {
                     return Ok(ReadObject {
-                        subject: Subject::of_asset(&asset)?,
+                        subject: Subject::of_captured(&asset)?,
                         trust: None,
                     });
                 }

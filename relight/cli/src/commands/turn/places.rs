@@ -4,7 +4,7 @@ use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf, absolute};
 
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::files::MovieWriter;
 use relight_turn::{TurnFiles, TurnLabels};
 
@@ -76,7 +76,7 @@ fn check_asset<'a>(
     if inner.starts_with(output) {
         return refuse("in the folder of the results the object is called object.relit");
     }
-    Asset::check(path)?;
+    CapturedObject::check(path)?;
     Ok(AssetPlace::Beside(path))
 }
 
