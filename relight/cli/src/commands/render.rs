@@ -104,7 +104,7 @@ struct LightArguments {
     light: Option<PathBuf>,
     /// The order of spherical harmonics to which a panorama is brought; the paper's is 2. Highlights need
     /// more, the smoother the surface is.
-    #[arg(long, value_name = "0-64", default_value_t = 48, value_parser = clap::value_parser!(u8).range(0..=64))]
+    #[arg(long, value_name = "0-64", default_value_t = Order::RENDER.get() as u8, value_parser = clap::value_parser!(u8).range(0..=Order::MAX as i64))]
     order: u8,
     /// Turn the light about the vertical first, from the viewer to the right.
     #[arg(

@@ -414,7 +414,11 @@ impl CutObject {
 /// Whether there is memory for the layers of so many pixels.
 pub(super) fn check_size(what: &'static str, extent: Extent) -> Result<(), DecomposeError> {
     if extent.width.saturating_mul(extent.height) > MOST_PIXELS {
-        return Err(DecomposeError::TooLarge { what, extent });
+        return Err(DecomposeError::TooLarge {
+            what,
+            extent,
+            most: MOST_PIXELS,
+        });
     }
     Ok(())
 }

@@ -5,8 +5,6 @@ use relight_core::image::Extent;
 use relight_core::light::{Order, Panorama, ShLight};
 use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
 
-/// The order to which panoramas and lamps are brought for highlights; diffuse light needs no more than 2.
-const HIGHLIGHT_ORDER: usize = 24;
 /// The size of a panorama that stands for a lamp or coefficients, from which shadows are drawn.
 const DRAWN: Extent = Extent::new(256, 128);
 
@@ -27,10 +25,9 @@ impl LightSource {
     /// # Errors
     /// [`InsertError::Dark`] where no surface receives any of it.
     pub fn light(&self) -> Result<ShLight, InsertError> {
-        let order = Order::new(HIGHLIGHT_ORDER)?;
         let light = match self {
-            Self::Panorama(panorama) => panorama.project(order),
-            Self::Lamp(lamp) => lamp.light(order),
+            Self::Panorama(panorama) => panorama.project(Order::HIGHLIGHT),
+            Self::Lamp(lamp) => lamp.light(Order::HIGHLIGHT),
             Self::Coefficients(light) => light.with_order(light.order().max(Order::TWO)),
         };
         // An exposure is 1 for light that reaches nothing.
