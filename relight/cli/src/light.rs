@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use relight_core::light::{Panorama, ShLight};
-use relight_photo::insert::{Lamp, LightSource};
+use relight_photo::insert::{DiscLamp, LightSource};
 
 /// The new light.
 #[derive(Args)]
@@ -20,7 +20,7 @@ pub(crate) struct NewLightArguments {
         value_name = "AZIMUTH,ELEVATION[,COLOUR][,SIZE]",
         allow_hyphen_values = true
     )]
-    pub(crate) lamp: Option<Lamp>,
+    pub(crate) lamp: Option<DiscLamp>,
     /// Even light beside a lamp, as a part of it.
     #[arg(long, value_name = "PART", default_value_t = 0.15, value_parser = part, requires = "lamp")]
     pub(crate) ambient: f64,
@@ -31,7 +31,7 @@ impl NewLightArguments {
     pub(crate) fn read(&self) -> Result<Option<LightSource>, Box<dyn std::error::Error>> {
         if let Some(lamp) = self.lamp {
             let ambient = self.ambient;
-            return Ok(Some(LightSource::Lamp(Lamp { ambient, ..lamp })));
+            return Ok(Some(LightSource::Lamp(DiscLamp { ambient, ..lamp })));
         }
         self.light.as_deref().map(read_light).transpose()
     }

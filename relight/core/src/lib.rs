@@ -27,3 +27,4 @@ pub mod light;
 pub mod metrics;
 pub mod parallel;
 pub mod render;
+mod sealed;

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use super::crop::{CropSquare, cut_out, enlarged, inside, reduced};
 use super::encoding::{AnsweredMaps, EncodedPicture, LEAST_FACING};
-use super::region::{self, Region, enlarged, inside, reduced};
 use relight_core::image::{Extent, ImageError, Part, Planes};
 use relight_core::light::{Normals, YUp};
 use relight_core::parallel;
@@ -194,7 +194,7 @@ pub(super) fn details(
         let columns = starts(extent.width, side);
         let row = parallel::map(columns.len(), |column| {
             let x = columns[column];
-            let tile = Region {
+            let tile = CropSquare {
                 x: x as i64,
                 y: y as i64,
                 side,
@@ -221,7 +221,7 @@ pub(super) fn details(
 /// the object.
 fn tile_detail(
     net: &dyn MapsNet,
-    tile: &Region,
+    tile: &CropSquare,
     (picture, mask): (&Planes<3>, &Planes<1>),
     coarse: usize,
     mirror: bool,
@@ -231,7 +231,7 @@ fn tile_detail(
     if !known.contains(&true) {
         return Ok(None);
     }
-    let fields = fields(net, &region::cut_out(picture, &mask), &mask, mirror)?;
+    let fields = fields(net, &cut_out(picture, &mask), &mask, mirror)?;
     let mut fine = enlarged(&fields, &known, &Part::all(tile.extent()));
     let low = fine
         .resized(Extent::new(coarse, coarse))

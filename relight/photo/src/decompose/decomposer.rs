@@ -4,11 +4,11 @@ use std::path::Path;
 
 use super::answer::{Engine, Fields, MapsNet, Scales, Whole, details, to_maps};
 use super::compose::{ComposedLayers, normalised, possible_highlight};
+use super::crop::{CropSquare, Window, cut_out, enlarged, inside};
 use super::encoding::AnsweredMaps;
 use super::error::DecomposeError;
 use super::gloss::{FittedGloss, fit_gloss};
 use super::other::OtherNormals;
-use super::region::{Region, Window, cut_out, enlarged, inside};
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::NormalsFrame;
 use relight_core::light::{LightError, Normals, ShLight, YUp};
@@ -105,7 +105,7 @@ pub struct Decomposition {
     /// The gloss of the whole object, where a highlight was separated and the light explains it.
     pub gloss: Option<FittedGloss>,
     /// The square of the picture that the network saw.
-    pub region: Region,
+    pub region: CropSquare,
     /// Whether highlights were separated.
     pub is_glossy: bool,
     /// The part of the object's pixels that are saturated.
@@ -360,7 +360,7 @@ fn is_too_one_sided(light: &ShLight) -> bool {
 /// An object cut out of its photograph.
 struct CutObject {
     /// The square that the network sees.
-    region: Region,
+    region: CropSquare,
     /// Where in the photograph these pixels are.
     window: Window,
     /// Light, 0 outside the mask.
@@ -377,7 +377,7 @@ impl CutObject {
         mask: &Planes<1>,
         size: WorkingSize,
     ) -> Result<Self, DecomposeError> {
-        let region = Region::around(mask).ok_or(DecomposeError::EmptyMask)?;
+        let region = CropSquare::around(mask).ok_or(DecomposeError::EmptyMask)?;
         let window = match size {
             WorkingSize::Network => Window::around(mask).ok_or(DecomposeError::EmptyMask)?,
             // Tiles cover a square.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
-use super::{Lamp, LampFault, MaterialChange, ObjectGloss, Placement};
+use super::{DiscLamp, LampFault, MaterialChange, ObjectGloss, Placement};
 
 /// The largest picture, pixels a side.
 const LARGEST_SIDE: u32 = 16_384;
@@ -193,13 +193,13 @@ impl LightDescription {
     ///
     /// # Errors
     /// Where its text is none.
-    pub fn lamp(&self) -> Result<Option<Lamp>, SceneFault> {
+    pub fn lamp(&self) -> Result<Option<DiscLamp>, SceneFault> {
         let Some(text) = &self.lamp else {
             return Ok(None);
         };
-        let lamp: Lamp = text.parse().map_err(SceneFault::Lamp)?;
+        let lamp: DiscLamp = text.parse().map_err(SceneFault::Lamp)?;
         let ambient = self.ambient.unwrap_or(lamp.ambient);
-        Ok(Some(Lamp { ambient, ..lamp }))
+        Ok(Some(DiscLamp { ambient, ..lamp }))
     }
 
     fn check(&self) -> Result<(), SceneFault> {

@@ -37,11 +37,11 @@ mod view;
 
 pub use description::{LightDescription, ObjectDescription, SceneDescription, SceneFault};
 pub use error::InsertError;
-pub use lamp::{Lamp, LampFault, colour_of_temperature};
+pub use lamp::{DiscLamp, LampFault, colour_of_temperature};
 pub use matching::Matching;
 pub use matte::Matte;
 pub use placement::Placement;
-pub use scene::{Scene, SceneLayer, SceneObject};
+pub use scene::{InsertScene, SceneLayer, SceneObject};
 pub use shot::{Backdrop, Shot};
 pub use source::{LightSource, exposure_between, likeness};
 pub use subject::{EdgeColours, MaterialChange, ObjectGloss, Subject};

@@ -32,7 +32,7 @@ pub struct SceneObject<'a> {
 
 /// A picture that objects are put into.
 #[derive(Debug)]
-pub struct Scene<'a> {
+pub struct InsertScene<'a> {
     extent: Extent,
     light: ShLight,
     /// The same light, as shadows are drawn from it.
@@ -62,7 +62,7 @@ struct GroundShadow {
     arriving: Planes<3>,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> InsertScene<'a> {
     /// A picture of a size in this light, whose ground the camera looks down on by `tilt` degrees (0 to 90), with objects from back to
     /// front.
     ///
@@ -313,7 +313,7 @@ fn over(
 mod tests {
     use super::*;
     use crate::decompose::{DecomposeOptions, Decomposer};
-    use crate::insert::Lamp;
+    use crate::insert::DiscLamp;
     use relight_nets::{Weights, decomposer};
 
     const PHOTO: Extent = Extent::new(60, 50);
@@ -357,16 +357,16 @@ mod tests {
     }
 
     fn lamp() -> LightSource {
-        LightSource::Lamp(Lamp {
+        LightSource::Lamp(DiscLamp {
             azimuth: 90.0,
             elevation: 45.0,
-            ..Lamp::default()
+            ..DiscLamp::default()
         })
     }
 
     fn composed(extent: Extent, objects: Vec<SceneObject<'_>>) -> Rgb<Linear> {
         let white = Rgb::new(Planes::filled(extent, [0.8; 3]));
-        let scene = Scene::new(extent, &lamp(), 25.0, Matching::default(), objects).unwrap();
+        let scene = InsertScene::new(extent, &lamp(), 25.0, Matching::default(), objects).unwrap();
         scene.compose(&white, &scene.layers(0.0).unwrap(), 0)
     }
 
@@ -409,7 +409,7 @@ mod tests {
     fn at_its_own_place_it_covers_itself() {
         let subject = subject();
         let placement = Placement::in_photo(&subject);
-        let scene = Scene::new(
+        let scene = InsertScene::new(
             PHOTO,
             &lamp(),
             25.0,
@@ -491,7 +491,7 @@ mod tests {
         let extent = Extent::new(160, 120);
         let black = Rgb::new(Planes::zeros(extent));
         let brightness = |matching: Matching, object: SceneObject<'_>| {
-            let scene = Scene::new(extent, &lamp(), 25.0, matching, vec![object]).unwrap();
+            let scene = InsertScene::new(extent, &lamp(), 25.0, matching, vec![object]).unwrap();
             let picture = scene.compose(&black, &scene.layers(0.0).unwrap(), 0);
             let middle: Vec<f32> = (70..90)
                 .map(|x| Srgb::from_linear(picture.planes().pixel(x, 70)[1]))
@@ -537,7 +537,7 @@ mod tests {
                 object(&subject, Placement::in_photo(&subject)),
                 object(&subject, placement),
             ];
-            Scene::new(PHOTO, &lamp(), 25.0, Matching::default(), objects)
+            InsertScene::new(PHOTO, &lamp(), 25.0, Matching::default(), objects)
                 .unwrap_err()
                 .to_string()
         };
@@ -563,7 +563,7 @@ mod tests {
                 ..good
             },
         )];
-        let error = Scene::new(
+        let error = InsertScene::new(
             Extent::new(4000, 4000),
             &lamp(),
             25.0,

@@ -1,6 +1,6 @@
 //! Where new light comes from.
 
-use super::{InsertError, Lamp};
+use super::{DiscLamp, InsertError};
 use relight_core::image::Extent;
 use relight_core::light::{Order, Panorama, ShLight};
 use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
@@ -14,7 +14,7 @@ pub enum LightSource {
     /// All around.
     Panorama(Panorama),
     /// One lamp and even light.
-    Lamp(Lamp),
+    Lamp(DiscLamp),
     /// Coefficients of spherical harmonics.
     Coefficients(ShLight),
 }
@@ -108,9 +108,9 @@ mod tests {
     use relight_core::light::{Direction, Rotation};
 
     fn lamp(azimuth: f64) -> ShLight {
-        Lamp {
+        DiscLamp {
             azimuth,
-            ..Lamp::default()
+            ..DiscLamp::default()
         }
         .light(Order::TWO)
     }
@@ -139,6 +139,6 @@ mod tests {
     fn no_light_is_refused() {
         let dark = LightSource::Coefficients(ShLight::dark(Order::TWO));
         assert!(matches!(dark.light(), Err(InsertError::Dark)));
-        assert!(LightSource::Lamp(Lamp::default()).light().is_ok());
+        assert!(LightSource::Lamp(DiscLamp::default()).light().is_ok());
     }
 }

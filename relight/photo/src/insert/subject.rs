@@ -5,7 +5,7 @@ use super::matte::Matte;
 use super::smooth::weighted_mean;
 use super::source::likeness;
 use crate::decompose::{
-    DecomposeError, DecomposeOptions, Decomposer, Decomposition, Region, WORKING_SIDE,
+    CropSquare, DecomposeError, DecomposeOptions, Decomposer, Decomposition, WORKING_SIDE,
 };
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Extent, Linear, Planes, Rgb};
@@ -568,7 +568,7 @@ impl Cut {
             }
         }
         check_light(photo)?;
-        let region = Region::around(mask).ok_or(DecomposeError::EmptyMask)?;
+        let region = CropSquare::around(mask).ok_or(DecomposeError::EmptyMask)?;
         let edge = Matte::edge_for(region.extent());
         let margin = 4 * edge + 4;
         let (place, extent) = window(&region, margin, expected);
@@ -605,7 +605,7 @@ fn check_light(photo: &Rgb<Linear>) -> Result<(), InsertError> {
 }
 
 /// The part of an image that a square with a margin covers.
-fn window(region: &Region, margin: usize, image: Extent) -> ([usize; 2], Extent) {
+fn window(region: &CropSquare, margin: usize, image: Extent) -> ([usize; 2], Extent) {
     let margin = margin as i64;
     let line = |from: i64, length: usize| {
         let inside = |at: i64| at.clamp(0, length as i64) as usize;

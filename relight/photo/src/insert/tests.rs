@@ -2,7 +2,7 @@
 
 use crate::decompose::{DecomposeOptions, Decomposer, SpecularGate};
 use crate::insert::{
-    InsertError, Lamp, LightSource, MaterialChange, ObjectGloss, Subject, exposure_between,
+    DiscLamp, InsertError, LightSource, MaterialChange, ObjectGloss, Subject, exposure_between,
 };
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
@@ -76,9 +76,9 @@ fn the_own_light_gives_the_photograph_back() {
 #[test]
 fn other_light_changes_the_object_and_nothing_else() {
     let subject = subject(SpecularGate::Off);
-    let lamp = LightSource::Lamp(Lamp {
+    let lamp = LightSource::Lamp(DiscLamp {
         azimuth: 270.0,
-        ..Lamp::default()
+        ..DiscLamp::default()
     });
     let relit = subject
         .relit(&lamp.light().unwrap(), &MaterialChange::default())
@@ -103,7 +103,7 @@ fn other_light_changes_the_object_and_nothing_else() {
 #[test]
 fn light_that_turns_once_changes_the_picture_smoothly_and_ends_where_it_began() {
     let subject = subject(SpecularGate::On);
-    let light = LightSource::Lamp(Lamp::default()).light().unwrap();
+    let light = LightSource::Lamp(DiscLamp::default()).light().unwrap();
     let frame = |part: f64| {
         let turn = Rotation::about(Direction::UP, part * std::f64::consts::TAU);
         let relit = subject
@@ -121,10 +121,10 @@ fn light_that_turns_once_changes_the_picture_smoothly_and_ends_where_it_began() 
 #[test]
 fn a_tint_colours_and_gloss_adds_light() {
     let subject = subject(SpecularGate::Off);
-    let light = LightSource::Lamp(Lamp {
+    let light = LightSource::Lamp(DiscLamp {
         azimuth: 0.0,
         elevation: 0.0,
-        ..Lamp::default()
+        ..DiscLamp::default()
     })
     .light()
     .unwrap();
@@ -211,9 +211,9 @@ fn a_captured_object_has_the_colours_of_its_albedo_in_even_light_and_is_bright_w
     for (found, wanted) in even.pixel(12, 20).into_iter().zip([0.6, 0.3, 0.1]) {
         assert!((found - wanted).abs() < 1e-3, "{found} {wanted}");
     }
-    let lamp = LightSource::Lamp(Lamp {
+    let lamp = LightSource::Lamp(DiscLamp {
         azimuth: 90.0,
-        ..Lamp::default()
+        ..DiscLamp::default()
     });
     let light = lamp.light().unwrap();
     let scale = f64::from(exposure_between(subject.light(), &light));

@@ -6,7 +6,7 @@ mod work;
 use std::iter;
 use std::path::{Path, PathBuf};
 
-use relight_photo::insert::{Scene, SceneDescription, SceneObject, TrustFigures};
+use relight_photo::insert::{InsertScene, SceneDescription, SceneObject, TrustFigures};
 use relit_console::{Console, Outcome};
 use serde_json::json;
 
@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         shadow: object.shadow,
         relit: true,
     });
-    let set = Scene::new(
+    let set = InsertScene::new(
         work.extent,
         &work.light,
         work.tilt,

@@ -11,7 +11,7 @@ use relight_core::render::exposure_for;
 use relight_photo::decompose::Photo;
 use relight_photo::files::{PhotoInput, PhotoReading};
 use relight_photo::insert::{
-    LightSource, Matching, ObjectDescription, PanoramaView, Scene, SceneDescription, Subject,
+    InsertScene, LightSource, Matching, ObjectDescription, PanoramaView, SceneDescription, Subject,
     TrustFigures, TrustMap,
 };
 use relit_console::Console;
@@ -224,7 +224,7 @@ impl Work {
     /// Writes the picture or the video; how many frames it has.
     pub(super) fn write(
         &mut self,
-        scene: &Scene<'_>,
+        scene: &InsertScene<'_>,
         arguments: &Arguments,
         console: Console,
     ) -> Result<u32, Box<dyn Error>> {
@@ -261,7 +261,7 @@ impl Work {
     /// A video whose frames have the objects before them, which do not move.
     fn film_over(
         &mut self,
-        scene: &Scene<'_>,
+        scene: &InsertScene<'_>,
         output: &Path,
         format: MovieFormat,
         console: Console,
@@ -290,7 +290,7 @@ impl Work {
     /// A video in which the panorama turns.
     fn film_turn(
         &self,
-        scene: &Scene<'_>,
+        scene: &InsertScene<'_>,
         arguments: &Arguments,
         format: MovieFormat,
         console: Console,
