@@ -11,8 +11,7 @@ use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use relight_nets::{InferenceEngine, NetError, OnnxRuntime, Weights};
 use relight_photo::decompose::{
-    DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, SpecularGate,
-    WORKING_SIDE, WorkingSize,
+    DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, WORKING_SIDE, WorkingSize,
 };
 use relight_photo::files::{DecompositionFigures, DecompositionFiles, PhotoInput, PhotoReading};
 use relit_console::{Console, Outcome};
@@ -21,7 +20,7 @@ use serde_json::{Value, json};
 
 use crate::commands::CommandResult;
 use crate::shipped;
-use crate::values::{TransferName, YName};
+use crate::values::{GateName, TransferName, YName};
 
 /// Each photograph takes its memory, gigabytes where it is large.
 const MOST_SIDE_BY_SIDE: usize = 4;
@@ -104,16 +103,6 @@ enum EngineName {
     Auto,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum GateName {
-    /// Where more than 5 % of the object's pixels are saturated.
-    Auto,
-    /// Always.
-    On,
-    /// Never.
-    Off,
-}
-
 impl Arguments {
     /// What is wrong with the combination of arguments, if anything is.
     pub(crate) fn fault(&self) -> Option<String> {
@@ -160,11 +149,7 @@ impl Arguments {
                 SizeName::Native => WorkingSize::Native,
             },
             mirror: !self.no_mirror,
-            specular: match self.specular {
-                GateName::Auto => SpecularGate::Auto,
-                GateName::On => SpecularGate::On,
-                GateName::Off => SpecularGate::Off,
-            },
+            specular: self.specular.into(),
             ..DecomposeOptions::default()
         }
     }

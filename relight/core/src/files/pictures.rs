@@ -158,6 +158,13 @@ impl ShLight {
 }
 
 impl CapturedObject {
+    /// Whether a file is called as a captured object (`.relit`).
+    #[must_use]
+    pub fn is_named(path: &Path) -> bool {
+        path.extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("relit"))
+    }
+
     /// Reads a file.
     ///
     /// # Errors

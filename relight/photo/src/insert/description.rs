@@ -1,7 +1,9 @@
 //! A scene as a text in TOML. Names files and opens none.
 
-use std::path::PathBuf;
+use std::iter;
+use std::path::{Path, PathBuf};
 
+use relight_core::image::Extent;
 use serde::Deserialize;
 
 use super::{DiscLamp, LampFault, MaterialChange, ObjectGloss, Placement};
@@ -145,6 +147,25 @@ impl SceneDescription {
         let scene: Self = toml::from_str(text)?;
         scene.check()?;
         Ok(scene)
+    }
+
+    /// The files that it names: background, light, photographs and masks.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let light = &self.light;
+        let lights = [&light.panorama, &light.coefficients, &light.object];
+        let objects = self.objects.iter();
+        let objects = objects.flat_map(|object| iter::once(&object.photo).chain(&object.mask));
+        iter::once(&self.background)
+            .chain(lights.into_iter().flatten())
+            .chain(objects)
+            .map(PathBuf::as_path)
+    }
+
+    /// Width and height of the picture that shows a part of a panorama.
+    #[must_use]
+    pub fn panorama_extent(&self) -> Extent {
+        let [width, height] = self.size.map(|side| side as usize);
+        Extent::new(width, height)
     }
 
     /// Whether all that is said can be.

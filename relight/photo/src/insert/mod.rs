@@ -9,6 +9,7 @@
 //! | `shot` | pictures of an object in light that stands or turns |
 //! | `view` | what a camera sees of a panorama |
 //! | `placement` | where an object stands, and how its pixels get there |
+//! | `setting` | what a background says of the objects: light, size, tilt of the ground, brightness |
 //! | `scene` | objects in a new picture, with their shadows |
 //! | `relief`, `shadow` | an object's shape out of its normals, and what it keeps from the ground |
 //! | `description` | a scene as a text in TOML |
@@ -24,6 +25,7 @@ mod matte;
 mod placement;
 mod relief;
 mod scene;
+mod setting;
 mod shadow;
 mod shot;
 mod smooth;
@@ -42,7 +44,8 @@ pub use matching::Matching;
 pub use matte::Matte;
 pub use placement::Placement;
 pub use scene::{InsertScene, SceneLayer, SceneObject};
-pub use shot::{Backdrop, Shot};
+pub use setting::{SceneBackground, SceneSetting};
+pub use shot::{Backdrop, Shot, ShotCompanions};
 pub use source::{LightSource, exposure_between, likeness};
 pub use subject::{EdgeColours, MaterialChange, ObjectGloss, Subject};
 pub use trust::{TrustFigures, TrustMap};

@@ -5,7 +5,8 @@ use super::placement::{Fit, placed, rows};
 use super::relief::Relief;
 use super::shadow::Shadow;
 use super::{
-    InsertError, LightSource, Matching, MaterialChange, Placement, Subject, exposure_between,
+    InsertError, LightSource, Matching, MaterialChange, ObjectDescription, Placement, Subject,
+    exposure_between,
 };
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Direction, Normals, Panorama, Rotation, ShLight, YUp};
@@ -244,7 +245,20 @@ impl<'a> InsertScene<'a> {
     }
 }
 
-impl SceneObject<'_> {
+impl<'a> SceneObject<'a> {
+    /// An object as it is described, in the scene's light.
+    #[must_use]
+    pub fn described(object: &ObjectDescription, subject: &'a Subject) -> Self {
+        Self {
+            subject,
+            placement: object.placement(),
+            change: object.change(),
+            exposure: object.exposure,
+            shadow: object.shadow,
+            relit: true,
+        }
+    }
+
     fn check(&self, extent: Extent, number: usize) -> Result<(), InsertError> {
         let Placement {
             at,

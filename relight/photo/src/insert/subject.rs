@@ -5,7 +5,7 @@ use super::matte::Matte;
 use super::smooth::weighted_mean;
 use super::source::likeness;
 use crate::decompose::{
-    CropSquare, DecomposeError, DecomposeOptions, Decomposer, Decomposition, WORKING_SIDE,
+    CropSquare, DecomposeError, DecomposeOptions, Decomposer, Decomposition, Photo, WORKING_SIDE,
 };
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Extent, Linear, Planes, Rgb};
@@ -143,6 +143,25 @@ impl Subject {
             decomposer,
             options,
             EdgeColours::Freed,
+        )
+    }
+
+    /// The object of a photograph with its mask.
+    ///
+    /// # Errors
+    /// As [`Subject::new`].
+    pub fn of_photo(
+        photo: &Photo,
+        decomposer: &Decomposer,
+        options: &DecomposeOptions,
+    ) -> Result<Self, InsertError> {
+        let options = photo.options(options);
+        Self::new(
+            &photo.picture,
+            &photo.mask,
+            photo.alpha.as_ref(),
+            decomposer,
+            &options,
         )
     }
 
