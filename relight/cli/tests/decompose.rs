@@ -653,7 +653,7 @@ fn normals_of_another_network_replace_ours() {
     );
 }
 
-/// How far normals and shading are from the truth, over how far those are that say nothing: normals towards the
+/// How far normals and shading are from the ground truth, over how far those are that say nothing: normals towards the
 /// viewer, and constant shading.
 struct Quality {
     normals: f64,

@@ -28,3 +28,8 @@ pub mod metrics;
 pub mod parallel;
 pub mod render;
 mod sealed;
+
+/// The example of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

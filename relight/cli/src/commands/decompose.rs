@@ -310,7 +310,7 @@ impl Run {
             "not separated"
         };
         let text = format!(
-            "{}: {seconds:.2} s; {:.1} % saturated, highlights {highlights}; {:.1} % of the picture left over{source}",
+            "{}: {seconds:.2} s; {:.1} % saturated, highlights {highlights}; residual {:.1} % of the picture{source}",
             out.display(),
             100.0 * found.saturated_fraction,
             100.0 * found.residual,

@@ -95,7 +95,7 @@ pub(crate) struct Arguments {
     /// Multiply the object's albedo with a colour, linear.
     #[arg(long, value_name = "R,G,B", value_parser = tint)]
     tint: Option<[f32; 3]>,
-    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is matt.
+    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is diffuse.
     #[arg(long, value_name = "PART,SMOOTHNESS", value_parser = gloss)]
     gloss: Option<ObjectGloss>,
     /// The longest side of the result, pixels [default: the photograph's; of a video at most 1080].

@@ -49,7 +49,7 @@ pub(crate) struct Arguments {
     /// Render one sheet of the object in many materials: smoothness 5 to 200 across, from 0 to 40 % of reflected light down.
     #[arg(long)]
     sweep: bool,
-    /// Brightness in stops beyond a white matt surface under even light of radiance 1, or "auto": a white matt
+    /// Brightness in stops beyond a white diffuse surface under even light of radiance 1, or "auto": a white diffuse
     /// surface that faces the strongest light is white.
     #[arg(long, value_name = "STOPS", default_value = "auto", value_parser = exposure, allow_hyphen_values = true)]
     exposure: Exposure,
@@ -78,7 +78,7 @@ struct ObjectArguments {
     /// Albedo: a file, or a linear value or three (0.8, or 0.8,0.5,0.3).
     #[arg(long, value_name = "FILE|VALUE", default_value = "0.8", value_parser = map)]
     albedo: Map,
-    /// Specular reflectance s_p: a file, or a linear value or three; without it the object is matt.
+    /// Specular reflectance s_p: a file, or a linear value or three; without it the object is diffuse.
     #[arg(long, value_name = "FILE|VALUE", value_parser = map)]
     reflectance: Option<Map>,
     /// Smoothness α: a value, an EXR, or an 8-bit PNG of values 0 to 255.
@@ -122,7 +122,7 @@ struct LightArguments {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum SpecularName {
-    /// Blinn and Phong's lobe in zonal harmonics: close to the truth.
+    /// The Blinn-Phong lobe in zonal harmonics: close to the ground truth.
     Lobe,
     /// The paper's formula, for the first nine coefficients.
     Power,

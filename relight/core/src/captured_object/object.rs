@@ -86,7 +86,7 @@ impl CapturedObject {
         &self.alpha
     }
 
-    /// How far each normal is to be believed, 0 to 1.
+    /// How confident each normal is, 0 to 1.
     #[must_use]
     pub const fn confidence(&self) -> &Planes<1> {
         &self.confidence

@@ -27,6 +27,7 @@ pub enum MovieFormat {
 
 /// Why a video is not written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MovieError {
     /// The program is not there.
     #[error("a video needs the program ffmpeg, which cannot be started: install it")]

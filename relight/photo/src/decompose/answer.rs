@@ -50,7 +50,7 @@ pub(super) struct Scales {
 
 /// The planes of fields that are normals.
 const NORMAL_PLANES: Range<usize> = 0..3;
-/// The share of the coarse scale in the low frequencies of the normals. Measured on photographs with truth: a share of 1
+/// The share of the coarse scale in the low frequencies of the normals. Measured on photographs with ground truth: a share of 1
 /// is three degrees better than 0.
 const SHAPE_OF_NORMALS: f32 = 1.0;
 /// The share of the coarse scale in the low frequencies of albedo, shading and highlight: a mean with a share of 0.3 to 0.5

@@ -261,11 +261,11 @@ impl Decomposer {
             &part,
             options.mirror,
         )?;
-        let explained = self.explain(&whole, is_glossy)?;
+        let fitted = self.fit(&whole, is_glossy)?;
         let mut maps = self.maps(&whole, &object, options)?;
         if self.normals.is_some() {
             let known = inside(&whole.mask);
-            let vectors = enlarged(explained.normals.planes(), &known, &part);
+            let vectors = enlarged(fitted.normals.planes(), &known, &part);
             maps.normals = Normals::new(cut_out(vectors, &object.mask));
         }
         let layers = ComposedLayers::new(object.picture, &object.inside, maps, is_glossy);
@@ -276,13 +276,13 @@ impl Decomposer {
             shading: window.put_back(layers.shading, extent),
             diffuse: Rgb::new(window.put_back(layers.diffuse, extent)),
             highlight: window.put_back(layers.highlight, extent),
-            light: explained.light,
-            gloss: explained.gloss,
+            light: fitted.light,
+            gloss: fitted.gloss,
             region,
             is_glossy,
             saturated_fraction,
             residual: layers.residual,
-            light_residual: explained.light_residual,
+            light_residual: fitted.light_residual,
         })
     }
 
@@ -306,7 +306,7 @@ impl Decomposer {
     }
 
     /// Fits light and gloss to the maps at the network's size.
-    fn explain(&self, whole: &Whole, is_glossy: bool) -> Result<Explained, DecomposeError> {
+    fn fit(&self, whole: &Whole, is_glossy: bool) -> Result<FittedLight, DecomposeError> {
         let known = inside(&whole.mask);
         let maps = to_maps(whole.fields.clone(), &known)?;
         let others = match &self.normals {
@@ -324,7 +324,7 @@ impl Decomposer {
         } else {
             None
         };
-        Ok(Explained {
+        Ok(FittedLight {
             light_residual: relative_difference(lit.planes().plane(0), shading.plane(0)),
             normals,
             light,
@@ -424,7 +424,7 @@ pub(super) fn check_size(what: &'static str, extent: Extent) -> Result<(), Decom
 }
 
 /// Normals, light and gloss at the network's size.
-struct Explained {
+struct FittedLight {
     normals: Normals<YUp>,
     light: ShLight,
     light_residual: f64,

@@ -32,7 +32,7 @@ pub struct Photo {
     saturated_fraction: Option<f64>,
 }
 
-/// What is told of a photograph beside its file.
+/// What is known of a photograph beside its file.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PhotoHints<'a> {
     /// A picture of the mask.

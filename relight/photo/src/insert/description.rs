@@ -113,6 +113,7 @@ pub struct ObjectDescription {
 
 /// Why a text describes no scene.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneFault {
     /// It is no TOML, or has fields that a scene has not.
     #[error("it is no scene: {}", .0.to_string().trim_end())]

@@ -115,6 +115,7 @@ impl DiscLamp {
 
 /// Why a text is no lamp.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LampFault {
     /// It does not begin with two angles.
     #[error("give AZIMUTH,ELEVATION[,COLOUR][,SIZE], such as 60,30 or -45,40,3200K,10")]

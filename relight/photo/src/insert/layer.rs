@@ -55,7 +55,7 @@ impl SceneLayer {
     }
 }
 
-/// Changes the pixels of a picture that lie under an image of which the first pixel is at `place`; `change` is told the pixel of the
+/// Changes the pixels of a picture that lie under an image of which the first pixel is at `place`; `change` is given the pixel of the
 /// image, the value and the channel.
 fn over(
     picture: &mut Planes<3>,

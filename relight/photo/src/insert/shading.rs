@@ -20,7 +20,7 @@ pub(super) struct Shading {
     /// The coarse part of D: shadows, bounced light, and what order 2 cannot say.
     shadow: Vec<f32>,
     /// What the bounds of D leave of S.
-    left: Vec<f32>,
+    residual: Vec<f32>,
     /// E.
     pub(super) own: Vec<f32>,
 }
@@ -51,7 +51,7 @@ impl Shading {
         let mut result = Self {
             relief: vec![1.0; own.len()],
             shadow: vec![1.0; own.len()],
-            left: vec![0.0; own.len()],
+            residual: vec![0.0; own.len()],
             own,
         };
         for at in (0..wanted.len()).filter(|&at| wanted[at]) {
@@ -59,7 +59,7 @@ impl Shading {
             result.relief[at] = (all - coarse).exp();
             result.shadow[at] = coarse.exp();
             let held = all.exp() * (result.own[at] + DARK) - DARK;
-            result.left[at] = shading.plane(0)[at] - held;
+            result.residual[at] = shading.plane(0)[at] - held;
         }
         result
     }
@@ -72,6 +72,6 @@ impl Shading {
             self.shadow[at].powf(kept)
         };
         let shade = self.relief[at] * shadow * (irradiance + DARK) - DARK;
-        (shade + kept * self.left[at]).max(0.0)
+        (shade + kept * self.residual[at]).max(0.0)
     }
 }

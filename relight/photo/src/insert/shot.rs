@@ -43,7 +43,7 @@ pub struct Shot<'a> {
 
 impl<'a> Shot<'a> {
     /// The object in this light, times `exposure`. The light is brought to the strength of the photograph's own:
-    /// [`exposure_between`]. A panorama behind it is as bright as a white matt surface in its light would be.
+    /// [`exposure_between`]. A panorama behind it is as bright as a white diffuse surface in its light would be.
     ///
     /// # Errors
     /// Where the photograph is not the subject's.

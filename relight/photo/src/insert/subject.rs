@@ -15,7 +15,7 @@ use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_core::light::{Normals, Order, ShLight, YUp};
 use relight_core::render::{DiffuseForm, DiffuseLayer, Gloss, LobeLayer, exposure_for};
 
-/// The most by which the unexplained rest of a pixel grows with the light.
+/// The most by which the residual of a pixel grows with the light.
 const REST_GROWTH: f32 = 3.0;
 
 /// An object of a photograph: its matte, its layers, and what they do not explain, so that its own light gives the
@@ -345,7 +345,7 @@ fn smoothed(normals: &Normals<YUp>, wanted: &[bool], side: usize) -> Normals<YUp
     }
 }
 
-/// Light from everywhere, of which a white matt surface is 1.
+/// Light from everywhere, of which a white diffuse surface is 1.
 fn even_light() -> ShLight {
     let light = ShLight::even(Order::TWO, [1.0; 3]);
     let exposure = f64::from(exposure_for(&light));

@@ -1,4 +1,4 @@
-//! What `relight insert` is told: its arguments, and the scene that they describe.
+//! The arguments of `relight insert`, and the scene that they describe.
 
 use std::error::Error;
 use std::fs;
@@ -25,7 +25,7 @@ Examples:
   relight insert object.relit --into room.hdr -o out.png
       an object that relight turn --asset has written
   relight insert --scene scene.toml -o out.png
-      all of it from a file (docs/insert.md)";
+      all of it from a file (docs/relight-insert.md)";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -106,7 +106,7 @@ struct ObjectArguments {
     /// Multiply the object's albedo with a colour, linear.
     #[arg(long, value_name = "R,G,B", value_parser = tint, action = ArgAction::Append, conflicts_with = "scene")]
     tint: Vec<[f32; 3]>,
-    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is matt.
+    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is diffuse.
     #[arg(long, value_name = "PART,SMOOTHNESS", value_parser = gloss_numbers, action = ArgAction::Append, conflicts_with = "scene")]
     gloss: Vec<[f32; 2]>,
     /// The object's brightness in stops.
