@@ -215,7 +215,7 @@ mod tests {
     fn a_photograph_is_brought_to_the_size_in_which_its_object_is_shown() {
         let extent = Extent::new(400, 300);
         let picture = Rgb::new(Planes::filled(extent, [0.5; 3]));
-        // The object is 150 rows high, and shown in 40 % of 48 rows.
+        // The object is 150 rows high, and shown in half of 48 rows.
         let mask = Planes::from_fn(extent, |_, y| {
             [f32::from(u8::from((100..250).contains(&y)))]
         });
@@ -223,10 +223,13 @@ mod tests {
         let background = dusk();
         let setting =
             SceneSetting::new(&described(""), SceneBackground::Picture(&background), None);
-        let object = &described("").objects[0];
-        let reduced = setting.unwrap().reduced(object, photo);
-        // 400 x 0.4 x 48 x 1.25 / 150 pixels.
-        assert_eq!(reduced.picture.planes().extent(), Extent::new(64, 48));
-        assert_eq!(rows(&reduced.mask).len(), 24);
+        let object = ObjectDescription {
+            height: 0.5,
+            ..described("").objects[0].clone()
+        };
+        let reduced = setting.unwrap().reduced(&object, photo);
+        // 400 x 0.5 x 48 x 1.25 / 150 pixels.
+        assert_eq!(reduced.picture.planes().extent(), Extent::new(80, 60));
+        assert_eq!(rows(&reduced.mask).len(), 30);
     }
 }
