@@ -26,6 +26,7 @@ pub struct MaskScore {
 
 /// Mask and truth, or the region, do not fit together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ScoreFault {
     /// They differ in size.
     #[error("the mask is {} x {} pixels and the truth {} x {}", .mask.0, .mask.1, .truth.0, .truth.1)]

@@ -14,7 +14,7 @@ use relit_grabcut::{
     Effort, Hints, Iterations, MaskError, MaskScore, Seeds, SegmentSettings, score, segment_with,
 };
 
-use super::{MaskingError, opencv_grab_cut};
+use super::{MaskEngine, MaskingError, opencv_grab_cut};
 
 /// Endings of the images.
 const IMAGES: [&str; 4] = ["jpg", "jpeg", "png", "bmp"];
@@ -43,6 +43,7 @@ impl Prompt {
 
 /// The figures of one image with one hint.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct BenchRow {
     /// The image's name, without folder and ending.
     pub image: String,
@@ -50,8 +51,8 @@ pub struct BenchRow {
     pub prompt: Prompt,
     /// Our mask.
     pub ours: MaskScore,
-    /// The mask of OpenCV's GrabCut after 5 iterations.
-    pub opencv: MaskScore,
+    /// The mask of OpenCV's GrabCut after 5 iterations, if it is built in.
+    pub opencv: Option<MaskScore>,
     /// Our mask, cut at the image's own size instead of coarse to fine; if it was asked for.
     pub whole: Option<MaskScore>,
 }
@@ -90,7 +91,7 @@ pub fn bench_images(folder: &Path) -> Result<Vec<BenchImage>, MaskingError> {
     Ok(images)
 }
 
-/// Measures our mask and OpenCV's on one image, for each hint that it has; with `whole` also ours cut at
+/// Measures our mask, and OpenCV's if it is built in, on one image, for each hint that it has; with `whole` also ours cut at
 /// the image's own size.
 ///
 /// # Errors
@@ -113,7 +114,13 @@ pub fn bench_image(entry: &BenchImage, whole: bool) -> Result<Vec<BenchRow>, Mas
             image: entry.name.clone(),
             prompt,
             ours: measure(&ours(&image, &hints, Effort::Fine)?)?,
-            opencv: measure(&opencv_grab_cut(&image, &hints, Iterations::default())?)?,
+            opencv: match MaskEngine::OpenCv.is_built_in() {
+                true => {
+                    let cut = opencv_grab_cut(&image, &hints, Iterations::default())?;
+                    Some(measure(&cut)?)
+                }
+                false => None,
+            },
             whole: match whole {
                 true => Some(measure(&ours(&image, &hints, Effort::Whole)?)?),
                 false => None,

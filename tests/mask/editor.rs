@@ -5,8 +5,9 @@ use std::fs;
 use serde_json::{Value, json};
 
 use super::editing::Editing;
-use super::program::{clip, code, read, relit_mask, said, turn_video};
+use super::program::turn_video;
 use super::scene::{WIDTH, disc_share};
+use super::support::{clip, code, read, relit_mask, said};
 
 /// A sketch with a rectangle around the disc, and a stroke of each kind.
 fn sketch() -> Value {

@@ -4,8 +4,7 @@
     clippy::unwrap_used,
     clippy::expect_used,
     clippy::panic,
-    clippy::print_stderr,
-    reason = "a test that cannot go on has failed, and one that looks at nothing says so"
+    reason = "a test that cannot go on has failed"
 )]
 
 use std::env;
@@ -29,7 +28,7 @@ fn onnx_runtime() -> Option<InferenceEngine> {
     match OnnxRuntime::load(&path) {
         Ok(library) => Some(InferenceEngine::OnnxRuntime(library)),
         Err(fault) => {
-            eprintln!("skipped: {fault}");
+            relit_test_support::say_skipped(&fault.to_string());
             None
         }
     }

@@ -302,7 +302,7 @@ fn what_cannot_be_compared_is_an_error_that_names_it() {
     write_exr(&found.join("pear/shading.exr"), &small).unwrap();
     let text = said(run());
     assert!(
-        text.contains("shading.exr has 9x7 pixels, its truth 44x44"),
+        text.contains("shading.exr has 9x7 pixels, its ground truth 44x44"),
         "{text}"
     );
 
@@ -322,7 +322,10 @@ fn what_cannot_be_compared_is_an_error_that_names_it() {
     fs::remove_file(truth.join("cup/normal.png")).unwrap();
     let method = [NormalMethod::Viewer];
     let text = said(evaluate_normals(&set(&truth), "both", &method, &|| {}));
-    assert!(text.contains("the truth has no normals of cup"), "{text}");
+    assert!(
+        text.contains("the ground truth has no normals of cup"),
+        "{text}"
+    );
 }
 
 /// Writes a set of one object under three lights, rendered by the layers themselves.

@@ -357,7 +357,7 @@ fn huge(path: &std::path::Path) {
 #[test]
 fn a_turn_is_a_video_of_as_many_frames() {
     if Command::new("ffmpeg").arg("-version").output().is_err() {
-        eprintln!("skipped: the program ffmpeg is not installed");
+        relit_test_support::say_skipped("the program ffmpeg is not installed");
         return;
     }
     let folder = Folder::new();

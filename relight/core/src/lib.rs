@@ -11,6 +11,7 @@
 //! | [`render`] | diffuse and specular layers on normals, their derivatives, Monte Carlo as the reference |
 //! | [`metrics`] | how far an estimate is from the ground truth |
 //! | [`captured_object`] | a captured object in one file, ready to be lit |
+//! | [`statistics`] | median and quantiles of samples |
 //! | [`parallel`] | rows and parts side by side, where there are threads |
 #![cfg_attr(
     feature = "files",
@@ -28,6 +29,7 @@ pub mod metrics;
 pub mod parallel;
 pub mod render;
 mod sealed;
+pub mod statistics;
 
 /// The example of the README compiles.
 #[cfg(doctest)]

@@ -12,14 +12,14 @@ use relight_reader::{DamagedSample, OpenError};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvalError {
-    /// The truth cannot be opened.
+    /// The ground truth cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// A sample of the truth cannot be read.
-    #[error("the truth is damaged")]
+    /// A sample of the ground truth cannot be read.
+    #[error("the ground truth is damaged")]
     Damage(#[from] DamagedSample),
-    /// The truth does not have a part that the protocol needs.
-    #[error("the truth has no {part} of {sample}: this protocol cannot be run on it")]
+    /// The ground truth does not have a part that the protocol needs.
+    #[error("the ground truth has no {part} of {sample}: this protocol cannot be run on it")]
     Lacks {
         /// The sample.
         sample: String,
@@ -28,7 +28,7 @@ pub enum EvalError {
     },
     /// There is no prediction.
     #[error(
-        "there is no prediction {part}.exr or {part}.png in {}: all images of the truth are compared, or none",
+        "there is no prediction {part}.exr or {part}.png in {}: all images of the ground truth are compared, or none",
         folder.display()
     )]
     Unpredicted {
@@ -40,14 +40,14 @@ pub enum EvalError {
     /// A prediction cannot be read.
     #[error("a prediction cannot be read")]
     Prediction(#[from] ImageError),
-    /// A prediction does not have the size of the truth.
-    #[error("{} has {}x{} pixels, its truth {}x{}", path.display(), found.width, found.height, expected.width, expected.height)]
+    /// A prediction does not have the size of the ground truth.
+    #[error("{} has {}x{} pixels, its ground truth {}x{}", path.display(), found.width, found.height, expected.width, expected.height)]
     Size {
         /// The prediction.
         path: PathBuf,
         /// Its size.
         found: Extent,
-        /// The truth's.
+        /// The ground truth's.
         expected: Extent,
     },
     /// A file cannot be read.
@@ -112,7 +112,7 @@ pub enum EvalError {
         /// Why.
         source: LightError,
     },
-    /// An object cannot be taken apart or inserted.
+    /// An object cannot be decomposed or inserted.
     #[error("{sample} cannot be inserted")]
     Insertion {
         /// The sample.

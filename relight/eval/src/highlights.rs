@@ -36,7 +36,7 @@ impl HighlightMethod {
 /// to a maximum of 1 and encoded as sRGB, in which highlights are seen.
 ///
 /// # Errors
-/// Where the truth or a prediction cannot be read or measured.
+/// Where the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_highlights(
     set: &TruthSet,
     split: &str,

@@ -17,7 +17,7 @@ pub enum IntrinsicInput {
     Original,
 }
 
-/// A decomposition that needs no learning, or that looks at the truth.
+/// A decomposition that needs no learning, or that looks at the ground truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum IntrinsicBaseline {
     /// Albedo 1; the shading is the mean of the image's channels.
@@ -166,7 +166,7 @@ impl IntrinsicMethod {
 /// SMSE and LMSE of albedo and shading, and their means, by both conventions, for each method.
 ///
 /// # Errors
-/// Where the truth or a prediction cannot be read or measured.
+/// Where the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_intrinsic(
     set: &TruthSet,
     split: &str,

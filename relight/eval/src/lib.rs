@@ -26,7 +26,7 @@ mod predictions;
 mod relighting;
 mod retinex;
 mod run;
-mod table;
+mod scores;
 mod trust;
 
 pub use error::EvalError;
@@ -42,5 +42,10 @@ pub use relighting::{
 };
 pub use retinex::{IntrinsicImages, Retinex};
 pub use run::EvalProgress;
-pub use table::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
+pub use scores::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
 pub use trust::{TrustCurve, TrustTable, evaluate_trust};
+
+/// The examples of the README, so that they are built.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -24,7 +24,7 @@ impl LightMethod {
     fn name(&self) -> String {
         match self {
             Self::Even => "even light".to_owned(),
-            Self::Oracle => "oracle: fitted to the truth".to_owned(),
+            Self::Oracle => "oracle: fitted to the ground truth".to_owned(),
             Self::Predictions(predictions) => predictions.name(),
         }
     }
@@ -49,7 +49,7 @@ impl LightMethod {
 /// says how shading follows from the coefficients.
 ///
 /// # Errors
-/// Where the truth or a prediction cannot be read or measured.
+/// Where the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_light(
     set: &TruthSet,
     split: &str,

@@ -36,7 +36,7 @@ impl NormalMethod {
 /// MSE and DSSIM of normal maps, and the angles between normals, for each method.
 ///
 /// # Errors
-/// Where the truth or a prediction cannot be read or measured.
+/// Where the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_normals(
     set: &TruthSet,
     split: &str,

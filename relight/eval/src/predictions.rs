@@ -9,7 +9,7 @@ use relight_core::light::NormalsFrame;
 use relight_core::light::{Normals, ShLight, YDown, YUp};
 use relight_core::render::{Gloss, Surface};
 
-/// A folder with a folder for each image of the truth, of the same name, in which the estimates lie:
+/// A folder with a folder for each image of the ground truth, of the same name, in which the estimates lie:
 /// `albedo`, `shading`, `highlight` (or `specular`), `normal` as `.exr` (linear, or vectors) or `.png` (8 or 16
 /// bits), `light.txt` as lines of red, green and blue coefficients.
 #[derive(Debug, Clone)]

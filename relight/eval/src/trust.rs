@@ -28,6 +28,7 @@ pub struct TrustCurve {
 
 /// Trust beside truth.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct TrustTable {
     /// How many images there were.
     pub images: usize,
@@ -58,7 +59,7 @@ const ORDERS: [&str; 6] = [
 /// Takes every image of a set apart, and orders its pixels by trust.
 ///
 /// # Errors
-/// Where the truth cannot be read or lacks images or normals, or the network fails.
+/// Where the ground truth cannot be read or lacks images or normals, or the network fails.
 pub fn evaluate_trust(
     set: &TruthSet,
     split: &str,

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use relight_reader::{DrawPlan, Encoding, Place, Stream, Streaming, Turns};
+use relight_reader::{Cursor, DrawPlan, Encoding, Stream, Streaming, Turns};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let streaming = Streaming {
         plan: DrawPlan::of_turns(1),
-        from: Place::default(),
+        from: Cursor::default(),
         until_epoch: rounds,
         threads,
         ahead: 4,

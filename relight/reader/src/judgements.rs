@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::turns::listed;
+use super::listing::listed;
 use super::{DamagedSample, OpenError, SampleFault};
 use relight_core::metrics::{Darker, Judgement};
 

@@ -4,7 +4,7 @@
 //! | what | type |
 //! | --- | --- |
 //! | whole turns: shards of `relit-extract`, and folders in the layout of the paper's released data set | [`Turns`] |
-//! | images with their truth, in folders: of `relight synth` (the warm-up set), MIT Intrinsic Images, Janner et al., LIME | [`TruthSet`] |
+//! | images with their ground truth, in folders: of `relight synth` (the warm-up set), MIT Intrinsic Images, Janner et al., LIME | [`TruthSet`] |
 //! | photographs with what people judged of them: Intrinsic Images in the Wild | [`JudgedImages`] |
 //! | the order in which samples are drawn: batches of neighbours, shuffled, restartable | [`DrawPlan`] |
 //! | batches decoded by threads ahead of their consumer | [`Stream`] |
@@ -13,6 +13,7 @@
 
 mod error;
 mod judgements;
+mod listing;
 mod plan;
 mod stream;
 mod truth;
@@ -20,7 +21,12 @@ mod turns;
 
 pub use error::{DamagedBatch, DamagedSample, OpenError, SampleFault};
 pub use judgements::JudgedImages;
-pub use plan::{Draw, DrawPlan, Place, SampleId, Share};
+pub use plan::{Cursor, Draw, DrawPlan, Rank, SampleId};
 pub use stream::{Drawn, Source, Stream, Streaming};
 pub use truth::{TruthLayout, TruthSample, TruthSet};
 pub use turns::{Encoding, TurnBatch, TurnFrame, Turns};
+
+/// The examples of the README, so that they are built.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -35,28 +35,31 @@ pub struct DrawPlan {
     pub draw: Draw,
     /// The seed of the shuffle; none draws in the order in which the samples stand.
     pub seed: Option<u64>,
-    /// Which share of the batches is drawn here.
-    pub share: Share,
+    /// Which process draws: each draws its own batches.
+    pub rank: Rank,
 }
 
-/// One of several equal shares, where many processes draw from one data set: of each `of` batches that follow
-/// each other, process `index` takes the one at its number. Epochs go on into each other: whenever the last process has
-/// had a batch, all of them have had as many.
+/// The rank of a process and the world size, where several processes draw from one data set: of each `world_size`
+/// batches that follow each other, a process takes the one at its rank. Epochs go on into each other: whenever the last
+/// process has had a batch, all of them have had as many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Share {
+pub struct Rank {
     index: u32,
-    of: u32,
+    world_size: u32,
 }
 
-impl Share {
-    /// All of it.
-    pub const ALL: Self = Self { index: 0, of: 1 };
+impl Rank {
+    /// The only process: it draws everything.
+    pub const ONLY: Self = Self {
+        index: 0,
+        world_size: 1,
+    };
 
-    /// The share of process `index` of `of`; none where there is no such process.
+    /// The process `index` of `world_size`; none where there is no such process.
     #[must_use]
-    pub const fn new(index: u32, of: u32) -> Option<Self> {
-        if index < of {
-            Some(Self { index, of })
+    pub const fn new(index: u32, world_size: u32) -> Option<Self> {
+        if index < world_size {
+            Some(Self { index, world_size })
         } else {
             None
         }
@@ -70,25 +73,25 @@ impl Share {
 
     /// How many processes there are, at least 1.
     #[must_use]
-    pub const fn of(self) -> u32 {
-        self.of
+    pub const fn world_size(self) -> u32 {
+        self.world_size
     }
 }
 
-/// A place between two samples of a plan, to go on from. It is the same for all shares.
+/// A position between two samples of a plan, to go on from. It is the same for all processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Place {
+pub struct Cursor {
     /// Which time all samples are drawn, from 0.
     pub epoch: u64,
-    /// How many samples were drawn in this epoch by all shares together, damaged ones included.
+    /// How many samples were drawn in this epoch by all processes together, damaged ones included.
     pub sample: u64,
 }
 
-/// The samples of a batch, and the place behind it.
+/// The samples of a batch, and the cursor behind it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Job {
     pub(super) samples: Vec<SampleId>,
-    pub(super) next: Place,
+    pub(super) next: Cursor,
 }
 
 impl DrawPlan {
@@ -99,16 +102,16 @@ impl DrawPlan {
             batch: 12,
             draw: Draw::Neighbours,
             seed: Some(seed),
-            share: Share::ALL,
+            rank: Rank::ONLY,
         }
     }
 
-    /// The batches of this share from a place on, up to the end of the epoch before `end`. `turns` are the numbers
-    /// of samples. The place behind a batch is behind those that the other shares take along with it.
+    /// The batches of this rank from a cursor on, up to the end of the epoch before `end`. `turns` are the numbers
+    /// of samples. The cursor behind a batch is behind those that the other ranks take along with it.
     pub(super) fn jobs(
         self,
         turns: &[u32],
-        from: Place,
+        from: Cursor,
         end: u64,
     ) -> impl Iterator<Item = Job> + use<> {
         let turns = turns.to_vec();
@@ -119,16 +122,16 @@ impl DrawPlan {
             let skip = if epoch == from.epoch { from.sample } else { 0 };
             self.epoch(&turns, epoch, skip)
         });
-        let Share { index, of } = self.share;
+        let Rank { index, world_size } = self.rank;
         std::iter::from_fn(move || {
-            let round: Vec<Job> = all.by_ref().take(of as usize).collect();
+            let round: Vec<Job> = all.by_ref().take(world_size as usize).collect();
             let next = round.last()?.next;
             let samples = round.into_iter().nth(index as usize)?.samples;
             Some(Job { samples, next })
         })
     }
 
-    /// The batches of an epoch, of all shares, without its first `skip` samples.
+    /// The batches of an epoch, of all ranks, without its first `skip` samples.
     fn epoch(self, turns: &[u32], epoch: u64, skip: u64) -> impl Iterator<Item = Job> + use<> {
         let mut random = self.seed.map(|seed| {
             // An odd factor keeps the seeds of different epochs apart.
@@ -147,7 +150,7 @@ impl DrawPlan {
             drawn += samples.len() as u64;
             let over = skip.saturating_sub(start).min(samples.len() as u64);
             samples.drain(..usize::try_from(over).unwrap_or(usize::MAX));
-            let next = Place {
+            let next = Cursor {
                 epoch,
                 sample: drawn,
             };
@@ -264,11 +267,11 @@ mod tests {
             batch,
             draw,
             seed,
-            share: Share::ALL,
+            rank: Rank::ONLY,
         }
     }
 
-    fn drawn(plan: DrawPlan, turns: &[u32], from: Place, end: u64) -> Vec<SampleId> {
+    fn drawn(plan: DrawPlan, turns: &[u32], from: Cursor, end: u64) -> Vec<SampleId> {
         plan.jobs(turns, from, end)
             .flat_map(|job| job.samples)
             .collect()
@@ -286,7 +289,7 @@ mod tests {
             draw in draws(),
             seed in prop::option::of(any::<u64>()),
         ) {
-            let all = drawn(plan(batch, draw, seed), &turns, Place::default(), 1);
+            let all = drawn(plan(batch, draw, seed), &turns, Cursor::default(), 1);
             let different: HashSet<SampleId> = all.iter().copied().collect();
             prop_assert_eq!(all.len(), turns.iter().sum::<u32>() as usize);
             prop_assert_eq!(different.len(), all.len());
@@ -294,22 +297,22 @@ mod tests {
         }
 
         #[test]
-        fn from_any_place_on_the_rest_is_drawn(
+        fn from_any_cursor_on_the_rest_is_drawn(
             turns in prop::collection::vec(0_u32..30, 1..5),
             draw in draws(),
             cut in any::<prop::sample::Index>(),
             seed in prop::option::of(any::<u64>()),
         ) {
             let plan = plan(12, draw, seed);
-            let both = drawn(plan, &turns, Place::default(), 2);
+            let both = drawn(plan, &turns, Cursor::default(), 2);
             let epoch = both.len() / 2;
             let cut = cut.index(epoch + 1);
-            let rest = drawn(plan, &turns, Place { epoch: 0, sample: cut as u64 }, 2);
+            let rest = drawn(plan, &turns, Cursor { epoch: 0, sample: cut as u64 }, 2);
             prop_assert_eq!(&both[cut..], rest);
         }
 
         #[test]
-        fn shares_draw_everything_between_them(
+        fn ranks_draw_everything_between_them(
             turns in prop::collection::vec(0_u32..60, 1..5),
             of in 1_u32..5,
             draw in draws(),
@@ -317,11 +320,11 @@ mod tests {
             let whole = plan(12, draw, Some(7));
             let mut all: Vec<SampleId> = (0..of)
                 .flat_map(|index| {
-                    let share = Share::new(index, of).unwrap();
-                    drawn(DrawPlan { share, ..whole }, &turns, Place::default(), 1)
+                    let rank = Rank::new(index, of).unwrap();
+                    drawn(DrawPlan { rank, ..whole }, &turns, Cursor::default(), 1)
                 })
                 .collect();
-            let mut expected = drawn(whole, &turns, Place::default(), 1);
+            let mut expected = drawn(whole, &turns, Cursor::default(), 1);
             all.sort_unstable();
             expected.sort_unstable();
             prop_assert_eq!(all, expected);
@@ -331,7 +334,7 @@ mod tests {
     #[test]
     fn a_batch_of_neighbours_is_a_run_of_one_turn_around_its_end() {
         let turns = [1500, 30];
-        for job in DrawPlan::of_turns(3).jobs(&turns, Place::default(), 1) {
+        for job in DrawPlan::of_turns(3).jobs(&turns, Cursor::default(), 1) {
             let turn = job.samples[0].turn;
             assert!(job.samples.len() == 12 || turn == 1 && job.samples.len() == 6);
             for pair in job.samples.windows(2) {
@@ -347,7 +350,7 @@ mod tests {
             drawn(
                 DrawPlan::of_turns(3),
                 &[120; 8],
-                Place { epoch, sample: 0 },
+                Cursor { epoch, sample: 0 },
                 epoch + 1,
             )
         };
@@ -362,7 +365,7 @@ mod tests {
         let all = drawn(
             plan(4, Draw::Neighbours, None),
             &[5, 3],
-            Place::default(),
+            Cursor::default(),
             1,
         );
         let mut sorted = all.clone();
@@ -372,50 +375,50 @@ mod tests {
 
     #[test]
     fn epochs_without_a_batch_end_at_once() {
-        let endless = |share, turns: &[u32]| {
+        let endless = |rank, turns: &[u32]| {
             let plan = DrawPlan {
-                share,
+                rank,
                 ..DrawPlan::of_turns(1)
             };
-            plan.jobs(turns, Place::default(), u64::MAX).next()
+            plan.jobs(turns, Cursor::default(), u64::MAX).next()
         };
-        assert_eq!(endless(Share::ALL, &[0, 0]), None);
-        assert!(endless(Share::new(2, 3).unwrap(), &[24]).is_some());
-        assert_eq!(Share::new(3, 3), None);
+        assert_eq!(endless(Rank::ONLY, &[0, 0]), None);
+        assert!(endless(Rank::new(2, 3).unwrap(), &[24]).is_some());
+        assert_eq!(Rank::new(3, 3), None);
     }
 
     #[test]
-    fn shares_go_on_together_over_epochs_and_from_each_others_places() {
+    fn ranks_go_on_together_over_epochs_and_from_each_others_cursors() {
         let whole = DrawPlan::of_turns(5);
         // Five batches an epoch: three processes do not come out even.
         let turns = [30, 24];
-        let jobs = |share, from| {
-            let plan = DrawPlan { share, ..whole };
+        let jobs = |rank, from| {
+            let plan = DrawPlan { rank, ..whole };
             plan.jobs(&turns, from, 7).collect::<Vec<Job>>()
         };
-        let alone = jobs(Share::ALL, Place::default());
-        let share = |index| Share::new(index, 3).unwrap();
-        let begun = jobs(share(0), Place::default());
+        let alone = jobs(Rank::ONLY, Cursor::default());
+        let rank = |index| Rank::new(index, 3).unwrap();
+        let begun = jobs(rank(0), Cursor::default());
         for (round, job) in begun.iter().take(10).enumerate() {
             assert_eq!(job.samples, alone[3 * round].samples);
             assert_eq!(job.next, alone[3 * round + 2].next);
-            let resumed = &jobs(share(2), job.next)[0];
+            let resumed = &jobs(rank(2), job.next)[0];
             assert_eq!(resumed.samples, alone[3 * round + 5].samples);
         }
     }
 
     #[test]
-    fn the_place_behind_a_batch_counts_the_samples_before_it() {
+    fn the_cursor_behind_a_batch_counts_the_samples_before_it() {
         let plan = plan(12, Draw::Neighbours, Some(1));
         let places: Vec<u64> = plan
-            .jobs(&[30], Place::default(), 1)
+            .jobs(&[30], Cursor::default(), 1)
             .map(|job| job.next.sample)
             .collect();
         assert_eq!(places.last(), Some(&30));
         let first = plan
             .jobs(
                 &[30],
-                Place {
+                Cursor {
                     epoch: 0,
                     sample: 5,
                 },

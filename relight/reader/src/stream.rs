@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
 use super::plan::Job;
-use super::{DamagedBatch, DamagedSample, DrawPlan, OpenError, Place, SampleId};
+use super::{Cursor, DamagedBatch, DamagedSample, DrawPlan, OpenError, SampleId};
 
 /// A set of samples that batches can be drawn from.
 pub trait Source: Send + Sync + 'static {
@@ -32,7 +32,7 @@ pub struct Streaming {
     /// Which samples make which batch.
     pub plan: DrawPlan,
     /// Where to begin.
-    pub from: Place,
+    pub from: Cursor,
     /// The epoch before which the stream ends: 1 for one time through all samples, `u64::MAX` for
     /// a stream without an end.
     pub until_epoch: u64,
@@ -42,13 +42,13 @@ pub struct Streaming {
     pub ahead: usize,
 }
 
-/// A batch, and the place from which a stream goes on behind it.
+/// A batch, and the cursor from which a stream goes on behind it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawn<B> {
     /// The samples.
     pub batch: B,
-    /// The place behind them.
-    pub next: Place,
+    /// The cursor behind them.
+    pub next: Cursor,
 }
 
 /// An iterator over batches in the order of the plan, whatever the number of threads.
@@ -61,12 +61,12 @@ pub struct Drawn<B> {
 /// use std::num::NonZeroUsize;
 /// use std::path::Path;
 /// use std::sync::{Arc, Mutex};
-/// use relight_reader::{DrawPlan, Encoding, Place, Stream, Streaming, Turns};
+/// use relight_reader::{DrawPlan, Encoding, Cursor, Stream, Streaming, Turns};
 ///
 /// let turns = Arc::new(Turns::open(Path::new("data"), Encoding::Srgb)?);
 /// let streaming = Streaming {
 ///     plan: DrawPlan::of_turns(1),
-///     from: Place::default(),
+///     from: Cursor::default(),
 ///     until_epoch: 3,
 ///     threads: NonZeroUsize::MIN,
 ///     ahead: 4,
@@ -202,7 +202,7 @@ fn decode<S: Source>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Draw, SampleFault, Share};
+    use crate::{Draw, Rank, SampleFault};
 
     /// Turns of which the samples are their own numbers; one of them is damaged.
     struct Numbers;
@@ -234,13 +234,13 @@ mod tests {
         }
     }
 
-    fn streaming(threads: usize, from: Place, until_epoch: u64) -> Streaming {
+    fn streaming(threads: usize, from: Cursor, until_epoch: u64) -> Streaming {
         Streaming {
             plan: DrawPlan {
                 batch: 12,
                 draw: Draw::Neighbours,
                 seed: Some(9),
-                share: Share::ALL,
+                rank: Rank::ONLY,
             },
             from,
             until_epoch,
@@ -249,7 +249,7 @@ mod tests {
         }
     }
 
-    fn drawn(threads: usize, from: Place) -> Vec<Drawn<Vec<SampleId>>> {
+    fn drawn(threads: usize, from: Cursor) -> Vec<Drawn<Vec<SampleId>>> {
         Stream::start(&Arc::new(Numbers), streaming(threads, from, 2))
             .unwrap()
             .map(|item| item.unwrap_or_else(|damaged| damaged.rest))
@@ -258,16 +258,16 @@ mod tests {
 
     #[test]
     fn the_number_of_threads_changes_nothing() {
-        let one = drawn(1, Place::default());
+        let one = drawn(1, Cursor::default());
         assert_eq!(one.iter().map(|d| d.batch.len()).sum::<usize>(), 2 * 89);
         for threads in [2, 3, 7, 40] {
-            assert_eq!(drawn(threads, Place::default()), one);
+            assert_eq!(drawn(threads, Cursor::default()), one);
         }
     }
 
     #[test]
     fn a_stream_goes_on_behind_any_batch_of_another() {
-        let whole = drawn(2, Place::default());
+        let whole = drawn(2, Cursor::default());
         for (at, drawn_before) in whole.iter().enumerate() {
             assert_eq!(drawn(3, drawn_before.next), whole[at + 1..]);
         }
@@ -275,7 +275,7 @@ mod tests {
 
     #[test]
     fn a_damaged_sample_is_an_error_that_holds_the_rest() {
-        let stream = Stream::start(&Arc::new(Numbers), streaming(2, Place::default(), 1)).unwrap();
+        let stream = Stream::start(&Arc::new(Numbers), streaming(2, Cursor::default(), 1)).unwrap();
         let damaged: Vec<_> = stream.filter_map(Result::err).collect();
         let [batch] = &damaged[..] else {
             panic!("{damaged:?}")
@@ -287,7 +287,7 @@ mod tests {
 
     #[test]
     fn a_stream_without_an_end_stops_when_it_is_dropped() {
-        let endless = streaming(3, Place::default(), u64::MAX);
+        let endless = streaming(3, Cursor::default(), u64::MAX);
         let mut stream = Stream::start(&Arc::new(Numbers), endless).unwrap();
         assert!(stream.by_ref().take(100).count() == 100);
         drop(stream);
@@ -305,7 +305,7 @@ mod tests {
                 ((), Vec::new())
             }
         }
-        let endless = streaming(2, Place::default(), u64::MAX);
+        let endless = streaming(2, Cursor::default(), u64::MAX);
         let mut stream = Stream::start(&Arc::new(Nothing), endless).unwrap();
         assert!(stream.next().is_none());
         assert!(stream.next().is_none());

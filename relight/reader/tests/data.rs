@@ -15,12 +15,12 @@ use std::sync::Arc;
 use image::{GrayImage, Luma, Rgb as Pixel, RgbImage};
 use relight_core::image::{Extent, Planes};
 use relight_reader::{
-    DamagedBatch, DrawPlan, Drawn, Encoding, OpenError, Place, Source, Stream, Streaming,
+    Cursor, DamagedBatch, DrawPlan, Drawn, Encoding, OpenError, Source, Stream, Streaming,
     TruthLayout, TruthSet, TurnBatch, Turns,
 };
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
-use relit_data::image_stats::MaskSpans;
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{
     Align, Dataset, ExtractionSettings, FrameRecord, ImageSize, Layout, Sample, ShardWriter,
 };
@@ -46,31 +46,15 @@ fn picture(index: u32) -> RgbImage {
 
 fn sample(session: &str, index: u32) -> Sample {
     let image = picture(index);
-    let measures = MaskSpans::of(&mask()).measure(&image, 250).unwrap();
-    let record = FrameRecord {
-        session: session.to_owned(),
-        object: "mug".to_owned(),
-        index,
-        source_frame: u64::from(index),
-        t_us: i64::from(index),
-        angle_deg: None,
-        duplicate: false,
-        crop: Rect::new(0, 0, WIDTH, HEIGHT),
-        size: [WIDTH, HEIGHT],
-        shift_px: None,
-        shift_applied: false,
-        align_confidence: None,
-        mask_px: measures.mask_px,
-        saturated_px: 0,
-        saturated_fraction: 0.0,
-        saturated_any_px: 0,
-        spec_net: false,
-        mean_rgb: measures.mean_rgb,
-        sharpness: measures.sharpness,
-        exposure_step: None,
-        identical_to: None,
-        blur: None,
-    };
+    let measures = MaskSpans::of(&mask())
+        .measure(&image, SATURATION_LEVEL)
+        .unwrap();
+    let whole = Rect::new(0, 0, WIDTH, HEIGHT);
+    let record = FrameRecord::new(session, "mug", index, whole, &measures, SPEC_NET_GATE).of_frame(
+        u64::from(index),
+        i64::from(index),
+        None,
+    );
     Sample::encode(record, image).unwrap()
 }
 
@@ -89,7 +73,7 @@ fn open(path: &Path) -> Arc<Turns> {
 
 type Item = Result<Drawn<TurnBatch>, DamagedBatch<Drawn<TurnBatch>>>;
 
-fn stream(turns: &Arc<Turns>, threads: usize, from: Place) -> Vec<Item> {
+fn stream(turns: &Arc<Turns>, threads: usize, from: Cursor) -> Vec<Item> {
     let streaming = Streaming {
         plan: DrawPlan::of_turns(5),
         from,
@@ -112,7 +96,7 @@ fn keys(drawn: &[Drawn<TurnBatch>]) -> Vec<String> {
 /// The stream over `path`: keys of the frames that are given, and what is said of the others.
 fn given_and_damaged(path: &Path) -> (Vec<String>, Vec<String>) {
     let (mut given, mut damaged) = (Vec::new(), Vec::new());
-    for item in stream(&open(path), 2, Place::default()) {
+    for item in stream(&open(path), 2, Cursor::default()) {
         let drawn = item.unwrap_or_else(|batch| {
             let told = batch.damage.iter().map(|one| with_causes(one));
             damaged.extend(told);
@@ -135,7 +119,7 @@ fn a_shard_is_given_as_it_was_written() {
     let turns = open(&dir.path().join("turn.tar"));
     assert_eq!(turns.turns(), [30]);
     assert_eq!(turns.names().collect::<Vec<_>>(), ["turn"]);
-    let drawn = whole(stream(&turns, 1, Place::default()));
+    let drawn = whole(stream(&turns, 1, Cursor::default()));
     let mut seen = keys(&drawn);
     seen.sort();
     let all: Vec<String> = (0..30).map(|index| format!("turn/{index:04}")).collect();
@@ -162,7 +146,7 @@ fn a_data_set_of_an_earlier_version_is_given_too() {
     let earlier = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/earlier");
     let turns = open(&earlier);
     assert_eq!(turns.turns(), [12]);
-    let drawn = whole(stream(&turns, 1, Place::default()));
+    let drawn = whole(stream(&turns, 1, Cursor::default()));
     let frames = drawn.iter().flat_map(|drawn| &drawn.batch.frames);
     let records: Vec<&FrameRecord> = frames.filter_map(|frame| frame.record.as_ref()).collect();
     assert_eq!(records.len(), 12);
@@ -174,7 +158,7 @@ fn values_can_be_had_in_proportion_to_light() {
     let dir = tempfile::tempdir().unwrap();
     write(dir.path(), Layout::Webdataset, "turn", 12);
     let turns = Turns::open(dir.path(), Encoding::Linear).unwrap();
-    let drawn = whole(stream(&Arc::new(turns), 1, Place::default()));
+    let drawn = whole(stream(&Arc::new(turns), 1, Cursor::default()));
     // The green of the pixels in column 5 is 100 of 255.
     let green = drawn[0].batch.images[PIXELS + 3 * 9 + 5];
     assert!((green - 0.127_438).abs() < 1e-6, "{green}");
@@ -186,9 +170,9 @@ fn a_stream_can_be_taken_up_at_any_sample() {
     write(dir.path(), Layout::Webdataset, "a", 30);
     write(dir.path(), Layout::Webdataset, "b", 17);
     let turns = open(dir.path());
-    let all = keys(&whole(stream(&turns, 2, Place::default())));
+    let all = keys(&whole(stream(&turns, 2, Cursor::default())));
     for sample in 0..=47 {
-        let rest = whole(stream(&turns, 3, Place { epoch: 0, sample }));
+        let rest = whole(stream(&turns, 3, Cursor { epoch: 0, sample }));
         assert_eq!(keys(&rest), all[sample as usize..]);
     }
 }
@@ -199,10 +183,10 @@ fn memory_that_is_given_back_leaves_no_trace() {
     write(dir.path(), Layout::Webdataset, "a", 30);
     write(dir.path(), Layout::Webdataset, "b", 17);
     let turns = open(dir.path());
-    let expected = whole(stream(&turns, 1, Place::default()));
+    let expected = whole(stream(&turns, 1, Cursor::default()));
     let streaming = Streaming {
         plan: DrawPlan::of_turns(5),
-        from: Place::default(),
+        from: Cursor::default(),
         until_epoch: 1,
         threads: NonZeroUsize::MIN,
         ahead: 1,
@@ -224,7 +208,7 @@ fn folders_in_the_layout_of_the_released_data_give_what_shards_give() {
         fs::create_dir(out).unwrap();
         write(out, layout, "turn", 30);
     }
-    let from = |path| whole(stream(&open(path), 2, Place::default()));
+    let from = |path| whole(stream(&open(path), 2, Cursor::default()));
     for (shard, folder) in from(&shards).into_iter().zip(from(&folders)) {
         assert_eq!(shard.batch.images, folder.batch.images);
         assert_eq!(shard.batch.masks, folder.batch.masks);
@@ -240,7 +224,7 @@ fn images_in_folders_are_cut_out_by_their_mask() {
     let white = RgbImage::from_pixel(WIDTH, HEIGHT, Pixel([255; 3]));
     white.save(dir.path().join("imgs/v/0.jpg")).unwrap();
     mask().save(dir.path().join("masks/v.png")).unwrap();
-    let drawn = whole(stream(&open(dir.path()), 1, Place::default()));
+    let drawn = whole(stream(&open(dir.path()), 1, Cursor::default()));
     let batch = &drawn[0].batch;
     assert_eq!(batch.images[..PIXELS], batch.masks);
     assert_eq!(batch.frames[0].record, None);
@@ -291,8 +275,8 @@ fn samples_that_the_description_tells_of_and_no_shard_holds_are_told() {
         frames: 20,
         size: ImageSize::NATIVE,
         margin: 0.0,
-        saturation_level: 250,
-        gate: 0.05,
+        saturation_level: SATURATION_LEVEL,
+        gate: SPEC_NET_GATE,
         align: Align::Off,
         align_tolerance: None,
         layout: Layout::Webdataset,

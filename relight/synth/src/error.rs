@@ -10,6 +10,7 @@ use relight_core::light::{LightError, PanoramaError};
 
 /// Why data could not be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SynthError {
     /// A file or folder could not be read.
     #[error("{path} could not be read")]

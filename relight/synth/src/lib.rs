@@ -1,5 +1,4 @@
-//! Pictures of objects together with the truth that they were made of: data to warm networks up with,
-//! and to judge them by.
+//! Synthetic pictures of objects together with their ground truth: data to warm networks up with, and to judge them by.
 //!
 //! | module | concern |
 //! | --- | --- |
@@ -14,7 +13,7 @@
 //! | `turn` | whole turns as shards |
 //!
 //! All of it follows from a seed: the same seed gives the same bytes on any number of threads. What is
-//! slow is kept apart from what is cheap: a [`Scene`] is made once for an object in a pose, and then
+//! slow is kept apart from what is cheap: a [`SyntheticScene`] is made once for an object in a pose, and then
 //! lit as often as one likes.
 //!
 //! ```
@@ -48,6 +47,7 @@ mod sample;
 mod shape;
 mod studio;
 mod turn;
+mod vectors;
 mod view;
 
 pub use camera::{CameraModel, Response};
@@ -57,11 +57,11 @@ pub use folder::{SynthTally, write_samples};
 pub use geometry::{GBuffer, Occluder};
 pub use library::{Folders, Library, PANORAMA_EXTENT, made_panoramas};
 pub use lighting::{
-    BlinnPhong, Emitter, Environment, Lamp, LampShadows, LightKind, Lighting, Material, Method,
-    Panoramas, Scene, Shaded,
+    BlinnPhong, Emitter, Environment, LampShadows, LightKind, Lighting, Material, Method,
+    Panoramas, Shaded, SyntheticLamp, SyntheticScene,
 };
 pub use mesh::{Mesh, MeshFault};
-pub use object::{ObjectSource, View};
+pub use object::{ObjectSource, SyntheticView};
 pub use paint::{AlbedoKind, Paint, Relief, TextureImage};
 pub use preview::write_preview;
 pub use random::stream;
@@ -71,3 +71,8 @@ pub use shape::ShapeKind;
 pub use studio::Surroundings;
 pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};
 pub use view::{Pose, Projection};
+
+/// The examples of the README, so that they are built.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::lighting::Scene;
+use super::lighting::SyntheticScene;
 use super::shape::ShapeKind;
 use super::view::{Pose, Projection};
 
@@ -39,7 +39,7 @@ impl ObjectSource {
 }
 
 /// An object in its pose before the camera, ready to be lit.
-pub struct View {
+pub struct SyntheticView {
     /// Where it comes from.
     pub object: ObjectSource,
     /// How it stands.
@@ -47,5 +47,5 @@ pub struct View {
     /// How it is seen.
     pub projection: Projection,
     /// What is seen.
-    pub scene: Scene,
+    pub scene: SyntheticScene,
 }

@@ -1,4 +1,4 @@
-//! Contact sheets: samples beside their truth.
+//! Contact sheets: samples beside their ground truth.
 
 use std::path::Path;
 

@@ -10,9 +10,9 @@ use super::camera::CameraModel;
 use super::finish::Finish;
 use super::geometry::{GBuffer, Occluder};
 use super::library::Library;
-use super::lighting::{LightKind, Lighting, Material, Scene};
+use super::lighting::{LightKind, Lighting, Material, SyntheticScene};
 use super::mesh::Mesh;
-use super::object::{ObjectSource, View};
+use super::object::{ObjectSource, SyntheticView};
 use super::random::{Random, stream};
 use super::sample::{Description, SynthSample};
 use super::shape::ShapeKind;
@@ -120,7 +120,7 @@ impl Recipe {
 
     /// The view of a number of an object: of several draws the first that covers enough of the picture.
     #[must_use]
-    pub fn view(&self, object: &ObjectSource, mesh: &Mesh, number: u64) -> View {
+    pub fn view(&self, object: &ObjectSource, mesh: &Mesh, number: u64) -> SyntheticView {
         let mut random = Random::new(stream(stream(self.seed, 3), number));
         let kind = match object {
             ObjectSource::Mesh { .. } => None,
@@ -155,11 +155,11 @@ impl Recipe {
         });
         let scene = if self.shadows {
             let occluder = Occluder::new(mesh, pose.place(mesh, projection));
-            Scene::shaded(buffer, occluder, AMBIENT_RAYS, random.seed())
+            SyntheticScene::shaded(buffer, occluder, AMBIENT_RAYS, random.seed())
         } else {
-            Scene::open(buffer)
+            SyntheticScene::open(buffer)
         };
-        View {
+        SyntheticView {
             object: object.clone(),
             pose,
             projection,
@@ -169,7 +169,12 @@ impl Recipe {
 
     /// The material of a number on what a view shows: paint, relief on a third, gloss on a third.
     #[must_use]
-    pub fn material(&self, library: &Library, view: &View, number: u64) -> (Finish, Material) {
+    pub fn material(
+        &self,
+        library: &Library,
+        view: &SyntheticView,
+        number: u64,
+    ) -> (Finish, Material) {
         let mut random = Random::new(stream(stream(self.seed, 5), number));
         let finish = Finish::draw(&mut random, view.scene.buffer(), library, 0.35);
         let material = finish.apply(view.scene.buffer(), library);
@@ -178,7 +183,12 @@ impl Recipe {
 
     /// The sample of a number: a view in a random material, under a random light, by a random camera.
     #[must_use]
-    pub fn sample<'a>(&self, library: &Library, view: &'a View, number: u64) -> SynthSample<'a> {
+    pub fn sample<'a>(
+        &self,
+        library: &Library,
+        view: &'a SyntheticView,
+        number: u64,
+    ) -> SynthSample<'a> {
         let seed = stream(stream(self.seed, 2), number);
         let mut random = Random::new(seed);
         let (finish, material) = self.material(library, view, number);

@@ -1,4 +1,4 @@
-//! One sample: a picture, its truth, and every number that it was made of.
+//! One sample: a picture, its ground truth, and every number that it was made of.
 
 use glam::Vec3;
 use image::{GrayImage, Luma, Rgb, RgbImage};
@@ -9,13 +9,14 @@ use super::camera::CameraModel;
 use super::finish::Finish;
 use super::geometry::GBuffer;
 use super::lighting::{Lighting, Material, Panoramas, Shaded};
-use super::object::{ObjectSource, View};
+use super::object::{ObjectSource, SyntheticView};
 use super::png::{Sixteen, encode_sixteen};
 use super::view::{Pose, Projection};
 use relight_core::light::ShLight;
 
 /// All that a sample was made of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Description {
     /// The sample's number.
     pub number: u64,
@@ -60,9 +61,9 @@ impl Lighting {
     }
 }
 
-/// A picture with its truth.
+/// A picture with its ground truth.
 pub struct SynthSample<'a> {
-    view: &'a View,
+    view: &'a SyntheticView,
     material: Material,
     /// With the camera's gain.
     shaded: Shaded,
@@ -86,7 +87,7 @@ impl<'a> SynthSample<'a> {
     /// Takes the picture: `shaded` is still without the gain of the description's camera; `seed` draws
     /// the noise.
     pub(super) fn new(
-        view: &'a View,
+        view: &'a SyntheticView,
         material: Material,
         mut shaded: Shaded,
         description: Description,
@@ -106,7 +107,7 @@ impl<'a> SynthSample<'a> {
 
     /// The view that is shown.
     #[must_use]
-    pub fn view(&self) -> &View {
+    pub fn view(&self) -> &SyntheticView {
         self.view
     }
 

@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::noise::Noise;
 use super::random::{Random, stream};
+use super::vectors::vector;
 use relight_core::image::{Extent, Planes, Rgb};
-use relight_core::light::{Direction, LightError, Panorama};
+use relight_core::light::{LightError, Panorama};
 
 /// A kind of panorama that is made here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -61,10 +62,6 @@ impl Surroundings {
         };
         Panorama::new(Rgb::new(Planes::from_fn(extent, radiance)))
     }
-}
-
-fn vector(direction: Direction) -> Vec3 {
-    Vec3::from_array(direction.components().map(|c| c as f32))
 }
 
 /// A warm (towards 1) or cool (towards -1) white.

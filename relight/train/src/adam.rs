@@ -28,7 +28,7 @@ pub struct AdamSettings {
     /// Part of the second moment that is kept at each step, 0..1.
     pub beta2: f64,
     /// Part of each parameter that is taken off at each step, times the learning rate, 0 and above.
-    pub decay: f64,
+    pub weight_decay: f64,
 }
 
 impl Default for AdamSettings {
@@ -36,7 +36,7 @@ impl Default for AdamSettings {
         Self {
             beta1: 0.9,
             beta2: 0.99,
-            decay: 1e-3,
+            weight_decay: 1e-3,
         }
     }
 }
@@ -117,25 +117,25 @@ impl Adam {
         Ok(())
     }
 
-    /// One step along the gradients of the parameters, which are forgotten then. Where together they
-    /// are longer than `longest`, they are shortened to it first. Answers how long they were.
+    /// One step along the gradients of the parameters, which are forgotten then. Where their norm is larger than
+    /// `max_grad_norm`, they are scaled down to it first. Answers the norm that they had.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
     pub fn step(
         &mut self,
         parameters: &BTreeMap<String, Tensor>,
-        rate: f64,
-        longest: f64,
+        learning_rate: f64,
+        max_grad_norm: f64,
     ) -> Result<f64, TrainError> {
-        no_grad(|| self.step_without_gradient(parameters, rate, longest))
+        no_grad(|| self.step_without_gradient(parameters, learning_rate, max_grad_norm))
     }
 
     fn step_without_gradient(
         &mut self,
         parameters: &BTreeMap<String, Tensor>,
-        rate: f64,
-        longest: f64,
+        learning_rate: f64,
+        max_grad_norm: f64,
     ) -> Result<f64, TrainError> {
         let mut square = 0.0;
         for parameter in parameters.values() {
@@ -144,9 +144,9 @@ impl Adam {
                 square += f64::try_from(gradient.f_norm()?)?.powi(2);
             }
         }
-        let length = square.sqrt();
-        let shrink = if length > longest {
-            longest / length
+        let norm = square.sqrt();
+        let shrink = if norm > max_grad_norm {
+            max_grad_norm / norm
         } else {
             1.0
         };
@@ -154,7 +154,7 @@ impl Adam {
         let AdamSettings {
             beta1,
             beta2,
-            decay,
+            weight_decay,
         } = self.settings;
         let steps = self.steps.min(i32::MAX as u64) as i32;
         let (bias1, bias2) = (1.0 - beta1.powi(steps), 1.0 - beta2.powi(steps));
@@ -174,13 +174,13 @@ impl Adam {
             let mut change = second.f_sqrt()?;
             let _ = change.f_add_scalar_(EPSILON * bias2.sqrt())?;
             let _ = change.f_reciprocal_()?.f_mul_(first)?;
-            let _ = change.f_mul_scalar_(-rate * bias2.sqrt() / bias1)?;
+            let _ = change.f_mul_scalar_(-learning_rate * bias2.sqrt() / bias1)?;
             let mut parameter = parameter.shallow_clone();
             let _ = parameter
-                .f_mul_scalar_(1.0 - rate * decay)?
+                .f_mul_scalar_(1.0 - learning_rate * weight_decay)?
                 .f_add_(&change)?;
             let _ = gradient.f_zero_()?;
         }
-        Ok(length)
+        Ok(norm)
     }
 }

@@ -18,8 +18,8 @@ pub(super) type Fact = (&'static str, String);
 /// # Errors
 /// [`TrainError::Disagreement`] in every process, [`TrainError::ProcessLost`].
 pub(super) fn agree(group: &ProcessGroup, facts: &[Fact]) -> Result<(), TrainError> {
-    let (own, count) = (group.share().index() as usize, facts.len());
-    let mut hashes = vec![0.0; count * group.share().of() as usize];
+    let (own, count) = (group.rank().index() as usize, facts.len());
+    let mut hashes = vec![0.0; count * group.rank().world_size() as usize];
     for (hash, (_, text)) in hashes[own * count..].iter_mut().zip(facts) {
         // As many bits as an f64 holds exactly; the others add 0 to it.
         *hash = (HASH.checksum(text.as_bytes()) >> 11) as f64;

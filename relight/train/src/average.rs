@@ -1,4 +1,4 @@
-//! The running average of a network's parameters, which answers better than the parameters themselves.
+//! The exponential moving average (EMA) of a network's parameters, which answers better than the parameters themselves.
 
 use std::collections::BTreeMap;
 
@@ -11,24 +11,24 @@ use relight_nets::Weights;
 /// An exponential moving average. In the first steps it forgets faster, so that it does not remember the
 /// initial weights.
 #[derive(Debug)]
-pub struct Average {
-    keep: f64,
+pub struct WeightAverage {
+    decay: f64,
     values: BTreeMap<String, Tensor>,
 }
 
-impl Average {
-    /// The average of parameters that keeps the part `keep` (0..1) of itself at each step.
+impl WeightAverage {
+    /// The average of parameters that keeps the part `decay` (0..1) of itself at each step.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub fn new(parameters: &BTreeMap<String, Tensor>, keep: f64) -> Result<Self, TrainError> {
+    pub fn new(parameters: &BTreeMap<String, Tensor>, decay: f64) -> Result<Self, TrainError> {
         let copy = |(name, parameter): (&String, &Tensor)| {
             let mut value = parameter.f_detach()?.f_zeros_like()?;
             value.f_copy_(&parameter.f_detach()?)?;
             Ok((name.clone(), value))
         };
         Ok(Self {
-            keep,
+            decay,
             values: parameters
                 .iter()
                 .map(copy)
@@ -46,11 +46,11 @@ impl Average {
         step: u64,
     ) -> Result<(), TrainError> {
         let step = step as f64;
-        let keep = self.keep.min((1.0 + step) / (10.0 + step));
+        let decay = self.decay.min((1.0 + step) / (10.0 + step));
         no_grad(|| {
             for (name, value) in &mut self.values {
                 if let Some(parameter) = parameters.get(name) {
-                    let _ = value.f_lerp_(parameter, 1.0 - keep)?;
+                    let _ = value.f_lerp_(parameter, 1.0 - decay)?;
                 }
             }
             Ok(())

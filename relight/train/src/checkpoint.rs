@@ -25,8 +25,8 @@ pub struct Checkpoint {
     pub settings: String,
     /// What the run was given beside its settings: another run's is refused.
     pub inputs: String,
-    /// Where the task stands in its data.
-    pub place: String,
+    /// The cursor in the data; the file names it `place`.
+    pub cursor: String,
     /// Networks, averages and optimisers.
     pub state: Weights,
 }
@@ -50,7 +50,7 @@ impl Checkpoint {
             ("step".to_owned(), self.step.to_string()),
             ("settings".to_owned(), self.settings.clone()),
             ("inputs".to_owned(), self.inputs.clone()),
-            ("place".to_owned(), self.place.clone()),
+            ("place".to_owned(), self.cursor.clone()),
         ]);
         let bytes = self
             .state
@@ -106,7 +106,7 @@ impl Checkpoint {
             step: fact("step")?.parse().map_err(|_| "its step is no number")?,
             settings: fact("settings")?,
             inputs: fact("inputs")?,
-            place: fact("place")?,
+            cursor: fact("place")?,
             state: Weights::from_bytes(bytes)?,
         })
     }
@@ -123,7 +123,7 @@ mod tests {
             step: 12,
             settings: "steps = 3".to_owned(),
             inputs: String::new(),
-            place: String::new(),
+            cursor: String::new(),
             state: Weights::initial(&decomposer(), 1),
         }
     }

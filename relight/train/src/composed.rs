@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use tch::Kind;
 
-use super::composer::Composition;
-use super::decompose_task::Resources;
+use super::data_loader::Composition;
 use super::error::TrainError;
+use super::resources::Resources;
 use super::sample::TruthBatch;
 use super::settings::{DataSettings, RunSettings};
-use super::window::{SampleWindow, SampleWindowSettings};
-use relight_reader::Share;
+use super::shuffle_buffer::{ShuffleBuffer, ShuffleBufferSettings};
+use relight_reader::Rank;
 use relight_synth::{Folders, Library, Recipe, stream};
 
 /// What samples are composed of, with the files that are named read.
@@ -42,29 +42,29 @@ pub(super) fn composition(data: &DataSettings, seed: u64) -> Result<Composition,
 #[derive(Debug)]
 pub(super) struct ComposedBatches {
     composition: Arc<Composition>,
-    settings: SampleWindowSettings,
-    share: Share,
+    settings: ShuffleBufferSettings,
+    rank: Rank,
     kind: Kind,
     resources: Resources,
     /// Opened with the first batch, whose step says where.
-    window: Option<SampleWindow>,
+    buffer: Option<ShuffleBuffer>,
 }
 
 impl ComposedBatches {
     /// The batches of a composition, in 32 or 64 bits.
     pub(super) fn new(
         composition: Arc<Composition>,
-        settings: SampleWindowSettings,
+        settings: ShuffleBufferSettings,
         kind: Kind,
         resources: Resources,
     ) -> Self {
         Self {
             composition,
             settings,
-            share: Share::ALL,
+            rank: Rank::ONLY,
             kind,
             resources,
-            window: None,
+            buffer: None,
         }
     }
 
@@ -72,33 +72,33 @@ impl ComposedBatches {
     ///
     /// # Errors
     /// [`TrainError::Indivisible`].
-    pub(super) fn take_share(&mut self, share: Share) -> Result<(), TrainError> {
-        self.settings.check(share)?;
-        self.share = share;
+    pub(super) fn set_rank(&mut self, rank: Rank) -> Result<(), TrainError> {
+        self.settings.check(rank)?;
+        self.rank = rank;
         Ok(())
     }
 
     /// The batch of a step; steps are asked for one after the other.
     pub(super) fn batch(&mut self, step: u64) -> Result<TruthBatch, TrainError> {
-        let window = match self.window.take() {
-            Some(window) => window,
-            None => SampleWindow::open(
+        let buffer = match self.buffer.take() {
+            Some(buffer) => buffer,
+            None => ShuffleBuffer::open(
                 self.settings,
-                self.share,
+                self.rank,
                 &self.composition,
                 &self.resources,
                 step,
             )?,
         };
-        let window = self.window.insert(window);
-        TruthBatch::new(&window.batch(step)?, self.kind, self.resources.device)
+        let buffer = self.buffer.insert(buffer);
+        TruthBatch::new(&buffer.batch(step)?, self.kind, self.resources.device)
     }
 }
 
 /// How samples are drawn.
-pub(super) fn window_settings(data: &DataSettings, run: &RunSettings) -> SampleWindowSettings {
-    SampleWindowSettings {
-        capacity: data.window,
+pub(super) fn buffer_settings(data: &DataSettings, run: &RunSettings) -> ShuffleBufferSettings {
+    ShuffleBufferSettings {
+        capacity: data.shuffle_buffer,
         lightings: u64::from(data.lightings).max(1),
         reuse: data.reuse,
         batch: run.batch,

@@ -7,7 +7,7 @@ use tch::Tensor;
 use super::error::TrainError;
 use super::losses::{Mean, chord, gradient, scale_invariant, windowed};
 use super::sample::TruthBatch;
-use super::terms::Terms;
+use super::terms::LossTerms;
 use relight_photo::decompose::{HIGHLIGHT_OFFSET, LEAST_FACING, LOG_LUMINANCE, LOG_SHADING};
 
 /// Added to shading before its logarithm is taken.
@@ -73,7 +73,7 @@ impl AnsweredTensors {
 /// What each loss counts.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct DecomposeWeights {
+pub struct DecomposeLossCoefficients {
     /// Scale-invariant errors of shading and albedo.
     pub whole: f64,
     /// Scale-invariant error of the picture over the shading, against albedo, in parts of the others.
@@ -90,7 +90,7 @@ pub struct DecomposeWeights {
     pub highlight_energy: f64,
 }
 
-impl Default for DecomposeWeights {
+impl Default for DecomposeLossCoefficients {
     fn default() -> Self {
         Self {
             whole: 1.0,
@@ -111,33 +111,38 @@ impl Default for DecomposeWeights {
 pub fn decompose_losses(
     batch: &TruthBatch,
     answer: &AnsweredTensors,
-    weights: &DecomposeWeights,
-) -> Result<Terms, TrainError> {
-    let mut terms = Terms::default();
+    coefficients: &DecomposeLossCoefficients,
+) -> Result<LossTerms, TrainError> {
+    let mut terms = LossTerms::default();
     let mask = &batch.mask;
     let (albedo, found_albedo) = (grey(&batch.albedo)?, grey(&answer.albedo)?);
     let diffuse = batch.picture.f_sub(&batch.highlight)?.f_clamp_min(0.0)?;
     let quotient = grey(&diffuse)?.f_div(&answer.shading.f_add_scalar(DIVISOR_FLOOR)?)?;
 
-    let whole = weights.whole;
+    let whole = coefficients.whole;
     let error = scale_invariant(&answer.shading, &batch.shading, mask)?;
     terms.add("shading", whole, error)?;
     let error = scale_invariant(&answer.albedo, &batch.albedo, mask)?;
     terms.add("albedo", whole, error)?;
     let error = scale_invariant(&quotient, &albedo, mask)?;
-    terms.add("quotient", whole * weights.quotient, error)?;
+    terms.add("quotient", whole * coefficients.quotient, error)?;
 
     let height = mask.size()[2];
     let narrow = (height / 16).max(4);
     for (name, found, truth, part) in [
         ("shading_windows", &answer.shading, &batch.shading, 1.0),
         ("albedo_windows", &found_albedo, &albedo, 1.0),
-        ("quotient_windows", &quotient, &albedo, weights.quotient),
+        (
+            "quotient_windows",
+            &quotient,
+            &albedo,
+            coefficients.quotient,
+        ),
     ] {
-        let weight = weights.windows * part;
+        let coefficient = coefficients.windows * part;
         let near = windowed(found, truth, mask, narrow)?;
         let far = windowed(found, truth, mask, 3 * narrow)?;
-        terms.add(name, weight, near.f_add(&far.f_mul_scalar(0.5)?)?)?;
+        terms.add(name, coefficient, near.f_add(&far.f_mul_scalar(0.5)?)?)?;
     }
 
     let log = |of: &Tensor, floor: f64| of.f_add_scalar(floor)?.f_log();
@@ -147,7 +152,7 @@ pub fn decompose_losses(
         mask,
     )?;
     for mean in steps {
-        terms.add_mean("shading_steps", weights.gradient, mean);
+        terms.add_mean("shading_steps", coefficients.gradient, mean);
     }
     let steps = gradient(
         &log(&found_albedo, ALBEDO_FLOOR)?,
@@ -155,14 +160,14 @@ pub fn decompose_losses(
         mask,
     )?;
     for mean in steps {
-        terms.add_mean("albedo_steps", weights.gradient * 0.5, mean);
+        terms.add_mean("albedo_steps", coefficients.gradient * 0.5, mean);
     }
     let distance = chord(&answer.normals, &batch.normals, mask)?;
-    terms.add_mean("normals", weights.normals, distance);
+    terms.add_mean("normals", coefficients.normals, distance);
     let highlight = highlight_error(batch, answer)?;
-    terms.add_mean("highlight", weights.highlight, highlight);
+    terms.add_mean("highlight", coefficients.highlight, highlight);
     let energy = highlight_energy_error(batch, answer)?;
-    terms.add_mean("highlight_energy", weights.highlight_energy, energy);
+    terms.add_mean("highlight_energy", coefficients.highlight_energy, energy);
     Ok(terms)
 }
 
@@ -194,7 +199,7 @@ fn highlight_energy_error(
     Ok(Mean { value, over })
 }
 
-/// How much each head's answers vary from pixel to pixel under the mask, as a part of the truth's variation: a head that has
+/// How much each head's answers vary from pixel to pixel under the mask, as a part of the ground truth's variation: a head that has
 /// collapsed answers the same everywhere.
 ///
 /// # Errors
@@ -215,7 +220,7 @@ pub fn head_spreads(
         .collect()
 }
 
-/// How much an answer varies under the mask, as a part of the truth's variation; 1 where that has none.
+/// How much an answer varies under the mask, as a part of the ground truth's variation; 1 where that has none.
 ///
 /// # Errors
 /// [`TrainError::Torch`].

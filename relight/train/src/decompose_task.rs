@@ -1,12 +1,11 @@
 //! The run that trains the decomposing network on composed samples.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use tch::{Device, Kind, Tensor};
 
-use super::composed::{ComposedBatches, composition, window_settings};
+use super::composed::{ComposedBatches, buffer_settings, composition};
 use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, highlight_figures};
@@ -14,25 +13,15 @@ use super::learner::{Learner, LearnerSettings};
 use super::losses::{angular_degrees, scale_invariant, windowed};
 use super::model::{ComputePrecision, Model};
 use super::process_group::ProcessGroup;
-use super::run::{StepLosses, Task, Validation};
+use super::resources::Resources;
 use super::sample::TruthBatch;
 use super::settings::{DecomposeSettings, PrecisionChoice, first_difference};
 use super::sheet::validation_sheet;
+use super::task::{StepLosses, TrainingTask, Validation};
 use relight_nets::{Weights, decomposer};
 
 /// Samples that are shown.
 const SHOWN: usize = 10;
-
-/// Where and with how many threads.
-#[derive(Debug, Clone)]
-pub struct Resources {
-    /// Where networks are computed.
-    pub device: Device,
-    /// Threads that compose samples.
-    pub composers: usize,
-    /// Set to end a run early, also while its first samples are being composed.
-    pub stop: Arc<AtomicBool>,
-}
 
 /// Training of the decomposing network.
 #[derive(Debug)]
@@ -71,7 +60,7 @@ impl DecomposeTask {
             &weights,
             LearnerSettings {
                 adam: settings.run.adam(),
-                average: settings.run.average,
+                ema_decay: settings.run.ema_decay,
                 precision,
                 device: resources.device,
             },
@@ -79,7 +68,7 @@ impl DecomposeTask {
         Ok(Self {
             composed: ComposedBatches::new(
                 composition,
-                window_settings(&settings.data, &settings.run),
+                buffer_settings(&settings.data, &settings.run),
                 precision.kind(),
                 resources.clone(),
             ),
@@ -95,7 +84,7 @@ impl DecomposeTask {
         let is_mixed = self.learner.model.precision() == ComputePrecision::Mixed;
         let mut votes = [f64::from(u8::from(is_mixed))];
         group.sum(&mut votes)?;
-        let mixed = 2.0 * votes[0] > f64::from(group.share().of());
+        let mixed = 2.0 * votes[0] > f64::from(group.rank().world_size());
         self.learner.model.set_precision(if mixed {
             ComputePrecision::Mixed
         } else {
@@ -105,7 +94,7 @@ impl DecomposeTask {
     }
 }
 
-impl Task for DecomposeTask {
+impl TrainingTask for DecomposeTask {
     fn name(&self) -> &'static str {
         "decompose"
     }
@@ -124,7 +113,7 @@ impl Task for DecomposeTask {
     }
 
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
-        self.composed.take_share(group.share())?;
+        self.composed.set_rank(group.rank())?;
         if self.settings.run.precision == PrecisionChoice::Fastest {
             self.choose_precision(group)?;
         }
@@ -143,7 +132,7 @@ impl Task for DecomposeTask {
         })
     }
 
-    fn place(&self) -> String {
+    fn cursor(&self) -> String {
         self.learner.model.precision().name().to_owned()
     }
 
@@ -173,7 +162,7 @@ impl Task for DecomposeTask {
     }
 }
 
-/// How far the answers are from the truth, means over the batch.
+/// How far the answers are from the ground truth, means over the batch.
 fn figures(
     batch: &TruthBatch,
     answer: &AnsweredTensors,

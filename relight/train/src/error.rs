@@ -33,12 +33,12 @@ pub enum TrainError {
         /// The option that gives it.
         option: &'static str,
     },
-    /// Threads could not be started.
-    #[error("threads that compose samples could not be started")]
+    /// Data-loader workers could not be started.
+    #[error("the data-loader workers could not be started")]
     Threads(#[source] io::Error),
     /// Composing samples panicked.
     #[error("a sample could not be composed: this is a fault of the program")]
-    Composer,
+    DataLoader,
     /// A sheet of answers could not be laid out.
     #[error("a sheet of answers could not be laid out: this is a fault of the program")]
     Sheet,
@@ -221,7 +221,7 @@ pub enum TrainError {
     },
     /// A head that answers the same for every pixel of every picture.
     #[error(
-        "at step {step} the answers for {head} have hardly any variation left ({spread:.2e} of the truth's): the head has collapsed, and the run \
+        "at step {step} the answers for {head} have hardly any variation left ({spread:.2e} of the ground truth's): the head has collapsed, and the run \
          ends; {batch}"
     )]
     Collapsed {
@@ -229,7 +229,7 @@ pub enum TrainError {
         step: u64,
         /// Which head.
         head: &'static str,
-        /// Standard deviation of the answers over that of the truth.
+        /// Standard deviation of the answers over that of the ground truth.
         spread: f64,
         /// Where the batch was saved, or why it was not.
         batch: String,

@@ -11,7 +11,7 @@ use super::error::TrainError;
 const SETTLING: u64 = 300;
 /// A loss this many times its running mean has exploded.
 const EXPLOSION: f64 = 50.0;
-/// A head that varies less than this part of the truth, in the running mean, has collapsed.
+/// A head that varies less than this part of the ground truth, in the running mean, has collapsed.
 const COLLAPSE: f64 = 0.02;
 /// Part of the running means that is kept at each step.
 const KEEP: f64 = 0.99;
@@ -130,7 +130,7 @@ mod tests {
             ("loss/albedo".to_owned(), 0.2),
             ("loss/normals".to_owned(), f64::NAN),
         ]);
-        let full = || Err(TrainError::Composer);
+        let full = || Err(TrainError::DataLoader);
         let error = Guard::default().check(7, &losses, &BTreeMap::new(), full);
         let text = error.unwrap_err().to_string();
         assert!(text.contains("loss/normals is NaN"), "{text}");

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use tch::{Device, Kind, Tensor, no_grad};
 
-use super::composer::Composition;
+use super::data_loader::Composition;
 use super::error::TrainError;
 use super::low_rank::{first_singular_values, rank_one};
 use super::paper_phases::equal_rows;
@@ -37,7 +37,7 @@ impl HeldOutTurns {
     pub(super) fn read(path: &Path, kind: Kind, device: Device) -> Result<Self, TrainError> {
         let mut reader = TurnReader::open(path, stream(0x74_75_72_6e, 23))?;
         let (mut batches, mut damage) = (Vec::with_capacity(TURN_BATCHES), Vec::new());
-        while batches.len() < TURN_BATCHES && reader.place().epoch == 0 {
+        while batches.len() < TURN_BATCHES && reader.cursor().epoch == 0 {
             let group = reader.next_group(kind, device)?;
             batches.extend(group.frames);
             damage.extend(group.damage);

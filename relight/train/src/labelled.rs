@@ -3,11 +3,11 @@
 
 use std::path::Path;
 
-use super::composer::unit;
+use super::data_loader::unit;
 use super::error::TrainError;
 use super::sample::{DrawnSample, TruthArrays};
 use relight_core::image::Extent;
-use relight_reader::{DamagedSample, SampleFault, Share, TruthLayout, TruthSet};
+use relight_reader::{DamagedSample, Rank, SampleFault, TruthLayout, TruthSet};
 use relight_synth::stream;
 
 /// A folder of them.
@@ -16,7 +16,7 @@ pub(super) struct LabelledFrames {
     names: Vec<String>,
     extent: Extent,
     seed: u64,
-    share: Share,
+    rank: Rank,
 }
 
 impl std::fmt::Debug for LabelledFrames {
@@ -52,13 +52,13 @@ impl LabelledFrames {
             names,
             extent,
             seed,
-            share: Share::ALL,
+            rank: Rank::ONLY,
         })
     }
 
     /// Leaves the rest of each batch to other processes.
-    pub(super) fn take_share(&mut self, share: Share) {
-        self.share = share;
+    pub(super) fn set_rank(&mut self, rank: Rank) {
+        self.rank = rank;
     }
 
     /// Text that tells folders of labels apart.
@@ -70,9 +70,9 @@ impl LabelledFrames {
 
     /// This process's part of the `count` frames of a step, half of them mirrored by chance.
     pub(super) fn batch(&self, step: u64, count: u64) -> LabelledBatch {
-        let own = u64::from(self.share.index())..count;
+        let own = u64::from(self.rank.index())..count;
         let mut batch = LabelledBatch::default();
-        for place in own.step_by(self.share.of() as usize) {
+        for place in own.step_by(self.rank.world_size() as usize) {
             let hash = stream(stream(self.seed, step), place);
             let index = (unit(hash) * self.names.len() as f64) as usize;
             match self.load(index) {

@@ -1,15 +1,15 @@
 //! How a run over several processes is launched: the environment that torchrun, scripts of Slurm and the training
 //! operators of Kubernetes set. Knows nothing of tensors.
 
-use relight_reader::Share;
+use relight_reader::Rank;
 
 use super::error::TrainError;
 
-/// The place of this process among those of a run, and where they meet.
+/// The rank of this process among those of a run, and where they meet.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Launch {
     /// Which process this is, and how many there are.
-    pub share: Share,
+    pub rank: Rank,
     /// Which process of its machine this is, where the launcher says it: the number of its GPU.
     pub local: Option<usize>,
     /// The host name or address of process 0.
@@ -35,7 +35,7 @@ impl Launch {
     /// let variables = [("RANK", "1"), ("WORLD_SIZE", "2"), ("MASTER_ADDR", "node-0"), ("MASTER_PORT", "29500")];
     /// let variable = |name: &str| variables.iter().find(|v| v.0 == name).map(|v| v.1.to_owned());
     /// let launch = Launch::from_variables(variable)?.expect("there are two processes");
-    /// assert_eq!((launch.share.index(), launch.share.of()), (1, 2));
+    /// assert_eq!((launch.rank.index(), launch.rank.world_size()), (1, 2));
     /// # Ok::<(), relight_train::TrainError>(())
     /// ```
     pub fn from_variables(
@@ -53,15 +53,15 @@ impl Launch {
         })?;
         let allowed = format!("a number below WORLD_SIZE, which is {size}");
         let index = number("RANK", &rank, &allowed, |rank: &u32| *rank < size)?;
-        let share = match Share::new(index, size) {
-            Some(share) if size > 1 => share,
+        let rank = match Rank::new(index, size) {
+            Some(rank) if size > 1 => rank,
             _ => return Ok(None),
         };
         let needed = |name| set(name).ok_or_else(|| incomplete("WORLD_SIZE", name));
         let optional =
             |name| set(name).map(|value| number(name, &value, "a number", |_: &u64| true));
         Ok(Some(Self {
-            share,
+            rank,
             local: optional("LOCAL_RANK")
                 .transpose()?
                 .map(|local| local as usize),
@@ -127,7 +127,7 @@ mod tests {
             ("TORCHELASTIC_RESTART_COUNT", "2"),
         ];
         let expected = Launch {
-            share: Share::new(3, 4).unwrap(),
+            rank: Rank::new(3, 4).unwrap(),
             local: Some(1),
             address: "node-0".to_owned(),
             port: 29500,

@@ -1,9 +1,9 @@
-//! A network that learns: its parameters, its optimiser and its average.
+//! A network that learns: its parameters, its optimiser and the moving average of its weights.
 
 use tch::Device;
 
 use super::adam::{Adam, AdamSettings};
-use super::average::Average;
+use super::average::WeightAverage;
 use super::error::TrainError;
 use super::model::{ComputePrecision, Model};
 use relight_nets::{Graph, Weights};
@@ -15,7 +15,7 @@ pub struct Learner {
     /// The network.
     pub model: Model,
     adam: Adam,
-    average: Average,
+    average: WeightAverage,
 }
 
 /// How a network learns.
@@ -24,7 +24,7 @@ pub struct LearnerSettings {
     /// Of the optimiser.
     pub adam: AdamSettings,
     /// Part of the average that is kept at each step, 0..1.
-    pub average: f64,
+    pub ema_decay: f64,
     /// In which precision its layers are computed.
     pub precision: ComputePrecision,
     /// Where it is computed.
@@ -46,7 +46,7 @@ impl Learner {
         Ok(Self {
             name,
             adam: Adam::new(settings.adam, model.parameters())?,
-            average: Average::new(model.parameters(), settings.average)?,
+            average: WeightAverage::new(model.parameters(), settings.ema_decay)?,
             model,
         })
     }
@@ -57,15 +57,17 @@ impl Learner {
         self.name
     }
 
-    /// One step along the gradients; their length before it was cut to `longest`.
+    /// One step along the gradients; their norm before they were scaled down to `max_grad_norm`.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub fn learn(&mut self, rate: f64, longest: f64) -> Result<f64, TrainError> {
-        let length = self.adam.step(self.model.parameters(), rate, longest)?;
+    pub fn learn(&mut self, learning_rate: f64, max_grad_norm: f64) -> Result<f64, TrainError> {
+        let norm = self
+            .adam
+            .step(self.model.parameters(), learning_rate, max_grad_norm)?;
         self.average
             .update(self.model.parameters(), self.adam.steps())?;
-        Ok(length)
+        Ok(norm)
     }
 
     /// The averaged weights: what is shipped.

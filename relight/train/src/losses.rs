@@ -1,4 +1,4 @@
-//! Losses between maps, on tensors: how far albedo, shading and normals are from the truth.
+//! Losses between maps, on tensors: how far albedo, shading and normals are from the ground truth.
 //!
 //! Pictures are `batch x channels x height x width`, weights `batch x 1 x height x width`, 0 outside
 //! the mask. Every loss is the mean over the batch.
@@ -21,8 +21,8 @@ pub struct Mean {
     pub over: Tensor,
 }
 
-/// Error that a factor of each picture cannot mend, as a part of the truth's energy: 0 for a multiple
-/// of the truth, 1 for nothing of it. (The scale-invariant error of Grosse et al. 2009, relative.)
+/// Error that a factor of each picture cannot mend, as a part of the ground truth's energy: 0 for a multiple
+/// of the ground truth, 1 for nothing of it. (The scale-invariant error of Grosse et al. 2009, relative.)
 ///
 /// # Errors
 /// [`TrainError::Torch`].

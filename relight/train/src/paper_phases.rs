@@ -8,8 +8,8 @@
 //! | `joint` | Normal-Net | reflectance of rank one on turns, Light-Net as it is (second round) |
 //! | `specular` | the reflectance net | the highlight of Spec-Net, rendered again |
 //!
-//! On turns alone the low-rank loss pulls networks away from what they know: each phase that has both is anchored by
-//! the composed samples.
+//! On turns alone the low-rank loss pulls networks away from what they know: each phase that has both has a supervised
+//! term on composed samples.
 
 use tch::Tensor;
 
@@ -64,7 +64,7 @@ impl PaperPhase {
     /// The learning rate where settings name none: the paper's, 1e-6 for Normal-Net on turns and 1e-4 for what begins from
     /// nothing.
     #[must_use]
-    pub fn usual_rate(self) -> f64 {
+    pub fn default_learning_rate(self) -> f64 {
         match self {
             Self::Joint => 1e-6,
             Self::Spec | Self::Normal | Self::Light | Self::Specular => 1e-4,
@@ -204,7 +204,7 @@ pub struct TruthLoss {
     pub mean: Mean,
     /// What is answered.
     pub head: &'static str,
-    /// How much it varies, as a part of the truth's variation.
+    /// How much it varies, as a part of the ground truth's variation.
     pub spread: f64,
 }
 

@@ -14,7 +14,7 @@ use torch_sys::C_tensor;
 
 use super::error::TrainError;
 use super::launch::Launch;
-use relight_reader::Share;
+use relight_reader::Rank;
 
 /// How long a process waits for the others to be started.
 const JOIN: Duration = Duration::from_secs(300);
@@ -55,7 +55,7 @@ unsafe extern "C" {
 /// This process and the others of its run. All of them make the same calls in the same order.
 #[derive(Debug)]
 pub struct ProcessGroup {
-    share: Share,
+    rank: Rank,
     raw: NonNull<RawGroup>,
 }
 
@@ -66,8 +66,8 @@ impl ProcessGroup {
     /// [`TrainError::NotJoined`].
     pub fn join(launch: &Launch) -> Result<Self, TrainError> {
         let not_joined = |fault: String| TrainError::NotJoined {
-            process: launch.share.index(),
-            of: launch.share.of(),
+            process: launch.rank.index(),
+            of: launch.rank.world_size(),
             address: launch.address.clone(),
             port: launch.port,
             fault,
@@ -86,8 +86,8 @@ impl ProcessGroup {
                     launch.port,
                     c_int::from(launch.hosted),
                     prefix.as_ptr(),
-                    launch.share.index() as c_int,
-                    launch.share.of() as c_int,
+                    launch.rank.index() as c_int,
+                    launch.rank.world_size() as c_int,
                     JOIN.as_millis() as i64,
                     PATIENCE.as_millis() as i64,
                     &raw mut raw,
@@ -98,20 +98,20 @@ impl ProcessGroup {
         })
         .map_err(not_joined)?;
         let raw = NonNull::new(raw).ok_or_else(|| not_joined("c10d made no group".to_owned()))?;
-        let share = launch.share;
-        Ok(Self { share, raw })
+        let rank = launch.rank;
+        Ok(Self { rank, raw })
     }
 
     /// Which process this is, and how many there are.
     #[must_use]
-    pub fn share(&self) -> Share {
-        self.share
+    pub fn rank(&self) -> Rank {
+        self.rank
     }
 
     /// Whether this is process 0, which writes the run's files.
     #[must_use]
     pub fn is_first(&self) -> bool {
-        self.share.index() == 0
+        self.rank.index() == 0
     }
 
     /// Replaces numbers by their sums over all processes, which have the same number of them.

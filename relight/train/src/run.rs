@@ -11,114 +11,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use relit_data::causes::with_causes;
-use tch::Tensor;
 
 use super::agreement::{Fact, agree, fingerprint};
+use super::all_reduced::AllReducedLosses;
 use super::checkpoint::Checkpoint;
 use super::error::TrainError;
 use super::guard::Guard;
-use super::joint::JointLosses;
 use super::journal::Journal;
-use super::learner::Learner;
 use super::model::to_weights;
 use super::process_group::ProcessGroup;
 use super::settings::RunSettings;
-use super::terms::Terms;
+use super::task::{StepLosses, TrainingTask, Validation};
 use relight_nets::{WeightPrecision, Weights};
 
 /// How long a process waits for process 0 to write its checkpoint and end, where the run ends early. No longer, as process 0 can
 /// itself be waiting for this one: only the neighbours of a lost process notice at once. Launchers kill after 30 seconds.
 const SUCCESSION: Duration = Duration::from_secs(3);
-
-/// What is trained.
-pub trait Task {
-    /// Its name, as on the command line.
-    fn name(&self) -> &'static str;
-
-    /// The settings that make the run what it is, as TOML.
-    fn settings(&self) -> String;
-
-    /// The first setting that another run's settings have otherwise.
-    fn differing_setting(&self, other: &str) -> Option<String>;
-
-    /// What it was given beside its settings and what learns, as text that is the same where that is.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    fn inputs(&self) -> Result<String, TrainError> {
-        Ok(String::new())
-    }
-
-    /// Takes this process's part of the work from now on. Called before the first step.
-    ///
-    /// # Errors
-    /// [`TrainError::Indivisible`] where the settings leave no equal parts.
-    fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError>;
-
-    /// The networks that learn.
-    fn learners(&mut self) -> Vec<&mut Learner>;
-
-    /// The losses of a step, from 0, on this process's part of its batch; always the same ones, in the same order. Steps
-    /// are asked for one after the other.
-    ///
-    /// # Errors
-    /// Whatever keeps the step from being computed.
-    fn step(&mut self, step: u64) -> Result<StepLosses, TrainError>;
-
-    /// Figures of the averaged networks on what they are not trained on.
-    ///
-    /// # Errors
-    /// Whatever keeps them from being computed.
-    fn validate(&mut self) -> Result<Validation, TrainError>;
-
-    /// Where it stands in data that are read one after the other, to go on from; empty where there are none.
-    fn place(&self) -> String {
-        String::new()
-    }
-
-    /// Goes on from such a place.
-    ///
-    /// # Errors
-    /// A sentence that says why it cannot.
-    fn go_to(&mut self, _place: &str) -> Result<(), String> {
-        Ok(())
-    }
-}
-
-/// What a step gives.
-#[derive(Debug, Default)]
-pub struct StepLosses {
-    /// The losses.
-    pub terms: Terms,
-    /// How much each head's answers vary, in parts of the truth's variation.
-    pub spreads: BTreeMap<&'static str, f64>,
-    /// The batch, to be saved where something is wrong with it. They share their numbers.
-    pub batch: BTreeMap<String, Tensor>,
-    /// What was damaged in the data, and is not in the batch.
-    pub damage: Option<String>,
-}
-
-impl StepLosses {
-    /// Adds what was damaged in a part of the data.
-    pub(super) fn add_damage(&mut self, damage: &[String]) {
-        if !damage.is_empty() {
-            let earlier = self.damage.take();
-            let all: Vec<&str> = earlier.iter().chain(damage).map(String::as_str).collect();
-            self.damage = Some(all.join("; "));
-        }
-    }
-}
-
-/// What a validation gives.
-#[derive(Debug, Default)]
-pub struct Validation {
-    /// Figures by name.
-    pub figures: BTreeMap<String, f64>,
-    /// A sheet of answers beside the truth, a PNG file, with its size.
-    pub sheet: Option<(Vec<u8>, (usize, usize))>,
-    /// What was damaged in the data, and is not in the figures.
-    pub damage: Option<String>,
-}
 
 /// What a run says while it goes on.
 pub trait TrainObserver {
@@ -134,6 +42,7 @@ pub trait TrainObserver {
 
 /// How a run came out.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct RunOutcome {
     /// Steps made in all.
     pub steps: u64,
@@ -149,7 +58,7 @@ pub struct RunOutcome {
 
 /// A run in its folder.
 pub struct Run<'a> {
-    task: &'a mut dyn Task,
+    task: &'a mut dyn TrainingTask,
     settings: &'a RunSettings,
     folder: &'a Path,
     group: Option<ProcessGroup>,
@@ -159,8 +68,8 @@ pub struct Run<'a> {
     step: u64,
     /// What the task was given beside its settings.
     inputs: String,
-    /// Where the task stands after that step.
-    place: String,
+    /// The cursor in the data after that step.
+    cursor: String,
     /// Whether something in the data was left out.
     damaged: bool,
 }
@@ -171,7 +80,7 @@ impl<'a> Run<'a> {
     /// # Errors
     /// [`TrainError::Occupied`], [`TrainError::Checkpoint`] where it is another run's, [`TrainError::Io`].
     pub fn open(
-        task: &'a mut dyn Task,
+        task: &'a mut dyn TrainingTask,
         settings: &'a RunSettings,
         folder: &'a Path,
         resume: bool,
@@ -184,7 +93,7 @@ impl<'a> Run<'a> {
     /// # Errors
     /// Those of [`Self::open`]; [`TrainError::Disagreement`], [`TrainError::Indivisible`], [`TrainError::ProcessLost`].
     pub fn open_among(
-        task: &'a mut dyn Task,
+        task: &'a mut dyn TrainingTask,
         settings: &'a RunSettings,
         folder: &'a Path,
         resume: bool,
@@ -213,7 +122,7 @@ impl<'a> Run<'a> {
         let is_first = group.as_ref().is_none_or(ProcessGroup::is_first);
         Ok(Self {
             inputs,
-            place: task.place(),
+            cursor: task.cursor(),
             task,
             settings,
             folder,
@@ -314,49 +223,50 @@ impl<'a> Run<'a> {
         stop: bool,
         observer: &mut dyn TrainObserver,
     ) -> Result<bool, TrainError> {
-        let rate = self.settings.rate_at(self.step);
+        let learning_rate = self.settings.learning_rate_at(self.step);
         let losses = self.task.step(self.step)?;
         if let Some(damage) = &losses.damage {
             self.damaged = true;
             observer.damaged(self.step, damage);
         }
-        let joint = match &self.group {
-            Some(group) => JointLosses::of(&losses, stop, group)?,
-            None => JointLosses::alone(&losses)?,
+        let reduced = match &self.group {
+            Some(group) => AllReducedLosses::of(&losses, stop, group)?,
+            None => AllReducedLosses::alone(&losses)?,
         };
         // Of some batches nothing can be learned, as of those for which the gate of saturation is closed.
-        if !joint.values.is_empty() {
-            self.check(&losses, &joint)?;
-            let length = self.descend(&losses, &joint, rate)?;
-            self.log(&joint, rate, length, observer)?;
+        if !reduced.values.is_empty() {
+            self.check(&losses, &reduced)?;
+            let norm = self.descend(&losses, &reduced, learning_rate)?;
+            self.log(&reduced, (learning_rate, norm), observer)?;
         }
         self.step += 1;
-        self.place = self.task.place();
-        Ok(joint.stop)
+        self.cursor = self.task.cursor();
+        Ok(reduced.stop)
     }
 
     /// Ends the run where something is wrong with the losses of a step.
-    fn check(&mut self, losses: &StepLosses, joint: &JointLosses) -> Result<(), TrainError> {
+    fn check(&mut self, losses: &StepLosses, reduced: &AllReducedLosses) -> Result<(), TrainError> {
         let (step, folder) = (self.step, self.folder);
         let process = match &self.group {
-            Some(group) => format!("-process-{}", group.share().index()),
+            Some(group) => format!("-process-{}", group.rank().index()),
             None => String::new(),
         };
-        self.guard.check(step, &joint.values, &joint.spreads, || {
-            let path = folder.join(format!("bad-batch-{step}{process}.safetensors"));
-            to_weights(&losses.batch)?.write(&path, WeightPrecision::Single)?;
-            Ok(path)
-        })
+        self.guard
+            .check(step, &reduced.values, &reduced.spreads, || {
+                let path = folder.join(format!("bad-batch-{step}{process}.safetensors"));
+                to_weights(&losses.batch)?.write(&path, WeightPrecision::Single)?;
+                Ok(path)
+            })
     }
 
-    /// Goes down the joint loss; the length of its gradient.
+    /// Goes down the all-reduced loss; the norm of its gradient.
     fn descend(
         &mut self,
         losses: &StepLosses,
-        joint: &JointLosses,
-        rate: f64,
+        reduced: &AllReducedLosses,
+        learning_rate: f64,
     ) -> Result<f64, TrainError> {
-        match joint.part(losses)? {
+        match reduced.part(losses)? {
             Some(part) => part.f_backward()?,
             None => {
                 for learner in self.task.learners() {
@@ -369,32 +279,31 @@ impl<'a> Run<'a> {
                 group.sum_gradients(learner.model.parameters())?;
             }
         }
-        let mut length = 0.0_f64;
+        let mut norm = 0.0_f64;
         for learner in self.task.learners() {
-            length = length.hypot(learner.learn(rate, self.settings.longest_gradient)?);
+            norm = norm.hypot(learner.learn(learning_rate, self.settings.max_grad_norm)?);
         }
-        Ok(length)
+        Ok(norm)
     }
 
     fn log(
         &mut self,
-        joint: &JointLosses,
-        rate: f64,
-        gradient: f64,
+        reduced: &AllReducedLosses,
+        (learning_rate, gradient_norm): (f64, f64),
         observer: &mut dyn TrainObserver,
     ) -> Result<(), TrainError> {
         let step = self.step + 1;
-        observer.step(step, &joint.values);
+        observer.step(step, &reduced.values);
         let Some(journal) = &mut self.journal else {
             return Ok(());
         };
         if !step.is_multiple_of(self.settings.log_every) {
             return Ok(());
         }
-        let mut values = joint.values.clone();
-        values.insert("rate".to_owned(), rate);
-        values.insert("gradient".to_owned(), gradient);
-        for (head, spread) in &joint.spreads {
+        let mut values = reduced.values.clone();
+        values.insert("learning_rate".to_owned(), learning_rate);
+        values.insert("gradient_norm".to_owned(), gradient_norm);
+        for (head, spread) in &reduced.spreads {
             values.insert(format!("spread/{head}"), *spread);
         }
         journal.scalars(step, &values)
@@ -482,7 +391,7 @@ impl<'a> Run<'a> {
             step: self.step,
             settings: self.task.settings(),
             inputs: self.inputs.clone(),
-            place: self.place.clone(),
+            cursor: self.cursor.clone(),
             state,
         }
         .write(self.folder)?;
@@ -506,7 +415,7 @@ impl<'a> Run<'a> {
 }
 
 /// What has to be the same in all processes.
-fn facts(task: &mut dyn Task, inputs: &str, step: u64) -> Result<Vec<Fact>, TrainError> {
+fn facts(task: &mut dyn TrainingTask, inputs: &str, step: u64) -> Result<Vec<Fact>, TrainError> {
     let version = format!("{} {}", env!("CARGO_PKG_VERSION"), task.name());
     let mut weights = String::new();
     for learner in task.learners() {
@@ -526,7 +435,7 @@ fn facts(task: &mut dyn Task, inputs: &str, step: u64) -> Result<Vec<Fact>, Trai
 
 /// Brings a task to a checkpoint; its step.
 fn recall(
-    task: &mut dyn Task,
+    task: &mut dyn TrainingTask,
     inputs: &str,
     checkpoint: &Checkpoint,
     folder: &Path,
@@ -550,7 +459,7 @@ fn recall(
             "it was trained on other turns, or with other networks beside the one that learns";
         return Err(other(fault.to_owned()));
     }
-    task.go_to(&checkpoint.place).map_err(other)?;
+    task.go_to(&checkpoint.cursor).map_err(other)?;
     for learner in task.learners() {
         learner.recall(&checkpoint.state)?;
     }

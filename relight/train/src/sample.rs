@@ -26,7 +26,7 @@ pub enum Linearisation {
     AsSrgb,
 }
 
-/// A picture as the decomposing network sees it, and its truth. Light is in parts of the picture's white; shading
+/// A picture as the decomposing network sees it, and its ground truth. Light is in parts of the picture's white; shading
 /// has the mean 1 under the mask. Half precision, as many are kept.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TruthArrays {
@@ -84,10 +84,10 @@ impl TruthArrays {
         Self { extent, values }
     }
 
-    /// The arrays of a picture whose truth was found otherwise. Its colours are taken for light as they stand.
+    /// The arrays of a picture whose ground truth was found otherwise. Its colours are taken for light as they stand.
     ///
     /// # Errors
-    /// The name of a part of the truth that is missing.
+    /// The name of a part of the ground truth that is missing.
     pub fn of_truth(sample: &TruthSample) -> Result<Self, &'static str> {
         let picture = sample.image.as_ref().ok_or("image")?.planes();
         let normals = sample.normals.as_ref().ok_or("normals")?;
@@ -137,7 +137,7 @@ fn grey(light: &Planes<3>) -> Vec<f32> {
     channels.map(|((r, g), b)| (r + g + b) / 3.0).collect()
 }
 
-/// The truth at the covered pixels.
+/// The ground truth at the covered pixels.
 fn fill_truth(sample: &SynthSample<'_>, white: f32, values: &mut [f16], pixels: usize) {
     let grey = |light: &Vec3| light.element_sum() / 3.0;
     let (shaded, material) = (sample.shaded(), sample.material());

@@ -1,4 +1,4 @@
-//! Sheets of answers beside the truth, to be looked at while a network trains.
+//! Sheets of answers beside the ground truth, to be looked at while a network trains.
 
 use tch::{Kind, Tensor};
 
@@ -9,8 +9,8 @@ use super::sample::TruthBatch;
 /// A PNG file and its width and height.
 type Sheet = (Vec<u8>, (usize, usize));
 
-/// The first samples of a batch, a row each: the picture; albedo, shading, normals and highlight, the truth left of
-/// each answer. Albedo and shading in the scale that suits the truth best.
+/// The first samples of a batch, a row each: the picture; albedo, shading, normals and highlight, the ground truth left of
+/// each answer. Albedo and shading in the scale that suits the ground truth best.
 ///
 /// # Errors
 /// [`TrainError::Torch`], [`TrainError::Sheet`].

@@ -7,18 +7,18 @@ use tch::Tensor;
 use super::error::TrainError;
 use super::losses::Mean;
 
-/// Losses with their weights. Their weighted sum is what is descended.
+/// Losses with their coefficients. Their weighted sum is what is descended.
 #[derive(Debug, Default)]
-pub struct Terms(Vec<Term>);
+pub struct LossTerms(Vec<Term>);
 
 #[derive(Debug)]
 struct Term {
     name: &'static str,
-    weight: f64,
+    coefficient: f64,
     mean: Option<Mean>,
 }
 
-impl Terms {
+impl LossTerms {
     /// Adds a loss that is a mean over the samples of the batch. Where several processes share a batch, each has as many
     /// of them.
     ///
@@ -27,24 +27,32 @@ impl Terms {
     pub fn add(
         &mut self,
         name: &'static str,
-        weight: f64,
+        coefficient: f64,
         value: Tensor,
     ) -> Result<(), TrainError> {
         let over = Tensor::f_from_slice(&[1.0_f64])?;
-        self.add_mean(name, weight, Mean { value, over });
+        self.add_mean(name, coefficient, Mean { value, over });
         Ok(())
     }
 
     /// Adds a loss that is a mean over something else, as over pixels. Several of one name are parts of one loss.
-    pub fn add_mean(&mut self, name: &'static str, weight: f64, mean: Mean) {
+    pub fn add_mean(&mut self, name: &'static str, coefficient: f64, mean: Mean) {
         let mean = Some(mean);
-        self.0.push(Term { name, weight, mean });
+        self.0.push(Term {
+            name,
+            coefficient,
+            mean,
+        });
     }
 
     /// Says that there is nothing in the batch that this loss could be taken of.
-    pub fn add_nothing(&mut self, name: &'static str, weight: f64) {
+    pub fn add_nothing(&mut self, name: &'static str, coefficient: f64) {
         let mean = None;
-        self.0.push(Term { name, weight, mean });
+        self.0.push(Term {
+            name,
+            coefficient,
+            mean,
+        });
     }
 
     /// Whether there is nothing to descend.
@@ -75,7 +83,7 @@ impl Terms {
         let mut total: Option<Tensor> = None;
         for (term, part) in self.0.iter().zip(parts) {
             if let Some(mean) = &term.mean {
-                let loss = mean.value.f_mul_scalar(term.weight * part)?;
+                let loss = mean.value.f_mul_scalar(term.coefficient * part)?;
                 total = Some(match total {
                     Some(total) => total.f_add(&loss)?,
                     None => loss,
@@ -85,12 +93,12 @@ impl Terms {
         Ok(total)
     }
 
-    /// Values in the order of [`Self::means`] by name, each times its weight, and their sum as `loss`.
+    /// Values in the order of [`Self::means`] by name, each times its coefficient, and their sum as `loss`.
     pub(super) fn named(&self, values: &[Option<f64>]) -> BTreeMap<String, f64> {
         let mut named = BTreeMap::new();
         for (term, value) in self.0.iter().zip(values) {
             if let Some(value) = value {
-                let weighted = term.weight * value;
+                let weighted = term.coefficient * value;
                 *named.entry(format!("loss/{}", term.name)).or_default() += weighted;
                 *named.entry("loss".to_owned()).or_default() += weighted;
             }

@@ -8,7 +8,7 @@ use tch::{Device, Kind, Tensor};
 
 use super::error::TrainError;
 use relight_reader::{
-    DrawPlan, Encoding, Place, Share, Source, Stream, Streaming, TurnBatch, Turns,
+    Cursor, DrawPlan, Encoding, Rank, Source, Stream, Streaming, TurnBatch, Turns,
 };
 
 /// Batches that are decoded ahead of the network.
@@ -19,7 +19,7 @@ pub struct TurnReader {
     turns: Arc<Turns>,
     stream: Stream<Turns>,
     plan: DrawPlan,
-    place: Place,
+    cursor: Cursor,
     /// The epoch of the last group of which frames could be read.
     readable: u64,
 }
@@ -28,7 +28,7 @@ impl std::fmt::Debug for TurnReader {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("TurnReader")
             .field("plan", &self.plan)
-            .field("place", &self.place)
+            .field("cursor", &self.cursor)
             .finish_non_exhaustive()
     }
 }
@@ -60,23 +60,23 @@ impl TurnReader {
     /// [`TrainError::Data`].
     pub fn open(path: &Path, seed: u64) -> Result<Self, TrainError> {
         let turns = Arc::new(Turns::open(path, Encoding::Linear)?);
-        let (plan, place) = (DrawPlan::of_turns(seed), Place::default());
+        let (plan, cursor) = (DrawPlan::of_turns(seed), Cursor::default());
         Ok(Self {
-            stream: start(&turns, plan, place)?,
+            stream: start(&turns, plan, cursor)?,
             turns,
             plan,
-            place,
-            readable: place.epoch,
+            cursor,
+            readable: cursor.epoch,
         })
     }
 
-    /// Leaves all but each so many groups to other processes, which go on from the same places.
+    /// Leaves all but each so many groups to other processes, which go on from the same cursor.
     ///
     /// # Errors
     /// [`TrainError::Data`].
-    pub fn take_share(&mut self, share: Share) -> Result<(), TrainError> {
-        self.plan.share = share;
-        self.go_to(self.place)
+    pub fn set_rank(&mut self, rank: Rank) -> Result<(), TrainError> {
+        self.plan.rank = rank;
+        self.go_to(self.cursor)
     }
 
     /// Text that tells data sets apart: of each turn its name, the number of its samples, and the bytes that they are stored
@@ -95,22 +95,22 @@ impl TurnReader {
 
     /// Where the next batch stands.
     #[must_use]
-    pub fn place(&self) -> Place {
-        self.place
+    pub fn cursor(&self) -> Cursor {
+        self.cursor
     }
 
-    /// Goes on from a place.
+    /// Goes on from a cursor.
     ///
     /// # Errors
     /// [`TrainError::Data`].
-    pub fn go_to(&mut self, place: Place) -> Result<(), TrainError> {
-        self.stream = start(&self.turns, self.plan, place)?;
-        self.place = place;
-        self.readable = place.epoch;
+    pub fn go_to(&mut self, cursor: Cursor) -> Result<(), TrainError> {
+        self.stream = start(&self.turns, self.plan, cursor)?;
+        self.cursor = cursor;
+        self.readable = cursor.epoch;
         Ok(())
     }
 
-    /// The next group of this process's share, in 32 or 64 bits.
+    /// The next group of this process, in 32 or 64 bits.
     ///
     /// # Errors
     /// [`TrainError::Torch`]; [`TrainError::NoFrames`] where a whole epoch has no group with two frames.
@@ -123,22 +123,22 @@ impl TurnReader {
             }
             None => return Err(TrainError::NoFrames),
         };
-        self.place = drawn.next;
+        self.cursor = drawn.next;
         let frames = if drawn.batch.frames.len() >= 2 {
-            self.readable = self.place.epoch;
+            self.readable = self.cursor.epoch;
             Some(tensors(&drawn.batch, kind, device)?)
         } else {
             None
         };
         self.stream.give_back(drawn.batch);
-        if self.place.epoch > self.readable + 1 {
+        if self.cursor.epoch > self.readable + 1 {
             return Err(TrainError::NoFrames);
         }
         Ok(TurnGroup { frames, damage })
     }
 }
 
-fn start(turns: &Arc<Turns>, plan: DrawPlan, from: Place) -> Result<Stream<Turns>, TrainError> {
+fn start(turns: &Arc<Turns>, plan: DrawPlan, from: Cursor) -> Result<Stream<Turns>, TrainError> {
     let streaming = Streaming {
         plan,
         from,

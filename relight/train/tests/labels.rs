@@ -44,7 +44,7 @@ fn settings(steps: u64) -> PaperSettings {
         run: RunSettings {
             steps,
             batch: 4,
-            rate: 1e-4,
+            learning_rate: 1e-4,
             precision: PrecisionChoice::Single,
             log_every: 1,
             validate_every: 3,
@@ -54,7 +54,7 @@ fn settings(steps: u64) -> PaperSettings {
             size: 32,
             views: 1,
             lightings: 2,
-            window: 8,
+            shuffle_buffer: 8,
             reuse: 2.0,
             validation: 2,
             ..DataSettings::default()
@@ -74,7 +74,7 @@ fn task(phase: PaperPhase, labels: &Path) -> Result<PaperTask, TrainError> {
     };
     let resources = Resources {
         device: Device::Cpu,
-        composers: 1,
+        workers: 1,
         stop: Arc::default(),
     };
     PaperTask::new(phase, settings(3), resources, &inputs)
@@ -208,7 +208,7 @@ fn labels_that_cannot_be_used_are_told_at_once_and_damaged_ones_are_left_out() {
     };
     let resources = Resources {
         device: Device::Cpu,
-        composers: 1,
+        workers: 1,
         stop: Arc::default(),
     };
     let error = PaperTask::new(PaperPhase::Specular, settings(1), resources, &inputs).unwrap_err();
@@ -222,5 +222,5 @@ fn labels_that_cannot_be_used_are_told_at_once_and_damaged_ones_are_left_out() {
         !damage.is_empty() && damage[0].contains("000001"),
         "{damage:?}"
     );
-    assert!(table(run.path()).contains("3,loss/truth,"));
+    assert!(table(run.path()).contains("3,loss/supervised,"));
 }

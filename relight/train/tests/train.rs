@@ -16,14 +16,14 @@ use relight_core::image::{Extent, Planes};
 use relight_nets::paper::{Head, light_net, normal_net, spec_net};
 use relight_nets::{Graph, Inference, Weights, decomposer};
 use relight_photo::decompose::EncodedPicture;
-use relight_reader::Share;
+use relight_reader::Rank;
 use relight_synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
 use relight_train::{
-    Adam, AdamSettings, AnsweredTensors, Checkpoint, Composer, Composition, ComputePrecision,
+    Adam, AdamSettings, AnsweredTensors, Checkpoint, Composition, ComputePrecision, DataLoader,
     DataSettings, DecomposeSettings, DecomposeTask, Journal, Learner, LearnerSettings, Model,
-    PaperInputs, PaperLosses, PaperPhase, PaperSettings, PaperTask, PrecisionChoice, ProcessGroup,
-    Resources, Run, RunOutcome, RunSettings, StepLosses, TABLE, Task, TrainError, TrainObserver,
-    TruthArrays, Validation, read_settings,
+    PaperInputs, PaperLossCoefficients, PaperPhase, PaperSettings, PaperTask, PrecisionChoice,
+    ProcessGroup, Resources, Run, RunOutcome, RunSettings, StepLosses, TABLE, TrainError,
+    TrainObserver, TrainingTask, TruthArrays, Validation, read_settings,
 };
 use tch::{Device, Kind, Tensor};
 
@@ -134,7 +134,7 @@ fn small_data() -> DataSettings {
         size: 32,
         views: 1,
         lightings: 2,
-        window: 6,
+        shuffle_buffer: 6,
         reuse: 2.0,
         validation: 2,
         ..DataSettings::default()
@@ -157,7 +157,7 @@ fn decompose_task(steps: u64) -> (DecomposeTask, RunSettings) {
 fn resources() -> Resources {
     Resources {
         device: Device::Cpu,
-        composers: 2,
+        workers: 2,
         stop: Arc::default(),
     }
 }
@@ -181,7 +181,7 @@ impl TrainObserver for StopAfter<'_> {
 }
 
 fn make_run(
-    task: &mut dyn Task,
+    task: &mut dyn TrainingTask,
     settings: &RunSettings,
     folder: &Path,
     (resume, until): (bool, u64),
@@ -255,8 +255,8 @@ fn samples_are_the_same_on_any_number_of_threads() {
     });
     let first = |threads: usize| -> Vec<TruthArrays> {
         let composition = Arc::clone(&composition);
-        let mut composer = Composer::start(composition, Share::ALL, 1, threads).unwrap();
-        let mut next = || composer.next_sample().unwrap();
+        let mut loader = DataLoader::start(composition, Rank::ONLY, 1, threads).unwrap();
+        let mut next = || loader.next_sample().unwrap();
         (3..12)
             .map(|number| {
                 let (found, sample) = next();
@@ -319,7 +319,7 @@ fn turns() -> tempfile::TempDir {
 fn paper_settings(steps: u64) -> PaperSettings {
     PaperSettings {
         run: RunSettings {
-            rate: 1e-4,
+            learning_rate: 1e-4,
             ..small_run(steps)
         },
         data: small_data(),
@@ -372,13 +372,13 @@ fn turns_that_are_held_out_are_judged_at_the_start_and_at_the_end() {
     };
     let settings = PaperSettings {
         run: RunSettings {
-            rate: 2e-5,
-            average: 0.0,
+            learning_rate: 2e-5,
+            ema_decay: 0.0,
             ..paper_settings(12).run
         },
-        loss: PaperLosses {
-            anchor: 0.0,
-            ..PaperLosses::default()
+        loss: PaperLossCoefficients {
+            supervised: 0.0,
+            ..PaperLossCoefficients::default()
         },
         ..paper_settings(12)
     };
@@ -469,7 +469,7 @@ impl EverySecondStep {
     fn new() -> Self {
         let settings = LearnerSettings {
             adam: AdamSettings::default(),
-            average: 0.9,
+            ema_decay: 0.9,
             precision: ComputePrecision::Single,
             device: Device::Cpu,
         };
@@ -481,7 +481,7 @@ impl EverySecondStep {
     }
 }
 
-impl Task for EverySecondStep {
+impl TrainingTask for EverySecondStep {
     fn name(&self) -> &'static str {
         "every second step"
     }
@@ -580,7 +580,7 @@ fn a_run_that_is_asked_to_stop_while_its_first_samples_are_composed_stops_then()
     let settings = DecomposeSettings {
         run: small_run(4),
         data: DataSettings {
-            window: 1_000_000,
+            shuffle_buffer: 1_000_000,
             ..small_data()
         },
         ..DecomposeSettings::default()
@@ -632,12 +632,14 @@ fn turns_are_refused_where_they_teach_nothing() {
 
 #[test]
 fn the_settings_that_come_with_relight_can_be_read() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights");
-    let paper: PaperSettings = read_settings(&folder.join("paper.toml")).unwrap();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cli/weights");
+    let paper = read_settings::<PaperSettings>(&folder.join("paper.toml"));
+    let paper = paper.unwrap().settings;
     paper.check().unwrap();
-    assert_eq!((paper.run.rate, paper.run.batch), (1e-6, 12));
+    assert_eq!((paper.run.learning_rate, paper.run.batch), (1e-6, 12));
     for ours in ["decompose.toml", "refine.toml"] {
-        let ours: DecomposeSettings = read_settings(&folder.join(ours)).unwrap();
+        let ours = read_settings::<DecomposeSettings>(&folder.join(ours));
+        let ours = ours.unwrap().settings;
         ours.check().unwrap();
     }
 }

@@ -33,6 +33,7 @@ const REPLAY_WAIT: Duration = Duration::from_secs(60);
 
 /// What a capture left.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Captured {
     /// The last take, which counts.
     pub take: TakeSummary,

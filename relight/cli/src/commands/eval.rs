@@ -95,7 +95,7 @@ enum Protocol {
 
 #[derive(Args)]
 struct CommonArguments {
-    /// The folder of the truth.
+    /// The folder of the ground truth.
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
     /// What the table calls these images [default: the folder's name].
@@ -119,7 +119,7 @@ struct CommonArguments {
 struct SetArguments {
     #[command(flatten)]
     common: CommonArguments,
-    /// How the folder of the truth is laid out.
+    /// How the folder of the ground truth is laid out.
     #[arg(long, value_name = "LAYOUT", default_value_t = TruthLayout::Mit)]
     layout: TruthLayout,
     /// Compare so many images only, spread evenly over the set.
@@ -152,7 +152,7 @@ struct RelightingArguments {
     /// Meshes to draw from besides procedural shapes (.obj, .gltf, .glb).
     #[arg(long, value_name = "DIR", requires = "make")]
     meshes: Option<PathBuf>,
-    /// Panoramas (.hdr, .exr) in place of those that are made.
+    /// Panoramas (.hdr, .exr) in place of the synthetic ones.
     #[arg(long, value_name = "DIR", requires = "make")]
     panoramas: Option<PathBuf>,
 }
@@ -171,13 +171,13 @@ struct InsertionArguments {
     /// Meshes to draw from besides procedural shapes (.obj, .gltf, .glb).
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
-    /// Panoramas (.hdr, .exr) in place of those that are made.
+    /// Panoramas (.hdr, .exr) in place of the synthetic ones.
     #[arg(long, value_name = "DIR")]
     panoramas: Option<PathBuf>,
     /// The network's weights [default: those that come with the program].
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// Write a sheet for each object: photograph, new picture, truth, and each method's result.
+    /// Write a sheet for each object: photograph, new picture, ground truth, and each method's result.
     #[arg(long, value_name = "DIR")]
     sheets: Option<PathBuf>,
     /// Write the table as JSON, with the scores of each image, to this file.

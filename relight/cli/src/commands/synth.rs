@@ -70,7 +70,7 @@ pub(crate) struct Arguments {
     /// Pictures to lay onto objects: .png, .jpg.
     #[arg(long, value_name = "FOLDER")]
     textures: Option<PathBuf>,
-    /// Light: .hdr, .exr [default: panoramas that are made on the spot].
+    /// Light: .hdr, .exr [default: synthetic panoramas].
     #[arg(long, value_name = "FOLDER")]
     panoramas: Option<PathBuf>,
     /// Threads that work side by side [default: as many as there are cores].
@@ -82,10 +82,10 @@ pub(crate) struct Arguments {
     /// Frames a turn.
     #[arg(long, value_name = "N", default_value_t = 1500, requires = "turn", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     frames: u32,
-    /// Write a sheet of pictures beside their truth, OUT/preview.png, and nothing else.
+    /// Write a sheet of pictures beside their ground truth, OUT/preview.png, and nothing else.
     #[arg(long, group = "mode")]
     preview: bool,
-    /// Write the panoramas that are made on the spot, and nothing else.
+    /// Write the synthetic panoramas, and nothing else.
     #[arg(long, group = "mode")]
     write_panoramas: bool,
 }
@@ -186,7 +186,7 @@ fn turns(arguments: &Arguments, library: &Library, console: Console) -> ModeResu
 }
 
 fn report(arguments: &Arguments, console: Console, what: &str, written: SynthTally) {
-    let SynthTally { new, kept } = written;
+    let SynthTally { new, kept, .. } = written;
     let out = &arguments.output;
     console.say(
         &format!("{}: {new} {what} written, {kept} were there", out.display()),

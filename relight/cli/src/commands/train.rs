@@ -13,7 +13,8 @@ use clap::{Args, Subcommand};
 use relight_nets::{NetError, Weights};
 use relight_train::{
     DecomposeSettings, DecomposeTask, Launch, PaperInputs, PaperPhase, PaperSettings, PaperTask,
-    ProcessGroup, Resources, Run, RunOutcome, RunSettings, Task, TrainObserver, read_settings,
+    ProcessGroup, Resources, Run, RunOutcome, RunSettings, SettingsFile, TrainObserver,
+    TrainingTask, read_settings,
 };
 use relit_console::{Console, Outcome, ProgressBar};
 use serde::Serialize;
@@ -28,9 +29,9 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight train decompose -o run
       the network of relight decompose, on samples that are made while it trains
-  relight train decompose --settings relight/weights/decompose.toml -o run
+  relight train decompose --settings relight/cli/weights/decompose.toml -o run
       as the weights that come with relight were trained, from the folders meshes and panoramas of what
-      relight/weights/README.md names
+      relight/cli/weights/README.md names
   relight train decompose --settings my.toml -o run --resume
       goes on with a run that was stopped, to the same losses
   relight train normal -o normal
@@ -116,9 +117,12 @@ struct RunArguments {
     /// Threads of the network [default: one a core].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
-    /// Threads that compose samples.
+    /// Data-loader workers: threads that compose samples.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
-    composers: usize,
+    workers: usize,
+    /// The old name of --workers, read until 0.3.
+    #[arg(long, hide = true, value_name = "N", conflicts_with = "workers", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
+    composers: Option<usize>,
     /// Where the network is computed: cpu, cuda:N, or cuda: of several processes on a machine, a GPU for each.
     #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
     device: DeviceName,
@@ -176,12 +180,16 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 
 fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
     let settings = arguments.settings.as_deref();
-    let settings = settings.map_or_else(|| Ok(DecomposeSettings::default()), read_settings)?;
+    let file = settings.map_or_else(|| Ok(DecomposeSettings::default().into()), read_settings)?;
     if arguments.print_settings {
-        return print_settings(&settings, console);
+        return print_settings(&file, arguments, console);
     }
-    let run = settings.run.clone();
     let processes = arguments.join(console)?;
+    if processes.is_first() {
+        arguments.tell_of_old_names(&file, console);
+    }
+    let settings = file.settings;
+    let run = settings.run.clone();
     let weights = read_weights(arguments.weights.as_deref())?;
     let resources = processes.resources.clone();
     let mut task = DecomposeTask::new(settings, resources, weights.as_ref())?;
@@ -189,12 +197,16 @@ fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
 }
 
 fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> CommandResult {
-    let settings = PaperSettings::of_phase(phase, arguments.run.settings.as_deref())?;
+    let file = PaperSettings::of_phase(phase, arguments.run.settings.as_deref())?;
     if arguments.run.print_settings {
-        return print_settings(&settings, console);
+        return print_settings(&file, &arguments.run, console);
     }
-    let run = settings.run.clone();
     let processes = arguments.run.join(console)?;
+    if processes.is_first() {
+        arguments.run.tell_of_old_names(&file, console);
+    }
+    let settings = file.settings;
+    let run = settings.run.clone();
     let inputs = PaperInputs {
         turns: arguments.turns.clone(),
         held_out: arguments.held_out.clone(),
@@ -214,7 +226,33 @@ struct Processes {
     group: Option<ProcessGroup>,
 }
 
+impl Processes {
+    fn is_first(&self) -> bool {
+        self.group.as_ref().is_none_or(ProcessGroup::is_first)
+    }
+}
+
 impl RunArguments {
+    /// Warns of names that this release still reads and the next one does not.
+    fn tell_of_old_names<S>(&self, file: &SettingsFile<S>, console: Console) {
+        let path = self.settings.as_deref().unwrap_or(Path::new(""));
+        for setting in &file.renamed {
+            let line = format!("{}: {setting}", path.display());
+            let event = json!({
+                "event": "renamed", "path": path.display().to_string(),
+                "old": format!("{}.{}", setting.table, setting.old), "new": format!("{}.{}", setting.table, setting.new),
+            });
+            console.warn_with(&line, &event);
+        }
+        if self.composers.is_some() {
+            let event = json!({ "event": "renamed", "old": "--composers", "new": "--workers" });
+            console.warn_with(
+                "--composers is now --workers: it is read, rename it before 0.3",
+                &event,
+            );
+        }
+    }
+
     fn folder(&self) -> Result<&Path, &'static str> {
         self.output
             .as_deref()
@@ -234,7 +272,7 @@ impl RunArguments {
         let group = launch.as_ref().map(ProcessGroup::join).transpose()?;
         let resources = Resources {
             device,
-            composers: self.composers,
+            workers: self.composers.unwrap_or(self.workers),
             // While processes wait for each other, signals end them: there is nothing to save.
             stop: stop_at_signals(group.is_some())?,
         };
@@ -244,11 +282,11 @@ impl RunArguments {
 
 /// Process 0 says whom it waits for: a process that was not started would keep it without a word.
 fn tell_of_waiting(launch: &Launch, console: Console) {
-    if launch.share.index() > 0 {
+    if launch.rank.index() > 0 {
         return;
     }
     let (others, place) = (
-        launch.share.of() - 1,
+        launch.rank.world_size() - 1,
         format!("{}:{}", launch.address, launch.port),
     );
     let text = format!("process 0 waits at {place} for the {others} others, five minutes at most");
@@ -260,7 +298,13 @@ fn read_weights(path: Option<&Path>) -> Result<Option<Weights>, NetError> {
     path.map(Weights::read).transpose()
 }
 
-fn print_settings(settings: &impl Serialize, console: Console) -> CommandResult {
+fn print_settings<S: Serialize>(
+    file: &SettingsFile<S>,
+    arguments: &RunArguments,
+    console: Console,
+) -> CommandResult {
+    arguments.tell_of_old_names(file, console);
+    let settings = &file.settings;
     let event = json!({ "event": "settings", "settings": settings });
     console.say(toml::to_string(settings)?.trim_end(), &event);
     Ok(Outcome::Whole)
@@ -268,14 +312,14 @@ fn print_settings(settings: &impl Serialize, console: Console) -> CommandResult 
 
 /// Makes the run, and tells how it came out.
 fn train(
-    task: &mut dyn Task,
+    task: &mut dyn TrainingTask,
     settings: &RunSettings,
     (arguments, processes): (&RunArguments, Processes),
     console: Console,
 ) -> CommandResult {
     let stop = processes.resources.stop;
     let group = processes.group;
-    let process = group.as_ref().map_or(0, |group| group.share().index());
+    let process = group.as_ref().map_or(0, |group| group.rank().index());
     let folder = arguments.folder()?;
     let run = Run::open_among(task, settings, folder, arguments.resume, group)?;
     if process > 0 {
@@ -283,14 +327,14 @@ fn train(
         return Ok(outcome_of(&outcome));
     }
     let made = run.steps_made();
-    let mut view = View {
+    let mut progress = RunProgress {
         console,
         bar: console.progress(settings.steps, "train"),
     };
-    view.bar.set_position(made);
-    view.bar.reset_eta();
-    let outcome = run.finish(&stop, &mut view)?;
-    view.bar.finish_and_clear();
+    progress.bar.set_position(made);
+    progress.bar.reset_eta();
+    let outcome = run.finish(&stop, &mut progress)?;
+    progress.bar.finish_and_clear();
     report(&outcome, console);
     Ok(outcome_of(&outcome))
 }
@@ -360,12 +404,12 @@ impl TrainObserver for OtherProcess {
 }
 
 /// Shows a run on the terminal.
-struct View {
+struct RunProgress {
     console: Console,
     bar: ProgressBar,
 }
 
-impl TrainObserver for View {
+impl TrainObserver for RunProgress {
     fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>) {
         if let Some(loss) = losses.get("loss") {
             self.bar.set_message(format!("train, loss {loss:.3}"));

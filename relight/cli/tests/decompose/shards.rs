@@ -7,7 +7,7 @@ use image::{Rgb as Pixel, RgbImage};
 use relight_photo::decompose::{MaskSource, SpecularGate};
 use relight_photo::files::{PhotoInput, PhotoReading};
 use relit_data::geometry::Rect;
-use relit_data::image_stats::MaskSpans;
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{FrameRecord, Layout, Sample, ShardWriter};
 
 use crate::support::{Folder, HEIGHT, WIDTH, decomposed, is_inside, mask, object};
@@ -29,31 +29,12 @@ fn sample(index: u32, saturated: f64) -> Sample {
         true => *object(0).get_pixel(x, y),
         false => Pixel([0; 3]),
     });
-    let measures = MaskSpans::of(&mask()).measure(&image, 250).unwrap();
-    let record = FrameRecord {
-        session: SESSION.to_owned(),
-        object: "mug".to_owned(),
-        index,
-        source_frame: u64::from(index),
-        t_us: 0,
-        angle_deg: None,
-        duplicate: false,
-        crop: Rect::new(0, 0, WIDTH, HEIGHT),
-        size: [WIDTH, HEIGHT],
-        shift_px: None,
-        shift_applied: false,
-        align_confidence: None,
-        mask_px: measures.mask_px,
-        saturated_px: (saturated * measures.mask_px as f64) as u64,
-        saturated_fraction: saturated,
-        saturated_any_px: 0,
-        spec_net: saturated > 0.05,
-        mean_rgb: measures.mean_rgb,
-        sharpness: measures.sharpness,
-        exposure_step: None,
-        identical_to: None,
-        blur: None,
-    };
+    let mut measures = MaskSpans::of(&mask())
+        .measure(&image, SATURATION_LEVEL)
+        .unwrap();
+    measures.saturated_px = (saturated * measures.mask_px as f64) as u64;
+    let whole = Rect::new(0, 0, WIDTH, HEIGHT);
+    let record = FrameRecord::new(SESSION, "mug", index, whole, &measures, SPEC_NET_GATE);
     Sample::encode(record, image).unwrap()
 }
 

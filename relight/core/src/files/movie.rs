@@ -449,7 +449,7 @@ mod tests {
     fn has_ffmpeg() -> bool {
         let found = MovieWriter::check();
         if found.is_err() {
-            eprintln!("skipped: the program ffmpeg is not installed");
+            relit_test_support::say_skipped("the program ffmpeg is not installed");
         }
         found.is_ok()
     }

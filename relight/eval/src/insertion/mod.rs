@@ -120,7 +120,7 @@ impl Places {
     }
 }
 
-/// Is given each object's name and its pictures in sRGB: photograph, new picture, truth, and the result of each method.
+/// Is given each object's name and its pictures in sRGB: photograph, new picture, ground truth, and the result of each method.
 pub type SheetWriter<'a> = &'a mut dyn FnMut(&str, &[Planes<3>]) -> Result<(), EvalError>;
 
 /// MSE and DSSIM of objects that were put into new pictures, for each method: of the whole picture, and of object,
@@ -184,7 +184,7 @@ pub fn evaluate_insertion(
         progress();
     }
     for (method, scored) in InsertionMethod::ALL.into_iter().zip(scored) {
-        add_lines(&mut table, method.name(), "made objects", 1, scored);
+        add_lines(&mut table, method.name(), "synthetic objects", 1, scored);
     }
     Ok(table)
 }

@@ -12,7 +12,7 @@ use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Direction, LightError, LightSampler, Order, Panorama, Rotation};
 use relight_synth::{
     Environment, GBuffer, Library, Lighting, Material, Method, Occluder, Pose, Projection, Recipe,
-    Scene, View, stream,
+    SyntheticScene, SyntheticView, stream,
 };
 
 /// Pixels of the rendering along a pixel of the picture.
@@ -80,11 +80,11 @@ impl Stage {
         let placement = pose.place(&mesh, Projection::Orthographic);
         let buffer = GBuffer::render(&mesh, placement, Projection::Orthographic, recipe.size);
         let name = format!("{number:03}-{}", object.name());
-        let view = View {
+        let view = SyntheticView {
             object,
             pose,
             projection: Projection::Orthographic,
-            scene: Scene::shaded(buffer, Occluder::new(&mesh, placement), 16, own),
+            scene: SyntheticScene::shaded(buffer, Occluder::new(&mesh, placement), 16, own),
         };
         let (_, material) = recipe.material(library, &view, number);
         let occluder = Occluder::new(&mesh, placement);
@@ -157,7 +157,7 @@ impl<'a> Table<'a> {
     fn pictures(
         &self,
         library: &Library,
-        (view, material): (&View, &Material),
+        (view, material): (&SyntheticView, &Material),
         around: &Around,
         seed: u64,
     ) -> (Planes<3>, Planes<3>) {

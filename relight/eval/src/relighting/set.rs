@@ -21,7 +21,7 @@ pub(super) const FILE: &str = "relighting.json";
 /// ```text
 /// relighting.json             what there is, and what it was made of; written last
 /// lights/<ll>.txt             the light as nine coefficients, in the units of the images
-/// <ooo>/{mask,normal,albedo}.png      the truth of an object: 16 bits, linear, y up
+/// <ooo>/{mask,normal,albedo}.png      the ground truth of an object: 16 bits, linear, y up
 /// <ooo>/<ll>-diffuse.png      the object without highlights under a light, sRGB
 /// <ooo>/<ll>-full.png         the same with its highlights
 /// ```
@@ -53,7 +53,7 @@ pub(super) struct ObjectEntry {
     pub(super) smoothness: f32,
 }
 
-/// An object of the set with its truth.
+/// An object of the set with its ground truth.
 pub(super) struct Object {
     /// Its folder.
     pub(super) name: String,

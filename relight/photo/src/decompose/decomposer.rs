@@ -15,14 +15,13 @@ use relight_core::light::{LightError, Normals, ShLight, YUp};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
 use relight_nets::{Inference, InferenceEngine, NetError, Weights, decomposer};
+use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
 
 /// Most pixels of a photograph, and with [`WorkingSize::Native`] of the square around the object: 24 million take 2.5 GB of
 /// memory, so these more than 6 GB.
 pub const MOST_PIXELS: usize = 64_000_000;
 /// Width and height of the picture that the network sees.
 pub const WORKING_SIDE: usize = 256;
-/// Highlights are separated where a larger part of the object's pixels is saturated, as in the paper.
-const SATURATED_PART: f64 = 0.05;
 /// Keeps the light from behind, which normals hardly show, small: see [`fit_light`].
 const STIFFNESS: f64 = 1e-3;
 /// Longest band 1 of a light, in parts of its mean. A single lamp has √3; far above it, the fit follows cast shadows to
@@ -44,7 +43,7 @@ pub enum WorkingSize {
 /// Whether highlights are separated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SpecularGate {
-    /// Where more than 5 % of the object's pixels are saturated.
+    /// Where a larger fraction of the object's pixels is saturated than [`SPEC_NET_GATE`].
     #[default]
     Auto,
     /// Always.
@@ -81,9 +80,6 @@ impl Default for DecomposeOptions {
         }
     }
 }
-
-/// The value in a file from which on a channel counts as saturated: 250 of 255, less rounding.
-pub(super) const SATURATED_VALUE: f32 = 249.5 / 255.0;
 
 /// A picture in layers, I = R S + H, with its normals and light. Everything is as large as the picture
 /// and 0 outside the mask.
@@ -248,7 +244,7 @@ impl Decomposer {
             .saturated_fraction
             .unwrap_or_else(|| object.saturated(options.saturated_from));
         let is_glossy = match options.specular {
-            SpecularGate::Auto => saturated_fraction > SATURATED_PART,
+            SpecularGate::Auto => saturated_fraction > SPEC_NET_GATE,
             SpecularGate::On => true,
             SpecularGate::Off => false,
         };

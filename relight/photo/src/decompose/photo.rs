@@ -3,12 +3,13 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use super::decomposer::{DecomposeOptions, SATURATED_VALUE, check_size};
+use super::decomposer::{DecomposeOptions, check_size};
 use super::error::DecomposeError;
 use super::mask::{MaskSource, NoObject, Rectangle, find_mask, is_empty, mask_of};
 use relight_core::image::{
     ColourSpace, Extent, Gamma22, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
 };
+use relit_data::image_stats::SATURATED_VALUE;
 
 /// The transfer function of ITU-T H.273 that says nothing.
 const UNSPECIFIED: u8 = 2;

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use crate::OpenError;
-use crate::turns::listed;
+use crate::listing::listed;
 use relight_core::image::Transfer;
 
-/// How a folder of images with their truth is laid out.
+/// How a folder of images with their ground truth is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum TruthLayout {
     /// MIT Intrinsic Images (Grosse et al. 2009), as the release of SIRFS has it:
     /// `<object>/{original,diffuse,reflectance,shading,specular,mask}.png`, 16 bits, linear, and

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::TruthSample;
 use super::layout::{Entry, NormalFile, Part, Role, TruthLayout};
+use super::sample::TruthSample;
 use crate::SampleFault;
 use crate::error::check_extent;
 use relight_core::files::read_planes;

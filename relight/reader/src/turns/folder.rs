@@ -8,8 +8,8 @@ use std::sync::Arc;
 use relit_data::shard::{MAX_SAMPLES, order, sample_key};
 
 use super::batch::{Frame, MaskBytes, TurnFrame, extent_of};
-use super::listed;
 use crate::error::check_extent;
+use crate::listing::listed;
 use crate::{DamagedSample, OpenError, SampleFault};
 use relight_core::image::{Extent, ImageError};
 

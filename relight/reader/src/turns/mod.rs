@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use relit_data::shard::{Dataset, Layout};
 
+use super::listing::listed;
 use super::{DamagedSample, OpenError, SampleId, Source};
 use batch::{BatchBuilder, Frame};
 use folder::FolderTurn;
@@ -159,26 +160,4 @@ fn open_folders(path: &Path) -> Result<Vec<Turn>, OpenError> {
 
 fn is_shard(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "tar") && path.is_file()
-}
-
-/// What a folder holds of some kind, sorted; hidden names are not looked at.
-pub(super) fn listed(
-    folder: &Path,
-    wanted: impl Fn(&Path) -> bool,
-) -> Result<Vec<PathBuf>, OpenError> {
-    let failed = |source| OpenError::Read {
-        path: folder.to_owned(),
-        source,
-    };
-    let mut paths = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(failed)? {
-        let entry = entry.map_err(failed)?;
-        let hidden = entry.file_name().as_encoded_bytes().starts_with(b".");
-        let path = entry.path();
-        if !hidden && wanted(&path) {
-            paths.push(path);
-        }
-    }
-    paths.sort();
-    Ok(paths)
 }

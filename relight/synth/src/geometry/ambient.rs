@@ -76,7 +76,7 @@ fn cosine_direction(normal: Vec3, number: u32, count: u32, turn: f32) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Mesh, Raw};
+    use crate::mesh::{Mesh, RawMesh};
     use crate::shape::ShapeKind;
     use crate::view::Projection;
     use glam::Affine3A;
@@ -130,7 +130,7 @@ mod tests {
 
     fn plane() -> Mesh {
         let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-        let raw = Raw {
+        let raw = RawMesh {
             positions: corners.map(|(x, y)| Vec3::new(x, y, 0.0)).to_vec(),
             triangles: vec![[0, 1, 2], [0, 2, 3]],
             texture: Vec::new(),

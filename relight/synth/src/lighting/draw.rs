@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::{Emitter, Environment, Lamp, Lighting, Method, Panoramas};
+use super::{Emitter, Environment, Lighting, Method, Panoramas, SyntheticLamp};
 use crate::geometry::GBuffer;
 use crate::random::Random;
 
@@ -59,7 +59,7 @@ impl Lighting {
                 };
                 if random.chance(0.4) {
                     let strength = random.uniform(0.3..2.0);
-                    sky.lamps = vec![Lamp::draw(random, buffer, strength)];
+                    sky.lamps = vec![SyntheticLamp::draw(random, buffer, strength)];
                 }
                 sky.with_bounce(random)
             }
@@ -76,7 +76,7 @@ impl Lighting {
                 } else {
                     random.uniform(0.2..1.0)
                 };
-                Lamp::draw(random, buffer, strength)
+                SyntheticLamp::draw(random, buffer, strength)
             })
             .collect();
         let nearly_none = random.chance(0.4);
@@ -98,7 +98,7 @@ impl Lighting {
     }
 }
 
-impl Lamp {
+impl SyntheticLamp {
     fn draw(random: &mut Random, buffer: &GBuffer, strength: f32) -> Self {
         let towards = lighting_direction(random, buffer);
         let (emitter, rays) = if random.chance(0.3) {

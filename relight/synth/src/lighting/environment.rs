@@ -6,9 +6,9 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::shaded::{BlinnPhong, Material, Shaded};
-use super::{direction, vector};
 use crate::geometry::{GBuffer, Occluder};
 use crate::random::{mix, stream, unit_of};
+use crate::vectors::{direction, vector};
 use relight_core::light::{LightSampler, Order, Panorama, Rotation, ShLight};
 
 /// Strata along each side of the square from which directions are drawn: 64 rays a pixel.
@@ -277,7 +277,7 @@ impl Point<'_> {
             let turn = number as f32 * 0.618_034 + second;
             ((number as f32 + first) / count as f32, turn)
         };
-        let matt = (0..COSINE_RAYS).map(move |number| {
+        let lambertian = (0..COSINE_RAYS).map(move |number| {
             let (part, turn) = place(number, COSINE_RAYS, 1_000);
             around(part.sqrt(), turn)
         });
@@ -291,21 +291,23 @@ impl Point<'_> {
                 (along > LEAST_COSINE).then(|| mirrored.normalize_or(self.normal))
             })
         });
-        matt.chain(glossy)
+        lambertian.chain(glossy)
     }
 
     /// How many of the directions that are drawn lie around this one, per steradian.
     fn density(&self, towards: Vec3) -> f32 {
-        let matt = COSINE_RAYS as f32 * self.normal.dot(towards).max(0.0) / PI;
-        let Some(gloss) = self.gloss else { return matt };
+        let lambertian = COSINE_RAYS as f32 * self.normal.dot(towards).max(0.0) / PI;
+        let Some(gloss) = self.gloss else {
+            return lambertian;
+        };
         let half = (towards + self.towards_eye).normalize_or_zero();
         let along = half.dot(self.towards_eye);
         if along <= LEAST_COSINE {
-            return matt;
+            return lambertian;
         }
         let lobe = gloss.lobe(self.normal, towards, self.towards_eye);
         // A step of the half vector is a quarter of the light's, over the cosine to the eye.
         let of_half = (gloss.exponent + 1.0) / (2.0 * PI) * lobe;
-        matt + LOBE_RAYS as f32 * of_half / (4.0 * along)
+        lambertian + LOBE_RAYS as f32 * of_half / (4.0 * along)
     }
 }

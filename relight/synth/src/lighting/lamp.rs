@@ -5,9 +5,9 @@ use std::f32::consts::TAU;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::{direction, vector};
 use crate::geometry::{GBuffer, Occluder};
 use crate::random::{mix, stream, unit_of};
+use crate::vectors::{direction, vector};
 use relight_core::light::{Order, Rotation, ShLight, basis};
 
 /// Most rays from a pixel to a lamp.
@@ -17,7 +17,7 @@ const BEFORE: f32 = 1e-3;
 
 /// A lamp.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Lamp {
+pub struct SyntheticLamp {
     /// Where it is.
     pub emitter: Emitter,
     /// Irradiance at the origin of a surface that faces the lamp.
@@ -62,7 +62,7 @@ pub struct LampShadows {
     open: Vec<u64>,
 }
 
-impl Lamp {
+impl SyntheticLamp {
     /// The rays from a point; `turn`, 0..1, shifts them from pixel to pixel so that shadows have no
     /// steps.
     pub(super) fn rays_from(

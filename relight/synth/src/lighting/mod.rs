@@ -25,17 +25,17 @@ use serde::{Deserialize, Serialize};
 
 pub use draw::LightKind;
 pub use environment::{Environment, Method, Panoramas};
-pub use lamp::{Emitter, Lamp, LampShadows};
-pub use scene::Scene;
+pub use lamp::{Emitter, LampShadows, SyntheticLamp};
+pub use scene::SyntheticScene;
 pub use shaded::{BlinnPhong, Material, Shaded};
 
-use relight_core::light::{Direction, Order, Rotation, ShLight};
+use relight_core::light::{Order, Rotation, ShLight};
 
 /// All light on an object. Colours are linear red, green and blue.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Lighting {
     /// Lamps, each with its shadows.
-    pub lamps: Vec<Lamp>,
+    pub lamps: Vec<SyntheticLamp>,
     /// A panorama around the object.
     pub environment: Option<Environment>,
     /// Irradiance of even light from all around.
@@ -91,14 +91,4 @@ fn add(sum: &mut ShLight, more: &ShLight) {
             *sum += more;
         }
     }
-}
-
-/// The direction of a vector that has a length; to the viewer where it has none.
-fn direction(vector: Vec3) -> Direction {
-    let [x, y, z] = vector.to_array().map(f64::from);
-    Direction::new(x, y, z).unwrap_or(Direction::VIEWER)
-}
-
-fn vector(direction: Direction) -> Vec3 {
-    Vec3::from_array(direction.components().map(|c| c as f32))
 }

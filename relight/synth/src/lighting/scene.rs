@@ -7,7 +7,7 @@ use crate::random::stream;
 
 /// What a camera sees of an object and what can be in the way of light: made once, lit as often as one
 /// likes. What is slow is kept: the buffer, the tree for rays, and how open each pixel is.
-pub struct Scene {
+pub struct SyntheticScene {
     buffer: GBuffer,
     /// None where light is never blocked.
     shade: Option<Shade>,
@@ -18,7 +18,7 @@ struct Shade {
     open: Vec<f32>,
 }
 
-impl Scene {
+impl SyntheticScene {
     /// A scene in which nothing is ever in the way of light.
     #[must_use]
     pub fn open(buffer: GBuffer) -> Self {

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::lamp::{Lamp, LampShadows, turn};
+use super::lamp::{LampShadows, SyntheticLamp, turn};
 use crate::geometry::GBuffer;
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Normals, ShLight, YUp};
@@ -16,7 +16,7 @@ pub struct Material {
     pub albedo: Vec<Vec3>,
     /// Unit normals, with relief.
     pub normals: Vec<Vec3>,
-    /// Its highlights; none where it is matt.
+    /// Its highlights; none where it is Lambertian.
     pub gloss: Option<BlinnPhong>,
 }
 
@@ -64,7 +64,7 @@ impl Shaded {
         &mut self,
         buffer: &GBuffer,
         material: &Material,
-        lamp: &Lamp,
+        lamp: &SyntheticLamp,
         shadows: Option<&LampShadows>,
         seed: u64,
     ) {
@@ -126,8 +126,8 @@ impl Shaded {
     /// What the surface sends to the camera.
     #[must_use]
     pub fn image(&self, albedo: &[Vec3]) -> Vec<Vec3> {
-        let matt = albedo.iter().zip(&self.shading).map(|(a, s)| *a * *s);
-        matt.zip(&self.highlight).map(|(d, h)| d + *h).collect()
+        let diffuse = albedo.iter().zip(&self.shading).map(|(a, s)| *a * *s);
+        diffuse.zip(&self.highlight).map(|(d, h)| d + *h).collect()
     }
 }
 

@@ -6,8 +6,9 @@ use glam::{Affine3A, Quat, Vec3};
 
 use super::*;
 use crate::geometry::{GBuffer, Occluder};
-use crate::mesh::{Mesh, Raw};
+use crate::mesh::{Mesh, RawMesh};
 use crate::shape::ShapeKind;
+use crate::vectors::direction;
 use crate::view::Projection;
 use relight_core::image::{Extent, Planes, Rgb};
 use relight_core::light::{Panorama, Rotation, basis};
@@ -20,19 +21,19 @@ fn ball() -> (Mesh, Affine3A) {
     (ShapeKind::Sphere.build(0), at)
 }
 
-fn ball_scene() -> Scene {
+fn ball_scene() -> SyntheticScene {
     let (mesh, at) = ball();
     let buffer = GBuffer::render(&mesh, at, Projection::Orthographic, SIZE);
-    Scene::shaded(buffer, Occluder::new(&mesh, at), 16, 3)
+    SyntheticScene::shaded(buffer, Occluder::new(&mesh, at), 16, 3)
 }
 
 /// A square in the plane z = 0, to ±0.7, and a ball of radius 0.2 that floats over its middle.
 const BALL: f32 = 0.2;
 const HEIGHT: f32 = 0.5;
 
-fn floor_scene() -> Scene {
+fn floor_scene() -> SyntheticScene {
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-    let raw = Raw {
+    let raw = RawMesh {
         positions: corners.map(|(x, y)| Vec3::new(x, y, 0.0)).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         texture: Vec::new(),
@@ -41,7 +42,7 @@ fn floor_scene() -> Scene {
     let buffer = GBuffer::render(&plane, Affine3A::IDENTITY, Projection::Orthographic, SIZE);
     let scale = Vec3::splat(BALL);
     let lifted = Affine3A::from_scale_rotation_translation(scale, Quat::IDENTITY, Vec3::Z * HEIGHT);
-    Scene::shaded(
+    SyntheticScene::shaded(
         buffer,
         Occluder::new(&ShapeKind::Sphere.build(0), lifted),
         256,
@@ -49,7 +50,7 @@ fn floor_scene() -> Scene {
     )
 }
 
-fn white(scene: &Scene, gloss: Option<BlinnPhong>) -> Material {
+fn white(scene: &SyntheticScene, gloss: Option<BlinnPhong>) -> Material {
     Material {
         albedo: vec![Vec3::ONE; scene.buffer().len()],
         normals: scene.buffer().normals().to_vec(),
@@ -57,8 +58,8 @@ fn white(scene: &Scene, gloss: Option<BlinnPhong>) -> Material {
     }
 }
 
-fn distant(towards: Vec3, rays: u32, half_angle: f32) -> Lamp {
-    Lamp {
+fn distant(towards: Vec3, rays: u32, half_angle: f32) -> SyntheticLamp {
+    SyntheticLamp {
         emitter: Emitter::Distant {
             towards,
             half_angle,
@@ -68,7 +69,7 @@ fn distant(towards: Vec3, rays: u32, half_angle: f32) -> Lamp {
     }
 }
 
-fn only_lamp(lamp: Lamp) -> Lighting {
+fn only_lamp(lamp: SyntheticLamp) -> Lighting {
     Lighting {
         lamps: vec![lamp],
         has_shadows: true,
@@ -77,7 +78,7 @@ fn only_lamp(lamp: Lamp) -> Lighting {
 }
 
 fn lit(
-    scene: &Scene,
+    scene: &SyntheticScene,
     lighting: &Lighting,
     panoramas: &Panoramas,
     gloss: Option<BlinnPhong>,
@@ -167,7 +168,7 @@ fn without_shadows_only_what_faces_away_is_dark() {
 #[test]
 fn a_disc_lights_the_floor_below_it_as_the_integral_says() {
     let (height, radius) = (2.0, 1.5);
-    let lamp = Lamp {
+    let lamp = SyntheticLamp {
         emitter: Emitter::Disc {
             centre: Vec3::Z * height,
             radius,
@@ -271,7 +272,7 @@ fn rays_to_a_panorama_give_what_the_reference_gives() {
     let panorama = speckled();
     let panoramas = Panoramas::new(vec![("speckled".to_owned(), panorama.clone())]);
     let (mesh, at) = ball();
-    let scene = Scene::open(GBuffer::render(&mesh, at, Projection::Orthographic, 32));
+    let scene = SyntheticScene::open(GBuffer::render(&mesh, at, Projection::Orthographic, 32));
     let gloss = BlinnPhong {
         reflectance: Vec3::splat(0.7),
         exponent: 30.0,
@@ -330,7 +331,7 @@ fn smooth_light_is_the_diffuse_layer_of_the_turned_coefficients() {
     let turn = Rotation::about(direction(Vec3::new(0.3, 0.8, -0.2)), 1.3);
     let lighting = around(Method::Smooth, &turn);
     let (mesh, at) = ball();
-    let scene = Scene::open(GBuffer::render(&mesh, at, Projection::Orthographic, SIZE));
+    let scene = SyntheticScene::open(GBuffer::render(&mesh, at, Projection::Orthographic, SIZE));
     let shaded = lit(&scene, &lighting, &panoramas, None);
     let light = speckled().project(Order::TWO).rotated(&turn);
     let truths = scene
@@ -395,7 +396,7 @@ fn bounced_light_comes_only_where_the_sky_is_hidden() {
 #[test]
 fn a_lamp_turns_with_its_light() {
     let turn = Rotation::about(direction(Vec3::Y), 0.9);
-    let lamp = Lamp {
+    let lamp = SyntheticLamp {
         emitter: Emitter::Disc {
             centre: Vec3::new(1.0, 2.0, 2.0),
             radius: 0.5,
@@ -422,7 +423,7 @@ fn a_lamp_turns_with_its_light() {
 fn drawn_lightings_have_light_and_come_back_from_their_json() {
     let panoramas = Panoramas::new(vec![("speckled".to_owned(), speckled())]);
     let (mesh, at) = ball();
-    let scene = Scene::open(GBuffer::render(&mesh, at, Projection::Orthographic, 24));
+    let scene = SyntheticScene::open(GBuffer::render(&mesh, at, Projection::Orthographic, 24));
     let mut random = crate::random::Random::new(2);
     let kinds = [
         LightKind::Mixed,

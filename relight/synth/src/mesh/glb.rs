@@ -11,7 +11,7 @@ use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::Mode;
 use gltf::{Accessor, Gltf, Node, Primitive, Semantic};
 
-use super::Raw;
+use super::raw::RawMesh;
 use crate::SynthError;
 
 /// Deepest nesting of nodes that is followed.
@@ -20,7 +20,7 @@ const DEEPEST: usize = 64;
 const MOST_NODES: usize = 100_000;
 
 /// All triangles of the default scene as one surface.
-pub(super) fn read(path: &Path) -> Result<Raw, SynthError> {
+pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
     let bytes = std::fs::read(path).map_err(SynthError::read(path))?;
     let damaged = |reason: String| SynthError::Mesh {
         path: path.to_owned(),
@@ -30,7 +30,7 @@ pub(super) fn read(path: &Path) -> Result<Raw, SynthError> {
     let buffers = buffers(path, &file)?;
     let mut reader = Reader {
         buffers: &buffers,
-        raw: Raw::default(),
+        raw: RawMesh::default(),
         all_textured: true,
         visited: 0,
     };
@@ -95,7 +95,7 @@ fn linked(path: &Path, uri: &str) -> Result<Vec<u8>, SynthError> {
 
 struct Reader<'a> {
     buffers: &'a [Cow<'a, [u8]>],
-    raw: Raw,
+    raw: RawMesh,
     all_textured: bool,
     visited: usize,
 }

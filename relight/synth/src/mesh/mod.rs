@@ -3,6 +3,7 @@
 
 mod glb;
 mod obj;
+mod raw;
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -10,6 +11,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::SynthError;
+pub(super) use raw::RawMesh;
 
 /// Most triangles that a mesh may have.
 const MOST_TRIANGLES: usize = 20_000_000;
@@ -27,17 +29,9 @@ pub struct Mesh {
     texture: Option<Vec<[Vec2; 3]>>,
 }
 
-/// What a file or a generator gives: positions, triangles by index, and texture coordinates for
-/// each corner where there are any.
-#[derive(Debug, Default)]
-pub(super) struct Raw {
-    pub(super) positions: Vec<Vec3>,
-    pub(super) triangles: Vec<[u32; 3]>,
-    pub(super) texture: Vec<[Vec2; 3]>,
-}
-
 /// Why numbers are no mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeshFault {
     /// No triangle, or none with an area.
     #[error("it has no triangle with an area")]
@@ -87,7 +81,7 @@ impl Mesh {
     /// A mesh of these triangles, moved and scaled into the unit sphere; normals are blended
     /// between faces that meet at less than `crease` radians. Triangles without an area are left
     /// out, vertices at one place are joined.
-    pub(super) fn new(raw: Raw, crease: f32) -> Result<Self, MeshFault> {
+    pub(super) fn new(raw: RawMesh, crease: f32) -> Result<Self, MeshFault> {
         check(&raw)?;
         let mut raw = weld(raw);
         into_unit_sphere(&mut raw.positions);
@@ -125,7 +119,7 @@ impl Mesh {
     }
 }
 
-fn check(raw: &Raw) -> Result<(), MeshFault> {
+fn check(raw: &RawMesh) -> Result<(), MeshFault> {
     if raw.triangles.len() > MOST_TRIANGLES {
         return Err(MeshFault::TooLarge(raw.triangles.len()));
     }
@@ -150,7 +144,7 @@ fn check(raw: &Raw) -> Result<(), MeshFault> {
 
 /// Joins vertices at one place, so that faces know their neighbours, and leaves out those that no
 /// triangle uses.
-fn weld(raw: Raw) -> Raw {
+fn weld(raw: RawMesh) -> RawMesh {
     let mut places: HashMap<[u32; 3], u32> = HashMap::with_capacity(raw.positions.len());
     let mut positions = Vec::with_capacity(raw.positions.len());
     let mut joined = |vertex: u32| {
@@ -167,7 +161,7 @@ fn weld(raw: Raw) -> Raw {
         .iter()
         .map(|corners| corners.map(&mut joined))
         .collect();
-    Raw {
+    RawMesh {
         positions,
         triangles,
         texture: raw.texture,
@@ -197,7 +191,7 @@ fn into_unit_sphere(positions: &mut [Vec3]) {
     }
 }
 
-fn drop_flat(raw: &mut Raw) {
+fn drop_flat(raw: &mut RawMesh) {
     let has_area: Vec<bool> = raw
         .triangles
         .iter()
@@ -299,8 +293,8 @@ mod tests {
     use super::*;
 
     /// A cube of two triangles a side, each with its own vertices.
-    fn cube() -> Raw {
-        let mut raw = Raw::default();
+    fn cube() -> RawMesh {
+        let mut raw = RawMesh::default();
         for axis in 0..3 {
             for sign in [-1.0, 1.0] {
                 let corner = |u: f32, v: f32| {
@@ -362,7 +356,7 @@ mod tests {
             position.y = 1.0;
         }
         assert_eq!(Mesh::new(raw, CREASE).unwrap_err(), MeshFault::Empty);
-        let empty = Mesh::new(Raw::default(), CREASE);
+        let empty = Mesh::new(RawMesh::default(), CREASE);
         assert_eq!(empty.unwrap_err(), MeshFault::Empty);
     }
 

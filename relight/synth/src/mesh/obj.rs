@@ -6,11 +6,11 @@ use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
-use super::Raw;
+use super::raw::RawMesh;
 use crate::SynthError;
 
 /// All models of the file as one surface. Materials are not read.
-pub(super) fn read(path: &Path) -> Result<Raw, SynthError> {
+pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
     let file = File::open(path).map_err(SynthError::read(path))?;
     let options = tobj::LoadOptions {
         triangulate: true,
@@ -24,7 +24,7 @@ pub(super) fn read(path: &Path) -> Result<Raw, SynthError> {
             path: path.to_owned(),
             reason: fault.to_string(),
         })?;
-    let mut raw = Raw::default();
+    let mut raw = RawMesh::default();
     let mut all_textured = true;
     for model in &models {
         all_textured &= append(&mut raw, &model.mesh);
@@ -36,7 +36,7 @@ pub(super) fn read(path: &Path) -> Result<Raw, SynthError> {
 }
 
 /// Adds a model; whether it has texture coordinates for all corners.
-fn append(raw: &mut Raw, mesh: &tobj::Mesh) -> bool {
+fn append(raw: &mut RawMesh, mesh: &tobj::Mesh) -> bool {
     let first = raw.positions.len() as u32;
     let places = mesh.positions.chunks_exact(3);
     raw.positions

@@ -2,7 +2,7 @@
 
 use glam::{Mat3, Vec3};
 
-use super::super::mesh::Raw;
+use super::super::mesh::RawMesh;
 use super::super::noise::Noise;
 use super::super::random::Random;
 use super::surface;
@@ -57,7 +57,7 @@ struct Blend {
 }
 
 /// The surface of a random blend.
-pub(super) fn draw(random: &mut Random) -> Raw {
+pub(super) fn draw(random: &mut Random) -> RawMesh {
     let blend = Blend::draw(random);
     surface::surface_of(|point| blend.distance(point))
 }

@@ -2,13 +2,13 @@
 
 use glam::{Mat3, Vec3};
 
-use super::super::mesh::Raw;
+use super::super::mesh::RawMesh;
 use super::super::random::Random;
 use super::surface::add_quad;
 
 /// A random arrangement.
-pub(super) fn draw(random: &mut Random) -> Raw {
-    let mut raw = Raw::default();
+pub(super) fn draw(random: &mut Random) -> RawMesh {
+    let mut raw = RawMesh::default();
     if random.chance(0.55) {
         open(&mut raw, random);
     } else {
@@ -26,7 +26,7 @@ pub(super) fn draw(random: &mut Random) -> Raw {
 }
 
 /// Four walls and a floor.
-fn open(raw: &mut Raw, random: &mut Random) {
+fn open(raw: &mut RawMesh, random: &mut Random) {
     let side = Vec3::from_array([(); 3].map(|()| random.uniform(0.4..1.0)));
     let wall = random.uniform(0.02..0.08) / 2.0;
     let mut add = |centre, half| add_box(raw, centre, half, Mat3::IDENTITY);
@@ -46,7 +46,7 @@ fn open(raw: &mut Raw, random: &mut Random) {
     );
 }
 
-fn add_box(raw: &mut Raw, centre: Vec3, half: Vec3, turn: Mat3) {
+fn add_box(raw: &mut RawMesh, centre: Vec3, half: Vec3, turn: Mat3) {
     for axis in 0..3 {
         for sign in [-1.0, 1.0] {
             let first = raw.positions.len() as u32;

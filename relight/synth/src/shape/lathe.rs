@@ -5,7 +5,7 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3};
 
-use super::super::mesh::Raw;
+use super::super::mesh::RawMesh;
 use super::super::random::Random;
 use super::surface::add_grid;
 
@@ -15,7 +15,7 @@ const AROUND: u32 = 96;
 const FINE: usize = 40;
 
 /// A random body.
-pub(super) fn draw(random: &mut Random) -> Raw {
+pub(super) fn draw(random: &mut Random) -> RawMesh {
     let outer = outline(random);
     let widest = outer.iter().map(|p| p.x).fold(0.0, f32::max);
     let is_hollow = random.chance(0.55);
@@ -24,7 +24,7 @@ pub(super) fn draw(random: &mut Random) -> Raw {
     } else {
         closed(&outer)
     };
-    let mut raw = Raw::default();
+    let mut raw = RawMesh::default();
     turn(&mut raw, &profile);
     if random.chance(0.4) {
         let middle = outer[outer.len() / 2].x;
@@ -88,7 +88,7 @@ fn hollow(outer: &[Vec2], wall: f32) -> Vec<Vec2> {
     [&bottom[..], outer, &inside, &[Vec2::new(0.0, floor)]].concat()
 }
 
-fn turn(raw: &mut Raw, profile: &[Vec2]) {
+fn turn(raw: &mut RawMesh, profile: &[Vec2]) {
     let rows = profile.len() as u32 - 1;
     add_grid(raw, AROUND, rows, |u, v| {
         let row = ((v + 1.0) / 2.0 * rows as f32).round() as usize;
@@ -100,7 +100,7 @@ fn turn(raw: &mut Raw, profile: &[Vec2]) {
 }
 
 /// A ring that stands upright at the side.
-fn handle(raw: &mut Raw, random: &mut Random, radius: f32) {
+fn handle(raw: &mut RawMesh, random: &mut Random, radius: f32) {
     let (major, minor) = (random.uniform(0.25..0.5), random.uniform(0.05..0.1));
     let height = random.uniform(-0.3..0.3);
     add_grid(raw, 48, 24, |u, v| {

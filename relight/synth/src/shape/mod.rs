@@ -9,12 +9,13 @@ mod surface;
 
 use serde::{Deserialize, Serialize};
 
-use super::mesh::{CREASE, Mesh, Raw};
+use super::mesh::{CREASE, Mesh, RawMesh};
 use super::random::Random;
 
 /// A kind of procedural object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum ShapeKind {
     /// One to nine rounded primitives, blended into one another, with bumps, twists, shells, cuts.
     Blend,
@@ -70,7 +71,7 @@ impl ShapeKind {
         }
     }
 
-    fn draw(self, random: &mut Random) -> (Raw, f32) {
+    fn draw(self, random: &mut Random) -> (RawMesh, f32) {
         match self {
             Self::Blend => (blend::draw(random), CREASE),
             Self::Lathe => (lathe::draw(random), 0.8),
@@ -83,9 +84,9 @@ impl ShapeKind {
 }
 
 /// A ball of 32 768 facets: a cube whose faces are grids, blown up.
-fn sphere() -> Raw {
+fn sphere() -> RawMesh {
     const CELLS: u32 = 52;
-    let mut raw = Raw::default();
+    let mut raw = RawMesh::default();
     for axis in 0..3 {
         for sign in [-1.0, 1.0] {
             // Even angles rather than even lengths; exactly 1 at the seams.

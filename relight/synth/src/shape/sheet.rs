@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::super::mesh::Raw;
+use super::super::mesh::RawMesh;
 use super::super::noise::Noise;
 use super::super::random::Random;
 use super::surface::add_grid;
@@ -11,7 +11,7 @@ use super::surface::add_grid;
 const CELLS: u32 = 110;
 
 /// A random sheet that faces +z.
-pub(super) fn draw(random: &mut Random) -> Raw {
+pub(super) fn draw(random: &mut Random) -> RawMesh {
     let narrowness = random.uniform(0.6..1.0);
     let folds = if random.chance(0.5) {
         folds(random)
@@ -19,7 +19,7 @@ pub(super) fn draw(random: &mut Random) -> Raw {
         Vec::new()
     };
     let waves = waves(random, folds.is_empty());
-    let mut raw = Raw::default();
+    let mut raw = RawMesh::default();
     add_grid(&mut raw, CELLS, CELLS, |x, y| {
         let at = Vec2::new(x, y * narrowness);
         let folded: f32 = folds.iter().map(|fold| fold.height(at)).sum();
@@ -31,8 +31,8 @@ pub(super) fn draw(random: &mut Random) -> Raw {
 }
 
 /// A flat square that faces +z.
-pub(super) fn flat() -> Raw {
-    let mut raw = Raw::default();
+pub(super) fn flat() -> RawMesh {
+    let mut raw = RawMesh::default();
     add_grid(&mut raw, 1, 1, |x, y| Vec3::new(x, y, 0.0));
     raw
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::super::mesh::Raw;
+use super::super::mesh::RawMesh;
 
 /// Samples along each side of the field's cube.
 const SIDE: usize = 80;
@@ -17,7 +17,12 @@ const STEEPEST: f32 = 2.0;
 
 /// Adds a grid of `columns` x `rows` cells, of which `place` gives the points for u and v in -1..=1;
 /// the side is outside from which u runs right and v up.
-pub(super) fn add_grid(raw: &mut Raw, columns: u32, rows: u32, place: impl Fn(f32, f32) -> Vec3) {
+pub(super) fn add_grid(
+    raw: &mut RawMesh,
+    columns: u32,
+    rows: u32,
+    place: impl Fn(f32, f32) -> Vec3,
+) {
     let first = raw.positions.len() as u32;
     // Exactly opposite at opposite ends, so that seams meet.
     let part = |k: u32, of: u32| (2.0 * k as f32 - of as f32) / of as f32;
@@ -40,14 +45,14 @@ pub(super) fn add_grid(raw: &mut Raw, columns: u32, rows: u32, place: impl Fn(f3
 }
 
 /// Two triangles for four corners, counter-clockwise as seen from outside.
-pub(super) fn add_quad(raw: &mut Raw, [a, b, c, d]: [u32; 4]) {
+pub(super) fn add_quad(raw: &mut RawMesh, [a, b, c, d]: [u32; 4]) {
     raw.triangles.push([a, b, c]);
     raw.triangles.push([a, c, d]);
 }
 
 /// The surface where `distance` is 0 in the cube from -1.25 to 1.25; negative is inside. At the cube's
 /// border everything is outside. Only the largest connected part is kept.
-pub(super) fn surface_of(distance: impl Fn(Vec3) -> f32) -> Raw {
+pub(super) fn surface_of(distance: impl Fn(Vec3) -> f32) -> RawMesh {
     let field = Field::sample(distance);
     largest_part(field.net())
 }
@@ -98,8 +103,8 @@ impl Field {
     }
 
     /// One vertex a cell that the surface passes through, one quad an edge that it cuts.
-    fn net(&self) -> Raw {
-        let mut raw = Raw::default();
+    fn net(&self) -> RawMesh {
+        let mut raw = RawMesh::default();
         let mut vertices = vec![u32::MAX; self.values.len()];
         for z in 0..SIDE - 1 {
             for y in 0..SIDE - 1 {
@@ -153,7 +158,7 @@ impl Field {
     }
 
     /// The quad around the edge that starts at `index` along `axis`, where the surface cuts it.
-    fn quad(&self, index: [usize; 3], axis: usize, vertices: &[u32], raw: &mut Raw) {
+    fn quad(&self, index: [usize; 3], axis: usize, vertices: &[u32], raw: &mut RawMesh) {
         let mut end = index;
         end[axis] += 1;
         let (starts_inside, ends_inside) = (self.at(index) < 0.0, self.at(end) < 0.0);
@@ -179,7 +184,7 @@ impl Field {
 }
 
 /// What hangs together and has the most triangles.
-fn largest_part(raw: Raw) -> Raw {
+fn largest_part(raw: RawMesh) -> RawMesh {
     let mut parents: Vec<u32> = (0..raw.positions.len() as u32).collect();
     for corners in &raw.triangles {
         let [a, b, c] = corners.map(|vertex| root(&mut parents, vertex));
@@ -205,7 +210,7 @@ fn largest_part(raw: Raw) -> Raw {
         .filter(|(_, part)| Some(**part) == largest)
         .map(|(corners, _)| *corners)
         .collect();
-    Raw { triangles, ..raw }
+    RawMesh { triangles, ..raw }
 }
 
 fn root(parents: &mut [u32], mut vertex: u32) -> u32 {

@@ -1,10 +1,11 @@
 //! The page of a turn.
 
 use image::imageops::{FilterType, resize};
+use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::report::{self, Page, THUMBNAIL_SIDE, Thumbnail};
 use relit_data::shard::{FrameRecord, Sample};
 
-use super::{GATE, SATURATION_LEVEL, Turn};
+use super::simulated::SimulatedTurn;
 use crate::SynthError;
 
 /// Thumbnails on a page.
@@ -37,7 +38,7 @@ impl TurnPage {
         self.thumbnails.push(Thumbnail { index, image });
     }
 
-    pub(super) fn render(&self, turn: &Turn<'_>) -> Result<String, SynthError> {
+    pub(super) fn render(&self, turn: &SimulatedTurn<'_>) -> Result<String, SynthError> {
         let pair = |name: &str, value: String| (name.to_owned(), value);
         let description = &turn.description;
         let facts = [
@@ -62,7 +63,7 @@ impl TurnPage {
             facts: &facts,
             warnings: &[],
             quality: None,
-            gate: GATE,
+            gate: SPEC_NET_GATE,
             saturation_level: SATURATION_LEVEL,
         })?)
     }

@@ -6,11 +6,13 @@ use std::io::BufReader;
 
 use image::RgbImage;
 use rayon::ThreadPoolBuilder;
-use relit_data::shard::{ShardReader, decode_rgb, verify};
+use relit_data::shard::{FrameRecord, ShardReader, decode_rgb, verify};
 
 use super::*;
+use crate::camera::CameraModel;
 use crate::library::Folders;
 use crate::lighting::LightKind;
+use crate::recipe::Recipe;
 use crate::write_samples;
 
 fn turns(seed: u64) -> TurnRecipe {

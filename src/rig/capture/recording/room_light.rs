@@ -2,6 +2,7 @@
 
 use image::RgbImage;
 use relit_data::geometry::Rect;
+use relit_data::image_stats::SATURATION_LEVEL;
 use relit_data::srgb::to_linear;
 use relit_data::turn_light::modulation;
 use relit_video::{LiveDecoder, PixelFormat, StreamFormat, is_key};
@@ -12,8 +13,6 @@ const BLOCKS: u32 = 12;
 const MOST_FRAMES: usize = 64;
 /// From one frame that is looked at to the next, at first.
 const FIRST_STEP: usize = 8;
-/// A value from which a channel is taken for clipped.
-const CLIPPED: u8 = 250;
 
 /// Looks at a frame now and then, about evenly spread over the turn.
 pub(super) struct RoomLight {
@@ -83,7 +82,7 @@ impl RoomLight {
             let light = pixel.0.map(|value| self.linear[usize::from(value)]);
             *sum += light.iter().sum::<f64>() / 3.0;
             *count += 1;
-            *clips |= pixel.0.iter().any(|&value| value >= CLIPPED);
+            *clips |= pixel.0.iter().any(|&value| value >= SATURATION_LEVEL);
         }
         let mean = |(sum, count, clips): (f64, u32, bool)| {
             (count > 0 && !clips).then(|| sum / f64::from(count))

@@ -1,0 +1,12 @@
+//! Triangles as files and generators give them.
+
+use glam::{Vec2, Vec3};
+
+/// What a file or a generator gives: positions, triangles by index, and texture coordinates for
+/// each corner where there are any.
+#[derive(Debug, Default)]
+pub(crate) struct RawMesh {
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) texture: Vec<[Vec2; 3]>,
+}

@@ -1,0 +1,67 @@
+//! What turns are made of, and what is true of their frames, as it stands in files.
+
+use serde::{Deserialize, Serialize};
+
+use crate::camera::CameraModel;
+use crate::finish::Finish;
+use crate::lighting::Lighting;
+use crate::object::ObjectSource;
+use crate::recipe::Recipe;
+use crate::sample::Whites;
+use crate::view::{Pose, Projection};
+
+/// How turns are made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TurnRecipe {
+    /// Seed, size, light and shadows; its camera is sRGB without noise or compression.
+    pub recipe: Recipe,
+    /// Frames a turn, 1..=1 000 000.
+    pub frames: u32,
+}
+
+/// What a turn is made of, as it stands in `turn.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct TurnDescription {
+    /// `relight.turn/1`.
+    pub schema: String,
+    /// What it was drawn from: the recipe's seed and the turn's number.
+    pub seed: u64,
+    /// The turn's number.
+    pub number: u64,
+    /// The object.
+    pub object: ObjectSource,
+    /// How it stands.
+    pub pose: Pose,
+    /// How it is seen.
+    pub projection: Projection,
+    /// The table's axis in the viewer's frame, upwards. At the table's angle `a`, the light has turned by
+    /// `-a` about it (right-hand rule).
+    pub axis: [f64; 3],
+    /// What it is made of.
+    pub finish: Finish,
+    /// The name of the panorama that the lighting has.
+    pub panorama: Option<String>,
+    /// The light at the angle 0.
+    pub lighting: Lighting,
+    /// The camera.
+    pub camera: CameraModel,
+    /// Frames.
+    pub frames: u32,
+    /// Width and height.
+    pub size: u32,
+}
+
+/// The ground truth of one frame, a line of `frames.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct FrameTruth {
+    /// The sample's index.
+    pub index: u32,
+    /// The table's angle, degrees.
+    pub angle_deg: f64,
+    /// What 65535 stands for in the frame's `shading` and `highlight`.
+    pub white: Whites,
+    /// All light but what bounces, as nine coefficients in the viewer's frame, with the camera's gain.
+    pub coefficients: [[f64; 3]; 9],
+}

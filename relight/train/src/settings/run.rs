@@ -1,0 +1,205 @@
+//! How long and how fast a network learns.
+
+use serde::{Deserialize, Serialize};
+
+use super::allowed::all_allowed;
+use crate::adam::AdamSettings;
+use crate::error::TrainError;
+use crate::model::ComputePrecision;
+
+// Nobody trains more: these keep a slip of the pen from filling the memory.
+const MOST_STEPS: u64 = 1_000_000_000;
+const LARGEST_BATCH: u64 = 4096;
+const MOST_MINUTES: f64 = 1e6;
+
+/// How long and how fast a network learns: the table `[run]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RunSettings {
+    /// Of the initial weights and of all draws.
+    pub seed: u64,
+    /// Steps in all, at least 1.
+    pub steps: u64,
+    /// Samples of a step, at least 1.
+    pub batch: u64,
+    /// The largest learning rate, above 0.
+    pub learning_rate: f64,
+    /// Steps over which the learning rate grows to it.
+    pub warmup_steps: u64,
+    /// The learning rate at the end, as a part of the largest; it falls along a cosine. 1: it does not fall.
+    pub min_lr_ratio: f64,
+    /// Gradients with a larger norm are scaled down to it.
+    pub max_grad_norm: f64,
+    /// Part of the first moment that Adam keeps.
+    pub beta1: f64,
+    /// Part of the second moment that Adam keeps.
+    pub beta2: f64,
+    /// Part of the parameters that is taken off at each step, times the learning rate.
+    pub weight_decay: f64,
+    /// Part of the exponential moving average of the weights that is kept at each step.
+    pub ema_decay: f64,
+    /// In which precision layers are computed.
+    pub precision: PrecisionChoice,
+    /// Steps from one line of losses to the next.
+    pub log_every: u64,
+    /// Steps from one validation, with its pictures, to the next.
+    pub validate_every: u64,
+    /// Minutes from one checkpoint to the next.
+    pub checkpoint_minutes: f64,
+}
+
+/// In which precision layers are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PrecisionChoice {
+    /// 32 bits.
+    Single,
+    /// bfloat16.
+    Mixed,
+    /// 64 bits, several times slower: to compare runs. Checkpoints keep 32 of them.
+    Double,
+    /// Of `decompose` the faster of single and mixed, by a short measurement when the run begins; a resumed run keeps it.
+    /// The paper's networks are small: single.
+    Fastest,
+}
+
+impl PrecisionChoice {
+    /// The precision that it names; none where it is to be found out.
+    #[must_use]
+    pub fn named(self) -> Option<ComputePrecision> {
+        match self {
+            Self::Single => Some(ComputePrecision::Single),
+            Self::Mixed => Some(ComputePrecision::Mixed),
+            Self::Double => Some(ComputePrecision::Double),
+            Self::Fastest => None,
+        }
+    }
+}
+
+impl Default for RunSettings {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            steps: 5000,
+            batch: 32,
+            learning_rate: 1e-3,
+            warmup_steps: 100,
+            min_lr_ratio: 0.02,
+            max_grad_norm: 1.0,
+            beta1: 0.9,
+            beta2: 0.99,
+            weight_decay: 1e-3,
+            ema_decay: 0.998,
+            precision: PrecisionChoice::Fastest,
+            log_every: 20,
+            validate_every: 250,
+            checkpoint_minutes: 5.0,
+        }
+    }
+}
+
+impl RunSettings {
+    /// Whether all numbers are in range.
+    ///
+    /// # Errors
+    /// [`TrainError::Setting`] names the first that is not.
+    pub fn check(&self) -> Result<(), TrainError> {
+        let part = |value: f64| (0.0..1.0).contains(&value);
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        all_allowed([
+            (
+                "run.steps",
+                (1..=MOST_STEPS).contains(&self.steps),
+                self.steps.to_string(),
+                "from 1 to a thousand million",
+            ),
+            (
+                "run.batch",
+                (1..=LARGEST_BATCH).contains(&self.batch),
+                self.batch.to_string(),
+                "from 1 to 4096",
+            ),
+            (
+                "run.learning_rate",
+                positive(self.learning_rate),
+                self.learning_rate.to_string(),
+                "above 0",
+            ),
+            (
+                "run.min_lr_ratio",
+                (0.0..=1.0).contains(&self.min_lr_ratio),
+                self.min_lr_ratio.to_string(),
+                "from 0 to 1",
+            ),
+            (
+                "run.max_grad_norm",
+                positive(self.max_grad_norm),
+                self.max_grad_norm.to_string(),
+                "above 0",
+            ),
+            (
+                "run.beta1",
+                part(self.beta1),
+                self.beta1.to_string(),
+                "from 0 to below 1",
+            ),
+            (
+                "run.beta2",
+                part(self.beta2),
+                self.beta2.to_string(),
+                "from 0 to below 1",
+            ),
+            (
+                "run.weight_decay",
+                (0.0..1.0).contains(&self.weight_decay),
+                self.weight_decay.to_string(),
+                "from 0 to below 1",
+            ),
+            (
+                "run.ema_decay",
+                part(self.ema_decay),
+                self.ema_decay.to_string(),
+                "from 0 to below 1",
+            ),
+            (
+                "run.log_every",
+                self.log_every > 0,
+                self.log_every.to_string(),
+                "at least 1",
+            ),
+            (
+                "run.validate_every",
+                self.validate_every > 0,
+                self.validate_every.to_string(),
+                "at least 1",
+            ),
+            (
+                "run.checkpoint_minutes",
+                positive(self.checkpoint_minutes) && self.checkpoint_minutes <= MOST_MINUTES,
+                self.checkpoint_minutes.to_string(),
+                "above 0 and at most a million",
+            ),
+        ])
+    }
+
+    /// The learning rate of a step, from 0: it grows evenly at first, and falls along a cosine.
+    #[must_use]
+    pub fn learning_rate_at(&self, step: u64) -> f64 {
+        let warm = (step + 1) as f64 / self.warmup_steps.max(1) as f64;
+        let part = step as f64 / self.steps as f64;
+        let cosine = 0.5 + 0.5 * (std::f64::consts::PI * part).cos();
+        self.learning_rate
+            * warm.min(1.0)
+            * (self.min_lr_ratio + (1.0 - self.min_lr_ratio) * cosine)
+    }
+
+    /// The optimiser's settings.
+    #[must_use]
+    pub fn adam(&self) -> AdamSettings {
+        AdamSettings {
+            beta1: self.beta1,
+            beta2: self.beta2,
+            weight_decay: self.weight_decay,
+        }
+    }
+}
