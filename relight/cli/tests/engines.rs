@@ -139,8 +139,8 @@ fn what_is_no_network_is_told_by_the_library_too() {
     let bytes = to_onnx(&graph, &Weights::initial(&graph, 1), 1, (SIDE, SIDE)).unwrap();
     fs::write(&path, bytes).unwrap();
     let net = Inference::read_onnx(&path, 3, (SIDE, SIDE), &engine);
-    let told = net.and_then(|net| net.run(&vec![0.0; 3 * SIDE * SIDE]));
-    assert!(told.is_err());
+    let answered = net.and_then(|net| net.run(&vec![0.0; 3 * SIDE * SIDE]));
+    assert!(answered.is_err());
 }
 
 #[test]

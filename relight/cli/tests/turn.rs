@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Linear, Planes, Rgb, Transfer};
 use relight_core::light::NormalsFrame;
 use relight_core::light::{Normals, Order, ShLight, YUp};
@@ -183,7 +183,7 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
             .iter()
             .any(|plane| plane.iter().any(|&v| v > 0.2))
     );
-    let asset = Asset::read(&object).unwrap();
+    let asset = CapturedObject::read(&object).unwrap();
     assert!(!asset.surface().normals().is_empty());
     assert_eq!(
         TruthSet::open(&labels, TruthLayout::Synth)

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use relight_core::asset::AssetError;
+use relight_core::captured_object::CapturedObjectError;
 use relight_core::files::{FolderFault, MovieError};
 use relight_core::image::{Extent, ImageError};
 use relight_core::light::{LightError, LightFileError, PanoramaError};
@@ -86,7 +86,7 @@ pub enum TurnError {
     Image(#[from] ImageError),
     /// The object cannot be made a file.
     #[error("the object cannot be written as a file that can be lit")]
-    Asset(#[source] Box<AssetError>),
+    Asset(#[source] Box<CapturedObjectError>),
     /// Metal has no diffuse part that a network could learn from.
     #[error(
         "the object is taken for metal, which has no albedo and shading apart: there are no labels of it"
@@ -216,8 +216,8 @@ impl TurnError {
     }
 }
 
-impl From<AssetError> for TurnError {
-    fn from(error: AssetError) -> Self {
+impl From<CapturedObjectError> for TurnError {
+    fn from(error: CapturedObjectError) -> Self {
         Self::Asset(Box::new(error))
     }
 }

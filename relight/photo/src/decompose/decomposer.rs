@@ -4,11 +4,11 @@ use std::path::Path;
 
 use super::answer::{Engine, Fields, MapsNet, Scales, Whole, details, to_maps};
 use super::compose::{ComposedLayers, normalised, possible_highlight};
+use super::crop::{CropSquare, Window, cut_out, enlarged, inside};
 use super::encoding::AnsweredMaps;
 use super::error::DecomposeError;
 use super::gloss::{FittedGloss, fit_gloss};
 use super::other::OtherNormals;
-use super::region::{Region, Window, cut_out, enlarged, inside};
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::NormalsFrame;
 use relight_core::light::{LightError, Normals, ShLight, YUp};
@@ -101,7 +101,7 @@ pub struct Decomposition {
     /// The gloss of the whole object, where a highlight was separated and the light explains it.
     pub gloss: Option<FittedGloss>,
     /// The square of the picture that the network saw.
-    pub region: Region,
+    pub region: CropSquare,
     /// Whether highlights were separated.
     pub is_glossy: bool,
     /// The part of the object's pixels that are saturated.
@@ -257,11 +257,11 @@ impl Decomposer {
             &part,
             options.mirror,
         )?;
-        let explained = self.explain(&whole, is_glossy)?;
+        let fitted = self.fit(&whole, is_glossy)?;
         let mut maps = self.maps(&whole, &object, options)?;
         if self.normals.is_some() {
             let known = inside(&whole.mask);
-            let vectors = enlarged(explained.normals.planes(), &known, &part);
+            let vectors = enlarged(fitted.normals.planes(), &known, &part);
             maps.normals = Normals::new(cut_out(vectors, &object.mask));
         }
         let layers = ComposedLayers::new(object.picture, &object.inside, maps, is_glossy);
@@ -272,13 +272,13 @@ impl Decomposer {
             shading: window.put_back(layers.shading, extent),
             diffuse: Rgb::new(window.put_back(layers.diffuse, extent)),
             highlight: window.put_back(layers.highlight, extent),
-            light: explained.light,
-            gloss: explained.gloss,
+            light: fitted.light,
+            gloss: fitted.gloss,
             region,
             is_glossy,
             saturated_fraction,
             residual: layers.residual,
-            light_residual: explained.light_residual,
+            light_residual: fitted.light_residual,
         })
     }
 
@@ -302,7 +302,7 @@ impl Decomposer {
     }
 
     /// Fits light and gloss to the maps at the network's size.
-    fn explain(&self, whole: &Whole, is_glossy: bool) -> Result<Explained, DecomposeError> {
+    fn fit(&self, whole: &Whole, is_glossy: bool) -> Result<FittedLight, DecomposeError> {
         let known = inside(&whole.mask);
         let maps = to_maps(whole.fields.clone(), &known)?;
         let others = match &self.normals {
@@ -320,7 +320,7 @@ impl Decomposer {
         } else {
             None
         };
-        Ok(Explained {
+        Ok(FittedLight {
             light_residual: relative_difference(lit.planes().plane(0), shading.plane(0)),
             normals,
             light,
@@ -356,7 +356,7 @@ fn is_too_one_sided(light: &ShLight) -> bool {
 /// An object cut out of its photograph.
 struct CutObject {
     /// The square that the network sees.
-    region: Region,
+    region: CropSquare,
     /// Where in the photograph these pixels are.
     window: Window,
     /// Light, 0 outside the mask.
@@ -373,7 +373,7 @@ impl CutObject {
         mask: &Planes<1>,
         size: WorkingSize,
     ) -> Result<Self, DecomposeError> {
-        let region = Region::around(mask).ok_or(DecomposeError::EmptyMask)?;
+        let region = CropSquare::around(mask).ok_or(DecomposeError::EmptyMask)?;
         let window = match size {
             WorkingSize::Network => Window::around(mask).ok_or(DecomposeError::EmptyMask)?,
             // Tiles cover a square.
@@ -410,13 +410,17 @@ impl CutObject {
 /// Whether there is memory for the layers of so many pixels.
 pub(super) fn check_size(what: &'static str, extent: Extent) -> Result<(), DecomposeError> {
     if extent.width.saturating_mul(extent.height) > MOST_PIXELS {
-        return Err(DecomposeError::TooLarge { what, extent });
+        return Err(DecomposeError::TooLarge {
+            what,
+            extent,
+            most: MOST_PIXELS,
+        });
     }
     Ok(())
 }
 
 /// Normals, light and gloss at the network's size.
-struct Explained {
+struct FittedLight {
     normals: Normals<YUp>,
     light: ShLight,
     light_residual: f64,

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf, absolute};
 
-use relight_core::asset::{Asset, AssetError};
+use relight_core::captured_object::{CapturedObject, CapturedObjectError};
 use relight_core::files::{MovieError, MovieWriter};
 
 use crate::error::TurnError;
@@ -54,7 +54,7 @@ pub enum DestinationError {
     },
     /// The object's file cannot be written.
     #[error(transparent)]
-    Asset(#[from] AssetError),
+    Asset(#[from] CapturedObjectError),
     /// The video cannot be written.
     #[error(transparent)]
     Movie(#[from] MovieError),
@@ -110,7 +110,7 @@ impl<'a> Destinations<'a> {
         if inner.starts_with(output) {
             return refuse("in the folder of the results the object is called object.relit");
         }
-        Asset::check(path)?;
+        CapturedObject::check(path)?;
         Ok(AssetDestination::Beside(path))
     }
 }

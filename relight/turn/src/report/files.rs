@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::files::{ResultFolder, write_png};
 use relight_core::image::{Depth, Extent};
 use relight_photo::files::{bright, write_light};
@@ -66,7 +66,7 @@ pub struct TurnFiles<'a> {
     /// The panorama strip, where the video was read.
     pub strip: Option<&'a PanoramaStrip>,
     /// The object, where it is to be among the files, as `object.relit`.
-    pub asset: Option<&'a Asset>,
+    pub asset: Option<&'a CapturedObject>,
     /// Whether to write the video.
     pub has_movie: bool,
 }

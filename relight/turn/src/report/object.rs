@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Planes, Rgb, beside};
 use relight_core::light::{Direction, Normals, Rotation, ShLight};
 use relight_core::render::{Gloss, Surface};
@@ -136,7 +136,7 @@ impl TurnSolution {
     ///
     /// # Errors
     /// Where the maps are too large for a file.
-    pub fn asset(&self, turn: &ReadTurn) -> Result<Asset, TurnError> {
+    pub fn asset(&self, turn: &ReadTurn) -> Result<CapturedObject, TurnError> {
         let curves = &turn.curves;
         let extent = curves.extent();
         let mask = curves.mask();
@@ -158,7 +158,12 @@ impl TurnSolution {
         let gloss = surface.gloss().cloned();
         let surface = Surface::new(Normals::new(normals), Rgb::new(albedo), gloss)?;
         let confidence = self.confidence(curves);
-        Ok(Asset::new(turn.name.clone(), surface, alpha, confidence)?)
+        Ok(CapturedObject::new(
+            turn.name.clone(),
+            surface,
+            alpha,
+            confidence,
+        )?)
     }
 }
 

@@ -11,11 +11,12 @@ use relight_turn::{
     TurnFigures, TurnFiles, TurnLabels, TurnMaps, TurnSolution, TurnWarning, film, read_curves,
     solve_turn,
 };
+use relit_console::{Console, Outcome};
 use serde_json::json;
 
 pub(crate) use self::arguments::{Arguments, EXAMPLES};
 use self::warnings::{warn, warn_of};
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let start = Instant::now();

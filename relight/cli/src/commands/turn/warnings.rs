@@ -1,13 +1,12 @@
 //! Warnings with the options that mend them.
 
 use relight_turn::TurnWarning;
-use serde_json::json;
+use relit_console::Console;
 
 use super::arguments::Arguments;
-use crate::console::Console;
 
 pub(super) fn warn(text: &str, console: Console) {
-    console.warn(text, &json!({ "event": "warning", "message": text }));
+    console.warn(text);
 }
 
 /// Says warnings, each with what to give instead.

@@ -1,14 +1,14 @@
-//! Why an asset cannot be read or written.
+//! Why a captured object cannot be read or written.
 
 use std::io;
 use std::path::PathBuf;
 
 use crate::image::{Extent, ImageError};
 
-/// Why an asset cannot be read or written.
+/// Why a captured object cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum AssetError {
+pub enum CapturedObjectError {
     /// The file cannot be read.
     #[error("{} cannot be read", path.display())]
     Read {
@@ -17,7 +17,7 @@ pub enum AssetError {
         /// What the system answers.
         source: io::Error,
     },
-    /// The file is no asset.
+    /// The file is no captured object.
     #[error("{} is no object that relight can light", path.display())]
     File {
         /// The file.
@@ -71,7 +71,7 @@ pub enum AssetError {
     },
 }
 
-impl AssetError {
+impl CapturedObjectError {
     /// For a closure that knows why an entry is of no use.
     pub(super) fn entry<E: ToString>(entry: &'static str) -> impl Fn(E) -> Self {
         move |reason| Self::Entry {

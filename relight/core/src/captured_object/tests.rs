@@ -6,12 +6,13 @@ use relit_data::causes::with_causes;
 use zip::write::SimpleFileOptions;
 use zip::{ZipArchive, ZipWriter};
 
+use super::manifest::MANIFEST;
 use super::*;
-use crate::image::Rgb;
+use crate::image::{Extent, Planes, Rgb};
 use crate::light::Normals;
-use crate::render::Gloss;
+use crate::render::{Gloss, Surface};
 
-fn ball(gloss: bool) -> Asset {
+fn ball(gloss: bool) -> CapturedObject {
     let normals = Normals::sphere(12);
     let extent = normals.extent();
     let albedo = Planes::from_fn(extent, |x, y| [0.1 * x as f32, 0.05 * y as f32, 1.7]);
@@ -19,12 +20,12 @@ fn ball(gloss: bool) -> Asset {
     let surface = Surface::new(normals, Rgb::new(albedo), gloss).unwrap();
     let alpha = Planes::from_fn(extent, |x, _| [x as f32 / 11.0]);
     let confidence = Planes::from_fn(extent, |_, y| [y as f32 / 11.0]);
-    Asset::new("a ball", surface, alpha, confidence).unwrap()
+    CapturedObject::new("a ball", surface, alpha, confidence).unwrap()
 }
 
 /// The archive with one entry replaced, or left out.
-fn changed(asset: &Asset, name: &str, content: Option<&[u8]>) -> Vec<u8> {
-    let bytes = asset.to_bytes().unwrap();
+fn changed(object: &CapturedObject, name: &str, content: Option<&[u8]>) -> Vec<u8> {
+    let bytes = object.to_bytes().unwrap();
     let mut old = ZipArchive::new(Cursor::new(bytes)).unwrap();
     let mut new = ZipWriter::new(Cursor::new(Vec::new()));
     for at in 0..old.len() {
@@ -48,7 +49,7 @@ fn changed(asset: &Asset, name: &str, content: Option<&[u8]>) -> Vec<u8> {
 }
 
 fn refusal(bytes: &[u8]) -> String {
-    with_causes(&Asset::from_bytes(bytes).unwrap_err())
+    with_causes(&CapturedObject::from_bytes(bytes).unwrap_err())
 }
 
 fn near<const C: usize>(a: &Planes<C>, b: &Planes<C>, within: f32) {
@@ -58,17 +59,17 @@ fn near<const C: usize>(a: &Planes<C>, b: &Planes<C>, within: f32) {
 }
 
 #[test]
-fn an_asset_comes_back_from_its_file() {
+fn an_object_comes_back_from_its_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("ball.relit");
     for gloss in [false, true] {
-        let asset = ball(gloss);
-        asset.write(&path).unwrap();
-        let back = Asset::read(&path).unwrap();
+        let object = ball(gloss);
+        object.write(&path).unwrap();
+        let back = CapturedObject::read(&path).unwrap();
         assert_eq!(back.name(), "a ball");
-        near(back.alpha(), asset.alpha(), 1e-5);
-        near(back.confidence(), asset.confidence(), 1e-5);
-        let (found, made) = (back.surface(), asset.surface());
+        near(back.alpha(), object.alpha(), 1e-5);
+        near(back.confidence(), object.confidence(), 1e-5);
+        let (found, made) = (back.surface(), object.surface());
         near(found.normals().planes(), made.normals().planes(), 1e-4);
         near(found.albedo().planes(), made.albedo().planes(), 2e-5);
         assert_eq!(found.gloss().is_some(), gloss);
@@ -88,22 +89,22 @@ fn writing_twice_gives_the_same_bytes() {
 }
 
 #[test]
-fn what_is_no_asset_is_refused_with_what_is_wrong() {
-    let asset = ball(true);
+fn what_is_no_object_is_refused_with_what_is_wrong() {
+    let object = ball(true);
     assert!(refusal(b"no archive at all").contains("no ZIP archive"));
     let later = br#"{"schema": "relight.asset/2", "shape": "mesh"}"#;
-    assert!(refusal(&changed(&asset, MANIFEST, Some(later))).contains("relight.asset/2"));
-    assert!(refusal(&changed(&asset, MANIFEST, None)).contains("asset.json is missing"));
-    assert!(refusal(&changed(&asset, "alpha.png", None)).contains("alpha.png is missing"));
-    assert!(refusal(&changed(&asset, "smoothness.png", None)).contains("smoothness.png"));
-    assert!(refusal(&changed(&asset, "normal.png", Some(b"text"))).contains("normal.png"));
-    let bytes = asset.to_bytes().unwrap();
-    assert!(Asset::from_bytes(&bytes[..bytes.len() / 2]).is_err());
+    assert!(refusal(&changed(&object, MANIFEST, Some(later))).contains("relight.asset/2"));
+    assert!(refusal(&changed(&object, MANIFEST, None)).contains("asset.json is missing"));
+    assert!(refusal(&changed(&object, "alpha.png", None)).contains("alpha.png is missing"));
+    assert!(refusal(&changed(&object, "smoothness.png", None)).contains("smoothness.png"));
+    assert!(refusal(&changed(&object, "normal.png", Some(b"text"))).contains("normal.png"));
+    let bytes = object.to_bytes().unwrap();
+    assert!(CapturedObject::from_bytes(&bytes[..bytes.len() / 2]).is_err());
 }
 
 #[test]
 fn sizes_that_cannot_be_are_refused_before_anything_is_decoded() {
-    let asset = ball(false);
+    let object = ball(false);
     let manifest = |width: u64, white: &str| {
         format!(
             r#"{{"schema": "relight.asset/1", "name": "", "width": {width}, "height": 12, "white": {white}}}"#
@@ -112,26 +113,31 @@ fn sizes_that_cannot_be_are_refused_before_anything_is_decoded() {
     let whole = r#"{"albedo": 1.0}"#;
     for width in [0, 9000, u64::MAX] {
         let json = manifest(width, whole);
-        let refused = refusal(&changed(&asset, MANIFEST, Some(json.as_bytes())));
+        let refused = refusal(&changed(&object, MANIFEST, Some(json.as_bytes())));
         assert!(
             refused.contains("16777216") || refused.contains("asset.json"),
             "{refused}"
         );
     }
     let json = manifest(8000, whole);
-    let refused = refusal(&changed(&asset, MANIFEST, Some(json.as_bytes())));
+    let refused = refusal(&changed(&object, MANIFEST, Some(json.as_bytes())));
     assert!(refused.contains("12 x 12 pixels"), "{refused}");
     let json = manifest(12, r#"{"albedo": -1.0}"#);
-    let refused = refusal(&changed(&asset, MANIFEST, Some(json.as_bytes())));
+    let refused = refusal(&changed(&object, MANIFEST, Some(json.as_bytes())));
     assert!(refused.contains("white.albedo"), "{refused}");
     let long = vec![b' '; 70_000];
-    assert!(refusal(&changed(&asset, MANIFEST, Some(&long))).contains("more than 65536 bytes"));
+    assert!(refusal(&changed(&object, MANIFEST, Some(&long))).contains("more than 65536 bytes"));
 }
 
 #[test]
-fn maps_of_other_sizes_make_no_asset() {
-    let asset = ball(false);
+fn maps_of_other_sizes_make_no_object() {
+    let object = ball(false);
     let small = Planes::filled(Extent::new(2, 2), [1.0]);
-    let refused = Asset::new("", asset.surface.clone(), small, asset.confidence.clone());
+    let refused = CapturedObject::new(
+        "",
+        object.surface().clone(),
+        small,
+        object.confidence().clone(),
+    );
     assert!(refused.unwrap_err().to_string().contains("map of coverage"));
 }

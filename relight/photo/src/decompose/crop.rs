@@ -9,7 +9,7 @@ const MARGIN: f64 = 0.04;
 
 /// A square of a photograph; it may reach beyond the photograph's edges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-pub struct Region {
+pub struct CropSquare {
     /// Column of its left edge, pixels; negative where it begins left of the photograph.
     pub x: i64,
     /// Row of its upper edge, pixels.
@@ -18,7 +18,7 @@ pub struct Region {
     pub side: usize,
 }
 
-impl Region {
+impl CropSquare {
     /// The square around the pixels where the mask is at least one half, with 4 % more than their longer
     /// side; none where there are none.
     #[must_use]
@@ -218,11 +218,11 @@ mod tests {
     #[test]
     fn the_region_is_a_square_around_the_object_and_may_leave_the_photograph() {
         let mask = disc(Extent::new(100, 60), [10.0, 30.0], 25.0);
-        let region = Region::around(&mask).unwrap();
+        let region = CropSquare::around(&mask).unwrap();
         // Columns 0 to 35, rows 5 to 55: 51 pixels, and 4 % more.
         assert_eq!(region.side, 54);
         assert_eq!((region.x, region.y), (-9, 3));
-        assert_eq!(Region::around(&Planes::zeros(Extent::new(9, 9))), None);
+        assert_eq!(CropSquare::around(&Planes::zeros(Extent::new(9, 9))), None);
     }
 
     #[test]
@@ -230,7 +230,7 @@ mod tests {
         let extent = Extent::new(20, 30);
         let image = Planes::from_fn(extent, |x, y| [x as f32, y as f32]);
         for (x, y) in [(-5, -5), (3, 4), (12, 25), (-40, 0)] {
-            let window = Region { x, y, side: 15 }.window();
+            let window = CropSquare { x, y, side: 15 }.window();
             let back = window.put_back(window.cut(&image), extent);
             for row in 0..30 {
                 for column in 0..20 {

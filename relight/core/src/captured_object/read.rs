@@ -1,4 +1,4 @@
-//! From bytes to an asset, with limits.
+//! From bytes to a captured object, with limits.
 
 use std::io::{Cursor, Read};
 
@@ -6,7 +6,8 @@ use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use zip::ZipArchive;
 use zip::result::ZipError;
 
-use super::{ASSET_SCHEMA, Asset, AssetError, MANIFEST, Manifest, check_size};
+use super::manifest::{CAPTURED_OBJECT_SCHEMA, MANIFEST, Manifest, check_size};
+use super::{CapturedObject, CapturedObjectError};
 use crate::image::{Extent, Planes, Rgb};
 use crate::light::{Normals, YUp};
 use crate::render::{Gloss, Surface};
@@ -20,38 +21,46 @@ const BYTES_A_PIXEL: u64 = 9;
 
 type Archive<'a> = ZipArchive<Cursor<&'a [u8]>>;
 
-pub(super) fn bytes(content: &[u8]) -> Result<Asset, AssetError> {
-    let length = content.len() as u64;
-    if length > Asset::MOST_BYTES {
-        return Err(AssetError::TooLarge {
-            bytes: length,
-            most: Asset::MOST_BYTES,
-        });
+impl CapturedObject {
+    /// Reads the content of a file. Bytes that are no captured object are refused and need no more memory than a file of
+    /// the largest size that is allowed: 8192 pixels a side, 2^24 in all.
+    ///
+    /// # Errors
+    /// Where it is no captured object that this program knows.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, CapturedObjectError> {
+        let length = bytes.len() as u64;
+        if length > Self::MOST_BYTES {
+            return Err(CapturedObjectError::TooLarge {
+                bytes: length,
+                most: Self::MOST_BYTES,
+            });
+        }
+        let mut archive = ZipArchive::new(Cursor::new(bytes))?;
+        let manifest = manifest(&mut archive)?;
+        let extent = Extent::new(manifest.width, manifest.height);
+        check_size(extent)?;
+        let mut maps = Maps {
+            archive,
+            extent,
+            manifest,
+        };
+        let surface = Surface::new(maps.normals()?, Rgb::new(maps.albedo()?), maps.gloss()?)?;
+        let alpha = maps.grey("alpha.png", 1.0)?;
+        let confidence = maps.grey("confidence.png", 1.0)?;
+        Self::new(maps.manifest.name, surface, alpha, confidence)
     }
-    let mut archive = ZipArchive::new(Cursor::new(content))?;
-    let manifest = manifest(&mut archive)?;
-    let extent = Extent::new(manifest.width, manifest.height);
-    check_size(extent)?;
-    let mut maps = Maps {
-        archive,
-        extent,
-        manifest,
-    };
-    let surface = Surface::new(maps.normals()?, Rgb::new(maps.albedo()?), maps.gloss()?)?;
-    let alpha = maps.grey("alpha.png", 1.0)?;
-    let confidence = maps.grey("confidence.png", 1.0)?;
-    Asset::new(maps.manifest.name, surface, alpha, confidence)
 }
 
-fn manifest(archive: &mut Archive<'_>) -> Result<Manifest, AssetError> {
+fn manifest(archive: &mut Archive<'_>) -> Result<Manifest, CapturedObjectError> {
     let json = entry(archive, MANIFEST, MOST_MANIFEST)?;
-    let schema: Schema = serde_json::from_slice(&json).map_err(AssetError::entry(MANIFEST))?;
-    if schema.schema != ASSET_SCHEMA {
-        return Err(AssetError::Schema {
+    let schema: Schema =
+        serde_json::from_slice(&json).map_err(CapturedObjectError::entry(MANIFEST))?;
+    if schema.schema != CAPTURED_OBJECT_SCHEMA {
+        return Err(CapturedObjectError::Schema {
             found: schema.schema.chars().take(80).collect(),
         });
     }
-    serde_json::from_slice(&json).map_err(AssetError::entry(MANIFEST))
+    serde_json::from_slice(&json).map_err(CapturedObjectError::entry(MANIFEST))
 }
 
 /// The one field of `asset.json` that every version has.
@@ -61,8 +70,12 @@ struct Schema {
 }
 
 /// The bytes of an entry that has at most so many.
-fn entry(archive: &mut Archive<'_>, name: &'static str, most: u64) -> Result<Vec<u8>, AssetError> {
-    let wrong = AssetError::entry::<String>(name);
+fn entry(
+    archive: &mut Archive<'_>,
+    name: &'static str,
+    most: u64,
+) -> Result<Vec<u8>, CapturedObjectError> {
+    let wrong = CapturedObjectError::entry::<String>(name);
     let entry = archive
         .by_name(name)
         .map_err(|source| wrong(source.to_string()))?;
@@ -85,16 +98,16 @@ struct Maps<'a> {
 }
 
 impl Maps<'_> {
-    fn normals(&mut self) -> Result<Normals<YUp>, AssetError> {
+    fn normals(&mut self) -> Result<Normals<YUp>, CapturedObjectError> {
         Ok(Normals::from_colours(self.colours("normal.png", 1.0)?))
     }
 
-    fn albedo(&mut self) -> Result<Planes<3>, AssetError> {
+    fn albedo(&mut self) -> Result<Planes<3>, CapturedObjectError> {
         let white = self.white("albedo")?;
         self.colours("albedo.png", white)
     }
 
-    fn gloss(&mut self) -> Result<Option<Gloss>, AssetError> {
+    fn gloss(&mut self) -> Result<Option<Gloss>, CapturedObjectError> {
         if let Err(ZipError::FileNotFound) = self.archive.by_name("specular.png") {
             return Ok(None);
         }
@@ -106,18 +119,22 @@ impl Maps<'_> {
     }
 
     /// The value that the largest number of a map stands for.
-    fn white(&self, map: &'static str) -> Result<f32, AssetError> {
+    fn white(&self, map: &'static str) -> Result<f32, CapturedObjectError> {
         let white = self.manifest.white.get(map).copied().unwrap_or(f32::NAN);
         if white.is_finite() && white >= 0.0 {
             return Ok(white);
         }
-        Err(AssetError::Entry {
+        Err(CapturedObjectError::Entry {
             entry: MANIFEST,
             reason: format!("white.{map} is no number from 0 up"),
         })
     }
 
-    fn colours(&mut self, name: &'static str, white: f32) -> Result<Planes<3>, AssetError> {
+    fn colours(
+        &mut self,
+        name: &'static str,
+        white: f32,
+    ) -> Result<Planes<3>, CapturedObjectError> {
         let image = self.image(name)?.into_rgb16();
         let channel = |channel: usize| -> Vec<f32> {
             let pixels = image.as_raw().chunks_exact(3);
@@ -126,16 +143,16 @@ impl Maps<'_> {
         Ok(Planes::from_planes(self.extent, [0, 1, 2].map(channel))?)
     }
 
-    fn grey(&mut self, name: &'static str, white: f32) -> Result<Planes<1>, AssetError> {
+    fn grey(&mut self, name: &'static str, white: f32) -> Result<Planes<1>, CapturedObjectError> {
         let image = self.image(name)?.into_luma16();
         let values = image.as_raw().iter().map(|&raw| value(raw, white));
         Ok(Planes::from_planes(self.extent, [values.collect()])?)
     }
 
-    fn image(&mut self, name: &'static str) -> Result<DynamicImage, AssetError> {
+    fn image(&mut self, name: &'static str) -> Result<DynamicImage, CapturedObjectError> {
         let pixels = self.extent.pixels() as u64;
         let content = entry(&mut self.archive, name, BYTES_A_PIXEL * pixels + DECODER)?;
-        let wrong = AssetError::entry(name);
+        let wrong = CapturedObjectError::entry(name);
         let mut limits = Limits::default();
         limits.max_image_width = u32::try_from(self.extent.width).ok();
         limits.max_image_height = u32::try_from(self.extent.height).ok();
@@ -145,7 +162,7 @@ impl Maps<'_> {
         let image = reader.decode().map_err(wrong)?;
         let found = Extent::new(image.width() as usize, image.height() as usize);
         if found != self.extent {
-            return Err(AssetError::Entry {
+            return Err(CapturedObjectError::Entry {
                 entry: name,
                 reason: format!("{} x {} pixels", found.width, found.height),
             });
