@@ -282,7 +282,11 @@ fn given_light(
     let grey = StoredImage::read(&path)?.planes;
     let [mask, ..] = grey.clone().into_planes();
     let mask = Planes::from_planes(grey.extent(), [mask])?.map(|m| f32::from(u8::from(m >= 0.5)));
-    let subject = Subject::new(picture, &mask, None, decomposer, options)
-        .map_err(|source| InsertionError::LightObject { path, source })?;
+    let subject = Subject::new(picture, &mask, None, decomposer, options).map_err(|source| {
+        InsertionError::LightObject {
+            path,
+            source: Box::new(source),
+        }
+    })?;
     Ok(Some(LightSource::Coefficients(subject.light().clone())))
 }

@@ -16,13 +16,13 @@ use crate::insert::{InsertError, SceneFault};
 pub enum InsertionError {
     /// An object cannot be relit or inserted.
     #[error(transparent)]
-    Insert(#[from] InsertError),
+    Insert(Box<InsertError>),
     /// A photograph cannot be read or decomposed.
     #[error(transparent)]
-    Decompose(#[from] DecomposeError),
+    Decompose(Box<DecomposeError>),
     /// A scene cannot be what it says.
     #[error(transparent)]
-    Scene(#[from] SceneFault),
+    Scene(Box<SceneFault>),
     /// An image cannot be read or written.
     #[error(transparent)]
     Image(#[from] ImageError),
@@ -62,6 +62,24 @@ pub enum InsertionError {
         /// The object's mask.
         path: PathBuf,
         /// Why.
-        source: InsertError,
+        source: Box<InsertError>,
     },
+}
+
+impl From<SceneFault> for InsertionError {
+    fn from(fault: SceneFault) -> Self {
+        Self::Scene(Box::new(fault))
+    }
+}
+
+impl From<InsertError> for InsertionError {
+    fn from(error: InsertError) -> Self {
+        Self::Insert(Box::new(error))
+    }
+}
+
+impl From<DecomposeError> for InsertionError {
+    fn from(error: DecomposeError) -> Self {
+        Self::Decompose(Box::new(error))
+    }
 }
