@@ -19,8 +19,7 @@ use std::time::{Duration, Instant};
 use relit_data::session::FrameClock;
 use relit_rig::camera::hold::{Aspect, ManualPlan, ManualValues, MissingControl};
 use relit_rig::camera::{
-    self, Camera, CameraError, ControlFault, ControlId, ControlKind, Frame,
-    GrantedMode, Rates,
+    self, Camera, CameraError, ControlFault, ControlId, ControlKind, Frame, GrantedMode, Rates,
 };
 use relit_rig::clock::Clock;
 
