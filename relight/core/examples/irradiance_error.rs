@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use relight_core::image::Extent;
-use relight_core::light::{Direction, Normals, Order, Panorama};
+use relight_core::light::{Direction, Normals, Order, Panorama, YUp};
 use relight_core::render::{DiffuseForm, DiffuseLayer};
 
 const ORDERS: [usize; 7] = [2, 4, 8, 12, 24, 48, 64];
@@ -20,7 +20,9 @@ const SIDE: usize = 48;
 const TIMED_SIDE: usize = 512;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = std::env::args().nth(1).ok_or("give a folder of panoramas")?;
+    let folder = std::env::args()
+        .nth(1)
+        .ok_or("give a folder of panoramas")?;
     let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)?
         .map(|entry| entry.map(|entry| entry.path()))
         .collect::<Result<_, _>>()?;
@@ -40,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let layer = DiffuseLayer::new(&light, DiffuseForm::Irradiance);
             errors[at].push(truth.error(&layer, &normals));
             let start = Instant::now();
-            layer.shading(&timed);
+            std::hint::black_box(layer.shading(&timed));
             seconds[at] += start.elapsed().as_secs_f64();
         }
     }
@@ -98,7 +100,7 @@ impl Irradiance {
     }
 
     /// The root mean square of the layer's difference over that of the irradiance, on the front of a sphere.
-    fn error(&self, layer: &DiffuseLayer, normals: &Normals) -> f64 {
+    fn error(&self, layer: &DiffuseLayer, normals: &Normals<YUp>) -> f64 {
         let shading = layer.shading(normals);
         let (mut square, mut whole) = (0.0, 0.0);
         for y in (0..SIDE).step_by(3) {
@@ -107,7 +109,10 @@ impl Irradiance {
                 let Some(normal) = Direction::new(nx, ny, nz) else {
                     continue;
                 };
-                let pairs = self.at(normal).into_iter().zip(shading.planes().pixel(x, y));
+                let pairs = self
+                    .at(normal)
+                    .into_iter()
+                    .zip(shading.planes().pixel(x, y));
                 for (exact, found) in pairs {
                     square += (f64::from(found) - exact).powi(2);
                     whole += exact * exact;

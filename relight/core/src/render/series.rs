@@ -21,6 +21,8 @@ struct Term<F> {
     plus: [F; 3],
     minus: [F; 3],
     step: [F; 2],
+    /// Whether both are 0, as in the odd bands of irradiance.
+    is_dark: bool,
 }
 
 impl HarmonicSeries {
@@ -109,10 +111,12 @@ fn sum_of_m<T: Number>(band: &[Term<T::Constant>], weights: &[T], first: f64, z:
     let [mut plus, mut minus] = [[T::of(0.0); 3]; 2];
     let (mut before, mut now) = (T::of(0.0), T::of(first));
     for (term, factor) in band.iter().zip(weights) {
-        let weight = *factor * now;
-        for c in 0..3 {
-            plus[c] = plus[c] + weight * T::constant(term.plus[c]);
-            minus[c] = minus[c] + weight * T::constant(term.minus[c]);
+        if !term.is_dark {
+            let weight = *factor * now;
+            for c in 0..3 {
+                plus[c] = plus[c] + weight * T::constant(term.plus[c]);
+                minus[c] = minus[c] + weight * T::constant(term.minus[c]);
+            }
         }
         let (a, b) = (T::constant(term.step[0]), T::constant(term.step[1]));
         (before, now) = (now, a * z * now - b * before);
@@ -155,14 +159,16 @@ fn terms(order: Order, coefficients: &[[f64; 3]]) -> Vec<Term<f64>> {
     let pairs = (0..=order.get()).flat_map(|m| (m..=order.get()).map(move |l| (l, m)));
     let term = |(l, m): (usize, usize)| {
         let middle = l * (l + 1);
+        let plus = coefficients[middle + m];
+        let minus = match m {
+            0 => [0.0; 3],
+            _ => coefficients[middle - m],
+        };
         Term {
-            plus: coefficients[middle + m],
-            minus: if m == 0 {
-                [0.0; 3]
-            } else {
-                coefficients[middle - m]
-            },
+            plus,
+            minus,
             step: legendre_step(l + 1, m),
+            is_dark: [plus, minus] == [[0.0; 3]; 2],
         }
     };
     pairs.map(term).collect()
@@ -174,6 +180,7 @@ impl Term<f64> {
             plus: self.plus.map(|v| v as f32),
             minus: self.minus.map(|v| v as f32),
             step: self.step.map(|v| v as f32),
+            is_dark: self.is_dark,
         }
     }
 }
