@@ -105,8 +105,8 @@ pub struct Gradients {
 }
 
 impl Layers {
-    /// The layers for a light. The diffuse layer and [`SpecularForm::Power`] take its first nine
-    /// coefficients, [`SpecularForm::Lobe`] takes all.
+    /// The layers for a light. [`DiffuseForm::Released`] and [`SpecularForm::Power`] take its first nine
+    /// coefficients, [`DiffuseForm::Irradiance`] and [`SpecularForm::Lobe`] take all.
     #[must_use]
     pub fn new(light: &ShLight, diffuse: DiffuseForm, specular: SpecularForm) -> Self {
         Self {
@@ -155,7 +155,7 @@ impl Layers {
             albedo: Planes::zeros(surface.extent()),
             reflectance: Planes::zeros(surface.extent()),
             smoothness: Planes::zeros(surface.extent()),
-            light: ShLight::dark(order.max(DiffuseLayer::ORDER)),
+            light: ShLight::dark(order.max(self.diffuse.order())),
         };
         let rows: Vec<Row> = parallel::map(height, |y| {
             let mut row = Row {

@@ -4,12 +4,10 @@ use std::f64::consts::PI;
 
 use super::Specular;
 use super::lanes::{Kernel, Lanes, Number};
+use super::series::HarmonicSeries;
 use super::surface::Gloss;
 use crate::image::{ImageError, Linear, Rgb};
-
-use crate::light::{
-    Normals, Order, Quadrature, ShLight, YUp, basis_into, legendre_step, polar_functions,
-};
+use crate::light::{Normals, Order, Quadrature, ShLight, YUp, basis_into, polar_functions};
 
 /// A specular layer for one light, of any order: H(n) = s_p ∫ L(ω) max(0, n·b)^α dω, where b is half way
 /// between ω and the viewer.
@@ -42,17 +40,7 @@ pub struct LobeLayer {
     order: Order,
     light_order: Order,
     transfer: Transfer,
-    exact: Vec<Term<f64>>,
-    fast: Vec<Term<f32>>,
-}
-
-/// A pair of coefficients of G, (l, m) and (l, -m), and the step of the recurrence from l to l + 1.
-/// Terms stand by m, then by l from m on.
-#[derive(Debug, Clone)]
-struct Term<F> {
-    plus: [F; 3],
-    minus: [F; 3],
-    step: [F; 2],
+    series: HarmonicSeries,
 }
 
 impl LobeLayer {
@@ -71,13 +59,11 @@ impl LobeLayer {
     #[must_use]
     pub fn with_order(light: &ShLight, order: Order) -> Self {
         let transfer = Transfer::new(light.order(), order);
-        let exact = terms(order, &transfer.apply(light));
         Self {
             order,
             light_order: light.order(),
+            series: HarmonicSeries::new(order, &transfer.apply(light)),
             transfer,
-            fast: exact.iter().map(Term::rounded).collect(),
-            exact,
         }
     }
 
@@ -102,7 +88,7 @@ impl Specular for LobeLayer {
     fn at(&self, normal: [f64; 3], smoothness: f64) -> [f64; 3] {
         let mut lobe = vec![0.0; self.order.get() + 1];
         zonal(smoothness, &mut lobe);
-        sum(self.order, &self.exact, &lobe, normal).map(|sum| sum.max(0.0))
+        self.series.at(&lobe, normal).map(|sum| sum.max(0.0))
     }
 
     fn backward(
@@ -114,18 +100,18 @@ impl Specular for LobeLayer {
     ) -> ([f64; 3], f64) {
         let mut lobe = vec![0.0; self.order.get() + 1];
         zonal(smoothness, &mut lobe);
-        let sums = sum(self.order, &self.exact, &lobe, normal);
+        let sums = self.series.at(&lobe, normal);
         let upstream = [0, 1, 2].map(|c| if sums[c] > 0.0 { upstream[c] } else { 0.0 });
         let weigh = |v: [f64; 3]| v[0] * upstream[0] + v[1] * upstream[1] + v[2] * upstream[2];
 
-        let by_lobe = sum(
-            self.order,
-            &self.exact,
-            &zonal_derivatives(smoothness, &lobe),
-            normal,
-        );
+        let by_lobe = self
+            .series
+            .at(&zonal_derivatives(smoothness, &lobe), normal);
         self.pass_to_light(normal, &lobe, upstream, light);
-        (self.gradient(&lobe, normal).map(weigh), weigh(by_lobe))
+        (
+            self.series.gradient(&lobe, normal).map(weigh),
+            weigh(by_lobe),
+        )
     }
 }
 
@@ -147,31 +133,6 @@ impl LobeLayer {
             }
         }
     }
-
-    /// The derivatives of the three sums by x, y and z of the normal.
-    fn gradient(&self, lobe: &[f64], [x, y, z]: [f64; 3]) -> [[f64; 3]; 3] {
-        let mut gradients = [[0.0; 3]; 3];
-        let (mut cos, mut sin) = ([0.0, 1.0], [0.0, 0.0]);
-        let mut terms = self.exact.as_slice();
-        for m in 0..=self.order.get() {
-            if m > 0 {
-                let power = |re: [f64; 2], im: [f64; 2]| re[1] * x - im[1] * y;
-                (cos, sin) = ([cos[1], power(cos, sin)], [sin[1], sin[1] * x + cos[1] * y]);
-            }
-            let (band, rest) = terms.split_at(self.order.get() + 1 - m);
-            terms = rest;
-            let [plus, minus] = sum_of_m(band, &lobe[m..], diagonal(m), z);
-            let [plus_z, minus_z] = gradient_of_m(band, &lobe[m..], diagonal(m), z);
-            // The derivatives of (x + iy)^m are m (x + iy)^(m - 1) and i times that.
-            let [cos_before, sin_before] = [cos[0], sin[0]].map(|v| v * m as f64);
-            for c in 0..3 {
-                gradients[0][c] += cos_before * plus[c] + sin_before * minus[c];
-                gradients[1][c] += cos_before * minus[c] - sin_before * plus[c];
-                gradients[2][c] += cos[1] * plus_z[c] + sin[1] * minus_z[c];
-            }
-        }
-        gradients
-    }
 }
 
 impl Kernel<7, 3> for LobeLayer {
@@ -188,111 +149,13 @@ impl Kernel<7, 3> for LobeLayer {
         [x, y, z, red, green, blue, smoothness]: [Lanes; 7],
     ) -> [Lanes; 3] {
         zonal(smoothness, lobe);
-        let [r, g, b] = sum(self.order, &self.fast, lobe, [x, y, z]);
+        let [r, g, b] = self.series.at_lanes(lobe, [x, y, z]);
         let surface = Lanes::surface([x, y, z]);
         [
             r.at_least_zero() * red * surface,
             g.at_least_zero() * green * surface,
             b.at_least_zero() * blue * surface,
         ]
-    }
-}
-
-/// Σ lobe_l G_lm Y_lm(n)
-#[inline(always)]
-fn sum<T: Number>(
-    order: Order,
-    mut terms: &[Term<T::Constant>],
-    lobe: &[T],
-    [x, y, z]: [T; 3],
-) -> [T; 3] {
-    let mut total = [T::of(0.0); 3];
-    let (mut cos, mut sin) = (T::of(1.0), T::of(0.0));
-    let mut first = diagonal(0);
-    for m in 0..=order.get() {
-        if m > 0 {
-            (cos, sin) = (cos * x - sin * y, cos * y + sin * x);
-            first *= diagonal_step(m);
-        }
-        let (band, rest) = terms.split_at(order.get() + 1 - m);
-        terms = rest;
-        let [plus, minus] = sum_of_m(band, &lobe[m..], first, z);
-        for c in 0..3 {
-            total[c] = total[c] + cos * plus[c] + sin * minus[c];
-        }
-    }
-    total
-}
-
-/// Σ lobe_l Q_l^m(z) G_lm over l, for m and for -m. Q is the normalised associated Legendre function over
-/// sin^m, which begins with `first`.
-#[inline(always)]
-fn sum_of_m<T: Number>(band: &[Term<T::Constant>], lobe: &[T], first: f64, z: T) -> [[T; 3]; 2] {
-    let [mut plus, mut minus] = [[T::of(0.0); 3]; 2];
-    let (mut before, mut now) = (T::of(0.0), T::of(first));
-    for (term, factor) in band.iter().zip(lobe) {
-        let weight = *factor * now;
-        for c in 0..3 {
-            plus[c] = plus[c] + weight * T::constant(term.plus[c]);
-            minus[c] = minus[c] + weight * T::constant(term.minus[c]);
-        }
-        let (a, b) = (T::constant(term.step[0]), T::constant(term.step[1]));
-        (before, now) = (now, a * z * now - b * before);
-    }
-    [plus, minus]
-}
-
-/// The derivative of [`sum_of_m`] by z.
-fn gradient_of_m(band: &[Term<f64>], lobe: &[f64], first: f64, z: f64) -> [[f64; 3]; 2] {
-    let [mut plus, mut minus] = [[0.0; 3]; 2];
-    let (mut before, mut now) = ([0.0, 0.0], [first, 0.0]);
-    for (term, factor) in band.iter().zip(lobe) {
-        for c in 0..3 {
-            plus[c] += factor * now[1] * term.plus[c];
-            minus[c] += factor * now[1] * term.minus[c];
-        }
-        let [a, b] = term.step;
-        let next = [
-            a * z * now[0] - b * before[0],
-            a * (now[0] + z * now[1]) - b * before[1],
-        ];
-        (before, now) = (now, next);
-    }
-    [plus, minus]
-}
-
-/// Q_m^m, with the √2 of m > 0.
-fn diagonal(m: usize) -> f64 {
-    (1..=m).fold((1.0 / (4.0 * PI)).sqrt(), |value, m| {
-        value * diagonal_step(m)
-    })
-}
-
-fn diagonal_step(m: usize) -> f64 {
-    let root = if m == 1 { 2.0_f64 } else { 1.0 };
-    (root * (1.0 + 0.5 / m as f64)).sqrt()
-}
-
-fn terms(order: Order, half: &[[f64; 3]]) -> Vec<Term<f64>> {
-    let pairs = (0..=order.get()).flat_map(|m| (m..=order.get()).map(move |l| (l, m)));
-    let term = |(l, m): (usize, usize)| {
-        let middle = l * (l + 1);
-        Term {
-            plus: half[middle + m],
-            minus: if m == 0 { [0.0; 3] } else { half[middle - m] },
-            step: legendre_step(l + 1, m),
-        }
-    };
-    pairs.map(term).collect()
-}
-
-impl Term<f64> {
-    fn rounded(&self) -> Term<f32> {
-        Term {
-            plus: self.plus.map(|v| v as f32),
-            minus: self.minus.map(|v| v as f32),
-            step: self.step.map(|v| v as f32),
-        }
     }
 }
 

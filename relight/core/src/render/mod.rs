@@ -12,6 +12,7 @@ mod layers;
 mod lobe;
 mod power;
 mod reference;
+mod series;
 mod shots;
 mod surface;
 

@@ -6,7 +6,7 @@ use super::diffuse::{DiffuseForm, DiffuseLayer};
 use super::layers::{Layers, SpecularForm};
 use super::surface::{Gloss, Surface};
 use crate::image::{ImageError, Linear, Planes, Rgb};
-use crate::light::{Direction, Order, Rotation, ShLight};
+use crate::light::{Direction, Rotation, ShLight};
 
 /// How a surface is rendered and shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,11 +25,6 @@ impl Look {
     /// # Errors
     /// None for a surface, whose maps have one size; those of [`super::Rendering::image`] in general.
     pub fn image(&self, surface: &Surface, light: &ShLight) -> Result<Rgb<Linear>, ImageError> {
-        let light = match surface.gloss() {
-            Some(_) => light,
-            // Nothing but the diffuse layer is needed.
-            None => &light.with_order(Order::TWO),
-        };
         let rendering = Layers::new(light, self.diffuse, self.specular).render(surface);
         let image = rendering.image(surface.albedo())?;
         Ok(Rgb::new(image.into_planes().map(|v| v * self.exposure)))
@@ -107,7 +102,7 @@ pub fn exposure_for(light: &ShLight) -> f32 {
 mod tests {
     use super::*;
     use crate::image::Extent;
-    use crate::light::Normals;
+    use crate::light::{Normals, Order};
 
     const LOOK: Look = Look {
         diffuse: DiffuseForm::Irradiance,
