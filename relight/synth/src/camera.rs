@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::random::{Random, mix};
 use relight_core::image::{ColourSpace, Srgb};
+use relight_core::statistics::ranked;
 
 /// How a camera turns light into 8-bit values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -105,10 +106,9 @@ impl CameraModel {
         let brightest = |colour: &Vec3| (*colour * self.gain).max_element();
         let mut levels: Vec<f32> = image.iter().map(brightest).collect();
         let place = levels.len() * 99 / 100;
-        if place >= levels.len() {
+        let Some(found) = ranked(&mut levels, place) else {
             return self;
-        }
-        let (_, &mut found, _) = levels.select_nth_unstable_by(place, f32::total_cmp);
+        };
         if found > 1e-9 {
             self.gain *= level / found;
         }
@@ -124,8 +124,7 @@ impl CameraModel {
                 .map(|colour| (*colour * self.gain).min_element())
                 .collect();
             let place = (levels.len() as f32 * (1.0 - part)) as usize;
-            let is_inside = place < levels.len();
-            is_inside.then(|| *levels.select_nth_unstable_by(place, f32::total_cmp).1)
+            ranked(&mut levels, place)
         };
         let brightest = pictures.iter().filter_map(level).fold(0.0, f32::max);
         if brightest > 1e-9 {

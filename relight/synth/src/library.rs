@@ -11,6 +11,7 @@ use super::paint::TextureImage;
 use super::studio::Surroundings;
 use relight_core::image::Extent;
 use relight_core::light::Panorama;
+use relight_core::statistics::ranked;
 
 /// Size of the panoramas that are made here.
 pub const PANORAMA_EXTENT: Extent = Extent::new(256, 128);
@@ -120,7 +121,7 @@ fn picture_of(panorama: &Panorama) -> TextureImage {
     let planes = small.image().planes();
     let mut levels: Vec<f32> = planes.planes().into_iter().flatten().copied().collect();
     let place = levels.len() * 9 / 10;
-    let (_, &mut level, _) = levels.select_nth_unstable_by(place, f32::total_cmp);
+    let level = ranked(&mut levels, place).unwrap_or_default();
     let scale = 1.0 / level.max(1e-6);
     let Extent { width, height } = PICTURE_EXTENT;
     TextureImage::from_fn(width, height, |x, y| {

@@ -13,6 +13,7 @@ use super::geometry::GBuffer;
 use super::library::Library;
 use super::recipe::Recipe;
 use super::sample::{SynthSample, picture_of};
+use relight_core::statistics::ranked;
 
 /// What stands beside each other: picture, albedo, shading, highlight, normals.
 const PARTS: u32 = 5;
@@ -98,9 +99,8 @@ fn values(colours: &[Vec3], encode: impl Fn(f32) -> f32) -> Vec<[u8; 3]> {
 fn bright(colours: &[Vec3]) -> f32 {
     let mut levels: Vec<f32> = colours.iter().map(|colour| colour.max_element()).collect();
     let place = levels.len() * 99 / 100;
-    if place >= levels.len() {
+    let Some(level) = ranked(&mut levels, place) else {
         return 1.0;
-    }
-    let (_, &mut level, _) = levels.select_nth_unstable_by(place, f32::total_cmp);
+    };
     level.max(1e-6)
 }

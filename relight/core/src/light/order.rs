@@ -9,7 +9,7 @@ use super::LightError;
 /// | constant | order | for |
 /// | --- | --- | --- |
 /// | [`Order::ZERO`] | 0 | even light |
-/// | [`Order::TWO`] | 2 | the paper's: light that is estimated, and all that diffuse surfaces show of any light |
+/// | [`Order::TWO`] | 2 | the paper's: light that is estimated |
 /// | [`Order::GLOSS`] | 6 | what the gloss of a turning object shows of its light |
 /// | [`Order::LAMP`] | 8 | a lamp that goes round an object in a video |
 /// | [`Order::HIGHLIGHT`] | 24 | panoramas and lamps that are given for a photograph: sharp enough for highlights |
@@ -23,8 +23,9 @@ impl Order {
     pub const MAX: usize = 64;
     /// One coefficient: even light.
     pub const ZERO: Self = Self(0);
-    /// Nine coefficients, as in the paper. Light is estimated to this order: of what a diffuse surface shows of any
-    /// light, the bands above have at most 2 % of the energy (Basri and Jacobs, 2003).
+    /// Nine coefficients, as in the paper. Light is estimated to this order: of what a diffuse surface shows of a light,
+    /// the bands above have 1 % of the energy in the mean over rooms and skies, and 6 % at worst under a sun. Light that
+    /// is given keeps all of its bands.
     pub const TWO: Self = Self(2);
     /// What the gloss of a turning object shows of its light: a panorama or a mirror ball is read to this order.
     pub const GLOSS: Self = Self(6);

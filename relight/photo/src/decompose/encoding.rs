@@ -3,6 +3,7 @@
 
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Normals, YUp};
+use relight_core::statistics::ranked;
 use relight_nets::{INPUTS, OUTPUTS};
 
 /// Part of the pixels that are darker than the encoded picture's white.
@@ -141,10 +142,9 @@ fn white(picture: &Planes<3>, inside: &[bool]) -> f32 {
         .filter(|value| value.is_finite())
         .collect();
     let place = (brightest.len() as f64 * WHITE_PERCENTILE) as usize;
-    if place >= brightest.len() {
+    let Some(found) = ranked(&mut brightest, place) else {
         return 1.0;
-    }
-    let (_, &mut found, _) = brightest.select_nth_unstable_by(place, f32::total_cmp);
+    };
     found.max(1e-6)
 }
 

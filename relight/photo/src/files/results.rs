@@ -14,6 +14,7 @@ use relight_core::files::write_png;
 use relight_core::image::{ColourSpace, Depth, Extent, ImageError, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, Panorama};
 use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
+use relight_core::statistics::ranked;
 
 /// The file of figures.
 const FIGURES: &str = "decomposition.json";
@@ -292,9 +293,8 @@ pub fn bright<const C: usize>(planes: &Planes<C>, mask: &Planes<1>) -> f32 {
         .map(brightest)
         .collect();
     let place = (values.len() as f64 * (1.0 - BEYOND_WHITE)) as usize;
-    if place >= values.len() {
+    let Some(value) = ranked(&mut values, place) else {
         return 1.0;
-    }
-    let (_, &mut value, _) = values.select_nth_unstable_by(place, f32::total_cmp);
+    };
     if value > 0.0 { value } else { 1.0 }
 }

@@ -1,6 +1,7 @@
 //! What of a background an inserted object has to follow: brightness, white balance, grain. Knows pictures only.
 
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
+use relight_core::statistics::ranked;
 
 /// The light that bright places of a picture have that was exposed well.
 const BRIGHT: f32 = 0.8;
@@ -60,10 +61,9 @@ fn bright(picture: &Rgb<Linear>) -> f32 {
         .filter(|v| v.is_finite())
         .collect();
     let place = (values.len() as f64 * (1.0 - BRIGHTEST_PART)) as usize;
-    if place >= values.len() {
+    let Some(value) = ranked(&mut values, place) else {
         return BRIGHT;
-    }
-    let (_, &mut value, _) = values.select_nth_unstable_by(place, f32::total_cmp);
+    };
     value
 }
 
@@ -106,10 +106,9 @@ pub(super) fn grain(picture: &Planes<3>, alpha: Option<&Planes<1>>) -> f32 {
         }
     }
     let place = (deviations.len() as f64 * SMOOTHEST_PART) as usize;
-    if place >= deviations.len() {
+    let Some(value) = ranked(&mut deviations, place) else {
         return 0.0;
-    }
-    let (_, &mut value, _) = deviations.select_nth_unstable_by(place, f32::total_cmp);
+    };
     value
 }
 

@@ -5,7 +5,6 @@ use std::path::Path;
 use relight_core::light::{Order, Panorama, ShLight};
 
 use crate::error::TurnError;
-use crate::model::harmonics::GLOSS_ORDER;
 
 /// The light of a file: the coefficients that it holds, or a panorama (.hdr, .exr) projected to the order that gloss is
 /// fitted with.
@@ -19,13 +18,13 @@ pub fn read_given_light(path: &Path) -> Result<ShLight, TurnError> {
     if !is_panorama {
         return Ok(ShLight::read(path)?);
     }
-    let order = Order::new(GLOSS_ORDER).unwrap_or(Order::TWO);
-    Ok(Panorama::read(path)?.project(order))
+    Ok(Panorama::read(path)?.project(Order::GLOSS))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::harmonics::GLOSS_ORDER;
     use relight_core::files::write_exr;
     use relight_core::image::{Extent, Planes};
 

@@ -1,7 +1,9 @@
 //! The curve of a pixel over the table's angle as a Fourier series.
 
+use relight_core::light::Order;
+
 /// The order of the light that gloss is taken to show.
-pub(crate) const GLOSS_ORDER: usize = 6;
+pub(crate) const GLOSS_ORDER: usize = Order::GLOSS.get();
 
 /// Harmonics that are fitted to a curve: gloss has more than a Lambertian surface.
 pub(crate) const HARMONICS: usize = GLOSS_ORDER;

@@ -7,7 +7,6 @@ use relight_core::light::{Direction, Order, ShLight, basis};
 use crate::error::TurnError;
 use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
-use crate::model::harmonics::GLOSS_ORDER;
 
 /// Parameters of the panorama.
 struct PanoramaParameters {
@@ -16,14 +15,11 @@ struct PanoramaParameters {
     rows: usize,
     /// Columns of the panorama. Derived: twice the rows, so that cells are square at the equator.
     columns: usize,
-    /// Order of the light. Derived: as much as gloss is fitted with.
-    order: usize,
 }
 
 const PARAMETERS: PanoramaParameters = PanoramaParameters {
     rows: 32,
     columns: 64,
-    order: GLOSS_ORDER,
 };
 
 /// The panorama that a chrome ball shows of the environment light while it turns, in the table's frame at its angle 0.
@@ -77,7 +73,7 @@ impl MirrorPanorama {
     /// What it shows, as coefficients; directions that it never shows are as bright as their row, or as all.
     pub(crate) fn light(&self) -> Result<ShLight, TurnError> {
         let all = self.all().ok_or(TurnError::NoLight)?;
-        let order = Order::new(PARAMETERS.order).unwrap_or(Order::TWO);
+        let order = Order::GLOSS;
         let mut light = ShLight::even(order, [0.0; 3]);
         for row in 0..PARAMETERS.rows {
             let cells = row * PARAMETERS.columns..(row + 1) * PARAMETERS.columns;

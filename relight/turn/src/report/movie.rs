@@ -15,9 +15,7 @@ struct MovieParameters {
     frames: u32,
     /// Frames a second. By convention.
     rate: u32,
-    /// Order of the lamp's light. By hand.
-    lamp_order: usize,
-    /// Width of the lamp, radians. Derived: a smaller one has rings in this order.
+    /// Width of the lamp, radians. Derived: a smaller one has rings in light of [`Order::LAMP`].
     lamp_spread: f64,
     /// Height of the lamp above the line of sight, radians. By hand.
     lamp_height: f64,
@@ -26,7 +24,6 @@ struct MovieParameters {
 const PARAMETERS: MovieParameters = MovieParameters {
     frames: 90,
     rate: 30,
-    lamp_order: 8,
     lamp_spread: 0.3,
     lamp_height: 0.6,
 };
@@ -50,10 +47,9 @@ pub(crate) fn write_movie(path: &Path, surface: &Surface, white: f32) -> Result<
 
 /// A lamp high before the object, and weak light from everywhere.
 fn lamp() -> ShLight {
-    let order = Order::new(PARAMETERS.lamp_order).unwrap_or(Order::TWO);
     let from = Direction::from_angles(PARAMETERS.lamp_height, FRAC_PI_2);
-    let mut light = ShLight::even(order, [0.15; 3]);
-    let values = basis(order, from);
+    let mut light = ShLight::even(Order::LAMP, [0.15; 3]);
+    let values = basis(Order::LAMP, from);
     let pairs = light.coefficients_mut().iter_mut().zip(values);
     for (at, (coefficient, value)) in pairs.enumerate() {
         let l = at.isqrt() as f64;
