@@ -3,9 +3,15 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-train test test-rig test-slurm test-objects lint demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-train test test-rig test-slurm test-objects lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
+
+# The programs from the rig to the shards.
+PROGRAMS := -p relit-capture -p relit-mask -p relit-extract
+
+# Parts of the programs that nobody needs to make shards; lint and tests look at them too.
+EXTRAS := --features relit-rig/nokhwa,relit-mask/opencv
 
 # The recorded session of a whole turn, which the demonstration replays as a camera.
 SESSION := 20261120T093015Z-cow
@@ -36,6 +42,9 @@ help: ## List the targets
 setup: ## Install the system packages that are missing
 	@.ci/setup
 
+setup-programs:
+	@.ci/setup --programs
+
 setup-train: ## Install libtorch, which relight's training is built with (544 MB, once)
 	@.ci/setup-train
 
@@ -46,7 +55,7 @@ test: setup ## Run all tests
 	else \
 	    echo "the firmware's tests on the emulated chip are skipped: 'make setup' printed why"; \
 	fi
-	cargo test --locked --workspace --exclude relit-fuzz $$(.ci/setup-train --features)
+	cargo test --locked --workspace --exclude relit-fuzz $(EXTRAS) $$(.ci/setup-train --features)
 
 test-rig: setup ## Capture with the kernel's camera drivers and a real tty, in a virtual machine
 	@tests/rig-vm/run
@@ -64,12 +73,12 @@ test-objects: setup $(OBJECTS_VENV)/ready ## Extract from and to object stores, 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check
 	cargo run -q --locked -p relit-house
-	cargo clippy --locked --workspace --all-targets $$(.ci/setup-train --features) -- -D warnings
+	cargo clippy --locked --workspace --all-targets $(EXTRAS),relit-extract/object-store \
+	    $$(.ci/setup-train --features) -- -D warnings
 	cargo clippy --locked -p relight -- -D warnings
-	cargo clippy --locked -p relit-extract --features object-store --all-targets -- -D warnings
-	cargo clippy --locked -p relit-mask --no-default-features --all-targets -- -D warnings
+	cargo clippy --locked $(PROGRAMS) --all-targets -- -D warnings
 	cargo clippy --locked -p relit-data --no-default-features -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps $(EXTRAS)
 	@if cargo tree --locked -p relight -e normal --prefix none \
 	    | grep -E '^(ffmpeg|opencv|axum|hyper|tokio|relit-(video|mask|rig))'; then \
 	    echo "relight must not depend on these"; exit 1; fi
@@ -79,8 +88,13 @@ lint: setup ## Check formatting, lints and documentation
 	@if cargo tree --locked -p relit-grabcut -e normal --prefix none \
 	    | grep -E '^(opencv|rayon|rustix|parquet|tar|clap|indicatif|relit-(video|web|mask))'; then \
 	    echo "relit-grabcut must not depend on these"; exit 1; fi
+	@.ci/dependencies
+	@.ci/wasm --check
 	cargo fmt --manifest-path rig-firmware/uno/Cargo.toml --check
 	@if rig-firmware/build --can; then rig-firmware/build --clippy; fi
+
+wasm: ## Build for WebAssembly the crates that a page in a browser is made of
+	@.ci/wasm
 
 firmware: ## Build the turntable's firmware for Arduino Uno and Nano
 	@rig-firmware/build $(FIRMWARE)
@@ -91,8 +105,8 @@ flash: firmware ## Flash the firmware to the Arduino at PORT (/dev/ttyACM0)
 	avrdude -p atmega328p -c arduino -P $(PORT) -b $(FLASH_BAUD) -D \
 	    -U flash:w:$(FIRMWARE)/rig-firmware-uno.hex:i
 
-demo: setup ## Record the turn in fixtures/ on a simulated rig, make a shard of it, list the results
-	cargo build --locked --release -p relit-capture -p relit-mask -p relit-extract --bins
+demo: setup-programs ## Record the turn in fixtures/ on a simulated rig, make a shard of it, list the results
+	cargo build --locked --release $(PROGRAMS) --bins
 	rm -rf $(DEMO)
 	$(TARGET)/release/relit-capture record --yes --object cow --root $(DEMO)/sessions \
 	    --camera 'replay:fixtures/$(SESSION)?loop=1' --turntable sim:

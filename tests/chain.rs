@@ -1,35 +1,27 @@
 //! From recorded turns to networks: `relit-extract` makes shards of the bundled sessions, `relight train` learns from
 //! them by the paper's phases. Runs where both programs were built, relight with the feature `train`.
-#![allow(
-    missing_docs,
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::print_stderr
-)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, ExitCode, Output};
+
+use relit_test_support::trials;
 
 /// The session that is trained on, and the one that judges.
 const TAUGHT: &str = "20261120T101500Z-cow-short";
 const HELD_OUT: &str = "20261120T102000Z-bust-short";
 
-/// The program relight, which cargo builds beside this test; none where it was not built, or without
-/// training.
-fn relight() -> Option<PathBuf> {
+/// The program relight, which cargo builds beside this test, if it was built, and with training.
+fn relight() -> Result<PathBuf, String> {
     let program = relit_tests::beside_this_test("relight").unwrap();
     let answer = Command::new(&program).args(["train", "--help"]).output();
     match answer {
-        Ok(output) if output.status.success() => Some(program),
-        _ => {
-            eprintln!(
-                "left out: {} is not there, or has no training",
-                program.display()
-            );
-            None
-        }
+        Ok(output) if output.status.success() => Ok(program),
+        _ => Err(format!(
+            "{} is not there, or has no training: `make setup-train` installs what that needs",
+            program.display()
+        )),
     }
 }
 
@@ -101,11 +93,13 @@ impl Bench {
     }
 }
 
-#[test]
-fn recorded_turns_train_the_networks_by_the_phases_of_the_paper() {
-    let Some(relight) = relight() else {
-        return;
-    };
+fn main() -> ExitCode {
+    trials::run(trials![
+        with relight => recorded_turns_train_the_networks_by_the_phases_of_the_paper,
+    ])
+}
+
+fn recorded_turns_train_the_networks_by_the_phases_of_the_paper(relight: PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let bench = Bench { folder, relight };
     extract(TAUGHT, &bench.path("shards"));

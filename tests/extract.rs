@@ -498,12 +498,17 @@ fn a_photograph_is_not_a_turn_and_a_session_folder_not_a_data_set() {
 fn with_json_events_are_printed_as_json_lines() {
     let bench = Bench::new();
     let output = bench.run("clip.mkv --mask mask.png --frames 30 --size 32 -o out --json");
-    assert!(output.stderr.is_empty());
+    let said = String::from_utf8(output.stderr).unwrap();
     let events: Vec<serde_json::Value> = String::from_utf8(output.stdout)
         .unwrap()
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
+    // Warnings are told to people too, and nothing else is.
+    let warnings = events.iter().filter(|event| event["event"] == "warning");
+    let warnings =
+        warnings.map(|event| format!("warning: {}\n", event["message"].as_str().unwrap()));
+    assert_eq!(said, warnings.collect::<String>());
     // The mask of these tests is not the outline of anything in the video, and that is said first.
     assert_eq!(events[0]["event"], "warning");
     assert!(events[0]["message"].as_str().unwrap().contains("mask"));

@@ -1,13 +1,14 @@
 //! Replay: every session folder in `fixtures/` is extracted by the program and compared with its
-//! `expect.json` and `truth.json`. A new folder there is a new test.
+//! `expect.json` and `truth.json`. A new folder there is a new test, of the folder's name.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, ExitCode, Output};
 
 use relit_data::session::{FrameIndex, Recording};
 use relit_data::shard::{Dataset, FrameRecord, ShardReader};
+use relit_test_support::trials::{self, free_trial};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -67,53 +68,62 @@ fn records(out: &Path, dataset: &Dataset) -> Vec<FrameRecord> {
     records
 }
 
-#[test]
-fn every_fixture_comes_out_as_it_says() {
-    for session in fixtures() {
-        let name = session.file_name().unwrap().to_str().unwrap();
-        let expect: Expect = read_json(&session.join("expect.json"));
-        let folder = tempfile::tempdir().unwrap();
-        let out = folder.path().join("out");
-        let (from, to) = (session.to_str().unwrap(), out.to_str().unwrap());
-        let mask = session.join("mask_gt.png");
-        let samples = expect.partial_of.unwrap_or(expect.samples).to_string();
-        let mut arguments = vec![
-            from,
-            "-o",
-            to,
-            "--mask",
-            mask.to_str().unwrap(),
-            "--frames",
-            &samples,
-            "--size",
-            "64",
-        ];
-        if expect.partial_of.is_some() {
-            let refused = run(&arguments);
-            assert_eq!(refused.status.code(), Some(3), "{name}: {refused:?}");
-            let said = String::from_utf8_lossy(&refused.stdout).into_owned();
-            assert!(
-                said.contains("left out: the frames cover"),
-                "{name}: {said}"
-            );
-            arguments.push("--partial");
-        }
-        let output = run(&arguments);
-        let errors = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(
-            output.status.code(),
-            Some(if expect.lossy { 3 } else { 0 }),
-            "{name}: {errors}"
-        );
-        let verified = run(&["verify", to]);
-        assert_eq!(verified.status.code(), Some(0), "{name}: {verified:?}");
+fn name_of(session: &Path) -> &str {
+    session.file_name().unwrap().to_str().unwrap()
+}
 
-        let dataset = Dataset::read(&out).unwrap();
-        check_entry(name, &expect, &dataset);
-        let records = records(&out, &dataset);
-        assert_eq!(records.len(), expect.samples as usize, "{name}");
-        check_records(name, &session, &expect, &records);
+fn main() -> ExitCode {
+    let trials = fixtures().into_iter().map(|session| {
+        let name = name_of(&session).to_owned();
+        free_trial(name, move || comes_out_as_it_says(&session))
+    });
+    trials::run(trials.collect())
+}
+
+fn comes_out_as_it_says(session: &Path) {
+    let name = name_of(session);
+    let expect: Expect = read_json(&session.join("expect.json"));
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let (from, to) = (session.to_str().unwrap(), out.to_str().unwrap());
+    let mask = session.join("mask_gt.png");
+    let samples = expect.partial_of.unwrap_or(expect.samples).to_string();
+    let mut arguments = vec![
+        from,
+        "-o",
+        to,
+        "--mask",
+        mask.to_str().unwrap(),
+        "--frames",
+        &samples,
+        "--size",
+        "64",
+    ];
+    if expect.partial_of.is_some() {
+        let refused = run(&arguments);
+        assert_eq!(refused.status.code(), Some(3), "{name}: {refused:?}");
+        let said = String::from_utf8_lossy(&refused.stdout).into_owned();
+        assert!(
+            said.contains("left out: the frames cover"),
+            "{name}: {said}"
+        );
+        arguments.push("--partial");
     }
+    let output = run(&arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(
+        output.status.code(),
+        Some(if expect.lossy { 3 } else { 0 }),
+        "{name}: {errors}"
+    );
+    let verified = run(&["verify", to]);
+    assert_eq!(verified.status.code(), Some(0), "{name}: {verified:?}");
+
+    let dataset = Dataset::read(&out).unwrap();
+    check_entry(name, &expect, &dataset);
+    let records = records(&out, &dataset);
+    assert_eq!(records.len(), expect.samples as usize, "{name}");
+    check_records(name, session, &expect, &records);
 }
 
 fn check_entry(name: &str, expect: &Expect, dataset: &Dataset) {

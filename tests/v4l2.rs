@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 use relit_data::session::FrameClock;
 use relit_rig::camera::hold::{Aspect, ManualPlan, ManualValues, MissingControl};
 use relit_rig::camera::{
-    self, Camera, CameraAddress, CameraError, ControlFault, ControlId, ControlKind, Frame,
+    self, Camera, CameraError, ControlFault, ControlId, ControlKind, Frame,
     GrantedMode, Rates,
 };
 use relit_rig::clock::Clock;
@@ -482,7 +482,7 @@ fn a_timeout_is_bounded_and_costs_no_frame() {
 #[test]
 #[ignore = "needs the driver vivid"]
 fn the_portable_library_shows_the_same_camera() {
-    let address = CameraAddress::Nokhwa(0).to_string();
+    let address = camera::CameraAddress::Nokhwa(0).to_string();
     let mut camera = open(&address).unwrap();
     println!(
         "{}: {} modes",

@@ -1,7 +1,17 @@
 //! The firmware that is flashed, on an emulated ATmega328P, timed in the chip's own cycles.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    missing_docs
+)]
 
 mod chip;
+
+use std::process::ExitCode;
+
+use relit_test_support::trials;
 
 use chip::{CYCLES_PER_US, Chip, MS, STEPS_PER_DEGREE, Step};
 
@@ -11,14 +21,30 @@ const TURN_INTERVAL: f64 = 60.0 * 16e6 / (432.0 * STEPS_PER_DEGREE);
 /// A byte's time on the wire.
 const BYTE: u64 = 1360;
 
-/// The chip after power-on; ends the test where there is none.
-macro_rules! power_on {
-    () => {
-        match Chip::start() {
-            Some((chip, _)) => chip,
-            None => return,
-        }
-    };
+fn main() -> ExitCode {
+    let mut trials = trials![with power_on =>
+        a_whole_turn_takes_50_s_at_constant_speed_while_the_host_polls,
+        speed_grows_and_falls_by_the_set_acceleration,
+        a_feed_hold_ramps_down_at_once_with_a_full_buffer_and_resumes_to_the_exact_target,
+        a_reset_stops_at_once_and_names_its_cause,
+        a_silent_host_loses_its_lease,
+        the_emergency_stop_ends_steps_and_current_within_a_millisecond_and_latches,
+        homing_finds_the_same_step_from_everywhere_and_from_both_sides,
+        a_table_without_an_index_gives_homing_up,
+        a_hung_program_stops_the_motor_and_starts_anew_and_says_so,
+        the_battery_is_measured,
+        the_driver_is_fed_before_the_first_step_and_released_after_rest,
+        time_and_position_of_a_report_belong_together,
+        ten_thousand_checked_lines_at_full_speed_lose_no_byte,
+        the_direction_pin_is_the_one_of_grbl,
+    ];
+    trials.extend(trials![with Chip::start => settings_survive_a_reset_and_damage_is_told]);
+    trials::run(trials)
+}
+
+/// The chip after power-on.
+fn power_on() -> Result<Chip, String> {
+    Chip::start().map(|(chip, _)| chip)
 }
 
 fn intervals(steps: &[Step]) -> impl Iterator<Item = f64> + '_ {
@@ -47,9 +73,7 @@ fn ramp_down_began(chip: &Chip) -> u64 {
     chip.steps[chip.steps.len() - ramp].cycle
 }
 
-#[test]
-fn a_whole_turn_takes_50_s_at_constant_speed_while_the_host_polls() {
-    let mut chip = power_on!();
+fn a_whole_turn_takes_50_s_at_constant_speed_while_the_host_polls(mut chip: Chip) {
     chip.accept("G91");
     chip.accept("G1 X362 F432");
     while chip.status().state() == "Run" {
@@ -85,9 +109,7 @@ fn a_whole_turn_takes_50_s_at_constant_speed_while_the_host_polls() {
     assert_eq!(chip.overruns, 0);
 }
 
-#[test]
-fn speed_grows_and_falls_by_the_set_acceleration() {
-    let mut chip = power_on!();
+fn speed_grows_and_falls_by_the_set_acceleration(mut chip: Chip) {
     chip.accept("G91");
     chip.accept("G1 X20 F432");
     chip.rest();
@@ -110,9 +132,9 @@ fn speed_grows_and_falls_by_the_set_acceleration() {
     assert!((down - 0.72).abs() < 0.05, "{down}");
 }
 
-#[test]
-fn a_feed_hold_ramps_down_at_once_with_a_full_buffer_and_resumes_to_the_exact_target() {
-    let mut chip = power_on!();
+fn a_feed_hold_ramps_down_at_once_with_a_full_buffer_and_resumes_to_the_exact_target(
+    mut chip: Chip,
+) {
     turn_with_full_buffer(&mut chip);
     let held = chip.cycle + BYTE;
     chip.write(b"!");
@@ -129,9 +151,7 @@ fn a_feed_hold_ramps_down_at_once_with_a_full_buffer_and_resumes_to_the_exact_ta
     assert_eq!(chip.net_steps(), (65.0 * STEPS_PER_DEGREE).round() as i64);
 }
 
-#[test]
-fn a_reset_stops_at_once_and_names_its_cause() {
-    let mut chip = power_on!();
+fn a_reset_stops_at_once_and_names_its_cause(mut chip: Chip) {
     turn_with_full_buffer(&mut chip);
     let reset = chip.cycle + BYTE;
     chip.write(&[0x18]);
@@ -152,9 +172,7 @@ fn a_reset_stops_at_once_and_names_its_cause() {
     chip.accept("$X");
 }
 
-#[test]
-fn a_silent_host_loses_its_lease() {
-    let mut chip = power_on!();
+fn a_silent_host_loses_its_lease(mut chip: Chip) {
     chip.accept("$60=1");
     chip.accept("G91");
     chip.accept("G1 X100 F432");
@@ -177,9 +195,7 @@ fn a_silent_host_loses_its_lease() {
     chip.accept("$X");
 }
 
-#[test]
-fn the_emergency_stop_ends_steps_and_current_within_a_millisecond_and_latches() {
-    let mut chip = power_on!();
+fn the_emergency_stop_ends_steps_and_current_within_a_millisecond_and_latches(mut chip: Chip) {
     turn_with_full_buffer(&mut chip);
     // The main loop is busy for some 50 ms.
     chip.write(b"$$\n");
@@ -220,9 +236,7 @@ fn home(chip: &mut Chip) -> i64 {
     chip.net_steps() - position
 }
 
-#[test]
-fn homing_finds_the_same_step_from_everywhere_and_from_both_sides() {
-    let mut chip = power_on!();
+fn homing_finds_the_same_step_from_everywhere_and_from_both_sides(mut chip: Chip) {
     chip.command("index 1000 1050 32000");
     chip.accept("$22=1");
     let first = home(&mut chip);
@@ -253,9 +267,7 @@ fn homing_finds_the_same_step_from_everywhere_and_from_both_sides() {
     );
 }
 
-#[test]
-fn a_table_without_an_index_gives_homing_up() {
-    let mut chip = power_on!();
+fn a_table_without_an_index_gives_homing_up(mut chip: Chip) {
     chip.accept("$22=1");
     chip.accept("$25=2160");
     chip.write(b"$H\n");
@@ -267,12 +279,7 @@ fn a_table_without_an_index_gives_homing_up() {
     assert!((374.9..376.0).contains(&searched), "{searched} degrees");
 }
 
-#[test]
-fn settings_survive_a_reset_and_damage_is_told() {
-    let (mut chip, banner) = match Chip::start() {
-        Some(started) => started,
-        None => return,
-    };
+fn settings_survive_a_reset_and_damage_is_told((mut chip, banner): (Chip, String)) {
     assert!(banner.ends_with("[reset: power-on]"), "{banner}");
     chip.accept("$120=40");
     chip.accept("$1=255");
@@ -293,9 +300,7 @@ fn settings_survive_a_reset_and_damage_is_told() {
     assert!(listing.contains(&"$120=36.000".to_string()), "{listing:?}");
 }
 
-#[test]
-fn a_hung_program_stops_the_motor_and_starts_anew_and_says_so() {
-    let mut chip = power_on!();
+fn a_hung_program_stops_the_motor_and_starts_anew_and_says_so(mut chip: Chip) {
     turn_with_full_buffer(&mut chip);
     let hung = chip.cycle;
     chip.command("hang");
@@ -312,9 +317,7 @@ fn a_hung_program_stops_the_motor_and_starts_anew_and_says_so() {
     assert!(chip.banner().ends_with("[reset: external]"));
 }
 
-#[test]
-fn the_battery_is_measured() {
-    let mut chip = power_on!();
+fn the_battery_is_measured(mut chip: Chip) {
     for (millivolts, full_scale, volts) in [(3000_u32, "15.5", 9.3), (4000, "16", 12.8)] {
         chip.accept(&format!("$61={full_scale}"));
         chip.command(&format!("battery {millivolts}"));
@@ -324,9 +327,7 @@ fn the_battery_is_measured() {
     }
 }
 
-#[test]
-fn the_driver_is_fed_before_the_first_step_and_released_after_rest() {
-    let mut chip = power_on!();
+fn the_driver_is_fed_before_the_first_step_and_released_after_rest(mut chip: Chip) {
     let before = chip.enables.len();
     chip.accept("G91");
     chip.accept("G1 X2 F432");
@@ -342,9 +343,7 @@ fn the_driver_is_fed_before_the_first_step_and_released_after_rest() {
     assert!((245 * MS..280 * MS).contains(&rest), "{} ms", rest / MS);
 }
 
-#[test]
-fn time_and_position_of_a_report_belong_together() {
-    let mut chip = power_on!();
+fn time_and_position_of_a_report_belong_together(mut chip: Chip) {
     chip.accept("G91");
     chip.accept("G1 X30 F2160");
     chip.run(300 * MS);
@@ -384,9 +383,7 @@ fn checked(text: &str) -> String {
     format!("{text}*{:04X}", crc(text.as_bytes()))
 }
 
-#[test]
-fn ten_thousand_checked_lines_at_full_speed_lose_no_byte() {
-    let mut chip = power_on!();
+fn ten_thousand_checked_lines_at_full_speed_lose_no_byte(mut chip: Chip) {
     chip.accept("$110=2160");
     chip.accept("G90");
     for target in [390, -390, 390, -390, 390] {
@@ -438,9 +435,7 @@ fn first_direction(chip: &mut Chip, line: &str) -> u8 {
     level
 }
 
-#[test]
-fn the_direction_pin_is_the_one_of_grbl() {
-    let mut chip = power_on!();
+fn the_direction_pin_is_the_one_of_grbl(mut chip: Chip) {
     chip.command("index 1000 1050 32000");
     // Grbl's documentation of 1.1: "By default, the axes move in a positive direction when the
     // direction pin signal is low, and a negative direction when the pin is high" ($3); homing

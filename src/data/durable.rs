@@ -22,7 +22,7 @@ pub struct Partial {
 /// A file that is complete and synced to disk, still under its temporary name. Dropping it removes
 /// the file.
 #[derive(Debug)]
-pub struct Sealed {
+pub struct SealedPartial {
     names: Names,
 }
 
@@ -73,13 +73,13 @@ impl Partial {
     ///
     /// # Errors
     /// If writing or syncing fails; the file is then removed.
-    pub fn seal(self) -> io::Result<Sealed> {
+    pub fn seal(self) -> io::Result<SealedPartial> {
         let Self { writer, names } = self;
         let file = writer
             .into_inner()
             .map_err(io::IntoInnerError::into_error)?;
         file.sync_all()?;
-        Ok(Sealed { names })
+        Ok(SealedPartial { names })
     }
 }
 
@@ -93,7 +93,7 @@ impl Write for Partial {
     }
 }
 
-impl Sealed {
+impl SealedPartial {
     /// Renames the file to its final name, replacing an older one.
     ///
     /// # Errors

@@ -8,8 +8,22 @@ use std::ops::Range;
 
 use image::{GrayImage, RgbImage};
 
-/// The channel value from which a pixel counts as saturated, where nobody asks for another.
+/// The 8-bit value from which a channel counts as saturated, where nobody asks for another.
+///
+/// The paper (section "Specularity separation") counts saturated pixels and gives no value: 250 is this
+/// project's.
 pub const SATURATION_LEVEL: u8 = 250;
+
+/// [`SATURATION_LEVEL`] as a part of white, less half a step: a value of a file with more bits, which would be rounded to
+/// that level, is saturated too.
+pub const SATURATED_VALUE: f32 = (SATURATION_LEVEL as f32 - 0.5) / 255.0;
+
+/// The Spec-Net gate: highlights are separated where a larger fraction of the object's pixels is saturated, where nobody
+/// asks for another.
+///
+/// The paper, section "Specularity separation": "If the percentage exceeds 5 %, Spec-Net will be performed, otherwise
+/// the object is considered as diffuse".
+pub const SPEC_NET_GATE: f64 = 0.05;
 
 /// An image of another size than the mask that it is measured under.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

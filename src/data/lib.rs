@@ -15,6 +15,7 @@
 //! | [`turn_light`] | how much light changes over a turn |
 //! | [`naming`] | the names that a session may have |
 //! | [`durable`] | files that appear whole or not at all |
+//! | [`disk`] | a full disk, and what is said of it |
 //! | [`causes`] | errors as text, with their causes |
 //! | [`counts`] | numbers of things in sentences |
 //!
@@ -24,6 +25,9 @@
 //! `shard` knows `geometry`, `image_stats`, `naming` and `durable`; `report` knows the records of `shard`
 //! and `image_stats`; `session` and `shard` do not know each other. `docs/formats.md` describes every
 //! file and field.
+//!
+//! The folder `examples/` has programs: `session_angles` prints the angle of each frame of a session, `shard_arrays`
+//! reads a shard as arrays, `write_shard` writes a small data set, and `verify_dataset` checks one.
 //!
 //! # Read a session
 //!
@@ -55,7 +59,7 @@
 //!
 //! use image::{GrayImage, Luma, Rgb, RgbImage};
 //! use relit_data::geometry::Rect;
-//! use relit_data::image_stats::MaskSpans;
+//! use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
 //! use relit_data::shard::{
 //!     Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
 //!     OutputFolder, Sample, SamplingBasis, SessionEntry, ShardReader, ShardWriter,
@@ -68,8 +72,8 @@
 //!     frames: SAMPLES,
 //!     size: ImageSize::Pixels(8),
 //!     margin: 0.0,
-//!     saturation_level: 250,
-//!     gate: 0.05,
+//!     saturation_level: SATURATION_LEVEL,
+//!     gate: SPEC_NET_GATE,
 //!     align: Align::Off,
 //!     align_tolerance: None,
 //!     layout: Layout::Webdataset,
@@ -88,30 +92,13 @@
 //!         Rgb(if x < 4 { [20 * index as u8, 128, 255] } else { [0; 3] })
 //!     });
 //!     let measures = spans.measure(&image, settings.saturation_level)?;
-//!     let record = FrameRecord {
-//!         session: SESSION.to_owned(),
-//!         object: "mug".to_owned(),
-//!         index,
-//!         source_frame: u64::from(index),
-//!         t_us: 33_333 * i64::from(index),
-//!         angle_deg: Some(30.0 * f64::from(index)),
-//!         duplicate: false,
-//!         crop: Rect::new(0, 0, 8, 8),
-//!         size: [8, 8],
-//!         shift_px: None,
-//!         shift_applied: false,
-//!         align_confidence: None,
-//!         mask_px: measures.mask_px,
-//!         saturated_px: measures.saturated_px,
-//!         saturated_fraction: measures.saturated_fraction(),
-//!         saturated_any_px: measures.saturated_any_px,
-//!         spec_net: measures.saturated_fraction() > settings.gate,
-//!         mean_rgb: measures.mean_rgb,
-//!         sharpness: measures.sharpness,
-//!         exposure_step: None,
-//!         identical_to: None,
-//!         blur: None,
-//!     };
+//!     let crop = Rect::new(0, 0, 8, 8);
+//!     let record =
+//!         FrameRecord::new(SESSION, "mug", index, crop, &measures, settings.gate).of_frame(
+//!             u64::from(index),
+//!             33_333 * i64::from(index),
+//!             Some(30.0 * f64::from(index)),
+//!         );
 //!     writer.push(Sample::encode(record, image)?)?;
 //! }
 //! let files = writer.finish()?;
@@ -166,6 +153,7 @@
 
 pub mod causes;
 pub mod counts;
+pub mod disk;
 #[cfg(feature = "files")]
 pub mod durable;
 pub mod geometry;

@@ -1,9 +1,9 @@
-//! How much light changes over a turn: whether a room is uneven enough to tell normals and albedo by. Knows
+//! How much light changes over a turn: whether the environment light is uneven enough to tell normals and albedo by. Knows
 //! numbers, and nothing of images and files.
 
 use std::f64::consts::TAU;
 
-/// Below this [`modulation`], the median over an object, its room is too even: what varies over the turn hardly stands
+/// Below this [`modulation`], the median over an object, the environment light is too even: what varies over the turn hardly stands
 /// out of the noise.
 pub const LEAST_MODULATION: f64 = 0.08;
 /// Fewest angles that tell two harmonics.

@@ -8,6 +8,7 @@ use relit_video as video;
 
 /// Why a recording, or all of them, could not be extracted.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ExtractError {
     /// An option is out of range.
     #[error("{name} is {value}: give {allowed}")]

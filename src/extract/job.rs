@@ -320,35 +320,28 @@ impl Job {
         options: &ExtractOptions,
     ) -> FrameRecord {
         let candidate = plan.candidate(frame.number);
-        let measures = &frame.measures;
         let alignment = frame.alignment;
-        let saturated_fraction = measures.saturated_fraction();
-        FrameRecord {
-            session: self.recording.id.clone(),
-            object: self.recording.object.clone(),
-            index: sample.index,
-            source_frame: frame.number,
-            t_us: candidate.map_or(0, |candidate| candidate.t_us),
-            angle_deg: candidate.and_then(|candidate| candidate.angle_deg),
-            duplicate: sample.duplicate,
-            crop: stage.crop,
-            size: frame.image.dimensions().into(),
-            shift_px: alignment
-                .and_then(|alignment| alignment.shift)
-                .map(|s| s.map(thousandths)),
-            shift_applied: frame.shift_applied,
-            align_confidence: alignment.map(|alignment| thousandths(alignment.confidence)),
-            mask_px: measures.mask_px,
-            saturated_px: measures.saturated_px,
-            saturated_fraction,
-            saturated_any_px: measures.saturated_any_px,
-            spec_net: saturated_fraction > options.gate,
-            mean_rgb: measures.mean_rgb,
-            sharpness: measures.sharpness,
-            exposure_step: None,
-            identical_to: None,
-            blur: None,
-        }
+        let shift = alignment.and_then(|alignment| alignment.shift);
+        FrameRecord::new(
+            &self.recording.id,
+            &self.recording.object,
+            sample.index,
+            stage.crop,
+            &frame.measures,
+            options.gate,
+        )
+        .of_frame(
+            frame.number,
+            candidate.map_or(0, |candidate| candidate.t_us),
+            candidate.and_then(|candidate| candidate.angle_deg),
+        )
+        .flagged_duplicate(sample.duplicate)
+        .scaled_to(frame.image.dimensions().into())
+        .aligned(
+            shift.map(|shift| shift.map(thousandths)),
+            frame.shift_applied,
+            alignment.map(|alignment| thousandths(alignment.confidence)),
+        )
     }
 
     /// What the plan shows: repeated frames, an incomplete turn, gaps.

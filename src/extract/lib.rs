@@ -36,11 +36,12 @@
 //! ```
 
 mod align;
+mod batch;
 mod blur;
 mod catalog;
 mod collected;
 mod crop;
-mod depot;
+mod crop_view;
 mod error;
 mod job;
 mod mask_doubts;
@@ -54,44 +55,24 @@ mod quality;
 mod scale;
 mod select;
 mod steadiness;
+mod storage;
+mod tally;
 mod timeline;
-mod view;
 
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use rayon::{ThreadPool, ThreadPoolBuilder};
-
-use relit_data::session::{self, recordings};
-use relit_data::shard::OutputFolder;
-
-use catalog::Catalog;
-use depot::{Depot, OnDisk};
+use storage::LocalDisk;
 
 pub use align::{AlignBuffers, AlignSample, Aligner, Alignment};
 pub use crop::{bounding_box, cut, square_around};
+pub use crop_view::CropView;
 pub use error::ExtractError;
 pub use mask_doubts::mask_doubts;
 pub use observer::{Observer, RecordingOutcome};
 pub use options::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
 pub use scale::{APRON, ScaleBuffers, Scaler};
 pub use select::{Candidate, Selection, TimeGap, TurnSpan, runs_back_at, time_gaps};
-pub use view::View;
-
-/// The outcome of an extraction: numbers of recordings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Tally {
-    /// Recordings that were extracted.
-    pub extracted: usize,
-    /// Extracted or skipped recordings of which something is lost.
-    pub lossy: usize,
-    /// Recordings that were in the data set already.
-    pub skipped: usize,
-    /// Recordings that hold too little of a turn, and were left out.
-    pub left_out: usize,
-    /// Recordings that failed.
-    pub failed: usize,
-}
+pub use tally::Tally;
 
 /// Extracts all recordings in `inputs` (session folders, folders of sessions, video files) into the
 /// data set in the folder `out`, which is created if it does not exist. With the feature `object-store`, both may
@@ -112,137 +93,6 @@ pub fn extract(
         return objects::extract(inputs, out, options, observer);
     }
     let mut tally = Tally::default();
-    let found = find(inputs, observer, &mut tally);
-    extract_recordings(&found, out, options, observer, &OnDisk, tally)
-}
-
-/// Extracts the recordings `found` into the folder `out`, and adds the outcomes to `tally`.
-fn extract_recordings(
-    found: &[PathBuf],
-    out: &Path,
-    options: &ExtractOptions,
-    observer: &dyn Observer,
-    depot: &dyn Depot,
-    mut tally: Tally,
-) -> Result<Tally, ExtractError> {
-    if out.join(session::MANIFEST_FILE).exists() {
-        return Err(ExtractError::IntoSession(out.to_owned()));
-    }
-    let folder = match options.task {
-        None => OutputFolder::lock(out)?,
-        Some(task) => OutputFolder::lock_for(out, task)?,
-    };
-    let pool = ThreadPoolBuilder::new()
-        .num_threads(options.threads)
-        .build()?;
-    let mut run = Run {
-        catalog: Catalog::open(&folder, found, options)?,
-        folder,
-        options,
-        pool,
-        names: HashSet::new(),
-        observer,
-        depot,
-    };
-    for (position, recording) in found.iter().enumerate() {
-        if options.task.is_none_or(|task| task.takes(position)) {
-            run.extract(position, recording, &mut tally)?;
-        }
-    }
-    Ok(tally)
-}
-
-/// All recordings in the inputs, in the order in which tasks share them; inputs without any are reported.
-fn find(inputs: &[PathBuf], observer: &dyn Observer, tally: &mut Tally) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    for input in inputs {
-        match recordings(input) {
-            Ok(inside) => found.extend(inside),
-            Err(error) => {
-                let outcome = RecordingOutcome::of(Err(error.into()));
-                tally.count(&outcome);
-                observer.ended(input, &outcome);
-            }
-        }
-    }
-    found
-}
-
-impl Tally {
-    fn count(&mut self, outcome: &RecordingOutcome) {
-        match outcome {
-            RecordingOutcome::Extracted(entry) => {
-                self.extracted += 1;
-                self.lossy += usize::from(entry.lossy);
-            }
-            RecordingOutcome::Skipped(entry) => {
-                self.skipped += 1;
-                self.lossy += usize::from(entry.lossy);
-            }
-            RecordingOutcome::LeftOut(_) => self.left_out += 1,
-            RecordingOutcome::Failed(_) => self.failed += 1,
-        }
-    }
-}
-
-/// One extraction into one data set.
-struct Run<'a> {
-    folder: OutputFolder,
-    catalog: Catalog,
-    options: &'a ExtractOptions,
-    pool: ThreadPool,
-    /// Names of the recordings so far.
-    names: HashSet<String>,
-    observer: &'a dyn Observer,
-    depot: &'a dyn Depot,
-}
-
-impl Run<'_> {
-    /// Extracts a recording and notes the outcome; an error if a task's outcome cannot be noted.
-    fn extract(
-        &mut self,
-        position: usize,
-        recording: &Path,
-        tally: &mut Tally,
-    ) -> Result<(), ExtractError> {
-        let outcome = RecordingOutcome::of(self.extract_one(recording));
-        tally.count(&outcome);
-        self.observer.ended(recording, &outcome);
-        self.catalog.note(&self.folder, position, &outcome)?;
-        let extracted = match &outcome {
-            RecordingOutcome::Extracted(entry) => Some(entry.id.as_str()),
-            _ => None,
-        };
-        self.depot
-            .ended(recording, self.catalog.dataset(), extracted)
-    }
-
-    fn extract_one(&mut self, path: &Path) -> Result<RecordingOutcome, ExtractError> {
-        let Self {
-            folder, options, ..
-        } = self;
-        let local = self.depot.fetch(path)?;
-        let job = job::Job::open(&local, options)?;
-        if !self.names.insert(job.id().to_owned()) {
-            return Err(ExtractError::SameName(job.id().to_owned()));
-        }
-        let dataset = self.catalog.dataset();
-        if options.resume
-            && let Some(entry) = job.existing_entry(dataset, options)
-            && self.depot.holds(dataset, folder.path(), job.id())
-        {
-            return Ok(RecordingOutcome::Skipped(Box::new(entry.clone())));
-        }
-        if !options.replace && job.would_replace_another(dataset) {
-            let (out, id) = (folder.path().to_owned(), job.id().to_owned());
-            return Err(ExtractError::NameTaken { out, id });
-        }
-        if options.task.is_some() {
-            folder.clear_leftovers_of(job.id())?;
-        }
-        self.observer.started(path, options.frames);
-        let (entry, shards) = job.run(folder, options, &self.pool, self.observer)?;
-        self.catalog.add(folder, entry.clone(), shards)?;
-        Ok(RecordingOutcome::Extracted(Box::new(entry)))
-    }
+    let found = batch::find(inputs, observer, &mut tally);
+    batch::extract_recordings(&found, out, options, observer, &LocalDisk, tally)
 }

@@ -1,7 +1,7 @@
 //! A look at the mask before it is used for a whole data set, by a few frames of the video.
 
 use image::GrayImage;
-use relit_grabcut::{Effort, MaskCheck, MaskError, ShapeCheck, Turn, TurnStatistics};
+use relit_grabcut::{Effort, MaskCheck, MaskError, ShapeCheck, TurnFrames, TurnStatistics};
 use relit_video::Video;
 
 use super::ExtractError;
@@ -21,7 +21,7 @@ pub fn mask_doubts(
 ) -> Result<Vec<String>, ExtractError> {
     let numbers = video.quick_spread(FRAMES);
     let size = mask.dimensions();
-    let mut turn = Turn::new(size.0, size.1);
+    let mut turn = TurnFrames::new(size.0, size.1);
     for (_, picture) in video.pictures(&numbers, size)? {
         turn.push(&picture);
     }

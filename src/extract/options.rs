@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::thread::available_parallelism;
 
-use relit_data::image_stats::SATURATION_LEVEL;
-use relit_data::shard::{Align, ExtractionSettings, ImageSize, Layout, Task};
+use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::shard::{Align, ArrayTask, ExtractionSettings, ImageSize, Layout};
 
 use super::{ExtractError, scale};
 
@@ -27,8 +27,7 @@ pub struct ExtractOptions {
     pub margin: f64,
     /// The 8-bit value from which a channel is saturated.
     pub saturation_level: u8,
-    /// The saturated fraction above which `spec_net` is set, 0..=1 (the paper: 5 %, section on
-    /// Spec-Net).
+    /// The saturated fraction above which `spec_net` is set, 0..=1: [`SPEC_NET_GATE`] by default.
     pub gate: f64,
     /// How samples are stored.
     pub layout: Layout,
@@ -50,7 +49,7 @@ pub struct ExtractOptions {
     /// Replace sessions of the same name that were made from another video.
     pub replace: bool,
     /// The task whose part of the recordings is extracted; `None` extracts all of them.
-    pub task: Option<Task>,
+    pub task: Option<ArrayTask>,
     /// The folder through which recordings and data sets of object stores pass; `None` is the system's folder
     /// for temporary files.
     pub cache: Option<PathBuf>,
@@ -65,7 +64,7 @@ impl Default for ExtractOptions {
             size: ImageSize::Pixels(256),
             margin: 0.05,
             saturation_level: SATURATION_LEVEL,
-            gate: 0.05,
+            gate: SPEC_NET_GATE,
             layout: Layout::Webdataset,
             align: Align::Correct,
             align_tolerance: 0.1,

@@ -19,7 +19,7 @@ use super::crop::repeat_edge;
 use super::plan::Assignments;
 use super::scale::APRON;
 use super::{
-    AlignBuffers, AlignSample, Aligner, Alignment, ExtractError, ScaleBuffers, Scaler, View,
+    AlignBuffers, AlignSample, Aligner, Alignment, CropView, ExtractError, ScaleBuffers, Scaler,
 };
 
 /// The processing of the frames of one video.
@@ -64,7 +64,7 @@ pub(super) struct ProcessedFrame {
 #[derive(Clone, Copy)]
 struct Moved<'v> {
     /// The crop, moved by whole pixels.
-    crop: View<'v>,
+    crop: CropView<'v>,
     whole: [i32; 2],
     /// The rest of the way.
     part: [f64; 2],
@@ -133,7 +133,7 @@ impl Stage<'_> {
             scale,
             align,
         } = buffers;
-        let crop = View::within(region, self.border());
+        let crop = CropView::within(region, self.border());
         let alignment = self.align.as_ref().map(|by| {
             let sample = AlignSample::of(crop);
             by.aligner.measure(&sample, align)
@@ -161,7 +161,7 @@ impl Stage<'_> {
     }
 
     /// The crop where its object went; `None` if it is not corrected.
-    fn moved<'v>(&self, crop: View<'v>, alignment: Alignment) -> Option<Moved<'v>> {
+    fn moved<'v>(&self, crop: CropView<'v>, alignment: Alignment) -> Option<Moved<'v>> {
         let correction = self.align.as_ref()?.correction.as_ref()?;
         let [dx, dy] = alignment.shift?;
         if dx.hypot(dy) <= correction.above {
@@ -232,7 +232,7 @@ impl Stage<'_> {
             let number = pending.number();
             self.video.part(pending, self.crop, crop).ok()?;
             repeat_edge(crop, self.crop, self.frame());
-            Some((number, AlignSample::of(View::whole(crop))))
+            Some((number, AlignSample::of(CropView::whole(crop))))
         };
         let mut samples: Vec<(u64, AlignSample)> = pool.install(|| {
             let samples = reader.par_bridge().map_init(RgbaImage::default, sample);
@@ -254,7 +254,7 @@ impl Stage<'_> {
             top,
         );
         repeat_edge(&mut crop, self.crop, self.frame());
-        Some((frame, AlignSample::of(View::whole(&crop))))
+        Some((frame, AlignSample::of(CropView::whole(&crop))))
     }
 }
 

@@ -129,33 +129,19 @@ fn exposure_steps(frames: &[&FrameRecord]) -> Vec<Option<f64>> {
 pub(super) mod tests {
     use super::*;
     use relit_data::geometry::Rect;
+    use relit_data::image_stats::{Measures, SPEC_NET_GATE};
 
     /// A sample whose brightness is `level`, of its own picture.
     pub(in super::super) fn record(index: u32, level: f64) -> FrameRecord {
-        FrameRecord {
-            session: "s".to_owned(),
-            object: "o".to_owned(),
-            index,
-            source_frame: u64::from(index),
-            t_us: 0,
-            angle_deg: None,
-            duplicate: false,
-            crop: Rect::new(0, 0, 1, 1),
-            size: [1, 1],
-            shift_px: None,
-            shift_applied: false,
-            align_confidence: None,
+        let measures = Measures {
             mask_px: 1,
             saturated_px: 0,
-            saturated_fraction: 0.0,
             saturated_any_px: 0,
-            spec_net: false,
             mean_rgb: [level; 3],
             sharpness: 1.0,
-            exposure_step: None,
-            identical_to: None,
-            blur: None,
-        }
+        };
+        let pixel = Rect::new(0, 0, 1, 1);
+        FrameRecord::new("s", "o", index, pixel, &measures, SPEC_NET_GATE)
     }
 
     fn found(levels: impl Iterator<Item = f64>) -> Vec<TurnFinding> {

@@ -7,7 +7,7 @@
 //! evidence is weak. Ends that show the table are left to the search for the table.
 
 use super::bitmap::Bitmap;
-use super::table::Table;
+use super::turntable::Turntable;
 
 /// Share of the width from which each end of a row is averaged.
 const END: f64 = 0.03;
@@ -37,7 +37,7 @@ pub(super) struct Backdrop {
 impl Backdrop {
     /// From the features of an image of `size` (average L, a, b, then the changes of light and colour)
     /// and the table.
-    pub(super) fn new(features: &[[f32; 5]], table: &Table, size: (usize, usize)) -> Self {
+    pub(super) fn new(features: &[[f32; 5]], table: &Turntable, size: (usize, usize)) -> Self {
         let ends = Ends::new(features, &table.surface, size);
         let distance: Vec<f32> = (0..features.len())
             .map(|at| ends.distance(&features[at], at / size.0))
@@ -144,9 +144,9 @@ mod tests {
         (0..40 * 30).map(feature).collect()
     }
 
-    fn no_table() -> Table {
+    fn no_table() -> Turntable {
         let nothing = Bitmap::new((40, 30), std::iter::empty());
-        Table {
+        Turntable {
             surface: nothing.clone(),
             shadow: nothing.clone(),
             plain: nothing,
@@ -170,7 +170,7 @@ mod tests {
         let stick = |x: usize, y: usize| x == 20 && (5..12).contains(&y);
         let rim = |x: usize, y: usize| y == 15 && (3..37).contains(&x);
         let features = room(|x, y| stick(x, y) || rim(x, y));
-        let table = Table {
+        let table = Turntable {
             surface: no_table().surface.map(|at, _| at / 40 > 15),
             ..no_table()
         };

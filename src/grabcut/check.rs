@@ -27,18 +27,18 @@ const ON_TABLE: f64 = 0.5;
 /// Most places of the outline at which distances are measured.
 const MOST_PLACES: usize = 2000;
 
-/// Where the object is in a frame.
+/// A frame registered against the average over the turn: where the object is in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct Registration {
     /// From the average over the turn: right and down, pixels of the frame.
     pub shift: [f32; 2],
     /// How alike the frame and the average are there, -1..=1.
     pub likeness: f32,
 }
 
-/// A part of the image.
+/// A part of the image in which mask and turn differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Region {
+pub struct DoubtfulRegion {
     /// Its area, pixels.
     pub px: u64,
     /// The smallest rectangle around it.
@@ -59,11 +59,11 @@ pub struct ShapeCheck {
     /// Distance of the mask's outline from the turn's, pixels: the median, and what 95 % stay below.
     pub edge_px: [f32; 2],
     /// Parts of the mask that are background according to the turn, largest first.
-    pub leaks: Vec<Region>,
+    pub leaks: Vec<DoubtfulRegion>,
     /// Parts of the object that are not in the mask according to the turn, largest first.
-    pub missing: Vec<Region>,
+    pub missing: Vec<DoubtfulRegion>,
     /// Holes in the mask where the turn shows object, largest first.
-    pub holes: Vec<Region>,
+    pub holes: Vec<DoubtfulRegion>,
 }
 
 /// A mask that is held against the frames of a turn.
@@ -72,7 +72,7 @@ pub struct MaskCheck<'a> {
     turn: &'a TurnStatistics,
     mask: Bitmap,
     size: (u32, u32),
-    /// Made when a place is asked for.
+    /// Made when a frame is registered.
     reference: OnceLock<Reference>,
 }
 
@@ -105,7 +105,7 @@ impl<'a> MaskCheck<'a> {
     /// Where the object is in a frame of the turn; none where nothing can be told, as in a frame that is
     /// dark or of another size.
     #[must_use]
-    pub fn place(&self, frame: &RgbImage) -> Option<Place> {
+    pub fn register(&self, frame: &RgbImage) -> Option<Registration> {
         if frame.dimensions() != self.size {
             return None;
         }
@@ -121,7 +121,7 @@ impl<'a> MaskCheck<'a> {
             .get_or_init(|| Reference::new(&turn.light(), &turn.reduced(&self.mask), turn.size()));
         let (shift, likeness) = reference.find(&light)?;
         let factor = self.turn.factor() as f32;
-        Some(Place {
+        Some(Registration {
             shift: shift.map(|way| way * factor),
             likeness,
         })
@@ -233,11 +233,11 @@ fn opened(part: &Bitmap, radius: usize) -> Bitmap {
     part.map(|at, bit| bit && wide.bits()[at])
 }
 
-fn regions(part: &Bitmap, least: f64) -> Vec<Region> {
+fn regions(part: &Bitmap, least: f64) -> Vec<DoubtfulRegion> {
     let components = part.components(Connectivity::Eight).list;
-    let mut regions: Vec<Region> = components
+    let mut regions: Vec<DoubtfulRegion> = components
         .into_iter()
-        .map(|Component { area, bounds }| Region { px: area, bounds })
+        .map(|Component { area, bounds }| DoubtfulRegion { px: area, bounds })
         .filter(|region| region.px as f64 >= least)
         .collect();
     regions.sort_by_key(|region| std::cmp::Reverse(region.px));

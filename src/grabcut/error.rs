@@ -2,7 +2,6 @@
 
 use relit_data::geometry::Rect;
 
-use super::StrokesFault;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
 
 /// Why no mask could be made.
@@ -126,4 +125,19 @@ pub enum SeedsFault {
     /// A recorded seeds image has an invalid grey level.
     #[error("it has the grey level {0}, but only 0, 128 and 255 are valid")]
     Level(u8),
+}
+
+/// Why strokes cannot be painted.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StrokesFault {
+    /// No point.
+    #[error("stroke {0} has no point")]
+    Empty(usize),
+    /// A number that is no length, or too large.
+    #[error("stroke {0} has a coordinate or radius that is out of range")]
+    OutOfRange(usize),
+    /// Painting would take too long.
+    #[error("the strokes cover too many pixels: paint with fewer or smaller ones")]
+    TooLarge,
 }

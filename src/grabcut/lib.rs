@@ -1,9 +1,9 @@
 //! Which pixels of an image are the object: hints from a person or what a turn shows, GrabCut, clean-up.
 //!
 //! Camera and object ride on the same turntable, so one mask fits all frames of a turn. [`segment`]
-//! makes it from one image and hints, [`segment_turn`] from what a whole [`Turn`] shows, with or without
-//! hints; [`preview`] shows it for a person to check; [`MaskCheck`] holds a mask against a turn, and [`score`]
-//! measures it against the truth.
+//! makes it from one image and hints, [`segment_turn`] from what the frames of a whole turn show
+//! ([`TurnFrames`]), with or without hints. [`preview`] shows it for a person to check; [`MaskCheck`] holds a mask
+//! against a turn, and [`score`] measures it against the ground truth.
 //!
 //! Everything is computed from images and bytes in memory: the crate knows no files, videos or threads, links
 //! no native library, and also runs in a browser.
@@ -72,23 +72,25 @@ mod segment;
 mod settings;
 mod shape_faults;
 mod strokes;
-mod table;
 mod turn;
+mod turntable;
 mod warning;
 
 pub use alpha::alpha;
-pub use check::{MaskCheck, Place, Region, ShapeCheck};
+pub use check::{DoubtfulRegion, MaskCheck, Registration, ShapeCheck};
 pub use drawing::Drawing;
 pub use encode::{grey_png, rgb_png};
-pub use error::{MaskError, SeedsFault};
+pub use error::{MaskError, SeedsFault, StrokesFault};
 pub use hints::{Hints, Mark, Seeds};
 pub use outline::outline;
 pub use preview::preview;
 pub use score::{BOUNDARY_TOLERANCE_PX, MaskScore, ScoreFault, score};
-pub use segment::{Mask, MaskStatistics, segment, segment_turn, segment_with};
+pub use segment::{
+    Mask, MaskStatistics, check_hints, clean_cut, segment, segment_turn, segment_with,
+};
 pub use settings::{
     Effort, Feather, Iterations, MAX_PIXELS, MIN_SIDE, SegmentSettings, SettingsFault,
 };
-pub use strokes::{Brush, Stroke, Strokes, StrokesFault};
-pub use turn::{MIN_TURN_FRAMES, TURN_FRAMES, Turn, TurnStatistics};
+pub use strokes::{Brush, Stroke, Strokes};
+pub use turn::{MIN_TURN_FRAMES, TURN_FRAMES, TurnFrames, TurnStatistics};
 pub use warning::{Side, Warning};

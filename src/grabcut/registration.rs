@@ -107,11 +107,11 @@ fn fit(average: &[[f32; 2]], frame: &[[f32; 2]], pixels: &[usize], step: isize) 
 
 /// The vertex of the parabola through three values at -1, 0 and 1.
 fn vertex(before: f32, most: f32, after: f32) -> f32 {
-    let bend = before - 2.0 * most + after;
-    if bend >= 0.0 {
+    let curvature = before - 2.0 * most + after;
+    if curvature >= 0.0 {
         return 0.0;
     }
-    (0.5 * (before - after) / bend).clamp(-0.5, 0.5)
+    (0.5 * (before - after) / curvature).clamp(-0.5, 0.5)
 }
 
 /// Most pixels by which a reference finds the object.

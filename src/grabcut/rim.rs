@@ -2,7 +2,7 @@
 //! the other on average, and hangs on the object as a thin line.
 
 use super::bitmap::{Bitmap, Connectivity};
-use super::table::Table;
+use super::turntable::Turntable;
 
 /// A line is at most twice this share of the frame's width wide.
 const WIDTH: f64 = 0.005;
@@ -14,7 +14,7 @@ const LENGTH: usize = 4;
 const BETWEEN: f64 = 0.4;
 
 /// The object without thin lines that have the table below and the room above them.
-pub(super) fn without_rim(object: &Bitmap, table: &Table, size: (usize, usize)) -> Bitmap {
+pub(super) fn without_rim(object: &Bitmap, table: &Turntable, size: (usize, usize)) -> Bitmap {
     let radius = ((size.0 as f64 * WIDTH).round() as usize).max(1);
     let reach = ((size.0 as f64 * REACH).round() as usize).max(2);
     let wide = object.inverted().dilated(radius).inverted().dilated(radius);
@@ -43,7 +43,7 @@ pub(super) fn without_rim(object: &Bitmap, table: &Table, size: (usize, usize)) 
 fn is_between(
     at: usize,
     object: &Bitmap,
-    table: &Table,
+    table: &Turntable,
     (width, height): (usize, usize),
     reach: usize,
 ) -> bool {
@@ -67,8 +67,8 @@ mod tests {
         Bitmap::new((80, 60), (0..4800).map(|at| set(at % 80, at / 80)))
     }
 
-    fn table() -> Table {
-        Table {
+    fn table() -> Turntable {
+        Turntable {
             surface: bitmap(|_, y| y > 41),
             shadow: bitmap(|_, _| false),
             plain: bitmap(|_, y| y > 41),

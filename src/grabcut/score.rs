@@ -1,4 +1,4 @@
-//! How good a mask is, measured against the truth.
+//! How good a mask is, measured against the ground truth.
 
 use image::GrayImage;
 use relit_data::geometry::Rect;
@@ -17,31 +17,32 @@ const OBJECT_FROM: u8 = 128;
 pub struct MaskScore {
     /// Wrong pixels, as a share of those that count in the region, 0..=1.
     pub error: f64,
-    /// Intersection over union of mask and truth over the pixels that count, 0..=1.
+    /// Intersection over union of mask and ground truth over the pixels that count, 0..=1.
     pub iou: f64,
     /// Harmonic mean of how much of the mask's edge is right and how much of the true edge was
     /// found, within [`BOUNDARY_TOLERANCE_PX`], 0..=1.
     pub boundary_f: f64,
 }
 
-/// Mask and truth, or the region, do not fit together.
+/// Mask and ground truth, or the region, do not fit together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ScoreFault {
     /// They differ in size.
-    #[error("the mask is {} x {} pixels and the truth {} x {}", .mask.0, .mask.1, .truth.0, .truth.1)]
+    #[error("the mask is {} x {} pixels and the ground truth {} x {}", .mask.0, .mask.1, .truth.0, .truth.1)]
     Size {
         /// Width and height of the mask, pixels.
         mask: (u32, u32),
-        /// Width and height of the truth, pixels.
+        /// Width and height of the ground truth, pixels.
         truth: (u32, u32),
     },
     /// No pixel of the region counts.
-    #[error("no pixel of the truth counts in the region")]
+    #[error("no pixel of the ground truth counts in the region")]
     NothingCounts,
 }
 
-/// Compares a mask (object from 128 on) with the truth (0 background, 255 object, 128 does not count).
-/// The error is that inside `region`, of the whole image without one. Where the truth leaves a band
+/// Compares a mask (object from 128 on) with the ground truth (0 background, 255 object, 128 does not count).
+/// The error is that inside `region`, of the whole image without one. Where the ground truth leaves a band
 /// along the edge open, its middle stands for the edge.
 ///
 /// # Errors
@@ -99,7 +100,7 @@ pub fn score(
     })
 }
 
-/// The truth with its open pixels given to the nearer side, step by step.
+/// The ground truth with its open pixels given to the nearer side, step by step.
 fn resolved(truth: &[Option<bool>], size: (u32, u32)) -> Bitmap {
     let (width, height) = (size.0 as usize, size.1 as usize);
     let mut known = truth.to_vec();

@@ -139,6 +139,37 @@ pub fn segment_with(
     Ok(mask.with_warning(still))
 }
 
+/// Whether a frame of `size` can be cut by these hints, before another engine does it.
+///
+/// # Errors
+/// As [`segment`], but for those of its result.
+pub fn check_hints(hints: &Hints, size: (u32, u32)) -> Result<(), MaskError> {
+    check_size(size)?;
+    InitialLabels::new(hints, size).map(drop)
+}
+
+/// The mask of what another engine cut out of a frame by these hints (object from 128 on), with the same clean-up
+/// and warnings as our own.
+///
+/// # Errors
+/// [`MaskError::Empty`], [`MaskError::Everything`].
+pub fn clean_cut(
+    cut: &GrayImage,
+    hints: &Hints,
+    settings: &SegmentSettings,
+) -> Result<Mask, MaskError> {
+    let size = cut.dimensions();
+    let raw = Bitmap::new(size, cut.as_raw().iter().map(|&level| level >= 128));
+    match raw.count() {
+        0 => return Err(MaskError::Empty),
+        all if all == cut.as_raw().len() as u64 => return Err(MaskError::Everything),
+        _ => {}
+    }
+    let rect = hints.rect();
+    let rect = rect.and_then(|rect| rect.clipped_to(size.0, size.1));
+    finish(&raw, size, Some(hints), rect, settings, FILLED_OF_FRAME)
+}
+
 fn by_hints(
     frame: &RgbImage,
     hints: &Hints,

@@ -1,6 +1,6 @@
 //! What is wrong with a mask's shape, as sentences.
 
-use super::{Region, ShapeCheck};
+use super::{DoubtfulRegion, ShapeCheck};
 
 /// Parts of the mask that are background, of the object that are not in it, or holes in it may have this
 /// share of its area, where all of the turn is looked at.
@@ -63,7 +63,7 @@ fn faults(shape: &ShapeCheck, most_region: f64) -> Vec<String> {
     faults
 }
 
-fn places(regions: &[Region]) -> String {
+fn places(regions: &[DoubtfulRegion]) -> String {
     let named: Vec<String> = regions
         .iter()
         .take(NAMED)

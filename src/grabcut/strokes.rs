@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::error::StrokesFault;
 use super::hints::Mark;
 use super::settings::MAX_PIXELS;
 use super::{MaskError, Seeds};
@@ -37,21 +38,6 @@ pub struct Stroke {
     /// The way of the brush's middle, x and y in pixels of the frame; the upper left pixel's middle
     /// is (0.5, 0.5).
     pub points: Vec<[f32; 2]>,
-}
-
-/// Why strokes cannot be painted.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum StrokesFault {
-    /// No point.
-    #[error("stroke {0} has no point")]
-    Empty(usize),
-    /// A number that is no length, or too large.
-    #[error("stroke {0} has a coordinate or radius that is out of range")]
-    OutOfRange(usize),
-    /// Painting would take too long.
-    #[error("the strokes cover too many pixels: paint with fewer or smaller ones")]
-    TooLarge,
 }
 
 /// Strokes in the order in which they were painted; later ones cover earlier ones.

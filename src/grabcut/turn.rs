@@ -16,7 +16,7 @@ use super::initial::InitialLabels;
 use super::lab::LabTable;
 use super::pyramid::{FirstModels, RgbField, grow, half_image, half_labels, refine, start};
 use super::rim::without_rim;
-use super::table::{Table, table};
+use super::turntable::{Turntable, find_turntable};
 use super::{Effort, Hints, Iterations, registration};
 
 /// Fewest frames from which anything can be learned.
@@ -51,12 +51,12 @@ const MOST_CONTRAST: f32 = 100.0;
 
 /// Frames of a turn, all of one size, reduced to what the statistics need.
 #[derive(Debug, Clone)]
-pub struct Turn {
+pub struct TurnFrames {
     frames: Vec<RgbImage>,
     full: (u32, u32),
 }
 
-impl Turn {
+impl TurnFrames {
     /// A turn without frames, whose frames are `width` x `height` pixels large.
     #[must_use]
     pub fn new(width: u32, height: u32) -> Self {
@@ -108,7 +108,7 @@ pub struct TurnStatistics {
 impl TurnStatistics {
     /// Looks at the frames of a turn.
     #[must_use]
-    pub fn new(turn: &Turn) -> Self {
+    pub fn new(turn: &TurnFrames) -> Self {
         let colours = LabTable::new();
         let fine = TurnField::new(&turn.frames, &colours);
         let coarse = (fine.size.0 * fine.size.1 > COARSE_PIXELS).then(|| {
@@ -240,7 +240,7 @@ pub(super) struct TurnField {
     contrasts: Vec<[f32; 4]>,
     /// Pixels that are background by the ends of their rows.
     backdrop: Bitmap,
-    table: Table,
+    table: Turntable,
     evidence: Vec<f32>,
 }
 
@@ -293,7 +293,7 @@ impl TurnField {
         };
         let features: Vec<[f32; 5]> = (0..count).map(feature).collect();
         let contrasts: Vec<[f32; 4]> = (0..count).map(contrast).collect();
-        let table = table(&features, &largest(&contrasts, size), size);
+        let table = find_turntable(&features, &largest(&contrasts, size), size);
         let backdrop = Backdrop::new(&features, &table, size);
         Self {
             size,
@@ -313,7 +313,7 @@ impl TurnField {
             features: Vec::new(),
             contrasts: Vec::new(),
             backdrop: Bitmap::new((0, 0), std::iter::empty()),
-            table: Table {
+            table: Turntable {
                 surface: Bitmap::new((0, 0), std::iter::empty()),
                 shadow: Bitmap::new((0, 0), std::iter::empty()),
                 plain: Bitmap::new((0, 0), std::iter::empty()),

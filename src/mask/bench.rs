@@ -1,6 +1,6 @@
-//! Masks of a folder of images with truth, ours and those of OpenCV's GrabCut, measured in one run.
+//! Masks of a folder of images with ground truth, ours and those of OpenCV's GrabCut, measured in one run.
 //!
-//! The folder has the form of the GrabCut data set: for an image `NAME.jpg` (or .png, .bmp), the truth
+//! The folder has the form of the GrabCut data set: for an image `NAME.jpg` (or .png, .bmp), the ground truth
 //! `NAME.gt.png` (0 background, 255 object, 128 does not count), and as hints `NAME.box.txt` with the
 //! numbers `x1 y1 x2 y2`, corners included, or `NAME.scribble.png` (black unknown, red background, any light
 //! colour object), or both.
@@ -14,7 +14,7 @@ use relit_grabcut::{
     Effort, Hints, Iterations, MaskError, MaskScore, Seeds, SegmentSettings, score, segment_with,
 };
 
-use super::{MaskingError, opencv_grab_cut};
+use super::{MaskEngine, MaskingError, opencv_grab_cut};
 
 /// Endings of the images.
 const IMAGES: [&str; 4] = ["jpg", "jpeg", "png", "bmp"];
@@ -43,6 +43,7 @@ impl Prompt {
 
 /// The figures of one image with one hint.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct BenchRow {
     /// The image's name, without folder and ending.
     pub image: String,
@@ -50,8 +51,8 @@ pub struct BenchRow {
     pub prompt: Prompt,
     /// Our mask.
     pub ours: MaskScore,
-    /// The mask of OpenCV's GrabCut after 5 iterations.
-    pub opencv: MaskScore,
+    /// The mask of OpenCV's GrabCut after 5 iterations, if it is built in.
+    pub opencv: Option<MaskScore>,
     /// Our mask, cut at the image's own size instead of coarse to fine; if it was asked for.
     pub whole: Option<MaskScore>,
 }
@@ -63,7 +64,7 @@ pub struct BenchImage {
     path: PathBuf,
 }
 
-/// The images of a folder that have a truth, in the order of their names.
+/// The images of a folder that have a ground truth, in the order of their names.
 ///
 /// # Errors
 /// [`MaskingError::Io`]; [`MaskingError::Bench`] if there is none.
@@ -84,13 +85,14 @@ pub fn bench_images(folder: &Path) -> Result<Vec<BenchImage>, MaskingError> {
     }
     images.sort_by(|a, b| a.name.cmp(&b.name));
     if images.is_empty() {
-        let why = "it holds no image with its truth, as in mug.jpg and mug.gt.png".to_owned();
+        let why =
+            "it holds no image with its ground truth, as in mug.jpg and mug.gt.png".to_owned();
         return Err(bench_error(folder, why));
     }
     Ok(images)
 }
 
-/// Measures our mask and OpenCV's on one image, for each hint that it has; with `whole` also ours cut at
+/// Measures our mask, and OpenCV's if it is built in, on one image, for each hint that it has; with `whole` also ours cut at
 /// the image's own size.
 ///
 /// # Errors
@@ -113,7 +115,13 @@ pub fn bench_image(entry: &BenchImage, whole: bool) -> Result<Vec<BenchRow>, Mas
             image: entry.name.clone(),
             prompt,
             ours: measure(&ours(&image, &hints, Effort::Fine)?)?,
-            opencv: measure(&opencv_grab_cut(&image, &hints, Iterations::default())?)?,
+            opencv: match MaskEngine::OpenCv.is_built_in() {
+                true => {
+                    let cut = opencv_grab_cut(&image, &hints, Iterations::default())?;
+                    Some(measure(&cut)?)
+                }
+                false => None,
+            },
             whole: match whole {
                 true => Some(measure(&ours(&image, &hints, Effort::Whole)?)?),
                 false => None,

@@ -87,10 +87,19 @@ pub enum MaskingError {
         /// What is wrong with it.
         why: String,
     },
+    /// A mask of OpenCV's GrabCut was wanted of a program that was built without it.
+    #[error(
+        "OpenCV is not built into this relit-mask: build it with `cargo build --release -p relit-mask --features opencv`, or leave out --engine opencv"
+    )]
+    WithoutOpenCv,
+    /// A mask of OpenCV's GrabCut was wanted by a turn.
+    #[error(
+        "OpenCV's GrabCut sees one frame and no turn: give --rect or --seeds without --auto, or leave out --engine opencv"
+    )]
+    OpenCvKnowsNoTurn,
     /// OpenCV's GrabCut reported an error.
-    #[cfg(feature = "opencv")]
     #[error("OpenCV's GrabCut failed")]
-    OpenCv(#[source] opencv::Error),
+    OpenCv(#[source] Box<dyn std::error::Error + Send + Sync>),
     /// The editor cannot be served: the address is taken or not this machine's, or there are no threads or no
     /// random numbers.
     #[error(

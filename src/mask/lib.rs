@@ -8,8 +8,10 @@
 //! [`check_mask`] holds a mask against all frames.
 //!
 //! This crate brings frames and folders to [`relit_grabcut`], and is the program `relit-mask` (in `cli/`).
-//! It knows nothing of data sets and the rig. OpenCV is linked with the feature `opencv` alone, for
-//! comparison.
+//! It knows nothing of data sets and the rig.
+//!
+//! With the feature `opencv`, which is off by default, OpenCV's GrabCut can cut a mask as well: a reference
+//! ([`MaskEngine::OpenCv`]), with which [`bench_image`] compares.
 //!
 //! # Mask the object of a recording
 //!
@@ -34,10 +36,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-#[cfg(feature = "opencv")]
 mod bench;
 mod checking;
 mod editor;
+mod engine;
 mod error;
 mod files;
 mod making;
@@ -48,15 +50,13 @@ mod request;
 mod sampling;
 mod seeds;
 
-#[cfg(feature = "opencv")]
 pub use bench::{BenchImage, BenchRow, Prompt, bench_image, bench_images};
-pub use checking::{CheckOutput, DriftCheck, FrameDrift, MaskReport, Verdict, check_mask};
+pub use checking::{CheckOutput, DriftCheck, FrameDrift, MaskReport, MaskVerdict, check_mask};
 pub use editor::edit;
+pub use engine::{MaskEngine, opencv_grab_cut};
 pub use error::MaskingError;
 pub use files::MaskFiles;
 pub use making::{MaskOutput, make_mask};
-#[cfg(feature = "opencv")]
-pub use opencv_grab_cut::opencv_grab_cut;
 pub use record::{
     MASK_SCHEMA, MaskRecord, MaskSoftware, RecordFault, RecordedHints, RecordedResult, SourceFrame,
 };

@@ -7,16 +7,18 @@ use relit_data::session::{MASK_FILE, Notice, Recording};
 use relit_grabcut::{Effort, Mask, Warning, alpha, grey_png, preview, rgb_png, segment_with};
 use relit_video::Video;
 
+use super::engine::cut_by_opencv;
 use super::files::{check_replaceable, has_alpha, remove, write};
 use super::request::Recipe;
 use super::sampling::{SampledTurn, read_turn};
 use super::{
-    MASK_SCHEMA, MaskFiles, MaskRecord, MaskRequest, MaskSoftware, MaskingError, RecordedHints,
-    RecordedResult, SourceFrame,
+    MASK_SCHEMA, MaskEngine, MaskFiles, MaskRecord, MaskRequest, MaskSoftware, MaskingError,
+    RecordedHints, RecordedResult, SourceFrame,
 };
 
 /// A mask that was written.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct MaskOutput {
     /// The recording's id.
     pub recording: String,
@@ -97,9 +99,14 @@ pub(super) fn cut(
     effort: Effort,
 ) -> Result<Mask, MaskingError> {
     let hints = request.drawing.hints(frame.dimensions(), turn.is_some())?;
-    let statistics = turn.map(|turn| &turn.statistics);
-    let mask = segment_with(frame, statistics, hints.as_ref(), &request.settings, effort)?;
-    Ok(mask)
+    let (hints, settings) = (hints.as_ref(), &request.settings);
+    match request.engine {
+        MaskEngine::Relit => {
+            let statistics = turn.map(|turn| &turn.statistics);
+            Ok(segment_with(frame, statistics, hints, settings, effort)?)
+        }
+        MaskEngine::OpenCv => cut_by_opencv(frame, hints, settings),
+    }
 }
 
 /// Writes a mask that was made by [`cut`] on `frame`, with its record and its preview: each file appears
@@ -179,7 +186,7 @@ fn record_of(
 ) -> Result<MaskRecord, MaskingError> {
     let result = RecordedResult::new(mask.statistics(), png);
     let mut warnings: Vec<String> = mask.warnings().iter().map(Warning::to_string).collect();
-    let software = MaskSoftware::current();
+    let software = MaskSoftware::of(request.engine);
     if let Some(Recipe { path, record }) = &request.recipe
         && record.result.mask_blake3 != result.mask_blake3
     {
@@ -197,6 +204,7 @@ fn record_of(
         software,
         source,
         hints: RecordedHints::new(&request.drawing, turn_frames)?,
+        engine: request.engine,
         settings: request.settings,
         result,
         warnings,

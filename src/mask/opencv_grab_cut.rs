@@ -1,4 +1,4 @@
-//! OpenCV's GrabCut as it is, for comparison.
+//! OpenCV's GrabCut as it is: a reference.
 
 use image::{GrayImage, RgbImage};
 use opencv::core::{self, Mat, Vec3b};
@@ -10,6 +10,11 @@ use super::MaskingError;
 
 /// Seed of OpenCV's random numbers, from which GrabCut draws its first clusters; any fixed number.
 const RNG_SEED: i32 = 1;
+
+/// The version of the OpenCV that is linked.
+pub(super) fn opencv_version() -> Option<String> {
+    core::get_version_string().ok()
+}
 
 /// The mask that OpenCV's `grabCut` makes of the same hints, without any clean-up: 255 object, 0
 /// background. With a rectangle, what is outside is background; without one, unmarked pixels start as
@@ -28,7 +33,8 @@ pub fn opencv_grab_cut(
         .pixels()
         .map(|pixel| Vec3b::from([pixel.0[2], pixel.0[1], pixel.0[0]]))
         .collect();
-    run(&pixels, (width, height), &mut labels, iterations).map_err(MaskingError::OpenCv)?;
+    run(&pixels, (width, height), &mut labels, iterations)
+        .map_err(|error| MaskingError::OpenCv(Box::new(error)))?;
     let is_object =
         |label: u8| i32::from(label) == imgproc::GC_FGD || i32::from(label) == imgproc::GC_PR_FGD;
     let levels = labels

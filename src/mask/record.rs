@@ -9,12 +9,16 @@ use relit_grabcut::{
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::MaskEngine;
+use super::engine::opencv_version;
+
 /// The schema that this version writes and reads.
 pub const MASK_SCHEMA: &str = "relit.mask/1";
 
 /// The content of `mask.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct MaskRecord {
     /// [`MASK_SCHEMA`].
     pub schema: String,
@@ -24,6 +28,9 @@ pub struct MaskRecord {
     pub source: SourceFrame,
     /// The hints.
     pub hints: RecordedHints,
+    /// What cut the object out; in older records relit's GrabCut.
+    #[serde(default)]
+    pub engine: MaskEngine,
     /// The settings.
     pub settings: SegmentSettings,
     /// The result.
@@ -35,10 +42,11 @@ pub struct MaskRecord {
 /// The versions on which a mask's bytes depend.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct MaskSoftware {
     /// Version of relit.
     pub version: String,
-    /// Version of OpenCV, where it was linked; masks do not depend on it any more.
+    /// Version of OpenCV, if that cut the mask; older records have it wherever it was linked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub opencv: Option<String>,
 }
@@ -46,6 +54,7 @@ pub struct MaskSoftware {
 /// The frame on which a mask was made.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct SourceFrame {
     /// File name of the video, without folders.
     pub video: String,
@@ -64,6 +73,7 @@ pub struct SourceFrame {
 /// A [`Drawing`] as it is recorded, and the turn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct RecordedHints {
     /// The rectangle as given; null without one.
     pub rect: Option<Rect>,
@@ -83,6 +93,7 @@ pub struct RecordedHints {
 /// [`MaskStatistics`] and hash of a mask as they are recorded.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct RecordedResult {
     /// BLAKE3 of the mask's file, in hexadecimal.
     pub mask_blake3: String,
@@ -150,15 +161,15 @@ impl MaskRecord {
 }
 
 impl MaskSoftware {
-    /// The versions of this program.
+    /// The versions on which a mask depends that this program makes by an engine.
     #[must_use]
-    pub fn current() -> Self {
+    pub fn of(engine: MaskEngine) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            #[cfg(feature = "opencv")]
-            opencv: opencv::core::get_version_string().ok(),
-            #[cfg(not(feature = "opencv"))]
-            opencv: None,
+            opencv: match engine {
+                MaskEngine::Relit => None,
+                MaskEngine::OpenCv => opencv_version(),
+            },
         }
     }
 }
@@ -244,7 +255,7 @@ mod tests {
         };
         MaskRecord {
             schema: MASK_SCHEMA.to_owned(),
-            software: MaskSoftware::current(),
+            software: MaskSoftware::of(MaskEngine::Relit),
             source: SourceFrame {
                 video: "video.mkv".to_owned(),
                 frame: 3,
@@ -254,6 +265,7 @@ mod tests {
                 frame_blake3: "00".to_owned(),
             },
             hints: RecordedHints::new(&Hints::Rect(Rect::new(-1, 2, 30, 40)).into(), &[]).unwrap(),
+            engine: MaskEngine::OpenCv,
             settings: SegmentSettings::default(),
             result: RecordedResult::new(statistics, b"png"),
             warnings: vec!["look".to_owned()],
@@ -264,6 +276,15 @@ mod tests {
     fn a_record_is_read_back_as_it_was_written() {
         let bytes = record().to_json().unwrap();
         assert_eq!(MaskRecord::from_json(&bytes).unwrap(), record());
+    }
+
+    #[test]
+    fn a_record_that_names_no_engine_is_of_relits_own() {
+        let text = String::from_utf8(record().to_json().unwrap()).unwrap();
+        let older = text.replace("  \"engine\": \"opencv\",\n", "");
+        assert_ne!(older, text);
+        let read = MaskRecord::from_json(older.as_bytes()).unwrap();
+        assert_eq!(read.engine, MaskEngine::Relit);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use relit_grabcut::{Drawing, SegmentSettings};
 
-use super::{MaskRecord, MaskingError, RecordFault};
+use super::{MaskEngine, MaskRecord, MaskingError, RecordFault};
 
 /// How to make a mask.
 #[derive(Debug, Clone)]
@@ -13,6 +13,7 @@ pub struct MaskRequest {
     pub(super) frame: u64,
     pub(super) drawing: Drawing,
     pub(super) turn: TurnRequest,
+    pub(super) engine: MaskEngine,
     pub(super) settings: SegmentSettings,
     pub(super) recipe: Option<Recipe>,
     pub(super) force: bool,
@@ -44,6 +45,7 @@ impl MaskRequest {
             frame,
             drawing: drawing.into(),
             turn: TurnRequest::None,
+            engine: MaskEngine::default(),
             settings,
             recipe: None,
             force: false,
@@ -57,6 +59,7 @@ impl MaskRequest {
             frame,
             drawing: drawing.into(),
             turn: TurnRequest::Sampled,
+            engine: MaskEngine::default(),
             settings,
             recipe: None,
             force: false,
@@ -66,7 +69,7 @@ impl MaskRequest {
     /// The mask that the record `path` describes, to the same bytes.
     ///
     /// # Errors
-    /// [`MaskingError::Io`] or [`MaskingError::Recipe`].
+    /// [`MaskingError::Io`] or [`MaskingError::Recipe`]; those of [`Self::with_engine`].
     pub fn from_recipe(path: &Path) -> Result<Self, MaskingError> {
         let wrong = |fault: RecordFault| MaskingError::Recipe {
             path: path.to_owned(),
@@ -76,17 +79,29 @@ impl MaskRequest {
         let record = MaskRecord::from_json(&bytes).map_err(wrong)?;
         let drawing = record.hints.drawing().map_err(wrong)?;
         let path = path.to_owned();
-        Ok(Self {
+        let engine = record.engine;
+        let request = Self {
             frame: record.source.frame,
             drawing,
             turn: match record.hints.turn_frames.as_slice() {
                 [] => TurnRequest::None,
                 frames => TurnRequest::Frames(frames.to_vec()),
             },
+            engine: MaskEngine::default(),
             settings: record.settings,
             recipe: Some(Recipe { path, record }),
             force: false,
-        })
+        };
+        request.with_engine(engine)
+    }
+
+    /// Lets this engine cut the object out. [`edit`](super::edit) cuts by relit's nevertheless.
+    ///
+    /// # Errors
+    /// [`MaskingError::WithoutOpenCv`], [`MaskingError::OpenCvKnowsNoTurn`].
+    pub fn with_engine(self, engine: MaskEngine) -> Result<Self, MaskingError> {
+        engine.check(self.turn != TurnRequest::None)?;
+        Ok(Self { engine, ..self })
     }
 
     /// With `force`, replaces a mask that differs from its record, and accepts another result of a

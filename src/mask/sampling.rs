@@ -1,6 +1,6 @@
 //! What a turn shows, by frames spread over its video.
 
-use relit_grabcut::{TURN_FRAMES, Turn, TurnStatistics};
+use relit_grabcut::{TURN_FRAMES, TurnFrames, TurnStatistics};
 use relit_video::Video;
 
 use super::MaskingError;
@@ -26,7 +26,7 @@ pub(super) fn read_turn(
         TurnRequest::Frames(frames) => frames.clone(),
     };
     let mut frames = Vec::new();
-    let mut turn = Turn::new(width, height);
+    let mut turn = TurnFrames::new(width, height);
     for (number, picture) in video.pictures(&numbers, (width, height))? {
         frames.push(number);
         turn.push(&picture);

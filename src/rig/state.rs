@@ -89,6 +89,7 @@ pub struct TakeSummary {
 
 /// The turntable as last heard.
 #[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
+#[non_exhaustive]
 pub struct TableState {
     /// Whether there is a table at all.
     pub present: bool,
@@ -116,6 +117,7 @@ pub struct TableState {
 
 /// The camera as last seen.
 #[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
+#[non_exhaustive]
 pub struct CameraState {
     /// Whether it can be reached.
     pub present: bool,
@@ -127,7 +129,7 @@ pub struct CameraState {
     pub fps: Option<f64>,
     /// Exposure, gain, white balance, focus and power-line filter as read back.
     pub controls: Vec<(String, i64)>,
-    /// Pixels of the newest frame with all channels >= 250, as a fraction 0 to 1.
+    /// Pixels of the newest frame with all channels saturated, as a fraction 0 to 1.
     pub clipped: Option<f64>,
     /// Variance of the Laplacian of luma in the middle of the newest frame: greater is sharper.
     pub focus: Option<f64>,
@@ -137,6 +139,7 @@ pub struct CameraState {
 
 /// Something that went wrong, in plain words.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[non_exhaustive]
 pub struct FaultLine {
     /// Microseconds of the capture's clock.
     pub t_us: i64,
@@ -146,6 +149,7 @@ pub struct FaultLine {
 
 /// Something that happened, with the time of day.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[non_exhaustive]
 pub struct LogLine {
     /// When, RFC 3339, UTC.
     pub at: String,
@@ -206,6 +210,7 @@ impl Check {
 
 /// All that a viewer may know.
 #[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
+#[non_exhaustive]
 pub struct RigState {
     /// Counts changes: a viewer that has seen this number has seen this state.
     pub version: u64,
@@ -259,6 +264,7 @@ impl RigState {
 
 /// A picture for viewers.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct PreviewFrame {
     /// Counts frames, so that a viewer knows a new one.
     pub number: u64,

@@ -98,6 +98,19 @@ impl PixelFormat {
     }
 }
 
+/// What a camera was set to deliver.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StreamFormat {
+    /// How its frames are coded.
+    pub format: PixelFormat,
+    /// Frame width, pixels.
+    pub width: u32,
+    /// Frame height, pixels.
+    pub height: u32,
+    /// Nominal frames a second.
+    pub fps: f64,
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

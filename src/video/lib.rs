@@ -60,26 +60,30 @@ mod reader;
 mod sampling;
 mod scan;
 mod seek;
+mod track;
 
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 
 use ffmpeg_next::format::context::Input;
+use relit_data::disk::DISK_FULL;
 
-pub use format::{BayerPattern, PixelFormat};
+pub use format::{BayerPattern, PixelFormat, StreamFormat};
 pub use live::LiveDecoder;
 pub use matroska::{Truncation, find_truncation};
-pub use mux::{Muxer, StreamFormat, Written};
+pub use mux::{Muxer, Written};
 pub use nal::is_key;
+pub use order::FrameInfo;
 pub use packets::{CodedFrame, Packets};
 pub use picture::Picture;
 pub use reader::{Pending, Reader};
-pub use scan::{Damage, Facts, FrameInfo, Video};
+pub use scan::{Damage, Facts, Video};
 pub use seek::first_picture;
 
 /// Why a video could not be read or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum VideoError {
     /// FFmpeg cannot read the file.
     #[error(
@@ -132,7 +136,7 @@ pub enum VideoError {
     },
     /// The disk is full.
     #[error(
-        "the disk is full: {missing} bytes of what was recorded could not be written to {path}; free some space in {folder}, or record elsewhere",
+        "{DISK_FULL}: {missing} bytes of what was recorded could not be written to {path}; free some space in {folder}, or record elsewhere",
         folder = folder_of(path).display()
     )]
     DiskFull {
@@ -198,6 +202,7 @@ fn folder_of(path: &Path) -> &Path {
 
 /// Why a frame cannot be decoded to a picture.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DecodeFault {
     /// The decoder refused its data.
     #[error("its data are damaged ({0})")]

@@ -4,8 +4,18 @@ use ffmpeg_next::codec::Id;
 use ffmpeg_next::packet::Ref;
 use ffmpeg_next::{Packet, Rational, ffi};
 
-use super::FrameInfo;
 use super::ffv1::slices_are_whole;
+
+/// What is known of one frame before it is decoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameInfo {
+    /// Position in the video, 0-based, in order of presentation.
+    pub number: u64,
+    /// When it is shown, microseconds from the zero of the file's clock.
+    pub t_us: i64,
+    /// True if, according to the container, its data are incomplete.
+    pub damaged: bool,
+}
 
 /// What a packet states about its frame. Time stamps are in units of the stream's time base.
 #[derive(Debug, Clone, Copy)]

@@ -7,7 +7,8 @@ use yuv::YuvStandardMatrix;
 use super::jpeg::decode_part;
 use super::orientation::Orientation;
 use super::reader::Pending;
-use super::scan::{Track, Video};
+use super::scan::Video;
+use super::track::Track;
 use super::{DecodeFault, Picture};
 use relit_data::geometry::Rect;
 

@@ -1,6 +1,7 @@
 //! Reading the wanted frames of a video, in order, with as little work as the codec allows.
 
 use std::collections::VecDeque;
+use std::path::Path;
 
 use ffmpeg_next::codec::{Parameters, decoder};
 use ffmpeg_next::format::context::Input;
@@ -8,11 +9,11 @@ use ffmpeg_next::{Packet, frame};
 
 use super::decoder::{self as opening, Pool};
 use super::picture::Picture;
-use super::scan::{Track, Video};
+use super::track::Track;
 use super::{DecodeFault, VideoError, open_input};
 
 /// A wanted frame on its way to a picture: still compressed, decoded, or lost.
-/// [`Video::picture`] makes the picture of it, on any thread.
+/// [`Video::picture`](super::Video::picture) makes the picture of it, on any thread.
 #[derive(Debug)]
 pub struct Pending {
     number: u64,
@@ -59,35 +60,10 @@ impl Pending {
     }
 }
 
-impl Track {
-    /// A decoded frame as a picture of this track.
-    pub(super) fn picture(&self, number: u64, frame: frame::Video) -> Result<Picture, DecodeFault> {
-        let (wanted_w, wanted_h) = self.coded;
-        let (found_w, found_h) = (frame.width(), frame.height());
-        if (found_w, found_h) != self.coded {
-            return Err(DecodeFault::Size {
-                found_w,
-                found_h,
-                wanted_w,
-                wanted_h,
-            });
-        }
-        Ok(Picture::new(number, frame, self.colour, self.orientation))
-    }
-
-    fn number_at(&self, pts: i64) -> Option<u64> {
-        let at = self
-            .number_at
-            .binary_search_by_key(&pts, |&(pts, _)| pts)
-            .ok()?;
-        Some(self.number_at[at].1)
-    }
-}
-
-/// Returns the wanted frames of a [`Video`]. Every wanted frame comes exactly once, in order of
+/// Returns the wanted frames of a [`Video`](super::Video). Every wanted frame comes exactly once, in order of
 /// presentation; lost ones may come last.
 pub struct Reader<'a> {
-    video: &'a Video,
+    track: &'a Track,
     input: Input,
     /// Packets of the track read so far.
     packets: usize,
@@ -102,29 +78,30 @@ pub struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     pub(super) fn open(
-        video: &'a Video,
+        path: &Path,
+        codec: &str,
+        track: &'a Track,
         wanted: &[u64],
         threads: usize,
     ) -> Result<Self, VideoError> {
-        let path = || video.path().to_owned();
-        let input = open_input(video.path())?;
+        let input = open_input(path)?;
         let stream = input
-            .stream(video.track.stream)
-            .ok_or_else(|| VideoError::NoVideo(path()))?;
-        let chain = if opening::frames_stand_alone(video.track.codec) {
+            .stream(track.stream)
+            .ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
+        let chain = if opening::frames_stand_alone(track.codec) {
             None
         } else {
             let chain = Chain::open(stream.parameters(), threads);
             Some(chain.map_err(|why| VideoError::Decoder {
-                path: path(),
-                codec: video.facts().codec.clone(),
+                path: path.to_owned(),
+                codec: codec.to_owned(),
                 why,
             })?)
         };
-        let is_key = |number: &u64| video.track.keys.binary_search(number).is_ok();
+        let is_key = |number: &u64| track.keys.binary_search(number).is_ok();
         Ok(Self {
-            keys_only: !video.track.number_at.is_empty() && wanted.iter().all(is_key),
-            video,
+            keys_only: !track.number_at.is_empty() && wanted.iter().all(is_key),
+            track,
             input,
             packets: 0,
             wanted: Wanted::new(wanted),
@@ -139,7 +116,7 @@ impl<'a> Reader<'a> {
         // A packet that is read into again would keep the memory of what it held.
         let mut packet = Packet::empty();
         match packet.read(&mut self.input) {
-            Ok(()) if packet.stream() == self.video.track.stream && packet.size() > 0 => {
+            Ok(()) if packet.stream() == self.track.stream && packet.size() > 0 => {
                 self.take_packet(packet);
             }
             Ok(()) => {}
@@ -148,7 +125,7 @@ impl<'a> Reader<'a> {
     }
 
     fn take_packet(&mut self, packet: Packet) {
-        let track = &self.video.track;
+        let track = self.track;
         let number = track.number_of_packet.get(self.packets).copied().flatten();
         self.packets += 1;
         match &mut self.chain {
@@ -166,7 +143,7 @@ impl<'a> Reader<'a> {
     fn end(&mut self) {
         self.ended = true;
         if let Some(chain) = &mut self.chain {
-            chain.flush(&self.video.track, &mut self.wanted, &mut self.ready);
+            chain.flush(self.track, &mut self.wanted, &mut self.ready);
         }
         for number in self.wanted.rest() {
             self.ready.push_back(Pending {

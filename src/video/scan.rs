@@ -10,25 +10,16 @@ use ffmpeg_next::{Packet, codec, format, media};
 use image::RgbImage;
 
 use super::decoder::{self, Pool, VideoDecoder};
-use super::order::{Ordered, Stamp, mark_wrong_checksums};
+use super::order::{FrameInfo, Ordered, Stamp, mark_wrong_checksums};
 use super::orientation::Orientation;
 use super::picture::Colour;
+use super::track::Track;
 use super::{DecodeFault, Pending, Reader, Truncation, VideoError, find_truncation, open_input};
 use relit_data::geometry::Rect;
 
-/// What is known of one frame before it is decoded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FrameInfo {
-    /// Position in the video, 0-based, in order of presentation.
-    pub number: u64,
-    /// When it is shown, microseconds from the zero of the file's clock.
-    pub t_us: i64,
-    /// True if, according to the container, its data are incomplete.
-    pub damaged: bool,
-}
-
 /// Codec, size and colour of a video.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Facts {
     /// The codec's name, such as `mjpeg`.
     pub codec: String,
@@ -44,6 +35,7 @@ pub struct Facts {
 
 /// A sign that a video is incomplete or damaged.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Damage {
     /// The file ends inside an element, or an element does not fit into its parent.
     #[error(
@@ -114,21 +106,6 @@ impl std::fmt::Debug for Video {
             .field("facts", &self.facts)
             .finish()
     }
-}
-
-/// How packets of the file become numbered frames.
-#[derive(Debug, Clone)]
-pub(super) struct Track {
-    pub(super) stream: usize,
-    pub(super) codec: codec::Id,
-    /// Coded width and height.
-    pub(super) coded: (u32, u32),
-    pub(super) colour: Colour,
-    pub(super) orientation: Orientation,
-    pub(super) number_of_packet: Vec<Option<u64>>,
-    pub(super) number_at: Vec<(i64, u64)>,
-    /// Numbers of the frames that need no other, sorted.
-    pub(super) keys: Vec<u64>,
 }
 
 impl Video {
@@ -249,7 +226,7 @@ impl Video {
                 last,
             });
         }
-        Reader::open(self, wanted, threads)
+        Reader::open(&self.path, &self.facts.codec, &self.track, wanted, threads)
     }
 
     /// Decodes one frame to RGB, as displayed.

@@ -18,5 +18,5 @@ pub use address::Announcement;
 pub use extract::{BodyLimit, JsonBody, QueryParams};
 pub use failure::{Failure, Problem};
 pub use listen::{ConnectionLimits, GRACE, Shutdown, run};
-pub use page::{Asset, Entry, Index, SCRIPT, STYLE, asset, index};
+pub use page::{Entry, Index, PageAsset, SCRIPT, STYLE, asset, index};
 pub use token::{InvalidToken, Token, TokenFileError};

@@ -18,7 +18,7 @@ pub const STYLE: &str = "text/css; charset=utf-8";
 
 /// A file of a page.
 #[derive(Debug)]
-pub struct Asset {
+pub struct PageAsset {
     /// Its path in the URL.
     pub path: &'static str,
     /// Its content type.
@@ -29,11 +29,11 @@ pub struct Asset {
 
 /// A file at `path` of the content type `kind`.
 #[must_use]
-pub const fn asset(path: &'static str, kind: &'static str, text: &'static str) -> Asset {
-    Asset { path, kind, text }
+pub const fn asset(path: &'static str, kind: &'static str, text: &'static str) -> PageAsset {
+    PageAsset { path, kind, text }
 }
 
-impl Asset {
+impl PageAsset {
     /// The file as an answer.
     #[must_use]
     pub fn answer(&self) -> Response {

@@ -28,6 +28,7 @@ pub struct InvalidToken;
 
 /// Why a file gives no token.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TokenFileError {
     /// It cannot be read.
     #[error("the token's file {path} could not be read")]

@@ -12,7 +12,7 @@ use relit_data::image_stats::MaskSpans;
 use relit_data::shard::{Digest, encode_rgb};
 use relit_extract::mask_doubts;
 use relit_extract::{
-    AlignBuffers, AlignSample, Aligner, ScaleBuffers, Scaler, View, bounding_box, cut,
+    AlignBuffers, AlignSample, Aligner, CropView, ScaleBuffers, Scaler, bounding_box, cut,
     square_around,
 };
 use relit_video::Video;
@@ -72,7 +72,7 @@ fn measure(path: &Path, mask: &GrayImage, frames: u64, side: u32) -> Result<(), 
     let mut samples = Vec::new();
     for pending in video.read(&spread, 1)? {
         video.part(pending, crop, &mut part)?;
-        samples.push(AlignSample::of(View::whole(&part)));
+        samples.push(AlignSample::of(CropView::whole(&part)));
     }
     let aligner = timed(&mut learnt, || Aligner::learn(&samples, 0, &crop_mask, 8.0));
     let aligner = aligner.ok_or("the object has too little structure")?;
@@ -83,7 +83,7 @@ fn measure(path: &Path, mask: &GrayImage, frames: u64, side: u32) -> Result<(), 
     let mut reader = video.read(&wanted, 1)?;
     while let Some(pending) = timed(&mut read, || reader.next()) {
         timed(&mut decoded, || video.part(pending, crop, &mut part))?;
-        let view = View::whole(&part);
+        let view = CropView::whole(&part);
         timed(&mut aligned, || {
             aligner.measure(&AlignSample::of(view), &mut aligning)
         });

@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 
 use image::{Rgb, RgbImage};
 use relit_data::geometry::Rect;
+use relit_data::image_stats::{Measures, SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::report::{Page, ReportError, Thumbnail, render};
 use relit_data::shard::record::FrameRecord;
 
@@ -20,31 +21,29 @@ fn record(index: u32, frames: u32) -> FrameRecord {
     let any = 0.22 + 0.14 * lights + 0.004 * flutter;
     let mask_px: u64 = 60_916;
     let pixels = |part: f64| (part * 60_916.0) as u64;
-    let saturated_fraction = pixels(fraction) as f64 / mask_px as f64;
-    FrameRecord {
-        session: "20261120T093015Z-cow".to_owned(),
-        object: "cow".to_owned(),
-        index,
-        source_frame: u64::from(index),
-        t_us: i64::from(index) * 33_333,
-        angle_deg: Some(360.0 * f64::from(index) / f64::from(frames)),
-        duplicate: index % 500 == 499,
-        crop: Rect::new(120, 60, 380, 380),
-        size: [256, 256],
-        shift_px: None,
-        shift_applied: false,
-        align_confidence: None,
+    let measures = Measures {
         mask_px,
         saturated_px: pixels(fraction),
-        saturated_fraction,
         saturated_any_px: pixels(any),
-        spec_net: saturated_fraction > 0.05,
         mean_rgb: [118.0, 126.0, 131.0].map(|mean| mean + 22.0 * lights + 0.6 * flutter),
         sharpness: 410.0 + 60.0 * (3.0 * angle).cos() + 9.0 * flutter,
-        exposure_step: None,
-        identical_to: None,
-        blur: None,
-    }
+    };
+    let crop = Rect::new(120, 60, 380, 380);
+    FrameRecord::new(
+        "20261120T093015Z-cow",
+        "cow",
+        index,
+        crop,
+        &measures,
+        SPEC_NET_GATE,
+    )
+    .of_frame(
+        u64::from(index),
+        i64::from(index) * 33_333,
+        Some(360.0 * f64::from(index) / f64::from(frames)),
+    )
+    .flagged_duplicate(index % 500 == 499)
+    .scaled_to([256; 2])
 }
 
 fn turn(frames: u32) -> Vec<FrameRecord> {
@@ -96,8 +95,8 @@ fn page<'a>(records: &'a [FrameRecord], thumbnails: &'a [Thumbnail]) -> Page<'a>
         facts: &[],
         warnings: &[],
         quality: None,
-        gate: 0.05,
-        saturation_level: 250,
+        gate: SPEC_NET_GATE,
+        saturation_level: SATURATION_LEVEL,
     }
 }
 

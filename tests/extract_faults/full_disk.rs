@@ -6,6 +6,9 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use relit_test_support::trials;
+use relit_test_support::trials::Trial;
+
 use crate::support::{PROGRAM, SETTINGS, Workshop, files};
 
 /// A file system in memory; unmounted when dropped.
@@ -14,8 +17,7 @@ struct SmallDisk {
 }
 
 impl SmallDisk {
-    /// `None`, with the reason on standard error, where none can be mounted.
-    fn mount(path: PathBuf, kilobytes: u64) -> Option<Self> {
+    fn mount(path: PathBuf, kilobytes: u64) -> Result<Self, String> {
         fs::create_dir_all(&path).unwrap();
         let size = format!("size={kilobytes}k");
         let mounted = Command::new("mount")
@@ -23,16 +25,12 @@ impl SmallDisk {
             .arg(&path)
             .output();
         match mounted {
-            Ok(output) if output.status.success() => Some(Self { path }),
+            Ok(output) if output.status.success() => Ok(Self { path }),
             Ok(output) => {
                 let why = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-                eprintln!("skipped: no small file system can be mounted: {why}");
-                None
+                Err(format!("no small file system can be mounted: {why}"))
             }
-            Err(error) => {
-                eprintln!("skipped: no small file system can be mounted: {error}");
-                None
-            }
+            Err(error) => Err(format!("no small file system can be mounted: {error}")),
         }
     }
 
@@ -52,7 +50,22 @@ impl Drop for SmallDisk {
     }
 }
 
-#[test]
+pub(crate) fn trials() -> Vec<Trial> {
+    let mut trials =
+        trials![if small_disks => a_full_disk_ends_with_what_is_needed_and_leaves_no_partial_file];
+    trials.extend(trials![if runs_without_rights =>
+        what_may_not_be_read_or_written_is_named_with_the_systems_reason,
+        a_folder_that_may_not_be_looked_into_is_named_and_the_others_go_on,
+    ]);
+    trials
+}
+
+/// Whether small file systems can be mounted.
+fn small_disks() -> Result<(), String> {
+    let folder = tempfile::tempdir().unwrap();
+    SmallDisk::mount(folder.path().join("disk"), 64).map(drop)
+}
+
 fn a_full_disk_ends_with_what_is_needed_and_leaves_no_partial_file() {
     let workshop = Workshop::with(&["a.mkv"]);
     for layout in ["webdataset", "relit"] {
@@ -63,10 +76,7 @@ fn a_full_disk_ends_with_what_is_needed_and_leaves_no_partial_file() {
         // From too small for the first image to too small for the last file.
         for part in [4, 30, 60, 90] {
             let name = format!("{layout}-{part}");
-            let Some(disk) = SmallDisk::mount(workshop.path(&name), 4 + kilobytes * part / 100)
-            else {
-                return;
-            };
+            let disk = SmallDisk::mount(workshop.path(&name), 4 + kilobytes * part / 100).unwrap();
             let errors = workshop.errors(1, &format!("{line} {name}/out"));
             assert!(errors.contains("No space left on device"), "{errors}");
             if part >= 30 {
@@ -82,12 +92,31 @@ fn a_full_disk_ends_with_what_is_needed_and_leaves_no_partial_file() {
     }
 }
 
-/// Runs the program as a user without rights; `None`, with the reason on standard error, where it cannot.
-fn as_nobody(workshop: &Workshop, line: &str) -> Option<(Option<i32>, String)> {
-    let status = Command::new("id").arg("-u").output().unwrap();
-    let root = status.stdout == b"0\n";
+fn is_root() -> bool {
+    let answer = Command::new("id").arg("-u").output().unwrap();
+    answer.stdout == b"0\n"
+}
+
+/// Makes root's commands those of a user without rights.
+fn without_rights(command: &mut Command) -> &mut Command {
+    if is_root() {
+        command.uid(65_534).gid(65_534);
+    }
+    command
+}
+
+/// Whether a program can be run as a user without rights.
+fn runs_without_rights() -> Result<(), String> {
+    match without_rights(Command::new("id").arg("-u")).output() {
+        Ok(_) => Ok(()),
+        Err(error) => Err(format!("no program can be run without rights: {error}")),
+    }
+}
+
+/// Runs the program as a user without rights: its exit code and standard error.
+fn as_nobody(workshop: &Workshop, line: &str) -> (Option<i32>, String) {
     let mut command = workshop.command(line);
-    if root {
+    if is_root() {
         let program = workshop.path("program");
         if !program.exists() {
             fs::copy(PROGRAM, &program).unwrap();
@@ -96,27 +125,17 @@ fn as_nobody(workshop: &Workshop, line: &str) -> Option<(Option<i32>, String)> {
         command = Command::new(program);
         command
             .args(line.split_whitespace())
-            .current_dir(workshop.folder.path())
-            .uid(65_534)
-            .gid(65_534);
+            .current_dir(workshop.folder.path());
     }
-    match command.output() {
-        Ok(output) => Some((
-            output.status.code(),
-            String::from_utf8_lossy(&output.stderr).into_owned(),
-        )),
-        Err(error) => {
-            eprintln!("skipped: no program can be run without rights: {error}");
-            None
-        }
-    }
+    let output = without_rights(&mut command).output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output.status.code(), errors)
 }
 
 fn forbid(path: &Path) {
     fs::set_permissions(path, fs::Permissions::from_mode(0o000)).unwrap();
 }
 
-#[test]
 fn what_may_not_be_read_or_written_is_named_with_the_systems_reason() {
     let workshop = Workshop::with(&["a.mkv", "b.mkv"]);
     let open = workshop.path("open");
@@ -127,9 +146,7 @@ fn what_may_not_be_read_or_written_is_named_with_the_systems_reason() {
     fs::set_permissions(&closed, fs::Permissions::from_mode(0o555)).unwrap();
     forbid(&workshop.path("b.mkv"));
     let line = format!("a.mkv b.mkv {SETTINGS} -o open/out");
-    let Some((code, errors)) = as_nobody(&workshop, &line) else {
-        return;
-    };
+    let (code, errors) = as_nobody(&workshop, &line);
     assert_eq!(code, Some(3), "{errors}");
     assert!(
         errors.contains("b.mkv") && errors.contains("Permission denied"),
@@ -137,9 +154,7 @@ fn what_may_not_be_read_or_written_is_named_with_the_systems_reason() {
     );
     assert!(open.join("out/a.tar").is_file() && !open.join("out/b.tar").exists());
     let line = format!("a.mkv {SETTINGS} -o closed");
-    let Some((code, errors)) = as_nobody(&workshop, &line) else {
-        return;
-    };
+    let (code, errors) = as_nobody(&workshop, &line);
     assert_eq!(code, Some(1), "{errors}");
     assert!(
         errors.contains("closed") && errors.contains("Permission denied"),
@@ -148,7 +163,6 @@ fn what_may_not_be_read_or_written_is_named_with_the_systems_reason() {
     assert!(files(&closed).is_empty());
 }
 
-#[test]
 fn a_folder_that_may_not_be_looked_into_is_named_and_the_others_go_on() {
     let workshop = Workshop::with(&["sessions/a/video.mkv"]);
     let closed = workshop.path("sessions/b");
@@ -157,10 +171,7 @@ fn a_folder_that_may_not_be_looked_into_is_named_and_the_others_go_on() {
     let open = workshop.path("open");
     fs::create_dir(&open).unwrap();
     fs::set_permissions(&open, fs::Permissions::from_mode(0o777)).unwrap();
-    let Some((code, errors)) = as_nobody(&workshop, &format!("sessions {SETTINGS} -o open/out"))
-    else {
-        return;
-    };
+    let (code, errors) = as_nobody(&workshop, &format!("sessions {SETTINGS} -o open/out"));
     assert_eq!(code, Some(3), "{errors}");
     assert!(
         errors.contains("sessions/b") && errors.contains("Permission denied"),

@@ -21,8 +21,7 @@ fn random() -> f64 {
     (number >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-#[test]
-fn a_kill_at_any_moment_leaves_only_whole_files_and_resume_ends_in_the_same_bytes() {
+pub(crate) fn a_kill_at_any_moment_leaves_only_whole_files_and_resume_ends_in_the_same_bytes() {
     let workshop = Workshop::with(&["a.mkv", "b.mkv"]);
     let layouts = ["webdataset", "relit"].map(|layout| {
         let line = format!("a.mkv b.mkv {SETTINGS} --layout {layout} --resume -o");

@@ -14,8 +14,7 @@ fn part(index: u32, count: u32) -> String {
     format!("{VIDEOS} {SETTINGS} -o out --resume --task-id {index} --task-count {count}")
 }
 
-#[test]
-fn tasks_at_the_same_time_and_a_merge_make_the_same_data_set_as_one_run() {
+pub(crate) fn tasks_at_the_same_time_and_a_merge_make_the_same_data_set_as_one_run() {
     let workshop = workshop();
     workshop.errors(0, &format!("{VIDEOS} {SETTINGS} -o whole"));
     let whole = files(&workshop.path("whole"));
@@ -34,8 +33,7 @@ fn tasks_at_the_same_time_and_a_merge_make_the_same_data_set_as_one_run() {
     workshop.errors(0, "verify out");
 }
 
-#[test]
-fn a_task_that_is_missing_or_was_killed_is_named_and_nothing_is_written() {
+pub(crate) fn a_task_that_is_missing_or_was_killed_is_named_and_nothing_is_written() {
     let workshop = workshop();
     workshop.errors(0, &part(0, 3));
     workshop.errors(0, &part(2, 3));
@@ -62,8 +60,7 @@ fn a_task_that_is_missing_or_was_killed_is_named_and_nothing_is_written() {
     workshop.errors(0, "merge out");
 }
 
-#[test]
-fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
+pub(crate) fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
     let workshop = workshop();
     fs::create_dir(workshop.path("x")).unwrap();
     fs::copy(workshop.path("a.mkv"), workshop.path("x/a.mkv")).unwrap();
@@ -94,8 +91,7 @@ fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
     );
 }
 
-#[test]
-fn a_session_that_no_task_made_and_a_file_that_is_gone_are_noticed() {
+pub(crate) fn a_session_that_no_task_made_and_a_file_that_is_gone_are_noticed() {
     let workshop = workshop();
     workshop.errors(0, &part(0, 1));
     fs::remove_file(workshop.path("out/c.parquet")).unwrap();
@@ -109,8 +105,7 @@ fn a_session_that_no_task_made_and_a_file_that_is_gone_are_noticed() {
     assert!(errors.contains("session e, which is no task's"), "{errors}");
 }
 
-#[test]
-fn a_task_without_recordings_says_so() {
+pub(crate) fn a_task_without_recordings_says_so() {
     let workshop = workshop();
     let errors = workshop.errors(0, &part(7, 100));
     assert!(
@@ -124,8 +119,7 @@ fn a_task_without_recordings_says_so() {
     );
 }
 
-#[test]
-fn a_page_of_sums_takes_no_file_of_the_data_set() {
+pub(crate) fn a_page_of_sums_takes_no_file_of_the_data_set() {
     let workshop = workshop();
     workshop.errors(0, &format!("a.mkv {SETTINGS} -o out"));
     let whole = files(&workshop.path("out"));
@@ -141,8 +135,7 @@ fn a_page_of_sums_takes_no_file_of_the_data_set() {
 }
 
 #[cfg(not(feature = "object-store"))]
-#[test]
-fn a_url_is_refused_by_a_program_without_object_stores() {
+pub(crate) fn a_url_is_refused_by_a_program_without_object_stores() {
     let workshop = Workshop::with(&[]);
     for line in [
         "s3://lab/in -o out",

@@ -11,8 +11,8 @@ use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage};
 use proptest::prelude::*;
 use relit_data::geometry::Rect;
 use relit_grabcut::{
-    Feather, Hints, Iterations, MaskError, Seeds, SegmentSettings, Turn, TurnStatistics, Warning,
-    alpha, segment, segment_turn,
+    Feather, Hints, Iterations, MaskError, Seeds, SegmentSettings, TurnFrames, TurnStatistics,
+    Warning, alpha, segment, segment_turn,
 };
 
 use scene::{AROUND, HEIGHT, WIDTH, disc_share, in_disc, seeds_image, strokes};
@@ -203,7 +203,7 @@ fn turn_frame(at: u32) -> RgbImage {
 }
 
 fn statistics(frames: u32) -> TurnStatistics {
-    let mut turn = Turn::new(WIDTH, HEIGHT);
+    let mut turn = TurnFrames::new(WIDTH, HEIGHT);
     (0..frames).for_each(|at| turn.push(&turn_frame(at)));
     TurnStatistics::new(&turn)
 }
@@ -236,13 +236,13 @@ fn a_turn_without_any_frame_is_refused() {
     let settings = SegmentSettings::default();
     let alone = segment_turn(&turn_frame(0), &statistics(0), None, &settings);
     assert!(matches!(alone, Err(MaskError::FewFrames { found: 0 })));
-    let other = TurnStatistics::new(&Turn::new(0, 0));
+    let other = TurnStatistics::new(&TurnFrames::new(0, 0));
     assert_eq!(other.frames(), 0);
 }
 
 #[test]
 fn a_video_in_which_nothing_moves_gives_a_warning() {
-    let mut still = Turn::new(WIDTH, HEIGHT);
+    let mut still = TurnFrames::new(WIDTH, HEIGHT);
     (0..8).for_each(|_| still.push(&disc()));
     let settings = SegmentSettings::default();
     let mask = segment_turn(

@@ -1,23 +1,41 @@
-//! The editor's page in a real browser, with mouse, keys and fingers. Skipped, with a line that says so,
-//! where there is no Chromium.
-#![allow(clippy::print_stderr, reason = "a skipped test says why")]
+//! The editor's page in a real browser, with mouse, keys and fingers.
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test fails by a panic, in its helpers too"
+)]
 
+mod chromium;
+#[allow(dead_code, reason = "the tests without a browser ask it more")]
+mod editing;
+#[allow(dead_code, reason = "the tests without a browser show more of it")]
+mod scene;
+mod support;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use relit_test_support::trials;
 use serde_json::Value;
 
-use super::chromium::{self, Chromium};
-use super::editing::Editing;
-use super::program::{clip, code, read, relit_mask, said};
-use super::scene::{disc_share, in_disc};
+use chromium::Chromium;
+use editing::Editing;
+use scene::{disc_share, in_disc};
+use support::{clip, code, read, relit_mask, said};
 
 const READY: &str = "document.getElementById('state')?.dataset.state === 'ready'";
 const NONE: &str = "document.getElementById('state')?.dataset.state === 'none'";
 
-fn browser() -> Option<std::path::PathBuf> {
-    let found = chromium::find();
-    if found.is_none() {
-        eprintln!("skipped: there is no Chromium or Chrome on the PATH");
-    }
-    found
+fn main() -> ExitCode {
+    trials::run(trials![with browser =>
+        drawn_undone_drawn_again_and_accepted_with_the_mouse,
+        a_finger_draws_and_two_zoom_on_a_phone,
+    ])
+}
+
+fn browser() -> Result<PathBuf, String> {
+    chromium::find().ok_or_else(|| "there is no Chromium or Chrome on the PATH".to_owned())
 }
 
 /// From places in the frame to places on the page.
@@ -54,9 +72,7 @@ fn strokes(page: &mut Chromium) -> usize {
         .unwrap() as usize
 }
 
-#[test]
-fn drawn_undone_drawn_again_and_accepted_with_the_mouse() {
-    let Some(program) = browser() else { return };
+fn drawn_undone_drawn_again_and_accepted_with_the_mouse(program: PathBuf) {
     let folder = clip();
     let path = folder.path();
     let editing = Editing::start(path, &["clip.y4m"]);
@@ -121,9 +137,7 @@ fn drawn_undone_drawn_again_and_accepted_with_the_mouse() {
     assert!(read(path, "mask.png") == read(path, "b.png"));
 }
 
-#[test]
-fn a_finger_draws_and_two_zoom_on_a_phone() {
-    let Some(program) = browser() else { return };
+fn a_finger_draws_and_two_zoom_on_a_phone(program: PathBuf) {
     let folder = clip();
     let path = folder.path();
     let editing = Editing::start(path, &["clip.y4m"]);

@@ -7,8 +7,8 @@ use image::{GrayImage, Luma};
 use relit_test_support::ffmpeg;
 use serde_json::Value;
 
-use super::program::{code, relit_mask, said};
 use super::scene::{HEIGHT, WIDTH};
+use super::support::{code, relit_mask, said};
 
 /// A turn of 24 frames: a disc with a pattern of its own before stripes that move, `drift(frame)` pixels
 /// to the right of (48, 32).

@@ -4,8 +4,9 @@
 use std::fs;
 use std::path::Path;
 
-use super::program::{clip, code, relit_mask, said, turn_video};
+use super::program::turn_video;
 use super::scene::{AROUND, HEIGHT, WIDTH, seeds_image, strokes};
+use super::support::{clip, code, relit_mask, said};
 
 /// Arguments for one place of the command line.
 type Choice = &'static [&'static str];

@@ -5,8 +5,9 @@ use std::fs;
 use serde_json::{Value, json};
 
 use super::editing::Editing;
-use super::program::{clip, code, read, relit_mask, said, turn_video};
+use super::program::turn_video;
 use super::scene::{WIDTH, disc_share};
+use super::support::{clip, code, read, relit_mask, said};
 
 /// A sketch with a rectangle around the disc, and a stroke of each kind.
 fn sketch() -> Value {
@@ -80,6 +81,7 @@ fn without_the_token_or_under_another_name_nothing_is_shown_and_nothing_done() {
     let editing = Editing::start(folder.path(), &["clip.y4m"]);
     assert!(editing.address.starts_with("127.0.0.1:"));
     assert_eq!(editing.token.len(), 32);
+    assert!(editing.url.contains(&editing.address), "{}", editing.url);
     let body = sketch().to_string();
     let json = "Content-Type: application/json";
     for (method, path) in [

@@ -5,11 +5,11 @@
     reason = "a test fails by a panic, in its helpers too"
 )]
 
-mod browser;
 mod check;
-mod chromium;
 mod degenerate;
 mod editing;
 mod editor;
+mod engine;
 mod program;
 mod scene;
+mod support;

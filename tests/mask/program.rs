@@ -2,59 +2,9 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-use tempfile::TempDir;
 
 use super::scene::{AROUND, HEIGHT, WIDTH, disc_share, in_disc, seeds_image, strokes};
-
-/// A video of three frames of the disc, as YUV4MPEG2: a container that needs no encoder.
-pub(crate) fn video() -> Vec<u8> {
-    let mut bytes = format!("YUV4MPEG2 W{WIDTH} H{HEIGHT} F30:1 Ip A1:1 C444\n").into_bytes();
-    let luma = |x, y| {
-        if in_disc(x, y) {
-            210
-        } else {
-            30 + ((x + y) % 5) as u8
-        }
-    };
-    for _ in 0..3 {
-        bytes.extend_from_slice(b"FRAME\n");
-        bytes.extend((0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| luma(x, y))));
-        bytes.extend(vec![128; (2 * WIDTH * HEIGHT) as usize]);
-    }
-    bytes
-}
-
-pub(crate) fn relit_mask(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_relit-mask"))
-        .current_dir(folder)
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
-pub(crate) fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&[&output.stdout[..], &output.stderr].concat()).into_owned()
-}
-
-pub(crate) fn code(output: &Output) -> i32 {
-    output
-        .status
-        .code()
-        .unwrap_or_else(|| panic!("{}", said(output)))
-}
-
-/// A folder with `clip.y4m` in it.
-pub(crate) fn clip() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("clip.y4m"), video()).unwrap();
-    folder
-}
-
-pub(crate) fn read(folder: &Path, name: &str) -> Vec<u8> {
-    fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
-}
+use super::support::{clip, code, read, relit_mask, said, video};
 
 #[test]
 fn a_video_gets_mask_record_and_preview_in_the_working_folder() {
@@ -252,7 +202,6 @@ fn auto_needs_no_hint_and_its_recipe_makes_the_same_files_again() {
     }
 }
 
-#[cfg(feature = "opencv")]
 #[test]
 fn bench_measures_every_hint_and_names_what_is_wrong() {
     let folder = tempfile::tempdir().unwrap();
@@ -280,6 +229,8 @@ fn bench_measures_every_hint_and_names_what_is_wrong() {
     assert_eq!(average["event"], "average");
     assert_eq!(average["hint"], "box");
     assert!(average["ours"]["iou"].as_f64().unwrap() > 0.97);
+    let opencv = average["opencv"]["iou"].as_f64();
+    assert_eq!(opencv.is_some(), cfg!(feature = "opencv"), "{average}");
     fs::write(path.join("disc.box.txt"), "24 8 73").unwrap();
     let output = relit_mask(path, &["bench", "."]);
     assert_eq!(code(&output), 1);

@@ -1,7 +1,6 @@
 //! The rig as a daemon: commands, the queue, and what comes back by itself.
 
 use std::path::Path;
-use std::thread;
 use std::time::{Duration, Instant};
 
 use relit_data::session::{Manifest, SessionWriter};
@@ -11,6 +10,9 @@ use relit_rig::serve::rig::{Command, Refused, Rig};
 use relit_rig::state::{Phase, RigState, Verdict};
 
 use crate::support::{SHORT, fixture};
+
+/// Longest time between two looks at the state.
+const ASKED_EVERY: Duration = Duration::from_millis(100);
 
 fn settings(root: &Path, camera: &str, table: &str) -> Settings {
     let camera = format!("replay:{}?loop=1{camera}", fixture(SHORT).display());
@@ -28,14 +30,13 @@ fn settings(root: &Path, camera: &str, table: &str) -> Settings {
 /// The state once it is as `wanted`; fails after a minute.
 fn once(daemon: &Daemon, mut wanted: impl FnMut(&RigState) -> bool) -> RigState {
     let until = Instant::now() + Duration::from_secs(60);
-    loop {
-        let state = daemon.monitor().state();
-        if wanted(&state) {
-            return state;
-        }
+    let mut state = daemon.monitor().state();
+    while !wanted(&state) {
         assert!(Instant::now() < until, "{state:#?}");
-        thread::sleep(Duration::from_millis(10));
+        // What is wanted may also come true without a change of the state.
+        state = daemon.monitor().wait_newer(state.version, ASKED_EVERY);
     }
+    state
 }
 
 fn dequeue(place: usize) -> Command {
@@ -127,11 +128,7 @@ fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
         object,
         meter: false,
     };
-    let until = Instant::now() + Duration::from_secs(10);
-    while daemon.command(start.clone()).is_err() {
-        assert!(Instant::now() < until);
-        thread::sleep(Duration::from_millis(10));
-    }
+    once(&daemon, |_| daemon.command(start.clone()).is_ok());
     once(&daemon, |state| state.frames > 20);
     let asked = Instant::now();
     daemon.end();

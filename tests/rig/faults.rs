@@ -6,8 +6,8 @@ use relit_data::session::Status;
 
 use crate::camera::{Unplugged, Vivid};
 use crate::program::{Ended, Running, sessions};
-use crate::table;
 use crate::turn::{TOLERANT, turn};
+use crate::turntable;
 
 /// A picture that costs an emulated machine little.
 const SMALL: &str = "320x180";
@@ -28,7 +28,7 @@ fn check_ends(test: &str, why: &str, fault: impl FnOnce()) {
         .time_of("checking")
         .duration_since(start)
         .as_secs_f64();
-    let state = table::stands();
+    let state = turntable::stands();
     assert_eq!(ended.code, Some(1), "{ended:#?}");
     assert!(ended.reason().contains(why), "{:?}", ended.reason());
     assert!(took < ENDS_WITHIN, "{took}");
@@ -79,7 +79,7 @@ fn an_unplugged_camera_ends_the_take_and_is_recorded_again_when_it_is_back() {
     println!(
         "while it is away: {reason}; when it is back: exit {:?}, complete, table {}",
         again.code,
-        table::stands()
+        turntable::stands()
     );
 }
 
@@ -110,7 +110,7 @@ fn dropped_frames_spoil_the_take_and_are_counted() {
     println!(
         "exit 1, aborted with {} faults told, table {}: {}",
         told.count(),
-        table::stands(),
+        turntable::stands(),
         ended.reason()
     );
 }
@@ -136,7 +136,7 @@ fn a_damaged_frame_is_told_and_counts_against_the_take() {
     assert_eq!(damaged.len(), 1, "{:#?}", manifest.faults);
     println!(
         "exit 3, complete, table {}: {}",
-        table::stands(),
+        turntable::stands(),
         damaged[0]
     );
 }
@@ -145,7 +145,7 @@ fn a_damaged_frame_is_told_and_counts_against_the_take() {
 #[ignore = "needs the driver vivid and a serial line"]
 fn a_camera_that_does_not_start_is_told_before_the_table_turns() {
     let mut vivid = Vivid::open();
-    let before = table::stands();
+    let before = turntable::stands();
     vivid.press("inject_vidioc_streamon_error", 1).unwrap();
     let ended = Running::start(&sessions("start"), &turn(SMALL, &[])).end();
     println!("exit 1, no session, table {before}: {}", ended.refusal());
@@ -165,7 +165,7 @@ fn a_second_recorder_is_refused_and_the_first_goes_on() {
     println!(
         "first: exit {:?}, complete, table {}; second: {}",
         first.code,
-        table::stands(),
+        turntable::stands(),
         second.reason()
     );
 }

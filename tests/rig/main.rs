@@ -18,5 +18,5 @@ mod faults;
 mod loopback;
 mod portable;
 mod program;
-mod table;
 mod turn;
+mod turntable;

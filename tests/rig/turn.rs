@@ -7,7 +7,7 @@ use relit_data::session::{FrameEntry, Status};
 
 use crate::camera::{BufferTrace, Handed, VIVID, Vivid};
 use crate::program::{Running, extract, sessions};
-use crate::table;
+use crate::turntable;
 
 /// Frames that may be missing. An emulated driver is late now and then and leaves one out: that is
 /// told, and is no fault of the recorder's.
@@ -30,7 +30,7 @@ fn every_frame_that_the_kernel_handed_out_during_the_turn_is_in_the_session() {
     let trace = BufferTrace::begin();
     let ended = Running::start(&root, &turn("640x480", &TOLERANT)).end();
     let handed = trace.end();
-    let state = table::stands();
+    let state = turntable::stands();
     assert!(matches!(ended.code, Some(0 | 3)), "{ended:#?}");
     let session = ended.session();
     let manifest = session.manifest.clone().unwrap();

@@ -4,13 +4,13 @@ use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{ArgMatches, CommandFactory, Error, FromArgMatches, Parser, Subcommand};
+use relit_console::Console;
 
 #[cfg(feature = "train")]
 use crate::commands::train;
 use crate::commands::{decompose, eval, insert, relight, render, synth, turn, weights};
-use crate::console::Console;
 
-/// Single-view relighting: photographs taken apart, light, rendering, data with truth, measures of the results.
+/// Single-view relighting: photographs decomposed and relit, rendering, synthetic data with ground truth, measures of the results.
 #[derive(Parser)]
 #[command(
     name = "relight",
@@ -27,7 +27,7 @@ struct CommandLine {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Take photographs apart: normals, albedo, shading, highlight and light.
+    /// Decompose photographs: normals, albedo, shading, highlight and light.
     #[command(after_help = decompose::EXAMPLES)]
     Decompose(decompose::Arguments),
     /// Show the objects of photographs in another light: a picture, or a video in which the light turns.
@@ -42,14 +42,14 @@ enum Verb {
     /// Measure estimates, and baselines beside them, by the protocols of the paper's tables.
     #[command(after_help = eval::EXAMPLES)]
     Eval(eval::Arguments),
-    /// Make pictures of objects together with their truth: samples, whole turns, panoramas.
+    /// Render synthetic objects with their ground truth: samples, whole turns, panoramas.
     #[command(after_help = synth::EXAMPLES)]
     Synth(synth::Arguments),
     /// Train networks (built with the feature `train`).
     #[cfg(feature = "train")]
     #[command(after_help = train::EXAMPLES)]
     Train(train::Arguments),
-    /// Take a whole turn apart: normals, albedo and light from the angle that the light turns by.
+    /// Decompose a whole turn: normals, albedo and light from the angle that the light turns by.
     #[command(after_help = turn::EXAMPLES)]
     Turn(turn::Arguments),
     /// Convert weights of networks.

@@ -1,10 +1,10 @@
 //! Options of new light, which several verbs take.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use relight_core::light::{Panorama, ShLight};
-use relight_photo::insert::{Lamp, LightSource};
+use relight_photo::files::InsertionError;
+use relight_photo::insert::{DiscLamp, LightSource};
 
 /// The new light.
 #[derive(Args)]
@@ -20,7 +20,7 @@ pub(crate) struct NewLightArguments {
         value_name = "AZIMUTH,ELEVATION[,COLOUR][,SIZE]",
         allow_hyphen_values = true
     )]
-    pub(crate) lamp: Option<Lamp>,
+    pub(crate) lamp: Option<DiscLamp>,
     /// Even light beside a lamp, as a part of it.
     #[arg(long, value_name = "PART", default_value_t = 0.15, value_parser = part, requires = "lamp")]
     pub(crate) ambient: f64,
@@ -28,25 +28,13 @@ pub(crate) struct NewLightArguments {
 
 impl NewLightArguments {
     /// The light that is asked for, if any is.
-    pub(crate) fn read(&self) -> Result<Option<LightSource>, Box<dyn std::error::Error>> {
+    pub(crate) fn read(&self) -> Result<Option<LightSource>, InsertionError> {
         if let Some(lamp) = self.lamp {
             let ambient = self.ambient;
-            return Ok(Some(LightSource::Lamp(Lamp { ambient, ..lamp })));
+            return Ok(Some(LightSource::Lamp(DiscLamp { ambient, ..lamp })));
         }
-        self.light.as_deref().map(read_light).transpose()
+        self.light.as_deref().map(LightSource::read).transpose()
     }
-}
-
-/// A panorama, or a text file of coefficients.
-pub(crate) fn read_light(path: &Path) -> Result<LightSource, Box<dyn std::error::Error>> {
-    let is_text = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("txt"));
-    Ok(if is_text {
-        LightSource::Coefficients(ShLight::read(path)?)
-    } else {
-        LightSource::Panorama(Panorama::read(path)?)
-    })
 }
 
 fn part(text: &str) -> Result<f64, String> {

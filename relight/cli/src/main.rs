@@ -2,7 +2,6 @@
 
 mod command_line;
 mod commands;
-mod console;
 mod folder;
 mod light;
 mod photos;

@@ -3,6 +3,7 @@
 use clap::ValueEnum;
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
+use relight_photo::decompose::SpecularGate;
 
 /// How integers in files of colour are encoded.
 #[derive(Clone, Copy, ValueEnum)]
@@ -39,6 +40,27 @@ impl From<YName> for NormalsFrame {
         match name {
             YName::Up => Self::YUp,
             YName::Down => Self::YDown,
+        }
+    }
+}
+
+/// Whether highlights are separated.
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum GateName {
+    /// Where more than 5 % of the object's pixels are saturated.
+    Auto,
+    /// Always.
+    On,
+    /// Never.
+    Off,
+}
+
+impl From<GateName> for SpecularGate {
+    fn from(name: GateName) -> Self {
+        match name {
+            GateName::Auto => Self::Auto,
+            GateName::On => Self::On,
+            GateName::Off => Self::Off,
         }
     }
 }

@@ -136,7 +136,7 @@ fn wait_for_a_step(folder: &Path, processes: &mut Processes) {
 /// squares fall short of what 32 bits hold well: they are left out.
 fn assert_same(a: &Path, b: &Path, net: &str) {
     let (first, second) = (checkpoint(a), checkpoint(b));
-    assert_eq!((first.step, &first.place), (second.step, &second.place));
+    assert_eq!((first.step, &first.cursor), (second.step, &second.cursor));
     let mut compared = 0;
     let mut moved = 0.0_f32;
     for part in ["model.", "average.", "first."] {

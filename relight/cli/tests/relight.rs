@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::files::{read_planes, write_exr};
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb as Picture, Srgb};
 use relight_core::light::{Normals, Order, Panorama, ShLight};
@@ -77,7 +77,7 @@ impl Folder {
     }
 
     /// Exit code and what was written on standard error.
-    fn told(&self, arguments: &str) -> (i32, String) {
+    fn code_and_errors(&self, arguments: &str) -> (i32, String) {
         let output = self.run(arguments);
         let errors = String::from_utf8(output.stderr).unwrap();
         (output.status.code().unwrap(), errors)
@@ -98,7 +98,7 @@ fn photographs_of_a_pattern_are_relit_before_the_panorama_and_what_has_no_mask_i
     let folder = Folder::new();
     photo().save(folder.path("photos/three.png")).unwrap();
     let (code, errors) = folder
-        .told("relight photos/*.png --mask masks --light sky.exr --compare --weights w.safetensors -o out");
+        .code_and_errors("relight photos/*.png --mask masks --light sky.exr --compare --weights w.safetensors -o out");
     assert_eq!(code, 3, "{errors}");
     assert!(
         errors.contains("photos/three.png: there is no mask"),
@@ -122,7 +122,7 @@ fn photographs_of_a_pattern_are_relit_before_the_panorama_and_what_has_no_mask_i
 fn the_photograph_s_own_light_gives_the_photograph_back_and_exr_is_linear() {
     let folder = Folder::new();
     let command = "relight photos/one.png --mask masks/one.png --own-light --weights w.safetensors";
-    let (code, errors) = folder.told(&format!("{command} -o same.png"));
+    let (code, errors) = folder.code_and_errors(&format!("{command} -o same.png"));
     assert_eq!((code, errors.as_str()), (0, ""));
     let same = image::open(folder.path("same.png")).unwrap().into_rgb8();
     for (a, b) in same.pixels().zip(photo().pixels()) {
@@ -130,7 +130,7 @@ fn the_photograph_s_own_light_gives_the_photograph_back_and_exr_is_linear() {
     }
     assert_eq!(
         folder
-            .told(&format!("{command} --exposure 1 -o twice.exr"))
+            .code_and_errors(&format!("{command} --exposure 1 -o twice.exr"))
             .0,
         0
     );
@@ -271,7 +271,7 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
             "none is no folder",
         ),
     ] {
-        let (found, errors) = folder.told(&command);
+        let (found, errors) = folder.code_and_errors(&command);
         assert_eq!(found, code, "{command}: {errors}");
         assert!(errors.contains(expected), "{command}: {errors}");
     }
@@ -302,7 +302,7 @@ fn no_file_that_is_read_is_overwritten() {
         format!("{inserted} photos/two.png -o photos/two.png"),
         format!("{inserted} sky.exr -o masks/one.png"),
     ] {
-        let (code, errors) = folder.told(&command);
+        let (code, errors) = folder.code_and_errors(&command);
         assert_eq!(code, 1, "{command}: {errors}");
         assert!(errors.contains("is read as well"), "{command}: {errors}");
         let after = files.map(|name| fs::read(folder.path(name)).unwrap());
@@ -357,7 +357,7 @@ fn huge(path: &std::path::Path) {
 #[test]
 fn a_turn_is_a_video_of_as_many_frames() {
     if Command::new("ffmpeg").arg("-version").output().is_err() {
-        eprintln!("skipped: the program ffmpeg is not installed");
+        relit_test_support::say_skipped("the program ffmpeg is not installed");
         return;
     }
     let folder = Folder::new();
@@ -392,7 +392,7 @@ fn objects_are_inserted_from_back_to_front_by_options_and_by_a_scene_file() {
     let folder = Folder::new();
     let common = "--weights w.safetensors -o";
     let options = "insert photos/one.png photos/two.png --mask masks --into sky.exr --size 96,64 --at 0.3,0.9 --at 0.7,0.9 --height 0.5";
-    let (code, errors) = folder.told(&format!("{options} {common} options.png"));
+    let (code, errors) = folder.code_and_errors(&format!("{options} {common} options.png"));
     assert_eq!((code, errors.as_str()), (0, ""));
     let scene = "background = \"sky.exr\"\nsize = [96, 64]\n\
                  [[object]]\nphoto = \"photos/one.png\"\nmask = \"masks/one.png\"\nat = [0.3, 0.9]\nheight = 0.5\n\
@@ -400,7 +400,7 @@ fn objects_are_inserted_from_back_to_front_by_options_and_by_a_scene_file() {
     fs::write(folder.path("scene.toml"), scene).unwrap();
     assert_eq!(
         folder
-            .told(&format!("insert --scene scene.toml {common} file.png"))
+            .code_and_errors(&format!("insert --scene scene.toml {common} file.png"))
             .0,
         0
     );
@@ -414,7 +414,7 @@ fn objects_are_inserted_from_back_to_front_by_options_and_by_a_scene_file() {
     let command = format!(
         "insert photos/one.png --mask masks/one.png --into photos/two.png --bits 16 {common} deep.png"
     );
-    assert_eq!(folder.told(&command).0, 0);
+    assert_eq!(folder.code_and_errors(&command).0, 0);
     assert_eq!(
         image::open(folder.path("deep.png")).unwrap().color(),
         image::ColorType::Rgb16
@@ -428,21 +428,21 @@ fn a_captured_object_is_inserted_beside_photographs_and_needs_no_mask() {
     let full = Planes::filled(normals.extent(), [1.0]);
     let albedo = Picture::new(Planes::filled(normals.extent(), [0.7, 0.1, 0.1]));
     let surface = Surface::new(normals, albedo, None).unwrap();
-    let asset = Asset::new("red", surface, full.clone(), full).unwrap();
+    let asset = CapturedObject::new("red", surface, full.clone(), full).unwrap();
     asset.write(&folder.path("red.relit")).unwrap();
     let common = "--into sky.exr --size 96,64 --height 0.5 --weights w.safetensors -o";
     let command = format!("insert photos/one.png red.relit --mask masks {common} both.png");
-    assert_eq!(folder.told(&command), (0, String::new()));
+    assert_eq!(folder.code_and_errors(&command), (0, String::new()));
     let (picture, _) = read_planes(&folder.path("both.png")).unwrap();
     let red = picture.pixel(72, 42);
     // In light as blue as this, paper would be blue.
     assert!(red[0] > red[2], "{red:?}");
 
     let command = format!("insert red.relit --mask masks/one.png {common} none.png");
-    let (code, errors) = folder.told(&command);
+    let (code, errors) = folder.code_and_errors(&command);
     assert!(code == 1 && errors.contains("its own mask"), "{errors}");
     fs::write(folder.path("red.relit"), b"PK").unwrap();
-    let (code, errors) = folder.told(&format!("insert red.relit {common} none.png"));
+    let (code, errors) = folder.code_and_errors(&format!("insert red.relit {common} none.png"));
     assert!(code == 1 && errors.contains("red.relit"), "{errors}");
     assert!(!folder.path("none.png").exists());
 }
@@ -510,7 +510,7 @@ fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
             "give .png, .exr, .mp4 or .webm",
         ),
     ] {
-        let (found, errors) = folder.told(&command);
+        let (found, errors) = folder.code_and_errors(&command);
         assert_eq!(found, code, "{command}: {errors}");
         assert!(errors.contains(expected), "{command}: {errors}");
     }

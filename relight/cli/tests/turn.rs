@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Linear, Planes, Rgb, Transfer};
 use relight_core::light::NormalsFrame;
 use relight_core::light::{Normals, Order, ShLight, YUp};
@@ -22,7 +22,7 @@ use relight_synth::{
     Folders, FrameTruth, Library, LightKind, Recipe, TurnDescription, TurnRecipe, write_turns,
 };
 use relight_turn::{
-    BodyKind, Elevation, NormalsSource, TableFrame, TableSense, TurnError, TurnOptions,
+    Elevation, MaterialKind, NormalsSource, RotationDirection, TableFrame, TurnError, TurnOptions,
     fit_turn_light, prior_normals, read_curves, solve_turn,
 };
 
@@ -84,7 +84,7 @@ fn a_turn_in_light_of_order_two_gives_normals_albedo_and_light_back() {
     let (shard, truth_folder) = turn(folder.path(), 60);
     let (degrees, light) = truth(&truth_folder);
     let surface = surface(&truth_folder);
-    let read = read_curves(&shard, TableSense::default(), &|_, _| {}).unwrap();
+    let read = read_curves(&shard, RotationDirection::default(), &|_, _| {}).unwrap();
     assert_eq!((read.curves.frames(), read.damage.len()), (60, 0));
     assert!(read.has_angles);
     let options = TurnOptions {
@@ -111,7 +111,7 @@ fn a_turn_in_light_of_order_two_gives_normals_albedo_and_light_back() {
     let relative = (pair.mse(ScaleFit::None) / own.mse(ScaleFit::None)).sqrt();
     assert!(relative < 0.01, "{relative}");
     let frame = TableFrame::new(Elevation::given(degrees).unwrap());
-    let solved = fit_turn_light(&read.curves, &surface, BodyKind::Diffuse, &frame).unwrap();
+    let solved = fit_turn_light(&read.curves, &surface, MaterialKind::Diffuse, &frame).unwrap();
     let size = |light: &[[f64; 3]]| light.iter().flatten().map(|v| v * v).sum::<f64>().sqrt();
     let difference: Vec<[f64; 3]> = solved
         .coefficients()
@@ -183,7 +183,7 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
             .iter()
             .any(|plane| plane.iter().any(|&v| v > 0.2))
     );
-    let asset = Asset::read(&object).unwrap();
+    let asset = CapturedObject::read(&object).unwrap();
     assert!(!asset.surface().normals().is_empty());
     assert_eq!(
         TruthSet::open(&labels, TruthLayout::Synth)
@@ -269,7 +269,7 @@ fn an_even_light_makes_no_labels_but_all_else() {
         said[0]["figures"]["conditioning"]["verdict"], "too_even",
         "{said:?}"
     );
-    for sentence in ["the room is too even", "no labels are written"] {
+    for sentence in ["the environment light is too even", "no labels are written"] {
         let has = |line: &serde_json::Value| {
             let message = line["message"].as_str();
             line["event"] == "warning" && message.is_some_and(|said| said.starts_with(sentence))
@@ -367,11 +367,22 @@ fn wrong_usage_and_several_turns_are_refused() {
     assert!(text(&run.stderr).contains("0 to 89 degrees"));
     let run = relight(&["turn", "a.tar", "--rim", "100,200", "-o", "out"]);
     assert_eq!(run.status.code(), Some(2));
+    // The names of before are still taken: it is the shard that is missing.
+    for [direction, material] in [["--direction", "--material"], ["--sense", "--body"]] {
+        let options = [direction, "clockwise", material, "metal", "--no-video"];
+        let run = relight(&[&["turn", "missing.tar", "-o", "missing"], &options[..]].concat());
+        assert_eq!(run.status.code(), Some(1), "{}", text(&run.stderr));
+        assert!(
+            text(&run.stderr).contains("missing.tar"),
+            "{}",
+            text(&run.stderr)
+        );
+    }
     let folder = tempfile::tempdir().unwrap();
     let (shard, _) = turn(folder.path(), 12);
     fs::copy(&shard, folder.path().join("again.tar")).unwrap();
     fs::remove_file(folder.path().join("dataset.json")).unwrap();
-    let error = read_curves(folder.path(), TableSense::default(), &|_, _| {}).unwrap_err();
+    let error = read_curves(folder.path(), RotationDirection::default(), &|_, _| {}).unwrap_err();
     assert!(
         matches!(error, TurnError::ManyTurns { found: 2, .. }),
         "{error}"
@@ -383,7 +394,7 @@ fn untrained() -> Result<Weights, NetError> {
 }
 
 #[test]
-fn normals_to_start_from_are_read_from_a_folder_of_maps() {
+fn initial_normals_are_read_from_a_folder_of_maps() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("normal.png");
     let sphere = Normals::sphere(16);

@@ -1,4 +1,4 @@
-//! Makes the pictures of docs/relight.md: the conventions, the specular layers beside the truth, a mug
+//! Makes the pictures of docs/relight.md: the conventions, the specular layers beside the ground truth, a mug
 //! under turning light, and the mug in many materials. All that they show is made here.
 //!
 //!     cargo run --release -p relight --example pictures -- docs/images
@@ -68,7 +68,7 @@ fn highlights() -> Result<Rgb<Linear>, Box<dyn Error>> {
         let [truth, _] = MonteCarlo::new(&panorama, 1000).highlights(&normals, &gloss, 1)?;
         let power = PowerLayer::new(&second).highlight(&normals, &gloss)?;
         let scale = inner(&power, &truth) / inner(&power, &power);
-        // All in one exposure, in which the brightest of the truth is white.
+        // All in one exposure, in which the brightest of the ground truth is white.
         let exposure = 1.0 / brightest(&truth);
         let images = [
             (

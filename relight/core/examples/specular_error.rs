@@ -1,4 +1,4 @@
-//! The specular layers' errors against Monte Carlo integration of Blinn and Phong's highlight, on a
+//! The specular layers' errors against Monte Carlo integration of the Blinn-Phong highlight, on a
 //! sphere under each panorama of a folder, as a table in Markdown.
 //!
 //!     cargo run --release -p relight --example specular_error -- FOLDER [SAMPLES]

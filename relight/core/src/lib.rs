@@ -10,7 +10,8 @@
 //! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
 //! | [`render`] | diffuse and specular layers on normals, their derivatives, Monte Carlo as the reference |
 //! | [`metrics`] | how far an estimate is from the ground truth |
-//! | [`asset`] | a captured object in one file, ready to be lit |
+//! | [`captured_object`] | a captured object in one file, ready to be lit |
+//! | [`statistics`] | median and quantiles of samples |
 //! | [`parallel`] | rows and parts side by side, where there are threads |
 #![cfg_attr(
     feature = "files",
@@ -19,7 +20,7 @@
 //!
 //! Without features it takes bytes and gives bytes, on one thread. The feature `files` reads and writes files, and
 //! `threads` works on rayon's threads; results are the same bits with and without.
-pub mod asset;
+pub mod captured_object;
 #[cfg(feature = "files")]
 pub mod files;
 pub mod image;
@@ -27,3 +28,10 @@ pub mod light;
 pub mod metrics;
 pub mod parallel;
 pub mod render;
+mod sealed;
+pub mod statistics;
+
+/// The example of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

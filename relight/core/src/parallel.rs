@@ -1,6 +1,20 @@
 //! Work on many rows, parts or frames side by side. Without the feature `threads`, as in a browser, one comes after
 //! the other. What is worked on must not depend on the order, so the results are the same.
 
+/// How many threads there are.
+#[cfg(feature = "threads")]
+#[must_use]
+pub fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
+/// How many threads there are.
+#[cfg(not(feature = "threads"))]
+#[must_use]
+pub fn threads() -> usize {
+    1
+}
+
 /// The results of `work` for 0, 1, ... `count` - 1, in this order.
 #[cfg(feature = "threads")]
 pub fn map<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {

@@ -64,8 +64,8 @@ fn squared_errors_are_those_of_their_definition() {
     let scaled = pair.mse(ScaleFit::Image);
     assert_near(scaled, &expected["mse_one_scale"], "SMSE");
     let psnr = pair.psnr(1.0) / 24.0;
-    let told = expected["psnr"].as_f64().unwrap() / 24.0;
-    assert_near(psnr, &Value::from(told), "PSNR");
+    let stated = expected["psnr"].as_f64().unwrap() / 24.0;
+    assert_near(psnr, &Value::from(stated), "PSNR");
 }
 
 #[test]
@@ -142,11 +142,16 @@ fn a_truth_that_is_black_has_no_relative_error() {
     let extent = Extent::new(20, 20);
     let pair = Comparison::new(extent, &[&dark], &[&bright], &mask).unwrap();
     let found = pair.lmse(ScaleFit::Image, Windows::GROSSE);
-    assert_eq!(found, Err(MetricError::DarkTruth));
+    assert_eq!(found, Err(MetricError::DarkGroundTruth));
     for convention in Convention::ALL {
         let (truth, estimate): (&[&[f32]], &[&[f32]]) = (&[&dark], &[&bright]);
         let found = intrinsic_error(convention, extent, truth, estimate, &mask, SMALL);
-        assert_eq!(found, Err(MetricError::DarkTruth), "{}", convention.name());
+        assert_eq!(
+            found,
+            Err(MetricError::DarkGroundTruth),
+            "{}",
+            convention.name()
+        );
     }
 }
 

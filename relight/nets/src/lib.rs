@@ -46,3 +46,8 @@ pub use onnx::{INPUT, check_size, to_onnx};
 pub use onnxruntime::OnnxRuntime;
 pub use parameter::{Parameter, Role};
 pub use weights::{Tensor, Weights};
+
+/// The example of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

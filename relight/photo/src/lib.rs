@@ -16,3 +16,8 @@ pub mod decompose;
 #[cfg(feature = "files")]
 pub mod files;
 pub mod insert;
+
+/// The example of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -20,7 +20,7 @@ use relight_reader::{
 };
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
-use relit_data::image_stats::MaskSpans;
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{
     Align, Dataset, ExtractionSettings, FrameRecord, ImageSize, Layout, Sample, ShardWriter,
 };
@@ -46,31 +46,15 @@ fn picture(index: u32) -> RgbImage {
 
 fn sample(session: &str, index: u32) -> Sample {
     let image = picture(index);
-    let measures = MaskSpans::of(&mask()).measure(&image, 250).unwrap();
-    let record = FrameRecord {
-        session: session.to_owned(),
-        object: "mug".to_owned(),
-        index,
-        source_frame: u64::from(index),
-        t_us: i64::from(index),
-        angle_deg: None,
-        duplicate: false,
-        crop: Rect::new(0, 0, WIDTH, HEIGHT),
-        size: [WIDTH, HEIGHT],
-        shift_px: None,
-        shift_applied: false,
-        align_confidence: None,
-        mask_px: measures.mask_px,
-        saturated_px: 0,
-        saturated_fraction: 0.0,
-        saturated_any_px: 0,
-        spec_net: false,
-        mean_rgb: measures.mean_rgb,
-        sharpness: measures.sharpness,
-        exposure_step: None,
-        identical_to: None,
-        blur: None,
-    };
+    let measures = MaskSpans::of(&mask())
+        .measure(&image, SATURATION_LEVEL)
+        .unwrap();
+    let whole = Rect::new(0, 0, WIDTH, HEIGHT);
+    let record = FrameRecord::new(session, "mug", index, whole, &measures, SPEC_NET_GATE).of_frame(
+        u64::from(index),
+        i64::from(index),
+        None,
+    );
     Sample::encode(record, image).unwrap()
 }
 
@@ -291,8 +275,8 @@ fn samples_that_the_description_tells_of_and_no_shard_holds_are_told() {
         frames: 20,
         size: ImageSize::NATIVE,
         margin: 0.0,
-        saturation_level: 250,
-        gate: 0.05,
+        saturation_level: SATURATION_LEVEL,
+        gate: SPEC_NET_GATE,
         align: Align::Off,
         align_tolerance: None,
         layout: Layout::Webdataset,

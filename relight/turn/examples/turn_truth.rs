@@ -18,8 +18,8 @@ use relight_core::render::Surface;
 use relight_nets::{NetError, Weights};
 use relight_reader::{Encoding, SampleId, Source, Turns};
 use relight_turn::{
-    BodyKind, Conditioning, Elevation, NormalsSource, ReadTurn, TableFrame, TableSense, TurnMaps,
-    TurnOptions, fit_turn_light, prior_normals, read_curves, solve_turn,
+    Conditioning, Elevation, MaterialKind, NormalsSource, ReadTurn, RotationDirection, TableFrame,
+    TurnMaps, TurnOptions, fit_turn_light, prior_normals, read_curves, solve_turn,
 };
 use serde_json::Value;
 
@@ -40,13 +40,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [shard, truth, normals @ ..] = arguments.as_slice() else {
         return Err("give a shard and its truth".into());
     };
-    let (normals, body) = match normals {
-        [normals @ .., kind] if kind == "metal" => (normals, BodyKind::Metal),
-        normals => (normals, BodyKind::Diffuse),
+    let (normals, material) = match normals {
+        [normals @ .., kind] if kind == "metal" => (normals, MaterialKind::Metal),
+        normals => (normals, MaterialKind::Diffuse),
     };
     let (shard, truth) = (Path::new(shard), Path::new(truth));
     let start = Instant::now();
-    let turn = read_curves(shard, TableSense::default(), &|_, _| {})?;
+    let turn = read_curves(shard, RotationDirection::default(), &|_, _| {})?;
     println!(
         "read in {:.1} s; {:?}",
         start.elapsed().as_secs_f64(),
@@ -60,7 +60,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     });
     let prior = prior_normals(&source, shipped, NormalsFrame::YUp, &turn.first, &turn.mask)?;
     truth.angles("prior alone", &prior)?;
-    let known = fit_turn_light(&turn.curves, &truth.surface, body, &frame)?;
+    let known = fit_turn_light(&turn.curves, &truth.surface, material, &frame)?;
     let options = |light, prior| TurnOptions {
         elevation: truth.elevation,
         light,
@@ -148,8 +148,12 @@ impl Truth {
             found.residual(),
             found.expected_error_deg(),
         );
-        println!("    body {:?}, {:?}", found.body(), found.bodies());
-        for start in found.starts() {
+        println!(
+            "    material {:?}, {:?}",
+            found.material(),
+            found.materials()
+        );
+        for start in found.initialisations() {
             println!("    start {start:?}");
         }
         if let Some(highlight) = &self.highlight {

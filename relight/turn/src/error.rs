@@ -3,16 +3,17 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use relit_data::session::SessionError;
-
-use super::{ProbePlace, RoomVerdict};
-use relight_core::asset::AssetError;
-use relight_core::files::FolderFault;
-use relight_core::files::MovieError;
+use relight_core::captured_object::CapturedObjectError;
+use relight_core::files::{FolderFault, MovieError};
 use relight_core::image::{Extent, ImageError};
-use relight_core::light::{LightError, LightFileError};
+use relight_core::light::{LightError, LightFileError, PanoramaError};
 use relight_photo::decompose::DecomposeError;
 use relight_reader::OpenError;
+use relit_data::session::SessionError;
+
+use crate::observe::probe_place::ProbePlace;
+use crate::observe::verdict::LightVerdict;
+use crate::setting_error::SettingError;
 
 /// Why a turn cannot be solved, or what was found cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -61,21 +62,14 @@ pub enum TurnError {
         needed: usize,
     },
     /// A setting cannot be.
-    #[error("{what} is {value}: it has to be {allowed}")]
-    Setting {
-        /// Which.
-        what: &'static str,
-        /// What was given.
-        value: f64,
-        /// What may be given.
-        allowed: &'static str,
-    },
-    /// No light explains the curves.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// No light fits the curves.
     #[error("no light explains the turn: all of it is dark, or all of it is clipped")]
     NoLight,
     /// The exposure was wrong.
     #[error("no light explains the turn: {}", .0.advice().unwrap_or("it is wrongly exposed"))]
-    Unfit(RoomVerdict),
+    Unfit(LightVerdict),
     /// A map of normals has another size than the frames.
     #[error("the normals have {} x {} pixels, and the frames {} x {}", found.width, found.height, expected.width, expected.height)]
     PriorSize {
@@ -92,20 +86,20 @@ pub enum TurnError {
     Image(#[from] ImageError),
     /// The object cannot be made a file.
     #[error("the object cannot be written as a file that can be lit")]
-    Asset(#[source] Box<AssetError>),
-    /// Metal has no matt part that a network could learn from.
+    Asset(#[source] Box<CapturedObjectError>),
+    /// Metal has no diffuse part that a network could learn from.
     #[error(
         "the object is taken for metal, which has no albedo and shading apart: there are no labels of it"
     )]
-    NoMattPart,
-    /// The turn tells too little for labels.
-    #[error("no labels are written: the turn does not tell normals and albedo")]
-    NothingTold,
-    /// No pixel is believed.
+    NoDiffusePart,
+    /// Normals and albedo are not observable.
+    #[error("no labels are written: the turn does not determine normals and albedo")]
+    NotObservable,
+    /// No pixel is confident enough.
     #[error(
         "no labels are written: no pixel's confidence reaches {least}, the highest is {most:.2}"
     )]
-    NothingBelieved {
+    NotConfident {
         /// The least confidence that was asked for.
         least: f32,
         /// The largest there is.
@@ -114,6 +108,9 @@ pub enum TurnError {
     /// Light cannot be used.
     #[error(transparent)]
     Light(#[from] LightError),
+    /// A panorama cannot be read.
+    #[error(transparent)]
+    Panorama(#[from] PanoramaError),
     /// Light cannot be read or written.
     #[error(transparent)]
     LightFile(#[from] LightFileError),
@@ -131,7 +128,7 @@ pub enum TurnError {
         /// The path.
         path: PathBuf,
     },
-    /// The session whose video shows the room cannot be read.
+    /// The session whose video shows the surroundings cannot be read.
     #[error(transparent)]
     Session(#[from] SessionError),
     /// The video is not that of the turn.
@@ -185,9 +182,9 @@ pub enum TurnError {
     Misplaced {
         /// Where it is said to be.
         given: ProbePlace,
-        /// Middle and radius of a circle that explains clearly more, pixels.
+        /// Middle and radius of a circle that fits clearly better, pixels.
         better: [f64; 3],
-        /// The parts that both explain, percent.
+        /// The parts of the variation that both explain, percent.
         explained: [f64; 2],
     },
     /// A video cannot be read or written.
@@ -213,14 +210,14 @@ pub enum TurnError {
 
 impl TurnError {
     /// Puts the path to an operating system's reason.
-    pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
+    pub(crate) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         |source| Self::Write { path, source }
     }
 }
 
-impl From<AssetError> for TurnError {
-    fn from(error: AssetError) -> Self {
+impl From<CapturedObjectError> for TurnError {
+    fn from(error: CapturedObjectError) -> Self {
         Self::Asset(Box::new(error))
     }
 }

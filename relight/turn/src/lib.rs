@@ -1,74 +1,56 @@
-//! What a whole turn tells of an object without training: normals, albedo and the light of the room.
+//! Photometric stereo of a whole turn: normals, albedo and the environment light, without training.
 //!
-//! Camera and object ride on one table, so for the object the light turns about the table's axis by an
-//! angle that is known. [`read_curves`] brings a turn to one curve over that angle a pixel and channel,
-//! [`solve_turn`] finds the normals, albedo and light that explain the curves, [`TurnMaps`] is what they
-//! leave over, and [`TurnFiles`] writes all of it.
+//! Camera and object ride on one table, so for the object the environment light rotates about the table's axis by an
+//! angle that is known. [`read_curves`] brings a turn to one curve over that angle a pixel and channel. [`solve_turn`]
+//! finds the normals, albedo and light that fit the curves. [`TurnMaps`] has their residuals, and [`TurnFiles`] writes
+//! all of it.
 //!
 //! | module | concern |
 //! | --- | --- |
-//! | `frame` | the camera over the table |
-//! | `curves`, `read` | light over the table's angle, from a shard |
-//! | `exposure` | steps of the exposure |
-//! | `film`, `strip`, `probe` | what the video shows beside the object: the room, and a ball that measures its light |
-//! | `placing` | whether the ball is where it is said to be |
-//! | `light` | light of order 2 in the table's frame |
-//! | `gloss` | what a shining surface shows of the room |
-//! | `moments`, `search`, `robust` | the normal and albedo of one pixel |
-//! | `start`, `prior` | normals to begin with |
-//! | `room` | the light that explains all pixels |
-//! | `joint` | light, gloss, normals and albedo at once |
-//! | `solve` | light and normals of all pixels |
-//! | `albedo` | albedo where a normal is hardly to be believed |
-//! | `maps`, `verdict` | what is left over, and whether the room is fit for this |
-//! | `shine` | the gloss of the whole object; the object as a file |
-//! | `files`, `labels` | what is written |
+//! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (Lambertian), `gloss`, `metal`, `shading` (one of them) |
+//! | `observe` | what the frames show: `reading`, `curves`, `exposure`, `conditioning`; `film`, `strip` and `probe` for what the video has beside the object |
+//! | `fit` | `search` and `normal_step` (one pixel), `joint`, `unknowns` and `schur` (all of them with the light), `initialisation`, `prior`, `robust`, `albedo`, `confidence`, `solve` |
+//! | `report` | `files`, `figures`, `maps`, `labels`, `object`: what is written; `warnings` and `destinations`: what a user should know after and before |
+//!
+//! A folder knows those above it in this table. Each module has its parameters in one struct, with unit and source:
+//! *derived*, *measured*, *by convention*, *numerical* (a guard on which results hardly depend), or *by hand*, of which
+//! no sweep is recorded.
 
-mod albedo;
-mod begin;
-mod body;
-mod curves;
 mod error;
-mod exposure;
-mod files;
-mod film;
-mod frame;
-mod gloss;
-mod joint;
-mod labels;
-mod light;
-mod maps;
-mod moments;
-mod placing;
-mod prior;
-mod probe;
-mod read;
-mod robust;
-mod room;
-mod search;
-mod shine;
-mod solve;
-mod start;
-mod strip;
-mod verdict;
+mod fit;
+mod model;
+mod observe;
+mod report;
+mod setting_error;
 
 #[cfg(test)]
-mod tests;
+mod test_turns;
 
-pub use body::{BodyFigure, BodyKind};
-pub use curves::{CurveBuilder, TurnCurves};
 pub use error::TurnError;
-pub use exposure::ExposureStep;
-pub use files::{TurnFigures, TurnFiles};
-pub use film::{Filmed, film};
-pub use frame::{Elevation, ElevationSource, TableFrame};
-pub use labels::TurnLabels;
-pub use light::TableLight;
-pub use maps::TurnMaps;
-pub use prior::{NormalsSource, prior_normals};
-pub use probe::{Probe, ProbeBall, ProbeBuilder, ProbeLight, ProbePlace};
-pub use read::{ReadTurn, TableSense, TurnOrigin, read_curves};
-pub use room::fit_turn_light;
-pub use solve::{SenseFigure, StartFigure, TurnOptions, TurnSolution, solve_turn};
-pub use strip::{RoomStrip, StripBuilder, StripFigures};
-pub use verdict::{Conditioning, RoomVerdict};
+pub use fit::environment::fit_turn_light;
+pub use fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure};
+pub use fit::given_light::read_given_light;
+pub use fit::options::TurnOptions;
+pub use fit::prior::{NormalsSource, prior_normals};
+pub use fit::probe_light::ProbeLight;
+pub use fit::solution::TurnSolution;
+pub use fit::solve::solve_turn;
+pub use model::frame::{Elevation, ElevationSource, TableFrame};
+pub use model::lighting::TableLight;
+pub use model::material::MaterialKind;
+pub use observe::conditioning::Conditioning;
+pub use observe::curves::{CurveBuilder, TurnCurves};
+pub use observe::exposure::ExposureStep;
+pub use observe::film::{Filmed, film};
+pub use observe::probe::{Probe, ProbeBall, ProbeBuilder};
+pub use observe::probe_place::ProbePlace;
+pub use observe::reading::{ReadTurn, RotationDirection, TurnOrigin, read_curves};
+pub use observe::strip::{PanoramaStrip, StripBuilder, StripFigures};
+pub use observe::verdict::LightVerdict;
+pub use report::destinations::{AssetDestination, DestinationError, Destinations};
+pub use report::figures::TurnFigures;
+pub use report::files::TurnFiles;
+pub use report::labels::TurnLabels;
+pub use report::maps::TurnMaps;
+pub use report::warnings::TurnWarning;
+pub use setting_error::SettingError;

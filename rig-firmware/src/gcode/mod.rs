@@ -5,6 +5,7 @@
 
 mod words;
 
+pub use self::words::Motion;
 use self::words::{OneShot, Words};
 use crate::error::Error;
 use crate::number::Decimal;
@@ -38,15 +39,6 @@ impl Default for Modal {
     fn default() -> Self {
         Modal::new()
     }
-}
-
-/// At which speed to move.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Motion {
-    /// `G0`: as fast as the table goes.
-    Rapid,
-    /// `G1`: at the feed.
-    Feed,
 }
 
 /// A place to go to, thousandths of a degree.

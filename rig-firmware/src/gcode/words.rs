@@ -1,8 +1,16 @@
 //! Words of a line: which commands and values it names, each at most once.
 
-use super::Motion;
 use crate::error::Error;
 use crate::number::{self, Decimal};
+
+/// At which speed to move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motion {
+    /// `G0`: as fast as the table goes.
+    Rapid,
+    /// `G1`: at the feed.
+    Feed,
+}
 
 /// The commands that count for their line only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

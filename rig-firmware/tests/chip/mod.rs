@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use std::sync::Once;
 use std::time::SystemTime;
 
 /// Cycles in a microsecond of the chip's clock.
@@ -85,16 +84,9 @@ pub(crate) struct Chip {
 }
 
 impl Chip {
-    /// Power on, up to the banner; `None`, with the reason on stderr, where firmware or emulator
-    /// have not been built.
-    pub(crate) fn start() -> Option<(Chip, String)> {
-        let (elf, emulator) = match find() {
-            Ok(found) => found,
-            Err(reason) => {
-                say_once(&reason);
-                return None;
-            }
-        };
+    /// Power on, up to the banner, where firmware and emulator have been built.
+    pub(crate) fn start() -> Result<(Chip, String), String> {
+        let (elf, emulator) = find()?;
         let mut process = Command::new(emulator)
             .arg(elf)
             .stdin(Stdio::piped())
@@ -116,7 +108,7 @@ impl Chip {
             stack_free: None,
         };
         let banner = chip.banner();
-        Some((chip, banner))
+        Ok((chip, banner))
     }
 
     /// The next banner.
@@ -265,17 +257,6 @@ impl Drop for Chip {
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
-}
-
-/// Prints past the test harness, which keeps the output of tests that pass.
-fn say_once(reason: &str) {
-    static SAID: Once = Once::new();
-    SAID.call_once(|| {
-        let _ = writeln!(
-            std::io::stderr(),
-            "skipped: the firmware's tests on the emulated chip: {reason}"
-        );
-    });
 }
 
 /// The program and the emulator where `make` puts them.

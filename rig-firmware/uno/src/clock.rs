@@ -3,14 +3,10 @@
 //! A step's time is a compare value computed from the last one, never from when an interrupt got
 //! its turn, so that lateness does not add up.
 
-use rig_firmware::stepper::Stepper;
-
+use crate::common::STEPPER;
 use crate::masked::{Masked, Shared};
 use crate::pins;
 use crate::registers::{CS11, OCIE1A, OCR1A, TCCR1B, TCNT1, TIFR1, TIMSK1, TOIE1, TOV1};
-
-/// The step generator.
-pub(crate) static STEPPER: Shared<Stepper> = Shared::new(Stepper::new());
 
 /// How often the timer went round, every 32.768 ms.
 static ROUNDS: Shared<u32> = Shared::new(0);

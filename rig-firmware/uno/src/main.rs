@@ -6,6 +6,7 @@
 //! | --- | --- |
 //! | `registers` | the chip's registers, by the data sheet's names |
 //! | `masked` | data shared with interrupts |
+//! | `common` | what several interrupts and the main loop work on |
 //! | `pins` | step, direction, driver; index and emergency stop |
 //! | `clock` | timer 1: microseconds, and the step interrupt |
 //! | `serial` | the UART with its two buffers |
@@ -21,6 +22,7 @@
 
 mod battery;
 mod clock;
+mod common;
 mod eeprom;
 mod masked;
 mod pins;

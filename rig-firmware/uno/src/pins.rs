@@ -10,12 +10,11 @@
 
 use rig_firmware::board::{Events, Inputs, Outputs};
 
-use crate::clock::STEPPER;
+use crate::common::{EVENTS, STEPPER};
 use crate::masked::{Masked, Shared};
 use crate::registers::{
     DDRB, DDRD, PCICR, PCIE1, PCINT8, PCMSK1, PINB, PINC, PORTB, PORTC, PORTD, bit,
 };
-use crate::serial::EVENTS;
 
 const STEP: u8 = bit(2);
 const DIRECTION: u8 = bit(5);

@@ -5,7 +5,7 @@
 use rig_firmware::board::Events;
 use rig_firmware::realtime::{Realtime, Received, classify};
 
-use crate::clock::STEPPER;
+use crate::common::{EVENTS, STEPPER};
 use crate::masked::{Masked, Shared};
 use crate::registers::{
     DOR0, FE0, RXC0, RXCIE0, RXEN0, TXEN0, U2X0, UBRR0, UCSR0A, UCSR0B, UCSR0C, UCSZ_8, UDR0,
@@ -14,9 +14,6 @@ use crate::registers::{
 
 /// 16 MHz / 8 / 17 = 117647 baud, 2.1 % fast: as Arduino's and Grbl's own firmware.
 const DIVISOR: u16 = 16;
-
-/// What interrupts noted for the main loop.
-pub(crate) static EVENTS: Shared<Events> = Shared::new(Events::NONE);
 
 static RECEIVED: Shared<Ring<128>> = Shared::new(Ring::new());
 static TO_SEND: Shared<Ring<64>> = Shared::new(Ring::new());

@@ -3,9 +3,10 @@
 use rig_firmware::board::{Board, Events, Inputs, Outputs, ResetCause};
 use rig_firmware::stepper::Stepper;
 
-use crate::clock::{self, STEPPER};
+use crate::clock;
+use crate::common::{EVENTS, STEPPER};
 use crate::masked::Foreground;
-use crate::serial::{self, EVENTS};
+use crate::serial;
 use crate::{battery, eeprom, pins, watchdog};
 
 /// An Arduino Uno or Nano with the CNC shield.

@@ -10,7 +10,7 @@ use relit_rig::capture::{ModePreference, Settings};
 use relit_rig::serve::Token;
 use relit_rig::turntable;
 
-use crate::table_arguments::{
+use crate::turntable_arguments::{
     SIMULATE_EXAMPLES, SimulateArguments, TURNTABLE_EXAMPLES, TurntableArguments,
 };
 

@@ -16,7 +16,7 @@ const TOGETHER: Duration = Duration::from_secs(1);
 pub(crate) fn heartbeat() -> Option<Heartbeat> {
     Some(Heartbeat {
         period: sd_notify::watchdog_enabled()? / 3,
-        beat: || notify_service(&[NotifyState::Watchdog]),
+        beat: Box::new(|| notify_service(&[NotifyState::Watchdog])),
     })
 }
 

@@ -7,9 +7,9 @@ mod environment;
 mod recording;
 mod serving;
 mod simulate;
-mod table_arguments;
 mod token;
 mod turntable;
+mod turntable_arguments;
 
 use std::process::ExitCode;
 

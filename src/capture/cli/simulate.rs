@@ -12,7 +12,7 @@ use relit_rig::simulator::{
 use serde_json::json;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use crate::table_arguments::SimulateArguments;
+use crate::turntable_arguments::SimulateArguments;
 use relit_console::{Console, Outcome};
 
 /// Interval at which the end conditions are checked.

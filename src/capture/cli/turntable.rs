@@ -9,7 +9,7 @@ use relit_rig::turntable::{
 use serde_json::json;
 
 use crate::environment::at_end;
-use crate::table_arguments::{Action, TurntableArguments};
+use crate::turntable_arguments::{Action, TurntableArguments};
 use relit_console::{Console, Outcome};
 
 pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcome, TurntableError> {

@@ -4,6 +4,7 @@ use super::page::THUMBNAIL_SIDE;
 
 /// Why a page cannot be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReportError {
     /// There are no records.
     #[error("the report has no records to show: extract at least one frame first")]

@@ -8,6 +8,7 @@ use super::manifest::ManifestFault;
 
 /// Why a session could not be read or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SessionError {
     /// The path does not exist.
     #[error("there is no {0}: give a session folder, a folder of sessions, or a video file")]

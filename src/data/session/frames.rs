@@ -29,6 +29,7 @@ pub struct Gap {
 
 /// What is wrong in a frame index.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum IndexFault {
     /// A line is not a frame's.
     #[error("line {line} is not a frame's entry ({what})")]

@@ -142,6 +142,7 @@ pub struct SoftwareFacts {
 
 /// What is wrong in a manifest.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ManifestFault {
     /// Not JSON, or a field is missing or has another type.
     #[error("{0}")]

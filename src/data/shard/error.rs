@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use parquet::errors::ParquetError;
 
+use crate::disk::{DISK_FULL, is_full};
 use crate::image_stats::SizeMismatch;
 
 /// Why a data set could not be written, read or checked.
@@ -26,7 +27,7 @@ pub enum ShardError {
     },
     /// The disk is full.
     #[error(
-        "the disk is full: {what} needs about {} in {folder} until it is written, and had {}; free some space, or give another folder",
+        "{DISK_FULL}: {what} needs about {} in {folder} until it is written, and had {}; free some space, or give another folder",
         in_megabytes(*needed), in_megabytes(*written), folder = .folder.display()
     )]
     DiskFull {
@@ -367,11 +368,6 @@ impl ShardError {
             source,
         }
     }
-}
-
-fn is_full(error: &io::Error) -> bool {
-    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
-    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
 }
 
 impl From<SizeMismatch> for ShardError {

@@ -10,7 +10,7 @@ use super::codec::encode_rgb;
 use super::dataset::ShardEntry;
 use super::digest::FolderHasher;
 use super::output;
-use super::table::TableRow;
+use super::parquet_table::TableRow;
 use super::{ShardError, names};
 
 /// The images of a session that are written into a folder.

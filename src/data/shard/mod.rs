@@ -16,7 +16,7 @@
 //! | [`Dataset`], [`ExtractionSettings`] | `dataset.json`; `integrity` compares the files with it |
 //! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tarball`) |
 //! | [`SampleSpans`] | where the samples of a shard stand, for reading in any order (`index`) |
-//! | [`Task`], [`TaskPiece`], [`merge`] | a data set that several tasks write |
+//! | [`ArrayTask`], [`TaskPiece`], [`merge`] | a data set that several tasks write |
 //! | [`Overview`] | a data set at a glance, by its tables |
 //! | [`verify`](verify()) | reads everything back and reports what is wrong |
 //!
@@ -24,6 +24,7 @@
 //! ([`image_stats`](crate::image_stats)). It knows nothing of videos, of how a mask was made, of the rig
 //! or of session folders: here a session is a name and its samples.
 
+mod array_task;
 mod codec;
 mod dataset;
 mod digest;
@@ -36,17 +37,18 @@ mod names;
 mod order;
 mod output;
 mod overview;
+mod parquet_table;
+mod pieces;
 mod quality;
 mod reader;
 pub mod record;
 mod settings;
 mod spool;
-mod table;
 mod tarball;
-mod task;
 mod verify;
 mod writer;
 
+pub use array_task::{ArrayTask, MAX_TASKS};
 pub use codec::{decode_mask, decode_rgb, encode_mask, encode_rgb};
 pub use dataset::{
     Dataset, DatasetSoftware, MaskInfo, SamplingBasis, SessionEntry, ShardEntry, SourceVideo,
@@ -61,13 +63,13 @@ pub use output::OutputFolder;
 pub use overview::{
     Overview, OverviewTotals, SATURATION_BOUNDS, SaturationHistogram, SessionOverview,
 };
+pub use parquet_table::{TableRow, read_table};
+pub use pieces::{Merged, TaskOutcome, TaskPiece, merge, merge_with};
 pub use quality::{QualityVerdict, SessionQuality};
 pub use reader::{ShardReader, ShardSample};
 pub use record::FrameRecord;
 pub use settings::{Align, ExtractionSettings, ImageSize, Layout, Native};
-pub use table::{TableRow, read_table};
-pub use task::{MAX_TASKS, Merged, Task, TaskOutcome, TaskPiece, merge, merge_with};
-pub use verify::{Problem, VerifyReport, verify};
+pub use verify::{VerifyProblem, VerifyReport, verify};
 pub use writer::{Sample, ShardFiles, ShardWriter, TurnFinding};
 
 /// Largest number of samples of a session.

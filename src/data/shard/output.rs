@@ -4,11 +4,11 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use super::array_task::ArrayTask;
 use super::digest::HashingWriter;
 use super::file::FileEntry;
-use super::task::Task;
 use super::{ShardError, names};
-use crate::durable::{self, Partial, Sealed};
+use crate::durable::{self, Partial, SealedPartial};
 
 /// The folder of a data set, locked by this process until it is dropped.
 #[derive(Debug)]
@@ -49,7 +49,7 @@ impl OutputFolder {
     ///
     /// # Errors
     /// As [`lock`](Self::lock).
-    pub fn lock_for(out: &Path, task: Task) -> Result<Self, ShardError> {
+    pub fn lock_for(out: &Path, task: ArrayTask) -> Result<Self, ShardError> {
         let tasks = out.join(names::TASKS);
         fs::create_dir_all(&tasks).map_err(ShardError::io("make the folder", &tasks))?;
         let handle = File::open(out).map_err(ShardError::io("open the folder", out))?;
@@ -139,7 +139,7 @@ pub(super) struct PartialFile {
 /// A file that is complete and synced to disk, still under its temporary name. Dropping it removes
 /// the file.
 pub(super) struct SealedFile {
-    sealed: Sealed,
+    sealed: SealedPartial,
     path: PathBuf,
     entry: FileEntry,
 }

@@ -5,25 +5,28 @@ use std::path::Path;
 
 use super::ShardError;
 use super::dataset::{Dataset, SessionEntry};
+use super::parquet_table::read_table;
+use super::pieces::read_pieces;
 use super::quality::{QualityVerdict, SessionQuality};
 use super::record::FrameRecord;
 use super::settings::ExtractionSettings;
-use super::table::read_table;
-use super::task::read_pieces;
 use crate::causes::with_causes;
+use crate::image_stats::SPEC_NET_GATE;
 
 /// Places of the turn at which a session's saturation is kept.
 const PLACES: usize = 90;
 
 /// The bounds of the classes of `saturated_fraction`: the first class holds exactly 0, each further one what
 /// is above the bound before it and not above its own, the last one what is above the last bound.
-pub const SATURATION_BOUNDS: [f64; 9] = [0.0, 0.001, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
+pub const SATURATION_BOUNDS: [f64; 9] =
+    [0.0, 0.001, 0.005, 0.01, 0.02, SPEC_NET_GATE, 0.1, 0.2, 0.5];
 
 /// Numbers of samples by class of `saturated_fraction`: see [`SATURATION_BOUNDS`].
 pub type SaturationHistogram = [u64; SATURATION_BOUNDS.len() + 1];
 
 /// A data set at a glance.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Overview {
     /// How all sessions were extracted.
     pub settings: ExtractionSettings,
@@ -35,6 +38,7 @@ pub struct Overview {
 
 /// A session at a glance.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct SessionOverview {
     /// Its entry in the description.
     pub entry: SessionEntry,
@@ -48,6 +52,7 @@ pub struct SessionOverview {
 
 /// Sums over the sessions of an [`Overview`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct OverviewTotals {
     /// Different objects.
     pub objects: usize,

@@ -3,10 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Rect;
+use crate::image_stats::Measures;
 
 /// The record of one sample, as it is in `<session>/<kkkk>.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct FrameRecord {
     /// The session's id; the folder part of the sample's key.
     pub session: String,
@@ -68,36 +70,117 @@ pub struct FrameRecord {
     pub blur: Option<f64>,
 }
 
-#[cfg(test)]
-pub(super) mod tests {
-    use super::*;
-
-    /// A record of which nothing is to say.
-    pub(in crate::shard) fn record(index: u32) -> FrameRecord {
-        FrameRecord {
-            session: "s".to_owned(),
-            object: "o".to_owned(),
+impl FrameRecord {
+    /// The record of sample `index` of a session, whose image shows the part `crop` of its source frame at the source's
+    /// own size, with what was measured of it. `gate`: the saturated fraction above which Spec-Net should run.
+    ///
+    /// The source frame is the one of the same number, at time 0; angle, shifts and findings are not known. The methods
+    /// that follow, and the fields, say more.
+    #[must_use]
+    pub fn new(
+        session: &str,
+        object: &str,
+        index: u32,
+        crop: Rect,
+        measures: &Measures,
+        gate: f64,
+    ) -> Self {
+        let saturated_fraction = measures.saturated_fraction();
+        Self {
+            session: session.to_owned(),
+            object: object.to_owned(),
             index,
             source_frame: u64::from(index),
-            t_us: i64::from(index) * 33_333,
+            t_us: 0,
             angle_deg: None,
             duplicate: false,
-            crop: Rect::new(0, 0, 8, 8),
-            size: [8, 8],
+            crop,
+            size: [crop.w, crop.h],
             shift_px: None,
             shift_applied: false,
             align_confidence: None,
-            mask_px: 40,
-            saturated_px: 2,
-            saturated_fraction: 0.05,
-            saturated_any_px: 4,
-            spec_net: false,
-            mean_rgb: [90.0; 3],
-            sharpness: 12.5,
+            mask_px: measures.mask_px,
+            saturated_px: measures.saturated_px,
+            saturated_fraction,
+            saturated_any_px: measures.saturated_any_px,
+            spec_net: saturated_fraction > gate,
+            mean_rgb: measures.mean_rgb,
+            sharpness: measures.sharpness,
             exposure_step: None,
             identical_to: None,
             blur: None,
         }
+    }
+
+    /// A record to be filled, field by field.
+    pub(super) fn empty() -> Self {
+        let nothing = Measures {
+            mask_px: 0,
+            saturated_px: 0,
+            saturated_any_px: 0,
+            mean_rgb: [0.0; 3],
+            sharpness: 0.0,
+        };
+        Self::new("", "", 0, Rect::new(0, 0, 0, 0), &nothing, 1.0)
+    }
+
+    /// Which frame of the video the sample shows, when it was taken (microseconds) and at which angle of the table
+    /// (degrees).
+    #[must_use]
+    pub fn of_frame(self, source_frame: u64, t_us: i64, angle_deg: Option<f64>) -> Self {
+        Self {
+            source_frame,
+            t_us,
+            angle_deg,
+            ..self
+        }
+    }
+
+    /// Another size of image and mask, pixels.
+    #[must_use]
+    pub fn scaled_to(self, size: [u32; 2]) -> Self {
+        Self { size, ..self }
+    }
+
+    /// Whether another sample shows the same source frame: see [`duplicate`](Self::duplicate).
+    #[must_use]
+    pub fn flagged_duplicate(self, duplicate: bool) -> Self {
+        Self { duplicate, ..self }
+    }
+
+    /// The shift that was measured, whether the image was corrected by it, and how well the structures fit: see the
+    /// fields.
+    #[must_use]
+    pub fn aligned(self, shift: Option<[f64; 2]>, applied: bool, confidence: Option<f64>) -> Self {
+        Self {
+            shift_px: shift,
+            shift_applied: applied,
+            align_confidence: confidence,
+            ..self
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::image_stats::SPEC_NET_GATE;
+
+    /// A record of which nothing is to say.
+    pub(in crate::shard) fn record(index: u32) -> FrameRecord {
+        let measures = Measures {
+            mask_px: 40,
+            saturated_px: 2,
+            saturated_any_px: 4,
+            mean_rgb: [90.0; 3],
+            sharpness: 12.5,
+        };
+        let crop = Rect::new(0, 0, 8, 8);
+        FrameRecord::new("s", "o", index, crop, &measures, SPEC_NET_GATE).of_frame(
+            u64::from(index),
+            i64::from(index) * 33_333,
+            None,
+        )
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::dataset::ShardEntry;
 use super::names::{self, Part};
 use super::order::order;
 use super::output::{PartialFile, ScratchFile, SealedFile};
-use super::table::TableRow;
+use super::parquet_table::TableRow;
 use super::{ShardError, tarball};
 
 /// Part of the spool that holds an image.

@@ -10,10 +10,10 @@ use super::digest::Digest;
 use super::file::FileEntry;
 use super::folder::FolderStore;
 use super::output::{PartialFile, SealedFile};
+use super::parquet_table::{TableRow, write_rows};
 use super::record::FrameRecord;
 use super::settings::Layout;
 use super::spool::SpoolStore;
-use super::table::{TableRow, write_rows};
 use super::{MAX_SAMPLES, ShardError, names};
 
 /// One sample, ready to be written.

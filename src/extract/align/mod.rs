@@ -14,7 +14,7 @@ mod template;
 use image::GrayImage;
 use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterator};
 
-use super::View;
+use super::CropView;
 use fit::Fit;
 use structure::{Extractor, Gradients, Plane, half, half_luma, luma};
 use template::Template;
@@ -59,7 +59,7 @@ pub struct AlignSample(GrayImage);
 impl AlignSample {
     /// The brightness of `crop`.
     #[must_use]
-    pub fn of(crop: View<'_>) -> Self {
+    pub fn of(crop: CropView<'_>) -> Self {
         let halvings = halvings(crop.dimensions());
         if halvings == 0 {
             return Self(luma(crop));

@@ -7,7 +7,7 @@
 use image::GrayImage;
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::View;
+use crate::CropView;
 
 /// Added to the brightness before the logarithm, 8-bit levels: dark pixels are mostly noise.
 const DARK: f32 = 8.0;
@@ -186,7 +186,7 @@ pub(super) fn cubic(part: f32) -> [f32; 4] {
 }
 
 /// Brightness of a picture, 0..=255.
-pub(super) fn luma(picture: View<'_>) -> GrayImage {
+pub(super) fn luma(picture: CropView<'_>) -> GrayImage {
     Arch::new().dispatch(Luma {
         picture,
         half: false,
@@ -194,7 +194,7 @@ pub(super) fn luma(picture: View<'_>) -> GrayImage {
 }
 
 /// The brightness of half the picture, each pixel the mean of two by two.
-pub(super) fn half_luma(picture: View<'_>) -> GrayImage {
+pub(super) fn half_luma(picture: CropView<'_>) -> GrayImage {
     Arch::new().dispatch(Luma {
         picture,
         half: true,
@@ -203,7 +203,7 @@ pub(super) fn half_luma(picture: View<'_>) -> GrayImage {
 
 /// The making of a picture's brightness, compiled for the kind of processor.
 struct Luma<'a> {
-    picture: View<'a>,
+    picture: CropView<'a>,
     half: bool,
 }
 

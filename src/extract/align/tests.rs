@@ -1,9 +1,9 @@
-//! Shifts of made objects whose place is known.
+//! Shifts of synthetic objects whose place is known.
 
 use image::{GrayImage, Luma, Rgba, RgbaImage};
 
 use super::{AlignBuffers, AlignSample, Aligner, Alignment, Motion};
-use crate::View;
+use crate::CropView;
 
 const SIDE: u32 = 150;
 
@@ -37,7 +37,7 @@ fn frame(shift: [f64; 2], angle: f64) -> AlignSample {
         let highlight = 150.0 * (-((u - hx).powi(2) + (v - hy).powi(2)) / 60.0).exp();
         grey((paint * light + highlight).round().clamp(0.0, 255.0) as u8)
     });
-    AlignSample::of(View::whole(&image))
+    AlignSample::of(CropView::whole(&image))
 }
 
 fn angle(at: usize, of: usize) -> f64 {
@@ -97,14 +97,18 @@ fn a_frame_without_the_object_is_not_registered() {
         grey((x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503_001)).to_le_bytes()[2])
     });
     for image in [noise, RgbaImage::from_pixel(SIDE, SIDE, grey(9))] {
-        let found = measured(&aligner, &AlignSample::of(View::whole(&image)));
+        let found = measured(&aligner, &AlignSample::of(CropView::whole(&image)));
         assert_eq!(found.shift, None, "{found:?}");
     }
 }
 
 #[test]
 fn an_object_without_structure_cannot_be_learnt() {
-    let grey = AlignSample::of(View::whole(&RgbaImage::from_pixel(SIDE, SIDE, grey(99))));
+    let grey = AlignSample::of(CropView::whole(&RgbaImage::from_pixel(
+        SIDE,
+        SIDE,
+        grey(99),
+    )));
     let samples = vec![grey; 8];
     assert!(Aligner::learn(&samples, 0, &mask(), 8.0).is_none());
 }
@@ -247,13 +251,13 @@ fn a_large_picture_is_measured_in_its_own_pixels() {
         })
     };
     let samples: Vec<AlignSample> = (0..24)
-        .map(|at| AlignSample::of(View::whole(&large(&frame([0.0; 2], angle(at, 24))))))
+        .map(|at| AlignSample::of(CropView::whole(&large(&frame([0.0; 2], angle(at, 24))))))
         .collect();
     assert!(samples[0].0.width() <= 640);
     let mask = image::imageops::resize(&mask(), 5 * SIDE, 5 * SIDE, image::imageops::Nearest);
     let aligner = Aligner::learn(&samples, 0, &mask, 16.0).unwrap();
     let moved = large(&frame([2.0, -1.0], angle(7, 24)));
-    let found = measured(&aligner, &AlignSample::of(View::whole(&moved)))
+    let found = measured(&aligner, &AlignSample::of(CropView::whole(&moved)))
         .shift
         .unwrap();
     assert!((found[0] - 10.0).hypot(found[1] + 5.0) < 0.5, "{found:?}");

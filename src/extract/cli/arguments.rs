@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::builder::RangedU64ValueParser;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
-use relit_data::shard::{Align, ImageSize, Layout, MAX_TASKS, Task};
+use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::shard::{Align, ArrayTask, ImageSize, Layout, MAX_TASKS};
 use relit_extract::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
 
 const EXAMPLES: &str = "\
@@ -126,10 +127,10 @@ struct ExtractArguments {
     #[arg(long, value_name = "FRACTION", default_value_t = 0.05, value_parser = margin)]
     margin: f64,
     /// A channel is saturated from this 8-bit value on.
-    #[arg(long, value_name = "0-255", default_value_t = 250)]
+    #[arg(long, value_name = "0-255", default_value_t = SATURATION_LEVEL)]
     saturation_level: u8,
     /// Spec-Net should run above this fraction of saturated pixels.
-    #[arg(long, value_name = "FRACTION", default_value_t = 0.05, value_parser = fraction)]
+    #[arg(long, value_name = "FRACTION", default_value_t = SPEC_NET_GATE, value_parser = fraction)]
     gate: f64,
     /// How samples are stored.
     #[arg(long, value_enum, default_value_t = LayoutName::Webdataset)]
@@ -246,7 +247,7 @@ pub(crate) fn parse() -> Arguments {
 fn task(
     line: &ExtractArguments,
     variable: &dyn Fn(&str) -> Option<String>,
-) -> Result<Option<Task>, String> {
+) -> Result<Option<ArrayTask>, String> {
     let number = |name: &str| -> Result<Option<u32>, String> {
         let text = variable(name).filter(|text| !text.is_empty());
         text.map(|text| {
@@ -271,13 +272,13 @@ fn task(
         return Ok(None);
     };
     let count = count.ok_or("give --task-count, the number of tasks")?;
-    let task = Task::new(index, count);
+    let task = ArrayTask::new(index, count);
     task.map(Some)
         .ok_or_else(|| format!("there is no task {index} of {count}: they count from 0"))
 }
 
 impl ExtractArguments {
-    fn with(self, task: Option<Task>) -> Arguments {
+    fn with(self, task: Option<ArrayTask>) -> Arguments {
         let line = self;
         let defaults = ExtractOptions::default();
         let options = ExtractOptions {
@@ -355,7 +356,7 @@ fn fraction(text: &str) -> Result<f64, String> {
 mod tests {
     use super::*;
 
-    fn asked(line: &str, variables: &[(&str, &str)]) -> Result<Option<Task>, String> {
+    fn asked(line: &str, variables: &[(&str, &str)]) -> Result<Option<ArrayTask>, String> {
         let words = "relit-extract in -o out"
             .split(' ')
             .chain(line.split_whitespace());
@@ -379,12 +380,12 @@ mod tests {
         ];
         let index = [("JOB_COMPLETION_INDEX", "2")];
         assert_eq!(asked("", &[]), Ok(None));
-        assert_eq!(asked("", &slurm), Ok(Task::new(3, 8)));
+        assert_eq!(asked("", &slurm), Ok(ArrayTask::new(3, 8)));
         assert_eq!(
             asked("--task-id 0 --task-count 2", &slurm),
-            Ok(Task::new(0, 2))
+            Ok(ArrayTask::new(0, 2))
         );
-        assert_eq!(asked("--task-count 3", &index), Ok(Task::new(2, 3)));
+        assert_eq!(asked("--task-count 3", &index), Ok(ArrayTask::new(2, 3)));
     }
 
     #[test]

@@ -21,7 +21,8 @@ use url::Url;
 
 use relit_data::durable::Partial;
 
-use super::{ObjectError, check, without_credentials};
+use super::ObjectError;
+use super::url::{check, without_credentials};
 
 /// Bytes that are uploaded at once; a longer object goes up in parts of this size.
 const PART: usize = 8 << 20;

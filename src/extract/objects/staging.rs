@@ -8,13 +8,15 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use relit_data::session::{self, recordings};
-use relit_data::shard::{self, Dataset, Merged, Overview, ShardError, Task};
+use relit_data::shard::{self, ArrayTask, Dataset, Merged, Overview, ShardError};
 use tempfile::TempDir;
 
+use super::ObjectError;
 use super::bucket::Bucket;
-use super::{ObjectError, check, is_url};
-use crate::depot::Depot;
-use crate::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally, extract_recordings};
+use super::url::{check, is_url};
+use crate::batch::extract_recordings;
+use crate::storage::StorageBackend;
+use crate::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally};
 
 /// As [`extract`](crate::extract), where some of the inputs or `out` are URLs.
 pub(super) fn extract(
@@ -189,7 +191,7 @@ fn placeholder(path: &Path) -> io::Result<()> {
     fs::write(path, b"")
 }
 
-impl Depot for Staging {
+impl StorageBackend for Staging {
     fn fetch(&self, recording: &Path) -> Result<PathBuf, ExtractError> {
         let Some(remote) = self.sources.get(recording) else {
             return Ok(recording.to_owned());
@@ -238,7 +240,7 @@ struct Target {
 
 impl Target {
     /// The data set at `url`, of which the description is brought to the local disk.
-    fn open(url: &Path, folder: &Path, task: Option<Task>) -> Result<Self, ExtractError> {
+    fn open(url: &Path, folder: &Path, task: Option<ArrayTask>) -> Result<Self, ExtractError> {
         let bucket = Bucket::open(url)?;
         // A bucket that does not exist is noticed before anything is extracted.
         bucket.holds_any("")?;
@@ -248,7 +250,7 @@ impl Target {
         let target = Self {
             bucket,
             folder: folder.join("out"),
-            description: task.map_or(Dataset::FILE.to_owned(), Task::file),
+            description: task.map_or(Dataset::FILE.to_owned(), ArrayTask::file),
             described: RefCell::default(),
         };
         let place = target.folder.join(&target.description);

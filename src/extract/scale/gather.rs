@@ -6,17 +6,43 @@
 
 use std::ops::Range;
 
-use image::RgbImage;
+use image::{GrayImage, RgbImage};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::filter::Axis;
-use super::light::linear;
-use super::{APRON, Scaler};
-use crate::View;
+use super::light::{Srgb, linear};
+use crate::CropView;
 use relit_data::image_stats::Measuring;
 
 /// Red, green, blue and the mask's share.
 const PLANES: usize = 4;
+
+/// Pixels that are needed around a crop to move it by part of a pixel.
+pub const APRON: u32 = 3;
+
+/// The mask of the crops, prepared for reading their rows.
+#[derive(Debug)]
+pub(super) struct SourceMask {
+    /// 0 or 255.
+    pub(super) image: GrayImage,
+    /// For each row, the columns from the first under the mask to the last.
+    hulls: Vec<Range<usize>>,
+}
+
+impl SourceMask {
+    pub(super) fn new(image: GrayImage) -> Self {
+        let hull = |row: &[u8]| {
+            let start = row.iter().position(|&m| m != 0).unwrap_or_default();
+            let end = row.iter().rposition(|&m| m != 0);
+            start..end.map_or(start, |last| last + 1)
+        };
+        let width = image.width().max(1) as usize;
+        Self {
+            hulls: image.as_raw().chunks_exact(width).map(hull).collect(),
+            image,
+        }
+    }
+}
 
 /// What a thread needs to scale crops; it keeps its memory from frame to frame.
 #[derive(Debug, Default)]
@@ -29,8 +55,11 @@ pub struct ScaleBuffers {
 
 /// The gathering of one crop's pixels.
 pub(super) struct Gather<'a> {
-    pub(super) scaler: &'a Scaler,
-    pub(super) crop: View<'a>,
+    pub(super) source: &'a SourceMask,
+    /// The mask of the scaled image.
+    pub(super) mask: &'a GrayImage,
+    pub(super) srgb: &'a Srgb,
+    pub(super) crop: CropView<'a>,
     pub(super) across: &'a Axis,
     pub(super) down: &'a Axis,
     /// 1 / the filtered mask; `None` if it is gathered with the pixels.
@@ -66,7 +95,7 @@ impl Gather<'_> {
     fn columns(&self, row: i64) -> Range<usize> {
         let hull = |row: i64| {
             let at = usize::try_from(row).ok();
-            let hull = at.and_then(|at| self.scaler.hulls.get(at)).cloned();
+            let hull = at.and_then(|at| self.source.hulls.get(at)).cloned();
             hull.filter(|hull| !hull.is_empty())
         };
         let Some(_) = self.part else {
@@ -99,7 +128,7 @@ impl WithSimd for Run<'_, '_> {
         };
         let ring = gather.down.overlap().max(1);
         buffers.reset(source + gather.across.taps(), ring);
-        let mask = gather.scaler.mask();
+        let mask = gather.mask;
         let mut scaled = RgbImage::new(mask.width(), mask.height());
         let (mut first, mut next) = (0, 0);
         for at in 0..(height + 2 * apron) as usize {
@@ -123,12 +152,14 @@ impl WithSimd for Run<'_, '_> {
                 );
                 match gather.part {
                     None => cut_out(
-                        gather.scaler.crop_mask.as_raw(),
+                        gather.source.image.as_raw(),
                         at * source,
                         &columns,
                         &mut buffers.light,
                     ),
-                    Some(part) => share(gather.scaler, part, y, &columns, &mut buffers.light),
+                    Some(part) => {
+                        share(&gather.source.image, part, y, &columns, &mut buffers.light)
+                    }
                 }
                 for output in first..next {
                     let (start, weights) = gather.down.window(output);
@@ -152,7 +183,7 @@ impl Gather<'_> {
     /// Filters an output row across.
     #[inline(always)]
     fn finish(&self, output: usize, sums: &[Vec<f32>; PLANES], scaled: &mut RgbImage) {
-        let mask = self.scaler.mask();
+        let mask = self.mask;
         let width = mask.width() as usize;
         let row = output * width..(output + 1) * width;
         let pixels = scaled
@@ -172,7 +203,7 @@ impl Gather<'_> {
                 None => 1.0 / filtered(shares).max(1e-5),
             };
             for (value, plane) in pixel.iter_mut().zip([red, green, blue]) {
-                *value = self.scaler.srgb.value(gain * filtered(plane));
+                *value = self.srgb.value(gain * filtered(plane));
             }
         }
     }
@@ -219,7 +250,7 @@ fn cut_out(mask: &[u8], start: usize, columns: &Range<usize>, light: &mut [Vec<f
 /// the shares.
 #[inline(always)]
 fn share(
-    scaler: &Scaler,
+    mask: &GrayImage,
     [dx, dy]: [f64; 2],
     y: i64,
     columns: &Range<usize>,
@@ -227,15 +258,12 @@ fn share(
 ) {
     let (whole_x, whole_y) = ((-dx).floor(), (-dy).floor());
     let (right, lower) = ((-dx - whole_x) as f32, (-dy - whole_y) as f32);
-    let width = scaler.crop_mask.width() as usize;
+    let width = mask.width() as usize;
     let row = |y: i64| {
         let at = usize::try_from(y).unwrap_or(usize::MAX);
-        let row = at.checked_mul(width).and_then(|start| {
-            scaler
-                .crop_mask
-                .as_raw()
-                .get(start..start.checked_add(width)?)
-        });
+        let row = at
+            .checked_mul(width)
+            .and_then(|start| mask.as_raw().get(start..start.checked_add(width)?));
         row.unwrap_or_default()
     };
     let (above, below) = (row(y + whole_y as i64), row(y + whole_y as i64 + 1));

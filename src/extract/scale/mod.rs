@@ -14,28 +14,23 @@ mod light;
 
 use image::{GrayImage, RgbImage};
 
-use super::{ExtractError, View};
+use super::{CropView, ExtractError};
 use filter::{Axis, Filter};
-use gather::Gather;
+use gather::{Gather, SourceMask};
 use light::Srgb;
 use relit_data::image_stats::Measuring;
 
-pub use gather::ScaleBuffers;
+pub use gather::{APRON, ScaleBuffers};
 
 /// The name of the method in `dataset.json`.
 pub(super) const METHOD: &str = "linear light, masked before, Hamming down, bilinear up";
 /// The name in `dataset.json` if nothing is scaled.
 pub(super) const NO_METHOD: &str = "none";
 
-/// Pixels that are needed around a crop to move it by part of a pixel.
-pub const APRON: u32 = 3;
-
 /// Scales the crops of one video, which share a mask.
 #[derive(Debug)]
 pub struct Scaler {
-    crop_mask: GrayImage,
-    /// For each row, the columns from the first under the mask to the last.
-    hulls: Vec<std::ops::Range<usize>>,
+    source: SourceMask,
     srgb: Srgb,
     /// `None` if the source pixels are kept.
     to: Option<Target>,
@@ -61,15 +56,8 @@ impl Scaler {
             None => None,
             Some(side) => Some(Target::new(&crop_mask, side)?),
         };
-        let hull = |row: &[u8]| {
-            let start = row.iter().position(|&m| m != 0).unwrap_or_default();
-            let end = row.iter().rposition(|&m| m != 0);
-            start..end.map_or(start, |last| last + 1)
-        };
-        let width = crop_mask.width().max(1) as usize;
         Ok(Self {
-            hulls: crop_mask.as_raw().chunks_exact(width).map(hull).collect(),
-            crop_mask,
+            source: SourceMask::new(crop_mask),
             srgb: Srgb::new(),
             to,
         })
@@ -81,7 +69,7 @@ impl Scaler {
     pub fn mask(&self) -> &GrayImage {
         self.to
             .as_ref()
-            .map_or(&self.crop_mask, |target| &target.mask)
+            .map_or(&self.source.image, |target| &target.mask)
     }
 
     /// Masks and scales one crop, which has the size of the mask, and measures it.
@@ -90,21 +78,23 @@ impl Scaler {
     /// [`ExtractError::Scaling`] if the crop has another size.
     pub fn scale(
         &self,
-        crop: View<'_>,
+        crop: CropView<'_>,
         buffers: &mut ScaleBuffers,
         measuring: &mut Measuring<'_>,
     ) -> Result<RgbImage, ExtractError> {
-        if crop.dimensions() != self.crop_mask.dimensions() {
+        if crop.dimensions() != self.source.image.dimensions() {
             return Err(ExtractError::Scaling(
                 "the crop and its mask differ in size",
             ));
         }
         let Some(target) = &self.to else {
             crop.rows().for_each(|row| measuring.add_row::<4>(row));
-            return Ok(masked(crop, &self.crop_mask));
+            return Ok(masked(crop, &self.source.image));
         };
         let gather = Gather {
-            scaler: self,
+            source: &self.source,
+            mask: self.mask(),
+            srgb: &self.srgb,
             crop,
             across: &target.across,
             down: &target.down,
@@ -122,18 +112,18 @@ impl Scaler {
     /// [`ExtractError::Scaling`] if the crop has another size or no apron.
     pub fn scale_moved(
         &self,
-        crop: View<'_>,
+        crop: CropView<'_>,
         part: [f64; 2],
         buffers: &mut ScaleBuffers,
         measuring: &mut Measuring<'_>,
     ) -> Result<RgbImage, ExtractError> {
-        let fits = crop.dimensions() == self.crop_mask.dimensions();
+        let fits = crop.dimensions() == self.source.image.dimensions();
         if !fits || crop.moved([0, 0], APRON).is_none() {
             return Err(ExtractError::Scaling(
                 "the crop and its mask differ in size",
             ));
         }
-        let (width, height) = self.crop_mask.dimensions();
+        let (width, height) = self.source.image.dimensions();
         let filter = self.to.as_ref().map_or(Filter::CatmullRom, |to| to.filter);
         let axis = |extent: u32, part: f64, outputs: u32| {
             let source = (extent + 2 * APRON) as usize;
@@ -141,7 +131,9 @@ impl Scaler {
             Axis::new(source, span, outputs as usize, filter)
         };
         let gather = Gather {
-            scaler: self,
+            source: &self.source,
+            mask: self.mask(),
+            srgb: &self.srgb,
             crop,
             across: &axis(width, part[0], self.mask().width()),
             down: &axis(height, part[1], self.mask().height()),
@@ -152,7 +144,7 @@ impl Scaler {
     }
 }
 
-fn masked(crop: View<'_>, mask: &GrayImage) -> RgbImage {
+fn masked(crop: CropView<'_>, mask: &GrayImage) -> RgbImage {
     let mut kept = RgbImage::new(mask.width(), mask.height());
     let pixels = crop.rows().flat_map(|row| row.chunks_exact(4));
     for ((kept, pixel), mask) in kept.pixels_mut().zip(pixels).zip(mask.as_raw()) {
@@ -237,7 +229,7 @@ fn shares(mask: &GrayImage, across: &Axis, down: &Axis) -> Vec<f32> {
 mod tests {
     use image::{Luma, Rgba, RgbaImage};
     use proptest::prelude::*;
-    use relit_data::image_stats::MaskSpans;
+    use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
 
     use super::*;
 
@@ -257,17 +249,17 @@ mod tests {
         Rgba([r, g, b, 255])
     }
 
-    fn still(scaler: &Scaler, crop: View<'_>) -> RgbImage {
-        let spans = MaskSpans::of(&scaler.crop_mask);
+    fn still(scaler: &Scaler, crop: CropView<'_>) -> RgbImage {
+        let spans = MaskSpans::of(&scaler.source.image);
         let mut buffers = ScaleBuffers::default();
         scaler
-            .scale(crop, &mut buffers, &mut spans.measuring(250))
+            .scale(crop, &mut buffers, &mut spans.measuring(SATURATION_LEVEL))
             .unwrap()
     }
 
     fn scaled(crop: &RgbaImage, mask: &GrayImage, side: Option<u32>) -> (RgbImage, GrayImage) {
         let scaler = Scaler::new(mask.clone(), side).unwrap();
-        (still(&scaler, View::whole(crop)), scaler.mask().clone())
+        (still(&scaler, CropView::whole(crop)), scaler.mask().clone())
     }
 
     proptest! {
@@ -353,14 +345,19 @@ mod tests {
         for side in [None, Some(24)] {
             let scaler = Scaler::new(mask.clone(), side).unwrap();
             let unmoved = around(&mask, [0.0; 2]);
-            let wanted = still(&scaler, View::within(&unmoved, APRON));
+            let wanted = still(&scaler, CropView::within(&unmoved, APRON));
             let mut buffers = ScaleBuffers::default();
             for part in [[0.5, -0.25], [-0.4, 0.5], [0.2, 0.0]] {
                 let around = around(&mask, part);
-                let crop = View::within(&around, APRON);
+                let crop = CropView::within(&around, APRON);
                 let spans = MaskSpans::of(&mask);
                 let found = scaler
-                    .scale_moved(crop, part, &mut buffers, &mut spans.measuring(250))
+                    .scale_moved(
+                        crop,
+                        part,
+                        &mut buffers,
+                        &mut spans.measuring(SATURATION_LEVEL),
+                    )
                     .unwrap();
                 for (a, b) in found.as_raw().iter().zip(wanted.as_raw()) {
                     assert!(a.abs_diff(*b) <= 4, "{side:?} {part:?}: {a} for {b}");
@@ -375,7 +372,7 @@ mod tests {
         let around = RgbaImage::from_fn(20 + 2 * APRON, 20 + 2 * APRON, |x, y| {
             opaque([(9 * x) as u8, (8 * y * y) as u8, (x * y) as u8])
         });
-        let crop = View::within(&around, APRON);
+        let crop = CropView::within(&around, APRON);
         let spans = MaskSpans::of(&mask);
         let rgb = image::DynamicImage::from(around.clone()).to_rgb8();
         let rgb = image::imageops::crop_imm(&rgb, APRON, APRON, 20, 20).to_image();
@@ -399,10 +396,10 @@ mod tests {
         let spans = MaskSpans::of(&disc(60));
         let mut buffers = ScaleBuffers::default();
         let refused = scaler.scale_moved(
-            View::whole(&bare),
+            CropView::whole(&bare),
             [0.0; 2],
             &mut buffers,
-            &mut spans.measuring(250),
+            &mut spans.measuring(SATURATION_LEVEL),
         );
         assert!(matches!(refused, Err(ExtractError::Scaling(_))));
     }

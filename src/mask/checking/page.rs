@@ -6,13 +6,16 @@ use std::path::PathBuf;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use image::GrayImage;
 use image::codecs::jpeg::JpegEncoder;
-use relit_grabcut::{MaskError, preview};
+use image::{GrayImage, RgbImage};
+use relit_data::geometry::Rect;
+use relit_grabcut::{DoubtfulRegion, MaskError, preview};
 use relit_video::Video;
 
 use super::super::{MaskFiles, MaskingError};
-use super::{FrameDrift, MaskReport, Verdict, cropped, surroundings};
+use super::drift::FrameDrift;
+use super::report::MaskReport;
+use super::verdict::MaskVerdict;
 
 /// JPEG quality of the frames, 1 to 100.
 const QUALITY: u8 = 85;
@@ -42,10 +45,10 @@ pub(super) fn page(
     mask: &GrayImage,
 ) -> Result<String, MaskingError> {
     let (word, class) = match report.verdict {
-        Verdict::Fits => ("The mask fits.", "fits"),
-        Verdict::Drifts => ("The object moves beside the mask.", "drifts"),
-        Verdict::Wrong => ("The mask is not that of the object.", "wrong"),
-        Verdict::Unknown => ("Nothing can be said about the mask.", "unknown"),
+        MaskVerdict::Fits => ("The mask fits.", "fits"),
+        MaskVerdict::Drifts => ("The object moves beside the mask.", "drifts"),
+        MaskVerdict::Wrong => ("The mask is not that of the object.", "wrong"),
+        MaskVerdict::Unknown => ("Nothing can be said about the mask.", "unknown"),
     };
     let id = escaped(id);
     let reasons: String = report
@@ -93,8 +96,7 @@ fn table(report: &MaskReport) -> String {
         ));
     }
     if let Some(shape) = &report.shape {
-        let sum =
-            |regions: &[relit_grabcut::Region]| regions.iter().map(|region| region.px).sum::<u64>();
+        let sum = |regions: &[DoubtfulRegion]| regions.iter().map(|region| region.px).sum::<u64>();
         rows.push((
             "The turn's own mask, intersection over union",
             format!("{:.3}", shape.iou),
@@ -177,4 +179,25 @@ fn figures(
         );
     }
     Ok(figures)
+}
+
+/// The object's bounds with some space around, inside the frame.
+fn surroundings(mask: &GrayImage) -> Rect {
+    let (width, height) = mask.dimensions();
+    let inside = mask.enumerate_pixels().filter(|(.., p)| p.0[0] >= 128);
+    let (mut low, mut high) = ((width, height), (0, 0));
+    for (x, y, _) in inside {
+        low = (low.0.min(x), low.1.min(y));
+        high = (high.0.max(x), high.1.max(y));
+    }
+    let space = (width.max(height) / 30).max(4);
+    let (left, top) = (low.0.saturating_sub(space), low.1.saturating_sub(space));
+    let right = (high.0 + space + 1).min(width).max(left + 1);
+    let bottom = (high.1 + space + 1).min(height).max(top + 1);
+    Rect::new(left as i32, top as i32, right - left, bottom - top)
+}
+
+fn cropped(image: &RgbImage, part: Rect) -> RgbImage {
+    let (x, y) = (part.x.unsigned_abs(), part.y.unsigned_abs());
+    image::imageops::crop_imm(image, x, y, part.w, part.h).to_image()
 }

@@ -3,7 +3,7 @@
 use relit_grabcut::ShapeCheck;
 use serde::Serialize;
 
-use super::DriftCheck;
+use super::drift::DriftCheck;
 
 /// The object may lie so far beside the mask in the worst frame, pixels.
 const MOST_DRIFT: f32 = 2.0;
@@ -13,7 +13,7 @@ const MEDIAN_DRIFT: f32 = 1.0;
 /// Whether a mask fits its recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum MaskVerdict {
     /// It does, in every frame.
     Fits,
     /// Its shape is right, but the object moves beside it.
@@ -28,19 +28,19 @@ pub enum Verdict {
 pub(super) fn verdict(
     drift: Option<&DriftCheck>,
     shape: Option<&ShapeCheck>,
-) -> (Verdict, Vec<String>) {
+) -> (MaskVerdict, Vec<String>) {
     let mut reasons = shape.map(ShapeCheck::faults).unwrap_or_default();
     let wrong = !reasons.is_empty();
     let moved = drift.and_then(reason_of_drift);
     let verdict = match (wrong, &moved) {
-        (true, _) => Verdict::Wrong,
-        (false, Some(_)) => Verdict::Drifts,
-        // A picture that stands still is found in its place whatever the mask is.
-        (false, None) if shape.is_none() => Verdict::Unknown,
-        (false, None) => Verdict::Fits,
+        (true, _) => MaskVerdict::Wrong,
+        (false, Some(_)) => MaskVerdict::Drifts,
+        // A picture that stands still is found where it is whatever the mask is.
+        (false, None) if shape.is_none() => MaskVerdict::Unknown,
+        (false, None) => MaskVerdict::Fits,
     };
     reasons.extend(moved);
-    if verdict == Verdict::Unknown {
+    if verdict == MaskVerdict::Unknown {
         reasons.push("hardly anything moves in the video, so that it does not show what the object is: look at mask-preview.png".to_owned());
     }
     (verdict, reasons)
@@ -58,10 +58,10 @@ fn reason_of_drift(drift: &DriftCheck) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::FrameDrift;
+    use super::super::drift::FrameDrift;
     use super::*;
     use relit_data::geometry::Rect;
-    use relit_grabcut::Region;
+    use relit_grabcut::DoubtfulRegion;
 
     fn shape() -> ShapeCheck {
         ShapeCheck {
@@ -93,17 +93,17 @@ mod tests {
     #[test]
     fn each_verdict_has_its_reason() {
         let region = |px| {
-            vec![Region {
+            vec![DoubtfulRegion {
                 px,
                 bounds: Rect::new(1, 2, 30, 40),
             }]
         };
         assert_eq!(
             verdict(Some(&drift(0.5)), Some(&shape())),
-            (Verdict::Fits, Vec::new())
+            (MaskVerdict::Fits, Vec::new())
         );
         let (found, reasons) = verdict(Some(&drift(-3.1)), Some(&shape()));
-        assert_eq!(found, Verdict::Drifts);
+        assert_eq!(found, MaskVerdict::Drifts);
         assert!(reasons[0].contains("3.1 px") && reasons[0].contains("frame 420"));
         for (changed, word) in [
             (
@@ -136,19 +136,19 @@ mod tests {
             ),
         ] {
             let (found, reasons) = verdict(None, Some(&changed));
-            assert_eq!((found, reasons.len()), (Verdict::Wrong, 1), "{word}");
+            assert_eq!((found, reasons.len()), (MaskVerdict::Wrong, 1), "{word}");
             assert!(reasons[0].contains(word), "{}", reasons[0]);
         }
-        assert_eq!(verdict(None, None).0, Verdict::Unknown);
+        assert_eq!(verdict(None, None).0, MaskVerdict::Unknown);
         assert_eq!(verdict(None, None).1.len(), 1);
         let still = verdict(Some(&drift(0.1)), None);
-        assert_eq!((still.0, still.1.len()), (Verdict::Unknown, 1));
-        assert_eq!(verdict(Some(&drift(3.1)), None).0, Verdict::Drifts);
+        assert_eq!((still.0, still.1.len()), (MaskVerdict::Unknown, 1));
+        assert_eq!(verdict(Some(&drift(3.1)), None).0, MaskVerdict::Drifts);
     }
 
     #[test]
     fn a_mask_that_follows_what_moves_better_than_the_turn_is_not_blamed() {
-        let leaks = vec![Region {
+        let leaks = vec![DoubtfulRegion {
             px: 900,
             bounds: Rect::new(1, 2, 30, 40),
         }];
@@ -157,6 +157,9 @@ mod tests {
             leaks,
             ..shape()
         };
-        assert_eq!(verdict(Some(&drift(0.1)), Some(&shape)).0, Verdict::Fits);
+        assert_eq!(
+            verdict(Some(&drift(0.1)), Some(&shape)).0,
+            MaskVerdict::Fits
+        );
     }
 }

@@ -4,10 +4,10 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::error::ErrorKind;
-use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand};
+use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use relit_data::geometry::Rect;
 use relit_grabcut::{Drawing, Feather, Iterations, SegmentSettings};
-use relit_mask::{MaskFiles, MaskRequest, MaskingError, read_seeds};
+use relit_mask::{MaskEngine, MaskFiles, MaskRequest, MaskingError, read_seeds};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -56,8 +56,7 @@ pub(crate) enum Verb {
         #[arg(long)]
         json: bool,
     },
-    #[cfg(feature = "opencv")]
-    /// Measure masks of images with truth, and OpenCV's GrabCut beside them
+    /// Measure masks of images with ground truth, and OpenCV's GrabCut beside them if it is built in
     #[command(after_help = "Example:\n  relit-mask bench images/")]
     Bench {
         /// A folder with NAME.jpg, NAME.gt.png, and NAME.box.txt or NAME.scribble.png for each image
@@ -70,6 +69,22 @@ pub(crate) enum Verb {
         #[arg(long)]
         json: bool,
     },
+}
+
+/// The names of the engines.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum EngineName {
+    Relit,
+    Opencv,
+}
+
+impl From<EngineName> for MaskEngine {
+    fn from(name: EngineName) -> Self {
+        match name {
+            EngineName::Relit => Self::Relit,
+            EngineName::Opencv => Self::OpenCv,
+        }
+    }
 }
 
 /// What mask is to be made.
@@ -109,6 +124,15 @@ pub(crate) struct MaskArguments {
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u64,
 
+    /// What cuts the object out; opencv knows --rect and --seeds, and has to be built in
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "relit",
+        conflicts_with = "edit"
+    )]
+    engine: EngineName,
+
     /// Number of GrabCut's iterations
     #[arg(long, value_name = "N", default_value = "5", value_parser = iterations)]
     iterations: Iterations,
@@ -135,7 +159,7 @@ pub(crate) struct MaskArguments {
 
     /// Make the mask again that this mask.json describes, to the same bytes
     #[arg(long, value_name = "JSON", conflicts_with_all =
-        ["rect", "seeds", "auto", "frame", "iterations", "keep_all", "feather", "alpha"])]
+        ["rect", "seeds", "auto", "frame", "engine", "iterations", "keep_all", "feather", "alpha"])]
     recipe: Option<PathBuf>,
 
     /// Print one JSON line per event on standard output
@@ -147,7 +171,7 @@ impl MaskArguments {
     /// The requested mask.
     ///
     /// # Errors
-    /// If seeds or recipe cannot be read.
+    /// If seeds or recipe cannot be read, or the engine is not built in.
     pub(crate) fn request(&self) -> Result<MaskRequest, MaskingError> {
         let request = match &self.recipe {
             Some(path) => MaskRequest::from_recipe(path)?,
@@ -157,22 +181,26 @@ impl MaskArguments {
                     seeds: self.seeds.as_deref().map(read_seeds).transpose()?,
                     ..Drawing::default()
                 };
-                match self.auto {
+                let request = match self.auto {
                     true => MaskRequest::auto(self.frame, drawing, self.settings()),
                     false => MaskRequest::new(self.frame, drawing, self.settings()),
-                }
+                };
+                request.with_engine(self.engine.into())?
             }
         };
         Ok(request.with_force(self.force))
     }
 
-    /// Refuses one name, or one page, for the masks of several recordings.
+    /// Refuses OpenCV's engine for a turn, and one name, or one page, for the masks of several recordings.
     ///
     /// # Errors
     /// A usage error, ready to be printed.
-    pub(crate) fn check_recordings(&self, recordings: usize) -> Result<(), clap::Error> {
+    pub(crate) fn check(&self, recordings: usize) -> Result<(), clap::Error> {
         let input = self.input.display();
         let text = match (self.edit, &self.output) {
+            _ if self.auto && matches!(self.engine, EngineName::Opencv) => {
+                MaskingError::OpenCvKnowsNoTurn.to_string()
+            }
             _ if recordings == 1 => return Ok(()),
             (true, _) => format!(
                 "--edit shows one recording, but {input} holds {recordings}: name one of them"

@@ -1,10 +1,10 @@
-//! `relit-mask bench`: figures over a folder of images with truth, as a table or JSON lines.
+//! `relit-mask bench`: figures over a folder of images with ground truth, as a table or JSON lines.
 
 use std::path::Path;
 
 use relit_console::{Console, Outcome};
 use relit_grabcut::MaskScore;
-use relit_mask::{BenchRow, MaskingError, Prompt, bench_image, bench_images};
+use relit_mask::{BenchRow, MaskEngine, MaskingError, Prompt, bench_image, bench_images};
 use serde_json::{Value, json};
 
 /// An image counts as worse if its IoU is lower by more than this.
@@ -34,21 +34,13 @@ pub(crate) fn run(console: Console, folder: &Path, whole: bool) -> Result<Outcom
 }
 
 fn print_head(console: Console) {
-    let text = format!(
-        "{:<24} {:<8}  {:^26}  {:^26}\n{:<24} {:<8}  {:>8} {:>8} {:>8}  {:>8} {:>8} {:>8}",
-        "",
-        "",
-        "relit-mask",
-        "OpenCV's GrabCut",
-        "image",
-        "hint",
-        "error %",
-        "IoU",
-        "F 2 px",
-        "error %",
-        "IoU",
-        "F 2 px",
-    );
+    let engines = match MaskEngine::OpenCv.is_built_in() {
+        true => &["relit-mask", "OpenCV's GrabCut"][..],
+        false => &["relit-mask"],
+    };
+    let names: String = engines.iter().map(|name| format!("  {name:^26}")).collect();
+    let columns = format!("  {:>8} {:>8} {:>8}", "error %", "IoU", "F 2 px").repeat(engines.len());
+    let text = format!("{:<33}{names}\n{:<24} {:<8}{columns}", "", "image", "hint");
     console.say(
         &text,
         &json!({ "event": "bench", "tolerance_px": relit_grabcut::BOUNDARY_TOLERANCE_PX }),
@@ -56,7 +48,7 @@ fn print_head(console: Console) {
 }
 
 fn print_row(console: Console, row: &BenchRow) {
-    let mut text = line(&row.image, row.prompt, &row.ours, &row.opencv);
+    let mut text = line(&row.image, row.prompt, &row.ours, row.opencv.as_ref());
     if let Some(whole) = &row.whole {
         text += &format!("  cut whole: IoU {:.3}", whole.iou);
     }
@@ -65,7 +57,7 @@ fn print_row(console: Console, row: &BenchRow) {
         "image": row.image,
         "hint": row.prompt.name(),
         "ours": figures(&row.ours),
-        "opencv": figures(&row.opencv),
+        "opencv": row.opencv.as_ref().map(figures),
         "whole": row.whole.as_ref().map(figures),
     });
     console.say(&text, &event);
@@ -77,40 +69,36 @@ fn print_average(console: Console, prompt: Prompt, rows: &[BenchRow]) {
         return;
     }
     let ours = average(rows.iter().map(|row| row.ours));
-    let opencv = average(rows.iter().map(|row| row.opencv));
-    let is_worse = |row: &&&BenchRow| row.ours.iou < row.opencv.iou - WORSE_BY;
+    let opencv = average_of_some(rows.iter().map(|row| row.opencv));
+    let whole = average_of_some(rows.iter().map(|row| row.whole));
     let worse: Vec<&str> = rows
         .iter()
-        .filter(is_worse)
+        .filter(|row| {
+            row.opencv
+                .is_some_and(|opencv| row.ours.iou < opencv.iou - WORSE_BY)
+        })
         .map(|row| &*row.image)
         .collect();
-    let ratio = ours.error / opencv.error.max(f64::MIN_POSITIVE);
-    let mut text = line("average", prompt, &ours, &opencv);
-    text += &format!(
-        "\n{:<24} {:<8}  error {ratio:.2} x OpenCV's; ",
-        "",
-        prompt.name()
-    );
-    text += &match worse.len() {
-        0 => "no image is worse by more than 2 points of IoU".to_owned(),
-        _ => format!("worse by more than 2 points of IoU: {}", worse.join(", ")),
-    };
-    let whole: Vec<MaskScore> = rows.iter().filter_map(|row| row.whole).collect();
-    let whole = (!whole.is_empty()).then(|| average(whole.iter().copied()));
+    let ratio = opencv.map(|opencv| ours.error / opencv.error.max(f64::MIN_POSITIVE));
+    let mut text = line("average", prompt, &ours, opencv.as_ref());
+    let indent = format!("\n{:<24} {:<8}", "", prompt.name());
+    if let Some(ratio) = ratio {
+        text += &format!("{indent}  error {ratio:.2} x OpenCV's; ");
+        text += &match worse.len() {
+            0 => "no image is worse by more than 2 points of IoU".to_owned(),
+            _ => format!("worse by more than 2 points of IoU: {}", worse.join(", ")),
+        };
+    }
     if let Some(whole) = &whole {
         let points = 100.0 * (ours.iou - whole.iou);
-        text += &format!(
-            "\n{:<24} {:<8}  {points:+.2} points of IoU against masks cut whole",
-            "",
-            prompt.name()
-        );
+        text += &format!("{indent}  {points:+.2} points of IoU against masks cut whole");
     }
     let event = json!({
         "event": "average",
         "hint": prompt.name(),
         "images": rows.len(),
         "ours": figures(&ours),
-        "opencv": figures(&opencv),
+        "opencv": opencv.as_ref().map(figures),
         "whole": whole.as_ref().map(figures),
         "error_ratio": ratio,
         "worse": worse,
@@ -118,20 +106,26 @@ fn print_average(console: Console, prompt: Prompt, rows: &[BenchRow]) {
     console.say(&text, &event);
 }
 
-fn line(name: &str, prompt: Prompt, ours: &MaskScore, opencv: &MaskScore) -> String {
-    let [ours, opencv] = [ours, opencv].map(|score| {
-        format!(
-            "{:>8.2} {:>8.3} {:>8.3}",
-            100.0 * score.error,
-            score.iou,
-            score.boundary_f
-        )
-    });
-    format!("{name:<24} {:<8}  {ours}  {opencv}", prompt.name())
+fn line(name: &str, prompt: Prompt, ours: &MaskScore, opencv: Option<&MaskScore>) -> String {
+    let mut line = format!("{name:<24} {:<8}", prompt.name());
+    for score in [Some(ours), opencv].into_iter().flatten() {
+        let error = 100.0 * score.error;
+        line += &format!(
+            "  {error:>8.2} {:>8.3} {:>8.3}",
+            score.iou, score.boundary_f
+        );
+    }
+    line
 }
 
 fn figures(score: &MaskScore) -> Value {
     json!({ "error": score.error, "iou": score.iou, "boundary_f": score.boundary_f })
+}
+
+/// The average of the scores that there are; `None` without any.
+fn average_of_some(scores: impl Iterator<Item = Option<MaskScore>>) -> Option<MaskScore> {
+    let scores: Vec<MaskScore> = scores.flatten().collect();
+    (!scores.is_empty()).then(|| average(scores.iter().copied()))
 }
 
 fn average(scores: impl ExactSizeIterator<Item = MaskScore> + Clone) -> MaskScore {

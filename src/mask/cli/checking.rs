@@ -4,7 +4,7 @@ use std::path::Path;
 
 use relit_console::{Console, Outcome};
 use relit_data::session::recordings;
-use relit_mask::{CheckOutput, MaskingError, Verdict, check_mask};
+use relit_mask::{CheckOutput, MaskVerdict, MaskingError, check_mask};
 use serde_json::json;
 
 /// Checks the mask of every recording, and prints a line and the reasons for each.
@@ -25,7 +25,7 @@ pub(crate) fn run(
         match checked {
             Ok(output) => {
                 print(&output, console);
-                if output.report.verdict != Verdict::Fits {
+                if output.report.verdict != MaskVerdict::Fits {
                     outcome = Outcome::Wrong;
                 }
             }
@@ -42,10 +42,10 @@ pub(crate) fn run(
 fn print(output: &CheckOutput, console: Console) {
     let (id, report) = (&output.recording, &output.report);
     let word = match report.verdict {
-        Verdict::Fits => "the mask fits",
-        Verdict::Drifts => "the object moves beside the mask",
-        Verdict::Wrong => "the mask is not that of the object",
-        Verdict::Unknown => "nothing can be said about the mask",
+        MaskVerdict::Fits => "the mask fits",
+        MaskVerdict::Drifts => "the object moves beside the mask",
+        MaskVerdict::Wrong => "the mask is not that of the object",
+        MaskVerdict::Unknown => "nothing can be said about the mask",
     };
     let drift = report.drift.as_ref().map_or(String::new(), |drift| {
         format!(

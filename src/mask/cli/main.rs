@@ -1,7 +1,6 @@
 //! `relit-mask`: finds the object in recordings.
 
 mod arguments;
-#[cfg(feature = "opencv")]
 mod benching;
 mod checking;
 mod making;
@@ -21,7 +20,6 @@ fn main() -> ExitCode {
             let console = Console::new(json);
             console.finish(checking::run(console, &input, mask.as_deref()))
         }
-        #[cfg(feature = "opencv")]
         (
             Some(Verb::Bench {
                 folder,

@@ -18,7 +18,7 @@ pub(crate) fn run(arguments: &MaskArguments) -> ExitCode {
         Ok(paths) => paths,
         Err(error) => return console.finish(Err(error)),
     };
-    if let Err(usage) = arguments.check_recordings(paths.len()) {
+    if let Err(usage) = arguments.check(paths.len()) {
         // Nothing can be done if standard error is closed.
         let _ = usage.print();
         return ExitCode::from(2);

@@ -19,8 +19,8 @@ use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 
 use super::super::{MaskRecord, MaskingError};
-use super::desk::{Description, Desk, Sketch};
 use super::page;
+use super::session::{Description, EditorSession, Sketch};
 
 /// Largest sketch: some hundred thousand points.
 const BODY: BodyLimit = BodyLimit {
@@ -35,7 +35,7 @@ const WIDEST: u32 = 8192;
 /// What all requests share.
 #[derive(Clone, FromRef)]
 pub(super) struct App {
-    desk: Arc<Desk>,
+    session: Arc<EditorSession>,
     policy: Arc<AccessPolicy>,
     shutdown: Shutdown,
     accepted: Arc<Mutex<Option<MaskRecord>>>,
@@ -43,9 +43,13 @@ pub(super) struct App {
 }
 
 impl App {
-    pub(super) fn new(desk: Arc<Desk>, policy: Arc<AccessPolicy>, shutdown: Shutdown) -> Self {
+    pub(super) fn new(
+        session: Arc<EditorSession>,
+        policy: Arc<AccessPolicy>,
+        shutdown: Shutdown,
+    ) -> Self {
         Self {
-            desk,
+            session,
             policy,
             shutdown,
             accepted: Arc::default(),
@@ -62,15 +66,15 @@ impl App {
     /// Works on the recording, on a thread for it.
     async fn work<T: Send + 'static>(
         &self,
-        job: impl FnOnce(&Desk) -> Result<T, MaskingError> + Send + 'static,
+        job: impl FnOnce(&EditorSession) -> Result<T, MaskingError> + Send + 'static,
     ) -> Result<T, Failure> {
         let broken = || Failure::broken("the request could not be worked on");
         let permit = self.permits.clone().acquire_owned().await;
         let permit = permit.map_err(|_| broken())?;
-        let desk = self.desk.clone();
+        let session = self.session.clone();
         let done = spawn_blocking(move || {
             let _permit = permit;
-            job(&desk)
+            job(&session)
         });
         done.await.map_err(|_| broken())?.map_err(failure)
     }
@@ -116,8 +120,8 @@ fn failure(error: MaskingError) -> Failure {
     Failure::new(status, with_causes(&error))
 }
 
-async fn recording(State(desk): State<Arc<Desk>>) -> Json<Description> {
-    Json(desk.description())
+async fn recording(State(session): State<Arc<EditorSession>>) -> Json<Description> {
+    Json(session.description())
 }
 
 #[derive(Deserialize)]
@@ -131,7 +135,7 @@ async fn frame(
     QueryParams(Width { width }): QueryParams<Width>,
 ) -> Result<Response, Failure> {
     let width = width.unwrap_or(WIDEST).clamp(1, WIDEST);
-    let jpeg = app.work(move |desk| desk.jpeg(number, width)).await?;
+    let jpeg = app.work(move |session| session.jpeg(number, width)).await?;
     let headers = [
         (header::CONTENT_TYPE, "image/jpeg"),
         (header::CACHE_CONTROL, "private, max-age=3600"),
@@ -165,10 +169,10 @@ async fn mask(
     JsonBody(sketch): JsonBody<Sketch>,
 ) -> Result<Json<Shown>, Failure> {
     let effort = if draft { Effort::Draft } else { Effort::Fine };
-    let exact = !draft || app.desk.is_small();
-    let shown = app.work(move |desk| {
+    let exact = !draft || app.session.is_small();
+    let shown = app.work(move |session| {
         let began = Instant::now();
-        let mask = desk.cut(sketch, effort)?;
+        let mask = session.cut(sketch, effort)?;
         Ok(Shown {
             outline: outline(mask.image()),
             area_px: mask.statistics().area_px,
@@ -193,7 +197,7 @@ async fn accept(
     State(app): State<App>,
     JsonBody(sketch): JsonBody<Sketch>,
 ) -> Result<Json<Accepted>, Failure> {
-    let record = app.work(move |desk| desk.write(sketch)).await?;
+    let record = app.work(move |session| session.write(sketch)).await?;
     let accepted = Accepted {
         area_px: record.result.area_px,
         mask_blake3: record.result.mask_blake3.clone(),

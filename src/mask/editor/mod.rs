@@ -6,8 +6,8 @@
 //! or the page is told to discard it. Without the random token of its URL nothing is shown or done.
 
 mod api;
-mod desk;
 mod page;
+mod session;
 
 use std::net::{SocketAddr, TcpListener};
 use std::path::Path;
@@ -21,14 +21,14 @@ use super::files::check_replaceable;
 use super::making::files_of;
 use super::{MaskFiles, MaskOutput, MaskRequest, MaskingError};
 use api::App;
-use desk::Desk;
+use session::EditorSession;
 
 /// Threads that carry requests; cuts and frames have their own.
 const THREADS: usize = 2;
 
 /// Serves the editor at `address`, whose port may be 0 for any free one, for the recording at `input`, a session folder or a video file, until a person accepts a
 /// mask or discards it. The request says what is drawn at the beginning, and may be empty. `announce` is called
-/// once, when a browser can connect. The files are those of [`make_mask`](super::make_mask), and none is
+/// once, when a browser can connect. relit's engine cuts, whichever the request names. The files are those of [`make_mask`](super::make_mask), and none is
 /// written before the mask is accepted; the result is `None` if it was discarded.
 ///
 /// # Errors
@@ -48,8 +48,8 @@ pub fn edit(
     };
     let files = files_of(&recording, output)?;
     check_replaceable(&files, request.force, request.settings.alpha).map_err(of_recording)?;
-    let desk = Desk::new(&recording, files.clone(), request).map_err(of_recording)?;
-    let app = serve(desk, address, announce)?;
+    let session = EditorSession::new(&recording, files.clone(), request).map_err(of_recording)?;
+    let app = serve(session, address, announce)?;
     let record = app.accepted();
     Ok(record.map(|record| MaskOutput {
         recording: recording.id,
@@ -60,7 +60,7 @@ pub fn edit(
 }
 
 fn serve(
-    desk: Desk,
+    session: EditorSession,
     asked: SocketAddr,
     announce: impl FnOnce(&Announcement),
 ) -> Result<App, MaskingError> {
@@ -82,7 +82,7 @@ fn serve(
         .build()
         .map_err(failed)?;
     let shutdown = Shutdown::new();
-    let app = App::new(Arc::new(desk), Arc::new(policy), shutdown.clone());
+    let app = App::new(Arc::new(session), Arc::new(policy), shutdown.clone());
     let served = runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(failed)?;
         announce(&announcement);

@@ -1,12 +1,12 @@
 //! The editor's page: a few files that are part of the program.
 
-use relit_web::{Asset, Index, SCRIPT, STYLE, asset};
+use relit_web::{Index, PageAsset, SCRIPT, STYLE, asset};
 
 /// The page itself.
 pub(super) const INDEX: Index = Index(include_str!("page/index.html"));
 
 /// All files but the page itself.
-pub(super) const ASSETS: [Asset; 5] = [
+pub(super) const ASSETS: [PageAsset; 5] = [
     asset("/editor.css", STYLE, include_str!("page/editor.css")),
     asset("/editor.js", SCRIPT, include_str!("page/editor.js")),
     asset("/history.js", SCRIPT, include_str!("page/history.js")),

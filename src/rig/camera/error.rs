@@ -18,6 +18,7 @@ const PERMITTING: &str = match cfg!(target_os = "linux") {
 /// Why a camera could not be found, set, or read. The system's error is the `source`:
 /// [`relit_data::causes::with_causes`] writes both as one sentence.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CameraError {
     /// A text that is neither an address nor a mode.
     #[error("{text:?} is not a camera's address: {fault}")]
@@ -190,6 +191,7 @@ pub enum CameraError {
 
 /// What is wrong in an address or mode.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum AddressFault {
     /// No known scheme.
     #[error("write v4l2:/dev/video0, nokhwa:0 or replay:PATH")]
@@ -226,6 +228,7 @@ pub enum AddressFault {
 
 /// Why a control could not be read or set.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ControlFault {
     /// The camera has no such control.
     #[error("the camera has no such control")]

@@ -14,6 +14,7 @@ use crate::turntable::TurntableError;
 
 /// Why there is no capture.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CaptureError {
     /// Something was not as it has to be before the table turns.
     #[error("the capture was not begun")]
@@ -90,6 +91,7 @@ pub enum Stopped {
 
 /// What preflight found wrong; nothing has turned yet.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Refusal {
     /// A real camera or table beside a rehearsal that is to run faster.
     #[error(
@@ -159,6 +161,7 @@ pub enum Refusal {
 
 /// Why metering found no exposure.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeterFault {
     /// Too bright even at the darkest exposure.
     #[error(

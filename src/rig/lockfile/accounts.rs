@@ -1,9 +1,5 @@
 //! Several accounts within one test, where it runs as root.
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a test's own mistakes should be loud"
-)]
+#![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
 use std::fs::{self, Permissions};
 use std::os::unix::fs::{PermissionsExt, chown};
@@ -42,7 +38,7 @@ pub(crate) fn as_user<T: Send>(user: u32, work: impl FnOnce() -> T + Send) -> T 
 /// Shares a folder as `docs/rig/relit-tmpfiles.conf` does; false, and a word, where this is not root.
 pub(crate) fn share(folder: &Path) -> bool {
     if !getuid().is_root() {
-        eprintln!("skipped: only root can be several accounts");
+        relit_test_support::say_skipped("only root can be several accounts");
         return false;
     }
     chown(folder, Some(0), Some(GROUP)).unwrap();

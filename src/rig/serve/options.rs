@@ -1,12 +1,13 @@
 //! Where, for whom and within which limits the rig is served.
 
+use std::fmt;
 use std::net::SocketAddr;
 use std::time::Duration;
 
 use relit_web::{ConnectionLimits, Token};
 
 /// Where and for whom the rig is served.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct ServeOptions {
     /// The address to listen on; port 0 takes any free one.
     pub address: SocketAddr,
@@ -37,13 +38,21 @@ impl ServeOptions {
 }
 
 /// How a supervisor, such as the service manager, learns that the server is alive.
-#[derive(Debug, Clone, Copy)]
 pub struct Heartbeat {
     /// Time between two beats.
     pub period: Duration,
     /// Called while requests are worked on, the rig's state can be read, and the
-    /// [rig runs](super::rig::Rig::is_running).
-    pub beat: fn(),
+    /// [rig runs](super::rig::Rig::is_running); dropped when that is over.
+    pub beat: Box<dyn Fn() + Send + Sync>,
+}
+
+impl fmt::Debug for Heartbeat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut heartbeat = f.debug_struct("Heartbeat");
+        heartbeat
+            .field("period", &self.period)
+            .finish_non_exhaustive()
+    }
 }
 
 /// What all clients together may take up.

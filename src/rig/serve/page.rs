@@ -1,12 +1,12 @@
 //! The page for a phone beside the rig: a few files that are part of the program.
 
-use relit_web::{Asset, Index, SCRIPT, STYLE, asset};
+use relit_web::{Index, PageAsset, SCRIPT, STYLE, asset};
 
 /// The page itself.
 pub(super) const INDEX: Index = Index(include_str!("page/index.html"));
 
 /// All files but the page itself.
-pub(super) const ASSETS: [Asset; 6] = [
+pub(super) const ASSETS: [PageAsset; 6] = [
     asset("/page.css", STYLE, include_str!("page/page.css")),
     asset("/page.js", SCRIPT, include_str!("page/page.js")),
     asset("/link.js", SCRIPT, include_str!("page/link.js")),

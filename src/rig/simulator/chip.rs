@@ -9,7 +9,7 @@ use rig_firmware::controller::Controller;
 use rig_firmware::realtime::{Realtime, Received, classify};
 use rig_firmware::stepper::Stepper;
 
-use super::truth::STEPS_PER_TURN;
+use super::ground_truth::STEPS_PER_TURN;
 use super::wire::{BYTE_TICKS, Timed};
 
 const RECEIVE_BUFFER: usize = 128;

@@ -3,7 +3,7 @@
 use std::str::FromStr;
 use std::time::Duration;
 
-use super::SimulatorError;
+use super::error::SimulatorError;
 
 /// Faults of the wire and of the chip.
 ///

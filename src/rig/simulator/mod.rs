@@ -31,120 +31,32 @@
 //! port.
 
 mod chip;
+mod error;
 mod faults;
+mod ground_truth;
 mod model;
 mod openings;
-mod table;
+mod options;
+mod simulated_table;
 mod terminal;
-mod truth;
 mod wire;
 
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use rustix::io::Errno;
-use serde::Serialize;
-
 use crate::clock::{Clock, JoinHandle};
 
+pub use error::SimulatorError;
 pub use faults::{EmergencyStop, TableFaults, WireFaults};
-pub use table::{SimulatedPort, SimulatedTable};
-pub use truth::{STEPS_PER_TURN, StepEdge};
+pub use ground_truth::{STEPS_PER_TURN, StepEdge};
+pub use options::{SimulatorCounts, SimulatorOptions};
+pub use simulated_table::{SimulatedPort, SimulatedTable};
 pub use wire::WireCounts;
 
-use table::LOOK;
+use simulated_table::LOOK;
 use terminal::Terminal;
-
-/// An error of the simulator.
-#[derive(Debug, thiserror::Error)]
-pub enum SimulatorError {
-    /// A fault that does not exist.
-    #[error("the fault {item:?} is not understood: {why}")]
-    Fault {
-        /// The fault.
-        item: String,
-        /// What is wrong with it.
-        why: &'static str,
-    },
-    /// A pseudoterminal could not be set up.
-    #[error(
-        "could not {step} a pseudoterminal: {errno}; see that /dev/pts is mounted and not full"
-    )]
-    Terminal {
-        /// The step that failed.
-        step: &'static str,
-        /// The system's error.
-        errno: Errno,
-    },
-    /// The link to the port could not be created.
-    #[error("could not make {path} a link to the simulated port: {source}; choose another name")]
-    Link {
-        /// The link.
-        path: PathBuf,
-        /// The system's error.
-        source: io::Error,
-    },
-    /// The thread could not be started.
-    #[error("could not start the simulated table's thread: {0}; end other programs and try again")]
-    Thread(io::Error),
-}
-
-/// Options of a simulated table.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SimulatorOptions {
-    /// Its clock. Everything that works with the table needs the same one.
-    pub clock: Clock,
-    /// The faults to inject.
-    pub faults: TableFaults,
-    /// Seed of the random faults.
-    pub seed: u64,
-    /// Angle at which the table stands at power-on, degrees.
-    pub start_angle: f64,
-    /// Angle at which the index becomes active in a positive turn, degrees.
-    pub index_at: f64,
-    /// Range in which the index stays active, degrees.
-    pub index_width: f64,
-    /// Battery voltage, volts.
-    pub battery: f64,
-    /// Deviation of the chip's crystal from the clock, parts per million; positive is faster.
-    pub drift_ppm: f64,
-    /// Whether opening the port resets the chip, as it does on an Arduino.
-    pub reset_on_open: bool,
-}
-
-impl Default for SimulatorOptions {
-    fn default() -> Self {
-        SimulatorOptions {
-            clock: Clock::monotonic(),
-            faults: TableFaults::default(),
-            seed: 0,
-            start_angle: 0.0,
-            index_at: 30.0,
-            index_width: 4.0,
-            battery: 12.0,
-            drift_ppm: 0.0,
-            reset_on_open: true,
-        }
-    }
-}
-
-/// Counters since power-on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct SimulatorCounts {
-    /// On the way to the chip.
-    pub to_chip: WireCounts,
-    /// On the way from the chip.
-    pub from_chip: WireCounts,
-    /// How many times the port was opened.
-    pub opened: u64,
-    /// How many times a fault restarted the chip.
-    pub resets: u64,
-    /// Whether a fault stopped the chip.
-    pub stalled: bool,
-}
 
 /// A simulated table at a pseudoterminal, with a thread. Runs until it is stopped or dropped.
 ///

@@ -7,9 +7,10 @@ use std::time::Duration;
 use rig_firmware::board::ResetCause;
 
 use super::chip::{Chip, IndexPlace, Pins};
-use super::truth::{STEPS_PER_TURN, StepEdge, Truth};
+use super::faults::TableFaults;
+use super::ground_truth::{GroundTruth, STEPS_PER_TURN, StepEdge};
+use super::options::{SimulatorCounts, SimulatorOptions};
 use super::wire::{Timed, Wire};
-use super::{SimulatorCounts, SimulatorOptions, TableFaults};
 
 /// Ticks of the chip's timer per microsecond.
 const TICKS_PER_US: f64 = 2.0;
@@ -53,7 +54,7 @@ pub(super) struct Model {
     reset_on_open: bool,
     /// What happens by itself, and when: the next one last.
     events: Vec<(u64, Event)>,
-    truth: Truth,
+    ground_truth: GroundTruth,
     counts: SimulatorCounts,
 }
 
@@ -83,7 +84,7 @@ impl Model {
             outbox: VecDeque::new(),
             reset_on_open: options.reset_on_open,
             events,
-            truth: Truth::new(options.start_angle, start_us),
+            ground_truth: GroundTruth::new(options.start_angle, start_us),
             counts: SimulatorCounts::default(),
         }
     }
@@ -104,7 +105,7 @@ impl Model {
             t_us: timebase.us(at),
             steps,
         });
-        self.truth.extend(edges);
+        self.ground_truth.extend(edges);
     }
 
     fn happen(&mut self, event: Event) {
@@ -163,8 +164,8 @@ impl Model {
         self.chip.set_pins(self.pins);
     }
 
-    pub(super) fn truth(&self) -> &Truth {
-        &self.truth
+    pub(super) fn ground_truth(&self) -> &GroundTruth {
+        &self.ground_truth
     }
 
     pub(super) fn counts(&self) -> SimulatorCounts {

@@ -8,6 +8,7 @@ use crate::lockfile::LockError;
 
 /// An error of a turntable.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TurntableError {
     /// The text is not an address.
     #[error(
@@ -207,6 +208,7 @@ pub enum TurntableError {
 
 /// The fault that ended a motion. The table is being stopped then, or has been.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MotionFault {
     /// The controller restarted.
     #[error("the controller restarted{}, and its position is lost; check its supply and cable, then home it", .0.map_or_else(String::new, |cause| format!(" ({cause})")))]

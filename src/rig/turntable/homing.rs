@@ -2,8 +2,9 @@
 
 use super::codes::Alarm;
 use super::error::TurntableError;
+use super::grbl_client::{Table, refused, require_released};
 use super::supervisor::MotionGoal;
-use super::table::{Table, refused};
+
 use super::wire::{ControllerState, LineOutcome, ReplyTimeout};
 
 /// Time limit of the search for the index.
@@ -61,5 +62,17 @@ impl Table {
         let status = self.ready()?;
         self.link().supervisor().set_zero_deg(status.machine_deg);
         Ok(Homed::WhereItStands)
+    }
+
+    /// Brings the table back after an alarm of any kind: resets the controller, unlocks and homes it.
+    ///
+    /// # Errors
+    /// [`TurntableError::EmergencyStop`] while the emergency stop is pressed, and the errors of
+    /// [`Table::stop`] and [`Table::home`].
+    pub fn reset(&self) -> Result<Homed, TurntableError> {
+        require_released(&self.status()?)?;
+        self.link().reset()?;
+        self.unlock()?;
+        self.home()
     }
 }

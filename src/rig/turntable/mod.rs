@@ -50,6 +50,7 @@ mod codes;
 mod error;
 #[cfg(test)]
 mod fake_grbl;
+mod grbl_client;
 mod greeting;
 mod homing;
 mod identity;
@@ -60,7 +61,6 @@ mod port;
 mod status;
 mod supervisor;
 mod sync;
-mod table;
 #[cfg(test)]
 mod tests;
 mod turn;
@@ -74,6 +74,7 @@ use crate::lockfile;
 pub use address::{SimulatedAddress, TurntableAddress, find_serial};
 pub use codes::Alarm;
 pub use error::{MotionFault, TurntableError};
+pub use grbl_client::Table;
 pub use homing::Homed;
 pub use identity::{Extras, Identity, TravelLimits};
 pub use owner::Owner;
@@ -81,7 +82,7 @@ pub use plan::{TurnDirection, TurnPlan, TurnRequest};
 pub use port::{Port, SerialPort};
 pub use status::TableStatus;
 pub use sync::{ExpectedTurn, Residuals, TimedReport, Track, TrackError};
-pub use table::Table;
+
 pub use turn::{ConstantPart, FinishedTurn, Turn, TurnPhase};
 pub use wire::{ControllerState, Counts, LineFault, RestartCause, SendError};
 

@@ -6,6 +6,7 @@ use super::wire::ControllerState;
 
 /// The status of a table by a fresh report.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct TableStatus {
     /// The controller's state.
     pub state: ControllerState,

@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use super::error::TurntableError;
+use super::grbl_client::{Table, straight};
 use super::plan::TurnPlan;
 use super::status::TableStatus;
 use super::supervisor::PositionReport;
 use super::sync::{self, ExpectedTurn, TimedReport, Track, TrackError};
-use super::table::{Table, straight};
 use super::wire::{ControllerState, Message};
 
 /// Rest before the start, until the table has stopped swinging.

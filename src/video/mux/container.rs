@@ -4,8 +4,7 @@ use ffmpeg_next::codec::{self, Parameters, encoder};
 use ffmpeg_next::format::context::{Output, StreamIo};
 use ffmpeg_next::{Dictionary, Rational, ffi, format, media};
 
-use super::StreamFormat;
-use crate::PixelFormat;
+use crate::{PixelFormat, StreamFormat};
 
 /// Longest duration of a cluster, milliseconds.
 const CLUSTER_MS: &str = "400";

@@ -20,24 +20,13 @@ use ffmpeg_next::{Packet, packet};
 use self::container::{end_cluster, open};
 use self::file::{Refusal, Sink};
 
+use relit_data::disk::is_full;
+
 use super::nal::{self, ParameterSets};
-use super::{PixelFormat, VideoError, initialise, lossless};
+use super::{PixelFormat, StreamFormat, VideoError, initialise, lossless};
 
 /// Bytes that are buffered before they are written.
 const BUFFER: usize = 1 << 15;
-
-/// What a camera was set to deliver.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StreamFormat {
-    /// How its frames are coded.
-    pub format: PixelFormat,
-    /// Frame width, pixels.
-    pub width: u32,
-    /// Frame height, pixels.
-    pub height: u32,
-    /// Nominal frames a second.
-    pub fps: f64,
-}
 
 /// What became of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -292,7 +281,7 @@ impl Muxer {
     /// The error for a write that the system refused.
     fn refused(&self, source: io::Error) -> VideoError {
         let path = self.path.clone();
-        if is_no_room(&source) {
+        if is_full(&source) {
             let kept = self.file.metadata().map_or(0, |data| data.len());
             let missing = self.taken.saturating_sub(kept).max(1);
             return VideoError::DiskFull {
@@ -303,10 +292,4 @@ impl Muxer {
         }
         VideoError::Write { path, source }
     }
-}
-
-/// True if a write failed because the disk, a quota or a limit on file sizes is exhausted.
-fn is_no_room(error: &io::Error) -> bool {
-    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
-    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use relit_data::report::render_overview;
 use relit_data::shard::{
-    Dataset, Layout, Overview, QualityVerdict, SessionQuality, ShardError, Task, TaskOutcome,
+    ArrayTask, Dataset, Layout, Overview, QualityVerdict, SessionQuality, ShardError, TaskOutcome,
     TaskPiece,
 };
 
@@ -86,7 +86,7 @@ fn what_tasks_have_written_so_far_is_summed_and_said_to_be_unmerged() {
     fs::remove_file(dir.path().join(Dataset::FILE)).unwrap();
     fs::create_dir(dir.path().join("tasks")).unwrap();
     let names = ["a", "b", "c"].map(str::to_owned).to_vec();
-    let mut piece = TaskPiece::new(Task::new(0, 2).unwrap(), names, dataset);
+    let mut piece = TaskPiece::new(ArrayTask::new(0, 2).unwrap(), names, dataset);
     for (position, session) in [(0, "a"), (2, "b")] {
         let session = session.to_owned();
         piece

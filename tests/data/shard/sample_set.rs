@@ -4,10 +4,10 @@ use std::path::Path;
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use relit_data::geometry::Rect;
-use relit_data::image_stats::MaskSpans;
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{
     Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
-    OutputFolder, Problem, Sample, SamplingBasis, SessionEntry, ShardWriter, SourceVideo,
+    OutputFolder, Sample, SamplingBasis, SessionEntry, ShardWriter, SourceVideo, VerifyProblem,
     VerifyReport, verify,
 };
 
@@ -15,8 +15,6 @@ pub(crate) const SESSION: &str = "20261120T093015Z-mug";
 pub(crate) const SAMPLES: u32 = 14;
 const WIDTH: u32 = 20;
 const HEIGHT: u32 = 16;
-const LEVEL: u8 = 250;
-const GATE: f64 = 0.05;
 
 pub(crate) fn mask() -> GrayImage {
     GrayImage::from_fn(WIDTH, HEIGHT, |x, y| {
@@ -44,32 +42,18 @@ fn image(index: u32) -> RgbImage {
 }
 
 pub(crate) fn record(session: &str, index: u32, image: &RgbImage) -> FrameRecord {
-    let measures = MaskSpans::of(&mask()).measure(image, LEVEL).unwrap();
+    let measures = MaskSpans::of(&mask())
+        .measure(image, SATURATION_LEVEL)
+        .unwrap();
     let duplicate = index == 5;
-    FrameRecord {
-        session: session.to_owned(),
-        object: "mug".to_owned(),
-        index,
-        source_frame: u64::from(index) * 3 - if duplicate { 3 } else { 0 },
-        t_us: 1_000_000 + i64::from(index) * 33_333,
-        angle_deg: (index != 2).then_some(f64::from(index) * 0.24),
-        duplicate,
-        crop: Rect::new(-2, 5, WIDTH, HEIGHT),
-        size: [WIDTH, HEIGHT],
-        shift_px: None,
-        shift_applied: false,
-        align_confidence: None,
-        mask_px: measures.mask_px,
-        saturated_px: measures.saturated_px,
-        saturated_fraction: measures.saturated_fraction(),
-        saturated_any_px: measures.saturated_any_px,
-        spec_net: measures.saturated_fraction() > GATE,
-        mean_rgb: measures.mean_rgb,
-        sharpness: measures.sharpness,
-        exposure_step: None,
-        identical_to: None,
-        blur: None,
-    }
+    let crop = Rect::new(-2, 5, WIDTH, HEIGHT);
+    FrameRecord::new(session, "mug", index, crop, &measures, SPEC_NET_GATE)
+        .of_frame(
+            u64::from(index) * 3 - if duplicate { 3 } else { 0 },
+            1_000_000 + i64::from(index) * 33_333,
+            (index != 2).then_some(f64::from(index) * 0.24),
+        )
+        .flagged_duplicate(duplicate)
 }
 
 pub(crate) fn sample(session: &str, index: u32) -> Sample {
@@ -82,8 +66,8 @@ pub(crate) fn settings(layout: Layout) -> ExtractionSettings {
         frames: SAMPLES,
         size: ImageSize::NATIVE,
         margin: 0.05,
-        saturation_level: LEVEL,
-        gate: GATE,
+        saturation_level: SATURATION_LEVEL,
+        gate: SPEC_NET_GATE,
         align: Align::Off,
         align_tolerance: None,
         layout,
@@ -190,6 +174,6 @@ pub(crate) fn assert_names(out: &Path, file: &str, sample: Option<u32>, says: &s
     );
 }
 
-pub(crate) fn texts(problems: &[Problem]) -> Vec<String> {
+pub(crate) fn texts(problems: &[VerifyProblem]) -> Vec<String> {
     problems.iter().map(ToString::to_string).collect()
 }

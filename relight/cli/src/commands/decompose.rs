@@ -11,16 +11,16 @@ use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use relight_nets::{InferenceEngine, NetError, OnnxRuntime, Weights};
 use relight_photo::decompose::{
-    DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, SpecularGate,
-    WORKING_SIDE, WorkingSize,
+    DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, WORKING_SIDE, WorkingSize,
 };
 use relight_photo::files::{DecompositionFigures, DecompositionFiles, PhotoInput, PhotoReading};
+use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
 use serde_json::{Value, json};
 
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 use crate::shipped;
-use crate::values::{TransferName, YName};
+use crate::values::{GateName, TransferName, YName};
 
 /// Each photograph takes its memory, gigabytes where it is large.
 const MOST_SIDE_BY_SIDE: usize = 4;
@@ -103,16 +103,6 @@ enum EngineName {
     Auto,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum GateName {
-    /// Where more than 5 % of the object's pixels are saturated.
-    Auto,
-    /// Always.
-    On,
-    /// Never.
-    Off,
-}
-
 impl Arguments {
     /// What is wrong with the combination of arguments, if anything is.
     pub(crate) fn fault(&self) -> Option<String> {
@@ -159,11 +149,7 @@ impl Arguments {
                 SizeName::Native => WorkingSize::Native,
             },
             mirror: !self.no_mirror,
-            specular: match self.specular {
-                GateName::Auto => SpecularGate::Auto,
-                GateName::On => SpecularGate::On,
-                GateName::Off => SpecularGate::Off,
-            },
+            specular: self.specular.into(),
             ..DecomposeOptions::default()
         }
     }
@@ -211,7 +197,7 @@ impl EngineName {
                 if named.is_some() || !matches!(fault, NetError::NoLibrary { .. }) {
                     let text = with_causes(&fault);
                     let event = json!({ "event": "engine", "message": text });
-                    console.warn(&format!("tract is used: {text}"), &event);
+                    console.warn_with(&format!("tract is used: {text}"), &event);
                 }
                 InferenceEngine::Tract
             })),
@@ -240,7 +226,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
                 let text = format!("{}: {message}", input.place());
                 let event =
                     json!({ "event": "failed", "photo": input.place(), "message": message });
-                console.warn(&text, &event);
+                console.warn_with(&text, &event);
             }
         });
         bar.inc(1);
@@ -324,7 +310,7 @@ impl Run {
             "not separated"
         };
         let text = format!(
-            "{}: {seconds:.2} s; {:.1} % saturated, highlights {highlights}; {:.1} % of the picture left over{source}",
+            "{}: {seconds:.2} s; {:.1} % saturated, highlights {highlights}; residual {:.1} % of the picture{source}",
             out.display(),
             100.0 * found.saturated_fraction,
             100.0 * found.residual,

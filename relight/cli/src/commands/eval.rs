@@ -18,11 +18,12 @@ use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
 use relight_reader::{JudgedImages, TruthLayout, TruthSet};
 use relight_synth::{Folders, Library};
+use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::shipped;
 use crate::values::{TransferName, YName};

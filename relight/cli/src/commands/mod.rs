@@ -1,5 +1,9 @@
 //! One file a verb: its arguments and its `run`.
 
+use std::error::Error;
+
+use relit_console::Outcome;
+
 pub(super) mod decompose;
 pub(super) mod eval;
 pub(super) mod insert;
@@ -10,3 +14,6 @@ pub(super) mod synth;
 pub(super) mod train;
 pub(super) mod turn;
 pub(super) mod weights;
+
+/// What a verb returns: an outcome, or the error that ends the program with exit code 1.
+pub(super) type CommandResult = Result<Outcome, Box<dyn Error>>;

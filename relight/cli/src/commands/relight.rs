@@ -6,27 +6,23 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use rayon::prelude::*;
-use relight_core::files::write_png;
-use relight_core::files::{MovieFormat, MovieWriter};
-use relight_core::image::{Depth, Linear, Planes, Rgb};
+use relight_core::files::{MovieFormat, MovieWriter, OutputKind, write_picture, write_png};
+use relight_core::image::Depth;
 use relight_photo::decompose::Rectangle;
-use relight_photo::files::{PhotoInput, PhotoReading};
+use relight_photo::files::{InsertionError, PhotoInput, PhotoReading};
 use relight_photo::insert::{
-    Backdrop, InsertError, LightSource, MaterialChange, ObjectGloss, PanoramaView, Shot, TrustMap,
-    likeness,
+    Backdrop, LightSource, MaterialChange, ObjectGloss, PanoramaView, Shot, ShotCompanions,
+    Subject, TrustMap, likeness,
 };
+use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
 use serde_json::json;
 
 use super::decompose::rectangle;
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::light::NewLightArguments;
-use crate::photos::{
-    Bits, Network, NetworkArguments, OutputKind, at_most, globbed, not_an_input, own_mask,
-    write_picture,
-};
+use crate::photos::{Bits, Network, NetworkArguments, globbed, not_an_input};
 use crate::values::TransferName;
 
 pub(crate) const EXAMPLES: &str = "\
@@ -99,7 +95,7 @@ pub(crate) struct Arguments {
     /// Multiply the object's albedo with a colour, linear.
     #[arg(long, value_name = "R,G,B", value_parser = tint)]
     tint: Option<[f32; 3]>,
-    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is matt.
+    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is diffuse.
     #[arg(long, value_name = "PART,SMOOTHNESS", value_parser = gloss)]
     gloss: Option<ObjectGloss>,
     /// The longest side of the result, pixels [default: the photograph's; of a video at most 1080].
@@ -196,6 +192,14 @@ impl Arguments {
         }
     }
 
+    fn companions(&self) -> ShotCompanions {
+        match (self.compare, self.beside) {
+            (true, _) => ShotCompanions::PhotoAndNaive,
+            (false, true) => ShotCompanions::Photo,
+            (false, false) => ShotCompanions::None,
+        }
+    }
+
     fn longest(&self) -> Option<usize> {
         match (self.size, self.turn) {
             (Some(size), _) => Some(size as usize),
@@ -245,7 +249,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             lost += 1;
             let message = with_causes(error.as_ref());
             let text = format!("{}: {message}", input.place());
-            console.warn(
+            console.warn_with(
                 &text,
                 &json!({ "event": "failed", "photo": input.place(), "message": message }),
             );
@@ -261,7 +265,11 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 impl Run<'_> {
     fn relight(&self, input: &PhotoInput, console: Console) -> Result<(), Box<dyn Error>> {
         let arguments = self.arguments;
-        let photo = at_most(input.load(&self.reading)?, arguments.longest());
+        let photo = input.load(&self.reading)?;
+        let photo = match arguments.longest() {
+            Some(longest) => photo.at_most(longest),
+            None => photo,
+        };
         let output = arguments.output_of(&photo.name);
         self.check_outputs(&output, &photo.name)?;
         let network = match self.network.get() {
@@ -272,7 +280,7 @@ impl Run<'_> {
             }
         };
         let start = Instant::now();
-        let subject = network.subject(&photo)?;
+        let subject = Subject::of_photo(&photo, &network.decomposer, &network.options)?;
         let decomposed = start.elapsed().as_secs_f64();
         let own = LightSource::Coefficients(subject.light().clone());
         let source = self.light.as_ref().unwrap_or(&own);
@@ -300,8 +308,9 @@ impl Run<'_> {
         let frames = match OutputKind::of(&output) {
             Some(OutputKind::Movie(format)) => self.film(&shot, &output, format, console)?,
             _ => {
-                let picture = self.sheet(&shot, arguments.turned.to_radians())?;
-                write_picture(&output, &picture, arguments.bits)?;
+                let turn = arguments.turned.to_radians();
+                let picture = shot.sheet(turn, arguments.companions())?;
+                write_picture(&output, &picture, arguments.bits.into())?;
                 1
             }
         };
@@ -332,7 +341,10 @@ impl Run<'_> {
     /// Nothing that is read may be overwritten, and nothing is written where the map of trust cannot be.
     fn check_outputs(&self, output: &Path, name: &str) -> Result<(), String> {
         let arguments = self.arguments;
-        let mask = arguments.mask.as_deref().map(|mask| own_mask(mask, name));
+        let mask = arguments
+            .mask
+            .as_deref()
+            .map(|mask| PhotoReading::mask_path(mask, name));
         let mut inputs: Vec<PathBuf> = mask.into_iter().collect();
         inputs.extend(self.photos.iter().cloned());
         inputs.extend(arguments.light.light.clone());
@@ -368,21 +380,6 @@ impl Run<'_> {
         }
     }
 
-    /// The picture, beside others where that is asked for.
-    fn sheet(&self, shot: &Shot<'_>, turn: f64) -> Result<Rgb<Linear>, InsertError> {
-        let relit = shot.picture(turn)?;
-        let arguments = self.arguments;
-        if !arguments.beside && !arguments.compare {
-            return Ok(relit);
-        }
-        let mut tiles = vec![shot.photo().planes().clone()];
-        if arguments.compare {
-            tiles.push(shot.naive(turn).into_planes());
-        }
-        tiles.push(relit.into_planes());
-        Ok(Rgb::new(Planes::sheet(&tiles, tiles.len())?))
-    }
-
     /// Writes the turn; how many frames it has.
     fn film(
         &self,
@@ -390,40 +387,21 @@ impl Run<'_> {
         output: &Path,
         format: MovieFormat,
         console: Console,
-    ) -> Result<u32, Box<dyn Error>> {
+    ) -> Result<u32, InsertionError> {
         let arguments = self.arguments;
         let frames = (arguments.seconds * f64::from(arguments.fps))
             .round()
             .max(1.0) as u32;
         let all = arguments.turn.unwrap_or(360.0);
         let bar = console.progress(frames.into(), "frames");
-        // A few at a time, side by side; they are encoded in order.
-        let together = rayon::current_num_threads() as u32 * 2;
-        let mut movie: Option<MovieWriter> = None;
-        for first in (0..frames).step_by(together as usize) {
-            let some: Vec<_> = (first..frames.min(first + together))
-                .into_par_iter()
-                .map(|frame| {
-                    let part = f64::from(frame) / f64::from(frames);
-                    let turn = (arguments.turned + all * part).to_radians();
-                    Ok(self.sheet(shot, turn)?.encode())
-                })
-                .collect::<Result<_, InsertError>>()?;
-            for frame in &some {
-                let movie = match &mut movie {
-                    Some(movie) => movie,
-                    none => {
-                        let extent = Rgb::planes(frame).extent();
-                        none.insert(MovieWriter::create(output, format, extent, arguments.fps)?)
-                    }
-                };
-                movie.push(frame)?;
-                bar.inc(1);
-            }
-        }
-        if let Some(movie) = movie {
-            movie.finish()?;
-        }
+        let frame = |frame: u32| {
+            let part = f64::from(frame) / f64::from(frames);
+            let turn = (arguments.turned + all * part).to_radians();
+            let sheet = shot.sheet(turn, arguments.companions())?;
+            Ok::<_, InsertionError>(sheet.encode())
+        };
+        let encoding = (format, arguments.fps);
+        MovieWriter::write_frames(output, encoding, frames, frame, || bar.inc(1))?;
         bar.finish_and_clear();
         Ok(frames)
     }

@@ -5,15 +5,16 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::files::{Map, MapFiles};
 use relight_core::files::{MovieFormat, MovieWriter};
 use relight_core::image::{Linear, Rgb, Srgb};
 use relight_core::light::{Direction, Order, Panorama, Rotation, ShLight};
 use relight_core::render::{DiffuseForm, Look, SpecularForm, Surface, exposure_for};
+use relit_console::{Console, Outcome};
 use serde_json::json;
 
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 use crate::folder::make_empty_folder;
 use crate::values::{TransferName, YName};
 
@@ -48,7 +49,7 @@ pub(crate) struct Arguments {
     /// Render one sheet of the object in many materials: smoothness 5 to 200 across, from 0 to 40 % of reflected light down.
     #[arg(long)]
     sweep: bool,
-    /// Brightness in stops beyond a white matt surface under even light of radiance 1, or "auto": a white matt
+    /// Brightness in stops beyond a white diffuse surface under even light of radiance 1, or "auto": a white diffuse
     /// surface that faces the strongest light is white.
     #[arg(long, value_name = "STOPS", default_value = "auto", value_parser = exposure, allow_hyphen_values = true)]
     exposure: Exposure,
@@ -77,7 +78,7 @@ struct ObjectArguments {
     /// Albedo: a file, or a linear value or three (0.8, or 0.8,0.5,0.3).
     #[arg(long, value_name = "FILE|VALUE", default_value = "0.8", value_parser = map)]
     albedo: Map,
-    /// Specular reflectance s_p: a file, or a linear value or three; without it the object is matt.
+    /// Specular reflectance s_p: a file, or a linear value or three; without it the object is diffuse.
     #[arg(long, value_name = "FILE|VALUE", value_parser = map)]
     reflectance: Option<Map>,
     /// Smoothness α: a value, an EXR, or an 8-bit PNG of values 0 to 255.
@@ -103,7 +104,7 @@ struct LightArguments {
     light: Option<PathBuf>,
     /// The order of spherical harmonics to which a panorama is brought; the paper's is 2. Highlights need
     /// more, the smoother the surface is.
-    #[arg(long, value_name = "0-64", default_value_t = 48, value_parser = clap::value_parser!(u8).range(0..=64))]
+    #[arg(long, value_name = "0-64", default_value_t = Order::RENDER.get() as u8, value_parser = clap::value_parser!(u8).range(0..=Order::MAX as i64))]
     order: u8,
     /// Turn the light about the vertical first, from the viewer to the right.
     #[arg(
@@ -121,7 +122,7 @@ struct LightArguments {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum SpecularName {
-    /// Blinn and Phong's lobe in zonal harmonics: close to the truth.
+    /// The Blinn-Phong lobe in zonal harmonics: close to the ground truth.
     Lobe,
     /// The paper's formula, for the first nine coefficients.
     Power,
@@ -204,7 +205,7 @@ impl Arguments {
 impl ObjectArguments {
     fn read(&self) -> Result<Surface, Box<dyn Error>> {
         match (&self.asset, &self.normals) {
-            (Some(path), _) => Ok(Asset::read(path)?.surface().clone()),
+            (Some(path), _) => Ok(CapturedObject::read(path)?.surface().clone()),
             (None, Some(normals)) => Ok(self.files(normals).read()?),
             (None, None) => Err("give an object (.relit), or --normals".into()),
         }

@@ -10,9 +10,10 @@ use relight_synth::{
     Folders, Library, LightKind, Recipe, SynthTally, TurnRecipe, made_panoramas, write_preview,
     write_samples, write_turns,
 };
+use relit_console::{Console, Outcome};
 use serde_json::json;
 
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 use crate::folder::make_folder;
 
 /// Objects on one sheet, at most.

@@ -10,20 +10,20 @@ use std::sync::atomic::AtomicBool;
 
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand};
-use indicatif::ProgressBar;
 use relight_nets::{NetError, Weights};
 use relight_train::{
     DecomposeSettings, DecomposeTask, Launch, PaperInputs, PaperPhase, PaperSettings, PaperTask,
     ProcessGroup, Resources, Run, RunOutcome, RunSettings, SettingsFile, TrainObserver,
     TrainingTask, read_settings,
 };
+use relit_console::{Console, Outcome, ProgressBar};
 use serde::Serialize;
 use serde_json::json;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use tch::Device;
 
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -242,11 +242,11 @@ impl RunArguments {
                 "event": "renamed", "path": path.display().to_string(),
                 "old": format!("{}.{}", setting.table, setting.old), "new": format!("{}.{}", setting.table, setting.new),
             });
-            console.warn(&line, &event);
+            console.warn_with(&line, &event);
         }
         if self.composers.is_some() {
             let event = json!({ "event": "renamed", "old": "--composers", "new": "--workers" });
-            console.warn(
+            console.warn_with(
                 "--composers is now --workers: it is read, rename it before 0.3",
                 &event,
             );
@@ -395,7 +395,7 @@ impl TrainObserver for OtherProcess {
         let event =
             json!({ "event": "damaged", "step": step, "process": process, "message": what });
         let line = format!("step {step}, process {process}: left out: {what}");
-        self.console.warn(&line, &event);
+        self.console.warn_with(&line, &event);
     }
 
     fn validated(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
@@ -420,7 +420,7 @@ impl TrainObserver for RunProgress {
     fn damaged(&mut self, step: u64, what: &str) {
         let event = json!({ "event": "damaged", "step": step, "message": what });
         let line = format!("step {step}: left out: {what}");
-        self.bar.suspend(|| self.console.warn(&line, &event));
+        self.bar.suspend(|| self.console.warn_with(&line, &event));
     }
 
     fn validated(&mut self, step: u64, figures: &BTreeMap<String, f64>) {

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 use relight_nets::paper::{self, Head};
 use relight_nets::{Graph, WeightPrecision, Weights, decomposer, to_onnx};
+use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
 use serde_json::json;
 
-use crate::console::{CommandResult, Console, Outcome};
+use crate::commands::CommandResult;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:

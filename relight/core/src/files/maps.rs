@@ -27,7 +27,7 @@ pub struct MapFiles {
     pub mask: Option<PathBuf>,
     /// The diffuse reflectance A.
     pub albedo: Map,
-    /// The specular reflectance s_p; without it the object is matt.
+    /// The specular reflectance s_p; without it the object is diffuse.
     pub reflectance: Option<Map>,
     /// The smoothness α. The 8-bit values of a PNG are α itself (0 to 255), as are those of an EXR.
     pub smoothness: Map,

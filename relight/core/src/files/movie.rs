@@ -11,6 +11,10 @@ use std::thread::{self, JoinHandle};
 use relit_data::durable;
 
 use crate::image::{Extent, Planes, Rgb, Srgb};
+use crate::parallel;
+
+/// How many frames each thread computes before they are encoded.
+const FRAMES_A_THREAD: u32 = 2;
 
 /// What a video file is encoded as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,6 +27,7 @@ pub enum MovieFormat {
 
 /// Why a video is not written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MovieError {
     /// The program is not there.
     #[error("a video needs the program ffmpeg, which cannot be started: install it")]
@@ -166,6 +171,36 @@ impl MovieWriter {
             program,
             errors,
         })
+    }
+
+    /// Writes a video of `count` frames. Some are computed side by side; they are encoded in order, and `written` is
+    /// called after each.
+    ///
+    /// # Errors
+    /// Where a frame cannot be computed, or the video not be written. There is no video of no frames.
+    pub fn write_frames<E: From<MovieError> + Send>(
+        path: &Path,
+        (format, frames_per_second): (MovieFormat, u32),
+        count: u32,
+        frame: impl Fn(u32) -> Result<Rgb<Srgb>, E> + Sync,
+        mut written: impl FnMut(),
+    ) -> Result<(), E> {
+        let together = parallel::threads() as u32 * FRAMES_A_THREAD;
+        let mut movie: Option<Self> = None;
+        for first in (0..count).step_by(together as usize) {
+            let some = together.min(count - first) as usize;
+            for image in parallel::map(some, |at| frame(first + at as u32)) {
+                let image = image?;
+                let extent = image.planes().extent();
+                let movie = match &mut movie {
+                    Some(movie) => movie,
+                    none => none.insert(Self::create(path, format, extent, frames_per_second)?),
+                };
+                movie.push(&image)?;
+                written();
+            }
+        }
+        movie.map_or(Ok(()), |movie| Ok(movie.finish()?))
     }
 
     /// Adds a frame; values beyond 0 to 1 are clipped.
@@ -414,7 +449,7 @@ mod tests {
     fn has_ffmpeg() -> bool {
         let found = MovieWriter::check();
         if found.is_err() {
-            eprintln!("skipped: the program ffmpeg is not installed");
+            relit_test_support::say_skipped("the program ffmpeg is not installed");
         }
         found.is_ok()
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use relit_data::durable::{Partial, write_whole};
 
-use crate::asset::{Asset, AssetError};
+use crate::captured_object::{CapturedObject, CapturedObjectError};
 use crate::image::{
     Depth, Gamma22, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
     encode_exr, encode_png,
@@ -157,20 +157,27 @@ impl ShLight {
     }
 }
 
-impl Asset {
+impl CapturedObject {
+    /// Whether a file is called as a captured object (`.relit`).
+    #[must_use]
+    pub fn is_named(path: &Path) -> bool {
+        path.extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("relit"))
+    }
+
     /// Reads a file.
     ///
     /// # Errors
-    /// Where it cannot be read or is no asset that this program knows.
-    pub fn read(path: &Path) -> Result<Self, AssetError> {
-        let read = |source| AssetError::Read {
+    /// Where it cannot be read or is no captured object that this program knows.
+    pub fn read(path: &Path) -> Result<Self, CapturedObjectError> {
+        let read = |source| CapturedObjectError::Read {
             path: path.to_owned(),
             source,
         };
         let mut content = Vec::new();
         let mut file = File::open(path).map_err(read)?.take(Self::MOST_BYTES + 1);
         file.read_to_end(&mut content).map_err(read)?;
-        Self::from_bytes(&content).map_err(|source| AssetError::File {
+        Self::from_bytes(&content).map_err(|source| CapturedObjectError::File {
             path: path.to_owned(),
             source: Box::new(source),
         })
@@ -180,8 +187,8 @@ impl Asset {
     ///
     /// # Errors
     /// Where its folder is not there or cannot be written, or it is a folder itself.
-    pub fn check(path: &Path) -> Result<(), AssetError> {
-        let write = |source| AssetError::Write {
+    pub fn check(path: &Path) -> Result<(), CapturedObjectError> {
+        let write = |source| CapturedObjectError::Write {
             path: path.to_owned(),
             source,
         };
@@ -196,8 +203,8 @@ impl Asset {
     ///
     /// # Errors
     /// Where it cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), AssetError> {
-        let write = |source| AssetError::Write {
+    pub fn write(&self, path: &Path) -> Result<(), CapturedObjectError> {
+        let write = |source| CapturedObjectError::Write {
             path: path.to_owned(),
             source,
         };

@@ -3,12 +3,14 @@
 //! Everything inside is linear: only [`Rgb<Linear>`] can be rendered, added or measured. Files hold
 //! [`Srgb`] or [`Gamma22`] values, and turning one into the other is always written out.
 
-use super::Planes;
 use std::fmt::Debug;
 use std::marker::PhantomData;
 
+use super::Planes;
+use crate::sealed::OwnMarker;
+
 /// How colour values stand for light. Implemented by [`Linear`], [`Srgb`] and [`Gamma22`] only.
-pub trait ColourSpace: sealed::Sealed + Copy + Debug + Send + Sync + 'static {
+pub trait ColourSpace: OwnMarker + Copy + Debug + Send + Sync + 'static {
     /// The light that an encoded value stands for; 1 is white. Negative values are mirrored.
     fn to_linear(encoded: f32) -> f32;
     /// The value that stands for that much light.
@@ -27,12 +29,9 @@ pub enum Srgb {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gamma22 {}
 
-mod sealed {
-    pub trait Sealed {}
-    impl Sealed for super::Linear {}
-    impl Sealed for super::Srgb {}
-    impl Sealed for super::Gamma22 {}
-}
+impl OwnMarker for Linear {}
+impl OwnMarker for Srgb {}
+impl OwnMarker for Gamma22 {}
 
 impl ColourSpace for Linear {
     fn to_linear(encoded: f32) -> f32 {

@@ -7,6 +7,7 @@ use super::Extent;
 
 /// What is wrong with an image or its file.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImageError {
     /// A plane has not one value a pixel.
     #[error("a plane of {found} values was given for {} x {} pixels", extent.width, extent.height)]

@@ -3,11 +3,13 @@
 mod codec;
 mod colour;
 mod error;
+mod extent;
 mod planes;
 mod resize;
 
 pub use codec::{Depth, Samples, StoredImage, encode_exr, encode_png};
 pub use colour::{ColourSpace, Gamma22, Linear, Rgb, Srgb, Transfer};
 pub use error::ImageError;
-pub use planes::{Extent, Planes};
+pub use extent::Extent;
+pub use planes::Planes;
 pub use resize::{Part, area_shares, beside};

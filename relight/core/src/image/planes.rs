@@ -2,31 +2,8 @@
 
 use std::array;
 
-use super::ImageError;
+use super::{Extent, ImageError};
 use crate::parallel;
-
-/// Width and height of an image, pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Extent {
-    /// Pixels in a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-}
-
-impl Extent {
-    /// An image of `width` x `height` pixels.
-    #[must_use]
-    pub const fn new(width: usize, height: usize) -> Self {
-        Self { width, height }
-    }
-
-    /// How many pixels there are.
-    #[must_use]
-    pub const fn pixels(self) -> usize {
-        self.width * self.height
-    }
-}
 
 /// `C` planes of one size, each row by row from the top. What the values mean is said by the types
 /// that hold planes, such as [`Rgb`](super::Rgb).

@@ -1,82 +1,10 @@
 //! Light as coefficients of spherical harmonics.
 
-use std::path::PathBuf;
+use std::fmt;
 use std::str::FromStr;
-use std::{fmt, io};
 
-use super::Direction;
 use super::basis::basis;
-
-/// What is wrong with light.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum LightError {
-    /// The order is too high.
-    #[error("spherical harmonics of order {0} were asked for, and {most} is the highest", most = Order::MAX)]
-    Order(usize),
-    /// There are not as many coefficients as an order has.
-    #[error("{0} coefficients were given where 1, 4, 9, 16, ... make an order")]
-    Count(usize),
-    /// A line of coefficients does not have three numbers.
-    #[error("line {line} of the coefficients has not three finite numbers (red, green, blue)")]
-    Line {
-        /// The line, from 1.
-        line: usize,
-    },
-    /// A value is infinite or not a number.
-    #[error("the light has a value that is infinite or not a number")]
-    NotFinite,
-    /// There are too few pixels for a fit.
-    #[error("there are too few pixels for a fit of so many coefficients")]
-    TooFewPixels,
-    /// The panorama has no pixels.
-    #[error("the panorama has no pixels")]
-    Empty,
-}
-
-/// The highest band of an expansion in spherical harmonics, 0 to 64. Order 2, nine coefficients, is the
-/// paper's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Order(u8);
-
-impl Order {
-    /// The highest order that can be asked for.
-    pub const MAX: usize = 64;
-    /// Nine coefficients.
-    pub const TWO: Self = Self(2);
-    /// The order that ends at [`Order::MAX`].
-    pub const HIGHEST: Self = Self(Self::MAX as u8);
-
-    /// The order with `highest` as its last band.
-    ///
-    /// # Errors
-    /// Above [`Order::MAX`].
-    pub fn new(highest: usize) -> Result<Self, LightError> {
-        match u8::try_from(highest) {
-            Ok(order) if highest <= Self::MAX => Ok(Self(order)),
-            _ => Err(LightError::Order(highest)),
-        }
-    }
-
-    /// The last band.
-    #[must_use]
-    pub const fn get(self) -> usize {
-        self.0 as usize
-    }
-
-    /// How many coefficients there are: (order + 1)².
-    #[must_use]
-    pub const fn coefficients(self) -> usize {
-        (self.get() + 1) * (self.get() + 1)
-    }
-
-    fn of_coefficients(count: usize) -> Result<Self, LightError> {
-        let side = count.isqrt();
-        if count == 0 || side * side != count {
-            return Err(LightError::Count(count));
-        }
-        Self::new(side - 1)
-    }
-}
+use super::{Direction, LightError, Order};
 
 /// Light from far away, linear RGB radiance over the sphere, as coefficients of the real spherical
 /// harmonics (see [`basis`]).
@@ -131,7 +59,7 @@ impl ShLight {
     #[must_use]
     pub fn even(order: Order, radiance: [f64; 3]) -> Self {
         let mut light = Self::dark(order);
-        let y0 = basis(Order(0), Direction::VIEWER)[0];
+        let y0 = basis(Order::ZERO, Direction::VIEWER)[0];
         light.coefficients[0] = radiance.map(|value| value / y0);
         light
     }
@@ -188,35 +116,6 @@ impl ShLight {
         }
         self
     }
-}
-
-/// Why a file of coefficients is not read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum LightFileError {
-    /// It cannot be read.
-    #[error("{} cannot be read", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system answers.
-        source: io::Error,
-    },
-    /// It does not hold coefficients.
-    #[error("{} holds no light", path.display())]
-    Light {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: LightError,
-    },
-    /// It cannot be written.
-    #[error("{} cannot be written", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system answers.
-        source: io::Error,
-    },
 }
 
 impl fmt::Display for ShLight {

@@ -11,8 +11,10 @@
 mod basis;
 mod coefficients;
 mod direction;
+mod error;
 mod least_squares;
 mod normals;
+mod order;
 mod panorama;
 mod quadrature;
 mod rotation;
@@ -20,10 +22,12 @@ mod wigner;
 
 pub use basis::basis;
 pub use basis::{basis_into, legendre_step, polar_functions};
-pub use coefficients::{LightError, LightFileError, Order, ShLight};
+pub use coefficients::ShLight;
 pub use direction::Direction;
+pub use error::{LightError, LightFileError};
 pub use least_squares::NormalEquations;
 pub use normals::{Normals, NormalsFrame, YAxis, YDown, YUp};
+pub use order::Order;
 pub use panorama::{DrawnLight, LightSampler, Panorama, PanoramaError};
 pub use quadrature::Quadrature;
 pub use rotation::Rotation;

@@ -1,14 +1,16 @@
 //! Normal maps that know which way y points.
 
-use crate::image::{Extent, ImageError, Planes};
 use std::fmt::Debug;
 use std::marker::PhantomData;
+
+use crate::image::{Extent, ImageError, Planes};
+use crate::sealed::OwnMarker;
 
 /// Vectors shorter than this stand for no surface: a map's background, however it was encoded.
 const SHORTEST: f32 = 0.1;
 
 /// Which way y points in a normal map. Implemented by [`YUp`] and [`YDown`] only.
-pub trait YAxis: sealed::Sealed + Copy + Debug + Send + Sync + 'static {
+pub trait YAxis: OwnMarker + Copy + Debug + Send + Sync + 'static {
     /// The other way.
     type Opposite: YAxis<Opposite = Self>;
 }
@@ -21,11 +23,8 @@ pub enum YUp {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum YDown {}
 
-mod sealed {
-    pub trait Sealed {}
-    impl Sealed for super::YUp {}
-    impl Sealed for super::YDown {}
-}
+impl OwnMarker for YUp {}
+impl OwnMarker for YDown {}
 
 impl YAxis for YUp {
     type Opposite = YDown;

@@ -37,11 +37,11 @@ fn node(count: usize, at: usize) -> [f64; 2] {
     let mut x = (PI * (at as f64 + 0.75) / (count as f64 + 0.5)).cos();
     // Converges from this start in four or five steps.
     for _ in 0..8 {
-        let [value, slope] = legendre(count, x);
-        x -= value / slope;
+        let [value, derivative] = legendre(count, x);
+        x -= value / derivative;
     }
-    let [_, slope] = legendre(count, x);
-    [x, 2.0 / ((1.0 - x * x) * slope * slope)]
+    let [_, derivative] = legendre(count, x);
+    [x, 2.0 / ((1.0 - x * x) * derivative * derivative)]
 }
 
 /// The Legendre polynomial and its derivative.

@@ -44,7 +44,7 @@ pub fn angular_error(
             Ok(vector)
         };
         let pair = (
-            vector("the truth", truth)?,
+            vector("the ground truth", truth)?,
             vector("the estimate", estimate)?,
         );
         angles.push(angle(pair.0, pair.1).to_degrees());

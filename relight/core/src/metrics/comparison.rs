@@ -3,7 +3,7 @@
 use super::MetricError;
 use crate::image::Extent;
 
-/// A truth and an estimate with the same channels, finite at each pixel under a mask that is not
+/// A ground truth and an estimate with the same channels, finite at each pixel under a mask that is not
 /// empty. Values elsewhere are never looked at.
 #[derive(Debug, Clone)]
 pub struct Comparison<'a> {
@@ -33,7 +33,7 @@ impl<'a> Comparison<'a> {
         mask: &'a [bool],
     ) -> Result<Self, MetricError> {
         check_length("the mask", mask.len(), extent)?;
-        check_plane("the truth", truth, extent, mask)?;
+        check_plane("the ground truth", truth, extent, mask)?;
         check_plane("the estimate", estimate, extent, mask)?;
         if truth.len() != estimate.len() || truth.is_empty() {
             return Err(MetricError::Channels {
@@ -62,7 +62,7 @@ impl<'a> Comparison<'a> {
 }
 
 impl<'a> Channel<'a> {
-    /// Truth and estimate of each pixel under the mask.
+    /// Ground truth and estimate of each pixel under the mask.
     pub(super) fn under(self, mask: &'a [bool]) -> impl Iterator<Item = (f64, f64)> {
         self.truth
             .iter()
@@ -125,7 +125,7 @@ mod tests {
         assert!(Comparison::new(EXTENT, &[&values], &[&values], &mask).is_ok());
         for (truth, estimate, mask, what) in [
             (&values[..], &values[..], &mask[..5], "the mask"),
-            (&values[..4], &values[..], &mask[..], "the truth"),
+            (&values[..4], &values[..], &mask[..], "the ground truth"),
             (&values[..], &values[..5], &mask[..], "the estimate"),
         ] {
             let error = Comparison::new(EXTENT, &[truth], &[estimate], mask).unwrap_err();

@@ -17,9 +17,11 @@ pub enum MetricError {
         expected: usize,
     },
     /// The images do not have the same channels.
-    #[error("the truth has {truth} channels and the estimate {estimate}: they cannot be compared")]
+    #[error(
+        "the ground truth has {truth} channels and the estimate {estimate}: they cannot be compared"
+    )]
     Channels {
-        /// Channels of the truth.
+        /// Channels of the ground truth.
         truth: usize,
         /// Channels of the estimate.
         estimate: usize,
@@ -55,11 +57,11 @@ pub enum MetricError {
         /// The window's side.
         window: usize,
     },
-    /// The truth is zero wherever it counts.
+    /// The ground truth is zero wherever it counts.
     #[error(
-        "the truth is zero at every pixel that counts: no error in relation to it can be given"
+        "the ground truth is zero at every pixel that counts: no error in relation to it can be given"
     )]
-    DarkTruth,
+    DarkGroundTruth,
     /// A vector that should be a direction has no length.
     #[error("{what} has a normal of length zero at pixel ({x}, {y})")]
     ZeroNormal {

@@ -6,7 +6,7 @@ use crate::image::Extent;
 /// What a number named SMSE or LMSE is of: published tables use both and often do not say which.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Convention {
-    /// Grey images (the mean of the channels), the truth scaled to a maximum of 1 under the mask,
+    /// Grey images (the mean of the channels), the ground truth scaled to a maximum of 1 under the mask,
     /// one scale an image.
     Strict,
     /// The values of the files as they are, 0..=1, one scale a colour channel; the mean over
@@ -42,15 +42,15 @@ impl Convention {
 pub struct IntrinsicError {
     /// Scale-invariant MSE: the mean over pixels under the mask.
     pub smse: f64,
-    /// Local MSE over [`Windows`], in relation to the truth's energy.
+    /// Local MSE over [`Windows`], in relation to the ground truth's energy.
     pub lmse: f64,
 }
 
 /// SMSE and LMSE of an albedo or shading by a convention. The planes are those of [`Comparison`]; an
-/// estimate of one plane stands for each channel of the truth.
+/// estimate of one plane stands for each channel of the ground truth.
 ///
 /// # Errors
-/// As [`Comparison::new`] and [`Comparison::lmse`]; [`MetricError::DarkTruth`] where the truth has
+/// As [`Comparison::new`] and [`Comparison::lmse`]; [`MetricError::DarkGroundTruth`] where the ground truth has
 /// no positive value to be scaled by.
 pub fn intrinsic_error(
     convention: Convention,
@@ -101,7 +101,7 @@ fn to_maximum_one(mut plane: Vec<f32>, mask: &[bool]) -> Result<Vec<f32>, Metric
     let under_mask = plane.iter().zip(mask).filter(|(_, counts)| **counts);
     let maximum = under_mask.fold(0.0_f32, |most, (&value, _)| most.max(value));
     if maximum <= 0.0 {
-        return Err(MetricError::DarkTruth);
+        return Err(MetricError::DarkGroundTruth);
     }
     for value in &mut plane {
         *value /= maximum;

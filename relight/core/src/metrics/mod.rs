@@ -1,4 +1,4 @@
-//! Measures of how far an estimated image is from the truth.
+//! Measures of how far an estimated image is from the ground truth.
 //!
 //! It works on plain planes of `f32`, one a channel, row by row from the top: those of
 //! [`Planes`](crate::image::Planes) or the slices of an array of channels x rows x columns. It knows

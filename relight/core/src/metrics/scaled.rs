@@ -43,21 +43,21 @@ impl Windows {
 
 /// Sums from which scale and error of a channel follow.
 #[derive(Debug, Clone, Copy, Default)]
-struct Moments {
+struct SufficientStatistics {
     truth_truth: f64,
     truth_estimate: f64,
     estimate_estimate: f64,
 }
 
-impl Moments {
+impl SufficientStatistics {
     fn of(pairs: impl Iterator<Item = (f64, f64)>) -> Self {
-        let mut moments = Self::default();
+        let mut statistics = Self::default();
         for (truth, estimate) in pairs {
-            moments.truth_truth += truth * truth;
-            moments.truth_estimate += truth * estimate;
-            moments.estimate_estimate += estimate * estimate;
+            statistics.truth_truth += truth * truth;
+            statistics.truth_estimate += truth * estimate;
+            statistics.estimate_estimate += estimate * estimate;
         }
-        moments
+        statistics
     }
 
     fn plus(self, other: Self) -> Self {
@@ -68,7 +68,7 @@ impl Moments {
         }
     }
 
-    /// The scale that brings the estimate nearest to the truth; 0 where the estimate is 0.
+    /// The scale that brings the estimate nearest to the ground truth; 0 where the estimate is 0.
     fn scale(self) -> f64 {
         if self.estimate_estimate > 0.0 {
             self.truth_estimate / self.estimate_estimate
@@ -84,15 +84,15 @@ impl Comparison<'_> {
     /// min over s of |truth - s estimate|^2 / n. A best scale may be negative; it is 0 for an
     /// estimate that is 0 everywhere.
     ///
-    /// Squared units of the truth.
+    /// Squared units of the ground truth.
     #[must_use]
     pub fn mse(&self, fit: ScaleFit) -> f64 {
-        let moments: Vec<Moments> = self
+        let statistics: Vec<SufficientStatistics> = self
             .channels
             .iter()
-            .map(|channel| Moments::of(channel.under(self.mask)))
+            .map(|channel| SufficientStatistics::of(channel.under(self.mask)))
             .collect();
-        let channels = self.channels.iter().zip(best_scales(fit, &moments));
+        let channels = self.channels.iter().zip(best_scales(fit, &statistics));
         let sum: f64 = channels
             .map(|(channel, scale)| squared_error(channel.under(self.mask), scale))
             .sum();
@@ -106,7 +106,7 @@ impl Comparison<'_> {
     }
 
     /// The local error of Grosse et al. (2009): squared error after the best scale of each window,
-    /// summed over all windows, in relation to the energy of the truth, summed over the same
+    /// summed over all windows, in relation to the energy of the ground truth, summed over the same
     /// windows. 0 for an estimate that is right up to a scale in each window, 1 for one that is 0
     /// (and, unless no scale is fitted, never more).
     ///
@@ -117,7 +117,7 @@ impl Comparison<'_> {
     ///
     /// # Errors
     /// [`MetricError::Setting`] where `windows` has a zero, [`MetricError::TooSmall`] where no
-    /// window fits, [`MetricError::DarkTruth`] where the truth is 0 in all windows.
+    /// window fits, [`MetricError::DarkGroundTruth`] where the ground truth is 0 in all windows.
     pub fn lmse(&self, fit: ScaleFit, windows: Windows) -> Result<f64, MetricError> {
         windows.check(self.extent)?;
         let mut totals = vec![Total::default(); self.channels.len()];
@@ -140,24 +140,24 @@ impl Comparison<'_> {
 
     /// Adds a window's squared error and energy to the totals of the channels.
     fn add_window(&self, fit: ScaleFit, corner: (usize, usize), side: usize, totals: &mut [Total]) {
-        let moments: Vec<Moments> = self
+        let statistics: Vec<SufficientStatistics> = self
             .channels
             .iter()
-            .map(|&channel| Moments::of(self.window(channel, corner, side)))
+            .map(|&channel| SufficientStatistics::of(self.window(channel, corner, side)))
             .collect();
-        let scales = best_scales(fit, &moments);
-        for (((total, &channel), moments), scale) in totals
+        let scales = best_scales(fit, &statistics);
+        for (((total, &channel), statistics), scale) in totals
             .iter_mut()
             .zip(&self.channels)
-            .zip(&moments)
+            .zip(&statistics)
             .zip(scales)
         {
             total.error += squared_error(self.window(channel, corner, side), scale);
-            total.energy += moments.truth_truth;
+            total.energy += statistics.truth_truth;
         }
     }
 
-    /// Truth and estimate of the pixels of a window that count.
+    /// Ground truth and estimate of the pixels of a window that count.
     fn window<'a>(
         &'a self,
         channel: Channel<'a>,
@@ -206,7 +206,7 @@ impl Windows {
     }
 }
 
-/// Squared error and energy of the truth, over windows.
+/// Squared error and energy of the ground truth, over windows.
 #[derive(Debug, Clone, Copy, Default)]
 struct Total {
     error: f64,
@@ -218,21 +218,23 @@ impl Total {
         if self.energy > 0.0 {
             Ok(self.error / self.energy)
         } else {
-            Err(MetricError::DarkTruth)
+            Err(MetricError::DarkGroundTruth)
         }
     }
 }
 
 /// The scale of each channel.
-fn best_scales(fit: ScaleFit, moments: &[Moments]) -> Vec<f64> {
+fn best_scales(fit: ScaleFit, statistics: &[SufficientStatistics]) -> Vec<f64> {
     match fit {
-        ScaleFit::None => vec![1.0; moments.len()],
-        ScaleFit::Channel => moments.iter().map(|channel| channel.scale()).collect(),
+        ScaleFit::None => vec![1.0; statistics.len()],
+        ScaleFit::Channel => statistics.iter().map(|channel| channel.scale()).collect(),
         ScaleFit::Image => {
-            let all = moments
+            let all = statistics
                 .iter()
-                .fold(Moments::default(), |sum, &channel| sum.plus(channel));
-            vec![all.scale(); moments.len()]
+                .fold(SufficientStatistics::default(), |sum, &channel| {
+                    sum.plus(channel)
+                });
+            vec![all.scale(); statistics.len()]
         }
     }
 }

@@ -6,7 +6,7 @@ use super::lanes::{self, Kernel, Lanes, Number};
 use crate::image::{Linear, Planes, Rgb};
 use crate::light::{Normals, Order, ShLight, YUp};
 
-/// How the shading of a matt surface follows from the nine coefficients.
+/// How the shading of a diffuse surface follows from the nine coefficients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum DiffuseForm {
     /// S = max(E, 0), where E is the irradiance.
@@ -108,7 +108,7 @@ impl DiffuseLayer {
         light: &mut [[f64; 3]],
     ) -> [f64; 3] {
         let terms = terms(normal);
-        let slopes = slopes(normal);
+        let gradients = gradients(normal);
         let mut by_normal = [0.0; 3];
         for channel in 0..3 {
             let products = terms.iter().zip(&self.coefficients);
@@ -116,11 +116,11 @@ impl DiffuseLayer {
             if sum <= 0.0 {
                 continue;
             }
-            for (at, (term, slope)) in terms.iter().zip(slopes).enumerate() {
+            for (at, (term, gradient)) in terms.iter().zip(gradients).enumerate() {
                 let sign = if at == 0 { self.sign[channel] } else { 1.0 };
                 light[at][channel] += upstream[channel] * term * sign;
-                for (sum, slope) in by_normal.iter_mut().zip(slope) {
-                    *sum += upstream[channel] * self.coefficients[at][channel] * slope;
+                for (sum, gradient) in by_normal.iter_mut().zip(gradient) {
+                    *sum += upstream[channel] * self.coefficients[at][channel] * gradient;
                 }
             }
         }
@@ -157,7 +157,7 @@ pub(super) fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
 }
 
 /// The derivatives of [`terms`] by x, y and z.
-fn slopes([x, y, z]: [f64; 3]) -> [[f64; 3]; 9] {
+fn gradients([x, y, z]: [f64; 3]) -> [[f64; 3]; 9] {
     let [c1, c2, c3, ..] = C.map(|c| 2.0 * c);
     [
         [0.0, 0.0, 0.0],

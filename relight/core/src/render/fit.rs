@@ -12,7 +12,7 @@ const RIDGE: f64 = 1e-8;
 /// paper's representation can hold of the shading.
 ///
 /// `stiffness`, 0 or more, draws the bands 1 and 2 towards none, by that part of the equations' mean
-/// diagonal. 0 gives the best fit; 1e-3 keeps light that the normals hardly tell, such as that from
+/// diagonal. 0 gives the best fit; 1e-3 keeps light that the normals hardly show, such as that from
 /// behind, small.
 ///
 /// # Errors

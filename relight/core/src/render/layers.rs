@@ -12,7 +12,7 @@ use crate::image::{Extent, ImageError, Linear, Planes, Rgb};
 use crate::light::ShLight;
 use crate::parallel;
 
-/// The factor that brings a white matt surface under even light of radiance 1 to 1, as a background
+/// The factor that brings a white diffuse surface under even light of radiance 1 to 1, as a background
 /// of that light is.
 pub const EXPOSURE: f32 = FRAC_1_PI;
 
@@ -59,7 +59,7 @@ enum SpecularLayer {
 pub struct Rendering {
     /// S.
     pub shading: Rgb<Linear>,
-    /// H; nothing for a matt surface.
+    /// H; nothing for a diffuse surface.
     pub highlight: Option<Rgb<Linear>>,
 }
 

@@ -1,4 +1,4 @@
-//! A specular layer that comes close to Blinn and Phong's highlight: their lobe in zonal harmonics.
+//! A specular layer that comes close to the Blinn-Phong highlight: its lobe in zonal harmonics.
 
 use std::f64::consts::PI;
 
@@ -22,7 +22,7 @@ use crate::light::{
 ///   G_lm follow from those of the light by a fixed matrix for each m.
 /// - The lobe's zonal coefficients are k_l(α) = 2π ∫ t^α P_l(t) dt over 0..1: k_0 = 2π / (α + 1),
 ///   k_1 = 2π / (α + 2), k_l = k_(l-2) (α - l + 2) / (α + l + 1).
-/// - H(n) = s_p Σ k_l(α) G_lm Y_lm(n) (Funk and Hecke), where negative ringing is cut off.
+/// - H(n) = s_p Σ k_l(α) G_lm Y_lm(n) (Funk-Hecke), where negative ringing is cut off.
 ///
 /// What is lost are the bands of the light beyond its order, and those of G beyond the layer's.
 ///
@@ -121,11 +121,11 @@ impl Specular for LobeLayer {
         let by_lobe = sum(
             self.order,
             &self.exact,
-            &zonal_slopes(smoothness, &lobe),
+            &zonal_derivatives(smoothness, &lobe),
             normal,
         );
         self.pass_to_light(normal, &lobe, upstream, light);
-        (self.slope(&lobe, normal).map(weigh), weigh(by_lobe))
+        (self.gradient(&lobe, normal).map(weigh), weigh(by_lobe))
     }
 }
 
@@ -149,8 +149,8 @@ impl LobeLayer {
     }
 
     /// The derivatives of the three sums by x, y and z of the normal.
-    fn slope(&self, lobe: &[f64], [x, y, z]: [f64; 3]) -> [[f64; 3]; 3] {
-        let mut slopes = [[0.0; 3]; 3];
+    fn gradient(&self, lobe: &[f64], [x, y, z]: [f64; 3]) -> [[f64; 3]; 3] {
+        let mut gradients = [[0.0; 3]; 3];
         let (mut cos, mut sin) = ([0.0, 1.0], [0.0, 0.0]);
         let mut terms = self.exact.as_slice();
         for m in 0..=self.order.get() {
@@ -161,16 +161,16 @@ impl LobeLayer {
             let (band, rest) = terms.split_at(self.order.get() + 1 - m);
             terms = rest;
             let [plus, minus] = sum_of_m(band, &lobe[m..], diagonal(m), z);
-            let [plus_z, minus_z] = slope_of_m(band, &lobe[m..], diagonal(m), z);
+            let [plus_z, minus_z] = gradient_of_m(band, &lobe[m..], diagonal(m), z);
             // The derivatives of (x + iy)^m are m (x + iy)^(m - 1) and i times that.
             let [cos_before, sin_before] = [cos[0], sin[0]].map(|v| v * m as f64);
             for c in 0..3 {
-                slopes[0][c] += cos_before * plus[c] + sin_before * minus[c];
-                slopes[1][c] += cos_before * minus[c] - sin_before * plus[c];
-                slopes[2][c] += cos[1] * plus_z[c] + sin[1] * minus_z[c];
+                gradients[0][c] += cos_before * plus[c] + sin_before * minus[c];
+                gradients[1][c] += cos_before * minus[c] - sin_before * plus[c];
+                gradients[2][c] += cos[1] * plus_z[c] + sin[1] * minus_z[c];
             }
         }
-        slopes
+        gradients
     }
 }
 
@@ -243,7 +243,7 @@ fn sum_of_m<T: Number>(band: &[Term<T::Constant>], lobe: &[T], first: f64, z: T)
 }
 
 /// The derivative of [`sum_of_m`] by z.
-fn slope_of_m(band: &[Term<f64>], lobe: &[f64], first: f64, z: f64) -> [[f64; 3]; 2] {
+fn gradient_of_m(band: &[Term<f64>], lobe: &[f64], first: f64, z: f64) -> [[f64; 3]; 2] {
     let [mut plus, mut minus] = [[0.0; 3]; 2];
     let (mut before, mut now) = ([0.0, 0.0], [first, 0.0]);
     for (term, factor) in band.iter().zip(lobe) {
@@ -310,19 +310,19 @@ fn zonal<T: Number>(smoothness: T, lobe: &mut [T]) {
 }
 
 /// The derivatives of the zonal coefficients by α.
-fn zonal_slopes(smoothness: f64, lobe: &[f64]) -> Vec<f64> {
-    let mut slopes = vec![0.0; lobe.len()];
+fn zonal_derivatives(smoothness: f64, lobe: &[f64]) -> Vec<f64> {
+    let mut gradients = vec![0.0; lobe.len()];
     for l in 0..lobe.len() {
         let degree = l as f64;
         let below = smoothness + degree + 1.0;
-        slopes[l] = if l < 2 {
+        gradients[l] = if l < 2 {
             -lobe[l] / below
         } else {
             let above = smoothness + 2.0 - degree;
-            (slopes[l - 2] * above + lobe[l - 2] - lobe[l]) / below
+            (gradients[l - 2] * above + lobe[l - 2] - lobe[l]) / below
         };
     }
-    slopes
+    gradients
 }
 
 /// From the coefficients of light to those of G: a matrix for each |m|.

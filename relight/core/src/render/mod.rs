@@ -1,8 +1,8 @@
 //! Light on surfaces that are given by their normals: the paper's render layers, a specular layer that is
-//! closer to the truth, their derivatives, and the truth by Monte Carlo. Knows light and images only.
+//! closer to the ground truth, their derivatives, and the reference by Monte Carlo. Knows light and images only.
 //!
 //! All of it is in the paper's units: I = A S + H, where S is the irradiance and H the integral of
-//! radiance times the specular lobe, without a factor 1/π. Under even light of radiance 1 a white matt
+//! radiance times the specular lobe, without a factor 1/π. Under even light of radiance 1 a white diffuse
 //! surface is π; [`EXPOSURE`] brings it to 1.
 
 mod diffuse;

@@ -14,9 +14,9 @@ use crate::light::{Normals, Order, ShLight, YUp};
 /// defined. Here it is sign(v) |v|^α: odd like the harmonics of band 1, and smooth through 0. H itself may
 /// become negative; it is passed on as it is.
 ///
-/// A power of a sum's terms is not the power of the sum: this is no approximation of Blinn and Phong's
+/// A power of a sum's terms is not the power of the sum: this is no approximation of the Blinn-Phong
 /// highlight but for small α, and its size depends on α by orders of magnitude. It is here so that results can be
-/// compared with the paper's; [`LobeLayer`](super::LobeLayer) is what comes close to the truth.
+/// compared with the paper's; [`LobeLayer`](super::LobeLayer) is what comes close to the ground truth.
 ///
 /// ```
 /// use relight_core::light::{Normals, Order, ShLight};
@@ -79,7 +79,7 @@ impl Specular for PowerLayer {
         light: &mut [[f64; 3]],
     ) -> ([f64; 3], f64) {
         let (mut by_normal, mut by_smoothness) = ([0.0; 3], 0.0);
-        let slopes = slopes(normal);
+        let gradients = gradients(normal);
         for (at, v) in terms(normal).into_iter().enumerate() {
             let power = v.abs().powf(smoothness).copysign(v);
             for (sum, upstream) in light[at].iter_mut().zip(upstream) {
@@ -92,8 +92,8 @@ impl Specular for PowerLayer {
             let weight = c[0] * upstream[0] + c[1] * upstream[1] + c[2] * upstream[2];
             by_smoothness += weight * power * v.abs().ln();
             let by_term = weight * smoothness * v.abs().powf(smoothness - 1.0);
-            for (sum, slope) in by_normal.iter_mut().zip(slopes[at]) {
-                *sum += by_term * slope;
+            for (sum, gradient) in by_normal.iter_mut().zip(gradients[at]) {
+                *sum += by_term * gradient;
             }
         }
         (by_normal, by_smoothness)
@@ -154,10 +154,10 @@ fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
 }
 
 /// The derivatives of [`terms`] by x, y and z.
-fn slopes([x, y, z]: [f64; 3]) -> [[f64; 3]; 9] {
+fn gradients([x, y, z]: [f64; 3]) -> [[f64; 3]; 9] {
     let [_, c1, c2, c3, c4] = constants();
     let square = z * z;
-    let (odd, odd_slope) = (4.0 * square * z - 2.0 * z, 12.0 * square - 2.0);
+    let (odd, odd_gradient) = (4.0 * square * z - 2.0 * z, 12.0 * square - 2.0);
     [
         [0.0, 0.0, 0.0],
         [0.0, 2.0 * c1 * z, 2.0 * c1 * y],
@@ -168,9 +168,9 @@ fn slopes([x, y, z]: [f64; 3]) -> [[f64; 3]; 9] {
             4.0 * c2 * x * square,
             8.0 * c2 * x * y * z,
         ],
-        [0.0, c2 * odd, c2 * y * odd_slope],
+        [0.0, c2 * odd, c2 * y * odd_gradient],
         [0.0, 0.0, 24.0 * c3 * z * (2.0 * square - 1.0)],
-        [c2 * odd, 0.0, c2 * x * odd_slope],
+        [c2 * odd, 0.0, c2 * x * odd_gradient],
         [
             8.0 * c4 * x * square,
             -8.0 * c4 * y * square,

@@ -1,4 +1,4 @@
-//! The truth that the layers are measured against: Blinn and Phong's model under a panorama, by Monte
+//! The ground truth that the layers are measured against: the Blinn-Phong model under a panorama, by Monte
 //! Carlo integration.
 
 use std::array;
@@ -33,7 +33,7 @@ pub struct Estimate {
     pub standard_error: [f64; 3],
 }
 
-/// Integrates the models of matt and glossy surfaces over a panorama by Monte Carlo: half of the
+/// Integrates the models of diffuse and glossy surfaces over a panorama by Monte Carlo: half of the
 /// samples are drawn in proportion to the light, half in proportion to the lobe, and weighted by
 /// the balance heuristic (Veach and Guibas, *Optimally Combining Sampling Techniques for Monte Carlo Rendering*,
 /// 1995). The same seed gives the same numbers, on any number of threads.

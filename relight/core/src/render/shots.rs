@@ -83,7 +83,7 @@ pub fn mirror_reflectance(part: f32, smoothness: f32) -> f32 {
     part * (smoothness + 2.0) / 8.0
 }
 
-/// The exposure that shows a white matt surface, turned to where the light is strongest, as 1. It does not
+/// The exposure that shows a white diffuse surface, turned to where the light is strongest, as 1. It does not
 /// change when the light turns.
 #[must_use]
 pub fn exposure_for(light: &ShLight) -> f32 {

@@ -68,7 +68,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// An object of these maps; without `gloss` it is matt.
+    /// An object of these maps; without `gloss` it is diffuse.
     ///
     /// # Errors
     /// Where they differ in size.

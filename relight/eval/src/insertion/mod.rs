@@ -9,8 +9,8 @@ use relight_core::image::{Linear, Planes, Rgb, Srgb};
 use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
 use relight_photo::decompose::{DecomposeOptions, Decomposer};
 use relight_photo::insert::{
-    EdgeColours, InsertError, LightSource, Matching, MaterialChange, Placement, Scene, SceneObject,
-    Subject,
+    EdgeColours, InsertError, InsertScene, LightSource, Matching, MaterialChange, Placement,
+    SceneObject, Subject,
 };
 use relight_synth::Library;
 use stage::Stage;
@@ -93,7 +93,7 @@ impl InsertionMethod {
         let extent = stage.background.planes().extent();
         let light = LightSource::Panorama(stage.light.clone());
         let tilt = f64::from(stage::TILT).to_degrees();
-        let scene = Scene::new(extent, &light, tilt, Matching::default(), vec![object])?;
+        let scene = InsertScene::new(extent, &light, tilt, Matching::default(), vec![object])?;
         Ok(scene.compose(&stage.background, &scene.layers(0.0)?, 0))
     }
 }

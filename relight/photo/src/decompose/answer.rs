@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use super::crop::{CropSquare, cut_out, enlarged, inside, reduced};
 use super::encoding::{AnsweredMaps, EncodedPicture, LEAST_FACING};
-use super::region::{self, Region, enlarged, inside, reduced};
 use relight_core::image::{Extent, ImageError, Part, Planes};
 use relight_core::light::{Normals, YUp};
 use relight_core::parallel;
@@ -50,7 +50,7 @@ pub(super) struct Scales {
 
 /// The planes of fields that are normals.
 const NORMAL_PLANES: Range<usize> = 0..3;
-/// The share of the coarse scale in the low frequencies of the normals. Measured on photographs with truth: a share of 1
+/// The share of the coarse scale in the low frequencies of the normals. Measured on photographs with ground truth: a share of 1
 /// is three degrees better than 0.
 const SHAPE_OF_NORMALS: f32 = 1.0;
 /// The share of the coarse scale in the low frequencies of albedo, shading and highlight: a mean with a share of 0.3 to 0.5
@@ -194,7 +194,7 @@ pub(super) fn details(
         let columns = starts(extent.width, side);
         let row = parallel::map(columns.len(), |column| {
             let x = columns[column];
-            let tile = Region {
+            let tile = CropSquare {
                 x: x as i64,
                 y: y as i64,
                 side,
@@ -221,7 +221,7 @@ pub(super) fn details(
 /// the object.
 fn tile_detail(
     net: &dyn MapsNet,
-    tile: &Region,
+    tile: &CropSquare,
     (picture, mask): (&Planes<3>, &Planes<1>),
     coarse: usize,
     mirror: bool,
@@ -231,7 +231,7 @@ fn tile_detail(
     if !known.contains(&true) {
         return Ok(None);
     }
-    let fields = fields(net, &region::cut_out(picture, &mask), &mask, mirror)?;
+    let fields = fields(net, &cut_out(picture, &mask), &mask, mirror)?;
     let mut fine = enlarged(&fields, &known, &Part::all(tile.extent()));
     let low = fine
         .resized(Extent::new(coarse, coarse))

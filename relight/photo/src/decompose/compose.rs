@@ -49,7 +49,7 @@ impl ComposedLayers {
         let (s, h) = (shading.plane(0), highlight.plane(0));
         let scale = albedo_scale(&picture, h, &maps.albedo, s);
         let (mut albedo, mut diffuse) = (maps.albedo, picture);
-        let (mut left, mut all) = (0.0_f64, 0.0_f64);
+        let (mut squared_residual, mut all) = (0.0_f64, 0.0_f64);
         let layers = albedo.planes_mut().into_iter().zip(diffuse.planes_mut());
         for (albedo, diffuse) in layers {
             for at in 0..mask.len() {
@@ -58,12 +58,12 @@ impl ComposedLayers {
                     continue;
                 }
                 let light = diffuse[at];
-                let (shading, matt) = (f64::from(s[at]), f64::from(matt(light, h[at])));
+                let (shading, target) = (f64::from(s[at]), f64::from(diffuse_part(light, h[at])));
                 let answered = scale * f64::from(albedo[at]);
-                let r = (matt * shading + RIDGE * answered) / (shading * shading + RIDGE);
+                let r = (target * shading + RIDGE * answered) / (shading * shading + RIDGE);
                 albedo[at] = r as f32;
                 diffuse[at] = (r * shading) as f32;
-                left += f64::from(light - diffuse[at] - h[at]).powi(2);
+                squared_residual += f64::from(light - diffuse[at] - h[at]).powi(2);
                 all += f64::from(light).powi(2);
             }
         }
@@ -73,7 +73,11 @@ impl ComposedLayers {
             shading,
             highlight,
             diffuse,
-            residual: if all > 0.0 { (left / all).sqrt() } else { 0.0 },
+            residual: if all > 0.0 {
+                (squared_residual / all).sqrt()
+            } else {
+                0.0
+            },
         }
     }
 }
@@ -111,7 +115,7 @@ pub(super) fn normalised(mut shading: Planes<1>, mask: &[bool]) -> Planes<1> {
 }
 
 /// Light less its highlight.
-fn matt(light: f32, highlight: f32) -> f32 {
+fn diffuse_part(light: f32, highlight: f32) -> f32 {
     (light - highlight).max(0.0)
 }
 
@@ -127,7 +131,7 @@ fn albedo_scale(
     for (light, albedo) in picture.planes().into_iter().zip(albedo.planes()) {
         for at in 0..shading.len() {
             let answered = f64::from(albedo[at]) * f64::from(shading[at]);
-            product += answered * f64::from(matt(light[at], highlight[at]));
+            product += answered * f64::from(diffuse_part(light[at], highlight[at]));
             square += answered * answered;
         }
     }

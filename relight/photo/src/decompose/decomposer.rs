@@ -4,25 +4,24 @@ use std::path::Path;
 
 use super::answer::{Engine, Fields, MapsNet, Scales, Whole, details, to_maps};
 use super::compose::{ComposedLayers, normalised, possible_highlight};
+use super::crop::{CropSquare, Window, cut_out, enlarged, inside};
 use super::encoding::AnsweredMaps;
 use super::error::DecomposeError;
 use super::gloss::{FittedGloss, fit_gloss};
 use super::other::OtherNormals;
-use super::region::{Region, Window, cut_out, enlarged, inside};
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::NormalsFrame;
 use relight_core::light::{LightError, Normals, ShLight, YUp};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
 use relight_nets::{Inference, InferenceEngine, NetError, Weights, decomposer};
+use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
 
 /// Most pixels of a photograph, and with [`WorkingSize::Native`] of the square around the object: 24 million take 2.5 GB of
 /// memory, so these more than 6 GB.
 pub const MOST_PIXELS: usize = 64_000_000;
 /// Width and height of the picture that the network sees.
 pub const WORKING_SIDE: usize = 256;
-/// Highlights are separated where a larger part of the object's pixels is saturated, as in the paper.
-const SATURATED_PART: f64 = 0.05;
 /// Keeps the light from behind, which normals hardly show, small: see [`fit_light`].
 const STIFFNESS: f64 = 1e-3;
 /// Longest band 1 of a light, in parts of its mean. A single lamp has √3; far above it, the fit follows cast shadows to
@@ -44,7 +43,7 @@ pub enum WorkingSize {
 /// Whether highlights are separated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SpecularGate {
-    /// Where more than 5 % of the object's pixels are saturated.
+    /// Where a larger fraction of the object's pixels is saturated than [`SPEC_NET_GATE`].
     #[default]
     Auto,
     /// Always.
@@ -82,9 +81,6 @@ impl Default for DecomposeOptions {
     }
 }
 
-/// The value in a file from which on a channel counts as saturated: 250 of 255, less rounding.
-pub(super) const SATURATED_VALUE: f32 = 249.5 / 255.0;
-
 /// A picture in layers, I = R S + H, with its normals and light. Everything is as large as the picture
 /// and 0 outside the mask.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,7 +101,7 @@ pub struct Decomposition {
     /// The gloss of the whole object, where a highlight was separated and the light explains it.
     pub gloss: Option<FittedGloss>,
     /// The square of the picture that the network saw.
-    pub region: Region,
+    pub region: CropSquare,
     /// Whether highlights were separated.
     pub is_glossy: bool,
     /// The part of the object's pixels that are saturated.
@@ -248,7 +244,7 @@ impl Decomposer {
             .saturated_fraction
             .unwrap_or_else(|| object.saturated(options.saturated_from));
         let is_glossy = match options.specular {
-            SpecularGate::Auto => saturated_fraction > SATURATED_PART,
+            SpecularGate::Auto => saturated_fraction > SPEC_NET_GATE,
             SpecularGate::On => true,
             SpecularGate::Off => false,
         };
@@ -261,11 +257,11 @@ impl Decomposer {
             &part,
             options.mirror,
         )?;
-        let explained = self.explain(&whole, is_glossy)?;
+        let fitted = self.fit(&whole, is_glossy)?;
         let mut maps = self.maps(&whole, &object, options)?;
         if self.normals.is_some() {
             let known = inside(&whole.mask);
-            let vectors = enlarged(explained.normals.planes(), &known, &part);
+            let vectors = enlarged(fitted.normals.planes(), &known, &part);
             maps.normals = Normals::new(cut_out(vectors, &object.mask));
         }
         let layers = ComposedLayers::new(object.picture, &object.inside, maps, is_glossy);
@@ -276,13 +272,13 @@ impl Decomposer {
             shading: window.put_back(layers.shading, extent),
             diffuse: Rgb::new(window.put_back(layers.diffuse, extent)),
             highlight: window.put_back(layers.highlight, extent),
-            light: explained.light,
-            gloss: explained.gloss,
+            light: fitted.light,
+            gloss: fitted.gloss,
             region,
             is_glossy,
             saturated_fraction,
             residual: layers.residual,
-            light_residual: explained.light_residual,
+            light_residual: fitted.light_residual,
         })
     }
 
@@ -306,7 +302,7 @@ impl Decomposer {
     }
 
     /// Fits light and gloss to the maps at the network's size.
-    fn explain(&self, whole: &Whole, is_glossy: bool) -> Result<Explained, DecomposeError> {
+    fn fit(&self, whole: &Whole, is_glossy: bool) -> Result<FittedLight, DecomposeError> {
         let known = inside(&whole.mask);
         let maps = to_maps(whole.fields.clone(), &known)?;
         let others = match &self.normals {
@@ -324,7 +320,7 @@ impl Decomposer {
         } else {
             None
         };
-        Ok(Explained {
+        Ok(FittedLight {
             light_residual: relative_difference(lit.planes().plane(0), shading.plane(0)),
             normals,
             light,
@@ -360,7 +356,7 @@ fn is_too_one_sided(light: &ShLight) -> bool {
 /// An object cut out of its photograph.
 struct CutObject {
     /// The square that the network sees.
-    region: Region,
+    region: CropSquare,
     /// Where in the photograph these pixels are.
     window: Window,
     /// Light, 0 outside the mask.
@@ -377,7 +373,7 @@ impl CutObject {
         mask: &Planes<1>,
         size: WorkingSize,
     ) -> Result<Self, DecomposeError> {
-        let region = Region::around(mask).ok_or(DecomposeError::EmptyMask)?;
+        let region = CropSquare::around(mask).ok_or(DecomposeError::EmptyMask)?;
         let window = match size {
             WorkingSize::Network => Window::around(mask).ok_or(DecomposeError::EmptyMask)?,
             // Tiles cover a square.
@@ -414,13 +410,17 @@ impl CutObject {
 /// Whether there is memory for the layers of so many pixels.
 pub(super) fn check_size(what: &'static str, extent: Extent) -> Result<(), DecomposeError> {
     if extent.width.saturating_mul(extent.height) > MOST_PIXELS {
-        return Err(DecomposeError::TooLarge { what, extent });
+        return Err(DecomposeError::TooLarge {
+            what,
+            extent,
+            most: MOST_PIXELS,
+        });
     }
     Ok(())
 }
 
 /// Normals, light and gloss at the network's size.
-struct Explained {
+struct FittedLight {
     normals: Normals<YUp>,
     light: ShLight,
     light_residual: f64,

@@ -5,7 +5,6 @@ use std::io;
 use std::path::Path;
 use std::path::PathBuf;
 
-use super::decomposer::MOST_PIXELS;
 #[cfg(feature = "files")]
 use relight_core::files::FolderFault;
 use relight_core::image::{Extent, ImageError};
@@ -37,7 +36,7 @@ pub enum DecomposeError {
     EmptyMask,
     /// There are more pixels than are decomposed.
     #[error(
-        "the {what} has {} x {} pixels, and at most {MOST_PIXELS} are decomposed: make the photograph smaller",
+        "the {what} has {} x {} pixels, and at most {most} are decomposed: make the photograph smaller",
         extent.width, extent.height
     )]
     TooLarge {
@@ -45,6 +44,8 @@ pub enum DecomposeError {
         what: &'static str,
         /// Its size.
         extent: Extent,
+        /// The most pixels that are decomposed.
+        most: usize,
     },
     /// There is no light on the object.
     #[error("the picture is black all over the object: nothing is lit")]

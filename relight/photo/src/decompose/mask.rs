@@ -1,7 +1,7 @@
 //! Where the object is: what a photograph, a file or a rectangle says of it.
 
+use super::crop::inside;
 use super::error::DecomposeError;
-use super::region::inside;
 use relight_core::image::{Extent, Planes, StoredImage, beside};
 
 /// Encoded values up to this count as nearly black: 12 of 255.

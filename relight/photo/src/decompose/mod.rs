@@ -5,6 +5,7 @@
 
 mod answer;
 mod compose;
+mod crop;
 mod decomposer;
 mod encoding;
 mod error;
@@ -12,10 +13,10 @@ mod gloss;
 mod mask;
 mod other;
 mod photo;
-mod region;
 #[cfg(test)]
 mod tests;
 
+pub use crop::CropSquare;
 #[cfg(feature = "files")]
 pub(crate) use decomposer::in_colour;
 pub use decomposer::{
@@ -31,4 +32,3 @@ pub use mask::{MaskSource, Rectangle};
 #[cfg(feature = "files")]
 pub(crate) use photo::stem;
 pub use photo::{Photo, PhotoHints};
-pub use region::Region;

@@ -3,12 +3,13 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use super::decomposer::{DecomposeOptions, SATURATED_VALUE, check_size};
+use super::decomposer::{DecomposeOptions, check_size};
 use super::error::DecomposeError;
 use super::mask::{MaskSource, NoObject, Rectangle, find_mask, is_empty, mask_of};
 use relight_core::image::{
     ColourSpace, Extent, Gamma22, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
 };
+use relit_data::image_stats::SATURATED_VALUE;
 
 /// The transfer function of ITU-T H.273 that says nothing.
 const UNSPECIFIED: u8 = 2;
@@ -32,7 +33,7 @@ pub struct Photo {
     saturated_fraction: Option<f64>,
 }
 
-/// What is told of a photograph beside its file.
+/// What is known of a photograph beside its file.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PhotoHints<'a> {
     /// A picture of the mask.
@@ -115,6 +116,22 @@ impl Photo {
             saturated_from: Srgb::to_linear(SATURATED_VALUE),
             saturated_fraction,
         })
+    }
+
+    /// The photograph with a longest side of at most so many pixels.
+    #[must_use]
+    pub fn at_most(mut self, longest: usize) -> Self {
+        let Extent { width, height } = self.picture.planes().extent();
+        if longest >= width.max(height) {
+            return self;
+        }
+        let side = |pixels: usize| (pixels * longest / width.max(height)).max(1);
+        let extent = Extent::new(side(width), side(height));
+        self.picture = Rgb::new(self.picture.planes().resized(extent));
+        let share = self.mask.resized(extent);
+        self.mask = share.map(|m| f32::from(u8::from(m >= 0.5)));
+        self.alpha = self.alpha.map(|alpha| alpha.resized(extent));
+        self
     }
 
     /// These options with what is known of the photograph's saturation.

@@ -13,6 +13,7 @@ use crate::decompose::{DecomposeError, Photo, PhotoHints, Rectangle, stem};
 
 /// How the files of photographs end.
 const PHOTOS: [&str; 5] = ["png", "jpg", "jpeg", "exr", "hdr"];
+
 /// How photographs are read.
 #[derive(Debug, Clone, Default)]
 pub struct PhotoReading {
@@ -22,6 +23,18 @@ pub struct PhotoReading {
     pub rectangle: Option<Rectangle>,
     /// How integers are encoded, where the file is not to be asked.
     pub transfer: Option<Transfer>,
+}
+
+impl PhotoReading {
+    /// The mask of a photograph of this name: the file that is given itself, or the photograph's in the folder that is given.
+    #[must_use]
+    pub fn mask_path(given: &Path, name: &str) -> PathBuf {
+        if given.is_dir() {
+            given.join(format!("{name}.png"))
+        } else {
+            given.to_owned()
+        }
+    }
 }
 
 /// Where a photograph is.
@@ -201,11 +214,8 @@ fn read_file(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeErro
 }
 
 fn mask_file(given: &Path, name: &str) -> Result<PathBuf, DecomposeError> {
-    if !given.is_dir() {
-        return Ok(given.to_owned());
-    }
-    let path = given.join(format!("{name}.png"));
-    if path.is_file() {
+    let path = PhotoReading::mask_path(given, name);
+    if !given.is_dir() || path.is_file() {
         Ok(path)
     } else {
         Err(DecomposeError::MaskMissing { path })

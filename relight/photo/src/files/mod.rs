@@ -1,9 +1,16 @@
-//! Photographs and decompositions in files: inputs from files, folders and shards,
-//! networks, and folders of results.
+//! Photographs, decompositions and scenes in files: inputs from files, folders and shards, networks, light, folders of
+//! results, and objects put into pictures and videos.
 
+mod background;
 mod input;
+mod insertion;
+mod insertion_error;
+mod light;
 mod networks;
 mod results;
 
+pub use background::BackgroundFile;
 pub use input::{PhotoInput, PhotoReading};
+pub use insertion::{InsertSource, InsertSubject, Insertion, InsertionOutput};
+pub use insertion_error::InsertionError;
 pub use results::{DecompositionFigures, DecompositionFiles, bright, write_light};

@@ -6,7 +6,7 @@ use relit_data::durable::write_whole;
 use serde::Serialize;
 
 use crate::decompose::{
-    DecomposeError, DecomposeOptions, Decomposition, MaskSource, Photo, Region, SpecularGate,
+    CropSquare, DecomposeError, DecomposeOptions, Decomposition, MaskSource, Photo, SpecularGate,
     WorkingSize, in_colour,
 };
 use relight_core::files::ResultFolder;
@@ -54,7 +54,7 @@ pub struct DecompositionFigures {
     photo: String,
     weights: String,
     size: [usize; 2],
-    region: Region,
+    region: CropSquare,
     working_size: &'static str,
     mirrored: bool,
     mask: FigureMask,

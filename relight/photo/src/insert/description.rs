@@ -1,10 +1,12 @@
 //! A scene as a text in TOML. Names files and opens none.
 
-use std::path::PathBuf;
+use std::iter;
+use std::path::{Path, PathBuf};
 
+use relight_core::image::Extent;
 use serde::Deserialize;
 
-use super::{Lamp, LampFault, MaterialChange, ObjectGloss, Placement};
+use super::{DiscLamp, LampFault, MaterialChange, ObjectGloss, Placement};
 
 /// The largest picture, pixels a side.
 const LARGEST_SIDE: u32 = 16_384;
@@ -111,6 +113,7 @@ pub struct ObjectDescription {
 
 /// Why a text describes no scene.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneFault {
     /// It is no TOML, or has fields that a scene has not.
     #[error("it is no scene: {}", .0.to_string().trim_end())]
@@ -145,6 +148,25 @@ impl SceneDescription {
         let scene: Self = toml::from_str(text)?;
         scene.check()?;
         Ok(scene)
+    }
+
+    /// The files that it names: background, light, photographs and masks.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let light = &self.light;
+        let lights = [&light.panorama, &light.coefficients, &light.object];
+        let objects = self.objects.iter();
+        let objects = objects.flat_map(|object| iter::once(&object.photo).chain(&object.mask));
+        iter::once(&self.background)
+            .chain(lights.into_iter().flatten())
+            .chain(objects)
+            .map(PathBuf::as_path)
+    }
+
+    /// Width and height of the picture that shows a part of a panorama.
+    #[must_use]
+    pub fn panorama_extent(&self) -> Extent {
+        let [width, height] = self.size.map(|side| side as usize);
+        Extent::new(width, height)
     }
 
     /// Whether all that is said can be.
@@ -193,13 +215,13 @@ impl LightDescription {
     ///
     /// # Errors
     /// Where its text is none.
-    pub fn lamp(&self) -> Result<Option<Lamp>, SceneFault> {
+    pub fn lamp(&self) -> Result<Option<DiscLamp>, SceneFault> {
         let Some(text) = &self.lamp else {
             return Ok(None);
         };
-        let lamp: Lamp = text.parse().map_err(SceneFault::Lamp)?;
+        let lamp: DiscLamp = text.parse().map_err(SceneFault::Lamp)?;
         let ambient = self.ambient.unwrap_or(lamp.ambient);
-        Ok(Some(Lamp { ambient, ..lamp }))
+        Ok(Some(DiscLamp { ambient, ..lamp }))
     }
 
     fn check(&self) -> Result<(), SceneFault> {

@@ -9,13 +9,13 @@ use relight_core::light::{Direction, Order, Panorama, ShLight, basis};
 /// A lamp far away.
 ///
 /// ```
-/// use relight_photo::insert::Lamp;
+/// use relight_photo::insert::DiscLamp;
 ///
-/// let lamp = Lamp { azimuth: 90.0, elevation: 0.0, ..Lamp::default() };
+/// let lamp = DiscLamp { azimuth: 90.0, elevation: 0.0, ..DiscLamp::default() };
 /// assert!(lamp.direction().components()[0] > 0.999); // from the right
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lamp {
+pub struct DiscLamp {
     /// Degrees about the vertical: 0 is at the viewer's side, 90 on the right, 180 behind the object, 270 on the left.
     pub azimuth: f64,
     /// Degrees above the horizon, -90 to 90.
@@ -28,7 +28,7 @@ pub struct Lamp {
     pub ambient: f64,
 }
 
-impl Default for Lamp {
+impl Default for DiscLamp {
     fn default() -> Self {
         Self {
             azimuth: 45.0,
@@ -40,7 +40,7 @@ impl Default for Lamp {
     }
 }
 
-impl Lamp {
+impl DiscLamp {
     /// The direction in which it stands.
     #[must_use]
     pub fn direction(&self) -> Direction {
@@ -115,6 +115,7 @@ impl Lamp {
 
 /// Why a text is no lamp.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LampFault {
     /// It does not begin with two angles.
     #[error("give AZIMUTH,ELEVATION[,COLOUR][,SIZE], such as 60,30 or -45,40,3200K,10")]
@@ -127,7 +128,7 @@ pub enum LampFault {
     Colour(String),
 }
 
-impl FromStr for Lamp {
+impl FromStr for DiscLamp {
     type Err = LampFault;
 
     /// Reads `AZIMUTH,ELEVATION[,COLOUR][,SIZE]`, the colour as `#rrggbb` (sRGB) or as a temperature such as `3200K`.
@@ -222,18 +223,18 @@ mod tests {
     use relight_core::light::Normals;
     use relight_core::render::{DiffuseForm, DiffuseLayer};
 
-    fn plain() -> Lamp {
-        Lamp {
+    fn plain() -> DiscLamp {
+        DiscLamp {
             azimuth: 0.0,
             elevation: 0.0,
             ambient: 0.0,
-            ..Lamp::default()
+            ..DiscLamp::default()
         }
     }
 
     #[test]
     fn coefficients_are_those_of_the_panorama() {
-        let lamp = Lamp {
+        let lamp = DiscLamp {
             azimuth: 130.0,
             elevation: 25.0,
             colour: [1.0, 0.5, 0.2],
@@ -264,7 +265,7 @@ mod tests {
     #[test]
     fn angles_go_from_the_viewer_to_the_right_and_up() {
         let at = |azimuth, elevation| {
-            let lamp = Lamp {
+            let lamp = DiscLamp {
                 azimuth,
                 elevation,
                 ..plain()
@@ -287,7 +288,7 @@ mod tests {
 
     #[test]
     fn a_lamp_has_two_angles_and_may_have_a_colour_and_a_size() {
-        let lamp = |text: &str| text.parse::<Lamp>();
+        let lamp = |text: &str| text.parse::<DiscLamp>();
         let plain = lamp("60,-30").unwrap();
         assert_eq!(
             (plain.azimuth, plain.elevation, plain.size),

@@ -4,26 +4,37 @@
 //! | file | concern |
 //! | --- | --- |
 //! | `matte` | what an object covers of each pixel, and its colours without those behind it |
-//! | `subject` | an object taken apart, relit, and put before another background |
-//! | `source`, `lamp`, `surroundings` | new light: a panorama, a lamp, coefficients, what a picture tells of it |
+//! | `cut` | the part of a photograph around an object |
+//! | `subject` | an object decomposed and relit |
+//! | `shading`, `material` | what of its shading stays in another light; what its material becomes |
+//! | `blend` | an object back in its photograph, or before another background |
+//! | `source`, `lamp`, `surroundings` | new light: a panorama, a lamp, coefficients, what a picture shows of it |
 //! | `shot` | pictures of an object in light that stands or turns |
 //! | `view` | what a camera sees of a panorama |
 //! | `placement` | where an object stands, and how its pixels get there |
-//! | `scene` | objects in a new picture, with their shadows |
+//! | `setting` | what a background says of the objects: light, size, tilt of the ground, brightness |
+//! | `scene`, `scene_object`, `layer` | objects in a new picture, with their shadows |
 //! | `relief`, `shadow` | an object's shape out of its normals, and what it keeps from the ground |
 //! | `description` | a scene as a text in TOML |
 //! | `matching` | brightness, white balance and grain of a background |
 //! | `trust` | how far a decomposition can be trusted, pixel by pixel |
 //! | `smooth` | means over squares of pixels |
 
+mod blend;
+mod cut;
 mod description;
 mod error;
 mod lamp;
+mod layer;
 mod matching;
+mod material;
 mod matte;
 mod placement;
 mod relief;
 mod scene;
+mod scene_object;
+mod setting;
+mod shading;
 mod shadow;
 mod shot;
 mod smooth;
@@ -35,15 +46,20 @@ mod tests;
 mod trust;
 mod view;
 
+pub use cut::EdgeColours;
 pub use description::{LightDescription, ObjectDescription, SceneDescription, SceneFault};
 pub use error::InsertError;
-pub use lamp::{Lamp, LampFault, colour_of_temperature};
+pub use lamp::{DiscLamp, LampFault, colour_of_temperature};
+pub use layer::SceneLayer;
 pub use matching::Matching;
+pub use material::{MaterialChange, ObjectGloss};
 pub use matte::Matte;
 pub use placement::Placement;
-pub use scene::{Scene, SceneLayer, SceneObject};
-pub use shot::{Backdrop, Shot};
+pub use scene::InsertScene;
+pub use scene_object::SceneObject;
+pub use setting::{SceneBackground, SceneSetting};
+pub use shot::{Backdrop, Shot, ShotCompanions};
 pub use source::{LightSource, exposure_between, likeness};
-pub use subject::{EdgeColours, MaterialChange, ObjectGloss, Subject};
+pub use subject::Subject;
 pub use trust::{TrustFigures, TrustMap};
 pub use view::PanoramaView;

@@ -5,7 +5,7 @@ use relight_core::light::{Normals, YUp};
 
 /// The longest side of the grid on which heights are found, cells.
 const LONGEST: usize = 72;
-/// Normals that face the viewer less than this count as if they did so much: the rim is as steep as can be told.
+/// Normals that face the viewer less than this count as if they did so much: the rim is as steep as can be seen.
 const LEAST_FACING: f32 = 0.2;
 /// Rounds of successive over-relaxation. A round reaches all cells; so many join the ends of a grid.
 const ROUNDS: usize = 300;

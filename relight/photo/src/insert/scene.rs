@@ -1,38 +1,17 @@
-//! Objects in a new picture: where they stand, their shadows, and all of it on the background.
+//! Objects in a new picture: in its light, with their shadows.
 
-use super::matching::{grain, noise};
-use super::placement::{Fit, placed, rows};
+use super::layer::{GroundShadow, SceneLayer};
+use super::matching::grain;
+use super::placement::{Fit, placed};
 use super::relief::Relief;
 use super::shadow::Shadow;
-use super::{
-    InsertError, LightSource, Matching, MaterialChange, Placement, Subject, exposure_between,
-};
-use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
+use super::{InsertError, LightSource, Matching, SceneObject, exposure_between};
+use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_core::light::{Direction, Normals, Panorama, Rotation, ShLight, YUp};
-
-/// How much an object may be enlarged.
-const MOST_GROWTH: f64 = 64.0;
-
-/// An object of a scene.
-#[derive(Debug, Clone, Copy)]
-pub struct SceneObject<'a> {
-    /// The object.
-    pub subject: &'a Subject,
-    /// Where it stands.
-    pub placement: Placement,
-    /// What its material becomes.
-    pub change: MaterialChange,
-    /// Its brightness in stops.
-    pub exposure: f32,
-    /// How much of its shadow is seen, 0 to 1.
-    pub shadow: f32,
-    /// Whether it is shown in the scene's light; else in that of its photograph.
-    pub relit: bool,
-}
 
 /// A picture that objects are put into.
 #[derive(Debug)]
-pub struct Scene<'a> {
+pub struct InsertScene<'a> {
     extent: Extent,
     light: ShLight,
     /// The same light, as shadows are drawn from it.
@@ -42,27 +21,7 @@ pub struct Scene<'a> {
     objects: Vec<SceneObject<'a>>,
 }
 
-/// An object as it is seen in a scene, ready to be put on any background.
-#[derive(Debug, Clone)]
-pub struct SceneLayer {
-    /// Column and row of its first pixel; it may begin outside.
-    place: [i64; 2],
-    alpha: Planes<1>,
-    /// Times alpha.
-    colours: Planes<3>,
-    shadow: Option<GroundShadow>,
-    /// The grain that it lacks.
-    grain: f32,
-}
-
-#[derive(Debug, Clone)]
-struct GroundShadow {
-    place: [i64; 2],
-    /// The part of the light that arrives.
-    arriving: Planes<3>,
-}
-
-impl<'a> Scene<'a> {
+impl<'a> InsertScene<'a> {
     /// A picture of a size in this light, whose ground the camera looks down on by `tilt` degrees (0 to 90), with objects from back to
     /// front.
     ///
@@ -130,32 +89,11 @@ impl<'a> Scene<'a> {
             "size of the background"
         );
         let mut picture = background.clone();
-        for shadow in layers.iter().filter_map(|layer| layer.shadow.as_ref()) {
-            over(
-                picture.planes_mut(),
-                &shadow.arriving,
-                shadow.place,
-                |at, value, channel| value * shadow.arriving.plane(channel)[at],
-            );
+        for layer in layers {
+            layer.darken(picture.planes_mut());
         }
         for layer in layers {
-            let alpha = layer.alpha.plane(0);
-            over(
-                picture.planes_mut(),
-                &layer.colours,
-                layer.place,
-                |at, value, channel| {
-                    if alpha[at] <= 0.0 {
-                        return value;
-                    }
-                    let covered = value * (1.0 - alpha[at]) + layer.colours.plane(channel)[at];
-                    if layer.grain <= 0.0 {
-                        return covered;
-                    }
-                    let noise = layer.grain * alpha[at] * noise(frame, at * 3 + channel);
-                    Srgb::to_linear(Srgb::from_linear(covered) + noise).max(0.0)
-                },
-            );
+            layer.cover(picture.planes_mut(), frame);
         }
         picture
     }
@@ -244,76 +182,12 @@ impl<'a> Scene<'a> {
     }
 }
 
-impl SceneObject<'_> {
-    fn check(&self, extent: Extent, number: usize) -> Result<(), InsertError> {
-        let Placement {
-            at,
-            height,
-            rotation,
-        } = self.placement;
-        let bounds = [
-            ("place", at[0], -0.5..=1.5),
-            ("place", at[1], -0.5..=2.0),
-            ("height", height, 1e-3..=4.0),
-            ("rotation", rotation, -3600.0..=3600.0),
-            ("shadow", f64::from(self.shadow), 0.0..=1.0),
-            ("exposure", f64::from(self.exposure), -20.0..=20.0),
-        ];
-        for (what, value, range) in bounds {
-            if !range.contains(&value) {
-                return Err(InsertError::Placement {
-                    object: number,
-                    what,
-                    value,
-                    least: *range.start(),
-                    most: *range.end(),
-                });
-            }
-        }
-        let growth =
-            height * extent.height as f64 / rows(&self.subject.matte().alpha).len().max(1) as f64;
-        if growth > MOST_GROWTH {
-            return Err(InsertError::Growth {
-                object: number,
-                growth,
-            });
-        }
-        Ok(())
-    }
-}
-
-/// Changes the pixels of a picture that lie under an image of which the first pixel is at `place`; `change` is told the pixel of the
-/// image, the value and the channel.
-fn over(
-    picture: &mut Planes<3>,
-    image: &Planes<3>,
-    place: [i64; 2],
-    change: impl Fn(usize, f32, usize) -> f32 + Sync,
-) {
-    let Extent { width, height } = image.extent();
-    picture.fill_rows(|y, row| {
-        let Some(line) = usize::try_from(y as i64 - place[1])
-            .ok()
-            .filter(|&line| line < height)
-        else {
-            return;
-        };
-        for (channel, values) in row.into_iter().enumerate() {
-            for (x, value) in values.iter_mut().enumerate() {
-                let column = usize::try_from(x as i64 - place[0]).ok();
-                if let Some(column) = column.filter(|&column| column < width) {
-                    *value = change(line * width + column, *value, channel);
-                }
-            }
-        }
-    });
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::decompose::{DecomposeOptions, Decomposer};
-    use crate::insert::Lamp;
+    use crate::insert::{DiscLamp, MaterialChange, Placement, Subject};
+    use relight_core::image::{ColourSpace, Srgb};
     use relight_nets::{Weights, decomposer};
 
     const PHOTO: Extent = Extent::new(60, 50);
@@ -357,16 +231,16 @@ mod tests {
     }
 
     fn lamp() -> LightSource {
-        LightSource::Lamp(Lamp {
+        LightSource::Lamp(DiscLamp {
             azimuth: 90.0,
             elevation: 45.0,
-            ..Lamp::default()
+            ..DiscLamp::default()
         })
     }
 
     fn composed(extent: Extent, objects: Vec<SceneObject<'_>>) -> Rgb<Linear> {
         let white = Rgb::new(Planes::filled(extent, [0.8; 3]));
-        let scene = Scene::new(extent, &lamp(), 25.0, Matching::default(), objects).unwrap();
+        let scene = InsertScene::new(extent, &lamp(), 25.0, Matching::default(), objects).unwrap();
         scene.compose(&white, &scene.layers(0.0).unwrap(), 0)
     }
 
@@ -409,7 +283,7 @@ mod tests {
     fn at_its_own_place_it_covers_itself() {
         let subject = subject();
         let placement = Placement::in_photo(&subject);
-        let scene = Scene::new(
+        let scene = InsertScene::new(
             PHOTO,
             &lamp(),
             25.0,
@@ -491,7 +365,7 @@ mod tests {
         let extent = Extent::new(160, 120);
         let black = Rgb::new(Planes::zeros(extent));
         let brightness = |matching: Matching, object: SceneObject<'_>| {
-            let scene = Scene::new(extent, &lamp(), 25.0, matching, vec![object]).unwrap();
+            let scene = InsertScene::new(extent, &lamp(), 25.0, matching, vec![object]).unwrap();
             let picture = scene.compose(&black, &scene.layers(0.0).unwrap(), 0);
             let middle: Vec<f32> = (70..90)
                 .map(|x| Srgb::from_linear(picture.planes().pixel(x, 70)[1]))
@@ -537,7 +411,7 @@ mod tests {
                 object(&subject, Placement::in_photo(&subject)),
                 object(&subject, placement),
             ];
-            Scene::new(PHOTO, &lamp(), 25.0, Matching::default(), objects)
+            InsertScene::new(PHOTO, &lamp(), 25.0, Matching::default(), objects)
                 .unwrap_err()
                 .to_string()
         };
@@ -563,7 +437,7 @@ mod tests {
                 ..good
             },
         )];
-        let error = Scene::new(
+        let error = InsertScene::new(
             Extent::new(4000, 4000),
             &lamp(),
             25.0,

@@ -188,7 +188,7 @@ fn rays(ground: &Ground, light: &Panorama) -> Vec<Vec<Ray>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::insert::Lamp;
+    use crate::insert::DiscLamp;
     use relight_core::light::Normals;
 
     fn ball() -> Relief {
@@ -200,12 +200,12 @@ mod tests {
     }
 
     fn lamp(azimuth: f64, ambient: f64) -> Panorama {
-        let lamp = Lamp {
+        let lamp = DiscLamp {
             azimuth,
             elevation: 40.0,
             ambient,
             size: 10.0,
-            ..Lamp::default()
+            ..DiscLamp::default()
         };
         lamp.panorama(Extent::new(128, 64))
     }

@@ -17,6 +17,18 @@ pub enum Backdrop {
     Panorama(PanoramaView, Panorama),
 }
 
+/// What stands beside a relit object, to compare it with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ShotCompanions {
+    /// Nothing.
+    #[default]
+    None,
+    /// Its photograph.
+    Photo,
+    /// Its photograph and naive insertion.
+    PhotoAndNaive,
+}
+
 /// An object of a photograph, and the light in which it is to be shown. All that does not depend on the light's angle is
 /// computed once, so that nothing flickers while it turns.
 #[derive(Debug)]
@@ -31,7 +43,7 @@ pub struct Shot<'a> {
 
 impl<'a> Shot<'a> {
     /// The object in this light, times `exposure`. The light is brought to the strength of the photograph's own:
-    /// [`exposure_between`]. A panorama behind it is as bright as a white matt surface in its light would be.
+    /// [`exposure_between`]. A panorama behind it is as bright as a white diffuse surface in its light would be.
     ///
     /// # Errors
     /// Where the photograph is not the subject's.
@@ -89,6 +101,25 @@ impl<'a> Shot<'a> {
             None => self.photo.clone(),
             Some(background) => self.subject.pasted(self.photo, &background),
         }
+    }
+
+    /// The picture, and to its left what it is compared with.
+    ///
+    /// # Errors
+    /// As [`Subject::relit`].
+    pub fn sheet(&self, turn: f64, beside: ShotCompanions) -> Result<Rgb<Linear>, InsertError> {
+        let relit = self.picture(turn)?;
+        let mut tiles = match beside {
+            ShotCompanions::None => return Ok(relit),
+            ShotCompanions::Photo | ShotCompanions::PhotoAndNaive => {
+                vec![self.photo.planes().clone()]
+            }
+        };
+        if beside == ShotCompanions::PhotoAndNaive {
+            tiles.push(self.naive(turn).into_planes());
+        }
+        tiles.push(relit.into_planes());
+        Ok(Rgb::new(Planes::sheet(&tiles, tiles.len())?))
     }
 
     /// The photograph.

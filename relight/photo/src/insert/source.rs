@@ -1,12 +1,10 @@
 //! Where new light comes from.
 
-use super::{InsertError, Lamp};
+use super::{DiscLamp, InsertError};
 use relight_core::image::Extent;
 use relight_core::light::{Order, Panorama, ShLight};
 use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
 
-/// The order to which panoramas and lamps are brought for highlights; diffuse light needs no more than 2.
-const HIGHLIGHT_ORDER: usize = 24;
 /// The size of a panorama that stands for a lamp or coefficients, from which shadows are drawn.
 const DRAWN: Extent = Extent::new(256, 128);
 
@@ -16,7 +14,7 @@ pub enum LightSource {
     /// All around.
     Panorama(Panorama),
     /// One lamp and even light.
-    Lamp(Lamp),
+    Lamp(DiscLamp),
     /// Coefficients of spherical harmonics.
     Coefficients(ShLight),
 }
@@ -27,10 +25,9 @@ impl LightSource {
     /// # Errors
     /// [`InsertError::Dark`] where no surface receives any of it.
     pub fn light(&self) -> Result<ShLight, InsertError> {
-        let order = Order::new(HIGHLIGHT_ORDER)?;
         let light = match self {
-            Self::Panorama(panorama) => panorama.project(order),
-            Self::Lamp(lamp) => lamp.light(order),
+            Self::Panorama(panorama) => panorama.project(Order::HIGHLIGHT),
+            Self::Lamp(lamp) => lamp.light(Order::HIGHLIGHT),
             Self::Coefficients(light) => light.with_order(light.order().max(Order::TWO)),
         };
         // An exposure is 1 for light that reaches nothing.
@@ -74,7 +71,7 @@ pub fn exposure_between(old: &ShLight, new: &ShLight) -> f32 {
 }
 
 /// How much two lights come from the same side, 0 to 1: 1 for lights of one shape, whatever their strength and
-/// colour, 0 for opposite ones. It tells how far shadows that were found in the one are right in the other.
+/// colour, 0 for opposite ones. It says how far shadows that were found in the one are right in the other.
 ///
 /// With a and b the irradiance of bands 1 and 2, each over that of band 0, it is `1 - |a - b| / (|a| + |b|)`.
 #[must_use]
@@ -111,9 +108,9 @@ mod tests {
     use relight_core::light::{Direction, Rotation};
 
     fn lamp(azimuth: f64) -> ShLight {
-        Lamp {
+        DiscLamp {
             azimuth,
-            ..Lamp::default()
+            ..DiscLamp::default()
         }
         .light(Order::TWO)
     }
@@ -142,6 +139,6 @@ mod tests {
     fn no_light_is_refused() {
         let dark = LightSource::Coefficients(ShLight::dark(Order::TWO));
         assert!(matches!(dark.light(), Err(InsertError::Dark)));
-        assert!(LightSource::Lamp(Lamp::default()).light().is_ok());
+        assert!(LightSource::Lamp(DiscLamp::default()).light().is_ok());
     }
 }

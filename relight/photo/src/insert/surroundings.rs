@@ -16,7 +16,7 @@ const CLIPPED: f32 = 0.92;
 const BEYOND: f32 = 6.0;
 
 impl LightSource {
-    /// The light that a picture of linear values tells of, whose longer side shows `field` degrees: itself behind the object, and its
+    /// The light that a picture of linear values shows, whose longer side shows `field` degrees: itself behind the object, and its
     /// mirror images, more and more blurred, at the sides and at the viewer. Clipped places count six times as bright.
     ///
     /// It is a guess. What lights a scene is mostly beside the picture.

@@ -2,9 +2,9 @@
 
 use crate::decompose::{DecomposeOptions, Decomposer, SpecularGate};
 use crate::insert::{
-    InsertError, Lamp, LightSource, MaterialChange, ObjectGloss, Subject, exposure_between,
+    DiscLamp, InsertError, LightSource, MaterialChange, ObjectGloss, Subject, exposure_between,
 };
-use relight_core::asset::Asset;
+use relight_core::captured_object::CapturedObject;
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Direction, Normals, Rotation};
 use relight_core::render::Surface;
@@ -76,9 +76,9 @@ fn the_own_light_gives_the_photograph_back() {
 #[test]
 fn other_light_changes_the_object_and_nothing_else() {
     let subject = subject(SpecularGate::Off);
-    let lamp = LightSource::Lamp(Lamp {
+    let lamp = LightSource::Lamp(DiscLamp {
         azimuth: 270.0,
-        ..Lamp::default()
+        ..DiscLamp::default()
     });
     let relit = subject
         .relit(&lamp.light().unwrap(), &MaterialChange::default())
@@ -103,7 +103,7 @@ fn other_light_changes_the_object_and_nothing_else() {
 #[test]
 fn light_that_turns_once_changes_the_picture_smoothly_and_ends_where_it_began() {
     let subject = subject(SpecularGate::On);
-    let light = LightSource::Lamp(Lamp::default()).light().unwrap();
+    let light = LightSource::Lamp(DiscLamp::default()).light().unwrap();
     let frame = |part: f64| {
         let turn = Rotation::about(Direction::UP, part * std::f64::consts::TAU);
         let relit = subject
@@ -121,10 +121,10 @@ fn light_that_turns_once_changes_the_picture_smoothly_and_ends_where_it_began() 
 #[test]
 fn a_tint_colours_and_gloss_adds_light() {
     let subject = subject(SpecularGate::Off);
-    let light = LightSource::Lamp(Lamp {
+    let light = LightSource::Lamp(DiscLamp {
         azimuth: 0.0,
         elevation: 0.0,
-        ..Lamp::default()
+        ..DiscLamp::default()
     })
     .light()
     .unwrap();
@@ -191,7 +191,7 @@ fn what_is_no_photograph_is_refused() {
 }
 
 /// A captured ball of one colour.
-fn captured_ball() -> Asset {
+fn captured_ball() -> CapturedObject {
     let normals = Normals::sphere(33);
     let extent = normals.extent();
     let alpha = Planes::from_fn(extent, |x, y| {
@@ -200,20 +200,20 @@ fn captured_ball() -> Asset {
     });
     let albedo = Rgb::new(Planes::filled(extent, [0.6, 0.3, 0.1]));
     let surface = Surface::new(normals, albedo, None).unwrap();
-    Asset::new("ball", surface, alpha.clone(), alpha).unwrap()
+    CapturedObject::new("ball", surface, alpha.clone(), alpha).unwrap()
 }
 
 #[test]
 fn a_captured_object_has_the_colours_of_its_albedo_in_even_light_and_is_bright_where_a_lamp_is() {
-    let subject = Subject::of_asset(&captured_ball()).unwrap();
+    let subject = Subject::of_captured(&captured_ball()).unwrap();
     let none = MaterialChange::default();
     let even = subject.relit(subject.light(), &none).unwrap();
     for (found, wanted) in even.pixel(12, 20).into_iter().zip([0.6, 0.3, 0.1]) {
         assert!((found - wanted).abs() < 1e-3, "{found} {wanted}");
     }
-    let lamp = LightSource::Lamp(Lamp {
+    let lamp = LightSource::Lamp(DiscLamp {
         azimuth: 90.0,
-        ..Lamp::default()
+        ..DiscLamp::default()
     });
     let light = lamp.light().unwrap();
     let scale = f64::from(exposure_between(subject.light(), &light));
@@ -229,6 +229,7 @@ fn a_captured_object_has_the_colours_of_its_albedo_in_even_light_and_is_bright_w
 fn a_captured_object_that_covers_nothing_is_refused() {
     let ball = captured_ball();
     let nothing = Planes::zeros(ball.extent());
-    let empty = Asset::new("none", ball.surface().clone(), nothing.clone(), nothing).unwrap();
-    assert!(Subject::of_asset(&empty).is_err());
+    let empty =
+        CapturedObject::new("none", ball.surface().clone(), nothing.clone(), nothing).unwrap();
+    assert!(Subject::of_captured(&empty).is_err());
 }

@@ -22,7 +22,7 @@ use std::path::Path;
 use image::GrayImage;
 use rayon::prelude::*;
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{
     self, Align, Dataset, Digest, ExtractionSettings, ImageSize, Layout, MaskInfo, OutputFolder,
     SamplingBasis, SessionEntry, SessionQuality, ShardEntry, ShardWriter,
@@ -34,7 +34,7 @@ use super::library::Library;
 use super::sample::mask;
 use ground_truth::GroundTruthFolder;
 use page::TurnPage;
-use simulated::{RenderedFrame, SPEC_NET_GATE, SimulatedTurn};
+use simulated::{RenderedFrame, SimulatedTurn};
 
 pub use description::{FrameTruth, TurnDescription, TurnRecipe};
 

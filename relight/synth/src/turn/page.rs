@@ -1,11 +1,11 @@
 //! The page of a turn.
 
 use image::imageops::{FilterType, resize};
-use relit_data::image_stats::SATURATION_LEVEL;
+use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::report::{self, Page, THUMBNAIL_SIDE, Thumbnail};
 use relit_data::shard::{FrameRecord, Sample};
 
-use super::simulated::{SPEC_NET_GATE, SimulatedTurn};
+use super::simulated::SimulatedTurn;
 use crate::SynthError;
 
 /// Thumbnails on a page.

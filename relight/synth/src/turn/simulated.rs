@@ -4,7 +4,7 @@ use glam::Vec3;
 use image::RgbImage;
 use rayon::prelude::*;
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{Digest, FrameRecord, Sample, SourceVideo};
 
 use super::description::{FrameTruth, TurnDescription, TurnRecipe};
@@ -32,8 +32,6 @@ const GLOSSY: f32 = 0.7;
 const CLIPPED: f32 = 0.5;
 /// How much brighter these become at most.
 const LONGEST_EXPOSURE: f32 = 3.0;
-/// Above this saturated fraction Spec-Net runs, as in `relit-extract`.
-pub(super) const SPEC_NET_GATE: f64 = 0.05;
 
 /// A turn, ready to be rendered.
 pub(super) struct SimulatedTurn<'a> {
@@ -194,32 +192,16 @@ impl<'a> SimulatedTurn<'a> {
         spans: &MaskSpans,
     ) -> Result<FrameRecord, SynthError> {
         let measures = spans.measure(image, SATURATION_LEVEL)?;
-        let saturated_fraction = measures.saturated_fraction();
         let size = self.description.size;
-        Ok(FrameRecord {
-            session: self.session.clone(),
-            object: self.object.clone(),
-            index,
-            source_frame: u64::from(index),
-            t_us: (f64::from(index) * 1e6 / RATE).round() as i64,
-            angle_deg: Some(self.angle_deg(index)),
-            duplicate: false,
-            crop: Rect::new(0, 0, size, size),
-            size: [size, size],
-            shift_px: None,
-            shift_applied: false,
-            align_confidence: None,
-            mask_px: measures.mask_px,
-            saturated_px: measures.saturated_px,
-            saturated_fraction,
-            saturated_any_px: measures.saturated_any_px,
-            spec_net: saturated_fraction > SPEC_NET_GATE,
-            mean_rgb: measures.mean_rgb,
-            sharpness: measures.sharpness,
-            exposure_step: None,
-            identical_to: None,
-            blur: None,
-        })
+        let whole = Rect::new(0, 0, size, size);
+        let (session, object) = (&self.session, &self.object);
+        let record = FrameRecord::new(session, object, index, whole, &measures, SPEC_NET_GATE)
+            .of_frame(
+                u64::from(index),
+                (f64::from(index) * 1e6 / RATE).round() as i64,
+                Some(self.angle_deg(index)),
+            );
+        Ok(record)
     }
 }
 

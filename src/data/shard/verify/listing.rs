@@ -4,7 +4,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use super::problem::Problem;
+use super::problem::VerifyProblem;
 use crate::causes::with_causes;
 use crate::shard::dataset::{Dataset, SessionEntry, ShardEntry};
 use crate::shard::{MAX_SAMPLES, ShardError, names, output};
@@ -12,7 +12,7 @@ use crate::shard::{MAX_SAMPLES, ShardError, names, output};
 const UNLISTED: &str = "dataset.json does not list it";
 
 /// The problems with the list of sessions and shards, with reports, and with unlisted files.
-pub(super) fn check(out: &Path, dataset: &Dataset) -> Result<Vec<Problem>, ShardError> {
+pub(super) fn check(out: &Path, dataset: &Dataset) -> Result<Vec<VerifyProblem>, ShardError> {
     let mut problems = entries(dataset);
     for report in dataset
         .sessions
@@ -38,15 +38,15 @@ pub(super) fn only_shard<'a>(
     (shards.next().is_none() && (1..=MAX_SAMPLES).contains(&session.samples)).then_some(first)
 }
 
-fn about(file: &str, what: String) -> Problem {
-    Problem {
+fn about(file: &str, what: String) -> VerifyProblem {
+    VerifyProblem {
         file: file.to_owned(),
         sample: None,
         what,
     }
 }
 
-fn entries(dataset: &Dataset) -> Vec<Problem> {
+fn entries(dataset: &Dataset) -> Vec<VerifyProblem> {
     let mut problems = Vec::new();
     let mut wrong = |what: String| problems.push(about(Dataset::FILE, what));
     for (name, count) in counted(dataset.sessions.iter().map(|session| session.id.as_str())) {
@@ -126,7 +126,7 @@ fn counted<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(&'a str, u32)> {
 }
 
 /// Shards, tables, images and temporary files in the folder that have no entry.
-fn unlisted(out: &Path, dataset: &Dataset) -> Result<Vec<Problem>, ShardError> {
+fn unlisted(out: &Path, dataset: &Dataset) -> Result<Vec<VerifyProblem>, ShardError> {
     let known: HashSet<&str> = dataset.files().collect();
     let mut problems = Vec::new();
     for name in output::names_in(out)? {

@@ -17,7 +17,7 @@ use super::record::FrameRecord;
 use super::settings::Layout;
 use session::{Found, Progress, SessionCheck};
 
-pub use problem::{Problem, VerifyReport};
+pub use problem::{VerifyProblem, VerifyReport};
 
 /// Reads the data set in the folder `out` back and checks everything that can be checked: counts,
 /// names and order; length and BLAKE3 of every file and every member; that images and masks decode,
@@ -31,7 +31,7 @@ pub use problem::{Problem, VerifyReport};
 /// # Errors
 /// Only if there is no data set to check: [`ShardError::NoDataset`], [`ShardError::Schema`],
 /// [`ShardError::Description`], [`ShardError::UnsafePath`], [`ShardError::SessionName`], or [`ShardError::Io`] on the
-/// folder. Everything else is a [`Problem`].
+/// folder. Everything else is a [`VerifyProblem`].
 pub fn verify(
     out: &Path,
     progress: &(dyn Fn(u64, u64) + Sync),

@@ -9,9 +9,9 @@ use crate::causes::with_causes;
 use crate::image_stats::{MaskSpans, Measures};
 use crate::shard::codec::{check_mask, decode_mask, decode_rgb};
 use crate::shard::digest::Digest;
+use crate::shard::parquet_table::TableRow;
 use crate::shard::record::FrameRecord;
 use crate::shard::settings::{ExtractionSettings, ImageSize};
-use crate::shard::table::TableRow;
 
 /// The mask of a session, which all its samples share. It is decoded once.
 #[derive(Default)]

@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::problem::Problem;
+use super::problem::VerifyProblem;
 use crate::causes::with_causes;
 use crate::shard::dataset::{SessionEntry, ShardEntry};
 use crate::shard::names::sample_key;
+use crate::shard::parquet_table::{TableRow, read_table};
 use crate::shard::record::FrameRecord;
 use crate::shard::settings::ExtractionSettings;
-use crate::shard::table::{TableRow, read_table};
 
 /// Counts verified samples and reports them to the caller.
 pub(super) struct Progress<'a> {
@@ -43,7 +43,7 @@ pub(super) struct SessionCheck<'a> {
     pub(super) progress: &'a Progress<'a>,
     /// The table, if it is intact: one row per sample, in index order.
     pub(super) rows: Option<Vec<TableRow>>,
-    pub(super) problems: Vec<Problem>,
+    pub(super) problems: Vec<VerifyProblem>,
 }
 
 /// What was found in a shard.
@@ -113,6 +113,6 @@ impl<'a> SessionCheck<'a> {
     pub(super) fn note_in(&mut self, file: &str, index: Option<u32>, what: String) {
         let sample = index.map(|index| sample_key(&self.session.id, index));
         let file = file.to_owned();
-        self.problems.push(Problem { file, sample, what });
+        self.problems.push(VerifyProblem { file, sample, what });
     }
 }

@@ -161,6 +161,7 @@ pub struct ControlSetting {
 
 /// A property that cannot be held, because a control is missing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MissingControl {
     /// The camera has no control for it: it is fixed, or the camera alone decides.
     #[error("the camera has no control of its {0}")]

@@ -10,7 +10,7 @@ use ::nokhwa::Buffer;
 use ::nokhwa::camera_traits::CaptureBackendTrait;
 use ::nokhwa::utils::{
     ApiBackend, CameraControl, CameraInfo, ControlValueDescription, ControlValueSetter,
-    KnownCameraControl,
+    FrameFormat, KnownCameraControl,
 };
 
 use proptest::collection::vec;

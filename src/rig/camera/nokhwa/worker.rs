@@ -14,7 +14,8 @@ use std::time::Duration;
 use ::nokhwa::utils::{CameraFormat, FrameFormat, RequestedFormat, RequestedFormatType};
 use ::nokhwa::{Camera as Library, NokhwaError};
 
-use super::super::{CameraError, Frame};
+use super::formats::fourcc;
+use crate::camera::{CameraError, Fourcc, Frame};
 use crate::clock::Clock;
 use relit_data::session::FrameClock;
 
@@ -45,7 +46,7 @@ pub(super) struct Owner {
 struct Stream {
     frames: SyncSender<FrameResult>,
     format: CameraFormat,
-    fourcc: super::Fourcc,
+    fourcc: Fourcc,
 }
 
 impl Worker {
@@ -174,7 +175,7 @@ impl Owner {
         self.library.set_camera_requset(request)?;
         self.library.open_stream()?;
         let format = self.library.camera_format();
-        let fourcc = super::fourcc(format.format()).ok_or_else(|| {
+        let fourcc = fourcc(format.format()).ok_or_else(|| {
             NokhwaError::OpenStreamError(format!("it gives {} frames", format.format()))
         })?;
         self.stream = Some(Stream {

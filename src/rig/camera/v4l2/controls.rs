@@ -5,9 +5,9 @@ use std::io;
 use rustix::io::Errno;
 use v4l::v4l_sys as sys;
 
-use super::{CameraError, Device, unplugged};
+use super::device::{Device, unplugged};
 use crate::camera::{
-    Control, ControlFault, ControlFlags, ControlId, ControlKind, MenuItem, snake_case,
+    CameraError, Control, ControlFault, ControlFlags, ControlId, ControlKind, MenuItem, snake_case,
 };
 
 /// Most controls that are read of a device, and most items of a menu, in case a faulty driver's list

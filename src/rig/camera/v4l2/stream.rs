@@ -5,10 +5,12 @@ use std::time::{Duration, Instant};
 
 use v4l::v4l_sys as sys;
 
+use super::device::{Device, unplugged};
 use super::ioctl::Mapping;
-use super::{CameraError, Device, unplugged};
 use crate::camera::frame::without_padding;
-use crate::camera::{Fourcc, Frame, GrantedMode, ModeRequest, Rate, SequenceUnwrapper};
+use crate::camera::{
+    CameraError, Fourcc, Frame, GrantedMode, ModeRequest, Rate, SequenceUnwrapper,
+};
 use crate::clock::Clock;
 use relit_data::session::FrameClock;
 use relit_video::PixelFormat;

@@ -3,12 +3,14 @@
 use std::io;
 use std::path::PathBuf;
 
+use relit_data::disk::is_full;
 use relit_data::session;
 use relit_video::VideoError;
 
 /// Why a recording could not begin, be finished, or be salvaged. What ends a recording early is no
 /// such error: see [`super::End`].
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RecordingError {
     /// The system refused a thread.
     #[error("a thread for the {what} could not be started: close other programs")]
@@ -55,12 +57,9 @@ impl RecordingError {
     /// True where a disk, quota or file size limit is exhausted.
     #[must_use]
     pub fn is_out_of_space(&self) -> bool {
-        use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
         match self {
             Self::Video(VideoError::DiskFull { .. }) => true,
-            Self::Session(session::SessionError::Io { source, .. }) => {
-                matches!(source.kind(), StorageFull | QuotaExceeded | FileTooLarge)
-            }
+            Self::Session(session::SessionError::Io { source, .. }) => is_full(source),
             _ => false,
         }
     }

@@ -16,12 +16,12 @@
 
 mod camera_thread;
 mod cutter;
+mod environment_light;
 mod error;
 mod finding;
 mod outcome;
 mod progress;
 mod recorder;
-mod room_light;
 mod salvage;
 mod timing;
 mod verdict;

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use super::cutter::TurnCount;
+use super::environment_light::EnvironmentLight;
 use super::error::RecordingError;
 use super::finding::Finding;
-use super::room_light::RoomLight;
 use crate::camera::{CameraError, FrameFault};
 use relit_data::session::SessionWriter;
 
@@ -57,8 +57,8 @@ pub(super) struct WriterOutcome {
     pub(super) delivered: Vec<Option<usize>>,
     /// What is wrong with delivered frames.
     pub(super) findings: Vec<Finding>,
-    /// What a sample of the turn's frames says of the room.
-    pub(super) light: RoomLight,
+    /// What a sample of the turn's frames says of the environment light.
+    pub(super) light: EnvironmentLight,
     /// Bytes of video.
     pub(super) bytes: u64,
     /// What the disk refused.

@@ -9,10 +9,10 @@ use crossbeam_channel::Sender;
 
 use super::camera_thread::CameraThread;
 use super::cutter::{Cutter, IsKey};
+use super::environment_light::EnvironmentLight;
 use super::error::RecordingError;
 use super::outcome::{CameraOutcome, WriterOutcome};
 use super::progress::{Progress, Shared, State};
-use super::room_light::RoomLight;
 use super::verdict::Recorded;
 use super::window::Window;
 use super::writer_thread::{JournalLine, WriterThread};
@@ -83,7 +83,7 @@ impl Recorder {
             delivered: Vec::new(),
             findings: Vec::new(),
             queue,
-            light: RoomLight::new(stream),
+            light: EnvironmentLight::new(stream),
             shared: Arc::clone(&shared),
         };
         let is_key = (stream.format == PixelFormat::H264).then_some(is_key as IsKey);

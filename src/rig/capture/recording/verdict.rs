@@ -10,6 +10,7 @@ use super::salvage::whole_frames;
 use super::timing::{MissingFrames, TimingAnomaly};
 use crate::state::{TakeSummary, Verdict};
 use relit_data::causes::with_causes;
+use relit_data::disk::DISK_FULL;
 use relit_data::session::{Fault, FrameEntry, TurnJournal};
 
 /// Largest angle that can be right, degrees.
@@ -214,7 +215,7 @@ impl Recorded {
         let mean_bytes = self.writer.bytes / self.recorded().max(1);
         let missing = pending.saturating_add(left.saturating_mul(mean_bytes));
         format!(
-            "the disk is full: in {} about {missing} bytes are missing for the rest of the turn ({}): {}",
+            "{DISK_FULL}: in {} about {missing} bytes are missing for the rest of the turn ({}): {}",
             self.writer.session.folder().display(),
             frames(left),
             first_cause(failure)

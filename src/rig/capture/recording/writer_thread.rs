@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::{Receiver, RecvTimeoutError};
 
 use super::cutter::TurnFrame;
+use super::environment_light::EnvironmentLight;
 use super::error::RecordingError;
 use super::finding::Finding;
 use super::outcome::WriterOutcome;
 use super::progress::Shared;
-use super::room_light::RoomLight;
 use relit_data::session::{FrameEntry, JournaledReport, JournaledTurn, SessionWriter};
 use relit_video::{Muxer, StreamFormat, Written};
 
@@ -34,7 +34,7 @@ pub(super) struct WriterThread {
     pub(super) findings: Vec<Finding>,
     pub(super) queue: Receiver<TurnFrame>,
     pub(super) journal: Receiver<JournalLine>,
-    pub(super) light: RoomLight,
+    pub(super) light: EnvironmentLight,
     pub(super) shared: Arc<Shared>,
 }
 

@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
@@ -31,6 +31,8 @@ use crate::state::{Monitor, Phase};
 
 /// Longest wait for anything in these tests; all that is waited for comes far sooner.
 const LONG: Duration = Duration::from_secs(30);
+/// Between two questions whether something is so.
+const ASKED_EVERY: Duration = Duration::from_millis(5);
 /// What begins and ends as a JPEG does.
 const PICTURE: &[u8] = &[0xFF, 0xD8, 1, 2, 3, 4, 0xFF, 0xD9];
 
@@ -270,6 +272,15 @@ impl Answer {
             text.push(byte[0]);
         }
         String::from_utf8_lossy(&text).into_owned()
+    }
+}
+
+/// Waits until something is so that cannot tell by itself.
+fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let began = Instant::now();
+    while !is_so() {
+        assert!(began.elapsed() < LONG, "it never was so: {what}");
+        thread::park_timeout(ASKED_EVERY);
     }
 }
 

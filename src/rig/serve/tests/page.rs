@@ -1,5 +1,5 @@
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::thread;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use super::{LONG, Serving};
@@ -99,49 +99,43 @@ fn every_path_of_the_description_is_served_and_its_schemas_are_there() {
     assert!(text.contains("set-control"));
 }
 
-#[test]
-fn a_supervisor_hears_that_the_server_is_alive_until_it_ends() {
-    static BEATS: AtomicU32 = AtomicU32::new(0);
-    let mut serving = Serving::with(|options| {
+/// A server whose beats come through a channel, which closes when there will be no more.
+fn beating() -> (Serving, Receiver<()>) {
+    let (sender, beats) = mpsc::channel();
+    let serving = Serving::with(|options| {
         options.heartbeat = Some(Heartbeat {
-            period: Duration::from_millis(20),
-            beat: || {
-                BEATS.fetch_add(1, Ordering::Relaxed);
-            },
+            period: Duration::from_millis(5),
+            beat: Box::new(move || {
+                let _ = sender.send(());
+            }),
         });
     });
+    (serving, beats)
+}
+
+/// Takes the beats that are left, until there will be no more.
+fn wait_end(beats: &Receiver<()>) {
     let began = Instant::now();
-    while BEATS.load(Ordering::Relaxed) < 3 {
-        assert!(began.elapsed() < LONG);
-        thread::sleep(Duration::from_millis(10));
+    while beats.recv_timeout(LONG) != Err(RecvTimeoutError::Disconnected) {
+        assert!(began.elapsed() < LONG, "it beats on");
+    }
+}
+
+#[test]
+fn a_supervisor_hears_that_the_server_is_alive_until_it_ends() {
+    let (mut serving, beats) = beating();
+    for _ in 0..3 {
+        beats.recv_timeout(LONG).unwrap();
     }
     serving.stop();
-    let beats = BEATS.load(Ordering::Relaxed);
-    thread::sleep(Duration::from_millis(100));
-    assert_eq!(BEATS.load(Ordering::Relaxed), beats);
+    wait_end(&beats);
 }
 
 #[test]
 fn a_supervisor_hears_nothing_more_once_the_rig_has_failed() {
-    static BEATS: AtomicU32 = AtomicU32::new(0);
-    let serving = Serving::with(|options| {
-        options.heartbeat = Some(Heartbeat {
-            period: Duration::from_millis(5),
-            beat: || {
-                BEATS.fetch_add(1, Ordering::Relaxed);
-            },
-        });
-    });
-    let beats = || BEATS.load(Ordering::Relaxed);
-    let began = Instant::now();
-    while beats() == 0 {
-        assert!(began.elapsed() < LONG);
-        thread::sleep(Duration::from_millis(5));
-    }
+    let (serving, beats) = beating();
+    beats.recv_timeout(LONG).unwrap();
     serving.rig.failed.store(true, Ordering::Relaxed);
-    // One beat may be under way.
-    thread::sleep(Duration::from_millis(100));
-    let last = beats();
-    thread::sleep(Duration::from_millis(200));
-    assert_eq!(beats(), last);
+    wait_end(&beats);
+    assert_eq!(serving.get("/").status, 200);
 }

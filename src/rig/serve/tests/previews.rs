@@ -1,8 +1,8 @@
 use std::sync::Arc;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use super::{PICTURE, Serving, begin};
+use super::{PICTURE, Serving, begin, wait_until};
 
 #[test]
 fn the_newest_picture_is_served_with_its_number() {
@@ -26,7 +26,10 @@ fn who_has_the_newest_picture_waits_for_the_next() {
     serving.rig.monitor.show(1, PICTURE.into());
     thread::scope(|scope| {
         let waiting = scope.spawn(|| serving.get("/api/v1/preview.jpg?after=1"));
-        thread::sleep(Duration::from_millis(300));
+        wait_until("a viewer waits", || {
+            let metrics = serving.get("/metrics").body;
+            String::from_utf8_lossy(&metrics).contains("relit_http_viewers 1\n")
+        });
         assert!(!waiting.is_finished());
         serving.rig.monitor.show(2, PICTURE.into());
         assert_eq!(waiting.join().unwrap().header("relit-frame"), Some("2"));
@@ -57,14 +60,16 @@ fn a_stream_of_pictures_gives_each_part_at_once() {
 fn a_viewer_that_does_not_read_skips_pictures() {
     let serving = Serving::start();
     let mut stream = begin(&serving, "/api/v1/preview.mjpg");
+    // Another one reads: it takes so long as one that reads needs for all pictures.
+    let mut other = begin(&serving, "/api/v1/preview.mjpg");
     // Far more in all than any buffer on the way holds.
-    let shown: i64 = 60;
+    let shown: i64 = 30;
     for number in 1..=shown {
         let mut jpeg = vec![b'.'; 2_000_000];
         let mark = format!("number {number} ");
         jpeg[..mark.len()].copy_from_slice(mark.as_bytes());
         serving.rig.monitor.show(number, Arc::from(jpeg));
-        thread::sleep(Duration::from_millis(20));
+        other.until(&mark);
     }
     let mut numbers = Vec::new();
     while numbers.last() != Some(&shown) {
@@ -84,13 +89,9 @@ fn a_viewer_that_stopped_reading_loses_its_place() {
     });
     let stream = begin(&serving, "/api/v1/preview.mjpg");
     assert_eq!(serving.get("/api/v1/preview.mjpg").status, 503);
-    let began = Instant::now();
-    let mut free = false;
-    while !free && began.elapsed() < super::LONG {
+    wait_until("its place is free", || {
         serving.rig.monitor.show(1, Arc::from(vec![0; 2_000_000]));
-        thread::sleep(Duration::from_millis(100));
-        free = begin(&serving, "/api/v1/preview.mjpg").status == 200;
-    }
-    assert!(free);
+        begin(&serving, "/api/v1/preview.mjpg").status == 200
+    });
     drop(stream);
 }

@@ -1,5 +1,4 @@
 use std::io::{Read, Write};
-use std::thread;
 use std::time::{Duration, Instant};
 
 use super::{Answer, LONG, Serving};
@@ -305,7 +304,6 @@ fn garbage_on_the_wire_is_answered_or_closed_and_the_next_client_served() {
         socket.shutdown(std::net::Shutdown::Write).unwrap();
         let _ = socket.read_to_end(&mut Vec::new());
     }
-    thread::sleep(Duration::from_millis(50));
     assert_eq!(serving.get("/api/v1/state").status, 200);
 }
 

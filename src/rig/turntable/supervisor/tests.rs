@@ -13,20 +13,20 @@ const TRAITS: ControllerTraits = ControllerTraits {
 };
 
 /// A supervisor with its time, driven by hand.
-struct Desk {
+struct Bench {
     supervisor: Supervisor,
     now_us: i64,
 }
 
-impl Desk {
-    fn new() -> Desk {
+impl Bench {
+    fn new() -> Bench {
         let supervisor = Supervisor::new(TRAITS);
-        let mut desk = Desk {
+        let mut bench = Bench {
             supervisor,
             now_us: 0,
         };
-        desk.supervisor.set_zero_deg(0.0);
-        desk
+        bench.supervisor.set_zero_deg(0.0);
+        bench
     }
 
     /// Lets time pass; gives what is sent, without the questions.
@@ -68,180 +68,180 @@ impl Desk {
 
 #[test]
 fn a_stop_holds_waits_for_rest_and_resets_only_then() {
-    let mut desk = Desk::new();
-    desk.moving(100.0);
-    desk.report("Run", 10.0, 1);
-    desk.supervisor.request_stop(desk.now_us);
-    assert_eq!(desk.report("Hold:1", 10.5, 1), b"!");
-    let sent = desk.report("Hold:1", 11.0, 2);
+    let mut bench = Bench::new();
+    bench.moving(100.0);
+    bench.report("Run", 10.0, 1);
+    bench.supervisor.request_stop(bench.now_us);
+    assert_eq!(bench.report("Hold:1", 10.5, 1), b"!");
+    let sent = bench.report("Hold:1", 11.0, 2);
     assert!(!sent.contains(&0x18));
-    desk.report("Hold:0", 11.2, 2);
-    assert_eq!(desk.pass(20), [0x18]);
-    desk.hear("Grbl 1.1h ['$' for help]");
-    assert!(desk.supervisor.is_stopping());
-    desk.report("Idle", 11.2, 2);
-    assert_eq!(desk.supervisor.stopped(), Some(StopOutcome::Standing));
-    assert_eq!(desk.supervisor.zero_deg(), Some(0.0));
-    assert_eq!(desk.supervisor.fault(), Some(&MotionFault::Stopped));
+    bench.report("Hold:0", 11.2, 2);
+    assert_eq!(bench.pass(20), [0x18]);
+    bench.hear("Grbl 1.1h ['$' for help]");
+    assert!(bench.supervisor.is_stopping());
+    bench.report("Idle", 11.2, 2);
+    assert_eq!(bench.supervisor.stopped(), Some(StopOutcome::Standing));
+    assert_eq!(bench.supervisor.zero_deg(), Some(0.0));
+    assert_eq!(bench.supervisor.fault(), Some(&MotionFault::Stopped));
 }
 
 #[test]
 fn a_hold_that_is_lost_is_sent_again() {
-    let mut desk = Desk::new();
-    desk.supervisor.request_stop(0);
-    let sent = desk.report("Run", 10.0, 8);
+    let mut bench = Bench::new();
+    bench.supervisor.request_stop(0);
+    let sent = bench.report("Run", 10.0, 8);
     assert!(sent.iter().filter(|byte| **byte == b'!').count() >= 2);
     assert!(!sent.contains(&0x18));
 }
 
 #[test]
 fn a_table_that_does_not_slow_down_or_says_nothing_is_reset_in_motion_and_not_homed_any_more() {
-    let mut desk = Desk::new();
-    desk.supervisor.request_stop(0);
-    assert!(desk.report("Run", 10.0, 70).contains(&0x18));
-    desk.hear("ALARM:3");
-    desk.hear("Grbl 1.1h ['$' for help]");
-    desk.report("Alarm", 10.0, 2);
-    assert_eq!(desk.supervisor.stopped(), Some(StopOutcome::Standing));
-    assert_eq!(desk.supervisor.zero_deg(), None);
+    let mut bench = Bench::new();
+    bench.supervisor.request_stop(0);
+    assert!(bench.report("Run", 10.0, 70).contains(&0x18));
+    bench.hear("ALARM:3");
+    bench.hear("Grbl 1.1h ['$' for help]");
+    bench.report("Alarm", 10.0, 2);
+    assert_eq!(bench.supervisor.stopped(), Some(StopOutcome::Standing));
+    assert_eq!(bench.supervisor.zero_deg(), None);
 
-    let mut desk = Desk::new();
-    desk.supervisor.request_stop(0);
-    assert!(desk.pass(1000).contains(&0x18));
-    desk.pass(6000);
-    assert_eq!(desk.supervisor.stopped(), Some(StopOutcome::Unknown));
-    assert_eq!(desk.supervisor.zero_deg(), None);
+    let mut bench = Bench::new();
+    bench.supervisor.request_stop(0);
+    assert!(bench.pass(1000).contains(&0x18));
+    bench.pass(6000);
+    assert_eq!(bench.supervisor.stopped(), Some(StopOutcome::Unknown));
+    assert_eq!(bench.supervisor.zero_deg(), None);
 }
 
 #[test]
 fn a_search_for_the_index_is_ended_by_a_reset() {
-    let mut desk = Desk::new();
-    desk.supervisor.request_stop(0);
-    let sent = desk.report("Home", 10.0, 2);
-    assert!(sent.ends_with(&[0x18]) || desk.pass(20) == [0x18]);
+    let mut bench = Bench::new();
+    bench.supervisor.request_stop(0);
+    let sent = bench.report("Home", 10.0, 2);
+    assert!(sent.ends_with(&[0x18]) || bench.pass(20) == [0x18]);
 }
 
 #[test]
 fn a_reset_that_counts_from_elsewhere_afterwards_has_lost_the_position() {
-    let mut desk = Desk::new();
-    desk.supervisor.request_stop(0);
-    desk.report("Hold:0", 11.2, 2);
-    desk.pass(20);
-    desk.hear("Grbl 1.1h ['$' for help]");
-    desk.report("Idle", 0.0, 2);
-    assert_eq!(desk.supervisor.stopped(), Some(StopOutcome::Displaced));
-    assert_eq!(desk.supervisor.zero_deg(), None);
+    let mut bench = Bench::new();
+    bench.supervisor.request_stop(0);
+    bench.report("Hold:0", 11.2, 2);
+    bench.pass(20);
+    bench.hear("Grbl 1.1h ['$' for help]");
+    bench.report("Idle", 0.0, 2);
+    assert_eq!(bench.supervisor.stopped(), Some(StopOutcome::Displaced));
+    assert_eq!(bench.supervisor.zero_deg(), None);
 }
 
 #[test]
 fn a_restart_for_another_reason_during_a_stop_loses_the_position() {
-    let mut desk = Desk::new();
-    desk.supervisor.request_stop(0);
-    desk.report("Hold:0", 11.2, 2);
-    desk.pass(20);
-    desk.hear("Grbl 1.1h ['$' for help] [reset: brown-out]");
-    assert_eq!(desk.supervisor.zero_deg(), None);
-    desk.report("Idle", 11.2, 2);
-    assert!(!desk.supervisor.is_stopping());
+    let mut bench = Bench::new();
+    bench.supervisor.request_stop(0);
+    bench.report("Hold:0", 11.2, 2);
+    bench.pass(20);
+    bench.hear("Grbl 1.1h ['$' for help] [reset: brown-out]");
+    assert_eq!(bench.supervisor.zero_deg(), None);
+    bench.report("Idle", 11.2, 2);
+    assert!(!bench.supervisor.is_stopping());
 }
 
 #[test]
 fn nothing_is_sent_while_the_table_is_being_stopped() {
-    let mut desk = Desk::new();
-    desk.supervisor.request_stop(0);
-    let sent = desk.supervisor.send(0, "$X", ReplyTimeout::AtOnce);
+    let mut bench = Bench::new();
+    bench.supervisor.request_stop(0);
+    let sent = bench.supervisor.send(0, "$X", ReplyTimeout::AtOnce);
     assert_eq!(sent, Err(SendError::Busy));
 }
 
 #[test]
 fn a_motion_is_over_when_the_table_rests_at_its_target_by_a_report_asked_for_afterwards() {
-    let mut desk = Desk::new();
-    desk.moving(10.0);
-    desk.hear("<Idle|MPos:10.000,0.000,0.000|FS:0,0>");
-    assert!(!desk.supervisor.motion().unwrap().is_at_target());
-    desk.report("Run", 5.0, 1);
-    desk.report("Idle", 9.991, 1);
-    assert!(desk.supervisor.motion().unwrap().is_at_target());
-    assert_eq!(desk.supervisor.fault(), None);
+    let mut bench = Bench::new();
+    bench.moving(10.0);
+    bench.hear("<Idle|MPos:10.000,0.000,0.000|FS:0,0>");
+    assert!(!bench.supervisor.motion().unwrap().is_at_target());
+    bench.report("Run", 5.0, 1);
+    bench.report("Idle", 9.991, 1);
+    assert!(bench.supervisor.motion().unwrap().is_at_target());
+    assert_eq!(bench.supervisor.fault(), None);
 }
 
 #[test]
 fn a_table_that_rests_elsewhere_is_astray_after_a_while() {
-    let mut desk = Desk::new();
-    desk.moving(10.0);
-    desk.report("Idle", 0.0, 5);
-    assert_eq!(desk.supervisor.fault(), None);
-    desk.report("Idle", 0.0, 5);
+    let mut bench = Bench::new();
+    bench.moving(10.0);
+    bench.report("Idle", 0.0, 5);
+    assert_eq!(bench.supervisor.fault(), None);
+    bench.report("Idle", 0.0, 5);
     assert!(matches!(
-        desk.supervisor.fault(),
+        bench.supervisor.fault(),
         Some(MotionFault::Astray { .. })
     ));
-    assert!(desk.supervisor.is_stopping());
+    assert!(bench.supervisor.is_stopping());
 }
 
 #[test]
 fn a_motion_that_takes_too_long_is_late() {
-    let mut desk = Desk::new();
-    desk.moving(1000.0);
+    let mut bench = Bench::new();
+    bench.moving(1000.0);
     for tenth in 0..750 {
-        desk.report("Run", f64::from(tenth) / 10.0, 1);
+        bench.report("Run", f64::from(tenth) / 10.0, 1);
     }
-    assert_eq!(desk.supervisor.fault(), None);
-    desk.report("Run", 80.0, 1);
-    desk.pass(500);
-    assert_eq!(desk.supervisor.fault(), Some(&MotionFault::Late));
+    assert_eq!(bench.supervisor.fault(), None);
+    bench.report("Run", 80.0, 1);
+    bench.pass(500);
+    assert_eq!(bench.supervisor.fault(), Some(&MotionFault::Late));
 }
 
 #[test]
 fn work_positions_count_once_their_zero_is_known_and_inches_are_converted() {
-    let mut desk = Desk::new();
-    desk.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0>");
-    assert!(desk.supervisor.last_report().is_none());
-    desk.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0|WCO:2.000,0.000,0.000>");
-    assert_eq!(desk.supervisor.last_report().unwrap().machine_deg, 3.0);
-    desk.supervisor.set_traits(ControllerTraits {
+    let mut bench = Bench::new();
+    bench.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0>");
+    assert!(bench.supervisor.last_report().is_none());
+    bench.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0|WCO:2.000,0.000,0.000>");
+    assert_eq!(bench.supervisor.last_report().unwrap().machine_deg, 3.0);
+    bench.supervisor.set_traits(ControllerTraits {
         degrees_per_unit: 25.4,
         ..TRAITS
     });
-    desk.hear("<Idle|MPos:1.000,0.000,0.000|FS:0,0>");
-    assert_eq!(desk.supervisor.last_report().unwrap().machine_deg, 25.4);
+    bench.hear("<Idle|MPos:1.000,0.000,0.000|FS:0,0>");
+    assert_eq!(bench.supervisor.last_report().unwrap().machine_deg, 25.4);
 }
 
 #[test]
 fn without_checksums_a_report_counts_when_the_one_before_says_the_same() {
-    let mut desk = Desk::new();
-    desk.report("Idle", 3.0, 2);
-    assert!(desk.supervisor.is_confirmed());
-    desk.report("Idle", 673.0, 1);
-    assert!(!desk.supervisor.is_confirmed());
-    desk.report("Idle", 3.0, 2);
-    assert!(desk.supervisor.is_confirmed());
-    desk.report("Run", 3.0, 1);
-    assert!(!desk.supervisor.is_confirmed());
-    desk.report("Run", 4.0, 1);
-    assert!(desk.supervisor.is_confirmed());
+    let mut bench = Bench::new();
+    bench.report("Idle", 3.0, 2);
+    assert!(bench.supervisor.is_confirmed());
+    bench.report("Idle", 673.0, 1);
+    assert!(!bench.supervisor.is_confirmed());
+    bench.report("Idle", 3.0, 2);
+    assert!(bench.supervisor.is_confirmed());
+    bench.report("Run", 3.0, 1);
+    assert!(!bench.supervisor.is_confirmed());
+    bench.report("Run", 4.0, 1);
+    assert!(bench.supervisor.is_confirmed());
 }
 
 #[test]
 fn a_report_that_comes_twice_and_late_is_no_stall() {
-    let mut desk = Desk::new();
-    desk.moving(10.0);
-    desk.report("Run", 5.0, 1);
-    desk.now_us += 850_000;
-    desk.hear("<Run|MPos:5.000,0.000,0.000|FS:432,0>");
-    assert_eq!(desk.supervisor.fault(), None);
-    desk.report("Run", 5.0, 12);
+    let mut bench = Bench::new();
+    bench.moving(10.0);
+    bench.report("Run", 5.0, 1);
+    bench.now_us += 850_000;
+    bench.hear("<Run|MPos:5.000,0.000,0.000|FS:432,0>");
+    assert_eq!(bench.supervisor.fault(), None);
+    bench.report("Run", 5.0, 12);
     assert!(matches!(
-        desk.supervisor.fault(),
+        bench.supervisor.fault(),
         Some(MotionFault::Stalled { .. })
     ));
 }
 
 #[test]
 fn a_banner_at_rest_loses_the_position_without_stopping_anything() {
-    let mut desk = Desk::new();
-    desk.hear("Grbl 1.1h ['$' for help]");
-    assert_eq!(desk.supervisor.zero_deg(), None);
-    assert!(!desk.supervisor.is_stopping());
-    assert_eq!(desk.supervisor.restarts(), 1);
+    let mut bench = Bench::new();
+    bench.hear("Grbl 1.1h ['$' for help]");
+    assert_eq!(bench.supervisor.zero_deg(), None);
+    assert!(!bench.supervisor.is_stopping());
+    assert_eq!(bench.supervisor.restarts(), 1);
 }

@@ -39,6 +39,7 @@ const WRAP_US: f64 = 4_294_967_296.0;
 
 /// Why the reports do not determine the angles.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TrackError {
     /// Too few reports.
     #[error(

@@ -1,15 +1,17 @@
-//! What `relight insert` is told: its arguments, and the scene that they describe.
+//! The arguments of `relight insert`, and the scene that they describe.
 
 use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{ArgAction, Args};
-use relight_photo::insert::{LightDescription, ObjectDescription, SceneDescription};
+use relight_core::captured_object::CapturedObject;
+use relight_core::files::OutputKind;
+use relight_photo::files::{InsertionOutput, PhotoReading};
+use relight_photo::insert::{LightDescription, LightSource, ObjectDescription, SceneDescription};
 
-use super::work::is_captured;
 use crate::commands::relight::{degrees, gloss_numbers, tint};
-use crate::photos::{Bits, NetworkArguments, OutputKind, own_mask};
+use crate::photos::{Bits, NetworkArguments};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -23,7 +25,7 @@ Examples:
   relight insert object.relit --into room.hdr -o out.png
       an object that relight turn --asset has written
   relight insert --scene scene.toml -o out.png
-      all of it from a file (docs/insert.md)";
+      all of it from a file (docs/relight-insert.md)";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -75,13 +77,13 @@ pub(crate) struct Arguments {
     pub(super) turn: Option<f64>,
     /// How long the turn takes, seconds.
     #[arg(long, value_name = "SECONDS", value_parser = number, default_value_t = 10.0, requires = "turn")]
-    pub(super) seconds: f64,
+    seconds: f64,
     /// Frames a second of a turn.
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240))]
-    pub(super) fps: u32,
+    fps: u32,
     /// Bits a channel of a PNG.
     #[arg(long, value_enum, default_value = "8")]
-    pub(super) bits: Bits,
+    bits: Bits,
     #[command(flatten)]
     pub(super) network: NetworkArguments,
 }
@@ -104,7 +106,7 @@ struct ObjectArguments {
     /// Multiply the object's albedo with a colour, linear.
     #[arg(long, value_name = "R,G,B", value_parser = tint, action = ArgAction::Append, conflicts_with = "scene")]
     tint: Vec<[f32; 3]>,
-    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is matt.
+    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is diffuse.
     #[arg(long, value_name = "PART,SMOOTHNESS", value_parser = gloss_numbers, action = ArgAction::Append, conflicts_with = "scene")]
     gloss: Vec<[f32; 2]>,
     /// The object's brightness in stops.
@@ -182,6 +184,17 @@ impl Arguments {
         })
     }
 
+    /// The file that is asked for.
+    pub(super) fn written(&self) -> InsertionOutput<'_> {
+        InsertionOutput {
+            path: &self.output,
+            depth: self.bits.into(),
+            turn: self.turn.unwrap_or(360.0),
+            seconds: self.seconds,
+            frames_per_second: self.fps,
+        }
+    }
+
     /// The scene that is asked for, and the folder that its paths are relative to.
     pub(super) fn description(&self) -> Result<(SceneDescription, PathBuf), Box<dyn Error>> {
         if let Some(path) = &self.scene {
@@ -195,12 +208,8 @@ impl Arguments {
         let objects = (0..self.photos.len())
             .map(|number| self.object.describe(&self.photos, number))
             .collect();
-        let is_text = |path: &Path| {
-            path.extension()
-                .is_some_and(|e| e.eq_ignore_ascii_case("txt"))
-        };
         let (coefficients, panorama) = match &self.light.light {
-            Some(path) if is_text(path) => (Some(path.clone()), None),
+            Some(path) if LightSource::is_text(path) => (Some(path.clone()), None),
             other => (None, other.clone()),
         };
         let scene = SceneDescription {
@@ -233,10 +242,10 @@ impl ObjectArguments {
         ObjectDescription {
             mask: of(&self.mask, number)
                 // A folder of masks is for the photographs.
-                .filter(|mask| !(is_captured(&photo) && mask.is_dir()))
+                .filter(|mask| !(CapturedObject::is_named(&photo) && mask.is_dir()))
                 .map(|mask| {
                     let name = photo.file_stem().unwrap_or_default();
-                    own_mask(&mask, &name.to_string_lossy())
+                    PhotoReading::mask_path(&mask, &name.to_string_lossy())
                 }),
             at: of(&self.at, number).unwrap_or([across, 0.9]),
             height: of(&self.height, number).unwrap_or(0.4),

@@ -1,13 +1,13 @@
-//! What `relight turn` is told.
+//! The arguments of `relight turn`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use relight_core::light::{Order, Panorama, ShLight};
+use relight_core::light::ShLight;
 use relight_turn::{
-    BodyKind, Elevation, NormalsSource, Probe, ProbeBall, ProbePlace, ReadTurn, TableSense,
-    TurnOptions, prior_normals,
+    Elevation, MaterialKind, NormalsSource, Probe, ProbeBall, ProbePlace, ReadTurn,
+    RotationDirection, TurnOptions, prior_normals, read_given_light,
 };
 
 use crate::shipped;
@@ -20,7 +20,7 @@ Examples:
   relight turn mug.tar --elevation 18 --light light.txt -o mug
       the light was measured: coefficients in the viewer's frame at the table's angle 0, or a panorama
   relight turn mug.tar --rim 812,251 --normals none -o mug
-      the table's rim is an ellipse of 812 x 251 pixels; no network, but the outline to start from";
+      the table's rim is an ellipse of 812 x 251 pixels; no network, but the outline to initialise";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -42,20 +42,20 @@ pub(crate) struct Arguments {
     /// (nine lines of red, green and blue, or up to 49), or a panorama (.hdr, .exr).
     #[arg(long, value_name = "FILE")]
     pub(super) light: Option<PathBuf>,
-    /// The session from which the shard was made, or its video: to see the room (room.png), and the ball of --probe. Needs the
-    /// program ffmpeg.
+    /// The session from which the shard was made, or its video: to see the surroundings (room.png), and the ball of
+    /// --probe. Needs the program ffmpeg.
     #[arg(long, value_name = "PATH")]
     pub(super) session: Option<PathBuf>,
-    /// A ball on the table, matt grey or chrome, which measures the light: its middle and radius in the video, pixels. The light is
-    /// then in units in which the ball's albedo is 1.
+    /// A ball on the table, diffuse grey or chrome, which measures the light: its middle and radius in the video,
+    /// pixels. The light is then in units in which the ball's albedo is 1.
     #[arg(long, value_name = "X,Y,R", value_parser = probe, requires = "session", conflicts_with = "light")]
     pub(super) probe: Option<ProbePlace>,
     /// What the ball is made of: without it, what it looks like.
     #[arg(long, value_enum, value_name = "KIND", requires = "probe")]
     pub(super) probe_ball: Option<BallName>,
-    /// Normals to start from: "shipped" (the network that comes with the program), "none", a network (.onnx, or weights
-    /// of decompose: .safetensors, .pth), a map of normals (.png, .exr), or a folder with normal.png
-    /// [default: shipped, and none with --light].
+    /// Normals that initialise: "shipped" (the network that comes with the program), "none", a network (.onnx, or
+    /// weights of decompose: .safetensors, .pth), a map of normals (.png, .exr), or a folder with normal.png [default:
+    /// shipped, and none with --light].
     #[arg(long, value_name = "FROM")]
     normals: Option<String>,
     /// Which way y points in these normals.
@@ -64,16 +64,16 @@ pub(crate) struct Arguments {
     /// How much these normals count beside what the turn says.
     #[arg(long, value_name = "WEIGHT", default_value_t = TurnOptions::default().prior_weight, value_parser = weight)]
     pub(super) normals_weight: f64,
-    /// What the object is made of: without it, what explains the turn.
-    #[arg(long, value_enum, value_name = "KIND")]
-    pub(super) body: Option<BodyName>,
-    /// Which way the table turns as its angle grows, seen from above.
-    #[arg(long, value_enum, default_value_t = SenseName::CounterClockwise)]
-    sense: SenseName,
+    /// The object's material: without it, the one that fits the turn.
+    #[arg(long, alias = "body", value_enum, value_name = "KIND")]
+    pub(super) material: Option<MaterialName>,
+    /// The table's rotation direction as its angle grows, seen from above.
+    #[arg(long, alias = "sense", value_enum, default_value_t = DirectionName::CounterClockwise)]
+    direction: DirectionName,
     /// Write the object as one file that can be lit, object.relit.
     #[arg(long, value_name = "FILE")]
     pub(super) asset: Option<PathBuf>,
-    /// Write twelve frames with what was found as their truth, in the layout of synth, for train to read.
+    /// Write twelve frames with what was fitted as labels, in the layout of synth, for train to read.
     #[arg(long, value_name = "DIR")]
     pub(super) labels: Option<PathBuf>,
     /// The least confidence, 0 to 1, of pixels in the labels.
@@ -85,14 +85,14 @@ pub(crate) struct Arguments {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-pub(super) enum SenseName {
+pub(super) enum DirectionName {
     /// The background moves to the right.
     CounterClockwise,
     /// The background moves to the left.
     Clockwise,
 }
 
-impl SenseName {
+impl DirectionName {
     /// The name of the other one.
     pub(super) const fn other(self) -> &'static str {
         match self {
@@ -104,7 +104,7 @@ impl SenseName {
 
 #[derive(Clone, Copy, ValueEnum)]
 pub(super) enum BallName {
-    /// It is matt.
+    /// It is diffuse.
     Grey,
     /// It mirrors.
     Chrome,
@@ -120,35 +120,35 @@ impl From<BallName> for ProbeBall {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-pub(super) enum BodyName {
+pub(super) enum MaterialName {
     /// It scatters light, with gloss or without.
     Diffuse,
     /// It only reflects, in its own colour.
     Metal,
 }
 
-impl From<BodyName> for BodyKind {
-    fn from(name: BodyName) -> Self {
+impl From<MaterialName> for MaterialKind {
+    fn from(name: MaterialName) -> Self {
         match name {
-            BodyName::Diffuse => Self::Diffuse,
-            BodyName::Metal => Self::Metal,
+            MaterialName::Diffuse => Self::Diffuse,
+            MaterialName::Metal => Self::Metal,
         }
     }
 }
 
 impl Arguments {
-    pub(super) const fn sense_name(&self) -> SenseName {
-        self.sense
+    pub(super) const fn direction_name(&self) -> DirectionName {
+        self.direction
     }
 
-    pub(super) fn sense(&self) -> TableSense {
-        match self.sense {
-            SenseName::CounterClockwise => TableSense::CounterClockwise,
-            SenseName::Clockwise => TableSense::Clockwise,
+    pub(super) fn direction(&self) -> RotationDirection {
+        match self.direction {
+            DirectionName::CounterClockwise => RotationDirection::CounterClockwise,
+            DirectionName::Clockwise => RotationDirection::Clockwise,
         }
     }
 
-    /// The normals to start from, and how they are named.
+    /// The normals that initialise, and how they are named.
     pub(super) fn normals(&self) -> Option<(NormalsSource, &str)> {
         match self.normals.as_deref() {
             None if self.light.is_some() || self.probe.is_some() => None,
@@ -189,35 +189,14 @@ impl Arguments {
         Ok(TurnOptions {
             elevation: self.elevation(),
             light: match &self.light {
-                Some(path) => Some(read_light(path)?),
+                Some(path) => Some(read_given_light(path)?),
                 None => measured,
             },
             prior: prior.transpose()?,
             prior_weight: self.normals_weight,
-            body: self.body.map(BodyKind::from),
+            material: self.material.map(MaterialKind::from),
         })
     }
-}
-
-pub(super) fn ball_name(ball: ProbeBall) -> &'static str {
-    match ball {
-        ProbeBall::Grey => "grey",
-        ProbeBall::Chrome => "chrome",
-    }
-}
-
-/// The order to which a panorama is taken up: gloss shows more of it than a matt surface.
-const KNOWN_ORDER: usize = 6;
-
-fn read_light(path: &Path) -> Result<ShLight, Box<dyn Error>> {
-    let is_panorama = path.extension().is_some_and(|ending| {
-        ending.eq_ignore_ascii_case("hdr") || ending.eq_ignore_ascii_case("exr")
-    });
-    if is_panorama {
-        let order = Order::new(KNOWN_ORDER).unwrap_or(Order::TWO);
-        return Ok(Panorama::read(path)?.project(order));
-    }
-    Ok(ShLight::read(path)?)
 }
 
 fn elevation(text: &str) -> Result<Elevation, String> {

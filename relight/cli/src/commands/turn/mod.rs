@@ -1,41 +1,40 @@
-//! `relight turn`: a whole turn into normals, albedo, light and what they leave over.
+//! `relight turn`: a whole turn into normals, albedo, light and their residuals.
 
 mod arguments;
-mod places;
 mod warnings;
 
 use std::error::Error;
 use std::time::Instant;
 
 use relight_turn::{
-    BodyKind, Filmed, ProbeLight, ReadTurn, TurnError, TurnFigures, TurnFiles, TurnLabels,
-    TurnMaps, TurnSolution, film, read_curves, solve_turn,
+    AssetDestination, DestinationError, Destinations, Filmed, ProbeLight, ReadTurn, TurnError,
+    TurnFigures, TurnFiles, TurnLabels, TurnMaps, TurnSolution, TurnWarning, film, read_curves,
+    solve_turn,
 };
+use relit_console::{Console, Outcome};
 use serde_json::json;
 
-use self::arguments::ball_name;
 pub(crate) use self::arguments::{Arguments, EXAMPLES};
-use self::places::{AssetPlace, check_places};
-use self::warnings::{warn, warn_of, warn_of_room, warn_of_sense};
-use crate::console::{CommandResult, Console, Outcome};
+use self::warnings::{warn, warn_of};
+use crate::commands::CommandResult;
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let start = Instant::now();
-    let asset = check_places(arguments)?;
+    let asset = check_destinations(arguments)?;
     let turn = read(arguments, console)?;
     let read_seconds = start.elapsed().as_secs_f64();
-    let mut filmed = film_room(arguments, &turn, console)?;
+    let mut filmed = film_surroundings(arguments, &turn, console)?;
     let measured = filmed.as_mut().map(Filmed::light).transpose()?.flatten();
     if let Some(measured) = &measured {
-        warn_of_ball(measured, console);
+        warn_of(TurnWarning::of_ball(measured), arguments, console);
     }
     let light_source = light_source(arguments, measured.as_ref());
     let options = arguments.options(&turn, measured.map(|measured| measured.light))?;
     let solution = solve_turn(&turn.curves, &options)?;
     let strip = filmed.as_ref().and_then(Filmed::strip);
     let object = match asset {
-        AssetPlace::None => None,
-        AssetPlace::Inside | AssetPlace::Beside(_) => Some(solution.asset(&turn)?),
+        AssetDestination::None => None,
+        AssetDestination::Inside | AssetDestination::Beside(_) => Some(solution.asset(&turn)?),
     };
     let figures = TurnFiles {
         turn: &turn,
@@ -44,11 +43,13 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         light_source: light_source.as_deref(),
         normals_source: arguments.normals().map(|(_, name)| name),
         strip,
-        asset: object.as_ref().filter(|_| asset == AssetPlace::Inside),
+        asset: object
+            .as_ref()
+            .filter(|_| asset == AssetDestination::Inside),
         has_movie: !arguments.no_video,
     }
     .write(&arguments.output)?;
-    if let (AssetPlace::Beside(path), Some(object)) = (asset, &object) {
+    if let (AssetDestination::Beside(path), Some(object)) = (asset, &object) {
         object.write(path).map_err(TurnError::from)?;
     }
     let refused = write_labels(arguments, &turn, &solution)?;
@@ -60,13 +61,19 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         console,
     );
     if arguments.session.is_some() {
-        warn_of_room(strip, arguments.sense_name(), console);
+        warn_of(TurnWarning::of_background(strip), arguments, console);
     }
     // The background, where it was seen, says more.
     if strip.is_none() {
-        warn_of_sense(&solution, arguments.sense_name(), console);
+        warn_of(TurnWarning::of_direction(&solution), arguments, console);
     }
-    let outcome = warn_of(&turn, &options, &solution, console);
+    let warnings = TurnWarning::of_solution(&turn, &options, &solution);
+    warn_of(warnings, arguments, console);
+    let outcome = if solution.is_whole(&turn) {
+        Outcome::Whole
+    } else {
+        Outcome::Incomplete
+    };
     let Some(refused) = refused else {
         return Ok(outcome);
     };
@@ -74,9 +81,24 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     Ok(Outcome::Incomplete)
 }
 
+/// Refuses places that cannot be written, before the work.
+fn check_destinations(arguments: &Arguments) -> Result<AssetDestination<'_>, Box<dyn Error>> {
+    let destinations = Destinations {
+        output: &arguments.output,
+        labels: arguments.labels.as_deref(),
+        asset: arguments.asset.as_deref(),
+        has_movie: !arguments.no_video,
+    };
+    destinations.check().map_err(|error| match error {
+        DestinationError::Labels(_) => format!("--labels {error}").into(),
+        DestinationError::AssetPlace { .. } => format!("--asset {error}").into(),
+        error => error.into(),
+    })
+}
+
 fn read(arguments: &Arguments, console: Console) -> Result<ReadTurn, TurnError> {
     let bar = console.progress(0, "frames");
-    let turn = read_curves(&arguments.shard, arguments.sense(), &|done, all| {
+    let turn = read_curves(&arguments.shard, arguments.direction(), &|done, all| {
         bar.set_length(all);
         bar.set_position(done);
     })?;
@@ -85,7 +107,7 @@ fn read(arguments: &Arguments, console: Console) -> Result<ReadTurn, TurnError> 
 }
 
 /// What the session's video shows, where there is one.
-fn film_room(
+fn film_surroundings(
     arguments: &Arguments,
     turn: &ReadTurn,
     console: Console,
@@ -101,29 +123,11 @@ fn film_room(
     .map(Some)
 }
 
-fn warn_of_ball(measured: &ProbeLight, console: Console) {
-    if measured.ball != measured.looks {
-        let text = format!(
-            "the ball was called {}, but it looks {}",
-            ball_name(measured.ball),
-            ball_name(measured.looks)
-        );
-        warn(&text, console);
-    }
-    if measured.is_doubtful() {
-        let text = format!(
-            "the light by the ball leaves {:.0} % of what varies in it: measure its middle and radius in the video again, and see that nothing shades it",
-            100.0 * measured.left
-        );
-        warn(&text, console);
-    }
-}
-
 /// Where the light is from; none where it is to be found.
 fn light_source(arguments: &Arguments, measured: Option<&ProbeLight>) -> Option<String> {
     let given = arguments.light.as_ref();
     let given = given.map(|path| path.display().to_string());
-    given.or_else(|| measured.map(|measured| format!("probe, {}", ball_name(measured.ball))))
+    given.or_else(|| measured.map(|measured| format!("probe, {}", measured.ball)))
 }
 
 /// Writes the labels that are asked for; why there are none.
@@ -156,7 +160,7 @@ fn say(
     console: Console,
 ) {
     let text = format!(
-        "{}: {} frames in {read_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees (median), light {}, body {}",
+        "{}: {} frames in {read_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees (median), light {}, material {}",
         arguments.output.display(),
         figures.frames(),
         solution.expected_error_deg(),
@@ -165,10 +169,7 @@ fn say(
             (None, Some(_)) => "measured",
             (None, None) => "found",
         },
-        match solution.body() {
-            BodyKind::Diffuse => "diffuse",
-            BodyKind::Metal => "metal",
-        },
+        solution.material(),
     );
     let event = json!({
         "event": "turned",

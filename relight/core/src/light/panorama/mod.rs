@@ -36,6 +36,7 @@ const LEAST_HEIGHT: usize = 4;
 
 /// Why a panorama is not read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PanoramaError {
     /// The file is no image that can be read.
     #[error(transparent)]

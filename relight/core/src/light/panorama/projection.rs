@@ -28,11 +28,11 @@ impl Panorama {
     #[must_use]
     pub fn project(&self, order: Order) -> ShLight {
         let Extent { width, height } = self.extent();
-        let waves = Waves::new(order, width);
+        let harmonics = AzimuthHarmonics::new(order, width);
         let step = PI / height as f64;
         let quadrature = Quadrature::for_waves(order.get() + 1, step);
         let rows: Vec<Vec<[f64; 3]>> = parallel::map(height, |row| {
-            let sums = self.sums_of_row(row, &waves);
+            let sums = self.sums_of_row(row, &harmonics);
             let polar = polar_integrals(order, &quadrature, row as f64 * step, step);
             spread(order, &sums, &polar)
         });
@@ -69,27 +69,27 @@ impl Panorama {
 
     /// The integrals over the azimuth of a row's radiance times cos mφ (at m) and sin mφ (at -m), with
     /// -order first.
-    fn sums_of_row(&self, row: usize, waves: &Waves) -> Vec<[f64; 3]> {
+    fn sums_of_row(&self, row: usize, harmonics: &AzimuthHarmonics) -> Vec<[f64; 3]> {
         let width = self.extent().width;
         let planes = self.image.planes().planes();
         let row = planes.map(|plane| &plane[row * width..(row + 1) * width]);
-        let sum = |wave: &[f64], channel: &[f32]| -> f64 {
-            let products = wave.iter().zip(channel);
+        let sum = |harmonic: &[f64], channel: &[f32]| -> f64 {
+            let products = harmonic.iter().zip(channel);
             products.map(|(w, &value)| w * f64::from(value)).sum()
         };
-        let waves = waves.integrals.chunks_exact(width);
-        waves
-            .map(|wave| row.map(|channel| sum(wave, channel)))
+        let harmonics = harmonics.integrals.chunks_exact(width);
+        harmonics
+            .map(|harmonic| row.map(|channel| sum(harmonic, channel)))
             .collect()
     }
 }
 
 /// The integrals of cos mφ and sin mφ over each column, by m from -order on.
-struct Waves {
+struct AzimuthHarmonics {
     integrals: Vec<f64>,
 }
 
-impl Waves {
+impl AzimuthHarmonics {
     fn new(order: Order, width: usize) -> Self {
         let order = order.get() as i32;
         let step = 2.0 * PI / width as f64;

@@ -1,0 +1,138 @@
+//! Photographs that cannot be decomposed, and what is said of them.
+
+use std::fs;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::PathBuf;
+
+use image::{GrayImage, ImageBuffer, Rgb as Pixel, RgbImage};
+use relight_photo::decompose::{DecomposeError, DecomposeOptions, Rectangle};
+use relight_photo::files::{PhotoInput, PhotoReading};
+use relit_data::causes::with_causes;
+
+use crate::support::{Folder, HEIGHT, WIDTH, load, object, untrained, with_mask};
+
+#[test]
+fn an_object_without_light_is_not_decomposed() {
+    let folder = Folder::new();
+    let black = folder.save("black.png", |path| {
+        RgbImage::new(WIDTH, HEIGHT).save(path).unwrap();
+    });
+    let numberless = folder.save("nan.exr", |path| {
+        let nan = ImageBuffer::from_pixel(WIDTH, HEIGHT, Pixel([f32::NAN; 3]));
+        image::DynamicImage::ImageRgb32F(nan).save(path).unwrap();
+    });
+    let reading = PhotoReading {
+        rectangle: Some(Rectangle {
+            x: 5,
+            y: 5,
+            width: 30,
+            height: 30,
+        }),
+        ..PhotoReading::default()
+    };
+    for path in [black, numberless] {
+        let photo = load(&path, &reading).unwrap();
+        let found = untrained().decompose(
+            &photo.picture,
+            &photo.mask,
+            &photo.options(&DecomposeOptions::default()),
+        );
+        assert!(matches!(found, Err(DecomposeError::Unlit)));
+        let found = load(&path, &PhotoReading::default());
+        assert!(matches!(found, Err(DecomposeError::Black { .. })));
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_photograph_is_said_in_a_sentence() {
+    let folder = Folder::new();
+    let grey = folder.save("grey.png", |path| object(90).save(path).unwrap());
+    let black = folder.save("black.png", |path| RgbImage::new(8, 8).save(path).unwrap());
+    let small = folder.save("small.png", |path| GrayImage::new(8, 8).save(path).unwrap());
+    let none = folder.save("none.png", |path| {
+        GrayImage::new(WIDTH, HEIGHT).save(path).unwrap()
+    });
+    let text = folder.save("text.png", |path| fs::write(path, "hello").unwrap());
+    let full = folder.path("full");
+    fs::create_dir(&full).unwrap();
+    GrayImage::new(WIDTH, HEIGHT)
+        .save(full.join("grey.png"))
+        .unwrap();
+    let cup = folder.save("cup.png", |path| object(0).save(path).unwrap());
+    let in_corner = PhotoReading {
+        rectangle: Some(Rectangle {
+            x: 0,
+            y: 0,
+            width: 2,
+            height: 2,
+        }),
+        ..PhotoReading::default()
+    };
+    let beside = PhotoReading {
+        rectangle: Some(Rectangle {
+            x: 100,
+            y: 0,
+            width: 5,
+            height: 5,
+        }),
+        ..PhotoReading::default()
+    };
+    let plain = PhotoReading::default();
+    for (path, reading, expected) in [
+        (&grey, plain.clone(), "Make a mask with `relit-mask`"),
+        (&black, plain.clone(), "black.png is black all over"),
+        (
+            &cup,
+            in_corner,
+            "in the rectangle 0,0,2,2 there is nothing of the object",
+        ),
+        (
+            &grey,
+            with_mask(small),
+            "the mask has 8 x 8 pixels, and the photograph 60 x 48",
+        ),
+        (&grey, with_mask(none), "the mask is empty"),
+        (
+            &grey,
+            with_mask(folder.path("no.png")),
+            "no.png cannot be read",
+        ),
+        (&grey, with_mask(full), "the mask is empty"),
+        (&grey, beside, "100,0,5,5 does not touch the photograph"),
+        (&text, plain.clone(), "is not a readable PNG"),
+        (&folder.path("gone.png"), plain, "gone.png cannot be read"),
+    ] {
+        let error = load(path, &reading).map(|photo| photo.name).unwrap_err();
+        let found = with_causes(&error);
+        assert!(found.contains(expected), "{found}");
+    }
+    let huge = folder.save("huge.png", |path| {
+        let file = BufWriter::new(File::create(path).unwrap());
+        let encoder = png::Encoder::new(file, 9000, 8000);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_chunk(png::chunk::IDAT, &[0x78, 0x9c]).unwrap();
+    });
+    let error = load(&huge, &PhotoReading::default()).map(|photo| photo.name);
+    let text = error.unwrap_err().to_string();
+    assert!(
+        text.contains("9000 x 8000 pixels, and at most 64000000"),
+        "{text}"
+    );
+    let masks = folder.path("masks");
+    fs::create_dir(&masks).unwrap();
+    let error = load(&grey, &with_mask(masks.clone())).map(|photo| photo.name);
+    assert!(error.unwrap_err().to_string().ends_with("masks/grey.png"));
+    let find = |paths: &[&PathBuf]| {
+        let paths: Vec<PathBuf> = paths.iter().map(|path| (*path).clone()).collect();
+        PhotoInput::find(&paths, None).map(|found| found.len())
+    };
+    assert!(
+        find(&[&masks])
+            .unwrap_err()
+            .to_string()
+            .contains("holds no photographs")
+    );
+    let twice = find(&[&grey, &masks.join("grey.jpg")]).unwrap_err();
+    assert!(twice.to_string().contains("would both be written to grey"));
+}

@@ -1,0 +1,84 @@
+//! What says where the object is.
+
+use image::{ImageBuffer, Rgb as Pixel, RgbImage, Rgba};
+use relight_photo::decompose::{MaskSource, Rectangle, SpecularGate};
+use relight_photo::files::PhotoReading;
+
+use crate::support::{Folder, HEIGHT, WIDTH, decomposed, is_inside, load, mask, object, with_mask};
+
+#[test]
+fn alpha_is_the_mask_and_what_it_hides_does_not_count() {
+    let folder = Folder::new();
+    let with_alpha = |hidden: u8| {
+        let picture = object(hidden);
+        ImageBuffer::from_fn(WIDTH, HEIGHT, |x, y| {
+            let Pixel([r, g, b]) = *picture.get_pixel(x, y);
+            Rgba([r, g, b, if is_inside(x, y) { 255 } else { 0 }])
+        })
+    };
+    let found: Vec<_> = [0, 255]
+        .into_iter()
+        .map(|hidden| {
+            let path = folder.save(&format!("{hidden}.png"), |path| {
+                with_alpha(hidden).save(path).unwrap();
+            });
+            let photo = load(&path, &PhotoReading::default()).unwrap();
+            assert_eq!(photo.mask_source, MaskSource::Alpha);
+            decomposed(&photo, SpecularGate::Auto).0
+        })
+        .collect();
+    assert_eq!(found[0], found[1]);
+}
+
+/// Writes a PNG of 16 bits with what is given as a chunk gAMA.
+#[test]
+fn a_mask_is_a_files_brightest_channel_or_its_alpha() {
+    let folder = Folder::new();
+    let photo = folder.save("photo.png", |path| object(90).save(path).unwrap());
+    let plain = folder.save("plain.png", |path| mask().save(path).unwrap());
+    let wanted = load(&photo, &with_mask(plain)).unwrap().mask;
+    let level = |x, y, inside: u8, outside: u8| if is_inside(x, y) { inside } else { outside };
+    let blue = folder.save("blue.png", |path| {
+        let pixel = |x, y| Pixel([0, 0, level(x, y, 255, 0)]);
+        RgbImage::from_fn(WIDTH, HEIGHT, pixel).save(path).unwrap();
+    });
+    // A dark object that was cut out.
+    let cut = folder.save("cut.png", |path| {
+        let pixel = |x, y| Rgba([30, 20, 10, level(x, y, 255, 0)]);
+        ImageBuffer::from_fn(WIDTH, HEIGHT, pixel)
+            .save(path)
+            .unwrap();
+    });
+    let hardly_transparent = folder.save("hardly.png", |path| {
+        let pixel = |x, y| {
+            let white = level(x, y, 255, 0);
+            Rgba([white, white, white, level(x, y, 255, 250)])
+        };
+        ImageBuffer::from_fn(WIDTH, HEIGHT, pixel)
+            .save(path)
+            .unwrap();
+    });
+    for path in [blue, cut, hardly_transparent] {
+        let name = path.display().to_string();
+        let found = load(&photo, &with_mask(path)).unwrap();
+        assert_eq!(found.mask, wanted, "{name}");
+    }
+}
+
+#[test]
+fn a_rectangle_is_the_mask_where_nothing_else_is() {
+    let folder = Folder::new();
+    let path = folder.save("grey.png", |path| object(90).save(path).unwrap());
+    let reading = PhotoReading {
+        rectangle: Some(Rectangle {
+            x: 10,
+            y: 4,
+            width: 40,
+            height: 40,
+        }),
+        ..PhotoReading::default()
+    };
+    let photo = load(&path, &reading).unwrap();
+    assert_eq!(photo.mask_source, MaskSource::Rectangle);
+    assert_eq!(photo.mask.plane(0).iter().sum::<f32>(), 1600.0);
+}

@@ -1,0 +1,157 @@
+//! What crosses the border of the process: arguments, files, messages and exit codes.
+
+use std::fs;
+use std::process::{Command, Output};
+
+use relight_nets::{WeightPrecision, Weights, decomposer};
+
+use crate::shards::write_shard;
+use crate::support::{Folder, names_in, object};
+
+fn relight(folder: &Folder, arguments: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_relight"))
+        .args(arguments.split(' '))
+        .current_dir(folder.0.path())
+        .output()
+        .unwrap()
+}
+
+fn code_and_errors(output: &Output) -> (i32, String) {
+    let errors = String::from_utf8(output.stderr.clone()).unwrap();
+    (output.status.code().unwrap(), errors)
+}
+
+#[test]
+fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
+    let folder = Folder::new();
+    let weights = Weights::initial(&decomposer(), 3);
+    weights
+        .write(&folder.path("w.safetensors"), WeightPrecision::Half)
+        .unwrap();
+    fs::create_dir(folder.path("photos")).unwrap();
+    object(0).save(folder.path("photos/black.png")).unwrap();
+    object(90).save(folder.path("photos/grey.png")).unwrap();
+    let command = "decompose photos -o out --weights w.safetensors --no-mirror --json";
+    let output = relight(&folder, command);
+    let (code, errors) = code_and_errors(&output);
+    assert_eq!(code, 3, "{errors}");
+    assert!(errors.contains("photos/grey.png"), "{errors}");
+    assert_eq!(names_in(&folder.path("out")), ["black"]);
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let events: Vec<serde_json::Value> = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    // Side by side: in the order in which they were done.
+    let of = |name: &str| events.iter().find(|event| event["event"] == name);
+    assert_eq!(
+        of("decomposed").unwrap()["figures"]["weights"],
+        "w.safetensors"
+    );
+    assert_eq!(of("failed").unwrap()["photo"], "photos/grey.png");
+    assert_eq!(events.len(), 2);
+
+    fs::create_dir(folder.path("shards")).unwrap();
+    write_shard(&folder.path("shards"));
+    for (command, code, expected) in [
+        (
+            "decompose shards --rect 1,2,3,4 -o o",
+            2,
+            "--rect is for photographs",
+        ),
+        (
+            "decompose shards/20261120T093015Z-mug.tar --transfer linear -o o",
+            2,
+            "--transfer is for photographs",
+        ),
+        (
+            "decompose photos shards --mask photos -o o",
+            2,
+            "Usage: relight decompose [OPTIONS]",
+        ),
+        (
+            "decompose photos --count 3 -o o",
+            2,
+            "--count is for shards",
+        ),
+        (
+            "weights export w.safetensors -o w.txt",
+            2,
+            "Usage: relight weights export [OPTIONS]",
+        ),
+        (
+            "decompose photos -o w.safetensors --weights w.safetensors",
+            1,
+            "w.safetensors cannot be the folder for the results",
+        ),
+        (
+            "decompose photos/black.png -o o --weights none.pth",
+            1,
+            "none.pth could not be read",
+        ),
+        (
+            "decompose photos --mask w.safetensors -o o",
+            2,
+            "give a folder of masks",
+        ),
+        (
+            "decompose photos/black.png --rect 1,2,3 -o o",
+            2,
+            "give X,Y,W,H",
+        ),
+        ("decompose photos/black.png", 2, "--output"),
+        (
+            "weights export w.safetensors -o w.txt",
+            2,
+            "give .onnx or .safetensors",
+        ),
+        (
+            "weights export w.safetensors --net normal-net -o w.onnx",
+            1,
+            "another network's",
+        ),
+    ] {
+        let (found, errors) = code_and_errors(&relight(&folder, command));
+        assert_eq!(found, code, "{command}: {errors}");
+        assert!(errors.contains(expected), "{command}: {errors}");
+    }
+    assert!(!folder.path("o").exists() && !folder.path("w.onnx").exists());
+
+    let command = "weights export w.safetensors -o w.onnx --size 64";
+    assert_eq!(
+        code_and_errors(&relight(&folder, command)),
+        (0, String::new())
+    );
+    assert!(fs::metadata(folder.path("w.onnx")).unwrap().len() > 1_000_000);
+}
+
+#[test]
+fn photographs_side_by_side_come_out_as_one_by_one() {
+    let folder = Folder::new();
+    let weights = Weights::initial(&decomposer(), 3);
+    weights
+        .write(&folder.path("w.safetensors"), WeightPrecision::Half)
+        .unwrap();
+    fs::create_dir(folder.path("photos")).unwrap();
+    for (name, shade) in [("a", 0), ("b", 3), ("c", 6), ("d", 90), ("e", 9)] {
+        object(shade)
+            .save(folder.path(&format!("photos/{name}.png")))
+            .unwrap();
+    }
+    for threads in ["1", "3"] {
+        let command =
+            format!("decompose photos --weights w.safetensors --threads {threads} -o {threads}");
+        let (code, errors) = code_and_errors(&relight(&folder, &command));
+        assert_eq!((code, errors.lines().count()), (3, 1), "{errors}");
+        assert!(errors.contains("photos/d.png"), "{errors}");
+    }
+    assert_eq!(names_in(&folder.path("1")), ["a", "b", "c", "e"]);
+    for name in names_in(&folder.path("1")) {
+        let [one, three] = ["1", "3"].map(|threads| folder.path(threads).join(&name));
+        assert_eq!(names_in(&one), names_in(&three));
+        for file in names_in(&one) {
+            let [one, three] = [&one, &three].map(|results| fs::read(results.join(&file)).unwrap());
+            assert!(one == three, "{name}/{file}");
+        }
+    }
+}

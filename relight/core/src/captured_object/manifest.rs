@@ -1,0 +1,39 @@
+//! `asset.json`, the entry that describes the others, and the sizes that there can be.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::CapturedObjectError;
+use crate::image::Extent;
+
+/// What the file says it is.
+pub const CAPTURED_OBJECT_SCHEMA: &str = "relight.asset/1";
+/// The entry that describes the others.
+pub(super) const MANIFEST: &str = "asset.json";
+/// The longest side of an object, pixels.
+const MOST_SIDE: usize = 8192;
+/// The most pixels of an object.
+const MOST_PIXELS: usize = 1 << 24;
+
+/// `asset.json`.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Manifest {
+    pub(super) schema: String,
+    #[serde(default)]
+    pub(super) software: String,
+    pub(super) name: String,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) white: BTreeMap<String, f32>,
+}
+
+/// Refuses sizes that no file has.
+pub(super) fn check_size(extent: Extent) -> Result<(), CapturedObjectError> {
+    let Extent { width, height } = extent;
+    let sides = 1..=MOST_SIDE;
+    if sides.contains(&width) && sides.contains(&height) && width * height <= MOST_PIXELS {
+        return Ok(());
+    }
+    Err(CapturedObjectError::Size { extent })
+}

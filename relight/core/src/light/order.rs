@@ -1,0 +1,75 @@
+//! How many bands an expansion in spherical harmonics has.
+
+use super::LightError;
+
+/// The highest band of an expansion in spherical harmonics, 0 to 64.
+///
+/// The orders that relight uses stand here and nowhere else:
+///
+/// | constant | order | for |
+/// | --- | --- | --- |
+/// | [`Order::ZERO`] | 0 | even light |
+/// | [`Order::TWO`] | 2 | the paper's: light that is estimated, and all that diffuse surfaces show of any light |
+/// | [`Order::GLOSS`] | 6 | what the gloss of a turning object shows of its light |
+/// | [`Order::LAMP`] | 8 | a lamp that goes round an object in a video |
+/// | [`Order::HIGHLIGHT`] | 24 | panoramas and lamps that are given for a photograph: sharp enough for highlights |
+/// | [`Order::RENDER`] | 48 | a panorama that lights given maps, where nothing else is asked for |
+/// | [`Order::HIGHEST`] | 64 | the highest that can be asked for |
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Order(u8);
+
+impl Order {
+    /// The highest order that can be asked for.
+    pub const MAX: usize = 64;
+    /// One coefficient: even light.
+    pub const ZERO: Self = Self(0);
+    /// Nine coefficients, as in the paper. Light is estimated to this order: of what a diffuse surface shows of any
+    /// light, the bands above have at most 2 % of the energy (Basri and Jacobs, 2003).
+    pub const TWO: Self = Self(2);
+    /// What the gloss of a turning object shows of its light: a panorama or a mirror ball is read to this order.
+    pub const GLOSS: Self = Self(6);
+    /// A lamp that goes round an object in a video.
+    pub const LAMP: Self = Self(8);
+    /// Panoramas and lamps that are given for a photograph. A highlight of smoothness α weakens band l by about
+    /// exp(-2 l² / α): where α is 200, the smoothest, 0.3 % of this band is left.
+    pub const HIGHLIGHT: Self = Self(24);
+    /// A panorama that lights given maps, whose smoothness may be any.
+    pub const RENDER: Self = Self(48);
+    /// The order that ends at [`Order::MAX`].
+    pub const HIGHEST: Self = Self(Self::MAX as u8);
+
+    /// The order with `highest` as its last band.
+    ///
+    /// # Errors
+    /// Above [`Order::MAX`].
+    pub fn new(highest: usize) -> Result<Self, LightError> {
+        match u8::try_from(highest) {
+            Ok(order) if highest <= Self::MAX => Ok(Self(order)),
+            _ => Err(LightError::Order {
+                asked: highest,
+                highest: Self::MAX,
+            }),
+        }
+    }
+
+    /// The last band.
+    #[must_use]
+    pub const fn get(self) -> usize {
+        self.0 as usize
+    }
+
+    /// How many coefficients there are: (order + 1)².
+    #[must_use]
+    pub const fn coefficients(self) -> usize {
+        (self.get() + 1) * (self.get() + 1)
+    }
+
+    /// The order that has so many coefficients.
+    pub(super) fn of_coefficients(count: usize) -> Result<Self, LightError> {
+        let side = count.isqrt();
+        if count == 0 || side * side != count {
+            return Err(LightError::Count(count));
+        }
+        Self::new(side - 1)
+    }
+}

@@ -1,0 +1,80 @@
+//! Order statistics of samples: median and quantiles.
+//!
+//! All of them are samples themselves, by the nearest rank. Nothing is interpolated. Samples are compared by the total
+//! order of floating-point numbers.
+
+use std::cmp::Ordering;
+
+/// A floating-point number with a total order.
+pub trait TotalOrder: Copy {
+    /// The total order.
+    fn total_order(&self, other: &Self) -> Ordering;
+}
+
+impl TotalOrder for f32 {
+    fn total_order(&self, other: &Self) -> Ordering {
+        self.total_cmp(other)
+    }
+}
+
+impl TotalOrder for f64 {
+    fn total_order(&self, other: &Self) -> Ordering {
+        self.total_cmp(other)
+    }
+}
+
+/// The sample that has `rank` others before it, from 0; the largest where there are fewer. None where there are no
+/// samples. The samples are left in another order.
+pub fn ranked<T: TotalOrder>(samples: &mut [T], rank: usize) -> Option<T> {
+    let last = samples.len().checked_sub(1)?;
+    let (_, found, _) = samples.select_nth_unstable_by(rank.min(last), T::total_order);
+    Some(*found)
+}
+
+/// The quantile of a part, 0 to 1: the sample of rank `part (n - 1)`, rounded down. None where there are no samples.
+pub fn quantile<T: TotalOrder>(samples: impl IntoIterator<Item = T>, part: f64) -> Option<T> {
+    let mut samples: Vec<T> = samples.into_iter().collect();
+    let rank = (samples.len().saturating_sub(1) as f64 * part) as usize;
+    ranked(&mut samples, rank)
+}
+
+/// The sample in the middle, the lower of two; none where there are no samples.
+pub fn median<T: TotalOrder>(samples: impl IntoIterator<Item = T>) -> Option<T> {
+    quantile(samples, 0.5)
+}
+
+/// The sample in the middle, the upper of two; none where there are no samples.
+pub fn upper_median<T: TotalOrder>(samples: impl IntoIterator<Item = T>) -> Option<T> {
+    let mut samples: Vec<T> = samples.into_iter().collect();
+    let rank = samples.len() / 2;
+    ranked(&mut samples, rank)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_are_samples() {
+        assert_eq!(median([3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median([4.0, 1.0, 2.0, 3.0]), Some(2.0));
+        assert_eq!(upper_median([4.0_f32, 1.0, 2.0, 3.0]), Some(3.0));
+        assert_eq!(upper_median([1.0]), Some(1.0));
+    }
+
+    #[test]
+    fn quantiles_are_of_the_nearest_rank_below() {
+        let tens = || (0..10).map(f64::from);
+        assert_eq!(quantile(tens(), 0.0), Some(0.0));
+        assert_eq!(quantile(tens(), 0.9), Some(8.0));
+        assert_eq!(quantile(tens(), 1.0), Some(9.0));
+        assert_eq!(quantile(tens(), 2.0), Some(9.0));
+    }
+
+    #[test]
+    fn there_is_no_statistic_of_nothing() {
+        assert_eq!(median(Vec::<f64>::new()), None);
+        assert_eq!(upper_median(Vec::<f32>::new()), None);
+        assert_eq!(ranked::<f64>(&mut [], 3), None);
+    }
+}

@@ -1,0 +1,287 @@
+//! The square around an object, and ways between the photograph and the network's size.
+
+use std::ops::Range;
+
+use relight_core::image::{Extent, Part, Planes};
+
+/// The part of the square that is left free around the object.
+const MARGIN: f64 = 0.04;
+
+/// A square of a photograph; it may reach beyond the photograph's edges.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct CropSquare {
+    /// Column of its left edge, pixels; negative where it begins left of the photograph.
+    pub x: i64,
+    /// Row of its upper edge, pixels.
+    pub y: i64,
+    /// Width and height, pixels.
+    pub side: usize,
+}
+
+impl CropSquare {
+    /// The square around the pixels where the mask is at least one half, with 4 % more than their longer
+    /// side; none where there are none.
+    #[must_use]
+    pub fn around(mask: &Planes<1>) -> Option<Self> {
+        let sides = bounds(mask)?;
+        let longest = sides.iter().map(Range::len).max()?;
+        let side = (longest as f64 * (1.0 + MARGIN)).ceil() as usize;
+        let [x, y] = sides.map(|line| ((line.start + line.end) as i64 - side as i64) / 2);
+        Some(Self { x, y, side })
+    }
+
+    /// Width and height.
+    #[must_use]
+    pub fn extent(&self) -> Extent {
+        Extent::new(self.side, self.side)
+    }
+
+    /// All of it.
+    pub(super) fn window(&self) -> Window {
+        Window {
+            at: [self.x, self.y],
+            extent: self.extent(),
+        }
+    }
+
+    /// What the image shows there; 0 beyond its edges.
+    pub(super) fn cut<const C: usize>(&self, image: &Planes<C>) -> Planes<C> {
+        self.window().cut(image)
+    }
+
+    /// A window of the photograph as a part of the square.
+    pub(super) fn part(&self, window: &Window) -> Part {
+        let [x, y] = window.at;
+        Part {
+            whole: self.extent(),
+            at: [x - self.x, y - self.y],
+            extent: window.extent,
+        }
+    }
+
+    /// What a photograph shows there, in another size; 0 beyond its edges.
+    pub fn resized<const C: usize>(&self, image: &Planes<C>, extent: Extent) -> Planes<C> {
+        let all = Window {
+            at: [0; 2],
+            extent: image.extent(),
+        };
+        image.resized_part(&self.part(&all), &Part::all(extent))
+    }
+}
+
+/// A rectangle of a photograph in which its layers are computed; it may reach beyond the photograph's edges.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Window {
+    /// Column and row of its first pixel.
+    pub(super) at: [i64; 2],
+    /// Width and height.
+    pub(super) extent: Extent,
+}
+
+impl Window {
+    /// The smallest that holds all pixels where the mask is at least one half.
+    pub(super) fn around(mask: &Planes<1>) -> Option<Self> {
+        let [columns, rows] = bounds(mask)?;
+        Some(Self {
+            at: [columns.start as i64, rows.start as i64],
+            extent: Extent::new(columns.len(), rows.len()),
+        })
+    }
+
+    /// What the image shows there; 0 beyond its edges.
+    pub(super) fn cut<const C: usize>(&self, image: &Planes<C>) -> Planes<C> {
+        shifted(image, self.at, self.extent)
+    }
+
+    /// The image of the size of the photograph that shows `part` there, and 0 elsewhere.
+    pub(super) fn put_back<const C: usize>(&self, part: Planes<C>, extent: Extent) -> Planes<C> {
+        if self.at == [0; 2] && self.extent == extent {
+            return part;
+        }
+        shifted(&part, self.at.map(|at| -at), extent)
+    }
+}
+
+/// The columns and rows in which a mask is somewhere at least one half; none where it is empty.
+fn bounds(mask: &Planes<1>) -> Option<[Range<usize>; 2]> {
+    let Extent { width, .. } = mask.extent();
+    let mut low = [usize::MAX; 2];
+    let mut high = [0; 2];
+    let values = mask.plane(0).iter().enumerate();
+    for (at, _) in values.filter(|(_, value)| **value >= 0.5) {
+        for (axis, place) in [at % width, at / width].into_iter().enumerate() {
+            low[axis] = low[axis].min(place);
+            high[axis] = high[axis].max(place + 1);
+        }
+    }
+    (high != [0; 2]).then(|| [low[0]..high[0], low[1]..high[1]])
+}
+
+/// The image whose first pixel is the one of `image` at `from`, 0 where there is none.
+fn shifted<const C: usize>(image: &Planes<C>, from: [i64; 2], extent: Extent) -> Planes<C> {
+    let source = image.extent();
+    let mut result = Planes::zeros(extent);
+    let columns = overlap(from[0], source.width, extent.width);
+    let rows = overlap(from[1], source.height, extent.height);
+    let Some(((x, to_x, width), (y, to_y, height))) = columns.zip(rows) else {
+        return result;
+    };
+    for (to, from) in result.planes_mut().into_iter().zip(image.planes()) {
+        for row in 0..height {
+            to[(to_y + row) * extent.width + to_x..][..width]
+                .copy_from_slice(&from[(y + row) * source.width + x..][..width]);
+        }
+    }
+    result
+}
+
+/// Where a line of `source` pixels and one of `length` that begins at `from` meet: the first place in
+/// each, and how many there are.
+fn overlap(from: i64, source: usize, length: usize) -> Option<(usize, usize, usize)> {
+    let (source, length) = (i64::try_from(source).ok()?, i64::try_from(length).ok()?);
+    let start = from.max(0);
+    let end = (from + length).min(source);
+    let count = usize::try_from(end - start)
+        .ok()
+        .filter(|&count| count > 0)?;
+    Some((
+        usize::try_from(start).ok()?,
+        usize::try_from(start - from).ok()?,
+        count,
+    ))
+}
+
+/// A picture, 0 outside its mask, and the mask, 0 or 1, in another size: each pixel is the mean of what the mask covers
+/// of its area, so that nothing of the background comes in. Both are a part of an image that is 0 elsewhere.
+pub(super) fn reduced(
+    picture: &Planes<3>,
+    mask: &Planes<1>,
+    part: &Part,
+    extent: Extent,
+) -> (Planes<3>, Planes<1>) {
+    let all = Part::all(extent);
+    let share = mask.resized_part(part, &all);
+    let most = share.plane(0).iter().fold(0.0_f32, |a, &b| a.max(b));
+    // Of an object that is thinner than a pixel everywhere, every trace counts.
+    let least = 0.5_f32.min(most).max(f32::MIN_POSITIVE);
+    let inside = share
+        .clone()
+        .map(|share| f32::from(u8::from(share >= least)));
+    let mut sums = picture.resized_part(part, &all);
+    for plane in sums.planes_mut() {
+        let places = share.plane(0).iter().zip(inside.plane(0));
+        for (value, (share, inside)) in plane.iter_mut().zip(places) {
+            *value *= inside / share.max(f32::MIN_POSITIVE);
+        }
+    }
+    (sums, inside)
+}
+
+/// The image times the mask.
+pub(super) fn cut_out<const C: usize>(mut image: Planes<C>, mask: &Planes<1>) -> Planes<C> {
+    for plane in image.planes_mut() {
+        for (value, mask) in plane.iter_mut().zip(mask.plane(0)) {
+            *value *= mask;
+        }
+    }
+    image
+}
+
+/// A part of the image in another size, where only what lies inside the mask counts: the values at its edge go on
+/// beyond it first.
+pub(super) fn enlarged<const C: usize>(
+    image: &Planes<C>,
+    inside: &[bool],
+    part: &Part,
+) -> Planes<C> {
+    let everywhere = vec![true; inside.len()];
+    let image = image.clone().extended(inside, &everywhere);
+    image.resized_part(&Part::all(image.extent()), part)
+}
+
+/// Where a mask is at least one half.
+pub(super) fn inside(mask: &Planes<1>) -> Vec<bool> {
+    mask.plane(0).iter().map(|&value| value >= 0.5).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn disc(extent: Extent, [x0, y0]: [f32; 2], radius: f32) -> Planes<1> {
+        Planes::from_fn(extent, |x, y| {
+            let inside = (x as f32 - x0).hypot(y as f32 - y0) <= radius;
+            [f32::from(u8::from(inside))]
+        })
+    }
+
+    #[test]
+    fn the_region_is_a_square_around_the_object_and_may_leave_the_photograph() {
+        let mask = disc(Extent::new(100, 60), [10.0, 30.0], 25.0);
+        let region = CropSquare::around(&mask).unwrap();
+        // Columns 0 to 35, rows 5 to 55: 51 pixels, and 4 % more.
+        assert_eq!(region.side, 54);
+        assert_eq!((region.x, region.y), (-9, 3));
+        assert_eq!(CropSquare::around(&Planes::zeros(Extent::new(9, 9))), None);
+    }
+
+    #[test]
+    fn what_is_cut_out_and_put_back_is_what_it_was() {
+        let extent = Extent::new(20, 30);
+        let image = Planes::from_fn(extent, |x, y| [x as f32, y as f32]);
+        for (x, y) in [(-5, -5), (3, 4), (12, 25), (-40, 0)] {
+            let window = CropSquare { x, y, side: 15 }.window();
+            let back = window.put_back(window.cut(&image), extent);
+            for row in 0..30 {
+                for column in 0..20 {
+                    let [dx, dy] = [column as i64 - x, row as i64 - y];
+                    let kept = (0..15).contains(&dx) && (0..15).contains(&dy);
+                    let expected = if kept {
+                        image.pixel(column, row)
+                    } else {
+                        [0.0; 2]
+                    };
+                    assert_eq!(back.pixel(column, row), expected);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_background_bleeds_neither_in_nor_out() {
+        let extent = Extent::new(64, 64);
+        let mask = disc(extent, [31.0, 31.0], 25.0);
+        let picture = Planes::from_fn(extent, |x, y| {
+            let value = if mask.pixel(x, y)[0] > 0.0 { 0.25 } else { 9.0 };
+            [value; 3]
+        });
+        let picture = cut_out(picture, &mask);
+        let all = Part::all(extent);
+        let (small, small_mask) = reduced(&picture, &mask, &all, Extent::new(16, 16));
+        let kept = inside(&small_mask);
+        for (value, &inside) in small.plane(0).iter().zip(&kept) {
+            let expected = if inside { 0.25 } else { 0.0 };
+            assert!((value - expected).abs() < 1e-6, "{value}");
+        }
+        let large = enlarged(&small, &kept, &all);
+        assert!(
+            large
+                .plane(1)
+                .iter()
+                .all(|value| (value - 0.25).abs() < 1e-6)
+        );
+    }
+
+    #[test]
+    fn an_object_thinner_than_a_pixel_is_still_there() {
+        let extent = Extent::new(64, 64);
+        let mask = Planes::from_fn(extent, |x, _| [f32::from(u8::from(x == 30))]);
+        let picture = cut_out(Planes::filled(extent, [0.5; 3]), &mask);
+        let all = Part::all(extent);
+        let (small, small_mask) = reduced(&picture, &mask, &all, Extent::new(16, 16));
+        let kept = inside(&small_mask);
+        assert_eq!(kept.iter().filter(|inside| **inside).count(), 16);
+        let value = small.pixel(7, 3)[0];
+        assert!((value - 0.5).abs() < 1e-6, "{value}");
+    }
+}

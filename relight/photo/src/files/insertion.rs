@@ -1,0 +1,288 @@
+//! A scene out of files and into one: objects, background and light are read, put together, and written.
+
+use std::path::Path;
+
+use relight_core::captured_object::CapturedObject;
+use relight_core::files::{MovieFormat, MovieReader, MovieWriter, OutputKind, write_picture};
+use relight_core::image::{Depth, Linear, Planes, Rgb, StoredImage};
+
+use super::{BackgroundFile, InsertionError, PhotoInput, PhotoReading};
+use crate::decompose::{DecomposeOptions, Decomposer, Photo};
+use crate::insert::{
+    InsertScene, LightSource, ObjectDescription, SceneBackground, SceneDescription, SceneSetting,
+    Subject, TrustFigures, TrustMap,
+};
+
+/// The most frames of a video in which a panorama turns.
+const MOST_FRAMES: f64 = 100_000.0;
+
+/// What an object is made of.
+#[derive(Debug)]
+pub enum InsertSource {
+    /// A photograph, which is decomposed.
+    Photo(Box<Photo>),
+    /// A captured object, whose maps are known.
+    Captured(Box<CapturedObject>),
+}
+
+/// An object that is ready to be lit, and how far its decomposition can be trusted, where somebody asks.
+#[derive(Debug)]
+pub struct InsertSubject {
+    /// The object.
+    pub subject: Subject,
+    /// None for a captured object: it was measured, and not estimated.
+    pub trust: Option<TrustFigures>,
+}
+
+/// A background and the setting that follows from it, with the network that decomposes the objects.
+#[derive(Debug)]
+pub struct Insertion<'a> {
+    background: BackgroundFile,
+    /// The first frame of a video.
+    first: Option<Rgb<Linear>>,
+    setting: SceneSetting,
+    decomposer: &'a Decomposer,
+    options: DecomposeOptions,
+}
+
+/// The file that is written.
+#[derive(Debug, Clone, Copy)]
+pub struct InsertionOutput<'a> {
+    /// A picture, or a video.
+    pub path: &'a Path,
+    /// Of a PNG.
+    pub depth: Depth,
+    /// By how many degrees a panorama turns in a video.
+    pub turn: f64,
+    /// How long that takes.
+    pub seconds: f64,
+    /// Frames a second of such a video.
+    pub frames_per_second: u32,
+}
+
+impl InsertSource {
+    /// Reads what a scene says of an object; its paths are relative to `folder`.
+    ///
+    /// # Errors
+    /// Where a file cannot be read, or a captured object is given a mask.
+    pub fn read(object: &ObjectDescription, folder: &Path) -> Result<Self, InsertionError> {
+        let path = folder.join(&object.photo);
+        if CapturedObject::is_named(&path) {
+            if object.mask.is_some() {
+                return Err(InsertionError::OwnMask { path });
+            }
+            return Ok(Self::Captured(Box::new(CapturedObject::read(&path)?)));
+        }
+        let reading = PhotoReading {
+            mask: object.mask.as_ref().map(|mask| folder.join(mask)),
+            ..PhotoReading::default()
+        };
+        let photo = PhotoInput::File(path).load(&reading)?;
+        Ok(Self::Photo(Box::new(photo)))
+    }
+}
+
+impl<'a> Insertion<'a> {
+    /// Everything but the objects: the first frame of a video is read, and the light, where the scene names one in files.
+    ///
+    /// # Errors
+    /// Where a file cannot be read, or there is no light.
+    pub fn new(
+        scene: &SceneDescription,
+        mut background: BackgroundFile,
+        folder: &Path,
+        decomposer: &'a Decomposer,
+        options: DecomposeOptions,
+    ) -> Result<Self, InsertionError> {
+        let first = match &mut background {
+            BackgroundFile::Movie(movie) => Some(first_frame(movie)?),
+            _ => None,
+        };
+        let still = match (&background, &first) {
+            (BackgroundFile::Panorama(parts), _) => SceneBackground::Panorama(&parts.1),
+            (BackgroundFile::Photo(picture), _) | (BackgroundFile::Movie(_), Some(picture)) => {
+                SceneBackground::Picture(picture)
+            }
+            (BackgroundFile::Movie(_), None) => return Err(InsertionError::NoFrame),
+        };
+        let given = given_light(scene, folder, still, (decomposer, &options))?;
+        let setting = SceneSetting::new(scene, still, given)?;
+        Ok(Self {
+            background,
+            first,
+            setting,
+            decomposer,
+            options,
+        })
+    }
+
+    /// Light, size, tilt and matching.
+    #[must_use]
+    pub const fn setting(&self) -> &SceneSetting {
+        &self.setting
+    }
+
+    /// An object, decomposed no larger than it has to be. How far it can be trusted takes three more looks of the network.
+    ///
+    /// # Errors
+    /// Where it cannot be decomposed.
+    pub fn subject(
+        &self,
+        object: &ObjectDescription,
+        source: InsertSource,
+        with_trust: bool,
+    ) -> Result<InsertSubject, InsertionError> {
+        let photo = match source {
+            InsertSource::Photo(photo) => self.setting.reduced(object, *photo),
+            InsertSource::Captured(object) => {
+                return Ok(InsertSubject {
+                    subject: Subject::of_captured(&object)?,
+                    trust: None,
+                });
+            }
+        };
+        let subject = Subject::of_photo(&photo, self.decomposer, &self.options)?;
+        let options = photo.options(&self.options);
+        let trust = with_trust
+            .then(|| TrustMap::of(&subject, self.decomposer, &options))
+            .transpose()?;
+        Ok(InsertSubject {
+            subject,
+            trust: trust.map(|trust| trust.figures()),
+        })
+    }
+
+    /// How many frames are written; none where the background has as many as it has.
+    #[must_use]
+    pub fn frames(&self, output: &InsertionOutput<'_>) -> Option<u32> {
+        match (OutputKind::of(output.path), &self.background) {
+            (Some(OutputKind::Movie(_)), BackgroundFile::Movie(_)) => None,
+            (Some(OutputKind::Movie(_)), _) => Some(output.turn_frames()),
+            _ => Some(1),
+        }
+    }
+
+    /// Writes the picture or the video; how many frames it has. `written` is called after each.
+    ///
+    /// # Errors
+    /// Where a frame cannot be read, composed or written.
+    pub fn write(
+        &mut self,
+        scene: &InsertScene<'_>,
+        output: &InsertionOutput<'_>,
+        written: impl FnMut(),
+    ) -> Result<u32, InsertionError> {
+        match OutputKind::of(output.path) {
+            Some(OutputKind::Movie(format)) => match &self.background {
+                BackgroundFile::Movie(_) => self.film_over(scene, output.path, format, written),
+                _ => self.film_turn(scene, output, format, written),
+            },
+            _ => {
+                let picture = scene.compose(&self.still(0.0), &scene.layers(0.0)?, 0);
+                write_picture(output.path, &picture, output.depth)?;
+                Ok(1)
+            }
+        }
+    }
+
+    /// The background after a panorama has turned.
+    fn still(&self, turn: f64) -> Rgb<Linear> {
+        match &self.background {
+            BackgroundFile::Photo(picture) => picture.clone(),
+            BackgroundFile::Panorama(parts) => self.setting.seen(&parts.0, &parts.1, turn),
+            BackgroundFile::Movie(_) => self
+                .first
+                .clone()
+                .unwrap_or_else(|| Rgb::new(Planes::zeros(self.setting.extent))),
+        }
+    }
+
+    /// A video whose frames have the objects before them, which do not move.
+    fn film_over(
+        &mut self,
+        scene: &InsertScene<'_>,
+        path: &Path,
+        format: MovieFormat,
+        mut written: impl FnMut(),
+    ) -> Result<u32, InsertionError> {
+        let layers = scene.layers(0.0)?;
+        let mut next = Some(self.still(0.0));
+        let BackgroundFile::Movie(movie) = &mut self.background else {
+            return Err(InsertionError::NoFrame);
+        };
+        let rate = movie.frames_per_second();
+        let mut film = MovieWriter::create(path, format, self.setting.extent, rate)?;
+        let mut frames = 0;
+        while let Some(background) = next {
+            let picture = scene.compose(&background, &layers, u64::from(frames));
+            film.push(&picture.encode())?;
+            frames += 1;
+            written();
+            next = movie.frame()?.map(Rgb::to_linear);
+        }
+        film.finish()?;
+        Ok(frames)
+    }
+
+    /// A video in which the panorama turns.
+    fn film_turn(
+        &self,
+        scene: &InsertScene<'_>,
+        output: &InsertionOutput<'_>,
+        format: MovieFormat,
+        mut written: impl FnMut(),
+    ) -> Result<u32, InsertionError> {
+        let frames = output.turn_frames();
+        let (extent, rate) = (self.setting.extent, output.frames_per_second);
+        let mut film = MovieWriter::create(output.path, format, extent, rate)?;
+        for frame in 0..frames {
+            let turn = (output.turn * f64::from(frame) / f64::from(frames)).to_radians();
+            let picture = scene.compose(&self.still(turn), &scene.layers(turn)?, u64::from(frame));
+            film.push(&picture.encode())?;
+            written();
+        }
+        film.finish()?;
+        Ok(frames)
+    }
+}
+
+impl InsertionOutput<'_> {
+    fn turn_frames(&self) -> u32 {
+        let frames = (self.seconds * f64::from(self.frames_per_second)).round();
+        frames.clamp(1.0, MOST_FRAMES) as u32
+    }
+}
+
+fn first_frame(movie: &mut MovieReader) -> Result<Rgb<Linear>, InsertionError> {
+    let frame = movie.frame()?.ok_or(InsertionError::NoFrame)?;
+    Ok(frame.to_linear())
+}
+
+/// The light that the scene names, if it names one.
+fn given_light(
+    scene: &SceneDescription,
+    folder: &Path,
+    background: SceneBackground<'_>,
+    (decomposer, options): (&Decomposer, &DecomposeOptions),
+) -> Result<Option<LightSource>, InsertionError> {
+    let light = &scene.light;
+    if let Some(lamp) = light.lamp()? {
+        return Ok(Some(LightSource::Lamp(lamp)));
+    }
+    if let Some(path) = light.panorama.as_ref().or(light.coefficients.as_ref()) {
+        return LightSource::read(&folder.join(path)).map(Some);
+    }
+    let Some(mask) = &light.object else {
+        return Ok(None);
+    };
+    let SceneBackground::Picture(picture) = background else {
+        return Err(InsertionError::LightInPanorama);
+    };
+    let path = folder.join(mask);
+    let grey = StoredImage::read(&path)?.planes;
+    let [mask, ..] = grey.clone().into_planes();
+    let mask = Planes::from_planes(grey.extent(), [mask])?.map(|m| f32::from(u8::from(m >= 0.5)));
+    let subject = Subject::new(picture, &mask, None, decomposer, options)
+        .map_err(|source| InsertionError::LightObject { path, source })?;
+    Ok(Some(LightSource::Coefficients(subject.light().clone())))
+}

@@ -1,0 +1,29 @@
+//! New light out of files.
+
+use std::path::Path;
+
+use relight_core::light::{Panorama, ShLight};
+
+use super::InsertionError;
+use crate::insert::LightSource;
+
+impl LightSource {
+    /// Whether a file is called as a text of coefficients (`.txt`).
+    #[must_use]
+    pub fn is_text(path: &Path) -> bool {
+        path.extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("txt"))
+    }
+
+    /// Reads a text file of coefficients (`.txt`), or else a panorama.
+    ///
+    /// # Errors
+    /// Where the file cannot be read or holds no light.
+    pub fn read(path: &Path) -> Result<Self, InsertionError> {
+        Ok(if Self::is_text(path) {
+            Self::Coefficients(ShLight::read(path)?)
+        } else {
+            Self::Panorama(Panorama::read(path)?)
+        })
+    }
+}

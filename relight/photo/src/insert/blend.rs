@@ -1,0 +1,120 @@
+//! An object and its maps back in its photograph, or before another background.
+
+use relight_core::image::{Extent, Linear, Planes, Rgb};
+
+use super::Subject;
+
+impl Subject {
+    /// The photograph with these colours of the object in place of its own: its soft edge keeps the background that it has.
+    ///
+    /// # Panics
+    /// Where the photograph or the colours have another size.
+    #[must_use]
+    pub fn in_place(&self, photo: &Rgb<Linear>, colours: &Planes<3>) -> Rgb<Linear> {
+        assert_eq!(
+            photo.planes().extent(),
+            self.photo_extent(),
+            "size of the photograph"
+        );
+        self.blended(
+            photo.clone(),
+            |alpha, old, own, new| (old + alpha * (new - own)).max(0.0),
+            colours,
+        )
+    }
+
+    /// A background of the photograph's size with the object before it, at its place and in these colours.
+    ///
+    /// # Panics
+    /// Where the background or the colours have another size.
+    #[must_use]
+    pub fn before(&self, background: &Rgb<Linear>, colours: &Planes<3>) -> Rgb<Linear> {
+        assert_eq!(
+            background.planes().extent(),
+            self.photo_extent(),
+            "size of the background"
+        );
+        self.blended(
+            background.clone(),
+            |alpha, old, _, new| old + alpha * (new - old),
+            colours,
+        )
+    }
+
+    /// A map of the size of [`Subject::extent`] at its place in the photograph; 0 elsewhere.
+    ///
+    /// # Panics
+    /// Where the map has another size.
+    #[must_use]
+    pub fn in_photo(&self, map: &Planes<3>) -> Planes<3> {
+        let Extent { width, height } = self.extent();
+        assert_eq!(map.extent(), self.extent(), "size of the map");
+        let [left, top] = self.place();
+        let mut photo = Planes::zeros(self.photo_extent());
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            photo.set_pixel(left + x, top + y, map.pixel(x, y));
+        }
+        photo
+    }
+
+    /// A background with the photograph's pixels under the mask, as they are: naive insertion.
+    ///
+    /// # Panics
+    /// Where the background or the photograph has another size.
+    #[must_use]
+    pub fn pasted(&self, photo: &Rgb<Linear>, background: &Rgb<Linear>) -> Rgb<Linear> {
+        assert_eq!(
+            photo.planes().extent(),
+            self.photo_extent(),
+            "size of the photograph"
+        );
+        assert_eq!(
+            background.planes().extent(),
+            self.photo_extent(),
+            "size of the background"
+        );
+        let mut picture = background.clone();
+        let Extent { width, height } = self.extent();
+        let [left, top] = self.place();
+        for y in 0..height {
+            for x in 0..width {
+                if self.mask().pixel(x, y)[0] >= 0.5 {
+                    let (x, y) = (left + x, top + y);
+                    let pixel = photo.planes().pixel(x, y);
+                    picture.planes_mut().set_pixel(x, y, pixel);
+                }
+            }
+        }
+        picture
+    }
+
+    fn blended(
+        &self,
+        mut picture: Rgb<Linear>,
+        blend: impl Fn(f32, f32, f32, f32) -> f32,
+        colours: &Planes<3>,
+    ) -> Rgb<Linear> {
+        let Extent { width, height } = self.extent();
+        assert_eq!(colours.extent(), self.extent(), "size of the colours");
+        let alpha = self.matte().alpha.plane(0);
+        let planes = picture.planes_mut().planes_mut();
+        for (channel, plane) in planes.into_iter().enumerate() {
+            let (own, new) = (
+                self.matte().foreground.plane(channel),
+                colours.plane(channel),
+            );
+            for y in 0..height {
+                let line = &mut plane
+                    [(self.place()[1] + y) * self.photo_extent().width + self.place()[0]..]
+                    [..width];
+                for (x, value) in line.iter_mut().enumerate() {
+                    let at = y * width + x;
+                    if alpha[at] > 0.0 {
+                        *value = blend(alpha[at], *value, own[at], new[at]);
+                    }
+                }
+            }
+        }
+        picture
+    }
+}

@@ -1,0 +1,110 @@
+//! The part of a photograph around an object.
+
+use relight_core::image::{Extent, Linear, Planes, Rgb};
+
+use super::InsertError;
+use super::matte::Matte;
+use crate::decompose::{CropSquare, DecomposeError};
+
+/// Which colours the soft edge of an object has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum EdgeColours {
+    /// The object's own: those of the background are taken out.
+    #[default]
+    Freed,
+    /// What the photograph shows there, mixed with its background: to see what the other way is good for.
+    Photographed,
+}
+
+/// The part of a photograph around an object.
+pub(super) struct Cut {
+    /// Column and row of its first pixel.
+    pub(super) place: [usize; 2],
+    /// Width and height of the photograph.
+    pub(super) photo: Extent,
+    /// 1 on the object, else 0.
+    pub(super) mask: Planes<1>,
+    pub(super) matte: Matte,
+}
+
+impl Cut {
+    pub(super) fn new(
+        photo: &Rgb<Linear>,
+        (mask, alpha): (&Planes<1>, Option<&Planes<1>>),
+        edges: EdgeColours,
+    ) -> Result<Self, InsertError> {
+        let expected = photo.planes().extent();
+        for (what, image) in [("mask", Some(mask)), ("alpha", alpha)] {
+            if let Some(found) = image.map(Planes::extent).filter(|&found| found != expected) {
+                return Err(InsertError::Size {
+                    what,
+                    found,
+                    expected,
+                });
+            }
+        }
+        check_light(photo)?;
+        let region = CropSquare::around(mask).ok_or(DecomposeError::EmptyMask)?;
+        let edge = Matte::edge_for(region.extent());
+        let margin = 4 * edge + 4;
+        let (place, extent) = window(&region, margin, expected);
+        let picture = cropped(photo.planes(), place, extent);
+        let mask = cropped(mask, place, extent).map(|m| f32::from(u8::from(m >= 0.5)));
+        let mut matte = match alpha {
+            Some(alpha) => Matte::of_cut_out(&picture, &cropped(alpha, place, extent)),
+            None => Matte::estimate(&picture, &mask, edge),
+        };
+        if edges == EdgeColours::Photographed {
+            matte.foreground = picture;
+        }
+        Ok(Self {
+            place,
+            photo: expected,
+            mask,
+            matte,
+        })
+    }
+}
+
+/// Whether all values are light.
+fn check_light(photo: &Rgb<Linear>) -> Result<(), InsertError> {
+    let width = photo.planes().extent().width;
+    for plane in photo.planes().planes() {
+        let odd = plane
+            .iter()
+            .position(|value| !(value.is_finite() && *value >= 0.0));
+        if let Some(at) = odd {
+            return Err(InsertError::NotLight {
+                x: at % width,
+                y: at / width,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The part of an image that a square with a margin covers.
+fn window(region: &CropSquare, margin: usize, image: Extent) -> ([usize; 2], Extent) {
+    let margin = margin as i64;
+    let line = |from: i64, length: usize| {
+        let inside = |at: i64| at.clamp(0, length as i64) as usize;
+        (
+            inside(from - margin),
+            inside(from + region.side as i64 + margin),
+        )
+    };
+    let ((left, right), (top, bottom)) =
+        (line(region.x, image.width), line(region.y, image.height));
+    ([left, top], Extent::new(right - left, bottom - top))
+}
+
+fn cropped<const C: usize>(image: &Planes<C>, place: [usize; 2], extent: Extent) -> Planes<C> {
+    let width = image.extent().width;
+    let mut part = Planes::zeros(extent);
+    for (to, from) in part.planes_mut().into_iter().zip(image.planes()) {
+        for (y, line) in to.chunks_exact_mut(extent.width.max(1)).enumerate() {
+            line.copy_from_slice(&from[(place[1] + y) * width + place[0]..][..extent.width]);
+        }
+    }
+    part
+}

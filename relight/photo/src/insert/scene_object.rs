@@ -1,0 +1,78 @@
+//! An object of a scene: where it stands and how it is shown.
+
+use relight_core::image::Extent;
+
+use super::placement::rows;
+use super::{InsertError, MaterialChange, ObjectDescription, Placement, Subject};
+
+/// How much an object may be enlarged.
+const MOST_GROWTH: f64 = 64.0;
+
+/// An object of a scene.
+#[derive(Debug, Clone, Copy)]
+pub struct SceneObject<'a> {
+    /// The object.
+    pub subject: &'a Subject,
+    /// Where it stands.
+    pub placement: Placement,
+    /// What its material becomes.
+    pub change: MaterialChange,
+    /// Its brightness in stops.
+    pub exposure: f32,
+    /// How much of its shadow is seen, 0 to 1.
+    pub shadow: f32,
+    /// Whether it is shown in the scene's light; else in that of its photograph.
+    pub relit: bool,
+}
+
+impl<'a> SceneObject<'a> {
+    /// An object as it is described, in the scene's light.
+    #[must_use]
+    pub fn described(object: &ObjectDescription, subject: &'a Subject) -> Self {
+        Self {
+            subject,
+            placement: object.placement(),
+            change: object.change(),
+            exposure: object.exposure,
+            shadow: object.shadow,
+            relit: true,
+        }
+    }
+
+    /// Refuses what cannot stand in a picture of this size.
+    pub(super) fn check(&self, extent: Extent, number: usize) -> Result<(), InsertError> {
+        let Placement {
+            at,
+            height,
+            rotation,
+        } = self.placement;
+        let bounds = [
+            ("place", at[0], -0.5..=1.5),
+            ("place", at[1], -0.5..=2.0),
+            ("height", height, 1e-3..=4.0),
+            ("rotation", rotation, -3600.0..=3600.0),
+            ("shadow", f64::from(self.shadow), 0.0..=1.0),
+            ("exposure", f64::from(self.exposure), -20.0..=20.0),
+        ];
+        for (what, value, range) in bounds {
+            if !range.contains(&value) {
+                return Err(InsertError::Placement {
+                    object: number,
+                    what,
+                    value,
+                    least: *range.start(),
+                    most: *range.end(),
+                });
+            }
+        }
+        let growth =
+            height * extent.height as f64 / rows(&self.subject.matte().alpha).len().max(1) as f64;
+        if growth > MOST_GROWTH {
+            return Err(InsertError::Growth {
+                object: number,
+                growth,
+            });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,45 @@
+//! A light that was measured, out of a file.
+
+use std::path::Path;
+
+use relight_core::light::{Order, Panorama, ShLight};
+
+use crate::error::TurnError;
+use crate::model::harmonics::GLOSS_ORDER;
+
+/// The light of a file: the coefficients that it holds, or a panorama (.hdr, .exr) projected to the order that gloss is
+/// fitted with.
+///
+/// # Errors
+/// Where the file cannot be read.
+pub fn read_given_light(path: &Path) -> Result<ShLight, TurnError> {
+    let is_panorama = path.extension().is_some_and(|ending| {
+        ending.eq_ignore_ascii_case("hdr") || ending.eq_ignore_ascii_case("exr")
+    });
+    if !is_panorama {
+        return Ok(ShLight::read(path)?);
+    }
+    let order = Order::new(GLOSS_ORDER).unwrap_or(Order::TWO);
+    Ok(Panorama::read(path)?.project(order))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relight_core::files::write_exr;
+    use relight_core::image::{Extent, Planes};
+
+    #[test]
+    fn a_panorama_has_all_the_bands_that_gloss_is_fitted_with() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("light.exr");
+        let picture = Planes::from_fn(Extent::new(64, 32), |x, _| {
+            [1.0 + f32::from(u8::from(x < 4)); 3]
+        });
+        write_exr(&path, &picture).unwrap();
+        let light = read_given_light(&path).unwrap();
+        assert_eq!(light.order().get(), GLOSS_ORDER);
+        let highest = &light.coefficients()[GLOSS_ORDER * GLOSS_ORDER..];
+        assert!(highest.iter().flatten().any(|value| value.abs() > 1e-3));
+    }
+}

@@ -1,0 +1,162 @@
+//! Joint optimisation of light, gloss, normals and albedo by Gauss-Newton steps, in which every pixel follows the
+//! light.
+//!
+//! Alternation between light and pixels takes many rounds, for each is held by the other. A step here takes out of what
+//! the light's unknowns do to a curve the part that the pixel's own normal and albedo could do as well: the Schur
+//! complement of the normal equations.
+
+use rayon::prelude::*;
+use relight_core::statistics::median;
+
+use crate::fit::curve_statistics::CurveStatistics;
+use crate::fit::normal_step::PriorNormal;
+use crate::fit::schur::JointEquations;
+use crate::fit::search::{PixelFit, Search, cost, search_all};
+use crate::fit::unknowns::{Columns, Estimate, Unknowns};
+use crate::model::shading::ShadingModel;
+
+/// Parameters of the joint optimisation.
+struct JointParameters {
+    /// Damping of the first step, relative to the diagonal (Levenberg-Marquardt). Numerical.
+    damping: f64,
+    /// Factor of the damping after a step that lowers the cost. Numerical.
+    damping_fall: f64,
+    /// Factor of the damping after one that does not. Numerical.
+    damping_rise: f64,
+    /// Damping at which the steps end. Numerical.
+    most_damping: f64,
+    /// Relative gain of a step below which the steps end. Numerical.
+    settled: f64,
+    /// Pixels that one task adds up. Fixed, so that sums do not depend on the number of threads.
+    chunk: usize,
+    /// Residual at which a pixel counts one quarter, in medians. By hand.
+    outlier: f64,
+    /// Least residual that is taken for the median, over the energy of the variation. Numerical.
+    least_median: f64,
+}
+
+const PARAMETERS: JointParameters = JointParameters {
+    damping: 1e-3,
+    damping_fall: 0.2,
+    damping_rise: 10.0,
+    most_damping: 1e3,
+    settled: 2e-3,
+    chunk: 128,
+    outlier: 4.0,
+    least_median: 1e-3,
+};
+
+/// Pixels whose shading model is fitted.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct JointOptimisation<'a> {
+    pub(crate) statistics: &'a [CurveStatistics],
+    pub(crate) prior: Option<&'a [PriorNormal]>,
+    pub(crate) unknowns: Unknowns<'a>,
+}
+
+impl JointOptimisation<'_> {
+    /// The final residual and shading model. Each round searches the normals anywhere, then refines all unknowns.
+    pub(crate) fn found(
+        &self,
+        start: ShadingModel,
+        rounds: usize,
+        steps: usize,
+    ) -> (f64, ShadingModel) {
+        let mut model = start;
+        let mut residual = f64::INFINITY;
+        for _ in 0..rounds {
+            let fits = search_all(&model, self.statistics, self.prior, None);
+            let (found, fits) = self.refined(model, fits, steps);
+            let reached = cost(&fits, self.prior);
+            if reached < residual {
+                (model, residual) = (found, reached);
+            }
+        }
+        (residual, model)
+    }
+
+    /// Shading model and pixels after at most so many steps from these.
+    pub(crate) fn refined(
+        &self,
+        model: ShadingModel,
+        fits: Vec<PixelFit>,
+        steps: usize,
+    ) -> (ShadingModel, Vec<PixelFit>) {
+        let (mut estimate, mut fits) = (Estimate::of(&model, self.unknowns), fits);
+        let (frame, mut damping) = (model.frame, PARAMETERS.damping);
+        let mut least = cost(&fits, self.prior);
+        for _ in 0..steps {
+            let model = estimate.model(&frame, self.unknowns);
+            let Some(step) = self.step(&estimate, &model, &fits, damping) else {
+                break;
+            };
+            let other = estimate.moved(&step, self.unknowns);
+            let model = other.model(&frame, self.unknowns);
+            let found = search_all(&model, self.statistics, self.prior, Some(&fits));
+            let reached = cost(&found, self.prior);
+            if reached < least {
+                let gain = (least - reached) / least;
+                (estimate, fits, least) = (other, found, reached);
+                damping *= PARAMETERS.damping_fall;
+                if gain < PARAMETERS.settled {
+                    break;
+                }
+            } else {
+                damping *= PARAMETERS.damping_rise;
+                if damping > PARAMETERS.most_damping {
+                    break;
+                }
+            }
+        }
+        (estimate.model(&frame, self.unknowns), fits)
+    }
+
+    /// How the unknowns should change.
+    fn step(
+        &self,
+        estimate: &Estimate,
+        model: &ShadingModel,
+        fits: &[PixelFit],
+        damping: f64,
+    ) -> Option<Vec<f64>> {
+        let weights = weights(fits);
+        let columns = Columns {
+            estimate,
+            bands: self.unknowns.bands(estimate)?,
+            layout: self.unknowns.layout(),
+            model,
+        };
+        let search = Search::new(model);
+        let sums = (0..fits.len().div_ceil(PARAMETERS.chunk))
+            .into_par_iter()
+            .map(|chunk| {
+                let mut sums = JointEquations::new(columns.layout.count());
+                let pixels =
+                    chunk * PARAMETERS.chunk..((chunk + 1) * PARAMETERS.chunk).min(fits.len());
+                for pixel in pixels.filter(|&pixel| !self.statistics[pixel].is_dark()) {
+                    let prior = self.prior.map(|all| all[pixel]);
+                    let one = (&self.statistics[pixel], prior, fits[pixel].normal);
+                    sums.add_pixel(&search, &columns, one, weights[pixel]);
+                }
+                sums
+            })
+            .reduce(
+                || JointEquations::new(columns.layout.count()),
+                JointEquations::plus,
+            );
+        sums.solve(damping)
+    }
+}
+
+/// How much the energy that is left of each pixel's curve counts, so that bright pixels, which stand out of the noise,
+/// count more: less where the model does not explain it.
+fn weights(fits: &[PixelFit]) -> Vec<f64> {
+    let median = median(fits.iter().map(|fit| fit.residual))
+        .unwrap_or(0.0)
+        .max(PARAMETERS.least_median);
+    let weight = |fit: &PixelFit| {
+        let size = fit.residual / (PARAMETERS.outlier * median);
+        1.0 / (1.0 + size).powi(2)
+    };
+    fits.iter().map(weight).collect()
+}

@@ -1,0 +1,100 @@
+//! Normals of a network, or of a file, to start from.
+
+use std::path::{Path, PathBuf};
+
+use relight_core::image::{Linear, Planes, Rgb};
+use relight_core::light::{Normals, NormalsFrame, YDown, YUp};
+use relight_nets::{NetError, Weights};
+use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer, SpecularGate};
+
+use crate::error::TurnError;
+
+/// Where normals come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum NormalsSource {
+    /// The decomposing network with the weights that the caller has.
+    Own,
+    /// That network with other weights.
+    Weights(PathBuf),
+    /// Another network, as an ONNX file: see [`Decomposer::set_normals`].
+    Onnx(PathBuf),
+    /// A map of normals, PNG or EXR.
+    Map(PathBuf),
+}
+
+impl NormalsSource {
+    /// What a path names: a map of normals (.png, .exr), a folder with a map `normal`, an ONNX file, or weights
+    /// (.safetensors, .pth).
+    #[must_use]
+    pub fn of(path: &Path) -> Self {
+        let has = |ending: &str| {
+            path.extension()
+                .is_some_and(|found| found.eq_ignore_ascii_case(ending))
+        };
+        if path.is_dir() {
+            let exr = path.join("normal.exr");
+            let map = if exr.is_file() {
+                exr
+            } else {
+                path.join("normal.png")
+            };
+            return Self::Map(map);
+        }
+        if has("onnx") {
+            Self::Onnx(path.to_owned())
+        } else if has("png") || has("exr") {
+            Self::Map(path.to_owned())
+        } else {
+            Self::Weights(path.to_owned())
+        }
+    }
+}
+
+/// The normals of a file, or the mean of a network's over some frames of the turn. `own` gives the caller's weights of
+/// the decomposing network.
+///
+/// # Errors
+/// Where a file cannot be read or the network fails.
+pub fn prior_normals(
+    source: &NormalsSource,
+    own: impl FnOnce() -> Result<Weights, NetError>,
+    frame: NormalsFrame,
+    frames: &[Rgb<Linear>],
+    mask: &Planes<1>,
+) -> Result<Normals<YUp>, TurnError> {
+    let decomposer = match source {
+        NormalsSource::Map(path) => {
+            return Ok(match frame {
+                NormalsFrame::YUp => Normals::<YUp>::read(path)?,
+                NormalsFrame::YDown => Normals::<YDown>::read(path)?.flipped(),
+            });
+        }
+        NormalsSource::Own => Decomposer::new(&own().map_err(DecomposeError::from)?)?,
+        NormalsSource::Weights(path) => {
+            Decomposer::new(&Weights::read(path).map_err(DecomposeError::from)?)?
+        }
+        NormalsSource::Onnx(path) => {
+            let mut decomposer = Decomposer::new(&own().map_err(DecomposeError::from)?)?;
+            decomposer.read_normals(path, frame)?;
+            decomposer
+        }
+    };
+    let options = DecomposeOptions {
+        specular: SpecularGate::Off,
+        ..DecomposeOptions::default()
+    };
+    let mut sums = Planes::<3>::zeros(mask.extent());
+    for picture in frames {
+        let found = decomposer.decompose(picture, mask, &options)?;
+        let pairs = sums
+            .planes_mut()
+            .into_iter()
+            .zip(found.normals.planes().planes());
+        for (sum, plane) in pairs {
+            sum.iter_mut()
+                .zip(plane)
+                .for_each(|(sum, value)| *sum += value);
+        }
+    }
+    Ok(Normals::new(sums))
+}

@@ -1,0 +1,242 @@
+//! Whether a ball is where it is said to be: the light that is fitted to it has to fit it, and no circle beside it
+//! has a clearly smaller residual. Knows nothing of what the light is used for.
+
+use crate::error::TurnError;
+use crate::fit::curve_statistics::CurveStatistics;
+use crate::fit::environment::relative_residual;
+use crate::model::frame::{Elevation, TableFrame};
+use crate::observe::curves::TurnCurves;
+use crate::observe::mirror_panorama::MirrorPanorama;
+use crate::observe::probe::ProbeBall;
+use crate::observe::surroundings::{SURROUNDINGS_PARAMETERS, Surroundings, middle_of};
+
+/// Parameters of the check of a ball's place.
+struct ProbeCheckParameters {
+    /// Share of a circle's radius that counts, 0 to 1. By hand: the rim also shows what is behind it.
+    radius_share: f64,
+    /// Middles that are tried first, in either direction, in given radii. By hand.
+    shifts: [f64; 5],
+    /// Radii that are tried first, in given radii. By hand: steps of a fourth root of 2.
+    scales: [f64; 5],
+    /// Steps around the best, in parts of half their distances. Derived: either way and none.
+    steps: [f64; 3],
+    /// How often the best is improved, each time by half the steps. By hand.
+    refined: i32,
+    /// Largest residual of a grey ball by its own light, over that by an even light. By hand.
+    most_of_grey: f64,
+    /// The same of a chrome ball, of whose small windows the panorama keeps less. By hand.
+    most_of_chrome: f64,
+    /// Largest part of the given circle's residual with which another one is the ball. By hand.
+    clearly: f64,
+    /// By how much its residual has to be less. By hand.
+    less: f64,
+    /// Least distance to the given circle, in radii. By hand: nearer ones measure nearly the same light.
+    apart: f64,
+    /// Least share of a circle, 0 to 1, that has to be in the picture. By hand.
+    least_inside: f64,
+}
+
+const PARAMETERS: ProbeCheckParameters = ProbeCheckParameters {
+    radius_share: 0.92,
+    shifts: [-0.5, -0.25, 0.0, 0.25, 0.5],
+    scales: [0.7, 0.84, 1.0, 1.19, 1.42],
+    steps: [-1.0, 0.0, 1.0],
+    refined: 3,
+    most_of_grey: 0.3,
+    most_of_chrome: 0.6,
+    clearly: 0.6,
+    less: 0.02,
+    apart: 0.08,
+    least_inside: 0.9,
+};
+
+/// A circle, in radii from the middle that was given: to the right and up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Circle {
+    middle: [f64; 2],
+    radius: f64,
+}
+
+/// A ball's pixels, each as a curve, and where they are.
+struct Shown {
+    curves: TurnCurves,
+    statistics: Vec<CurveStatistics>,
+    at: Vec<[f64; 2]>,
+    frame: TableFrame,
+    ball: ProbeBall,
+}
+
+impl Surroundings {
+    /// The residual of the ball's own light, over the variation, 0 to 1.
+    ///
+    /// # Errors
+    /// [`TurnError::NoBall`] where that is most of it, [`TurnError::Misplaced`] where another circle has a clearly
+    /// smaller one.
+    pub(crate) fn check(self, ball: ProbeBall, elevation: Elevation) -> Result<f64, TurnError> {
+        let (place, side) = (self.place, self.side);
+        let curves = self.builder.finish()?;
+        let shown = Shown {
+            statistics: (0..curves.pixels())
+                .map(|pixel| CurveStatistics::new(&curves, pixel, None))
+                .collect(),
+            at: curves
+                .places()
+                .iter()
+                .map(|&at| middle_of(side, at))
+                .collect(),
+            curves,
+            frame: TableFrame::new(elevation),
+            ball,
+        };
+        let given = Circle {
+            middle: [0.0; 2],
+            radius: 1.0,
+        };
+        let residual = shown.residual(given).unwrap_or(1.0);
+        let (best, least) = shown.best(given, residual);
+        let [x, y] = best.middle;
+        let apart = x.hypot(y).max((best.radius - 1.0).abs());
+        let most = most_residual(ball);
+        if least < PARAMETERS.clearly * residual
+            && least < residual - PARAMETERS.less
+            && apart > PARAMETERS.apart
+            && least < most
+        {
+            let [x, y] = place.in_picture(best.middle);
+            return Err(TurnError::Misplaced {
+                given: place,
+                better: [x, y, best.radius * place.radius].map(f64::round),
+                explained: [residual, least].map(|residual| 100.0 * (1.0 - residual).max(0.0)),
+            });
+        }
+        if residual > most {
+            return Err(TurnError::NoBall {
+                given: place,
+                explained: 100.0 * (1.0 - residual).max(0.0),
+            });
+        }
+        Ok(residual)
+    }
+}
+
+/// The largest residual of a ball by its own light.
+pub(crate) const fn most_residual(ball: ProbeBall) -> f64 {
+    match ball {
+        ProbeBall::Grey => PARAMETERS.most_of_grey,
+        ProbeBall::Chrome => PARAMETERS.most_of_chrome,
+    }
+}
+
+impl Shown {
+    /// The circle of the smallest residual, and that residual.
+    fn best(&self, given: Circle, residual: f64) -> (Circle, f64) {
+        let mut best = (given, residual);
+        let tries = PARAMETERS.shifts.iter().flat_map(|&x| {
+            PARAMETERS.shifts.iter().flat_map(move |&y| {
+                PARAMETERS.scales.iter().map(move |&radius| Circle {
+                    middle: [x, y],
+                    radius,
+                })
+            })
+        });
+        self.try_all(tries, &mut best);
+        for round in 1..=PARAMETERS.refined {
+            let part = 0.5_f64.powi(round);
+            let around = best.0;
+            let tries = PARAMETERS.steps.iter().flat_map(|x| {
+                PARAMETERS.steps.iter().flat_map(move |y| {
+                    PARAMETERS.steps.iter().map(move |scale| Circle {
+                        middle: [
+                            around.middle[0] + 0.25 * part * x,
+                            around.middle[1] + 0.25 * part * y,
+                        ],
+                        radius: around.radius * PARAMETERS.scales[3].powf(part * scale),
+                    })
+                })
+            });
+            self.try_all(tries, &mut best);
+        }
+        best
+    }
+
+    fn try_all(&self, circles: impl Iterator<Item = Circle>, best: &mut (Circle, f64)) {
+        for circle in circles {
+            if let Some(residual) = self.residual(circle)
+                && residual < best.1
+            {
+                *best = (circle, residual);
+            }
+        }
+    }
+
+    /// The residual of the light fitted to a ball in a circle, over that of an even light; none where the circle is not
+    /// in the picture, or nothing varies in it.
+    fn residual(&self, circle: Circle) -> Option<f64> {
+        let wanted = std::f64::consts::PI
+            * (PARAMETERS.radius_share * circle.radius * SURROUNDINGS_PARAMETERS.across as f64
+                / 2.0)
+                .powi(2);
+        let (pixels, normals): (Vec<usize>, Vec<[f64; 3]>) = self
+            .at
+            .iter()
+            .enumerate()
+            .filter_map(|(pixel, &at)| Some((pixel, circle.normal(at)?)))
+            .unzip();
+        if (pixels.len() as f64) < PARAMETERS.least_inside * wanted {
+            return None;
+        }
+        match self.ball {
+            ProbeBall::Grey => {
+                let statistics = pixels.iter().map(|&pixel| &self.statistics[pixel]);
+                relative_residual(statistics, &normals, &self.frame)
+            }
+            ProbeBall::Chrome => self.residual_by_mirror(&pixels, &normals),
+        }
+    }
+
+    /// The same for a ball that mirrors its surroundings.
+    fn residual_by_mirror(&self, pixels: &[usize], normals: &[[f64; 3]]) -> Option<f64> {
+        let mut panorama = MirrorPanorama::new(self.frame);
+        self.each_value(pixels, normals, |normal, angle, value| {
+            panorama.add(angle, normal, value);
+        });
+        let all = panorama.all()?;
+        let (mut rest, mut energy) = (0.0, 0.0);
+        self.each_value(pixels, normals, |normal, angle, value| {
+            let seen = panorama.seen(angle, normal).unwrap_or(all);
+            for c in 0..3 {
+                rest += (value[c] - seen[c]).powi(2);
+                energy += (value[c] - all[c]).powi(2);
+            }
+        });
+        (energy > 0.0).then(|| rest / energy)
+    }
+
+    /// Every value that is not clipped, with its normal and the table's angle, radians.
+    fn each_value(
+        &self,
+        pixels: &[usize],
+        normals: &[[f64; 3]],
+        mut take: impl FnMut([f64; 3], f64, [f64; 3]),
+    ) {
+        for (&pixel, &normal) in pixels.iter().zip(normals) {
+            let values = self.curves.values(pixel).iter();
+            let parts = values.zip(self.curves.weights(pixel));
+            for ((value, weight), &angle) in parts.zip(self.curves.angles()) {
+                if weight.iter().all(|&weight| weight > 0.5) {
+                    take(normal, angle, value.map(f64::from));
+                }
+            }
+        }
+    }
+}
+
+impl Circle {
+    /// The normal of the ball in it at a place, where that is well inside.
+    fn normal(self, at: [f64; 2]) -> Option<[f64; 3]> {
+        let [x, y] = [0, 1].map(|i| (at[i] - self.middle[i]) / self.radius);
+        let square = x * x + y * y;
+        (square < PARAMETERS.radius_share * PARAMETERS.radius_share)
+            .then(|| [x, y, (1.0 - square).sqrt()])
+    }
+}

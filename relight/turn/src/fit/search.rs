@@ -1,0 +1,325 @@
+//! The normal of one pixel: the one whose curve is nearest to what was seen.
+
+use rayon::prelude::*;
+
+use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts, sum_of_products};
+use crate::fit::normal_step::{NormalDerivatives, PriorNormal, QuadraticCost};
+use crate::model::directions::{LEAST_FACING, dot, half_sphere, tangents, tilted};
+use crate::model::harmonics::COEFFICIENTS;
+use crate::model::shading::{PixelHarmonics, ShadingModel};
+
+/// Parameters of the search for a normal.
+struct SearchParameters {
+    /// Candidates over the visible half sphere. By hand: about 7 degrees apart.
+    candidates: usize,
+    /// How many of the best candidates are refined. By hand.
+    refined: usize,
+    /// Gauss-Newton steps of each of them before the best is taken. By hand.
+    first_steps: usize,
+    /// Largest number of Gauss-Newton steps. By hand.
+    steps: usize,
+    /// Length of a step at which the refinement ends, radians. Numerical.
+    last_step: f64,
+    /// Step of the finite differences of the gradient, radians. Numerical.
+    gradient_step: f64,
+    /// Step of the finite differences of the Hessian, radians. By hand.
+    hessian_step: f64,
+    /// Damping of the first step, relative to the trace of the Hessian (Levenberg-Marquardt). Numerical.
+    damping: f64,
+    /// Factor of the damping after a step that lowers the cost. Numerical.
+    damping_fall: f64,
+    /// Factor of the damping after one that does not. Numerical.
+    damping_rise: f64,
+    /// Least eigenvalue of the Hessian: at a border of what is allowed it need not be positive. Numerical.
+    least_curvature: f64,
+}
+
+const PARAMETERS: SearchParameters = SearchParameters {
+    candidates: 400,
+    refined: 3,
+    first_steps: 4,
+    steps: 16,
+    last_step: 1e-4,
+    gradient_step: 1e-4,
+    hessian_step: 0.06,
+    damping: 1e-3,
+    damping_fall: 0.2,
+    damping_rise: 8.0,
+    least_curvature: 1e-3,
+};
+
+/// A pixel's answer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PixelFit {
+    /// In the viewer's frame.
+    pub(crate) normal: [f64; 3],
+    pub(crate) albedo: [f64; 3],
+    /// What is left of the curve, over the energy of its variation.
+    pub(crate) residual: f64,
+}
+
+/// Candidate normals under a shading model.
+pub(crate) struct Search<'a> {
+    model: &'a ShadingModel,
+    tried: Vec<Tried>,
+}
+
+struct Tried {
+    normal: [f64; 3],
+    harmonics: PixelHarmonics,
+    products: HarmonicProducts,
+}
+
+impl<'a> Search<'a> {
+    pub(crate) fn new(model: &'a ShadingModel) -> Self {
+        let tried = half_sphere(PARAMETERS.candidates).map(|normal| {
+            let harmonics = model.harmonics(normal);
+            Tried {
+                normal,
+                harmonics,
+                products: HarmonicProducts::of(&harmonics),
+            }
+        });
+        Self {
+            model,
+            tried: tried.collect(),
+        }
+    }
+
+    /// The best normal anywhere.
+    pub(crate) fn anywhere(
+        &self,
+        statistics: &CurveStatistics,
+        prior: Option<PriorNormal>,
+    ) -> PixelFit {
+        let mut best = [(f64::INFINITY, [0.0, 0.0, 1.0]); PARAMETERS.refined];
+        for tried in &self.tried {
+            let cost =
+                statistics.residual(&tried.harmonics, &tried.products) + bias(prior, tried.normal);
+            if cost < best[PARAMETERS.refined - 1].0 {
+                insert(&mut best, (cost, tried.normal));
+            }
+        }
+        let refined =
+            best.map(|(_, start)| self.downhill(statistics, prior, start, PARAMETERS.first_steps));
+        let [first, rest @ ..] = refined;
+        let (start, _) = rest.into_iter().fold(
+            first,
+            |best, other| {
+                if other.1 < best.1 { other } else { best }
+            },
+        );
+        self.near(statistics, prior, start)
+    }
+
+    /// The best normal that is reached from `start` downhill.
+    pub(crate) fn near(
+        &self,
+        statistics: &CurveStatistics,
+        prior: Option<PriorNormal>,
+        start: [f64; 3],
+    ) -> PixelFit {
+        let (normal, _) = self.downhill(statistics, prior, start, PARAMETERS.steps);
+        PixelFit {
+            normal,
+            albedo: statistics.albedo(&self.model.harmonics(normal)),
+            residual: self.residual(statistics, normal),
+        }
+    }
+
+    /// Where so many steps lead, and what it costs there: Gauss-Newton steps, damped as by Levenberg-Marquardt,
+    /// with the albedo at its best for each normal.
+    fn downhill(
+        &self,
+        statistics: &CurveStatistics,
+        prior: Option<PriorNormal>,
+        start: [f64; 3],
+        steps: usize,
+    ) -> ([f64; 3], f64) {
+        let cost = |normal| self.residual(statistics, normal) + bias(prior, normal);
+        let mut normal = start;
+        let mut least = cost(normal);
+        let mut damping = PARAMETERS.damping;
+        for _ in 0..steps {
+            let axes = tangents(normal);
+            let quadratic = self.quadratic(statistics, prior, normal, axes);
+            let step = quadratic.step(damping);
+            let other = tilted(normal, axes, step);
+            let found = cost(other);
+            let length = step[0].hypot(step[1]);
+            if other[2] >= LEAST_FACING && found < least {
+                (normal, least) = (other, found);
+                damping *= PARAMETERS.damping_fall;
+            } else {
+                damping *= PARAMETERS.damping_rise;
+            }
+            if length < PARAMETERS.last_step {
+                break;
+            }
+        }
+        (normal, least)
+    }
+
+    /// How the cost changes as a normal leans.
+    fn quadratic(
+        &self,
+        statistics: &CurveStatistics,
+        prior: Option<PriorNormal>,
+        normal: [f64; 3],
+        axes: [[f64; 3]; 2],
+    ) -> QuadraticCost {
+        let derivatives = self.derivatives(statistics, normal, axes);
+        let mut quadratic = QuadraticCost::default();
+        for (channel, jacobian) in derivatives.jacobian.iter().enumerate() {
+            quadratic.add(statistics, channel, jacobian, &derivatives.seen[channel]);
+        }
+        quadratic.scale(statistics.unit());
+        if let Some(prior) = prior {
+            quadratic.add_prior(prior, normal, axes);
+        }
+        quadratic
+    }
+
+    /// How the harmonics of a pixel change as its normal leans.
+    pub(crate) fn derivatives(
+        &self,
+        statistics: &CurveStatistics,
+        normal: [f64; 3],
+        [u, v]: [[f64; 3]; 2],
+    ) -> NormalDerivatives {
+        let here = self.model.harmonics(normal);
+        let albedo = statistics.albedo(&here);
+        let there = [
+            [PARAMETERS.gradient_step, 0.0],
+            [0.0, PARAMETERS.gradient_step],
+        ]
+        .map(|step| self.model.harmonics(tilted(normal, [u, v], step)));
+        let base = here.base;
+        let seen: [_; 3] = std::array::from_fn(|c| sum(&base[c], albedo[c], &here.gloss[c]));
+        let jacobian = std::array::from_fn(|c| {
+            let along = statistics.times(c, &base[c]);
+            let own = sum_of_products(&base[c], &along);
+            there.map(|there| {
+                let moved = sum(&there.base[c], albedo[c], &there.gloss[c]);
+                let mut column: [f64; COEFFICIENTS] =
+                    std::array::from_fn(|i| (moved[i] - seen[c][i]) / PARAMETERS.gradient_step);
+                // The albedo follows the normal.
+                if own > 1e-12 && albedo[c] > 0.0 {
+                    let share = sum_of_products(&column, &along) / own;
+                    column
+                        .iter_mut()
+                        .zip(&base[c])
+                        .for_each(|(column, base)| *column -= share * base);
+                }
+                column
+            })
+        });
+        NormalDerivatives {
+            albedo,
+            base,
+            seen,
+            jacobian,
+        }
+    }
+
+    /// The residual of a normal.
+    pub(crate) fn residual(&self, statistics: &CurveStatistics, normal: [f64; 3]) -> f64 {
+        let harmonics = self.model.harmonics(normal);
+        statistics.residual(&harmonics, &HarmonicProducts::of(&harmonics))
+    }
+
+    /// How far the normal may lean before the residual grows by as much as it is: the standard deviation of
+    /// the angle, radians, were the residual of the curve noise of `freedom` degrees of freedom.
+    pub(crate) fn standard_deviation(
+        &self,
+        statistics: &CurveStatistics,
+        prior: Option<PriorNormal>,
+        fit: &PixelFit,
+        freedom: f64,
+    ) -> f64 {
+        let [u, v] = tangents(fit.normal);
+        let cost = |a: f64, b: f64| {
+            let normal = tilted(fit.normal, [u, v], [a, b]);
+            self.residual(statistics, normal) + bias(prior, normal)
+        };
+        let h = PARAMETERS.hessian_step;
+        let middle = cost(0.0, 0.0);
+        let uu = (cost(h, 0.0) + cost(-h, 0.0) - 2.0 * middle) / (h * h);
+        let vv = (cost(0.0, h) + cost(0.0, -h) - 2.0 * middle) / (h * h);
+        let uv = (cost(h, h) - cost(h, -h) - cost(-h, h) + cost(-h, -h)) / (4.0 * h * h);
+        // The eigenvalues of the Hessian, which at a border of what is allowed need not be positive.
+        let (half, rest) = (
+            (uu + vv) / 2.0,
+            (((uu - vv) / 2.0).powi(2) + uv * uv).sqrt(),
+        );
+        let inverse: f64 = [half + rest, half - rest]
+            .into_iter()
+            .map(|eigenvalue| 1.0 / eigenvalue.max(PARAMETERS.least_curvature))
+            .sum();
+        (2.0 * fit.residual / freedom * inverse).sqrt()
+    }
+}
+
+fn sum(
+    base: &[f64; COEFFICIENTS],
+    albedo: f64,
+    gloss: &[f64; COEFFICIENTS],
+) -> [f64; COEFFICIENTS] {
+    std::array::from_fn(|i| albedo * base[i] + gloss[i])
+}
+
+/// Puts one of less cost in its place, and the last one out.
+fn insert(best: &mut [(f64, [f64; 3]); PARAMETERS.refined], one: (f64, [f64; 3])) {
+    best[PARAMETERS.refined - 1] = one;
+    best.sort_by(|a, b| a.0.total_cmp(&b.0));
+}
+
+fn bias(prior: Option<PriorNormal>, normal: [f64; 3]) -> f64 {
+    prior.map_or(0.0, |prior| {
+        prior.weight * (1.0 - dot(prior.normal, normal))
+    })
+}
+
+/// The best normals of all pixels: near those of other fits, or anywhere.
+pub(crate) fn search_all(
+    model: &ShadingModel,
+    statistics: &[CurveStatistics],
+    prior: Option<&[PriorNormal]>,
+    near: Option<&[PixelFit]>,
+) -> Vec<PixelFit> {
+    let search = Search::new(model);
+    statistics
+        .par_iter()
+        .enumerate()
+        .map(|(pixel, statistics)| {
+            let prior = prior.map(|all| all[pixel]);
+            if statistics.is_dark() {
+                return PixelFit {
+                    normal: prior.map_or([0.0, 0.0, 1.0], |prior| prior.normal),
+                    albedo: [0.0; 3],
+                    residual: 1.0,
+                };
+            }
+            match near {
+                Some(fits) => search.near(statistics, prior, fits[pixel].normal),
+                None => search.anywhere(statistics, prior),
+            }
+        })
+        .collect()
+}
+
+/// What is left of the curves, with what normals are off those that are expected, the mean over the pixels.
+pub(crate) fn cost(fits: &[PixelFit], prior: Option<&[PriorNormal]>) -> f64 {
+    let sum: f64 = fits
+        .iter()
+        .enumerate()
+        .map(|(pixel, fit)| {
+            let off = prior.map_or(0.0, |all| {
+                let prior = all[pixel];
+                prior.weight * (1.0 - dot(prior.normal, fit.normal))
+            });
+            fit.residual.min(1.0) + off
+        })
+        .sum();
+    sum / fits.len().max(1) as f64
+}

@@ -1,0 +1,154 @@
+//! Normals, albedo and light of a solved turn.
+
+use relight_core::image::{Linear, Planes, Rgb};
+use relight_core::light::{Normals, ShLight, YUp};
+use relight_core::statistics::median;
+
+use crate::fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure};
+use crate::fit::material_choice::doubted;
+use crate::fit::search::PixelFit;
+use crate::model::frame::{Elevation, TableFrame};
+use crate::model::lighting::TableLight;
+use crate::model::material::MaterialKind;
+use crate::model::shading::ShadingModel;
+use crate::observe::conditioning::Conditioning;
+use crate::observe::curves::TurnCurves;
+
+/// Parameters of the confidence.
+struct ConfidenceParameters {
+    /// Expected error at which the confidence is one half, radians. By convention of the files.
+    half_error: f64,
+}
+
+const PARAMETERS: ConfidenceParameters = ConfidenceParameters { half_error: 0.2 };
+
+/// Normals, albedo and light.
+#[derive(Debug, Clone)]
+pub struct TurnSolution {
+    /// One a pixel under the mask.
+    pub(crate) fits: Vec<PixelFit>,
+    /// The albedo of each pixel, which is that of its fit where its normal is to be trusted.
+    pub(crate) albedo: Vec<[f64; 3]>,
+    /// The angle that each normal is expected to be off, radians.
+    pub(crate) expected_errors: Vec<f64>,
+    pub(crate) model: ShadingModel,
+    pub(crate) elevation: Elevation,
+    /// The light, where it was measured.
+    pub(crate) measured: Option<ShLight>,
+    pub(crate) initialisations: Vec<InitialisationFigure>,
+    pub(crate) materials: Vec<MaterialFigure>,
+    pub(crate) has_prior: bool,
+    pub(crate) is_prior_left_out: bool,
+    pub(crate) direction: Option<DirectionFigure>,
+    pub(crate) given_material: Option<MaterialKind>,
+    pub(crate) conditioning: Conditioning,
+}
+
+impl TurnSolution {
+    /// The normals in the viewer's frame.
+    #[must_use]
+    pub fn normals(&self, curves: &TurnCurves) -> Normals<YUp> {
+        Normals::new(curves.map(|pixel| self.fits[pixel].normal.map(|v| v as f32)))
+    }
+
+    /// The albedo: in the light's units where that was known, else in such units that the mean shading of the object
+    /// over the turn is 1 in each channel. Where a normal is hardly to be trusted, it is that of the same colour
+    /// around.
+    #[must_use]
+    pub fn albedo(&self, curves: &TurnCurves) -> Rgb<Linear> {
+        Rgb::new(curves.map(|pixel| self.albedo[pixel].map(|v| v as f32)))
+    }
+
+    /// The albedo that goes with each normal's shading, right or wrong.
+    #[must_use]
+    pub fn fitted_albedo(&self, curves: &TurnCurves) -> Rgb<Linear> {
+        Rgb::new(curves.map(|pixel| self.fits[pixel].albedo.map(|v| v as f32)))
+    }
+
+    /// The shading over the whole turn: the mean irradiance of each pixel, or what white metal would show.
+    #[must_use]
+    pub fn shading(&self, curves: &TurnCurves) -> Rgb<Linear> {
+        Rgb::new(curves.map(|pixel| {
+            let harmonics = self.model.harmonics(self.fits[pixel].normal);
+            harmonics.base.map(|harmonics| harmonics[0].max(0.0) as f32)
+        }))
+    }
+
+    /// How far each normal is to be trusted, 0 to 1: one half where it is expected to be off by 11.5 degrees.
+    #[must_use]
+    pub fn confidence(&self, curves: &TurnCurves) -> Planes<1> {
+        curves.map(|pixel| [confidence(self.expected_errors[pixel]) as f32])
+    }
+
+    /// The light.
+    #[must_use]
+    pub const fn light(&self) -> &TableLight {
+        &self.model.light
+    }
+
+    /// The camera over the table.
+    #[must_use]
+    pub const fn frame(&self) -> &TableFrame {
+        &self.model.frame
+    }
+
+    /// What the object is taken for.
+    #[must_use]
+    pub const fn material(&self) -> MaterialKind {
+        self.model.material
+    }
+
+    /// The residual of each material that was tried.
+    #[must_use]
+    pub fn materials(&self) -> &[MaterialFigure] {
+        &self.materials
+    }
+
+    /// Whether the light, of the turn and where it was given, is fit for this.
+    #[must_use]
+    pub const fn conditioning(&self) -> Conditioning {
+        self.conditioning
+    }
+
+    /// The other kind, where one was given and the other fits clearly better.
+    #[must_use]
+    pub fn doubted_material(&self) -> Option<MaterialKind> {
+        self.given_material.and_then(|_| doubted(&self.materials))
+    }
+
+    /// How well both rotation directions fit the curves; none where that is not observable.
+    #[must_use]
+    pub const fn direction(&self) -> Option<DirectionFigure> {
+        self.direction
+    }
+
+    /// Whether the given normals were left out: a shape inflated out of the outline fits the turn better.
+    #[must_use]
+    pub const fn is_prior_left_out(&self) -> bool {
+        self.is_prior_left_out
+    }
+
+    /// How each initialisation of an unknown light ended; none where it was known.
+    #[must_use]
+    pub fn initialisations(&self) -> &[InitialisationFigure] {
+        &self.initialisations
+    }
+
+    /// The median over the pixels of the residual of a curve, over the energy of its variation.
+    #[must_use]
+    pub fn residual(&self) -> f64 {
+        median(self.fits.iter().map(|fit| fit.residual)).unwrap_or(0.0)
+    }
+
+    /// The median over the pixels of the angle that a normal is expected to be off, degrees.
+    #[must_use]
+    pub fn expected_error_deg(&self) -> f64 {
+        median(self.expected_errors.iter().copied())
+            .unwrap_or(0.0)
+            .to_degrees()
+    }
+}
+
+pub(crate) fn confidence(expected_error: f64) -> f64 {
+    1.0 / (1.0 + (expected_error / PARAMETERS.half_error).powi(2))
+}

@@ -1,0 +1,186 @@
+//! The camera over the table.
+
+use relight_core::light::Rotation;
+use serde::Serialize;
+
+use crate::setting_error::SettingError;
+
+/// Parameters of the elevation.
+struct ElevationParameters {
+    /// Elevation where none is known, degrees. By convention of the rig.
+    usual_deg: f64,
+    /// Uncertainty of that one, degrees. By hand.
+    usual_uncertainty_deg: f64,
+    /// Uncertainty of one that was given, degrees. By hand.
+    given_uncertainty_deg: f64,
+    /// Uncertainty of a length that was measured in a picture, in heights of the rim. By hand.
+    rim_uncertainty: f64,
+}
+
+const PARAMETERS: ElevationParameters = ElevationParameters {
+    usual_deg: 18.0,
+    usual_uncertainty_deg: 8.0,
+    given_uncertainty_deg: 1.0,
+    rim_uncertainty: 0.03,
+};
+
+/// Where an elevation comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ElevationSource {
+    /// Nobody said: what is usual on this rig.
+    Assumed,
+    /// It was given.
+    Given,
+    /// From the ellipse of the table's rim.
+    Rim,
+}
+
+/// How high the camera looks down on the table: 0 from the side, 90 degrees from above.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Elevation {
+    degrees: f64,
+    uncertainty_deg: f64,
+    source: ElevationSource,
+}
+
+impl Elevation {
+    /// What is usual where nothing is known: 18 degrees, and 8 either way.
+    #[must_use]
+    pub const fn assumed() -> Self {
+        Self {
+            degrees: PARAMETERS.usual_deg,
+            uncertainty_deg: PARAMETERS.usual_uncertainty_deg,
+            source: ElevationSource::Assumed,
+        }
+    }
+
+    /// An elevation that was measured, degrees.
+    ///
+    /// # Errors
+    /// [`SettingError`] beyond 0 to 89 degrees.
+    pub fn given(degrees: f64) -> Result<Self, SettingError> {
+        if !(0.0..=89.0).contains(&degrees) {
+            return Err(SettingError {
+                what: "the elevation",
+                value: degrees,
+                allowed: "0 to 89 degrees",
+            });
+        }
+        Ok(Self {
+            degrees,
+            uncertainty_deg: PARAMETERS.given_uncertainty_deg,
+            source: ElevationSource::Given,
+        })
+    }
+
+    /// From the ellipse that the table's round rim is in the picture, pixels: seen from far away its height
+    /// over its width is the sine of the elevation.
+    ///
+    /// # Errors
+    /// [`SettingError`] where that is no ellipse of a round rim.
+    pub fn of_rim(width: f64, height: f64) -> Result<Self, SettingError> {
+        let sine = height / width;
+        if !(width > 0.0 && (0.0..1.0).contains(&sine)) {
+            return Err(SettingError {
+                what: "the rim's height over its width",
+                value: sine,
+                allowed: "0 to 1",
+            });
+        }
+        let elevation = sine.asin();
+        let quadratic = 1.0 / elevation.cos();
+        Ok(Self {
+            degrees: elevation.to_degrees(),
+            uncertainty_deg: (PARAMETERS.rim_uncertainty * sine * quadratic)
+                .to_degrees()
+                .max(0.5),
+            source: ElevationSource::Rim,
+        })
+    }
+
+    /// Degrees.
+    #[must_use]
+    pub const fn degrees(&self) -> f64 {
+        self.degrees
+    }
+
+    /// How far it may be off, degrees.
+    #[must_use]
+    pub const fn uncertainty_deg(&self) -> f64 {
+        self.uncertainty_deg
+    }
+
+    /// Where it comes from.
+    #[must_use]
+    pub const fn source(&self) -> ElevationSource {
+        self.source
+    }
+}
+
+/// The frame in which the light turns: x to the camera's right, y level and away from the camera, z along
+/// the table's axis, upwards (right-handed).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TableFrame {
+    sin: f64,
+    cos: f64,
+}
+
+impl TableFrame {
+    /// The frame of a table that is seen from this elevation.
+    #[must_use]
+    pub fn new(elevation: Elevation) -> Self {
+        let (sin, cos) = elevation.degrees.to_radians().sin_cos();
+        Self { sin, cos }
+    }
+
+    /// A vector of the viewer's frame in the table's.
+    #[must_use]
+    pub fn to_table(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        [x, self.sin * y - self.cos * z, self.cos * y + self.sin * z]
+    }
+
+    /// The table's axis, upwards, in the viewer's frame.
+    #[must_use]
+    pub const fn axis(&self) -> [f64; 3] {
+        [0.0, self.cos, self.sin]
+    }
+
+    /// The rotation that does the same.
+    #[must_use]
+    pub fn rotation(&self) -> Rotation {
+        let Self { sin, cos } = *self;
+        let matrix = [[1.0, 0.0, 0.0], [0.0, sin, -cos], [0.0, cos, sin]];
+        // The rows are orthonormal for every angle.
+        Rotation::from_matrix(matrix).unwrap_or(Rotation::IDENTITY)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_axis_is_up_for_the_table_and_leans_to_the_viewer() {
+        let frame = TableFrame::new(Elevation::given(30.0).unwrap());
+        let (sin, cos) = 30.0_f64.to_radians().sin_cos();
+        let up = frame.to_table([0.0, cos, sin]);
+        assert!((up[2] - 1.0).abs() < 1e-12);
+        let away = frame.to_table([0.0, sin, -cos]);
+        assert!((away[1] - 1.0).abs() < 1e-12);
+        let apply = frame.rotation();
+        let row = apply.matrix()[2];
+        assert!((row[1] - cos).abs() < 1e-12 && (row[2] - sin).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_rim_half_as_high_as_wide_is_seen_from_thirty_degrees() {
+        let elevation = Elevation::of_rim(400.0, 200.0).unwrap();
+        assert!((elevation.degrees() - 30.0).abs() < 1e-9);
+        assert_eq!(elevation.source(), ElevationSource::Rim);
+        assert!(Elevation::of_rim(200.0, 400.0).is_err());
+        assert!(Elevation::of_rim(0.0, 0.0).is_err());
+        assert!(Elevation::given(f64::NAN).is_err());
+        assert!(Elevation::given(90.0).is_err());
+    }
+}

@@ -1,0 +1,47 @@
+//! What a pixel shows of the environment light.
+
+use crate::model::directions::reflected;
+use crate::model::frame::TableFrame;
+use crate::model::gloss::GlossLight;
+use crate::model::harmonics::{COEFFICIENTS, LAMBERTIAN_COEFFICIENTS};
+use crate::model::lighting::TableLight;
+use crate::model::material::MaterialKind;
+use crate::model::metal::mirror_terms;
+
+/// The shading model: environment light and material, as a pixel shows them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ShadingModel {
+    pub(crate) frame: TableFrame,
+    pub(crate) light: TableLight,
+    /// What gloss shows of it beside the diffuse part; of metal, what a white one shows.
+    pub(crate) gloss: GlossLight,
+    pub(crate) material: MaterialKind,
+}
+
+/// The harmonics of a base layer of albedo 1, and those that gloss adds whatever the albedo is, for each channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PixelHarmonics {
+    pub(crate) base: [[f64; COEFFICIENTS]; 3],
+    /// How many harmonics of the base layer there are: the others are 0.
+    pub(crate) count: usize,
+    pub(crate) gloss: [[f64; COEFFICIENTS]; 3],
+}
+
+impl ShadingModel {
+    /// The harmonics of a normal in the viewer's frame.
+    pub(crate) fn harmonics(&self, normal: [f64; 3]) -> PixelHarmonics {
+        let reflected = self.frame.to_table(reflected(normal));
+        match self.material {
+            MaterialKind::Diffuse => PixelHarmonics {
+                base: self.light.harmonics(self.frame.to_table(normal)),
+                count: LAMBERTIAN_COEFFICIENTS,
+                gloss: self.gloss.harmonics(normal[2], reflected),
+            },
+            MaterialKind::Metal => PixelHarmonics {
+                base: self.gloss.harmonics_of(&mirror_terms(reflected)),
+                count: COEFFICIENTS,
+                gloss: [[0.0; COEFFICIENTS]; 3],
+            },
+        }
+    }
+}

@@ -1,0 +1,403 @@
+//! Light over the table's angle, one curve a pixel and channel.
+
+use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
+use relit_data::image_stats::SATURATED_VALUE;
+
+use crate::error::TurnError;
+use crate::model::harmonics::{COEFFICIENTS, HARMONICS};
+use crate::observe::exposure::{ExposureStep, ExposureWatch};
+
+/// Parameters of the curves.
+struct CurveParameters {
+    /// Parts into which the turn is divided. Derived: a part of 5 degrees is narrow beside the harmonics, and its own
+    /// mean of them is kept, so that dividing loses nothing.
+    parts: usize,
+    /// Encoded value, 0 to 1, from which a channel counts as clipped. Derived: the saturation level of the data, less
+    /// rounding.
+    clipped_value: f32,
+    /// Least share of the frames of a part, 0 to 1, in which a channel is not clipped. By hand: the mean of fewer would
+    /// be that of the darker ones.
+    least_unclipped: f32,
+    /// Relative difference up to which exposures of the frames of a part count as equal. By hand.
+    same_exposure: f64,
+    /// Least number of parts with frames. Derived: five Fourier coefficients of a Lambertian curve, and three to spare.
+    least_parts: usize,
+    /// Least share of the pixels of a block, 0 to 1, that have to be unclipped. By hand: the mean of fewer would be too
+    /// dark.
+    least_of_block: f32,
+}
+
+const PARAMETERS: CurveParameters = CurveParameters {
+    parts: 72,
+    clipped_value: SATURATED_VALUE,
+    least_unclipped: 0.95,
+    same_exposure: 0.01,
+    least_parts: 8,
+    least_of_block: 0.9,
+};
+
+/// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Of each frame it keeps the light of a few pixels,
+/// about a kilobyte; beyond that its memory does not grow with the number of frames.
+#[derive(Debug)]
+pub struct CurveBuilder {
+    extent: Extent,
+    /// Which pixels are under the mask.
+    places: Vec<usize>,
+    clipped: f32,
+    parts: Vec<Part>,
+    /// Pixel by pixel, in it part by part: sum of light and number of frames that are not clipped.
+    sums: Vec<[f32; 3]>,
+    counts: Vec<[u16; 3]>,
+    watch: ExposureWatch,
+    frames: usize,
+}
+
+/// The frames of a part of the turn.
+#[derive(Debug, Clone, Default)]
+struct Part {
+    frames: u32,
+    /// Which frames, in the order in which they came.
+    members: Vec<usize>,
+    harmonics: [f64; COEFFICIENTS - 1],
+}
+
+/// Light over the table's angle. The turn is divided into parts; of each part a pixel has the mean of its
+/// light, channel by channel, where the channel is not clipped.
+#[derive(Debug, Clone)]
+pub struct TurnCurves {
+    extent: Extent,
+    places: Vec<usize>,
+    frames: u32,
+    steps: Vec<ExposureStep>,
+    /// The mean of 1, cos t, -sin t, cos 2t, -sin 2t and so on over each part's frames.
+    harmonics: Vec<[f64; COEFFICIENTS]>,
+    /// The middle of each part, radians.
+    angles: Vec<f64>,
+    /// Pixel by pixel, in it part by part.
+    values: Vec<[f32; 3]>,
+    weights: Vec<[f32; 3]>,
+}
+
+impl CurveBuilder {
+    /// For the pixels under a mask: where it is at least one half.
+    ///
+    /// # Errors
+    /// [`TurnError::Empty`] where there are none.
+    pub fn new(extent: Extent, mask: &[f32]) -> Result<Self, TurnError> {
+        let places: Vec<usize> = (0..extent.pixels().min(mask.len()))
+            .filter(|&at| mask[at] >= 0.5)
+            .collect();
+        if places.is_empty() {
+            return Err(TurnError::Empty);
+        }
+        let cells = places.len() * PARAMETERS.parts;
+        Ok(Self {
+            extent,
+            places,
+            clipped: Srgb::to_linear(PARAMETERS.clipped_value),
+            parts: vec![Part::default(); PARAMETERS.parts],
+            sums: vec![[0.0; 3]; cells],
+            counts: vec![[0; 3]; cells],
+            watch: ExposureWatch::default(),
+            frames: 0,
+        })
+    }
+
+    /// Takes a frame up: its angle, degrees, and its planes of linear red, green and blue. Frames at angles
+    /// that are no number are left out.
+    ///
+    /// # Errors
+    /// [`TurnError::FrameSize`] where it has another size.
+    pub fn push(
+        &mut self,
+        angle_deg: f64,
+        extent: Extent,
+        planes: [&[f32]; 3],
+    ) -> Result<(), TurnError> {
+        if extent != self.extent || planes.iter().any(|plane| plane.len() != extent.pixels()) {
+            return Err(TurnError::FrameSize {
+                found: extent,
+                expected: self.extent,
+            });
+        }
+        if !angle_deg.is_finite() {
+            return Ok(());
+        }
+        let part = (angle_deg.rem_euclid(360.0) / 360.0 * PARAMETERS.parts as f64) as usize
+            % PARAMETERS.parts;
+        self.watch
+            .push(angle_deg, &self.places, planes, self.clipped);
+        self.parts[part].add(angle_deg.to_radians(), self.frames);
+        self.frames += 1;
+        for (pixel, &at) in self.places.iter().enumerate() {
+            let cell = pixel * PARAMETERS.parts + part;
+            for (channel, plane) in planes.iter().enumerate() {
+                if plane[at] < self.clipped {
+                    self.sums[cell][channel] += plane[at];
+                    let count = &mut self.counts[cell][channel];
+                    *count = count.saturating_add(1);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The curves of all frames.
+    ///
+    /// # Errors
+    /// [`TurnError::TooFewAngles`] where the frames do not tell two harmonics.
+    pub fn finish(self) -> Result<TurnCurves, TurnError> {
+        let seen: Vec<usize> = (0..PARAMETERS.parts)
+            .filter(|&at| self.parts[at].frames > 0)
+            .collect();
+        if seen.len() < PARAMETERS.least_parts {
+            return Err(TurnError::TooFewAngles {
+                angles: seen.len(),
+                needed: PARAMETERS.least_parts,
+            });
+        }
+        let (steps, exposures) = self.watch.finish();
+        let exposures: Vec<Option<f64>> = self
+            .parts
+            .iter()
+            .map(|part| part.exposure(&exposures))
+            .collect();
+        let cells = || {
+            self.places
+                .iter()
+                .enumerate()
+                .flat_map(|(pixel, _)| seen.iter().map(move |part| pixel * PARAMETERS.parts + part))
+        };
+        let mean = |cell: usize| {
+            let exposure = exposures[cell % PARAMETERS.parts].unwrap_or(1.0) as f32;
+            [0, 1, 2]
+                .map(|c| self.sums[cell][c] / f32::from(self.counts[cell][c].max(1)) / exposure)
+        };
+        let values = cells().map(mean).collect();
+        let weights = cells()
+            .map(|cell| {
+                let frames = self.parts[cell % PARAMETERS.parts].frames as f32;
+                self.counts[cell].map(|count| {
+                    let is_seen = f32::from(count) >= PARAMETERS.least_unclipped * frames
+                        && exposures[cell % PARAMETERS.parts].is_some();
+                    f32::from(u8::from(is_seen))
+                })
+            })
+            .collect();
+        Ok(TurnCurves {
+            extent: self.extent,
+            frames: self.frames as u32,
+            steps,
+            harmonics: seen.iter().map(|&at| self.parts[at].harmonics()).collect(),
+            angles: seen
+                .iter()
+                .map(|&at| (at as f64 + 0.5) / PARAMETERS.parts as f64 * std::f64::consts::TAU)
+                .collect(),
+            values,
+            weights,
+            places: self.places,
+        })
+    }
+}
+
+impl Part {
+    fn add(&mut self, angle: f64, frame: usize) {
+        self.frames += 1;
+        self.members.push(frame);
+        for harmonic in 1..=HARMONICS {
+            let (sin, cos) = (harmonic as f64 * angle).sin_cos();
+            self.harmonics[2 * harmonic - 2] += cos;
+            self.harmonics[2 * harmonic - 1] -= sin;
+        }
+    }
+
+    /// The exposure of its frames; none where they are not all the same.
+    fn exposure(&self, of_frames: &[f64]) -> Option<f64> {
+        let all = || self.members.iter().map(|&frame| of_frames[frame]);
+        let (least, most) = (
+            all().fold(f64::INFINITY, f64::min),
+            all().fold(0.0, f64::max),
+        );
+        (most <= least * (1.0 + PARAMETERS.same_exposure)).then_some(most)
+    }
+
+    fn harmonics(&self) -> [f64; COEFFICIENTS] {
+        let mut harmonics = [1.0; COEFFICIENTS];
+        for (coefficient, sum) in harmonics[1..].iter_mut().zip(self.harmonics) {
+            *coefficient = sum / f64::from(self.frames.max(1));
+        }
+        harmonics
+    }
+}
+
+impl TurnCurves {
+    /// Width and height of the frames.
+    #[must_use]
+    pub const fn extent(&self) -> Extent {
+        self.extent
+    }
+
+    /// How many pixels are under the mask.
+    #[must_use]
+    pub fn pixels(&self) -> usize {
+        self.places.len()
+    }
+
+    /// How many frames were taken up.
+    #[must_use]
+    pub const fn frames(&self) -> u32 {
+        self.frames
+    }
+
+    /// Where the exposure changed. The curves are as if it had not: they have the exposure of most frames.
+    #[must_use]
+    pub fn exposure_steps(&self) -> &[ExposureStep] {
+        &self.steps
+    }
+
+    /// In how many parts of the turn there are frames.
+    #[must_use]
+    pub fn parts(&self) -> usize {
+        self.harmonics.len()
+    }
+
+    /// The part of the light, 0 to 1, that is left out because it is clipped in the same part of the turn.
+    #[must_use]
+    pub fn clipped(&self) -> f64 {
+        let sum: f64 = self
+            .weights
+            .iter()
+            .flatten()
+            .map(|&weight| f64::from(weight))
+            .sum();
+        (1.0 - sum / (3 * self.weights.len()).max(1) as f64).max(0.0)
+    }
+
+    /// The light from which a channel counts as clipped.
+    pub(crate) fn clipped_value(&self) -> f64 {
+        f64::from(Srgb::to_linear(PARAMETERS.clipped_value))
+    }
+
+    /// The part of a pixel's light, 0 to 1, that is left out because it is clipped.
+    pub(crate) fn clipped_at(&self, pixel: usize) -> f64 {
+        let weights = self.weights(pixel).as_flattened();
+        1.0 - weights.iter().map(|&weight| f64::from(weight)).sum::<f64>() / weights.len() as f64
+    }
+
+    /// Where the pixels under the mask stand in the frame, row by row.
+    pub(crate) fn places(&self) -> &[usize] {
+        &self.places
+    }
+
+    /// Where the mask is.
+    pub(crate) fn mask(&self) -> Vec<bool> {
+        let mut mask = vec![false; self.extent.pixels()];
+        self.places.iter().for_each(|&at| mask[at] = true);
+        mask
+    }
+
+    /// The mean of 1, cos t, -sin t, cos 2t, -sin 2t and so on over each part.
+    pub(crate) fn harmonics(&self) -> &[[f64; COEFFICIENTS]] {
+        &self.harmonics
+    }
+
+    /// The middle of each part, radians.
+    pub(crate) fn angles(&self) -> &[f64] {
+        &self.angles
+    }
+
+    /// The light of a pixel, part by part.
+    pub(crate) fn values(&self, pixel: usize) -> &[[f32; 3]] {
+        &self.values[pixel * self.parts()..][..self.parts()]
+    }
+
+    /// How much each of them counts, 0 or 1: nothing where it is clipped.
+    pub(crate) fn weights(&self, pixel: usize) -> &[[f32; 3]] {
+        &self.weights[pixel * self.parts()..][..self.parts()]
+    }
+
+    /// A map whose values under the mask are these, and 0 elsewhere.
+    ///
+    /// # Panics
+    /// Where there are fewer values than pixels.
+    pub(crate) fn map<const C: usize>(&self, value: impl Fn(usize) -> [f32; C]) -> Planes<C> {
+        let mut map = Planes::zeros(self.extent);
+        let width = self.extent.width;
+        for (pixel, &at) in self.places.iter().enumerate() {
+            map.set_pixel(at % width, at / width, value(pixel));
+        }
+        map
+    }
+
+    /// The curves as they are if the table turns the other way as its angle grows.
+    pub(crate) fn with_other_direction(&self) -> Self {
+        let mut other = self.clone();
+        for harmonics in &mut other.harmonics {
+            for sine in harmonics.iter_mut().skip(2).step_by(2) {
+                *sine = -*sine;
+            }
+        }
+        for angle in &mut other.angles {
+            *angle = -*angle;
+        }
+        other
+    }
+
+    /// The curves of blocks of `side` x `side` pixels, of those that are mostly under the mask; of an object
+    /// that fills no block, of all that it touches.
+    pub(crate) fn reduced(&self, side: usize) -> Self {
+        let extent = Extent::new(
+            self.extent.width.div_ceil(side),
+            self.extent.height.div_ceil(side),
+        );
+        let mut members: Vec<Vec<usize>> = vec![Vec::new(); extent.pixels()];
+        for (pixel, &at) in self.places.iter().enumerate() {
+            let (x, y) = (at % self.extent.width, at / self.extent.width);
+            members[y / side * extent.width + x / side].push(pixel);
+        }
+        let is_full = |block: &&usize| 2 * members[**block].len() >= side * side;
+        let all: Vec<usize> = (0..members.len())
+            .filter(|&block| !members[block].is_empty())
+            .collect();
+        let full: Vec<usize> = all.iter().filter(is_full).copied().collect();
+        let places = if full.is_empty() { all } else { full };
+        let mut reduced = Self {
+            extent,
+            frames: self.frames,
+            steps: self.steps.clone(),
+            harmonics: self.harmonics.clone(),
+            angles: self.angles.clone(),
+            values: Vec::with_capacity(places.len() * self.parts()),
+            weights: Vec::with_capacity(places.len() * self.parts()),
+            places,
+        };
+        for &block in &reduced.places {
+            for part in 0..self.harmonics.len() {
+                let (value, weight) = self.mean(&members[block], part);
+                reduced.values.push(value);
+                reduced.weights.push(weight);
+            }
+        }
+        reduced
+    }
+
+    /// The mean light of pixels in a part of the turn, and how much it counts.
+    fn mean(&self, pixels: &[usize], part: usize) -> ([f32; 3], [f32; 3]) {
+        let (mut sum, mut weights) = ([0.0; 3], [0.0; 3]);
+        for &pixel in pixels {
+            let (value, weight) = (self.values(pixel)[part], self.weights(pixel)[part]);
+            for channel in 0..3 {
+                sum[channel] += weight[channel] * value[channel];
+                weights[channel] += weight[channel];
+            }
+        }
+        // A block of which a pixel clips is too dark by the mean of the others: it does not count.
+        let least = PARAMETERS.least_of_block * pixels.len() as f32;
+        let mean = [0, 1, 2].map(|c| sum[c] / weights[c].max(f32::MIN_POSITIVE));
+        let weight = weights.map(|weight| if weight >= least { 1.0 } else { 0.0 });
+        (mean, weight)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,29 @@
+use relight_core::image::Extent;
+
+use crate::{CurveBuilder, TurnError};
+
+#[test]
+fn turns_without_frames_or_angles_are_refused_by_what_is_wrong() {
+    let extent = Extent::new(4, 4);
+    let empty = CurveBuilder::new(extent, &[0.0; 16]);
+    assert!(matches!(empty, Err(TurnError::Empty)));
+    let builder = || CurveBuilder::new(extent, &[1.0; 16]).unwrap();
+    let grey = [0.3; 16];
+    let mut few = builder();
+    for k in 0..100 {
+        few.push(f64::from(k % 4), extent, [&grey; 3]).unwrap();
+    }
+    assert!(matches!(
+        few.finish(),
+        Err(TurnError::TooFewAngles { angles: 1, .. })
+    ));
+    let other = builder().push(0.0, Extent::new(8, 2), [&grey; 3]);
+    assert!(matches!(other, Err(TurnError::FrameSize { .. })));
+    let mut lost = builder();
+    lost.push(f64::NAN, extent, [&grey; 3]).unwrap();
+    lost.push(f64::INFINITY, extent, [&grey; 3]).unwrap();
+    assert!(matches!(
+        lost.finish(),
+        Err(TurnError::TooFewAngles { angles: 0, .. })
+    ));
+}

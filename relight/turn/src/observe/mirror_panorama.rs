@@ -1,0 +1,113 @@
+//! The panorama that a chrome ball shows.
+
+use std::f64::consts::{FRAC_1_PI, PI, TAU};
+
+use relight_core::light::{Direction, Order, ShLight, basis};
+
+use crate::error::TurnError;
+use crate::model::directions::reflected;
+use crate::model::frame::TableFrame;
+use crate::model::harmonics::GLOSS_ORDER;
+
+/// Parameters of the panorama.
+struct PanoramaParameters {
+    /// Rows of the panorama, from the table's axis upwards to downwards. By hand: about 6 degrees, finer than order 6
+    /// shows.
+    rows: usize,
+    /// Columns of the panorama. Derived: twice the rows, so that cells are square at the equator.
+    columns: usize,
+    /// Order of the light. Derived: as much as gloss is fitted with.
+    order: usize,
+}
+
+const PARAMETERS: PanoramaParameters = PanoramaParameters {
+    rows: 32,
+    columns: 64,
+    order: GLOSS_ORDER,
+};
+
+/// The panorama that a chrome ball shows of the environment light while it turns, in the table's frame at its angle 0.
+#[derive(Debug)]
+pub(crate) struct MirrorPanorama {
+    frame: TableFrame,
+    sums: Vec<[f64; 3]>,
+    counts: Vec<f64>,
+}
+
+impl MirrorPanorama {
+    pub(crate) fn new(frame: TableFrame) -> Self {
+        Self {
+            frame,
+            sums: vec![[0.0; 3]; PARAMETERS.rows * PARAMETERS.columns],
+            counts: vec![0.0; PARAMETERS.rows * PARAMETERS.columns],
+        }
+    }
+
+    /// Adds what a normal of the ball shows at an angle of the table, radians.
+    pub(crate) fn add(&mut self, angle: f64, normal: [f64; 3], light: [f64; 3]) {
+        let cell = self.cell(angle, normal);
+        for (sum, light) in self.sums[cell].iter_mut().zip(light) {
+            *sum += light;
+        }
+        self.counts[cell] += 1.0;
+    }
+
+    /// What the same direction showed in the mean; none where it was never added.
+    pub(crate) fn seen(&self, angle: f64, normal: [f64; 3]) -> Option<[f64; 3]> {
+        let cell = self.cell(angle, normal);
+        mean(&self.sums[cell..=cell], &self.counts[cell..=cell])
+    }
+
+    /// The mean of all that was added.
+    pub(crate) fn all(&self) -> Option<[f64; 3]> {
+        mean(&self.sums, &self.counts)
+    }
+
+    /// Where the direction is that a normal of the ball shows.
+    pub(crate) fn cell(&self, angle: f64, normal: [f64; 3]) -> usize {
+        let [x, y, z] = self.frame.to_table(reflected(normal));
+        let azimuth = y.atan2(x) + angle;
+        let column = (azimuth.rem_euclid(TAU) / TAU * PARAMETERS.columns as f64) as usize
+            % PARAMETERS.columns;
+        let row = ((z.clamp(-1.0, 1.0).acos() / PI * PARAMETERS.rows as f64) as usize)
+            .min(PARAMETERS.rows - 1);
+        row * PARAMETERS.columns + column
+    }
+
+    /// What it shows, as coefficients; directions that it never shows are as bright as their row, or as all.
+    pub(crate) fn light(&self) -> Result<ShLight, TurnError> {
+        let all = self.all().ok_or(TurnError::NoLight)?;
+        let order = Order::new(PARAMETERS.order).unwrap_or(Order::TWO);
+        let mut light = ShLight::even(order, [0.0; 3]);
+        for row in 0..PARAMETERS.rows {
+            let cells = row * PARAMETERS.columns..(row + 1) * PARAMETERS.columns;
+            let of_row = mean(&self.sums[cells.clone()], &self.counts[cells]).unwrap_or(all);
+            let polar = PI * (row as f64 + 0.5) / PARAMETERS.rows as f64;
+            let edges =
+                [row, row + 1].map(|edge| (PI * edge as f64 / PARAMETERS.rows as f64).cos());
+            let area = (edges[0] - edges[1]) * TAU / PARAMETERS.columns as f64;
+            for column in 0..PARAMETERS.columns {
+                let cell = row * PARAMETERS.columns + column;
+                let shown = mean(&self.sums[cell..=cell], &self.counts[cell..=cell]);
+                let azimuth = TAU * (column as f64 + 0.5) / PARAMETERS.columns as f64;
+                let (sin, cos) = azimuth.sin_cos();
+                let to = Direction::new(polar.sin() * cos, polar.sin() * sin, polar.cos());
+                let Some(to) = to else { continue };
+                let values = basis(order, to);
+                for (coefficient, value) in light.coefficients_mut().iter_mut().zip(values) {
+                    for (sum, shown) in coefficient.iter_mut().zip(shown.unwrap_or(of_row)) {
+                        *sum += FRAC_1_PI * area * value * shown;
+                    }
+                }
+            }
+        }
+        Ok(light)
+    }
+}
+
+/// The mean of all cells that were seen.
+fn mean(sums: &[[f64; 3]], counts: &[f64]) -> Option<[f64; 3]> {
+    let count: f64 = counts.iter().sum();
+    let sum = |channel: usize| sums.iter().map(|sum| sum[channel]).sum::<f64>();
+    (count > 0.0).then(|| [0, 1, 2].map(|channel| sum(channel) / count))
+}

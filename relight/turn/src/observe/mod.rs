@@ -1,0 +1,14 @@
+//! What the frames show: curves over the table's angle, the background of the video, and a ball that measures the
+//! light.
+
+pub(crate) mod conditioning;
+pub(crate) mod curves;
+pub(crate) mod exposure;
+pub(crate) mod film;
+pub(crate) mod mirror_panorama;
+pub(crate) mod probe;
+pub(crate) mod probe_place;
+pub(crate) mod reading;
+pub(crate) mod strip;
+pub(crate) mod surroundings;
+pub(crate) mod verdict;

@@ -1,0 +1,239 @@
+//! A turn's frames, once through, into curves.
+
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::sync::Arc;
+use std::thread::available_parallelism;
+
+use relight_core::image::{Extent, Linear, Planes, Rgb};
+use relight_reader::{
+    Cursor, Draw, DrawPlan, Encoding, Rank, Source, Stream, Streaming, TurnBatch, TurnFrame, Turns,
+};
+use relit_data::causes::with_causes;
+use relit_data::geometry::Rect;
+use serde::Serialize;
+
+use crate::error::TurnError;
+use crate::observe::curves::{CurveBuilder, TurnCurves};
+
+/// Parameters of the reading.
+struct ReadingParameters {
+    /// Frames that are drawn at a time. By convention of the shards: twelve neighbours cover the whole turn.
+    batch: u32,
+}
+
+const PARAMETERS: ReadingParameters = ReadingParameters { batch: 12 };
+
+/// Which way the table turns as its angle grows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RotationDirection {
+    /// Counter-clockwise, seen from above: the background moves to the right.
+    #[default]
+    CounterClockwise,
+    /// Clockwise: the background moves to the left.
+    Clockwise,
+}
+
+/// What the records of a shard say of the video that it was made from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TurnOrigin {
+    /// The session's id.
+    pub session: String,
+    /// The part of the video's frames that the shard's show, pixels.
+    pub crop: Rect,
+}
+
+/// A turn that was read.
+#[derive(Debug)]
+pub struct ReadTurn {
+    /// Its name: the shard's.
+    pub name: String,
+    /// Its curves.
+    pub curves: TurnCurves,
+    /// Its first twelve frames, which cover the whole turn.
+    pub first: Vec<Rgb<Linear>>,
+    /// Their angles of the table, degrees.
+    pub first_angles: Vec<f64>,
+    /// Where the frames stand in the turn's video, from 0, and the table's angle of each, degrees.
+    pub sources: Vec<(u64, f64)>,
+    /// The video itself; none where the frames have no records.
+    pub origin: Option<TurnOrigin>,
+    /// 1 on the object, else 0.
+    pub mask: Planes<1>,
+    /// Whether frames have their angles; else they are taken for evenly spread over one turn.
+    pub has_angles: bool,
+    /// What is wrong with frames that are left out.
+    pub damage: Vec<String>,
+}
+
+/// Reads the turn of a shard, or of what else [`Turns::open`] takes, once through. `progress` is told how many
+/// frames are done, and how many there are.
+///
+/// # Errors
+/// Where it cannot be opened, holds several turns, or shows too little.
+pub fn read_curves(
+    path: &Path,
+    direction: RotationDirection,
+    progress: &dyn Fn(u64, u64),
+) -> Result<ReadTurn, TurnError> {
+    let turns = Arc::new(Turns::open(path, Encoding::Linear)?);
+    let names: Vec<&str> = turns.names().collect();
+    let [name] = names.as_slice() else {
+        return Err(TurnError::ManyTurns {
+            path: path.to_owned(),
+            found: names.len(),
+        });
+    };
+    let frames = turns.turns().iter().sum::<u32>();
+    let streaming = Streaming {
+        plan: DrawPlan {
+            batch: PARAMETERS.batch,
+            draw: Draw::Neighbours,
+            seed: None,
+            rank: Rank::ONLY,
+        },
+        from: Cursor::default(),
+        until_epoch: 1,
+        threads: available_parallelism().unwrap_or(NonZeroUsize::MIN),
+        ahead: 2,
+    };
+    let mut reader = Reader {
+        frames,
+        direction,
+        builder: None,
+        first: Vec::new(),
+        first_angles: Vec::new(),
+        sources: Vec::new(),
+        origin: None,
+        mask: None,
+        has_angles: None,
+        last_index: 0.0,
+        damage: Vec::new(),
+    };
+    let mut stream = Stream::start(&turns, streaming)?;
+    let mut done = 0;
+    while let Some(shrunk) = stream.next() {
+        let shrunk = shrunk.unwrap_or_else(|damaged| {
+            reader
+                .damage
+                .extend(damaged.damage.iter().map(|one| with_causes(one)));
+            damaged.rest
+        });
+        reader.take(&shrunk.batch)?;
+        done += u64::from(PARAMETERS.batch);
+        progress(done.min(frames.into()), frames.into());
+        stream.give_back(shrunk.batch);
+    }
+    reader.finish((*name).to_owned())
+}
+
+struct Reader {
+    frames: u32,
+    direction: RotationDirection,
+    builder: Option<CurveBuilder>,
+    first: Vec<Rgb<Linear>>,
+    first_angles: Vec<f64>,
+    sources: Vec<(u64, f64)>,
+    origin: Option<TurnOrigin>,
+    mask: Option<Planes<1>>,
+    /// As the first frame has it.
+    has_angles: Option<bool>,
+    last_index: f64,
+    damage: Vec<String>,
+}
+
+impl Reader {
+    fn take(&mut self, batch: &TurnBatch) -> Result<(), TurnError> {
+        let (extent, pixels) = (batch.extent, batch.extent.pixels());
+        for (at, frame) in batch.frames.iter().enumerate() {
+            let image = &batch.images[3 * pixels * at..][..3 * pixels];
+            let planes = [0, 1, 2].map(|c| &image[c * pixels..][..pixels]);
+            let mask = &batch.masks[pixels * at..][..pixels];
+            if frame.record.as_ref().is_some_and(|record| record.duplicate) {
+                continue;
+            }
+            let Some(angle) = self.angle(frame) else {
+                continue;
+            };
+            if let Some(record) = &frame.record {
+                self.sources.push((record.source_frame, angle));
+                self.origin.get_or_insert_with(|| TurnOrigin {
+                    session: record.session.clone(),
+                    crop: record.crop,
+                });
+            }
+            self.builder(extent, mask)?.push(angle, extent, planes)?;
+            if self.first.len() < PARAMETERS.batch as usize {
+                let planes = planes.map(<[f32]>::to_vec);
+                self.first_angles.push(angle);
+                self.first
+                    .push(Rgb::new(Planes::from_planes(extent, planes)?));
+            }
+        }
+        Ok(())
+    }
+
+    /// The builder for the mask of the first frame.
+    fn builder(&mut self, extent: Extent, mask: &[f32]) -> Result<&mut CurveBuilder, TurnError> {
+        if self.builder.is_none() {
+            self.mask = Some(Planes::from_planes(extent, [mask.to_vec()])?);
+            self.builder = Some(CurveBuilder::new(extent, mask)?);
+        }
+        self.builder.as_mut().ok_or(TurnError::Empty)
+    }
+
+    /// The angle of a frame in degrees; `None` if others have one and it has none, or the other way around.
+    fn angle(&mut self, frame: &TurnFrame) -> Option<f64> {
+        let recorded = frame.record.as_ref().and_then(|record| record.angle_deg);
+        if *self.has_angles.get_or_insert(recorded.is_some()) != recorded.is_some() {
+            let key = &frame.key;
+            self.damage.push(match recorded {
+                Some(_) => format!("{key} has an angle and others have none: it is left out"),
+                None => format!("{key} has no angle and others do: it is left out"),
+            });
+            return None;
+        }
+        self.last_index = self.last_index.max(index(frame));
+        let degrees =
+            recorded.unwrap_or_else(|| 360.0 * index(frame) / f64::from(self.frames.max(1)));
+        Some(match self.direction {
+            RotationDirection::CounterClockwise => degrees,
+            RotationDirection::Clockwise => -degrees,
+        })
+    }
+
+    fn finish(self, name: String) -> Result<ReadTurn, TurnError> {
+        let has_angles = self.has_angles.unwrap_or(true);
+        let indices = self.last_index as u64 + 1;
+        if !has_angles && indices > self.frames.into() {
+            return Err(TurnError::NoAngles {
+                found: self.frames,
+                indices,
+            });
+        }
+        let builder = self.builder.ok_or(TurnError::Empty)?;
+        Ok(ReadTurn {
+            name,
+            curves: builder.finish()?,
+            first: self.first,
+            first_angles: self.first_angles,
+            sources: self.sources,
+            origin: self.origin,
+            mask: self.mask.ok_or(TurnError::Empty)?,
+            has_angles,
+            damage: self.damage,
+        })
+    }
+}
+
+/// Which frame of its turn it is: by its record, or by its key, which ends in the index.
+fn index(frame: &TurnFrame) -> f64 {
+    match &frame.record {
+        Some(record) => f64::from(record.index),
+        None => {
+            let last = frame.key.rsplit('/').next().unwrap_or_default();
+            last.parse().unwrap_or_default()
+        }
+    }
+}

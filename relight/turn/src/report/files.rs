@@ -1,0 +1,186 @@
+//! What is written of a turn: a folder that appears when it is whole.
+
+use std::path::Path;
+
+use relight_core::captured_object::CapturedObject;
+use relight_core::files::{ResultFolder, write_png};
+use relight_core::image::{Depth, Extent};
+use relight_photo::files::{bright, write_light};
+
+use crate::error::TurnError;
+use crate::fit::solution::TurnSolution;
+use crate::observe::reading::ReadTurn;
+use crate::observe::strip::PanoramaStrip;
+use crate::report::encoding::{grey, write_json};
+use crate::report::figures::{
+    FigureGloss, FigureLight, FigurePanorama, FigureWhites, LightFile, TurnFigures,
+};
+use crate::report::maps::TurnMaps;
+use crate::report::movie::write_movie;
+use crate::report::sheet::contact_sheet;
+
+/// The file of figures.
+const FIGURES: &str = "turn.json";
+
+/// The object as a file that can be lit.
+pub(crate) const ASSET: &str = "object.relit";
+
+/// What is written beside it.
+const FILES: [&str; 13] = [
+    "normal.png",
+    "albedo.png",
+    "shading.png",
+    "highlight.png",
+    "shadow.png",
+    "confidence.png",
+    "mask.png",
+    "light.txt",
+    "light.json",
+    "contact.png",
+    "relit.mp4",
+    "room.png",
+    ASSET,
+];
+
+const RESULTS: ResultFolder = ResultFolder {
+    marker: FIGURES,
+    holds: |name| name == FIGURES || FILES.contains(&name),
+};
+
+/// What it says it is.
+const SCHEMA: &str = "relight.solved_turn/1";
+
+/// A solved turn with all that is written of it.
+#[derive(Debug, Clone, Copy)]
+pub struct TurnFiles<'a> {
+    /// What was read.
+    pub turn: &'a ReadTurn,
+    /// What was found.
+    pub solution: &'a TurnSolution,
+    /// Its residuals.
+    pub maps: &'a TurnMaps,
+    /// Where the light is from: a file's name, or none where it was found.
+    pub light_source: Option<&'a str>,
+    /// Where the normals that initialise are from.
+    pub normals_source: Option<&'a str>,
+    /// The panorama strip, where the video was read.
+    pub strip: Option<&'a PanoramaStrip>,
+    /// The object, where it is to be among the files, as `object.relit`.
+    pub asset: Option<&'a CapturedObject>,
+    /// Whether to write the video.
+    pub has_movie: bool,
+}
+
+impl TurnFiles<'_> {
+    /// Whether results may be written to the folder `out`: it is not there, empty, or holds earlier results and nothing
+    /// else.
+    ///
+    /// # Errors
+    /// Where it holds something else, or cannot be read or written.
+    pub fn check(out: &Path) -> Result<(), TurnError> {
+        Ok(RESULTS.check(out)?)
+    }
+
+    /// Writes all files into the folder `out`, which appears when they are there; an earlier result in it is
+    /// replaced.
+    ///
+    /// # Errors
+    /// Where the folder holds something else or a file cannot be written: then the folder is as it was.
+    pub fn write(&self, out: &Path) -> Result<TurnFigures, TurnError> {
+        RESULTS.write(out, |folder| self.write_files(folder))
+    }
+
+    fn write_files(&self, folder: &Path) -> Result<TurnFigures, TurnError> {
+        let Self { solution, maps, .. } = *self;
+        let curves = &self.turn.curves;
+        let path = |name: &str| folder.join(name);
+        let surface = solution.surface(curves)?;
+        let albedo = solution.albedo(curves);
+        let shading = solution.shading(curves);
+        surface
+            .normals()
+            .write_png(&path("normal.png"), Depth::Sixteen)?;
+        let white = FigureWhites {
+            albedo: write_light(&path("albedo.png"), &albedo)?,
+            shading: write_light(&path("shading.png"), &shading)?,
+            highlight: write_light(&path("highlight.png"), &grey(&maps.highlight))?,
+        };
+        let confidence = grey(&solution.confidence(curves));
+        write_png(
+            &path("shadow.png"),
+            grey(&maps.shadow).planes(),
+            Depth::Eight,
+        )?;
+        write_png(&path("confidence.png"), confidence.planes(), Depth::Eight)?;
+        write_png(
+            &path("mask.png"),
+            grey(&self.turn.mask).planes(),
+            Depth::Eight,
+        )?;
+        let light = solution.light().to_viewer(solution.frame())?;
+        light.write(&path("light.txt"))?;
+        write_json(&path("light.json"), &LightFile::new(solution)?)?;
+        let sheet = contact_sheet(self.turn, solution, maps, (&surface, &light))?;
+        write_png(&path("contact.png"), &sheet, Depth::Eight)?;
+        if let Some(strip) = self.strip {
+            strip.write_png(&path("room.png"))?;
+        }
+        if let Some(asset) = self.asset {
+            asset.write(&path(ASSET))?;
+        }
+        if self.has_movie {
+            let white = bright(albedo.planes(), &self.turn.mask);
+            write_movie(&path("relit.mp4"), &surface, white)?;
+        }
+        let figures = self.figures(white)?;
+        write_json(&path(FIGURES), &figures)?;
+        Ok(figures)
+    }
+
+    fn figures(&self, white: FigureWhites) -> Result<TurnFigures, TurnError> {
+        let Self { turn, solution, .. } = *self;
+        let Extent { width, height } = turn.curves.extent();
+        let is_open = self.light_source.is_none() && !solution.has_prior;
+        let gloss = solution.gloss(&turn.curves)?.map(|gloss| FigureGloss {
+            reflectance: gloss.reflectance,
+            smoothness: gloss.smoothness,
+            residual: gloss.residual,
+        });
+        Ok(TurnFigures {
+            schema: SCHEMA,
+            software: format!("relight {}", env!("CARGO_PKG_VERSION")),
+            turn: turn.name.clone(),
+            size: [width, height],
+            pixels: turn.curves.pixels(),
+            frames: turn.curves.frames(),
+            lost: turn.damage.clone(),
+            has_angles: turn.has_angles,
+            clipped: turn.curves.clipped(),
+            elevation: solution.elevation,
+            conditioning: solution.conditioning(),
+            advice: solution.conditioning().verdict.advice(),
+            normals: self.normals_source.map(str::to_owned),
+            normals_left_out: solution.is_prior_left_out(),
+            light: FigureLight {
+                source: self.light_source.map(str::to_owned),
+                initialisations: solution.initialisations().to_vec(),
+            },
+            material: solution.material(),
+            materials: solution.materials().to_vec(),
+            direction: solution.direction(),
+            residual: solution.residual(),
+            expected_error_deg: solution.expected_error_deg(),
+            gloss,
+            ambiguity: is_open.then_some(
+                "light and shape are both unknown: the outline says that the object bulges, \
+                 but how steep it is as a whole is open",
+            ),
+            exposure_steps: turn.curves.exposure_steps().to_vec(),
+            panorama: self
+                .strip
+                .map(|strip| FigurePanorama::new(strip, solution.light())),
+            white,
+            over_angle: self.maps.over_angle.clone(),
+        })
+    }
+}

@@ -1,0 +1,69 @@
+use relight_core::files::MovieReader;
+use relight_core::image::Planes;
+
+use crate::test_turns::{SIDE, SOLVED, known, metal_ball, read};
+use crate::{ReadTurn, TurnFiles, TurnMaps, TurnSolution, solve_turn};
+
+/// The frames of the video that is written of a turn, as planes of sRGB.
+fn film_of(turn: &ReadTurn, solution: &TurnSolution, out: &std::path::Path) -> Vec<Planes<3>> {
+    let maps = TurnMaps::new(&turn.curves, solution);
+    let files = TurnFiles {
+        turn,
+        solution,
+        maps: &maps,
+        light_source: None,
+        normals_source: None,
+        strip: None,
+        asset: None,
+        has_movie: true,
+    };
+    files.write(out).unwrap();
+    let mut movie = MovieReader::open(&out.join("relit.mp4")).unwrap();
+    let mut frames = Vec::new();
+    while let Some(frame) = movie.frame().unwrap() {
+        frames.push(frame.planes().clone());
+    }
+    frames
+}
+
+/// The mean of a part of the ball's columns.
+fn columns(frame: &Planes<3>, columns: std::ops::Range<usize>) -> f32 {
+    let rows = SIDE / 3..2 * SIDE / 3;
+    let count = (columns.len() * rows.len()) as f32;
+    let all = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+    all.map(|(x, y)| frame.pixel(x, y)[1]).sum::<f32>() / count
+}
+
+#[test]
+fn the_film_shows_the_object_while_a_lamp_goes_around_it() {
+    let run = std::process::Command::new("ffmpeg")
+        .arg("-version")
+        .output();
+    if run.is_err() {
+        relit_test_support::say_skipped("the program ffmpeg is not installed");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (surface, light, curves) = metal_ball();
+    let metal = ReadTurn {
+        curves,
+        ..read(&surface, &light)
+    };
+    let of_metal = solve_turn(&metal.curves, &known(&light)).unwrap();
+    let (turn, solution) = &*SOLVED;
+    for (name, turn, solution) in [("diffuse", turn, solution), ("metal", &metal, &of_metal)] {
+        let frames = film_of(turn, solution, &folder.path().join(name));
+        assert_eq!(frames.len(), 90);
+        let [left, right] = [2..SIDE / 3, 2 * SIDE / 3..SIDE - 2];
+        let derivatives =
+            |frame: &Planes<3>| columns(frame, right.clone()) - columns(frame, left.clone());
+        let most = frames.iter().map(derivatives).fold(f32::MIN, f32::max);
+        let least = frames.iter().map(derivatives).fold(f32::MAX, f32::min);
+        assert!(most > 0.02 && least < -0.02, "{name}: {least} to {most}");
+        let middle = |frame: &Planes<3>| columns(frame, SIDE / 3..2 * SIDE / 3);
+        assert!(
+            frames.iter().map(middle).fold(f32::MIN, f32::max) > 0.2,
+            "{name}"
+        );
+    }
+}

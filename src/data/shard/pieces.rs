@@ -1,0 +1,285 @@
+//! Data sets that are written by several tasks, on one machine or many, and joined afterwards.
+//!
+//! Each task writes the shards of its part of the recordings and its own piece of the description,
+//! `tasks/<task>-of-<count>.json`. [`merge`] joins the pieces to `dataset.json`.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::array_task::{ArrayTask, file_of};
+use super::dataset::Dataset;
+use super::output::{self, OutputFolder};
+use super::{ShardError, names};
+
+/// The schema that this version writes and reads.
+const SCHEMA: &str = "relit.task/1";
+/// What became of a recording.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "outcome")]
+pub enum TaskOutcome {
+    /// It is in the piece's sessions.
+    Extracted {
+        /// The session's id.
+        session: String,
+    },
+    /// It holds too little of a turn.
+    LeftOut {
+        /// Why.
+        why: String,
+    },
+    /// It could not be extracted.
+    Failed {
+        /// Why.
+        why: String,
+    },
+}
+
+/// A task's piece of the description.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TaskPiece {
+    schema: String,
+    task: u32,
+    count: u32,
+    /// The names of all recordings, of all tasks, in the order in which they share them.
+    pub recordings: Vec<String>,
+    /// The outcomes of this task's recordings, by position in that list.
+    pub outcomes: BTreeMap<usize, TaskOutcome>,
+    /// This task's sessions and shards.
+    pub dataset: Dataset,
+}
+
+impl TaskPiece {
+    /// A piece without outcomes.
+    #[must_use]
+    pub fn new(task: ArrayTask, recordings: Vec<String>, dataset: Dataset) -> Self {
+        Self {
+            schema: SCHEMA.to_owned(),
+            task: task.index(),
+            count: task.count(),
+            recordings,
+            outcomes: BTreeMap::new(),
+            dataset,
+        }
+    }
+
+    /// The piece that the task wrote into the data set `out`, if there is one.
+    ///
+    /// # Errors
+    /// [`ShardError::Description`] or [`ShardError::Schema`] if it cannot be read, [`ShardError::Io`].
+    pub fn read(out: &Path, task: ArrayTask) -> Result<Option<Self>, ShardError> {
+        let path = out.join(task.file());
+        match fs::read(&path) {
+            Ok(bytes) => Self::parse(&path, &bytes).map(Some),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(ShardError::io("read", &path)(error)),
+        }
+    }
+
+    /// Writes the piece into the data set `out`, whole or not at all.
+    ///
+    /// # Errors
+    /// [`ShardError::Json`] if a number is not finite, [`ShardError::Io`].
+    pub fn write(&self, out: &Path) -> Result<(), ShardError> {
+        let file = file_of(self.task, self.count);
+        let mut bytes = serde_json::to_vec_pretty(self).map_err(|source| ShardError::Json {
+            what: file.clone(),
+            source,
+        })?;
+        bytes.push(b'\n');
+        output::write_whole(out, &file, &bytes).map(|_| ())
+    }
+
+    /// Number of tasks that write the data set together.
+    pub(super) fn task_count(&self) -> u32 {
+        self.count
+    }
+
+    fn parse(path: &Path, bytes: &[u8]) -> Result<Self, ShardError> {
+        let piece: Self =
+            serde_json::from_slice(bytes).map_err(|source| ShardError::Description {
+                path: path.to_owned(),
+                source,
+            })?;
+        if piece.schema != SCHEMA {
+            return Err(ShardError::Schema {
+                path: path.to_owned(),
+                found: piece.schema,
+                expected: SCHEMA,
+            });
+        }
+        piece.dataset.check_names()?;
+        Ok(piece)
+    }
+}
+
+/// What was joined.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Merged {
+    /// The description, as it was written.
+    pub dataset: Dataset,
+    /// Number of tasks.
+    pub tasks: u32,
+    /// Recordings that hold too little of a turn: name and reason.
+    pub left_out: Vec<(String, String)>,
+}
+
+/// Joins the pieces in the data set `out` and writes its `dataset.json`: the same bytes as one run over all
+/// recordings writes. It can be repeated, and changes nothing else.
+///
+/// # Errors
+/// [`ShardError::Pieces`] if a task or a recording is missing, failed, or is there twice, if tasks saw
+/// different recordings or settings, or a file is missing; then nothing is written.
+/// [`ShardError::Locked`] while a task is running, [`ShardError::Description`], [`ShardError::Io`].
+pub fn merge(out: &Path) -> Result<Merged, ShardError> {
+    merge_with(out, &|file| {
+        fs::metadata(out.join(file)).map(|found| found.len())
+    })
+}
+
+/// As [`merge`], of a data set whose files are elsewhere: `length` is that of a file, or of anything for a folder of
+/// images, or an error where there is none.
+///
+/// # Errors
+/// As [`merge`].
+pub fn merge_with(
+    out: &Path,
+    length: &dyn Fn(&str) -> io::Result<u64>,
+) -> Result<Merged, ShardError> {
+    let folder = OutputFolder::lock_existing(out)?;
+    let pieces = read_pieces(out)?;
+    let mut problems = Vec::new();
+    let merged = join(&pieces, &mut problems);
+    if let Some(merged) = &merged {
+        problems.extend(missing_files(&merged.dataset, length));
+        problems.extend(not_of_a_task(out, &merged.dataset)?);
+    }
+    match merged.filter(|_| problems.is_empty()) {
+        Some(merged) => {
+            merged.dataset.write(folder.path())?;
+            Ok(merged)
+        }
+        None => Err(ShardError::Pieces {
+            path: out.join(names::TASKS),
+            problems,
+        }),
+    }
+}
+
+/// The pieces of all tasks that are there.
+pub(super) fn read_pieces(out: &Path) -> Result<Vec<TaskPiece>, ShardError> {
+    let folder = out.join(names::TASKS);
+    let files = output::names_in(&folder)?;
+    let pieces = files
+        .iter()
+        .filter(|name| !name.starts_with('.') && name.ends_with(".json"));
+    pieces
+        .map(|name| {
+            let path = folder.join(name);
+            let bytes = fs::read(&path).map_err(ShardError::io("read", &path))?;
+            TaskPiece::parse(&path, &bytes)
+        })
+        .collect()
+}
+
+/// The pieces joined, and what is wrong with them; `None` if they do not belong together.
+fn join(pieces: &[TaskPiece], problems: &mut Vec<String>) -> Option<Merged> {
+    let Some(first) = pieces.first() else {
+        problems.push("there are none".to_owned());
+        return None;
+    };
+    for piece in pieces {
+        let (a, b) = (first.task, piece.task);
+        if piece.count != first.count {
+            let (a, b) = (first.count, piece.count);
+            problems.push(format!(
+                "some are of {a} tasks, others of {b}: remove those of an earlier run"
+            ));
+            return None;
+        }
+        if piece.recordings != first.recordings {
+            problems.push(format!(
+                "tasks {a} and {b} saw different recordings: run them again with the same inputs"
+            ));
+            return None;
+        }
+        if piece.dataset.settings != first.dataset.settings {
+            problems.push(format!("tasks {a} and {b} had different settings"));
+            return None;
+        }
+    }
+    let by_task: BTreeMap<u32, &TaskPiece> = pieces.iter().map(|p| (p.task, p)).collect();
+    let missing: Vec<String> = (0..first.count)
+        .filter(|task| !by_task.contains_key(task))
+        .map(|task| task.to_string())
+        .collect();
+    if !missing.is_empty() {
+        problems.push(format!("no piece of task {}", missing.join(", ")));
+    }
+    let mut dataset = Dataset::new(first.dataset.settings.clone());
+    let mut left_out = Vec::new();
+    for (position, name) in first.recordings.iter().enumerate() {
+        let task = (position % first.count as usize) as u32;
+        let Some(piece) = by_task.get(&task) else {
+            continue;
+        };
+        match piece.outcomes.get(&position) {
+            None => problems.push(format!(
+                "task {task} lacks {name}: run it again with --resume"
+            )),
+            Some(TaskOutcome::Failed { why }) => {
+                problems.push(format!("task {task} failed with {name}: {why}"));
+            }
+            Some(TaskOutcome::LeftOut { why }) => left_out.push((name.clone(), why.clone())),
+            Some(TaskOutcome::Extracted { session }) => match piece.dataset.session(session) {
+                _ if dataset.session(session).is_some() => {
+                    problems.push(format!("session {session} is there twice"));
+                }
+                Some(entry) => dataset.replace(
+                    entry.clone(),
+                    piece.dataset.shards_of(session).cloned().collect(),
+                ),
+                None => problems.push(format!("the piece of task {task} lacks {session}")),
+            },
+        }
+    }
+    Some(Merged {
+        dataset,
+        tasks: first.count,
+        left_out,
+    })
+}
+
+/// Files of the data set that are not there or have another length.
+fn missing_files(dataset: &Dataset, length: &dyn Fn(&str) -> io::Result<u64>) -> Vec<String> {
+    let ids = dataset.sessions.iter().map(|session| session.id.as_str());
+    let files = ids.flat_map(|id| dataset.files_of(id));
+    let problem = |(file, bytes): (&str, Option<u64>)| match length(file) {
+        Err(error) => Some(format!("{file}: {error}")),
+        Ok(found) => bytes
+            .filter(|&bytes| bytes != found)
+            .map(|bytes| format!("{file} has {found} bytes, not {bytes}")),
+    };
+    files.filter_map(problem).collect()
+}
+
+/// Sessions of an existing description that no task has.
+fn not_of_a_task(out: &Path, dataset: &Dataset) -> Result<Vec<String>, ShardError> {
+    let existing = match Dataset::read(out) {
+        Ok(existing) => existing,
+        Err(ShardError::NoDataset { .. }) => return Ok(Vec::new()),
+        Err(error) => return Err(error),
+    };
+    let others = existing
+        .sessions
+        .iter()
+        .filter(|session| dataset.session(&session.id).is_none());
+    let problem = |id: &str| {
+        format!("dataset.json also has session {id}, which is no task's: use a folder of its own")
+    };
+    Ok(others.map(|session| problem(&session.id)).collect())
+}

@@ -1,0 +1,128 @@
+//! Several recordings into one data set: one after the other, each noted when it is done with.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use relit_data::session::{self, recordings};
+use relit_data::shard::OutputFolder;
+
+use super::catalog::Catalog;
+use super::job::Job;
+use super::storage::StorageBackend;
+use super::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally};
+
+/// Extracts the recordings `found` into the folder `out`, and adds the outcomes to `tally`.
+pub(super) fn extract_recordings(
+    found: &[PathBuf],
+    out: &Path,
+    options: &ExtractOptions,
+    observer: &dyn Observer,
+    storage: &dyn StorageBackend,
+    mut tally: Tally,
+) -> Result<Tally, ExtractError> {
+    if out.join(session::MANIFEST_FILE).exists() {
+        return Err(ExtractError::IntoSession(out.to_owned()));
+    }
+    let folder = match options.task {
+        None => OutputFolder::lock(out)?,
+        Some(task) => OutputFolder::lock_for(out, task)?,
+    };
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(options.threads)
+        .build()?;
+    let mut run = Run {
+        catalog: Catalog::open(&folder, found, options)?,
+        folder,
+        options,
+        pool,
+        names: HashSet::new(),
+        observer,
+        storage,
+    };
+    for (position, recording) in found.iter().enumerate() {
+        if options.task.is_none_or(|task| task.takes(position)) {
+            run.extract(position, recording, &mut tally)?;
+        }
+    }
+    Ok(tally)
+}
+
+/// All recordings in the inputs, in the order in which tasks share them; inputs without any are reported.
+pub(super) fn find(inputs: &[PathBuf], observer: &dyn Observer, tally: &mut Tally) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for input in inputs {
+        match recordings(input) {
+            Ok(inside) => found.extend(inside),
+            Err(error) => {
+                let outcome = RecordingOutcome::of(Err(error.into()));
+                tally.count(&outcome);
+                observer.ended(input, &outcome);
+            }
+        }
+    }
+    found
+}
+
+/// One extraction into one data set.
+struct Run<'a> {
+    folder: OutputFolder,
+    catalog: Catalog,
+    options: &'a ExtractOptions,
+    pool: ThreadPool,
+    /// Names of the recordings so far.
+    names: HashSet<String>,
+    observer: &'a dyn Observer,
+    storage: &'a dyn StorageBackend,
+}
+
+impl Run<'_> {
+    /// Extracts a recording and notes the outcome; an error if a task's outcome cannot be noted.
+    fn extract(
+        &mut self,
+        position: usize,
+        recording: &Path,
+        tally: &mut Tally,
+    ) -> Result<(), ExtractError> {
+        let outcome = RecordingOutcome::of(self.extract_one(recording));
+        tally.count(&outcome);
+        self.observer.ended(recording, &outcome);
+        self.catalog.note(&self.folder, position, &outcome)?;
+        let extracted = match &outcome {
+            RecordingOutcome::Extracted(entry) => Some(entry.id.as_str()),
+            _ => None,
+        };
+        self.storage
+            .ended(recording, self.catalog.dataset(), extracted)
+    }
+
+    fn extract_one(&mut self, path: &Path) -> Result<RecordingOutcome, ExtractError> {
+        let Self {
+            folder, options, ..
+        } = self;
+        let local = self.storage.fetch(path)?;
+        let job = Job::open(&local, options)?;
+        if !self.names.insert(job.id().to_owned()) {
+            return Err(ExtractError::SameName(job.id().to_owned()));
+        }
+        let dataset = self.catalog.dataset();
+        if options.resume
+            && let Some(entry) = job.existing_entry(dataset, options)
+            && self.storage.holds(dataset, folder.path(), job.id())
+        {
+            return Ok(RecordingOutcome::Skipped(Box::new(entry.clone())));
+        }
+        if !options.replace && job.would_replace_another(dataset) {
+            let (out, id) = (folder.path().to_owned(), job.id().to_owned());
+            return Err(ExtractError::NameTaken { out, id });
+        }
+        if options.task.is_some() {
+            folder.clear_leftovers_of(job.id())?;
+        }
+        self.observer.started(path, options.frames);
+        let (entry, shards) = job.run(folder, options, &self.pool, self.observer)?;
+        self.catalog.add(folder, entry.clone(), shards)?;
+        Ok(RecordingOutcome::Extracted(Box::new(entry)))
+    }
+}

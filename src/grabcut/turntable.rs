@@ -1,0 +1,191 @@
+//! The turntable itself: still, dark, without colour or structure, below the object.
+
+use super::bitmap::{Bitmap, Connectivity};
+
+/// Largest average brightness, as a feature.
+const MOST_LIGHT: f32 = 50.0 / 3.0;
+/// Largest average chroma, as a feature.
+const MOST_CHROMA: f32 = 14.0 / 3.0;
+/// Largest change of the brightness, as a feature.
+const MOST_CHANGE: f32 = 7.5;
+/// A contrast of so many times the median of what is dark and below is structure.
+const STRUCTURE: f32 = 3.0;
+/// And at least and at most so much.
+const STRUCTURE_BOUNDS: (f32, f32) = (0.3, 30.0);
+/// The table covers at least this share of the frame.
+const LEAST: f64 = 0.01;
+/// It comes as near to the lower border as this share of the height, or is this share of the width wide.
+const FOOT: f64 = 0.03;
+const WIDE: f64 = 0.5;
+
+/// The largest brightness that a shadow on the table has beyond the table's, as a feature.
+const SHADOW_LIGHT: f32 = 0.3;
+/// How far the colour of a shadow is from the table's, as a feature.
+const SHADOW_COLOUR: f32 = 0.8;
+/// A contrast of so many times the square of the table's brightness is an outline and ends a shadow.
+const OUTLINE: f32 = 0.009 * 9.0;
+/// A shadow reaches at most this share of the frame's height beyond the plain surface.
+const SHADOW_REACH: f64 = 0.08;
+
+/// The table, as far as it is seen.
+#[derive(Debug)]
+pub(super) struct Turntable {
+    /// Its plain surface.
+    pub(super) surface: Bitmap,
+    /// Darker pixels of the same colour beside it: where the object shadows it all the time.
+    pub(super) shadow: Bitmap,
+    /// All that is as dark, still and plain as a table, connected with its surface or not.
+    pub(super) plain: Bitmap,
+}
+
+/// The table, from the features of a turn (average L, a, b, changes of light and colour)
+/// and the largest contrast of each pixel to its neighbours. Empty if none is
+/// found.
+pub(super) fn find_turntable(
+    features: &[[f32; 5]],
+    contrast: &[f32],
+    size: (usize, usize),
+) -> Turntable {
+    let (width, height) = size;
+    let dark = |at: usize| {
+        let [light, a, b, change, _] = features[at];
+        light < MOST_LIGHT && a.hypot(b) < MOST_CHROMA && change < MOST_CHANGE
+    };
+    let below = height * 2 / 3 * width..width * height;
+    let below = below.filter(|&at| dark(at)).map(|at| contrast[at]);
+    let structure = structure_from(below.collect());
+    let plain = (0..features.len()).map(|at| dark(at) && contrast[at] < structure);
+    let plain = Bitmap::new((width as u32, height as u32), plain);
+    // Away from its border, so that it does not run into the object through a gap in the outline.
+    let inner = plain.inverted().dilated(1).inverted();
+    let components = inner.components(Connectivity::Four);
+    let mut below = vec![0_usize; components.list.len()];
+    for at in height * 2 / 3 * width..width * height {
+        if let Some(component) = components.at(at) {
+            below[component] += 1;
+        }
+    }
+    let lowest = below
+        .iter()
+        .enumerate()
+        .max_by_key(|&(at, count)| (count, std::cmp::Reverse(at)));
+    let least = (width * height) as f64 * LEAST;
+    let lowest = lowest
+        .map(|(at, _)| at)
+        .filter(|&at| components.list[at].area as f64 >= least)
+        .filter(|&at| {
+            let bounds = components.list[at].bounds;
+            let gap = height as i64 - bounds.bottom();
+            gap as f64 <= height as f64 * FOOT || f64::from(bounds.w) >= width as f64 * WIDE
+        });
+    let is_table = |at: usize, _| lowest.is_some() && components.at(at) == lowest;
+    let surface = inner.map(is_table).dilated(1);
+    let shadow = shadow(features, contrast, structure, &surface, size);
+    Turntable {
+        surface,
+        shadow,
+        plain,
+    }
+}
+
+/// Grows from the surface, row by row and column by column, over what may be its shadow.
+fn shadow(
+    features: &[[f32; 5]],
+    contrast: &[f32],
+    structure: f32,
+    surface: &Bitmap,
+    size: (usize, usize),
+) -> Bitmap {
+    let Some(mean) = mean(features, surface) else {
+        return surface.clone();
+    };
+    let outline = structure.max(OUTLINE * mean[0] * mean[0]);
+    let may_be = |at: usize| {
+        let [light, a, b, ..] = features[at];
+        light < mean[0] + SHADOW_LIGHT
+            && (a - mean[1]).hypot(b - mean[2]) < SHADOW_COLOUR
+            && contrast[at] < outline
+    };
+    let mut grown = surface.clone();
+    for _ in 0..(size.1 as f64 * SHADOW_REACH) as usize {
+        let next = grown.dilated(1);
+        grown = grown.map(|at, set| set || next.bits()[at] && may_be(at));
+    }
+    grown.map(|at, set| set && !surface.bits()[at])
+}
+
+/// The average colour of the surface; `None` if it is empty.
+fn mean(features: &[[f32; 5]], surface: &Bitmap) -> Option<[f32; 3]> {
+    let mut sum = [0.0_f32; 3];
+    let pixels = features.iter().zip(surface.bits());
+    for (feature, _) in pixels.filter(|(_, on)| **on) {
+        sum.iter_mut().zip(feature).for_each(|(s, v)| *s += v);
+    }
+    let count = surface.count();
+    (count > 0).then(|| sum.map(|s| s / count as f32))
+}
+
+fn structure_from(mut contrast: Vec<f32>) -> f32 {
+    if contrast.is_empty() {
+        return STRUCTURE_BOUNDS.0;
+    }
+    let middle = contrast.len() / 2;
+    let (_, median, _) = contrast.select_nth_unstable_by(middle, f32::total_cmp);
+    (STRUCTURE * *median).clamp(STRUCTURE_BOUNDS.0, STRUCTURE_BOUNDS.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: (usize, usize) = (40, 30);
+
+    /// A dark object on a dark table in a bright room, with a contrast at every outline.
+    fn scene() -> (Vec<[f32; 5]>, Vec<f32>) {
+        let kind = |x: usize, y: usize| match (x, y) {
+            (15..25, 8..22) => 2,
+            (4..36, 18..) => 1,
+            _ => 0,
+        };
+        let feature = |at: usize| match kind(at % 40, at / 40) {
+            0 => [25.0, 1.0, 2.0, 9.0, 3.0],
+            _ => [8.0, 0.2, 0.1, 3.0, 0.5],
+        };
+        let contrast = |at: usize| {
+            let (x, y) = (at % 40, at / 40);
+            let near = [
+                (x + 1, y),
+                (x.saturating_sub(1), y),
+                (x, y + 1),
+                (x, y.saturating_sub(1)),
+            ];
+            let differs = near
+                .iter()
+                .any(|&(i, j)| kind(i.min(39), j.min(29)) != kind(x, y));
+            if differs { 40.0 } else { 0.1 }
+        };
+        (
+            (0..1200).map(feature).collect(),
+            (0..1200).map(contrast).collect(),
+        )
+    }
+
+    #[test]
+    fn the_table_is_found_and_the_dark_object_on_it_is_not() {
+        let (features, contrast) = scene();
+        let table = find_turntable(&features, &contrast, SIZE);
+        let at = |x: usize, y: usize| table.surface.bits()[y * 40 + x];
+        assert!(at(8, 24) && at(30, 28) && at(20, 27));
+        assert!(!at(20, 12) && !at(20, 20) && !at(2, 2));
+    }
+
+    #[test]
+    fn without_a_table_nothing_is_found() {
+        let (features, contrast) = scene();
+        let bright: Vec<_> = features
+            .iter()
+            .map(|f| [f[0] + 20.0, f[1], f[2], f[3], f[4]])
+            .collect();
+        assert_eq!(find_turntable(&bright, &contrast, SIZE).surface.count(), 0);
+    }
+}
