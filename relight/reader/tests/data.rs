@@ -143,7 +143,7 @@ fn a_shard_is_given_as_it_was_written() {
 
 #[test]
 fn a_data_set_of_an_earlier_version_is_given_too() {
-    let earlier = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/earlier");
+    let earlier = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/earlier");
     let turns = open(&earlier);
     assert_eq!(turns.turns(), [12]);
     let drawn = whole(stream(&turns, 1, Cursor::default()));
