@@ -41,8 +41,8 @@ pub fn diffuse_constants() -> [f64; 5] {
 /// E(n) = Σ Â_l C_lm Y_lm(n) is the integral of radiance times max(0, n·ω) over the sphere; even light of radiance 1
 /// gives π. Up to band 2 (paper, section 4.2.1) it is written as the polynomial n^T M n of Ramamoorthi and Hanrahan,
 /// *An Efficient Representation for Irradiance Environment Maps*, 2001. Of the bands beyond, the odd ones have no
-/// irradiance, and the even ones are added: see [`cosine_lobe`]. They are 7 % of the irradiance of panoramas of rooms
-/// and skies in the mean, and over 20 % under a sun.
+/// irradiance, and the even ones are added: Â_l = 2π (-1)^(l/2 - 1) / ((l + 2) (l - 1)) l! / (2^l (l/2)!²). They are 6 %
+/// of the irradiance of panoramas of rooms and skies in the mean, and 25 % under a sun.
 ///
 /// Images leave out the last bands as long as the root mean square of their irradiance over the sphere is below 0.002 of
 /// the mean irradiance, half a step of 8 bits: rooms and skies need 8 to 16 bands, however many they are given by.
