@@ -65,7 +65,7 @@ fn a_queue_is_captured_object_by_object_and_a_second_start_is_refused() {
     let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3")).unwrap();
     once(&daemon, is_ready);
     once(&daemon, |state| state.camera.focus.is_some());
-    assert!(daemon.monitor().preview().is_some());
+    once(&daemon, |_| daemon.monitor().preview().is_some());
     enqueue(&daemon, &["mug", "cow"]);
     once(&daemon, |state| state.phase == Phase::WaitingForObject);
     daemon.command(NEXT).unwrap();
@@ -165,7 +165,9 @@ fn a_fault_is_shown_with_its_cause() {
         fault.contains("has to be a folder of this account"),
         "{fault}"
     );
-    assert!(state.faults.iter().any(|line| line.what == fault));
+    once(&daemon, |state| {
+        state.faults.iter().any(|line| line.what == fault)
+    });
 }
 
 #[test]
