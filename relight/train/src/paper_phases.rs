@@ -61,13 +61,13 @@ impl PaperPhase {
         }
     }
 
-    /// The learning rate where settings name none: the paper's, 1e-6 for Normal-Net on turns and 1e-4 for what begins from
-    /// nothing.
+    /// The learning rate where settings name none: the paper's, 1e-6 in both rounds of joint training (`light` and `joint`)
+    /// and 1e-4 for what is trained apart.
     #[must_use]
     pub fn default_learning_rate(self) -> f64 {
         match self {
-            Self::Joint => 1e-6,
-            Self::Spec | Self::Normal | Self::Light | Self::Specular => 1e-4,
+            Self::Light | Self::Joint => 1e-6,
+            Self::Spec | Self::Normal | Self::Specular => 1e-4,
         }
     }
 

@@ -7,9 +7,11 @@ use std::sync::Arc;
 use tch::{Device, Kind, Tensor};
 
 use super::error::TrainError;
+use relight_core::image::{ColourSpace, Srgb};
 use relight_reader::{
-    Cursor, DrawPlan, Encoding, Rank, Source, Stream, Streaming, TurnBatch, Turns,
+    Cursor, DrawPlan, Encoding, Rank, Source, Stream, Streaming, TurnBatch, TurnFrame, Turns,
 };
+use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
 
 /// Batches that are decoded ahead of the network.
 const AHEAD: usize = 3;
@@ -158,11 +160,51 @@ fn tensors(batch: &TurnBatch, kind: Kind, device: Device) -> Result<TurnTensors,
             .f_to_device(device)?
             .f_to_kind(kind)
     };
-    let opens =
-        |frame: &relight_reader::TurnFrame| frame.record.as_ref().is_none_or(|r| r.spec_net);
+    let opens = |(at, frame): (usize, &TurnFrame)| match &frame.record {
+        Some(record) => record.spec_net,
+        None => is_saturated(batch, at),
+    };
     Ok(TurnTensors {
         picture: tensor(&batch.images, 3)?,
         mask: tensor(&batch.masks, 1)?,
-        spec_net: batch.frames.iter().map(opens).collect(),
+        spec_net: batch.frames.iter().enumerate().map(opens).collect(),
     })
+}
+
+/// Whether the gate opens for a frame that has no record, as in the layout of the paper's released data set: by the
+/// saturated part of the pixels that are there.
+fn is_saturated(batch: &TurnBatch, frame: usize) -> bool {
+    let pixels = batch.extent.pixels();
+    let level = Srgb::to_linear(SATURATED_VALUE);
+    let picture = &batch.images[3 * pixels * frame..3 * pixels * (frame + 1)];
+    let mask = &batch.masks[pixels * frame..pixels * (frame + 1)];
+    let inside = || (0..pixels).filter(|&at| mask[at] >= 0.5);
+    let is_white = |at: &usize| (0..3).all(|channel| picture[channel * pixels + at] >= level);
+    inside().filter(is_white).count() as f64 > SPEC_NET_GATE * inside().count() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relight_core::image::Extent;
+
+    #[test]
+    fn a_frame_without_a_record_opens_the_gate_where_it_is_saturated() {
+        let extent = Extent::new(10, 10);
+        let frame = |white: usize| TurnBatch {
+            extent,
+            images: (0..300)
+                .map(|at| if at % 100 < white { 1.0 } else { 0.5 })
+                .collect(),
+            masks: vec![1.0; 100],
+            frames: Vec::new(),
+        };
+        assert!(is_saturated(&frame(6), 0));
+        assert!(!is_saturated(&frame(5), 0));
+        let outside = TurnBatch {
+            masks: vec![0.0; 100],
+            ..frame(50)
+        };
+        assert!(!is_saturated(&outside, 0));
+    }
 }

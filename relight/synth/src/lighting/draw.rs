@@ -93,7 +93,7 @@ impl Lighting {
     }
 
     fn with_bounce(mut self, random: &mut Random) -> Self {
-        self.bounce = tint(random, 0.15) * random.uniform(0.0..0.5);
+        self.bounce = tint(random, 0.15) * random.uniform(0.0..1.0);
         self
     }
 }

@@ -40,7 +40,8 @@ pub struct Lighting {
     pub environment: Option<Environment>,
     /// Irradiance of even light from all around.
     pub ambient: Vec3,
-    /// Light that comes from the object's own lit parts to its hollows.
+    /// Light that comes from the object's own lit parts to its hollows, as a factor of what they send back: 1 where all of
+    /// it arrives.
     pub bounce: Vec3,
     /// Whether the object blocks light: without, there are neither cast shadows nor dark hollows.
     pub has_shadows: bool,

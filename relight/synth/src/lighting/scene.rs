@@ -77,7 +77,7 @@ impl SyntheticScene {
         }
         shaded.add_ambient(lighting.ambient, open);
         if let Some(open) = open {
-            shaded.add_bounce(&self.buffer, lighting.bounce, open);
+            shaded.add_bounce(&self.buffer, &material.albedo, lighting.bounce, open);
         }
         shaded
     }

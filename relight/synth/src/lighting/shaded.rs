@@ -108,9 +108,15 @@ impl Shaded {
     }
 
     /// Adds light that the object throws into its own hollows, an approximation: of the part that sees
-    /// the object instead of the sky, `strength` times the mean shading around.
-    pub fn add_bounce(&mut self, buffer: &GBuffer, strength: Vec3, open: &[f32]) {
-        let around = buffer.blurred(&self.shading, buffer.size() / 16);
+    /// the object instead of the sky, `strength` times the light that the surface around sends back, which is its
+    /// albedo times its shading. So black objects throw none, and red ones red light.
+    pub fn add_bounce(&mut self, buffer: &GBuffer, albedo: &[Vec3], strength: Vec3, open: &[f32]) {
+        let sent: Vec<Vec3> = albedo
+            .iter()
+            .zip(&self.shading)
+            .map(|(a, s)| *a * *s)
+            .collect();
+        let around = buffer.blurred(&sent, buffer.size() / 16);
         for ((sum, around), open) in self.shading.iter_mut().zip(around).zip(open) {
             *sum += strength * around * (1.0 - open);
         }

@@ -394,6 +394,35 @@ fn bounced_light_comes_only_where_the_sky_is_hidden() {
 }
 
 #[test]
+fn what_bounces_has_the_albedo_of_where_it_comes_from() {
+    let scene = floor_scene();
+    let lighting = Lighting {
+        bounce: Vec3::ONE,
+        ..only_lamp(distant(Vec3::Z, 1, 0.0))
+    };
+    let added = |albedo: Vec3| {
+        let shading = |lighting: &Lighting| {
+            let mut material = white(&scene, None);
+            material.albedo.fill(albedo);
+            scene
+                .light(&material, lighting, &Panoramas::default(), 1)
+                .shading
+        };
+        let direct = Lighting {
+            bounce: Vec3::ZERO,
+            ..lighting.clone()
+        };
+        let pairs = shading(&lighting).into_iter().zip(shading(&direct));
+        pairs.map(|(with, without)| with - without).sum::<Vec3>()
+    };
+    let white = added(Vec3::ONE);
+    assert!(white.min_element() > 0.1, "{white}");
+    assert_eq!(added(Vec3::ZERO), Vec3::ZERO);
+    let red = added(Vec3::new(0.8, 0.2, 0.2));
+    assert!((red - white * Vec3::new(0.8, 0.2, 0.2)).abs().max_element() < 1e-3 * white.x);
+}
+
+#[test]
 fn a_lamp_turns_with_its_light() {
     let turn = Rotation::about(direction(Vec3::Y), 0.9);
     let lamp = SyntheticLamp {

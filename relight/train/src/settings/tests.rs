@@ -111,7 +111,7 @@ fn a_phase_has_its_own_learning_rate_where_none_is_named() {
         1e-3
     );
     let without = PaperSettings::of_phase(PaperPhase::Light, None).unwrap();
-    assert_eq!(without.settings.run.learning_rate, 1e-4);
+    assert_eq!(without.settings.run.learning_rate, 1e-6);
 }
 
 #[test]
