@@ -11,6 +11,7 @@
 //! | `library`, `recipe` | what there is to draw from, and what is drawn |
 //! | `sample`, `folder`, `preview` | one sample; a folder, a sheet of them |
 //! | `turn` | whole turns as shards |
+//! | `transfer` | objects on the table, to be lit by any room over a whole turn without a ray |
 //!
 //! All of it follows from a seed: the same seed gives the same bytes on any number of threads. What is
 //! slow is kept apart from what is cheap: a [`SyntheticScene`] is made once for an object in a pose, and then
@@ -46,6 +47,7 @@ mod recipe;
 mod sample;
 mod shape;
 mod studio;
+mod transfer;
 mod turn;
 mod vectors;
 mod view;
@@ -69,6 +71,10 @@ pub use recipe::Recipe;
 pub use sample::{Description, SynthSample, Whites};
 pub use shape::ShapeKind;
 pub use studio::Surroundings;
+pub use transfer::{
+    CURVE_COEFFICIENTS, CurveCoefficients, Rooms, Transfer, TransferCache, TransferFinish,
+    TransferMaterial, TransferRecipe,
+};
 pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};
 pub use view::{Pose, Projection};
 

@@ -6,7 +6,7 @@ use glam::{Affine3A, Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::builder::build_cwbvh_from_tris;
-use obvhs::ray::Ray;
+use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
 
 use crate::mesh::Mesh;
@@ -16,27 +16,59 @@ pub struct Occluder {
     tree: CwBvh,
     /// In the order of the tree's leaves.
     triangles: Vec<Triangle>,
+    /// Which of them are the plate's.
+    is_plate: Vec<bool>,
+}
+
+/// What a ray meets first.
+pub(crate) struct Hit {
+    /// The unit normal of the object's facet, on the ray's side; none of the plate, which is black.
+    pub(crate) normal: Option<Vec3>,
 }
 
 impl Occluder {
     /// The mesh in its place.
     pub fn new(mesh: &Mesh, placement: Affine3A) -> Self {
-        Self::of(triangles(mesh, placement))
+        Self::of(triangles(mesh, placement), usize::MAX)
     }
 
     /// The mesh in its place together with a disc (a turntable's plate) that is not seen.
     pub(crate) fn with_disc(mesh: &Mesh, placement: Affine3A, disc: &Disc) -> Self {
         let mut all = triangles(mesh, placement);
+        let plate = all.len();
         all.extend(disc.triangles());
-        Self::of(all)
+        Self::of(all, plate)
     }
 
-    fn of(triangles: Vec<Triangle>) -> Self {
+    /// The triangles from the number `plate` on are the plate's.
+    fn of(triangles: Vec<Triangle>, plate: usize) -> Self {
         let mut unused = Duration::ZERO;
         let tree = build_cwbvh_from_tris(&triangles, BvhBuildParams::fast_build(), &mut unused);
-        let order = tree.primitive_indices.iter();
-        let triangles = order.map(|&index| triangles[index as usize]).collect();
-        Self { tree, triangles }
+        let order = || tree.primitive_indices.iter().map(|&index| index as usize);
+        let is_plate = order().map(|index| index >= plate).collect();
+        let triangles = order().map(|index| triangles[index]).collect();
+        Self {
+            tree,
+            triangles,
+            is_plate,
+        }
+    }
+
+    /// What a ray from a point in a direction (of unit length) meets first.
+    pub(crate) fn first_hit(&self, from: Vec3, direction: Vec3) -> Option<Hit> {
+        let ray = Ray::new(Vec3A::from(from), Vec3A::from(direction), 0.0, f32::INFINITY);
+        let mut hit = RayHit::none();
+        let is_hit = self
+            .tree
+            .ray_traverse(ray, &mut hit, |ray, at| self.triangles[at].intersect(ray));
+        is_hit.then(|| {
+            let at = hit.primitive_id as usize;
+            let normal = Vec3::from(self.triangles[at].compute_normal());
+            let side = if normal.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+            Hit {
+                normal: (!self.is_plate[at]).then_some(normal * side),
+            }
+        })
     }
 
     /// Whether anything stands between a point and what lies from it in a direction (of unit length)

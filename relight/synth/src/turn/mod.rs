@@ -35,6 +35,7 @@ use super::sample::mask;
 use ground_truth::GroundTruthFolder;
 use page::TurnPage;
 use simulated::{RenderedFrame, SimulatedTurn};
+pub(crate) use stand::{Stand, standing_object};
 
 pub use description::{FrameTruth, TurnDescription, TurnRecipe};
 

@@ -1,5 +1,7 @@
 //! A simulated turn and its frames, rendered and encoded.
 
+use std::ops::Range;
+
 use glam::Vec3;
 use image::RgbImage;
 use rayon::prelude::*;
@@ -26,6 +28,8 @@ use relight_core::light::{Direction, Rotation};
 const METERED: u32 = 12;
 /// Frames a second of the turns that are simulated.
 const RATE: f64 = 30.0;
+/// The camera over the plate, degrees.
+const ELEVATIONS: Range<f32> = 8.0..30.0;
 /// Part of the turns whose objects are glossy.
 const GLOSSY: f32 = 0.7;
 /// Part of the glossy turns whose highlights clip.
@@ -59,7 +63,7 @@ impl<'a> SimulatedTurn<'a> {
         let seed = stream(stream(recipe.seed, 4), number);
         let mut random = Random::new(seed);
         let (object, mesh) = standing_object(recipe, library, &mut random);
-        let stand = Stand::draw(&mut random);
+        let stand = Stand::draw(&mut random, ELEVATIONS);
         let scene = scene(recipe, &stand, &mesh, random.seed());
         let finish = Finish::draw(&mut random, scene.buffer(), library, GLOSSY);
         let material = finish.apply(scene.buffer(), library);

@@ -1,6 +1,7 @@
 //! How an object stands on the turntable.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use glam::{Affine3A, Vec3};
 
@@ -16,16 +17,17 @@ use crate::view::{Pose, Projection};
 const PLATE: f32 = 2.5;
 
 /// How an object stands on the table.
-pub(super) struct Stand {
-    pub(super) pose: Pose,
-    pub(super) projection: Projection,
+pub(crate) struct Stand {
+    pub(crate) pose: Pose,
+    pub(crate) projection: Projection,
     /// Of the camera over the plate, radians.
     elevation: f32,
 }
 
 impl Stand {
-    pub(super) fn draw(random: &mut Random) -> Self {
-        let elevation = random.uniform(8.0..30.0_f32).to_radians();
+    /// A camera at an elevation within this range, degrees.
+    pub(crate) fn draw(random: &mut Random, elevations: Range<f32>) -> Self {
+        let elevation = random.uniform(elevations).to_radians();
         let azimuth = random.uniform(0.0..std::f32::consts::TAU);
         Self {
             pose: Pose::upright(elevation, azimuth, random.uniform(0.85..0.95)),
@@ -36,18 +38,23 @@ impl Stand {
         }
     }
 
+    /// Of the camera over the plate, radians.
+    pub(crate) fn elevation(&self) -> f32 {
+        self.elevation
+    }
+
     /// Of the table in the viewer's frame, upwards.
-    pub(super) fn axis(&self) -> Vec3 {
+    pub(crate) fn axis(&self) -> Vec3 {
         Vec3::new(0.0, self.elevation.cos(), self.elevation.sin())
     }
 
     /// The map from the mesh's own frame into the viewer's.
-    pub(super) fn placement(&self, mesh: &Mesh) -> Affine3A {
+    pub(crate) fn placement(&self, mesh: &Mesh) -> Affine3A {
         self.pose.place(mesh, self.projection)
     }
 
     /// The plate on which the object stands.
-    pub(super) fn plate(&self, mesh: &Mesh) -> Disc {
+    pub(crate) fn plate(&self, mesh: &Mesh) -> Disc {
         let placement = self.placement(mesh);
         let points = mesh
             .positions()
@@ -67,7 +74,7 @@ impl Stand {
 }
 
 /// An object that can stand: sheets do not.
-pub(super) fn standing_object<'a>(
+pub(crate) fn standing_object<'a>(
     recipe: &Recipe,
     library: &'a Library,
     random: &mut Random,

@@ -1,0 +1,69 @@
+//! Precomputed radiance transfer of an object on the turntable: what each pixel makes of light from all around, cast
+//! once and then lit by any room over a whole turn, without a ray.
+//!
+//! In the table's frame (x to the camera's right, y level and away from the camera, z up the axis) the light L and what
+//! a pixel takes of it T are written in real spherical harmonics about the axis. With the pairs of order m as complex
+//! numbers, `T_m = T_lm + i T_l-m`, a turn of the table by `a` is a phase of the light, and the pixel shows
+//!
+//! ```text
+//! I(a) = c_0 + Re Σ_m c_m e^(i m a),    c_m = Σ_l T_lm conj(L_lm)
+//! ```
+//!
+//! T of a matt surface is the cosine's, known in closed form (Ramamoorthi and Hanrahan, "An Efficient Representation
+//! for Irradiance Environment Maps", 2001), less the sum over the directions that the object or the plate block (Sloan,
+//! Kautz and Snyder, "Precomputed Radiance Transfer", 2002).
+//!
+//! | file | concern |
+//! | --- | --- |
+//! | `cast` | the rays of a view |
+//! | `curves` | the Fourier coefficients of a view in a light |
+//! | `rooms` | light to draw from |
+//! | `views` | which objects and poses are drawn |
+//! | `cache` | views on disk |
+
+mod cache;
+mod cast;
+mod curves;
+mod rooms;
+#[cfg(test)]
+mod tests;
+mod views;
+
+use relight_core::light::Order;
+
+pub use cache::TransferCache;
+pub use cast::{Transfer, TransferFinish};
+pub use curves::{CURVE_COEFFICIENTS, CurveCoefficients, TransferMaterial};
+pub use rooms::Rooms;
+pub use views::TransferRecipe;
+
+/// The order of the light: lamps are blurred by it, and gloss as smooth as varnish.
+pub(crate) const TRANSFER_ORDER: Order = Order::LAMP;
+/// Coefficients of that order.
+const COEFFICIENTS: usize = TRANSFER_ORDER.coefficients();
+/// Coefficients of what bounces: it is smooth.
+const BOUNCE_COEFFICIENTS: usize = Order::TWO.coefficients();
+
+/// What is left of a band of radiance in irradiance: the cosine's coefficients (Ramamoorthi and Hanrahan 2001,
+/// equation 8; π for band 0).
+fn cosine_band(l: usize) -> f32 {
+    use std::f64::consts::PI;
+    let value = match l {
+        0 => PI,
+        1 => 2.0 * PI / 3.0,
+        l if l % 2 == 1 => 0.0,
+        l => {
+            let half = l / 2;
+            // l! / (2^l ((l / 2)!)^2), factor by factor.
+            let ratio: f64 = (1..=half).map(|k| (half + k) as f64 / (4.0 * k as f64)).product();
+            let sign = if half % 2 == 1 { 1.0 } else { -1.0 };
+            2.0 * PI * sign * ratio / ((l + 2) * (l - 1)) as f64
+        }
+    };
+    value as f32
+}
+
+/// The band of a coefficient.
+fn band(coefficient: usize) -> usize {
+    coefficient.isqrt()
+}

@@ -1,0 +1,61 @@
+//! Which objects and poses are drawn, and how many rays each pixel has.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use super::cast::{Transfer, TransferFinish};
+use crate::finish::Finish;
+use crate::geometry::{GBuffer, Occluder};
+use crate::library::Library;
+use crate::random::{Random, stream};
+use crate::recipe::Recipe;
+use crate::turn::{Stand, standing_object};
+
+/// The camera over the plate, degrees.
+const ELEVATIONS: Range<f32> = 5.0..40.0;
+/// Materials of a view.
+const FINISHES: u64 = 3;
+
+/// How views are drawn and cast. The same recipe and library give the same views.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TransferRecipe {
+    /// What all is drawn from.
+    pub seed: u64,
+    /// Width and height, pixels.
+    pub size: u32,
+    /// Rays a pixel, all around; half of them leave the surface.
+    pub rays: u32,
+}
+
+impl TransferRecipe {
+    /// Casts the view of a number.
+    #[must_use]
+    pub fn cast(&self, library: &Library, number: u64) -> Transfer {
+        let mut random = Random::new(stream(stream(self.seed, 31), number));
+        let recipe = Recipe {
+            seed: random.seed(),
+            size: self.size,
+            ..Recipe::default()
+        };
+        let (_, mesh) = standing_object(&recipe, library, &mut random);
+        let stand = Stand::draw(&mut random, ELEVATIONS);
+        let placement = stand.placement(&mesh);
+        let buffer = GBuffer::render(&mesh, placement, stand.projection, self.size);
+        let occluder = Occluder::with_disc(&mesh, placement, &stand.plate(&mesh));
+        let elevation = stand.elevation();
+        let mut transfer =
+            Transfer::cast(&buffer, &occluder, elevation, self.rays, random.seed());
+        transfer.finishes = (0..FINISHES)
+            .map(|_| {
+                let finish = Finish::draw(&mut random, &buffer, library, 0.0);
+                let material = finish.apply(&buffer, library);
+                TransferFinish {
+                    normals: material.normals,
+                    albedo: material.albedo,
+                }
+            })
+            .collect();
+        transfer
+    }
+}
