@@ -243,6 +243,17 @@ impl Graph {
         self.push(operation, vec![of], outputs, scale)
     }
 
+    /// A convolution of single pixels.
+    pub fn pointwise(&mut self, name: String, of: Value, outputs: usize) -> Value {
+        let scale = self.node(of).scale;
+        let operation = Operation::Convolution {
+            name,
+            kernel: 1,
+            stride: 1,
+        };
+        self.push(operation, vec![of], outputs, scale)
+    }
+
     /// Normalisation of each channel of each picture, without parameters.
     pub fn instance_norm(&mut self, of: Value) -> Value {
         let groups = self.node(of).channels;

@@ -2,7 +2,7 @@
 //! of parameters are made; their weights in files; and their inference.
 //!
 //! [`paper`] has the paper's four networks with the released shapes and parameter names, and
-//! [`decomposer`] ours. [`Weights`] reads safetensors and PyTorch's state dicts (a reader that
+//! [`decomposer`] and [`turn_network`] ours. [`Weights`] reads safetensors and PyTorch's state dicts (a reader that
 //! executes nothing), [`to_onnx`] writes what any engine runs, and [`Inference`] runs it here, by an [`InferenceEngine`].
 //! Knows nothing of pictures, colour or light: tensors go in and come out.
 //!
@@ -33,6 +33,7 @@ mod parameter;
 mod pickle;
 mod plan;
 mod tract;
+mod turn_network;
 mod weights;
 
 pub use codec::WeightPrecision;
@@ -45,6 +46,7 @@ pub use onnx::{INPUT, check_size, to_onnx};
 #[cfg(feature = "onnxruntime")]
 pub use onnxruntime::OnnxRuntime;
 pub use parameter::{Parameter, Role};
+pub use turn_network::{TURN_INPUTS, TURN_OUTPUTS, turn_network};
 pub use weights::{Tensor, Weights};
 
 /// The example of the README compiles.

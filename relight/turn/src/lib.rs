@@ -9,6 +9,7 @@
 //! | --- | --- |
 //! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (Lambertian), `gloss`, `metal`, `shading` (one of them) |
 //! | `observe` | what the frames show: `reading`, `curves`, `exposure`, `conditioning`; `film`, `strip` and `probe` for what the video has beside the object |
+//! | `network` | `input`, `answer`: normals by the network of turns |
 //! | `fit` | `search` and `normal_step` (one pixel), `joint`, `unknowns` and `schur` (all of them with the light), `initialisation`, `prior`, `robust`, `albedo`, `confidence`, `solve` |
 //! | `report` | `files`, `figures`, `maps`, `labels`, `object`: what is written; `warnings` and `destinations`: what a user should know after and before |
 //!
@@ -19,6 +20,7 @@
 mod error;
 mod fit;
 mod model;
+mod network;
 mod observe;
 mod report;
 mod setting_error;
@@ -38,6 +40,8 @@ pub use fit::solve::solve_turn;
 pub use model::frame::{Elevation, ElevationSource, TableFrame};
 pub use model::lighting::TableLight;
 pub use model::material::MaterialKind;
+pub use network::answer::NetworkNormal;
+pub use network::input::{NetworkTurn, PhaseHypothesis, network_input};
 pub use observe::conditioning::Conditioning;
 pub use observe::curves::{CurveBuilder, TurnCurves};
 pub use observe::exposure::ExposureStep;

@@ -20,10 +20,12 @@
 //! | `rooms` | light to draw from |
 //! | `views` | which objects and poses are drawn |
 //! | `cache` | views on disk |
+//! | `drawn` | a view in a random material, room and camera |
 
 mod cache;
 mod cast;
 mod curves;
+mod drawn;
 mod rooms;
 #[cfg(test)]
 mod tests;
@@ -34,6 +36,7 @@ use relight_core::light::Order;
 pub use cache::TransferCache;
 pub use cast::{Transfer, TransferFinish};
 pub use curves::{CURVE_COEFFICIENTS, CurveCoefficients, TransferMaterial};
+pub use drawn::DrawnTurn;
 pub use rooms::Rooms;
 pub use views::TransferRecipe;
 

@@ -166,3 +166,32 @@ fn rooms_are_of_any_kind_and_never_darker_than_nothing_in_the_mean() {
     }
     assert!(Rooms::new(&[], 2, 1).is_empty());
 }
+
+#[test]
+fn a_mirror_image_has_the_normals_and_curves_of_the_mirrored_object_under_the_mirrored_light() {
+    let transfer = open_ball(0.3);
+    let mut seed = 0;
+    // Two draws that differ in nothing but whether they are mirrored cannot be asked for; the ball is its own mirror
+    // image, so that its mirrored curves have to be those of its own normals.
+    let rooms = {
+        let made = made_panoramas().unwrap();
+        let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
+        Rooms::new(&panoramas, 1, 1)
+    };
+    let drawn = loop {
+        seed += 1;
+        let drawn = DrawnTurn::draw(&transfer, &rooms, seed);
+        if drawn.pixels != transfer.pixels || drawn.normals != transfer.finishes[0].normals {
+            break drawn;
+        }
+        assert!(seed < 50);
+    };
+    assert!(drawn.pixels.is_sorted());
+    for (&pixel, normal) in drawn.pixels.iter().zip(&drawn.normals) {
+        let x = ((pixel % 32) as f32 + 0.5) / 16.0 - 1.0;
+        assert!(normal.x * x >= -0.02 && normal.z >= 0.0, "{normal} at {x}");
+    }
+    let half = drawn.halved();
+    assert_eq!(half.size, 16);
+    assert!((half.pixels.len() as f32 * 4.0 / drawn.pixels.len() as f32 - 1.0).abs() < 0.15);
+}

@@ -1,0 +1,351 @@
+//! The harmonics of a turn as the planes that the network of turns is given.
+//!
+//! Normals do not depend on a pixel's albedo, on the light's strength, or on which way the room is turned. So harmonics
+//! are divided by the curve's mean, by their effective value over the object, and turned by the phase of the light, which
+//! is read from the curves themselves.
+
+use std::f32::consts::TAU;
+
+use relight_nets::TURN_INPUTS;
+
+/// Harmonics of which the network sees all channels.
+const COLOURED: usize = 4;
+/// Harmonics that it sees in all.
+const HARMONICS: usize = 6;
+/// Harmonics that it also sees undivided, and of which it is told the mean.
+const STRONG: usize = 2;
+/// Terms of a curve.
+const TERMS: usize = 2 * HARMONICS + 1;
+
+/// Parameters of the input.
+struct InputParameters {
+    /// Least mean of a curve, in means over the object. By hand: below, harmonics are noise.
+    least_mean: f32,
+    /// Largest harmonic, in means of the curve. Derived: of non-negative light it is at most 2.
+    largest_ratio: f32,
+    /// Largest harmonic, in effective values over the object. By hand.
+    largest_value: f32,
+    /// Pixels darker than this, in means over the object, count less for the phase of the light. By hand.
+    dark: f32,
+    /// Largest logarithm of a mean beside that of all. By hand.
+    largest_log: f32,
+}
+
+const PARAMETERS: InputParameters = InputParameters {
+    least_mean: 0.002,
+    largest_ratio: 1.5,
+    largest_value: 4.0,
+    dark: 0.1,
+    largest_log: 3.0,
+};
+
+/// Which way the room is taken to be turned. The phase of the first harmonic says it, where that is strong; in a room
+/// that is bright on two opposite sides that of the second says it, up to half a turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PhaseHypothesis {
+    /// By the first harmonic.
+    First,
+    /// By the second harmonic.
+    Second,
+    /// By the second harmonic, half a turn further.
+    SecondOpposite,
+}
+
+impl PhaseHypothesis {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::First, Self::Second, Self::SecondOpposite];
+}
+
+/// A turn for the network: a square crop around the object.
+#[derive(Debug, Clone, Copy)]
+pub struct NetworkTurn<'a> {
+    /// Width and height, pixels.
+    pub side: usize,
+    /// The covered pixels, ascending: row times side plus column.
+    pub pixels: &'a [u32],
+    /// Of each covered pixel, red, green and blue of the terms of its curve: its mean, then real and imaginary part of
+    /// each of six harmonics.
+    pub curves: &'a [[[f32; 3]; TERMS]],
+    /// The camera over the table, radians.
+    pub elevation: f32,
+}
+
+/// A harmonic of the three channels.
+type Harmonic = [Complex; 3];
+
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Complex {
+    re: f32,
+    im: f32,
+}
+
+impl Complex {
+    fn at(phase: f32) -> Self {
+        let (im, re) = phase.sin_cos();
+        Self { re, im }
+    }
+
+    fn times(self, other: Self) -> Self {
+        Self {
+            re: self.re * other.re - self.im * other.im,
+            im: self.re * other.im + self.im * other.re,
+        }
+    }
+
+    fn scaled(self, factor: f32) -> Self {
+        Self {
+            re: self.re * factor,
+            im: self.im * factor,
+        }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            re: self.re + other.re,
+            im: self.im + other.im,
+        }
+    }
+
+    fn length(self) -> f32 {
+        self.re.hypot(self.im)
+    }
+
+    /// The same direction, no longer than this.
+    fn up_to(self, most: f32) -> Self {
+        self.scaled((most / self.length().max(1e-9)).min(1.0))
+    }
+}
+
+/// The planes of the network, [`TURN_INPUTS`] of side x side values, 0 outside the object.
+#[must_use]
+pub fn network_input(turn: &NetworkTurn<'_>, phase: PhaseHypothesis) -> Vec<f32> {
+    let ratios = Ratios::new(turn);
+    let turned = ratios.turned(ratios.phase(phase));
+    let mut planes = PlaneWriter::new(turn);
+    let mut whole = Vec::new();
+    for m in 0..HARMONICS {
+        let channels: &[usize] = if m < COLOURED { &[0, 1, 2] } else { &[3] };
+        for &c in channels {
+            let of = |k: usize| channel(&turned[m][k], c);
+            let square = (0..turn.pixels.len()).map(|k| of(k).length().powi(2)).sum::<f32>();
+            let effective = (square / turn.pixels.len().max(1) as f32).sqrt() + 1e-4;
+            whole.push(effective.ln() / 1.5 + 1.0);
+            let value = |k: usize| of(k).scaled(1.0 / effective).up_to(PARAMETERS.largest_value);
+            planes.push(|k| value(k).re);
+            planes.push(|k| value(k).im);
+        }
+    }
+    for harmonic in &turned[..STRONG] {
+        planes.push(|k| channel(&harmonic[k], 3).re);
+        planes.push(|k| channel(&harmonic[k], 3).im);
+        for c in 0..3 {
+            let mean = mean_of(harmonic, c);
+            whole.extend([mean.re, mean.im]);
+        }
+    }
+    for c in 0..3 {
+        let middle = ratios.means.iter().map(|mean| mean[c].ln()).sum::<f32>()
+            / ratios.means.len().max(1) as f32;
+        let most = PARAMETERS.largest_log;
+        planes.push(|k| (ratios.means[k][c].ln() - middle).clamp(-most, most));
+    }
+    let side = turn.side as f32;
+    planes.push(|_| 1.0);
+    planes.push(|k| 2.0 * (turn.pixels[k] as usize % turn.side) as f32 / side - 1.0);
+    planes.push(|k| 1.0 - 2.0 * (turn.pixels[k] as usize / turn.side) as f32 / side);
+    planes.push(|_| 3.0 * turn.elevation.sin() - 1.0);
+    for value in whole {
+        planes.push(|_| value);
+    }
+    planes.finish()
+}
+
+/// A channel, or with the number 3 the mean of all.
+fn channel(harmonic: &Harmonic, c: usize) -> Complex {
+    if c < 3 {
+        return harmonic[c];
+    }
+    let [r, g, b] = *harmonic;
+    r.plus(g).plus(b).scaled(1.0 / 3.0)
+}
+
+fn mean_of(harmonic: &[Harmonic], c: usize) -> Complex {
+    let sum = harmonic.iter().fold(Complex::default(), |sum, one| sum.plus(one[c]));
+    sum.scaled(1.0 / harmonic.len().max(1) as f32)
+}
+
+/// Harmonics over means.
+struct Ratios {
+    /// Of each pixel and channel, in means over the object and channel.
+    means: Vec<[f32; 3]>,
+    /// Harmonic by harmonic, pixel by pixel.
+    harmonics: Vec<Vec<Harmonic>>,
+}
+
+impl Ratios {
+    fn new(turn: &NetworkTurn<'_>) -> Self {
+        let count = turn.curves.len().max(1) as f32;
+        let of_all = [0, 1, 2].map(|c| {
+            let sum: f32 = turn.curves.iter().map(|curve| curve[0][c].max(0.0)).sum();
+            (sum / count).max(1e-9)
+        });
+        let means: Vec<[f32; 3]> = turn
+            .curves
+            .iter()
+            .map(|curve| {
+                [0, 1, 2].map(|c| (curve[0][c] / of_all[c]).max(PARAMETERS.least_mean))
+            })
+            .collect();
+        let ratio = |m: usize, k: usize| {
+            [0, 1, 2].map(|c| {
+                let curve = &turn.curves[k];
+                let value = Complex {
+                    re: curve[2 * m + 1][c],
+                    im: curve[2 * m + 2][c],
+                };
+                let over = means[k][c] * of_all[c];
+                value.scaled(1.0 / over).up_to(PARAMETERS.largest_ratio)
+            })
+        };
+        let harmonics = (0..HARMONICS)
+            .map(|m| (0..turn.curves.len()).map(|k| ratio(m, k)).collect())
+            .collect();
+        Self { means, harmonics }
+    }
+
+    /// The phase of a harmonic over the object, radians.
+    fn phase_of(&self, m: usize) -> f32 {
+        let weighted = self.harmonics[m].iter().zip(&self.means).map(|(harmonic, mean)| {
+            [0, 1, 2]
+                .map(|c| harmonic[c].scaled(mean[c] / (mean[c] + PARAMETERS.dark)))
+                .into_iter()
+                .fold(Complex::default(), Complex::plus)
+        });
+        let sum = weighted.fold(Complex::default(), Complex::plus);
+        sum.im.atan2(sum.re)
+    }
+
+    fn phase(&self, hypothesis: PhaseHypothesis) -> f32 {
+        match hypothesis {
+            PhaseHypothesis::First => self.phase_of(0),
+            PhaseHypothesis::Second => self.phase_of(1) / 2.0,
+            PhaseHypothesis::SecondOpposite => self.phase_of(1) / 2.0 + TAU / 2.0,
+        }
+    }
+
+    /// The harmonics as they are where the room is turned back by this phase.
+    fn turned(&self, phase: f32) -> Vec<Vec<Harmonic>> {
+        let harmonics = self.harmonics.iter().enumerate();
+        harmonics
+            .map(|(m, pixels)| {
+                let back = Complex::at(-phase * (m + 1) as f32);
+                pixels.iter().map(|one| one.map(|value| value.times(back))).collect()
+            })
+            .collect()
+    }
+}
+
+/// Planes that are filled one after the other.
+struct PlaneWriter<'a> {
+    turn: &'a NetworkTurn<'a>,
+    values: Vec<f32>,
+}
+
+impl<'a> PlaneWriter<'a> {
+    fn new(turn: &'a NetworkTurn<'a>) -> Self {
+        let values = Vec::with_capacity(TURN_INPUTS * turn.side * turn.side);
+        Self { turn, values }
+    }
+
+    /// Adds a plane by what it has at the covered pixels.
+    fn push(&mut self, value: impl Fn(usize) -> f32) {
+        let begin = self.values.len();
+        self.values.resize(begin + self.turn.side * self.turn.side, 0.0);
+        for (k, &pixel) in self.turn.pixels.iter().enumerate() {
+            self.values[begin + pixel as usize] = value(k);
+        }
+    }
+
+    fn finish(self) -> Vec<f32> {
+        debug_assert_eq!(self.values.len(), TURN_INPUTS * self.turn.side * self.turn.side);
+        self.values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIDE: usize = 16;
+
+    fn curves() -> (Vec<u32>, Vec<[[f32; 3]; TERMS]>) {
+        let pixels: Vec<u32> = (0..256).filter(|pixel| pixel % 16 > 3).collect();
+        let curve = |&pixel: &u32| {
+            let mut curve = [[1.0; 3]; TERMS];
+            for (term, values) in curve.iter_mut().enumerate().skip(1) {
+                let wave = (pixel as f32 * 0.37 * term as f32).sin() / (term + 1) as f32;
+                *values = [0.3 * wave + 0.1, 0.2 * wave + 0.1, 0.4 * wave];
+            }
+            curve
+        };
+        let curves = pixels.iter().map(curve).collect();
+        (pixels, curves)
+    }
+
+    fn input(pixels: &[u32], curves: &[[[f32; 3]; TERMS]], phase: PhaseHypothesis) -> Vec<f32> {
+        let turn = NetworkTurn {
+            side: SIDE,
+            pixels,
+            curves,
+            elevation: 0.3,
+        };
+        network_input(&turn, phase)
+    }
+
+    /// The largest difference of two inputs.
+    fn difference(a: &[f32], b: &[f32]) -> f32 {
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn it_has_as_many_planes_as_the_network_wants_and_nothing_outside_the_object() {
+        let (pixels, curves) = curves();
+        let planes = input(&pixels, &curves, PhaseHypothesis::First);
+        assert_eq!(planes.len(), TURN_INPUTS * SIDE * SIDE);
+        for plane in planes.chunks(SIDE * SIDE) {
+            assert!((0..256).filter(|at| at % 16 <= 3).all(|at| plane[at] == 0.0));
+        }
+    }
+
+    #[test]
+    fn it_does_not_depend_on_how_the_room_is_turned_nor_on_the_strength_of_the_light() {
+        let (pixels, curves) = curves();
+        let mut other = curves.clone();
+        let angle = 1.234_f32;
+        for curve in &mut other {
+            for m in 1..=HARMONICS {
+                let back = Complex::at(angle * m as f32);
+                for c in 0..3 {
+                    let value = Complex {
+                        re: curve[2 * m - 1][c],
+                        im: curve[2 * m][c],
+                    };
+                    let turned = value.times(back);
+                    (curve[2 * m - 1][c], curve[2 * m][c]) = (turned.re, turned.im);
+                }
+            }
+            curve.as_flattened_mut().iter_mut().for_each(|value| *value *= 7.0);
+        }
+        let (before, after) = (
+            input(&pixels, &curves, PhaseHypothesis::First),
+            input(&pixels, &other, PhaseHypothesis::First),
+        );
+        assert!(difference(&before, &after) < 1e-3);
+        // By the second harmonic the two hypotheses may change places.
+        let second = |curves| input(&pixels, curves, PhaseHypothesis::Second);
+        let opposite = input(&pixels, &other, PhaseHypothesis::SecondOpposite);
+        let nearest = difference(&second(&curves), &second(&other))
+            .min(difference(&second(&curves), &opposite));
+        assert!(nearest < 1e-3, "{nearest}");
+    }
+}
