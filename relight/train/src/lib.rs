@@ -12,6 +12,7 @@
 //! | `resources` | device, workers, how a run is stopped |
 //! | `launch`, `process_group`, `agreement`, `all_reduced` | several processes: their ranks, sums over them, whether they agree, all-reduced losses |
 //! | `paper_layers`, `paper_phases`, `paper_networks`, `paper_task` | the paper's phases: layers on tensors, losses, networks, runs |
+//! | `turn_samples`, `turn_task` | the network of whole turns: views in rooms, its run |
 //! | `turn_reader`, `labelled` | turns, and frames with labels |
 //! | [`RunSettings`] and others, `settings/` | TOML, also with the keys of earlier releases |
 
@@ -48,6 +49,8 @@ mod shuffle_buffer;
 mod task;
 mod terms;
 mod turn_reader;
+mod turn_samples;
+mod turn_task;
 
 pub use adam::{Adam, AdamSettings};
 pub use average::WeightAverage;
@@ -70,12 +73,14 @@ pub use run::{Run, RunOutcome, TrainObserver};
 pub use sample::{DrawnSample, Linearisation, TruthArrays, TruthBatch};
 pub use settings::{
     DataSettings, DecomposeSettings, PaperLossCoefficients, PaperSettings, PrecisionChoice,
-    RenamedSetting, RunSettings, SettingsFile, TurnSettings, read_settings,
+    RenamedSetting, RunSettings, SettingsFile, TransferSettings, TurnNetworkSettings,
+    TurnSettings, read_settings,
 };
 pub use shuffle_buffer::{ShuffleBuffer, ShuffleBufferSettings};
 pub use task::{StepLosses, TrainingTask, Validation};
 pub use terms::LossTerms;
 pub use turn_reader::{TurnGroup, TurnReader, TurnTensors};
+pub use turn_task::TurnNetworkTask;
 
 /// The examples of the README, so that they are built.
 #[cfg(doctest)]

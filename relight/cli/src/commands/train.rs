@@ -14,7 +14,7 @@ use relight_nets::{NetError, Weights};
 use relight_train::{
     DecomposeSettings, DecomposeTask, Launch, PaperInputs, PaperPhase, PaperSettings, PaperTask,
     ProcessGroup, Resources, Run, RunOutcome, RunSettings, SettingsFile, TrainObserver,
-    TrainingTask, read_settings,
+    TrainingTask, TurnNetworkSettings, TurnNetworkTask, read_settings,
 };
 use relit_console::{Console, Outcome, ProgressBar};
 use serde::Serialize;
@@ -39,6 +39,8 @@ Examples:
   relight train joint --turns shards --light light/light-net.safetensors \
       --weights normal/normal-net.safetensors -o joint
       the paper's phases: a warm-up, and two rounds on turns
+  relight train turn -o turn
+      the network of relight turn
   torchrun --no-python --nproc-per-node 4 relight train decompose --threads 2 -o run
       four processes of one machine, each with its part of every batch; also by RANK, WORLD_SIZE, MASTER_ADDR,
       MASTER_PORT and LOCAL_RANK, as scripts of Slurm and operators of Kubernetes set them
@@ -69,6 +71,17 @@ enum TaskName {
     Joint(PaperArguments),
     /// The net for specular reflectance and smoothness, on the highlights of turns.
     Specular(PaperArguments),
+    /// The network of whole turns: normals from the harmonics of a turn in an unknown room.
+    Turn(TurnArguments),
+}
+
+#[derive(Args)]
+struct TurnArguments {
+    #[command(flatten)]
+    run: RunArguments,
+    /// The folder in which views are kept, each of which is cast once; runs can share it [default: RUN/views].
+    #[arg(long, value_name = "FOLDER")]
+    views: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -175,6 +188,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         TaskName::Light(arguments) => paper(PaperPhase::Light, arguments, console),
         TaskName::Joint(arguments) => paper(PaperPhase::Joint, arguments, console),
         TaskName::Specular(arguments) => paper(PaperPhase::Specular, arguments, console),
+        TaskName::Turn(arguments) => turn(arguments, console),
     }
 }
 
@@ -194,6 +208,26 @@ fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
     let resources = processes.resources.clone();
     let mut task = DecomposeTask::new(settings, resources, weights.as_ref())?;
     train(&mut task, &run, (arguments, processes), console)
+}
+
+fn turn(arguments: &TurnArguments, console: Console) -> CommandResult {
+    let settings = arguments.run.settings.as_deref();
+    let file = settings.map_or_else(|| Ok(TurnNetworkSettings::default().into()), read_settings)?;
+    if arguments.run.print_settings {
+        return print_settings(&file, &arguments.run, console);
+    }
+    let processes = arguments.run.join(console)?;
+    if processes.is_first() {
+        arguments.run.tell_of_old_names(&file, console);
+    }
+    let settings = file.settings;
+    let run = settings.run.clone();
+    let weights = read_weights(arguments.run.weights.as_deref())?;
+    let own = arguments.run.folder()?.join("views");
+    let views = arguments.views.as_deref().unwrap_or(&own);
+    let resources = processes.resources.clone();
+    let mut task = TurnNetworkTask::new(settings, views, resources, weights.as_ref())?;
+    train(&mut task, &run, (&arguments.run, processes), console)
 }
 
 fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> CommandResult {

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | `run` | how long and how fast a network learns: `[run]` |
 //! | `data` | composed samples and turns: `[data]`, `[turns]` |
+//! | `transfer` | views and rooms of the network of turns: its `[data]` |
 //! | `loss` | loss coefficients: `[loss]` |
 //! | `file` | reading TOML, and how the settings of two runs differ |
 //! | `renamed` | old names of settings |
@@ -17,6 +18,7 @@ mod renamed;
 mod run;
 #[cfg(test)]
 mod tests;
+mod transfer;
 
 use std::path::Path;
 
@@ -34,6 +36,7 @@ pub use file::{SettingsFile, read_settings};
 pub use loss::PaperLossCoefficients;
 pub use renamed::RenamedSetting;
 pub use run::{PrecisionChoice, RunSettings};
+pub use transfer::TransferSettings;
 
 /// The settings of `relight train decompose`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -45,6 +48,27 @@ pub struct DecomposeSettings {
     pub data: DataSettings,
     /// Loss coefficients.
     pub loss: DecomposeLossCoefficients,
+}
+
+/// The settings of `relight train turn`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TurnNetworkSettings {
+    /// How long and how fast.
+    pub run: RunSettings,
+    /// On what.
+    pub data: TransferSettings,
+}
+
+impl TurnNetworkSettings {
+    /// Whether all numbers are in range.
+    ///
+    /// # Errors
+    /// [`TrainError::Setting`] names the first that is not.
+    pub fn check(&self) -> Result<(), TrainError> {
+        self.run.check()?;
+        self.data.check()
+    }
 }
 
 /// The settings of `relight train spec`, `normal`, `light`, `joint` and `specular`.

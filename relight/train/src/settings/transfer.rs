@@ -1,0 +1,114 @@
+//! What the network of turns learns from.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use super::allowed::all_allowed;
+use crate::error::TrainError;
+
+const MOST_VIEWS: u64 = 1_000_000;
+
+/// Views of objects on the table and rooms around them: the table `[data]` of `relight train turn`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TransferSettings {
+    /// Width and height, a multiple of 32.
+    pub size: u32,
+    /// Views in all; each is cast once.
+    pub views: u64,
+    /// Views that are there from the first step on.
+    pub first_views: u64,
+    /// Views that join at each step, until all have.
+    pub new_views: u64,
+    /// Rays a pixel.
+    pub rays: u32,
+    /// Part of the steps, 0..=1, in which views are seen at half the width: four times as many fit into a second.
+    pub coarse_part: f64,
+    /// Curves of brightness of each panorama.
+    pub variants: u32,
+    /// A folder of meshes beside the procedural shapes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub meshes: Option<PathBuf>,
+    /// A folder of panoramas in place of the synthetic ones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub panoramas: Option<PathBuf>,
+    /// A folder of panoramas to validate in; the synthetic ones where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation_panoramas: Option<PathBuf>,
+    /// Turns on which the network is validated, of procedural shapes that it does not train on.
+    pub validation: u64,
+}
+
+impl Default for TransferSettings {
+    fn default() -> Self {
+        Self {
+            size: 128,
+            views: 3000,
+            first_views: 64,
+            new_views: 2,
+            rays: 144,
+            coarse_part: 0.6,
+            variants: 8,
+            meshes: None,
+            panoramas: None,
+            validation_panoramas: None,
+            validation: 48,
+        }
+    }
+}
+
+impl TransferSettings {
+    /// Whether all numbers are in range.
+    ///
+    /// # Errors
+    /// [`TrainError::Setting`] names the first that is not.
+    pub fn check(&self) -> Result<(), TrainError> {
+        let views = |name, value: u64| {
+            let is_allowed = (1..=MOST_VIEWS).contains(&value);
+            (name, is_allowed, value.to_string(), "from 1 to a million")
+        };
+        all_allowed([
+            (
+                "data.size",
+                (32..=512).contains(&self.size) && self.size.is_multiple_of(32),
+                self.size.to_string(),
+                "a multiple of 32 up to 512",
+            ),
+            views("data.views", self.views),
+            views("data.first_views", self.first_views),
+            views("data.validation", self.validation),
+            (
+                "data.new_views",
+                self.new_views <= MOST_VIEWS,
+                self.new_views.to_string(),
+                "up to a million",
+            ),
+            (
+                "data.rays",
+                (16..=4096).contains(&self.rays),
+                self.rays.to_string(),
+                "from 16 to 4096",
+            ),
+            (
+                "data.coarse_part",
+                (0.0..=1.0).contains(&self.coarse_part),
+                self.coarse_part.to_string(),
+                "from 0 to 1",
+            ),
+            (
+                "data.variants",
+                (1..=1000).contains(&self.variants),
+                self.variants.to_string(),
+                "from 1 to 1000",
+            ),
+        ])
+    }
+
+    /// How many of the views there are at a step.
+    #[must_use]
+    pub fn views_at(&self, step: u64) -> u64 {
+        let joined = self.new_views.saturating_mul(step);
+        self.first_views.saturating_add(joined).clamp(1, self.views)
+    }
+}

@@ -1,0 +1,183 @@
+//! What the network of turns learns from: views of objects on the table, each in a random room, as tensors.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use rayon::prelude::*;
+use tch::{Device, Kind, Tensor};
+
+use super::error::TrainError;
+use super::settings::TransferSettings;
+use relight_core::light::Panorama;
+use relight_nets::TURN_INPUTS;
+use relight_synth::{
+    DrawnTurn, Folders, Library, Rooms, TransferCache, TransferRecipe, stream,
+};
+use relight_turn::{NetworkTurn, PhaseHypothesis, network_input};
+
+/// Views that are drawn for training, for validation.
+const TRAINING: u64 = 41;
+const VALIDATION: u64 = 42;
+/// Of the turns that are drawn, one in so many has the phase of its second harmonic, in one of two directions.
+const BY_SECOND: u64 = 3;
+
+/// Views and rooms to draw from.
+#[derive(Debug)]
+pub(super) struct TurnViews {
+    library: Library,
+    cache: TransferCache,
+    rooms: Rooms,
+}
+
+/// A batch of turns for the network.
+#[derive(Debug)]
+pub(super) struct TurnBatch {
+    /// `batch x channels x height x width`.
+    pub(super) input: Tensor,
+    /// Unit normals, 3 channels.
+    pub(super) normals: Tensor,
+    /// 1 where the object is, 1 channel.
+    pub(super) mask: Tensor,
+}
+
+impl TurnViews {
+    /// For training: with the meshes, in the panoramas of the settings.
+    pub(super) fn for_training(
+        settings: &TransferSettings,
+        folder: &Path,
+        seed: u64,
+    ) -> Result<Self, TrainError> {
+        let library = Library::read(&Folders {
+            meshes: settings.meshes.clone(),
+            textures: None,
+            panoramas: settings.panoramas.clone(),
+        })?;
+        Self::new(settings, folder, library, stream(seed, TRAINING))
+    }
+
+    /// For validation: procedural shapes and panoramas of their own, the same for all seeds.
+    pub(super) fn for_validation(
+        settings: &TransferSettings,
+        folder: &Path,
+    ) -> Result<Self, TrainError> {
+        let library = Library::read(&Folders {
+            panoramas: settings.validation_panoramas.clone(),
+            ..Folders::default()
+        })?;
+        Self::new(settings, folder, library, VALIDATION)
+    }
+
+    fn new(
+        settings: &TransferSettings,
+        folder: &Path,
+        library: Library,
+        seed: u64,
+    ) -> Result<Self, TrainError> {
+        let recipe = TransferRecipe {
+            seed,
+            size: settings.size,
+            rays: settings.rays,
+        };
+        let cache = TransferCache::open(folder, recipe, &library)?;
+        let panoramas: Vec<&Panorama> = (0..library.panoramas.len())
+            .filter_map(|number| library.panoramas.get(number))
+            .collect();
+        let rooms = Rooms::new(&panoramas, settings.variants, seed);
+        Ok(Self {
+            library,
+            cache,
+            rooms,
+        })
+    }
+
+    /// A batch of turns, each by its view's number and a seed; at half the width where `is_coarse`.
+    pub(super) fn batch(
+        &self,
+        turns: &[(u64, u64)],
+        is_coarse: bool,
+        (kind, device): (Kind, Device),
+    ) -> Result<TurnBatch, TrainError> {
+        let drawn: Result<Vec<Planes>, TrainError> = turns
+            .par_iter()
+            .map(|&(view, seed)| {
+                let view = self.cache.view(&self.library, view)?;
+                let drawn = DrawnTurn::draw(&view, &self.rooms, seed);
+                let drawn = if is_coarse { drawn.halved() } else { drawn };
+                Ok(Planes::new(&drawn, phase_of(stream(seed, 1))))
+            })
+            .collect();
+        TurnBatch::new(&drawn?, kind, device)
+    }
+}
+
+/// Mostly the phase by which turns are looked at first.
+fn phase_of(seed: u64) -> PhaseHypothesis {
+    match seed % (2 * BY_SECOND) {
+        0 => PhaseHypothesis::Second,
+        1 => PhaseHypothesis::SecondOpposite,
+        _ => PhaseHypothesis::First,
+    }
+}
+
+/// A turn as planes.
+struct Planes {
+    side: usize,
+    input: Vec<f32>,
+    normals: Vec<f32>,
+    mask: Vec<f32>,
+}
+
+impl Planes {
+    fn new(drawn: &DrawnTurn, phase: PhaseHypothesis) -> Self {
+        let side = drawn.size as usize;
+        let turn = NetworkTurn {
+            side,
+            pixels: &drawn.pixels,
+            curves: &drawn.curves,
+            elevation: drawn.elevation,
+        };
+        let area = side * side;
+        let (mut normals, mut mask) = (vec![0.0; 3 * area], vec![0.0; area]);
+        for (&pixel, normal) in drawn.pixels.iter().zip(&drawn.normals) {
+            mask[pixel as usize] = 1.0;
+            for (axis, value) in normal.to_array().into_iter().enumerate() {
+                normals[axis * area + pixel as usize] = value;
+            }
+        }
+        Self {
+            side,
+            input: network_input(&turn, phase),
+            normals,
+            mask,
+        }
+    }
+}
+
+impl TurnBatch {
+    fn new(turns: &[Planes], kind: Kind, device: Device) -> Result<Self, TrainError> {
+        let side = turns.first().map_or(0, |turn| turn.side) as i64;
+        let stacked = |channels: usize, of: fn(&Planes) -> &[f32]| {
+            let values: Vec<f32> = turns.iter().flat_map(|turn| of(turn).to_vec()).collect();
+            Tensor::f_from_slice(&values)?
+                .f_reshape([turns.len() as i64, channels as i64, side, side])?
+                .f_to_kind(kind)?
+                .f_to_device(device)
+        };
+        Ok(Self {
+            input: stacked(TURN_INPUTS, |turn| &turn.input)?,
+            normals: stacked(3, |turn| &turn.normals)?,
+            mask: stacked(1, |turn| &turn.mask)?,
+        })
+    }
+
+    /// Its tensors by name.
+    pub(super) fn named(&self) -> BTreeMap<String, Tensor> {
+        [
+            ("input", &self.input),
+            ("normals", &self.normals),
+            ("mask", &self.mask),
+        ]
+        .map(|(name, tensor)| (name.to_owned(), tensor.shallow_clone()))
+        .into()
+    }
+}
