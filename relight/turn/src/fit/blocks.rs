@@ -71,16 +71,20 @@ pub(crate) fn reduced(
 ) -> Vec<PriorNormal> {
     let (width, across) = (curves.extent().width, coarse.extent().width);
     let mut sums = vec![[0.0; 3]; coarse.extent().pixels()];
+    // Sum of the weights, and how many there are.
+    let mut weights = vec![(0.0, 0.0); coarse.extent().pixels()];
     for (prior, &place) in fine.iter().zip(curves.places()) {
         let block = place / width / side * across + place % width / side;
         for (sum, value) in sums[block].iter_mut().zip(prior.normal) {
             *sum += value;
         }
+        let (sum, count) = &mut weights[block];
+        *sum += prior.weight;
+        *count += 1.0;
     }
-    let weight = fine.first().map_or(0.0, |prior| prior.weight);
     let at = |&place: &usize| PriorNormal {
         normal: unit(sums[place]),
-        weight,
+        weight: weights[place].0 / f64::max(weights[place].1, 1.0),
     };
     coarse.places().iter().map(at).collect()
 }

@@ -1,9 +1,29 @@
 //! What is known of a turn beforehand.
 
+use relight_core::image::Planes;
 use relight_core::light::{Normals, ShLight, YUp};
 
 use crate::model::frame::Elevation;
 use crate::model::material::MaterialKind;
+
+/// Normals that are expected before a turn is solved.
+#[derive(Debug, Clone)]
+pub struct TurnPrior {
+    /// Unit normals.
+    pub normals: Normals<YUp>,
+    /// By how much each is expected to be off, degrees, where that is known: then a normal counts the more, the
+    /// surer it is.
+    pub expected_errors: Option<Planes<1>>,
+}
+
+impl From<Normals<YUp>> for TurnPrior {
+    fn from(normals: Normals<YUp>) -> Self {
+        Self {
+            normals,
+            expected_errors: None,
+        }
+    }
+}
 
 /// What is known of a turn beforehand.
 #[derive(Debug, Clone)]
@@ -14,7 +34,7 @@ pub struct TurnOptions {
     /// count, those beyond 2 for gloss alone.
     pub light: Option<ShLight>,
     /// Normals that initialise, where there are any.
-    pub prior: Option<Normals<YUp>>,
+    pub prior: Option<TurnPrior>,
     /// How much these count: `weight (1 - cos)` is added to the residual of a pixel's curve, over the energy
     /// of its variation.
     pub prior_weight: f64,

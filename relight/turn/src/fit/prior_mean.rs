@@ -1,13 +1,13 @@
 //! The prior mean of a turn's normals, and the shading model that a fit begins with.
 
-use relight_core::light::{Normals, YUp};
+use relight_core::image::Extent;
 
 use crate::error::TurnError;
 use crate::fit::figures::InitialisationFigure;
 use crate::fit::inflation::inflated;
 use crate::fit::initialisation::FittedLight;
 use crate::fit::normal_step::PriorNormal;
-use crate::fit::options::TurnOptions;
+use crate::fit::options::{TurnOptions, TurnPrior};
 use crate::fit::setting::Setting;
 use crate::model::directions::unit;
 use crate::model::frame::TableFrame;
@@ -19,10 +19,17 @@ use crate::observe::curves::TurnCurves;
 struct PriorParameters {
     /// Weight of the inflated shape as the prior mean, as `TurnOptions::prior_weight`. By hand.
     outline_weight: f64,
+    /// Expected error at which a normal has the prior's weight as it is, degrees. By hand: that of the network of turns
+    /// on synthetic turns.
+    usual_error_deg: f64,
+    /// Least and largest factor of the weight. By hand.
+    factors: (f64, f64),
 }
 
 const PARAMETERS: PriorParameters = PriorParameters {
     outline_weight: 0.15,
+    usual_error_deg: 12.0,
+    factors: (0.1, 4.0),
 };
 
 /// The prior normals, and the shading model on blocks of pixels that goes with them.
@@ -60,18 +67,23 @@ impl Initialised {
             found,
             is_prior_left_out: false,
         };
-        Ok(initialised.or_outline(curves, options.prior_weight))
+        Ok(initialised.or_outline(curves, options))
     }
 
     /// Where a Lambertian material fits the turn, light and shape that go with the prior mean fit it as well as others
     /// do. Then the shape inflated out of the outline becomes the prior mean, if it is nearer to what fits the turn.
-    fn or_outline(mut self, curves: &TurnCurves, weight: f64) -> Self {
+    fn or_outline(mut self, curves: &TurnCurves, options: &TurnOptions) -> Self {
+        let weight = options.prior_weight;
+        // A prior that knows how far it is off has seen the turn: the outline says nothing more.
+        let has_errors =
+            |prior: &TurnPrior| prior.expected_errors.is_some();
         let is_lambertian =
             self.found.model.material == MaterialKind::Diffuse && self.found.model.gloss.is_none();
         if self.setting.known.is_some()
             || !self.setting.has_shape
             || !is_lambertian
             || weight <= 0.0
+            || options.prior.as_ref().is_some_and(has_errors)
         {
             return self;
         }
@@ -125,20 +137,31 @@ fn of_outline(curves: &TurnCurves, weight: f64) -> Vec<PriorNormal> {
 /// The prior at each pixel under the mask.
 fn prior_of(
     curves: &TurnCurves,
-    prior: &Normals<YUp>,
+    prior: &TurnPrior,
     weight: f64,
 ) -> Result<Vec<PriorNormal>, TurnError> {
-    if prior.extent() != curves.extent() {
-        return Err(TurnError::PriorSize {
-            found: prior.extent(),
-            expected: curves.extent(),
-        });
+    let errors = prior.expected_errors.as_ref();
+    let fits = |extent: Extent| extent == curves.extent();
+    for found in [Some(prior.normals.extent()), errors.map(|errors| errors.extent())] {
+        if let Some(found) = found.filter(|&found| !fits(found)) {
+            return Err(TurnError::PriorSize {
+                found,
+                expected: curves.extent(),
+            });
+        }
     }
-    let whole = prior.completed(&curves.mask());
+    let whole = prior.normals.completed(&curves.mask());
     let [x, y, z] = whole.planes().planes();
+    let factor = |place: usize| {
+        let (least, most) = PARAMETERS.factors;
+        errors.map_or(1.0, |errors| {
+            let error = f64::from(errors.plane(0)[place]).max(1.0);
+            (PARAMETERS.usual_error_deg / error).powi(2).clamp(least, most)
+        })
+    };
     let at = |&place: &usize| PriorNormal {
         normal: unit([x, y, z].map(|plane| f64::from(plane[place]))),
-        weight,
+        weight: weight * factor(place),
     };
     Ok(curves.places().iter().map(at).collect())
 }

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use relight_core::light::ShLight;
+use relight_nets::{NetError, Weights};
 use relight_turn::{
     Elevation, MaterialKind, NormalsSource, Probe, ProbeBall, ProbePlace, ReadTurn,
-    RotationDirection, TurnOptions, prior_normals, read_given_light,
+    RotationDirection, TurnNetwork, TurnOptions, TurnPrior, prior_normals, read_given_light,
 };
 
 use crate::shipped;
@@ -53,9 +54,9 @@ pub(crate) struct Arguments {
     /// What the ball is made of: without it, what it looks like.
     #[arg(long, value_enum, value_name = "KIND", requires = "probe")]
     pub(super) probe_ball: Option<BallName>,
-    /// Normals that initialise: "shipped" (the network that comes with the program), "none", a network (.onnx, or
-    /// weights of decompose: .safetensors, .pth), a map of normals (.png, .exr), or a folder with normal.png [default:
-    /// shipped, and none with --light].
+    /// Normals that initialise: "turn" (the network that sees the whole turn), "photo" (that of relight decompose, which
+    /// sees single frames), "none", a network (.onnx, or weights of decompose: .safetensors, .pth), a map of normals
+    /// (.png, .exr), or a folder with normal.png [default: turn, and none with --light].
     #[arg(long, value_name = "FROM")]
     normals: Option<String>,
     /// Which way y points in these normals.
@@ -64,6 +65,9 @@ pub(crate) struct Arguments {
     /// How much these normals count beside what the turn says.
     #[arg(long, value_name = "WEIGHT", default_value_t = TurnOptions::default().prior_weight, value_parser = weight)]
     pub(super) normals_weight: f64,
+    /// Weights of the network of turns, as relight train turn writes them [default: those that come with the program].
+    #[arg(long, value_name = "FILE")]
+    turn_network: Option<PathBuf>,
     /// The object's material: without it, the one that fits the turn.
     #[arg(long, alias = "body", value_enum, value_name = "KIND")]
     pub(super) material: Option<MaterialName>,
@@ -82,6 +86,14 @@ pub(crate) struct Arguments {
     /// Do not write the video, which needs the program ffmpeg.
     #[arg(long)]
     pub(super) no_video: bool,
+}
+
+/// Where normals come from that a turn is solved from.
+pub(super) enum InitialNormals {
+    /// The network that sees the whole turn.
+    Turn,
+    /// What sees single frames, or a file.
+    Photo(NormalsSource),
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -149,12 +161,44 @@ impl Arguments {
     }
 
     /// The normals that initialise, and how they are named.
-    pub(super) fn normals(&self) -> Option<(NormalsSource, &str)> {
+    pub(super) fn normals(&self) -> Option<(InitialNormals, &str)> {
         match self.normals.as_deref() {
             None if self.light.is_some() || self.probe.is_some() => None,
             Some("none") => None,
-            None | Some("shipped") => Some((NormalsSource::Own, "shipped")),
-            Some(path) => Some((NormalsSource::of(Path::new(path)), path)),
+            None | Some("turn") => Some((InitialNormals::Turn, "turn")),
+            // "shipped" was its name before there was a network of turns.
+            Some("photo" | "shipped") => {
+                Some((InitialNormals::Photo(NormalsSource::Own), "photo"))
+            }
+            Some(path) => {
+                let source = NormalsSource::of(Path::new(path));
+                Some((InitialNormals::Photo(source), path))
+            }
+        }
+    }
+
+    /// Normals to start from.
+    fn prior(&self, source: &InitialNormals, turn: &ReadTurn) -> Result<TurnPrior, Box<dyn Error>> {
+        match source {
+            InitialNormals::Turn => {
+                let network = TurnNetwork::new(&self.turn_weights()?)?;
+                let found = network.predict(&turn.curves, self.elevation())?;
+                Ok(TurnPrior {
+                    normals: found.normals,
+                    expected_errors: Some(found.expected_errors),
+                })
+            }
+            InitialNormals::Photo(source) => {
+                let (y, shown) = (self.normals_y.into(), &turn.first);
+                Ok(prior_normals(source, shipped::weights, y, shown, &turn.mask)?.into())
+            }
+        }
+    }
+
+    fn turn_weights(&self) -> Result<Weights, NetError> {
+        match &self.turn_network {
+            Some(path) => Weights::read(path),
+            None => shipped::turn_weights(),
         }
     }
 
@@ -177,15 +221,7 @@ impl Arguments {
         turn: &ReadTurn,
         measured: Option<ShLight>,
     ) -> Result<TurnOptions, Box<dyn Error>> {
-        let prior = self.normals().map(|(source, _)| {
-            prior_normals(
-                &source,
-                shipped::weights,
-                self.normals_y.into(),
-                &turn.first,
-                &turn.mask,
-            )
-        });
+        let prior = self.normals().map(|(source, _)| self.prior(&source, turn));
         Ok(TurnOptions {
             elevation: self.elevation(),
             light: match &self.light {

@@ -18,7 +18,7 @@ fn a_table_that_turns_the_other_way_is_noticed() {
     let curves = builder.finish().unwrap();
     let unknown = TurnOptions {
         elevation: elevation(),
-        prior: Some(surface.normals().clone()),
+        prior: Some(surface.normals().clone().into()),
         ..TurnOptions::default()
     };
     for options in [known(&light), unknown] {
@@ -57,7 +57,7 @@ fn metal_is_found_in_unknown_light_with_prior_normals() {
     let (surface, _, curves) = metal_ball();
     let options = TurnOptions {
         elevation: elevation(),
-        prior: Some(surface.normals().clone()),
+        prior: Some(surface.normals().clone().into()),
         ..TurnOptions::default()
     };
     let found = solve_turn(&curves, &options).unwrap();

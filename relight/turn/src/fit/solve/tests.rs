@@ -31,7 +31,7 @@ fn with_its_own_normals_as_the_prior_unknown_light_is_found_up_to_its_colour() {
     let curves = film(&surface, &light, TAKE);
     let options = TurnOptions {
         elevation: elevation(),
-        prior: Some(surface.normals().clone()),
+        prior: Some(surface.normals().clone().into()),
         ..TurnOptions::default()
     };
     let found = solve_turn(&curves, &options).unwrap();
@@ -157,7 +157,7 @@ fn a_dark_turn_and_a_white_one_are_wrongly_exposed_and_a_prior_of_another_size_i
         assert!(found.confidence(&curves).plane(0)[0] < 0.1);
     }
     let options = TurnOptions {
-        prior: Some(Normals::sphere(5)),
+        prior: Some(Normals::sphere(5).into()),
         ..TurnOptions::default()
     };
     let refused = solve_turn(&of(0.3), &options);
