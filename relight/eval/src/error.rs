@@ -50,6 +50,20 @@ pub enum EvalError {
         /// The ground truth's.
         expected: Extent,
     },
+    /// A folder holds no turns.
+    #[error("{} holds no turns of relight synth --turn", path.display())]
+    Turns {
+        /// The folder.
+        path: PathBuf,
+        /// Why not.
+        source: Box<relit_data::shard::ShardError>,
+    },
+    /// A turn cannot be solved.
+    #[error("a turn cannot be solved")]
+    Turn(#[source] Box<relight_turn::TurnError>),
+    /// A network cannot be run.
+    #[error(transparent)]
+    Network(#[from] relight_nets::NetError),
     /// A file cannot be read.
     #[error("{} cannot be read", path.display())]
     Read {
@@ -135,5 +149,11 @@ impl EvalError {
     pub(super) fn write(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
         |source| Self::Write { path, source }
+    }
+}
+
+impl From<relight_turn::TurnError> for EvalError {
+    fn from(fault: relight_turn::TurnError) -> Self {
+        Self::Turn(Box::new(fault))
     }
 }

@@ -9,6 +9,7 @@
 //! | [`evaluate_ordinal`] | what people judged of points | albedo | WHDR |
 //! | [`evaluate_insertion`] | an object rendered in another picture | nothing: it runs `insert` | MSE, DSSIM |
 //! | [`evaluate_trust`] | normals | nothing: it runs `decompose` | errors ordered by trust |
+//! | [`evaluate_turns`] | turns with normals, albedo, light | nothing: it runs `turn` | angles, albedo, what is expected beside what is |
 //! | [`evaluate_relighting`] | an object's maps, images under many lights | maps, or images | MSE, DSSIM |
 //!
 //! Each line of a [`ScoreTable`] says what was compared and how: numbers under one name differ by a
@@ -28,6 +29,7 @@ mod retinex;
 mod run;
 mod scores;
 mod trust;
+mod turns;
 
 pub use error::EvalError;
 pub use highlights::{HighlightMethod, evaluate_highlights};
@@ -44,6 +46,9 @@ pub use retinex::{IntrinsicImages, Retinex};
 pub use run::EvalProgress;
 pub use scores::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
 pub use trust::{TrustCurve, TrustTable, evaluate_trust};
+pub use turns::{
+    TurnLine, TurnMethod, TurnNetworks, TurnScore, TurnSet, TurnTable, evaluate_turns,
+};
 
 /// The examples of the README, so that they are built.
 #[cfg(doctest)]

@@ -42,7 +42,13 @@ pub fn turn_network() -> Graph {
     for (step, &skip) in skips.iter().enumerate().rev().skip(1) {
         value = net.upsample(value, false);
         value = net.concatenate(value, skip);
-        value = layer(&mut net, &format!("decoder.{step}"), value, ENCODER[step], 1);
+        value = layer(
+            &mut net,
+            &format!("decoder.{step}"),
+            value,
+            ENCODER[step],
+            1,
+        );
     }
     value = net.convolution("fine".to_owned(), value, FINE * BLOCK * BLOCK, 1);
     value = net.pixel_shuffle(value, BLOCK);

@@ -72,8 +72,8 @@ pub use sample::{Description, SynthSample, Whites};
 pub use shape::ShapeKind;
 pub use studio::Surroundings;
 pub use transfer::{
-    CURVE_COEFFICIENTS, CurveCoefficients, DrawnTurn, Rooms, Transfer, TransferCache, TransferFinish,
-    TransferMaterial, TransferRecipe,
+    CURVE_COEFFICIENTS, CurveCoefficients, DrawnTurn, Rooms, Transfer, TransferCache,
+    TransferFinish, TransferMaterial, TransferRecipe,
 };
 pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};
 pub use view::{Pose, Projection};

@@ -73,8 +73,8 @@ pub use run::{Run, RunOutcome, TrainObserver};
 pub use sample::{DrawnSample, Linearisation, TruthArrays, TruthBatch};
 pub use settings::{
     DataSettings, DecomposeSettings, PaperLossCoefficients, PaperSettings, PrecisionChoice,
-    RenamedSetting, RunSettings, SettingsFile, TransferSettings, TurnNetworkSettings,
-    TurnSettings, read_settings,
+    RenamedSetting, RunSettings, SettingsFile, TransferSettings, TurnNetworkSettings, TurnSettings,
+    read_settings,
 };
 pub use shuffle_buffer::{ShuffleBuffer, ShuffleBufferSettings};
 pub use task::{StepLosses, TrainingTask, Validation};

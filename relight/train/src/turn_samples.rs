@@ -10,9 +10,7 @@ use super::error::TrainError;
 use super::settings::TransferSettings;
 use relight_core::light::Panorama;
 use relight_nets::TURN_INPUTS;
-use relight_synth::{
-    DrawnTurn, Folders, Library, Rooms, TransferCache, TransferRecipe, stream,
-};
+use relight_synth::{DrawnTurn, Folders, Library, Rooms, TransferCache, TransferRecipe, stream};
 use relight_turn::{NetworkTurn, PhaseHypothesis, network_input};
 
 /// Views that are drawn for training, for validation.

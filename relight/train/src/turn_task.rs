@@ -59,7 +59,11 @@ impl TurnNetworkTask {
             LearnerSettings {
                 adam: settings.run.adam(),
                 ema_decay: settings.run.ema_decay,
-                precision: settings.run.precision.named().unwrap_or(ComputePrecision::Single),
+                precision: settings
+                    .run
+                    .precision
+                    .named()
+                    .unwrap_or(ComputePrecision::Single),
                 device: resources.device,
             },
         )?;
@@ -100,7 +104,9 @@ fn answered(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
         .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
         .f_add_scalar(1e-8)?
         .f_sqrt()?;
-    let log_chord = answer.f_narrow(1, 3, 1)?.f_clamp(LOG_CHORD.0, LOG_CHORD.1)?;
+    let log_chord = answer
+        .f_narrow(1, 3, 1)?
+        .f_clamp(LOG_CHORD.0, LOG_CHORD.1)?;
     Ok((normals.f_div(&length)?, log_chord))
 }
 
@@ -116,7 +122,9 @@ fn expected_error(
         .f_square()?
         .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
         .f_sqrt()?;
-    let each = chord.f_mul(&log_chord.f_neg()?.f_exp()?)?.f_add(log_chord)?;
+    let each = chord
+        .f_mul(&log_chord.f_neg()?.f_exp()?)?
+        .f_add(log_chord)?;
     let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
     let value = each.f_mul(&batch.mask)?.f_sum(None)?.f_div(&over)?;
     Ok(Mean { value, over })
@@ -162,7 +170,11 @@ impl TrainingTask for TurnNetworkTask {
         let answer = self.learner.model.forward(&batch.input)?;
         let (normals, log_chord) = answered(&answer[0])?;
         let mut terms = LossTerms::default();
-        terms.add_mean("normals", 1.0, chord(&normals, &batch.normals, &batch.mask)?);
+        terms.add_mean(
+            "normals",
+            1.0,
+            chord(&normals, &batch.normals, &batch.mask)?,
+        );
         let expected = expected_error(&normals, &log_chord, &batch)?;
         terms.add_mean("expected_error", EXPECTED_ERROR, expected);
         Ok(StepLosses {
@@ -220,14 +232,19 @@ impl ValidationTally {
                 .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
                 .f_clamp(-1.0, 1.0)?;
             let errors = dots.f_acos()?.f_rad2deg()?.f_masked_select(&inside)?;
-            let chords = part(log_chord)?.f_exp()?.f_mul_scalar(0.5)?.f_clamp_max(1.0)?;
+            let chords = part(log_chord)?
+                .f_exp()?
+                .f_mul_scalar(0.5)?
+                .f_clamp_max(1.0)?;
             let expected = chords
                 .f_asin()?
                 .f_rad2deg()?
                 .f_mul_scalar(2.0)?
                 .f_masked_select(&inside)?;
-            let (errors, expected) =
-                (Vec::<f32>::try_from(errors)?, Vec::<f32>::try_from(expected)?);
+            let (errors, expected) = (
+                Vec::<f32>::try_from(errors)?,
+                Vec::<f32>::try_from(expected)?,
+            );
             self.pixels.extend(errors.into_iter().zip(expected));
         }
         Ok(())
@@ -242,7 +259,10 @@ impl ValidationTally {
             ("standard_error".to_owned(), square.sqrt() / count),
         ]);
         for (limit, name) in WITHIN_DEG {
-            let expected = self.pixels.iter().filter(|(_, expected)| f64::from(*expected) <= limit);
+            let expected = self
+                .pixels
+                .iter()
+                .filter(|(_, expected)| f64::from(*expected) <= limit);
             let (all, kept) = expected.fold((0.0, 0.0), |(all, kept), (error, _)| {
                 let is_kept = f64::from(*error) <= limit;
                 (all + 1.0, kept + f64::from(u8::from(is_kept)))
@@ -250,7 +270,10 @@ impl ValidationTally {
             figures.insert(name.to_owned(), if all > 0.0 { kept / all } else { 1.0 });
         }
         self.pixels.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let median = self.pixels.get(self.pixels.len() / 2).map_or(0.0, |pixel| pixel.0);
+        let median = self
+            .pixels
+            .get(self.pixels.len() / 2)
+            .map_or(0.0, |pixel| pixel.0);
         figures.insert("median_deg".to_owned(), f64::from(median));
         figures
     }

@@ -10,14 +10,15 @@ use relight_core::render::{DiffuseForm, SpecularForm};
 use relight_eval::{
     EvalError, HighlightMethod, InsertionRecipe, IntrinsicBaseline, IntrinsicInput,
     IntrinsicMethod, LightMethod, NormalMethod, OrdinalMethod, Predictions, RelightMethod,
-    RelightingRecipe, RelightingSet, ScoreTable, evaluate_highlights, evaluate_insertion,
-    evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal, evaluate_relighting,
-    evaluate_trust, make_relighting,
+    RelightingRecipe, RelightingSet, ScoreTable, TurnMethod, TurnNetworks, TurnSet,
+    evaluate_highlights, evaluate_insertion, evaluate_intrinsic, evaluate_light, evaluate_normals,
+    evaluate_ordinal, evaluate_relighting, evaluate_trust, evaluate_turns, make_relighting,
 };
 use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
 use relight_reader::{JudgedImages, TruthLayout, TruthSet};
 use relight_synth::{Folders, Library};
+use relight_turn::TurnNetwork;
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
 use serde::Serialize;
@@ -40,6 +41,9 @@ Examples:
       100 objects under 30 lights each, made by the renderer of `relight synth`
   relight eval insertion --panoramas hdri -o insertion.json
       24 objects in other pictures, with and without shadow, edge colours and relighting
+  relight synth --turn --light monte-carlo --count 24 --frames 60 --size 128 --seed 2611 -o turns
+  relight eval turn --data turns
+      24 synthetic turns in rooms that no network was trained in
   relight eval trust --data MIT-intrinsic
       errors of the most trusted pixels";
 
@@ -89,8 +93,33 @@ enum Protocol {
         #[arg(long, value_name = "FILE")]
         weights: Option<PathBuf>,
     },
+    /// Whole turns in unknown rooms: normals, albedo, and whether what is said to be sure is right.
+    Turn(TurnArguments),
     /// Albedo as people judge it: WHDR on the folder of Intrinsic Images in the Wild.
     Whdr(CommonArguments),
+}
+
+#[derive(Args)]
+struct TurnArguments {
+    /// Turns with their ground truth, as relight synth --turn writes them.
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// What the table calls these turns [default: the folder's name].
+    #[arg(long, value_name = "TEXT")]
+    split: Option<String>,
+    /// How turns are solved; may be given several times [default: all ways].
+    #[arg(long, value_enum, value_name = "HOW")]
+    method: Vec<TurnMethodName>,
+    /// Weights of the network of turns [default: those that come with the program].
+    #[arg(long, value_name = "FILE")]
+    turn_network: Option<PathBuf>,
+    /// Write twelve frames and the mask of each turn into this folder, as methods of universal photometric stereo read
+    /// them.
+    #[arg(long, value_name = "DIR")]
+    frames: Option<PathBuf>,
+    /// Write the table as JSON, with the scores of each turn, to this file.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -186,6 +215,32 @@ struct InsertionArguments {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
+enum TurnMethodName {
+    /// From shapes inflated out of the outline.
+    Outline,
+    /// From the network of photographs.
+    Photo,
+    /// The network of turns alone.
+    Network,
+    /// From the network of turns.
+    Turn,
+    /// In the true light.
+    Light,
+}
+
+impl From<TurnMethodName> for TurnMethod {
+    fn from(name: TurnMethodName) -> Self {
+        match name {
+            TurnMethodName::Outline => Self::Outline,
+            TurnMethodName::Photo => Self::Photo,
+            TurnMethodName::Network => Self::Network,
+            TurnMethodName::Turn => Self::NetworkThenSolver,
+            TurnMethodName::Light => Self::KnownLight,
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
 enum InputName {
     /// Without highlights.
     Diffuse,
@@ -212,7 +267,10 @@ impl Arguments {
             | Protocol::Highlight { set } => {
                 (set.count == Some(0)).then(|| "--count 0 leaves no image to compare".to_owned())
             }
-            Protocol::Relighting(_) | Protocol::Insertion(_) | Protocol::Whdr(_) => None,
+            Protocol::Relighting(_)
+            | Protocol::Insertion(_)
+            | Protocol::Turn(_)
+            | Protocol::Whdr(_) => None,
         }
     }
 
@@ -220,6 +278,7 @@ impl Arguments {
     fn output(&self) -> Option<&Path> {
         let common = match &self.protocol {
             Protocol::Insertion(arguments) => return arguments.output.as_deref(),
+            Protocol::Turn(arguments) => return arguments.output.as_deref(),
             Protocol::Mit { set, .. }
             | Protocol::Normals { set }
             | Protocol::Light { set, .. }
@@ -272,6 +331,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         Protocol::Relighting(arguments) => relighting(arguments, console),
         Protocol::Whdr(common) => ordinal(common, console),
         Protocol::Insertion(arguments) => insertion(arguments, console),
+        Protocol::Turn(arguments) => return turns(arguments, console),
         Protocol::Trust { set, weights } => return trust(set, weights.as_deref(), console),
     }?;
     report(&table, arguments.output(), console)
@@ -406,6 +466,39 @@ fn trust(arguments: &SetArguments, weights: Option<&Path>, console: Console) -> 
         evaluate_trust(&set, &split, &network, progress)
     })?;
     write_json(&table, arguments.common.output.as_deref())?;
+    let event = json!({ "event": "table", "table": table });
+    console.say(table.to_string().trim_end(), &event);
+    Ok(Outcome::Whole)
+}
+
+fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
+    let set = TurnSet::open(&arguments.data)?;
+    if let Some(folder) = &arguments.frames {
+        set.write_frames(folder)?;
+    }
+    let weights = match &arguments.turn_network {
+        Some(path) => Weights::read(path)?,
+        None => shipped::turn_weights()?,
+    };
+    let networks = TurnNetworks {
+        photo: shipped::weights()?,
+        turn: TurnNetwork::new(&weights)?,
+    };
+    let name = arguments
+        .data
+        .file_name()
+        .unwrap_or(arguments.data.as_os_str());
+    let own = name.to_string_lossy().into_owned();
+    let split = arguments.split.clone().unwrap_or(own);
+    let methods: Vec<TurnMethod> = if arguments.method.is_empty() {
+        TurnMethod::ALL.to_vec()
+    } else {
+        arguments.method.iter().map(|&name| name.into()).collect()
+    };
+    let table = with_progress(set.len() * methods.len(), "solving", console, |progress| {
+        evaluate_turns(&set, &split, &methods, &networks, progress)
+    })?;
+    write_json(&table, arguments.output.as_deref())?;
     let event = json!({ "event": "table", "table": table });
     console.say(table.to_string().trim_end(), &event);
     Ok(Outcome::Whole)

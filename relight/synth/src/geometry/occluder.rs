@@ -56,7 +56,12 @@ impl Occluder {
 
     /// What a ray from a point in a direction (of unit length) meets first.
     pub(crate) fn first_hit(&self, from: Vec3, direction: Vec3) -> Option<Hit> {
-        let ray = Ray::new(Vec3A::from(from), Vec3A::from(direction), 0.0, f32::INFINITY);
+        let ray = Ray::new(
+            Vec3A::from(from),
+            Vec3A::from(direction),
+            0.0,
+            f32::INFINITY,
+        );
         let mut hit = RayHit::none();
         let is_hit = self
             .tree
@@ -64,7 +69,11 @@ impl Occluder {
         is_hit.then(|| {
             let at = hit.primitive_id as usize;
             let normal = Vec3::from(self.triangles[at].compute_normal());
-            let side = if normal.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+            let side = if normal.dot(direction) > 0.0 {
+                -1.0
+            } else {
+                1.0
+            };
             Hit {
                 normal: (!self.is_plate[at]).then_some(normal * side),
             }

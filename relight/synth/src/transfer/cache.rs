@@ -86,7 +86,10 @@ fn digest_of(library: &Library) -> Digest {
     for (name, mesh) in &library.meshes {
         bytes.extend(name.as_bytes());
         for position in mesh.positions() {
-            position.to_array().iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+            position
+                .to_array()
+                .iter()
+                .for_each(|x| bytes.extend(x.to_le_bytes()));
         }
     }
     bytes.extend(library.pictures.len().to_le_bytes());
@@ -120,7 +123,11 @@ fn encode(transfer: &Transfer) -> Vec<u8> {
 }
 
 fn push_halves(bytes: &mut Vec<u8>, values: &[f32]) {
-    bytes.extend(values.iter().flat_map(|&value| f16::from_f32(value).to_le_bytes()));
+    bytes.extend(
+        values
+            .iter()
+            .flat_map(|&value| f16::from_f32(value).to_le_bytes()),
+    );
 }
 
 fn push_vectors(bytes: &mut Vec<u8>, vectors: &[Vec3]) {
@@ -194,6 +201,13 @@ impl<'a> Rest<'a> {
 
     fn vectors(&mut self, count: usize) -> Option<Vec<Vec3>> {
         let values = self.halves(count.checked_mul(3)?)?;
-        Some(values.as_chunks::<3>().0.iter().map(|&v| Vec3::from_array(v)).collect())
+        Some(
+            values
+                .as_chunks::<3>()
+                .0
+                .iter()
+                .map(|&v| Vec3::from_array(v))
+                .collect(),
+        )
     }
 }

@@ -157,8 +157,7 @@ impl PixelRays {
                 *sum += part * harmonic;
             }
             if let Some(there) = hit.normal {
-                let there: [f32; BOUNCE_COEFFICIENTS] =
-                    harmonics_at(Order::TWO, to_table * there);
+                let there: [f32; BOUNCE_COEFFICIENTS] = harmonics_at(Order::TWO, to_table * there);
                 for (at, (sum, harmonic)) in found.bounced.iter_mut().zip(there).enumerate() {
                     *sum += part * harmonic * cosine_band(band(at)) / std::f32::consts::PI;
                 }

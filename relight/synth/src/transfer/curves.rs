@@ -54,20 +54,34 @@ impl Transfer {
             .iter()
             .map(|c| c.map(|c| c as f32))
             .collect();
-        let mean_albedo =
-            finish.albedo.iter().sum::<Vec3>() / finish.albedo.len().max(1) as f32 * material.bounce;
+        let mean_albedo = finish.albedo.iter().sum::<Vec3>() / finish.albedo.len().max(1) as f32
+            * material.bounce;
         (0..self.pixels.len())
             .into_par_iter()
             .map(|k| {
                 let pixel = self.of_pixel(k, finish.normals[k], material);
                 let mut curve = [[0.0; 3]; CURVE_COEFFICIENTS];
-                add(&mut curve, &pixel.diffuse, &light, finish.albedo[k] / std::f32::consts::PI);
+                add(
+                    &mut curve,
+                    &pixel.diffuse,
+                    &light,
+                    finish.albedo[k] / std::f32::consts::PI,
+                );
                 if !material.is_metal {
                     let back = finish.albedo[k] * mean_albedo / std::f32::consts::PI;
-                    add(&mut curve, &self.bounced[k], &light[..BOUNCE_COEFFICIENTS], back);
+                    add(
+                        &mut curve,
+                        &self.bounced[k],
+                        &light[..BOUNCE_COEFFICIENTS],
+                        back,
+                    );
                 }
                 if let Some(gloss) = pixel.gloss {
-                    let colour = if material.is_metal { finish.albedo[k] } else { Vec3::ONE };
+                    let colour = if material.is_metal {
+                        finish.albedo[k]
+                    } else {
+                        Vec3::ONE
+                    };
                     add(&mut curve, &gloss, &light, colour);
                 }
                 curve

@@ -113,8 +113,7 @@ impl DrawnTurn {
     fn mirror(&mut self) {
         let mut order: Vec<usize> = (0..self.pixels.len()).collect();
         let size = self.size;
-        let mirrored =
-            |pixel: u32| pixel / size * size + (size - 1 - pixel % size);
+        let mirrored = |pixel: u32| pixel / size * size + (size - 1 - pixel % size);
         order.sort_by_key(|&k| mirrored(self.pixels[k]));
         self.normals = order
             .iter()
@@ -155,10 +154,16 @@ impl DrawnTurn {
             elevation: self.elevation,
             normals: Vec::new(),
         };
-        for (block, members) in (0_u32..).zip(&members).filter(|(_, members)| members.len() >= 2) {
+        for (block, members) in (0_u32..)
+            .zip(&members)
+            .filter(|(_, members)| members.len() >= 2)
+        {
             let mut curve = [[0.0; 3]; CURVE_COEFFICIENTS];
             for &k in members {
-                let pairs = curve.as_flattened_mut().iter_mut().zip(self.curves[k].as_flattened());
+                let pairs = curve
+                    .as_flattened_mut()
+                    .iter_mut()
+                    .zip(self.curves[k].as_flattened());
                 pairs.for_each(|(sum, value)| *sum += value / members.len() as f32);
             }
             let normal: Vec3 = members.iter().map(|&k| self.normals[k]).sum();
@@ -205,7 +210,10 @@ fn finish(view: &Transfer, random: &mut Random) -> TransferFinish {
         finish.albedo.fill(plain);
     } else {
         let darker = random.log_uniform(0.1..1.0);
-        finish.albedo.iter_mut().for_each(|albedo| *albedo *= darker);
+        finish
+            .albedo
+            .iter_mut()
+            .for_each(|albedo| *albedo *= darker);
     }
     finish
 }
@@ -224,8 +232,8 @@ fn angles() -> impl Iterator<Item = f32> {
 /// No value of the curve is above this.
 fn brightest_of(curve: &CurveCoefficients) -> f32 {
     let most = |c: usize| {
-        let swings = (1..=CURVE_COEFFICIENTS / 2)
-            .map(|m| curve[2 * m - 1][c].hypot(curve[2 * m][c]));
+        let swings =
+            (1..=CURVE_COEFFICIENTS / 2).map(|m| curve[2 * m - 1][c].hypot(curve[2 * m][c]));
         curve[0][c] + swings.sum::<f32>()
     };
     (0..3).map(most).fold(0.0, f32::max)

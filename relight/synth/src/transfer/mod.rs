@@ -58,7 +58,9 @@ fn cosine_band(l: usize) -> f32 {
         l => {
             let half = l / 2;
             // l! / (2^l ((l / 2)!)^2), factor by factor.
-            let ratio: f64 = (1..=half).map(|k| (half + k) as f64 / (4.0 * k as f64)).product();
+            let ratio: f64 = (1..=half)
+                .map(|k| (half + k) as f64 / (4.0 * k as f64))
+                .product();
             let sign = if half % 2 == 1 { 1.0 } else { -1.0 };
             2.0 * PI * sign * ratio / ((l + 2) * (l - 1)) as f64
         }

@@ -51,7 +51,10 @@ impl Rooms {
         };
         let panoramas = panoramas.par_iter().enumerate().map(of).collect::<Vec<_>>();
         Self {
-            panoramas: panoramas.into_iter().filter(|list| !list.is_empty()).collect(),
+            panoramas: panoramas
+                .into_iter()
+                .filter(|list| !list.is_empty())
+                .collect(),
         }
     }
 
@@ -152,7 +155,10 @@ fn of_mean_one(light: &ShLight) -> Option<ShLight> {
 }
 
 fn add(light: &mut ShLight, other: &ShLight, share: [f32; 3]) {
-    let pairs = light.coefficients_mut().iter_mut().zip(other.coefficients());
+    let pairs = light
+        .coefficients_mut()
+        .iter_mut()
+        .zip(other.coefficients());
     for (to, from) in pairs {
         for c in 0..3 {
             to[c] += f64::from(share[c]) * from[c];

@@ -6,13 +6,17 @@ use relight_core::light::{Direction, ShLight, basis};
 use super::*;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::{Folders, Library};
+use crate::made_panoramas;
 use crate::mesh::Mesh;
 use crate::shape::ShapeKind;
 use crate::view::{Pose, Projection};
-use crate::made_panoramas;
 
 fn recipe() -> TransferRecipe {
-    TransferRecipe { seed: 5, size: 32, rays: 400 }
+    TransferRecipe {
+        seed: 5,
+        size: 32,
+        rays: 400,
+    }
 }
 
 const MATT: TransferMaterial = TransferMaterial {
@@ -28,8 +32,7 @@ fn open_ball(elevation: f32) -> Transfer {
     let projection = Projection::Orthographic;
     let placement = Pose::upright(elevation, 0.3, 0.9).place(&mesh, projection);
     let buffer = GBuffer::render(&mesh, placement, projection, 32);
-    let mut transfer =
-        Transfer::cast(&buffer, &Occluder::new(&mesh, placement), elevation, 200, 3);
+    let mut transfer = Transfer::cast(&buffer, &Occluder::new(&mesh, placement), elevation, 200, 3);
     transfer.finishes = vec![TransferFinish {
         normals: buffer.normals().to_vec(),
         albedo: vec![Vec3::splat(PI); buffer.len()],
@@ -133,7 +136,10 @@ fn under_even_light_a_pixel_shows_the_part_of_the_sky_that_it_sees() {
             }
         }
         let found = curves[k][0][0];
-        assert!((found - open).abs() < 0.08, "pixel {k}: {found}, by other rays {open}");
+        assert!(
+            (found - open).abs() < 0.08,
+            "pixel {k}: {found}, by other rays {open}"
+        );
         assert!(curves[k][1..].as_flattened().iter().all(|c| c.abs() < 1e-5));
     }
 }
@@ -145,7 +151,11 @@ fn views_are_cast_once_and_a_damaged_one_again() {
     let cache = TransferCache::open(folder.path(), recipe(), &library).unwrap();
     let first = cache.view(&library, 0).unwrap();
     assert_eq!(cache.view(&library, 0).unwrap(), first);
-    let files = || std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().path());
+    let files = || {
+        std::fs::read_dir(folder.path())
+            .unwrap()
+            .map(|e| e.unwrap().path())
+    };
     assert_eq!(files().count(), 1);
     let path = files().next().unwrap();
     let mut bytes = std::fs::read(&path).unwrap();
@@ -153,8 +163,14 @@ fn views_are_cast_once_and_a_damaged_one_again() {
     bytes[middle] ^= 1;
     std::fs::write(&path, &bytes).unwrap();
     assert_eq!(cache.view(&library, 0).unwrap(), first);
-    let other = TransferRecipe { rays: 300, ..recipe() };
-    TransferCache::open(folder.path(), other, &library).unwrap().view(&library, 0).unwrap();
+    let other = TransferRecipe {
+        rays: 300,
+        ..recipe()
+    };
+    TransferCache::open(folder.path(), other, &library)
+        .unwrap()
+        .view(&library, 0)
+        .unwrap();
     assert_eq!(files().count(), 2);
 }
 
@@ -162,7 +178,11 @@ fn views_are_cast_once_and_a_damaged_one_again() {
 fn rooms_are_of_any_kind_and_never_darker_than_nothing_in_the_mean() {
     for seed in 0..40 {
         let light = a_room(seed);
-        assert!(light.coefficients()[0].iter().all(|&c| c > 0.0 && c.is_finite()));
+        assert!(
+            light.coefficients()[0]
+                .iter()
+                .all(|&c| c > 0.0 && c.is_finite())
+        );
     }
     assert!(Rooms::new(&[], 2, 1).is_empty());
 }

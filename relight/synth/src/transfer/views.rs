@@ -44,8 +44,7 @@ impl TransferRecipe {
         let buffer = GBuffer::render(&mesh, placement, stand.projection, self.size);
         let occluder = Occluder::with_disc(&mesh, placement, &stand.plate(&mesh));
         let elevation = stand.elevation();
-        let mut transfer =
-            Transfer::cast(&buffer, &occluder, elevation, self.rays, random.seed());
+        let mut transfer = Transfer::cast(&buffer, &occluder, elevation, self.rays, random.seed());
         transfer.finishes = (0..FINISHES)
             .map(|_| {
                 let finish = Finish::draw(&mut random, &buffer, library, 0.0);

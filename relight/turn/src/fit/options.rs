@@ -5,6 +5,7 @@ use relight_core::light::{Normals, ShLight, YUp};
 
 use crate::model::frame::Elevation;
 use crate::model::material::MaterialKind;
+use crate::network::predict::TurnPrediction;
 
 /// Normals that are expected before a turn is solved.
 #[derive(Debug, Clone)]
@@ -21,6 +22,15 @@ impl From<Normals<YUp>> for TurnPrior {
         Self {
             normals,
             expected_errors: None,
+        }
+    }
+}
+
+impl From<TurnPrediction> for TurnPrior {
+    fn from(found: TurnPrediction) -> Self {
+        Self {
+            normals: found.normals,
+            expected_errors: Some(found.expected_errors),
         }
     }
 }

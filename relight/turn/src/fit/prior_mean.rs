@@ -75,8 +75,7 @@ impl Initialised {
     fn or_outline(mut self, curves: &TurnCurves, options: &TurnOptions) -> Self {
         let weight = options.prior_weight;
         // A prior that knows how far it is off has seen the turn: the outline says nothing more.
-        let has_errors =
-            |prior: &TurnPrior| prior.expected_errors.is_some();
+        let has_errors = |prior: &TurnPrior| prior.expected_errors.is_some();
         let is_lambertian =
             self.found.model.material == MaterialKind::Diffuse && self.found.model.gloss.is_none();
         if self.setting.known.is_some()
@@ -142,7 +141,10 @@ fn prior_of(
 ) -> Result<Vec<PriorNormal>, TurnError> {
     let errors = prior.expected_errors.as_ref();
     let fits = |extent: Extent| extent == curves.extent();
-    for found in [Some(prior.normals.extent()), errors.map(|errors| errors.extent())] {
+    for found in [
+        Some(prior.normals.extent()),
+        errors.map(|errors| errors.extent()),
+    ] {
         if let Some(found) = found.filter(|&found| !fits(found)) {
             return Err(TurnError::PriorSize {
                 found,
@@ -156,7 +158,9 @@ fn prior_of(
         let (least, most) = PARAMETERS.factors;
         errors.map_or(1.0, |errors| {
             let error = f64::from(errors.plane(0)[place]).max(1.0);
-            (PARAMETERS.usual_error_deg / error).powi(2).clamp(least, most)
+            (PARAMETERS.usual_error_deg / error)
+                .powi(2)
+                .clamp(least, most)
         })
     };
     let at = |&place: &usize| PriorNormal {

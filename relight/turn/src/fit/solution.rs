@@ -80,6 +80,12 @@ impl TurnSolution {
         curves.map(|pixel| [confidence(self.expected_errors[pixel]) as f32])
     }
 
+    /// The angle that each normal is expected to be off, degrees; 0 outside the mask.
+    #[must_use]
+    pub fn expected_errors(&self, curves: &TurnCurves) -> Planes<1> {
+        curves.map(|pixel| [self.expected_errors[pixel].to_degrees() as f32])
+    }
+
     /// The light.
     #[must_use]
     pub const fn light(&self) -> &TableLight {

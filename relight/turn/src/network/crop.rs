@@ -91,7 +91,12 @@ impl Crop {
     }
 
     /// Values of the grid's cells at a pixel of the frame, between the four cells around it.
-    pub(crate) fn at<const N: usize>(&self, cells: &[Option<[f32; N]>], x: usize, y: usize) -> Option<[f32; N]> {
+    pub(crate) fn at<const N: usize>(
+        &self,
+        cells: &[Option<[f32; N]>],
+        x: usize,
+        y: usize,
+    ) -> Option<[f32; N]> {
         let place = |pixel: usize, corner: f32| (pixel as f32 + 0.5 - corner) / self.step - 0.5;
         let (u, v) = (place(x, self.corner[0]), place(y, self.corner[1]));
         let (mut sum, mut weights) = ([0.0; N], 0.0);
@@ -103,7 +108,9 @@ impl Crop {
                 // Cells of no weight count where there are no others.
                 let weight = wx * wy + 1e-6;
                 weights += weight;
-                sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += weight * value);
+                sum.iter_mut()
+                    .zip(value)
+                    .for_each(|(sum, value)| *sum += weight * value);
             }
         }
         (weights > 0.0).then(|| sum.map(|sum| sum / weights))
@@ -148,7 +155,10 @@ fn place_of(curves: &TurnCurves) -> ([f32; 2], f32) {
     let extents = [0, 1].map(|axis| (high[axis] - low[axis]) as f32);
     let side = extents[0].max(extents[1]) / PARAMETERS.fill;
     let middles = [0, 1].map(|axis| (high[axis] + low[axis]) as f32 / 2.0);
-    (middles.map(|middle| middle - side / 2.0), side / GRID as f32)
+    (
+        middles.map(|middle| middle - side / 2.0),
+        side / GRID as f32,
+    )
 }
 
 /// The pixels under the mask by their place.
@@ -225,7 +235,10 @@ impl<'a> CoveredPixels<'a> {
         for (part, harmonics) in parts.filter(|(part, _)| self.is_seen[*part]) {
             let mut mean = [0.0; 3];
             for &(pixel, weight) in members {
-                let (values, seen) = (self.curves.values(pixel)[part], self.curves.weights(pixel)[part]);
+                let (values, seen) = (
+                    self.curves.values(pixel)[part],
+                    self.curves.weights(pixel)[part],
+                );
                 for c in 0..3 {
                     let value = if seen[c] > 0.0 { values[c] } else { white };
                     mean[c] += f64::from(value * weight / total);

@@ -127,10 +127,16 @@ pub fn network_input(turn: &NetworkTurn<'_>, phase: PhaseHypothesis) -> Vec<f32>
         let channels: &[usize] = if m < COLOURED { &[0, 1, 2] } else { &[3] };
         for &c in channels {
             let of = |k: usize| channel(&turned[m][k], c);
-            let square = (0..turn.pixels.len()).map(|k| of(k).length().powi(2)).sum::<f32>();
+            let square = (0..turn.pixels.len())
+                .map(|k| of(k).length().powi(2))
+                .sum::<f32>();
             let effective = (square / turn.pixels.len().max(1) as f32).sqrt() + 1e-4;
             whole.push(effective.ln() / 1.5 + 1.0);
-            let value = |k: usize| of(k).scaled(1.0 / effective).up_to(PARAMETERS.largest_value);
+            let value = |k: usize| {
+                of(k)
+                    .scaled(1.0 / effective)
+                    .up_to(PARAMETERS.largest_value)
+            };
             planes.push(|k| value(k).re);
             planes.push(|k| value(k).im);
         }
@@ -170,7 +176,9 @@ fn channel(harmonic: &Harmonic, c: usize) -> Complex {
 }
 
 fn mean_of(harmonic: &[Harmonic], c: usize) -> Complex {
-    let sum = harmonic.iter().fold(Complex::default(), |sum, one| sum.plus(one[c]));
+    let sum = harmonic
+        .iter()
+        .fold(Complex::default(), |sum, one| sum.plus(one[c]));
     sum.scaled(1.0 / harmonic.len().max(1) as f32)
 }
 
@@ -192,9 +200,7 @@ impl Ratios {
         let means: Vec<[f32; 3]> = turn
             .curves
             .iter()
-            .map(|curve| {
-                [0, 1, 2].map(|c| (curve[0][c] / of_all[c]).max(PARAMETERS.least_mean))
-            })
+            .map(|curve| [0, 1, 2].map(|c| (curve[0][c] / of_all[c]).max(PARAMETERS.least_mean)))
             .collect();
         let ratio = |m: usize, k: usize| {
             [0, 1, 2].map(|c| {
@@ -215,12 +221,15 @@ impl Ratios {
 
     /// The phase of a harmonic over the object, radians.
     fn phase_of(&self, m: usize) -> f32 {
-        let weighted = self.harmonics[m].iter().zip(&self.means).map(|(harmonic, mean)| {
-            [0, 1, 2]
-                .map(|c| harmonic[c].scaled(mean[c] / (mean[c] + PARAMETERS.dark)))
-                .into_iter()
-                .fold(Complex::default(), Complex::plus)
-        });
+        let weighted = self.harmonics[m]
+            .iter()
+            .zip(&self.means)
+            .map(|(harmonic, mean)| {
+                [0, 1, 2]
+                    .map(|c| harmonic[c].scaled(mean[c] / (mean[c] + PARAMETERS.dark)))
+                    .into_iter()
+                    .fold(Complex::default(), Complex::plus)
+            });
         let sum = weighted.fold(Complex::default(), Complex::plus);
         sum.im.atan2(sum.re)
     }
@@ -239,7 +248,10 @@ impl Ratios {
         harmonics
             .map(|(m, pixels)| {
                 let back = Complex::at(-phase * (m + 1) as f32);
-                pixels.iter().map(|one| one.map(|value| value.times(back))).collect()
+                pixels
+                    .iter()
+                    .map(|one| one.map(|value| value.times(back)))
+                    .collect()
             })
             .collect()
     }
@@ -260,14 +272,18 @@ impl<'a> PlaneWriter<'a> {
     /// Adds a plane by what it has at the covered pixels.
     fn push(&mut self, value: impl Fn(usize) -> f32) {
         let begin = self.values.len();
-        self.values.resize(begin + self.turn.side * self.turn.side, 0.0);
+        self.values
+            .resize(begin + self.turn.side * self.turn.side, 0.0);
         for (k, &pixel) in self.turn.pixels.iter().enumerate() {
             self.values[begin + pixel as usize] = value(k);
         }
     }
 
     fn finish(self) -> Vec<f32> {
-        debug_assert_eq!(self.values.len(), TURN_INPUTS * self.turn.side * self.turn.side);
+        debug_assert_eq!(
+            self.values.len(),
+            TURN_INPUTS * self.turn.side * self.turn.side
+        );
         self.values
     }
 }
@@ -304,7 +320,10 @@ mod tests {
 
     /// The largest difference of two inputs.
     fn difference(a: &[f32], b: &[f32]) -> f32 {
-        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+        a.iter()
+            .zip(b)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f32::max)
     }
 
     #[test]
@@ -313,7 +332,11 @@ mod tests {
         let planes = input(&pixels, &curves, PhaseHypothesis::First);
         assert_eq!(planes.len(), TURN_INPUTS * SIDE * SIDE);
         for plane in planes.chunks(SIDE * SIDE) {
-            assert!((0..256).filter(|at| at % 16 <= 3).all(|at| plane[at] == 0.0));
+            assert!(
+                (0..256)
+                    .filter(|at| at % 16 <= 3)
+                    .all(|at| plane[at] == 0.0)
+            );
         }
     }
 
@@ -334,7 +357,10 @@ mod tests {
                     (curve[2 * m - 1][c], curve[2 * m][c]) = (turned.re, turned.im);
                 }
             }
-            curve.as_flattened_mut().iter_mut().for_each(|value| *value *= 7.0);
+            curve
+                .as_flattened_mut()
+                .iter_mut()
+                .for_each(|value| *value *= 7.0);
         }
         let (before, after) = (
             input(&pixels, &curves, PhaseHypothesis::First),

@@ -73,7 +73,8 @@ impl TurnNetwork {
                 best = Some((error, phase, cells));
             }
         }
-        let (_, phase, cells) = best.unwrap_or((0.0, PhaseHypothesis::First, vec![None; GRID * GRID]));
+        let (_, phase, cells) =
+            best.unwrap_or((0.0, PhaseHypothesis::First, vec![None; GRID * GRID]));
         Ok(spread(curves, &crop, &cells, phase, hypotheses))
     }
 

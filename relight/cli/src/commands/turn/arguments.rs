@@ -167,9 +167,7 @@ impl Arguments {
             Some("none") => None,
             None | Some("turn") => Some((InitialNormals::Turn, "turn")),
             // "shipped" was its name before there was a network of turns.
-            Some("photo" | "shipped") => {
-                Some((InitialNormals::Photo(NormalsSource::Own), "photo"))
-            }
+            Some("photo" | "shipped") => Some((InitialNormals::Photo(NormalsSource::Own), "photo")),
             Some(path) => {
                 let source = NormalsSource::of(Path::new(path));
                 Some((InitialNormals::Photo(source), path))
@@ -182,11 +180,7 @@ impl Arguments {
         match source {
             InitialNormals::Turn => {
                 let network = TurnNetwork::new(&self.turn_weights()?)?;
-                let found = network.predict(&turn.curves, self.elevation())?;
-                Ok(TurnPrior {
-                    normals: found.normals,
-                    expected_errors: Some(found.expected_errors),
-                })
+                Ok(network.predict(&turn.curves, self.elevation())?.into())
             }
             InitialNormals::Photo(source) => {
                 let (y, shown) = (self.normals_y.into(), &turn.first);

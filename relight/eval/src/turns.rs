@@ -1,0 +1,524 @@
+//! Normals and albedo of whole turns in rooms that are not known, on synthetic turns with their ground truth.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use relight_core::files::write_png;
+use relight_core::image::{ColourSpace, Depth, Linear, Planes, Rgb, Srgb, Transfer};
+use relight_core::light::{Normals, Order, Rotation, ShLight, YUp};
+use relight_core::statistics::median;
+use relight_nets::Weights;
+use relight_synth::{FrameTruth, TurnDescription};
+use relight_turn::{
+    Elevation, NormalsSource, ReadTurn, RotationDirection, TableFrame, TurnError, TurnNetwork,
+    TurnOptions, TurnPrediction, TurnPrior, prior_normals, read_curves, solve_turn,
+};
+use relit_data::shard::Dataset;
+use serde::Serialize;
+
+use super::{EvalError, EvalProgress};
+
+/// Errors up to which it is counted how many pixels keep what is expected of them, degrees.
+const LIMITS_DEG: [f64; 3] = [10.0, 20.0, 30.0];
+/// Azimuths that are tried for the turn about the table's axis, degrees to each side.
+const AZIMUTHS_DEG: i32 = 90;
+/// How a turn is solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TurnMethod {
+    /// From shapes inflated out of the outline.
+    Outline,
+    /// From what the network of photographs says of single frames.
+    Photo,
+    /// The network of turns alone.
+    Network,
+    /// From what the network of turns says.
+    NetworkThenSolver,
+    /// In its true light, of order 2.
+    KnownLight,
+}
+
+impl TurnMethod {
+    /// All of them, in the table's order.
+    pub const ALL: [Self; 5] = [
+        Self::Outline,
+        Self::Photo,
+        Self::Network,
+        Self::NetworkThenSolver,
+        Self::KnownLight,
+    ];
+
+    /// Its name in the table.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Outline => "outline",
+            Self::Photo => "network of photographs",
+            Self::Network => "network of turns alone",
+            Self::NetworkThenSolver => "network of turns",
+            Self::KnownLight => "light known",
+        }
+    }
+}
+
+/// The networks that methods start from.
+#[derive(Debug)]
+pub struct TurnNetworks {
+    /// The weights of the network of photographs.
+    pub photo: Weights,
+    /// The network of turns.
+    pub turn: TurnNetwork,
+}
+
+/// The errors of a turn by a method.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TurnScore {
+    /// The turn.
+    pub turn: String,
+    /// Mean and median angle between found and true normals, degrees.
+    pub mean_deg: f64,
+    /// The median of these angles, degrees.
+    pub median_deg: f64,
+    /// By how much the answer is turned about the table's axis, degrees: without that its mean error is least.
+    pub azimuth_deg: f64,
+    /// That least mean error, degrees.
+    pub unturned_deg: f64,
+    /// Squared error of the albedo over its energy, after one scale a channel; none of normals alone.
+    pub albedo: Option<f64>,
+    /// For the pixels that are expected to be off by at most 10, 20 and 30 degrees: how many there are, and how many
+    /// of them are.
+    pub kept: [[usize; 2]; 3],
+}
+
+/// A method on all turns.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TurnLine {
+    /// The method.
+    pub method: String,
+    /// Each turn.
+    pub turns: Vec<TurnScore>,
+}
+
+/// All methods on all turns.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct TurnTable {
+    /// What the turns are called.
+    pub split: String,
+    /// The methods.
+    pub lines: Vec<TurnLine>,
+}
+
+/// Turns in the layout of `relight synth --turn`, with their ground truth.
+#[derive(Debug)]
+pub struct TurnSet {
+    folder: PathBuf,
+    turns: Vec<(String, PathBuf)>,
+}
+
+/// A turn and its ground truth.
+struct TrueTurn {
+    turn: ReadTurn,
+    normals: Normals<YUp>,
+    albedo: Rgb<Linear>,
+    elevation: Elevation,
+    light: ShLight,
+}
+
+impl TurnSet {
+    /// Opens a data set of `relight synth --turn`.
+    ///
+    /// # Errors
+    /// [`EvalError::Turns`] where it is none.
+    pub fn open(folder: &Path) -> Result<Self, EvalError> {
+        let dataset = Dataset::read(folder).map_err(|source| EvalError::Turns {
+            path: folder.to_owned(),
+            source: Box::new(source),
+        })?;
+        let shard = |id: &str| {
+            dataset
+                .shards_of(id)
+                .next()
+                .map(|shard| folder.join(&shard.file))
+        };
+        let sessions = dataset.sessions.iter();
+        let turns = sessions
+            .filter_map(|session| Some((session.id.clone(), shard(&session.id)?)))
+            .collect();
+        Ok(Self {
+            folder: folder.to_owned(),
+            turns,
+        })
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.turns.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.turns.is_empty()
+    }
+
+    fn read(&self, number: usize) -> Result<TrueTurn, EvalError> {
+        let (id, shard) = &self.turns[number];
+        let truth = self.folder.join("truth").join(id);
+        let description: TurnDescription = parse(&truth.join("turn.json"), |bytes| {
+            serde_json::from_slice(bytes)
+        })?;
+        let first: FrameTruth = parse(&truth.join("frames.jsonl"), |bytes| {
+            let end = bytes
+                .iter()
+                .position(|&byte| byte == b'\n')
+                .unwrap_or(bytes.len());
+            serde_json::from_slice(&bytes[..end])
+        })?;
+        let [_, up, out] = description.axis;
+        let turn = read_curves(shard, RotationDirection::CounterClockwise, &|_, _| {})?;
+        Ok(TrueTurn {
+            turn,
+            normals: Normals::<YUp>::read(&truth.join("normal.png"))?,
+            albedo: Rgb::<Linear>::read(&truth.join("albedo.png"), Transfer::Linear)?,
+            elevation: Elevation::given(out.atan2(up).to_degrees()).map_err(TurnError::from)?,
+            light: ShLight::new(first.coefficients.to_vec()).map_err(TurnError::from)?,
+        })
+    }
+
+    /// Writes each turn as others read it: `<turn>.data/` with twelve frames that cover the turn, `L (001).png` and so on,
+    /// and `mask.png`, as methods of universal photometric stereo expect it.
+    ///
+    /// # Errors
+    /// Where a turn cannot be read or a file cannot be written.
+    pub fn write_frames(&self, out: &Path) -> Result<(), EvalError> {
+        for (number, (id, _)) in self.turns.iter().enumerate() {
+            let turn = self.read(number)?.turn;
+            let folder = out.join(format!("{id}.data"));
+            std::fs::create_dir_all(&folder).map_err(|source| EvalError::Write {
+                path: folder.clone(),
+                source,
+            })?;
+            for (frame, picture) in (1..).zip(&turn.first) {
+                let path = folder.join(format!("L ({frame:03}).png"));
+                write_png(&path, &as_seen(picture), Depth::Eight)?;
+            }
+            let grey = turn.mask.plane(0).to_vec();
+            let grey = Planes::from_planes(turn.mask.extent(), [grey.clone(), grey.clone(), grey])?;
+            write_png(&folder.join("mask.png"), &grey, Depth::Eight)?;
+        }
+        Ok(())
+    }
+}
+
+/// A frame as a camera shows it.
+fn as_seen(frame: &Rgb<Linear>) -> Planes<3> {
+    frame
+        .planes()
+        .clone()
+        .map(|value| Srgb::from_linear(value.clamp(0.0, 1.0)))
+}
+
+fn parse<T>(
+    path: &Path,
+    parse: impl FnOnce(&[u8]) -> Result<T, serde_json::Error>,
+) -> Result<T, EvalError> {
+    let bytes = std::fs::read(path).map_err(|source| EvalError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    parse(&bytes).map_err(|source| EvalError::Description {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Solves every turn by every method. `progress` is told each turn and method.
+///
+/// # Errors
+/// Where a turn or its ground truth cannot be read, or cannot be solved.
+pub fn evaluate_turns(
+    set: &TurnSet,
+    split: &str,
+    methods: &[TurnMethod],
+    networks: &TurnNetworks,
+    progress: EvalProgress<'_>,
+) -> Result<TurnTable, EvalError> {
+    let mut lines: Vec<TurnLine> = methods
+        .iter()
+        .map(|method| TurnLine {
+            method: method.name().to_owned(),
+            turns: Vec::new(),
+        })
+        .collect();
+    for number in 0..set.len() {
+        let truth = set.read(number)?;
+        for (line, &method) in lines.iter_mut().zip(methods) {
+            let answer = Answer::new(&truth, method, networks)?;
+            line.turns
+                .push(score(&set.turns[number].0, &truth, &answer));
+            progress();
+        }
+    }
+    Ok(TurnTable {
+        split: split.to_owned(),
+        lines,
+    })
+}
+
+/// What a method says of a turn.
+struct Answer {
+    normals: Normals<YUp>,
+    /// Degrees.
+    expected_errors: Planes<1>,
+    albedo: Option<Rgb<Linear>>,
+}
+
+impl Answer {
+    fn new(
+        truth: &TrueTurn,
+        method: TurnMethod,
+        networks: &TurnNetworks,
+    ) -> Result<Self, EvalError> {
+        let turn = &truth.turn;
+        let predict = || networks.turn.predict(&turn.curves, truth.elevation);
+        let prior = match method {
+            TurnMethod::Network => return Ok(Self::of_network(predict()?)),
+            TurnMethod::NetworkThenSolver => Some(predict()?.into()),
+            TurnMethod::Photo => {
+                let own = || Ok(networks.photo.clone());
+                let source = NormalsSource::Own;
+                let axes = relight_core::light::NormalsFrame::YUp;
+                let normals = prior_normals(&source, own, axes, &turn.first, &turn.mask)?;
+                Some(TurnPrior::from(normals))
+            }
+            TurnMethod::Outline | TurnMethod::KnownLight => None,
+        };
+        let options = TurnOptions {
+            elevation: truth.elevation,
+            light: (method == TurnMethod::KnownLight).then(|| truth.light.with_order(Order::TWO)),
+            prior,
+            ..TurnOptions::default()
+        };
+        let solution = solve_turn(&turn.curves, &options)?;
+        Ok(Self {
+            normals: solution.normals(&turn.curves),
+            expected_errors: solution.expected_errors(&turn.curves),
+            albedo: Some(solution.albedo(&turn.curves)),
+        })
+    }
+
+    fn of_network(found: TurnPrediction) -> Self {
+        Self {
+            normals: found.normals,
+            expected_errors: found.expected_errors,
+            albedo: None,
+        }
+    }
+}
+
+fn score(name: &str, truth: &TrueTurn, answer: &Answer) -> TurnScore {
+    let inside: Vec<usize> = (0..truth.turn.mask.extent().pixels())
+        .filter(|&at| truth.turn.mask.plane(0)[at] >= 0.5)
+        .filter(|&at| {
+            truth
+                .normals
+                .planes()
+                .planes()
+                .iter()
+                .any(|plane| plane[at] != 0.0)
+        })
+        .collect();
+    let vectors = |normals: &Normals<YUp>| -> Vec<[f64; 3]> {
+        let planes = normals.planes().planes();
+        let at = |&at: &usize| planes.map(|plane| f64::from(plane[at]));
+        inside.iter().map(at).collect()
+    };
+    let (right, found) = (vectors(&truth.normals), vectors(&answer.normals));
+    let errors: Vec<f64> = right
+        .iter()
+        .zip(&found)
+        .map(|(a, b)| angle_deg(*a, *b))
+        .collect();
+    let (azimuth_deg, unturned_deg) = best_azimuth(&right, &found, truth.elevation);
+    let kept = LIMITS_DEG.map(|limit| {
+        let expected = answer.expected_errors.plane(0);
+        let chosen = inside
+            .iter()
+            .zip(&errors)
+            .filter(|(at, _)| f64::from(expected[**at]) <= limit);
+        let (all, kept) = chosen.fold((0, 0), |(all, kept), (_, error)| {
+            (all + 1, kept + usize::from(*error <= limit))
+        });
+        [all, kept]
+    });
+    TurnScore {
+        turn: name.to_owned(),
+        mean_deg: mean(&errors),
+        median_deg: median(errors.iter().copied()).unwrap_or(0.0),
+        azimuth_deg,
+        unturned_deg,
+        albedo: answer
+            .albedo
+            .as_ref()
+            .map(|albedo| albedo_error(&truth.albedo, albedo, &inside)),
+        kept,
+    }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let cosine = dot(a, b) / (dot(a, a) * dot(b, b)).sqrt().max(1e-12);
+    cosine.clamp(-1.0, 1.0).acos().to_degrees()
+}
+
+/// The turn about the table's axis by which the answer is off, degrees, and the mean error without it.
+fn best_azimuth(right: &[[f64; 3]], found: &[[f64; 3]], elevation: Elevation) -> (f64, f64) {
+    let [x, y, z] = TableFrame::new(elevation).axis();
+    let axis =
+        relight_core::light::Direction::new(x, y, z).unwrap_or(relight_core::light::Direction::UP);
+    let every = (right.len() / 2000).max(1);
+    let tried = (-AZIMUTHS_DEG..=AZIMUTHS_DEG).map(|degrees| {
+        let degrees = f64::from(degrees);
+        let back = Rotation::about(axis, -degrees.to_radians());
+        let turned = |[x, y, z]: [f64; 3]| {
+            back.matrix()
+                .map(|row| row[0] * x + row[1] * y + row[2] * z)
+        };
+        let pairs = right.iter().zip(found).step_by(every);
+        let errors: Vec<f64> = pairs.map(|(a, b)| angle_deg(*a, turned(*b))).collect();
+        (degrees, mean(&errors))
+    });
+    tried
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .unwrap_or((0.0, 0.0))
+}
+
+/// The squared error over the energy, each channel of the answer scaled to fit best.
+fn albedo_error(truth: &Rgb<Linear>, found: &Rgb<Linear>, inside: &[usize]) -> f64 {
+    let (mut error, mut energy) = (0.0, 0.0);
+    for (a, b) in truth
+        .planes()
+        .planes()
+        .into_iter()
+        .zip(found.planes().planes())
+    {
+        let pairs = || {
+            inside
+                .iter()
+                .map(|&at| (f64::from(a[at]), f64::from(b[at])))
+        };
+        let product: f64 = pairs().map(|(a, b)| a * b).sum();
+        let square: f64 = pairs().map(|(_, b)| b * b).sum();
+        let scale = product / square.max(1e-12);
+        error += pairs().map(|(a, b)| (a - scale * b).powi(2)).sum::<f64>();
+        energy += pairs().map(|(a, _)| a * a).sum::<f64>();
+    }
+    error / energy.max(1e-12)
+}
+
+impl TurnLine {
+    /// The mean of a figure over the turns, and its standard error.
+    fn mean_of(&self, figure: impl Fn(&TurnScore) -> f64) -> (f64, f64) {
+        let values: Vec<f64> = self.turns.iter().map(figure).collect();
+        let mean = mean(&values);
+        let count = values.len() as f64;
+        let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        let error = (square / (count - 1.0).max(1.0) / count.max(1.0)).sqrt();
+        (mean, error)
+    }
+
+    /// The part of the pixels expected within a limit that are.
+    fn kept(&self, limit: usize) -> Option<f64> {
+        let sum = |k: usize| {
+            self.turns
+                .iter()
+                .map(|turn| turn.kept[limit][k])
+                .sum::<usize>()
+        };
+        (sum(0) > 0).then(|| sum(1) as f64 / sum(0) as f64)
+    }
+}
+
+impl fmt::Display for TurnTable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let turns = self.lines.first().map_or(0, |line| line.turns.len());
+        writeln!(f, "turns, {turns} of {}", self.split)?;
+        writeln!(
+            f,
+            "  angles between found and true normals, degrees: mean over the turns and its standard error, of their means and \
+             medians; by how much answers are turned about the table's axis (mean of the amounts), and the mean error without \
+             it; albedo: squared error over energy; of the pixels expected within 10, 20, 30 degrees how many are"
+        )?;
+        writeln!(
+            f,
+            "{:24}  {:>12}  {:>12}  {:>7}  {:>8}  {:>6}  {:>5} {:>5} {:>5}",
+            "method", "mean", "median", "azimuth", "unturned", "albedo", "10", "20", "30"
+        )?;
+        for line in &self.lines {
+            let (mean, error) = line.mean_of(|turn| turn.mean_deg);
+            let (median, median_error) = line.mean_of(|turn| turn.median_deg);
+            let (azimuth, _) = line.mean_of(|turn| turn.azimuth_deg.abs());
+            let (unturned, _) = line.mean_of(|turn| turn.unturned_deg);
+            let has_albedo = line.turns.iter().all(|turn| turn.albedo.is_some());
+            let albedo = if has_albedo {
+                format!("{:.3}", line.mean_of(|turn| turn.albedo.unwrap_or(0.0)).0)
+            } else {
+                "-".to_owned()
+            };
+            write!(
+                f,
+                "{:24}  {:>12}  {:>12}  {azimuth:>7.1}  {unturned:>8.1}  {albedo:>6} ",
+                line.method,
+                format!("{mean:.1} ± {error:.1}"),
+                format!("{median:.1} ± {median_error:.1}"),
+            )?;
+            for limit in 0..LIMITS_DEG.len() {
+                let kept = line.kept(limit);
+                let kept = kept.map_or("-".to_owned(), |kept| format!("{:.0} %", 100.0 * kept));
+                write!(f, " {kept:>5}")?;
+            }
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_turned_about_the_axis_is_found_out() {
+        let elevation = Elevation::given(20.0).unwrap();
+        let [x, y, z] = TableFrame::new(elevation).axis();
+        let axis = relight_core::light::Direction::new(x, y, z).unwrap();
+        let turn = Rotation::about(axis, 17.0_f64.to_radians());
+        let right: Vec<[f64; 3]> = (0..200)
+            .map(|k| {
+                let (u, v) = (
+                    f64::from(k % 20) / 12.0 - 0.8,
+                    f64::from(k / 20) / 8.0 - 0.6,
+                );
+                let length = (u * u + v * v + 1.0).sqrt();
+                [u / length, v / length, 1.0 / length]
+            })
+            .collect();
+        let found: Vec<[f64; 3]> = right
+            .iter()
+            .map(|&[x, y, z]| {
+                turn.matrix()
+                    .map(|row| row[0] * x + row[1] * y + row[2] * z)
+            })
+            .collect();
+        let (azimuth, rest) = best_azimuth(&right, &found, elevation);
+        assert!(
+            (azimuth - 17.0).abs() < 0.5 && rest < 0.01,
+            "{azimuth} {rest}"
+        );
+    }
+}
