@@ -71,10 +71,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     truth.tell(
         "light known, prior",
         &turn,
-        &options(Some(known), Some(prior.clone())),
+        &options(Some(known), Some(prior.clone().into())),
     )?;
     truth.tell("light unknown", &turn, &options(None, None))?;
-    truth.tell("light unknown, prior", &turn, &options(None, Some(prior)))
+    truth.tell("light unknown, prior", &turn, &options(None, Some(prior.into())))
 }
 
 struct Truth {

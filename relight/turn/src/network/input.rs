@@ -123,10 +123,10 @@ pub fn network_input(turn: &NetworkTurn<'_>, phase: PhaseHypothesis) -> Vec<f32>
     let turned = ratios.turned(ratios.phase(phase));
     let mut planes = PlaneWriter::new(turn);
     let mut whole = Vec::new();
-    for m in 0..HARMONICS {
+    for (m, harmonic) in turned.iter().enumerate() {
         let channels: &[usize] = if m < COLOURED { &[0, 1, 2] } else { &[3] };
         for &c in channels {
-            let of = |k: usize| channel(&turned[m][k], c);
+            let of = |k: usize| channel(&harmonic[k], c);
             let square = (0..turn.pixels.len())
                 .map(|k| of(k).length().powi(2))
                 .sum::<f32>();
@@ -348,14 +348,16 @@ mod tests {
         for curve in &mut other {
             for m in 1..=HARMONICS {
                 let back = Complex::at(angle * m as f32);
-                for c in 0..3 {
+                let [re, im] = [curve[2 * m - 1], curve[2 * m]];
+                let turned = [0, 1, 2].map(|c| {
                     let value = Complex {
-                        re: curve[2 * m - 1][c],
-                        im: curve[2 * m][c],
+                        re: re[c],
+                        im: im[c],
                     };
-                    let turned = value.times(back);
-                    (curve[2 * m - 1][c], curve[2 * m][c]) = (turned.re, turned.im);
-                }
+                    value.times(back)
+                });
+                curve[2 * m - 1] = turned.map(|value| value.re);
+                curve[2 * m] = turned.map(|value| value.im);
             }
             curve
                 .as_flattened_mut()
