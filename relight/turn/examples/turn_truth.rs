@@ -74,7 +74,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         &options(Some(known), Some(prior.clone().into())),
     )?;
     truth.tell("light unknown", &turn, &options(None, None))?;
-    truth.tell("light unknown, prior", &turn, &options(None, Some(prior.into())))
+    truth.tell(
+        "light unknown, prior",
+        &turn,
+        &options(None, Some(prior.into())),
+    )
 }
 
 struct Truth {

@@ -54,6 +54,16 @@ pub enum PhaseHypothesis {
 impl PhaseHypothesis {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::First, Self::Second, Self::SecondOpposite];
+
+    /// The same of the mirror image, left and right, in which a phase has the other sign, and half a turn more where the
+    /// harmonic is odd.
+    pub(crate) const fn in_mirror(self) -> Self {
+        match self {
+            Self::First => Self::First,
+            Self::Second => Self::SecondOpposite,
+            Self::SecondOpposite => Self::Second,
+        }
+    }
 }
 
 /// A turn for the network: a square crop around the object.

@@ -1,5 +1,6 @@
 //! Normals of a turn by the network, in an unknown room.
 
+use rayon::prelude::*;
 use relight_core::image::Planes;
 use relight_core::light::{Normals, YUp};
 use relight_nets::{Inference, NetError, Weights, turn_network};
@@ -55,26 +56,24 @@ impl TurnNetwork {
         let crop = Crop::new(curves);
         let mirrored = crop.mirrored();
         let elevation = elevation.degrees().to_radians() as f32;
-        let mut best: Option<(f32, PhaseHypothesis, Cells)> = None;
-        let mut hypotheses = Vec::new();
-        for phase in PhaseHypothesis::ALL {
-            let seen = self.cells(&crop, elevation, phase)?;
-            // In the mirror image the phase of a harmonic has the other sign, and half a turn more where it is odd.
-            let other = match phase {
-                PhaseHypothesis::First => PhaseHypothesis::First,
-                PhaseHypothesis::Second => PhaseHypothesis::SecondOpposite,
-                PhaseHypothesis::SecondOpposite => PhaseHypothesis::Second,
-            };
-            let in_mirror = self.cells(&mirrored, elevation, other)?;
-            let cells = mean_of_looks(&seen, &in_mirror);
-            let error = mean_error(&cells);
-            hypotheses.push((phase, error));
-            if best.as_ref().is_none_or(|(least, ..)| error < *least) {
-                best = Some((error, phase, cells));
-            }
-        }
-        let (_, phase, cells) =
-            best.unwrap_or((0.0, PhaseHypothesis::First, vec![None; GRID * GRID]));
+        let looks: Vec<(PhaseHypothesis, f32, Cells)> = PhaseHypothesis::ALL
+            .into_par_iter()
+            .map(|phase| {
+                let seen = self.cells(&crop, elevation, phase)?;
+                let in_mirror = self.cells(&mirrored, elevation, phase.in_mirror())?;
+                let cells = mean_of_looks(&seen, &in_mirror);
+                Ok((phase, mean_error(&cells), cells))
+            })
+            .collect::<Result<_, NetError>>()?;
+        let hypotheses = looks
+            .iter()
+            .map(|(phase, error, _)| (*phase, *error))
+            .collect();
+        let best = looks.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        let (phase, cells) = best.map_or_else(
+            || (PhaseHypothesis::First, vec![None; GRID * GRID]),
+            |(phase, _, cells)| (phase, cells),
+        );
         Ok(spread(curves, &crop, &cells, phase, hypotheses))
     }
 
