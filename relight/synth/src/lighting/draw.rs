@@ -1,11 +1,15 @@
 //! Random lightings.
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::{Emitter, Environment, Lighting, Method, Panoramas, SyntheticLamp};
 use crate::geometry::GBuffer;
 use crate::random::Random;
+use crate::vectors::rotation_rows;
+
+/// How far tables are from level, radians: the deviation about each of two axes.
+const LEVEL: f32 = 0.04;
 
 /// What kind of light is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -137,24 +141,30 @@ impl Environment {
             return None;
         }
         let turn = if random.chance(0.7) {
-            let around = glam::Mat3::from_rotation_y(random.uniform(0.0..std::f32::consts::TAU));
-            glam::Mat3::from_rotation_x(random.uniform(-0.1..0.8)) * around
+            let around = Mat3::from_rotation_y(random.uniform(0.0..std::f32::consts::TAU));
+            Mat3::from_rotation_x(random.uniform(-0.1..0.8)) * around
         } else {
             random.rotation()
         };
         Some(Self {
             panorama: random.index(panoramas.len()),
-            rotation: orthonormal(turn),
+            rotation: rotation_rows(turn),
             irradiance,
             method,
         })
     }
-}
 
-/// The rows of a rotation, exact to the last bit of an `f64`.
-fn orthonormal(turn: glam::Mat3) -> [[f64; 3]; 3] {
-    let turn = glam::DQuat::from_mat3(&turn.as_dmat3()).normalize();
-    glam::DMat3::from_quat(turn).transpose().to_cols_array_2d()
+    /// The same light around a table that stands level in it, but for a few degrees: the panorama's zenith is along the
+    /// table's axis. `elevation` is that of the camera over the table, radians.
+    pub(crate) fn level(self, random: &mut Random, elevation: f32) -> Self {
+        let around = Mat3::from_rotation_y(random.uniform(0.0..std::f32::consts::TAU));
+        let lean = Mat3::from_rotation_x(elevation + random.normal() * LEVEL)
+            * Mat3::from_rotation_z(random.normal() * LEVEL);
+        Self {
+            rotation: rotation_rows(lean * around),
+            ..self
+        }
+    }
 }
 
 /// A direction from which a good part of what is seen is lit.

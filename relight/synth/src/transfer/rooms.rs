@@ -7,6 +7,7 @@ use relight_core::light::{Direction, Panorama, Rotation, ShLight, basis};
 
 use super::curves::room_order;
 use crate::random::{Random, stream};
+use crate::vectors::rotation_rows;
 
 /// Size at which panoramas are projected: many times finer than the order of the light.
 const PROJECTED: Extent = Extent::new(96, 48);
@@ -22,6 +23,8 @@ const TWO_SIDED: f32 = 0.12;
 const NEARLY_EVEN: f32 = 0.08;
 /// Deviation of the table's axis from a panorama's zenith, radians.
 const TILT: f32 = 0.15;
+/// Part of the rooms that are turned any way: floors that are brighter than ceilings, windows above.
+const ANY_WAY: f32 = 0.15;
 
 /// Light to draw from, in the table's frame.
 #[derive(Debug, Clone)]
@@ -106,6 +109,9 @@ impl Rooms {
         let about = Mat3::from_rotation_z(random.uniform(0.0..std::f32::consts::TAU));
         let lean = Mat3::from_rotation_x(random.normal() * TILT)
             * Mat3::from_rotation_y(random.normal() * TILT);
+        if random.chance(ANY_WAY) {
+            return light.rotated(&rotation(random.rotation()));
+        }
         // A panorama's zenith is y up; that of the table is z.
         let upright = Mat3::from_rotation_x(std::f32::consts::FRAC_PI_2);
         light.rotated(&rotation(about * lean * upright))
@@ -113,9 +119,8 @@ impl Rooms {
 }
 
 fn rotation(matrix: Mat3) -> Rotation {
-    let row = |k: usize| matrix.row(k).to_array().map(f64::from);
-    // Made of rotations; what rounding leaves is within what is tolerated.
-    Rotation::from_matrix([row(0), row(1), row(2)]).unwrap_or(Rotation::IDENTITY)
+    // The rows are exact: this is a rotation.
+    Rotation::from_matrix(rotation_rows(matrix)).unwrap_or(Rotation::IDENTITY)
 }
 
 /// A panorama in another curve of brightness, other colours, its brightest parts cut off.

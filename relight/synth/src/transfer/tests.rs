@@ -1,11 +1,13 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
-use relight_core::light::{Direction, ShLight, basis};
+use relight_core::image::{Extent, Planes, Rgb};
+use relight_core::light::{Direction, Panorama, Rotation, ShLight, basis};
 
 use super::*;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::{Folders, Library};
+use crate::lighting::{Environment, Lighting, Material, Method, Panoramas, SyntheticScene};
 use crate::made_panoramas;
 use crate::mesh::Mesh;
 use crate::shape::ShapeKind;
@@ -144,6 +146,113 @@ fn under_even_light_a_pixel_shows_the_part_of_the_sky_that_it_sees() {
     }
 }
 
+/// Light of few bands: a bright side, a second one, and a floor.
+fn soft_panorama() -> Panorama {
+    let extent = Extent::new(64, 32);
+    let pixel = |x: usize, y: usize| {
+        let around = (x as f32 + 0.5) / 64.0 * 2.0 * PI;
+        let down = (y as f32 + 0.5) / 32.0 * PI;
+        let side = (down.sin() * (around - 1.0).cos()).max(0.0).powi(3);
+        let other = (down.sin() * (around - 4.4).cos() * 0.8 + down.cos() * 0.6).max(0.0);
+        [
+            0.1 + 4.0 * side + other.powi(4),
+            0.1 + 3.0 * side + 2.0 * other.powi(4),
+            0.2 + side + 2.5 * other.powi(4),
+        ]
+    };
+    Panorama::new(Rgb::new(Planes::from_fn(extent, pixel))).unwrap()
+}
+
+/// Ninety frames of a turn, rendered with rays as `synth --turn` renders them.
+const FRAMES: u32 = 90;
+
+/// Mean and first harmonics of rendered frames: shading of a white object, pixel by pixel.
+fn harmonics_of_frames(
+    scene: &SyntheticScene,
+    panoramas: &Panoramas,
+    axis: Vec3,
+) -> Vec<[[f32; 3]; 7]> {
+    let pixels = scene.buffer().len();
+    let material = Material {
+        albedo: vec![Vec3::ONE; pixels],
+        normals: scene.buffer().normals().to_vec(),
+        gloss: None,
+    };
+    let [x, y, z] = axis.to_array().map(f64::from);
+    let axis = Direction::new(x, y, z).unwrap();
+    let mut sums = vec![[[0.0; 3]; 7]; pixels];
+    for frame in 0..FRAMES {
+        let angle = f64::from(frame) / f64::from(FRAMES) * std::f64::consts::TAU;
+        let lighting = Lighting {
+            environment: Some(Environment {
+                panorama: 0,
+                rotation: *Rotation::about(axis, -angle).matrix(),
+                irradiance: Vec3::ONE,
+                method: Method::MonteCarlo,
+            }),
+            has_shadows: true,
+            ..Lighting::default()
+        };
+        let shaded = scene.light(&material, &lighting, panoramas, u64::from(frame));
+        for (sum, shading) in sums.iter_mut().zip(&shaded.shading) {
+            for (term, sum) in sum.iter_mut().enumerate() {
+                let (sin, cos) = (term.div_ceil(2) as f64 * angle).sin_cos();
+                let weight = match term {
+                    0 => 1.0,
+                    term if term % 2 == 1 => 2.0 * cos,
+                    _ => -2.0 * sin,
+                };
+                for (sum, value) in sum.iter_mut().zip(shading.to_array()) {
+                    *sum += weight as f32 * value / FRAMES as f32;
+                }
+            }
+        }
+    }
+    sums
+}
+
+#[test]
+fn rendered_frames_of_a_turn_have_the_fourier_coefficients_that_the_transfer_says() {
+    let (transfer, buffer, occluder) = standing(20, 1500);
+    let axis = Vec3::new(0.0, transfer.elevation.cos(), transfer.elevation.sin());
+    let panorama = soft_panorama();
+    let panoramas = Panoramas::new(vec![("soft".to_owned(), panorama.clone())]);
+    let light = panorama.project(TRANSFER_ORDER);
+    // What brings the panorama to a mean irradiance of 1, which is pi times the mean radiance.
+    let mean = light.coefficients()[0].iter().sum::<f64>() / 3.0;
+    let scale = 1.0 / (mean * std::f64::consts::PI.sqrt() / 2.0);
+    let rows = cast::table_frame(transfer.elevation);
+    let to_table = Rotation::from_matrix(crate::vectors::rotation_rows(rows)).unwrap();
+    let light = light.rotated(&to_table).tinted([scale; 3]);
+    let finish = TransferFinish {
+        normals: buffer.normals().to_vec(),
+        albedo: vec![Vec3::splat(PI); buffer.len()],
+    };
+    let curves = transfer.curves(&finish, &MATT, &light);
+    let scene = SyntheticScene::shaded(buffer, occluder, 16, 7);
+    let rendered = harmonics_of_frames(&scene, &panoramas, axis);
+    let mut off = [0.0_f64; 7];
+    let mut energy = [0.0_f64; 7];
+    for (curve, rendered) in curves.iter().zip(&rendered) {
+        for (term, rendered) in rendered.iter().enumerate() {
+            for (a, b) in curve[term].iter().zip(rendered) {
+                off[term] += f64::from(a - b).powi(2);
+                energy[term] += f64::from(*b).powi(2);
+            }
+        }
+    }
+    // What is left is the noise of the rays, alike in all harmonics: it is told as a part of the first one.
+    let harmonics: [&[usize]; 4] = [&[0], &[1, 2], &[3, 4], &[5, 6]];
+    let sum = |of: &[f64; 7], terms: &[usize]| terms.iter().map(|&term| of[term]).sum::<f64>();
+    for terms in harmonics {
+        let relative = (sum(&off, terms) / sum(&energy, &[1, 2])).sqrt();
+        assert!(relative < 0.04, "{terms:?}: {relative}");
+    }
+    // The second harmonic is found for what it is, not by its noise.
+    let relative = (sum(&off, &[3, 4]) / sum(&energy, &[3, 4])).sqrt();
+    assert!(relative < 0.08, "{relative}");
+}
+
 #[test]
 fn views_are_cast_once_and_a_damaged_one_again() {
     let library = Library::read(&Folders::default()).unwrap();
@@ -185,6 +294,32 @@ fn rooms_are_of_any_kind_and_never_darker_than_nothing_in_the_mean() {
         );
     }
     assert!(Rooms::new(&[], 2, 1).is_empty());
+}
+
+#[test]
+fn the_zenith_of_a_panorama_is_along_the_table_s_axis_in_most_rooms_and_its_azimuth_is_any() {
+    let sky = |_: usize, y: usize| [if y < 16 { 1.0 } else { 0.1 }; 3];
+    let sky = Panorama::new(Rgb::new(Planes::from_fn(Extent::new(64, 32), sky))).unwrap();
+    let above: Vec<bool> = (0..200)
+        .map(|seed| {
+            // Band 1 of the basis is y, z, x: its middle one is along the axis.
+            let light = Rooms::new(&[&sky], 1, 1).draw(seed);
+            let [y, z, x] = [1, 2, 3].map(|at: usize| light.coefficients()[at][1]);
+            z > 2.0 * x.hypot(y)
+        })
+        .collect();
+    let part = above.iter().filter(|&&above| above).count();
+    assert!((120..200).contains(&part), "{part} of 200");
+    let lamp = |x: usize, _: usize| [if x < 8 { 1.0 } else { 0.0 }; 3];
+    let lamp = Panorama::new(Rgb::new(Planes::from_fn(Extent::new(64, 32), lamp))).unwrap();
+    let rooms = Rooms::new(&[&lamp], 1, 1);
+    let quarters = (0..200).fold([0; 4], |mut counts, seed| {
+        let light = rooms.draw(seed);
+        let [y, x] = [1, 3].map(|at: usize| light.coefficients()[at][1]);
+        counts[2 * usize::from(x > 0.0) + usize::from(y > 0.0)] += 1;
+        counts
+    });
+    assert!(quarters.iter().all(|&count| count > 20), "{quarters:?}");
 }
 
 #[test]

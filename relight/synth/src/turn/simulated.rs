@@ -16,7 +16,7 @@ use crate::camera::CameraModel;
 use crate::finish::Finish;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::Library;
-use crate::lighting::{Lighting, Material, Shaded, SyntheticScene};
+use crate::lighting::{Environment, Lighting, Material, Shaded, SyntheticScene};
 use crate::mesh::Mesh;
 use crate::png::{Sixteen, encode_sixteen};
 use crate::random::{Random, stream};
@@ -73,8 +73,10 @@ impl<'a> SimulatedTurn<'a> {
             scene.buffer(),
             &library.panoramas,
         );
+        let level = |around: Environment| around.level(&mut random, stand.elevation());
         let lighting = Lighting {
             has_shadows: recipe.shadows,
+            environment: lighting.environment.clone().map(level),
             ..lighting.above(stand.axis())
         };
         let [x, y, z] = stand.axis().to_array().map(f64::from);
