@@ -44,7 +44,7 @@ impl Lighting {
         };
         match kind {
             LightKind::Sh => Self {
-                environment: around(random, Method::Smooth, Vec3::ONE),
+                environment: around(random, Method::OrderTwo, Vec3::ONE),
                 ..lighting
             },
             LightKind::MonteCarlo => Self {

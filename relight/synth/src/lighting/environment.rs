@@ -34,7 +34,7 @@ pub struct Panoramas {
 struct Entry {
     name: String,
     panorama: Panorama,
-    /// Of order 2, scaled to a mean irradiance of 1.
+    /// All bands that a diffuse surface shows, scaled to a mean irradiance of 1.
     light: ShLight,
     /// What the panorama's radiance was scaled by.
     scale: f64,
@@ -57,7 +57,10 @@ pub struct Environment {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// By its nine coefficients, times the part of the sky that is seen. Makes no highlight.
+    /// By its nine coefficients, times the part of the sky that is seen: light as the paper estimates it. Makes no
+    /// highlight.
+    OrderTwo,
+    /// By all bands that a diffuse surface shows of it, times the part of the sky that is seen. Makes no highlight.
     Smooth,
     /// By rays, each blocked or not; highlights with rays along the lobe too.
     MonteCarlo,
@@ -68,7 +71,7 @@ impl Panoramas {
     #[must_use]
     pub fn new(named: Vec<(String, Panorama)>) -> Self {
         let entries = named.into_iter().filter_map(|(name, panorama)| {
-            let light = panorama.project(Order::TWO);
+            let light = panorama.project(Order::HIGHLIGHT);
             let mean = light.coefficients()[0].iter().sum::<f64>() / 3.0;
             // The mean irradiance is pi times the mean radiance, which is the first coefficient times
             // the constant harmonic.
@@ -115,12 +118,26 @@ impl Environment {
     /// panorama.
     #[must_use]
     pub fn coefficients(&self, panoramas: &Panoramas) -> ShLight {
+        self.of_order(panoramas, Order::TWO)
+    }
+
+    /// The light as the coefficients whose irradiance the method takes; none where it casts rays.
+    pub(super) fn smooth(&self, panoramas: &Panoramas) -> Option<ShLight> {
+        match self.method {
+            Method::OrderTwo => Some(self.coefficients(panoramas)),
+            Method::Smooth => Some(self.of_order(panoramas, Order::HIGHLIGHT)),
+            Method::MonteCarlo => None,
+        }
+    }
+
+    fn of_order(&self, panoramas: &Panoramas, order: Order) -> ShLight {
         match panoramas.entries.get(self.panorama) {
             Some(entry) => entry
                 .light
+                .with_order(order)
                 .rotated(&self.turn())
                 .tinted(self.irradiance.to_array().map(f64::from)),
-            None => ShLight::dark(Order::TWO),
+            None => ShLight::dark(order),
         }
     }
 

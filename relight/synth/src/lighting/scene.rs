@@ -1,7 +1,7 @@
 //! A buffer together with what blocks its light, under whole lightings.
 
 use super::environment::Sky;
-use super::{Lighting, Material, Method, Panoramas, Shaded};
+use super::{Lighting, Material, Panoramas, Shaded};
 use crate::geometry::{GBuffer, Occluder};
 use crate::random::stream;
 
@@ -62,17 +62,11 @@ impl SyntheticScene {
             shaded.add_lamp(&self.buffer, material, lamp, shadows.as_ref(), own);
         }
         if let Some(environment) = &lighting.environment {
-            match environment.method {
-                Method::Smooth => {
-                    shaded.add_smooth(material, &environment.coefficients(panoramas), open);
-                }
-                Method::MonteCarlo => {
-                    let sky = Sky::new(environment, panoramas, stream(seed, 0));
-                    let occluder = shade.map(|shade| &shade.occluder);
-                    if let Some(sky) = sky {
-                        sky.light(&self.buffer, material, occluder, seed, &mut shaded);
-                    }
-                }
+            if let Some(light) = environment.smooth(panoramas) {
+                shaded.add_smooth(material, &light, open);
+            } else if let Some(sky) = Sky::new(environment, panoramas, stream(seed, 0)) {
+                let occluder = shade.map(|shade| &shade.occluder);
+                sky.light(&self.buffer, material, occluder, seed, &mut shaded);
             }
         }
         shaded.add_ambient(lighting.ambient, open);

@@ -91,7 +91,7 @@ impl Shaded {
         }
     }
 
-    /// Adds order-2 light: its irradiance, times the part of the sky that each pixel sees (`open`).
+    /// Adds light by its coefficients: its irradiance, times the part of the sky that each pixel sees (`open`).
     /// It makes no highlight.
     pub fn add_smooth(&mut self, material: &Material, light: &ShLight, open: Option<&[f32]>) {
         let shading = irradiance(&material.normals, light);

@@ -329,7 +329,7 @@ fn irradiance(light: &ShLight, normal: Vec3) -> [f64; 3] {
 fn smooth_light_is_the_diffuse_layer_of_the_turned_coefficients() {
     let panoramas = Panoramas::new(vec![("speckled".to_owned(), speckled())]);
     let turn = Rotation::about(direction(Vec3::new(0.3, 0.8, -0.2)), 1.3);
-    let lighting = around(Method::Smooth, &turn);
+    let lighting = around(Method::OrderTwo, &turn);
     let (mesh, at) = ball();
     let scene = SyntheticScene::open(GBuffer::render(&mesh, at, Projection::Orthographic, SIZE));
     let shaded = lit(&scene, &lighting, &panoramas, None);
@@ -350,6 +350,30 @@ fn smooth_light_is_the_diffuse_layer_of_the_turned_coefficients() {
             ratios[0]
         );
     }
+}
+
+#[test]
+fn smooth_light_has_all_the_bands_that_rays_bring() {
+    let panoramas = Panoramas::new(vec![("speckled".to_owned(), speckled())]);
+    let turn = Rotation::about(direction(Vec3::new(0.3, 0.8, -0.2)), 1.3);
+    let (mesh, at) = ball();
+    let scene = SyntheticScene::open(GBuffer::render(&mesh, at, Projection::Orthographic, 32));
+    let material = white(&scene, None);
+    let by_rays: Vec<Shaded> = (1..40)
+        .map(|seed| {
+            let lighting = around(Method::MonteCarlo, &turn);
+            scene.light(&material, &lighting, &panoramas, seed)
+        })
+        .collect();
+    let off = [Method::OrderTwo, Method::Smooth].map(|method| {
+        let smooth = lit(&scene, &around(method, &turn), &panoramas, None);
+        let squares = smooth.shading.iter().enumerate().map(|(k, smooth)| {
+            let rays: Vec3 = by_rays.iter().map(|one| one.shading[k]).sum();
+            (*smooth - rays / by_rays.len() as f32).length_squared()
+        });
+        (squares.sum::<f32>() / smooth.shading.len() as f32).sqrt()
+    });
+    assert!(off[1] < 0.5 * off[0], "{off:?}");
 }
 
 #[test]
