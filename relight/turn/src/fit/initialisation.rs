@@ -8,6 +8,7 @@ use crate::fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure}
 use crate::fit::inflation::inflated;
 use crate::fit::material_choice::{is_metal, may_be_metal};
 use crate::fit::normal_step::PriorNormal;
+use crate::fit::prior_weight::PriorWeight;
 use crate::fit::setting::Setting;
 use crate::model::gloss::GlossLight;
 use crate::model::known_light::KnownLight;
@@ -51,8 +52,12 @@ impl Setting {
         curves: &TurnCurves,
         prior: Option<&[PriorNormal]>,
         material: Option<MaterialKind>,
+        weight: PriorWeight,
     ) -> Result<FittedLight, TurnError> {
-        let coarse = Blocks::new(curves, prior);
+        let mut coarse = Blocks::new(curves, prior, self.has_errors);
+        if self.has_errors {
+            self.balance(&mut coarse, weight)?;
+        }
         let run = |material| self.find_of(&coarse, material);
         if let Some(material) = material {
             let mut given = run(material)?;
@@ -85,6 +90,25 @@ impl Setting {
         })
     }
 
+    /// Weights a prior whose errors are known by what is left of the curves in the light that goes with its normals.
+    fn balance(&self, coarse: &mut Blocks, weight: PriorWeight) -> Result<(), TurnError> {
+        let Some(prior) = &coarse.prior else {
+            return Ok(());
+        };
+        let normals: Vec<_> = prior.iter().map(|prior| prior.normal).collect();
+        let alternation = Alternation {
+            coarse,
+            setting: self,
+            material: MaterialKind::Diffuse,
+        };
+        let model = alternation
+            .room_of(&normals, &mut alternation.first_albedo(), 0)
+            .ok_or(TurnError::NoLight)?;
+        let fits = coarse.fits(&model);
+        coarse.balance(weight, &fits);
+        Ok(())
+    }
+
     /// The other kind, where the residual of the given one does not settle that it is right. Without gloss a diffuse
     /// material is not to be compared with metal.
     fn other_kind(&self, given: MaterialFigure) -> Option<MaterialKind> {
@@ -105,9 +129,13 @@ impl Setting {
         prior: Option<&[PriorNormal]>,
         found: &FittedLight,
     ) -> Option<DirectionFigure> {
-        let coarse = Blocks::new(curves, prior).with_other_direction();
+        let coarse = Blocks::new(curves, prior, self.has_errors).with_other_direction();
         let mut told = None;
-        for (figure, &residual) in found.materials.iter().zip(&found.costs) {
+        // A sure prior settles the material.
+        let counts =
+            |figure: &MaterialFigure| !self.has_errors || figure.material == found.model.material;
+        let tried = found.materials.iter().zip(&found.costs);
+        for (figure, &residual) in tried.filter(|(figure, _)| counts(figure)) {
             // Metal in the wrong rotation direction can seem to fit a diffuse material, so that both are compared.
             let other_residual = self.cost_in(&coarse, figure.material)?;
             let direction = DirectionFigure {
@@ -196,6 +224,9 @@ impl Setting {
         if let Some(prior) = coarse.prior.as_ref().filter(|_| self.has_shape) {
             let normals = prior.iter().map(|prior| prior.normal).collect();
             initialisations.push(("prior", normals));
+            if self.has_errors {
+                return initialisations;
+            }
         }
         initialisations.extend(
             PARAMETERS

@@ -51,11 +51,13 @@ const PARAMETERS: JointParameters = JointParameters {
 pub(crate) struct JointOptimisation<'a> {
     pub(crate) statistics: &'a [CurveStatistics],
     pub(crate) prior: Option<&'a [PriorNormal]>,
+    /// Where normals are searched from; anywhere without.
+    pub(crate) starts: Option<&'a [PixelFit]>,
     pub(crate) unknowns: Unknowns<'a>,
 }
 
 impl JointOptimisation<'_> {
-    /// The final residual and shading model. Each round searches the normals anywhere, then refines all unknowns.
+    /// The final residual and shading model. Each round searches the normals, then refines all unknowns.
     pub(crate) fn found(
         &self,
         start: ShadingModel,
@@ -65,7 +67,7 @@ impl JointOptimisation<'_> {
         let mut model = start;
         let mut residual = f64::INFINITY;
         for _ in 0..rounds {
-            let fits = search_all(&model, self.statistics, self.prior, None);
+            let fits = search_all(&model, self.statistics, self.prior, self.starts);
             let (found, fits) = self.refined(model, fits, steps);
             let reached = cost(&fits, self.prior);
             if reached < residual {

@@ -17,6 +17,7 @@ pub(crate) mod normal_step;
 pub(crate) mod options;
 pub(crate) mod prior;
 pub(crate) mod prior_mean;
+pub(crate) mod prior_weight;
 pub(crate) mod probe_check;
 pub(crate) mod probe_light;
 pub(crate) mod residuals;

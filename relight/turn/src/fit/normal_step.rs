@@ -18,6 +18,8 @@ const PARAMETERS: NormalStepParameters = NormalStepParameters { longest_step: 0.
 pub(crate) struct PriorNormal {
     pub(crate) normal: [f64; 3],
     pub(crate) weight: f64,
+    /// How much surer it is than others: one over the squared error that is expected of it, 1 where that is not known.
+    pub(crate) sureness: f64,
 }
 
 /// The harmonics of a pixel, channel by channel, and how they change as its normal leans.

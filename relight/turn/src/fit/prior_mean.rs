@@ -8,6 +8,7 @@ use crate::fit::inflation::inflated;
 use crate::fit::initialisation::FittedLight;
 use crate::fit::normal_step::PriorNormal;
 use crate::fit::options::{TurnOptions, TurnPrior};
+use crate::fit::prior_weight::PriorWeight;
 use crate::fit::setting::Setting;
 use crate::model::directions::unit;
 use crate::model::frame::TableFrame;
@@ -19,17 +20,13 @@ use crate::observe::curves::TurnCurves;
 struct PriorParameters {
     /// Weight of the inflated shape as the prior mean, as `TurnOptions::prior_weight`. By hand.
     outline_weight: f64,
-    /// Expected error at which a normal has the prior's weight as it is, degrees. By hand: that of the network of turns
-    /// on synthetic turns.
-    usual_error_deg: f64,
-    /// Least and largest factor of the weight. By hand.
-    factors: (f64, f64),
+    /// Range in which the expected error of a normal counts, degrees. By hand.
+    errors_deg: (f64, f64),
 }
 
 const PARAMETERS: PriorParameters = PriorParameters {
     outline_weight: 0.15,
-    usual_error_deg: 12.0,
-    factors: (0.1, 4.0),
+    errors_deg: (5.0, 40.0),
 };
 
 /// The prior normals, and the shading model on blocks of pixels that goes with them.
@@ -55,12 +52,16 @@ impl Initialised {
             None => Some(prior.unwrap_or_else(|| of_outline(curves, PARAMETERS.outline_weight))),
             Some(_) => prior,
         };
+        let has_errors = |prior: &TurnPrior| prior.expected_errors.is_some();
+        let has_errors = options.prior.as_ref().is_some_and(has_errors);
         let setting = Setting {
             frame,
             known,
             has_shape,
+            has_errors,
         };
-        let found = setting.find(curves, prior.as_deref(), options.material)?;
+        let weight = PriorWeight::of(options);
+        let found = setting.find(curves, prior.as_deref(), options.material, weight)?;
         let initialised = Self {
             prior,
             setting,
@@ -75,23 +76,25 @@ impl Initialised {
     fn or_outline(mut self, curves: &TurnCurves, options: &TurnOptions) -> Self {
         let weight = options.prior_weight;
         // A prior that knows how far it is off has seen the turn: the outline says nothing more.
-        let has_errors = |prior: &TurnPrior| prior.expected_errors.is_some();
         let is_lambertian =
             self.found.model.material == MaterialKind::Diffuse && self.found.model.gloss.is_none();
         if self.setting.known.is_some()
             || !self.setting.has_shape
             || !is_lambertian
             || weight <= 0.0
-            || options.prior.as_ref().is_some_and(has_errors)
+            || self.setting.has_errors
         {
             return self;
         }
         let setting = Setting {
             has_shape: false,
+            has_errors: false,
             ..self.setting.clone()
         };
         let outline = of_outline(curves, weight);
-        let Ok(found) = setting.find(curves, Some(&outline), Some(MaterialKind::Diffuse)) else {
+        let diffuse = Some(MaterialKind::Diffuse);
+        let by_outline = PriorWeight::of(options);
+        let Ok(found) = setting.find(curves, Some(&outline), diffuse, by_outline) else {
             return self;
         };
         let is_nearer = found.costs[0] < self.found.costs[0];
@@ -129,7 +132,11 @@ impl Initialised {
 
 /// The normals of the shape inflated out of the outline, where nothing else is known of the shape.
 fn of_outline(curves: &TurnCurves, weight: f64) -> Vec<PriorNormal> {
-    let normal = |normal| PriorNormal { normal, weight };
+    let normal = |normal| PriorNormal {
+        normal,
+        weight,
+        sureness: 1.0,
+    };
     inflated(curves, 1.0).into_iter().map(normal).collect()
 }
 
@@ -154,18 +161,17 @@ fn prior_of(
     }
     let whole = prior.normals.completed(&curves.mask());
     let [x, y, z] = whole.planes().planes();
-    let factor = |place: usize| {
-        let (least, most) = PARAMETERS.factors;
+    let sureness = |place: usize| {
+        let (least, most) = PARAMETERS.errors_deg;
         errors.map_or(1.0, |errors| {
-            let error = f64::from(errors.plane(0)[place]).max(1.0);
-            (PARAMETERS.usual_error_deg / error)
-                .powi(2)
-                .clamp(least, most)
+            let error = f64::from(errors.plane(0)[place]).clamp(least, most);
+            error.to_radians().powi(-2)
         })
     };
     let at = |&place: &usize| PriorNormal {
         normal: unit([x, y, z].map(|plane| f64::from(plane[place]))),
-        weight: weight * factor(place),
+        weight,
+        sureness: sureness(place),
     };
     Ok(curves.places().iter().map(at).collect())
 }

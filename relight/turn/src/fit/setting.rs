@@ -17,6 +17,8 @@ pub(crate) struct Setting {
     pub(crate) known: Option<KnownLight>,
     /// Whether more is known of the shape than its outline.
     pub(crate) has_shape: bool,
+    /// Whether what is known of it says how far it is off: then nothing else initialises.
+    pub(crate) has_errors: bool,
 }
 
 impl Setting {

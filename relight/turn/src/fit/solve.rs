@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use relight_core::statistics::{median, quantile};
 
 use crate::error::TurnError;
-use crate::fit::blocks::BLOCK_PARAMETERS;
+use crate::fit::blocks::{BLOCK_PARAMETERS, starts};
 use crate::fit::confidence::{
     ERROR_PARAMETERS, FittedPixels, OwnError, common_error, own_errors, shared_albedo,
 };
@@ -13,6 +13,7 @@ use crate::fit::joint::JointOptimisation;
 use crate::fit::normal_step::PriorNormal;
 use crate::fit::options::TurnOptions;
 use crate::fit::prior_mean::Initialised;
+use crate::fit::prior_weight::PriorWeight;
 use crate::fit::robust::robust_weights;
 use crate::fit::search::{PixelFit, search_all};
 use crate::fit::setting::Setting;
@@ -81,10 +82,13 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         prior,
         model: found.model,
         setting,
+        prior_weight: PriorWeight::of(options),
         statistics: all_statistics(curves),
         fits: Vec::new(),
     };
-    solver.fits = solver.search(None);
+    let prior = solver.prior.as_deref();
+    let near = prior.filter(|_| solver.setting.has_errors).map(starts);
+    solver.fits = solver.search(near.as_deref());
     for _ in 0..PARAMETERS.robust_rounds {
         solver.refine();
     }
@@ -120,6 +124,7 @@ struct Solver<'a> {
     prior: Option<Vec<PriorNormal>>,
     model: ShadingModel,
     setting: Setting,
+    prior_weight: PriorWeight,
     statistics: Vec<CurveStatistics>,
     fits: Vec<PixelFit>,
 }
@@ -140,6 +145,9 @@ impl Solver<'_> {
                 CurveStatistics::new(curves, pixel, Some(&robust_weights))
             })
             .collect();
+        if let Some(prior) = self.prior.as_mut().filter(|_| self.setting.has_errors) {
+            self.prior_weight.balance(prior, &self.fits);
+        }
         let every = self
             .statistics
             .len()
@@ -154,6 +162,7 @@ impl Solver<'_> {
         let joint = JointOptimisation {
             statistics: &statistics,
             prior: prior.as_deref(),
+            starts: None,
             unknowns: self.setting.unknowns_of(&self.model),
         };
         let near = search_all(&self.model, &statistics, joint.prior, Some(&fits));
