@@ -8,7 +8,7 @@ use relight_core::statistics::median;
 use crate::fit::albedo::shared;
 use crate::fit::curve_statistics::CurveStatistics;
 use crate::fit::normal_step::PriorNormal;
-use crate::fit::options::TurnOptions;
+use crate::fit::options::{TurnOptions, TurnPrior};
 use crate::fit::search::{PixelFit, Search};
 use crate::fit::smoothing::smoothed_normals;
 use crate::model::directions::dot;
@@ -32,6 +32,11 @@ pub(crate) struct ErrorParameters {
     pub(crate) common_with_prior: f64,
     /// The same with the outline alone, radians. By hand: 20 degrees.
     pub(crate) common_alone: f64,
+    /// Factor of what is expected of a prior normal beside the curves. Measured: with the next, on the ten synthetic
+    /// turns of docs/results/turns.md that nothing is reported of.
+    of_prior: f64,
+    /// Factor of how far the curves lead away from it. Measured.
+    of_shift: f64,
     /// The same in known light, radians, by shade in hollows and bounced light. By hand: 5 degrees.
     pub(crate) common_in_known_light: f64,
     /// Error of normals where the turn does not determine them, radians. By hand.
@@ -47,6 +52,8 @@ pub(crate) const ERROR_PARAMETERS: ErrorParameters = ErrorParameters {
     relative_residual: 0.005,
     common_with_prior: 0.25,
     common_alone: 0.35,
+    of_prior: 0.85,
+    of_shift: 0.5,
     common_in_known_light: 0.08,
     unobservable: 1.0,
     clipped: 0.8,
@@ -72,6 +79,11 @@ pub(crate) struct OwnError {
 }
 
 impl OwnError {
+    /// Whether nothing is seen of the curve.
+    fn is_blind(&self) -> bool {
+        self.deviation >= FRAC_PI_2
+    }
+
     /// With what all pixels have in common.
     pub(crate) fn with(&self, common: f64) -> f64 {
         self.deviation
@@ -83,8 +95,11 @@ impl OwnError {
 
 /// What all normals of a turn are expected to be off, radians.
 pub(crate) fn common_error(options: &TurnOptions, has_prior: bool, is_fit: bool) -> f64 {
+    let has_errors = |prior: &TurnPrior| prior.expected_errors.is_some();
     let common = match &options.light {
         Some(_) => ERROR_PARAMETERS.common_in_known_light,
+        // Each normal has its own.
+        None if options.prior.as_ref().is_some_and(has_errors) => 0.0,
         None if has_prior => ERROR_PARAMETERS.common_with_prior,
         None => ERROR_PARAMETERS.common_alone,
     };
@@ -96,6 +111,31 @@ pub(crate) fn common_error(options: &TurnOptions, has_prior: bool, is_fit: bool)
     common
         .hypot(options.elevation.uncertainty_deg().to_radians())
         .hypot(untold)
+}
+
+/// What normals are expected to be off, radians, where that was known of the prior: as much as was expected of the prior,
+/// a little less because the curves agree, and more the further they lead away from it.
+pub(crate) fn errors_beside_prior(
+    fits: &[PixelFit],
+    prior: &[PriorNormal],
+    own: &[OwnError],
+    common: f64,
+) -> Vec<f64> {
+    let pixels = fits.iter().zip(prior).zip(own);
+    pixels
+        .map(|((fit, prior), own)| {
+            let shift = dot(fit.normal, prior.normal).clamp(-1.0, 1.0).acos();
+            let expected = (ERROR_PARAMETERS.of_prior * prior.sureness.powf(-0.5))
+                .hypot(ERROR_PARAMETERS.of_shift * shift)
+                .hypot(common);
+            // Of black pixels the curves say nothing, whatever was expected.
+            if own.is_blind() {
+                FRAC_PI_2
+            } else {
+                expected.min(FRAC_PI_2)
+            }
+        })
+        .collect()
 }
 
 /// What each pixel's normal is expected to be off by itself.

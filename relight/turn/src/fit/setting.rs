@@ -22,6 +22,11 @@ pub(crate) struct Setting {
 }
 
 impl Setting {
+    /// Whether the errors of the prior are what is known best: of a light that has to be found too.
+    pub(crate) fn knows_errors_of_unknown_light(&self) -> bool {
+        self.has_errors && self.known.is_none()
+    }
+
     /// The unknowns of an object of such a material. Where nothing is known of the shape but its outline, light and
     /// gloss together could fit any shape: a diffuse object is taken for one without gloss.
     pub(crate) fn unknowns(&self, material: MaterialKind) -> Unknowns<'_> {

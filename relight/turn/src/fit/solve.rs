@@ -6,7 +6,8 @@ use relight_core::statistics::{median, quantile};
 use crate::error::TurnError;
 use crate::fit::blocks::{BLOCK_PARAMETERS, starts};
 use crate::fit::confidence::{
-    ERROR_PARAMETERS, FittedPixels, OwnError, common_error, own_errors, shared_albedo,
+    ERROR_PARAMETERS, FittedPixels, OwnError, common_error, errors_beside_prior, own_errors,
+    shared_albedo,
 };
 use crate::fit::curve_statistics::{CurveStatistics, all_statistics};
 use crate::fit::joint::JointOptimisation;
@@ -93,6 +94,7 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         solver.refine();
     }
     solver.shrink_albedo();
+    let conditioning = conditioning.in_found(solver.is_light_possible());
     let has_prior = options.prior.is_some() && !is_prior_left_out;
     let common = common_error(options, has_prior, conditioning.verdict.is_fit());
     let own_errors = solver.own_errors();
@@ -100,7 +102,12 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         solver.normalise();
     }
     let albedo = shared_albedo(curves, &solver.fits, &own_errors);
-    let expected_errors = own_errors.iter().map(|own| own.with(common)).collect();
+    let expected_errors = match solver.prior.as_deref() {
+        Some(prior) if solver.setting.knows_errors_of_unknown_light() => {
+            errors_beside_prior(&solver.fits, prior, &own_errors, common)
+        }
+        _ => own_errors.iter().map(|own| own.with(common)).collect(),
+    };
     Ok(TurnSolution {
         has_prior,
         is_prior_left_out,
@@ -205,6 +212,13 @@ impl Solver<'_> {
             model: &self.model,
             fits: &self.fits,
         })
+    }
+
+    /// Whether a light that had to be found is nowhere negative. Metal shows only what it mirrors of it.
+    fn is_light_possible(&self) -> bool {
+        self.setting.known.is_some()
+            || self.model.material == MaterialKind::Metal
+            || self.model.light.is_possible()
     }
 
     /// Brings the mean shading of each channel to 1.

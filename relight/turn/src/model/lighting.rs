@@ -49,6 +49,9 @@ pub(crate) const LAMBERTIAN_IN_GLOSS: [(usize, f64); TERMS] = {
     all
 };
 
+/// Largest band 1 of a light over its band 0: √3 is that of a point light, and a tenth is left to noise.
+const MOST_FIRST_BAND: f64 = 1.1 * 1.732_050_807_568_877_2;
+
 /// The irradiance of the environment light on a normal, while the table turns: with the normal (x, y, z) in the
 /// table's frame and q = x + i y,
 ///
@@ -103,6 +106,19 @@ impl TableLight {
     pub fn bright_azimuth_deg(&self) -> f64 {
         let sum = |at: usize| self.terms.iter().map(|terms| terms[at]).sum::<f64>();
         (-sum(4)).atan2(sum(3)).to_degrees()
+    }
+
+    /// Whether light that is nowhere negative can have these terms: no channel's band 1 is larger than that of light from
+    /// one direction, √3 times band 0 (`C_1m` and `C_00` of a point light, from the basis at its direction).
+    #[must_use]
+    pub fn is_possible(&self) -> bool {
+        self.coefficients().is_ok_and(|light| {
+            let [even, bands @ ..] = [0, 1, 2, 3].map(|at: usize| light.coefficients()[at]);
+            (0..3).all(|c| {
+                let first = bands.iter().map(|band| band[c].powi(2)).sum::<f64>().sqrt();
+                first <= MOST_FIRST_BAND * even[c]
+            })
+        })
     }
 
     /// The terms of each channel.
@@ -174,6 +190,22 @@ mod tests {
     fn light() -> ShLight {
         let values = [9.0, 0.6, -0.5, 0.4, 0.3, -0.2, 0.5, 0.1, -0.4];
         ShLight::new(values.map(|v| [v, 0.5 * v + 0.2, v - 0.1]).to_vec()).unwrap()
+    }
+
+    #[test]
+    fn light_from_one_side_is_possible_and_what_is_brighter_there_than_all_light_is_not() {
+        let frame = TableFrame::new(Elevation::given(23.0).unwrap());
+        let towards = Direction::new(0.3, 0.5, 0.4).unwrap();
+        let point = relight_core::light::basis(Order::TWO, towards);
+        let stretched = |factor: f64| {
+            let values = point.iter().enumerate();
+            let values = values.map(|(at, value)| [value * if at == 0 { 1.0 } else { factor }; 3]);
+            TableLight::from_viewer(&ShLight::new(values.collect()).unwrap(), &frame)
+        };
+        assert!(stretched(1.0).is_possible());
+        assert!(!stretched(1.3).is_possible());
+        assert!(!stretched(30.0).is_possible());
+        assert!(TableLight::from_viewer(&light(), &frame).is_possible());
     }
 
     #[test]

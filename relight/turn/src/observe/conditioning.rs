@@ -86,6 +86,16 @@ impl Conditioning {
         }
     }
 
+    /// The same where a light was found that cannot be, unless the turn is unfit for another reason.
+    pub(crate) fn in_found(self, is_possible: bool) -> Self {
+        let verdict = if self.verdict.is_fit() && !is_possible {
+            LightVerdict::ImpossibleLight
+        } else {
+            self.verdict
+        };
+        Self { verdict, ..self }
+    }
+
     /// Whether a light was given that is too even while the turn is not.
     #[must_use]
     pub fn is_given_at_odds(&self) -> bool {

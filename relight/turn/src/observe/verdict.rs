@@ -17,6 +17,8 @@ pub enum LightVerdict {
     Overexposed,
     /// Nearly all of the object is black.
     Underexposed,
+    /// The light that was found would have to be negative somewhere.
+    ImpossibleLight,
 }
 
 impl LightVerdict {
@@ -45,6 +47,10 @@ impl LightVerdict {
             Self::Underexposed => Some(
                 "the object is underexposed: nearly all of it is black; \
                  lengthen the exposure or add light, and capture the turn again",
+            ),
+            Self::ImpossibleLight => Some(
+                "no light explains the turn: the one that fits it best would be negative from some side; \
+                 do not trust the normals and the albedo, or give the light (--light, --probe)",
             ),
         }
     }

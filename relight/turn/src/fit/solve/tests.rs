@@ -1,6 +1,7 @@
 use proptest::prelude::*;
-use relight_core::image::Extent;
-use relight_core::light::{Direction, Normals, Rotation};
+use relight_core::image::{Extent, Planes};
+use relight_core::light::{Direction, Normals, Rotation, YUp};
+use relight_core::render::Surface;
 
 use crate::model::gloss::GlossLight;
 use crate::model::shading::ShadingModel;
@@ -10,7 +11,7 @@ use crate::test_turns::{
 };
 use crate::{
     CurveBuilder, LightVerdict, MaterialKind, TableFrame, TableLight, TurnError, TurnMaps,
-    TurnOptions, solve_turn,
+    TurnOptions, TurnPrior, solve_turn,
 };
 
 #[test]
@@ -59,6 +60,51 @@ fn with_its_own_normals_as_the_prior_unknown_light_is_found_up_to_its_colour() {
         1
     );
     assert!(!found.is_prior_left_out());
+}
+
+/// The ball's normals leaning by this angle about an axis that changes from place to place, degrees.
+fn leaning(surface: &Surface, degrees: f32) -> Normals<YUp> {
+    let planes = surface.normals().planes();
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let normal = |x: usize, y: usize| {
+        let [a, b, c] = planes.pixel(x, y);
+        // Every other column leans to one side, the rest to the other.
+        let sin = if (x + y / 3) % 2 == 0 { sin } else { -sin };
+        [a * cos + c * sin, b, c * cos - a * sin]
+    };
+    Normals::new(Planes::from_fn(planes.extent(), normal))
+}
+
+#[test]
+fn normals_that_know_how_far_they_are_off_count_by_it_and_their_errors_are_told() {
+    let (surface, light) = (ball(), environment());
+    let curves = film(&surface, &light, TAKE);
+    let solved = |expected_deg: f32| {
+        let prior = TurnPrior {
+            normals: leaning(&surface, 10.0),
+            expected_errors: Some(Planes::filled(curves.extent(), [expected_deg])),
+        };
+        let options = TurnOptions {
+            elevation: elevation(),
+            prior: Some(prior),
+            ..TurnOptions::default()
+        };
+        let found = solve_turn(&curves, &options).unwrap();
+        (
+            off(&surface, &found.normals(&curves)),
+            found.expected_error_deg(),
+        )
+    };
+    // The curves of a ball without noise mend what leans to both sides.
+    let (error, expected) = solved(10.0);
+    assert!(error < 4.0, "{error}");
+    assert!((error..15.0).contains(&expected), "{expected}");
+    let (_, less) = solved(5.0);
+    let (_, more) = solved(30.0);
+    assert!(
+        less < expected && expected < more,
+        "{less} {expected} {more}"
+    );
 }
 
 #[test]

@@ -31,3 +31,16 @@ fn even_light_is_called_too_even() {
     let advice = bad.verdict.advice().unwrap();
     assert!(advice.contains("turn on one lamp"), "{advice}");
 }
+
+#[test]
+fn a_light_that_cannot_be_makes_a_good_turn_unfit_and_keeps_the_reason_of_a_bad_one() {
+    let surface = ball();
+    let good = Conditioning::of(&film(&surface, &environment(), TAKE));
+    assert_eq!(good.in_found(true).verdict, LightVerdict::Good);
+    let refused = good.in_found(false).verdict;
+    assert_eq!(refused, LightVerdict::ImpossibleLight);
+    assert!(!refused.is_fit());
+    assert!(refused.advice().unwrap().contains("--light"));
+    let even = Conditioning::of(&film(&surface, &even_environment(), TAKE));
+    assert_eq!(even.in_found(false).verdict, LightVerdict::TooEven);
+}
