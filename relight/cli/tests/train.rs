@@ -14,7 +14,15 @@ use std::process::Command;
 fn the_settings_that_are_printed_are_the_defaults_and_can_be_read_again() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("settings.toml");
-    for verb in ["decompose", "spec", "normal", "light", "joint", "specular"] {
+    for verb in [
+        "decompose",
+        "spec",
+        "normal",
+        "light",
+        "joint",
+        "specular",
+        "turn",
+    ] {
         let print = |more: &[&str]| {
             let output = Command::new(env!("CARGO_BIN_EXE_relight"))
                 .args(["train", verb, "--print-settings"])

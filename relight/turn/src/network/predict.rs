@@ -44,7 +44,7 @@ impl TurnNetwork {
     }
 
     /// Normals and what they are expected to be off by. Of the hypotheses of the light's phase that with the least
-    /// expected error is taken.
+    /// expected error is taken, and of it the mean of what is said of the turn and of its mirror image.
     ///
     /// # Errors
     /// [`NetError`] where the network fails.
@@ -54,14 +54,11 @@ impl TurnNetwork {
         elevation: Elevation,
     ) -> Result<TurnPrediction, NetError> {
         let crop = Crop::new(curves);
-        let mirrored = crop.mirrored();
         let elevation = elevation.degrees().to_radians() as f32;
         let looks: Vec<(PhaseHypothesis, f32, Cells)> = PhaseHypothesis::ALL
             .into_par_iter()
             .map(|phase| {
-                let seen = self.cells(&crop, elevation, phase)?;
-                let in_mirror = self.cells(&mirrored, elevation, phase.in_mirror())?;
-                let cells = mean_of_looks(&seen, &in_mirror);
+                let cells = self.cells(&crop, elevation, phase)?;
                 Ok((phase, mean_error(&cells), cells))
             })
             .collect::<Result<_, NetError>>()?;
@@ -70,10 +67,13 @@ impl TurnNetwork {
             .map(|(phase, error, _)| (*phase, *error))
             .collect();
         let best = looks.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        let (phase, cells) = best.map_or_else(
-            || (PhaseHypothesis::First, vec![None; GRID * GRID]),
-            |(phase, _, cells)| (phase, cells),
-        );
+        let (phase, cells) = match best {
+            Some((phase, _, seen)) => {
+                let in_mirror = self.cells(&crop.mirrored(), elevation, phase.in_mirror())?;
+                (phase, mean_of_looks(&seen, &in_mirror))
+            }
+            None => (PhaseHypothesis::First, vec![None; GRID * GRID]),
+        };
         Ok(spread(curves, &crop, &cells, phase, hypotheses))
     }
 

@@ -1,0 +1,93 @@
+//! `relight eval turn` as a user runs it, on turns that `relight synth --turn` makes.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn relight(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_relight"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+/// One small turn in a folder.
+fn write_turn(folder: &Path) {
+    let made = relight(&[
+        "synth",
+        "--turn",
+        "--light",
+        "monte-carlo",
+        "--seed",
+        "12",
+        "--count",
+        "1",
+        "--frames",
+        "24",
+        "--size",
+        "48",
+        "-o",
+        folder.to_str().unwrap(),
+    ]);
+    assert!(made.status.success(), "{made:?}");
+}
+
+#[test]
+fn a_turn_is_scored_by_each_method_and_written_for_others() {
+    let dir = tempfile::tempdir().unwrap();
+    let (data, table, frames) = (
+        dir.path().join("turns"),
+        dir.path().join("table.json"),
+        dir.path().join("frames"),
+    );
+    write_turn(&data);
+    let output = relight(&[
+        "eval",
+        "turn",
+        "--data",
+        data.to_str().unwrap(),
+        "--method",
+        "network",
+        "--method",
+        "turn",
+        "--frames",
+        frames.to_str().unwrap(),
+        "-o",
+        table.to_str().unwrap(),
+    ]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("turns, 1 of turns"), "{text}");
+    let json: serde_json::Value = serde_json::from_slice(&fs::read(table).unwrap()).unwrap();
+    let [network, solved] = [0, 1].map(|line: usize| json["lines"][line]["turns"][0].clone());
+    // Normals at random are 57 degrees off.
+    for score in [&network, &solved] {
+        assert!(score["mean_deg"].as_f64().unwrap() < 35.0, "{score}");
+    }
+    assert!(network["albedo"].is_null() && solved["albedo"].is_number());
+    let written = fs::read_dir(frames.join("synth-12-0000.data")).unwrap();
+    let mut names: Vec<String> = written
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(names.len(), 13);
+    assert_eq!(names[0], "L (001).png");
+    assert_eq!(names[12], "mask.png");
+}
+
+#[test]
+fn a_folder_that_holds_no_turns_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = dir.path().to_str().unwrap();
+    let output = relight(&["eval", "turn", "--data", data]);
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(told.contains(data), "{told}");
+}
