@@ -72,7 +72,7 @@ pub use sample::{Description, SynthSample, Whites};
 pub use shape::ShapeKind;
 pub use studio::Surroundings;
 pub use transfer::{
-    CURVE_COEFFICIENTS, CurveCoefficients, DrawnTurn, Rooms, Transfer, TransferCache,
+    CURVE_COEFFICIENTS, CurveCoefficients, DrawnTurn, RadianceTransfer, Rooms, TransferCache,
     TransferFinish, TransferMaterial, TransferRecipe,
 };
 pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};

@@ -10,7 +10,7 @@ use half::slice::HalfFloatSliceExt;
 use relit_data::shard::Digest;
 use serde::{Deserialize, Serialize};
 
-use super::cast::{Transfer, TransferFinish};
+use super::cast::{RadianceTransfer, TransferFinish};
 use super::views::TransferRecipe;
 use super::{BOUNCE_COEFFICIENTS, COEFFICIENTS};
 use crate::SynthError;
@@ -60,7 +60,7 @@ impl TransferCache {
     ///
     /// # Errors
     /// [`SynthError`] where it cannot be written.
-    pub fn view(&self, library: &Library, number: u64) -> Result<Transfer, SynthError> {
+    pub fn view(&self, library: &Library, number: u64) -> Result<RadianceTransfer, SynthError> {
         let path = self.path_of(number);
         if let Some(found) = fs::read(&path).ok().and_then(|bytes| decode(&bytes)) {
             return Ok(found);
@@ -96,7 +96,7 @@ fn digest_of(library: &Library) -> Digest {
     Digest::of(&bytes)
 }
 
-fn encode(transfer: &Transfer) -> Vec<u8> {
+fn encode(transfer: &RadianceTransfer) -> Vec<u8> {
     let header = Header {
         format: FORMAT.to_owned(),
         size: transfer.size,
@@ -137,7 +137,7 @@ fn push_vectors(bytes: &mut Vec<u8>, vectors: &[Vec3]) {
 }
 
 /// None where the bytes are not those of a whole file.
-fn decode(bytes: &[u8]) -> Option<Transfer> {
+fn decode(bytes: &[u8]) -> Option<RadianceTransfer> {
     let digest_length = Digest::of(&[]).to_string().len();
     let (bytes, digest) = bytes.split_at_checked(bytes.len().checked_sub(digest_length)?)?;
     if Digest::of(bytes).to_string().as_bytes() != digest {
@@ -166,7 +166,7 @@ fn decode(bytes: &[u8]) -> Option<Transfer> {
             })
         })
         .collect::<Option<Vec<_>>>()?;
-    (header.format == FORMAT && rest.0.is_empty()).then(|| Transfer {
+    (header.format == FORMAT && rest.0.is_empty()).then(|| RadianceTransfer {
         size: header.size,
         elevation: header.elevation,
         pixels,

@@ -13,7 +13,7 @@ const SETS: usize = 16;
 
 /// What each pixel of a view makes of light from all around. All lists run along the covered pixels.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Transfer {
+pub struct RadianceTransfer {
     /// Width and height, pixels.
     pub size: u32,
     /// The camera over the plate, radians.
@@ -86,7 +86,7 @@ impl Directions {
     }
 }
 
-impl Transfer {
+impl RadianceTransfer {
     /// Casts `rays` rays a pixel (all around; half of them leave the surface) from what a buffer shows.
     pub(super) fn cast(
         buffer: &GBuffer,

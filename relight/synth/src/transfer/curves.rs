@@ -4,7 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use relight_core::light::{Order, ShLight};
 
-use super::cast::{Transfer, TransferFinish, harmonics_at, table_frame};
+use super::cast::{RadianceTransfer, TransferFinish, harmonics_at, table_frame};
 use super::{BOUNCE_COEFFICIENTS, COEFFICIENTS, TRANSFER_ORDER, band, cosine_band};
 
 /// Harmonics of the table's angle that are computed.
@@ -35,7 +35,7 @@ struct PixelTransfer {
     gloss: Option<[f32; COEFFICIENTS]>,
 }
 
-impl Transfer {
+impl RadianceTransfer {
     /// What each pixel shows of a light, over a whole turn. `light` is in the table's frame at the angle 0; bands beyond
     /// 8 do not count.
     ///

@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3};
 
-use super::cast::{Transfer, TransferFinish};
+use super::cast::{RadianceTransfer, TransferFinish};
 use super::curves::{CURVE_COEFFICIENTS, CurveCoefficients, TransferMaterial};
 use super::rooms::Rooms;
 use crate::random::Random;
@@ -42,7 +42,7 @@ pub struct DrawnTurn {
 impl DrawnTurn {
     /// The turn of a seed: the view in a random material and room.
     #[must_use]
-    pub fn draw(view: &Transfer, rooms: &Rooms, seed: u64) -> Self {
+    pub fn draw(view: &RadianceTransfer, rooms: &Rooms, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let finish = finish(view, &mut random);
         let material = TransferMaterial::draw(&mut random);
@@ -196,7 +196,7 @@ impl TransferMaterial {
 }
 
 /// One of the view's finishes, mostly in its own colours, darker or brighter.
-fn finish(view: &Transfer, random: &mut Random) -> TransferFinish {
+fn finish(view: &RadianceTransfer, random: &mut Random) -> TransferFinish {
     let Some(finish) = view.finishes.get(random.index(view.finishes.len())) else {
         return TransferFinish {
             normals: view.towards_eye.clone(),

@@ -34,7 +34,7 @@ mod views;
 use relight_core::light::Order;
 
 pub use cache::TransferCache;
-pub use cast::{Transfer, TransferFinish};
+pub use cast::{RadianceTransfer, TransferFinish};
 pub use curves::{CURVE_COEFFICIENTS, CurveCoefficients, TransferMaterial};
 pub use drawn::DrawnTurn;
 pub use rooms::Rooms;

@@ -29,12 +29,13 @@ const MATT: TransferMaterial = TransferMaterial {
 };
 
 /// A ball far above any plate: nothing blocks its light.
-fn open_ball(elevation: f32) -> Transfer {
+fn open_ball(elevation: f32) -> RadianceTransfer {
     let mesh: Mesh = ShapeKind::Sphere.build(0);
     let projection = Projection::Orthographic;
     let placement = Pose::upright(elevation, 0.3, 0.9).place(&mesh, projection);
     let buffer = GBuffer::render(&mesh, placement, projection, 32);
-    let mut transfer = Transfer::cast(&buffer, &Occluder::new(&mesh, placement), elevation, 200, 3);
+    let mut transfer =
+        RadianceTransfer::cast(&buffer, &Occluder::new(&mesh, placement), elevation, 200, 3);
     transfer.finishes = vec![TransferFinish {
         normals: buffer.normals().to_vec(),
         albedo: vec![Vec3::splat(PI); buffer.len()],
@@ -93,14 +94,22 @@ fn value(curve: &CurveCoefficients, angle: f64, c: usize) -> f64 {
 
 #[test]
 fn the_cosine_s_bands_are_those_of_the_published_table() {
-    let expected = [3.141593, 2.094395, 0.785398, 0.0, -0.130900, 0.0, 0.049087];
+    let expected = [
+        PI,
+        2.0 * PI / 3.0,
+        PI / 4.0,
+        0.0,
+        -PI / 24.0,
+        0.0,
+        PI / 64.0,
+    ];
     for (l, expected) in expected.into_iter().enumerate() {
         assert!((cosine_band(l) - expected).abs() < 1e-5, "{l}");
     }
 }
 
 /// An object of which parts shade others, on a plate.
-fn standing(size: u32, rays: u32) -> (Transfer, GBuffer, Occluder) {
+fn standing(size: u32, rays: u32) -> (RadianceTransfer, GBuffer, Occluder) {
     let mesh: Mesh = ShapeKind::Blend.build(2);
     let elevation = 0.35;
     let projection = Projection::Perspective { distance: 5.0 };
@@ -113,7 +122,7 @@ fn standing(size: u32, rays: u32) -> (Transfer, GBuffer, Occluder) {
     };
     let buffer = GBuffer::render(&mesh, placement, projection, size);
     let occluder = Occluder::with_disc(&mesh, placement, &plate);
-    let mut transfer = Transfer::cast(&buffer, &occluder, elevation, rays, 3);
+    let mut transfer = RadianceTransfer::cast(&buffer, &occluder, elevation, rays, 3);
     transfer.finishes = vec![TransferFinish {
         normals: buffer.normals().to_vec(),
         albedo: vec![Vec3::ONE; buffer.len()],

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::cast::{Transfer, TransferFinish};
+use super::cast::{RadianceTransfer, TransferFinish};
 use crate::finish::Finish;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::Library;
@@ -31,7 +31,7 @@ pub struct TransferRecipe {
 impl TransferRecipe {
     /// Casts the view of a number.
     #[must_use]
-    pub fn cast(&self, library: &Library, number: u64) -> Transfer {
+    pub fn cast(&self, library: &Library, number: u64) -> RadianceTransfer {
         let mut random = Random::new(stream(stream(self.seed, 31), number));
         let recipe = Recipe {
             seed: random.seed(),
@@ -44,7 +44,8 @@ impl TransferRecipe {
         let buffer = GBuffer::render(&mesh, placement, stand.projection, self.size);
         let occluder = Occluder::with_disc(&mesh, placement, &stand.plate(&mesh));
         let elevation = stand.elevation();
-        let mut transfer = Transfer::cast(&buffer, &occluder, elevation, self.rays, random.seed());
+        let mut transfer =
+            RadianceTransfer::cast(&buffer, &occluder, elevation, self.rays, random.seed());
         transfer.finishes = (0..FINISHES)
             .map(|_| {
                 let finish = Finish::draw(&mut random, &buffer, library, 0.0);

@@ -69,7 +69,11 @@ fn leaning(surface: &Surface, degrees: f32) -> Normals<YUp> {
     let normal = |x: usize, y: usize| {
         let [a, b, c] = planes.pixel(x, y);
         // Every other column leans to one side, the rest to the other.
-        let sin = if (x + y / 3) % 2 == 0 { sin } else { -sin };
+        let sin = if (x + y / 3).is_multiple_of(2) {
+            sin
+        } else {
+            -sin
+        };
         [a * cos + c * sin, b, c * cos - a * sin]
     };
     Normals::new(Planes::from_fn(planes.extent(), normal))
