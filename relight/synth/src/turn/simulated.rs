@@ -16,7 +16,7 @@ use crate::camera::CameraModel;
 use crate::finish::Finish;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::Library;
-use crate::lighting::{Environment, Lighting, Material, Shaded, SyntheticScene};
+use crate::lighting::{Environment, Lighting, Material, Method, Shaded, SyntheticScene};
 use crate::mesh::Mesh;
 use crate::png::{Sixteen, encode_sixteen};
 use crate::random::{Random, stream};
@@ -73,7 +73,11 @@ impl<'a> SimulatedTurn<'a> {
             scene.buffer(),
             &library.panoramas,
         );
-        let level = |around: Environment| around.level(&mut random, stand.elevation());
+        // Nine coefficients are no room, and bright skies make them negative below: they stay as they are drawn.
+        let level = |around: Environment| match around.method {
+            Method::OrderTwo => around,
+            Method::Smooth | Method::MonteCarlo => around.level(&mut random, stand.elevation()),
+        };
         let lighting = Lighting {
             has_shadows: recipe.shadows,
             environment: lighting.environment.clone().map(level),
