@@ -14,7 +14,7 @@ use std::process::Command;
 use relight_core::files::{write_exr, write_png};
 use relight_core::image::{Depth, Extent, Linear, Planes, Rgb, Srgb, Transfer};
 use relight_core::light::NormalsFrame;
-use relight_core::light::{Normals, ShLight, YDown, YUp};
+use relight_core::light::{Direction, Normals, Rotation, ShLight, YDown, YUp};
 use relight_core::render::{DiffuseForm, DiffuseLayer, Gloss, Layers, SpecularForm, Surface};
 use relight_eval::{
     EvalError, HighlightMethod, IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, LightMethod,
@@ -223,6 +223,33 @@ fn predicted_light_is_judged_by_the_shading_that_it_makes() {
     fs::write(found.join("cup/light.txt"), "1 2\n").unwrap();
     let text = said(run());
     assert!(text.contains("light.txt does not hold light"), "{text}");
+}
+
+#[test]
+fn predicted_light_is_judged_by_where_it_comes_from() {
+    let dir = tempfile::tempdir().unwrap();
+    let (truth, found) = (dir.path().join("truth"), dir.path().join("net"));
+    write_set(&truth);
+    let turned = Rotation::about(Direction::UP, 0.3);
+    for name in ["cup", "pear"] {
+        fs::create_dir_all(found.join(name)).unwrap();
+        let text = light().rotated(&turned).to_string();
+        fs::write(found.join(name).join("light.txt"), text).unwrap();
+    }
+    let methods = [
+        LightMethod::Predictions(predictions(&found)),
+        LightMethod::Oracle,
+        LightMethod::Even,
+    ];
+    let form = DiffuseForm::Irradiance;
+    let table = evaluate_light(&set(&truth), "both", form, &methods, &|| {}).unwrap();
+    let directions = table.lines.iter().filter(|line| line.part == "direction");
+    let degrees: Vec<f64> = directions.map(|line| value(line, "degrees")).collect();
+    // Band 1 has no vertical part, so that it turns by the whole angle.
+    for (found, expected) in degrees.iter().zip([0.3_f64.to_degrees(), 0.0, 90.0]) {
+        assert!((found - expected).abs() < 0.1, "{degrees:?}");
+    }
+    assert_eq!(degrees.len(), 3);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::normals::known;
 use super::run::{Scored, add_method, largest, measured, need};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use relight_core::image::{Linear, Rgb};
-use relight_core::light::{Order, ShLight};
+use relight_core::light::{Direction, Order, ShLight};
 use relight_core::metrics::{Comparison, ScaleFit, Ssim};
 use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
 use relight_reader::{TruthSample, TruthSet};
@@ -32,21 +32,24 @@ impl LightMethod {
     fn light(&self, sample: &TruthSample, known: &[bool]) -> Result<ShLight, EvalError> {
         match self {
             Self::Even => Ok(ShLight::even(Order::TWO, [1.0; 3])),
-            Self::Oracle => {
-                let normals = need(sample, "normals", &sample.normals)?;
-                let shading = need(sample, "shading", &sample.shading)?;
-                fit_light(normals, shading, known, 0.0).map_err(|source| EvalError::Unlit {
-                    sample: sample.name.clone(),
-                    source,
-                })
-            }
+            Self::Oracle => fitted(sample, known),
             Self::Predictions(predictions) => predictions.light(&sample.name),
         }
     }
 }
 
-/// MSE, SMSE and SSIM of the shading that light makes on the true normals, for each method. `form`
-/// says how shading follows from the coefficients.
+/// The light of order 2 that is nearest to the true shading on the true normals.
+fn fitted(sample: &TruthSample, known: &[bool]) -> Result<ShLight, EvalError> {
+    let normals = need(sample, "normals", &sample.normals)?;
+    let shading = need(sample, "shading", &sample.shading)?;
+    fit_light(normals, shading, known, 0.0).map_err(|source| EvalError::Unlit {
+        sample: sample.name.clone(),
+        source,
+    })
+}
+
+/// MSE, SMSE and SSIM of the shading that light makes on the true normals, and the angle between its direction and that
+/// of the true light, for each method. `form` says how shading follows from the coefficients.
 ///
 /// # Errors
 /// Where the ground truth or a prediction cannot be read or measured.
@@ -66,6 +69,9 @@ pub fn evaluate_light(
                 "MSE and SSIM after both were brought to a maximum of 1; SSIM by {}",
                 Ssim::Gaussian.name()
             ),
+            "direction: degrees between the bands 1 of the light and of the true light (where the set has none, of that \
+             fitted to the true shading), 90 where one of them has no direction"
+                .to_owned(),
         ],
         lines: Vec::new(),
         images: Vec::new(),
@@ -81,7 +87,9 @@ pub fn evaluate_light(
                 let known = known(sample, normals);
                 let light = method.light(sample, &known)?;
                 let found = DiffuseLayer::new(&light, form).shading(normals);
-                score(sample, &found, &known)
+                let mut lines = score(sample, &found, &known)?;
+                lines.push(direction_score(sample, &light, &known)?);
+                Ok(lines)
             },
         )?;
     }
@@ -115,6 +123,34 @@ fn score(
         ),
         line(vec![("SMSE", pair.mse(ScaleFit::Image))], ScaleFit::Image),
     ])
+}
+
+fn direction_score(
+    sample: &TruthSample,
+    found: &ShLight,
+    known: &[bool],
+) -> Result<Scored, EvalError> {
+    let truth = match &sample.light {
+        Some(light) => light.clone(),
+        None => fitted(sample, known)?,
+    };
+    let cosine = match (direction(&truth), direction(found)) {
+        (Some(truth), Some(found)) => truth.dot(found),
+        _ => 0.0,
+    };
+    Ok(Scored {
+        part: "direction",
+        measures: vec![("degrees", cosine.clamp(-1.0, 1.0).acos().to_degrees())],
+        colour: "mean of the channels",
+        scale: ScaleFit::None.name(),
+        mask: MaskRule::Known,
+    })
+}
+
+/// Where most of the light comes from: its band 1, the mean of the channels. None of even light.
+fn direction(light: &ShLight) -> Option<Direction> {
+    let [y, z, x] = [1, 2, 3].map(|at: usize| light.coefficients()[at].iter().sum::<f64>());
+    Direction::new(x, y, z)
 }
 
 /// The image with its largest value under the mask brought to 1; unchanged where all is dark.

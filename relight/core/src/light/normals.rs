@@ -1,5 +1,6 @@
 //! Normal maps that know which way y points.
 
+use std::f32::consts::FRAC_PI_2;
 use std::fmt::Debug;
 use std::marker::PhantomData;
 
@@ -192,6 +193,23 @@ pub enum NormalsFrame {
 }
 
 impl Normals<YUp> {
+    /// The same map with each normal's angle to the viewer's axis times `factor`, at most a right angle. What points away from
+    /// the viewer stays as it is.
+    #[must_use]
+    pub fn steeper(mut self, factor: f32) -> Self {
+        let [x, y, z] = self.planes.planes_mut();
+        for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+            let across = x.hypot(*y);
+            if across <= 0.0 || *z <= 0.0 {
+                continue;
+            }
+            let tilt = (factor * across.atan2(*z)).min(FRAC_PI_2);
+            let (sin, cos) = tilt.sin_cos();
+            [*x, *y, *z] = [*x * sin / across, *y * sin / across, cos.max(0.0)];
+        }
+        self
+    }
+
     /// The front of a sphere that fills a square image of `side` pixels, seen from far away.
     #[must_use]
     pub fn sphere(side: usize) -> Self {
@@ -233,6 +251,26 @@ mod tests {
             .zip(three().planes.into_planes());
         for (a, b) in pairs {
             assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 3e-5));
+        }
+    }
+
+    #[test]
+    fn steeper_normals_are_tilted_by_a_factor_and_never_beyond_the_outline() {
+        let (sin, cos) = 0.4_f32.sin_cos();
+        let vectors = [[sin, 0.0, cos], [0.0, 0.6, 0.8], [0.0; 3], [0.0, 0.0, -1.0]];
+        let flat = Normals::<YUp>::new(Planes::from_fn(Extent::new(4, 1), |x, _| vectors[x]));
+        let near = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
+        let steep = flat.clone().steeper(1.5);
+        assert!(near(
+            steep.planes().pixel(0, 0),
+            [0.6_f32.sin(), 0.0, 0.6_f32.cos()]
+        ));
+        assert!(near(
+            flat.steeper(10.0).planes().pixel(1, 0),
+            [0.0, 1.0, 0.0]
+        ));
+        for x in [2, 3] {
+            assert!(near(steep.planes().pixel(x, 0), vectors[x]));
         }
     }
 

@@ -24,6 +24,10 @@ pub const MOST_PIXELS: usize = 64_000_000;
 pub const WORKING_SIDE: usize = 256;
 /// Keeps the light from behind, which normals hardly show, small: see [`fit_light`].
 const STIFFNESS: f64 = 1e-3;
+/// By how much normals are tilted further before light is fitted to them: the network's are flatter than the true ones, and
+/// light fitted to flat normals swings aside. Measured: on 48 synthetic pictures the direction is 34.7 degrees off with 1,
+/// 31.1 with 1.25, and the shading's error after one scale is alike; beyond it that grows.
+const TILT: f32 = 1.25;
 /// Longest band 1 of a light, in parts of its mean. A single lamp has √3; far above it, the fit follows cast shadows to
 /// a light that is negative in most directions.
 const MOST_ONE_SIDED: f64 = 2.5;
@@ -312,8 +316,9 @@ impl Decomposer {
         let normals = others.unwrap_or(maps.normals);
         let shading = normalised(maps.shading, &known);
         let target = Rgb::new(in_colour(shading.clone()));
-        let light = fit_possible_light(&normals, &target, &known)?;
-        let lit = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&normals);
+        let steep = normals.clone().steeper(TILT);
+        let light = fit_possible_light(&steep, &target, &known)?;
+        let lit = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&steep);
         let gloss = if is_glossy {
             let highlight = possible_highlight(&whole.picture, &known, maps.highlight);
             fit_gloss(&light, &normals, &highlight)?
