@@ -11,7 +11,7 @@ use relight_nets::Weights;
 use relight_synth::{FrameTruth, TurnDescription};
 use relight_turn::{
     Elevation, NormalsSource, ReadTurn, RotationDirection, TableFrame, TurnError, TurnNetwork,
-    TurnOptions, TurnPrediction, TurnPrior, prior_normals, read_curves, solve_turn,
+    TurnOptions, TurnPrediction, TurnPrior, prior_albedo, prior_normals, read_curves, solve_turn,
 };
 use relit_data::shard::Dataset;
 use serde::Serialize;
@@ -293,6 +293,13 @@ impl Answer {
                 Some(TurnPrior::from(normals))
             }
             TurnMethod::Outline | TurnMethod::KnownLight => None,
+        };
+        let prior = match prior {
+            Some(prior) => Some(TurnPrior {
+                albedo: Some(prior_albedo(&networks.photo, &turn.first, &turn.mask)?),
+                ..prior
+            }),
+            None => None,
         };
         let options = TurnOptions {
             elevation: truth.elevation,

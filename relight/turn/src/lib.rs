@@ -33,7 +33,7 @@ pub use fit::environment::fit_turn_light;
 pub use fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure};
 pub use fit::given_light::read_given_light;
 pub use fit::options::{TurnOptions, TurnPrior};
-pub use fit::prior::{NormalsSource, prior_normals};
+pub use fit::prior::{NormalsSource, prior_albedo, prior_normals};
 pub use fit::probe_light::ProbeLight;
 pub use fit::solution::TurnSolution;
 pub use fit::solve::solve_turn;

@@ -1,13 +1,13 @@
 //! What is known of a turn beforehand.
 
-use relight_core::image::Planes;
+use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{Normals, ShLight, YUp};
 
 use crate::model::frame::Elevation;
 use crate::model::material::MaterialKind;
 use crate::network::predict::TurnPrediction;
 
-/// Normals that are expected before a turn is solved.
+/// What is expected of the object before a turn is solved.
 #[derive(Debug, Clone)]
 pub struct TurnPrior {
     /// Unit normals.
@@ -15,6 +15,9 @@ pub struct TurnPrior {
     /// By how much each is expected to be off, degrees, where that is known: then a normal counts the more, the
     /// surer it is.
     pub expected_errors: Option<Planes<1>>,
+    /// The albedo that is expected, each channel in any unit: what a pixel has whose normal is hardly to be trusted, and
+    /// so its shading.
+    pub albedo: Option<Rgb<Linear>>,
 }
 
 impl From<Normals<YUp>> for TurnPrior {
@@ -22,6 +25,7 @@ impl From<Normals<YUp>> for TurnPrior {
         Self {
             normals,
             expected_errors: None,
+            albedo: None,
         }
     }
 }
@@ -31,6 +35,7 @@ impl From<TurnPrediction> for TurnPrior {
         Self {
             normals: found.normals,
             expected_errors: Some(found.expected_errors),
+            albedo: None,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Normals of a network, or of a file, to start from.
+//! Normals of a network, or of a file, to start from, and the albedo that a network of photographs sees.
 
 use std::path::{Path, PathBuf};
 
@@ -50,6 +50,57 @@ impl NormalsSource {
     }
 }
 
+/// Parameters of the expected albedo.
+struct AlbedoParameters {
+    /// Frames that are decomposed, spread over the turn. Measured: with twelve the error is no less.
+    frames: usize,
+    /// The least albedo that counts: darker ones are noise. Numerical.
+    darkest: f32,
+}
+
+const PARAMETERS: AlbedoParameters = AlbedoParameters {
+    frames: 4,
+    darkest: 1e-4,
+};
+
+/// The albedo of the decomposing network: the geometric mean over a few frames of the turn, each of which the network
+/// sees in another light. Its unit is not known.
+///
+/// # Errors
+/// Where the network fails.
+pub fn prior_albedo(
+    weights: &Weights,
+    frames: &[Rgb<Linear>],
+    mask: &Planes<1>,
+) -> Result<Rgb<Linear>, TurnError> {
+    let decomposer = Decomposer::new(weights)?;
+    let every = frames.len().div_ceil(PARAMETERS.frames).max(1);
+    let chosen = frames.iter().step_by(every);
+    let part = 1.0 / chosen.len() as f32;
+    let mut logarithms = Planes::<3>::zeros(mask.extent());
+    for picture in chosen {
+        let found = decomposer.decompose(picture, mask, &without_gate())?;
+        let pairs = logarithms
+            .planes_mut()
+            .into_iter()
+            .zip(found.albedo.planes().planes());
+        for (sum, plane) in pairs {
+            sum.iter_mut()
+                .zip(plane)
+                .for_each(|(sum, value)| *sum += part * value.max(PARAMETERS.darkest).ln());
+        }
+    }
+    Ok(Rgb::new(logarithms.map(f32::exp)))
+}
+
+/// How frames of a turn are decomposed.
+fn without_gate() -> DecomposeOptions {
+    DecomposeOptions {
+        specular: SpecularGate::Off,
+        ..DecomposeOptions::default()
+    }
+}
+
 /// The normals of a file, or the mean of a network's over some frames of the turn. `own` gives the caller's weights of
 /// the decomposing network.
 ///
@@ -79,13 +130,9 @@ pub fn prior_normals(
             decomposer
         }
     };
-    let options = DecomposeOptions {
-        specular: SpecularGate::Off,
-        ..DecomposeOptions::default()
-    };
     let mut sums = Planes::<3>::zeros(mask.extent());
     for picture in frames {
-        let found = decomposer.decompose(picture, mask, &options)?;
+        let found = decomposer.decompose(picture, mask, &without_gate())?;
         let pairs = sums
             .planes_mut()
             .into_iter()

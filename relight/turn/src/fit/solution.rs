@@ -53,7 +53,7 @@ impl TurnSolution {
 
     /// The albedo: in the light's units where that was known, else in such units that the mean shading of the object
     /// over the turn is 1 in each channel. Where a normal is hardly to be trusted, it is that of the same colour
-    /// around.
+    /// around, and that which was expected.
     #[must_use]
     pub fn albedo(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| self.albedo[pixel].map(|v| v as f32)))

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use relight_core::statistics::{median, quantile};
 
 use crate::error::TurnError;
+use crate::fit::albedo::toward_expected;
 use crate::fit::blocks::{BLOCK_PARAMETERS, starts};
 use crate::fit::confidence::{
     ERROR_PARAMETERS, FittedPixels, OwnError, common_error, errors_beside_prior, own_errors,
@@ -107,6 +108,16 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
             errors_beside_prior(&solver.fits, prior, &own_errors, common)
         }
         _ => own_errors.iter().map(|own| own.with(common)).collect(),
+    };
+    let albedo = match options
+        .prior
+        .as_ref()
+        .and_then(|prior| prior.albedo.as_ref())
+    {
+        Some(expected) if solver.model.material == MaterialKind::Diffuse => {
+            toward_expected(curves, &albedo, expected, &expected_errors)
+        }
+        _ => albedo,
     };
     Ok(TurnSolution {
         has_prior,

@@ -8,7 +8,8 @@ use relight_core::light::ShLight;
 use relight_nets::{NetError, Weights};
 use relight_turn::{
     Elevation, MaterialKind, NormalsSource, Probe, ProbeBall, ProbePlace, ReadTurn,
-    RotationDirection, TurnNetwork, TurnOptions, TurnPrior, prior_normals, read_given_light,
+    RotationDirection, TurnNetwork, TurnOptions, TurnPrior, prior_albedo, prior_normals,
+    read_given_light,
 };
 
 use crate::shipped;
@@ -177,16 +178,25 @@ impl Arguments {
 
     /// Normals to start from.
     fn prior(&self, source: &InitialNormals, turn: &ReadTurn) -> Result<TurnPrior, Box<dyn Error>> {
-        match source {
+        let (y, shown) = (self.normals_y.into(), &turn.first);
+        let prior: TurnPrior = match source {
             InitialNormals::Turn => {
                 let network = TurnNetwork::new(&self.turn_weights()?)?;
-                Ok(network.predict(&turn.curves, self.elevation())?.into())
+                network.predict(&turn.curves, self.elevation())?.into()
             }
             InitialNormals::Photo(source) => {
-                let (y, shown) = (self.normals_y.into(), &turn.first);
-                Ok(prior_normals(source, shipped::weights, y, shown, &turn.mask)?.into())
+                prior_normals(source, shipped::weights, y, shown, &turn.mask)?.into()
             }
-        }
+        };
+        // In a light that is known, curves tell the albedo, and in its units.
+        let is_lit = self.light.is_some() || self.probe.is_some();
+        let albedo = if is_lit {
+            None
+        } else {
+            let weights = shipped::weights()?;
+            Some(prior_albedo(&weights, shown, &turn.mask)?)
+        };
+        Ok(TurnPrior { albedo, ..prior })
     }
 
     fn turn_weights(&self) -> Result<Weights, NetError> {
