@@ -82,6 +82,45 @@ fn a_turn_is_scored_by_each_method_and_written_for_others() {
     assert_eq!(names[12], "mask.png");
 }
 
+/// What `relight turn` writes and warns of with a rotation direction.
+fn solved(data: &Path, direction: &str, out: &Path) -> (serde_json::Value, String) {
+    let shard = data.join("shards").join("synth-12-0000-0.tar");
+    let output = relight(&[
+        "turn",
+        shard.to_str().unwrap(),
+        "--direction",
+        direction,
+        "--no-video",
+        "-o",
+        out.to_str().unwrap(),
+    ]);
+    assert!(matches!(output.status.code(), Some(0 | 3)), "{output:?}");
+    let json = fs::read(out.join("turn.json")).unwrap();
+    let told = String::from_utf8(output.stderr).unwrap();
+    (serde_json::from_slice(&json).unwrap(), told)
+}
+
+#[test]
+fn a_turn_read_the_wrong_way_is_doubted_by_the_network() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = dir.path().join("turns");
+    write_turn(&data);
+    let (right, told) = solved(&data, "counter-clockwise", &dir.path().join("right"));
+    let (wrong, warned) = solved(&data, "clockwise", &dir.path().join("wrong"));
+    let other = |json: &serde_json::Value| json["network"]["other_direction_deg"].as_f64().unwrap();
+    let phases = right["network"]["phases"].as_array().unwrap();
+    let least = phases
+        .iter()
+        .map(|phase| phase["expected_error_deg"].as_f64().unwrap())
+        .fold(f64::INFINITY, f64::min);
+    assert!((least - other(&wrong)).abs() < 1e-3, "{right} {wrong}");
+    assert!(other(&right) > other(&wrong), "{right} {wrong}");
+    let doubt = "in the other rotation direction";
+    assert!(!told.contains(doubt), "{told}");
+    assert!(warned.contains(doubt), "{warned}");
+    assert!(warned.contains("--direction counter-clockwise"), "{warned}");
+}
+
 #[test]
 fn a_folder_that_holds_no_turns_is_named() {
     let dir = tempfile::tempdir().unwrap();

@@ -42,7 +42,7 @@ pub use model::lighting::TableLight;
 pub use model::material::MaterialKind;
 pub use network::answer::NetworkNormal;
 pub use network::input::{NetworkTurn, PhaseHypothesis, network_input};
-pub use network::predict::{TurnNetwork, TurnPrediction};
+pub use network::predict::{HypothesisFigures, PhaseFigure, TurnNetwork, TurnPrediction};
 pub use observe::conditioning::Conditioning;
 pub use observe::curves::{CurveBuilder, TurnCurves};
 pub use observe::exposure::ExposureStep;

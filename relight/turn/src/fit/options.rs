@@ -5,7 +5,7 @@ use relight_core::light::{Normals, ShLight, YUp};
 
 use crate::model::frame::Elevation;
 use crate::model::material::MaterialKind;
-use crate::network::predict::TurnPrediction;
+use crate::network::predict::{HypothesisFigures, TurnPrediction};
 
 /// What is expected of the object before a turn is solved.
 #[derive(Debug, Clone)]
@@ -18,6 +18,8 @@ pub struct TurnPrior {
     /// The albedo that is expected, each channel in any unit: what a pixel has whose normal is hardly to be trusted, and
     /// so its shading.
     pub albedo: Option<Rgb<Linear>>,
+    /// What the network of turns took the turn for, where the normals are its own.
+    pub hypotheses: Option<HypothesisFigures>,
 }
 
 impl From<Normals<YUp>> for TurnPrior {
@@ -26,6 +28,7 @@ impl From<Normals<YUp>> for TurnPrior {
             normals,
             expected_errors: None,
             albedo: None,
+            hypotheses: None,
         }
     }
 }
@@ -36,6 +39,7 @@ impl From<TurnPrediction> for TurnPrior {
             normals: found.normals,
             expected_errors: Some(found.expected_errors),
             albedo: None,
+            hypotheses: Some(found.hypotheses),
         }
     }
 }

@@ -11,6 +11,7 @@ use crate::model::frame::{Elevation, TableFrame};
 use crate::model::lighting::TableLight;
 use crate::model::material::MaterialKind;
 use crate::model::shading::ShadingModel;
+use crate::network::predict::HypothesisFigures;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
 
@@ -38,6 +39,7 @@ pub struct TurnSolution {
     pub(crate) initialisations: Vec<InitialisationFigure>,
     pub(crate) materials: Vec<MaterialFigure>,
     pub(crate) has_prior: bool,
+    pub(crate) hypotheses: Option<HypothesisFigures>,
     pub(crate) is_prior_left_out: bool,
     pub(crate) direction: Option<DirectionFigure>,
     pub(crate) given_material: Option<MaterialKind>,
@@ -126,6 +128,12 @@ impl TurnSolution {
     #[must_use]
     pub const fn direction(&self) -> Option<DirectionFigure> {
         self.direction
+    }
+
+    /// What the network of turns took the turn for, where its normals were given.
+    #[must_use]
+    pub const fn hypotheses(&self) -> Option<&HypothesisFigures> {
+        self.hypotheses.as_ref()
     }
 
     /// Whether the given normals were left out: a shape inflated out of the outline fits the turn better.

@@ -121,6 +121,10 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
     };
     Ok(TurnSolution {
         has_prior,
+        hypotheses: options
+            .prior
+            .as_ref()
+            .and_then(|prior| prior.hypotheses.clone()),
         is_prior_left_out,
         direction,
         given_material: options.material,

@@ -7,6 +7,7 @@
 use std::f32::consts::TAU;
 
 use relight_nets::TURN_INPUTS;
+use serde::Serialize;
 
 /// Harmonics of which the network sees all channels.
 const COLOURED: usize = 4;
@@ -41,7 +42,8 @@ const PARAMETERS: InputParameters = InputParameters {
 
 /// Which way the room is taken to be turned. The phase of the first harmonic says it, where that is strong; in a room
 /// that is bright on two opposite sides that of the second says it, up to half a turn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PhaseHypothesis {
     /// By the first harmonic.
     First,

@@ -9,6 +9,7 @@ use crate::fit::solution::TurnSolution;
 use crate::model::frame::Elevation;
 use crate::model::lighting::{TERMS, TableLight};
 use crate::model::material::MaterialKind;
+use crate::network::predict::HypothesisFigures;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::exposure::ExposureStep;
 use crate::observe::strip::{PanoramaStrip, StripFigures};
@@ -41,6 +42,8 @@ pub struct TurnFigures {
     /// How well both rotation directions fit the turn; none where that is not observable.
     #[serde(rename = "sense")]
     pub(crate) direction: Option<DirectionFigure>,
+    /// What the network of turns took the turn for; none where it was not asked.
+    pub(crate) network: Option<HypothesisFigures>,
     /// The residual of a curve, over the energy of its variation, the median.
     pub(crate) residual: f64,
     /// The angle that normals are expected to be off, degrees, the median.

@@ -168,6 +168,7 @@ impl TurnFiles<'_> {
             material: solution.material(),
             materials: solution.materials().to_vec(),
             direction: solution.direction(),
+            network: solution.hypotheses().cloned(),
             residual: solution.residual(),
             expected_error_deg: solution.expected_error_deg(),
             gloss,

@@ -45,6 +45,16 @@ pub enum TurnWarning {
         "the two sides of the picture do not show the same surroundings: there is no room.png, and the rotation direction is not checked"
     )]
     NoPanoramaStrip,
+    /// The network of turns is surer of the turn in the other rotation direction.
+    #[error(
+        "the network of turns expects its normals to be {other_deg:.0} degrees off in the other rotation direction, and {expected_deg:.0} in this one"
+    )]
+    SurerInOtherDirection {
+        /// The mean expected error in the given direction, degrees.
+        expected_deg: f32,
+        /// The same in the other one.
+        other_deg: f32,
+    },
     /// The other rotation direction fits the turn clearly better.
     #[error("the other rotation direction fits the turn clearly better, with a residual of {:.0} % instead of {:.0} %", 100.0 * other_residual, 100.0 * residual)]
     OtherDirection {
@@ -133,6 +143,13 @@ impl TurnWarning {
     /// That of the rotation direction, where no background says more.
     #[must_use]
     pub fn of_direction(solution: &TurnSolution) -> Option<Self> {
+        let network = solution.hypotheses();
+        if let Some(figures) = network.filter(|figures| figures.is_direction_doubted()) {
+            return Some(Self::SurerInOtherDirection {
+                expected_deg: figures.expected_error_deg(),
+                other_deg: figures.other_direction_deg,
+            });
+        }
         let figure = solution.direction().filter(|figure| figure.is_doubted())?;
         Some(Self::OtherDirection {
             residual: figure.residual,

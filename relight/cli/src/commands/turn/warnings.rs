@@ -27,7 +27,9 @@ fn advice(warning: &TurnWarning, arguments: &Arguments) -> Option<String> {
     let other = arguments.direction_name().other();
     Some(match warning {
         TurnWarning::BackgroundMovesOtherWay => format!(", give --direction {other}"),
-        TurnWarning::OtherDirection { .. } => format!(": try --direction {other}"),
+        TurnWarning::OtherDirection { .. } | TurnWarning::SurerInOtherDirection { .. } => {
+            format!(": try --direction {other}")
+        }
         TurnWarning::AssumedElevation { .. } => ": give --elevation or --rim".to_owned(),
         TurnWarning::OtherMaterial { material, .. } => format!(": try --material {material}"),
         TurnWarning::MetalInUnknownLight => {

@@ -88,6 +88,7 @@ fn normals_that_know_how_far_they_are_off_count_by_it_and_their_errors_are_told(
             normals: leaning(&surface, 10.0),
             expected_errors: Some(Planes::filled(curves.extent(), [expected_deg])),
             albedo: None,
+            hypotheses: None,
         };
         let options = TurnOptions {
             elevation: elevation(),
