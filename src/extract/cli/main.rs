@@ -1,7 +1,8 @@
 //! `relit-extract`: turns recordings into training shards of masked frames, joins, verifies and
-//! sums them up.
+//! sums them up, and describes them for those who publish them.
 
 mod arguments;
+mod carding;
 mod extracting;
 mod merging;
 mod stats;
@@ -21,6 +22,7 @@ fn main() -> ExitCode {
             out,
             options,
         } => console.finish(extracting::run(console, &inputs, &out, &options)),
+        Command::Card { out, facts } => console.finish(carding::run(console, &out, &facts)),
         Command::Merge { out } => console.finish(merging::run(console, &out)),
         Command::Stats { out, html } => console.finish(stats::run(console, &out, html.as_deref())),
         Command::Verify { out } => console.finish(verifying::run(console, &out)),
