@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-programs setup-train test test-rig test-slurm test-objects lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-train test test-rig test-slurm test-objects packages test-packages image release lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -69,6 +69,18 @@ test-objects: setup $(OBJECTS_VENV)/ready ## Extract from and to object stores, 
 	cargo test --locked -p relit-extract --features object-store --test objects
 	cargo build --locked -p relit-extract --features object-store
 	tests/objects/s3 $(TARGET)/debug/relit-extract $(abspath $(OBJECTS_VENV))/bin/python
+
+packages: setup-programs ## Make the Debian packages relit-rig, relit and relight
+	@.ci/packages
+
+test-packages: packages ## Install, use and purge the packages in clean Debian systems
+	@tests/packages/run
+
+image: packages ## Make a container image of relit-extract, relit-mask and relight, as an OCI layout
+	@.ci/image
+
+release: packages image ## Make all that a release has: packages, image, checksums, list of crates
+	@.ci/release
 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check

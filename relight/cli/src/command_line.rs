@@ -81,6 +81,9 @@ impl Verb {
 
 /// Runs the verb that the command line names; its exit code.
 pub(crate) fn run() -> ExitCode {
+    if let Some(code) = relit_console::written_manual(CommandLine::command()) {
+        return code;
+    }
     let matches = CommandLine::command().get_matches();
     let line = CommandLine::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     if let Some(fault) = line.verb.fault() {

@@ -264,6 +264,11 @@ impl From<LayoutName> for Layout {
     }
 }
 
+/// The command line as its manual shows it.
+pub(crate) fn command() -> clap::Command {
+    CommandLine::command()
+}
+
 /// Parses the command line; ends the program with exit code 2 if it is wrong.
 pub(crate) fn parse() -> Arguments {
     let line = CommandLine::parse();
