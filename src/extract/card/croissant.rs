@@ -3,7 +3,7 @@
 use relit_data::shard::{Dataset, Layout};
 use serde_json::{Value, json};
 
-use super::{CardFacts, SummedFile};
+use super::facts::{CardFacts, SummedFile};
 
 /// Columns of the tables that are described as fields: name, type, meaning.
 const FIELDS: [(&str, &str, &str); 12] = [

@@ -4,6 +4,7 @@
 //! rows as records. They are made out of `dataset.json` and the tables; only checksums need the shards.
 
 mod croissant;
+mod facts;
 mod readme;
 
 use std::fs::File;
@@ -14,50 +15,15 @@ use relit_data::durable::write_whole;
 use relit_data::shard::{Dataset, Layout, Overview, ShardError};
 use sha2::{Digest as _, Sha256};
 
+use self::facts::SummedFile;
 use crate::ExtractError;
+
+pub use self::facts::CardFacts;
 
 /// The files that are written.
 const FILES: [&str; 3] = ["README.md", "croissant.json", "SHA256SUMS"];
 /// Bytes that are read at a time.
 const PIECE: usize = 1 << 20;
-
-/// What a data set cannot say of itself.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct CardFacts {
-    /// Its name.
-    pub name: String,
-    /// Its licence: an SPDX identifier, or a URL.
-    pub license: String,
-    /// Who made it.
-    pub creators: Vec<String>,
-    /// Where it is published.
-    pub url: String,
-    /// What it is.
-    pub description: String,
-    /// When it is published, YYYY-MM-DD.
-    pub published: String,
-    /// Its version.
-    pub version: String,
-    /// How to cite it.
-    pub cite: Option<String>,
-}
-
-impl CardFacts {
-    /// The licence as a URL.
-    fn license_url(&self) -> String {
-        match self.license.contains("://") {
-            true => self.license.clone(),
-            false => format!("https://spdx.org/licenses/{}.html", self.license),
-        }
-    }
-}
-
-/// A file of the data set with its checksum.
-struct SummedFile {
-    name: String,
-    bytes: u64,
-    sha256: String,
-}
 
 /// Writes the files that describe the data set in `out`: their names. `progress` is told how many files are summed of how
 /// many.

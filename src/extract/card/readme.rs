@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use relit_data::counts::count_of;
 use relit_data::shard::{Dataset, Overview, SamplingBasis};
 
-use super::{CardFacts, SummedFile};
+use super::facts::{CardFacts, SummedFile};
 
 /// The content of `README.md`.
 pub(super) fn readme(
