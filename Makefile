@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-programs setup-train test test-rig test-slurm test-objects lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-train test test-rig test-slurm test-objects packages test-packages test-python wheel bench-python image release lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -23,6 +23,7 @@ BENCH_MASK ?= fixtures/$(SESSION)/mask_gt.png
 BENCH_RUNS ?= 3
 BENCH_VENV := $(TARGET)/bench-venv
 OBJECTS_VENV := $(TARGET)/objects-venv
+PYTHON_VENV := $(TARGET)/python-venv
 
 # The turntable's firmware, and the emulated chip that its tests run on.
 FIRMWARE := $(TARGET)/firmware
@@ -69,6 +70,31 @@ test-objects: setup $(OBJECTS_VENV)/ready ## Extract from and to object stores, 
 	cargo test --locked -p relit-extract --features object-store --test objects
 	cargo build --locked -p relit-extract --features object-store
 	tests/objects/s3 $(TARGET)/debug/relit-extract $(abspath $(OBJECTS_VENV))/bin/python
+
+packages: setup-programs ## Make the Debian packages relit-rig, relit and relight
+	@.ci/packages
+
+test-packages: packages ## Install, use and purge the packages in clean Debian systems
+	@tests/packages/run
+
+wheel: $(PYTHON_VENV)/ready ## Make the Python package, one wheel for Python 3.9 and newer
+	$(PYTHON_VENV)/bin/maturin build --release --locked -m relight/python/Cargo.toml -i $(PYTHON_VENV)/bin/python \
+	    --out $(TARGET)/packages
+
+test-python: wheel $(DEMO)/mask.png ## Install the Python package and test it; tests of torch run where it is installed
+	$(PYTHON_VENV)/bin/pip install --quiet --force-reinstall --no-deps $(TARGET)/packages/relit-*.whl
+	cd relight/python/tests && RELIT_DATA=$(abspath $(DEMO))/out $(abspath $(PYTHON_VENV))/bin/python -m pytest -q -rs .
+
+bench-python: wheel $(DEMO)/mask.png ## Measure the reader through Python against webdataset
+	$(PYTHON_VENV)/bin/pip install --quiet --force-reinstall --no-deps $(TARGET)/packages/relit-*.whl
+	$(PYTHON_VENV)/bin/pip install --quiet -r tests/bench/requirements.txt
+	$(PYTHON_VENV)/bin/python tests/bench/python_reader.py --runs $(BENCH_RUNS) $(DEMO)/out
+
+image: packages ## Make a container image of relit-extract, relit-mask and relight, as an OCI layout
+	@.ci/image
+
+release: packages image ## Make all that a release has: packages, image, checksums, list of crates
+	@.ci/release
 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check
@@ -163,6 +189,11 @@ $(DEMO)/mask.png:
 $(OBJECTS_VENV)/ready: tests/objects/requirements.txt
 	python3 -m venv $(OBJECTS_VENV)
 	$(OBJECTS_VENV)/bin/pip install --quiet -r $<
+	touch $@
+
+$(PYTHON_VENV)/ready: relight/python/requirements.txt
+	python3 -m venv $(PYTHON_VENV)
+	$(PYTHON_VENV)/bin/pip install --quiet -r $<
 	touch $@
 
 $(BENCH_VENV)/ready: tests/bench/requirements.txt

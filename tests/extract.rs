@@ -657,3 +657,57 @@ fn a_shaken_object_that_the_border_cuts_off_gets_no_black_pixels_and_only_what_w
     }
     bench.verified(0, "out");
 }
+
+const CARD: &str = "card out --name turns --license CC-BY-4.0 --creator Somebody \
+     --url https://example.org/turns --published 2026-11-23";
+
+#[test]
+fn a_card_lists_every_file_with_its_checksum_and_leaves_a_data_set_that_verifies() {
+    let bench = Bench::new();
+    bench.errors(0, "clip.mkv --mask mask.png -o out --frames 12 --size 32");
+    bench.errors(0, CARD);
+    bench.errors(0, "verify out");
+    let read = |name: &str| fs::read_to_string(bench.path("out").join(name)).unwrap();
+    let sums = read("SHA256SUMS");
+    for name in ["clip.html", "clip.parquet", "clip.tar", "dataset.json"] {
+        assert!(sums.contains(&format!("  {name}\n")), "{sums}");
+    }
+    let checked = Command::new("sha256sum")
+        .args(["-c", "SHA256SUMS"])
+        .current_dir(bench.path("out"))
+        .output()
+        .unwrap();
+    assert!(checked.status.success());
+    let metadata: serde_json::Value = serde_json::from_str(&read("croissant.json")).unwrap();
+    assert_eq!(
+        metadata["license"],
+        "https://spdx.org/licenses/CC-BY-4.0.html"
+    );
+    assert_eq!(metadata["distribution"].as_array().unwrap().len(), 4);
+    assert!(read("README.md").contains("| holds | 1 turn of 1 object, 12 samples"));
+    bench.errors(2, &CARD.replace("2026-11-23", "today"));
+    bench.errors(1, &CARD.replace("card out", "card nothing"));
+}
+
+#[test]
+fn two_turns_of_one_object_are_one_object_of_the_data_set() {
+    use relit_data::shard::{Align, ExtractionSettings};
+    let bench = Bench::new();
+    bench.errors(0, "clip.mkv --mask mask.png -o out --frames 6 --size 32");
+    let mut dataset = Dataset::read(&bench.path("out")).unwrap();
+    let settings: &ExtractionSettings = &dataset.settings;
+    assert_eq!(settings.align, Align::Off);
+    let mut other = dataset.sessions[0].clone();
+    other.id = "clip-upside-down".to_owned();
+    dataset.sessions.push(other);
+    dataset.write(&bench.path("out")).unwrap();
+    let text = fs::read_to_string(bench.path("out/dataset.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(json["objects"].as_array().unwrap().len(), 1);
+    assert_eq!(
+        json["objects"][0]["sessions"],
+        serde_json::json!(["clip", "clip-upside-down"])
+    );
+    assert_eq!(json["objects"][0]["samples"], 12);
+    assert_eq!(Dataset::read(&bench.path("out")).unwrap(), dataset);
+}

@@ -31,7 +31,10 @@ use indicatif::ProgressStyle;
 use relit_data::causes::with_causes;
 use serde_json::{Value, json};
 
+mod manual;
+
 pub use indicatif::ProgressBar;
+pub use manual::written_manual;
 
 /// What first kept a line from being printed, other than that nobody reads any more.
 static LOST_LINE: OnceLock<io::Error> = OnceLock::new();

@@ -38,6 +38,7 @@
 mod align;
 mod batch;
 mod blur;
+pub mod card;
 mod catalog;
 mod collected;
 mod crop;

@@ -8,7 +8,7 @@ use relit_console::Console;
 
 #[cfg(feature = "train")]
 use crate::commands::train;
-use crate::commands::{decompose, eval, insert, relight, render, synth, turn, weights};
+use crate::commands::{decompose, eval, export, insert, relight, render, synth, turn, weights};
 
 /// Single-view relighting: photographs decomposed and relit, rendering, synthetic data with ground truth, measures of the results.
 #[derive(Parser)]
@@ -52,6 +52,9 @@ enum Verb {
     /// Decompose a whole turn: normals, albedo and light from the angle that the light turns by.
     #[command(after_help = turn::EXAMPLES)]
     Turn(turn::Arguments),
+    /// Write objects and turns for other programs: GLB, layered EXR, a Blender script, frames with their mask.
+    #[command(after_help = export::EXAMPLES)]
+    Export(export::Arguments),
     /// Convert weights of networks.
     #[command(after_help = weights::EXAMPLES)]
     Weights(weights::Arguments),
@@ -70,6 +73,7 @@ impl Verb {
             #[cfg(feature = "train")]
             Self::Train(_) => None,
             Self::Turn(_) => None,
+            Self::Export(arguments) => arguments.fault(),
             Self::Weights(arguments) => arguments.fault(),
         }
     }
@@ -77,6 +81,9 @@ impl Verb {
 
 /// Runs the verb that the command line names; its exit code.
 pub(crate) fn run() -> ExitCode {
+    if let Some(code) = relit_console::written_manual(CommandLine::command()) {
+        return code;
+    }
     let matches = CommandLine::command().get_matches();
     let line = CommandLine::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     if let Some(fault) = line.verb.fault() {
@@ -93,6 +100,7 @@ pub(crate) fn run() -> ExitCode {
         #[cfg(feature = "train")]
         Verb::Train(arguments) => train::run(&arguments, console),
         Verb::Turn(arguments) => turn::run(&arguments, console),
+        Verb::Export(arguments) => export::run(&arguments, console),
         Verb::Weights(arguments) => weights::run(&arguments, console),
     })
 }

@@ -3,7 +3,7 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use relit_rig::camera::hold::ManualValues;
 use relit_rig::camera::{CameraAddress, Fourcc};
 use relit_rig::capture::{ModePreference, Settings};
@@ -187,6 +187,11 @@ struct RigArguments {
     /// How often a take that came out bad is repeated; the bad ones are kept.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(0..=100))]
     retries: u32,
+}
+
+/// The command line as its manual shows it.
+pub(crate) fn command() -> clap::Command {
+    CommandLine::command()
 }
 
 /// Reads the command line; ends the program with exit code 2 where it is wrong.

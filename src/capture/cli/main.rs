@@ -17,6 +17,9 @@ use arguments::Command;
 use relit_console::Console;
 
 fn main() -> ExitCode {
+    if let Some(code) = relit_console::written_manual(arguments::command()) {
+        return code;
+    }
     let arguments = arguments::parse();
     let console = Console::new(arguments.json);
     match arguments.command {

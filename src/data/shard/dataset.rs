@@ -1,5 +1,6 @@
 //! `dataset.json`: the description of a data set, with the digest of every file.
 
+use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
@@ -123,6 +124,25 @@ pub struct SessionEntry {
     pub report: Option<FileEntry>,
 }
 
+/// An object with all its turns: it may have been put on the table in several poses.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ObjectTurns {
+    /// The object's name.
+    pub name: String,
+    /// The ids of its sessions, sorted.
+    pub sessions: Vec<String>,
+    /// Samples of all of them.
+    pub samples: u64,
+}
+
+/// What is written: the description, and what follows from it for readers that know no more than JSON.
+#[derive(Serialize)]
+struct WrittenDataset<'a> {
+    #[serde(flatten)]
+    dataset: &'a Dataset,
+    objects: Vec<ObjectTurns>,
+}
+
 /// The description of a data set, `dataset.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Dataset {
@@ -199,13 +219,35 @@ impl Dataset {
     /// [`ShardError::Json`] if a number is not finite, [`ShardError::Io`].
     pub fn write(&self, out: &Path) -> Result<(), ShardError> {
         self.check_names()?;
-        let mut bytes = serde_json::to_vec_pretty(self).map_err(|source| ShardError::Json {
+        let written = WrittenDataset {
+            dataset: self,
+            objects: self.objects(),
+        };
+        let mut bytes = serde_json::to_vec_pretty(&written).map_err(|source| ShardError::Json {
             what: Self::FILE.to_owned(),
             source,
         })?;
         bytes.push(b'\n');
         output::write_whole(out, Self::FILE, &bytes)?;
         Ok(())
+    }
+
+    /// The objects, sorted by name, each with all its turns.
+    #[must_use]
+    pub fn objects(&self) -> Vec<ObjectTurns> {
+        let mut objects: BTreeMap<&str, ObjectTurns> = BTreeMap::new();
+        for session in &self.sessions {
+            let object = objects
+                .entry(&session.object)
+                .or_insert_with(|| ObjectTurns {
+                    name: session.object.clone(),
+                    sessions: Vec::new(),
+                    samples: 0,
+                });
+            object.sessions.push(session.id.clone());
+            object.samples += u64::from(session.samples);
+        }
+        objects.into_values().collect()
     }
 
     /// The entry of a session.

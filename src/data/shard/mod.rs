@@ -51,7 +51,8 @@ mod writer;
 pub use array_task::{ArrayTask, MAX_TASKS};
 pub use codec::{decode_mask, decode_rgb, encode_mask, encode_rgb};
 pub use dataset::{
-    Dataset, DatasetSoftware, MaskInfo, SamplingBasis, SessionEntry, ShardEntry, SourceVideo,
+    Dataset, DatasetSoftware, MaskInfo, ObjectTurns, SamplingBasis, SessionEntry, ShardEntry,
+    SourceVideo,
 };
 pub use digest::{Digest, NotADigest};
 pub use error::ShardError;

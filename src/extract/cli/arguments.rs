@@ -1,12 +1,13 @@
 //! The command line, and what it asks for.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::builder::RangedU64ValueParser;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{Align, ArrayTask, ImageSize, Layout, MAX_TASKS};
+use relit_extract::card::CardFacts;
 use relit_extract::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
 
 const EXAMPLES: &str = "\
@@ -21,6 +22,8 @@ Examples:
       read everything back
   relit-extract stats dataset --html dataset/index.html
       the data set at a glance
+  relit-extract card dataset --license CC-BY-4.0 --creator NAME --url URL --published 2026-11-23
+      README, Croissant metadata and checksums for publishing it
   relit-extract sessions -o dataset --task-id 3 --task-count 10
       the fourth of ten parts; afterwards: relit-extract merge dataset
 
@@ -48,6 +51,10 @@ pub(crate) enum Command {
     Stats {
         out: PathBuf,
         html: Option<PathBuf>,
+    },
+    Card {
+        out: PathBuf,
+        facts: CardFacts,
     },
 }
 
@@ -89,6 +96,20 @@ enum Verb {
         #[arg(long)]
         json: bool,
     },
+    /// Describe a data set for those who publish it: README.md, Croissant metadata, checksums.
+    #[command(
+        after_help = "Example:\n  relit-extract card dataset --name mugs --license CC-BY-4.0 --creator 'A. Researcher' --url https://example.org/mugs\n\nIt writes README.md, croissant.json and SHA256SUMS into the folder."
+    )]
+    Card {
+        /// The data set's folder.
+        #[arg(value_name = "OUT")]
+        out: PathBuf,
+        #[command(flatten)]
+        facts: CardArguments,
+        /// Print one JSON line per event on standard output.
+        #[arg(long)]
+        json: bool,
+    },
     /// Show a data set at a glance: sessions with verdicts, saturation, shifts and what else was found.
     #[command(
         after_help = "Example:\n  relit-extract stats dataset --html dataset/index.html\n\nIt reads dataset.json and the tables, and no shards."
@@ -104,6 +125,37 @@ enum Verb {
         #[arg(long)]
         json: bool,
     },
+}
+
+#[derive(Args)]
+struct CardArguments {
+    /// The data set's name [default: that of its folder].
+    #[arg(long)]
+    name: Option<String>,
+    /// Its licence: an SPDX identifier, or a URL.
+    #[arg(long, value_name = "SPDX")]
+    license: String,
+    /// Who made it; may be given several times.
+    #[arg(long, value_name = "NAME", required = true)]
+    creator: Vec<String>,
+    /// Where it is published.
+    #[arg(long)]
+    url: String,
+    /// What it is, in a sentence or two.
+    #[arg(
+        long,
+        default_value = "Turns of objects on a turntable: masked frames whose light changes."
+    )]
+    description: String,
+    /// When it is published, YYYY-MM-DD.
+    #[arg(long, value_name = "DATE", value_parser = date)]
+    published: String,
+    /// Its version.
+    #[arg(long, value_name = "X.Y.Z", default_value = "1.0.0")]
+    release: String,
+    /// How to cite it.
+    #[arg(long, value_name = "TEXT")]
+    cite: Option<String>,
 }
 
 #[derive(Args)]
@@ -212,6 +264,11 @@ impl From<LayoutName> for Layout {
     }
 }
 
+/// The command line as its manual shows it.
+pub(crate) fn command() -> clap::Command {
+    CommandLine::command()
+}
+
 /// Parses the command line; ends the program with exit code 2 if it is wrong.
 pub(crate) fn parse() -> Arguments {
     let line = CommandLine::parse();
@@ -227,6 +284,13 @@ pub(crate) fn parse() -> Arguments {
         (Some(Verb::Stats { out, html, json }), _) => Arguments {
             json,
             command: Command::Stats { out, html },
+        },
+        (Some(Verb::Card { out, facts, json }), _) => Arguments {
+            json,
+            command: Command::Card {
+                facts: facts.of(&out),
+                out,
+            },
         },
         (None, Some(extract)) => match task(&extract, &|name| std::env::var(name).ok()) {
             Ok(task) => extract.with(task),
@@ -275,6 +339,40 @@ fn task(
     let task = ArrayTask::new(index, count);
     task.map(Some)
         .ok_or_else(|| format!("there is no task {index} of {count}: they count from 0"))
+}
+
+impl CardArguments {
+    fn of(self, out: &Path) -> CardFacts {
+        let folder = || {
+            let whole = out.canonicalize().unwrap_or_else(|_| out.to_owned());
+            let name = whole.file_name().unwrap_or(whole.as_os_str());
+            name.to_string_lossy().into_owned()
+        };
+        CardFacts {
+            name: self.name.unwrap_or_else(folder),
+            license: self.license,
+            creators: self.creator,
+            url: self.url,
+            description: self.description,
+            published: self.published,
+            version: self.release,
+            cite: self.cite,
+        }
+    }
+}
+
+/// A date as Croissant writes it.
+fn date(text: &str) -> Result<String, String> {
+    let parts: Vec<&str> = text.split('-').collect();
+    let is_number = |part: &str, digits: usize| {
+        part.len() == digits && part.bytes().all(|b| b.is_ascii_digit())
+    };
+    match parts[..] {
+        [year, month, day] if is_number(year, 4) && is_number(month, 2) && is_number(day, 2) => {
+            Ok(text.to_owned())
+        }
+        _ => Err("give YYYY-MM-DD".to_owned()),
+    }
 }
 
 impl ExtractArguments {

@@ -1,7 +1,8 @@
 //! `relit-extract`: turns recordings into training shards of masked frames, joins, verifies and
-//! sums them up.
+//! sums them up, and describes them for those who publish them.
 
 mod arguments;
+mod carding;
 mod extracting;
 mod merging;
 mod stats;
@@ -13,6 +14,9 @@ use arguments::Command;
 use relit_console::Console;
 
 fn main() -> ExitCode {
+    if let Some(code) = relit_console::written_manual(arguments::command()) {
+        return code;
+    }
     let arguments = arguments::parse();
     let console = Console::new(arguments.json);
     match arguments.command {
@@ -21,6 +25,7 @@ fn main() -> ExitCode {
             out,
             options,
         } => console.finish(extracting::run(console, &inputs, &out, &options)),
+        Command::Card { out, facts } => console.finish(carding::run(console, &out, &facts)),
         Command::Merge { out } => console.finish(merging::run(console, &out)),
         Command::Stats { out, html } => console.finish(stats::run(console, &out, html.as_deref())),
         Command::Verify { out } => console.finish(verifying::run(console, &out)),

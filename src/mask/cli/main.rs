@@ -14,6 +14,9 @@ use relit_console::Console;
 use arguments::{CommandLine, Verb};
 
 fn main() -> ExitCode {
+    if let Some(code) = relit_console::written_manual(CommandLine::command()) {
+        return code;
+    }
     let line = CommandLine::parse();
     match (line.verb, line.mask) {
         (Some(Verb::Check { input, mask, json }), _) => {

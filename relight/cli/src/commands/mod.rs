@@ -6,6 +6,7 @@ use relit_console::Outcome;
 
 pub(super) mod decompose;
 pub(super) mod eval;
+pub(super) mod export;
 pub(super) mod insert;
 pub(super) mod relight;
 pub(super) mod render;
