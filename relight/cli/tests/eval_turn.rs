@@ -84,7 +84,7 @@ fn a_turn_is_scored_by_each_method_and_written_for_others() {
 
 /// What `relight turn` writes and warns of with a rotation direction.
 fn solved(data: &Path, direction: &str, out: &Path) -> (serde_json::Value, String) {
-    let shard = data.join("shards").join("synth-12-0000-0.tar");
+    let shard = data.join("synth-12-0000.tar");
     let output = relight(&[
         "turn",
         shard.to_str().unwrap(),

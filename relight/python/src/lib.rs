@@ -39,7 +39,11 @@ struct Data {
 impl Data {
     #[new]
     fn new(py: Python<'_>, path: PathBuf, linear: bool) -> PyResult<Self> {
-        let encoding = if linear { Encoding::Linear } else { Encoding::Srgb };
+        let encoding = if linear {
+            Encoding::Linear
+        } else {
+            Encoding::Srgb
+        };
         let turns = py.detach(|| Turns::open(&path, encoding));
         Ok(Self {
             turns: Arc::new(turns.map_err(|error| open_error(&error))?),
