@@ -1,5 +1,12 @@
 //! What is written, read back by readers of others.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
 use std::path::Path;
 
 use relight_core::captured_object::CapturedObject;

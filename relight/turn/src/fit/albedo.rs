@@ -189,7 +189,7 @@ mod tests {
             let [red, green, blue] = truth(pixel).map(|value| value as f32);
             [2.0 * red, 3.0 * green, 5.0 * blue]
         });
-        let wrong = |pixel: usize| pixel % 3 == 0;
+        let wrong = |pixel: usize| pixel.is_multiple_of(3);
         let albedo: Vec<[f64; 3]> = (0..curves.pixels())
             .map(|pixel| truth(pixel).map(|value| if wrong(pixel) { 6.0 * value } else { value }))
             .collect();
