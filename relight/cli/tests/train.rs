@@ -67,7 +67,7 @@ fn old_keys_are_read_with_a_warning_and_printed_as_the_new_ones() {
         ("window", "shuffle_buffer"),
         ("anchor", "supervised"),
     ] {
-        let line = format!("`{old}` is now `{new}`: this file is read, rename it before 0.3");
+        let line = format!("`{old}` is now `{new}`: this file is read, rename it before 0.4");
         assert!(told.contains(&line), "{told}");
     }
 }

@@ -133,7 +133,7 @@ struct RunArguments {
     /// Data-loader workers: threads that compose samples.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     workers: usize,
-    /// The old name of --workers, read until 0.3.
+    /// The old name of --workers, read in 0.3, not in 0.4.
     #[arg(long, hide = true, value_name = "N", conflicts_with = "workers", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     composers: Option<usize>,
     /// Where the network is computed: cpu, cuda:N, or cuda: of several processes on a machine, a GPU for each.
@@ -281,7 +281,7 @@ impl RunArguments {
         if self.composers.is_some() {
             let event = json!({ "event": "renamed", "old": "--composers", "new": "--workers" });
             console.warn_with(
-                "--composers is now --workers: it is read, rename it before 0.3",
+                "--composers is now --workers: it is read, rename it before 0.4",
                 &event,
             );
         }

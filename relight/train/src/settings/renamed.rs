@@ -1,4 +1,5 @@
-//! Settings that have had another name: files and checkpoints with the old one are read for one more release.
+//! Settings that had another name in 0.1: files and checkpoints with the old one are read in 0.3, the first
+//! release that has the new one, and no longer in 0.4.
 
 use std::fmt;
 
@@ -6,7 +7,7 @@ use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
 /// The release that no longer reads the old names.
-const READ_BEFORE: &str = "0.3";
+const READ_BEFORE: &str = "0.4";
 
 /// Table, old key and new key.
 pub(super) const RENAMED: [(&str, &str, &str); 8] = [

@@ -40,7 +40,7 @@ fn each_old_key_is_read_as_the_new_one_and_named() {
         assert_eq!(now.renamed, []);
         assert_eq!(before.renamed, [RenamedSetting { table, old, new }]);
         let told = before.renamed[0].to_string();
-        let expected = format!("`{old}` is now `{new}`: this file is read, rename it before 0.3");
+        let expected = format!("`{old}` is now `{new}`: this file is read, rename it before 0.4");
         assert!(told.contains(&expected), "{told}");
     }
 }
