@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-programs setup-train test test-rig test-slurm test-objects packages test-packages test-python wheel bench-python image release lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-train test test-rig test-slurm test-objects packages test-packages test-image test-python wheel bench-python image release lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -77,6 +77,9 @@ packages: setup-programs ## Make the Debian packages relit-rig, relit and religh
 test-packages: packages ## Install, use and purge the packages in clean Debian systems
 	@tests/packages/run
 
+test-image: image ## Run the container image without a daemon, as a cluster does
+	@tests/packages/image
+
 wheel: $(PYTHON_VENV)/ready ## Make the Python package, one wheel for Python 3.9 and newer
 	$(PYTHON_VENV)/bin/maturin build --release --locked -m relight/python/Cargo.toml -i $(PYTHON_VENV)/bin/python \
 	    --out $(TARGET)/packages
@@ -93,7 +96,7 @@ bench-python: wheel $(DEMO)/mask.png ## Measure the reader through Python agains
 image: packages ## Make a container image of relit-extract, relit-mask and relight, as an OCI layout
 	@.ci/image
 
-release: packages image ## Make all that a release has: packages, image, checksums, list of crates
+release: packages wheel image ## Make all that a release has: packages, wheel, image, checksums, list of crates
 	@.ci/release
 
 lint: setup ## Check formatting, lints and documentation
