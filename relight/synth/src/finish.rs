@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::geometry::GBuffer;
 use super::library::Library;
 use super::lighting::{BlinnPhong, Material};
-use super::paint::{Paint, Relief};
+use super::paint::{AlbedoKind, Paint, Relief};
 use super::random::Random;
 
 /// Part of the objects that have relief.
@@ -24,14 +24,17 @@ pub struct Finish {
 }
 
 impl Finish {
-    /// A random finish for what a buffer shows; it is glossy with the probability `glossy`.
+    /// A random finish for what a buffer shows; it is glossy with the probability `glossy`, and
+    /// painted as `albedo` says, where that says anything.
     pub(super) fn draw(
         random: &mut Random,
         buffer: &GBuffer,
         library: &Library,
         glossy: f32,
+        albedo: Option<AlbedoKind>,
     ) -> Self {
-        let paint = Paint::draw(random, buffer.object_points(), library.pictures.len());
+        let pictures = library.pictures.len();
+        let paint = Paint::draw(random, buffer.object_points(), pictures, albedo);
         let relief = random.chance(RELIEF).then(|| Relief::draw(random));
         let gloss = random
             .chance(glossy)

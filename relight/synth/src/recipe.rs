@@ -13,6 +13,7 @@ use super::library::Library;
 use super::lighting::{LightKind, Lighting, Material, SyntheticScene};
 use super::mesh::Mesh;
 use super::object::{ObjectSource, SyntheticView};
+use super::paint::AlbedoKind;
 use super::random::{Random, stream};
 use super::sample::{Description, SynthSample};
 use super::shape::ShapeKind;
@@ -42,6 +43,9 @@ pub struct Recipe {
     pub lightings: u32,
     /// Whether the camera is a random one; else it is [`CameraModel::plain`].
     pub random_camera: bool,
+    /// What kind of albedo all objects have; none: all kinds, each as often as it trains best.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub albedo: Option<AlbedoKind>,
 }
 
 impl Default for Recipe {
@@ -54,6 +58,7 @@ impl Default for Recipe {
             views: 4,
             lightings: 4,
             random_camera: true,
+            albedo: None,
         }
     }
 }
@@ -176,7 +181,7 @@ impl Recipe {
         number: u64,
     ) -> (Finish, Material) {
         let mut random = Random::new(stream(stream(self.seed, 5), number));
-        let finish = Finish::draw(&mut random, view.scene.buffer(), library, 0.35);
+        let finish = Finish::draw(&mut random, view.scene.buffer(), library, 0.35, self.albedo);
         let material = finish.apply(view.scene.buffer(), library);
         (finish, material)
     }

@@ -7,8 +7,8 @@ use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use rayon::ThreadPoolBuilder;
 use relight_synth::{
-    Folders, Library, LightKind, Recipe, SynthTally, TurnRecipe, made_panoramas, write_preview,
-    write_samples, write_turns,
+    AlbedoKind, Folders, Library, LightKind, Recipe, SynthTally, TurnRecipe, made_panoramas,
+    write_preview, write_samples, write_turns,
 };
 use relit_console::{Console, Outcome};
 use serde_json::json;
@@ -58,6 +58,9 @@ pub(crate) struct Arguments {
     /// An sRGB camera without noise, clipping on purpose, or compression.
     #[arg(long)]
     plain_camera: bool,
+    /// Paint all objects in one way [default: each kind as often as networks learn most from].
+    #[arg(long, value_enum, value_name = "KIND")]
+    albedo: Option<AlbedoName>,
     /// Views of each object.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: u32,
@@ -113,6 +116,35 @@ impl From<LightName> for LightKind {
     }
 }
 
+#[derive(Clone, Copy, ValueEnum)]
+enum AlbedoName {
+    /// One colour.
+    Constant,
+    /// Two colours that go over into one another.
+    Gradient,
+    /// Patterns of greys.
+    Grey,
+    /// Nearly white against dark.
+    TwoTone,
+    /// Labels, glyphs, logos and bar codes, in dark and neutral ink mostly.
+    Print,
+    /// Patterns of two to five colours.
+    Patterned,
+}
+
+impl From<AlbedoName> for AlbedoKind {
+    fn from(name: AlbedoName) -> Self {
+        match name {
+            AlbedoName::Constant => Self::Constant,
+            AlbedoName::Gradient => Self::Gradient,
+            AlbedoName::Grey => Self::Grey,
+            AlbedoName::TwoTone => Self::TwoTone,
+            AlbedoName::Print => Self::Print,
+            AlbedoName::Patterned => Self::Patterned,
+        }
+    }
+}
+
 impl Arguments {
     /// What is wrong with the arguments together.
     pub(crate) fn fault(&self) -> Option<String> {
@@ -159,6 +191,7 @@ fn recipe(arguments: &Arguments, size: u32) -> Recipe {
         views: arguments.views,
         lightings: arguments.lightings,
         random_camera: !arguments.plain_camera,
+        albedo: arguments.albedo.map(Into::into),
     }
 }
 

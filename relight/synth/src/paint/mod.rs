@@ -6,6 +6,7 @@
 //! | `frame` | planes to draw on, soft edges |
 //! | `palette` | which colours stand together |
 //! | `pattern` | which points have which colour of the palette |
+//! | `print` | labels, glyphs, logos and bar codes in ink |
 //! | `writing` | lines of strokes that look like a script |
 //! | `picture` | image files and parts of panoramas as patterns |
 //! | `relief` | slopes that are finer than the mesh |
@@ -14,6 +15,7 @@ mod frame;
 mod palette;
 mod pattern;
 mod picture;
+mod print;
 mod relief;
 mod writing;
 
@@ -22,7 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use super::noise::Noise;
 use super::random::{Random, stream};
-use palette::Palette;
+use palette::{Inks, Palette};
 use pattern::{Canvas, Pattern};
 
 pub use palette::AlbedoKind;
@@ -81,9 +83,18 @@ impl Paint {
     }
 
     /// A random paint for an object on which `points` lie; `pictures` tells how many there are to
-    /// choose from.
-    pub(super) fn draw(random: &mut Random, points: &[Vec3], pictures: usize) -> Self {
-        let kind = AlbedoKind::draw(random);
+    /// choose from, `kind` what it is drawn as, else that is drawn, too.
+    pub(super) fn draw(
+        random: &mut Random,
+        points: &[Vec3],
+        pictures: usize,
+        kind: Option<AlbedoKind>,
+    ) -> Self {
+        let drawn = AlbedoKind::draw(random);
+        let kind = kind.unwrap_or(drawn);
+        if kind == AlbedoKind::Print {
+            return Self::printed(random, points);
+        }
         let palette = Palette::draw(random, kind);
         if kind == AlbedoKind::Constant {
             return Self::constant(palette.colours[0].to_array());
@@ -123,6 +134,18 @@ impl Paint {
                 frequency: random.log_uniform(1.0..30.0),
                 strength: random.uniform(0.0..0.15),
             }),
+        }
+    }
+
+    /// Print on a ground. Neither bent nor mottled: ink is even.
+    fn printed(random: &mut Random, points: &[Vec3]) -> Self {
+        let inks = Inks::draw(random);
+        Self {
+            kind: AlbedoKind::Print,
+            ground: inks.ground,
+            coats: print::draw(random, points, &inks),
+            warp: None,
+            mottle: None,
         }
     }
 
@@ -176,15 +199,15 @@ mod tests {
     }
 
     #[test]
-    fn a_third_of_all_paints_is_constant_and_every_albedo_is_one_that_exists() {
+    fn kinds_come_as_often_as_the_recipe_says_and_every_albedo_is_one_that_exists() {
         let points = points();
         let mut random = Random::new(1);
         let pictures = [TextureImage::from_fn(4, 4, |x, y| {
             Vec3::new(x as f32, y as f32, 1.0)
         })];
-        let mut constant = 0;
-        for _ in 0..300 {
-            let paint = Paint::draw(&mut random, &points, pictures.len());
+        let mut counts = std::collections::HashMap::new();
+        for _ in 0..600 {
+            let paint = Paint::draw(&mut random, &points, pictures.len(), None);
             let albedo = paint.apply(&points, None, &pictures);
             assert!(
                 albedo
@@ -193,9 +216,37 @@ mod tests {
             );
             let is_constant = albedo.iter().all(|a| *a == albedo[0]);
             assert!(is_constant || paint.kind != AlbedoKind::Constant);
-            constant += usize::from(paint.kind == AlbedoKind::Constant);
+            *counts.entry(format!("{:?}", paint.kind)).or_insert(0) += 1;
         }
-        assert!((80..120).contains(&constant), "{constant}");
+        // Within three standard deviations.
+        let plain = counts["Constant"] + counts["Gradient"];
+        assert!((63..117).contains(&plain), "{counts:?}");
+        assert!((204..276).contains(&counts["TwoTone"]), "{counts:?}");
+        assert!((80..136).contains(&counts["Print"]), "{counts:?}");
+    }
+
+    #[test]
+    fn print_is_dark_and_neutral_mostly_and_covers_a_part_of_what_it_is_on() {
+        let points = points();
+        let mut random = Random::new(12);
+        let (mut inked, mut neutral, mut covered) = (0, 0, 0.0);
+        for _ in 0..200 {
+            let paint = Paint::draw(&mut random, &points, 0, Some(AlbedoKind::Print));
+            let albedo = paint.apply(&points, None, &[]);
+            let grey = |a: &Vec3| a.element_sum() / 3.0;
+            let lightest = albedo.iter().map(grey).fold(0.0, f32::max);
+            let is_dark = |a: &&Vec3| grey(a) < 0.3 * lightest;
+            let dark: Vec<&Vec3> = albedo.iter().filter(is_dark).collect();
+            let part = dark.len() as f32 / albedo.len() as f32;
+            let chroma = |a: &&&Vec3| (a.max_element() - a.min_element()) / a.max_element();
+            inked += usize::from(part > 0.005);
+            covered += part;
+            let greys = dark.iter().filter(|a| chroma(a) < 0.25).count();
+            neutral += usize::from(!dark.is_empty() && 2 * greys > dark.len());
+        }
+        assert!(inked > 150, "{inked}");
+        assert!(neutral > 110, "{neutral}");
+        assert!((0.03..0.5).contains(&(covered / 200.0)), "{covered}");
     }
 
     #[test]
@@ -213,7 +264,7 @@ mod tests {
         let points = points();
         let mut random = Random::new(3);
         for _ in 0..40 {
-            let paint = Paint::draw(&mut random, &points, 3);
+            let paint = Paint::draw(&mut random, &points, 3, None);
             let text = serde_json::to_string(&paint).unwrap();
             let back: Paint = serde_json::from_str(&text).unwrap();
             assert_eq!(back, paint);

@@ -8,6 +8,7 @@ use super::super::random::Random;
 use super::frame::{Frame, step};
 use super::palette::Palette;
 use super::picture::TextureImage;
+use super::print::Mark;
 use super::writing::Writing;
 
 /// Where a coat of paint lies. Lengths are in the object's own frame, in which it is about 2 large.
@@ -44,6 +45,8 @@ pub(super) enum Pattern {
     Half { normal: Vec3, offset: f32 },
     /// Lines of a script.
     Writing(Writing),
+    /// A printed form.
+    Mark(Mark),
     /// A picture, thrown onto the object along a direction or laid on by its texture coordinates.
     Picture {
         number: usize,
@@ -258,6 +261,7 @@ impl Pattern {
             }
             Self::Half { normal, offset } => step(point.dot(*normal) - offset, 0.02),
             Self::Writing(writing) => writing.coverage(point),
+            Self::Mark(mark) => mark.coverage(point),
             Self::Voronoi { .. } | Self::Picture { .. } => 0.0,
         }
     }

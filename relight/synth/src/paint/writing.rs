@@ -33,6 +33,19 @@ impl Writing {
         }
     }
 
+    /// Lines of letters that fill a rectangle of a frame, from edge to edge.
+    pub(super) fn filling(random: &mut Random, frame: &Frame, half: Vec2, lines: u32) -> Self {
+        // A line is as high as 1.8 letters are wide.
+        let width = 2.0 * half.y / (1.8 * lines.max(1) as f32);
+        let across = (2.0 * half.x / width).floor().clamp(1.0, 24.0);
+        Self {
+            frame: frame.shifted(Vec2::ZERO, width),
+            seed: random.seed(),
+            letters: [across as u32, lines.max(1)],
+            weight: random.uniform(0.07..0.2),
+        }
+    }
+
     /// How much ink there is at a point, 0..=1.
     pub(super) fn coverage(&self, point: Vec3) -> f32 {
         // Lines are somewhat farther apart than letters.
@@ -88,6 +101,23 @@ fn stroke(letter: u64, number: u64) -> Stroke {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lines_that_fill_a_rectangle_stay_within_it() {
+        let mut random = Random::new(9);
+        let frame = Frame::draw(&mut random, Vec3::ZERO, 0.3);
+        let writing = Writing::filling(&mut random, &frame, Vec2::new(1.0, 0.5), 3);
+        let mut inked = 0;
+        for _ in 0..4000 {
+            let point = random.in_box(0.5);
+            let at = frame.place(point).abs();
+            if writing.coverage(point) > 0.5 {
+                assert!(at.x < 1.05 && at.y < 0.55, "{at}");
+                inked += 1;
+            }
+        }
+        assert!(inked > 40, "{inked}");
+    }
 
     #[test]
     fn ink_covers_a_part_of_the_label_and_nothing_beyond() {
