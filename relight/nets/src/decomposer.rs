@@ -9,9 +9,11 @@
 //! power 1 / 2.2; the mask; log luminance; two chroma differences. All are 0 outside the mask.
 //! Output `maps`, [`OUTPUTS`] channels: normal (3, before its length is made 1), albedo (3, logit),
 //! highlight (1, before softplus), and log shading as two: an offset, and the share of the picture's
-//! own log luminance (logit).
+//! own log luminance (logit). With [`decomposer_with_paint`] there is a second output, `paint`: how much of a pixel's
+//! darkness is paint rather than shadow (1, logit).
 
 use super::graph::{Graph, Value};
+use super::weights::Weights;
 
 /// Channels of the input.
 pub const INPUTS: usize = 7;
@@ -27,9 +29,34 @@ const GROUP: usize = 16;
 /// Residual blocks between encoder and decoder.
 const MIDDLE: usize = 2;
 
+/// The convolution of the head for paint.
+const PAINT: &str = "paint";
+/// How the names of its parameters begin.
+pub const PAINT_PARAMETERS: &str = "paint.";
+
 /// The network; width and height of its input are multiples of 32.
 #[must_use]
 pub fn decomposer() -> Graph {
+    build(false)
+}
+
+/// The same network with a head that tells paint from shadow.
+#[must_use]
+pub fn decomposer_with_paint() -> Graph {
+    build(true)
+}
+
+/// The network that has these weights: with the head for paint, where they have one.
+#[must_use]
+pub fn decomposer_of(weights: &Weights) -> Graph {
+    let of_head = |name: &str| {
+        name.trim_start_matches("module.")
+            .starts_with(PAINT_PARAMETERS)
+    };
+    build(weights.iter().any(|(name, _)| of_head(name)))
+}
+
+fn build(with_paint: bool) -> Graph {
     let (mut net, input) = Graph::new("decomposer", INPUTS);
     let blocks = net.pixel_unshuffle(input, BLOCK);
     let features = encode(&mut net, blocks);
@@ -46,9 +73,14 @@ pub fn decomposer() -> Graph {
     }
     value = net.concatenate(value, features[0]);
     value = layer(&mut net, "head.0", value, ENCODER[0], 1);
-    value = net.convolution("head.1".to_owned(), value, OUTPUTS * BLOCK * BLOCK, 1);
-    value = net.pixel_shuffle(value, BLOCK);
-    net.output("maps", value);
+    let maps = net.convolution("head.1".to_owned(), value, OUTPUTS * BLOCK * BLOCK, 1);
+    let maps = net.pixel_shuffle(maps, BLOCK);
+    net.output("maps", maps);
+    if with_paint {
+        let paint = net.convolution(PAINT.to_owned(), value, BLOCK * BLOCK, 1);
+        let paint = net.pixel_shuffle(paint, BLOCK);
+        net.output(PAINT, paint);
+    }
     net
 }
 
@@ -87,6 +119,17 @@ fn residual(net: &mut Graph, name: &str, of: Value) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn weights_tell_whether_their_network_has_the_head_for_paint() {
+        let (plain, more) = (decomposer(), decomposer_with_paint());
+        assert_eq!(plain.outputs().len(), 1);
+        let paint = more.node(more.outputs()[1].value);
+        assert_eq!((paint.channels, paint.scale), (1, Some(1)));
+        for graph in [plain, more] {
+            assert_eq!(decomposer_of(&Weights::initial(&graph, 1)), graph);
+        }
+    }
 
     #[test]
     fn it_answers_as_many_pixels_as_it_is_given_and_fits_in_40_megabytes_at_half_precision() {

@@ -1,6 +1,7 @@
 //! What computes a network: tract, which is always there, or with the feature `onnxruntime` a library that is loaded
 //! where it is installed. Both are given the same ONNX file.
 
+use super::inference::GivenNumber;
 #[cfg(feature = "onnxruntime")]
 use super::onnxruntime::OnnxRuntime;
 use super::plan::Plan;
@@ -28,15 +29,20 @@ impl InferenceEngine {
         }
     }
 
-    /// Makes an ONNX file with one input ready for inputs of a shape.
+    /// Makes an ONNX file ready for inputs of a shape; its other inputs are the given numbers.
     ///
     /// # Errors
     /// The engine's own words.
-    pub(super) fn prepare(&self, onnx: &[u8], shape: [usize; 4]) -> Result<Box<dyn Plan>, String> {
+    pub(super) fn prepare(
+        &self,
+        onnx: &[u8],
+        shape: [usize; 4],
+        given: &[GivenNumber],
+    ) -> Result<Box<dyn Plan>, String> {
         Ok(match self {
-            Self::Tract => Box::new(TractPlan::new(onnx, shape)?),
+            Self::Tract => Box::new(TractPlan::new(onnx, shape, given)?),
             #[cfg(feature = "onnxruntime")]
-            Self::OnnxRuntime(library) => Box::new(library.prepare(onnx, shape)?),
+            Self::OnnxRuntime(library) => Box::new(library.prepare(onnx, shape, given)?),
         })
     }
 }

@@ -9,6 +9,15 @@ use super::onnx::to_onnx;
 use super::plan::Plan;
 use super::weights::{Tensor, Weights};
 
+/// A whole number that an input of a network always gets.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GivenNumber {
+    /// The input's name.
+    pub name: String,
+    /// The number.
+    pub value: i64,
+}
+
 /// A network ready to be run on single pictures of one size.
 pub struct Inference {
     name: &'static str,
@@ -49,7 +58,7 @@ impl Inference {
         let bytes = to_onnx(graph, weights, 1, (width, height))?;
         let shape = [1, graph.input_channels(), height, width];
         let plan = engine
-            .prepare(&bytes, shape)
+            .prepare(&bytes, shape, &[])
             .map_err(|fault| NetError::Engine {
                 engine: engine.name(),
                 doing: "prepare",
@@ -58,6 +67,34 @@ impl Inference {
             });
         Ok(Self {
             name: graph.name(),
+            engine: engine.name(),
+            shape,
+            plan: plan?,
+        })
+    }
+
+    /// The same for a file whose further inputs are numbers that stay the same: the picture goes into the input that is
+    /// none of them.
+    ///
+    /// # Errors
+    /// As [`Self::from_onnx`].
+    pub fn from_onnx_with(
+        path: &Path,
+        bytes: &[u8],
+        channels: usize,
+        (width, height): (usize, usize),
+        given: &[GivenNumber],
+        engine: &InferenceEngine,
+    ) -> Result<Self, NetError> {
+        let shape = [1, channels, height, width];
+        let plan = engine
+            .prepare(bytes, shape, given)
+            .map_err(|fault| NetError::Onnx {
+                path: path.to_owned(),
+                fault,
+            });
+        Ok(Self {
+            name: "the network of the ONNX file",
             engine: engine.name(),
             shape,
             plan: plan?,
@@ -73,22 +110,10 @@ impl Inference {
         path: &Path,
         bytes: &[u8],
         channels: usize,
-        (width, height): (usize, usize),
+        size: (usize, usize),
         engine: &InferenceEngine,
     ) -> Result<Self, NetError> {
-        let shape = [1, channels, height, width];
-        let plan = engine
-            .prepare(bytes, shape)
-            .map_err(|fault| NetError::Onnx {
-                path: path.to_owned(),
-                fault,
-            });
-        Ok(Self {
-            name: "the network of the ONNX file",
-            engine: engine.name(),
-            shape,
-            plan: plan?,
-        })
+        Self::from_onnx_with(path, bytes, channels, size, &[], engine)
     }
 
     /// Runs it on one picture: channel by channel, row by row. The outputs come in the graph's order.

@@ -32,20 +32,24 @@ pub mod paper;
 mod parameter;
 mod pickle;
 mod plan;
+mod signature;
 mod tract;
 mod turn_network;
 mod weights;
 
 pub use codec::WeightPrecision;
-pub use decomposer::{INPUTS, OUTPUTS, decomposer};
+pub use decomposer::{
+    INPUTS, OUTPUTS, PAINT_PARAMETERS, decomposer, decomposer_of, decomposer_with_paint,
+};
 pub use engine::InferenceEngine;
 pub use error::NetError;
 pub use graph::{EPSILON, Graph, Node, Operation, Output, Value};
-pub use inference::Inference;
+pub use inference::{GivenNumber, Inference};
 pub use onnx::{INPUT, check_size, to_onnx};
 #[cfg(feature = "onnxruntime")]
 pub use onnxruntime::OnnxRuntime;
 pub use parameter::{Parameter, Role};
+pub use signature::{OnnxElement, OnnxSignature, OnnxValue};
 pub use turn_network::{TURN_INPUTS, TURN_OUTPUTS, turn_network};
 pub use weights::{Tensor, Weights};
 

@@ -5,12 +5,13 @@ use std::sync::Mutex;
 
 use ort::LoadDynamicError;
 use ort::environment::Environment;
-use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
-use ort::value::TensorRef;
+use ort::session::{Session, SessionInputValue};
+use ort::value::{Tensor as OrtTensor, TensorRef};
 use relit_data::causes::with_causes;
 
 use super::error::NetError;
+use super::inference::GivenNumber;
 use super::plan::Plan;
 use super::weights::Tensor;
 
@@ -67,6 +68,7 @@ impl OnnxRuntime {
         &self,
         onnx: &[u8],
         shape: [usize; 4],
+        given: &[GivenNumber],
     ) -> Result<impl Plan + use<>, String> {
         let session = Session::builder(&self.environment)
             .and_then(
@@ -74,13 +76,24 @@ impl OnnxRuntime {
             )
             .and_then(|mut builder| builder.commit_from_memory(onnx))
             .map_err(|fault| fault.to_string())?;
-        let session = Mutex::new(session);
-        Ok(SessionPlan { session, shape })
+        let inputs = session.inputs().iter();
+        let inputs = inputs.map(|input| {
+            let name = input.name().to_owned();
+            let number = given.iter().find(|given| given.name == name);
+            (name, number.map(|given| given.value))
+        });
+        Ok(SessionPlan {
+            inputs: inputs.collect(),
+            session: Mutex::new(session),
+            shape,
+        })
     }
 }
 
 /// A network in ONNX Runtime. One input at a time: the library itself shares its work among the cores.
 struct SessionPlan {
+    /// Names of its inputs, and the number that goes into each; none for the picture.
+    inputs: Vec<(String, Option<i64>)>,
     session: Mutex<Session>,
     shape: [usize; 4],
 }
@@ -93,11 +106,22 @@ impl Plan for SessionPlan {
             Ok(session) => session,
             Err(poisoned) => poisoned.get_mut(),
         };
-        let input = TensorRef::from_array_view((self.shape, input));
-        let input = input.map_err(|fault| fault.to_string())?;
-        let outputs = session
-            .run(ort::inputs![input])
-            .map_err(|fault| fault.to_string())?;
+        let failed = |fault: ort::Error| fault.to_string();
+        let mut values: Vec<(&str, SessionInputValue<'_>)> = Vec::new();
+        for (name, number) in &self.inputs {
+            let value = match number {
+                Some(number) => {
+                    let number = OrtTensor::from_array((Vec::<i64>::new(), vec![*number]));
+                    number.map_err(failed)?.into()
+                }
+                None => {
+                    let picture = TensorRef::from_array_view((self.shape, input));
+                    picture.map_err(failed)?.into()
+                }
+            };
+            values.push((name, value));
+        }
+        let outputs = session.run(values).map_err(failed)?;
         outputs
             .values()
             .map(|output| {

@@ -160,6 +160,20 @@ impl Weights {
     }
 }
 
+impl Weights {
+    /// The same with those of a graph's parameters under `prefix` that are missing here as [`Self::initial`] has them: a
+    /// network that gets a head more.
+    #[must_use]
+    pub fn completed(mut self, graph: &Graph, prefix: &str, seed: u64) -> Self {
+        for (name, tensor) in Self::initial(graph, seed) {
+            if name.starts_with(prefix) {
+                self.tensors.entry(name).or_insert(tensor);
+            }
+        }
+        self
+    }
+}
+
 /// Normal numbers of mean 0 by Box and Muller's transform.
 fn normal_numbers(seed: u64, stream: u64, count: usize, spread: f64) -> Vec<f32> {
     let mut state = Random(seed.wrapping_add(stream.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
@@ -204,6 +218,20 @@ mod tests {
         let mean_square =
             middle.values().iter().map(|v| v * v).sum::<f32>() / middle.values().len() as f32;
         assert!((mean_square * (256.0 * 9.0) / 2.0 - 1.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn missing_parameters_are_filled_in_and_the_others_stay() {
+        let graph = normal_net();
+        let mut weights = Weights::initial(&graph, 7);
+        weights.tensors.remove("mid.0.weight");
+        let other = weights.clone().completed(&graph, "last.", 8);
+        assert!(other.fitted_to(&graph).is_err());
+        let completed = weights.clone().completed(&graph, "mid.0.", 8);
+        assert!(completed.fitted_to(&graph).is_ok());
+        assert_eq!(completed.get("mid.3.weight"), weights.get("mid.3.weight"));
+        let fresh = Weights::initial(&graph, 8);
+        assert_eq!(completed.get("mid.0.weight"), fresh.get("mid.0.weight"));
     }
 
     #[test]

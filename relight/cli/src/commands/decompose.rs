@@ -63,13 +63,13 @@ pub(crate) struct Arguments {
     /// Leave out the mirror image: faster, and a little worse.
     #[arg(long)]
     no_mirror: bool,
-    /// Another network's normals: 1 x 3 x 256 x 256 in, (x - 0.5) / 0.5 of sRGB values; 1 x 3 x 256 x 256
-    /// (vectors) or 1 x 2 x 256 x 256 (slopes) out.
+    /// Another network's normals: MoGe-2's or Metric3D's published file, or 1 x 3 x 256 x 256 in, (x - 0.5) / 0.5 of
+    /// sRGB values; 1 x 3 x 256 x 256 (vectors) or 1 x 2 x 256 x 256 (slopes) out.
     #[arg(long, value_name = "FILE.onnx")]
     normals: Option<PathBuf>,
-    /// Which way y points in that network's normals.
-    #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up, requires = "normals")]
-    normals_y: YName,
+    /// Which way y points in that network's normals [default: as MoGe-2 and Metric3D have it, else up].
+    #[arg(long, value_enum, value_name = "WAY", requires = "normals")]
+    normals_y: Option<YName>,
     /// What computes the network.
     #[arg(long, value_enum, default_value_t = EngineName::Tract)]
     engine: EngineName,
@@ -174,7 +174,10 @@ impl Arguments {
         let engine = self.engine.engine(console)?;
         let mut decomposer = Decomposer::with_engine(&weights, WORKING_SIDE, engine)?;
         if let Some(path) = &self.normals {
-            decomposer.read_normals(path, self.normals_y.into())?;
+            decomposer.read_normals(path, self.normals_y.map(Into::into))?;
+            let name = decomposer.normals_network().unwrap_or_default();
+            let event = json!({ "event": "normals", "file": path, "network": name });
+            console.say(&format!("{}: taken for {name}", path.display()), &event);
         }
         Ok((decomposer, name))
     }

@@ -11,6 +11,7 @@ mod encodings;
 mod faults;
 mod masks;
 mod networks;
+mod onnx_file;
 mod program;
 mod results;
 mod shards;

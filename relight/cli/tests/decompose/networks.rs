@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use relight_core::image::{Planes, Rgb};
+use relight_core::image::{ColourSpace, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, NormalsFrame, Order, ShLight, YUp};
 use relight_core::metrics::{Comparison, ScaleFit, angular_error};
 use relight_core::render::{DiffuseForm, DiffuseLayer};
@@ -12,6 +12,9 @@ use relight_nets::{Weights, decomposer, to_onnx};
 use relight_photo::decompose::{DecomposeOptions, Decomposer};
 use relight_photo::files::PhotoReading;
 
+use relit_data::causes::with_causes;
+
+use crate::onnx_file::{OnnxNode, OnnxPort, integer, integers, onnx_file};
 use crate::support::{Folder, load, object, untrained};
 
 #[test]
@@ -32,9 +35,9 @@ fn normals_of_another_network_replace_ours() {
     };
     let mut net = untrained();
     let own = decompose(&net);
-    net.read_normals(&file, NormalsFrame::YUp).unwrap();
+    net.read_normals(&file, Some(NormalsFrame::YUp)).unwrap();
     let up = decompose(&net);
-    net.read_normals(&file, NormalsFrame::YDown).unwrap();
+    net.read_normals(&file, Some(NormalsFrame::YDown)).unwrap();
     let down = decompose(&net);
     assert_eq!(own.albedo, up.albedo);
     assert_ne!(own.normals, up.normals);
@@ -50,17 +53,126 @@ fn normals_of_another_network_replace_ours() {
     let graph = light_net(Head::Pooled);
     let weights = Weights::initial(&graph, 9);
     fs::write(&file, to_onnx(&graph, &weights, 1, (32, 32)).unwrap()).unwrap();
-    let error = net.read_normals(&file, NormalsFrame::YUp).unwrap_err();
+    let error = net
+        .read_normals(&file, Some(NormalsFrame::YUp))
+        .unwrap_err();
     assert!(
         error.to_string().contains("does not answer a picture"),
         "{error}"
     );
     fs::write(&file, "no network").unwrap();
-    let error = net.read_normals(&file, NormalsFrame::YUp).unwrap_err();
+    let error = net
+        .read_normals(&file, Some(NormalsFrame::YUp))
+        .unwrap_err();
     assert!(
         error.to_string().contains("normals.onnx cannot be run"),
         "{error}"
     );
+}
+
+fn node(kind: &'static str, input: &'static str, output: &'static str) -> OnnxNode {
+    OnnxNode {
+        kind,
+        input,
+        output,
+        attributes: Vec::new(),
+    }
+}
+
+fn port(name: &'static str, element: u64, sides: &[u64]) -> OnnxPort {
+    let sides = sides.to_vec();
+    OnnxPort {
+        name,
+        element,
+        sides,
+    }
+}
+
+/// A network in the signature of MoGe-2's published files. Its normals are the colours, turned to the viewer.
+fn moge() -> Vec<u8> {
+    let turned = OnnxNode {
+        attributes: vec![integers("perm", &[0, 2, 3, 1])],
+        ..node("Transpose", "image", "turned")
+    };
+    let scale = OnnxNode {
+        attributes: vec![integer("to", 1)],
+        ..node("Cast", "num_tokens", "metric_scale")
+    };
+    onnx_file(
+        &[
+            turned,
+            node("Identity", "turned", "points"),
+            node("Neg", "turned", "normal"),
+            node("Sigmoid", "turned", "mask"),
+            scale,
+        ],
+        &[port("image", 1, &[0, 3, 0, 0]), port("num_tokens", 7, &[])],
+        &["points", "normal", "mask", "metric_scale"].map(|name| port(name, 1, &[])),
+    )
+}
+
+/// A network in the signature of Metric3D's published files, for pictures that are wider than high. Its normals are the
+/// colours.
+fn metric3d() -> Vec<u8> {
+    onnx_file(
+        &[
+            node("Neg", "pixel_values", "predicted_depth"),
+            node("Identity", "pixel_values", "predicted_normal"),
+            node("Sigmoid", "pixel_values", "normal_confidence"),
+        ],
+        &[port("pixel_values", 1, &[1, 3, 32, 48])],
+        &["predicted_depth", "predicted_normal", "normal_confidence"]
+            .map(|name| port(name, 1, &[])),
+    )
+}
+
+#[test]
+fn published_networks_are_known_by_their_names_and_taken_in_their_own_axes() {
+    let folder = Folder::new();
+    let path = folder.save("cup.png", |path| object(0).save(path).unwrap());
+    let photo = load(&path, &PhotoReading::default()).unwrap();
+    for (name, bytes) in [("MoGe-2", moge()), ("Metric3D", metric3d())] {
+        let file = folder.save("normals.onnx", |path| fs::write(path, &bytes).unwrap());
+        let mut net = untrained();
+        assert_eq!(net.normals_network(), None);
+        net.read_normals(&file, None).unwrap();
+        let said = net.normals_network().unwrap();
+        assert!(said.starts_with(name), "{said}");
+        let options = DecomposeOptions::default();
+        let found = net
+            .decompose(&photo.picture, &photo.mask, &options)
+            .unwrap();
+        let (mut inside, mut steps) = (0, 0.0_f32);
+        for at in 0..photo.mask.extent().pixels() {
+            let [x, y, z] = found.normals.planes().planes().map(|plane| plane[at]);
+            if photo.mask.plane(0)[at] < 0.5 {
+                assert_eq!([x, y, z], [0.0; 3]);
+                continue;
+            }
+            inside += 1;
+            // OpenCV's y points down and its z away: of colours, which are positive, x is turned over too.
+            let colour = photo.picture.planes().planes().map(|plane| plane[at]);
+            let encoded = colour.map(Srgb::from_linear);
+            let length = encoded.iter().map(|v| v * v).sum::<f32>().sqrt();
+            let [r, g, b] = encoded.map(|v| v / length);
+            let apart = [x + r, y - g, z - b].map(f32::abs);
+            steps += apart.into_iter().fold(0.0, f32::max);
+        }
+        // The network sees a smaller picture, so that edges differ.
+        let mean = steps / inside as f32;
+        assert!(mean < 0.1, "{name}: {mean}");
+    }
+    let two = onnx_file(
+        &[node("Identity", "left", "depth")],
+        &[
+            port("left", 1, &[1, 3, 32, 32]),
+            port("right", 1, &[1, 3, 32, 32]),
+        ],
+        &[port("depth", 1, &[])],
+    );
+    let file = folder.save("normals.onnx", |path| fs::write(path, &two).unwrap());
+    let error = untrained().read_normals(&file, None).unwrap_err();
+    assert!(with_causes(&error).contains("left, right"), "{error}");
 }
 
 /// How far normals and shading are from the ground truth, over how far those are that say nothing: normals towards the

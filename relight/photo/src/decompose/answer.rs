@@ -37,8 +37,8 @@ impl MapsNet for Engine {
 }
 
 /// All maps of a picture as one image, in values that can be averaged and blended: normals, log albedo,
-/// log shading, highlight.
-pub(super) type Fields = Planes<8>;
+/// log shading, highlight, paint.
+pub(super) type Fields = Planes<9>;
 
 /// The network for pictures of two sizes. An object that fills a smaller picture is nearer to those that it was trained on,
 /// and is seen as a whole; the larger picture shows what is finer.
@@ -101,6 +101,7 @@ fn of_maps(maps: AnsweredMaps) -> Fields {
         blue,
         maps.shading.plane(0),
         maps.highlight.plane(0),
+        maps.paint.plane(0),
     ];
     for (at, (to, from)) in fields.planes_mut().into_iter().zip(sources).enumerate() {
         for (to, &from) in to.iter_mut().zip(from) {
@@ -125,6 +126,7 @@ pub(super) fn to_maps(mut fields: Fields, mask: &[bool]) -> Result<AnsweredMaps,
                 2 => |z| z.max(LEAST_FACING),
                 3..7 => f32::exp,
                 7 => |value| value.max(0.0),
+                8 => |value| value.clamp(0.0, 1.0),
                 _ => |value| value,
             };
             for (value, &inside) in values.iter_mut().zip(mask) {
@@ -132,13 +134,14 @@ pub(super) fn to_maps(mut fields: Fields, mask: &[bool]) -> Result<AnsweredMaps,
             }
         }
     });
-    let [x, y, z, red, green, blue, shading, highlight] = fields.into_planes();
+    let [x, y, z, red, green, blue, shading, highlight, paint] = fields.into_planes();
     let normals = Normals::new(Planes::from_planes(extent, [x, y, z])?);
     Ok(AnsweredMaps {
         normals: without_gaps(normals, mask),
         albedo: Planes::from_planes(extent, [red, green, blue])?,
         shading: Planes::from_planes(extent, [shading])?,
         highlight: Planes::from_planes(extent, [highlight])?,
+        paint: Planes::from_planes(extent, [paint])?,
     })
 }
 

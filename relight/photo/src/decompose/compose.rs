@@ -15,41 +15,121 @@ pub(super) struct ComposedLayers {
     pub(super) normals: Normals<YUp>,
     /// R.
     pub(super) albedo: Planes<3>,
-    /// S, mean 1 under the mask.
+    /// S, mean 1 under the mask of the whole picture.
     pub(super) shading: Planes<1>,
     /// H, in no channel more than the picture.
     pub(super) highlight: Planes<1>,
     /// R S.
     pub(super) diffuse: Planes<3>,
-    /// The root mean square of I - R S - H under the mask, over that of I; 0 for a black picture.
-    pub(super) residual: f64,
+    /// How much of the darkness is paint.
+    pub(super) paint: Planes<1>,
+    /// Energies of I - R S - H and of I under the mask.
+    pub(super) residual: ResidualSums,
+}
+
+/// Energies of what layers leave of a picture, and of the picture.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct ResidualSums {
+    rest: f64,
+    all: f64,
+}
+
+impl ResidualSums {
+    pub(super) fn and(self, other: Self) -> Self {
+        Self {
+            rest: self.rest + other.rest,
+            all: self.all + other.all,
+        }
+    }
+
+    /// The root mean square of the rest over that of the picture; 0 for a black picture.
+    pub(super) fn relative(self) -> f64 {
+        if self.all > 0.0 {
+            (self.rest / self.all).sqrt()
+        } else {
+            0.0
+        }
+    }
+}
+
+/// What layers need to know of the whole picture: its strips are composed one by one.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct LayerSums {
+    shading: f64,
+    pixels: u64,
+    /// Of albedo times shading and the picture less its highlight.
+    product: f64,
+    /// Of albedo times shading with itself.
+    square: f64,
+}
+
+impl LayerSums {
+    /// The sums over a picture, or a strip of it, whose maps have a highlight that is possible.
+    pub(super) fn of(picture: &Planes<3>, mask: &[bool], maps: &AnsweredMaps) -> Self {
+        let (s, h) = (maps.shading.plane(0), maps.highlight.plane(0));
+        let mut sums = Self::default();
+        for at in (0..mask.len()).filter(|&at| mask[at]) {
+            sums.shading += f64::from(s[at]);
+            sums.pixels += 1;
+        }
+        for (light, albedo) in picture.planes().into_iter().zip(maps.albedo.planes()) {
+            for at in (0..mask.len()).filter(|&at| mask[at]) {
+                let answered = f64::from(albedo[at]) * f64::from(s[at]);
+                sums.product += answered * f64::from(diffuse_part(light[at], h[at]));
+                sums.square += answered * answered;
+            }
+        }
+        sums
+    }
+
+    pub(super) fn and(self, other: Self) -> Self {
+        Self {
+            shading: self.shading + other.shading,
+            pixels: self.pixels + other.pixels,
+            product: self.product + other.product,
+            square: self.square + other.square,
+        }
+    }
+
+    /// By what the network's shading is multiplied, so that its mean is 1.
+    fn shading_scale(&self) -> f64 {
+        let mean = self.shading / self.pixels.max(1) as f64;
+        if mean > 0.0 { 1.0 / mean } else { 0.0 }
+    }
+
+    /// The factor that brings albedo times that shading nearest to the picture less its highlight, by least squares.
+    fn albedo_scale(&self) -> f64 {
+        let scale = self.shading_scale();
+        if self.square > 0.0 && scale > 0.0 {
+            self.product / (self.square * scale)
+        } else {
+            0.0
+        }
+    }
 }
 
 impl ComposedLayers {
-    /// The layers of a picture, without a highlight where `with_highlight` is false.
+    /// The layers of a picture, or of a strip of one that has these sums. Its maps have a highlight that is possible.
     ///
-    /// H is the network's highlight, as far as the picture's darkest channel allows, and I_d = I - H. S is
-    /// the network's shading over its mean. R = (I_d S + 0.1 R_h) / (S² + 0.1), where R_h is the
+    /// I_d = I - H. S is the network's shading over its mean. R = (I_d S + 0.1 R_h) / (S² + 0.1), where R_h is the
     /// network's albedo, scaled so that R_h S is nearest to I_d: the albedo is I_d / S where there is
     /// light, and the network's where there is hardly any.
     ///
-    /// Everything is computed in the memory of the picture and the maps: those of a large photograph take gigabytes.
+    /// Everything is computed in the memory of the picture and the maps.
     pub(super) fn new(
         picture: Planes<3>,
         mask: &[bool],
         maps: AnsweredMaps,
-        with_highlight: bool,
+        sums: &LayerSums,
     ) -> Self {
-        let highlight = if with_highlight {
-            possible_highlight(&picture, mask, maps.highlight)
-        } else {
-            maps.highlight.map(|_| 0.0)
-        };
-        let shading = normalised(maps.shading, mask);
-        let (s, h) = (shading.plane(0), highlight.plane(0));
-        let scale = albedo_scale(&picture, h, &maps.albedo, s);
+        let (shading_scale, scale) = (sums.shading_scale() as f32, sums.albedo_scale());
+        let mut shading = maps.shading;
+        for (value, &inside) in shading.planes_mut()[0].iter_mut().zip(mask) {
+            *value = if inside { *value * shading_scale } else { 0.0 };
+        }
+        let (s, h) = (shading.plane(0), maps.highlight.plane(0));
         let (mut albedo, mut diffuse) = (maps.albedo, picture);
-        let (mut squared_residual, mut all) = (0.0_f64, 0.0_f64);
+        let mut residual = ResidualSums::default();
         let layers = albedo.planes_mut().into_iter().zip(diffuse.planes_mut());
         for (albedo, diffuse) in layers {
             for at in 0..mask.len() {
@@ -63,21 +143,18 @@ impl ComposedLayers {
                 let r = (target * shading + RIDGE * answered) / (shading * shading + RIDGE);
                 albedo[at] = r as f32;
                 diffuse[at] = (r * shading) as f32;
-                squared_residual += f64::from(light - diffuse[at] - h[at]).powi(2);
-                all += f64::from(light).powi(2);
+                residual.rest += f64::from(light - diffuse[at] - h[at]).powi(2);
+                residual.all += f64::from(light).powi(2);
             }
         }
         Self {
             normals: maps.normals,
             albedo,
             shading,
-            highlight,
+            highlight: maps.highlight,
             diffuse,
-            residual: if all > 0.0 {
-                (squared_residual / all).sqrt()
-            } else {
-                0.0
-            },
+            paint: maps.paint,
+            residual,
         }
     }
 }
@@ -119,25 +196,6 @@ fn diffuse_part(light: f32, highlight: f32) -> f32 {
     (light - highlight).max(0.0)
 }
 
-/// The factor that brings albedo, 0 outside the mask, times shading nearest to the picture less its highlight, by
-/// least squares.
-fn albedo_scale(
-    picture: &Planes<3>,
-    highlight: &[f32],
-    albedo: &Planes<3>,
-    shading: &[f32],
-) -> f64 {
-    let (mut product, mut square) = (0.0_f64, 0.0_f64);
-    for (light, albedo) in picture.planes().into_iter().zip(albedo.planes()) {
-        for at in 0..shading.len() {
-            let answered = f64::from(albedo[at]) * f64::from(shading[at]);
-            product += answered * f64::from(diffuse_part(light[at], highlight[at]));
-            square += answered * answered;
-        }
-    }
-    if square > 0.0 { product / square } else { 0.0 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,16 +225,69 @@ mod tests {
             albedo,
             shading,
             highlight,
+            paint: Planes::zeros(EXTENT),
         };
         (picture, maps)
+    }
+
+    /// The layers of a whole picture.
+    fn composed(
+        picture: Planes<3>,
+        mask: &[bool],
+        mut maps: AnsweredMaps,
+        with_highlight: bool,
+    ) -> ComposedLayers {
+        maps.highlight = if with_highlight {
+            possible_highlight(&picture, mask, maps.highlight)
+        } else {
+            Planes::zeros(EXTENT)
+        };
+        let sums = LayerSums::of(&picture, mask, &maps);
+        ComposedLayers::new(picture, mask, maps, &sums)
+    }
+
+    #[test]
+    fn strips_with_the_sums_of_all_are_strips_of_the_whole() {
+        let (picture, maps) = scene();
+        let mask: Vec<bool> = (0..EXTENT.pixels()).map(|at| at % 5 != 0).collect();
+        let whole = composed(picture.clone(), &mask, maps.clone(), true);
+        let half = Extent::new(EXTENT.width, EXTENT.height / 2);
+        fn rows<const C: usize>(of: &Planes<C>, half: Extent, first: usize) -> Planes<C> {
+            Planes::from_fn(half, |x, y| of.pixel(x, first + y))
+        }
+        let strip = |first: usize| {
+            let picture = rows(&picture, half, first);
+            let mask = mask[first * half.width..][..half.pixels()].to_vec();
+            let highlight = rows(&maps.highlight, half, first);
+            let maps = AnsweredMaps {
+                normals: Normals::new(Planes::filled(half, [0.0, 0.0, 1.0])),
+                albedo: rows(&maps.albedo, half, first),
+                shading: rows(&maps.shading, half, first),
+                highlight: possible_highlight(&picture, &mask, highlight),
+                paint: Planes::zeros(half),
+            };
+            (picture, mask, maps)
+        };
+        let strips = [0, half.height].map(strip);
+        let sums = strips.iter().map(|(p, m, maps)| LayerSums::of(p, m, maps));
+        let sums = sums.fold(LayerSums::default(), LayerSums::and);
+        let mut residual = ResidualSums::default();
+        for (number, (picture, mask, maps)) in strips.into_iter().enumerate() {
+            let layers = ComposedLayers::new(picture, &mask, maps, &sums);
+            let first = number * half.height;
+            assert_eq!(layers.shading, rows(&whole.shading, half, first));
+            assert_eq!(layers.albedo, rows(&whole.albedo, half, first));
+            residual = residual.and(layers.residual);
+        }
+        assert!((residual.relative() - whole.residual.relative()).abs() < 1e-12);
     }
 
     #[test]
     fn maps_that_are_right_give_the_picture_back_and_the_shading_has_mean_one() {
         let (picture, maps) = scene();
         let mask = vec![true; EXTENT.pixels()];
-        let layers = ComposedLayers::new(picture, &mask, maps.clone(), true);
-        assert!(layers.residual < 1e-6);
+        let layers = composed(picture, &mask, maps.clone(), true);
+        assert!(layers.residual.relative() < 1e-6);
         let mean = layers.shading.plane(0).iter().sum::<f32>() / EXTENT.pixels() as f32;
         assert!((mean - 1.0).abs() < 1e-5);
         assert_eq!(layers.highlight, maps.highlight);
@@ -189,16 +300,19 @@ mod tests {
         let (picture, mut maps) = scene();
         maps.albedo = Planes::filled(EXTENT, [0.5; 3]);
         let mask = vec![true; EXTENT.pixels()];
-        let layers = ComposedLayers::new(picture.clone(), &mask, maps.clone(), false);
-        let none = vec![0.0; EXTENT.pixels()];
-        let scale = albedo_scale(&picture, &none, &maps.albedo, layers.shading.plane(0)) as f32;
+        let layers = composed(picture.clone(), &mask, maps.clone(), false);
+        let without = AnsweredMaps {
+            highlight: Planes::zeros(EXTENT),
+            ..maps
+        };
+        let scale = LayerSums::of(&picture, &mask, &without).albedo_scale() as f32;
         for at in 0..EXTENT.pixels() {
             let s = layers.shading.plane(0)[at];
             let rest = picture.plane(1)[at] - layers.diffuse.plane(1)[at];
             let ridge = 0.1 * (picture.plane(1)[at] - scale * 0.5 * s) / (s * s + 0.1);
             assert!((rest - ridge).abs() < 1e-5, "{rest} {ridge}");
         }
-        assert!(layers.residual < 0.1);
+        assert!(layers.residual.relative() < 0.1);
     }
 
     #[test]
@@ -206,7 +320,7 @@ mod tests {
         let (picture, mut maps) = scene();
         maps.highlight = Planes::filled(EXTENT, [9.0]);
         let mask: Vec<bool> = (0..EXTENT.pixels()).map(|at| at != 5).collect();
-        let layers = ComposedLayers::new(picture.clone(), &mask, maps, true);
+        let layers = composed(picture.clone(), &mask, maps, true);
         for at in 0..EXTENT.pixels() {
             let least = [0, 1, 2].map(|c| picture.plane(c)[at]);
             let least = least.into_iter().fold(f32::INFINITY, f32::min);
@@ -221,7 +335,7 @@ mod tests {
         let (_, maps) = scene();
         let mask = vec![true; EXTENT.pixels()];
         let black = Planes::zeros(EXTENT);
-        let layers = ComposedLayers::new(black, &mask, maps, true);
+        let layers = composed(black, &mask, maps, true);
         assert!(
             layers
                 .albedo
@@ -230,6 +344,6 @@ mod tests {
                 .flatten()
                 .all(|&v| v == 0.0)
         );
-        assert_eq!(layers.residual, 0.0);
+        assert_eq!(layers.residual.relative(), 0.0);
     }
 }

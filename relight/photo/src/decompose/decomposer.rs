@@ -3,18 +3,18 @@
 use std::path::Path;
 
 use super::answer::{Engine, Fields, MapsNet, Scales, Whole, details, to_maps};
-use super::compose::{ComposedLayers, normalised, possible_highlight};
-use super::crop::{CropSquare, Window, cut_out, enlarged, inside};
-use super::encoding::AnsweredMaps;
+use super::compose::{normalised, possible_highlight};
+use super::crop::{CropSquare, Window, cut_out, inside};
 use super::error::DecomposeError;
 use super::gloss::{FittedGloss, fit_gloss};
 use super::other::OtherNormals;
-use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
+use super::strips::{Enlargement, LayerPlan};
+use relight_core::image::{ColourSpace, Extent, Linear, Part, Planes, Rgb, Srgb};
 use relight_core::light::NormalsFrame;
 use relight_core::light::{LightError, Normals, ShLight, YUp};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
-use relight_nets::{Inference, InferenceEngine, NetError, Weights, decomposer};
+use relight_nets::{Inference, InferenceEngine, NetError, Weights, decomposer_of};
 use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
 
 /// Most pixels of a photograph, and with [`WorkingSize::Native`] of the square around the object: 24 million take 2.5 GB of
@@ -99,6 +99,9 @@ pub struct Decomposition {
     pub diffuse: Rgb<Linear>,
     /// The highlight H, grey; 0 where none was separated.
     pub highlight: Planes<1>,
+    /// Per pixel, which part of its darkness is expected to be paint, 0..=1: near 1 print, near 0 shadow, in between where
+    /// the network cannot tell. None of weights without that head.
+    pub paint: Option<Planes<1>>,
     /// The light of order 2 whose irradiance on the normals is nearest to the shading: grey, as the
     /// shading is. The colour of the light is part of the albedo.
     pub light: ShLight,
@@ -134,6 +137,8 @@ pub struct Decomposition {
 /// ```
 pub struct Decomposer {
     scales: Scales,
+    /// Whether the network tells paint from shadow.
+    tells_paint: bool,
     normals: Option<OtherNormals>,
     engine: InferenceEngine,
 }
@@ -174,7 +179,7 @@ impl Decomposer {
         side: usize,
         engine: InferenceEngine,
     ) -> Result<Self, DecomposeError> {
-        let graph = decomposer();
+        let graph = decomposer_of(weights);
         let net = |side: usize| -> Result<Box<dyn MapsNet>, NetError> {
             let inference = Inference::with_engine(&graph, weights, (side, side), &engine)?;
             Ok(Box::new(Engine { inference, side }))
@@ -183,12 +188,17 @@ impl Decomposer {
         let coarse = || has_coarse.then(|| net(side / 2)).transpose();
         let (fine, coarse) = parallel::join(|| net(side), coarse);
         let found = Self::of(fine?, coarse?);
-        Ok(Self { engine, ..found })
+        Ok(Self {
+            engine,
+            tells_paint: graph.outputs().len() > 1,
+            ..found
+        })
     }
 
     pub(super) fn of(fine: Box<dyn MapsNet>, coarse: Option<Box<dyn MapsNet>>) -> Self {
         Self {
             scales: Scales { fine, coarse },
+            tells_paint: false,
             normals: None,
             engine: InferenceEngine::default(),
         }
@@ -200,10 +210,12 @@ impl Decomposer {
         &self.engine
     }
 
-    /// Takes the normals of another network from now on, the content of an ONNX file that errors name as `path`. It takes one picture,
-    /// 1 x 3 x side x side, (x - 0.5) / 0.5 of the sRGB values x, 0 outside the mask; and answers with
-    /// 1 x 3 x side x side, vectors of any length, or with 1 x 2 x side x side, slopes (p, q) of normals
-    /// (p, q, 1).
+    /// Takes the normals of another network from now on, the content of an ONNX file that errors name as `path`.
+    ///
+    /// MoGe-2's and Metric3D's published files are known by the names of their inputs and outputs, and used as they are. Any
+    /// other takes one picture, 1 x 3 x side x side, (x - 0.5) / 0.5 of the sRGB values x, 0 outside the mask; and answers
+    /// with 1 x 3 x side x side, vectors of any length, or with 1 x 2 x side x side, slopes (p, q) of normals (p, q, 1).
+    /// `frame` says which way y points; where it is none, y points as a known network has it, and else up.
     ///
     /// # Errors
     /// Where it cannot be run, or answers something else; then all stays as it was.
@@ -211,11 +223,17 @@ impl Decomposer {
         &mut self,
         path: &Path,
         onnx: &[u8],
-        frame: NormalsFrame,
+        frame: Option<NormalsFrame>,
     ) -> Result<(), DecomposeError> {
         let side = self.side();
         self.normals = Some(OtherNormals::new(path, onnx, side, frame, &self.engine)?);
         Ok(())
+    }
+
+    /// What the other network for normals was taken for, in words; none where there is none.
+    #[must_use]
+    pub fn normals_network(&self) -> Option<&'static str> {
+        self.normals.as_ref().map(OtherNormals::name)
     }
 
     /// Width and height of what the network sees, pixels.
@@ -262,20 +280,26 @@ impl Decomposer {
             options.mirror,
         )?;
         let fitted = self.fit(&whole, is_glossy)?;
-        let mut maps = self.maps(&whole, &object, options)?;
-        if self.normals.is_some() {
-            let known = inside(&whole.mask);
-            let vectors = enlarged(fitted.normals.planes(), &known, &part);
-            maps.normals = Normals::new(cut_out(vectors, &object.mask));
-        }
-        let layers = ComposedLayers::new(object.picture, &object.inside, maps, is_glossy);
-        let normals = window.put_back(layers.normals.into_planes(), extent);
+        let others = self.normals.as_ref().map(|_| fitted.normals.planes());
+        let maps = Enlargement::new(&whole.fields, &whole.mask, part)
+            .with_normals(others, &whole.mask)
+            .with_details(self.details(&object, &part, options)?);
+        let plan = LayerPlan {
+            picture: &object.picture,
+            inside: &object.inside,
+            window,
+            photograph: extent,
+            with_highlight: is_glossy,
+            with_paint: self.tells_paint,
+        };
+        let layers = plan.compose(&maps)?;
         Ok(Decomposition {
-            normals: Normals::new(normals),
-            albedo: Rgb::new(window.put_back(layers.albedo, extent)),
-            shading: window.put_back(layers.shading, extent),
-            diffuse: Rgb::new(window.put_back(layers.diffuse, extent)),
-            highlight: window.put_back(layers.highlight, extent),
+            normals: layers.normals,
+            albedo: Rgb::new(layers.albedo),
+            shading: layers.shading,
+            diffuse: Rgb::new(layers.diffuse),
+            highlight: layers.highlight,
+            paint: layers.paint,
             light: fitted.light,
             gloss: fitted.gloss,
             region,
@@ -286,23 +310,19 @@ impl Decomposer {
         })
     }
 
-    /// The maps at the picture's own size.
-    fn maps(
+    /// What tiles show beyond the network's size, where that is wanted and the picture is larger.
+    fn details(
         &self,
-        whole: &Whole,
         object: &CutObject,
+        part: &Part,
         options: &DecomposeOptions,
-    ) -> Result<AnsweredMaps, DecomposeError> {
-        let part = object.region.part(&object.window);
-        let mut fields = enlarged(&whole.fields, &inside(&whole.mask), &part);
-        if options.size == WorkingSize::Native && part.extent.width > self.side() {
-            let net = self.scales.fine.as_ref();
-            add(
-                &mut fields,
-                &details(net, &object.picture, &object.mask, options.mirror)?,
-            );
+    ) -> Result<Option<Fields>, DecomposeError> {
+        if options.size != WorkingSize::Native || part.extent.width <= self.side() {
+            return Ok(None);
         }
-        Ok(to_maps(fields, &object.inside)?)
+        let net = self.scales.fine.as_ref();
+        let found = details(net, &object.picture, &object.mask, options.mirror)?;
+        Ok(Some(found))
     }
 
     /// Fits light and gloss to the maps at the network's size.
@@ -438,14 +458,6 @@ fn usable(value: f32) -> f32 {
         value.max(0.0)
     } else {
         0.0
-    }
-}
-
-fn add(fields: &mut Fields, details: &Fields) {
-    for (to, from) in fields.planes_mut().into_iter().zip(details.planes()) {
-        for (to, from) in to.iter_mut().zip(from) {
-            *to += from;
-        }
     }
 }
 

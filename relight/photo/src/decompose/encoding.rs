@@ -38,6 +38,8 @@ pub struct AnsweredMaps {
     pub shading: Planes<1>,
     /// Highlight, grey, in the picture's units.
     pub highlight: Planes<1>,
+    /// How much of the darkness is paint rather than shadow, 0..=1; 0 of a network that does not tell it.
+    pub paint: Planes<1>,
 }
 
 impl EncodedPicture {
@@ -86,16 +88,21 @@ impl EncodedPicture {
         self.white
     }
 
-    /// What an answer of the network to this picture, [`OUTPUTS`] planes, means.
+    /// What an answer of the network to this picture, [`OUTPUTS`] planes and perhaps that of paint, means.
     ///
     /// # Panics
     /// Where the answer has another size.
     #[must_use]
     pub fn decode(&self, answer: &[f32]) -> AnsweredMaps {
         let (extent, pixels) = (self.extent, self.extent.pixels());
-        assert_eq!(answer.len(), OUTPUTS * pixels, "size of the answer");
+        let has_paint = answer.len() == (OUTPUTS + 1) * pixels;
+        assert!(
+            has_paint || answer.len() == OUTPUTS * pixels,
+            "size of the answer"
+        );
         let (mut normals, mut albedo) = (Planes::zeros(extent), Planes::zeros(extent));
         let (mut shading, mut highlight) = (Planes::zeros(extent), Planes::zeros(extent));
+        let mut paint = Planes::zeros(extent);
         for at in (0..pixels).filter(|&at| self.values[MASK * pixels + at] > 0.5) {
             let of = |channel: usize| answer[channel * pixels + at];
             let (x, y) = (at % extent.width, at / extent.width);
@@ -106,12 +113,16 @@ impl EncodedPicture {
             let log_luminance = 2.0 * self.values[LOG_LUMINANCE * pixels + at] - 2.0;
             let log = of(7) + sigmoid(of(8)) * log_luminance;
             shading.set_pixel(x, y, [log.clamp(LOG_SHADING.0, LOG_SHADING.1).exp()]);
+            if has_paint {
+                paint.set_pixel(x, y, [sigmoid(of(OUTPUTS))]);
+            }
         }
         AnsweredMaps {
             normals: Normals::new(normals),
             albedo,
             shading,
             highlight,
+            paint,
         }
     }
 }
@@ -185,6 +196,16 @@ mod tests {
                 assert!((0..INPUTS).all(|c| encoded.values()[c * 200 + y * 20 + x] == 0.0));
             }
         }
+    }
+
+    #[test]
+    fn the_answer_about_paint_is_a_probability_and_0_where_there_is_none() {
+        let mask = Planes::filled(Extent::new(20, 10), [1.0]);
+        let encoded = EncodedPicture::new(&ramp(), &mask);
+        let without = encoded.decode(&vec![0.3; OUTPUTS * 200]);
+        assert!(without.paint.plane(0).iter().all(|&p| p == 0.0));
+        let with = encoded.decode(&vec![0.0; (OUTPUTS + 1) * 200]);
+        assert!(with.paint.plane(0).iter().all(|&p| p == 0.5));
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 mod answer;
 mod compose;
+mod convention;
 mod crop;
 mod decomposer;
 mod encoding;
@@ -13,6 +14,7 @@ mod gloss;
 mod mask;
 mod other;
 mod photo;
+mod strips;
 #[cfg(test)]
 mod tests;
 

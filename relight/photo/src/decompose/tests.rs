@@ -288,7 +288,7 @@ fn tiles_beside_the_object_and_an_empty_one_add_nothing() {
     };
     let found: Fields = details(&net, &smooth(extent), &mask, false).unwrap();
     assert!(found.planes().into_iter().flatten().all(|v| v.is_finite()));
-    assert_eq!(found.pixel(100, 60), [0.0; 8]);
+    assert_eq!(found.pixel(100, 60), [0.0; 9]);
 }
 
 #[test]

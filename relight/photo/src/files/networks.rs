@@ -13,7 +13,11 @@ impl Decomposer {
     ///
     /// # Errors
     /// Where the file cannot be read or run, or answers something else; then all stays as it was.
-    pub fn read_normals(&mut self, path: &Path, frame: NormalsFrame) -> Result<(), DecomposeError> {
+    pub fn read_normals(
+        &mut self,
+        path: &Path,
+        frame: Option<NormalsFrame>,
+    ) -> Result<(), DecomposeError> {
         let onnx = fs::read(path).map_err(|source| NetError::Io {
             path: path.to_owned(),
             doing: "read",

@@ -60,6 +60,7 @@ pub struct DecompositionFigures {
     mirrored: bool,
     mask: FigureMask,
     specular: FigureSpecular,
+    transfer: &'static str,
     white: FigureWhites,
     light: FigureLight,
     residual: f64,
@@ -201,6 +202,7 @@ impl DecompositionFiles<'_> {
                 smoothness: gloss.map(|gloss| gloss.smoothness),
                 residual: gloss.map(|gloss| gloss.residual),
             },
+            transfer: "srgb",
             white,
             light: FigureLight {
                 order: found.light.order().get(),

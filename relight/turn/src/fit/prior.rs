@@ -126,7 +126,9 @@ pub fn prior_normals(
         }
         NormalsSource::Onnx(path) => {
             let mut decomposer = Decomposer::new(&own().map_err(DecomposeError::from)?)?;
-            decomposer.read_normals(path, frame)?;
+            // Up is what is assumed where nobody says anything; networks that are known have their own axes.
+            let said = (frame == NormalsFrame::YDown).then_some(frame);
+            decomposer.read_normals(path, said)?;
             decomposer
         }
     };

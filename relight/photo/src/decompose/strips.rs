@@ -1,0 +1,229 @@
+//! Layers at the photograph's size, composed strip by strip: all maps of a large photograph at once would take gigabytes.
+
+use std::ops::Range;
+
+use super::answer::{Fields, to_maps};
+use super::compose::{ComposedLayers, LayerSums, ResidualSums, possible_highlight};
+use super::crop::{Window, inside};
+use super::encoding::AnsweredMaps;
+use relight_core::image::{Extent, ImageError, Part, Planes};
+use relight_core::light::{Normals, YUp};
+use relight_core::parallel;
+
+/// Rows of a strip.
+const ROWS: usize = 64;
+
+/// Maps at the network's size that are brought to another one, a strip at a time.
+pub(super) struct Enlargement {
+    /// They go on beyond the mask.
+    fields: Fields,
+    /// Of another network, in place of the own ones.
+    normals: Option<Planes<3>>,
+    /// What is added to the fields.
+    details: Option<Fields>,
+    /// Which part of the other size is wanted.
+    part: Part,
+}
+
+impl Enlargement {
+    /// Of fields that are known inside a mask, for a part of the square around the object.
+    pub(super) fn new(fields: &Fields, mask: &Planes<1>, part: Part) -> Self {
+        Self {
+            fields: everywhere(fields, mask),
+            normals: None,
+            details: None,
+            part,
+        }
+    }
+
+    pub(super) fn with_normals(self, normals: Option<&Planes<3>>, mask: &Planes<1>) -> Self {
+        let normals = normals.map(|normals| everywhere(normals, mask));
+        Self { normals, ..self }
+    }
+
+    pub(super) fn with_details(self, details: Option<Fields>) -> Self {
+        Self { details, ..self }
+    }
+
+    /// The maps of some rows, 0 outside the mask.
+    fn maps(&self, rows: &Range<usize>, mask: &[bool]) -> Result<AnsweredMaps, ImageError> {
+        let mut fields = self.rows_of(&self.fields, rows);
+        if let Some(details) = &self.details {
+            let width = self.part.extent.width;
+            let range = rows.start * width..rows.end * width;
+            for (to, from) in fields.planes_mut().into_iter().zip(details.planes()) {
+                for (to, from) in to.iter_mut().zip(&from[range.clone()]) {
+                    *to += from;
+                }
+            }
+        }
+        let mut maps = to_maps(fields, mask)?;
+        if let Some(normals) = &self.normals {
+            let mut vectors = self.rows_of(normals, rows);
+            for plane in vectors.planes_mut() {
+                for (value, &inside) in plane.iter_mut().zip(mask) {
+                    *value = if inside { *value } else { 0.0 };
+                }
+            }
+            maps.normals = Normals::new(vectors);
+        }
+        Ok(maps)
+    }
+
+    /// Rows of an image in the other size. Of the image only the rows that they are made of are looked at.
+    fn rows_of<const C: usize>(&self, image: &Planes<C>, rows: &Range<usize>) -> Planes<C> {
+        let (small, whole) = (image.extent(), self.part.whole);
+        let target = Part {
+            whole,
+            at: [self.part.at[0], self.part.at[1] + rows.start as i64],
+            extent: Extent::new(self.part.extent.width, rows.len()),
+        };
+        let place = |row: i64| row as f64 * small.height as f64 / whole.height.max(1) as f64;
+        let first = (place(target.at[1]) - 2.0).floor().max(0.0) as usize;
+        let first = first.min(small.height);
+        let behind = place(target.at[1] + rows.len() as i64) + 2.0;
+        let behind = (behind.ceil().max(0.0) as usize).clamp(first, small.height);
+        let source = Part {
+            whole: small,
+            at: [0, first as i64],
+            extent: Extent::new(small.width, behind - first),
+        };
+        cut_rows(image, first..behind).resized_part(&source, &target)
+    }
+}
+
+/// The image with the values at the mask's edge beyond it.
+fn everywhere<const C: usize>(image: &Planes<C>, mask: &Planes<1>) -> Planes<C> {
+    let known = inside(mask);
+    let wanted = vec![true; known.len()];
+    image.clone().extended(&known, &wanted)
+}
+
+fn cut_rows<const C: usize>(image: &Planes<C>, rows: Range<usize>) -> Planes<C> {
+    let width = image.extent().width;
+    let extent = Extent::new(width, rows.len());
+    let mut cut = Planes::zeros(extent);
+    for (to, from) in cut.planes_mut().into_iter().zip(image.planes()) {
+        to.copy_from_slice(&from[rows.start * width..rows.end * width]);
+    }
+    cut
+}
+
+/// The layers of a photograph, as large as it is.
+pub(super) struct FullLayers {
+    pub(super) normals: Normals<YUp>,
+    pub(super) albedo: Planes<3>,
+    pub(super) shading: Planes<1>,
+    pub(super) highlight: Planes<1>,
+    pub(super) diffuse: Planes<3>,
+    pub(super) paint: Option<Planes<1>>,
+    pub(super) residual: f64,
+}
+
+/// What layers are made for.
+pub(super) struct LayerPlan<'a> {
+    /// The object's pixels, 0 outside the mask.
+    pub(super) picture: &'a Planes<3>,
+    pub(super) inside: &'a [bool],
+    /// Where in the photograph these pixels are, and how large that is.
+    pub(super) window: Window,
+    pub(super) photograph: Extent,
+    pub(super) with_highlight: bool,
+    pub(super) with_paint: bool,
+}
+
+impl LayerPlan<'_> {
+    /// Composes all strips: once for what is known of the whole picture only, and once more for the layers.
+    pub(super) fn compose(&self, maps: &Enlargement) -> Result<FullLayers, ImageError> {
+        let height = self.picture.extent().height;
+        let strips: Vec<Range<usize>> = (0..height)
+            .step_by(ROWS)
+            .map(|first| first..(first + ROWS).min(height))
+            .collect();
+        let sums = parallel::map(strips.len(), |at| {
+            let (picture, mask, maps) = self.strip(maps, &strips[at])?;
+            Ok::<_, ImageError>(LayerSums::of(&picture, mask, &maps))
+        });
+        let mut all = LayerSums::default();
+        for sums in sums {
+            all = all.and(sums?);
+        }
+        let mut full = FullLayers {
+            normals: Normals::new(Planes::zeros(Extent::new(0, 0))),
+            albedo: Planes::zeros(self.photograph),
+            shading: Planes::zeros(self.photograph),
+            highlight: Planes::zeros(self.photograph),
+            diffuse: Planes::zeros(self.photograph),
+            paint: self.with_paint.then(|| Planes::zeros(self.photograph)),
+            residual: 0.0,
+        };
+        let mut normals = Planes::zeros(self.photograph);
+        let mut residual = ResidualSums::default();
+        // As many at once as there are threads: each waits in memory until it is put in its place.
+        for some in strips.chunks(parallel::threads().max(1)) {
+            let layers = parallel::map(some.len(), |at| {
+                let (picture, mask, maps) = self.strip(maps, &some[at])?;
+                Ok::<_, ImageError>(ComposedLayers::new(picture, mask, maps, &all))
+            });
+            for (rows, layers) in some.iter().zip(layers) {
+                let layers = layers?;
+                residual = residual.and(layers.residual);
+                self.put(layers.normals.planes(), rows.start, &mut normals);
+                self.put(&layers.albedo, rows.start, &mut full.albedo);
+                self.put(&layers.shading, rows.start, &mut full.shading);
+                self.put(&layers.diffuse, rows.start, &mut full.diffuse);
+                if self.with_highlight {
+                    self.put(&layers.highlight, rows.start, &mut full.highlight);
+                }
+                if let Some(paint) = &mut full.paint {
+                    self.put(&layers.paint, rows.start, paint);
+                }
+            }
+        }
+        full.normals = Normals::new(normals);
+        full.residual = residual.relative();
+        Ok(full)
+    }
+
+    /// Picture, mask and maps of some rows.
+    fn strip(
+        &self,
+        maps: &Enlargement,
+        rows: &Range<usize>,
+    ) -> Result<(Planes<3>, &[bool], AnsweredMaps), ImageError> {
+        let width = self.picture.extent().width;
+        let mask = &self.inside[rows.start * width..rows.end * width];
+        let picture = cut_rows(self.picture, rows.clone());
+        let mut maps = maps.maps(rows, mask)?;
+        maps.highlight = if self.with_highlight {
+            possible_highlight(&picture, mask, maps.highlight)
+        } else {
+            Planes::zeros(picture.extent())
+        };
+        Ok((picture, mask, maps))
+    }
+
+    /// Puts a strip where it belongs in the photograph, as far as it lies in it.
+    fn put<const C: usize>(&self, strip: &Planes<C>, first: usize, to: &mut Planes<C>) {
+        let Extent { width, height } = strip.extent();
+        let whole = self.photograph;
+        let [x, y] = self.window.at;
+        let left = usize::try_from(-x).unwrap_or(0);
+        let column = usize::try_from(x).unwrap_or(0);
+        let count = width
+            .saturating_sub(left)
+            .min(whole.width.saturating_sub(column));
+        for row in 0..height {
+            let Ok(line) = usize::try_from(y + (first + row) as i64) else {
+                continue;
+            };
+            if line >= whole.height {
+                return;
+            }
+            for (to, from) in to.planes_mut().into_iter().zip(strip.planes()) {
+                to[line * whole.width + column..][..count]
+                    .copy_from_slice(&from[row * width + left..][..count]);
+            }
+        }
+    }
+}
