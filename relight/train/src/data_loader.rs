@@ -17,8 +17,8 @@ use relight_reader::Rank;
 use relight_synth::{Library, Recipe, stream};
 
 /// Part of the pictures whose values are taken for sRGB, whatever the camera's response: the user of a photograph
-/// does not know it either.
-const TAKEN_AS_SRGB: f64 = 0.25;
+/// does not know it either. Hardly more, as albedo times shading is not such a picture.
+const TAKEN_AS_SRGB: f64 = 0.10;
 /// Views that wait to be taken, for each thread.
 const AHEAD: usize = 2;
 

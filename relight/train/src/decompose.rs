@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use tch::Tensor;
 
+use super::darkness::Darkness;
 use super::error::TrainError;
 use super::losses::{Mean, chord, gradient, scale_invariant, windowed};
 use super::sample::TruthBatch;
@@ -35,10 +36,22 @@ pub struct AnsweredTensors {
     pub shading: Tensor,
     /// Highlight in whites, 1 channel.
     pub highlight: Tensor,
+    /// How much of the darkness is paint, as a logit, 1 channel; none of a network without that head.
+    pub paint: Option<Tensor>,
 }
 
 impl AnsweredTensors {
-    /// The maps for the network's input and its answer.
+    /// The maps for the network's input and its outputs.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub fn of_outputs(input: &Tensor, outputs: &[Tensor]) -> Result<Self, TrainError> {
+        let paint = outputs.get(1).map(Tensor::shallow_clone);
+        let maps = Self::new(input, &outputs[0])?;
+        Ok(Self { paint, ..maps })
+    }
+
+    /// The maps for the network's input and its answer, the output `maps`.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
@@ -66,6 +79,7 @@ impl AnsweredTensors {
             highlight: part(6, 1)?
                 .f_add_scalar(-f64::from(HIGHLIGHT_OFFSET))?
                 .f_softplus()?,
+            paint: None,
         })
     }
 }
@@ -88,6 +102,8 @@ pub struct DecomposeLossCoefficients {
     pub highlight: f64,
     /// Energy of the highlights' error, as a part of their energy.
     pub highlight_energy: f64,
+    /// Cross entropy of what is paint of a pixel's darkness.
+    pub paint: f64,
 }
 
 impl Default for DecomposeLossCoefficients {
@@ -100,6 +116,7 @@ impl Default for DecomposeLossCoefficients {
             normals: 1.0,
             highlight: 1.0,
             highlight_energy: 0.2,
+            paint: 0.1,
         }
     }
 }
@@ -168,6 +185,10 @@ pub fn decompose_losses(
     terms.add_mean("highlight", coefficients.highlight, highlight);
     let energy = highlight_energy_error(batch, answer)?;
     terms.add_mean("highlight_energy", coefficients.highlight_energy, energy);
+    if let Some(logit) = &answer.paint {
+        let truth = Darkness::new(&batch.albedo, &batch.shading, mask)?;
+        terms.add_mean("paint", coefficients.paint, truth.cross_entropy(logit)?);
+    }
     Ok(terms)
 }
 

@@ -6,6 +6,7 @@ use std::time::Instant;
 use tch::{Device, Kind, Tensor};
 
 use super::composed::{ComposedBatches, buffer_settings, composition};
+use super::darkness::Darkness;
 use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, highlight_figures};
@@ -18,7 +19,8 @@ use super::sample::TruthBatch;
 use super::settings::{DecomposeSettings, PrecisionChoice, first_difference};
 use super::sheet::validation_sheet;
 use super::task::{StepLosses, TrainingTask, Validation};
-use relight_nets::{Weights, decomposer};
+use relight_nets::{PAINT_PARAMETERS, Weights, decomposer_with_paint};
+use relight_synth::AlbedoKind;
 
 /// Samples that are shown.
 const SHOWN: usize = 10;
@@ -31,6 +33,8 @@ pub struct DecomposeTask {
     learner: Learner,
     composed: ComposedBatches,
     validation: HeldOutSamples,
+    /// The same with print on all objects.
+    print: HeldOutSamples,
 }
 
 impl DecomposeTask {
@@ -46,10 +50,14 @@ impl DecomposeTask {
         settings.check()?;
         let composition = Arc::new(composition(&settings.data, settings.run.seed)?);
         composition.recipe.check()?;
-        let validation = HeldOutSamples::new(&composition, settings.data.validation);
-        let graph = decomposer();
+        let validation = HeldOutSamples::new(&composition, settings.data.validation, None);
+        let print = Some(AlbedoKind::Print);
+        let print = HeldOutSamples::new(&composition, settings.data.validation.div_ceil(2), print);
+        let graph = decomposer_with_paint();
         let initial = || Weights::initial(&graph, settings.run.seed);
         let weights = weights.cloned().unwrap_or_else(initial);
+        // Weights from before there was a head for paint begin without one.
+        let weights = weights.completed(&graph, PAINT_PARAMETERS, settings.run.seed);
         let device = resources.device;
         let precision = match settings.run.precision.named() {
             Some(precision) => precision,
@@ -76,6 +84,7 @@ impl DecomposeTask {
             resources,
             learner,
             validation,
+            print,
         })
     }
 
@@ -123,7 +132,7 @@ impl TrainingTask for DecomposeTask {
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
         let batch = self.composed.batch(step)?;
         let answer = self.learner.model.forward(&batch.input)?;
-        let answer = AnsweredTensors::new(&batch.input, &answer[0])?;
+        let answer = AnsweredTensors::of_outputs(&batch.input, &answer)?;
         Ok(StepLosses {
             terms: decompose_losses(&batch, &answer, &self.settings.loss)?,
             spreads: head_spreads(&batch, &answer)?,
@@ -147,15 +156,21 @@ impl TrainingTask for DecomposeTask {
     fn validate(&mut self) -> Result<Validation, TrainError> {
         let (model, device) = (self.learner.averaged_model()?, self.resources.device);
         let (kind, mut sheet) = (model.precision().kind(), None);
-        let figures = self.validation.figures(kind, device, |batch| {
-            let answer = AnsweredTensors::new(&batch.input, &model.forward(&batch.input)?[0])?;
+        let mut found = self.validation.figures(kind, device, |batch| {
+            let answer = AnsweredTensors::of_outputs(&batch.input, &model.forward(&batch.input)?)?;
             if sheet.is_none() {
                 sheet = Some(validation_sheet(batch, &answer, SHOWN)?);
             }
             figures(batch, &answer)
         })?;
+        let of_print = self.print.figures(kind, device, |batch| {
+            let answer = AnsweredTensors::of_outputs(&batch.input, &model.forward(&batch.input)?)?;
+            figures(batch, &answer)
+        })?;
+        let of_print = of_print.into_iter();
+        found.extend(of_print.map(|(name, value)| (format!("print_{name}"), value)));
         Ok(Validation {
-            figures,
+            figures: found,
             sheet,
             damage: None,
         })
@@ -196,6 +211,17 @@ fn figures(
     for (name, error) in errors {
         figures.push((name, f64::try_from(error)?));
     }
+    if let Some(logit) = &answer.paint {
+        let truth = Darkness::new(&batch.albedo, &batch.shading, mask)?;
+        let of_maps = Darkness::new(&quotient, &answer.shading, mask)?;
+        for (name, found) in [
+            ("paint", &logit.f_sigmoid()?),
+            ("paint_of_maps", &of_maps.paint),
+        ] {
+            let error = truth.squared_error(found)?.value;
+            figures.push((name, f64::try_from(error)?));
+        }
+    }
     Ok(figures)
 }
 
@@ -206,7 +232,7 @@ fn fastest(
     device: Device,
 ) -> Result<ComputePrecision, TrainError> {
     let seconds = |precision| -> Result<f64, TrainError> {
-        let model = Model::new(decomposer(), weights, device, precision)?;
+        let model = Model::new(decomposer_with_paint(), weights, device, precision)?;
         let mut best = f64::INFINITY;
         for _ in 0..3 {
             let start = Instant::now();

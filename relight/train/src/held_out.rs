@@ -11,8 +11,9 @@ use super::error::TrainError;
 use super::low_rank::{first_singular_values, rank_one};
 use super::paper_phases::equal_rows;
 use super::sample::{DrawnSample, TruthArrays, TruthBatch};
+use super::symmetry::Symmetry;
 use super::turn_reader::{TurnReader, TurnTensors};
-use relight_synth::{Recipe, stream};
+use relight_synth::{AlbedoKind, Recipe, stream};
 
 /// Batches of turns that are kept.
 const TURN_BATCHES: usize = 4;
@@ -81,15 +82,16 @@ pub(super) struct HeldOutSamples {
 }
 
 impl HeldOutSamples {
-    /// One sample each of `count` objects. Neither their seed nor their light depends on the run's, so that runs can be
-    /// compared.
-    pub(super) fn new(composition: &Composition, count: u64) -> Self {
+    /// One sample each of `count` objects, painted as `albedo` says where it says anything. Neither their seed nor their
+    /// light depends on the run's, so that runs can be compared.
+    pub(super) fn new(composition: &Composition, count: u64, albedo: Option<AlbedoKind>) -> Self {
         let composition = Composition {
             recipe: Recipe {
                 seed: stream(0x76_61_6c, 23),
                 size: composition.recipe.size,
                 views: 1,
                 lightings: 1,
+                albedo,
                 ..Recipe::default()
             },
             library: composition.library.without_meshes(),
@@ -140,7 +142,7 @@ impl HeldOutSamples {
 fn batch_of(samples: &[TruthArrays], kind: Kind, device: Device) -> Result<TruthBatch, TrainError> {
     let plain = |arrays| DrawnSample {
         arrays,
-        mirrored: false,
+        symmetry: Symmetry::NONE,
     };
     let samples: Vec<DrawnSample<'_>> = samples.iter().map(plain).collect();
     TruthBatch::new(&samples, kind, device)

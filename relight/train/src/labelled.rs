@@ -6,6 +6,7 @@ use std::path::Path;
 use super::data_loader::unit;
 use super::error::TrainError;
 use super::sample::{DrawnSample, TruthArrays};
+use super::symmetry::Symmetry;
 use relight_core::image::Extent;
 use relight_reader::{DamagedSample, Rank, SampleFault, TruthLayout, TruthSet};
 use relight_synth::stream;
@@ -114,7 +115,7 @@ impl LabelledBatch {
         frames
             .map(|(arrays, mirrored)| DrawnSample {
                 arrays,
-                mirrored: *mirrored,
+                symmetry: Symmetry::mirror(*mirrored),
             })
             .collect()
     }

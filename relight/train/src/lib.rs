@@ -22,6 +22,7 @@ mod all_reduced;
 mod average;
 mod checkpoint;
 mod composed;
+mod darkness;
 mod data_loader;
 mod decompose;
 mod decompose_task;
@@ -46,6 +47,7 @@ mod sample;
 mod settings;
 mod sheet;
 mod shuffle_buffer;
+mod symmetry;
 mod task;
 mod terms;
 mod turn_reader;
@@ -77,6 +79,7 @@ pub use settings::{
     read_settings,
 };
 pub use shuffle_buffer::{ShuffleBuffer, ShuffleBufferSettings};
+pub use symmetry::Symmetry;
 pub use task::{StepLosses, TrainingTask, Validation};
 pub use terms::LossTerms;
 pub use turn_reader::{TurnGroup, TurnReader, TurnTensors};

@@ -93,7 +93,7 @@ impl PaperTask {
             _ => settings.data.validation,
         };
         Ok(Self {
-            held_out_samples: HeldOutSamples::new(&composition, samples),
+            held_out_samples: HeldOutSamples::new(&composition, samples, None),
             held_out_turns: inputs.held_out.as_ref().map(held_out).transpose()?,
             networks: PhaseNetworks::new(phase, &settings, resources.device, inputs)?,
             name: phase.name(),

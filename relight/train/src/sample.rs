@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use tch::{Device, Kind, Tensor};
 
 use super::error::TrainError;
+use super::symmetry::Symmetry;
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
 use relight_nets::INPUTS;
 use relight_photo::decompose::EncodedPicture;
@@ -39,8 +40,8 @@ pub struct TruthArrays {
 pub struct DrawnSample<'a> {
     /// The sample.
     pub arrays: &'a TruthArrays,
-    /// Whether it is turned from right to left, normals and all.
-    pub mirrored: bool,
+    /// How it is seen, normals and all.
+    pub symmetry: Symmetry,
 }
 
 /// A batch of them on a device, `batch x channels x height x width`.
@@ -250,24 +251,24 @@ const NORMAL_X: usize = INPUTS + 7;
 impl DrawnSample<'_> {
     /// Writes the planes one after the other, two bytes a value.
     fn write(&self, to: &mut [u8]) {
-        let Extent { width, .. } = self.arrays.extent;
-        let pixels = self.arrays.extent.pixels();
-        let rows = self.arrays.values.chunks_exact(width.max(1));
-        for (row, (to, from)) in to.chunks_exact_mut(2 * width.max(1)).zip(rows).enumerate() {
+        let extent = self.arrays.extent;
+        let pixels = extent.pixels().max(1);
+        for (plane, to) in to.chunks_exact_mut(2 * pixels).enumerate() {
+            let (from, sign) = match plane.checked_sub(NORMAL_X) {
+                Some(axis @ 0..2) => self.symmetry.component(axis),
+                _ => (0, 1.0),
+            };
+            let is_turned = (NORMAL_X..NORMAL_X + 2).contains(&plane);
+            let from = if is_turned { NORMAL_X + from } else { plane };
+            let values = &self.arrays.values[from * pixels..][..pixels];
+            let is_negated = is_turned && sign < 0.0;
             let (to, _) = to.as_chunks_mut::<2>();
-            let is_x = row * width / pixels == NORMAL_X;
-            match (self.mirrored, is_x) {
-                (false, _) => fill(to, from.iter().copied()),
-                (true, false) => fill(to, from.iter().rev().copied()),
-                (true, true) => fill(to, from.iter().rev().map(|&x| -x)),
+            for (at, to) in to.iter_mut().enumerate() {
+                let (x, y) = (at % extent.width, at / extent.width);
+                let value = values[self.symmetry.source(extent, x, y)];
+                *to = (if is_negated { -value } else { value }).to_le_bytes();
             }
         }
-    }
-}
-
-fn fill(to: &mut [[u8; 2]], from: impl Iterator<Item = f16>) {
-    for (to, value) in to.iter_mut().zip(from) {
-        *to = value.to_le_bytes();
     }
 }
 
@@ -285,7 +286,8 @@ mod tests {
         };
         let batch = |mirrored: bool| {
             let arrays = &arrays;
-            let sample = DrawnSample { arrays, mirrored };
+            let symmetry = Symmetry::mirror(mirrored);
+            let sample = DrawnSample { arrays, symmetry };
             TruthBatch::new(&[sample], Kind::Float, Device::Cpu).unwrap()
         };
         let (plain, mirrored) = (batch(false), batch(true));

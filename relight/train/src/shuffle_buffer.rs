@@ -15,6 +15,7 @@ use super::data_loader::{Composition, DataLoader, unit};
 use super::error::TrainError;
 use super::resources::Resources;
 use super::sample::{DrawnSample, TruthArrays};
+use super::symmetry::Symmetry;
 use relight_reader::Rank;
 use relight_synth::stream;
 
@@ -37,7 +38,7 @@ pub struct ShuffleBufferSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct SampleDraw {
     number: u64,
-    mirrored: bool,
+    symmetry: Symmetry,
 }
 
 /// The buffer.
@@ -90,8 +91,8 @@ impl ShuffleBuffer {
                     .samples
                     .get(&draw.number)
                     .ok_or(TrainError::DataLoader)?;
-                let mirrored = draw.mirrored;
-                Ok(DrawnSample { arrays, mirrored })
+                let symmetry = draw.symmetry;
+                Ok(DrawnSample { arrays, symmetry })
             })
             .collect()
     }
@@ -160,7 +161,7 @@ impl ShuffleBufferSettings {
             SampleDraw {
                 number: self.pick(step, place % self.classes(), unit(hash)),
                 // The bits above make the part.
-                mirrored: hash & 1 == 1,
+                symmetry: Symmetry::of_bits(hash),
             }
         })
     }

@@ -16,8 +16,8 @@ use relight_reader::{TruthLayout, TruthSet};
 use relight_synth::{Folders, Library, Recipe, write_samples};
 use relight_train::{
     Composition, DataSettings, DrawnSample, PaperInputs, PaperPhase, PaperSettings, PaperTask,
-    PrecisionChoice, Resources, Run, RunSettings, TABLE, TrainError, TrainObserver, TruthArrays,
-    TruthBatch, TurnSettings,
+    PrecisionChoice, Resources, Run, RunSettings, Symmetry, TABLE, TrainError, TrainObserver,
+    TruthArrays, TruthBatch, TurnSettings,
 };
 use tch::{Device, Kind, Tensor};
 
@@ -141,7 +141,7 @@ fn labels_that_are_read_say_what_the_samples_say_that_they_were_written_of() {
         let [read, composed] = arrays.each_ref().map(|arrays| {
             let sample = DrawnSample {
                 arrays,
-                mirrored: false,
+                symmetry: Symmetry::NONE,
             };
             TruthBatch::new(&[sample], Kind::Float, Device::Cpu).unwrap()
         });

@@ -142,6 +142,7 @@ impl DecomposeSettings {
             ("loss.normals", loss.normals),
             ("loss.highlight", loss.highlight),
             ("loss.highlight_energy", loss.highlight_energy),
+            ("loss.paint", loss.paint),
         ])?;
         // A part of others: alone it counts nothing.
         check_coefficient("loss.quotient", loss.quotient)

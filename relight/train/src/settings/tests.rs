@@ -199,6 +199,7 @@ fn loss_coefficients_that_teach_nothing_are_named() {
         normals: 0.0,
         highlight: 0.0,
         highlight_energy: 0.0,
+        paint: 0.0,
     };
     let told = error(nothing).unwrap_err();
     assert!(told.contains("all others"), "{told}");

@@ -1,0 +1,125 @@
+//! The eight symmetries of a square picture, by which a sample is seen in eight ways.
+
+use relight_core::image::Extent;
+
+/// One of them: the picture's axes are swapped, then each is turned over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Symmetry {
+    /// Whether rows become columns; of square pictures only.
+    pub transposed: bool,
+    /// Whether left becomes right.
+    pub mirrored: bool,
+    /// Whether up becomes down.
+    pub upside_down: bool,
+}
+
+impl Symmetry {
+    /// The picture as it is.
+    pub const NONE: Self = Self {
+        transposed: false,
+        mirrored: false,
+        upside_down: false,
+    };
+
+    /// The one that the lowest three bits of a number say.
+    #[must_use]
+    pub fn of_bits(bits: u64) -> Self {
+        Self {
+            mirrored: bits & 1 == 1,
+            upside_down: bits & 2 == 2,
+            transposed: bits & 4 == 4,
+        }
+    }
+
+    /// The picture or its mirror image.
+    #[must_use]
+    pub fn mirror(mirrored: bool) -> Self {
+        Self {
+            mirrored,
+            ..Self::NONE
+        }
+    }
+
+    /// Which pixel of the picture is seen at a place.
+    pub(super) fn source(self, extent: Extent, x: usize, y: usize) -> usize {
+        let (mut u, mut v) = if self.transposed { (y, x) } else { (x, y) };
+        if self.mirrored {
+            u = extent.width - 1 - u;
+        }
+        if self.upside_down {
+            v = extent.height - 1 - v;
+        }
+        v * extent.width + u
+    }
+
+    /// From which component of a normal its component `axis` comes (0: to the right, 1: up, 2: to the viewer), and with
+    /// which sign.
+    pub(super) fn component(self, axis: usize) -> (usize, f32) {
+        let sign = |turned_over: bool| if turned_over { -1.0 } else { 1.0 };
+        match (axis, self.transposed) {
+            (0, false) => (0, sign(self.mirrored)),
+            (1, false) => (1, sign(self.upside_down)),
+            // Rows run down, normals point up.
+            (0, true) => (1, -sign(self.upside_down)),
+            (1, true) => (0, -sign(self.mirrored)),
+            _ => (axis, 1.0),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIDE: usize = 9;
+
+    /// Heights of a surface that has no symmetry of its own.
+    fn height(x: f32, y: f32) -> f32 {
+        0.3 * x + 0.11 * x * y - 0.2 * y + 0.05 * x * x
+    }
+
+    /// The slopes to the right and up at a pixel of a picture of heights.
+    fn slopes(heights: &[f32], x: usize, y: usize) -> [f32; 2] {
+        let at = |x: usize, y: usize| heights[y * SIDE + x];
+        [at(x + 1, y) - at(x - 1, y), at(x, y - 1) - at(x, y + 1)]
+    }
+
+    #[test]
+    fn normals_are_those_of_the_surface_as_it_is_seen() {
+        let extent = Extent::new(SIDE, SIDE);
+        let heights: Vec<f32> = (0..SIDE * SIDE)
+            .map(|at| height((at % SIDE) as f32, (at / SIDE) as f32))
+            .collect();
+        for bits in 0..8 {
+            let symmetry = Symmetry::of_bits(bits);
+            let place = |at: usize| symmetry.source(extent, at % SIDE, at / SIDE);
+            let seen: Vec<f32> = (0..SIDE * SIDE).map(|at| heights[place(at)]).collect();
+            for (x, y) in [(2, 3), (4, 4), (6, 2)] {
+                let source = symmetry.source(extent, x, y);
+                let own = slopes(&heights, source % SIDE, source / SIDE);
+                let found = slopes(&seen, x, y);
+                for axis in 0..2 {
+                    let (from, sign) = symmetry.component(axis);
+                    assert!(
+                        (sign * own[from] - found[axis]).abs() < 1e-5,
+                        "{symmetry:?}"
+                    );
+                }
+            }
+            let mut places: Vec<usize> = (0..SIDE * SIDE).map(place).collect();
+            places.sort_unstable();
+            places.dedup();
+            assert_eq!(places.len(), SIDE * SIDE);
+        }
+    }
+
+    #[test]
+    fn eight_numbers_are_eight_symmetries() {
+        let all: Vec<Symmetry> = (0..8).map(Symmetry::of_bits).collect();
+        for (at, one) in all.iter().enumerate() {
+            assert!(!all[..at].contains(one));
+        }
+        assert_eq!(all[0], Symmetry::NONE);
+        assert_eq!(Symmetry::mirror(true), all[1]);
+    }
+}
