@@ -12,7 +12,7 @@ use std::path::Path;
 use std::process::Command;
 
 use relight_core::files::{write_exr, write_png};
-use relight_core::image::{Depth, Extent, Linear, Planes, Rgb, Srgb, Transfer};
+use relight_core::image::{Depth, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::NormalsFrame;
 use relight_core::light::{Direction, Normals, Rotation, ShLight, YDown, YUp};
 use relight_core::render::{DiffuseForm, DiffuseLayer, Gloss, Layers, SpecularForm, Surface};
@@ -106,7 +106,7 @@ fn set(root: &Path) -> TruthSet {
 }
 
 fn predictions(root: &Path) -> Predictions {
-    Predictions::new(root.to_owned(), Transfer::Linear, NormalsFrame::YUp)
+    Predictions::new(root.to_owned(), None, NormalsFrame::YUp)
 }
 
 fn value(line: &ScoreLine, name: &str) -> f64 {
@@ -264,7 +264,7 @@ fn predicted_normals_are_read_in_the_axes_that_are_told() {
         down.write_png(&path, Depth::Sixteen).unwrap();
     }
     let mean_angle = |frame| {
-        let predictions = Predictions::new(found.clone(), Transfer::Linear, frame);
+        let predictions = Predictions::new(found.clone(), None, frame);
         let method = NormalMethod::Predictions(predictions);
         let table = evaluate_normals(&set(&truth), "both", &[method], &|| {}).unwrap();
         assert_eq!(table.lines[0].terms.mask, MaskRule::Known);

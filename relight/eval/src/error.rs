@@ -88,6 +88,19 @@ pub enum EvalError {
         /// What is wrong with it.
         source: serde_json::Error,
     },
+    /// A folder says that its files are encoded otherwise than the caller does.
+    #[error(
+        "{} says that its files are {written}, and --transfer that they are {said}: leave --transfer out",
+        path.display()
+    )]
+    Encoding {
+        /// The description.
+        path: PathBuf,
+        /// What it says.
+        written: &'static str,
+        /// What the caller says.
+        said: &'static str,
+    },
     /// The description is of another version.
     #[error("{} says {found:?}, this version reads {expected:?}", path.display())]
     Schema {

@@ -141,7 +141,7 @@ impl IntrinsicMethod {
         sample: &TruthSample,
         input: IntrinsicInput,
         mask: &[bool],
-    ) -> Result<IntrinsicImages, EvalError> {
+    ) -> Result<FoundImages, EvalError> {
         match self {
             Self::Baseline(baseline) => {
                 let image = match input {
@@ -150,20 +150,38 @@ impl IntrinsicMethod {
                     }
                     IntrinsicInput::Original => need(sample, "image", &sample.image),
                 };
-                baseline.decompose(sample, image?, mask)
+                Ok(baseline.decompose(sample, image?, mask)?.into())
             }
             Self::Predictions(predictions) => {
                 let read = |part| predictions.colour(&sample.name, part, sample.extent());
-                Ok(IntrinsicImages {
+                // What has no ground truth need not be there.
+                let shading = sample.shading.as_ref().map(|_| read("shading"));
+                Ok(FoundImages {
                     albedo: read("albedo")?,
-                    shading: read("shading")?,
+                    shading: shading.transpose()?,
                 })
             }
         }
     }
 }
 
-/// SMSE and LMSE of albedo and shading, and their means, by both conventions, for each method.
+/// What is compared with the ground truth.
+struct FoundImages {
+    albedo: Rgb<Linear>,
+    shading: Option<Rgb<Linear>>,
+}
+
+impl From<IntrinsicImages> for FoundImages {
+    fn from(found: IntrinsicImages) -> Self {
+        Self {
+            albedo: found.albedo,
+            shading: Some(found.shading),
+        }
+    }
+}
+
+/// SMSE and LMSE of albedo and shading, and their means, by both conventions, for each method. Of a set that does not
+/// know its shading, of albedo alone.
 ///
 /// # Errors
 /// Where the ground truth or a prediction cannot be read or measured.
@@ -180,7 +198,14 @@ pub fn evaluate_intrinsic(
         lines: Vec::new(),
         images: Vec::new(),
     };
+    let first = (set.names().len() > 0).then(|| set.load(0)).transpose()?;
+    let has_oracle = first.is_none_or(|one| one.shading.is_some() && one.normals.is_some());
     for method in methods {
+        if !has_oracle && matches!(method, IntrinsicMethod::Baseline(IntrinsicBaseline::Oracle)) {
+            let note = "the oracle is left out: the set does not know both normals and shading";
+            table.notes.push(note.to_owned());
+            continue;
+        }
         add_method(
             &mut table,
             (set, split),
@@ -211,11 +236,10 @@ fn notes(input: IntrinsicInput) -> Vec<String> {
 
 fn score(
     sample: &TruthSample,
-    found: &IntrinsicImages,
+    found: &FoundImages,
     mask: &[bool],
 ) -> Result<Vec<Scored>, EvalError> {
     let albedo = need(sample, "albedo", &sample.albedo)?;
-    let shading = need(sample, "shading", &sample.shading)?;
     let mut lines = Vec::new();
     for convention in Convention::ALL {
         let compare = |truth: &Rgb<Linear>, estimate: &Rgb<Linear>| {
@@ -226,16 +250,16 @@ fn score(
             measured(sample, error)
         };
         let of_albedo = compare(albedo, &found.albedo)?;
-        let of_shading = compare(shading, &found.shading)?;
-        let mean = IntrinsicError {
-            smse: f64::midpoint(of_albedo.smse, of_shading.smse),
-            lmse: f64::midpoint(of_albedo.lmse, of_shading.lmse),
-        };
-        for (part, error) in [
-            ("albedo", of_albedo),
-            ("shading", of_shading),
-            ("mean", mean),
-        ] {
+        let mut parts = vec![("albedo", of_albedo)];
+        if let (Some(shading), Some(found)) = (&sample.shading, &found.shading) {
+            let of_shading = compare(shading, found)?;
+            let mean = IntrinsicError {
+                smse: f64::midpoint(of_albedo.smse, of_shading.smse),
+                lmse: f64::midpoint(of_albedo.lmse, of_shading.lmse),
+            };
+            parts.extend([("shading", of_shading), ("mean", mean)]);
+        }
+        for (part, error) in parts {
             lines.push(Scored {
                 part,
                 measures: vec![("SMSE", error.smse), ("LMSE", error.lmse)],

@@ -1,6 +1,9 @@
 //! Folders of predictions.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
+
+use serde::Deserialize;
 
 use super::EvalError;
 use relight_core::files::read_planes;
@@ -11,18 +14,33 @@ use relight_core::render::{Gloss, Surface};
 
 /// A folder with a folder for each image of the ground truth, of the same name, in which the estimates lie:
 /// `albedo`, `shading`, `highlight` (or `specular`), `normal` as `.exr` (linear, or vectors) or `.png` (8 or 16
-/// bits), `light.txt` as lines of red, green and blue coefficients.
+/// bits), `light.txt` as lines of red, green and blue coefficients. Estimates that are a whole number of times larger than
+/// the ground truth are brought to its size, each pixel the mean of those that it covers.
 #[derive(Debug, Clone)]
 pub struct Predictions {
     root: PathBuf,
-    transfer: Transfer,
+    /// As the caller says; none: as the folder says.
+    transfer: Option<Transfer>,
     frame: NormalsFrame,
 }
 
+/// What `relight decompose` writes beside its layers.
+const DESCRIPTION: &str = "decomposition.json";
+/// What that says it is.
+const SCHEMA: &str = "relight.decomposition/1";
+
+/// The part of it that says how its PNGs hold colours. The first files of the schema did not say it, and held sRGB.
+#[derive(Deserialize)]
+struct Encoding {
+    schema: String,
+    transfer: Option<String>,
+}
+
 impl Predictions {
-    /// The predictions in the folder `root`, of which PNGs hold colours by `transfer`.
+    /// The predictions in the folder `root`, of which PNGs hold colours by `transfer`. Where that is none, an image's
+    /// folder says it if `relight decompose` wrote it, and else they are linear.
     #[must_use]
-    pub const fn new(root: PathBuf, transfer: Transfer, frame: NormalsFrame) -> Self {
+    pub const fn new(root: PathBuf, transfer: Option<Transfer>, frame: NormalsFrame) -> Self {
         Self {
             root,
             transfer,
@@ -45,9 +63,52 @@ impl Predictions {
         extent: Extent,
     ) -> Result<Rgb<Linear>, EvalError> {
         let path = self.find(name, part)?;
-        let image = Rgb::read(&path, self.transfer)?;
-        check_size(path, image.planes().extent(), extent)?;
-        Ok(image)
+        let image = Rgb::read(&path, self.transfer(name)?)?;
+        Ok(Rgb::new(brought_to(path, image.into_planes(), extent)?))
+    }
+
+    /// How PNGs of the sample `name` hold colours.
+    fn transfer(&self, name: &str) -> Result<Transfer, EvalError> {
+        let written = self.written_transfer(name)?;
+        match (self.transfer, written) {
+            (Some(said), Some(written)) if said != written => Err(EvalError::Encoding {
+                path: self.file(name, DESCRIPTION),
+                written: transfer_name(written),
+                said: transfer_name(said),
+            }),
+            (said, written) => Ok(said.or(written).unwrap_or(Transfer::Linear)),
+        }
+    }
+
+    /// How they do by the description beside them; none where there is none, or it describes something else.
+    fn written_transfer(&self, name: &str) -> Result<Option<Transfer>, EvalError> {
+        let path = self.file(name, DESCRIPTION);
+        let bytes = match std::fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(source) if source.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(source) => return Err(EvalError::Read { path, source }),
+        };
+        let parsed: Result<Encoding, _> = serde_json::from_slice(&bytes);
+        let encoding = match parsed {
+            Ok(encoding) => encoding,
+            Err(source) => return Err(EvalError::Description { path, source }),
+        };
+        if encoding.schema != SCHEMA {
+            return Err(EvalError::Schema {
+                path,
+                found: encoding.schema,
+                expected: SCHEMA,
+            });
+        }
+        match encoding.transfer.as_deref() {
+            None | Some("srgb") => Ok(Some(Transfer::Srgb)),
+            Some("linear") => Ok(Some(Transfer::Linear)),
+            Some(other) => Err(EvalError::Schema {
+                path,
+                found: format!("transfer {other}"),
+                expected: "transfer srgb or linear",
+            }),
+        }
     }
 
     /// The predicted normals of the sample `name`.
@@ -57,8 +118,11 @@ impl Predictions {
             NormalsFrame::YUp => Normals::<YUp>::read(&path)?,
             NormalsFrame::YDown => Normals::<YDown>::read(&path)?.flipped(),
         };
-        check_size(path, normals.extent(), extent)?;
-        Ok(normals)
+        Ok(Normals::new(brought_to(
+            path,
+            normals.into_planes(),
+            extent,
+        )?))
     }
 
     /// The predicted light of the sample `name`.
@@ -126,6 +190,25 @@ impl Predictions {
             .map(file)
             .into_iter()
             .find(|path| path.is_file())
+    }
+}
+
+/// An estimate at the size of the ground truth: as it is, or the means over blocks where it is so many times larger.
+fn brought_to(path: PathBuf, planes: Planes<3>, extent: Extent) -> Result<Planes<3>, EvalError> {
+    let found = planes.extent();
+    let times = found.width / extent.width.max(1);
+    if times > 1 && found == Extent::new(times * extent.width, times * extent.height) {
+        return Ok(planes.resized(extent));
+    }
+    check_size(path, found, extent)?;
+    Ok(planes)
+}
+
+fn transfer_name(transfer: Transfer) -> &'static str {
+    match transfer {
+        Transfer::Linear => "linear",
+        Transfer::Srgb => "sRGB",
+        Transfer::Gamma22 => "of gamma 2.2",
     }
 }
 

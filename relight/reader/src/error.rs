@@ -89,6 +89,14 @@ pub enum SampleFault {
         /// The size that it should have.
         expected: Extent,
     },
+    /// A file of NumPy holds no picture.
+    #[error("{}: {fault}", path.display())]
+    Array {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        fault: String,
+    },
     /// A file of numbers does not parse.
     #[error("{} does not parse", path.display())]
     Numbers {

@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand, ValueEnum};
 use relight_core::files::write_png;
 use relight_core::image::{Depth, Planes};
@@ -133,9 +134,10 @@ struct CommonArguments {
     /// A folder of estimates, with a folder for each image. May be given several times.
     #[arg(long, value_name = "DIR")]
     predictions: Vec<PathBuf>,
-    /// How PNG files of colour among the estimates are encoded; EXR is linear.
-    #[arg(long, value_enum, value_name = "SPACE", default_value_t = TransferName::Linear)]
-    transfer: TransferName,
+    /// How PNG files of colour among the estimates are encoded; EXR is linear [default: as decomposition.json says, linear
+    /// where there is none].
+    #[arg(long, value_enum, value_name = "SPACE")]
+    transfer: Option<TransferName>,
     /// Which way y points in estimated normals.
     #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up)]
     normals_y: YName,
@@ -149,11 +151,17 @@ struct SetArguments {
     #[command(flatten)]
     common: CommonArguments,
     /// How the folder of the ground truth is laid out.
-    #[arg(long, value_name = "LAYOUT", default_value_t = TruthLayout::Mit)]
+    #[arg(long, value_name = "LAYOUT", default_value = TruthLayout::Mit.name(), value_parser = layout_parser())]
     layout: TruthLayout,
     /// Compare so many images only, spread evenly over the set.
     #[arg(long, value_name = "N")]
     count: Option<usize>,
+}
+
+/// Layouts by their names, which the help lists.
+fn layout_parser() -> impl TypedValueParser<Value = TruthLayout> {
+    PossibleValuesParser::new(TruthLayout::ALL.map(TruthLayout::name))
+        .try_map(|name| name.parse::<TruthLayout>())
 }
 
 #[derive(Args)]
@@ -301,7 +309,8 @@ impl CommonArguments {
 
     fn predictions(&self) -> impl Iterator<Item = Predictions> {
         let folder = |path: &PathBuf| {
-            Predictions::new(path.clone(), self.transfer.into(), self.normals_y.into())
+            let transfer = self.transfer.map(Into::into);
+            Predictions::new(path.clone(), transfer, self.normals_y.into())
         };
         self.predictions.iter().map(folder)
     }

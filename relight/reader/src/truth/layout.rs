@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use super::scenes;
 use crate::OpenError;
 use crate::listing::listed;
 use relight_core::image::Transfer;
@@ -30,6 +31,15 @@ pub enum TruthLayout {
     /// `Shading` where those folders are. Assumed, as no description is published: input and albedo
     /// are sRGB, shading is linear, normals are y down as in the paper's colour figure.
     Lime,
+    /// ARAP (Bonneel et al. 2017), one folder: the pictures `<scene>.<ext>` or `<scene>_light<n>.<ext>`, beside each
+    /// `<name>_albedo.<ext>` (of the picture, or of the scene for all its lights) and perhaps `<name>_shading.<ext>` and
+    /// `<name>_mask.png`. HDR and EXR are linear, PNG and JPEG sRGB. Without a mask the whole picture counts, as far as its
+    /// albedo is known; without a shading that is picture over albedo.
+    Arap,
+    /// Stanford-ORB (Kuang et al. 2023), single images: the test pictures of `blender_HDR/<scene>`, else of `blender_LDR`
+    /// (sRGB), with their masks, and of `ground_truth/<scene>` the normals and the albedo (PNG: sRGB). All are brought to
+    /// 512 x 512 pixels, at which that benchmark measures. Normals are taken as the camera's of Blender: x right, y up.
+    Orb,
 }
 
 /// What a file is of a sample.
@@ -116,7 +126,14 @@ const LIME: [(Role, &str, bool); 5] = [
 
 impl TruthLayout {
     /// All layouts.
-    pub const ALL: [Self; 4] = [Self::Synth, Self::Mit, Self::Janner, Self::Lime];
+    pub const ALL: [Self; 6] = [
+        Self::Synth,
+        Self::Mit,
+        Self::Janner,
+        Self::Lime,
+        Self::Arap,
+        Self::Orb,
+    ];
 
     /// The name on the command line.
     #[must_use]
@@ -126,6 +143,8 @@ impl TruthLayout {
             Self::Mit => "mit",
             Self::Janner => "janner",
             Self::Lime => "lime",
+            Self::Arap => "arap",
+            Self::Orb => "orb",
         }
     }
 
@@ -134,20 +153,24 @@ impl TruthLayout {
             Self::Synth | Self::Mit => "folders with a mask.png each",
             Self::Janner => "files <n>_mask.png, or folders of such",
             Self::Lime => "folders Input_Masked, Normal and Mask",
+            Self::Arap => "pictures with a file <name>_albedo beside them",
+            Self::Orb => "folders blender_HDR (or blender_LDR) and ground_truth",
         }
     }
 
     /// How the values of this file stand for light.
     pub(super) const fn transfer(self, role: Role) -> Transfer {
         match (self, role) {
-            (Self::Lime, Role::Image | Role::Albedo) | (Self::Synth, Role::Image) => Transfer::Srgb,
+            (Self::Lime | Self::Orb, Role::Image | Role::Albedo)
+            | (Self::Synth, Role::Image)
+            | (Self::Arap, Role::Image | Role::Albedo | Role::Shading) => Transfer::Srgb,
             _ => Transfer::Linear,
         }
     }
 
     pub(super) const fn normal_file(self) -> NormalFile {
         match self {
-            Self::Synth | Self::Mit => NormalFile::YUp,
+            Self::Synth | Self::Mit | Self::Arap | Self::Orb => NormalFile::YUp,
             Self::Janner => NormalFile::RedDownGreenRight,
             Self::Lime => NormalFile::YDown,
         }
@@ -159,7 +182,22 @@ impl TruthLayout {
             Self::Mit => folders(root, &MIT),
             Self::Janner => janner(root),
             Self::Lime => lime(root),
+            Self::Arap => scenes::arap(root),
+            Self::Orb => scenes::orb(root),
         }
+    }
+
+    /// The width and height to which larger pictures are brought.
+    pub(super) const fn measured_side(self) -> Option<usize> {
+        match self {
+            Self::Orb => Some(512),
+            _ => None,
+        }
+    }
+
+    /// Whether a picture of its own without highlights is lacking, and that with them stands for it.
+    pub(super) const fn has_one_picture(self) -> bool {
+        matches!(self, Self::Arap | Self::Orb)
     }
 }
 
@@ -263,7 +301,7 @@ fn parts(known: &[(Role, &str, bool)], path: impl Fn(&str) -> PathBuf) -> Vec<Pa
     known.iter().map(part).collect()
 }
 
-fn name_of(path: &Path) -> String {
+pub(super) fn name_of(path: &Path) -> String {
     path.file_name()
         .unwrap_or_default()
         .to_string_lossy()

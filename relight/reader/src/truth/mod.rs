@@ -1,8 +1,10 @@
 //! Images with their ground truth.
 
 mod layout;
+mod npy;
 mod read;
 mod sample;
+mod scenes;
 
 use std::path::Path;
 

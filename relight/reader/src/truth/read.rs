@@ -7,29 +7,39 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::layout::{Entry, NormalFile, Part, Role, TruthLayout};
+use super::npy;
 use super::sample::TruthSample;
 use crate::SampleFault;
 use crate::error::check_extent;
 use relight_core::files::read_planes;
-use relight_core::image::{ImageError, Linear, Planes, Rgb};
+use relight_core::image::{Extent, ImageError, Linear, Planes, Rgb};
 use relight_core::light::{Normals, ShLight, YDown, YUp};
 
 pub(super) fn sample(entry: &Entry, layout: TruthLayout) -> Result<TruthSample, SampleFault> {
     let parts = Parts { entry, layout };
-    let mask = parts.binary(Role::Mask)?;
+    let whites = parts.whites()?;
+    let image = parts.colour(Role::Image, 1.0)?;
+    let albedo = parts.colour(Role::Albedo, 1.0)?;
+    let mut shading = parts.colour(Role::Shading, whites.shading)?;
+    let mut mask = parts.binary(Role::Mask)?;
+    if layout == TruthLayout::Arap
+        && let (Some(image), Some(albedo)) = (&image, &albedo)
+    {
+        check_extent("albedo", albedo.planes().extent(), image.planes().extent())?;
+        mask.get_or_insert_with(|| known(albedo.planes()));
+        shading.get_or_insert_with(|| quotient(image.planes(), albedo.planes()));
+    }
     let mask = mask.ok_or_else(|| SampleFault::Missing {
         part: "mask".to_owned(),
     })?;
-    let whites = parts.whites()?;
-    let albedo = parts.colour(Role::Albedo, 1.0)?;
-    let shading = parts.colour(Role::Shading, whites.shading)?;
     let diffuse = match parts.colour(Role::Diffuse, 1.0)? {
         Some(diffuse) => Some(diffuse),
+        None if layout.has_one_picture() => image.clone(),
         None => product(albedo.as_ref(), shading.as_ref())?,
     };
     let sample = TruthSample {
         name: entry.name.clone(),
-        image: parts.colour(Role::Image, 1.0)?,
+        image,
         diffuse,
         normals: parts.normals()?,
         albedo,
@@ -58,8 +68,36 @@ impl Parts<'_> {
     /// The image in a file of which the largest value stands for `white`.
     fn colour(&self, role: Role, white: f32) -> Result<Option<Rgb<Linear>>, SampleFault> {
         let transfer = self.layout.transfer(role);
+        if let Some(planes) = self.array(role)? {
+            return Ok(Some(Rgb::new(self.measured(planes))));
+        }
         let image = self.read(role, |path| Rgb::<Linear>::read(path, transfer))?;
-        Ok(image.map(|image| Rgb::new(image.into_planes().map(|value| value * white))))
+        let scaled = |image: Rgb<Linear>| image.into_planes().map(|value| value * white);
+        Ok(image.map(|image| Rgb::new(self.measured(scaled(image)))))
+    }
+
+    /// The numbers in a file of NumPy, where the part is one.
+    fn array(&self, role: Role) -> Result<Option<Planes<3>>, SampleFault> {
+        let path = self.path(role);
+        let Some(path) = path.filter(|path| path.extension().is_some_and(|e| e == "npy")) else {
+            return Ok(None);
+        };
+        let bytes = fs::read(path).map_err(SampleFault::read(path))?;
+        let planes = npy::planes(&bytes);
+        planes.map(Some).map_err(|fault| SampleFault::Array {
+            path: path.to_owned(),
+            fault,
+        })
+    }
+
+    /// The picture at the size at which the data set is measured.
+    fn measured<const C: usize>(&self, planes: Planes<C>) -> Planes<C> {
+        match self.layout.measured_side() {
+            Some(side) if planes.extent().width > side && planes.extent().height > side => {
+                planes.resized(Extent::new(side, side))
+            }
+            _ => planes,
+        }
     }
 
     fn whites(&self) -> Result<Whites, SampleFault> {
@@ -93,6 +131,11 @@ impl Parts<'_> {
 
     fn normals(&self) -> Result<Option<Normals<YUp>>, SampleFault> {
         let file = self.layout.normal_file();
+        if let Some(planes) = self.array(Role::Normals)? {
+            // Where a mesh is not seen, some files hold no numbers.
+            let finite = planes.map(|value| if value.is_finite() { value } else { 0.0 });
+            return Ok(Some(Normals::new(self.measured(finite))));
+        }
         let normals = self.read(Role::Normals, |path| read_normals(path, file))?;
         match (normals, self.binary(Role::NormalsValid)?) {
             (Some(normals), Some(valid)) => only_where(&normals, &valid).map(Some),
@@ -106,7 +149,7 @@ impl Parts<'_> {
             let (planes, _) = read_planes(path)?;
             let extent = planes.extent();
             let [plane, _, _] = planes.into_planes();
-            let plane = Planes::from_planes(extent, [plane])?;
+            let plane = self.measured(Planes::from_planes(extent, [plane])?);
             Ok(plane.map(|value| f32::from(u8::from(value >= 0.5))))
         })
     }
@@ -132,6 +175,30 @@ impl Parts<'_> {
             Err(error) => Err(error.into()),
         }
     }
+}
+
+/// 1 where albedo is known: where it is not black.
+fn known(albedo: &Planes<3>) -> Planes<1> {
+    let extent = albedo.extent();
+    Planes::from_fn(extent, |x, y| {
+        let pixel = albedo.pixel(x, y);
+        let is_known = pixel.iter().all(|v| v.is_finite()) && pixel.iter().any(|&v| v > 0.0);
+        [f32::from(u8::from(is_known))]
+    })
+}
+
+/// Least albedo by which a picture is divided, in parts of the brightest.
+const LEAST_ALBEDO: f32 = 1e-3;
+
+/// A picture over its albedo.
+fn quotient(image: &Planes<3>, albedo: &Planes<3>) -> Rgb<Linear> {
+    let values = albedo.planes().into_iter().flatten();
+    let brightest = values.fold(0.0_f32, |a, &b| a.max(b));
+    let least = (LEAST_ALBEDO * brightest).max(f32::MIN_POSITIVE);
+    Rgb::new(Planes::from_fn(image.extent(), |x, y| {
+        let (light, albedo) = (image.pixel(x, y), albedo.pixel(x, y));
+        [0, 1, 2].map(|c| light[c] / albedo[c].max(least))
+    }))
 }
 
 /// Albedo times shading.
