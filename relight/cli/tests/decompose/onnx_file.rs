@@ -1,22 +1,22 @@
 //! ONNX files of a few nodes, in the signatures of networks that others publish.
 
 /// A node: what it does, what goes in, what comes out, and its attributes as they are written.
-pub struct OnnxNode {
-    pub kind: &'static str,
-    pub input: &'static str,
-    pub output: &'static str,
-    pub attributes: Vec<Vec<u8>>,
+pub(crate) struct OnnxNode {
+    pub(crate) kind: &'static str,
+    pub(crate) input: &'static str,
+    pub(crate) output: &'static str,
+    pub(crate) attributes: Vec<Vec<u8>>,
 }
 
 /// An input or output: its name, the type of its numbers (1: 32-bit, 7: whole), and its sides, 0 where they are open.
-pub struct OnnxPort {
-    pub name: &'static str,
-    pub element: u64,
-    pub sides: Vec<u64>,
+pub(crate) struct OnnxPort {
+    pub(crate) name: &'static str,
+    pub(crate) element: u64,
+    pub(crate) sides: Vec<u64>,
 }
 
 /// The bytes of a file of operator set 13.
-pub fn onnx_file(nodes: &[OnnxNode], inputs: &[OnnxPort], outputs: &[OnnxPort]) -> Vec<u8> {
+pub(crate) fn onnx_file(nodes: &[OnnxNode], inputs: &[OnnxPort], outputs: &[OnnxPort]) -> Vec<u8> {
     let mut graph = Vec::new();
     for node in nodes {
         let mut bytes = Vec::new();
@@ -44,7 +44,7 @@ pub fn onnx_file(nodes: &[OnnxNode], inputs: &[OnnxPort], outputs: &[OnnxPort]) 
 }
 
 /// An attribute that is one whole number.
-pub fn integer(name: &str, value: u64) -> Vec<u8> {
+pub(crate) fn integer(name: &str, value: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
     message(&mut bytes, 1, name.as_bytes());
     number(&mut bytes, 3, value);
@@ -53,7 +53,7 @@ pub fn integer(name: &str, value: u64) -> Vec<u8> {
 }
 
 /// An attribute that is a list of whole numbers.
-pub fn integers(name: &str, values: &[u64]) -> Vec<u8> {
+pub(crate) fn integers(name: &str, values: &[u64]) -> Vec<u8> {
     let mut bytes = Vec::new();
     message(&mut bytes, 1, name.as_bytes());
     for &value in values {
