@@ -1,10 +1,9 @@
 //! What computes a network: tract, which is always there, or with the feature `onnxruntime` a library that is loaded
 //! where it is installed. Both are given the same ONNX file.
 
-use super::inference::GivenNumber;
 #[cfg(feature = "onnxruntime")]
 use super::onnxruntime::OnnxRuntime;
-use super::plan::Plan;
+use super::plan::{GivenNumber, Plan};
 use super::tract::TractPlan;
 
 /// What computes a network.

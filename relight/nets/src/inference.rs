@@ -6,17 +6,8 @@ use super::engine::InferenceEngine;
 use super::error::NetError;
 use super::graph::Graph;
 use super::onnx::to_onnx;
-use super::plan::Plan;
+use super::plan::{GivenNumber, Plan};
 use super::weights::{Tensor, Weights};
-
-/// A whole number that an input of a network always gets.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct GivenNumber {
-    /// The input's name.
-    pub name: String,
-    /// The number.
-    pub value: i64,
-}
 
 /// A network ready to be run on single pictures of one size.
 pub struct Inference {

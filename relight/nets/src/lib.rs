@@ -44,11 +44,12 @@ pub use decomposer::{
 pub use engine::InferenceEngine;
 pub use error::NetError;
 pub use graph::{EPSILON, Graph, Node, Operation, Output, Value};
-pub use inference::{GivenNumber, Inference};
+pub use inference::Inference;
 pub use onnx::{INPUT, check_size, to_onnx};
 #[cfg(feature = "onnxruntime")]
 pub use onnxruntime::OnnxRuntime;
 pub use parameter::{Parameter, Role};
+pub use plan::GivenNumber;
 pub use signature::{OnnxElement, OnnxSignature, OnnxValue};
 pub use turn_network::{TURN_INPUTS, TURN_OUTPUTS, turn_network};
 pub use weights::{Tensor, Weights};

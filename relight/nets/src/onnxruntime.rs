@@ -11,8 +11,7 @@ use ort::value::{Tensor as OrtTensor, TensorRef};
 use relit_data::causes::with_causes;
 
 use super::error::NetError;
-use super::inference::GivenNumber;
-use super::plan::Plan;
+use super::plan::{GivenNumber, Plan};
 use super::weights::Tensor;
 
 /// The library of ONNX Runtime, 1.17 or later, loaded.

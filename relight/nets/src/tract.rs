@@ -7,8 +7,7 @@ use tract_onnx::prelude::{
     TractResult, TypedRunnableModel,
 };
 
-use super::inference::GivenNumber;
-use super::plan::Plan;
+use super::plan::{GivenNumber, Plan};
 use super::weights::Tensor;
 
 /// A network in tract.

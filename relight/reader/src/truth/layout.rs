@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use super::entry::{Entry, Part, Role, name_of};
 use super::scenes;
 use crate::OpenError;
 use crate::listing::listed;
@@ -40,38 +41,6 @@ pub enum TruthLayout {
     /// (sRGB), with their masks, and of `ground_truth/<scene>` the normals and the albedo (PNG: sRGB). All are brought to
     /// 512 x 512 pixels, at which that benchmark measures. Normals are taken as the camera's of Blender: x right, y up.
     Orb,
-}
-
-/// What a file is of a sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Role {
-    Image,
-    Diffuse,
-    Normals,
-    NormalsValid,
-    Albedo,
-    Shading,
-    Highlight,
-    Mask,
-    Light,
-    /// The largest values that `shading` and `highlight` stand for.
-    Whites,
-}
-
-/// A file of a sample.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Part {
-    pub(super) role: Role,
-    pub(super) path: PathBuf,
-    /// Whether the sample is damaged without it.
-    pub(super) required: bool,
-}
-
-/// A sample's name and files.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Entry {
-    pub(super) name: String,
-    pub(super) parts: Vec<Part>,
 }
 
 /// How a file of normals holds its axes.
@@ -299,11 +268,4 @@ fn parts(known: &[(Role, &str, bool)], path: impl Fn(&str) -> PathBuf) -> Vec<Pa
         required,
     };
     known.iter().map(part).collect()
-}
-
-pub(super) fn name_of(path: &Path) -> String {
-    path.file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned()
 }

@@ -1,5 +1,6 @@
 //! Images with their ground truth.
 
+mod entry;
 mod layout;
 mod npy;
 mod read;
@@ -9,7 +10,7 @@ mod scenes;
 use std::path::Path;
 
 use super::{DamagedSample, OpenError, SampleId, Source};
-use layout::Entry;
+use entry::Entry;
 
 pub use layout::TruthLayout;
 pub use sample::TruthSample;

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::layout::{Entry, NormalFile, Part, Role, TruthLayout};
+use super::entry::{Entry, Part, Role};
+use super::layout::{NormalFile, TruthLayout};
 use super::npy;
 use super::sample::TruthSample;
 use crate::SampleFault;

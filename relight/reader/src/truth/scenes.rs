@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::layout::{Entry, Part, Role, name_of};
+use super::entry::{Entry, Part, Role, name_of};
 use crate::OpenError;
 use crate::listing::listed;
 

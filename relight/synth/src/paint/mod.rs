@@ -6,12 +6,14 @@
 //! | `frame` | planes to draw on, soft edges |
 //! | `palette` | which colours stand together |
 //! | `pattern` | which points have which colour of the palette |
+//! | `mark` | printed forms |
 //! | `print` | labels, glyphs, logos and bar codes in ink |
 //! | `writing` | lines of strokes that look like a script |
 //! | `picture` | image files and parts of panoramas as patterns |
 //! | `relief` | slopes that are finer than the mesh |
 
 mod frame;
+mod mark;
 mod palette;
 mod pattern;
 mod picture;
@@ -143,7 +145,10 @@ impl Paint {
         Self {
             kind: AlbedoKind::Print,
             ground: inks.ground,
-            coats: print::draw(random, points, &inks),
+            coats: print::draw(random, points, &inks)
+                .into_iter()
+                .map(|(colour, pattern)| Coat { colour, pattern })
+                .collect(),
             warp: None,
             mottle: None,
         }
