@@ -17,7 +17,8 @@ from . import open as _open
 
 class TurnBatches(torch.utils.data.IterableDataset):
     """Images, masks and the state behind them, batch by batch. Each worker of a loader draws its own batches, as if it
-    were a rank of its own: so the state is that of the data set for any one number of workers."""
+    were a rank of its own. With `n` workers the state moves on behind every `n`-th batch: who goes on from it may read
+    up to `n - 1` batches again, and misses none."""
 
     def __init__(self, path, batch=12, *, linear=False, rank=0, world_size=1, epochs=1, **options):
         self._path, self._linear = path, linear
@@ -40,7 +41,12 @@ class TurnBatches(torch.utils.data.IterableDataset):
             epochs=self._epochs,
             **self._options,
         )
+        state = self._cursor.state_dict()
         for batch in batches:
+            # The cursor is behind the batches of all workers: only the last one's is behind what a loop has had.
+            if number == count - 1:
+                state = batch.cursor.state_dict()
             if batch.damaged:
                 raise ValueError("; ".join(batch.damaged))
-            yield (*batch.torch(), batch.cursor.state_dict())
+            yield (*batch.torch(), state)
+            state = batch.cursor.state_dict()

@@ -65,3 +65,21 @@ def test_a_loader_of_torch_goes_on_where_it_stopped():
     rest = list(torch.utils.data.DataLoader(again, batch_size=None))
     assert len(rest) == len(seen) - 2
     assert torch.equal(rest[0][0], seen[2][0])
+
+
+@pytest.mark.parametrize("workers", [2, 3])
+def test_no_batch_is_missed_from_the_state_of_any_worker(workers):
+    torch = pytest.importorskip("torch", reason="torch is not installed")
+    from relit.torch import TurnBatches
+
+    def seen(data):
+        loader = torch.utils.data.DataLoader(data, batch_size=None, num_workers=workers)
+        return [(images.double().sum().item(), state) for images, _, state in loader]
+
+    whole = seen(TurnBatches(DATA, seed=7))
+    for stop in range(workers + 1):
+        again = TurnBatches(DATA, seed=7)
+        again.load_state_dict(whole[stop][1])
+        rest = [value for value, _ in seen(again)]
+        assert {value for value, _ in whole[stop + 1 :]} <= set(rest)
+        assert len(rest) < len(whole) - stop - 1 + workers
