@@ -76,15 +76,14 @@ pub(super) fn check_replaceable(
     }
 }
 
-/// Said before anybody works on a mask that cannot be kept.
+/// Makes the mask's folder, before anybody works on a mask that cannot be kept.
 fn check_folder(mask: &Path) -> Result<(), MaskingError> {
     match mask.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => {
-            fs::read_dir(folder).map_err(MaskingError::io(folder, "written to"))?;
+            fs::create_dir_all(folder).map_err(MaskingError::io(folder, "made"))
         }
-        _ => {}
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 fn read_record(files: &MaskFiles) -> Result<Option<MaskRecord>, MaskingError> {
@@ -154,6 +153,18 @@ mod tests {
         fs::write(&files.record, r#"{"schema": "relit.session/1"}"#).unwrap();
         let result = check_replaceable(&files, true, false);
         assert!(matches!(result, Err(MaskingError::ForeignFile { .. })));
+    }
+
+    #[test]
+    fn the_folder_of_a_mask_is_made_and_a_file_in_its_place_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("masks").join("of").join("mug.png");
+        check_replaceable(&MaskFiles::of(&path).unwrap(), false, false).unwrap();
+        assert!(path.parent().unwrap().is_dir());
+        fs::write(&path, "painted").unwrap();
+        let below = MaskFiles::of(&path.join("mug.png")).unwrap();
+        let error = check_replaceable(&below, false, false).unwrap_err();
+        assert!(error.to_string().contains("could not be made"), "{error}");
     }
 
     #[test]

@@ -168,6 +168,7 @@ pub(super) fn read_frame(
         t_us: info.map_or(0, |info| info.t_us),
         width: frame.width(),
         height: frame.height(),
+        exif_orientation: video.facts().exif_orientation,
         frame_blake3: blake3::hash(frame.as_raw()).to_hex().to_string(),
     };
     Ok((frame, source))

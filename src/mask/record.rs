@@ -66,6 +66,9 @@ pub struct SourceFrame {
     pub width: u32,
     /// Its height, pixels.
     pub height: u32,
+    /// Exif's number, 2 to 8, by which a photograph was turned for display before; width, height and mask are those after.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exif_orientation: Option<u8>,
     /// BLAKE3 of its 8-bit RGB values, row by row, in hexadecimal.
     pub frame_blake3: String,
 }
@@ -262,6 +265,7 @@ mod tests {
                 t_us: 100_000,
                 width: 64,
                 height: 48,
+                exif_orientation: None,
                 frame_blake3: "00".to_owned(),
             },
             hints: RecordedHints::new(&Hints::Rect(Rect::new(-1, 2, 30, 40)).into(), &[]).unwrap(),

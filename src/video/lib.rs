@@ -7,7 +7,7 @@
 //! frames, which any number of threads can decode in parallel; otherwise FFmpeg's own threads decode
 //! ahead. Memory does not grow with the length of the video, except for about 30 bytes a frame.
 //!
-//! Colour range (limited, full) and matrix are respected, a display rotation is applied, variable
+//! Colour range (limited, full) and matrix are respected, a display rotation is applied (of a photograph: Exif's), variable
 //! frame rate and gaps in the time stamps are kept. [`PixelFormat`] is the one type for how a
 //! camera's frames are coded. This crate knows nothing of sessions, masks or angles.
 //!
@@ -54,6 +54,7 @@ mod order;
 mod orientation;
 mod packets;
 mod part;
+mod photograph;
 mod picture;
 mod raw;
 mod reader;

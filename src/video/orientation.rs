@@ -1,7 +1,8 @@
-//! Rotation and mirroring for display: the display matrix of MP4 and Matroska.
+//! Rotation and mirroring for display: the display matrix of MP4 and Matroska, and Exif's orientation.
 
 use image::RgbImage;
 use image::imageops::{flip_horizontal_in_place, flip_vertical_in_place};
+use image::metadata::Orientation as Exif;
 
 use relit_data::geometry::Rect;
 
@@ -38,6 +39,25 @@ impl Orientation {
                 flip_y: b < 0,
             }),
             _ => None,
+        }
+    }
+
+    /// What Exif asks for.
+    pub(super) const fn from_exif(exif: Exif) -> Self {
+        let (transpose, flip_x, flip_y) = match exif {
+            Exif::NoTransforms => (false, false, false),
+            Exif::FlipHorizontal => (false, true, false),
+            Exif::Rotate180 => (false, true, true),
+            Exif::FlipVertical => (false, false, true),
+            Exif::Rotate90FlipH => (true, false, false),
+            Exif::Rotate90 => (true, true, false),
+            Exif::Rotate270FlipH => (true, true, true),
+            Exif::Rotate270 => (true, false, true),
+        };
+        Self {
+            transpose,
+            flip_x,
+            flip_y,
         }
     }
 
@@ -123,6 +143,17 @@ mod tests {
         assert_eq!(shown.dimensions(), (3, 4));
         assert_eq!(shown.get_pixel(2, 0).0, [0, 0, 0]);
         assert_eq!(shown.get_pixel(2, 3).0, [3, 0, 0]);
+    }
+
+    #[test]
+    fn exif_turns_a_picture_as_the_crate_image_does() {
+        for number in 1..=8 {
+            let exif = Exif::from_exif(number).unwrap();
+            let mut wanted = image::DynamicImage::from(numbered(4, 3));
+            wanted.apply_orientation(exif);
+            let shown = Orientation::from_exif(exif).apply(numbered(4, 3));
+            assert_eq!(shown, wanted.into_rgb8(), "{number}");
+        }
     }
 
     #[test]

@@ -8,10 +8,12 @@ use ffmpeg_next::codec::packet::side_data;
 use ffmpeg_next::format::context::Input;
 use ffmpeg_next::{Packet, codec, format, media};
 use image::RgbImage;
+use image::metadata::Orientation as Exif;
 
 use super::decoder::{self, Pool, VideoDecoder};
 use super::order::{FrameInfo, Ordered, Stamp, mark_wrong_checksums};
 use super::orientation::Orientation;
+use super::photograph::exif_orientation;
 use super::picture::Colour;
 use super::track::Track;
 use super::{DecodeFault, Pending, Reader, Truncation, VideoError, find_truncation, open_input};
@@ -31,6 +33,9 @@ pub struct Facts {
     pub pixel_format: String,
     /// True where black is 0 and white is 255; false where they are 16 and 235 and are expanded.
     pub full_range: bool,
+    /// Exif's number, 2 to 8, by which a photograph is turned for display; none for a video, and for a photograph that is
+    /// displayed as it is stored.
+    pub exif_orientation: Option<u8>,
 }
 
 /// A sign that a video is incomplete or damaged.
@@ -131,7 +136,8 @@ impl Video {
             duration_us: input.duration(),
         };
         let parameters = stream.parameters();
-        let (orientation, mut notes) = orientation(&stream);
+        let exif = exif_orientation(&input, path);
+        let (orientation, mut notes) = orientation(&stream, exif);
 
         let (mut stamps, read_error) = read_through(&mut input, index, parameters.id());
         mark_wrong_checksums(&mut stamps);
@@ -157,7 +163,7 @@ impl Video {
         notes.extend(colour.note());
         Ok(Self {
             path: path.to_owned(),
-            facts: facts(&decoder, colour, orientation),
+            facts: facts(&decoder, colour, orientation, exif),
             damage: find_damage(path, &ordered.frames, stamps.len(), &promised, read_error),
             frames: ordered.frames,
             notes,
@@ -267,7 +273,12 @@ impl Video {
     }
 }
 
-fn facts(decoder: &VideoDecoder, colour: Colour, orientation: Orientation) -> Facts {
+fn facts(
+    decoder: &VideoDecoder,
+    colour: Colour,
+    orientation: Orientation,
+    exif: Option<Exif>,
+) -> Facts {
     let (width, height) = orientation.displayed(decoder.width(), decoder.height());
     let codec = decoder.codec().map(|codec| codec.name().to_owned());
     let format = decoder
@@ -280,11 +291,18 @@ fn facts(decoder: &VideoDecoder, colour: Colour, orientation: Orientation) -> Fa
         height,
         pixel_format: format.unwrap_or_else(|| "unknown".to_owned()),
         full_range: colour.full_range,
+        exif_orientation: exif.map(Exif::to_exif),
     }
 }
 
-/// The rotation that the stream asks for, and remarks about it.
-pub(super) fn orientation(stream: &format::stream::Stream<'_>) -> (Orientation, Vec<String>) {
+/// The rotation that the stream or a photograph's Exif asks for, and remarks about it.
+pub(super) fn orientation(
+    stream: &format::stream::Stream<'_>,
+    exif: Option<Exif>,
+) -> (Orientation, Vec<String>) {
+    if let Some(exif) = exif {
+        return (Orientation::from_exif(exif), Vec::new());
+    }
     let mut side_data = stream.side_data();
     let matrix = side_data.find(|data| data.kind() == side_data::Type::DisplayMatrix);
     match matrix.map(|matrix| Orientation::from_display_matrix(matrix.data())) {

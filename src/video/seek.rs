@@ -9,6 +9,7 @@ use ffmpeg_next::{Packet, frame, media};
 use image::RgbImage;
 
 use super::decoder::{self as opening, VideoDecoder};
+use super::photograph::exif_orientation;
 use super::picture::{Colour, Picture};
 use super::scan::{Video, orientation};
 use super::{DecodeFault, VideoError, open_input};
@@ -29,7 +30,7 @@ pub fn first_picture(path: &Path) -> Result<RgbImage, VideoError> {
         .best(media::Type::Video)
         .ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
     let (index, parameters) = (stream.index(), stream.parameters());
-    let (orientation, _) = orientation(&stream);
+    let (orientation, _) = orientation(&stream, exif_orientation(&input, path));
     let codec = format!("{:?}", parameters.id());
     let mut decoder = opening::open(parameters, 1).map_err(|why| VideoError::Decoder {
         path: path.to_owned(),

@@ -10,6 +10,7 @@ mod degenerate;
 mod editing;
 mod editor;
 mod engine;
+mod photographs;
 mod program;
 mod scene;
 mod support;

@@ -4,6 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use relight_core::files::OutputKind;
 use relight_core::image::Depth;
 use relight_nets::Weights;
 use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer};
@@ -52,6 +53,19 @@ pub(crate) enum Bits {
     Eight,
     #[value(name = "16")]
     Sixteen,
+}
+
+impl Bits {
+    /// What is wrong with so many bits in a file of this name, if anything is.
+    pub(crate) fn fault(self, output: &Path) -> Option<String> {
+        let is_jpeg = OutputKind::of(output) == Some(OutputKind::Jpeg);
+        (is_jpeg && matches!(self, Self::Sixteen)).then(|| {
+            format!(
+                "--output {}: a JPEG has 8 bits; give .png for --bits 16",
+                output.display()
+            )
+        })
+    }
 }
 
 impl From<Bits> for Depth {

@@ -1,6 +1,9 @@
 //! What says where the object is.
 
-use image::{ImageBuffer, Rgb as Pixel, RgbImage, Rgba};
+use std::io::Cursor;
+
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageBuffer, ImageFormat, Rgb as Pixel, RgbImage, Rgba};
 use relight_photo::decompose::{MaskSource, Rectangle, SpecularGate};
 use relight_photo::files::PhotoReading;
 
@@ -63,6 +66,63 @@ fn a_mask_is_a_files_brightest_channel_or_its_alpha() {
         let found = load(&photo, &with_mask(path)).unwrap();
         assert_eq!(found.mask, wanted, "{name}");
     }
+}
+
+/// A JPEG of a picture as a camera stores it that is held so that Exif has this orientation.
+fn stored(displayed: &RgbImage, orientation: u8) -> Vec<u8> {
+    let mut turned = DynamicImage::from(displayed.clone());
+    // What takes the orientation back.
+    let back = match orientation {
+        6 => Orientation::Rotate270,
+        8 => Orientation::Rotate90,
+        _ => Orientation::Rotate180,
+    };
+    turned.apply_orientation(back);
+    let mut bytes = Cursor::new(Vec::new());
+    turned.write_to(&mut bytes, ImageFormat::Jpeg).unwrap();
+    let jpeg = bytes.into_inner();
+    let exif = [
+        b"\xff\xe1\x00\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".as_slice(),
+        &[orientation],
+        b"\0\0\0\0\0\0".as_slice(),
+    ]
+    .concat();
+    [&jpeg[..2], &exif, &jpeg[2..]].concat()
+}
+
+#[test]
+fn a_photograph_that_is_held_otherwise_is_turned_and_a_mask_of_how_it_is_stored_is_told() {
+    let folder = Folder::new();
+    let displayed = mask_of_displayed(&folder);
+    for orientation in [3, 6, 8] {
+        let path = folder.save("held.jpg", |path| {
+            std::fs::write(path, stored(&object(90), orientation)).unwrap();
+        });
+        let photo = load(&path, &with_mask(displayed.clone())).unwrap();
+        assert_eq!(photo.mask.extent().width, WIDTH as usize, "{orientation}");
+        // The object's colours lie under the mask: it is brighter below.
+        let [_, _, upper] = photo.picture.planes().pixel(30, 10);
+        let [_, _, lower] = photo.picture.planes().pixel(30, 38);
+        assert!(lower > upper, "{orientation}: {upper} {lower}");
+    }
+    // The mask of the picture on its side.
+    let side = folder.save("side.png", |path| {
+        image::imageops::rotate90(&mask()).save(path).unwrap();
+    });
+    let held = folder.save("held.jpg", |path| {
+        std::fs::write(path, stored(&object(90), 6)).unwrap();
+    });
+    let error = load(&held, &with_mask(side)).unwrap_err().to_string();
+    assert!(error.contains("as the photograph is stored"), "{error}");
+    // Of the picture upside down, only its record tells.
+    let record = r#"{"schema": "relit.mask/1", "source": {"video": "held.jpg", "frame": 0}}"#;
+    std::fs::write(displayed.with_extension("json"), record).unwrap();
+    let error = load(&held, &with_mask(displayed)).unwrap_err().to_string();
+    assert!(error.contains("before it was turned"), "{error}");
+}
+
+fn mask_of_displayed(folder: &Folder) -> std::path::PathBuf {
+    folder.save("displayed.png", |path| mask().save(path).unwrap())
 }
 
 #[test]

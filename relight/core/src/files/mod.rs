@@ -9,5 +9,5 @@ mod result_folder;
 pub use maps::{Map, MapFiles};
 pub use movie::{MovieError, MovieFormat, MovieReader, MovieWriter};
 pub use output::{OutputKind, write_picture};
-pub use pictures::{read_planes, write_exr, write_png};
+pub use pictures::{read_planes, write_exr, write_jpeg, write_png};
 pub use result_folder::{FolderFault, ResultFolder};

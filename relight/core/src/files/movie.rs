@@ -10,6 +10,7 @@ use std::thread::{self, JoinHandle};
 
 use relit_data::durable;
 
+use super::output::make_parent;
 use crate::image::{Extent, Planes, Rgb, Srgb};
 use crate::parallel;
 
@@ -130,27 +131,29 @@ impl MovieWriter {
             .map_err(MovieError::NoProgram)
     }
 
-    /// Starts `ffmpeg` for frames of one size. An odd width or height is filled up with a black line, since
-    /// both formats halve the resolution of colours.
+    /// Starts `ffmpeg` for frames of one size. The last line of an odd width or height is shown twice, since
+    /// both formats halve the resolution of colours. The folder is made where there is none.
     ///
     /// # Errors
-    /// Where the program cannot be started.
+    /// Where the program cannot be started, or the folder not be made.
     pub fn create(
         path: &Path,
         format: MovieFormat,
         extent: Extent,
         frames_per_second: u32,
     ) -> Result<Self, MovieError> {
+        make_parent(path).map_err(|source| MovieError::Write {
+            path: path.to_owned(),
+            source,
+        })?;
         let partial = partial_name(path);
+        let shown = even(extent);
         let mut program = Command::new("ffmpeg")
             .args(["-hide_banner", "-loglevel", "error", "-nostdin", "-y"])
             .args(["-f", "rawvideo", "-pixel_format", "rgb24", "-video_size"])
-            .arg(format!("{}x{}", extent.width, extent.height))
+            .arg(format!("{}x{}", shown.width, shown.height))
             .args(["-framerate", &frames_per_second.to_string(), "-i", "pipe:0"])
-            .args([
-                "-vf",
-                "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709",
-            ])
+            .args(["-vf", "scale=out_color_matrix=bt709"])
             .args(["-pix_fmt", "yuv420p", "-colorspace", "bt709"])
             .args(["-color_primaries", "bt709", "-color_trc", "iec61966-2-1"])
             .args(format.arguments())
@@ -215,7 +218,7 @@ impl MovieWriter {
                 expected: self.extent,
             });
         }
-        let bytes = frame.planes().to_bytes();
+        let bytes = filled_up(frame.planes().to_bytes(), found);
         let written = match &mut self.program.stdin {
             Some(pipe) => pipe.write_all(&bytes),
             None => Ok(()),
@@ -419,6 +422,32 @@ fn probe(path: &Path) -> Result<(Extent, u32), MovieError> {
 }
 
 /// The name under which a video is written, in the same folder.
+/// A size whose sides are even.
+const fn even(extent: Extent) -> Extent {
+    Extent::new(
+        extent.width.next_multiple_of(2),
+        extent.height.next_multiple_of(2),
+    )
+}
+
+/// Pixels of three bytes with the last column and the last row twice where there is an odd number of them.
+fn filled_up(bytes: Vec<u8>, extent: Extent) -> Vec<u8> {
+    let whole = even(extent);
+    if whole == extent {
+        return bytes;
+    }
+    let mut filled = Vec::with_capacity(3 * whole.pixels());
+    for row in 0..whole.height {
+        let line = row.min(extent.height.saturating_sub(1)) * 3 * extent.width;
+        let line = bytes.get(line..line + 3 * extent.width).unwrap_or_default();
+        filled.extend_from_slice(line);
+        if whole.width > extent.width {
+            filled.extend_from_slice(line.last_chunk::<3>().unwrap_or(&[0; 3]));
+        }
+    }
+    filled
+}
+
 fn partial_name(path: &Path) -> PathBuf {
     static COUNTER: AtomicU64 = AtomicU64::new(0);
     let counter = COUNTER.fetch_add(1, Ordering::Relaxed);
@@ -493,6 +522,29 @@ mod tests {
             .output()
             .unwrap();
         assert_eq!(String::from_utf8_lossy(&probed.stdout).trim(), "34,34,7");
+        // What the even size has more shows the edge, and no black line.
+        let mut clip = MovieReader::open(&path).unwrap();
+        let frame = clip.frame().unwrap().unwrap();
+        for (x, y) in [(33, 5), (5, 33), (33, 33)] {
+            assert!(
+                (frame.planes().pixel(x, y)[1] - 0.5).abs() < 0.03,
+                "{x} {y}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_last_column_and_row_of_an_odd_size_come_twice() {
+        let bytes: Vec<u8> = (0..27).collect();
+        let filled = filled_up(bytes.clone(), Extent::new(3, 3));
+        assert_eq!(filled.len(), 48);
+        assert_eq!(filled[6..12], [6, 7, 8, 6, 7, 8]);
+        assert_eq!(filled[24..36], filled[36..48]);
+        assert_eq!(filled_up(bytes.clone(), Extent::new(1, 9)).len(), 60);
+        assert_eq!(
+            filled_up(bytes[..24].to_vec(), Extent::new(4, 2)),
+            bytes[..24]
+        );
     }
 
     #[test]
@@ -501,14 +553,33 @@ mod tests {
             return;
         }
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("missing").join("turn.mp4");
-        let mut movie =
-            MovieWriter::create(&path, MovieFormat::Mp4, Extent::new(32, 32), 30).unwrap();
+        // H.264 has no frame as wide as that.
+        let path = folder.path().join("turn.mp4");
+        let extent = Extent::new(20_000, 2);
+        let mut movie = MovieWriter::create(&path, MovieFormat::Mp4, extent, 30).unwrap();
+        let wide = Rgb::new(Planes::filled(extent, [0.5; 3]));
         // The pipe may take some frames before it breaks.
-        let pushed = (0..50).try_for_each(|_| movie.push(&grey(32)));
+        let pushed = (0..50).try_for_each(|_| movie.push(&wide));
         let error = pushed.and_then(|()| movie.finish()).unwrap_err();
-        assert!(error.to_string().contains("No such file"), "{error}");
+        assert!(error.to_string().contains("turn.mp4"), "{error}");
         assert!(names_in(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn a_folder_for_a_video_is_made_and_a_file_in_its_place_is_told() {
+        if !has_ffmpeg() {
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let create =
+            |path: &Path| MovieWriter::create(path, MovieFormat::Mp4, Extent::new(32, 32), 30);
+        let path = folder.path().join("new").join("turn.mp4");
+        let mut movie = create(&path).unwrap();
+        movie.push(&grey(32)).unwrap();
+        movie.finish().unwrap();
+        assert!(path.is_file());
+        let below = create(&path.join("turn.mp4"));
+        assert!(matches!(below, Err(MovieError::Write { .. })));
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! The kinds of file that pictures and videos are written into.
 
+use std::fs;
+use std::io;
 use std::path::Path;
 
-use super::{MovieFormat, write_png};
+use super::{MovieFormat, write_jpeg, write_png};
 use crate::image::{Depth, ImageError, Linear, Rgb, Srgb};
 
 /// What a file's name asks for.
@@ -20,6 +22,8 @@ use crate::image::{Depth, ImageError, Linear, Rgb, Srgb};
 pub enum OutputKind {
     /// A picture, encoded.
     Png,
+    /// A picture, encoded with 8 bits and a little loss.
+    Jpeg,
     /// A picture, linear.
     Exr,
     /// A video.
@@ -34,22 +38,35 @@ impl OutputKind {
         match MovieFormat::of(path) {
             Some(format) => Some(Self::Movie(format)),
             None if ending.eq_ignore_ascii_case("png") => Some(Self::Png),
+            None if ["jpg", "jpeg"]
+                .iter()
+                .any(|e| ending.eq_ignore_ascii_case(e)) =>
+            {
+                Some(Self::Jpeg)
+            }
             None if ending.eq_ignore_ascii_case("exr") => Some(Self::Exr),
             None => None,
         }
     }
 }
 
-/// Writes a picture: linear into an EXR, encoded with so many bits into any other file, a PNG.
+/// Writes a picture: linear into an EXR, encoded into a JPEG, and with so many bits into any other file, a PNG. The folder is
+/// made where there is none.
 ///
 /// # Errors
 /// Where the file cannot be written.
 pub fn write_picture(path: &Path, picture: &Rgb<Linear>, depth: Depth) -> Result<(), ImageError> {
     match OutputKind::of(path) {
         Some(OutputKind::Exr) => picture.write_exr(path),
-        _ => {
-            let encoded = picture.clone().encode::<Srgb>().into_planes();
-            write_png(path, &encoded, depth)
-        }
+        Some(OutputKind::Jpeg) => write_jpeg(path, picture.clone().encode::<Srgb>().planes()),
+        _ => write_png(path, picture.clone().encode::<Srgb>().planes(), depth),
+    }
+}
+
+/// Makes the folder of a file that is to be written, and those that it lies in.
+pub(super) fn make_parent(path: &Path) -> io::Result<()> {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => fs::create_dir_all(folder),
+        _ => Ok(()),
     }
 }

@@ -6,10 +6,11 @@ use std::path::Path;
 
 use relit_data::durable::{Partial, write_whole};
 
+use super::output::make_parent;
 use crate::captured_object::{CapturedObject, CapturedObjectError};
 use crate::image::{
     Depth, Gamma22, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
-    encode_exr, encode_png,
+    encode_exr, encode_jpeg, encode_png,
 };
 use crate::light::{LightFileError, Normals, Panorama, PanoramaError, ShLight, YAxis};
 
@@ -19,6 +20,14 @@ use crate::light::{LightFileError, Normals, Panorama, PanoramaError, ShLight, YA
 /// Where the file cannot be written.
 pub fn write_png(path: &Path, planes: &Planes<3>, depth: Depth) -> Result<(), ImageError> {
     write(path, &encode_png(path, planes, depth)?)
+}
+
+/// Writes values of 0 to 1 with 8 bits and a little loss; others are clipped.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn write_jpeg(path: &Path, planes: &Planes<3>) -> Result<(), ImageError> {
+    write(path, &encode_jpeg(path, planes)?)
 }
 
 /// Writes the values as they are, 32-bit floating point.
@@ -39,7 +48,8 @@ pub fn read_planes(path: &Path) -> Result<(Planes<3>, Samples), ImageError> {
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
-    write_whole(path, bytes).map_err(|source| ImageError::Write {
+    let written = make_parent(path).and_then(|()| write_whole(path, bytes));
+    written.map_err(|source| ImageError::Write {
         path: path.to_owned(),
         source,
     })
@@ -60,7 +70,7 @@ impl StoredImage {
 }
 
 impl Rgb<Linear> {
-    /// Reads a PNG or JPEG, whose values are encoded as `transfer` says, or an EXR or HDR, which are
+    /// Reads a PNG, JPEG or WebP, whose values are encoded as `transfer` says, or an EXR or HDR, which are
     /// linear. Alpha is left out; grey becomes three equal channels.
     ///
     /// # Errors
@@ -253,6 +263,48 @@ mod tests {
         let bright = ramp().map(|v| v * 1000.0 - 1.0);
         write_exr(&path, &bright).unwrap();
         assert_eq!(read_planes(&path).unwrap(), (bright, Samples::Float));
+    }
+
+    #[test]
+    fn a_jpeg_comes_back_nearly_and_a_folder_that_is_missing_is_made() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new").join("deep").join("ramp.jpg");
+        let smooth = Planes::from_fn(Extent::new(64, 48), |x, y| {
+            [x as f32 / 63.0, y as f32 / 47.0, 0.5]
+        });
+        write_jpeg(&path, &smooth).unwrap();
+        let (back, samples) = read_planes(&path).unwrap();
+        assert_eq!(samples, Samples::Integer);
+        assert!(largest_difference(&back, &smooth) < 0.03);
+    }
+
+    #[test]
+    fn half_a_picture_is_an_error_in_every_format() {
+        let folder = tempfile::tempdir().unwrap();
+        let noise = Planes::from_fn(Extent::new(64, 48), |x, y| {
+            [0, 1, 2].map(|c| ((x * 31 + y * 17 + c * 7) % 64) as f32 / 63.0)
+        });
+        let bytes = noise.to_bytes();
+        let mut webp = Vec::new();
+        image::codecs::webp::WebPEncoder::new_lossless(&mut webp)
+            .encode(&bytes, 64, 48, image::ExtendedColorType::Rgb8)
+            .unwrap();
+        let path = Path::new("half");
+        let files = [
+            encode_png(path, &noise, Depth::Eight).unwrap(),
+            encode_jpeg(path, &noise).unwrap(),
+            encode_exr(path, &noise).unwrap(),
+            webp,
+        ];
+        for (number, whole) in files.into_iter().enumerate() {
+            let file = folder.path().join(format!("{number}"));
+            std::fs::write(&file, &whole).unwrap();
+            assert!(StoredImage::read(&file).is_ok(), "{number}");
+            for part in [2, 3, 6, 9] {
+                std::fs::write(&file, &whole[..whole.len() * part / 10]).unwrap();
+                assert!(StoredImage::read(&file).is_err(), "{number} {part}");
+            }
+        }
     }
 
     #[test]

@@ -42,12 +42,18 @@ pub enum ImageError {
         source: io::Error,
     },
     /// The file is not an image of a known format.
-    #[error("{} is not a readable PNG, JPEG, EXR or HDR image", path.display())]
+    #[error("{} is not a readable PNG, JPEG, WebP, EXR or HDR image", path.display())]
     Decode {
         /// The file.
         path: PathBuf,
         /// What the decoder found.
         source: image::ImageError,
+    },
+    /// The file ends before the picture does.
+    #[error("{} is cut off: a part of the picture is missing; copy the file again", path.display())]
+    CutOff {
+        /// The file.
+        path: PathBuf,
     },
     /// The image has more pixels than are read.
     #[error("{} is too large: its pixels would take more than 512 MiB of memory", path.display())]

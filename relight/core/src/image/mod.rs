@@ -6,8 +6,11 @@ mod error;
 mod extent;
 mod planes;
 mod resize;
+mod wholeness;
 
-pub use codec::{Depth, Samples, StoredImage, encode_exr, encode_png};
+pub use codec::{
+    Depth, Samples, StoredImage, encode_exr, encode_jpeg, encode_png, exif_orientation,
+};
 pub use colour::{ColourSpace, Gamma22, Linear, Rgb, Srgb, Transfer};
 pub use error::ImageError;
 pub use extent::Extent;

@@ -31,6 +31,29 @@ pub enum DecomposeError {
         /// The photograph's.
         expected: Extent,
     },
+    /// A mask has the sides of the photograph as it is stored.
+    #[error(
+        "the mask has {} x {} pixels as the photograph is stored, which is displayed turned to {} x {}: make the mask again \
+         with this version's relit-mask, or turn it",
+        found.width, found.height, expected.width, expected.height
+    )]
+    MaskStored {
+        /// The mask's size.
+        found: Extent,
+        /// The photograph's.
+        expected: Extent,
+    },
+    /// A mask was made of the photograph as it is stored, or of another form of it.
+    #[error(
+        "{} was made of {} before it was turned as its Exif orientation says: make it again with this version's relit-mask",
+        mask.display(), photo.display()
+    )]
+    MaskNotTurned {
+        /// The mask.
+        mask: PathBuf,
+        /// The photograph.
+        photo: PathBuf,
+    },
     /// There is nothing under the mask.
     #[error("the mask is empty: it is nowhere at least one half")]
     EmptyMask,
@@ -124,7 +147,7 @@ pub enum DecomposeError {
         transfer: String,
     },
     /// There are no photographs.
-    #[error("{} holds no photographs (.png, .jpg, .exr, .hdr) and no shards (.tar)", path.display())]
+    #[error("{} holds no photographs (.png, .jpg, .webp, .exr, .hdr) and no shards (.tar)", path.display())]
     NoPhotos {
         /// The folder.
         path: PathBuf,

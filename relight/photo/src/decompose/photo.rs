@@ -8,6 +8,7 @@ use super::error::DecomposeError;
 use super::mask::{MaskSource, NoObject, Rectangle, find_mask, is_empty, mask_of};
 use relight_core::image::{
     ColourSpace, Extent, Gamma22, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
+    exif_orientation,
 };
 use relit_data::image_stats::SATURATED_VALUE;
 
@@ -65,10 +66,11 @@ impl Photo {
             (Samples::Integer, None) => Some(stated_transfer(path, bytes)?),
         };
         let (mask, mask_source) = match hints.mask {
-            Some(mask) => (
-                mask_of(mask.clone(), image.planes.extent())?,
-                MaskSource::File,
-            ),
+            Some(mask) => {
+                check_stored(mask.planes.extent(), image.planes.extent(), bytes)?;
+                let mask = mask_of(mask.clone(), image.planes.extent())?;
+                (mask, MaskSource::File)
+            }
             None => {
                 let encoded = shown(&image.planes, transfer);
                 find_mask(&encoded, image.alpha.as_ref(), hints.rectangle).map_err(|why| {
@@ -156,6 +158,16 @@ fn stated_extent(bytes: &[u8]) -> Option<Extent> {
     let reader = ::image::ImageReader::new(Cursor::new(bytes));
     let sides = reader.with_guessed_format().ok()?.into_dimensions().ok()?;
     Some(Extent::new(sides.0 as usize, sides.1 as usize))
+}
+
+/// Tells a mask of a photograph that was not turned as its Exif orientation says from any other mask that does not fit.
+fn check_stored(found: Extent, expected: Extent, bytes: &[u8]) -> Result<(), DecomposeError> {
+    let is_turned = found == Extent::new(expected.height, expected.width) && found != expected;
+    // Exif's orientations from 5 on swap the sides.
+    if is_turned && exif_orientation(bytes).is_some_and(|number| number >= 5) {
+        return Err(DecomposeError::MaskStored { found, expected });
+    }
+    Ok(())
 }
 
 fn check_mask(mask: &Planes<1>, rectangle: Option<Rectangle>) -> Result<(), DecomposeError> {

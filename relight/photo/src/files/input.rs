@@ -5,14 +5,17 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use relight_core::image::{Extent, ImageError, Planes, Rgb, StoredImage, Transfer};
+use relight_core::image::{
+    Extent, ImageError, Planes, Rgb, StoredImage, Transfer, exif_orientation,
+};
 use relight_reader::{Encoding, SampleId, Source, Turns};
 use relit_data::shard::Dataset;
 
+use super::mask_record::check_turned;
 use crate::decompose::{DecomposeError, Photo, PhotoHints, Rectangle, stem};
 
 /// How the files of photographs end.
-const PHOTOS: [&str; 5] = ["png", "jpg", "jpeg", "exr", "hdr"];
+const PHOTOS: [&str; 6] = ["png", "jpg", "jpeg", "webp", "exr", "hdr"];
 
 /// How photographs are read.
 #[derive(Debug, Clone, Default)]
@@ -202,7 +205,11 @@ fn read_file(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeErro
         source,
     })?;
     let mask = match &reading.mask {
-        Some(file) => Some(StoredImage::read(&mask_file(file, &stem(path))?)?),
+        Some(file) => {
+            let file = mask_file(file, &stem(path))?;
+            check_turned(&file, path, exif_orientation(&bytes))?;
+            Some(StoredImage::read(&file)?)
+        }
         None => None,
     };
     let hints = PhotoHints {

@@ -6,6 +6,7 @@ mod input;
 mod insertion;
 mod insertion_error;
 mod light;
+mod mask_record;
 mod networks;
 mod results;
 

@@ -1,0 +1,98 @@
+//! Photographs as cameras store them: turned by Exif, in folders that are not there yet.
+
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
+use serde_json::Value;
+
+use super::support::{code, read, relit_mask, said};
+
+const WIDTH: u32 = 120;
+const HEIGHT: u32 = 80;
+
+/// A disc near the upper left corner, on grey that is not quite even.
+fn displayed() -> RgbImage {
+    RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        match (f64::from(x) - 35.0).hypot(f64::from(y) - 30.0) < 16.0 {
+            true => Rgb([220, 120, 40]),
+            false => Rgb([40 + ((x * 7 + y * 3) % 6) as u8; 3]),
+        }
+    })
+}
+
+/// The same as a camera stores it that is held so that Exif has this orientation.
+fn stored(orientation: u8, format: ImageFormat) -> Vec<u8> {
+    let back = match orientation {
+        6 => Orientation::Rotate270,
+        8 => Orientation::Rotate90,
+        _ => Orientation::Rotate180,
+    };
+    let mut turned = DynamicImage::from(displayed());
+    turned.apply_orientation(back);
+    let mut bytes = Cursor::new(Vec::new());
+    turned.write_to(&mut bytes, format).unwrap();
+    bytes.into_inner()
+}
+
+/// A JPEG's content with Exif's orientation in it.
+fn with_exif(jpeg: &[u8], orientation: u8) -> Vec<u8> {
+    let mut exif =
+        b"\xff\xe1\x00\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".to_vec();
+    exif.extend([orientation, 0, 0, 0, 0, 0, 0]);
+    [&jpeg[..2], &exif, &jpeg[2..]].concat()
+}
+
+fn record_of(folder: &Path, name: &str) -> Value {
+    serde_json::from_slice(&read(folder, name)).unwrap()
+}
+
+#[test]
+fn a_photograph_is_masked_as_it_is_displayed_into_a_folder_that_is_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for orientation in [1, 3, 6, 8] {
+        let jpeg = match orientation {
+            1 => {
+                let mut bytes = Cursor::new(Vec::new());
+                let picture = DynamicImage::from(displayed());
+                picture.write_to(&mut bytes, ImageFormat::Jpeg).unwrap();
+                bytes.into_inner()
+            }
+            _ => stored(orientation, ImageFormat::Jpeg),
+        };
+        fs::write(folder.join("held.jpg"), with_exif(&jpeg, orientation)).unwrap();
+        let output = format!("masks/{orientation}/held.png");
+        let arguments = ["held.jpg", "--rect", "12,8,46,44", "-o", &output];
+        let done = relit_mask(folder, &arguments);
+        assert_eq!(code(&done), 0, "{orientation}: {}", said(&done));
+        let mask = image::load_from_memory(&read(folder, &output))
+            .unwrap()
+            .into_luma8();
+        assert_eq!(mask.dimensions(), (WIDTH, HEIGHT), "{orientation}");
+        assert_eq!(mask.get_pixel(35, 30).0, [255], "{orientation}");
+        assert_eq!(mask.get_pixel(85, 50).0, [0], "{orientation}");
+        let record = record_of(folder, &output.replace(".png", ".json"));
+        let noted = record["source"]
+            .get("exif_orientation")
+            .and_then(Value::as_u64);
+        assert_eq!(noted, (orientation > 1).then_some(orientation.into()));
+    }
+}
+
+#[test]
+fn a_webp_is_masked_as_a_jpeg_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("cup.webp"), stored(3, ImageFormat::WebP)).unwrap();
+    // It lies upside down, and nothing says so.
+    let arguments = ["cup.webp", "--rect", "62,28,46,44", "-o", "cup.png"];
+    let done = relit_mask(folder, &arguments);
+    assert_eq!(code(&done), 0, "{}", said(&done));
+    let mask = image::load_from_memory(&read(folder, "cup.png"))
+        .unwrap()
+        .into_luma8();
+    assert_eq!(mask.get_pixel(WIDTH - 36, HEIGHT - 31).0, [255]);
+}
