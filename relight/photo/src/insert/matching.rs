@@ -17,6 +17,15 @@ const SHADES_OF_GREY: i32 = 6;
 const SQUARE: usize = 16;
 /// The part of the squares that is smoother than the one that counts: the others show more than grain.
 const SMOOTHEST_PART: f64 = 0.1;
+/// Grain is as fine as the pixels: in half the size it has half the deviation. A square that keeps more than this part of it there
+/// shows gravel, cloth or leaves.
+const FINE: f32 = 0.75;
+/// Deviations below this are those of rounding to 8 bits: nothing is to be told of how fine they are.
+const ROUNDING: f32 = 2e-3;
+/// The part of the squares that have to show nothing but grain, so that it is known.
+const LEAST_PART: f64 = 0.02;
+/// The most grain that a camera makes.
+const MOST_GRAIN: f32 = 0.06;
 
 /// What a background asks of the objects that are put into it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,7 +91,7 @@ fn balance(picture: &Rgb<Linear>) -> [f32; 3] {
 }
 
 /// The standard deviation of the grain of a linear picture, in sRGB values, where `alpha` is 1: by Immerkær's mask (1996), which
-/// answers to neither planes nor edges, in the smoothest squares.
+/// answers to neither planes nor edges, in the smoothest of the squares that show nothing coarser.
 pub(super) fn grain(picture: &Planes<3>, alpha: Option<&Planes<1>>) -> f32 {
     let Extent { width, height } = picture.extent();
     let green: Vec<f32> = picture
@@ -90,7 +99,8 @@ pub(super) fn grain(picture: &Planes<3>, alpha: Option<&Planes<1>>) -> f32 {
         .iter()
         .map(|&v| Srgb::from_linear(v.clamp(0.0, 1.0)))
         .collect();
-    let mut deviations = Vec::new();
+    let halved = halved(&green, picture.extent());
+    let (mut squares, mut deviations) = (0_usize, Vec::new());
     for top in (0..height.saturating_sub(SQUARE + 1)).step_by(SQUARE) {
         for left in (0..width.saturating_sub(SQUARE + 1)).step_by(SQUARE) {
             let inside = |alpha: &Planes<1>| {
@@ -101,29 +111,44 @@ pub(super) fn grain(picture: &Planes<3>, alpha: Option<&Planes<1>>) -> f32 {
                 })
             };
             if alpha.is_none_or(inside) {
-                deviations.push(deviation(&green, width, left, top));
+                squares += 1;
+                let fine = deviation(&green, width, [left, top], SQUARE);
+                let coarse = deviation(&halved, width / 2, [left / 2, top / 2], SQUARE / 2 - 1);
+                if fine <= ROUNDING || coarse <= FINE * fine {
+                    deviations.push(fine);
+                }
             }
         }
     }
-    let place = (deviations.len() as f64 * SMOOTHEST_PART) as usize;
-    let Some(value) = ranked(&mut deviations, place) else {
+    if (deviations.len() as f64) < LEAST_PART * squares as f64 {
         return 0.0;
-    };
-    value
+    }
+    let place = (deviations.len() as f64 * SMOOTHEST_PART) as usize;
+    ranked(&mut deviations, place)
+        .unwrap_or(0.0)
+        .min(MOST_GRAIN)
 }
 
-/// The deviation in a square.
-fn deviation(values: &[f32], width: usize, left: usize, top: usize) -> f32 {
+/// The deviation in a square of so many pixels a side, of which the first has this column and row; the pixels about it are read too.
+fn deviation(values: &[f32], width: usize, [left, top]: [usize; 2], side: usize) -> f32 {
     let mut sum = 0.0;
-    for y in top + 1..=top + SQUARE {
-        for x in left + 1..=left + SQUARE {
+    for y in top + 1..=top + side {
+        for x in left + 1..=left + side {
             let line = |row: usize| &values[row * width + x - 1..][..3];
             let [above, here, below] = [line(y - 1), line(y), line(y + 1)];
             let outer = above[0] - 2.0 * above[1] + above[2] + below[0] - 2.0 * below[1] + below[2];
             sum += (outer - 2.0 * here[0] + 4.0 * here[1] - 2.0 * here[2]).abs();
         }
     }
-    sum * std::f32::consts::FRAC_PI_2.sqrt() / (6.0 * (SQUARE * SQUARE) as f32)
+    sum * std::f32::consts::FRAC_PI_2.sqrt() / (6.0 * (side * side) as f32)
+}
+
+/// The means of two by two pixels; an odd last column or row is left out.
+fn halved(values: &[f32], extent: Extent) -> Vec<f32> {
+    let Extent { width, height } = extent;
+    let rows = (0..height / 2).flat_map(|y| (0..width / 2).map(move |x| 2 * (y * width + x)));
+    rows.map(|at| (values[at] + values[at + 1] + values[at + width] + values[at + width + 1]) / 4.0)
+        .collect()
 }
 
 /// Noise of mean 0 and deviation 1 for a pixel of a frame: nearly normal, always the same.
@@ -160,6 +185,23 @@ mod tests {
             grain(&noisy(0.1), Some(&Planes::zeros(Extent::new(120, 100)))),
             0.0
         );
+    }
+
+    #[test]
+    fn gravel_is_no_grain_and_grain_before_it_is_found_on_the_sky() {
+        // Stones of four pixels, each with a brightness of its own.
+        let stone =
+            |x: usize, y: usize| 0.4 + 0.12 * noise(2, (y / 4) * 97 + (x + 2 * (y / 4)) / 4);
+        let gravel = |sky: usize| {
+            Planes::from_fn(Extent::new(192, 160), |x, y| {
+                let value = if y < sky { 0.6 } else { stone(x, y) };
+                [Srgb::to_linear(value + 0.01 * noise(1, y * 192 + x)); 3]
+            })
+        };
+        let found = grain(&gravel(0), None);
+        assert!(found < 5e-3, "{found}");
+        let found = grain(&gravel(60), None);
+        assert!((found / 0.01 - 1.0).abs() < 0.4, "{found}");
     }
 
     #[test]
