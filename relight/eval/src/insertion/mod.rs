@@ -13,7 +13,7 @@ use relight_photo::insert::{
     SceneObject, Subject,
 };
 use relight_synth::Library;
-use stage::Stage;
+use stage::{Stage, StageRecipe};
 
 /// What an evaluation of insertion consists of. The same recipe and library make the same pictures.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,6 +24,8 @@ pub struct InsertionRecipe {
     pub size: u32,
     /// What all is drawn from.
     pub seed: u64,
+    /// Whether a part of each object is painted black: paint that may be taken for shadow.
+    pub black_paint: bool,
 }
 
 /// Ways to put an object into a picture.
@@ -37,17 +39,20 @@ pub enum InsertionMethod {
     WithoutEdgeColours,
     /// The same in the light of the photograph.
     WithoutRelighting,
+    /// The same where all that is dark beyond what the light explains counts as shadow, and none of it as paint.
+    WithoutPaint,
     /// The photograph's pixels under the mask.
     Naive,
 }
 
 impl InsertionMethod {
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Whole,
         Self::WithoutShadow,
         Self::WithoutEdgeColours,
         Self::WithoutRelighting,
+        Self::WithoutPaint,
         Self::Naive,
     ];
 
@@ -59,28 +64,25 @@ impl InsertionMethod {
             Self::WithoutShadow => "without shadow",
             Self::WithoutEdgeColours => "without edge colours",
             Self::WithoutRelighting => "without relighting",
+            Self::WithoutPaint => "without black paint",
             Self::Naive => "naive insertion",
         }
     }
 
-    fn insert(self, stage: &Stage, decomposer: &Decomposer) -> Result<Rgb<Linear>, InsertError> {
-        let mask = stage
-            .coverage
-            .clone()
-            .map(|part| f32::from(u8::from(part >= 0.5)));
-        let edges = match self {
-            Self::WithoutEdgeColours => EdgeColours::Photographed,
-            _ => EdgeColours::Freed,
+    /// The object in the new picture, and before the bright table.
+    fn insert(self, stage: &Stage, subjects: &Subjects) -> Result<[Rgb<Linear>; 2], InsertError> {
+        let subject = match self {
+            Self::WithoutEdgeColours => &subjects.photographed,
+            Self::WithoutPaint => &subjects.without_paint,
+            _ => &subjects.freed,
         };
-        let options = DecomposeOptions::default();
-        let subject =
-            Subject::with_edges(&stage.photo, (&mask, None), decomposer, &options, edges)?;
+        let backgrounds = [&stage.background, &stage.bright[0]];
         if self == Self::Naive {
-            return Ok(subject.pasted(&stage.photo, &stage.background));
+            return Ok(backgrounds.map(|background| subject.pasted(&stage.photo, background)));
         }
         let object = SceneObject {
-            subject: &subject,
-            placement: Placement::in_photo(&subject),
+            subject,
+            placement: Placement::in_photo(subject),
             change: MaterialChange::default(),
             exposure: 0.0,
             shadow: if self == Self::WithoutShadow {
@@ -94,7 +96,33 @@ impl InsertionMethod {
         let light = LightSource::Panorama(stage.light.clone());
         let tilt = f64::from(stage::TILT).to_degrees();
         let scene = InsertScene::new(extent, &light, tilt, Matching::default(), vec![object])?;
-        Ok(scene.compose(&stage.background, &scene.layers(0.0)?, 0))
+        let layers = scene.layers(0.0)?;
+        Ok(backgrounds.map(|background| scene.compose(background, &layers, 0)))
+    }
+}
+
+/// An object, decomposed in each way that a method needs.
+struct Subjects {
+    freed: Subject,
+    photographed: Subject,
+    without_paint: Subject,
+}
+
+impl Subjects {
+    fn of(stage: &Stage, decomposer: &Decomposer) -> Result<Self, InsertError> {
+        let mask = stage
+            .coverage
+            .clone()
+            .map(|part| f32::from(u8::from(part >= 0.5)));
+        let options = DecomposeOptions::default();
+        let subject =
+            |edges| Subject::with_edges(&stage.photo, (&mask, None), decomposer, &options, edges);
+        let freed = subject(EdgeColours::Freed)?;
+        Ok(Self {
+            photographed: subject(EdgeColours::Photographed)?,
+            without_paint: freed.clone().without_paint(),
+            freed,
+        })
     }
 }
 
@@ -120,11 +148,12 @@ impl Places {
     }
 }
 
-/// Is given each object's name and its pictures in sRGB: photograph, new picture, ground truth, and the result of each method.
+/// Is given each object's name and its pictures in sRGB: photograph, new picture, ground truth, and the result of each method;
+/// then the same but the photograph before a nearly white table.
 pub type SheetWriter<'a> = &'a mut dyn FnMut(&str, &[Planes<3>]) -> Result<(), EvalError>;
 
 /// MSE and DSSIM of objects that were put into new pictures, for each method: of the whole picture, and of object,
-/// edge and ground alone.
+/// edge and ground alone, and of the edge before a nearly white table.
 ///
 /// # Errors
 /// Where a picture cannot be made or measured, or the network fails.
@@ -156,30 +185,37 @@ pub fn evaluate_insertion(
     };
     let mut scored: [Vec<(String, Vec<Scored>)>; InsertionMethod::ALL.len()] = Default::default();
     for number in 0..recipe.objects {
-        let stage = Stage::make(library, recipe.seed, recipe.size, number).map_err(|source| {
-            EvalError::Unlit {
-                sample: format!("{number:03}"),
-                source,
-            }
+        let made = StageRecipe {
+            seed: recipe.seed,
+            size: recipe.size,
+            black_paint: recipe.black_paint,
+        };
+        let stage = Stage::make(library, made, number).map_err(|source| EvalError::Unlit {
+            sample: format!("{number:03}"),
+            source,
         })?;
         let places = Places::of(&stage);
-        let truth = shown(&stage.truth);
+        let failed = |source| EvalError::Insertion {
+            sample: stage.name.clone(),
+            source: Box::new(source),
+        };
+        let subjects = Subjects::of(&stage, decomposer).map_err(failed)?;
+        let truths = [shown(&stage.truth), shown(&stage.bright[1])];
+        let truth = truths[0].clone();
         let mut tiles = vec![shown(&stage.photo), shown(&stage.background), truth.clone()];
+        let mut bright = vec![shown(&stage.bright[0]), truths[1].clone()];
         for (method, scored) in InsertionMethod::ALL.into_iter().zip(&mut scored) {
-            let found =
-                method
-                    .insert(&stage, decomposer)
-                    .map_err(|source| EvalError::Insertion {
-                        sample: stage.name.clone(),
-                        source: Box::new(source),
-                    })?;
-            let found = shown(&found);
+            let found = method.insert(&stage, &subjects).map_err(failed)?;
+            let found = found.map(|picture| shown(&picture));
             scored.push((
                 stage.name.clone(),
-                score(&stage.name, &truth, &found, &places)?,
+                score(&stage.name, &truths, &found, &places)?,
             ));
+            let [found, before_bright] = found;
             tiles.push(found);
+            bright.push(before_bright);
         }
+        tiles.extend(bright);
         show(&stage.name, &tiles)?;
         progress();
     }
@@ -191,24 +227,26 @@ pub fn evaluate_insertion(
 
 fn score(
     name: &str,
-    truth: &Planes<3>,
-    found: &Planes<3>,
+    truths: &[Planes<3>; 2],
+    found: &[Planes<3>; 2],
     places: &Places,
 ) -> Result<Vec<Scored>, EvalError> {
     let whole = vec![true; places.object.len()];
     let parts = [
-        ("picture", &whole, MaskRule::WholeImage),
-        ("object", &places.object, MaskRule::Object),
-        ("edge", &places.edge, MaskRule::Known),
-        ("ground", &places.ground, MaskRule::Known),
+        ("picture", 0, &whole, MaskRule::WholeImage),
+        ("object", 0, &places.object, MaskRule::Object),
+        ("edge", 0, &places.edge, MaskRule::Known),
+        ("edge, bright", 1, &places.edge, MaskRule::Known),
+        ("ground", 0, &places.ground, MaskRule::Known),
     ];
     let failed = |source| EvalError::Metric {
         sample: name.to_owned(),
         source,
     };
-    let (truth_planes, found_planes) = (truth.planes(), found.planes());
     let mut lines = Vec::new();
-    for (part, mask, rule) in parts {
+    for (part, picture, mask, rule) in parts {
+        let (truth, found) = (&truths[picture], &found[picture]);
+        let (truth_planes, found_planes) = (truth.planes(), found.planes());
         let pair =
             Comparison::new(truth.extent(), &truth_planes, &found_planes, mask).map_err(failed)?;
         let ssim = pair.ssim(Ssim::Gaussian, 1.0).map_err(failed)?;
@@ -242,6 +280,7 @@ mod tests {
             objects: 1,
             size: 48,
             seed: 5,
+            black_paint: false,
         };
         let mut sheets = Vec::new();
         let mut evaluate = || {
@@ -253,8 +292,8 @@ mod tests {
         };
         let table = evaluate();
         assert_eq!(table, evaluate());
-        assert_eq!(table.lines.len(), 4 * InsertionMethod::ALL.len());
-        assert_eq!(sheets[0].1, 3 + InsertionMethod::ALL.len());
+        assert_eq!(table.lines.len(), 5 * InsertionMethod::ALL.len());
+        assert_eq!(sheets[0].1, 5 + 2 * InsertionMethod::ALL.len());
         // On the table's top, shadows are what counts.
         let ground = |method: InsertionMethod| {
             let line = table

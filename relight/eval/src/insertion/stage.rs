@@ -25,6 +25,12 @@ pub(super) const TILT: f32 = 0.5;
 const FILL: f32 = 0.55;
 /// Rays by which the light on a place of the table is found.
 const TABLE_RAYS: u32 = 64;
+/// The albedo of a table before which edges are seen best.
+const BRIGHT_TABLE: f32 = 0.9;
+/// The most albedo of black paint.
+const BLACK: f32 = 0.04;
+/// How narrow its bands are, radians over half the object.
+const BLACK_BANDS: f32 = 3.0;
 /// What is drawn here: a stream that `Recipe` does not use.
 const STREAM: u64 = 104;
 
@@ -42,6 +48,17 @@ pub(super) struct Stage {
     pub(super) light: Panorama,
     /// The object on the new table.
     pub(super) truth: Rgb<Linear>,
+    /// A nearly white table in the same light, without the object and with it.
+    pub(super) bright: [Rgb<Linear>; 2],
+}
+
+/// What is made beside the objects of a recipe.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StageRecipe {
+    pub(super) seed: u64,
+    pub(super) size: u32,
+    /// Whether a part of each object is painted black.
+    pub(super) black_paint: bool,
 }
 
 /// The table of a picture, and what stands on it.
@@ -50,6 +67,17 @@ struct Table<'a> {
     level: f32,
     occluder: &'a Occluder,
     size: u32,
+}
+
+/// What a light makes of a stage, before the table has its colours.
+struct Lit {
+    object: Planes<3>,
+    mask: Planes<1>,
+    /// The irradiance at each pixel's place on the table, without and with the object in the way.
+    table: Vec<[Vec3; 2]>,
+    /// The mean of the first.
+    open: Vec3,
+    pattern: Pattern,
 }
 
 /// A light around a stage.
@@ -64,10 +92,10 @@ impl Stage {
     /// The stage of a number. The same seed and library make the same stages.
     pub(super) fn make(
         library: &Library,
-        seed: u64,
-        size: u32,
+        stage: StageRecipe,
         number: u64,
     ) -> Result<Self, LightError> {
+        let StageRecipe { seed, size, .. } = stage;
         let recipe = Recipe {
             seed,
             size: size * SUPERSAMPLES,
@@ -86,13 +114,19 @@ impl Stage {
             projection: Projection::Orthographic,
             scene: SyntheticScene::shaded(buffer, Occluder::new(&mesh, placement), 16, own),
         };
-        let (_, material) = recipe.material(library, &view, number);
+        let (_, mut material) = recipe.material(library, &view, number);
+        if stage.black_paint {
+            paint_black(&mut material, view.scene.buffer().object_points(), own);
+        }
         let occluder = Occluder::new(&mesh, placement);
         let table = Table::under(mesh.positions(), placement, &occluder, recipe.size);
         let old = Around::draw(library, &mut random)?;
         let new = Around::draw(library, &mut random)?;
-        let (_, photo) = table.pictures(library, (&view, &material), &old, stream(own, 1));
-        let (background, truth) = table.pictures(library, (&view, &material), &new, stream(own, 2));
+        let before = table.lit(library, (&view, &material), &old, stream(own, 1));
+        let after = table.lit(library, (&view, &material), &new, stream(own, 2));
+        let [_, photo] = before.pictures(&before.pattern);
+        let [background, truth] = after.pictures(&after.pattern);
+        let bright = after.pictures(&Pattern::even(BRIGHT_TABLE));
         let small = Extent::new(size as usize, size as usize);
         let camera = |light: Planes<3>| {
             let seen = light
@@ -107,6 +141,7 @@ impl Stage {
             background: camera(background),
             light: new.radiance,
             truth: camera(truth),
+            bright: bright.map(camera),
         })
     }
 }
@@ -153,14 +188,14 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The table without and with the object in a light.
-    fn pictures(
+    /// Object and table in a light.
+    fn lit(
         &self,
         library: &Library,
         (view, material): (&SyntheticView, &Material),
         around: &Around,
         seed: u64,
-    ) -> (Planes<3>, Planes<3>) {
+    ) -> Lit {
         let width = around.radiance.extent().width;
         let turn = f64::from(TAU) * around.columns as f64 / width as f64;
         let lighting = Lighting {
@@ -180,30 +215,23 @@ impl<'a> Table<'a> {
         let mask = view.scene.buffer().mask();
         let sampler = LightSampler::new(&around.radiance);
         let side = self.size as usize;
-        let pattern = Pattern::of(seed);
-        let lit: Vec<[Vec3; 2]> = (0..side * side)
+        let table: Vec<[Vec3; 2]> = (0..side * side)
             .into_par_iter()
-            .map(|at| self.lit(at, &sampler, seed))
+            .map(|at| self.lit_at(at, &sampler, seed))
             .collect();
         // What is open sends the same light everywhere: its mean has less noise.
-        let open = lit.iter().map(|[open, _]| *open).sum::<Vec3>() / lit.len().max(1) as f32;
-        let extent = Extent::new(side, side);
-        let albedo =
-            |x: usize, y: usize| pattern.at(x as f32 / side as f32, y as f32 / side as f32);
-        let empty = Planes::from_fn(extent, |x, y| (albedo(x, y) * open).to_array());
-        let full = Planes::from_fn(extent, |x, y| {
-            if mask.pixel(x, y) == [1.0] {
-                return object.pixel(x, y);
-            }
-            let [all, arriving] = lit[y * side + x];
-            let part = arriving / all.max(Vec3::splat(1e-6));
-            (albedo(x, y) * open * part).to_array()
-        });
-        (empty, full)
+        let open = table.iter().map(|[open, _]| *open).sum::<Vec3>() / table.len().max(1) as f32;
+        Lit {
+            object,
+            mask,
+            table,
+            open,
+            pattern: Pattern::of(seed),
+        }
     }
 
     /// The irradiance at a pixel's place on the table, without and with the object in the way.
-    fn lit(&self, at: usize, sampler: &LightSampler<'_>, seed: u64) -> [Vec3; 2] {
+    fn lit_at(&self, at: usize, sampler: &LightSampler<'_>, seed: u64) -> [Vec3; 2] {
         let place = |at: usize| 2.0 * (at as f32 + 0.5) / self.size as f32 - 1.0;
         let (x, y) = (
             place(at % self.size as usize),
@@ -232,6 +260,39 @@ impl<'a> Table<'a> {
     }
 }
 
+impl Lit {
+    /// A table with these colours, without and with the object on it.
+    fn pictures(&self, pattern: &Pattern) -> [Planes<3>; 2] {
+        let extent = self.mask.extent();
+        let side = extent.width;
+        let albedo =
+            |x: usize, y: usize| pattern.at(x as f32 / side as f32, y as f32 / side as f32);
+        let empty = Planes::from_fn(extent, |x, y| (albedo(x, y) * self.open).to_array());
+        let full = Planes::from_fn(extent, |x, y| {
+            if self.mask.pixel(x, y) == [1.0] {
+                return self.object.pixel(x, y);
+            }
+            let [all, arriving] = self.table[y * side + x];
+            let part = arriving / all.max(Vec3::splat(1e-6));
+            (albedo(x, y) * self.open * part).to_array()
+        });
+        [empty, full]
+    }
+}
+
+/// Paints about half of an object black, in bands that stick to it and are as wide as it is.
+fn paint_black(material: &mut Material, points: &[Vec3], seed: u64) {
+    let mut random = Pcg64::seed_from_u64(stream(seed, 11));
+    let mut centred = || 2.0 * unit(&mut random) - 1.0;
+    let across = Vec3::new(centred(), centred(), centred()).normalize_or(Vec3::Y);
+    let phase = centred() * TAU;
+    for (albedo, point) in material.albedo.iter_mut().zip(points) {
+        if (point.dot(across) * BLACK_BANDS + phase).sin() > 0.0 {
+            *albedo = albedo.min(Vec3::splat(BLACK));
+        }
+    }
+}
+
 /// A table's top: checks of two colours, or stripes.
 struct Pattern {
     colours: [Vec3; 2],
@@ -251,6 +312,15 @@ impl Pattern {
             colours: [first, second],
             across: count(6.0),
             down: count(6.0),
+        }
+    }
+
+    /// The same grey everywhere.
+    const fn even(albedo: f32) -> Self {
+        Self {
+            colours: [Vec3::splat(albedo); 2],
+            across: 0.0,
+            down: 0.0,
         }
     }
 

@@ -4,7 +4,7 @@ use super::InsertError;
 use super::cut::{Cut, EdgeColours};
 use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
-use super::shading::{DARK, Shading};
+use super::shading::{DARK, PaintCues, Shading};
 use super::smooth::weighted_mean;
 use super::source::likeness;
 use crate::decompose::{
@@ -12,7 +12,7 @@ use crate::decompose::{
 };
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Extent, Linear, Planes, Rgb};
-use relight_core::light::{Normals, Order, ShLight, YUp};
+use relight_core::light::{Direction, Normals, Order, Rotation, ShLight, YUp};
 use relight_core::render::{DiffuseForm, DiffuseLayer, Gloss, LobeLayer, exposure_for};
 
 /// The most by which the residual of a pixel grows with the light.
@@ -139,7 +139,15 @@ impl Subject {
             matte: Matte::of_cut_out(&albedo, asset.alpha()),
             normals: surface.normals().completed(&wanted),
             albedo,
-            shading: Shading::new(&ones, &Planes::filled(extent, [1.0; 3]), &wanted),
+            shading: Shading::new(
+                &ones,
+                &Planes::filled(extent, [1.0; 3]),
+                &wanted,
+                &PaintCues {
+                    albedo: &albedo,
+                    dark_side: 1.0,
+                },
+            ),
             highlight: Planes::zeros(extent),
             gloss: surface.gloss().map(|gloss| mean_gloss(gloss, &covered)),
             rest: Planes::zeros(extent),
@@ -194,7 +202,15 @@ impl Subject {
             place: cut.place,
             photo: cut.photo,
             mask: cut.mask,
-            shading: Shading::new(&shading, own.planes(), &wanted),
+            shading: Shading::new(
+                &shading,
+                own.planes(),
+                &wanted,
+                &PaintCues {
+                    albedo: &albedo,
+                    dark_side: dark_side(&found.light),
+                },
+            ),
             matte: cut.matte,
             normals,
             albedo,
@@ -203,6 +219,14 @@ impl Subject {
             rest,
             light: found.light.clone(),
         })
+    }
+
+    /// The same where all that is darker than the light explains counts as shadow, and none of it as paint: to see what the other
+    /// way is good for.
+    #[must_use]
+    pub fn without_paint(mut self) -> Self {
+        self.shading.forget_paint();
+        self
     }
 
     /// The light in which the object was, grey, of order 2, in units in which the mean shading is 1.
@@ -267,12 +291,13 @@ impl Subject {
     ///
     /// ```text
     /// D = (S + d) / (E + d) = relief x shadow, d = 0.05
-    /// S' = relief x shadow^w x (E' + d) - d
+    /// S' = relief x shadow^(w + (1 - w) p) x (E' + d) - d
     /// I' = R S' + (E' + d) / (E + d) (I - R S - H) + H'
     /// H' = lobe(E') + w (H - lobe(E))
     /// ```
     ///
-    /// So relief and fine texture stay, shadows stay as far as the light comes from where it came from, and the photograph's own
+    /// where p is how likely the dark place is paint. So relief and fine texture stay, paint that may have been taken for shadow stays,
+    /// shadows stay as far as the light comes from where it came from, and the photograph's own
     /// light gives the photograph.
     ///
     /// # Errors
@@ -350,6 +375,19 @@ fn even_light() -> ShLight {
     let light = ShLight::even(Order::TWO, [1.0; 3]);
     let exposure = f64::from(exposure_for(&light));
     light.tinted([exposure; 3])
+}
+
+/// The irradiance on the normal that a light reaches least.
+fn dark_side(light: &ShLight) -> f32 {
+    let behind = light.rotated(&Rotation::about(Direction::UP, std::f64::consts::PI));
+    let least = [light, &behind].map(|light| {
+        let ball = Normals::sphere(24);
+        let shading = DiffuseLayer::new(light, DiffuseForm::Irradiance).shading(&ball);
+        let seen = ball.planes().plane(2).iter().zip(shading.planes().plane(0));
+        seen.filter(|(z, _)| **z > 0.0)
+            .fold(f32::INFINITY, |least, (_, &e)| least.min(e))
+    });
+    least[0].min(least[1]).max(0.0)
 }
 
 fn mean_gloss(gloss: &Gloss, covered: &[usize]) -> ObjectGloss {
