@@ -4,6 +4,7 @@ use clap::ValueEnum;
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_photo::decompose::SpecularGate;
+use relight_photo::insert::WhiteBalance;
 
 /// How integers in files of colour are encoded.
 #[derive(Clone, Copy, ValueEnum)]
@@ -40,6 +41,24 @@ impl From<YName> for NormalsFrame {
         match name {
             YName::Up => Self::YUp,
             YName::Down => Self::YDown,
+        }
+    }
+}
+
+/// How the colour of new light is shown.
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum WhiteName {
+    /// As the light has it.
+    Light,
+    /// As by a camera that is balanced for it: white is as grey as in the picture around.
+    Auto,
+}
+
+impl From<WhiteName> for WhiteBalance {
+    fn from(name: WhiteName) -> Self {
+        match name {
+            WhiteName::Light => Self::Light,
+            WhiteName::Auto => Self::Auto,
         }
     }
 }

@@ -422,6 +422,57 @@ fn objects_are_inserted_from_back_to_front_by_options_and_by_a_scene_file() {
 }
 
 #[test]
+fn a_webp_becomes_a_jpeg_in_a_folder_that_is_made_and_half_a_file_is_refused() {
+    let folder = Folder::new();
+    photo().save(folder.path("photos/one.webp")).unwrap();
+    let insert = "--mask masks/one.png --into sky.exr --size 96,64 --weights w.safetensors -o";
+    let command = format!("insert photos/one.webp {insert} new/deep/one.jpg");
+    assert_eq!(folder.code_and_errors(&command), (0, String::new()));
+    let command = format!("insert photos/one.png {insert} new/one.png");
+    assert_eq!(folder.code_and_errors(&command).0, 0);
+    let read = |name: &str| read_planes(&folder.path(name)).unwrap().0;
+    let (jpeg, png) = (read("new/deep/one.jpg"), read("new/one.png"));
+    let pairs = jpeg.plane(1).iter().zip(png.plane(1));
+    let apart = pairs.map(|(a, b)| (a - b).abs()).sum::<f32>() / jpeg.plane(1).len() as f32;
+    assert!(apart < 0.02, "{apart}");
+
+    let whole = fs::read(folder.path("new/deep/one.jpg")).unwrap();
+    fs::write(folder.path("half.jpg"), &whole[..whole.len() / 2]).unwrap();
+    let relit =
+        "relight half.jpg --mask masks/one.png --lamp 10,20 --weights w.safetensors -o o.png";
+    let (code, errors) = folder.code_and_errors(relit);
+    assert!(
+        code == 1 && errors.contains("half.jpg is cut off"),
+        "{errors}"
+    );
+    assert!(!folder.path("o.png").exists());
+}
+
+#[test]
+fn linear_photographs_are_inserted_as_such_and_a_warm_lamp_may_be_balanced() {
+    let folder = Folder::new();
+    let insert = "insert photos/one.png --mask masks/one.png --into photos/two.png --height 0.7 --lamp 20,40,2700K \
+                  --weights w.safetensors";
+    let picture = |options: &str| {
+        let command = format!("{insert} {options}");
+        assert_eq!(
+            folder.code_and_errors(&command),
+            (0, String::new()),
+            "{command}"
+        );
+        read_planes(&folder.path("o.png")).unwrap().0.pixel(32, 26)
+    };
+    let warm = picture("-o o.png");
+    let balanced = picture("--white-balance auto -o o.png");
+    assert!(
+        warm[0] / warm[2] > 1.2 * balanced[0] / balanced[2],
+        "{warm:?} {balanced:?}"
+    );
+    let linear = picture("--transfer linear -o o.png");
+    assert_ne!(linear, warm);
+}
+
+#[test]
 fn a_captured_object_is_inserted_beside_photographs_and_needs_no_mask() {
     let folder = Folder::new();
     let normals = Normals::sphere(40);
@@ -479,6 +530,16 @@ fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
             "object 1: height is 9",
         ),
         (
+            format!("{one} --into sky.exr --at 1.5,0.9 --height 0.3 -o o.png"),
+            1,
+            "object 1 would lie wholly outside the picture",
+        ),
+        (
+            format!("{one} --into sky.exr --bits 16 -o o.jpg"),
+            2,
+            "a JPEG has 8 bits",
+        ),
+        (
             format!("{one} --into sky.exr --lamp 5 -o o.png"),
             1,
             "light.lamp: give AZIMUTH,ELEVATION",
@@ -507,14 +568,14 @@ fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
         (
             format!("{one} --into sky.exr -o o.bmp"),
             2,
-            "give .png, .exr, .mp4 or .webm",
+            "give .png, .jpg, .exr, .mp4 or .webm",
         ),
     ] {
         let (found, errors) = folder.code_and_errors(&command);
         assert_eq!(found, code, "{command}: {errors}");
         assert!(errors.contains(expected), "{command}: {errors}");
     }
-    for name in ["o.png", "o.mp4", "o.bmp"] {
+    for name in ["o.png", "o.jpg", "o.mp4", "o.bmp"] {
         assert!(!folder.path(name).exists(), "{name}");
     }
 }

@@ -38,7 +38,7 @@ Examples:
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Photographs (.png, .jpg, .exr, .hdr), folders of them, or shards (.tar).
+    /// Photographs (.png, .jpg, .webp, .exr, .hdr), folders of them, or shards (.tar).
     #[arg(required = true, value_name = "PHOTO")]
     photos: Vec<PathBuf>,
     /// The folder for the results; several photographs have a folder each in it.
@@ -73,7 +73,7 @@ pub(crate) struct Arguments {
     /// What computes the network.
     #[arg(long, value_enum, default_value_t = EngineName::Tract)]
     engine: EngineName,
-    /// How PNG and JPEG files are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
+    /// How PNG, JPEG and WebP files are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
     #[arg(long, value_enum)]
     transfer: Option<TransferName>,
     /// Of each shard the first so many samples, which are spread over the turn.

@@ -205,6 +205,9 @@ struct InsertionArguments {
     /// What objects, materials and lights are drawn from.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    /// Paint a part of each object black, which may be taken for shadow.
+    #[arg(long)]
+    black_paint: bool,
     /// Meshes to draw from besides procedural shapes (.obj, .gltf, .glb).
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
@@ -439,6 +442,7 @@ fn insertion(arguments: &InsertionArguments, console: Console) -> Evaluated {
         objects: arguments.objects,
         size: arguments.size,
         seed: arguments.seed,
+        black_paint: arguments.black_paint,
     };
     let library = Library::read(&Folders {
         meshes: arguments.meshes.clone(),
@@ -452,7 +456,7 @@ fn insertion(arguments: &InsertionArguments, console: Console) -> Evaluated {
     let mut show = |name: &str, tiles: &[Planes<3>]| match &arguments.sheets {
         None => Ok(()),
         Some(folder) => {
-            let sheet = Planes::sheet(tiles, tiles.len())?;
+            let sheet = Planes::sheet(tiles, tiles.len().div_ceil(2))?;
             Ok::<(), EvalError>(write_png(
                 &folder.join(format!("{name}.png")),
                 &sheet,

@@ -12,7 +12,7 @@ use relight_photo::decompose::Rectangle;
 use relight_photo::files::{InsertionError, PhotoInput, PhotoReading};
 use relight_photo::insert::{
     Backdrop, LightSource, MaterialChange, ObjectGloss, PanoramaView, Shot, ShotCompanions,
-    Subject, TrustMap, likeness,
+    Subject, TrustMap, WhiteBalance, likeness,
 };
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
@@ -23,7 +23,7 @@ use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::light::NewLightArguments;
 use crate::photos::{Bits, Network, NetworkArguments, globbed, not_an_input};
-use crate::values::TransferName;
+use crate::values::{TransferName, WhiteName};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -41,10 +41,11 @@ const MOVIE_SIDE: usize = 1080;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Photographs (.png, .jpg, .exr, .hdr), folders of them, patterns such as 'photos/*.jpg', or shards (.tar).
+    /// Photographs (.png, .jpg, .webp, .exr, .hdr), folders of them, patterns such as 'photos/*.jpg', or shards (.tar).
     #[arg(required = true, value_name = "PHOTO")]
     photos: Vec<PathBuf>,
-    /// The picture (.png, .exr), or for --turn a video (.mp4, .webm); of several photographs a folder.
+    /// The picture (.png, .jpg, .exr), or for --turn a video (.mp4, .webm); of several photographs a folder. It is made where
+    /// there is none.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// A grey image as large as the photograph, white on the object; or a folder of such, <photo's name>.png
@@ -89,6 +90,9 @@ pub(crate) struct Arguments {
     /// Put the photograph and naive insertion beside the result.
     #[arg(long, conflicts_with = "beside")]
     compare: bool,
+    /// How the colour of the light is shown.
+    #[arg(long, value_enum, default_value = "light")]
+    white_balance: WhiteName,
     /// Brightness in stops. With 0 the strongest light is as strong as in the photograph.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = stops, allow_hyphen_values = true)]
     exposure: f32,
@@ -109,7 +113,7 @@ pub(crate) struct Arguments {
     bits: Bits,
     #[command(flatten)]
     network: NetworkArguments,
-    /// How PNG and JPEG photographs are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
+    /// How PNG, JPEG and WebP photographs are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
     #[arg(long, value_enum)]
     transfer: Option<TransferName>,
 }
@@ -155,13 +159,15 @@ impl Arguments {
             return None;
         }
         let wanted = match OutputKind::of(&self.output) {
-            Some(OutputKind::Movie(_)) if self.turn.is_none() => ".png or .exr, or --turn DEGREES",
-            Some(OutputKind::Png | OutputKind::Exr) if self.turn.is_some() => {
+            Some(OutputKind::Movie(_)) if self.turn.is_none() => {
+                ".png, .jpg or .exr, or --turn DEGREES"
+            }
+            Some(OutputKind::Png | OutputKind::Jpeg | OutputKind::Exr) if self.turn.is_some() => {
                 ".mp4 or .webm for --turn"
             }
             None if self.turn.is_some() => ".mp4 or .webm",
-            None => ".png or .exr",
-            Some(_) => return None,
+            None => ".png, .jpg or .exr",
+            Some(_) => return self.bits.fault(&self.output),
         };
         Some(format!("--output {}: give {wanted}", self.output.display()))
     }
@@ -232,7 +238,10 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let inputs = PhotoInput::find(&globbed(&arguments.photos)?, None)?;
     let run = Run {
         arguments,
-        light: arguments.light.read()?,
+        light: match arguments.light.read()? {
+            Some(light) => Some(WhiteBalance::from(arguments.white_balance).shown(light)?),
+            None => None,
+        },
         network: OnceLock::new(),
         reading: arguments.reading(),
         photos: inputs.iter().filter_map(file_of).collect(),
@@ -301,9 +310,6 @@ impl Run<'_> {
             &photo.options(&network.options),
         )?;
         let figures = trust.figures();
-        if let Some(parent) = output.parent().filter(|_| arguments.is_set()) {
-            make_folder(parent)?;
-        }
         let start = Instant::now();
         let frames = match OutputKind::of(&output) {
             Some(OutputKind::Movie(format)) => self.film(&shot, &output, format, console)?,
@@ -338,7 +344,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Nothing that is read may be overwritten, and nothing is written where the map of trust cannot be.
+    /// Nothing that is read may be overwritten, and the folders of what is written are made.
     fn check_outputs(&self, output: &Path, name: &str) -> Result<(), String> {
         let arguments = self.arguments;
         let mask = arguments
@@ -352,11 +358,17 @@ impl Run<'_> {
         for output in [Some(output), trust].into_iter().flatten() {
             not_an_input(output, &inputs)?;
         }
-        let folder = trust.and_then(Path::parent);
-        match folder.filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
-            Some(folder) => Err(format!("--trust: {} is no folder", folder.display())),
-            None => Ok(()),
+        // What lies in the way of a folder is told before the work.
+        for folder in [Some(output), trust]
+            .into_iter()
+            .flatten()
+            .filter_map(Path::parent)
+        {
+            if !folder.as_os_str().is_empty() {
+                make_folder(folder)?;
+            }
         }
+        Ok(())
     }
 
     fn backdrop(&self, extent: relight_core::image::Extent) -> Backdrop {

@@ -75,6 +75,7 @@ impl InsertSource {
         }
         let reading = PhotoReading {
             mask: object.mask.as_ref().map(|mask| folder.join(mask)),
+            transfer: object.transfer,
             ..PhotoReading::default()
         };
         let photo = PhotoInput::File(path).load(&reading)?;

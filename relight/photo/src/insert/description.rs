@@ -3,10 +3,10 @@
 use std::iter;
 use std::path::{Path, PathBuf};
 
-use relight_core::image::Extent;
-use serde::Deserialize;
+use relight_core::image::{Extent, Transfer};
+use serde::{Deserialize, Deserializer};
 
-use super::{DiscLamp, LampFault, MaterialChange, ObjectGloss, Placement};
+use super::{DiscLamp, LampFault, MaterialChange, ObjectGloss, Placement, WhiteBalance};
 
 /// The largest picture, pixels a side.
 const LARGEST_SIDE: u32 = 16_384;
@@ -55,7 +55,10 @@ pub struct SceneDescription {
     /// Whether brightness, white balance and grain of the objects follow the background.
     #[serde(default = "default_true", rename = "match")]
     pub matches: bool,
-    /// The brightness of a panorama and its light in stops.
+    /// How the colour of the light is shown.
+    #[serde(default)]
+    pub white_balance: WhiteBalance,
+    /// The brightness of a panorama and its light in stops, from that which is found.
     #[serde(default)]
     pub exposure: f32,
     /// From back to front.
@@ -88,6 +91,9 @@ pub struct ObjectDescription {
     /// Its mask in it.
     #[serde(default)]
     pub mask: Option<PathBuf>,
+    /// How its integers are encoded, where the file is not to be asked.
+    #[serde(default, deserialize_with = "transfer")]
+    pub transfer: Option<Transfer>,
     /// The middle of its lower edge in the picture, in parts of its width and height from the upper left corner.
     #[serde(default = "default_at")]
     pub at: [f64; 2],
@@ -331,6 +337,22 @@ fn within(
     })
 }
 
+/// How integers are encoded, as the command line names it.
+fn transfer<'de, D: Deserializer<'de>>(text: D) -> Result<Option<Transfer>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    enum Name {
+        Srgb,
+        Gamma22,
+        Linear,
+    }
+    Ok(Some(match Name::deserialize(text)? {
+        Name::Srgb => Transfer::Srgb,
+        Name::Gamma22 => Transfer::Gamma22,
+        Name::Linear => Transfer::Linear,
+    }))
+}
+
 fn default_size() -> [u32; 2] {
     [1280, 960]
 }
@@ -379,6 +401,10 @@ mod tests {
                 .unwrap();
         assert_eq!(scene.objects[0].at, [0.5, 0.9]);
         assert_eq!(scene.objects[0].change(), MaterialChange::default());
+        assert_eq!(scene.objects[0].transfer, None);
+        let linear = "background = \"a.hdr\"\n[[object]]\nphoto = \"b.png\"\ntransfer = \"linear\"";
+        let linear = SceneDescription::parse(linear).unwrap();
+        assert_eq!(linear.objects[0].transfer, Some(Transfer::Linear));
         assert!(scene.matches && scene.light == LightDescription::default());
     }
 
@@ -405,6 +431,7 @@ mod tests {
                 .contains("object 1: gloss is 2, it has to be a part")
         );
         assert!(fault(&format!("{object}shadow = -1")).contains("object 1: shadow is -1"));
+        assert!(fault(&format!("{object}transfer = \"log\"")).contains("unknown variant `log`"));
         assert!(fault("= 3").contains("it is no scene"));
     }
 }

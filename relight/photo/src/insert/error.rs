@@ -54,6 +54,14 @@ pub enum InsertError {
         /// The most.
         most: f64,
     },
+    /// An object would not be seen.
+    #[error("object {object} would lie wholly outside the picture: its place is {},{}, in parts of the picture's sides", at[0], at[1])]
+    Outside {
+        /// Which, from 1.
+        object: usize,
+        /// Its place.
+        at: [f64; 2],
+    },
     /// An object would be enlarged too much.
     #[error(
         "object {object} would be enlarged {growth:.0} times: give a larger photograph or a smaller height"

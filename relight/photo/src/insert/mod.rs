@@ -9,6 +9,7 @@
 //! | `shading`, `material` | what of its shading stays in another light; what its material becomes |
 //! | `blend` | an object back in its photograph, or before another background |
 //! | `source`, `lamp`, `surroundings` | new light: a panorama, a lamp, coefficients, what a picture shows of it |
+//! | `sun` | the sun that is seen in a picture |
 //! | `shot` | pictures of an object in light that stands or turns |
 //! | `view` | what a camera sees of a panorama |
 //! | `placement` | where an object stands, and how its pixels get there |
@@ -16,6 +17,7 @@
 //! | `scene`, `scene_object`, `layer` | objects in a new picture, with their shadows |
 //! | `relief`, `shadow` | an object's shape out of its normals, and what it keeps from the ground |
 //! | `description` | a scene as a text in TOML |
+//! | `exposure`, `white_balance` | how bright a panorama is shown, and in which colours its light |
 //! | `matching` | brightness, white balance and grain of a background |
 //! | `trust` | how far a decomposition can be trusted, pixel by pixel |
 //! | `smooth` | means over squares of pixels |
@@ -24,6 +26,7 @@ mod blend;
 mod cut;
 mod description;
 mod error;
+mod exposure;
 mod lamp;
 mod layer;
 mod matching;
@@ -40,15 +43,18 @@ mod shot;
 mod smooth;
 mod source;
 mod subject;
+mod sun;
 mod surroundings;
 #[cfg(test)]
 mod tests;
 mod trust;
 mod view;
+mod white_balance;
 
 pub use cut::EdgeColours;
 pub use description::{LightDescription, ObjectDescription, SceneDescription, SceneFault};
 pub use error::InsertError;
+pub use exposure::PanoramaExposure;
 pub use lamp::{DiscLamp, LampFault, colour_of_temperature};
 pub use layer::SceneLayer;
 pub use matching::Matching;
@@ -61,5 +67,7 @@ pub use setting::{SceneBackground, SceneSetting};
 pub use shot::{Backdrop, Shot, ShotCompanions};
 pub use source::{LightSource, exposure_between, likeness};
 pub use subject::Subject;
+pub use sun::SeenSun;
 pub use trust::{TrustFigures, TrustMap};
 pub use view::PanoramaView;
+pub use white_balance::WhiteBalance;

@@ -1,5 +1,7 @@
 //! Where an object stands in a picture, and how its pixels get there: another size, turned, moved.
 
+use std::ops::Range;
+
 use super::Subject;
 use relight_core::image::{Extent, Planes};
 
@@ -29,6 +31,20 @@ impl Placement {
             height: rows.len() as f64 / photo.height as f64,
             rotation: 0.0,
         }
+    }
+}
+
+impl Placement {
+    /// Whether any of an object of this coverage would be seen in a picture of this size.
+    pub(super) fn is_seen(&self, alpha: &Planes<1>, scene: Extent) -> bool {
+        let (width, height) = (scene.width as f64, scene.height as f64);
+        let high = self.height * height;
+        let wide = high * columns(alpha).len() as f64 / rows(alpha).len().max(1) as f64;
+        let (sin, cos) = self.rotation.to_radians().sin_cos();
+        let across = (wide * cos).abs() + (high * sin).abs();
+        let down = (wide * sin).abs() + (high * cos).abs();
+        let [x, y] = [self.at[0] * width, self.at[1] * height];
+        x + across / 2.0 > 0.0 && x - across / 2.0 < width && y > 0.0 && y - down < height
     }
 }
 
@@ -106,7 +122,7 @@ fn between(plane: &[f32], extent: Extent, [x, y]: [f64; 2]) -> f32 {
 }
 
 /// The rows in which an object covers at least half of a pixel.
-pub(super) fn rows(alpha: &Planes<1>) -> std::ops::Range<usize> {
+pub(super) fn rows(alpha: &Planes<1>) -> Range<usize> {
     let width = alpha.extent().width.max(1);
     let covers = |line: &[f32]| line.iter().any(|&a| a >= 0.5);
     let lines = || alpha.plane(0).chunks_exact(width);
@@ -127,13 +143,19 @@ pub(super) fn placed(alpha: &Planes<1>, placement: Placement, scene: Extent) -> 
     ]
 }
 
-/// The middle of the columns in which an object covers at least half of a pixel.
-fn middle(alpha: &Planes<1>) -> f64 {
+/// The columns in which an object covers at least half of a pixel.
+fn columns(alpha: &Planes<1>) -> Range<usize> {
     let Extent { width, height } = alpha.extent();
     let covers = |&x: &usize| (0..height).any(|y| alpha.pixel(x, y)[0] >= 0.5);
     let (first, last) = ((0..width).find(covers), (0..width).rfind(covers));
     match (first, last) {
-        (Some(first), Some(last)) => (first + last + 1) as f64 / 2.0,
-        _ => width as f64 / 2.0,
+        (Some(first), Some(last)) => first..last + 1,
+        _ => 0..width,
     }
+}
+
+/// The middle of these columns.
+fn middle(alpha: &Planes<1>) -> f64 {
+    let Range { start, end } = columns(alpha);
+    (start + end) as f64 / 2.0
 }

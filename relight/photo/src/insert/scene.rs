@@ -430,6 +430,17 @@ mod tests {
             })
             .contains("its place is NaN")
         );
+        for at in [[1.5, 0.9], [0.5, 1.9], [0.5, -0.1], [-0.4, 0.9]] {
+            let found = refused(Placement {
+                at,
+                height: 0.4,
+                rotation: 30.0,
+            });
+            assert!(
+                found.starts_with("object 2 would lie wholly outside"),
+                "{found}"
+            );
+        }
         let objects = vec![object(
             &subject,
             Placement {

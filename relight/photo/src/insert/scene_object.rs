@@ -65,8 +65,11 @@ impl<'a> SceneObject<'a> {
                 });
             }
         }
-        let growth =
-            height * extent.height as f64 / rows(&self.subject.matte().alpha).len().max(1) as f64;
+        let alpha = &self.subject.matte().alpha;
+        if !self.placement.is_seen(alpha, extent) {
+            return Err(InsertError::Outside { object: number, at });
+        }
+        let growth = height * extent.height as f64 / rows(alpha).len().max(1) as f64;
         if growth > MOST_GROWTH {
             return Err(InsertError::Growth {
                 object: number,

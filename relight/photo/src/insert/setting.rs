@@ -4,19 +4,22 @@
 use std::f32::consts::PI;
 
 use relight_core::image::{Extent, Linear, Rgb};
-use relight_core::light::Panorama;
+use relight_core::light::{Panorama, ShLight};
 use relight_core::render::exposure_for;
 
 use super::placement::rows;
+use super::white_balance::tinted;
 use super::{
-    InsertError, InsertScene, LightSource, Matching, ObjectDescription, PanoramaView,
-    SceneDescription, SceneObject,
+    InsertError, InsertScene, LightSource, Matching, ObjectDescription, PanoramaExposure,
+    PanoramaView, SceneDescription, SceneObject, SeenSun, WhiteBalance,
 };
 use crate::decompose::Photo;
 
 /// The part of the brightest light that a white diffuse surface has in a picture of a panorama: bright places clip, as in
 /// photographs.
 const WHITE: f32 = 1.4;
+/// The longer side of the picture of a panorama by which it is exposed, pixels.
+const LOOK: usize = 160;
 /// Photographs are brought to this much more than the size in which they are shown.
 const RESERVE: f64 = 1.25;
 /// The shortest that the longest side of a photograph is made, pixels.
@@ -46,8 +49,12 @@ pub struct SceneSetting {
     pub tilt: f64,
     /// What the background asks of the objects.
     pub matching: Matching,
+    /// The sun that is seen in a picture from which the light is taken.
+    pub sun: Option<SeenSun>,
+    /// How a panorama is exposed.
+    pub exposure: Option<PanoramaExposure>,
     /// What a panorama's radiance is multiplied with to be shown.
-    panorama_scale: f32,
+    panorama_scale: [f32; 3],
 }
 
 impl SceneSetting {
@@ -68,13 +75,32 @@ impl SceneSetting {
             // Light that was taken from the background has its colour.
             matching.balance = [1.0; 3];
         }
+        if scene.white_balance == WhiteBalance::Auto
+            && let SceneBackground::Picture(picture) = background
+        {
+            matching.balance = Matching::of(picture).balance;
+        }
+        let sun = match background {
+            SceneBackground::Picture(picture) if given.is_none() => SeenSun::find(picture.planes()),
+            _ => None,
+        };
         let light = given.unwrap_or_else(|| match background {
             SceneBackground::Panorama(panorama) => LightSource::Panorama(panorama.clone()),
-            SceneBackground::Picture(picture) => LightSource::of_picture(picture, scene.field),
+            SceneBackground::Picture(picture) => {
+                LightSource::of_picture_with(picture, scene.field, sun)
+            }
         });
-        let panorama_scale = exposure_for(&light.light()?) * WHITE * PI * scene.exposure.exp2();
-        if let SceneBackground::Panorama(_) = background {
-            matching.level = scene.exposure.exp2();
+        let coefficients = light.light()?;
+        let tint = scene.white_balance.tint(&coefficients);
+        let light = scene.white_balance.shown(light)?;
+        let base = exposure_for(&coefficients.clone().tinted(tint)) * WHITE * PI;
+        let mut panorama_scale = tint.map(|t| t as f32 * base);
+        let mut exposure = None;
+        if let SceneBackground::Panorama(panorama) = background {
+            let found = exposed(scene, panorama, panorama_scale, &coefficients);
+            matching.level = found.stops.exp2();
+            panorama_scale = panorama_scale.map(|scale| scale * matching.level);
+            exposure = Some(found);
         }
         let extent = match background {
             SceneBackground::Panorama(_) => scene.panorama_extent(),
@@ -85,6 +111,8 @@ impl SceneSetting {
             light,
             tilt: scene.tilt.unwrap_or_else(|| tilt_of(scene, background)),
             matching,
+            sun,
+            exposure,
             panorama_scale,
         })
     }
@@ -110,9 +138,36 @@ impl SceneSetting {
     /// What is seen of a panorama that has turned by so many radians, as bright as it is shown.
     #[must_use]
     pub fn seen(&self, view: &PanoramaView, panorama: &Panorama, turn: f64) -> Rgb<Linear> {
-        let seen = view.picture(panorama, turn).into_planes();
-        Rgb::new(seen.map(|v| v.max(0.0) * self.panorama_scale))
+        shown(view, panorama, turn, self.panorama_scale)
     }
+}
+
+fn shown(view: &PanoramaView, panorama: &Panorama, turn: f64, scale: [f32; 3]) -> Rgb<Linear> {
+    let seen = view.picture(panorama, turn).into_planes();
+    tinted(Rgb::new(seen.map(|v| v.max(0.0))), scale)
+}
+
+/// The exposure of a panorama: by what is seen of it, where brightness is to be matched, and as it is given beyond that.
+fn exposed(
+    scene: &SceneDescription,
+    panorama: &Panorama,
+    scale: [f32; 3],
+    light: &ShLight,
+) -> PanoramaExposure {
+    let Extent { width, height } = scene.panorama_extent();
+    let side = |side: usize| (side * LOOK / width.max(height).max(1)).max(1);
+    let view = PanoramaView::new(
+        Extent::new(side(width), side(height)),
+        scene.field,
+        scene.down,
+    );
+    let seen = shown(&view, panorama, 0.0, scale);
+    let found = if scene.matches {
+        PanoramaExposure::of(&seen, light)
+    } else {
+        PanoramaExposure::fixed(&seen, 0.0)
+    };
+    found.brighter(&seen, scene.exposure)
 }
 
 /// How far the camera looks down on the ground of the first object, degrees.
@@ -158,7 +213,11 @@ mod tests {
         let plain = SceneSetting::new(&scene, background, None).unwrap();
         assert_eq!(plain.extent, Extent::new(200, 100));
         assert_eq!(plain.light, LightSource::Panorama(panorama.clone()));
-        assert_eq!(plain.matching, Matching::default());
+        // The sky is even: it is brought to the brightness of a bright place, and the objects with it.
+        let exposure = plain.exposure.unwrap();
+        assert!(exposure.clipped == 0.0 && !exposure.for_objects);
+        assert_eq!(plain.matching.level, exposure.stops.exp2());
+        assert_eq!(plain.matching.balance, [1.0; 3]);
         let view = PanoramaView::new(plain.extent, scene.field, scene.down);
         let shown = |setting: &SceneSetting| {
             let seen = setting.seen(&view, &panorama, 0.0);
@@ -166,8 +225,34 @@ mod tests {
         };
         let brighter = described("size = [200, 100]\nexposure = 1.0");
         let brighter = SceneSetting::new(&brighter, background, None).unwrap();
-        assert_eq!(brighter.matching.level, 2.0);
+        assert!((brighter.matching.level / plain.matching.level - 2.0).abs() < 1e-5);
         assert!((shown(&brighter) / shown(&plain) - 2.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn nothing_is_matched_where_nobody_asks_and_a_camera_may_be_balanced_for_the_light() {
+        let panorama = sky();
+        let background = SceneBackground::Panorama(&panorama);
+        let unmatched = described("size = [200, 100]\nmatch = false");
+        let unmatched = SceneSetting::new(&unmatched, background, None).unwrap();
+        assert_eq!(unmatched.matching, Matching::default());
+        let balanced = described("size = [200, 100]\nwhite_balance = \"auto\"");
+        let balanced = SceneSetting::new(&balanced, background, None).unwrap();
+        let view = PanoramaView::new(balanced.extent, 60.0, 10.0);
+        let [r, g, b] = balanced.seen(&view, &panorama, 0.0).planes().pixel(9, 9);
+        assert!((r / b - 1.0).abs() < 0.01 && (g / b - 1.0).abs() < 0.01);
+        assert!((g - 0.8).abs() < 0.02, "{g}");
+        // Before a picture, the light is as coloured as the picture's.
+        let lamp: DiscLamp = "60,30,2700K".parse().unwrap();
+        let scene = described("white_balance = \"auto\"");
+        let dusk = dusk();
+        let picture = SceneBackground::Picture(&dusk);
+        let set = SceneSetting::new(&scene, picture, Some(LightSource::Lamp(lamp))).unwrap();
+        let LightSource::Lamp(shown) = set.light else {
+            panic!("a lamp")
+        };
+        assert!((shown.colour[0] / shown.colour[2] - 1.0).abs() < 1e-6);
+        assert!(set.matching.balance[0] > set.matching.balance[2]);
     }
 
     #[test]

@@ -8,10 +8,13 @@ use clap::{ArgAction, Args};
 use relight_core::captured_object::CapturedObject;
 use relight_core::files::OutputKind;
 use relight_photo::files::{InsertionOutput, PhotoReading};
-use relight_photo::insert::{LightDescription, LightSource, ObjectDescription, SceneDescription};
+use relight_photo::insert::{
+    LightDescription, LightSource, ObjectDescription, SceneDescription, WhiteBalance,
+};
 
 use crate::commands::relight::{degrees, gloss_numbers, tint};
 use crate::photos::{Bits, NetworkArguments};
+use crate::values::{TransferName, WhiteName};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -39,7 +42,7 @@ pub(crate) struct Arguments {
     /// A scene: background, light and objects in a TOML file.
     #[arg(long, value_name = "FILE.toml")]
     scene: Option<PathBuf>,
-    /// The picture (.png, .exr), or a video (.mp4, .webm).
+    /// The picture (.png, .jpg, .exr), or a video (.mp4, .webm). Its folder is made where there is none.
     #[arg(short, long, value_name = "OUT")]
     pub(super) output: PathBuf,
     /// The background: a photograph, a panorama (HDR or EXR, twice as wide as high), or a video.
@@ -69,7 +72,10 @@ pub(crate) struct Arguments {
     /// Leave brightness, white balance and grain of the objects as they are.
     #[arg(long, conflicts_with = "scene")]
     no_match: bool,
-    /// Brightness of a panorama and its light in stops.
+    /// How the colour of the light is shown [default: light].
+    #[arg(long, value_enum, conflicts_with = "scene")]
+    white_balance: Option<WhiteName>,
+    /// Brightness of a panorama and its light in stops, from that which is found.
     #[arg(long, value_name = "STOPS", value_parser = number, allow_hyphen_values = true, conflicts_with = "scene")]
     exposure: Option<f64>,
     /// Turn a panorama and its light by so many degrees about the vertical, in a video.
@@ -91,6 +97,10 @@ pub(crate) struct Arguments {
 /// What is said of the objects; what is given once holds for all, what is given as often as there are objects for one each.
 #[derive(Args)]
 struct ObjectArguments {
+    /// How the photograph is encoded, where it is a PNG, JPEG or WebP; EXR and HDR are linear [default: what the file says, or
+    /// sRGB].
+    #[arg(long, value_enum, action = ArgAction::Append, conflicts_with = "scene")]
+    transfer: Vec<TransferName>,
     /// A mask, white on the object, or a folder of masks, <photo's name>.png.
     #[arg(long, value_name = "FILE|DIR", action = ArgAction::Append, conflicts_with = "scene")]
     mask: Vec<PathBuf>,
@@ -144,6 +154,7 @@ impl Arguments {
         let object = &self.object;
         let lists = [
             ("--mask", object.mask.len()),
+            ("--transfer", object.transfer.len()),
             ("--at", object.at.len()),
             ("--height", object.height.len()),
             ("--rotate", object.rotate.len()),
@@ -171,9 +182,12 @@ impl Arguments {
         }
         if OutputKind::of(&self.output).is_none() {
             return Some(format!(
-                "--output {}: give .png, .exr, .mp4 or .webm",
+                "--output {}: give .png, .jpg, .exr, .mp4 or .webm",
                 self.output.display()
             ));
+        }
+        if let Some(fault) = self.bits.fault(&self.output) {
+            return Some(fault);
         }
         let is_movie = matches!(OutputKind::of(&self.output), Some(OutputKind::Movie(_)));
         (self.turn.is_some() && !is_movie).then(|| {
@@ -226,6 +240,7 @@ impl Arguments {
                 object: self.light.light_object.clone(),
             },
             matches: !self.no_match,
+            white_balance: self.white_balance.map_or(WhiteBalance::Light, Into::into),
             exposure: self.exposure.unwrap_or(0.0) as f32,
             objects,
         };
@@ -247,6 +262,7 @@ impl ObjectArguments {
                     let name = photo.file_stem().unwrap_or_default();
                     PhotoReading::mask_path(&mask, &name.to_string_lossy())
                 }),
+            transfer: of(&self.transfer, number).map(Into::into),
             at: of(&self.at, number).unwrap_or([across, 0.9]),
             height: of(&self.height, number).unwrap_or(0.4),
             rotation: of(&self.rotate, number).unwrap_or(0.0),

@@ -6,7 +6,10 @@ use std::path::{Path, PathBuf};
 
 use relight_core::files::OutputKind;
 use relight_photo::files::{BackgroundFile, InsertSource, Insertion};
-use relight_photo::insert::{SceneObject, TrustFigures};
+use relight_photo::insert::{
+    LightDescription, PanoramaExposure, SceneDescription, SceneObject, SceneSetting, SeenSun,
+    TrustFigures,
+};
 use relit_console::{Console, Outcome, ProgressBar};
 use serde_json::json;
 
@@ -49,13 +52,56 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let (setting, output) = (insertion.setting(), output.path);
     let matching = setting.matching;
     console.say(
-        &format!("{}: {} object(s), {frames} frame(s)", output.display(), scene.objects.len()),
+        &format!(
+            "{}: {} object(s), {frames} frame(s){}{}",
+            output.display(),
+            scene.objects.len(),
+            setting.exposure.map(described).unwrap_or_default(),
+            if takes_light(&scene, setting) {
+                sun_described(setting.sun)
+            } else {
+                String::new()
+            }
+        ),
         &json!({
             "event": "inserted", "output": output, "objects": scene.objects.len(), "frames": frames,
             "trust": trust, "tilt": setting.tilt, "level": matching.level, "balance": matching.balance, "grain": matching.grain,
+            "exposure": setting.exposure, "sun": setting.sun,
         }),
     );
     Ok(Outcome::Whole)
+}
+
+/// Whether the light was taken from a photograph.
+fn takes_light(scene: &SceneDescription, setting: &SceneSetting) -> bool {
+    setting.exposure.is_none() && scene.light == LightDescription::default()
+}
+
+/// The sun that is seen in a photograph, in words.
+fn sun_described(sun: Option<SeenSun>) -> String {
+    match sun {
+        Some(sun) => format!(
+            "; the sun is seen in the picture, with a confidence of {:.1}",
+            sun.confidence
+        ),
+        None => "; no sun is seen in the picture, so that shadows are soft: --lamp \
+                 AZIMUTH,ELEVATION,2 makes them hard"
+            .to_owned(),
+    }
+}
+
+/// How a panorama was exposed, in words.
+fn described(exposure: PanoramaExposure) -> String {
+    let reason = if exposure.for_objects {
+        ", as its objects ask for"
+    } else {
+        ""
+    };
+    format!(
+        "; exposed by {:+.1} stops{reason}, {:.0} % of the picture clip",
+        exposure.stops,
+        100.0 * exposure.clipped
+    )
 }
 
 /// Whether this background can become that output.
@@ -67,10 +113,10 @@ fn check_output(background: &BackgroundFile, arguments: &Arguments) -> Result<()
     let output = arguments.output.display();
     match background {
         BackgroundFile::Photo(_) if is_movie => Err(format!(
-            "{output}: a photograph does not move; give .png or .exr"
+            "{output}: a photograph does not move; give .png, .jpg or .exr"
         )),
         BackgroundFile::Panorama(_) if is_movie && arguments.turn.is_none() => Err(format!(
-            "{output}: a panorama moves with --turn DEGREES; give it, or .png or .exr"
+            "{output}: a panorama moves with --turn DEGREES; give it, or .png, .jpg or .exr"
         )),
         BackgroundFile::Movie(_) if !is_movie => {
             Err(format!("{output}: give .mp4 or .webm for a video"))
