@@ -183,6 +183,10 @@ pub fn evaluate_insertion(
         lines: Vec::new(),
         images: Vec::new(),
     };
+    if recipe.black_paint {
+        let note = "about half of each object is painted black, with an albedo of 0.04 at most";
+        table.notes.push(note.to_owned());
+    }
     let mut scored: [Vec<(String, Vec<Scored>)>; InsertionMethod::ALL.len()] = Default::default();
     for number in 0..recipe.objects {
         let made = StageRecipe {

@@ -132,6 +132,12 @@ impl Subject {
         let albedo = surface.albedo().planes().clone();
         let light = even_light();
         let ones = Planes::filled(extent, [1.0]);
+        let cues = PaintCues {
+            albedo: &albedo,
+            dark_side: 1.0,
+        };
+        let even = Planes::filled(extent, [1.0; 3]);
+        let shading = Shading::new(&ones, &even, &wanted, &cues);
         Ok(Self {
             place: [0, 0],
             photo: extent,
@@ -139,15 +145,7 @@ impl Subject {
             matte: Matte::of_cut_out(&albedo, asset.alpha()),
             normals: surface.normals().completed(&wanted),
             albedo,
-            shading: Shading::new(
-                &ones,
-                &Planes::filled(extent, [1.0; 3]),
-                &wanted,
-                &PaintCues {
-                    albedo: &albedo,
-                    dark_side: 1.0,
-                },
-            ),
+            shading,
             highlight: Planes::zeros(extent),
             gloss: surface.gloss().map(|gloss| mean_gloss(gloss, &covered)),
             rest: Planes::zeros(extent),
