@@ -3,6 +3,7 @@
 mod maps;
 mod movie;
 mod output;
+mod parent;
 mod pictures;
 mod result_folder;
 

@@ -10,7 +10,7 @@ use std::thread::{self, JoinHandle};
 
 use relit_data::durable;
 
-use super::output::make_parent;
+use super::parent::make_parent;
 use crate::image::{Extent, Planes, Rgb, Srgb};
 use crate::parallel;
 

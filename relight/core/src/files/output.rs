@@ -1,7 +1,5 @@
 //! The kinds of file that pictures and videos are written into.
 
-use std::fs;
-use std::io;
 use std::path::Path;
 
 use super::{MovieFormat, write_jpeg, write_png};
@@ -60,13 +58,5 @@ pub fn write_picture(path: &Path, picture: &Rgb<Linear>, depth: Depth) -> Result
         Some(OutputKind::Exr) => picture.write_exr(path),
         Some(OutputKind::Jpeg) => write_jpeg(path, picture.clone().encode::<Srgb>().planes()),
         _ => write_png(path, picture.clone().encode::<Srgb>().planes(), depth),
-    }
-}
-
-/// Makes the folder of a file that is to be written, and those that it lies in.
-pub(super) fn make_parent(path: &Path) -> io::Result<()> {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => fs::create_dir_all(folder),
-        _ => Ok(()),
     }
 }

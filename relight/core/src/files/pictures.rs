@@ -6,7 +6,7 @@ use std::path::Path;
 
 use relit_data::durable::{Partial, write_whole};
 
-use super::output::make_parent;
+use super::parent::make_parent;
 use crate::captured_object::{CapturedObject, CapturedObjectError};
 use crate::image::{
     Depth, Gamma22, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
