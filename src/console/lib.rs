@@ -8,7 +8,7 @@
 //! | results | text on standard output | JSON lines on standard output |
 //! | what is being done | text on standard error | JSON lines on standard output |
 //! | warnings and errors | text on standard error | JSON lines on standard output, and the same text on standard error |
-//! | progress | a bar on standard error, where that is a terminal | none |
+//! | progress | a bar on standard error, where that is a terminal | JSON lines, where the program was asked for them |
 //!
 //! So standard output alone tells a machine everything, and standard error alone, which a cluster keeps as
 //! the log of a job, tells a person what went wrong.
@@ -24,20 +24,17 @@ use std::error::Error;
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::OnceLock;
-use std::time::Duration;
 
-use indicatif::ProgressStyle;
 use relit_data::causes::with_causes;
 use serde_json::{Value, json};
 
+mod lines;
 mod manual;
+mod progress;
 
-pub use indicatif::ProgressBar;
+use lines::{lost_line, print_error_line, print_line};
 pub use manual::written_manual;
-
-/// What first kept a line from being printed, other than that nobody reads any more.
-static LOST_LINE: OnceLock<io::Error> = OnceLock::new();
+pub use progress::ProgressBar;
 
 /// The outcome of a command that ran to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,12 +61,26 @@ impl From<Outcome> for ExitCode {
 #[derive(Debug, Clone, Copy)]
 pub struct Console {
     json: bool,
+    progress: bool,
 }
 
 impl Console {
     /// A console that prints JSON lines (`json`) or text on standard output.
     pub fn new(json: bool) -> Self {
-        Self { json }
+        Self {
+            json,
+            progress: false,
+        }
+    }
+
+    /// The same, which with `wanted` tells a machine also how far the work has come, twice a second at most:
+    /// `{"event": "progress", "what": ..., "done": ..., "of": ...}`, where 0 of 0 steps are not counted yet.
+    #[must_use]
+    pub fn with_progress(self, wanted: bool) -> Self {
+        Self {
+            progress: wanted,
+            ..self
+        }
     }
 
     /// Whether a machine reads the lines.
@@ -153,7 +164,7 @@ impl Console {
     /// Prints the command's error, if there is one, and returns the exit code. Where lines could not be printed, the
     /// outcome is not whole.
     pub fn finish<E: Into<Box<dyn Error>>>(self, result: Result<Outcome, E>) -> ExitCode {
-        match (result, LOST_LINE.get()) {
+        match (result, lost_line()) {
             (Ok(Outcome::Whole), Some(fault)) => {
                 print_error_line(&format!(
                     "error: standard output could not be written, lines are missing there: {fault}"
@@ -168,30 +179,13 @@ impl Console {
         }
     }
 
-    /// A progress bar of `length` steps; hidden with `--json` or if standard error is not a terminal.
+    /// A progress bar of `length` steps; hidden if standard error is not a terminal. With `--json` lines for
+    /// the machine, or nothing where it did not [ask for them](Self::with_progress).
     pub fn progress(self, length: u64, label: &str) -> ProgressBar {
-        if self.json {
-            return ProgressBar::hidden();
+        match (self.json, self.progress) {
+            (true, true) => ProgressBar::lines(length, label),
+            (true, false) => ProgressBar::hidden(),
+            (false, _) => ProgressBar::visible(length, label),
         }
-        let bar = ProgressBar::new(length).with_message(label.to_owned());
-        let template = "{msg:.bold} {wide_bar} {pos}/{len} {per_sec} {eta}";
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
-        }
-        bar.enable_steady_tick(Duration::from_millis(200));
-        bar
     }
-}
-
-/// Prints a line. If the output is closed, the work goes on without it.
-fn print_line(text: &str) {
-    if let Err(fault) = writeln!(io::stdout(), "{text}")
-        && fault.kind() != io::ErrorKind::BrokenPipe
-    {
-        let _ = LOST_LINE.set(fault);
-    }
-}
-
-fn print_error_line(text: &str) {
-    let _ = writeln!(io::stderr(), "{text}");
 }

@@ -32,6 +32,7 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left 
 /// The parsed command line.
 pub(crate) struct Arguments {
     pub(crate) json: bool,
+    pub(crate) progress: bool,
     pub(crate) command: Command,
 }
 
@@ -85,6 +86,9 @@ enum Verb {
         /// Print one JSON line per event on standard output.
         #[arg(long)]
         json: bool,
+        /// With --json, print also how far the work has come.
+        #[arg(long, requires = "json")]
+        progress: bool,
     },
     /// Join what several tasks wrote into one data set.
     #[command(after_help = "Example:\n  relit-extract merge dataset")]
@@ -225,6 +229,9 @@ struct ExtractArguments {
     /// Print one JSON line per event on standard output.
     #[arg(long)]
     json: bool,
+    /// With --json, print also how far the work has come.
+    #[arg(long, requires = "json")]
+    progress: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -273,20 +280,31 @@ pub(crate) fn command() -> clap::Command {
 pub(crate) fn parse() -> Arguments {
     let line = CommandLine::parse();
     match (line.verb, line.extract) {
-        (Some(Verb::Verify { out, json }), _) => Arguments {
+        (
+            Some(Verb::Verify {
+                out,
+                json,
+                progress,
+            }),
+            _,
+        ) => Arguments {
             json,
+            progress,
             command: Command::Verify { out },
         },
         (Some(Verb::Merge { out, json }), _) => Arguments {
             json,
+            progress: false,
             command: Command::Merge { out },
         },
         (Some(Verb::Stats { out, html, json }), _) => Arguments {
             json,
+            progress: false,
             command: Command::Stats { out, html },
         },
         (Some(Verb::Card { out, facts, json }), _) => Arguments {
             json,
+            progress: false,
             command: Command::Card {
                 facts: facts.of(&out),
                 out,
@@ -405,6 +423,7 @@ impl ExtractArguments {
         };
         Arguments {
             json: line.json,
+            progress: line.progress,
             command,
         }
     }

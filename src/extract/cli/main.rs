@@ -18,7 +18,7 @@ fn main() -> ExitCode {
         return code;
     }
     let arguments = arguments::parse();
-    let console = Console::new(arguments.json);
+    let console = Console::new(arguments.json).with_progress(arguments.progress);
     match arguments.command {
         Command::Extract {
             inputs,

@@ -55,6 +55,9 @@ pub(crate) enum Verb {
         /// Print one JSON line per event on standard output
         #[arg(long)]
         json: bool,
+        /// With --json, print also how far the check has come
+        #[arg(long, requires = "json")]
+        progress: bool,
     },
     /// Measure masks of images with ground truth, and OpenCV's GrabCut beside them if it is built in
     #[command(after_help = "Example:\n  relit-mask bench images/")]

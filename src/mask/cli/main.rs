@@ -19,8 +19,16 @@ fn main() -> ExitCode {
     }
     let line = CommandLine::parse();
     match (line.verb, line.mask) {
-        (Some(Verb::Check { input, mask, json }), _) => {
-            let console = Console::new(json);
+        (
+            Some(Verb::Check {
+                input,
+                mask,
+                json,
+                progress,
+            }),
+            _,
+        ) => {
+            let console = Console::new(json).with_progress(progress);
             console.finish(checking::run(console, &input, mask.as_deref()))
         }
         (
