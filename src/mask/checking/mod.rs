@@ -1,6 +1,7 @@
 //! A mask held against all frames of its recording: does the object stay under it, and is its shape right?
 
 mod drift;
+mod files;
 mod page;
 mod report;
 mod verdict;
@@ -15,6 +16,7 @@ use relit_video::Video;
 use super::files::{read_if_exists, write};
 use super::{MaskFiles, MaskRecord, MaskingError};
 use drift::{drifts, summary, worst};
+use files::{CheckFiles, record};
 use verdict::verdict;
 
 pub use drift::{DriftCheck, FrameDrift};
@@ -22,7 +24,7 @@ pub use report::{CheckOutput, MaskReport};
 pub use verdict::MaskVerdict;
 
 /// Holds a recording's mask (`mask`, or else the one in the session folder) against all its frames, and
-/// writes a page about it beside the mask. `advanced` is called after each frame. Memory does not grow with the
+/// writes a page and a record about it beside the mask. `advanced` is called after each frame. Memory does not grow with the
 /// video, except for a few bytes a frame.
 ///
 /// # Errors
@@ -52,7 +54,7 @@ fn check_recording(
 ) -> Result<(MaskReport, PathBuf), MaskingError> {
     let folder = recording.folder.clone().unwrap_or_default();
     let files = MaskFiles::of(&mask.map_or_else(|| folder.join(MASK_FILE), Path::to_owned))?;
-    let image = read_mask(&files.mask)?;
+    let (image, png) = read_mask(&files.mask)?;
     let video = Video::open(&recording.video)?;
     check_size(&files.mask, &image, &video)?;
     if image.pixels().all(|pixel| pixel.0[0] < 128) {
@@ -80,18 +82,21 @@ fn check_recording(
     };
     let shown = worst(&drifts, source, video.frames().len());
     let page = page::page(&recording.id, &report, &drifts, &shown, &video, &image)?;
-    let path = page::path(&files);
-    write(&path, page.as_bytes())?;
-    Ok((report, path))
+    let files = CheckFiles::of(&files, recording);
+    let record = record(&recording.id, &report, &png, &files.record)?;
+    write(&files.page, page.as_bytes())?;
+    write(&files.record, &record)?;
+    Ok((report, files.page))
 }
 
-fn read_mask(path: &Path) -> Result<GrayImage, MaskingError> {
+/// The mask, and its file.
+fn read_mask(path: &Path) -> Result<(GrayImage, Vec<u8>), MaskingError> {
     let bytes = std::fs::read(path).map_err(MaskingError::io(path, "read"))?;
     let image = image::load_from_memory(&bytes).map_err(|error| MaskingError::Check {
         path: path.to_owned(),
         why: error.to_string(),
     })?;
-    Ok(image.into_luma8())
+    Ok((image.into_luma8(), bytes))
 }
 
 fn check_size(path: &Path, mask: &GrayImage, video: &Video) -> Result<(), MaskingError> {

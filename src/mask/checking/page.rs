@@ -2,7 +2,6 @@
 //! scripts that loads nothing.
 
 use std::fmt::Write;
-use std::path::PathBuf;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -12,7 +11,7 @@ use relit_data::geometry::Rect;
 use relit_grabcut::{DoubtfulRegion, MaskError, preview};
 use relit_video::Video;
 
-use super::super::{MaskFiles, MaskingError};
+use super::super::MaskingError;
 use super::drift::FrameDrift;
 use super::report::MaskReport;
 use super::verdict::MaskVerdict;
@@ -28,13 +27,6 @@ const STYLE: &str = "body{font:16px/1.4 system-ui,sans-serif;max-width:56rem;mar
 h1{font-size:1.2rem}.verdict{font-weight:700}.fits{color:#13703a}.drifts,.unknown{color:#96550a}.wrong{color:#b3261e}\
 table{border-collapse:collapse}td{padding:.1rem 1rem .1rem 0;font-variant-numeric:tabular-nums}\
 svg{width:100%;height:auto;background:#f4f5f7}figure{display:inline-block;margin:.3rem;vertical-align:top}img{max-width:26rem;width:100%}";
-
-/// Where the page about a mask is written.
-pub(super) fn path(files: &MaskFiles) -> PathBuf {
-    let mut name = files.mask.file_stem().unwrap_or_default().to_owned();
-    name.push("-check.html");
-    files.mask.with_file_name(name)
-}
 
 pub(super) fn page(
     id: &str,

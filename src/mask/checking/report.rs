@@ -30,6 +30,7 @@ pub struct CheckOutput {
     pub recording: String,
     /// The report.
     pub report: MaskReport,
-    /// The page: `NAME-check.html` beside the mask.
+    /// The page: `NAME-check.html` beside the mask, or `NAME-on-RECORDING-check.html` where the mask is not the
+    /// recording's own.
     pub page: PathBuf,
 }
