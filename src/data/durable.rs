@@ -114,6 +114,42 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     partial.seal()?.publish()
 }
 
+/// A folder that was there, or that was made with those around it. What was made and is empty when this is dropped is
+/// removed again: what fails before its first file leaves nothing behind.
+#[derive(Debug)]
+#[must_use = "what was made is removed with it while it is empty"]
+pub struct MadeFolder {
+    /// Those that were made, the outermost first.
+    made: Vec<PathBuf>,
+}
+
+impl MadeFolder {
+    /// Makes the folder, and those around it, where they are missing.
+    ///
+    /// # Errors
+    /// If one of them cannot be made.
+    pub fn make(path: &Path) -> io::Result<Self> {
+        let is_missing = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
+        let missing = path.ancestors().take_while(is_missing);
+        let mut made: Vec<PathBuf> = missing.map(Path::to_owned).collect();
+        made.reverse();
+        let made = Self { made };
+        fs::create_dir_all(path)?;
+        Ok(made)
+    }
+}
+
+impl Drop for MadeFolder {
+    fn drop(&mut self) {
+        for folder in self.made.iter().rev() {
+            // One that holds something stays, and so do those around it.
+            if fs::remove_dir(folder).is_err() {
+                return;
+            }
+        }
+    }
+}
+
 /// Renames a finished, synced file or folder to its final name and syncs the rename to disk.
 ///
 /// # Errors
@@ -160,6 +196,21 @@ fn temporary_name(path: &Path) -> io::Result<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_that_was_made_and_stays_empty_is_removed_with_those_around_it() {
+        let root = tempfile::tempdir().unwrap();
+        let (outer, inner) = (root.path().join("a"), root.path().join("a/b"));
+        drop(MadeFolder::make(&inner).unwrap());
+        assert!(!outer.exists() && root.path().exists());
+        fs::create_dir(&outer).unwrap();
+        drop(MadeFolder::make(&inner).unwrap());
+        assert!(outer.exists() && !inner.exists(), "it was there before");
+        let made = MadeFolder::make(&inner).unwrap();
+        fs::write(inner.join("file"), "").unwrap();
+        drop(made);
+        assert!(inner.join("file").exists());
+    }
     use std::thread;
 
     fn names_in(folder: &Path) -> Vec<String> {

@@ -1,6 +1,5 @@
 //! `relit-capture record`: one capture, for a person or a machine.
 
-use std::fs;
 use std::io::{self, IsTerminal};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -17,6 +16,7 @@ use serde_json::json;
 use crate::arguments::Record;
 use crate::environment::at_end;
 use relit_console::{Console, Outcome};
+use relit_data::durable::MadeFolder;
 
 /// How often progress is looked at.
 const UPDATE: Duration = Duration::from_millis(100);
@@ -28,7 +28,7 @@ pub(crate) fn run(console: Console, record: Record) -> Result<Outcome, CaptureEr
         meter,
         yes,
     } = record;
-    make_root(&settings)?;
+    let _made = make_root(&settings)?;
     if !yes && matches!(settings.turntable, TurntableAddress::Serial(_)) && !agreed(console)? {
         console.warn("the table was not turned: nobody agreed; --yes agrees beforehand");
         return Ok(Outcome::Wrong);
@@ -61,8 +61,9 @@ fn system(what: &'static str, doing: &'static str) -> impl FnOnce(io::Error) -> 
     }
 }
 
-fn make_root(settings: &Settings) -> Result<(), CaptureError> {
-    fs::create_dir_all(&settings.root).map_err(|source| CaptureError::System {
+/// Makes the folder of sessions; one that stays empty is removed at the end.
+fn make_root(settings: &Settings) -> Result<MadeFolder, CaptureError> {
+    MadeFolder::make(&settings.root).map_err(|source| CaptureError::System {
         what: settings.root.display().to_string(),
         doing: "made",
         source,

@@ -8,7 +8,7 @@ use super::array_task::ArrayTask;
 use super::digest::HashingWriter;
 use super::file::FileEntry;
 use super::{ShardError, names};
-use crate::durable::{self, Partial, SealedPartial};
+use crate::durable::{self, MadeFolder, Partial, SealedPartial};
 
 /// The folder of a data set, locked by this process until it is dropped.
 #[derive(Debug)]
@@ -17,6 +17,8 @@ pub struct OutputFolder {
     /// The locks are held as long as these handles.
     _handle: File,
     _task: Option<File>,
+    /// A run that fails before its first file leaves no folder behind.
+    _made: Option<MadeFolder>,
 }
 
 impl OutputFolder {
@@ -27,8 +29,11 @@ impl OutputFolder {
     /// [`ShardError::Locked`] if another process holds the lock; [`ShardError::Io`] if the folder cannot be
     /// created, opened, locked or cleaned.
     pub fn lock(out: &Path) -> Result<Self, ShardError> {
-        fs::create_dir_all(out).map_err(ShardError::io("make the folder", out))?;
-        Self::lock_existing(out)
+        let made = MadeFolder::make(out).map_err(ShardError::io("make the folder", out))?;
+        Ok(Self {
+            _made: Some(made),
+            ..Self::lock_existing(out)?
+        })
     }
 
     /// As [`lock`](Self::lock), of a folder that exists.
@@ -40,6 +45,7 @@ impl OutputFolder {
             path: out.to_owned(),
             _handle: handle,
             _task: None,
+            _made: None,
         })
     }
 
@@ -68,6 +74,7 @@ impl OutputFolder {
             path: out.to_owned(),
             _handle: handle,
             _task: Some(own),
+            _made: None,
         })
     }
 
