@@ -11,6 +11,7 @@
 //! | [`preview`] | the camera's newest frame as a JPEG |
 //! | [`capture`] | one recorded turn, from the checks before it to the session folder |
 //! | [`serve`] | HTTP: the API and the page for the phone, for any [`serve::rig::Rig`] |
+//! | [`processing`] | masks, checks and extractions of sessions, by other programs, while the rig rests |
 //! | [`daemon`] | the rig between captures: it owns camera and turntable, and runs captures on request |
 //!
 //! `capture` brings `camera` and `turntable` together, which do not know each other. `serve` knows
@@ -23,6 +24,7 @@ pub mod clock;
 pub mod daemon;
 pub mod lockfile;
 pub mod preview;
+pub mod processing;
 pub mod serve;
 pub mod simulator;
 pub mod state;

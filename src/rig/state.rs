@@ -1,10 +1,14 @@
 //! What the rig is doing, as everybody beside it sees it: terminal, page, metrics.
 //!
 //! One [`Monitor`] a rig. The capture writes into it, any number of viewers read or subscribe; none of
-//! them can hold the capture up. This module knows no other module.
+//! them can hold the capture up. What follows from it for the person at the rig is [`Advice`]. This module
+//! knows no other module.
+
+mod advice;
+mod parts;
+mod processing;
 
 use std::collections::VecDeque;
-use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -13,200 +17,22 @@ use serde::Serialize;
 use tokio::sync::watch;
 use utoipa::ToSchema;
 
+use advice::Situation;
+pub use advice::{Advice, AdvisedAction, AdvisedButton, Obstacle};
+pub use parts::{
+    CameraState, CaptureSettings, Check, FaultLine, LogLine, Phase, TableState, TakeSummary,
+    Verdict,
+};
+pub use processing::{
+    FinishedJob, ProcessingJob, ProcessingOutcome, ProcessingState, ProcessingStatus,
+    ProcessingStep,
+};
+
 /// Faults kept for display; older ones are in the sessions' manifests.
 const FAULTS_KEPT: usize = 50;
 
 /// Lines of the log kept for display.
 const LOG_KEPT: usize = 40;
-
-/// Where a capture stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Default, ToSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Phase {
-    /// Nothing is under way.
-    #[default]
-    Idle,
-    /// Camera, table and disk are being checked and the camera's settings locked.
-    Preflight,
-    /// A slow turn that finds the exposure.
-    Metering,
-    /// The table goes back by its ramp.
-    MovingBack,
-    /// The table gathers speed.
-    Starting,
-    /// The frames of the turn are being written.
-    Recording,
-    /// The table slows down and goes back to where it began.
-    Unwinding,
-    /// The take is being checked and the session closed.
-    Checking,
-    /// A queue of objects waits for somebody to say that the next one stands on the table.
-    WaitingForObject,
-}
-
-impl fmt::Display for Phase {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Idle => "waiting",
-            Self::WaitingForObject => "waiting for the next object",
-            Self::Preflight => "checking camera, table and disk",
-            Self::Metering => "metering: the table turns slowly",
-            Self::MovingBack => "the table goes back by its ramp",
-            Self::Starting => "the table gathers speed",
-            Self::Recording => "recording",
-            Self::Unwinding => "the table goes back to where it began",
-            Self::Checking => "checking the take",
-        })
-    }
-}
-
-/// How a take came out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// All frames of the turn, nothing moved.
-    Clean,
-    /// Frames were dropped, no more than allowed.
-    Tolerated,
-    /// Kept, marked as aborted.
-    Aborted,
-}
-
-/// The last take, or the one before the present one.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct TakeSummary {
-    /// The session's name.
-    pub session: String,
-    /// How it came out.
-    pub verdict: Verdict,
-    /// Frames on disk.
-    pub frames: u64,
-    /// Frames missing of the turn.
-    pub dropped: u64,
-    /// Why, in a sentence, where the verdict is not clean.
-    pub reason: Option<String>,
-}
-
-/// The turntable as last heard.
-#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
-#[non_exhaustive]
-pub struct TableState {
-    /// Whether there is a table at all.
-    pub present: bool,
-    /// Its state in Grbl's words, such as `Idle` or `Run`.
-    pub state: String,
-    /// Degrees from machine zero.
-    pub angle_deg: Option<f64>,
-    /// Degrees a second.
-    pub degrees_per_second: Option<f64>,
-    /// Whether zero is known.
-    pub homed: bool,
-    /// Whether the emergency stop is pressed.
-    pub emergency_stop: bool,
-    /// Whether an alarm has locked it: the command `reset` resets, unlocks and homes it.
-    pub locked: bool,
-    /// How far it may turn back, degrees from the angle 0, where its cable hangs free.
-    pub low_deg: Option<f64>,
-    /// How far it may turn on, degrees from the angle 0.
-    pub high_deg: Option<f64>,
-    /// Volts of its battery, where it is measured.
-    pub battery_v: Option<f64>,
-    /// What is wrong with it, in a sentence.
-    pub fault: Option<String>,
-}
-
-/// The camera as last seen.
-#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
-#[non_exhaustive]
-pub struct CameraState {
-    /// Whether it can be reached.
-    pub present: bool,
-    /// Its name.
-    pub name: String,
-    /// Four-character code, width, height and frames a second as granted, such as `MJPG 1920x1080 30/s`.
-    pub mode: String,
-    /// Frames a second as measured over the last second.
-    pub fps: Option<f64>,
-    /// Exposure, gain, white balance, focus and power-line filter as read back.
-    pub controls: Vec<(String, i64)>,
-    /// Pixels of the newest frame with all channels saturated, as a fraction 0 to 1.
-    pub clipped: Option<f64>,
-    /// Variance of the Laplacian of luma in the middle of the newest frame: greater is sharper.
-    pub focus: Option<f64>,
-    /// What is wrong with it, in a sentence.
-    pub fault: Option<String>,
-}
-
-/// Something that went wrong, in plain words.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-#[non_exhaustive]
-pub struct FaultLine {
-    /// Microseconds of the capture's clock.
-    pub t_us: i64,
-    /// What failed, on what, what to do.
-    pub what: String,
-}
-
-/// Something that happened, with the time of day.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
-#[non_exhaustive]
-pub struct LogLine {
-    /// When, RFC 3339, UTC.
-    pub at: String,
-    /// What.
-    pub what: String,
-}
-
-/// How takes are captured. All but the addresses can be changed by the command `configure`.
-#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
-pub struct CaptureSettings {
-    /// The folder of sessions.
-    pub root: String,
-    /// The camera's address.
-    pub camera: String,
-    /// The turntable's address.
-    pub turntable: String,
-    /// Frame width and height that are asked for, pixels; `null` takes the largest.
-    pub size: Option<(u32, u32)>,
-    /// Frames a second.
-    pub fps: f64,
-    /// Speed of the turn, degrees a second.
-    pub degrees_per_second: f64,
-    /// Frames that may be missing or damaged.
-    pub max_dropped: u64,
-    /// How often a take that is not usable is repeated.
-    pub retries: u32,
-}
-
-/// Something that was checked before the table turned.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
-pub struct Check {
-    /// What was checked.
-    pub what: String,
-    /// False where it is not as it should be, and the capture goes on all the same.
-    pub good: bool,
-    /// What was found.
-    pub found: String,
-}
-
-impl Check {
-    /// A check that was passed.
-    pub fn passed(what: impl Into<String>, found: impl Into<String>) -> Self {
-        Self {
-            what: what.into(),
-            good: true,
-            found: found.into(),
-        }
-    }
-
-    /// Something that the person at the rig has to know, and that keeps nobody from going on.
-    pub fn noted(what: impl Into<String>, found: impl Into<String>) -> Self {
-        Self {
-            good: false,
-            ..Self::passed(what, found)
-        }
-    }
-}
 
 /// All that a viewer may know.
 #[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
@@ -236,6 +62,8 @@ pub struct RigState {
     pub free_bytes: u64,
     /// Bytes that a take is expected to need.
     pub needed_bytes: u64,
+    /// What is wrong with the folder of sessions, in a sentence.
+    pub disk_fault: Option<String>,
     /// What the last preflight found.
     pub checks: Vec<Check>,
     /// Newest last.
@@ -248,9 +76,51 @@ pub struct RigState {
     /// What happened last, newest last.
     #[schema(value_type = Vec<LogLine>)]
     pub log: VecDeque<LogLine>,
+    /// What is made of the sessions.
+    pub processing: ProcessingState,
+    /// What follows from all this for the person at the rig.
+    pub advice: Advice,
 }
 
 impl RigState {
+    fn situation(&self) -> Situation<'_> {
+        Situation {
+            phase: self.phase,
+            has_table: self.has_table(),
+            table: &self.table,
+            camera: &self.camera,
+            disk_fault: self.disk_fault.as_deref(),
+            free_bytes: self.free_bytes,
+            needed_bytes: self.needed_bytes,
+            next: self.queue.first().map(String::as_str),
+            last_take: self.last_take.as_ref(),
+        }
+    }
+
+    /// Whether nothing is captured at the moment.
+    #[must_use]
+    pub fn rests(&self) -> bool {
+        self.situation().rests()
+    }
+
+    /// What keeps a take from beginning: of several obstacles the first that a person has to remove.
+    #[must_use]
+    pub fn obstacle_to_take(&self) -> Option<Obstacle> {
+        self.situation().obstacle_to_take()
+    }
+
+    /// What keeps the table from moving, other than that there is to be none.
+    #[must_use]
+    pub fn obstacle_to_motion(&self) -> Option<Obstacle> {
+        self.situation().obstacle_to_motion()
+    }
+
+    /// Whether the rig has a table, be it there at the moment or not.
+    #[must_use]
+    pub fn has_table(&self) -> bool {
+        !matches!(self.settings.turntable.as_str(), "" | "none")
+    }
+
     /// Adds a line to the log that is shown.
     pub fn note(&mut self, what: impl Into<String>) {
         let what = what.into();
@@ -303,6 +173,7 @@ impl Monitor {
             let phase = state.phase.to_string();
             state.note(phase);
         }
+        state.advice = Advice::of(&state.situation());
         state.version = state.version.wrapping_add(1);
         self.shared.changed.notify_all();
         self.shared.version.send_replace(state.version);
@@ -366,4 +237,15 @@ impl Monitor {
 /// A viewer that panicked left the value whole: every change is made under one lock.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rig_of_which_nothing_is_known_has_its_own_advice() {
+        let state = RigState::default();
+        assert_eq!(Advice::default(), Advice::of(&state.situation()));
+    }
 }

@@ -62,6 +62,7 @@ pub(crate) struct Serve {
     pub(crate) token: Option<Token>,
     pub(crate) token_file: Option<PathBuf>,
     pub(crate) names: Vec<String>,
+    pub(crate) datasets: Option<PathBuf>,
 }
 
 /// Record turns of objects on a turntable as session folders.
@@ -136,6 +137,10 @@ struct ServeArguments {
     /// A name under which clients reach this machine, such as rig.local; may be given several times.
     #[arg(long = "name", value_name = "NAME")]
     names: Vec<String>,
+    /// The folder in which data sets are made, where relit-mask and relit-extract are installed [default: the
+    /// one that holds --root].
+    #[arg(long, value_name = "DIR")]
+    datasets: Option<PathBuf>,
     #[command(flatten)]
     rig: RigArguments,
 }
@@ -211,6 +216,7 @@ pub(crate) fn parse() -> Arguments {
             token: line.token,
             token_file: line.token_file,
             names: line.names,
+            datasets: line.datasets,
         })),
         Verb::Turntable(line) => Command::Turntable(line),
         Verb::Simulate(line) => Command::Simulate(line),

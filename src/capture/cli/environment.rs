@@ -1,8 +1,11 @@
 //! What the program takes from its surroundings: signals and environment variables.
 
+use std::env;
+use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use relit_rig::processing::ProcessingPrograms;
 use relit_rig::serve::Heartbeat;
 use sd_notify::NotifyState;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -24,6 +27,27 @@ pub(crate) fn heartbeat() -> Option<Heartbeat> {
 pub(crate) fn notify_service(states: &[NotifyState<'_>]) {
     // A manager that cannot be reached hears nothing, and does what it is there for.
     let _ = sd_notify::notify(states);
+}
+
+/// The programs that make masks and data sets: beside this one, or where the shell finds them.
+pub(crate) fn programs() -> ProcessingPrograms {
+    let own = env::current_exe().ok();
+    let beside = own.as_deref().and_then(Path::parent).map(Path::to_owned);
+    let path = env::var_os("PATH").unwrap_or_default();
+    let folders: Vec<PathBuf> = beside.into_iter().chain(env::split_paths(&path)).collect();
+    let find = |name: &str| {
+        let mut places = folders.iter().map(|folder| folder.join(name));
+        places.find(|place| place.is_file())
+    };
+    // The disk, too, is the capture's first.
+    let launcher = find("ionice").map_or(Vec::new(), |ionice| {
+        vec![ionice.into(), "-c".into(), "3".into()]
+    });
+    ProcessingPrograms {
+        mask: find("relit-mask"),
+        extract: find("relit-extract"),
+        launcher,
+    }
 }
 
 /// Calls `end` when a signal asks the program to end, as a closed terminal does. Another signal

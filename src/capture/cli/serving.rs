@@ -1,19 +1,21 @@
 //! `relit-capture serve`: the daemon and its page.
 
-use std::fs;
 use std::sync::Arc;
 
 use relit_rig::capture::CaptureError;
 use relit_rig::daemon::Daemon;
+use relit_rig::processing::{Processing, ProcessingError, ProcessingOptions};
+use relit_rig::serve::rig::Rig;
 use relit_rig::serve::{
-    Announcement, ServeError, ServeOptions, Shutdown, Token, TokenFileError, serve,
+    Announcement, ServeError, ServeOptions, Shutdown, Token, TokenFileError, check_address, serve,
 };
 use sd_notify::NotifyState;
 use serde_json::json;
 
 use crate::arguments::Serve;
-use crate::environment::{at_end, heartbeat, notify_service};
+use crate::environment::{at_end, heartbeat, notify_service, programs};
 use relit_console::{Console, Outcome};
+use relit_data::durable::MadeFolder;
 
 /// Why the rig is not served.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +29,9 @@ pub(crate) enum Error {
     /// The token's file.
     #[error(transparent)]
     Token(#[from] TokenFileError),
+    /// The processing of sessions.
+    #[error(transparent)]
+    Processing(#[from] ProcessingError),
 }
 
 pub(crate) fn run(console: Console, asked: Serve) -> Result<Outcome, Error> {
@@ -42,7 +47,9 @@ pub(crate) fn run(console: Console, asked: Serve) -> Result<Outcome, Error> {
         Some(path) => Some(Token::from_file_or_new(path)?),
         None => asked.token,
     };
-    fs::create_dir_all(root).map_err(failed(root.display().to_string(), "made"))?;
+    // An address that is taken is known before anything is made or moved.
+    check_address(asked.address)?;
+    let made = MadeFolder::make(root).map_err(failed(root.display().to_string(), "made"))?;
     let shutdown = Shutdown::new();
     let ending = shutdown.clone();
     let end = move || {
@@ -51,7 +58,14 @@ pub(crate) fn run(console: Console, asked: Serve) -> Result<Outcome, Error> {
     };
     at_end(end).map_err(failed("the signals".to_owned(), "listened to"))?;
     let rig = Arc::new(Daemon::start(asked.settings)?);
+    let processing = ProcessingOptions {
+        datasets: asked.datasets,
+        programs: Box::new(programs),
+    };
+    let processing = Processing::start(rig.root(), rig.monitor().clone(), processing)?;
+    let processing = Arc::new(processing);
     let options = ServeOptions {
+        processing: Some(Arc::clone(&processing)),
         token,
         names: asked.names,
         heartbeat: heartbeat(),
@@ -64,6 +78,8 @@ pub(crate) fn run(console: Console, asked: Serve) -> Result<Outcome, Error> {
     })?;
     // Threads of the server may hold the rig a moment longer: its end does not wait for them.
     rig.end();
+    processing.end();
+    drop(made);
     Ok(Outcome::Whole)
 }
 

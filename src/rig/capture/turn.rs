@@ -9,7 +9,7 @@ use super::journal::{journaled_report, journaled_turn};
 use super::preflight;
 use super::recording::{Recorder, Window};
 use crate::clock::Clock;
-use crate::state::{Monitor, Phase, TableState};
+use crate::state::{Monitor, Obstacle, Phase, TableState};
 use crate::turntable::{
     ControllerState, FinishedTurn, Table, TableStatus, Track, TrackError, Turn, TurnPlan,
     TurntableError,
@@ -154,13 +154,10 @@ fn enter_without_reports(context: CaptureContext<'_>, phase: Phase) {
     });
 }
 
-/// What is said while the emergency stop is pressed.
-pub(crate) const EMERGENCY_STOP: &str = "the emergency stop is pressed: release it";
-
 /// What is wrong with the table, in a sentence.
 fn fault_of(status: &TableStatus) -> Option<String> {
     match status.emergency_stop {
-        true => Some(EMERGENCY_STOP.to_owned()),
+        true => Some(Obstacle::EmergencyStop.to_string()),
         false => status.alarm.map(|alarm| alarm.to_string()),
     }
 }

@@ -1,6 +1,7 @@
 //! The time between captures: pictures for the person who sets up the object, the table's state,
 //! and cameras and tables that come back after they were unplugged.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -69,9 +70,7 @@ impl Idle {
         if now_us >= self.search_due_us {
             self.search_due_us = self.clock.after(SEARCH_PERIOD);
             self.search(equipment);
-            if let Ok(free) = free_bytes(&equipment.settings().root) {
-                self.monitor.update(|state| state.free_bytes = free);
-            }
+            self.look_at_folder(&equipment.settings().root);
         }
         if now_us >= self.table_due_us {
             self.table_due_us = self.clock.after(TABLE_PERIOD);
@@ -137,6 +136,26 @@ impl Idle {
         {
             self.show_no_table(with_causes(&error));
         }
+    }
+
+    /// Shows the free space of the folder of sessions, or that there is no folder any more.
+    fn look_at_folder(&self, root: &Path) {
+        let fault = match free_bytes(root) {
+            Ok(free) => {
+                self.monitor.update(|state| {
+                    state.free_bytes = free;
+                    state.disk_fault = None;
+                });
+                return;
+            }
+            Err(error) => with_causes(&error),
+        };
+        let why =
+            format!("no session can be written: {fault}; put the folder back, or mount its disk");
+        self.show_fault(why, |state, why| {
+            state.free_bytes = 0;
+            state.disk_fault.replace(why)
+        });
     }
 
     fn start_camera(&self, equipment: &mut Equipment) -> Result<(), CaptureError> {

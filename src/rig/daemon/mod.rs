@@ -17,7 +17,6 @@ use std::thread;
 
 use relit_data::causes::with_causes;
 
-use crate::capture::turn::EMERGENCY_STOP;
 use crate::capture::{CaptureError, Equipment, Settings, preflight, salvage};
 use crate::clock::{Clock, JoinHandle};
 use crate::lockfile::LockFile;
@@ -36,7 +35,6 @@ const FARTHEST_JOG: f64 = 800.0;
 pub struct Daemon {
     dispatcher: Arc<Dispatcher>,
     root: PathBuf,
-    wants_table: bool,
     worker: Mutex<Option<JoinHandle<()>>>,
     _locks: (LockFile, Option<LockFile>),
 }
@@ -49,7 +47,9 @@ impl Daemon {
     /// [`CaptureError::Lock`] where another daemon has them, [`crate::capture::Refusal::Pace`], or what
     /// the system answers.
     pub fn start(settings: Settings) -> Result<Self, CaptureError> {
-        let locks = (LockFile::of_root(&settings.root)?, settings.lock_camera()?);
+        // The lock of the folder is a file in it: nothing is left there where the camera is another's.
+        let camera = settings.lock_camera()?;
+        let locks = (LockFile::of_root(&settings.root)?, camera);
         let root = settings.root.clone();
         let shown = settings.shown();
         let equipment = Equipment::for_viewers(settings)?;
@@ -57,7 +57,6 @@ impl Daemon {
         let show = |state: &mut RigState| state.settings = shown;
         dispatcher.monitor().update(show);
         report_salvaged(&root, &equipment.clock(), dispatcher.monitor())?;
-        let wants_table = equipment.wants_table();
         let thread = |source| CaptureError::system("a thread", "started")(source);
         let preview = Preview::start(dispatcher.monitor().clone()).map_err(thread)?;
         let clock = equipment.clock();
@@ -66,7 +65,6 @@ impl Daemon {
         Ok(Self {
             dispatcher,
             root,
-            wants_table,
             worker: Mutex::new(Some(worker)),
             _locks: locks,
         })
@@ -87,52 +85,24 @@ impl Daemon {
         self.worker.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn check_camera(&self) -> Result<(), Refused> {
-        let camera = self.dispatcher.monitor().state().camera;
-        if camera.present {
-            return Ok(());
-        }
-        let why = camera.fault;
-        Err(Refused::Unavailable(
-            why.unwrap_or_else(|| "there is no camera yet".to_owned()),
-        ))
-    }
-
-    /// Nothing moves while the emergency stop is pressed.
-    fn check_table(&self) -> Result<(), Refused> {
-        match self.dispatcher.monitor().state().table.emergency_stop {
-            true => Err(Refused::Unavailable(EMERGENCY_STOP.to_owned())),
-            false => Ok(()),
-        }
-    }
-
-    fn move_table(&self, job: Job) -> Result<(), Refused> {
-        self.check_table()?;
-        if !self.wants_table {
-            return Err(Refused::Unavailable(
-                "there is no turntable: give --turntable".to_owned(),
-            ));
-        }
+    fn submit(&self, job: Job) -> Result<(), Refused> {
         self.dispatcher.change(|schedule| schedule.submit(job))
-    }
-
-    fn jog(&self, degrees: f64) -> Result<(), Refused> {
-        if !degrees.is_finite() || degrees.abs() > FARTHEST_JOG {
-            let what = format!("the table cannot be turned by {degrees} degrees");
-            return Err(Refused::Invalid(what));
-        }
-        self.move_table(Job::Jog(degrees))
     }
 }
 
 impl Rig for Daemon {
     fn command(&self, command: Command) -> Result<(), Refused> {
         let dispatcher = &self.dispatcher;
+        // A name that cannot be is the better answer than a camera that is away.
+        if let Command::Start { object, .. } = &command {
+            check_object(object)?;
+        }
+        if let Command::Jog { degrees } = command {
+            check_jog(degrees)?;
+        }
+        command.check(&dispatcher.monitor().state())?;
         match command {
             Command::Start { object, meter } => {
-                check_object(&object)?;
-                self.check_table()?;
-                self.check_camera()?;
                 dispatcher.change(|schedule| schedule.submit(Job::Capture { object, meter }))
             }
             Command::Stop => {
@@ -147,18 +117,12 @@ impl Rig for Daemon {
                 dispatcher.change(|schedule| schedule.dequeue(place, object.as_deref()))
             }
             Command::Next { object } => {
-                let ready = self.check_table().and_then(|()| self.check_camera());
-                dispatcher.change(|schedule| {
-                    if !schedule.queue().is_empty() {
-                        ready?;
-                    }
-                    schedule.submit_next(object.as_deref())
-                })
+                dispatcher.change(|schedule| schedule.submit_next(object.as_deref()))
             }
-            Command::Home => self.move_table(Job::Home),
-            Command::Jog { degrees } => self.jog(degrees),
-            Command::Unlock => self.move_table(Job::Unlock),
-            Command::Reset => self.move_table(Job::ResetTable),
+            Command::Home => self.submit(Job::Home),
+            Command::Jog { degrees } => self.submit(Job::Jog(degrees)),
+            Command::Unlock => self.submit(Job::Unlock),
+            Command::Reset => self.submit(Job::ResetTable),
             Command::Configure {
                 size,
                 fps,
@@ -225,6 +189,15 @@ impl Drop for PanicReport {
         if thread::panicking() {
             self.0.fail();
         }
+    }
+}
+
+fn check_jog(degrees: f64) -> Result<(), Refused> {
+    match degrees.is_finite() && degrees.abs() <= FARTHEST_JOG {
+        true => Ok(()),
+        false => Err(Refused::Invalid(format!(
+            "the table cannot be turned by {degrees} degrees"
+        ))),
     }
 }
 

@@ -144,7 +144,8 @@ impl Worker {
         self.equipment.change_settings(settings);
         let shown = self.equipment.settings().shown();
         let monitor = self.dispatcher.monitor();
-        monitor.update(|state| state.settings = shown);
+        // Takes of another size or speed need another space.
+        monitor.update(|state| (state.settings, state.needed_bytes) = (shown, 0));
     }
 
     fn set_control(&mut self, name: &str, value: i64) -> Result<(), CaptureError> {

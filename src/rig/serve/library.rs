@@ -2,24 +2,23 @@
 
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
-use std::{fs, io};
+use std::{fmt, fs, io};
 
 use axum::http::StatusCode;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::cache::Cache;
+use super::results::{CHECK_PAGE, ResultsReader, SessionResults};
+use super::version::FileVersion;
+use crate::processing::ProcessingCommands;
 use relit_data::causes::with_causes;
-use relit_data::durable;
 use relit_data::naming::is_session_name;
 use relit_data::session::{
     self, FrameIndex, INDEX_FILE, MANIFEST_FILE, MASK_FILE, Manifest, Status, object_of,
 };
 use relit_web::Failure;
 
-/// Where sessions go that were put away. It begins with a dot: nobody takes it for a session.
-const TRASH: &str = ".trash";
 /// Longest note, characters.
 const LONGEST_NOTE: usize = 2000;
 /// Summaries that are kept.
@@ -62,6 +61,8 @@ pub(super) struct SessionSummary {
     pub(super) note: Option<String>,
     /// How a person rated it, 1 to 5.
     pub(super) rating: Option<u8>,
+    /// What was made of it; `null` in the trash.
+    pub(super) results: Option<SessionResults>,
 }
 
 /// All that is known of a session.
@@ -80,6 +81,8 @@ pub(super) struct SessionDetail {
     pub(super) angles_deg: Vec<Option<f64>>,
     /// Where frames are missing.
     pub(super) gaps: Vec<DroppedFrames>,
+    /// Commands that make its mask and extract it, for a terminal.
+    pub(super) commands: ProcessingCommands,
 }
 
 /// Frames that are missing.
@@ -98,50 +101,55 @@ pub(super) struct VideoFile {
     version: FileVersion,
 }
 
-/// What differs between one state of a file and another.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-struct FileVersion {
-    bytes: u64,
-    modified: Option<SystemTime>,
-}
-
-impl FileVersion {
-    /// `None` where there is no such file.
-    fn of(path: &Path) -> Option<Self> {
-        let data = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
-        Some(Self {
-            bytes: data.len(),
-            modified: data.modified().ok(),
-        })
-    }
-}
-
 /// The sessions under one folder.
-#[derive(Debug)]
 pub(super) struct Library {
-    root: PathBuf,
-    /// Summaries by name, and the version of the manifest that each was made from.
-    summaries: Cache<(String, FileVersion), SessionSummary>,
+    pub(super) root: PathBuf,
+    /// Where their data set is, which a person may change.
+    dataset: Box<dyn Fn() -> PathBuf + Send + Sync>,
+    /// Summaries by folder, and the version of the manifest that each was made from.
+    summaries: Cache<(PathBuf, FileVersion), SessionSummary>,
+    results: ResultsReader,
+}
+
+impl fmt::Debug for Library {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut library = f.debug_struct("Library");
+        library.field("root", &self.root).finish_non_exhaustive()
+    }
 }
 
 impl Library {
-    pub(super) fn new(root: PathBuf) -> Self {
+    pub(super) fn new(root: PathBuf, dataset: Box<dyn Fn() -> PathBuf + Send + Sync>) -> Self {
         Self {
             root,
+            dataset,
             summaries: Cache::new(SUMMARIES),
+            results: ResultsReader::new(),
         }
     }
 
-    /// Up to `most` sessions, newest first, from those whose names come before `before`.
+    /// Up to `most` sessions, newest first, from those whose names come before `before` and begin with the `day`.
     pub(super) fn list(
         &self,
         before: Option<&str>,
+        day: Option<&str>,
         most: usize,
     ) -> Result<Vec<SessionSummary>, Failure> {
         let mut names = self.names()?;
         names.retain(|name| before.is_none_or(|before| name.as_str() < before));
+        names.retain(|name| day.is_none_or(|day| name.starts_with(day)));
         names.truncate(most);
-        Ok(names.iter().filter_map(|name| self.summary(name)).collect())
+        let dataset = (self.dataset)();
+        let listed = names.iter().filter_map(|name| {
+            let mut summary = self.summary(&self.root, name)?;
+            summary.results = Some(self.results_of(name, &dataset));
+            Some(summary)
+        });
+        Ok(listed.collect())
+    }
+
+    fn results_of(&self, name: &str, dataset: &Path) -> SessionResults {
+        self.results.of(name, &self.root.join(name), Some(dataset))
     }
 
     /// The objects of the newest sessions, each once.
@@ -161,7 +169,7 @@ impl Library {
 
     /// Names of all session folders, newest first: they begin with the date.
     fn names(&self) -> Result<Vec<String>, Failure> {
-        let mut names = self.read_names().map_err(|error| {
+        let mut names = read_names(&self.root).map_err(|error| {
             let root = self.root.display();
             Failure::broken(format!(
                 "the folder of sessions {root} cannot be read: {error}"
@@ -171,25 +179,11 @@ impl Library {
         Ok(names)
     }
 
-    fn read_names(&self) -> io::Result<Vec<String>> {
-        let mut names = Vec::new();
-        for entry in fs::read_dir(&self.root)? {
-            let entry = entry?;
-            if let Ok(name) = entry.file_name().into_string()
-                && is_session_name(&name)
-                && entry.path().join(MANIFEST_FILE).is_file()
-            {
-                names.push(name);
-            }
-        }
-        Ok(names)
-    }
-
-    /// The summary of a session. `None` where it has gone meanwhile.
-    fn summary(&self, name: &str) -> Option<SessionSummary> {
-        let folder = self.root.join(name);
+    /// The summary of a session, without what was made of it. `None` where it has gone meanwhile.
+    pub(super) fn summary(&self, root: &Path, name: &str) -> Option<SessionSummary> {
+        let folder = root.join(name);
         let version = FileVersion::of(&folder.join(MANIFEST_FILE))?;
-        let key = (name.to_owned(), version);
+        let key = (folder.clone(), version);
         let summary = self.summaries.get_or_make(key, |_| {
             Ok::<_, Infallible>(match read_manifest(&folder) {
                 Ok(manifest) => {
@@ -207,7 +201,9 @@ impl Library {
         let folder = self.folder(id)?;
         let manifest = read_manifest(&folder).map_err(Failure::broken)?;
         let index = read_index(&folder, &manifest);
-        let summary = summarise(id, &manifest, index.as_ref());
+        let dataset = (self.dataset)();
+        let mut summary = summarise(id, &manifest, index.as_ref());
+        summary.results = Some(self.results_of(id, &dataset));
         let json = manifest.to_json().map_err(|error| with_causes(&error));
         let json = json
             .and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string()));
@@ -228,6 +224,7 @@ impl Library {
                 .collect(),
             angles_deg: entries.iter().map(|entry| entry.angle_deg).collect(),
             gaps: gaps.collect(),
+            commands: ProcessingCommands::of(&absolute(&folder), &absolute(&dataset)),
         })
     }
 
@@ -284,22 +281,17 @@ impl Library {
         fs::read(path).map_err(|_| Failure::not_found(format!("{id} has no mask")))
     }
 
-    /// Moves a session to the trash.
-    pub(super) fn put_away(&self, id: &str) -> Result<(), Failure> {
-        let folder = self.ended(id)?;
-        let trash = self.root.join(TRASH);
-        fs::create_dir_all(&trash).map_err(not_moved(id))?;
-        move_folder(id, &folder, &trash.join(id))
+    /// The page about the check of a session's mask.
+    pub(super) fn check_page(&self, id: &str) -> Result<Vec<u8>, Failure> {
+        let path = self.folder(id)?.join(CHECK_PAGE);
+        fs::read(path).map_err(|_| Failure::not_found(format!("the mask of {id} was not checked")))
     }
 
-    /// Moves a session back from the trash.
-    pub(super) fn restore(&self, id: &str) -> Result<(), Failure> {
-        let folder = self.root.join(TRASH).join(id);
-        if !is_session_name(id) || !folder.is_dir() {
-            let error = "no session of that name was put away";
-            return Err(Failure::not_found(error));
-        }
-        move_folder(id, &folder, &self.root.join(id))
+    /// The page about a session in the data set.
+    pub(super) fn report_page(&self, id: &str) -> Result<Vec<u8>, Failure> {
+        self.folder(id)?;
+        let path = (self.dataset)().join(format!("{id}.html"));
+        fs::read(path).map_err(|_| Failure::not_found(format!("{id} is not in the data set")))
     }
 
     /// Writes note and rating of a session to its manifest.
@@ -332,18 +324,24 @@ impl Library {
     }
 }
 
-/// Moves a session's folder to where no other one is.
-fn move_folder(id: &str, from: &Path, to: &Path) -> Result<(), Failure> {
-    if to.exists() {
-        let error =
-            format!("another session named {id} is there already: move one of them by hand");
-        return Err(Failure::new(StatusCode::CONFLICT, error));
+/// The names of the sessions in a folder.
+pub(super) fn read_names(root: &Path) -> io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(root)? {
+        let entry = entry?;
+        if let Ok(name) = entry.file_name().into_string()
+            && is_session_name(&name)
+            && entry.path().join(MANIFEST_FILE).is_file()
+        {
+            names.push(name);
+        }
     }
-    durable::publish(from, to).map_err(not_moved(id))
+    Ok(names)
 }
 
-fn not_moved(id: &str) -> impl FnOnce(io::Error) -> Failure {
-    move |error| Failure::broken(format!("{id} could not be moved: {error}"))
+/// The path as it is understood in every folder.
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
 fn read_manifest(folder: &Path) -> Result<Manifest, String> {
@@ -386,6 +384,7 @@ fn summarise(id: &str, manifest: &Manifest, index: Option<&FrameIndex>) -> Sessi
         duration_s: ends.map(|(first, last)| seconds(first.t_us, last.t_us)),
         note: manifest.note.clone(),
         rating: manifest.rating,
+        results: None,
     }
 }
 
@@ -401,6 +400,7 @@ fn unreadable(id: &str, reason: String) -> SessionSummary {
         duration_s: None,
         note: None,
         rating: None,
+        results: None,
     }
 }
 

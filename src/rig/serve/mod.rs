@@ -14,6 +14,7 @@
 mod api;
 mod archive;
 mod cache;
+mod editor;
 mod files;
 mod library;
 mod metrics;
@@ -22,10 +23,14 @@ mod page;
 mod permits;
 mod pictures;
 mod preview;
+mod processing;
+mod results;
 pub mod rig;
 mod routes;
 mod sessions;
 mod snapshots;
+mod trash;
+mod version;
 
 #[cfg(test)]
 mod tests;
@@ -68,6 +73,15 @@ pub enum ServeError {
     Random(io::Error),
 }
 
+/// Whether the address can be listened on, as things are.
+///
+/// # Errors
+/// [`ServeError::Listen`].
+pub fn check_address(address: SocketAddr) -> Result<(), ServeError> {
+    let listened = TcpListener::bind(address).map(drop);
+    listened.map_err(|source| ServeError::Listen { address, source })
+}
+
 /// Serves the rig until `shutdown` is cancelled; it ends within a few seconds then. `announce` is called
 /// once, when clients can connect.
 ///
@@ -103,7 +117,13 @@ pub fn serve(
         .map_err(ServeError::Threads)?;
     let announcement = Announcement::new(address, &options.names, token.as_ref());
     let policy = relit_web::AccessPolicy::new(address.port(), token, options.names, page::paths());
-    let app = routes::App::new(rig, policy, options.limits, shutdown.clone());
+    let app = routes::App::new(
+        rig,
+        policy,
+        options.limits,
+        shutdown.clone(),
+        options.processing,
+    );
     let served = runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(failed)?;
         announce(&announcement);

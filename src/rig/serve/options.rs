@@ -2,9 +2,12 @@
 
 use std::fmt;
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use relit_web::{ConnectionLimits, Token};
+
+use crate::processing::Processing;
 
 /// Where and for whom the rig is served.
 #[derive(Debug)]
@@ -21,6 +24,8 @@ pub struct ServeOptions {
     pub heartbeat: Option<Heartbeat>,
     /// What clients may take up.
     pub limits: ClientLimits,
+    /// What makes masks and data sets of the sessions, where that is done here.
+    pub processing: Option<Arc<Processing>>,
 }
 
 impl ServeOptions {
@@ -33,6 +38,7 @@ impl ServeOptions {
             names: Vec::new(),
             heartbeat: None,
             limits: ClientLimits::default(),
+            processing: None,
         }
     }
 }

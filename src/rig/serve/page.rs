@@ -6,10 +6,12 @@ use relit_web::{Index, PageAsset, SCRIPT, STYLE, asset};
 pub(super) const INDEX: Index = Index(include_str!("page/index.html"));
 
 /// All files but the page itself.
-pub(super) const ASSETS: [PageAsset; 6] = [
+pub(super) const ASSETS: [PageAsset; 8] = [
     asset("/page.css", STYLE, include_str!("page/page.css")),
     asset("/page.js", SCRIPT, include_str!("page/page.js")),
     asset("/link.js", SCRIPT, include_str!("page/link.js")),
+    asset("/elements.js", SCRIPT, include_str!("page/elements.js")),
+    asset("/process.js", SCRIPT, include_str!("page/process.js")),
     asset("/preview.js", SCRIPT, include_str!("page/preview.js")),
     asset("/sessions.js", SCRIPT, include_str!("page/sessions.js")),
     asset("/icon.svg", "image/svg+xml", include_str!("page/icon.svg")),

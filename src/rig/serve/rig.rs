@@ -7,7 +7,7 @@ use relit_web::Failure;
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
-use crate::state::Monitor;
+use crate::state::{Monitor, Obstacle, RigState};
 
 /// Something a person at the rig asks for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -110,6 +110,42 @@ impl From<Refused> for Failure {
             Refused::Unavailable(error) => (StatusCode::SERVICE_UNAVAILABLE, error),
         };
         Self::new(status, error)
+    }
+}
+
+impl From<Obstacle> for Refused {
+    fn from(obstacle: Obstacle) -> Self {
+        Self::Unavailable(obstacle.to_string())
+    }
+}
+
+impl Command {
+    /// Whether the rig, as it stands, can do this at all. Whether something else is under way is another
+    /// question.
+    ///
+    /// # Errors
+    /// [`Refused::Unavailable`] with what is in the way.
+    pub fn check(&self, state: &RigState) -> Result<(), Refused> {
+        // An empty queue is the better answer to `next`.
+        let captures = match self {
+            Self::Start { .. } => true,
+            Self::Next { .. } => !state.queue.is_empty(),
+            _ => false,
+        };
+        let moves = matches!(
+            self,
+            Self::Home | Self::Jog { .. } | Self::Unlock | Self::Reset
+        );
+        if moves && !state.has_table() {
+            let none = "there is no turntable: give --turntable".to_owned();
+            return Err(Refused::Unavailable(none));
+        }
+        let obstacle = match (captures, moves) {
+            (true, _) => state.obstacle_to_take(),
+            (_, true) => state.obstacle_to_motion(),
+            _ => None,
+        };
+        obstacle.map_or(Ok(()), |obstacle| Err(obstacle.into()))
     }
 }
 

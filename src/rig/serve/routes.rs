@@ -5,7 +5,7 @@ use std::sync::Arc;
 use axum::extract::{FromRef, Request};
 use axum::http::StatusCode;
 use axum::middleware::from_fn_with_state;
-use axum::routing::get;
+use axum::routing::{any, get};
 use axum::{Json, Router};
 use utoipa::OpenApi as _;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
@@ -18,9 +18,10 @@ use super::metrics::Responses;
 use super::options::ClientLimits;
 use super::permits::Permits;
 use super::pictures::Pictures;
+use super::processing::MayProcess;
 use super::rig::Rig;
 use super::snapshots::Snapshots;
-use super::{api, files, metrics, page, preview, sessions};
+use super::{api, editor, files, metrics, page, preview, processing, sessions};
 use crate::state::Monitor;
 use relit_web::Shutdown;
 use relit_web::{AccessPolicy, BodyLimit, Failure, Index, guard};
@@ -41,6 +42,7 @@ pub(super) struct App {
     pub(super) pictures: Arc<Pictures>,
     pub(super) responses: Arc<Responses>,
     pub(super) shutdown: Shutdown,
+    pub(super) processing: MayProcess,
 }
 
 impl App {
@@ -49,17 +51,23 @@ impl App {
         policy: AccessPolicy,
         limits: ClientLimits,
         shutdown: Shutdown,
+        processing: MayProcess,
     ) -> Self {
+        let root = rig.root().to_owned();
+        let beside = root.with_file_name("dataset");
+        let worker = processing.clone();
+        let dataset = move || worker.as_ref().map_or(beside.clone(), |it| it.dataset());
         Self {
             monitor: rig.monitor().clone(),
             snapshots: Snapshots::new(rig.monitor()),
             policy: Arc::new(policy),
             limits,
             permits: Arc::new(Permits::new(&limits)),
-            library: Arc::new(Library::new(rig.root().to_owned())),
+            library: Arc::new(Library::new(root, Box::new(dataset))),
             pictures: Arc::new(Pictures::new()),
             responses: Arc::default(),
             shutdown,
+            processing,
             rig,
         }
     }
@@ -91,6 +99,7 @@ pub(super) fn interface() -> OpenApiRouter<App> {
         .routes(routes!(sessions::list))
         .routes(routes!(sessions::detail, sessions::put_away))
         .routes(routes!(sessions::restore))
+        .routes(routes!(sessions::trash))
         .routes(routes!(sessions::remark))
         .routes(routes!(files::day_tar))
         .routes(routes!(files::mask))
@@ -98,6 +107,14 @@ pub(super) fn interface() -> OpenApiRouter<App> {
         .routes(routes!(sessions::frame))
         .routes(routes!(sessions::objects))
         .routes(routes!(files::video))
+        .routes(routes!(processing::state, processing::configure))
+        .routes(routes!(processing::process))
+        .routes(routes!(processing::verify))
+        .routes(routes!(processing::cancel))
+        .routes(routes!(processing::check_page))
+        .routes(routes!(processing::report_page))
+        .routes(routes!(editor::open))
+        .routes(routes!(editor::close))
         .routes(routes!(metrics::metrics))
         .routes(routes!(document))
 }
@@ -143,7 +160,11 @@ struct TarPath;
 
 /// Everything that is served.
 pub(super) fn router(app: &App) -> Router {
-    let mut router = Router::from(interface()).route("/", get(relit_web::index));
+    let mut router = Router::from(interface())
+        .route("/", get(relit_web::index))
+        .route("/edit", get(editor::with_slash))
+        .route(editor::PLACE, get(editor::pass_on))
+        .route("/edit/{*path}", any(editor::pass_on));
     for asset in &page::ASSETS {
         router = router.route(asset.path, get(async || asset.answer()));
     }

@@ -13,6 +13,7 @@ use super::files::session_tar;
 use super::library::{Library, SessionDetail, SessionSummary};
 use super::permits::{Permits, Work};
 use super::pictures::Pictures;
+use super::processing::MayProcess;
 use relit_web::{Failure, JsonBody, Problem, QueryParams};
 
 /// Sessions in one answer, unless asked otherwise, and at most.
@@ -34,6 +35,9 @@ pub(super) struct Part {
     before: Option<String>,
     /// How many, up to 1000; 100 if left out.
     limit: Option<usize>,
+    /// Only those of a day (UTC), as session names begin.
+    #[param(example = "20261120")]
+    day: Option<String>,
 }
 
 /// The sessions, newest first
@@ -44,10 +48,12 @@ pub(super) struct Part {
 pub(super) async fn list(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
-    QueryParams(Part { before, limit }): QueryParams<Part>,
+    QueryParams(Part { before, limit, day }): QueryParams<Part>,
 ) -> Result<Json<Vec<SessionSummary>>, Failure> {
     let most = limit.unwrap_or(SESSIONS).min(MOST_SESSIONS);
-    let list = permits.run(Work::Listing, move || library.list(before.as_deref(), most));
+    let list = permits.run(Work::Listing, move || {
+        library.list(before.as_deref(), day.as_deref(), most)
+    });
     Ok(Json(list.await?))
 }
 
@@ -78,7 +84,7 @@ pub(super) async fn detail(
 
 /// Put a session away
 ///
-/// Into the folder `.trash` beside the sessions, which nobody empties but a person.
+/// Into the folder `.trash` beside the sessions, which nobody empties but a person. Work on it is cancelled.
 #[utoipa::path(
     delete, path = "/api/v1/sessions/{id}", tag = "sessions",
     params(("id" = String, Path, description = "The session's name")),
@@ -91,10 +97,15 @@ pub(super) async fn detail(
 )]
 pub(super) async fn put_away(
     State(library): State<Arc<Library>>,
+    State(processing): State<MayProcess>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
 ) -> Result<StatusCode, Failure> {
-    let done = permits.run(Work::Listing, move || library.put_away(&id));
+    let done = permits.run(Work::Command, move || {
+        library.ended(&id)?;
+        processing.map_or(Ok(()), |processing| processing.release(&id))?;
+        library.put_away(&id)
+    });
     done.await.map(|()| StatusCode::NO_CONTENT)
 }
 
@@ -116,6 +127,19 @@ pub(super) async fn restore(
 ) -> Result<StatusCode, Failure> {
     let done = permits.run(Work::Listing, move || library.restore(&id));
     done.await.map(|()| StatusCode::NO_CONTENT)
+}
+
+/// The sessions in `.trash`, newest first
+#[utoipa::path(
+    get, path = "/api/v1/trash", tag = "sessions",
+    responses((status = 200, body = [SessionSummary]), (status = 401, body = Problem))
+)]
+pub(super) async fn trash(
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
+) -> Result<Json<Vec<SessionSummary>>, Failure> {
+    let list = permits.run(Work::Listing, move || library.trash());
+    Ok(Json(list.await?))
 }
 
 /// What a person says of a take; a field that is left out or `null` is removed.

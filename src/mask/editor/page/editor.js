@@ -1,7 +1,7 @@
 // The editor: tools, pointers and keys; the line to the program that cuts.
 
-import { History, isEnough } from "/history.js";
-import { View, corners } from "/view.js";
+import { History, isEnough } from "./history.js";
+import { View, corners } from "./view.js";
 
 const $ = (id) => document.getElementById(id);
 /** Width of the frames that are shown while scrubbing, pixels. */
@@ -16,6 +16,9 @@ const SHORT = 6;
 let about, history, view;
 let tool = "rect";
 let shown = 0;
+
+/** Whether the page is served by another program under a path of its own: the rig, which takes over again at the end. */
+const within = location.pathname !== "/";
 
 /** Asks the program; throws an Error with its sentence. */
 async function request(path, options = {}) {
@@ -75,7 +78,7 @@ async function cut(draft) {
   cutting = true;
   say("busy", sketch.auto && cutOf?.auto !== true ? "looking at the turn" : "cutting");
   try {
-    const mask = await (await send(`/api/v1/mask?draft=${draft}`, sketch)).json();
+    const mask = await (await send(`api/v1/mask?draft=${draft}`, sketch)).json();
     if (history.now === sketch) {
       [cutOf, exact, view.stale] = [sketch, mask.exact, false];
       view.setOutline(mask.outline);
@@ -113,7 +116,7 @@ async function showFrame(number) {
   while (loaded !== keyOf(wanted)) {
     const [number, width] = [wanted, widthOf(wanted)];
     try {
-      const response = await request(`/api/v1/frames/${number}?width=${width}`);
+      const response = await request(`api/v1/frames/${number}?width=${width}`);
       view.image = await createImageBitmap(await response.blob());
       shown = number;
     } catch (error) {
@@ -365,8 +368,8 @@ async function accept() {
   $("accept").disabled = true;
   say("busy", "writing");
   try {
-    const written = await (await send("/api/v1/accept", sketch)).json();
-    end("accepted", "The mask is written", `${about.output}, ${written.area_px} pixels. The program has ended; this page can be closed.`);
+    const written = await (await send("api/v1/accept", sketch)).json();
+    end("accepted", "The mask is written", `${about.output}, ${written.area_px} pixels. ${CLOSED}`);
   } catch (error) {
     say("wrong", "not written");
     warn([error.message]);
@@ -377,15 +380,21 @@ async function accept() {
 async function discard() {
   if (history.canUndo && !confirm("End without writing a mask?")) return;
   try {
-    await request("/api/v1/discard", { method: "POST" });
-    end("discarded", "Nothing was written", "The program has ended; this page can be closed.");
+    await request("api/v1/discard", { method: "POST" });
+    end("discarded", "Nothing was written", CLOSED);
   } catch (error) {
     warn([error.message]);
   }
 }
 
+const CLOSED = within ? "" : "The program has ended; this page can be closed.";
+
 function end(state, title, text) {
   say(state, state);
+  $("end-back").hidden = !within;
+  if (about) $("end-back").href = `../#${encodeURIComponent(about.recording)}`;
+  // What was asked for is done: the rig shows the session.
+  if (within && state !== "wrong") location.replace($("end-back").href);
   $("end-title").textContent = title;
   $("end-text").textContent = text;
   $("end").hidden = false;
@@ -393,7 +402,7 @@ function end(state, title, text) {
 
 async function begin() {
   try {
-    about = await (await request("/api/v1/recording")).json();
+    about = await (await request("api/v1/recording")).json();
   } catch (error) {
     say("wrong", "no access");
     return end("wrong", "The editor cannot be opened", error.message);

@@ -2,21 +2,14 @@
 // rig goes in as text, never as markup.
 import { ask, follow, give } from "./link.js";
 import { startPreview } from "./preview.js";
-import { listSessions, make, showRoot } from "./sessions.js";
+import { make } from "./elements.js";
+import { showProcessing, startProcessing } from "./process.js";
+import { listSessions, openSession, refreshStages, sessionChanged } from "./sessions.js";
 
 const $ = (id) => document.getElementById(id);
 
-const PHASES = {
-  "idle": "Ready",
-  "preflight": "Checking camera, table and disk",
-  "metering": "Finding the exposure",
-  "moving-back": "Moving back for the run-up",
-  "starting": "Gathering speed",
-  "recording": "Recording",
-  "unwinding": "Turning back",
-  "checking": "Checking the take",
-  "waiting-for-object": "Put the next object on the table",
-};
+/** Longest name of an object, bytes. */
+const LONGEST_NAME = 80;
 const VERDICTS = { clean: "clean", tolerated: "kept, with dropped frames", aborted: "aborted" };
 /** Controls that can be set here, and by how much a step moves them. */
 const STEPS = [
@@ -26,9 +19,6 @@ const STEPS = [
   [/gain/, () => 1],
   [/white_balance_temperature/, () => 100],
 ];
-/** A take needs its predicted size and a fifth more. */
-const RESERVE = 1.2;
-
 let state = null;
 let seenFault = -Infinity;
 
@@ -69,16 +59,19 @@ function show(next) {
   if (before && finished) signal(state.last_take.verdict === "clean");
   showSettings();
   showLog();
+  const jobs = JSON.stringify(before?.processing.jobs.map(({ number, step, status }) => [number, step, status]));
+  showProcessing(state.processing, (ended) => {
+    refresh();
+    sessionChanged(ended.map(({ session }) => session));
+  });
+  if (before && jobs !== JSON.stringify(state.processing.jobs.map(({ number, step, status }) => [number, step, status]))) refreshStages();
 }
 
 /** The table is locked: this is said in one sentence, and there is one button. */
 const alarmed = () => state.table.emergency_stop || state.table.locked;
-const moving = () => /^(Run|Jog|Home|Hold)/.test(state.table.state);
 
 function showAlarm() {
-  const { emergency_stop: pressed, fault } = state.table;
-  const sentence = pressed ? "The emergency stop is pressed: release it." : (fault ?? "The table is locked.");
-  $("alarm").textContent = alarmed() ? sentence : "";
+  $("alarm").textContent = alarmed() ? state.advice.explanation : "";
   $("alarm").hidden = !alarmed();
   if (alarmed()) {
     say("");
@@ -113,8 +106,7 @@ function showTake() {
   const { phase, object, frames, frames_wanted: wanted, dropped, table } = state;
   const part = wanted > 0 ? Math.min(frames / wanted, 1) : 0;
   const busy = !resting();
-  const ready = phase !== "idle" ? PHASES[phase] : atRest();
-  $("phase").textContent = ready ?? phase;
+  $("phase").textContent = state.advice.headline;
   const left = phase === "recording" && state.settings.degrees_per_second > 0 ? ` · ${Math.ceil(((1 - part) * 360) / state.settings.degrees_per_second)} s left` : "";
   $("what").textContent = object && busy ? `${object}${left}` : "";
   $("progress").hidden = !busy;
@@ -127,36 +119,54 @@ function showTake() {
   $("counts").replaceChildren(...counts);
   const take = state.last_take;
   $("last").hidden = !take || alarmed();
-  $("again").hidden = !take || take.verdict === "clean" || !resting() || alarmed();
+  // Where the big button captures it again, there is no second one.
+  $("again").hidden = take?.verdict !== "tolerated" || !["start", "next"].includes(state.advice.button.action);
   if (!take) return;
   const words = make("b", { text: VERDICTS[take.verdict] ?? take.verdict, className: take.verdict === "clean" ? "good" : "bad" });
   const rest = `: ${take.frames} frames, ${take.dropped} dropped, ${take.session}.${take.reason ? ` ${take.reason}` : ""}`;
   $("last-text").replaceChildren(words, rest);
 }
 
-/** What is said while nothing is captured. */
-function atRest() {
-  if (alarmed()) return "The table is locked";
-  if (moving()) return "The table moves";
-  return state.camera.present ? PHASES.idle : "No camera";
+/** Why an object cannot have this name, by the rule of the server; "" where it can. */
+function wrongName(object) {
+  if (object.startsWith(".")) return "A name does not begin with a dot.";
+  if (!/^[\p{Alphabetic}\p{N}\-_.]*$/u.test(object)) return "A name has letters, digits, “-”, “_” and “.”, and no spaces.";
+  if (new TextEncoder().encode(object).length > LONGEST_NAME) return "This name is too long.";
+  return "";
 }
 
-/** What the big button does now. */
+/** The commands behind the advised actions; `start` needs a name. */
+const ACTIONS = {
+  stop: () => ({ command: "stop" }),
+  reset: () => ({ command: "reset" }),
+  next: (object) => ({ command: "next", object }),
+  again: (object) => ({ command: "start", object, meter: false }),
+};
+
+/** What the big button does now: as the rig advises, with the name that stands in the field. */
 function action() {
-  const object = $("object").value.trim();
   if (!state) return { text: "Start" };
-  const stop = { text: "Stop", stop: true, command: { command: "stop" } };
-  if (!resting()) return stop;
-  if (state.table.emergency_stop) return { text: "Release the emergency stop" };
-  if (state.table.locked) return { text: "Reset and home the table", command: { command: "reset" } };
-  if (moving()) return stop;
-  if (!state.camera.present) return { text: "No camera" };
-  if (state.phase === "waiting-for-object") return { text: `Capture ${state.queue[0] ?? "the next object"}`, command: { command: "next", object: state.queue[0] } };
-  if (!object) return { text: "Name the object" };
-  return { text: `Start ${object}`, command: { command: "start", object, meter: $("meter").checked } };
+  const { text, action, object } = state.advice.button;
+  const typed = $("object").value.trim();
+  const names = action === "start" || (action === "again" && typed && typed !== object);
+  if (names) {
+    if (!typed) return { text: "Name the object" };
+    if (wrongName(typed)) return { text: "Another name, please" };
+    return { text: `Start ${typed}`, command: { command: "start", object: typed, meter: $("meter").checked } };
+  }
+  return { text, stop: action === "stop", command: ACTIONS[action]?.(object) };
+}
+
+function showName() {
+  const why = wrongName($("object").value.trim());
+  $("wrong-name").textContent = why;
+  $("wrong-name").hidden = !why;
+  $("object").setAttribute("aria-invalid", Boolean(why));
+  $("enqueue").disabled = Boolean(why);
 }
 
 function showGo() {
+  showName();
   const { text, stop, command } = action();
   $("go").textContent = text;
   $("go").disabled = !command || document.body.className !== "";
@@ -165,7 +175,7 @@ function showGo() {
 
 function showFaults() {
   // What is wrong now is said above.
-  const now = [state.camera.fault, state.table.fault];
+  const now = [state.camera.fault, state.table.fault, state.disk_fault];
   const faults = state.faults.filter(({ t_us, what }) => t_us > seenFault && !now.includes(what)).reverse();
   $("faults").hidden = faults.length === 0;
   const lines = faults.slice(0, 10).map(({ what }) => what);
@@ -176,7 +186,9 @@ function showFaults() {
 function showQueue() {
   const waiting = state.phase === "waiting-for-object";
   $("queue").hidden = state.queue.length === 0;
-  $("next").hidden = state.phase !== "idle";
+  // Where the big button captures it, there is no second one.
+  $("next").hidden = !resting() || alarmed() || state.advice.button.action === "next";
+  $("next").disabled = !["start", "again", "next"].includes(state.advice.button.action);
   $("next").textContent = `${state.queue[0]} stands on the table: capture`;
   // An object stays in the queue until its take is usable.
   const captured = !resting() && state.object === state.queue[0];
@@ -249,18 +261,17 @@ function line(control, value) {
 function showDisk() {
   const { free_bytes: free, needed_bytes: needed } = state;
   const size = (bytes) => (bytes < 1e9 ? `${(bytes / 1e6).toFixed(0)} MB` : `${(bytes / 1e9).toFixed(1)} GB`);
-  const short = needed > 0 && free < needed * RESERVE;
   const takes = needed > 0 ? `, a take needs ${size(needed)}` : "";
-  $("disk").textContent = `${size(free)} free${takes}${short ? ": too little space for a take" : ""}`;
-  $("disk").className = short ? "bad" : "quiet";
-  $("disk").hidden = !resting() && !short;
+  const wrong = state.disk_fault ?? (state.advice.headline === "Too little space" ? state.advice.explanation : null);
+  $("disk").textContent = wrong ?? `${size(free)} free${takes}`;
+  $("disk").className = wrong ? "bad" : "quiet";
+  $("disk").hidden = !resting() && !wrong;
 }
 
 const SETTINGS = ["size", "fps", "degrees_per_second", "max_dropped", "retries"];
 
 function showSettings() {
   const { settings } = state;
-  showRoot(settings.root);
   $("devices").textContent = [settings.camera, settings.turntable, settings.root].filter(Boolean).join(" · ");
   const form = $("settings");
   $("settings-set").disabled = !resting();
@@ -354,6 +365,13 @@ $("unlock-page").addEventListener("submit", (event) => {
 });
 
 startPreview();
+startProcessing(say);
+// The editor of masks comes back with the session's name.
+if (location.hash) {
+  const id = decodeURIComponent(location.hash.slice(1));
+  history.replaceState(null, "", "/");
+  openSession(id).catch((problem) => say(problem.message));
+}
 follow({
   state: (next) => {
     if (document.body.className === "lost") say("");

@@ -1,5 +1,7 @@
 // The list of what was recorded, and the player that scrubs through a turn.
+import { make } from "./elements.js";
 import { ask, request } from "./link.js";
+import { describe, hideSteps, showSteps, standing } from "./process.js";
 
 /** Sessions that are fetched at a time. */
 const PART = 20;
@@ -8,14 +10,6 @@ const PLAY = 100;
 
 const $ = (id) => document.getElementById(id);
 const path = (id) => `/api/v1/sessions/${encodeURIComponent(id)}`;
-
-/** An element with text, class and children. */
-export function make(tag, { text, ...rest } = {}, ...children) {
-  const element = Object.assign(document.createElement(tag), rest);
-  if (text !== undefined) element.textContent = text;
-  element.append(...children);
-  return element;
-}
 
 /** A session's verdict in words, and its class. */
 function verdict(session) {
@@ -43,41 +37,100 @@ function entry(session) {
   const image = ended ? make("img", { src, alt: "", loading: "lazy" }) : make("span", { className: "none" });
   image.addEventListener("error", () => image.replaceWith(make("span", { className: "none" })));
   const [words, className] = verdict(session);
+  const [stage, stageClass] = standing(session);
   const text = make(
     "span",
     {},
     make("b", { text: session.object }),
     make("small", { text: when(session) }),
     make("small", {}, make("span", { text: words, className }), make("span", { text: facts(session) && ` · ${facts(session)}` })),
+    make("small", { className: `stage ${stageClass}`, text: stage }),
   );
   const button = make("button", { type: "button", disabled: !ended }, image, text);
   button.addEventListener("click", () => play(session));
   return make("li", {}, button);
 }
 
+const dayOf = ({ id }) => /^\d{8}(?=T)/.exec(id)?.[0] ?? "";
+
+/** The heading of a day: how many sessions there are, and how far they have come. */
+function heading(day, sessions) {
+  const date = day && new Date(`${day.slice(0, 4)}-${day.slice(4, 6)}-${day.slice(6)}T12:00Z`).toLocaleDateString([], { dateStyle: "medium", timeZone: "UTC" });
+  const stages = ["recorded", "masked", "checked", "extracted"];
+  const reached = (at) => sessions.filter(({ results }) => stages.indexOf(results?.stage) >= at).length;
+  const doubtful = sessions.filter(({ results }) => results?.is_doubtful).length;
+  const counts = [`${sessions.length} recorded`, `${reached(1)} masked`, `${reached(3)} extracted`];
+  if (doubtful) counts.push(`${doubtful} doubtful`);
+  return make("li", { className: "day" }, make("b", { text: date || "Other names" }), make("small", { text: counts.join(" · ") }));
+}
+
+/** The sessions that are shown, newest first. */
+let listed = [];
+
+function showList() {
+  const days = Map.groupBy ? [...Map.groupBy(listed, dayOf)] : grouped();
+  $("sessions").replaceChildren(...days.flatMap(([day, sessions]) => [heading(day, sessions), ...sessions.map(entry)]));
+  $("no-sessions").hidden = listed.length > 0;
+}
+
+function grouped() {
+  const days = new Map();
+  for (const session of listed) days.set(dayOf(session), [...(days.get(dayOf(session)) ?? []), session]);
+  return [...days];
+}
+
 /** Fills the list anew, or with `before` goes on with older ones. */
 export async function listSessions(before) {
   const query = before ? `&before=${encodeURIComponent(before)}` : "";
   const sessions = await ask(`/api/v1/sessions?limit=${PART}${query}`);
-  const entries = sessions.map(entry);
-  if (before) $("sessions").append(...entries);
-  else $("sessions").replaceChildren(...entries);
-  $("no-sessions").hidden = $("sessions").childElementCount > 0;
+  listed = before ? [...listed, ...sessions] : sessions;
+  showList();
   $("more").hidden = sessions.length < PART;
   $("more").onclick = () => listSessions(sessions.at(-1).id).catch(() => {});
+  if (!before) await listTrash();
 }
+
+/** What was put away, each with the way back. */
+async function listTrash() {
+  const sessions = await ask("/api/v1/trash");
+  $("trash-card").hidden = sessions.length === 0;
+  $("trash-title").textContent = `Trash (${sessions.length})`;
+  const lines = sessions.slice(0, PART).map((session) => {
+    const back = make("button", { type: "button", text: "Restore", ariaLabel: `Restore ${session.object}` });
+    back.addEventListener("click", async () => {
+      back.disabled = true;
+      try {
+        await request(`${path(session.id)}/restore`, { method: "POST" });
+        changed();
+      } catch (problem) {
+        back.replaceWith(make("span", { className: "bad", text: problem.message }));
+      }
+    });
+    return make("li", {}, make("span", {}, make("b", { text: session.object }), make("small", { text: when(session) })), back);
+  });
+  $("trash").replaceChildren(...lines);
+}
+
+/** The states of jobs changed: the list says so without being fetched. */
+export const refreshStages = showList;
 
 const player = $("player");
 const slider = $("player-slider");
 let shown = null;
 let timer = null;
 
+/** Opens a session by its name, such as after its mask was edited. */
+export async function openSession(id) {
+  play(await describe(id));
+}
+
 async function play(session) {
+  inTrash(false);
   $("player-title").textContent = session.object;
   $("player-when").textContent = when(session);
   $("player-video").href = `${path(session.id)}/video`;
   $("player-tar").href = `${path(session.id)}.tar`;
-  const day = /^\d{8}(?=T)/.exec(session.id)?.[0];
+  const day = dayOf(session);
   $("player-day").hidden = !day;
   $("player-day").href = `/api/v1/sessions.tar?day=${day}`;
   showRemarks(session);
@@ -95,8 +148,9 @@ async function play(session) {
   seek(0);
   try {
     const mine = shown;
-    const detail = await ask(path(session.id));
+    const detail = await describe(session.id);
     if (shown !== mine) return;
+    showSteps(detail, complain);
     Object.assign(shown, { times: detail.times_s, angles: detail.angles_deg });
     const gaps = detail.gaps.map(({ before, missing }) => `${missing} dropped before frame ${before}`);
     const faults = detail.manifest.faults.map(({ what }) => what);
@@ -108,15 +162,29 @@ async function play(session) {
   }
 }
 
+const complain = (sentence) => ($("player-error").textContent = sentence);
+
+/** A job of the session that is shown has ended: its mask and results are other ones. */
+export async function sessionChanged(ids) {
+  const mine = shown;
+  if (!mine || !ids.includes(mine.id)) return;
+  try {
+    const detail = await describe(mine.id);
+    if (shown !== mine) return;
+    showSteps(detail, complain);
+    showMask(mine, detail.has_mask);
+  } catch (problem) {
+    complain(problem.message);
+  }
+}
+
 const outline = $("player-mask");
 
-/** Draws the mask's outline over the frames, or says how to make a mask. */
+/** Draws the mask's outline over the frames. */
 async function showMask(mine, has) {
-  if (!has) {
-    const folder = [root, mine.id].filter(Boolean).join("/");
-    $("player-outline").replaceChildren("No mask yet: ", make("code", { text: `relit-mask ${folder} --rect X,Y,W,H` }));
-    return;
-  }
+  outline.hidden = true;
+  $("player-outline").textContent = "";
+  if (!has) return;
   const response = await request(`${path(mine.id)}/mask.png`);
   const mask = await createImageBitmap(await response.blob());
   if (shown !== mine) return mask.close();
@@ -139,13 +207,6 @@ async function showMask(mine, has) {
   context.putImageData(image, 0, 0);
   outline.hidden = false;
   $("player-outline").textContent = "The line is the mask's outline.";
-}
-
-let root = "";
-
-/** The folder of sessions on the rig's computer, for the commands that are shown. */
-export function showRoot(folder) {
-  root = folder;
 }
 
 let remarks = { session: null, rating: null };
@@ -183,28 +244,30 @@ async function saveRemarks() {
   }
 }
 
-/** Puts the session away; it can be had back until the page is left, and from the trash folder after that. */
+/** While the session that is shown is in the trash, the one thing to do is to have it back, by the same button. */
+function inTrash(is) {
+  player.classList.toggle("trashed", is);
+  $("put-away").textContent = is ? "Undo" : "Delete";
+  $("trashed").hidden = !is;
+  $("save").disabled = is;
+}
+
+/** Puts the session away, or has it back. */
 async function putAway() {
   const { session } = remarks;
+  const back = player.classList.contains("trashed");
+  $("put-away").disabled = true;
   try {
-    await request(path(session.id), { method: "DELETE" });
+    if (back) await request(`${path(session.id)}/restore`, { method: "POST" });
+    else await request(path(session.id), { method: "DELETE", wait: 20_000 });
+    inTrash(!back);
+    complain("");
+    changed();
+    if (back && shown) showSteps(await describe(session.id), complain);
   } catch (problem) {
-    $("player-error").textContent = problem.message;
-    return;
+    complain(problem.message);
   }
-  player.close();
-  changed();
-  $("undo-text").textContent = `${session.object} is in the trash folder.`;
-  $("undo").hidden = false;
-  $("undo-button").onclick = async () => {
-    try {
-      await request(`${path(session.id)}/restore`, { method: "POST" });
-      $("undo").hidden = true;
-      changed();
-    } catch (problem) {
-      $("undo-text").textContent = problem.message;
-    }
-  };
+  $("put-away").disabled = false;
 }
 
 function place() {
@@ -272,4 +335,5 @@ $("put-away").addEventListener("click", putAway);
 player.addEventListener("close", () => {
   running(false);
   shown = null;
+  hideSteps();
 });

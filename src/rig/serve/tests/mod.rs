@@ -11,9 +11,11 @@ mod api;
 mod load;
 mod page;
 mod previews;
+mod processing;
 mod rehearsal;
 mod security;
 mod sessions;
+mod states;
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -42,11 +44,16 @@ struct Fake {
     root: PathBuf,
     told: Mutex<Vec<Command>>,
     failed: AtomicBool,
+    /// Whether it refuses what its state does not allow, as the daemon does.
+    minds_state: AtomicBool,
 }
 
 impl Rig for Fake {
     fn command(&self, command: Command) -> Result<(), Refused> {
         self.told.lock().unwrap().push(command.clone());
+        if self.minds_state.load(Ordering::Relaxed) {
+            return command.check(&self.monitor.state());
+        }
         match command {
             Command::Start { object, .. } => self.start(&object),
             Command::Home => Err(Refused::Unavailable("there is no table".to_owned())),
@@ -102,15 +109,21 @@ impl Serving {
     }
 
     fn with(change: impl FnOnce(&mut ServeOptions)) -> Self {
+        Self::beside(|options, _| change(options))
+    }
+
+    /// With what the options need to know of the rig.
+    fn beside(change: impl FnOnce(&mut ServeOptions, &Fake)) -> Self {
         let root = tempfile::tempdir().unwrap();
         let rig = Arc::new(Fake {
             monitor: Monitor::default(),
             root: root.path().to_owned(),
             told: Mutex::new(Vec::new()),
             failed: AtomicBool::new(false),
+            minds_state: AtomicBool::new(false),
         });
         let mut options = ServeOptions::at("127.0.0.1:0".parse().unwrap());
-        change(&mut options);
+        change(&mut options, &rig);
         let shutdown = Shutdown::new();
         let (tell, told) = mpsc::sync_channel(1);
         let thread = {

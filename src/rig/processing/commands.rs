@@ -1,0 +1,153 @@
+//! The programs that do the work, and how they are called.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::state::ProcessingStep;
+
+/// Where the programs are on this machine.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ProcessingPrograms {
+    /// `relit-mask`, where it is installed.
+    pub mask: Option<PathBuf>,
+    /// `relit-extract`, where it is installed.
+    pub extract: Option<PathBuf>,
+    /// What a program is started by, such as `ionice -c 3`; the program and its arguments follow.
+    pub launcher: Vec<OsString>,
+}
+
+/// The same work for a terminal, to be copied.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct ProcessingCommands {
+    /// Makes the mask by the turn.
+    pub mask: String,
+    /// Extracts the session into the data set.
+    pub extract: String,
+}
+
+/// Folders that a step works on.
+#[derive(Debug, Clone)]
+pub(super) struct StepPlaces {
+    pub(super) session: PathBuf,
+    pub(super) dataset: PathBuf,
+    /// Whether the capture was aborted: it may hold a part of the turn.
+    pub(super) is_aborted: bool,
+}
+
+impl ProcessingPrograms {
+    /// The command of a step; `None` where its program is not installed.
+    pub(super) fn command(&self, step: ProcessingStep, places: &StepPlaces) -> Option<Command> {
+        let (session, dataset) = (places.session.as_os_str(), places.dataset.as_os_str());
+        let (program, mut arguments): (_, Vec<OsString>) = match step {
+            ProcessingStep::Mask => (&self.mask, vec![session.into(), "--auto".into()]),
+            ProcessingStep::Check => (
+                &self.mask,
+                vec!["check".into(), session.into(), "--progress".into()],
+            ),
+            ProcessingStep::Extract => (
+                &self.extract,
+                vec![
+                    session.into(),
+                    "-o".into(),
+                    dataset.into(),
+                    "--resume".into(),
+                    "--progress".into(),
+                ],
+            ),
+            ProcessingStep::Verify => (
+                &self.extract,
+                vec!["verify".into(), dataset.into(), "--progress".into()],
+            ),
+        };
+        if step == ProcessingStep::Extract && places.is_aborted {
+            arguments.push("--partial".into());
+        }
+        arguments.push("--json".into());
+        Some(self.launch(program.as_deref()?, arguments))
+    }
+
+    /// The editor of a session's mask, on this machine alone. It goes on with a `recipe` where there is one.
+    pub(super) fn editor(&self, session: &Path, recipe: Option<&Path>) -> Option<Command> {
+        let mut arguments: Vec<OsString> = vec![session.into(), "--edit".into(), "--json".into()];
+        match recipe {
+            Some(recipe) => arguments.extend(["--recipe".into(), recipe.into()]),
+            None => arguments.push("--auto".into()),
+        }
+        arguments.extend(["--listen".into(), "127.0.0.1:0".into()]);
+        Some(self.launch(self.mask.as_deref()?, arguments))
+    }
+
+    fn launch(&self, program: &Path, arguments: Vec<OsString>) -> Command {
+        let mut words = self.launcher.iter().cloned().chain([program.into()]);
+        // There is at least the program.
+        let mut command = Command::new(words.next().unwrap_or_default());
+        command.args(words).args(arguments);
+        command
+    }
+}
+
+impl ProcessingCommands {
+    /// The commands for a session's folder and a data set's.
+    #[must_use]
+    pub fn of(session: &Path, dataset: &Path) -> Self {
+        let (session, dataset) = (quoted(session), quoted(dataset));
+        Self {
+            mask: format!("relit-mask {session} --auto"),
+            extract: format!("relit-extract {session} -o {dataset}"),
+        }
+    }
+}
+
+/// A path as a shell takes it for one word.
+fn quoted(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    let plain = |c: char| c.is_alphanumeric() || "/._-+,:@%".contains(c);
+    match !text.is_empty() && !text.starts_with('-') && text.chars().all(plain) {
+        true => text.into_owned(),
+        false => format!("'{}'", text.replace('\'', r"'\''")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(command: &Command) -> Vec<String> {
+        let arguments = command.get_args();
+        let words = [command.get_program()].into_iter().chain(arguments);
+        words
+            .map(|word| word.to_string_lossy().into_owned())
+            .collect()
+    }
+
+    #[test]
+    fn a_step_whose_program_is_missing_has_no_command() {
+        let places = StepPlaces {
+            session: "/s/mug".into(),
+            dataset: "/d".into(),
+            is_aborted: true,
+        };
+        let programs = ProcessingPrograms {
+            extract: Some("/bin/relit-extract".into()),
+            launcher: vec!["ionice".into(), "-c".into(), "3".into()],
+            ..ProcessingPrograms::default()
+        };
+        assert!(programs.command(ProcessingStep::Mask, &places).is_none());
+        assert!(programs.editor(&places.session, None).is_none());
+        let command = programs.command(ProcessingStep::Extract, &places).unwrap();
+        let wanted =
+            "ionice -c 3 /bin/relit-extract /s/mug -o /d --resume --progress --partial --json";
+        assert_eq!(words(&command).join(" "), wanted);
+    }
+
+    #[test]
+    fn commands_to_copy_are_safe_for_a_shell() {
+        let commands = ProcessingCommands::of(Path::new("/my rig/it's"), Path::new("/d"));
+        assert_eq!(commands.mask, r"relit-mask '/my rig/it'\''s' --auto");
+        assert_eq!(commands.extract, r"relit-extract '/my rig/it'\''s' -o /d");
+    }
+}

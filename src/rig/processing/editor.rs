@@ -1,0 +1,117 @@
+//! The editor of masks: `relit-mask --edit`, reachable on this machine alone, for one session at a time.
+
+use std::net::SocketAddr;
+use std::path::Path;
+use std::time::{Duration, Instant};
+use std::{fs, thread};
+
+use relit_data::session::MASK_FILE;
+
+use super::child::Worker;
+use super::commands::ProcessingPrograms;
+use super::heard::Heard;
+use crate::serve::rig::Refused;
+
+/// Time in which the editor has to come up: it reads the video through once.
+const START: Duration = Duration::from_secs(60);
+/// An editor that nobody used for so long is ended.
+const UNUSED: Duration = Duration::from_secs(15 * 60);
+/// Somebody who used it within this time is still at it.
+const IN_USE: Duration = Duration::from_secs(60);
+/// Time between two looks at it.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Where requests for the editor go.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EditorTarget {
+    /// Its address, on this machine.
+    pub address: SocketAddr,
+    /// What it demands.
+    pub token: String,
+}
+
+/// An editor that is open.
+#[derive(Debug)]
+pub(super) struct OpenEditor {
+    pub(super) session: String,
+    pub(super) target: EditorTarget,
+    worker: Worker,
+    heard: Heard,
+    used: Instant,
+}
+
+impl OpenEditor {
+    /// Starts the editor of a session's mask and waits until it can be reached. It is held while `is_busy`.
+    pub(super) fn open(
+        programs: &ProcessingPrograms,
+        session: &str,
+        folder: &Path,
+        is_busy: &dyn Fn() -> bool,
+    ) -> Result<Self, Refused> {
+        let recipe = recipe(folder);
+        let command = programs.editor(folder, recipe.as_deref());
+        let missing =
+            || Refused::Unavailable("relit-mask is not installed on this machine".to_owned());
+        let failed = |why: String| Refused::Unavailable(format!("the editor did not open: {why}"));
+        let mut worker = Worker::start(command.ok_or_else(missing)?)
+            .map_err(|error| failed(error.to_string()))?;
+        let mut heard = Heard::default();
+        let until = Instant::now() + START;
+        loop {
+            worker.hold(is_busy());
+            worker.hear(&mut heard);
+            if let Some(target) = target(&heard) {
+                return Ok(Self {
+                    session: session.to_owned(),
+                    target,
+                    worker,
+                    heard,
+                    used: Instant::now(),
+                });
+            }
+            match worker.ended(&mut heard) {
+                Ok(None) if Instant::now() < until => thread::park_timeout(LOOK),
+                Ok(None) => return Err(failed("it took too long".to_owned())),
+                Ok(Some(status)) => {
+                    let complaint = worker.complaint();
+                    return Err(failed(heard.failure(status.code(), &complaint)));
+                }
+                Err(error) => return Err(failed(error.to_string())),
+            }
+        }
+    }
+
+    /// Somebody uses it.
+    pub(super) fn touch(&mut self) {
+        self.used = Instant::now();
+    }
+
+    /// Whether somebody used it a moment ago.
+    pub(super) fn is_in_use(&self) -> bool {
+        self.used.elapsed() < IN_USE
+    }
+
+    /// Holds it while the rig is busy. False once it is over: accepted, discarded, or left alone.
+    pub(super) fn look_after(&mut self, held: bool) -> bool {
+        self.worker.hear(&mut self.heard);
+        self.worker.hold(held);
+        let is_running = matches!(self.worker.ended(&mut self.heard), Ok(None));
+        is_running && self.used.elapsed() < UNUSED
+    }
+}
+
+fn target(heard: &Heard) -> Option<EditorTarget> {
+    let place = heard.editor()?;
+    let (_, token) = place.url.split_once("?token=")?;
+    Some(EditorTarget {
+        address: place.address.parse().ok()?,
+        token: token.to_owned(),
+    })
+}
+
+/// How the mask was made, where the editor can go on with that.
+fn recipe(folder: &Path) -> Option<std::path::PathBuf> {
+    let path = folder.join(MASK_FILE).with_extension("json");
+    let is_there = fs::metadata(&path).is_ok_and(|file| file.is_file());
+    is_there.then_some(path)
+}

@@ -1,0 +1,365 @@
+//! What the programs say on standard output, one JSON object a line, and what follows from it. Without I/O.
+
+use serde::Deserialize;
+
+use super::queue::StepEnd;
+use crate::state::{ProcessingOutcome, ProcessingStep};
+
+/// Warnings and reasons that are kept.
+const KEPT: usize = 8;
+
+/// A line, as far as it is needed: the programs may say more.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Line {
+    event: String,
+    message: Option<String>,
+    done: u64,
+    of: u64,
+    /// Of `relit-mask check`.
+    report: Option<CheckReport>,
+    /// Of `relit-extract`.
+    session: Option<ExtractedSession>,
+    lossy: bool,
+    url: Option<String>,
+    address: Option<String>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct CheckReport {
+    verdict: String,
+    reasons: Vec<String>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct ExtractedSession {
+    samples: u64,
+    lossy: bool,
+    quality: Option<Quality>,
+    warnings: Vec<String>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Quality {
+    verdict: String,
+    reasons: Vec<String>,
+}
+
+/// Where the editor of masks is, as it says itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct EditorPlace {
+    pub(super) address: String,
+    pub(super) url: String,
+}
+
+/// All that was heard of a program.
+#[derive(Debug, Default)]
+pub(super) struct Heard {
+    progress: Option<(u64, u64)>,
+    error: Option<String>,
+    warnings: Vec<String>,
+    check: Option<CheckReport>,
+    extracted: Option<ExtractedSession>,
+    is_skipped: Option<bool>,
+    left_out: Option<String>,
+    problems: Vec<String>,
+    problem_count: u64,
+    is_verified: bool,
+    has_mask: bool,
+    editor: Option<EditorPlace>,
+}
+
+impl Heard {
+    /// Takes in a line. What cannot be understood is passed over: newer programs say more.
+    pub(super) fn line(&mut self, line: &[u8]) {
+        let Ok(line) = serde_json::from_slice::<Line>(line) else {
+            return;
+        };
+        match line.event.as_str() {
+            "progress" => self.progress = Some((line.done, line.of)),
+            "error" => self.error = line.message,
+            "warning" => keep(&mut self.warnings, line.message),
+            "mask" => self.has_mask = true,
+            "check" => self.check = line.report,
+            "extracted" => self.extracted = line.session,
+            "skipped" => self.is_skipped = Some(line.lossy),
+            "left_out" => self.left_out = line.message,
+            "problem" => {
+                self.problem_count += 1;
+                keep(&mut self.problems, line.message);
+            }
+            "verified" => self.is_verified = true,
+            "editor" => {
+                self.editor = line
+                    .address
+                    .zip(line.url)
+                    .map(|(address, url)| EditorPlace { address, url });
+            }
+            _ => {}
+        }
+    }
+
+    /// The newest word on how far the work has come, once.
+    pub(super) fn take_progress(&mut self) -> Option<(u64, u64)> {
+        self.progress.take()
+    }
+
+    /// Where the editor is, once it has said so.
+    pub(super) fn editor(&self) -> Option<&EditorPlace> {
+        self.editor.as_ref()
+    }
+
+    /// What went wrong, for a person; `complaint` is what the program wrote on standard error.
+    pub(super) fn failure(&self, exit_code: Option<i32>, complaint: &str) -> String {
+        let said = self.error.clone().or_else(|| self.left_out.clone());
+        let last = || {
+            let mut lines = complaint.lines().map(str::trim);
+            let last = lines.rfind(|line| !line.is_empty())?;
+            Some(last.strip_prefix("error: ").unwrap_or(last).to_owned())
+        };
+        said.or_else(last).unwrap_or_else(|| match exit_code {
+            Some(code) => format!("the program ended with exit code {code} and said nothing"),
+            None => "the program was ended by a signal: look at the machine's memory".to_owned(),
+        })
+    }
+
+    /// How a step ended whose program had this exit code; none where a signal ended it.
+    pub(super) fn end(
+        mut self,
+        step: ProcessingStep,
+        exit_code: Option<i32>,
+        complaint: &str,
+    ) -> StepEnd {
+        let end = match (step, exit_code) {
+            (ProcessingStep::Mask, Some(0)) if self.has_mask => Some(self.masked()),
+            (ProcessingStep::Check, Some(_)) => self.check.take().map(checked),
+            (ProcessingStep::Extract, Some(code @ (0 | 3))) => self.extracted(code),
+            (ProcessingStep::Verify, Some(0)) if self.is_verified => Some(good(
+                "every file of the data set reads back as it was written",
+            )),
+            (ProcessingStep::Verify, Some(_)) if self.problem_count > 0 => {
+                let first = self.problems.first().map_or("", String::as_str);
+                Some(StepEnd {
+                    outcome: ProcessingOutcome::Failed,
+                    what: format!("{} problems, the first: {first}", self.problem_count),
+                    goes_on: false,
+                })
+            }
+            _ => None,
+        };
+        end.unwrap_or_else(|| StepEnd {
+            outcome: ProcessingOutcome::Failed,
+            what: self.failure(exit_code, complaint),
+            goes_on: false,
+        })
+    }
+
+    /// The check looks at a mask of which its maker is unsure.
+    fn masked(&self) -> StepEnd {
+        match self.warnings.first() {
+            None => good("the mask is made"),
+            Some(warning) => doubtful(warning, true),
+        }
+    }
+
+    fn extracted(&mut self, code: i32) -> Option<StepEnd> {
+        if let Some(is_lossy) = self.is_skipped {
+            return Some(match is_lossy {
+                false => good("it is in the data set already"),
+                true => doubtful(
+                    "it is in the data set already; something of it is lost: see its report",
+                    true,
+                ),
+            });
+        }
+        let session = self.extracted.take()?;
+        let quality = session.quality.unwrap_or_default();
+        let is_good = code == 0 && !session.lossy && matches!(&*quality.verdict, "good" | "");
+        if is_good {
+            return Some(good(&format!("{} samples, good", session.samples)));
+        }
+        let mut why = quality.reasons;
+        why.extend(session.warnings.into_iter().take(1));
+        let (samples, verdict) = (session.samples, quality.verdict);
+        let what = format!("{samples} samples, {verdict}: {}", why.join("; "));
+        Some(doubtful(&what, true))
+    }
+}
+
+fn checked(report: CheckReport) -> StepEnd {
+    let why = report.reasons.join("; ");
+    match &*report.verdict {
+        "fits" => good("the mask fits"),
+        // Extraction aligns the frames.
+        "drifts" => doubtful(&why, true),
+        verdict => doubtful(&format!("{verdict}: {why}"), false),
+    }
+}
+
+fn good(what: &str) -> StepEnd {
+    StepEnd {
+        outcome: ProcessingOutcome::Good,
+        what: what.to_owned(),
+        goes_on: true,
+    }
+}
+
+fn doubtful(what: &str, goes_on: bool) -> StepEnd {
+    StepEnd {
+        outcome: ProcessingOutcome::Doubtful,
+        what: what.to_owned(),
+        goes_on,
+    }
+}
+
+fn keep(list: &mut Vec<String>, text: Option<String>) {
+    if list.len() < KEPT {
+        list.extend(text);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ProcessingOutcome::{Doubtful, Failed, Good};
+    use super::*;
+
+    fn end(
+        step: ProcessingStep,
+        code: Option<i32>,
+        lines: &[&str],
+    ) -> (ProcessingOutcome, String, bool) {
+        let mut heard = Heard::default();
+        for line in lines {
+            heard.line(line.as_bytes());
+        }
+        let end = heard.end(step, code, "warning: x\nerror: no space\n");
+        (end.outcome, end.what, end.goes_on)
+    }
+
+    #[test]
+    fn each_programs_last_word_is_understood() {
+        use ProcessingStep::{Check, Extract, Mask, Verify};
+        let good = r#"{"event":"extracted","session":{"samples":1500,"lossy":false,"quality":{"verdict":"good","reasons":[]},"warnings":[]}}"#;
+        let usable = r#"{"event":"extracted","session":{"samples":1500,"lossy":true,"quality":{"verdict":"usable","reasons":["3 frames are lost"]},"warnings":["the camera dropped 3 frames"]}}"#;
+        for (step, code, line, outcome, words, goes_on) in [
+            (
+                Mask,
+                0,
+                r#"{"event":"mask","recording":"x"}"#,
+                Good,
+                "made",
+                true,
+            ),
+            (
+                Check,
+                0,
+                r#"{"event":"check","report":{"verdict":"fits","reasons":[]}}"#,
+                Good,
+                "fits",
+                true,
+            ),
+            (
+                Check,
+                1,
+                r#"{"event":"check","report":{"verdict":"drifts","reasons":["by 3 px"]}}"#,
+                Doubtful,
+                "by 3 px",
+                true,
+            ),
+            (
+                Check,
+                1,
+                r#"{"event":"check","report":{"verdict":"wrong","reasons":["a hole"]}}"#,
+                Doubtful,
+                "wrong: a hole",
+                false,
+            ),
+            (
+                Check,
+                3,
+                r#"{"event":"check","report":{"verdict":"of-a-later-version","reasons":[]}}"#,
+                Doubtful,
+                "later",
+                false,
+            ),
+            (
+                Check,
+                1,
+                r#"{"event":"error","message":"it is empty"}"#,
+                Failed,
+                "it is empty",
+                false,
+            ),
+            (Extract, 0, good, Good, "1500 samples, good", true),
+            (Extract, 3, good, Doubtful, "1500 samples", true),
+            (
+                Extract,
+                3,
+                usable,
+                Doubtful,
+                "usable: 3 frames are lost; the camera dropped",
+                true,
+            ),
+            (
+                Extract,
+                0,
+                r#"{"event":"skipped","id":"x","lossy":false}"#,
+                Good,
+                "already",
+                true,
+            ),
+            (
+                Extract,
+                3,
+                r#"{"event":"left_out","message":"the frames cover 20"}"#,
+                Failed,
+                "cover 20",
+                false,
+            ),
+            (Extract, 1, good, Failed, "no space", false),
+            (
+                Verify,
+                0,
+                r#"{"event":"verified"}"#,
+                Good,
+                "reads back",
+                true,
+            ),
+            (
+                Verify,
+                1,
+                r#"{"event":"problem","message":"x.tar differs"}"#,
+                Failed,
+                "1 problems, the first: x.tar differs",
+                false,
+            ),
+            (Mask, 0, "no JSON", Failed, "no space", false),
+        ] {
+            let (found, what, on) = end(step, Some(code), &[line]);
+            assert_eq!((found, on), (outcome, goes_on), "{line}: {what}");
+            assert!(what.contains(words), "{line}: {what}");
+        }
+    }
+
+    #[test]
+    fn a_mask_with_a_warning_is_looked_at_by_the_check() {
+        let lines = [
+            r#"{"event":"warning","message":"x: the mask touches the border"}"#,
+            r#"{"event":"mask"}"#,
+        ];
+        let (outcome, what, goes_on) = end(ProcessingStep::Mask, Some(0), &lines);
+        assert_eq!((outcome, goes_on), (Doubtful, true));
+        assert!(what.contains("border"));
+    }
+
+    #[test]
+    fn a_program_that_says_nothing_is_reported_by_what_ended_it() {
+        let heard = Heard::default();
+        assert!(heard.failure(Some(7), "").contains("exit code 7"));
+        assert!(heard.failure(None, "\n").contains("signal"));
+        assert_eq!(heard.failure(Some(1), "error: a\n\n"), "a");
+    }
+}

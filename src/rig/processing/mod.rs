@@ -1,0 +1,283 @@
+//! What is made of recorded sessions: masks, their check, the extraction, by the programs relit-mask and
+//! relit-extract where they are installed.
+//!
+//! The [`queue`] decides what is done when, [`heard`] what a program's words mean; both are without I/O. One thread
+//! starts the programs as [`child`] processes of the lowest priority. While the rig captures or moves nothing begins,
+//! and what runs is stopped (`SIGSTOP`) until the rig rests. Results lie where the programs leave them, in the session
+//! and the data set; only settings and what is not done yet are [kept](store) here.
+
+mod child;
+mod commands;
+mod editor;
+mod heard;
+mod queue;
+mod runner;
+mod shared;
+mod store;
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use relit_data::naming::is_session_name;
+
+pub use commands::{ProcessingCommands, ProcessingPrograms};
+pub use editor::EditorTarget;
+pub use shared::ProcessingOptions;
+
+use crate::serve::rig::Refused;
+use crate::state::{Monitor, ProcessingStep};
+use editor::OpenEditor;
+use queue::{PendingWork, ProcessingQueue};
+use shared::{HELD, Plan, Shared, is_busy};
+use store::KeptProcessing;
+
+/// Longest wait for a cancelled program to end.
+const RELEASE: Duration = Duration::from_secs(10);
+/// Time between two looks while waiting for that.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Why sessions cannot be processed at all.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProcessingError {
+    /// The folder of sessions cannot be used.
+    #[error("the folder of sessions {path} could not be found")]
+    Root {
+        /// The folder.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// What an earlier run kept cannot be read.
+    #[error("{path} could not be read: mend it, or remove it and set again what it held")]
+    Kept {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: io::Error,
+    },
+    /// No thread.
+    #[error("a thread for processing could not be started")]
+    Thread(#[source] io::Error),
+}
+
+/// What a request changes of the settings.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ProcessingChange {
+    /// Whether each usable take is processed once the rig rests.
+    pub when_done: Option<bool>,
+    /// The data set's name.
+    pub dataset: Option<String>,
+}
+
+/// Works on sessions until it is dropped.
+#[derive(Debug)]
+pub struct Processing {
+    shared: Arc<Shared>,
+    thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+impl Processing {
+    /// Goes on with what an earlier run left. `monitor` says when the rig rests, and shows what is done.
+    ///
+    /// # Errors
+    /// [`ProcessingError`].
+    pub fn start(
+        root: &Path,
+        monitor: Monitor,
+        options: ProcessingOptions,
+    ) -> Result<Self, ProcessingError> {
+        let root = root
+            .canonicalize()
+            .map_err(|source| ProcessingError::Root {
+                path: root.to_owned(),
+                source,
+            })?;
+        let kept = KeptProcessing::read(&root).map_err(|source| ProcessingError::Kept {
+            path: store::path(&root),
+            source,
+        })?;
+        let beside = || root.parent().unwrap_or(&root).to_owned();
+        let mut queue = ProcessingQueue::default();
+        for work in kept.pending {
+            // A file that a person changed may name a session twice.
+            let _ = queue.submit(work);
+        }
+        let shared = Arc::new(Shared {
+            datasets: options.datasets.clone().unwrap_or_else(beside),
+            monitor,
+            plan: Mutex::new(Plan {
+                queue,
+                settings: kept.settings,
+                programs: (options.programs)(),
+            }),
+            editor: Mutex::default(),
+            opening: Mutex::default(),
+            is_ending: AtomicBool::new(false),
+            options,
+            root,
+        });
+        shared.show();
+        let worked = Arc::clone(&shared);
+        let thread = thread::Builder::new()
+            .name("relit-processing".to_owned())
+            .spawn(move || runner::run(&worked))
+            .map_err(ProcessingError::Thread)?;
+        Ok(Self {
+            shared,
+            thread: Mutex::new(Some(thread)),
+        })
+    }
+
+    /// Queues steps for a session; returns the job's number.
+    ///
+    /// # Errors
+    /// [`Refused`] where a program is missing, or the session is being worked on.
+    pub fn submit(&self, session: &str, steps: Vec<ProcessingStep>) -> Result<u64, Refused> {
+        if self.shared.editor().as_ref().is_some_and(|open| {
+            open.session == session && open.is_in_use() && steps.contains(&ProcessingStep::Mask)
+        }) {
+            let error = format!("the mask of {session} is open in the editor: finish it there");
+            return Err(Refused::Busy(error));
+        }
+        self.queue(PendingWork {
+            session: Some(session.to_owned()),
+            steps,
+        })
+    }
+
+    /// Queues the verification of the data set; returns the job's number.
+    ///
+    /// # Errors
+    /// [`Refused`] where the program is missing, or the data set is being verified.
+    pub fn verify(&self) -> Result<u64, Refused> {
+        self.queue(PendingWork {
+            session: None,
+            steps: vec![ProcessingStep::Verify],
+        })
+    }
+
+    fn queue(&self, work: PendingWork) -> Result<u64, Refused> {
+        self.shared.look_for_programs();
+        self.shared.submit(work)
+    }
+
+    /// Cancels a job; its program is ended. False where there is none of that number.
+    pub fn cancel(&self, number: u64) -> bool {
+        self.shared.change(|plan| plan.queue.cancel(number))
+    }
+
+    /// Changes the settings.
+    ///
+    /// # Errors
+    /// [`Refused::Invalid`] where the data set cannot have that name.
+    pub fn configure(&self, change: ProcessingChange) -> Result<(), Refused> {
+        let names = change.dataset.as_deref();
+        if names.is_some_and(|name| !is_session_name(name)) {
+            let error = "the data set's name has letters, digits, '-', '_' and '.', and no dot at its beginning: it is a folder beside that of the sessions";
+            return Err(Refused::Invalid(error.to_owned()));
+        }
+        self.shared.look_for_programs();
+        self.shared.change(|plan| {
+            let settings = &mut plan.settings;
+            settings.when_done = change.when_done.unwrap_or(settings.when_done);
+            if let Some(name) = change.dataset {
+                settings.dataset = name;
+            }
+        });
+        Ok(())
+    }
+
+    /// Ends all work on a session, so that its folder can be moved.
+    ///
+    /// # Errors
+    /// [`Refused::Busy`] where a program does not end.
+    pub fn release(&self, session: &str) -> Result<(), Refused> {
+        self.shared.close_editor_of(session);
+        self.shared
+            .change(|plan| plan.queue.cancel_session(session));
+        let until = Instant::now() + RELEASE;
+        while self.shared.plan().queue.has(Some(session)) {
+            if Instant::now() > until {
+                let error = format!("{session} is still being processed: try again in a moment");
+                return Err(Refused::Busy(error));
+            }
+            thread::park_timeout(LOOK);
+        }
+        Ok(())
+    }
+
+    /// Opens the editor of a session's mask, or goes on with the one that is open.
+    ///
+    /// # Errors
+    /// [`Refused`] where the program is missing or fails, the rig is busy, or somebody edits another session.
+    pub fn edit(&self, session: &str) -> Result<(), Refused> {
+        if is_busy(&self.shared.monitor) {
+            return Err(Refused::Busy(HELD.to_owned()));
+        }
+        if self.shared.plan().queue.has(Some(session)) {
+            let error = format!("{session} is being processed: wait for it, or cancel it");
+            return Err(Refused::Busy(error));
+        }
+        self.shared.look_for_programs();
+        let programs = self.shared.plan().programs.clone();
+        let _opening = self.shared.opening.lock();
+        if !self.shared.goes_on(session)? {
+            let folder = self.shared.root.join(session);
+            let is_busy = || is_busy(&self.shared.monitor);
+            let opened = OpenEditor::open(&programs, session, &folder, &is_busy)?;
+            *self.shared.editor() = Some(opened);
+        }
+        self.shared.show();
+        Ok(())
+    }
+
+    /// Where requests for the editor go.
+    ///
+    /// # Errors
+    /// [`Refused`] where none is open, or it is held while the rig is busy.
+    pub fn editor(&self) -> Result<EditorTarget, Refused> {
+        if is_busy(&self.shared.monitor) {
+            return Err(Refused::Unavailable(HELD.to_owned()));
+        }
+        let mut editor = self.shared.editor();
+        let none = || "no mask is open in the editor: open one from the list of sessions";
+        let open = editor.as_mut();
+        let open = open.ok_or_else(|| Refused::Unavailable(none().to_owned()))?;
+        open.touch();
+        Ok(open.target.clone())
+    }
+
+    /// Ends the editor without a mask.
+    pub fn close_editor(&self) {
+        *self.shared.editor() = None;
+        self.shared.show();
+    }
+
+    /// The folder of the data set.
+    #[must_use]
+    pub fn dataset(&self) -> PathBuf {
+        self.shared.dataset(&self.shared.plan().settings)
+    }
+
+    /// Ends the programs, and comes back when that is done. Does nothing the second time.
+    pub fn end(&self) {
+        self.shared.is_ending.store(true, Ordering::Relaxed);
+        let thread = self.thread.lock();
+        let thread = thread.unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(thread) = thread {
+            let _ = thread.join();
+        }
+        *self.shared.editor() = None;
+    }
+}
+
+impl Drop for Processing {
+    fn drop(&mut self) {
+        self.end();
+    }
+}

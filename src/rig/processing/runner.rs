@@ -1,0 +1,188 @@
+//! The thread that has the programs do the work, one after the other, while the rig rests.
+
+use std::fs;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use relit_data::causes::with_causes;
+use relit_data::session::{MANIFEST_FILE, Manifest, Status};
+
+use super::child::Worker;
+use super::commands::StepPlaces;
+use super::heard::Heard;
+use super::queue::{Begun, PendingWork, StepEnd};
+use super::shared::{Shared, is_busy};
+use crate::state::{Monitor, ProcessingOutcome, ProcessingStep, Verdict};
+
+/// Longest time between two looks at the program and the rig.
+const LOOK: Duration = Duration::from_millis(50);
+/// Time between two searches for the programs.
+const SEARCH: Duration = Duration::from_secs(5);
+/// What is done with a usable take by itself.
+const ALL: [ProcessingStep; 3] = [
+    ProcessingStep::Mask,
+    ProcessingStep::Check,
+    ProcessingStep::Extract,
+];
+
+/// The step under way.
+struct Running {
+    begun: Begun,
+    worker: Worker,
+    heard: Heard,
+}
+
+/// Works until the program ends.
+pub(super) fn run(shared: &Shared) {
+    let mut running: Option<Running> = None;
+    let mut last_take = last_take(&shared.monitor).0;
+    let mut searched = Instant::now();
+    let mut seen = 0;
+    while !shared.is_ending.load(Ordering::Relaxed) {
+        seen = shared.monitor.wait_newer(seen, LOOK).version;
+        if searched.elapsed() > SEARCH {
+            searched = Instant::now();
+            shared.look_for_programs();
+            shared.show();
+        }
+        let is_busy = is_busy(&shared.monitor);
+        shared.plan().queue.set_rig_busy(is_busy);
+        look_after_editor(shared, is_busy);
+        take_up_what_was_recorded(shared, &mut last_take);
+        running = match running.take() {
+            Some(running) => go_on(shared, running),
+            None => begin(shared),
+        };
+        shared.show();
+    }
+    // What was under way is still pending on the disk, and begins anew with the next start.
+    drop(running);
+}
+
+fn look_after_editor(shared: &Shared, is_busy: bool) {
+    let mut editor = shared.editor();
+    if let Some(open) = editor.as_mut()
+        && !open.look_after(is_busy)
+    {
+        *editor = None;
+    }
+}
+
+/// The last take's session, and whether it can be used.
+fn last_take(monitor: &Monitor) -> (Option<String>, bool) {
+    let take = monitor.state().last_take;
+    let usable = take.as_ref().map(|take| take.verdict != Verdict::Aborted);
+    (take.map(|take| take.session), usable.unwrap_or(false))
+}
+
+/// Queues a take that has just ended, where that is wanted.
+fn take_up_what_was_recorded(shared: &Shared, seen: &mut Option<String>) {
+    let (session, is_usable) = last_take(&shared.monitor);
+    if session == *seen {
+        return;
+    }
+    seen.clone_from(&session);
+    let is_wanted = is_usable && shared.plan().settings.when_done;
+    let Some(session) = session.filter(|_| is_wanted) else {
+        return;
+    };
+    let steps = {
+        let plan = shared.plan();
+        let can = |step: &ProcessingStep| plan.lacks(*step).is_none();
+        ALL.into_iter().take_while(can).collect::<Vec<_>>()
+    };
+    let session = Some(session);
+    // Without the programs the page shows the commands.
+    if !steps.is_empty()
+        && let Err(refused) = shared.submit(PendingWork { session, steps })
+    {
+        shared
+            .monitor
+            .update(|state| state.note(format!("not processed: {refused}")));
+    }
+}
+
+/// Begins what is next, if the rig leaves time for it.
+fn begin(shared: &Shared) -> Option<Running> {
+    let begun = shared.plan().queue.begin()?;
+    match start(shared, &begun) {
+        Ok(worker) => Some(Running {
+            begun,
+            worker,
+            heard: Heard::default(),
+        }),
+        Err(why) => {
+            finish(
+                shared,
+                &begun,
+                StepEnd {
+                    outcome: ProcessingOutcome::Failed,
+                    what: why,
+                    goes_on: false,
+                },
+            );
+            None
+        }
+    }
+}
+
+fn start(shared: &Shared, begun: &Begun) -> Result<Worker, String> {
+    let session = shared.root.join(begun.session.as_deref().unwrap_or("."));
+    let is_aborted = match &begun.session {
+        Some(id) => is_aborted(&session).map_err(|why| format!("{id}: {why}"))?,
+        None => false,
+    };
+    let (programs, dataset) = {
+        let plan = shared.plan();
+        (plan.programs.clone(), shared.dataset(&plan.settings))
+    };
+    let places = StepPlaces {
+        session,
+        dataset,
+        is_aborted,
+    };
+    let command = programs.command(begun.step, &places);
+    let command = command.ok_or("its program is not installed on this machine")?;
+    let program = command.get_program().to_string_lossy().into_owned();
+    Worker::start(command).map_err(|error| format!("{program} could not be started: {error}"))
+}
+
+fn is_aborted(session: &std::path::Path) -> Result<bool, String> {
+    let bytes = fs::read(session.join(MANIFEST_FILE))
+        .map_err(|error| format!("the session is gone: {error}"))?;
+    let manifest = Manifest::from_json(&bytes).map_err(|error| with_causes(&error))?;
+    Ok(matches!(manifest.status, Status::Aborted(_)))
+}
+
+/// Hears the program, holds or ends it, and notes its end.
+fn go_on(shared: &Shared, mut running: Running) -> Option<Running> {
+    let (holds, is_cancelled) = {
+        let plan = shared.plan();
+        (plan.queue.holds(), plan.queue.is_cancelled())
+    };
+    if is_cancelled {
+        running.worker.end();
+    } else {
+        running.worker.hold(holds);
+    }
+    running.worker.hear(&mut running.heard);
+    if let Some((done, of)) = running.heard.take_progress() {
+        shared.plan().queue.advance(done, of);
+    }
+    let status = match running.worker.ended(&mut running.heard) {
+        Ok(None) => return Some(running),
+        Ok(Some(status)) => status.code(),
+        Err(_) => None,
+    };
+    let complaint = running.worker.complaint();
+    let end = running.heard.end(running.begun.step, status, &complaint);
+    finish(shared, &running.begun, end);
+    None
+}
+
+fn finish(shared: &Shared, begun: &Begun, end: StepEnd) {
+    let of = begun.session.as_deref().unwrap_or("the data set");
+    let line = format!("{of}: {}: {}", begun.step, end.what);
+    shared.change(|plan| plan.queue.finish(end));
+    shared.monitor.update(|state| state.note(line));
+}

@@ -1,0 +1,176 @@
+//! What those who ask for processing and the thread that works share.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::commands::ProcessingPrograms;
+use super::editor::OpenEditor;
+use super::queue::{NotQueued, PendingWork, ProcessingQueue};
+use super::store::{self, KeptProcessing, ProcessingSettings};
+use crate::serve::rig::Refused;
+use crate::state::{Monitor, ProcessingState, ProcessingStep};
+
+/// Where data sets and programs are.
+pub struct ProcessingOptions {
+    /// The folder in which data sets lie; `None`: the one that holds the folder of sessions.
+    pub datasets: Option<PathBuf>,
+    /// Looks for the programs: one that is installed later is found then.
+    pub programs: Box<dyn Fn() -> ProcessingPrograms + Send + Sync>,
+}
+
+impl fmt::Debug for ProcessingOptions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut options = f.debug_struct("ProcessingOptions");
+        options
+            .field("datasets", &self.datasets)
+            .finish_non_exhaustive()
+    }
+}
+
+/// What those who ask and the thread that works share.
+#[derive(Debug)]
+pub(super) struct Shared {
+    pub(super) root: PathBuf,
+    pub(super) datasets: PathBuf,
+    pub(super) options: ProcessingOptions,
+    pub(super) monitor: Monitor,
+    pub(super) plan: Mutex<Plan>,
+    pub(super) editor: Mutex<Option<OpenEditor>>,
+    /// Held by who opens an editor, which takes a while.
+    pub(super) opening: Mutex<()>,
+    pub(super) is_ending: AtomicBool,
+}
+
+#[derive(Debug)]
+pub(super) struct Plan {
+    pub(super) queue: ProcessingQueue,
+    pub(super) settings: ProcessingSettings,
+    pub(super) programs: ProcessingPrograms,
+}
+
+/// What is said of the editor while the rig is busy.
+pub(super) const HELD: &str = "the rig is capturing: the editor goes on when it rests";
+
+/// Whether the rig captures or moves, so that nothing may take its processor or disk.
+pub(super) fn is_busy(monitor: &Monitor) -> bool {
+    let state = monitor.state();
+    !state.rests() || state.table.moves()
+}
+
+impl Shared {
+    pub(super) fn plan(&self) -> MutexGuard<'_, Plan> {
+        self.plan.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn editor(&self) -> MutexGuard<'_, Option<OpenEditor>> {
+        self.editor.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn dataset(&self, settings: &ProcessingSettings) -> PathBuf {
+        self.datasets.join(&settings.dataset)
+    }
+
+    pub(super) fn look_for_programs(&self) {
+        let found = (self.options.programs)();
+        self.plan().programs = found;
+    }
+
+    /// Whether the editor that is open is this session's. One that nobody uses makes room.
+    pub(super) fn goes_on(&self, session: &str) -> Result<bool, Refused> {
+        let mut editor = self.editor();
+        match editor.as_mut() {
+            Some(open) if open.session == session => open.touch(),
+            Some(open) if open.is_in_use() => {
+                let other = &open.session;
+                let error = format!("somebody edits the mask of {other}: finish or close it there");
+                return Err(Refused::Busy(error));
+            }
+            _ => {
+                *editor = None;
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    pub(super) fn close_editor_of(&self, session: &str) {
+        let mut editor = self.editor();
+        if editor.as_ref().is_some_and(|open| open.session == session) {
+            *editor = None;
+        }
+    }
+
+    pub(super) fn submit(&self, work: PendingWork) -> Result<u64, Refused> {
+        self.change(|plan| {
+            let lacks = |step: &ProcessingStep| plan.lacks(*step);
+            if let Some(program) = work.steps.iter().find_map(lacks) {
+                let error = format!("{program} is not installed on this machine: install the package relit, or copy the command");
+                return Err(Refused::Unavailable(error));
+            }
+            plan.queue.submit(work).map_err(|refusal| match refusal {
+                NotQueued::Already(_) | NotQueued::Full => Refused::Busy(refusal.to_string()),
+                NotQueued::Nothing => Refused::Invalid(refusal.to_string()),
+            })
+        })
+    }
+
+    /// Changes the plan, keeps on disk what is to outlast the program, and shows what came of it.
+    pub(super) fn change<T>(&self, change: impl FnOnce(&mut Plan) -> T) -> T {
+        let mut plan = self.plan();
+        let before = (plan.settings.clone(), plan.queue.pending());
+        let done = change(&mut plan);
+        let after = (plan.settings.clone(), plan.queue.pending());
+        if before != after {
+            let (settings, pending) = after;
+            if let Err(error) = KeptProcessing::new(settings, pending).write(&self.root) {
+                let path = store::path(&self.root);
+                self.monitor.update(|state| {
+                    state.note(format!(
+                        "{} could not be written, what is to be processed is forgotten at the next start: {error}",
+                        path.display()
+                    ));
+                });
+            }
+        }
+        drop(plan);
+        self.show();
+        done
+    }
+
+    /// Shows how things stand, where that is new.
+    pub(super) fn show(&self) {
+        let editing = self.editor().as_ref().map(|open| open.session.clone());
+        let shown = {
+            let plan = self.plan();
+            ProcessingState {
+                has_mask_program: plan.programs.mask.is_some(),
+                has_extract_program: plan.programs.extract.is_some(),
+                when_done: plan.settings.when_done,
+                dataset: plan.settings.dataset.clone(),
+                dataset_folder: self.dataset(&plan.settings).display().to_string(),
+                jobs: plan.queue.jobs(),
+                finished: plan.queue.finished(),
+                editing,
+            }
+        };
+        if self.monitor.state().processing != shown {
+            self.monitor.update(|state| state.processing = shown);
+        }
+    }
+}
+
+impl Plan {
+    /// The program that a step needs and that is not installed.
+    pub(super) fn lacks(&self, step: ProcessingStep) -> Option<&'static str> {
+        match step {
+            ProcessingStep::Mask | ProcessingStep::Check => {
+                self.programs.mask.is_none().then_some("relit-mask")
+            }
+            ProcessingStep::Extract | ProcessingStep::Verify => {
+                self.programs.extract.is_none().then_some("relit-extract")
+            }
+        }
+    }
+}

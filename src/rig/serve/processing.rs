@@ -1,0 +1,238 @@
+//! What is made of sessions: the jobs, their settings, and the pages that come out.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::library::Library;
+use super::permits::{Permits, Work};
+use super::rig::Refused;
+use super::snapshots::Snapshots;
+use crate::processing::{Processing, ProcessingChange};
+use crate::state::{ProcessingState, ProcessingStep};
+use relit_web::{Failure, JsonBody, Problem};
+
+/// The pages hold their own style and pictures, no scripts, and load nothing.
+const PAGE_POLICY: &str =
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; sandbox";
+
+/// What works on sessions, where something does.
+pub(super) type MayProcess = Option<Arc<Processing>>;
+
+/// What works on sessions, or that nothing does.
+pub(super) fn present(processing: MayProcess) -> Result<Arc<Processing>, Failure> {
+    processing.ok_or_else(|| {
+        Refused::Unavailable("this server does not process sessions".to_owned()).into()
+    })
+}
+
+/// Steps for a session, in their order.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WantedSteps {
+    /// `mask`, `check`, `extract`, or several of them.
+    steps: Vec<ProcessingStep>,
+}
+
+/// A job that was queued.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct QueuedJob {
+    /// Its number.
+    number: u64,
+}
+
+/// What is changed of the settings; what is left out stays.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ProcessingSettingsChange {
+    /// Whether each usable take is masked, checked and extracted once the rig rests.
+    when_done: Option<bool>,
+    /// The data set's name: a folder beside that of the sessions.
+    dataset: Option<String>,
+}
+
+/// Process a session
+///
+/// Queues steps, which are done one after the other at the lowest priority, and only while the rig rests. What
+/// comes of them shows in the state (`processing`) and in the session's `results`. A check that does not fit
+/// ends the steps of its session.
+#[utoipa::path(
+    post, path = "/api/v1/sessions/{id}/process", tag = "processing", request_body = WantedSteps,
+    params(("id" = String, Path, description = "The session's name")),
+    responses(
+        (status = 202, description = "Queued", body = QueuedJob),
+        (status = 400, description = "Not understood", body = Problem),
+        (status = 401, body = Problem),
+        (status = 404, description = "No such session", body = Problem),
+        (status = 409, description = "It is being recorded or processed", body = Problem),
+        (status = 415, description = "Not JSON", body = Problem),
+        (status = 422, description = "No step is named", body = Problem),
+        (status = 503, description = "A program is not installed", body = Problem),
+    )
+)]
+pub(super) async fn process(
+    State(library): State<Arc<Library>>,
+    State(processing): State<MayProcess>,
+    State(permits): State<Arc<Permits>>,
+    Path(id): Path<String>,
+    JsonBody(WantedSteps { steps }): JsonBody<WantedSteps>,
+) -> Result<Response, Failure> {
+    let processing = present(processing)?;
+    let queued = permits.run(Work::Command, move || {
+        library.ended(&id)?;
+        if steps.contains(&ProcessingStep::Verify) {
+            let error = "a session is not verified by itself: verify the data set";
+            return Err(Refused::Invalid(error.to_owned()).into());
+        }
+        Ok(processing.submit(&id, steps)?)
+    });
+    let number = queued.await?;
+    Ok((StatusCode::ACCEPTED, Json(QueuedJob { number })).into_response())
+}
+
+/// Verify the data set
+///
+/// Queues a job that reads every file of it back.
+#[utoipa::path(
+    post, path = "/api/v1/processing/verify", tag = "processing",
+    responses(
+        (status = 202, description = "Queued", body = QueuedJob),
+        (status = 401, body = Problem),
+        (status = 409, description = "It is being verified", body = Problem),
+        (status = 503, description = "The program is not installed", body = Problem),
+    )
+)]
+pub(super) async fn verify(
+    State(processing): State<MayProcess>,
+    State(permits): State<Arc<Permits>>,
+) -> Result<Response, Failure> {
+    let processing = present(processing)?;
+    let number = permits
+        .run(Work::Command, move || Ok(processing.verify()?))
+        .await?;
+    Ok((StatusCode::ACCEPTED, Json(QueuedJob { number })).into_response())
+}
+
+/// Cancel a job
+///
+/// Its program is ended; what follows in its session is not begun.
+#[utoipa::path(
+    delete, path = "/api/v1/processing/jobs/{number}", tag = "processing",
+    params(("number" = u64, Path, description = "The job's number")),
+    responses(
+        (status = 204, description = "Done"),
+        (status = 401, body = Problem),
+        (status = 404, description = "No such job waits or is under way", body = Problem),
+    )
+)]
+pub(super) async fn cancel(
+    State(processing): State<MayProcess>,
+    State(permits): State<Arc<Permits>>,
+    Path(number): Path<String>,
+) -> Result<StatusCode, Failure> {
+    let none = || Failure::not_found("no job of that number waits or is under way");
+    let number: u64 = number.parse().map_err(|_| none())?;
+    let processing = present(processing)?;
+    let cancelled = permits.run(Work::Command, move || Ok(processing.cancel(number)));
+    match cancelled.await? {
+        true => Ok(StatusCode::NO_CONTENT),
+        false => Err(none()),
+    }
+}
+
+/// Jobs, programs and settings
+#[utoipa::path(
+    get, path = "/api/v1/processing", tag = "processing",
+    responses((status = 200, body = ProcessingState), (status = 401, body = Problem))
+)]
+pub(super) async fn state(State(snapshots): State<Snapshots>) -> Json<ProcessingState> {
+    snapshots.refresh();
+    Json(snapshots.newest().state.processing.clone())
+}
+
+/// Change how sessions are processed
+///
+/// The settings are kept on the disk.
+#[utoipa::path(
+    put, path = "/api/v1/processing", tag = "processing", request_body = ProcessingSettingsChange,
+    responses(
+        (status = 200, body = ProcessingState),
+        (status = 400, description = "Not understood", body = Problem),
+        (status = 401, body = Problem),
+        (status = 415, description = "Not JSON", body = Problem),
+        (status = 422, description = "A data set cannot have that name", body = Problem),
+        (status = 503, description = "Sessions are not processed here", body = Problem),
+    )
+)]
+pub(super) async fn configure(
+    State(processing): State<MayProcess>,
+    State(snapshots): State<Snapshots>,
+    State(permits): State<Arc<Permits>>,
+    JsonBody(change): JsonBody<ProcessingSettingsChange>,
+) -> Result<Json<ProcessingState>, Failure> {
+    let processing = present(processing)?;
+    let change = ProcessingChange {
+        when_done: change.when_done,
+        dataset: change.dataset,
+    };
+    let changed = permits.run(Work::Command, move || Ok(processing.configure(change)?));
+    changed.await?;
+    Ok(state(State(snapshots)).await)
+}
+
+/// The page about the check of a session's mask
+#[utoipa::path(
+    get, path = "/api/v1/sessions/{id}/check.html", tag = "processing",
+    params(("id" = String, Path, description = "The session's name")),
+    responses(
+        (status = 200, description = "A page without scripts", content_type = "text/html"),
+        (status = 401, body = Problem),
+        (status = 404, description = "No such session, or its mask was not checked", body = Problem),
+    )
+)]
+pub(super) async fn check_page(
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
+    Path(id): Path<String>,
+) -> Result<Response, Failure> {
+    let page = permits.run(Work::Listing, move || library.check_page(&id));
+    Ok(html(page.await?))
+}
+
+/// The page about a session in the data set
+#[utoipa::path(
+    get, path = "/api/v1/sessions/{id}/report.html", tag = "processing",
+    params(("id" = String, Path, description = "The session's name")),
+    responses(
+        (status = 200, description = "A page without scripts", content_type = "text/html"),
+        (status = 401, body = Problem),
+        (status = 404, description = "No such session, or it was not extracted", body = Problem),
+    )
+)]
+pub(super) async fn report_page(
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
+    Path(id): Path<String>,
+) -> Result<Response, Failure> {
+    let page = permits.run(Work::Listing, move || library.report_page(&id));
+    Ok(html(page.await?))
+}
+
+fn html(page: Vec<u8>) -> Response {
+    let headers: [(HeaderName, HeaderValue); 2] = [
+        (
+            header::CONTENT_TYPE,
+            HeaderValue::from_static("text/html; charset=utf-8"),
+        ),
+        (
+            header::CONTENT_SECURITY_POLICY,
+            HeaderValue::from_static(PAGE_POLICY),
+        ),
+    ];
+    (headers, page).into_response()
+}

@@ -1,0 +1,289 @@
+//! What was made of a session, as the programs left it: the mask with its record, the check of it, and the session's
+//! entry in the data set. Nothing of this is kept anywhere else.
+
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use relit_data::session::MASK_FILE;
+use relit_data::shard::{Dataset, QualityVerdict};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::cache::Cache;
+use super::version::FileVersion;
+
+/// The record of a mask, and of its check, in a session's folder.
+const RECORD_FILE: &str = "mask.json";
+const CHECK_FILE: &str = "mask-check.json";
+/// The page about a check.
+pub(super) const CHECK_PAGE: &str = "mask-check.html";
+/// Results that are kept in memory.
+const KEPT: usize = 4096;
+/// Descriptions of data sets that are kept in memory.
+const DATASETS: usize = 2;
+
+/// How far a session has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum SessionStage {
+    /// There is its recording.
+    Recorded,
+    /// It has a mask.
+    Masked,
+    /// The mask was held against all frames.
+    Checked,
+    /// It is in the data set, with the mask as it is now.
+    Extracted,
+}
+
+/// How a mask came to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum MaskOrigin {
+    /// By the turn alone.
+    Turn,
+    /// By a rectangle, seeds or strokes.
+    Hints,
+    /// By another program, or changed since it was made.
+    Hand,
+}
+
+/// A session's mask.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub(super) struct MaskState {
+    /// How it came to be.
+    pub(super) origin: MaskOrigin,
+    /// What its maker warned of.
+    pub(super) warnings: Vec<String>,
+}
+
+/// What `relit-mask check` found.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub(super) struct CheckState {
+    /// `fits`, `drifts`, `wrong`, `unknown`.
+    pub(super) verdict: String,
+    /// Why it does not fit.
+    pub(super) reasons: Vec<String>,
+    /// Whether the mask is still the one that was checked.
+    pub(super) is_current: bool,
+}
+
+/// What `relit-extract` made.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub(super) struct ExtractionState {
+    /// `good`, `usable`, `broken`, or `not judged`.
+    pub(super) verdict: String,
+    /// Why it is not good, and what else to know.
+    pub(super) reasons: Vec<String>,
+    /// Samples in the data set.
+    pub(super) samples: u32,
+    /// Whether something of the recording was lost.
+    pub(super) is_lossy: bool,
+    /// Whether the mask is still the one that it was extracted with.
+    pub(super) is_current: bool,
+}
+
+/// What was made of a session.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub(super) struct SessionResults {
+    /// How far it has come.
+    pub(super) stage: SessionStage,
+    /// True where a person has to look; false where all that was made is good; `null` where nothing was.
+    pub(super) is_doubtful: Option<bool>,
+    /// Its mask.
+    pub(super) mask: Option<MaskState>,
+    /// The check of the mask.
+    pub(super) check: Option<CheckState>,
+    /// Its entry in the data set.
+    pub(super) extraction: Option<ExtractionState>,
+}
+
+/// The mask's record, as far as it is needed.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct MaskRecordLine {
+    warnings: Vec<String>,
+    hints: HintsLine,
+    result: ResultLine,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct HintsLine {
+    rect: serde_json::Value,
+    seeds: serde_json::Value,
+    strokes: serde_json::Value,
+    turn_frames: Vec<u64>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct ResultLine {
+    mask_blake3: String,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct CheckLine {
+    verdict: String,
+    reasons: Vec<String>,
+    mask_blake3: String,
+}
+
+/// A session's entry, and the hash of the mask that it was made with.
+type Entry = (ExtractionState, String);
+
+/// What differs between one state of a session's results and another.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct ResultsKey {
+    folder: PathBuf,
+    files: [Option<FileVersion>; 3],
+    dataset: Option<(PathBuf, FileVersion)>,
+}
+
+/// Reads results, and remembers them.
+#[derive(Debug)]
+pub(super) struct ResultsReader {
+    results: Cache<ResultsKey, SessionResults>,
+    datasets: Cache<(PathBuf, FileVersion), Arc<BTreeMap<String, Entry>>>,
+}
+
+impl std::fmt::Debug for ResultsKey {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("ResultsKey").field(&self.folder).finish()
+    }
+}
+
+impl ResultsReader {
+    pub(super) fn new() -> Self {
+        Self {
+            results: Cache::new(KEPT),
+            datasets: Cache::new(DATASETS),
+        }
+    }
+
+    /// What was made of the session `id` in `folder`, with the data set in `dataset`.
+    pub(super) fn of(&self, id: &str, folder: &Path, dataset: Option<&Path>) -> SessionResults {
+        let of = |name: &str| FileVersion::of(&folder.join(name));
+        let described = dataset.and_then(|dataset| {
+            let version = FileVersion::of(&dataset.join(Dataset::FILE))?;
+            Some((dataset.to_owned(), version))
+        });
+        let key = ResultsKey {
+            folder: folder.to_owned(),
+            files: [of(MASK_FILE), of(RECORD_FILE), of(CHECK_FILE)],
+            dataset: described.clone(),
+        };
+        let made = self.results.get_or_make(key, |_| {
+            let entry = described.and_then(|key| self.entries(key).get(id).cloned());
+            Ok::<_, Infallible>(read(folder, entry))
+        });
+        made.unwrap_or_else(|never| match never {})
+    }
+
+    fn entries(&self, key: (PathBuf, FileVersion)) -> Arc<BTreeMap<String, Entry>> {
+        let read = self.datasets.get_or_make(key, |(dataset, _)| {
+            // A description that cannot be read tells of no session; `relit-extract` says what is wrong with it.
+            let read = Dataset::read(dataset).map(|dataset| Arc::new(entries_of(&dataset)));
+            Ok::<_, Infallible>(read.unwrap_or_default())
+        });
+        read.unwrap_or_else(|never| match never {})
+    }
+}
+
+fn entries_of(dataset: &Dataset) -> BTreeMap<String, Entry> {
+    let entries = dataset.sessions.iter().map(|session| {
+        let quality = session.quality.as_ref();
+        let verdict = quality.map_or(QualityVerdict::NONE.to_owned(), |quality| {
+            quality.verdict.to_string()
+        });
+        let mut reasons = quality.map_or(Vec::new(), |quality| quality.reasons.clone());
+        reasons.extend(session.warnings.iter().cloned());
+        let state = ExtractionState {
+            verdict,
+            reasons,
+            samples: session.samples,
+            is_lossy: session.lossy,
+            is_current: false,
+        };
+        (session.id.clone(), (state, session.mask.blake3.to_string()))
+    });
+    entries.collect()
+}
+
+fn read(folder: &Path, entry: Option<Entry>) -> SessionResults {
+    let png = fs::read(folder.join(MASK_FILE)).ok();
+    let hash = png.map(|png| blake3::hash(&png).to_hex().to_string());
+    let is_same = |made: &str| hash.as_deref() == Some(made);
+    let mask = hash.as_ref().map(|_| {
+        let record: Option<MaskRecordLine> = json(&folder.join(RECORD_FILE));
+        mask_state(record.filter(|record| is_same(&record.result.mask_blake3)))
+    });
+    let check = json(&folder.join(CHECK_FILE)).map(|check: CheckLine| CheckState {
+        is_current: is_same(&check.mask_blake3),
+        verdict: check.verdict,
+        reasons: check.reasons,
+    });
+    let extraction = entry.map(|(state, made_with)| ExtractionState {
+        is_current: is_same(&made_with),
+        ..state
+    });
+    let mut results = SessionResults {
+        stage: SessionStage::Recorded,
+        is_doubtful: None,
+        mask,
+        check,
+        extraction,
+    };
+    (results.stage, results.is_doubtful) = judged(&results);
+    results
+}
+
+fn mask_state(record: Option<MaskRecordLine>) -> MaskState {
+    let Some(record) = record else {
+        return MaskState {
+            origin: MaskOrigin::Hand,
+            warnings: Vec::new(),
+        };
+    };
+    let hints = &record.hints;
+    let given = |value: &serde_json::Value| match value {
+        serde_json::Value::Null => false,
+        serde_json::Value::Array(items) => !items.is_empty(),
+        _ => true,
+    };
+    let is_hinted = given(&hints.rect) || given(&hints.seeds) || given(&hints.strokes);
+    MaskState {
+        origin: match is_hinted || hints.turn_frames.is_empty() {
+            true => MaskOrigin::Hints,
+            false => MaskOrigin::Turn,
+        },
+        warnings: record.warnings,
+    }
+}
+
+/// How far the session has come, and whether a person has to look. What was made of an earlier mask does not count.
+fn judged(results: &SessionResults) -> (SessionStage, Option<bool>) {
+    let Some(mask) = &results.mask else {
+        return (SessionStage::Recorded, None);
+    };
+    let check = results.check.as_ref().filter(|check| check.is_current);
+    let wrong = check.is_some_and(|check| !matches!(&*check.verdict, "fits" | "drifts"));
+    let extraction = results.extraction.as_ref();
+    match (extraction.filter(|made| made.is_current), check) {
+        (Some(made), _) => {
+            let doubtful = made.verdict != QualityVerdict::Good.to_string() || made.is_lossy;
+            (SessionStage::Extracted, Some(doubtful || wrong))
+        }
+        (None, Some(check)) => (SessionStage::Checked, Some(check.verdict != "fits")),
+        (None, None) => (SessionStage::Masked, Some(!mask.warnings.is_empty())),
+    }
+}
+
+/// The content of a JSON file; `None` where there is none, or it is something else.
+fn json<T: for<'a> Deserialize<'a>>(path: &Path) -> Option<T> {
+    serde_json::from_slice(&fs::read(path).ok()?).ok()
+}

@@ -1,0 +1,527 @@
+//! Sessions processed by programs that only pretend: scripts that the tests write.
+
+use std::fs;
+use std::io::{Read, Write};
+use std::net::TcpListener;
+use std::path::Path;
+use std::sync::{Arc, mpsc};
+use std::thread;
+
+use serde_json::{Value, json};
+
+use super::{Fake, Serving, wait_until};
+use crate::processing::{Processing, ProcessingOptions, ProcessingPrograms};
+use crate::state::{Phase, TakeSummary, Verdict};
+
+const COW: &str = "20261120T101500Z-cow-short";
+const BUST: &str = "20261120T102000Z-bust-short";
+/// A mask that fits, and an extraction: what the programs leave and say.
+const MASK: &str = r#"printf png > "$1/mask.png"; echo '{"event":"mask"}'"#;
+const FITS: &str = r#"echo '{"event":"check","report":{"verdict":"fits","reasons":[]}}'"#;
+const GOOD: &str = r#"echo '{"event":"extracted","session":{"samples":1500,"quality":{"verdict":"good","reasons":[]}}}'"#;
+/// Waits until the file `go` appears beside the script. It starts no other program meanwhile: a shell that is held
+/// while it does so waits for that program, and does not count as stopped.
+const WAIT: &str = r#"echo $$ > "$here/pid"; while [ ! -e "$here/go" ]; do :; done"#;
+
+/// Scripts in place of the programs; `None` leaves one out. `relit-mask check` is one of its own here.
+#[derive(Clone, Copy)]
+struct Scripts<'a> {
+    mask: Option<&'a str>,
+    check: &'a str,
+    extract: Option<&'a str>,
+}
+
+const ALL_WELL: Scripts<'_> = Scripts {
+    mask: Some(MASK),
+    check: FITS,
+    extract: Some(GOOD),
+};
+
+fn written(folder: &Path, scripts: Scripts<'_>) -> ProcessingPrograms {
+    let script = |name: &str, body: &str| {
+        let path = folder.join(name);
+        let here = folder.display();
+        let log = format!("echo \"{name} $*\" >> '{here}/log'");
+        fs::write(&path, format!("here='{here}'\n{log}\n{body}\n")).unwrap();
+        path
+    };
+    let mask = scripts.mask.map(|mask| {
+        let check = scripts.check;
+        script(
+            "relit-mask",
+            &format!("if [ \"$1\" = check ]; then shift; {check}; else {mask}; fi"),
+        )
+    });
+    ProcessingPrograms {
+        mask,
+        extract: scripts.extract.map(|body| script("relit-extract", body)),
+        launcher: vec!["sh".into()],
+    }
+}
+
+fn start(rig: &Fake, programs: &ProcessingPrograms) -> Arc<Processing> {
+    let programs = programs.clone();
+    let options = ProcessingOptions {
+        datasets: None,
+        programs: Box::new(move || programs.clone()),
+    };
+    Arc::new(Processing::start(&rig.root, rig.monitor.clone(), options).unwrap())
+}
+
+/// A server that processes sessions by scripts in a folder.
+fn serving(folder: &Path, scripts: Scripts<'_>) -> Serving {
+    let programs = written(folder, scripts);
+    let serving = Serving::beside(|options, rig| options.processing = Some(start(rig, &programs)));
+    serving.hold(&[COW, BUST]);
+    serving
+}
+
+fn process(serving: &Serving, session: &str, steps: &[&str]) -> super::Answer {
+    let body = json!({ "steps": steps }).to_string();
+    let headers = ["Content-Type: application/json"];
+    let path = format!("/api/v1/sessions/{session}/process");
+    serving.ask("POST", &path, &headers, body.as_bytes())
+}
+
+fn set(serving: &Serving, settings: &Value) -> super::Answer {
+    let headers = ["Content-Type: application/json"];
+    let body = settings.to_string();
+    serving.ask("PUT", "/api/v1/processing", &headers, body.as_bytes())
+}
+
+fn state(serving: &Serving) -> Value {
+    serving.get("/api/v1/processing").json()
+}
+
+/// Steps that ended, with how.
+fn finished(serving: &Serving) -> Vec<(String, String)> {
+    let state = state(serving);
+    let jobs = state["finished"].as_array().unwrap().iter();
+    let text = |value: &Value| value.as_str().unwrap().to_owned();
+    jobs.map(|job| (text(&job["step"]), text(&job["outcome"])))
+        .collect()
+}
+
+fn wait_finished(serving: &Serving, steps: usize) -> Vec<(String, String)> {
+    wait_until("the steps ended", || finished(serving).len() >= steps);
+    finished(serving)
+}
+
+fn steps(wanted: &[(&str, &str)]) -> Vec<(String, String)> {
+    let owned = wanted.iter();
+    owned
+        .map(|(step, end)| ((*step).to_owned(), (*end).to_owned()))
+        .collect()
+}
+
+/// The state of a process as the kernel calls it: `T` is stopped.
+fn state_of(folder: &Path) -> Option<String> {
+    let pid = fs::read_to_string(folder.join("pid")).ok()?;
+    let stat = fs::read_to_string(format!("/proc/{}/stat", pid.trim())).ok()?;
+    stat.rsplit(") ").next()?.chars().next().map(String::from)
+}
+
+#[test]
+fn a_session_goes_through_mask_check_and_extraction_by_the_programs() {
+    let folder = tempfile::tempdir().unwrap();
+    let serving = serving(folder.path(), ALL_WELL);
+    let answer = process(&serving, COW, &["mask", "check", "extract"]);
+    assert_eq!(answer.status, 202);
+    assert_eq!(
+        wait_finished(&serving, 3),
+        steps(&[("mask", "good"), ("check", "good"), ("extract", "good")])
+    );
+    let listed = serving.get("/api/v1/sessions").json();
+    assert_eq!(listed[1]["results"]["stage"], "masked", "{listed}");
+    assert_eq!(listed[1]["results"]["mask"]["origin"], "hand");
+    assert_eq!(listed[0]["results"]["stage"], "recorded");
+    let log = fs::read_to_string(folder.path().join("log")).unwrap();
+    let root = serving.root.path().canonicalize().unwrap();
+    let session = root.join(COW).display().to_string();
+    let dataset = root.with_file_name("dataset").display().to_string();
+    let wanted = [
+        format!("relit-mask {session} --auto --json"),
+        format!("relit-mask check {session} --progress --json"),
+        format!("relit-extract {session} -o {dataset} --resume --progress --json"),
+    ];
+    assert_eq!(log.lines().collect::<Vec<_>>(), wanted);
+}
+
+#[test]
+fn what_a_program_says_of_its_progress_is_shown_and_a_cancel_ends_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let progress = r#"echo '{"event":"progress","done":30,"of":120}'"#;
+    let extract = format!("{progress}; {WAIT}");
+    let scripts = Scripts {
+        extract: Some(&extract),
+        ..ALL_WELL
+    };
+    let serving = serving(folder.path(), scripts);
+    let number = process(&serving, COW, &["extract"]).json()["number"].clone();
+    let waiting = process(&serving, BUST, &["extract"]).json()["number"].clone();
+    wait_until("it has come so far", || {
+        let job = &state(&serving)["jobs"][0];
+        job["status"] == "running" && job["done"] == 30 && job["of"] == 120
+    });
+    assert_eq!(process(&serving, COW, &["mask"]).status, 409);
+    let path = |number: &Value| format!("/api/v1/processing/jobs/{number}");
+    for number in [&waiting, &number] {
+        assert_eq!(serving.ask("DELETE", &path(number), &[], b"").status, 204);
+    }
+    wait_finished(&serving, 2);
+    assert_eq!(
+        finished(&serving),
+        steps(&[("extract", "cancelled"), ("extract", "cancelled")])
+    );
+    assert_eq!(state_of(folder.path()), None, "the program has ended");
+    assert_eq!(serving.ask("DELETE", &path(&number), &[], b"").status, 404);
+}
+
+#[test]
+fn a_program_is_held_while_the_rig_captures_and_goes_on_afterwards() {
+    let folder = tempfile::tempdir().unwrap();
+    let extract = format!("{WAIT}; {GOOD}");
+    let scripts = Scripts {
+        extract: Some(&extract),
+        ..ALL_WELL
+    };
+    let serving = serving(folder.path(), scripts);
+    process(&serving, COW, &["extract"]);
+    wait_until("it runs", || {
+        state_of(folder.path()).is_some_and(|state| state != "T")
+    });
+    let phase = |phase| serving.rig.monitor.update(|state| state.phase = phase);
+    phase(Phase::Preflight);
+    wait_until("it is held", || {
+        state_of(folder.path()).as_deref() == Some("T")
+    });
+    wait_until("that is shown", || {
+        state(&serving)["jobs"][0]["status"] == "held"
+    });
+    process(&serving, BUST, &["mask"]);
+    fs::write(folder.path().join("go"), "").unwrap();
+    phase(Phase::Recording);
+    serving.rig.monitor.update(|state| state.frames += 1);
+    assert_eq!(finished(&serving), []);
+    // The table moves by itself, too: after the take, or by a person's hand.
+    serving.rig.monitor.update(|state| {
+        state.phase = Phase::Idle;
+        state.table.state = "Home".to_owned();
+    });
+    wait_until("the state was seen", || {
+        state(&serving)["jobs"][0]["status"] == "held"
+    });
+    serving
+        .rig
+        .monitor
+        .update(|state| state.table.state = "Idle".to_owned());
+    assert_eq!(
+        wait_finished(&serving, 2),
+        steps(&[("extract", "good"), ("mask", "good")])
+    );
+}
+
+#[test]
+fn a_cancel_reaches_a_program_that_is_held() {
+    let folder = tempfile::tempdir().unwrap();
+    let scripts = Scripts {
+        extract: Some(WAIT),
+        ..ALL_WELL
+    };
+    let serving = serving(folder.path(), scripts);
+    let number = process(&serving, COW, &["extract"]).json()["number"].clone();
+    wait_until("it runs", || state_of(folder.path()).is_some());
+    serving
+        .rig
+        .monitor
+        .update(|state| state.phase = Phase::Recording);
+    wait_until("it is held", || {
+        state_of(folder.path()).as_deref() == Some("T")
+    });
+    let path = format!("/api/v1/processing/jobs/{number}");
+    serving.ask("DELETE", &path, &[], b"");
+    assert_eq!(
+        wait_finished(&serving, 1),
+        steps(&[("extract", "cancelled")])
+    );
+}
+
+#[test]
+fn what_goes_wrong_is_told_in_the_programs_own_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let scripts = Scripts {
+        mask: Some(r#"echo '{"event":"error","message":"no object was found"}'; exit 1"#),
+        extract: Some("echo 'error: the disk is full' >&2; exit 1"),
+        ..ALL_WELL
+    };
+    let serving = serving(folder.path(), scripts);
+    process(&serving, COW, &["mask", "check", "extract"]);
+    process(&serving, BUST, &["extract"]);
+    assert_eq!(
+        wait_finished(&serving, 2),
+        steps(&[("mask", "failed"), ("extract", "failed")])
+    );
+    let state = state(&serving);
+    assert_eq!(state["finished"][0]["what"], "no object was found");
+    assert_eq!(state["finished"][1]["what"], "the disk is full");
+    assert_eq!(state["jobs"], json!([]));
+}
+
+#[test]
+fn a_mask_that_is_wrong_is_not_extracted_before_a_person_has_looked() {
+    let folder = tempfile::tempdir().unwrap();
+    let scripts = Scripts {
+        check: r#"echo '{"event":"check","report":{"verdict":"wrong","reasons":["a hole"]}}'; exit 1"#,
+        ..ALL_WELL
+    };
+    let serving = serving(folder.path(), scripts);
+    process(&serving, COW, &["check", "extract"]);
+    process(&serving, BUST, &["mask"]);
+    assert_eq!(
+        wait_finished(&serving, 2),
+        steps(&[("check", "doubtful"), ("mask", "good")])
+    );
+    assert_eq!(state(&serving)["finished"][0]["what"], "wrong: a hole");
+}
+
+#[test]
+fn where_a_program_is_missing_the_command_is_shown_and_nothing_is_queued() {
+    let folder = tempfile::tempdir().unwrap();
+    let scripts = Scripts {
+        mask: None,
+        extract: None,
+        ..ALL_WELL
+    };
+    let serving = serving(folder.path(), scripts);
+    for steps in [&["mask"][..], &["extract"], &["mask", "extract"]] {
+        let refused = process(&serving, COW, steps);
+        assert_eq!(refused.status, 503);
+        assert!(refused.error().contains("install the package relit"));
+    }
+    let verify = serving.ask("POST", "/api/v1/processing/verify", &[], b"");
+    assert_eq!(verify.status, 503);
+    let edit = format!("/api/v1/sessions/{COW}/edit");
+    assert_eq!(serving.ask("POST", &edit, &[], b"").status, 503);
+    let detail = serving.get(&format!("/api/v1/sessions/{COW}")).json();
+    let mask = detail["commands"]["mask"].as_str().unwrap();
+    assert!(mask.starts_with("relit-mask /") && mask.ends_with("--auto"));
+    let extract = detail["commands"]["extract"].as_str().unwrap();
+    assert!(extract.ends_with("/dataset"), "{extract}");
+    assert_eq!(state(&serving)["has_mask_program"], json!(false));
+}
+
+#[test]
+fn settings_and_what_is_not_done_outlast_a_restart() {
+    let folder = tempfile::tempdir().unwrap();
+    let slow = format!("{WAIT}; {MASK}");
+    let scripts = Scripts {
+        mask: Some(&slow),
+        ..ALL_WELL
+    };
+    let programs = written(folder.path(), scripts);
+    let mut serving = serving(folder.path(), scripts);
+    let settings = json!({ "when_done": true, "dataset": "mugs" });
+    assert_eq!(set(&serving, &settings).status, 200);
+    process(&serving, COW, &["mask", "check"]);
+    process(&serving, BUST, &["extract"]);
+    wait_until("it runs", || state_of(folder.path()).is_some());
+    serving.stop();
+    wait_until("the program has ended", || {
+        state_of(folder.path()).is_none()
+    });
+    fs::write(folder.path().join("go"), "").unwrap();
+    let again = start(&serving.rig, &programs);
+    let ended = || serving.rig.monitor.state().processing.finished;
+    wait_until("all was done", || ended().len() == 3);
+    let of = |at: usize| ended()[at].session.clone().unwrap();
+    assert_eq!((of(0), of(1), of(2)), (COW.into(), COW.into(), BUST.into()));
+    let state = serving.rig.monitor.state().processing;
+    assert!(state.when_done && state.dataset_folder.ends_with("/mugs"));
+    drop(again);
+    let third = start(&serving.rig, &programs);
+    assert!(serving.rig.monitor.state().processing.jobs.is_empty());
+    drop(third);
+}
+
+#[test]
+fn a_usable_take_is_processed_by_itself_where_that_is_set_and_another_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let serving = serving(folder.path(), ALL_WELL);
+    let take = |session: &str, verdict| {
+        serving.rig.monitor.update(|state| {
+            state.last_take = Some(TakeSummary {
+                session: session.to_owned(),
+                verdict,
+                frames: 1500,
+                dropped: 0,
+                reason: None,
+            });
+        });
+    };
+    assert_eq!(set(&serving, &json!({ "when_done": true })).status, 200);
+    take(COW, Verdict::Aborted);
+    take(BUST, Verdict::Tolerated);
+    let ended = wait_finished(&serving, 3);
+    assert_eq!(
+        ended,
+        steps(&[("mask", "good"), ("check", "good"), ("extract", "good")])
+    );
+    let first = &state(&serving)["finished"][0];
+    assert_eq!(first["session"], BUST);
+}
+
+#[test]
+fn a_data_set_is_a_name_and_leads_nowhere_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let serving = serving(folder.path(), ALL_WELL);
+    for name in ["../x", "/etc", "a/b", "", ".hidden", ".."] {
+        let refused = set(&serving, &json!({ "dataset": name }));
+        assert_eq!(refused.status, 422, "{name}");
+    }
+    assert_eq!(set(&serving, &json!({ "other": 1 })).status, 400);
+    let page = |name: &str| {
+        serving
+            .get(&format!("/api/v1/sessions/{COW}/{name}"))
+            .status
+    };
+    assert_eq!((page("report.html"), page("check.html")), (404, 404));
+    let dataset = serving.root.path().with_file_name("dataset-of-test");
+    assert_eq!(
+        set(&serving, &json!({ "dataset": "dataset-of-test" })).status,
+        200
+    );
+    fs::create_dir_all(&dataset).unwrap();
+    fs::write(dataset.join(format!("{COW}.html")), "<p>fine").unwrap();
+    let report = serving.get(&format!("/api/v1/sessions/{COW}/report.html"));
+    fs::remove_dir_all(&dataset).unwrap();
+    assert_eq!(report.body, b"<p>fine");
+    let policy = report.header("content-security-policy").unwrap();
+    assert!(policy.contains("sandbox") && policy.contains("default-src 'none'"));
+}
+
+#[test]
+fn a_session_that_is_put_away_is_no_longer_worked_on_and_its_trash_outlasts_a_reload() {
+    let folder = tempfile::tempdir().unwrap();
+    let scripts = Scripts {
+        extract: Some(WAIT),
+        ..ALL_WELL
+    };
+    let serving = serving(folder.path(), scripts);
+    assert_eq!(serving.get("/api/v1/trash").json(), json!([]));
+    process(&serving, COW, &["extract"]);
+    wait_until("it runs", || state_of(folder.path()).is_some());
+    let path = format!("/api/v1/sessions/{COW}");
+    assert_eq!(serving.ask("DELETE", &path, &[], b"").status, 204);
+    assert_eq!(state_of(folder.path()), None);
+    let trash = serving.get("/api/v1/trash").json();
+    assert_eq!(trash[0]["id"], COW);
+    let restore = format!("{path}/restore");
+    assert_eq!(serving.ask("POST", &restore, &[], b"").status, 204);
+    assert_eq!(serving.get("/api/v1/trash").json(), json!([]));
+    assert_eq!(serving.get(&path).status, 200);
+}
+
+/// What a request asked of an editor, which answers it.
+fn pretend_editor() -> (u16, mpsc::Receiver<String>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let (tell, told) = mpsc::sync_channel(8);
+    thread::spawn(move || {
+        for socket in listener.incoming() {
+            let mut socket = socket.unwrap();
+            let mut text = vec![0; 4096];
+            let read = socket.read(&mut text).unwrap();
+            let body = "cut";
+            let answer = format!(
+                "HTTP/1.1 200 OK\r\nContent-Type: text/plain\r\nSet-Cookie: a=b\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{body}",
+                body.len()
+            );
+            socket.write_all(answer.as_bytes()).unwrap();
+            let text = String::from_utf8_lossy(&text[..read]).into_owned();
+            if tell.send(text).is_err() {
+                return;
+            }
+        }
+    });
+    (port, told)
+}
+
+#[test]
+fn the_editor_is_reached_through_the_rig_by_those_whom_the_rig_lets_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let (port, told) = pretend_editor();
+    let editor = format!(
+        "echo '{{\"event\":\"editor\",\"address\":\"127.0.0.1:{port}\",\"url\":\"http://127.0.0.1:{port}/?token=secret\"}}'; {WAIT}"
+    );
+    let scripts = Scripts {
+        mask: Some(&editor),
+        ..ALL_WELL
+    };
+    let serving = serving(folder.path(), scripts);
+    assert_eq!(serving.get("/edit/").status, 503, "nothing is open");
+    let edit = |session: &str| {
+        let path = format!("/api/v1/sessions/{session}/edit");
+        serving.ask("POST", &path, &[], b"")
+    };
+    let opened = edit(COW);
+    assert_eq!(opened.json()["path"], "/edit/");
+    assert_eq!(edit(COW).status, 200, "it goes on");
+    assert_eq!(edit(BUST).status, 409, "one at a time");
+    assert_eq!(state(&serving)["editing"], COW);
+    let headers = ["Content-Type: application/json", "Cookie: relit-1=outer"];
+    let answer = serving.ask("POST", "/edit/api/v1/mask?draft=true", &headers, b"{}");
+    assert_eq!((answer.status, &*answer.body), (200, &b"cut"[..]));
+    assert_eq!(answer.header("set-cookie"), None);
+    assert!(answer.header("content-security-policy").is_some());
+    let asked = told.recv_timeout(super::LONG).unwrap().to_lowercase();
+    assert!(
+        asked.starts_with("post /api/v1/mask?draft=true http/1.1"),
+        "{asked}"
+    );
+    assert!(asked.contains("authorization: bearer secret"), "{asked}");
+    assert!(
+        asked.contains(&format!("host: 127.0.0.1:{port}")),
+        "{asked}"
+    );
+    assert!(!asked.contains("outer"), "{asked}");
+    let foreign = serving.ask(
+        "POST",
+        "/edit/api/v1/accept",
+        &["Origin: http://evil.example"],
+        b"{}",
+    );
+    assert_eq!(foreign.status, 403);
+    let other = serving.ask("GET", "/edit/", &["Host: evil.example"], b"");
+    assert_eq!(other.status, 421);
+    serving
+        .rig
+        .monitor
+        .update(|state| state.phase = Phase::Recording);
+    assert_eq!(serving.get("/edit/").status, 503, "it is held");
+    assert_eq!(edit(COW).status, 409);
+    wait_until("it is held", || {
+        state_of(folder.path()).as_deref() == Some("T")
+    });
+    serving
+        .rig
+        .monitor
+        .update(|state| state.phase = Phase::Idle);
+    fs::write(folder.path().join("go"), "").unwrap();
+    wait_until("it is over", || state(&serving)["editing"].is_null());
+    assert_eq!(serving.get("/edit/").status, 503);
+}
+
+#[test]
+fn programs_run_at_the_lowest_priority() {
+    let folder = tempfile::tempdir().unwrap();
+    let mask = format!("nice > \"$here/nice\"; {MASK}");
+    let scripts = Scripts {
+        mask: Some(&mask),
+        ..ALL_WELL
+    };
+    let serving = serving(folder.path(), scripts);
+    process(&serving, COW, &["mask"]);
+    wait_finished(&serving, 1);
+    let nice = fs::read_to_string(folder.path().join("nice")).unwrap();
+    assert_eq!(nice.trim(), "19");
+}

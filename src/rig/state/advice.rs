@@ -1,0 +1,305 @@
+//! What stands between the rig and its next take, and what a person does about it: decided once, for the page,
+//! the interface for scripts, and whoever refuses a command.
+
+use std::fmt;
+
+use relit_data::session::object_of;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::parts::{CameraState, Phase, TableState, TakeSummary, Verdict};
+
+/// A take needs its expected size and a fifth more.
+const RESERVE: f64 = 1.2;
+
+/// Something that keeps a take from beginning, or the table from moving.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Obstacle {
+    /// The emergency stop is pressed.
+    EmergencyStop,
+    /// An alarm has locked the table; what it says.
+    Locked(String),
+    /// The table is not there; why, where that is known.
+    NoTable(Option<String>),
+    /// The camera is not there; why, where that is known.
+    NoCamera(Option<String>),
+    /// Nothing can be written into the folder of sessions; why.
+    NoFolder(String),
+    /// Too little space for a take: bytes free, and bytes needed with the reserve.
+    NoSpace(u64, u64),
+}
+
+impl Obstacle {
+    fn headline(&self) -> &'static str {
+        match self {
+            Self::EmergencyStop => "The emergency stop is pressed",
+            Self::Locked(_) => "The table is locked",
+            Self::NoTable(_) => "No turntable",
+            Self::NoCamera(_) => "No camera",
+            Self::NoFolder(_) => "No folder for sessions",
+            Self::NoSpace(..) => "Too little space",
+        }
+    }
+
+    fn button(&self) -> AdvisedButton {
+        let (text, action) = match self {
+            Self::EmergencyStop => ("Release the emergency stop", None),
+            Self::Locked(_) => ("Reset and home the table", Some(AdvisedAction::Reset)),
+            other => (other.headline(), None),
+        };
+        AdvisedButton {
+            text: text.to_owned(),
+            action,
+            object: None,
+        }
+    }
+}
+
+/// The sentence for the person at the rig: what is wrong, and what to do.
+impl fmt::Display for Obstacle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::EmergencyStop => f.write_str("the emergency stop is pressed: release it"),
+            Self::Locked(why) if why.is_empty() => f.write_str("the table is locked: reset it"),
+            Self::NoTable(None) => f.write_str("there is no turntable yet: it is being looked for"),
+            Self::NoCamera(None) => f.write_str("there is no camera yet: it is being looked for"),
+            Self::Locked(why)
+            | Self::NoTable(Some(why))
+            | Self::NoCamera(Some(why))
+            | Self::NoFolder(why) => f.write_str(why),
+            Self::NoSpace(free, needed) => write!(
+                f,
+                "{} MB are free and a take needs {} MB (a fifth in reserve): free some space",
+                free / 1_000_000,
+                needed.div_ceil(1_000_000)
+            ),
+        }
+    }
+}
+
+/// What the one button does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum AdvisedAction {
+    /// Captures the object that a person names: command `start`.
+    Start,
+    /// Captures again what was aborted: command `start` with the object.
+    Again,
+    /// Captures the next object of the queue: command `next`.
+    Next,
+    /// Stops what is under way: command `stop`.
+    Stop,
+    /// Brings the table back after an alarm: command `reset`.
+    Reset,
+}
+
+/// The one button at the rig.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct AdvisedButton {
+    /// What stands on it.
+    pub text: String,
+    /// What it does; `null` where nothing can be done by a button.
+    pub action: Option<AdvisedAction>,
+    /// The object that it captures, where that is settled.
+    pub object: Option<String>,
+}
+
+/// What a person at the rig is told, and the one thing to do next.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct Advice {
+    /// How the rig stands, in a few words.
+    pub headline: String,
+    /// What is wrong and what to do, in a sentence.
+    pub explanation: Option<String>,
+    /// The button.
+    pub button: AdvisedButton,
+}
+
+/// The advice of a rig of which nothing is known yet.
+impl Default for Advice {
+    fn default() -> Self {
+        Self::against(&Obstacle::NoCamera(None))
+    }
+}
+
+impl Advice {
+    pub(super) fn of(state: &Situation<'_>) -> Self {
+        if !state.rests() {
+            return Self::stopping(doing(state.phase));
+        }
+        let obstacle = state.obstacle_to_take();
+        match &obstacle {
+            Some(alarm @ (Obstacle::EmergencyStop | Obstacle::Locked(_))) => Self::against(alarm),
+            _ if state.table.moves() => Self::stopping("The table moves"),
+            Some(other) => Self::against(other),
+            None => Self::of_ready(state),
+        }
+    }
+
+    fn against(obstacle: &Obstacle) -> Self {
+        Self {
+            headline: obstacle.headline().to_owned(),
+            explanation: Some(capitalised(&obstacle.to_string())),
+            button: obstacle.button(),
+        }
+    }
+
+    fn stopping(headline: &str) -> Self {
+        Self {
+            headline: headline.to_owned(),
+            explanation: None,
+            button: AdvisedButton {
+                text: "Stop".to_owned(),
+                action: Some(AdvisedAction::Stop),
+                object: None,
+            },
+        }
+    }
+
+    fn of_ready(state: &Situation<'_>) -> Self {
+        let next = state.next;
+        if let Some(take) = state.last_take.filter(|take| is_aborted(take)) {
+            return Self::after_an_abort(take, next);
+        }
+        let (headline, text, action) = match next {
+            Some(object) => (
+                "Put the next object on the table".to_owned(),
+                format!("Capture {object}"),
+                AdvisedAction::Next,
+            ),
+            None => ("Ready".to_owned(), "Start".to_owned(), AdvisedAction::Start),
+        };
+        let object = next.map(str::to_owned);
+        Self {
+            headline,
+            explanation: None,
+            button: AdvisedButton {
+                text,
+                action: Some(action),
+                object,
+            },
+        }
+    }
+
+    /// What failed still stands on the table: it comes again before anything else.
+    fn after_an_abort(take: &TakeSummary, next: Option<&str>) -> Self {
+        let object = object_of(&take.session);
+        let action = match next == Some(object) {
+            true => AdvisedAction::Next,
+            false => AdvisedAction::Again,
+        };
+        Self {
+            headline: format!("The take of {object} was aborted"),
+            explanation: take.reason.as_deref().map(capitalised),
+            button: AdvisedButton {
+                text: format!("Again: {object}"),
+                action: Some(action),
+                object: Some(object.to_owned()),
+            },
+        }
+    }
+}
+
+/// What the advice is about.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Situation<'a> {
+    pub(super) phase: Phase,
+    /// Whether there is to be a table.
+    pub(super) has_table: bool,
+    pub(super) table: &'a TableState,
+    pub(super) camera: &'a CameraState,
+    pub(super) disk_fault: Option<&'a str>,
+    pub(super) free_bytes: u64,
+    pub(super) needed_bytes: u64,
+    /// The next object of the queue.
+    pub(super) next: Option<&'a str>,
+    pub(super) last_take: Option<&'a TakeSummary>,
+}
+
+impl Situation<'_> {
+    /// Whether nothing is captured at the moment.
+    pub(super) fn rests(&self) -> bool {
+        matches!(self.phase, Phase::Idle | Phase::WaitingForObject)
+    }
+
+    /// What keeps a take from beginning: of several obstacles the first that a person has to remove.
+    pub(super) fn obstacle_to_take(&self) -> Option<Obstacle> {
+        self.obstacle_of_table()
+            .or_else(|| self.obstacle_of_camera())
+            .or_else(|| self.obstacle_of_disk())
+    }
+
+    /// What keeps the table from moving, other than that there is to be none.
+    pub(super) fn obstacle_to_motion(&self) -> Option<Obstacle> {
+        self.obstacle_of_table()
+            .filter(|obstacle| !matches!(obstacle, Obstacle::Locked(_)))
+    }
+
+    fn obstacle_of_table(&self) -> Option<Obstacle> {
+        let table = self.table;
+        if table.emergency_stop {
+            return Some(Obstacle::EmergencyStop);
+        }
+        if table.locked {
+            return Some(Obstacle::Locked(table.fault.clone().unwrap_or_default()));
+        }
+        (self.has_table && !table.present).then(|| Obstacle::NoTable(table.fault.clone()))
+    }
+
+    fn obstacle_of_camera(&self) -> Option<Obstacle> {
+        let camera = self.camera;
+        (!camera.present).then(|| Obstacle::NoCamera(camera.fault.clone()))
+    }
+
+    fn obstacle_of_disk(&self) -> Option<Obstacle> {
+        if let Some(why) = self.disk_fault {
+            return Some(Obstacle::NoFolder(why.to_owned()));
+        }
+        let needed = (self.needed_bytes as f64 * RESERVE).ceil() as u64;
+        (self.free_bytes < needed).then_some(Obstacle::NoSpace(self.free_bytes, needed))
+    }
+}
+
+fn is_aborted(take: &TakeSummary) -> bool {
+    take.verdict == Verdict::Aborted
+}
+
+/// What the rig is doing, for its page.
+fn doing(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Idle => "Ready",
+        Phase::WaitingForObject => "Put the next object on the table",
+        Phase::Preflight => "Checking camera, table and disk",
+        Phase::Metering => "Finding the exposure",
+        Phase::MovingBack => "Moving back for the run-up",
+        Phase::Starting => "Gathering speed",
+        Phase::Recording => "Recording",
+        Phase::Unwinding => "Turning back",
+        Phase::Checking => "Checking the take",
+    }
+}
+
+/// The sentence as it begins a line.
+fn capitalised(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    let first = letters.next().map(char::to_uppercase);
+    let mut text: String = first.into_iter().flatten().collect();
+    text.push_str(letters.as_str());
+    if !text.ends_with(['.', '!', '?']) {
+        text.push('.');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sentences_begin_large_and_end() {
+        assert_eq!(capitalised("öl is low"), "Öl is low.");
+        assert_eq!(capitalised("it is so."), "It is so.");
+        assert_eq!(capitalised(""), ".");
+    }
+}

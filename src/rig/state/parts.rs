@@ -1,0 +1,205 @@
+//! What a rig's state is made of.
+
+use std::fmt;
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// Where a capture stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Default, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Phase {
+    /// Nothing is under way.
+    #[default]
+    Idle,
+    /// Camera, table and disk are being checked and the camera's settings locked.
+    Preflight,
+    /// A slow turn that finds the exposure.
+    Metering,
+    /// The table goes back by its ramp.
+    MovingBack,
+    /// The table gathers speed.
+    Starting,
+    /// The frames of the turn are being written.
+    Recording,
+    /// The table slows down and goes back to where it began.
+    Unwinding,
+    /// The take is being checked and the session closed.
+    Checking,
+    /// A queue of objects waits for somebody to say that the next one stands on the table.
+    WaitingForObject,
+}
+
+impl fmt::Display for Phase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Idle => "waiting",
+            Self::WaitingForObject => "waiting for the next object",
+            Self::Preflight => "checking camera, table and disk",
+            Self::Metering => "metering: the table turns slowly",
+            Self::MovingBack => "the table goes back by its ramp",
+            Self::Starting => "the table gathers speed",
+            Self::Recording => "recording",
+            Self::Unwinding => "the table goes back to where it began",
+            Self::Checking => "checking the take",
+        })
+    }
+}
+
+/// How a take came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// All frames of the turn, nothing moved.
+    Clean,
+    /// Frames were dropped, no more than allowed.
+    Tolerated,
+    /// Kept, marked as aborted.
+    Aborted,
+}
+
+/// The last take, or the one before the present one.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct TakeSummary {
+    /// The session's name.
+    pub session: String,
+    /// How it came out.
+    pub verdict: Verdict,
+    /// Frames on disk.
+    pub frames: u64,
+    /// Frames missing of the turn.
+    pub dropped: u64,
+    /// Why, in a sentence, where the verdict is not clean.
+    pub reason: Option<String>,
+}
+
+/// The turntable as last heard.
+#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
+#[non_exhaustive]
+pub struct TableState {
+    /// Whether there is a table at all.
+    pub present: bool,
+    /// Its state in Grbl's words, such as `Idle` or `Run`.
+    pub state: String,
+    /// Degrees from machine zero.
+    pub angle_deg: Option<f64>,
+    /// Degrees a second.
+    pub degrees_per_second: Option<f64>,
+    /// Whether zero is known.
+    pub homed: bool,
+    /// Whether the emergency stop is pressed.
+    pub emergency_stop: bool,
+    /// Whether an alarm has locked it: the command `reset` resets, unlocks and homes it.
+    pub locked: bool,
+    /// How far it may turn back, degrees from the angle 0, where its cable hangs free.
+    pub low_deg: Option<f64>,
+    /// How far it may turn on, degrees from the angle 0.
+    pub high_deg: Option<f64>,
+    /// Volts of its battery, where it is measured.
+    pub battery_v: Option<f64>,
+    /// What is wrong with it, in a sentence.
+    pub fault: Option<String>,
+}
+
+/// The camera as last seen.
+#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
+#[non_exhaustive]
+pub struct CameraState {
+    /// Whether it can be reached.
+    pub present: bool,
+    /// Its name.
+    pub name: String,
+    /// Four-character code, width, height and frames a second as granted, such as `MJPG 1920x1080 30/s`.
+    pub mode: String,
+    /// Frames a second as measured over the last second.
+    pub fps: Option<f64>,
+    /// Exposure, gain, white balance, focus and power-line filter as read back.
+    pub controls: Vec<(String, i64)>,
+    /// Pixels of the newest frame with all channels saturated, as a fraction 0 to 1.
+    pub clipped: Option<f64>,
+    /// Variance of the Laplacian of luma in the middle of the newest frame: greater is sharper.
+    pub focus: Option<f64>,
+    /// What is wrong with it, in a sentence.
+    pub fault: Option<String>,
+}
+
+/// Something that went wrong, in plain words.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[non_exhaustive]
+pub struct FaultLine {
+    /// Microseconds of the capture's clock.
+    pub t_us: i64,
+    /// What failed, on what, what to do.
+    pub what: String,
+}
+
+/// Something that happened, with the time of day.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[non_exhaustive]
+pub struct LogLine {
+    /// When, RFC 3339, UTC.
+    pub at: String,
+    /// What.
+    pub what: String,
+}
+
+/// How takes are captured. All but the addresses can be changed by the command `configure`.
+#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
+pub struct CaptureSettings {
+    /// The folder of sessions.
+    pub root: String,
+    /// The camera's address.
+    pub camera: String,
+    /// The turntable's address.
+    pub turntable: String,
+    /// Frame width and height that are asked for, pixels; `null` takes the largest.
+    pub size: Option<(u32, u32)>,
+    /// Frames a second.
+    pub fps: f64,
+    /// Speed of the turn, degrees a second.
+    pub degrees_per_second: f64,
+    /// Frames that may be missing or damaged.
+    pub max_dropped: u64,
+    /// How often a take that is not usable is repeated.
+    pub retries: u32,
+}
+
+/// Something that was checked before the table turned.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct Check {
+    /// What was checked.
+    pub what: String,
+    /// False where it is not as it should be, and the capture goes on all the same.
+    pub good: bool,
+    /// What was found.
+    pub found: String,
+}
+
+impl Check {
+    /// A check that was passed.
+    pub fn passed(what: impl Into<String>, found: impl Into<String>) -> Self {
+        Self {
+            what: what.into(),
+            good: true,
+            found: found.into(),
+        }
+    }
+
+    /// Something that the person at the rig has to know, and that keeps nobody from going on.
+    pub fn noted(what: impl Into<String>, found: impl Into<String>) -> Self {
+        Self {
+            good: false,
+            ..Self::passed(what, found)
+        }
+    }
+}
+
+impl TableState {
+    /// Whether it moves, on whosever account.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        ["Run", "Jog", "Home", "Hold"]
+            .iter()
+            .any(|word| self.state.starts_with(word))
+    }
+}
