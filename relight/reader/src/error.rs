@@ -27,6 +27,17 @@ pub enum OpenError {
         /// What is wrong.
         source: relit_data::shard::ShardError,
     },
+    /// A file of which nothing can be read.
+    #[error(
+        "{} holds no sample that can be read ({why}): give a shard (.tar) as relit-extract writes them",
+        path.display()
+    )]
+    NoShard {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
     /// There is nothing in it.
     #[error("{} holds no samples: {expected} were expected in it", path.display())]
     Empty {

@@ -264,6 +264,20 @@ fn samples_that_a_cut_or_a_damaged_header_took_are_told() {
 }
 
 #[test]
+fn a_file_that_is_no_shard_is_an_error_that_says_what_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let photo = folder.path().join("photo.png");
+    picture(0).save(&photo).unwrap();
+    let error = Turns::open(&photo, Encoding::Linear).err().unwrap();
+    let text = error.to_string();
+    assert!(matches!(error, OpenError::NoShard { .. }), "{text}");
+    assert!(
+        text.contains("photo.png") && text.contains("give a shard"),
+        "{text}"
+    );
+}
+
+#[test]
 fn samples_that_the_description_tells_of_and_no_shard_holds_are_told() {
     let dir = tempfile::tempdir().unwrap();
     let mut writer =

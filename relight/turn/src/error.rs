@@ -22,6 +22,16 @@ pub enum TurnError {
     /// The shard cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
+    /// The shard is damaged, and what is left of it does not do.
+    #[error("{} is damaged ({damage}), and what is left of it does not do", path.display())]
+    Damaged {
+        /// The shard.
+        path: PathBuf,
+        /// The first damage.
+        damage: String,
+        /// Why the rest does not do.
+        source: Box<TurnError>,
+    },
     /// There is more than one turn.
     #[error("{} holds {found} turns: give the shard (.tar) of one", path.display())]
     ManyTurns {

@@ -47,7 +47,14 @@ impl Turns {
     /// [`OpenError::Read`], [`OpenError::Dataset`], [`OpenError::Empty`].
     pub fn open(path: &Path, encoding: Encoding) -> Result<Self, OpenError> {
         let turns = if path.is_file() {
-            vec![Turn::Shard(ShardTurn::open(path, None)?)]
+            let shard = ShardTurn::open(path, None)?;
+            if let Some(why) = shard.whole_loss() {
+                return Err(OpenError::NoShard {
+                    path: path.to_owned(),
+                    why: why.to_owned(),
+                });
+            }
+            vec![Turn::Shard(shard)]
         } else if path.join(Dataset::FILE).is_file() {
             open_dataset(path)?
         } else if path.join("imgs").is_dir() {

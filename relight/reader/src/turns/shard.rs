@@ -69,6 +69,16 @@ impl ShardTurn {
         u32::try_from(self.slots.len()).unwrap_or(u32::MAX)
     }
 
+    /// Why none of its samples is there, where that is so: it may be no shard at all.
+    pub(super) fn whole_loss(&self) -> Option<&str> {
+        let mut losses = self.slots.iter().map(|slot| match slot {
+            Slot::At(_) => None,
+            Slot::Lost(why) => Some(why.as_str()),
+        });
+        let first = losses.next()??;
+        losses.all(|loss| loss.is_some()).then_some(first)
+    }
+
     /// Bytes of the samples that were found.
     pub(super) fn bytes(&self) -> u64 {
         let sizes = self.slots.iter().map(|slot| match slot {

@@ -125,7 +125,17 @@ pub fn read_curves(
         progress(done.min(frames.into()), frames.into());
         stream.give_back(shrunk.batch);
     }
-    reader.finish((*name).to_owned())
+    let damage = reader.damage.first().cloned();
+    let finished = reader.finish((*name).to_owned());
+    finished.map_err(|error| match damage {
+        // That frames are missing explains it better than how many are left.
+        Some(damage) => TurnError::Damaged {
+            path: path.to_owned(),
+            damage,
+            source: Box::new(error),
+        },
+        None => error,
+    })
 }
 
 struct Reader {
