@@ -134,10 +134,8 @@ impl Stage<'_> {
             align,
         } = buffers;
         let crop = CropView::within(region, self.border());
-        let alignment = self.align.as_ref().map(|by| {
-            let sample = AlignSample::of(crop);
-            by.aligner.measure(&sample, align)
-        });
+        let alignment = self.align.as_ref();
+        let alignment = alignment.map(|by| by.aligner.measure_crop(crop, align));
         let moved = alignment.and_then(|alignment| self.moved(crop, alignment));
         let spans = match moved {
             None => Cow::Borrowed(&self.spans),

@@ -84,9 +84,7 @@ fn measure(path: &Path, mask: &GrayImage, frames: u64, side: u32) -> Result<(), 
     while let Some(pending) = timed(&mut read, || reader.next()) {
         timed(&mut decoded, || video.part(pending, crop, &mut part))?;
         let view = CropView::whole(&part);
-        timed(&mut aligned, || {
-            aligner.measure(&AlignSample::of(view), &mut aligning)
-        });
+        let _ = timed(&mut aligned, || aligner.measure_crop(view, &mut aligning));
         let mut measuring = spans.measuring(250);
         let image = timed(&mut scaled, || {
             scaler.scale(view, &mut scaling, &mut measuring)

@@ -7,7 +7,10 @@
 //!
 //! This module knows pictures and a mask, and nothing of files, videos or shards.
 
+mod brightness;
+mod demand;
 mod fit;
+mod region;
 mod structure;
 mod template;
 
@@ -15,8 +18,11 @@ use image::GrayImage;
 use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterator};
 
 use super::CropView;
+use brightness::{half, half_luma, luma};
+use demand::Demand;
 use fit::Fit;
-use structure::{Extractor, Gradients, Plane, half, half_luma, luma};
+use region::Region;
+use structure::{Extractor, Gradients, Plane};
 use template::Template;
 
 /// A fit whose correlation is less is none.
@@ -61,10 +67,14 @@ impl AlignSample {
     #[must_use]
     pub fn of(crop: CropView<'_>) -> Self {
         let halvings = halvings(crop.dimensions());
+        let mut image = GrayImage::default();
         if halvings == 0 {
-            return Self(luma(crop));
+            luma(crop, &Region::whole(crop.dimensions()), &mut image);
+            return Self(image);
         }
-        Self((1..halvings).fold(half_luma(crop), |image, _| half(&image)))
+        let (width, height) = crop.dimensions();
+        half_luma(crop, &Region::whole((width / 2, height / 2)), &mut image);
+        Self((1..halvings).fold(image, |image, _| halved(&image)))
     }
 }
 
@@ -102,6 +112,7 @@ pub struct Aligner {
     reach: f64,
     /// Pixels of a frame in one of the finest template.
     unit: f64,
+    demand: Demand,
     least_confidence: f64,
     motion: Motion,
 }
@@ -121,9 +132,16 @@ struct Motion {
 /// What a thread needs to measure shifts; it keeps its buffers from frame to frame.
 #[derive(Debug, Default)]
 pub struct AlignBuffers {
+    /// The brightness at each scale.
+    lumas: Vec<GrayImage>,
+    gradients: GradientBuffers,
+}
+
+/// The gradients of a frame at each scale, and what makes them.
+#[derive(Debug, Default)]
+struct GradientBuffers {
     extractor: Extractor,
-    plane: Plane,
-    gradients: Vec<Gradients>,
+    scales: Vec<Gradients>,
 }
 
 impl Aligner {
@@ -141,7 +159,7 @@ impl Aligner {
     ) -> Option<Self> {
         let halvings = halvings(mask.dimensions());
         let unit = f64::from(1_u32 << halvings);
-        let scales = scales(&halved(mask, halvings));
+        let scales = scales(&halved_mask(mask, halvings));
         let reach = (max_shift * LOOK_BEYOND + 1.0) / unit;
         let near = SAME_PLACE / unit;
         let mut shifts = vec![[0.0; 2]; samples.len()];
@@ -185,7 +203,9 @@ impl Aligner {
             }
         }
         templates.reverse();
+        let coarsest = reach / (1_u32 << (templates.len() - 1)) as f64;
         let mut aligner = Self {
+            demand: Demand::of(&templates, mask.dimensions(), halvings, coarsest),
             templates,
             reach,
             unit,
@@ -215,8 +235,19 @@ impl Aligner {
     /// Where the object is in a frame, in pixels of the frame.
     #[must_use]
     pub fn measure(&self, frame: &AlignSample, buffers: &mut AlignBuffers) -> Alignment {
-        self.take(frame, buffers);
-        let gradients = &buffers.gradients;
+        let lumas = self.demand.lumas_of_sample(&frame.0, &mut buffers.lumas);
+        self.located(lumas, &mut buffers.gradients)
+    }
+
+    /// The same from the frame's crop, of which no more is looked at than is needed. It has the size of the mask.
+    #[must_use]
+    pub fn measure_crop(&self, crop: CropView<'_>, buffers: &mut AlignBuffers) -> Alignment {
+        let lumas = self.demand.lumas_of_crop(crop, &mut buffers.lumas);
+        self.located(lumas, &mut buffers.gradients)
+    }
+
+    fn located(&self, lumas: &[GrayImage], buffers: &mut GradientBuffers) -> Alignment {
+        let gradients = self.gradients(lumas, buffers);
         let sure = |fit: &Fit| fit.correlation >= self.least_confidence;
         let coarsest = self.templates.len() - 1;
         let reach = self.reach / (1_u32 << coarsest) as f64;
@@ -235,22 +266,18 @@ impl Aligner {
         }
     }
 
-    /// Fills the buffers with the frame's gradients at all scales.
-    fn take(&self, frame: &AlignSample, buffers: &mut AlignBuffers) {
-        let AlignBuffers {
-            extractor,
-            plane,
-            gradients,
-        } = buffers;
-        gradients.resize_with(self.templates.len(), Gradients::default);
-        let mut smaller: Option<GrayImage> = None;
-        for (scale, gradients) in gradients.iter_mut().enumerate() {
-            if scale > 0 {
-                smaller = Some(half(smaller.as_ref().unwrap_or(&frame.0)));
-            }
-            extractor.structure(smaller.as_ref().unwrap_or(&frame.0), plane);
-            gradients.take(plane);
+    /// A frame's gradients at all scales, where they are needed.
+    fn gradients<'b>(
+        &self,
+        lumas: &[GrayImage],
+        buffers: &'b mut GradientBuffers,
+    ) -> &'b [Gradients] {
+        let GradientBuffers { extractor, scales } = buffers;
+        scales.resize_with(self.templates.len(), Gradients::default);
+        for ((luma, needs), gradients) in lumas.iter().zip(&self.demand.needs).zip(&mut *scales) {
+            extractor.gradients(luma, needs, gradients);
         }
+        scales
     }
 
     /// From the coarsest scale to the finest; `start` is in the coarsest's pixels.
@@ -397,21 +424,29 @@ fn still(scale: usize) -> f64 {
 fn plane_at(sample: &GrayImage, scale: usize) -> Plane {
     let mut smaller: Option<GrayImage> = None;
     for _ in 0..scale {
-        smaller = Some(half(smaller.as_ref().unwrap_or(sample)));
+        smaller = Some(halved(smaller.as_ref().unwrap_or(sample)));
     }
     let mut plane = Plane::default();
     Extractor::default().structure(smaller.as_ref().unwrap_or(sample), &mut plane);
     plane
 }
 
+/// Half the picture.
+fn halved(image: &GrayImage) -> GrayImage {
+    let mut small = GrayImage::default();
+    let all = Region::whole((image.width() / 2, image.height() / 2));
+    half(image, &all, &mut small);
+    small
+}
+
 /// The mask of as many halvings as the frames have: only what is object in all pixels.
-fn halved(mask: &GrayImage, halvings: u32) -> GrayImage {
+fn halved_mask(mask: &GrayImage, halvings: u32) -> GrayImage {
     let mut small = mask.clone();
     small
         .iter_mut()
         .for_each(|m| *m = if *m != 0 { 255 } else { 0 });
     for _ in 0..halvings {
-        small = half(&small);
+        small = halved(&small);
         small
             .iter_mut()
             .for_each(|m| *m = if *m == 255 { 255 } else { 0 });
@@ -425,7 +460,7 @@ fn scales(mask: &GrayImage) -> Vec<Vec<bool>> {
     let mut scales: Vec<Vec<bool>> = vec![eroded(full(mask), mask.dimensions(), OUTLINE[0])];
     let mut image = mask.clone();
     while image.width().max(image.height()) > COARSEST_SIDE && scales.len() < MOST_SCALES {
-        image = half(&image);
+        image = halved(&image);
         // Only what was object in all four pixels.
         let whole = image.as_raw().iter().map(|&m| m == 255).collect();
         let inner = eroded(whole, image.dimensions(), OUTLINE[1]);
