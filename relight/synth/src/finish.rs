@@ -67,9 +67,7 @@ impl Finish {
 impl BlinnPhong {
     /// White highlights mostly, as of plastic and varnish; some in the object's own colour, as of metal.
     fn draw(random: &mut Random, paint: &Paint) -> Self {
-        let exponent = random.log_uniform(4.0..150.0);
-        // A sharper highlight is brighter, as it gathers the same light.
-        let strength = random.uniform(0.03..0.6) * ((exponent + 8.0) / 16.0).min(4.0);
+        let (strength, exponent) = Self::draw_strength(random);
         let colour = if random.chance(0.2) {
             paint.ground / paint.ground.max_element().max(1e-3)
         } else {
@@ -79,5 +77,13 @@ impl BlinnPhong {
             reflectance: colour * strength,
             exponent,
         }
+    }
+
+    /// A random strength and exponent.
+    pub(super) fn draw_strength(random: &mut Random) -> (f32, f32) {
+        let exponent = random.log_uniform(4.0..150.0);
+        // A sharper highlight is brighter, as it gathers the same light.
+        let strength = random.uniform(0.03..0.6) * ((exponent + 8.0) / 16.0).min(4.0);
+        (strength, exponent)
     }
 }

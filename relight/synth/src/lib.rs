@@ -73,7 +73,7 @@ pub use shape::ShapeKind;
 pub use studio::Surroundings;
 pub use transfer::{
     CURVE_COEFFICIENTS, CurveCoefficients, DrawnTurn, RadianceTransfer, Rooms, TransferCache,
-    TransferFinish, TransferMaterial, TransferRecipe,
+    TransferFinish, TransferLobe, TransferMaterial, TransferRecipe,
 };
 pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};
 pub use view::{Pose, Projection};

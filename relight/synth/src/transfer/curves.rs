@@ -9,6 +9,8 @@ use super::{BOUNCE_COEFFICIENTS, COEFFICIENTS, TRANSFER_ORDER, band, cosine_band
 
 /// Harmonics of the table's angle that are computed.
 const HARMONICS: usize = 6;
+/// A colour of less than this is black. Numerical.
+const LEAST_ALBEDO: f32 = 1e-3;
 /// Terms of a curve: its mean, then real and imaginary part of each harmonic.
 pub const CURVE_COEFFICIENTS: usize = 2 * HARMONICS + 1;
 
@@ -20,12 +22,50 @@ pub type CurveCoefficients = [[f32; 3]; CURVE_COEFFICIENTS];
 pub struct TransferMaterial {
     /// Whether it has no diffuse part: its albedo is the colour of what it mirrors.
     pub is_metal: bool,
-    /// What it mirrors head-on (Schlick's F_0), 0..=1: 0.04 of plastic, 0 of a surface without gloss. Of metal 1.
+    /// What it mirrors head-on, of even light: 0.04 of plastic, 0 of a surface without gloss. Of metal 1.
     pub reflectance: f32,
+    /// How that changes as the surface is seen from aside.
+    pub lobe: TransferLobe,
+    /// Whether highlights have the object's own colour, brought to its largest channel. Those of metal always have.
+    pub is_tinted: bool,
     /// How far it blurs what it mirrors, radians (the deviation of a Gaussian on the sphere).
     pub blur: f32,
     /// How much of the light that it throws onto itself counts, 0..=1.
     pub bounce: f32,
+}
+
+/// How strong highlights are as a surface is seen from aside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TransferLobe {
+    /// Stronger, by Schlick's approximation of Fresnel's reflectance: plastic, varnish.
+    Fresnel,
+    /// Weaker, by the cosine: a power of the half vector's cosine without a reflectance of its own, as
+    /// [`BlinnPhong`](crate::BlinnPhong) has it.
+    HalfVector,
+}
+
+impl TransferLobe {
+    fn at(self, head_on: f32, facing: f32) -> f32 {
+        match self {
+            Self::Fresnel => schlick(head_on, facing),
+            Self::HalfVector => head_on * facing,
+        }
+    }
+}
+
+impl TransferMaterial {
+    /// The gloss of a power of the half vector's cosine, which the transfer shows as a Gaussian around the mirrored
+    /// direction: the lobe's solid angle is 8 π / (exponent + 1) times the cosine to the eye, and light moves by twice the
+    /// half vector's angle.
+    #[must_use]
+    pub fn with_half_vector(self, reflectance: f32, exponent: f32) -> Self {
+        Self {
+            reflectance: 8.0 * reflectance / (exponent + 1.0),
+            blur: 2.0 / exponent.max(1.0).sqrt(),
+            lobe: TransferLobe::HalfVector,
+            ..self
+        }
+    }
 }
 
 /// The parts of a pixel's transfer, each in harmonics of the table's frame.
@@ -54,8 +94,13 @@ impl RadianceTransfer {
             .iter()
             .map(|c| c.map(|c| c as f32))
             .collect();
-        let mean_albedo = finish.albedo.iter().sum::<Vec3>() / finish.albedo.len().max(1) as f32
-            * material.bounce;
+        let mean_albedo = finish.albedo.iter().sum::<Vec3>() / finish.albedo.len().max(1) as f32;
+        let highlight = if material.is_tinted {
+            mean_albedo / mean_albedo.max_element().max(LEAST_ALBEDO)
+        } else {
+            Vec3::ONE
+        };
+        let mean_albedo = mean_albedo * material.bounce;
         (0..self.pixels.len())
             .into_par_iter()
             .map(|k| {
@@ -80,7 +125,7 @@ impl RadianceTransfer {
                     let colour = if material.is_metal {
                         finish.albedo[k]
                     } else {
-                        Vec3::ONE
+                        highlight
                     };
                     add(&mut curve, &gloss, &light, colour);
                 }
@@ -103,7 +148,7 @@ impl RadianceTransfer {
             let eye = self.towards_eye[k];
             let facing = normal.dot(eye).max(0.0);
             let mirrored = normal * (2.0 * facing) - eye;
-            let part = schlick(material.reflectance, facing);
+            let part = material.lobe.at(material.reflectance, facing);
             let mut gloss: [f32; COEFFICIENTS] =
                 harmonics_at(TRANSFER_ORDER, to_table * mirrored.normalize_or(normal));
             for (at, value) in gloss.iter_mut().enumerate() {

@@ -5,14 +5,20 @@ use std::f32::consts::TAU;
 use glam::{Vec2, Vec3};
 
 use super::cast::{RadianceTransfer, TransferFinish};
-use super::curves::{CURVE_COEFFICIENTS, CurveCoefficients, TransferMaterial};
+use super::curves::{CURVE_COEFFICIENTS, CurveCoefficients, TransferLobe, TransferMaterial};
 use super::rooms::Rooms;
+use crate::lighting::BlinnPhong;
 use crate::random::Random;
 
 /// Part of the objects of metal.
 const METAL: f32 = 0.12;
 /// Part of the others without gloss.
 const MATT: f32 = 0.3;
+/// Part of the glossy ones whose highlights are as strong as a half vector's power is drawn in `synth`: up to half of the
+/// light, in broad lobes. The others are plastic and varnish.
+const HALF_VECTOR: f32 = 0.5;
+/// Part of these whose highlights have the object's colour.
+const TINTED: f32 = 0.2;
 /// Part of the objects of one colour.
 const PLAIN: f32 = 0.35;
 /// Part of the turns whose highlights clip.
@@ -179,18 +185,33 @@ impl TransferMaterial {
     /// Metal, or a diffuse surface with or without gloss.
     fn draw(random: &mut Random) -> Self {
         let is_metal = random.chance(METAL);
-        let reflectance = if is_metal {
-            1.0
-        } else if random.chance(MATT) {
-            0.0
-        } else {
-            random.log_uniform(0.02..0.15)
-        };
-        Self {
+        let material = Self {
             is_metal,
-            reflectance,
+            reflectance: 1.0,
+            lobe: TransferLobe::Fresnel,
+            is_tinted: false,
             blur: random.log_uniform(0.05..0.6),
-            bounce: random.uniform(0.3..1.0),
+            bounce: random.uniform(0.0..1.0),
+        };
+        if is_metal {
+            return material;
+        }
+        if random.chance(MATT) {
+            return Self {
+                reflectance: 0.0,
+                ..material
+            };
+        }
+        if random.chance(HALF_VECTOR) {
+            let (strength, exponent) = BlinnPhong::draw_strength(random);
+            return Self {
+                is_tinted: random.chance(TINTED),
+                ..material.with_half_vector(strength, exponent)
+            };
+        }
+        Self {
+            reflectance: random.log_uniform(0.02..0.15),
+            ..material
         }
     }
 }

@@ -35,7 +35,7 @@ use relight_core::light::Order;
 
 pub use cache::TransferCache;
 pub use cast::{RadianceTransfer, TransferFinish};
-pub use curves::{CURVE_COEFFICIENTS, CurveCoefficients, TransferMaterial};
+pub use curves::{CURVE_COEFFICIENTS, CurveCoefficients, TransferLobe, TransferMaterial};
 pub use drawn::DrawnTurn;
 pub use rooms::Rooms;
 pub use views::TransferRecipe;

@@ -7,7 +7,9 @@ use relight_core::light::{Direction, Panorama, Rotation, ShLight, basis};
 use super::*;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::{Folders, Library};
-use crate::lighting::{Environment, Lighting, Material, Method, Panoramas, SyntheticScene};
+use crate::lighting::{
+    BlinnPhong, Environment, Lighting, Material, Method, Panoramas, SyntheticScene,
+};
 use crate::made_panoramas;
 use crate::mesh::Mesh;
 use crate::shape::ShapeKind;
@@ -24,6 +26,8 @@ fn recipe() -> TransferRecipe {
 const MATT: TransferMaterial = TransferMaterial {
     is_metal: false,
     reflectance: 0.0,
+    lobe: TransferLobe::Fresnel,
+    is_tinted: false,
     blur: 0.2,
     bounce: 0.0,
 };
@@ -175,17 +179,18 @@ fn soft_panorama() -> Panorama {
 /// Ninety frames of a turn, rendered with rays as `synth --turn` renders them.
 const FRAMES: u32 = 90;
 
-/// Mean and first harmonics of rendered frames: shading of a white object, pixel by pixel.
+/// Mean and first harmonics of rendered frames: shading of a white object, or its highlights, pixel by pixel.
 fn harmonics_of_frames(
     scene: &SyntheticScene,
     panoramas: &Panoramas,
     axis: Vec3,
+    gloss: Option<BlinnPhong>,
 ) -> Vec<[[f32; 3]; 7]> {
     let pixels = scene.buffer().len();
     let material = Material {
         albedo: vec![Vec3::ONE; pixels],
         normals: scene.buffer().normals().to_vec(),
-        gloss: None,
+        gloss,
     };
     let [x, y, z] = axis.to_array().map(f64::from);
     let axis = Direction::new(x, y, z).unwrap();
@@ -203,7 +208,11 @@ fn harmonics_of_frames(
             ..Lighting::default()
         };
         let shaded = scene.light(&material, &lighting, panoramas, u64::from(frame));
-        for (sum, shading) in sums.iter_mut().zip(&shaded.shading) {
+        let seen = match gloss {
+            Some(_) => &shaded.highlight,
+            None => &shaded.shading,
+        };
+        for (sum, shading) in sums.iter_mut().zip(seen) {
             for (term, sum) in sum.iter_mut().enumerate() {
                 let (sin, cos) = (term.div_ceil(2) as f64 * angle).sin_cos();
                 let weight = match term {
@@ -220,29 +229,23 @@ fn harmonics_of_frames(
     sums
 }
 
-#[test]
-fn rendered_frames_of_a_turn_have_the_fourier_coefficients_that_the_transfer_says() {
-    let (transfer, buffer, occluder) = standing(20, 1500);
-    let axis = Vec3::new(0.0, transfer.elevation.cos(), transfer.elevation.sin());
+/// The soft panorama with a mean irradiance of 1, which is pi times the mean radiance: as it is rendered, and in
+/// harmonics of the table's frame.
+fn soft_room(elevation: f32) -> (Panoramas, ShLight) {
     let panorama = soft_panorama();
-    let panoramas = Panoramas::new(vec![("soft".to_owned(), panorama.clone())]);
     let light = panorama.project(TRANSFER_ORDER);
-    // What brings the panorama to a mean irradiance of 1, which is pi times the mean radiance.
     let mean = light.coefficients()[0].iter().sum::<f64>() / 3.0;
     let scale = 1.0 / (mean * std::f64::consts::PI.sqrt() / 2.0);
-    let rows = cast::table_frame(transfer.elevation);
+    let rows = cast::table_frame(elevation);
     let to_table = Rotation::from_matrix(crate::vectors::rotation_rows(rows)).unwrap();
     let light = light.rotated(&to_table).tinted([scale; 3]);
-    let finish = TransferFinish {
-        normals: buffer.normals().to_vec(),
-        albedo: vec![Vec3::splat(PI); buffer.len()],
-    };
-    let curves = transfer.curves(&finish, &MATT, &light);
-    let scene = SyntheticScene::shaded(buffer, occluder, 16, 7);
-    let rendered = harmonics_of_frames(&scene, &panoramas, axis);
-    let mut off = [0.0_f64; 7];
-    let mut energy = [0.0_f64; 7];
-    for (curve, rendered) in curves.iter().zip(&rendered) {
+    (Panoramas::new(vec![("soft".to_owned(), panorama)]), light)
+}
+
+/// By how much mean and harmonics of curves are off rendered ones, and the energy of the latter.
+fn differences(curves: &[CurveCoefficients], rendered: &[[[f32; 3]; 7]]) -> ([f64; 7], [f64; 7]) {
+    let (mut off, mut energy) = ([0.0_f64; 7], [0.0_f64; 7]);
+    for (curve, rendered) in curves.iter().zip(rendered) {
         for (term, rendered) in rendered.iter().enumerate() {
             for (a, b) in curve[term].iter().zip(rendered) {
                 off[term] += f64::from(a - b).powi(2);
@@ -250,6 +253,22 @@ fn rendered_frames_of_a_turn_have_the_fourier_coefficients_that_the_transfer_say
             }
         }
     }
+    (off, energy)
+}
+
+#[test]
+fn rendered_frames_of_a_turn_have_the_fourier_coefficients_that_the_transfer_says() {
+    let (transfer, buffer, occluder) = standing(20, 1500);
+    let axis = Vec3::new(0.0, transfer.elevation.cos(), transfer.elevation.sin());
+    let (panoramas, light) = soft_room(transfer.elevation);
+    let finish = TransferFinish {
+        normals: buffer.normals().to_vec(),
+        albedo: vec![Vec3::splat(PI); buffer.len()],
+    };
+    let curves = transfer.curves(&finish, &MATT, &light);
+    let scene = SyntheticScene::shaded(buffer, occluder, 16, 7);
+    let rendered = harmonics_of_frames(&scene, &panoramas, axis, None);
+    let (off, energy) = differences(&curves, &rendered);
     // What is left is the noise of the rays, alike in all harmonics: it is told as a part of the first one.
     let harmonics: [&[usize]; 4] = [&[0], &[1, 2], &[3, 4], &[5, 6]];
     let sum = |of: &[f64; 7], terms: &[usize]| terms.iter().map(|&term| of[term]).sum::<f64>();
@@ -260,6 +279,44 @@ fn rendered_frames_of_a_turn_have_the_fourier_coefficients_that_the_transfer_say
     // The second harmonic is found for what it is, not by its noise.
     let relative = (sum(&off, &[3, 4]) / sum(&energy, &[3, 4])).sqrt();
     assert!(relative < 0.08, "{relative}");
+}
+
+#[test]
+fn highlights_of_rendered_frames_are_as_strong_as_the_transfer_says() {
+    let elevation = 0.35;
+    let transfer = open_ball(elevation);
+    let mesh: Mesh = ShapeKind::Sphere.build(0);
+    let projection = Projection::Orthographic;
+    let placement = Pose::upright(elevation, 0.3, 0.9).place(&mesh, projection);
+    let buffer = GBuffer::render(&mesh, placement, projection, 32);
+    let (panoramas, light) = soft_room(elevation);
+    let axis = Vec3::new(0.0, elevation.cos(), elevation.sin());
+    let finish = TransferFinish {
+        normals: buffer.normals().to_vec(),
+        albedo: vec![Vec3::ZERO; buffer.len()],
+    };
+    let scene = SyntheticScene::open(buffer);
+    for (reflectance, exponent) in [(0.5, 12.0), (0.8, 40.0)] {
+        let gloss = BlinnPhong {
+            reflectance: Vec3::splat(reflectance),
+            exponent,
+        };
+        let rendered = harmonics_of_frames(&scene, &panoramas, axis, Some(gloss));
+        let material = MATT.with_half_vector(reflectance, exponent);
+        let curves = transfer.curves(&finish, &material, &light);
+        // An albedo of pi stands for a white surface in the transfer.
+        let curves: Vec<CurveCoefficients> = curves
+            .into_iter()
+            .map(|curve| curve.map(|values| values.map(|value| PI * value)))
+            .collect();
+        let (off, energy) = differences(&curves, &rendered);
+        let sum = |of: &[f64; 7]| of[1..3].iter().sum::<f64>();
+        let relative = [off[0] / energy[0], sum(&off) / sum(&energy)].map(f64::sqrt);
+        assert!(
+            relative.iter().all(|part| *part < 0.25),
+            "exponent {exponent}: {relative:?}"
+        );
+    }
 }
 
 #[test]
