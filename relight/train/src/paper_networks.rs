@@ -11,9 +11,9 @@ use super::losses::angular_degrees;
 use super::low_rank::chromaticity;
 use super::model::{ComputePrecision, Model};
 use super::paper_phases::{
-    PaperPhase, TruthLoss, diffuse_chromaticity, highlight_of, light_on_truth, normal_on_truth,
-    normals_of, reflectance, reflectance_on_turns, saturated_frames, spec_on_truth, spec_on_turns,
-    specular_on_turns,
+    PaperPhase, TruthLoss, diffuse_chromaticity, diffuse_of_truth, highlight_of, light_on_truth,
+    normal_on_truth, normals_of, reflectance, reflectance_on_turns, saturated_frames,
+    spec_on_truth, spec_on_turns, specular_on_turns,
 };
 use super::sample::TruthBatch;
 use super::settings::PaperSettings;
@@ -147,7 +147,7 @@ impl PhaseNetworks {
                 highlight_figures(&grey, batch)?.to_vec()
             }
             Self::Normal | Self::Joint { .. } => {
-                let normals = normals_of(own, picture, mask)?;
+                let normals = normals_of(own, &diffuse_of_truth(batch)?, mask)?;
                 let degrees = angular_degrees(&normals, &batch.normals, mask)?;
                 vec![("normals_deg", f64::try_from(degrees)?)]
             }

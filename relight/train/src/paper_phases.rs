@@ -236,7 +236,7 @@ pub fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<TruthLoss, Trai
 /// # Errors
 /// [`TrainError::Torch`].
 pub fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
-    let found = normals_of(normal, &batch.picture, &batch.mask)?;
+    let found = normals_of(normal, &diffuse_of_truth(batch)?, &batch.mask)?;
     Ok(TruthLoss {
         mean: angular(&found, &batch.normals, &batch.mask)?,
         head: "normals",
@@ -249,7 +249,7 @@ pub fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<TruthLoss, 
 /// # Errors
 /// [`TrainError::Torch`].
 pub fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
-    let coefficients = light_of(light, &batch.picture, &batch.mask)?;
+    let coefficients = light_of(light, &diffuse_of_truth(batch)?, &batch.mask)?;
     let shading = diffuse_shading(&batch.normals, &coefficients, DiffuseForm::Released)?;
     let grey = shading.f_mean_dim([1_i64].as_slice(), true, None)?;
     let value = scale_invariant(&grey, &batch.shading, &batch.mask)?;
@@ -285,20 +285,28 @@ pub fn reflectance(
     spec: Option<&Model>,
     turns: &TurnTensors,
 ) -> Result<Tensor, TrainError> {
-    let (picture, mask) = (&turns.picture, &turns.mask);
+    let mask = &turns.mask;
     let diffuse = match spec {
-        Some(spec) => {
-            let highlight = highlight_of(spec, picture, mask)?.f_mul(&gate(turns)?)?;
-            picture.f_sub(&highlight)?.f_clamp(0.0, 1.0)?
-        }
-        None => picture.shallow_clone(),
+        Some(spec) => without_highlight(turns, &highlight_of(spec, &turns.picture, mask)?)?,
+        None => turns.picture.shallow_clone(),
     };
-    let normals = normals_of(normal, picture, mask)?;
-    let coefficients = light_of(light, picture, mask)?;
+    let normals = normals_of(normal, &diffuse, mask)?;
+    let coefficients = light_of(light, &diffuse, mask)?;
     let shading = diffuse_shading(&normals, &coefficients, DiffuseForm::Released)?;
     Ok(diffuse
         .f_div(&shading.f_clamp_min(LEAST_SHADING)?)?
         .f_clamp(0.0, 1.0)?)
+}
+
+/// The pictures without Spec-Net's highlights, where the gate is open for them: what Normal-Net and Light-Net are given.
+fn without_highlight(turns: &TurnTensors, highlight: &Tensor) -> Result<Tensor, TrainError> {
+    let removed = highlight.f_mul(&gate(turns)?)?;
+    Ok(turns.picture.f_sub(&removed)?.f_clamp(0.0, 1.0)?)
+}
+
+/// The same of composed samples, whose highlights are known.
+pub(super) fn diffuse_of_truth(batch: &TruthBatch) -> Result<Tensor, TrainError> {
+    Ok(batch.picture.f_sub(&batch.highlight)?.f_clamp(0.0, 1.0)?)
 }
 
 /// 1 for the frames for which the gate of saturation opens Spec-Net, 0 for the others: `frames x 1 x 1 x 1`.
@@ -328,8 +336,9 @@ pub fn specular_on_turns(
     }
     let (picture, mask) = (&turns.picture, &turns.mask);
     let highlight = highlight_of(spec, picture, mask)?;
-    let normals = normals_of(normal, picture, mask)?;
-    let coefficients = light_of(light, picture, mask)?;
+    let diffuse = without_highlight(turns, &highlight)?;
+    let normals = normals_of(normal, &diffuse, mask)?;
+    let coefficients = light_of(light, &diffuse, mask)?;
     let answer = &reflectance.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
     let (strength, smoothness) = answered_gloss(answer)?;
     let rendered = power_highlight(&normals, &coefficients, &strength, &smoothness)?
@@ -339,4 +348,138 @@ pub fn specular_on_turns(
     let error = rendered.f_sub(&highlight)?.f_square()?.f_mul(&weight)?;
     let pixels = weight.f_sum(None)?.f_mul_scalar(3.0)?.f_clamp_min(1.0)?;
     Ok(Some(error.f_sum(None)?.f_div(&pixels)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::ComputePrecision;
+    use relight_nets::paper::{Head, light_net, normal_net, spec_net};
+    use relight_nets::{Graph, Weights};
+    use tch::{Device, Kind};
+
+    const SIDE: i64 = 64;
+
+    fn model(graph: Graph, seed: u64) -> Model {
+        let weights = Weights::initial(&graph, seed);
+        Model::new(graph, &weights, Device::Cpu, ComputePrecision::Single).unwrap()
+    }
+
+    fn frames(picture: Tensor, spec_net: Vec<bool>) -> TurnTensors {
+        TurnTensors {
+            mask: Tensor::ones([2, 1, SIDE, SIDE], (Kind::Float, Device::Cpu)),
+            picture,
+            spec_net,
+        }
+    }
+
+    fn picture() -> Tensor {
+        let count = 2 * 3 * SIDE * SIDE;
+        let ramp = Tensor::arange(count, (Kind::Float, Device::Cpu));
+        (ramp * 0.37)
+            .sin()
+            .f_mul_scalar(0.3)
+            .unwrap()
+            .f_add_scalar(0.6)
+            .unwrap()
+            .view([2, 3, SIDE, SIDE])
+    }
+
+    #[test]
+    fn normal_net_and_light_net_are_given_the_picture_without_its_highlights() {
+        let (normal, light) = (model(normal_net(), 1), model(light_net(Head::Pooled), 2));
+        let spec = model(spec_net(), 3);
+        let turns = frames(picture(), vec![true, false]);
+        let found = reflectance(&normal, &light, Some(&spec), &turns).unwrap();
+        // The first frame without its highlight, the second as it is: the gate is closed.
+        let highlight = highlight_of(&spec, &turns.picture, &turns.mask).unwrap();
+        assert!(highlight.max().double_value(&[]) > 0.05);
+        let open = Tensor::from_slice(&[1.0_f32, 0.0]).view([2, 1, 1, 1]);
+        let diffuse = (&turns.picture - highlight * open).clamp(0.0, 1.0);
+        let expected =
+            reflectance(&normal, &light, None, &frames(diffuse, vec![false; 2])).unwrap();
+        let off = (found - expected).abs().max().double_value(&[]);
+        assert!(off < 1e-5, "{off}");
+    }
+
+    #[test]
+    fn a_turn_has_a_reflectance_of_rank_one_in_linear_light_and_not_in_that_of_files() {
+        let place = (Kind::Float, Device::Cpu);
+        let (frames, side) = (12, SIDE);
+        let across = Tensor::linspace(-0.7, 0.7, side, place);
+        let (x, y) = (
+            across
+                .view([1, 1, 1, side])
+                .expand([frames, 1, side, side], false),
+            across
+                .view([1, 1, side, 1])
+                .expand([frames, 1, side, side], false),
+        );
+        let z = (x.square() + y.square())
+            .neg()
+            .f_add_scalar(1.0)
+            .unwrap()
+            .sqrt();
+        let normals = Tensor::cat(&[&x, &y, &z], 1);
+        // A bright side that goes around, as over a turn.
+        let light: Vec<f32> = (0..frames)
+            .flat_map(|frame| {
+                let (sin, cos) = (frame as f32 / frames as f32 * std::f32::consts::TAU).sin_cos();
+                let bands = [
+                    0.8,
+                    0.2,
+                    0.3 * cos,
+                    0.3 * sin,
+                    0.1 * sin * cos,
+                    0.05,
+                    0.1,
+                    0.05,
+                    0.05,
+                ];
+                bands.into_iter().flat_map(|value| [value; 3])
+            })
+            .collect();
+        let light = Tensor::from_slice(&light).view([frames, 9, 3]);
+        let shading = diffuse_shading(&normals, &light, DiffuseForm::Released).unwrap();
+        let albedo = (x * 7.0)
+            .sin()
+            .f_mul_scalar(0.25)
+            .unwrap()
+            .f_add_scalar(0.4)
+            .unwrap();
+        let picture = (albedo * &shading).clamp(0.0, 1.0);
+        let mask = Tensor::ones([frames, 1, side, side], place);
+        let residual = |picture: &Tensor| {
+            let reflectance = picture / &shading;
+            crate::held_out::rank_figures(&reflectance, &mask)
+                .unwrap()
+                .0
+        };
+        let (linear, file) = (residual(&picture), residual(&to_srgb(&picture).unwrap()));
+        assert!(linear < 1e-6 && file > 0.002, "{linear} {file}");
+    }
+
+    #[test]
+    fn composed_samples_teach_normals_of_the_picture_without_its_highlights() {
+        let normal = model(normal_net(), 1);
+        let place = (Kind::Float, Device::Cpu);
+        let ones = || Tensor::ones([2, 1, SIDE, SIDE], place);
+        let batch = |picture: Tensor, highlight: Tensor| TruthBatch {
+            input: Tensor::zeros([2, 4, SIDE, SIDE], place),
+            mask: ones(),
+            picture,
+            shading: ones(),
+            albedo: Tensor::ones([2, 3, SIDE, SIDE], place),
+            normals: Tensor::cat(&[ones() * 0.0, ones() * 0.0, ones()], 1),
+            highlight,
+        };
+        let loss = |batch: &TruthBatch| {
+            let loss = normal_on_truth(&normal, batch).unwrap();
+            loss.mean.value.double_value(&[])
+        };
+        let highlight = picture().narrow(1, 0, 1) * 0.3;
+        let shining = loss(&batch(picture() * 0.5 + &highlight, highlight.copy()));
+        let plain = loss(&batch(picture() * 0.5, ones() * 0.0));
+        assert!((shining - plain).abs() < 1e-4, "{shining} {plain}");
+    }
 }
