@@ -47,6 +47,7 @@ fn a_turn_is_scored_by_each_method_and_written_for_others() {
         dir.path().join("table.json"),
         dir.path().join("frames"),
     );
+    let diagram = dir.path().join("reliability.png");
     write_turn(&data);
     let output = relight(&[
         "eval",
@@ -59,6 +60,8 @@ fn a_turn_is_scored_by_each_method_and_written_for_others() {
         "turn",
         "--frames",
         frames.to_str().unwrap(),
+        "--reliability",
+        diagram.to_str().unwrap(),
         "-o",
         table.to_str().unwrap(),
     ]);
@@ -72,6 +75,19 @@ fn a_turn_is_scored_by_each_method_and_written_for_others() {
         assert!(score["mean_deg"].as_f64().unwrap() < 35.0, "{score}");
     }
     assert!(network["albedo"].is_null() && solved["albedo"].is_number());
+    // One diagram a method, and every pixel is in one of its bins.
+    let (width, height) = image::image_dimensions(&diagram).unwrap();
+    assert_eq!(width, 2 * height - 16);
+    let pixels = |score: &serde_json::Value| {
+        let bins = score["reliability"].as_array().unwrap();
+        let counts = bins.iter().map(|bin| bin["pixels"].as_u64().unwrap());
+        counts.sum::<u64>()
+    };
+    assert!(pixels(&network) > 300 && pixels(&network) == pixels(&solved));
+    // The network, the outline where there is enough of it, and all together.
+    let azimuths = solved["azimuths"].as_array().unwrap();
+    assert!(azimuths.len() >= 2 && network["azimuths"].as_array().unwrap().is_empty());
+    assert!(azimuths.last().unwrap()["source"].is_null());
     let written = fs::read_dir(frames.join("synth-12-0000.data")).unwrap();
     let mut names: Vec<String> = written
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())

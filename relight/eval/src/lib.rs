@@ -24,6 +24,7 @@ mod light;
 mod normals;
 mod ordinal;
 mod predictions;
+mod reliability;
 mod relighting;
 mod retinex;
 mod run;
@@ -39,6 +40,7 @@ pub use light::{LightMethod, evaluate_light};
 pub use normals::{NormalMethod, evaluate_normals};
 pub use ordinal::{OrdinalMethod, evaluate_ordinal};
 pub use predictions::Predictions;
+pub use reliability::ReliabilityBin;
 pub use relighting::{
     RelightMethod, RelightingRecipe, RelightingSet, evaluate_relighting, make_relighting,
 };
@@ -47,7 +49,7 @@ pub use run::EvalProgress;
 pub use scores::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
 pub use trust::{TrustCurve, TrustTable, evaluate_trust};
 pub use turns::{
-    TurnLine, TurnMethod, TurnNetworks, TurnScore, TurnSet, TurnTable, evaluate_turns,
+    AzimuthScore, TurnLine, TurnMethod, TurnNetworks, TurnScore, TurnSet, TurnTable, evaluate_turns,
 };
 
 /// The examples of the README, so that they are built.

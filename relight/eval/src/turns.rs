@@ -10,12 +10,14 @@ use relight_core::statistics::median;
 use relight_nets::Weights;
 use relight_synth::{FrameTruth, TurnDescription};
 use relight_turn::{
-    Elevation, NormalsSource, ReadTurn, RotationDirection, TableFrame, TurnError, TurnNetwork,
-    TurnOptions, TurnPrediction, TurnPrior, prior_albedo, prior_normals, read_curves, solve_turn,
+    AzimuthSource, Elevation, MaterialKind, NormalsSource, ReadTurn, RotationDirection, TableFrame,
+    TableLight, TurnError, TurnNetwork, TurnOptions, TurnPrediction, TurnPrior, TurnSolution,
+    prior_albedo, prior_normals, read_curves, solve_turn,
 };
 use relit_data::shard::Dataset;
 use serde::Serialize;
 
+use super::reliability::{ReliabilityBin, reliability, summed, write_diagrams};
 use super::{EvalError, EvalProgress};
 
 /// Errors up to which it is counted how many pixels keep what is expected of them, degrees.
@@ -87,6 +89,23 @@ pub struct TurnScore {
     /// For the pixels that are expected to be off by at most 10, 20 and 30 degrees: how many there are, and how many
     /// of them are.
     pub kept: [[usize; 2]; 3],
+    /// The pixels by what is expected of them, in steps of 5 degrees.
+    pub reliability: Vec<ReliabilityBin>,
+    /// What the object is taken for; none of normals alone.
+    pub material: Option<MaterialKind>,
+    /// By how much each source of the light's azimuth is off, and all together.
+    pub azimuths: Vec<AzimuthScore>,
+}
+
+/// A source of the light's azimuth beside the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AzimuthScore {
+    /// Which; none for all together.
+    pub source: Option<AzimuthSource>,
+    /// By how much it is off, degrees.
+    pub off_deg: f64,
+    /// Its standard deviation as it is said, degrees.
+    pub uncertainty_deg: f64,
 }
 
 /// A method on all turns.
@@ -272,6 +291,8 @@ struct Answer {
     /// Degrees.
     expected_errors: Planes<1>,
     albedo: Option<Rgb<Linear>>,
+    material: Option<MaterialKind>,
+    azimuths: Vec<AzimuthScore>,
 }
 
 impl Answer {
@@ -312,6 +333,8 @@ impl Answer {
             normals: solution.normals(&turn.curves),
             expected_errors: solution.expected_errors(&turn.curves),
             albedo: Some(solution.albedo(&turn.curves)),
+            material: Some(solution.material()),
+            azimuths: azimuths(&solution, truth),
         })
     }
 
@@ -320,8 +343,31 @@ impl Answer {
             normals: found.normals,
             expected_errors: found.expected_errors,
             albedo: None,
+            material: None,
+            azimuths: Vec::new(),
         }
     }
+}
+
+/// The sources of a solution's azimuth beside the bright side of the true light.
+fn azimuths(solution: &TurnSolution, truth: &TrueTurn) -> Vec<AzimuthScore> {
+    let light = truth.light.with_order(Order::TWO);
+    let right = TableLight::from_viewer(&light, &TableFrame::new(truth.elevation));
+    let right = right.bright_azimuth_deg();
+    let Some(figures) = solution.azimuth() else {
+        return Vec::new();
+    };
+    let score = |source, azimuth_deg: f64, uncertainty_deg| AzimuthScore {
+        source,
+        off_deg: (azimuth_deg - right + 180.0).rem_euclid(360.0) - 180.0,
+        uncertainty_deg,
+    };
+    let all = score(None, figures.azimuth_deg, figures.uncertainty_deg);
+    let each = figures
+        .evidence
+        .iter()
+        .map(|one| score(Some(one.source), one.azimuth_deg, one.uncertainty_deg));
+    each.chain([all]).collect()
 }
 
 fn score(name: &str, truth: &TrueTurn, answer: &Answer) -> TurnScore {
@@ -370,6 +416,13 @@ fn score(name: &str, truth: &TrueTurn, answer: &Answer) -> TurnScore {
             .as_ref()
             .map(|albedo| albedo_error(&truth.albedo, albedo, &inside)),
         kept,
+        reliability: {
+            let expected = answer.expected_errors.plane(0);
+            let pixels = inside.iter().zip(&errors);
+            reliability(pixels.map(|(&at, &error)| (f64::from(expected[at]), error)))
+        },
+        material: answer.material,
+        azimuths: answer.azimuths.clone(),
     }
 }
 
@@ -448,6 +501,22 @@ impl TurnLine {
                 .sum::<usize>()
         };
         (sum(0) > 0).then(|| sum(1) as f64 / sum(0) as f64)
+    }
+}
+
+impl TurnTable {
+    /// Draws a reliability diagram for each method, side by side: expected errors to the right, errors upwards, up to 45
+    /// degrees with a line every 10.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn write_reliability(&self, path: &Path) -> Result<(), EvalError> {
+        let of_line = |line: &TurnLine| {
+            let turns = line.turns.iter();
+            summed(turns.map(|turn| turn.reliability.as_slice()))
+        };
+        let diagrams: Vec<_> = self.lines.iter().map(of_line).collect();
+        write_diagrams(path, &diagrams)
     }
 }
 

@@ -118,6 +118,9 @@ struct TurnArguments {
     /// them.
     #[arg(long, value_name = "DIR")]
     frames: Option<PathBuf>,
+    /// Draw errors beside what is expected of them, a diagram for each method, to this file (.png).
+    #[arg(long, value_name = "FILE")]
+    reliability: Option<PathBuf>,
     /// Write the table as JSON, with the scores of each turn, to this file.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -511,6 +514,9 @@ fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
     let table = with_progress(set.len() * methods.len(), "solving", console, |progress| {
         evaluate_turns(&set, &split, &methods, &networks, progress)
     })?;
+    if let Some(path) = &arguments.reliability {
+        table.write_reliability(path)?;
+    }
     write_json(&table, arguments.output.as_deref())?;
     let event = json!({ "event": "table", "table": table });
     console.say(table.to_string().trim_end(), &event);
