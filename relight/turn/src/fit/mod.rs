@@ -2,6 +2,7 @@
 
 pub(crate) mod albedo;
 pub(crate) mod alternation;
+pub(crate) mod azimuth;
 pub(crate) mod blocks;
 pub(crate) mod confidence;
 pub(crate) mod curve_statistics;

@@ -6,6 +6,7 @@ use relight_core::light::{Normals, ShLight, YUp};
 use crate::model::frame::Elevation;
 use crate::model::material::MaterialKind;
 use crate::network::predict::{HypothesisFigures, TurnPrediction};
+use crate::observe::strip::StripFigures;
 
 /// What is expected of the object before a turn is solved.
 #[derive(Debug, Clone)]
@@ -59,6 +60,9 @@ pub struct TurnOptions {
     pub prior_weight: f64,
     /// The material; the one that fits the curves where it is not known.
     pub material: Option<MaterialKind>,
+    /// The surroundings by the background of the video, where it was read: they help to say from which side the light
+    /// comes.
+    pub panorama: Option<StripFigures>,
 }
 
 impl Default for TurnOptions {
@@ -69,6 +73,7 @@ impl Default for TurnOptions {
             prior: None,
             prior_weight: 0.15,
             material: None,
+            panorama: None,
         }
     }
 }

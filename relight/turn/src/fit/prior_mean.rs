@@ -3,6 +3,7 @@
 use relight_core::image::Extent;
 
 use crate::error::TurnError;
+use crate::fit::azimuth::{AzimuthFigures, AzimuthSources};
 use crate::fit::figures::InitialisationFigure;
 use crate::fit::inflation::inflated;
 use crate::fit::initialisation::FittedLight;
@@ -35,6 +36,8 @@ pub(crate) struct Initialised {
     pub(crate) setting: Setting,
     pub(crate) found: FittedLight,
     pub(crate) is_prior_left_out: bool,
+    /// From which side the light comes, where a network said so too.
+    pub(crate) azimuth: Option<AzimuthFigures>,
 }
 
 impl Initialised {
@@ -42,9 +45,16 @@ impl Initialised {
         let frame = TableFrame::new(options.elevation);
         let known = options.light.as_ref();
         let known = known.map(|light| KnownLight::new(light, &frame));
-        let prior = options
-            .prior
+        let sources = AzimuthSources {
+            frame,
+            panorama: options.panorama.as_ref(),
+            given: known.as_ref().map(|known| &known.diffuse),
+        };
+        let align = |prior| sources.align(curves, prior);
+        let (aligned, azimuth) = options.prior.as_ref().and_then(align).unzip();
+        let prior = aligned
             .as_ref()
+            .or(options.prior.as_ref())
             .map(|prior| prior_of(curves, prior, options.prior_weight))
             .transpose()?;
         let has_shape = prior.is_some();
@@ -67,6 +77,7 @@ impl Initialised {
             setting,
             found,
             is_prior_left_out: false,
+            azimuth,
         };
         Ok(initialised.or_outline(curves, options))
     }
@@ -123,6 +134,7 @@ impl Initialised {
                     ..found
                 },
                 is_prior_left_out: true,
+                azimuth: self.azimuth,
             };
         }
         self.found.initialisations = initialisations;

@@ -4,6 +4,7 @@ use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{Normals, ShLight, YUp};
 use relight_core::statistics::median;
 
+use crate::fit::azimuth::AzimuthFigures;
 use crate::fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure};
 use crate::fit::material_choice::doubted;
 use crate::fit::search::PixelFit;
@@ -41,6 +42,7 @@ pub struct TurnSolution {
     pub(crate) has_prior: bool,
     pub(crate) hypotheses: Option<HypothesisFigures>,
     pub(crate) is_prior_left_out: bool,
+    pub(crate) azimuth: Option<AzimuthFigures>,
     pub(crate) direction: Option<DirectionFigure>,
     pub(crate) given_material: Option<MaterialKind>,
     pub(crate) conditioning: Conditioning,
@@ -140,6 +142,12 @@ impl TurnSolution {
     #[must_use]
     pub const fn is_prior_left_out(&self) -> bool {
         self.is_prior_left_out
+    }
+
+    /// From which side the light comes, by all that says so; none where no network of turns was asked.
+    #[must_use]
+    pub const fn azimuth(&self) -> Option<&AzimuthFigures> {
+        self.azimuth.as_ref()
     }
 
     /// How each initialisation of an unknown light ended; none where it was known.

@@ -69,6 +69,7 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         setting,
         found,
         is_prior_left_out,
+        azimuth,
     } = initialised;
     let conditioning = match &setting.known {
         Some(known) => of_turn.in_given(&setting.unblurred(known, found.model.material)),
@@ -126,6 +127,7 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
             .as_ref()
             .and_then(|prior| prior.hypotheses.clone()),
         is_prior_left_out,
+        azimuth,
         direction,
         given_material: options.material,
         albedo,

@@ -34,6 +34,8 @@ pub enum ElevationSource {
     Given,
     /// From the ellipse of the table's rim.
     Rim,
+    /// From the rim as the session's video shows it.
+    Video,
 }
 
 /// How high the camera looks down on the table: 0 from the side, 90 degrees from above.
@@ -99,6 +101,15 @@ impl Elevation {
         })
     }
 
+    /// From a rim that was found in the video, with its uncertainty, degrees.
+    pub(crate) fn seen(degrees: f64, uncertainty_deg: f64) -> Result<Self, SettingError> {
+        Ok(Self {
+            uncertainty_deg,
+            source: ElevationSource::Video,
+            ..Self::given(degrees)?
+        })
+    }
+
     /// Degrees.
     #[must_use]
     pub const fn degrees(&self) -> f64 {
@@ -140,6 +151,12 @@ impl TableFrame {
         [x, self.sin * y - self.cos * z, self.cos * y + self.sin * z]
     }
 
+    /// A vector of the table's frame in the viewer's.
+    #[must_use]
+    pub fn to_viewer(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        [x, self.sin * y + self.cos * z, self.sin * z - self.cos * y]
+    }
+
     /// The table's axis, upwards, in the viewer's frame.
     #[must_use]
     pub const fn axis(&self) -> [f64; 3] {
@@ -171,6 +188,9 @@ mod tests {
         let apply = frame.rotation();
         let row = apply.matrix()[2];
         assert!((row[1] - cos).abs() < 1e-12 && (row[2] - sin).abs() < 1e-12);
+        let there = [0.3, -0.5, 0.8];
+        let back = frame.to_viewer(frame.to_table(there));
+        assert!(back.iter().zip(there).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 
     #[test]

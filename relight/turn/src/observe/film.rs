@@ -1,4 +1,5 @@
-//! What the video of a turn shows beside the object: the surroundings, and a ball that measures its light.
+//! What the video of a turn shows beside the object: the surroundings, the table's rim, and a ball that measures its
+//! light.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -10,9 +11,11 @@ use relit_data::geometry::Rect;
 use relit_data::session::Recording;
 
 use crate::error::TurnError;
+use crate::model::frame::Elevation;
 use crate::observe::probe::{Probe, ProbeBuilder};
 use crate::observe::probe_place::ProbePlace;
 use crate::observe::reading::{ReadTurn, TurnOrigin};
+use crate::observe::rim::RimBuilder;
 use crate::observe::strip::{PanoramaStrip, StripBuilder};
 
 /// Parameters of the comparison of a video with its shard.
@@ -25,18 +28,22 @@ struct FilmParameters {
     /// Relative difference of the light of blocks from which frames show something else. Measured: those of their own
     /// video differ by 0.01 to 0.02, by JPEG and scaling.
     most_different: f64,
+    /// One frame of so many counts for the mean in which the table's rim is looked for. By hand.
+    every: u64,
 }
 
 const PARAMETERS: FilmParameters = FilmParameters {
     most_covered: 0.05,
     block: 16,
     most_different: 0.12,
+    every: 4,
 };
 
 /// What was seen beside the object.
 #[derive(Debug)]
 pub struct Filmed {
     pub(crate) strip: Option<PanoramaStrip>,
+    elevation: Option<Elevation>,
     pub(crate) probe: Option<ProbeBuilder>,
 }
 
@@ -60,12 +67,16 @@ pub fn film(
     let angles: HashMap<u64, f64> = turn.sources.iter().copied().collect();
     let mut likeness = Likeness::new(turn);
     let mut strip = StripBuilder::new(movie.extent())?;
+    let mut rim = RimBuilder::new(movie.extent());
     let mut probe = probe.map(ProbeBuilder::new).transpose()?;
     let (mut number, mut done) = (0, 0);
     while let Some(frame) = movie.frame()? {
         if let Some(&angle) = angles.get(&number) {
             likeness.compare(number, &frame);
             strip.push(angle, &frame)?;
+            if done % PARAMETERS.every == 0 {
+                rim.push(&frame);
+            }
             if let Some(probe) = &mut probe {
                 probe.push(angle, &frame)?;
             }
@@ -85,8 +96,11 @@ pub fn film(
             path: recording.video,
         });
     }
+    let strip = strip.finish();
+    let focal = strip.as_ref().map(PanoramaStrip::focal);
     Ok(Filmed {
-        strip: strip.finish(),
+        elevation: focal.and_then(|focal| rim.finish(turn, focal)),
+        strip,
         probe,
     })
 }
@@ -226,6 +240,12 @@ impl Filmed {
     pub const fn strip(&self) -> Option<&PanoramaStrip> {
         self.strip.as_ref()
     }
+
+    /// The camera over the table, by the table's rim; none where the video does not show it clearly.
+    #[must_use]
+    pub const fn elevation(&self) -> Option<Elevation> {
+        self.elevation
+    }
 }
 
 #[cfg(test)]
@@ -234,6 +254,7 @@ mod tests {
 
     use super::*;
     use crate::CurveBuilder;
+    use crate::observe::session::session_of;
     use relight_core::image::Linear;
 
     const EXTENT: Extent = Extent {
@@ -333,6 +354,22 @@ mod tests {
         );
         recording.id = "20261120T093015Z-mug".to_owned();
         assert!(check(&recording).is_ok());
+    }
+
+    #[test]
+    fn the_session_that_a_shard_names_is_found_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let shard_file = folder.path().join("dataset/20261120T093015Z-mug.tar");
+        std::fs::create_dir_all(folder.path().join("dataset")).unwrap();
+        std::fs::write(&shard_file, "").unwrap();
+        let turn = shard(0);
+        assert_eq!(session_of(&shard_file, &turn), None);
+        let session = folder.path().join("sessions/20261120T093015Z-mug");
+        std::fs::create_dir_all(&session).unwrap();
+        // A folder without a video leads nowhere.
+        assert_eq!(session_of(&shard_file, &turn), None);
+        std::fs::write(session.join("video.mkv"), "").unwrap();
+        assert_eq!(session_of(&shard_file, &turn), Some(session));
     }
 
     #[test]

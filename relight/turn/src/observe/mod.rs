@@ -9,6 +9,8 @@ pub(crate) mod mirror_panorama;
 pub(crate) mod probe;
 pub(crate) mod probe_place;
 pub(crate) mod reading;
+pub(crate) mod rim;
+pub(crate) mod session;
 pub(crate) mod strip;
 pub(crate) mod surroundings;
 pub(crate) mod verdict;

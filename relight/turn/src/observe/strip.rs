@@ -70,6 +70,8 @@ struct Side {
 #[derive(Debug, Clone)]
 pub struct PanoramaStrip {
     image: Rgb<Linear>,
+    /// The camera's focal length by the angle between the two columns, pixels of the video.
+    focal: f64,
     figures: StripFigures,
 }
 
@@ -184,6 +186,7 @@ impl StripBuilder {
         ));
         Some(PanoramaStrip {
             image: Rgb::new(image),
+            focal: between as f64 / 2.0 / (field_deg / 2.0).to_radians().tan(),
             figures: StripFigures {
                 direction,
                 field_deg,
@@ -238,6 +241,11 @@ impl PanoramaStrip {
     #[must_use]
     pub const fn figures(&self) -> &StripFigures {
         &self.figures
+    }
+
+    /// The camera's focal length by the angle between the two columns, pixels of the video.
+    pub(crate) const fn focal(&self) -> f64 {
+        self.focal
     }
 
     /// The strip itself: what is to the right in the surroundings is to the right in it, and what the camera sees at

@@ -4,6 +4,7 @@ use relight_core::light::Order;
 use serde::Serialize;
 
 use crate::error::TurnError;
+use crate::fit::azimuth::AzimuthFigures;
 use crate::fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure};
 use crate::fit::solution::TurnSolution;
 use crate::model::frame::Elevation;
@@ -44,6 +45,8 @@ pub struct TurnFigures {
     pub(crate) direction: Option<DirectionFigure>,
     /// What the network of turns took the turn for; none where it was not asked.
     pub(crate) network: Option<HypothesisFigures>,
+    /// From which side the light comes, by all that says so; none where no network of turns was asked.
+    pub(crate) azimuth: Option<AzimuthFigures>,
     /// The residual of a curve, over the energy of its variation, the median.
     pub(crate) residual: f64,
     /// The angle that normals are expected to be off, degrees, the median.

@@ -169,6 +169,7 @@ impl TurnFiles<'_> {
             materials: solution.materials().to_vec(),
             direction: solution.direction(),
             network: solution.hypotheses().cloned(),
+            azimuth: solution.azimuth().cloned(),
             residual: solution.residual(),
             expected_error_deg: solution.expected_error_deg(),
             gloss,

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use relight_core::light::ShLight;
 use relight_nets::{NetError, Weights};
 use relight_turn::{
-    Elevation, MaterialKind, NormalsSource, Probe, ProbeBall, ProbePlace, ReadTurn,
+    Elevation, Filmed, MaterialKind, NormalsSource, Probe, ProbeBall, ProbePlace, ReadTurn,
     RotationDirection, TurnNetwork, TurnOptions, TurnPrior, prior_albedo, prior_normals,
     read_given_light,
 };
@@ -32,8 +32,8 @@ pub(crate) struct Arguments {
     /// The folder for the results.
     #[arg(short, long, value_name = "DIR")]
     pub(super) output: PathBuf,
-    /// How high the camera looks down on the table, degrees: 0 from the side, 90 from above [default: 18, and 8
-    /// either way].
+    /// How high the camera looks down on the table, degrees: 0 from the side, 90 from above [default: by the table's
+    /// rim in the session's video; else 18, and 8 either way].
     #[arg(long, value_name = "DEGREES", value_parser = elevation, conflicts_with = "rim")]
     elevation: Option<Elevation>,
     /// Width and height, pixels, of the ellipse that the table's rim is in the video: another way to say the
@@ -44,10 +44,14 @@ pub(crate) struct Arguments {
     /// (nine lines of red, green and blue, or up to 49), or a panorama (.hdr, .exr).
     #[arg(long, value_name = "FILE")]
     pub(super) light: Option<PathBuf>,
-    /// The session from which the shard was made, or its video: to see the surroundings (room.png), and the ball of
-    /// --probe. Needs the program ffmpeg.
+    /// The session from which the shard was made, or its video: to see the surroundings (room.png), the table's rim, and
+    /// the ball of --probe. Needs the program ffmpeg [default: the session that the shard names, where it lies beside the
+    /// shard or its folder, or in sessions there].
     #[arg(long, value_name = "PATH")]
     pub(super) session: Option<PathBuf>,
+    /// Do not look for the session.
+    #[arg(long, conflicts_with = "session")]
+    pub(super) no_session: bool,
     /// A ball on the table, diffuse grey or chrome, which measures the light: its middle and radius in the video,
     /// pixels. The light is then in units in which the ball's albedo is 1.
     #[arg(long, value_name = "X,Y,R", value_parser = probe, requires = "session", conflicts_with = "light")]
@@ -177,12 +181,17 @@ impl Arguments {
     }
 
     /// Normals to start from.
-    fn prior(&self, source: &InitialNormals, turn: &ReadTurn) -> Result<TurnPrior, Box<dyn Error>> {
+    fn prior(
+        &self,
+        source: &InitialNormals,
+        turn: &ReadTurn,
+        elevation: Elevation,
+    ) -> Result<TurnPrior, Box<dyn Error>> {
         let (y, shown) = (self.normals_y.into(), &turn.first);
         let prior: TurnPrior = match source {
             InitialNormals::Turn => {
                 let network = TurnNetwork::new(&self.turn_weights()?)?;
-                network.predict(&turn.curves, self.elevation())?.into()
+                network.predict(&turn.curves, elevation)?.into()
             }
             InitialNormals::Photo(source) => {
                 prior_normals(source, shipped::weights, y, shown, &turn.mask)?.into()
@@ -214,20 +223,36 @@ impl Arguments {
         })
     }
 
-    pub(super) fn elevation(&self) -> Elevation {
+    fn elevation(&self) -> Elevation {
         let given = self.elevation.or(self.rim);
         given.unwrap_or_else(Elevation::assumed)
+    }
+
+    /// The elevation that was given, or else that of the table's rim in the video.
+    fn elevation_by(&self, filmed: Option<&Filmed>) -> Elevation {
+        let seen = filmed
+            .and_then(Filmed::elevation)
+            // A light by a ball was measured with the elevation that was known then.
+            .filter(|_| self.elevation.is_none() && self.rim.is_none() && self.probe.is_none());
+        seen.unwrap_or_else(|| self.elevation())
     }
 
     /// `measured` is the light by the ball.
     pub(super) fn options(
         &self,
         turn: &ReadTurn,
+        filmed: Option<&Filmed>,
         measured: Option<ShLight>,
     ) -> Result<TurnOptions, Box<dyn Error>> {
-        let prior = self.normals().map(|(source, _)| self.prior(&source, turn));
+        let elevation = self.elevation_by(filmed);
+        let prior = self
+            .normals()
+            .map(|(source, _)| self.prior(&source, turn, elevation));
+        let strip = filmed.and_then(Filmed::strip).map(|strip| *strip.figures());
         Ok(TurnOptions {
-            elevation: self.elevation(),
+            elevation,
+            // Of a table that turns the other way it would be the mirrored azimuth.
+            panorama: strip.filter(|strip| strip.direction == RotationDirection::CounterClockwise),
             light: match &self.light {
                 Some(path) => Some(read_given_light(path)?),
                 None => measured,

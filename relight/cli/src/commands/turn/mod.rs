@@ -4,14 +4,16 @@ mod arguments;
 mod warnings;
 
 use std::error::Error;
+use std::path::Path;
 use std::time::Instant;
 
 use relight_turn::{
     AssetDestination, DestinationError, Destinations, Filmed, ProbeLight, ReadTurn, TurnError,
     TurnFigures, TurnFiles, TurnLabels, TurnMaps, TurnSolution, TurnWarning, film, read_curves,
-    solve_turn,
+    session_of, solve_turn,
 };
 use relit_console::{Console, Outcome};
+use relit_data::causes::with_causes;
 use serde_json::json;
 
 pub(crate) use self::arguments::{Arguments, EXAMPLES};
@@ -29,7 +31,11 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         warn_of(TurnWarning::of_ball(measured), arguments, console);
     }
     let light_source = light_source(arguments, measured.as_ref());
-    let options = arguments.options(&turn, measured.map(|measured| measured.light))?;
+    let options = arguments.options(
+        &turn,
+        filmed.as_ref(),
+        measured.map(|measured| measured.light),
+    )?;
     let solution = solve_turn(&turn.curves, &options)?;
     let strip = filmed.as_ref().and_then(Filmed::strip);
     let object = match asset {
@@ -60,7 +66,8 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         [start.elapsed().as_secs_f64(), read_seconds],
         console,
     );
-    if arguments.session.is_some() {
+    // Of a session that nobody named nothing is missed.
+    if arguments.session.is_some() || strip.is_some() {
         warn_of(TurnWarning::of_background(strip), arguments, console);
     }
     // The background, where it was seen, says more.
@@ -112,15 +119,34 @@ fn film_surroundings(
     turn: &ReadTurn,
     console: Console,
 ) -> Result<Option<Filmed>, TurnError> {
-    let Some(path) = &arguments.session else {
+    let bar = console.progress(0, "frames of the video");
+    let filmed = |path: &Path| {
+        film(path, turn, arguments.probe(), &|done, all| {
+            bar.set_length(all);
+            bar.set_position(done);
+        })
+    };
+    if let Some(path) = &arguments.session {
+        return filmed(path).map(Some);
+    }
+    if arguments.no_session {
+        return Ok(None);
+    }
+    let Some(path) = session_of(&arguments.shard, turn) else {
         return Ok(None);
     };
-    let bar = console.progress(0, "frames of the video");
-    film(path, turn, arguments.probe(), &|done, all| {
-        bar.set_length(all);
-        bar.set_position(done);
+    // Nobody asked for it: the turn is solved without.
+    Ok(match filmed(&path) {
+        Ok(found) => Some(found),
+        Err(error) => {
+            let text = with_causes(&error);
+            console.warn(&format!(
+                "the session {} beside the shard was left out: {text}",
+                path.display()
+            ));
+            None
+        }
     })
-    .map(Some)
 }
 
 /// Where the light is from; none where it is to be found.
