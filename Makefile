@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-programs setup-train test test-rig test-slurm test-objects packages test-packages test-image test-python wheel bench-python image release lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-train train-turn test test-rig test-slurm test-objects packages test-packages test-image test-python wheel bench-python image release lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -48,6 +48,23 @@ setup-programs:
 
 setup-train: ## Install libtorch, which relight's training is built with (544 MB, once)
 	@.ci/setup-train
+
+# The runs of the network of relight turn, each from the weights of the one before. DATA holds the folders meshes,
+# panoramas and held of what relight/cli/weights/README.md names; a run that was stopped goes on.
+TURN_STAGES := turn turn-2 turn-3
+RUNS ?= $(CURDIR)/$(TARGET)/train-turn
+
+train-turn: setup-train ## Train the network of relight turn, all of its runs, from the folder DATA into RUNS
+	@[[ -d "$(DATA)/panoramas" ]] || { echo "say where the data is: make train-turn DATA=FOLDER"; exit 1; }
+	cargo build --locked --release -p relight --features train
+	@program="$$(realpath $(TARGET)/release/relight)"; weights=(); mkdir -p "$(RUNS)"; runs="$$(realpath "$(RUNS)")"; \
+	cd "$(DATA)"; \
+	for stage in $(TURN_STAGES); do \
+	    "$$program" train turn --settings "$(CURDIR)/relight/cli/weights/$$stage.toml" "$${weights[@]}" \
+	        --views "$$runs/views" --resume -o "$$runs/$$stage" || exit; \
+	    weights=(--weights "$$runs/$$stage/turn-net.safetensors"); \
+	done; \
+	echo "$$runs/$$stage/turn-net.safetensors"
 
 # Cargo builds the programs before it runs the first test: those of the package relit-tests run several.
 test: setup ## Run all tests
