@@ -2,8 +2,9 @@
 //! from what the turn shows.
 //!
 //! The object's place in a frame is found by the directions of the brightness's gradients inside the
-//! mask, compared with the average over the turn: paint and relief stay, light does not. The shape is
-//! compared with the mask that the turn alone gives ([`segment_turn`](crate::segment_turn)).
+//! mask, compared with the average over the turn: paint and relief stay, light does not. The mask that the turn
+//! alone gives ([`segment_turn`](crate::segment_turn)) shows where to look; what the curves of brightness there show
+//! decides.
 
 use std::sync::OnceLock;
 
@@ -12,8 +13,10 @@ use relit_data::geometry::Rect;
 use serde::Serialize;
 
 use super::bitmap::{Bitmap, Component, Connectivity};
+use super::parts::holes;
 use super::pyramid::half_image;
 use super::registration::Reference;
+use super::turn::TurnField;
 use super::{Effort, MaskError, SegmentSettings, TurnStatistics, segment_with};
 
 /// Pixels at or above this level belong to the mask.
@@ -54,15 +57,17 @@ pub struct ShapeCheck {
     pub outline: f32,
     /// The same of the turn's own outline.
     pub outline_of_turn: f32,
+    /// Whether the turn shows the mask to be right wherever its own differs: its outline is no measure then.
+    pub contradicted: bool,
     /// Intersection over union of both.
     pub iou: f64,
     /// Distance of the mask's outline from the turn's, pixels: the median, and what 95 % stay below.
     pub edge_px: [f32; 2],
-    /// Parts of the mask that are background according to the turn, largest first.
+    /// Parts of the mask that show the background, largest first.
     pub leaks: Vec<DoubtfulRegion>,
-    /// Parts of the object that are not in the mask according to the turn, largest first.
+    /// Parts outside the mask that show the object, largest first.
     pub missing: Vec<DoubtfulRegion>,
-    /// Holes in the mask where the turn shows object, largest first.
+    /// Holes in the mask that show the object, largest first.
     pub holes: Vec<DoubtfulRegion>,
 }
 
@@ -155,26 +160,59 @@ impl<'a> MaskCheck<'a> {
         let either = pairs().filter(|(mask, own)| **mask || **own).count() as f64;
         let in_hole = holes(&self.mask);
         let wide = NARROW * self.turn.factor();
-        let least = self.mask.count() as f64 * SMALL;
-        let wide_regions = |part: Bitmap| regions(&opened(&part, wide), least);
-        let leaks = opened(&self.mask.map(|at, bit| bit && !own.bits()[at]), wide);
+        let differs = |part: Bitmap| opened(&part, wide);
+        let leaks = differs(self.mask.map(|at, bit| bit && !own.bits()[at]));
+        let leaks = self.without_cut_off(leaks);
+        let missing = differs(
+            self.mask
+                .map(|at, bit| !bit && own.bits()[at] && !in_hole.bits()[at]),
+        );
+        let differing = leaks.count() + missing.count();
+        let leaks = self.shown(&leaks, |turn, part, mask| {
+            turn.is_background(part, mask) == Some(true)
+        });
+        let missing = self.shown(&missing, TurnField::belongs);
+        // Whatever the turn's own mask says of a hole, the picture in it decides.
+        let filled = self.shown(&differs(in_hole), |turn, part, mask| {
+            turn.is_background(part, mask) == Some(false)
+        });
         Ok(Some(ShapeCheck {
             area_px: self.mask.count(),
             outline: self.turn.outline(&self.mask),
             outline_of_turn: self.turn.outline(&own),
+            contradicted: differing > 0 && leaks.count() + missing.count() == 0,
             iou: both / either.max(1.0),
             edge_px: distances(&self.mask, &own, self.size),
-            leaks: regions(&self.without_cut_off(leaks), least),
-            missing: wide_regions(
-                self.mask
-                    .map(|at, bit| !bit && own.bits()[at] && !in_hole.bits()[at]),
-            ),
-            holes: wide_regions(in_hole.map(|at, bit| bit && own.bits()[at])),
+            leaks: self.regions(&leaks),
+            missing: self.regions(&missing),
+            holes: self.regions(&filled),
         }))
     }
 }
 
 impl MaskCheck<'_> {
+    /// Of parts in which the mask may be wrong, those of which the turn shows that they are background, or object. The
+    /// turn's own mask has no say.
+    fn shown(&self, parts: &Bitmap, says: impl Fn(&TurnField, &Bitmap, &Bitmap) -> bool) -> Bitmap {
+        let components = parts.components(Connectivity::Eight);
+        let object = self.turn.reduced(&self.mask);
+        let least = self.mask.count() as f64 * SMALL;
+        let is_shown = |(index, component): (usize, &Component)| {
+            if (component.area as f64) < least {
+                return false;
+            }
+            let part = parts.map(|at, _| components.at(at) == Some(index));
+            let part = self.turn.reduced(&part);
+            says(self.turn.field(), &part, &object)
+        };
+        let shown: Vec<bool> = components.list.iter().enumerate().map(is_shown).collect();
+        parts.map(|at, bit| bit && components.at(at).is_some_and(|index| shown[index]))
+    }
+
+    fn regions(&self, part: &Bitmap) -> Vec<DoubtfulRegion> {
+        regions(part, self.mask.count() as f64 * SMALL)
+    }
+
     /// What the turn takes for background in the mask, without the parts at the frame's border that are the object:
     /// of an object that the border cuts off, the turn says nothing, because it takes the border for background.
     /// Such a part is the object's if it moves with the rest of the mask rather than with what is around, and is not
@@ -206,24 +244,6 @@ impl MaskCheck<'_> {
 
 fn luma([r, g, b]: [u8; 3]) -> f32 {
     0.299 * f32::from(r) + 0.587 * f32::from(g) + 0.114 * f32::from(b)
-}
-
-/// What is not in the mask and does not reach the border.
-fn holes(mask: &Bitmap) -> Bitmap {
-    let ground = mask.inverted();
-    let components = ground.components(Connectivity::Four);
-    let frame = mask.map(|_, _| true).bounds();
-    let inside: Vec<bool> = components
-        .list
-        .iter()
-        .map(|Component { bounds, .. }| {
-            bounds.x > 0
-                && bounds.y > 0
-                && bounds.right() < frame.right()
-                && bounds.bottom() < frame.bottom()
-        })
-        .collect();
-    ground.map(|at, _| components.at(at).is_some_and(|index| inside[index]))
 }
 
 /// The parts that are wider than twice `radius`.

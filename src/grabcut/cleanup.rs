@@ -26,6 +26,8 @@ pub(super) struct Cleaned {
     pub(super) dropped_marks_px: u64,
     /// The holes that were filled, in the order of their first pixels.
     pub(super) holes: Vec<Component>,
+    /// The largest of them that what the seeds mark as object encloses.
+    pub(super) closed_by_marks: Option<Component>,
 }
 
 /// Keeps the largest component and those of a similar size, or with `keep_all` every one, and fills
@@ -36,7 +38,7 @@ pub(super) fn clean(raw: &Bitmap, seeds: Option<&Seeds>, keep_all: bool, fill_to
     let least = largest.map_or(0.0, |at| components.list[at].area as f64 * KEPT_FROM);
     let is_kept = |component: usize| keep_all || components.list[component].area as f64 >= least;
     let kept = raw.map(|at, _| components.at(at).is_some_and(is_kept));
-    let (mask, holes) = fill_holes(&kept, seeds, fill_to);
+    let (mask, holes, closed_by_marks) = fill_holes(&kept, seeds, fill_to);
     let all = || components.list.iter().enumerate();
     Cleaned {
         components: components.list.len(),
@@ -50,12 +52,17 @@ pub(super) fn clean(raw: &Bitmap, seeds: Option<&Seeds>, keep_all: bool, fill_to
             .count() as u64,
         mask,
         holes,
+        closed_by_marks,
     }
 }
 
 /// Fills the holes: background that is not 4-connected to the border (4, because the object is
 /// 8-connected).
-fn fill_holes(object: &Bitmap, seeds: Option<&Seeds>, fill_to: f64) -> (Bitmap, Vec<Component>) {
+fn fill_holes(
+    object: &Bitmap,
+    seeds: Option<&Seeds>,
+    fill_to: f64,
+) -> (Bitmap, Vec<Component>, Option<Component>) {
     let ground = object.inverted();
     let components = ground.components(Connectivity::Four);
     let frame = object.map(|_, _| true).bounds();
@@ -78,8 +85,19 @@ fn fill_holes(object: &Bitmap, seeds: Option<&Seeds>, fill_to: f64) -> (Bitmap, 
     let in_hole = |at: usize| components.at(at).is_some_and(|index| is_hole[index]);
     let filled = object.map(|at, bit| bit || in_hole(at));
     let holes = components.list.iter().zip(&is_hole);
-    let holes = holes.filter(|&(_, &hole)| hole).map(|(hole, _)| *hole);
-    (filled, holes.collect())
+    let holes = holes.filter(|&(_, &hole)| hole);
+    let holes: Vec<Component> = holes.map(|(hole, _)| *hole).collect();
+    let width = frame.w as usize;
+    let beside = |at: usize| {
+        let above = at.checked_sub(width);
+        [at.checked_sub(1), Some(at + 1), above, Some(at + width)]
+    };
+    let closed = marked(seeds, Mark::Object).flat_map(beside).flatten();
+    let closed = closed.filter_map(|at| components.at(at).filter(|&index| is_hole[index]));
+    let largest = closed
+        .map(|index| components.list[index])
+        .max_by_key(|hole| hole.area);
+    (filled, holes, largest)
 }
 
 /// The pixels that the seeds mark as `wanted`.
@@ -159,6 +177,15 @@ mod tests {
         let cleaned = clean(&Bitmap::drawn(&RING), Some(&marks), false, 1.0);
         assert!(cleaned.holes.is_empty());
         assert_eq!(cleaned.mask.count(), 11);
+    }
+
+    #[test]
+    fn a_hole_that_a_mark_closed_is_named_and_others_are_not() {
+        let open = clean(&Bitmap::drawn(&RING), None, false, 1.0);
+        assert_eq!(open.closed_by_marks, None);
+        let marks = seeds((7, 6), &[(3, 1, 255)]);
+        let closed = clean(&Bitmap::drawn(&RING), Some(&marks), false, 1.0);
+        assert_eq!(closed.closed_by_marks.map(|hole| hole.area), Some(2));
     }
 
     #[test]

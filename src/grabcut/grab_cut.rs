@@ -11,7 +11,7 @@ use super::mixture::Mixture;
 /// Gaussians of each side.
 const COMPONENTS: usize = 5;
 /// Cost of separating two equal neighbours, in units of the log-likelihood.
-const SMOOTHNESS: f32 = 50.0;
+pub(super) const SMOOTHNESS: f32 = 50.0;
 /// Integer capacity of one unit of cost.
 const UNIT: f32 = 256.0;
 /// The largest cost of a pixel, far above any sum of smoothness around it.

@@ -213,6 +213,23 @@ impl Hints {
         }
     }
 
+    /// The hints without what the seeds mark as object; none where nothing is left.
+    pub(super) fn without_object_marks(&self) -> Option<Self> {
+        let background = self.seeds().and_then(|seeds| {
+            let keep = |&mark: &Mark| match mark {
+                Mark::Object => Mark::Unknown,
+                other => other,
+            };
+            let marks = seeds.marks.iter().map(keep).collect();
+            Seeds::new(seeds.size(), marks, seeds.coloured_px).ok()
+        });
+        match (self.rect(), background) {
+            (Some(rect), Some(seeds)) => Some(Self::Both { rect, seeds }),
+            (Some(rect), None) => Some(Self::Rect(rect)),
+            (None, seeds) => seeds.map(Self::Seeds),
+        }
+    }
+
     /// The seeds.
     #[must_use]
     pub fn seeds(&self) -> Option<&Seeds> {

@@ -34,8 +34,8 @@
 //!
 //! # How it decides
 //!
-//! With a rectangle, pixels outside are background, and the half of those inside that looks most like the
-//! outside starts as background too; seeds overrule both. With seeds alone, the colours of the marked
+//! With a rectangle, pixels outside are background; seeds overrule that. Two cuts are made: in one the half of the
+//! pixels inside that looks most like the outside starts as background too. The one with the lower energy counts. With seeds alone, the colours of the marked
 //! pixels decide first; if no background is marked, unmarked pixels start as probable background. Colour
 //! models of both sides and minimum cuts then take turns at a small size, and at each larger size a band
 //! along the edge is decided again.
@@ -53,6 +53,7 @@ mod bitmap;
 mod blur;
 mod check;
 mod cleanup;
+mod closed;
 mod drawing;
 mod encode;
 mod error;
@@ -63,6 +64,7 @@ mod lab;
 mod max_flow;
 mod mixture;
 mod outline;
+mod parts;
 mod preview;
 mod pyramid;
 mod registration;
@@ -71,10 +73,12 @@ mod score;
 mod segment;
 mod settings;
 mod shape_faults;
+mod starts;
 mod strokes;
 mod turn;
 mod turntable;
 mod warning;
+mod witness;
 
 pub use alpha::alpha;
 pub use check::{DoubtfulRegion, MaskCheck, Registration, ShapeCheck};

@@ -4,9 +4,14 @@ use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
 
 use super::bitmap::Bitmap;
+use super::closed::enclosed;
+use super::grab_cut::Label;
 use super::initial::InitialLabels;
+use super::pyramid::FirstModels;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
+use super::starts::prefers_ranked;
 use super::turn::{self, TurnStatistics};
+use super::warning::OPENING;
 use super::{Effort, Hints, MaskError, SegmentSettings, Warning, cleanup, pyramid, warning};
 
 /// On one frame a hole of this share of the object may be a highlight, and is filled.
@@ -45,6 +50,12 @@ impl Mask {
         self
     }
 
+    /// The pixels of the object.
+    pub(super) fn bitmap(&self) -> Bitmap {
+        let levels = self.image.as_raw().iter();
+        Bitmap::new(self.image.dimensions(), levels.map(|&level| level >= 128))
+    }
+
     /// The mask, in the size of the frame: 255 object, 0 background; with a feather also values
     /// between.
     #[must_use]
@@ -76,7 +87,7 @@ pub fn segment(
     hints: &Hints,
     settings: &SegmentSettings,
 ) -> Result<Mask, MaskError> {
-    by_hints(frame, hints, settings, Effort::Fine)
+    segment_with(frame, None, Some(hints), settings, Effort::Fine)
 }
 
 /// Finds the object in `frame` by what a turn shows, with or without hints. `turn` was made from frames of
@@ -102,6 +113,50 @@ pub fn segment_turn(
 /// # Errors
 /// As these; [`MaskError::NoHints`] with neither turn nor hints.
 pub fn segment_with(
+    frame: &RgbImage,
+    turn: Option<&TurnStatistics>,
+    hints: Option<&Hints>,
+    settings: &SegmentSettings,
+    effort: Effort,
+) -> Result<Mask, MaskError> {
+    let mask = cut_unclosed(frame, turn, hints, settings, effort)?;
+    let told = |warning: &Warning| matches!(warning, Warning::HoleFilled { .. });
+    let closed = match hints {
+        Some(hints) if effort != Effort::Draft && !mask.warnings.iter().any(told) => {
+            closed_opening(frame, turn, hints, settings, &mask)
+        }
+        _ => None,
+    };
+    Ok(mask.with_warning(closed))
+}
+
+/// What a mask lacks that the marks closed. It is found by a cut without the marks of the object; none where there is
+/// no cut without them.
+fn closed_opening(
+    frame: &RgbImage,
+    turn: Option<&TurnStatistics>,
+    hints: &Hints,
+    settings: &SegmentSettings,
+    mask: &Mask,
+) -> Option<Warning> {
+    if !hints.seeds()?.mark_the_object() {
+        return None;
+    }
+    let fewer = hints.without_object_marks();
+    // Marks of the background alone show no object.
+    let fewer = fewer.filter(|fewer| turn.is_some() || fewer.rect().is_some());
+    if fewer.is_none() && turn.is_none() {
+        return None;
+    }
+    let before = cut_unclosed(frame, turn, fewer.as_ref(), settings, Effort::Fine).ok()?;
+    let hole = enclosed(&before.bitmap(), &mask.bitmap())?;
+    let (px, bounds) = (hole.area, hole.bounds);
+    let large = px as f64 >= OPENING * mask.statistics().area_px as f64;
+    large.then_some(Warning::HoleFilled { px, bounds })
+}
+
+/// [`segment_with`] without a look at openings that the marks closed.
+fn cut_unclosed(
     frame: &RgbImage,
     turn: Option<&TurnStatistics>,
     hints: Option<&Hints>,
@@ -179,22 +234,45 @@ fn by_hints(
     let size = frame.dimensions();
     check_size(size)?;
     let InitialLabels {
-        mut labels,
+        labels,
         first,
         rect,
     } = InitialLabels::new(hints, size)?;
+    let begin = |labels: Vec<Label>, first: FirstModels| {
+        cut_from(frame, labels, first, settings, effort)
+            .and_then(|raw| finish(&raw, size, Some(hints), rect, settings, FILLED_OF_FRAME))
+    };
+    let Some(rect) = rect else {
+        return begin(labels, first);
+    };
+    match (
+        begin(labels.clone(), FirstModels::All),
+        begin(labels, first),
+    ) {
+        (Ok(plain), Ok(ranked)) => {
+            let better = prefers_ranked(frame, rect, &plain.bitmap(), &ranked.bitmap());
+            Ok(if better { ranked } else { plain })
+        }
+        (Err(_), ranked) => ranked,
+        (plain, Err(_)) => plain,
+    }
+}
+
+fn cut_from(
+    frame: &RgbImage,
+    mut labels: Vec<Label>,
+    first: FirstModels,
+    settings: &SegmentSettings,
+    effort: Effort,
+) -> Result<Bitmap, MaskError> {
     pyramid::segment(frame, &mut labels, first, settings.iterations, effort)?;
-    let raw = Bitmap::new(size, labels.iter().map(|label| label.is_object()));
-    drop(labels);
-    finish(&raw, size, Some(hints), rect, settings, FILLED_OF_FRAME)
+    let object = labels.iter().map(|label| label.is_object());
+    Ok(Bitmap::new(frame.dimensions(), object))
 }
 
 /// Why the turn's mask is worse than that of the hints alone; none if it is not.
 fn misled(turn: &TurnStatistics, by_turn: &Bitmap, by_hints: &Mask) -> Option<String> {
-    let size = by_hints.image.dimensions();
-    let object = by_hints.image.as_raw().iter().map(|&level| level >= 128);
-    let object = Bitmap::new(size, object);
-    let (of_turn, of_hints) = (turn.outline(by_turn), turn.outline(&object));
+    let (of_turn, of_hints) = (turn.outline(by_turn), turn.outline(&by_hints.bitmap()));
     (of_turn < LEAST_OF_HINTS * of_hints).then(|| {
         format!(
             "its outline follows what moves less well ({of_turn:.2}) than that of the hints alone ({of_hints:.2})"

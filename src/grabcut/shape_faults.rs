@@ -11,6 +11,8 @@ const MOST_REGION_OF_A_LOOK: f64 = 0.03;
 const LEAST_OUTLINE: f32 = 0.85;
 /// Where it follows it better than the turn's own, differences are the turn's mistakes.
 const BETTER_OUTLINE: f32 = 1.05;
+/// A mask of which more is wrong, as a share of its area, is that of something else.
+const SOMETHING_ELSE: f64 = 0.2;
 /// Regions that are named.
 const NAMED: usize = 3;
 
@@ -27,6 +29,15 @@ impl ShapeCheck {
     pub fn faults_at_a_look(&self) -> Vec<String> {
         faults(self, MOST_REGION_OF_A_LOOK)
     }
+
+    /// Whether the mask is that of another object or recording, rather than one with a flaw: much of it is background,
+    /// or much of the object is not in it.
+    #[must_use]
+    pub fn is_of_something_else(&self) -> bool {
+        let px = |regions: &[DoubtfulRegion]| regions.iter().map(|region| region.px).sum::<u64>();
+        let wrong = px(&self.leaks).max(px(&self.missing));
+        wrong as f64 > SOMETHING_ELSE * self.area_px as f64
+    }
 }
 
 fn faults(shape: &ShapeCheck, most_region: f64) -> Vec<String> {
@@ -34,7 +45,7 @@ fn faults(shape: &ShapeCheck, most_region: f64) -> Vec<String> {
         return Vec::new();
     }
     let mut faults = Vec::new();
-    if shape.outline < LEAST_OUTLINE * shape.outline_of_turn {
+    if !shape.contradicted && shape.outline < LEAST_OUTLINE * shape.outline_of_turn {
         faults.push(format!(
             "the mask's outline does not follow what moves differently ({:.2}; the turn's own {:.2}): make it again, with --auto or --edit",
             shape.outline, shape.outline_of_turn

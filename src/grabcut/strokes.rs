@@ -72,6 +72,12 @@ impl Strokes {
         self.0.is_empty()
     }
 
+    /// Number of strokes.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+
     /// The marks in a frame of `size` after painting over `base`; none if nothing is marked then.
     ///
     /// # Errors

@@ -17,6 +17,7 @@ use super::lab::LabTable;
 use super::pyramid::{FirstModels, RgbField, grow, half_image, half_labels, refine, start};
 use super::rim::without_rim;
 use super::turntable::{Turntable, find_turntable};
+use super::witness::{Curves, Witness};
 use super::{Effort, Hints, Iterations, registration};
 
 /// Fewest frames from which anything can be learned.
@@ -183,23 +184,12 @@ impl TurnStatistics {
     /// The same along the boundary between two parts, which have the size of the statistics; `None` where they do not
     /// touch.
     pub(super) fn boundary(&self, one: &Bitmap, other: &Bitmap) -> Option<f32> {
-        let (columns, rows) = self.fine.size;
-        let (one, other) = (one.bits(), other.bits());
-        let scale = grab_cut::contrast_scale(&self.fine);
-        let (mut sum, mut edges) = (0.0, 0.0);
-        for at in 0..columns * rows {
-            for direction in [4, 6] {
-                let next = neighbour(at, direction, self.fine.size);
-                let is_edge = |next: &usize| one[at] && other[*next] || other[at] && one[*next];
-                if let Some(next) = next.filter(is_edge) {
-                    // The edge may lie a pixel beside it.
-                    let strongest = self.strongest_near(at).max(self.strongest_near(next));
-                    sum += 1.0 - (-scale * strongest).exp();
-                    edges += 1.0;
-                }
-            }
-        }
-        (edges > 0.0).then_some(sum / edges)
+        self.fine.boundary(one, other)
+    }
+
+    /// What the field says of the parts of an image.
+    pub(super) fn field(&self) -> &TurnField {
+        &self.fine
     }
 
     /// The share of a part, which has the size of the statistics, that is plain table, 0..=1.
@@ -207,11 +197,6 @@ impl TurnStatistics {
         let table = self.fine.table.surface.bits();
         let on_table = part.map(|at, bit| bit && table[at]).count();
         on_table as f64 / part.count().max(1) as f64
-    }
-
-    fn strongest_near(&self, at: usize) -> f32 {
-        let contrasts = self.fine.contrasts[at].iter();
-        contrasts.copied().fold(0.0, f32::max)
     }
 
     /// Whether anything moves: the median change of the brightness away from the table.
@@ -234,14 +219,15 @@ impl TurnStatistics {
 /// Averages and changes of each pixel over the frames.
 #[derive(Debug)]
 pub(super) struct TurnField {
-    size: (usize, usize),
+    pub(super) size: (usize, usize),
     features: Vec<[f32; 5]>,
     /// To the neighbours in [`DIRECTIONS_AHEAD`].
     contrasts: Vec<[f32; 4]>,
     /// Pixels that are background by the ends of their rows.
-    backdrop: Bitmap,
-    table: Turntable,
+    pub(super) backdrop: Bitmap,
+    pub(super) table: Turntable,
     evidence: Vec<f32>,
+    pub(super) witness: Witness,
 }
 
 impl TurnField {
@@ -254,8 +240,10 @@ impl TurnField {
         let mut sum = vec![[0.0_f32; 3]; count];
         let mut square = vec![[0.0_f32; 2]; count];
         let mut difference = vec![[0.0_f32; 4]; count];
-        for frame in frames {
+        let mut curves = Curves::new(frames.len(), count);
+        for (number, frame) in frames.iter().enumerate() {
             let lab: Vec<[f32; 3]> = frame.pixels().map(|p| colours.lab(p.0)).collect();
+            curves.add(number, &lab);
             for (at, &[l, a, b]) in lab.iter().enumerate() {
                 sum[at].iter_mut().zip([l, a, b]).for_each(|(s, v)| *s += v);
                 square[at][0] += l * l;
@@ -299,6 +287,7 @@ impl TurnField {
             size,
             backdrop: backdrop.alike,
             evidence: backdrop.evidence,
+            witness: curves.finish(),
             table,
             features,
             contrasts,
@@ -319,7 +308,35 @@ impl TurnField {
                 plain: Bitmap::new((0, 0), std::iter::empty()),
             },
             evidence: Vec::new(),
+            witness: Curves::new(0, 0).finish(),
         }
+    }
+
+    /// How strong the contrast is along the boundary between two parts, which have its size; `None` where they do not
+    /// touch.
+    pub(super) fn boundary(&self, one: &Bitmap, other: &Bitmap) -> Option<f32> {
+        let (columns, rows) = self.size;
+        let (one, other) = (one.bits(), other.bits());
+        let scale = grab_cut::contrast_scale(self);
+        let (mut sum, mut edges) = (0.0, 0.0);
+        for at in 0..columns * rows {
+            for direction in [4, 6] {
+                let next = neighbour(at, direction, self.size);
+                let is_edge = |next: &usize| one[at] && other[*next] || other[at] && one[*next];
+                if let Some(next) = next.filter(is_edge) {
+                    // The edge may lie a pixel beside it.
+                    let strongest = self.strongest_near(at).max(self.strongest_near(next));
+                    sum += 1.0 - (-scale * strongest).exp();
+                    edges += 1.0;
+                }
+            }
+        }
+        (edges > 0.0).then_some(sum / edges)
+    }
+
+    fn strongest_near(&self, at: usize) -> f32 {
+        let contrasts = self.contrasts[at].iter();
+        contrasts.copied().fold(0.0, f32::max)
     }
 
     /// Takes what equals the ends of its row for background at first. False, and nothing is done, if that
@@ -448,6 +465,7 @@ pub(super) fn segment(
     let (mut labels, mut models) = cut_turn(turn, &levels[at_fine..], share, iterations)?;
     let mut size = fine.size;
     take_rim_away(fine, &mut labels);
+    complete(fine, &mut labels);
     labels = register(frame, &levels[at_fine], fine, &labels, &table);
     for (steps, level) in levels[..at_fine].iter().rev().enumerate() {
         let field = FrameInTurn {
@@ -477,6 +495,19 @@ fn take_rim_away(turn: &TurnField, labels: &mut [Label]) {
     let object = Bitmap::new((width as u32, height as u32), object);
     let left = without_rim(&object, &turn.table, turn.size);
     for (label, &object) in labels.iter_mut().zip(left.bits()) {
+        if !label.is_sure() {
+            *label = Label::probably(object);
+        }
+    }
+}
+
+/// Makes object what the object encloses and what shows nothing else.
+fn complete(turn: &TurnField, labels: &mut [Label]) {
+    let (width, height) = turn.size;
+    let object = labels.iter().map(|label| label.is_object());
+    let object = Bitmap::new((width as u32, height as u32), object);
+    let completed = turn.completed(&object);
+    for (label, &object) in labels.iter_mut().zip(completed.bits()) {
         if !label.is_sure() {
             *label = Label::probably(object);
         }

@@ -14,6 +14,8 @@ const SMALL: f64 = 0.005;
 const LARGE: f64 = 0.9;
 /// Dropped components and filled holes are reported from this fraction of the mask's area on.
 const LARGE_PART: f64 = 0.05;
+/// A hole that marks closed is reported from this fraction of the mask's area on.
+pub(super) const OPENING: f64 = 0.001;
 /// A mask that covers at least this fraction of the rectangle nearly equals it.
 const NEARLY_RECT: f64 = 0.97;
 
@@ -73,7 +75,7 @@ pub enum Warning {
         /// Number of such pixels.
         px: u64,
     },
-    /// A large hole, which may be an opening of the object, was filled.
+    /// A hole, which may be an opening of the object, was filled: a large one, or one that marks closed.
     HoleFilled {
         /// Its area, pixels.
         px: u64,
@@ -115,7 +117,7 @@ pub(super) fn warnings(
         (fraction > LARGE).then_some(Warning::Large { fraction }),
         dropped(&cleaned.dropped, area),
         (marks > 0).then_some(Warning::MarksDropped { px: marks }),
-        filled(&cleaned.holes, area),
+        filled(cleaned, area),
         used.and_then(|rect| nearly_rect(rect, &cleaned.mask)),
     ]
     .into_iter()
@@ -150,10 +152,14 @@ fn dropped(components: &[Component], area: f64) -> Option<Warning> {
     Some(Warning::PartsDropped { count, largest })
 }
 
-fn filled(holes: &[Component], area: f64) -> Option<Warning> {
-    let largest = holes.iter().max_by_key(|hole| hole.area)?;
-    let (px, bounds) = (largest.area, largest.bounds);
-    (px as f64 >= LARGE_PART * area).then_some(Warning::HoleFilled { px, bounds })
+fn filled(cleaned: &Cleaned, area: f64) -> Option<Warning> {
+    let largest = cleaned.holes.iter().max_by_key(|hole| hole.area);
+    let large = largest.filter(|hole| hole.area as f64 >= LARGE_PART * area);
+    // A person who closes an opening by mistake does not see it.
+    let closed = cleaned.closed_by_marks.as_ref();
+    let closed = closed.filter(|hole| hole.area as f64 >= OPENING * area);
+    let &Component { area: px, bounds } = large.or(closed)?;
+    Some(Warning::HoleFilled { px, bounds })
 }
 
 fn nearly_rect(rect: Rect, mask: &Bitmap) -> Option<Warning> {

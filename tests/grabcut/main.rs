@@ -6,6 +6,8 @@
 
 #[path = "../mask/scene.rs"]
 mod scene;
+mod turn_scene;
+mod turns;
 
 use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage};
 use proptest::prelude::*;

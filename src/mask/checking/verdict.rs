@@ -68,6 +68,7 @@ mod tests {
             area_px: 10_000,
             outline: 0.8,
             outline_of_turn: 0.8,
+            contradicted: false,
             iou: 0.99,
             edge_px: [0.0, 1.0],
             leaks: Vec::new(),
