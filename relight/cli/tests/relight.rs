@@ -263,13 +263,6 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
             2,
             "that is not --output",
         ),
-        (
-            format!(
-                "{one} --mask masks/one.png --lamp 30,40 --weights w.safetensors -o o.png --trust none/t.png"
-            ),
-            1,
-            "none is no folder",
-        ),
     ] {
         let (found, errors) = folder.code_and_errors(&command);
         assert_eq!(found, code, "{command}: {errors}");
