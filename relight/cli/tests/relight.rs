@@ -231,7 +231,7 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
         (
             format!("{one} --lamp 30,40 -o o.mp4"),
             2,
-            "give .png or .exr, or --turn DEGREES",
+            "give .png, .jpg or .exr, or --turn DEGREES",
         ),
         (
             format!("{one} --lamp 30,40 --turn 360 -o o.png"),
@@ -241,7 +241,7 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
         (
             format!("{one} --lamp 30,40 -o o.bmp"),
             2,
-            "give .png or .exr",
+            "give .png, .jpg or .exr",
         ),
         (
             format!("{one} --lamp 30,40 --background light -o o.png"),
