@@ -168,6 +168,9 @@ impl<'a> MaskCheck<'a> {
                 .map(|at, bit| !bit && own.bits()[at] && !in_hole.bits()[at]),
         );
         let differing = leaks.count() + missing.count();
+        let undecided = self.shown(&leaks, |turn, part, mask| {
+            turn.is_background(part, mask).is_none()
+        });
         let leaks = self.shown(&leaks, |turn, part, mask| {
             turn.is_background(part, mask) == Some(true)
         });
@@ -180,7 +183,7 @@ impl<'a> MaskCheck<'a> {
             area_px: self.mask.count(),
             outline: self.turn.outline(&self.mask),
             outline_of_turn: self.turn.outline(&own),
-            contradicted: differing > 0 && leaks.count() + missing.count() == 0,
+            contradicted: differing > 0 && leaks.count() + missing.count() + undecided.count() == 0,
             iou: both / either.max(1.0),
             edge_px: distances(&self.mask, &own, self.size),
             leaks: self.regions(&leaks),

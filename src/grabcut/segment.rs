@@ -238,6 +238,10 @@ fn by_hints(
         first,
         rect,
     } = InitialLabels::new(hints, size)?;
+    // Marks of the background alone cut nothing out of a frame; a turn may do without those of the object.
+    if !labels.iter().any(|label| label.is_object()) {
+        return Err(MaskError::NothingMarked);
+    }
     let begin = |labels: Vec<Label>, first: FirstModels| {
         cut_from(frame, labels, first, settings, effort)
             .and_then(|raw| finish(&raw, size, Some(hints), rect, settings, FILLED_OF_FRAME))
