@@ -47,6 +47,11 @@ pub enum MaskingError {
         /// What is wrong with it.
         why: String,
     },
+    /// A mask would lose its strokes, which were painted on another recording.
+    #[error(
+        "{0} holds strokes that were painted on another recording: give another name with -o, or --force to make the mask without them"
+    )]
+    StrokesOfAnother(PathBuf),
     /// The frame is not the one on which the recipe was recorded.
     #[error(
         "frame {frame} of {video} is not the frame on which {recipe} was recorded: give other hints, or --force to use the recorded ones"

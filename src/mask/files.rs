@@ -19,6 +19,8 @@ pub struct MaskFiles {
     pub preview: PathBuf,
     /// The share of the object in each pixel; written only if the settings ask for it.
     pub alpha: PathBuf,
+    /// The record of the mask before it, kept where a person painted for that one.
+    pub previous: PathBuf,
 }
 
 impl MaskFiles {
@@ -34,6 +36,8 @@ impl MaskFiles {
             Some(stem) if is_png => {
                 let mut preview = stem.to_owned();
                 preview.push("-preview.png");
+                let mut previous = stem.to_owned();
+                previous.push("-previous.json");
                 let mut alpha = stem.to_owned();
                 alpha.push("-alpha.png");
                 if stem == "mask" {
@@ -44,6 +48,7 @@ impl MaskFiles {
                     record: mask.with_extension("json"),
                     preview: mask.with_file_name(preview),
                     alpha: mask.with_file_name(alpha),
+                    previous: mask.with_file_name(previous),
                 })
             }
             _ => Err(MaskingError::OutputName(mask.to_owned())),
@@ -58,7 +63,9 @@ pub(super) fn check_replaceable(
     with_alpha: bool,
 ) -> Result<(), MaskingError> {
     check_folder(&files.mask)?;
-    let record = read_record(files)?;
+    let record = read_record(&files.record)?;
+    // It may be written, too, and another program's file of that name is never overwritten.
+    read_record(&files.previous)?;
     if force {
         return Ok(());
     }
@@ -86,12 +93,13 @@ fn check_folder(mask: &Path) -> Result<(), MaskingError> {
     }
 }
 
-fn read_record(files: &MaskFiles) -> Result<Option<MaskRecord>, MaskingError> {
-    let Some(bytes) = read_if_exists(&files.record)? else {
+/// The record in a file, if there is such a file.
+pub(super) fn read_record(path: &Path) -> Result<Option<MaskRecord>, MaskingError> {
+    let Some(bytes) = read_if_exists(path)? else {
         return Ok(None);
     };
     let record = MaskRecord::from_json(&bytes).map_err(|fault| MaskingError::ForeignFile {
-        path: files.record.clone(),
+        path: path.to_owned(),
         why: fault.to_string(),
     })?;
     Ok(Some(record))
@@ -99,7 +107,7 @@ fn read_record(files: &MaskFiles) -> Result<Option<MaskRecord>, MaskingError> {
 
 /// Whether the mask that is there was written with its soft form, which belongs to no other mask.
 pub(super) fn has_alpha(files: &MaskFiles) -> Result<bool, MaskingError> {
-    Ok(read_record(files)?.is_some_and(|record| record.settings.alpha))
+    Ok(read_record(&files.record)?.is_some_and(|record| record.settings.alpha))
 }
 
 /// Removes a file if it is there.
@@ -134,6 +142,7 @@ mod tests {
         assert_eq!(files.record, Path::new("a/mug.v2.json"));
         assert_eq!(files.preview, Path::new("a/mug.v2-preview.png"));
         assert_eq!(files.alpha, Path::new("a/mug.v2-alpha.png"));
+        assert_eq!(files.previous, Path::new("a/mug.v2-previous.json"));
         let files = MaskFiles::of(Path::new("a/mask.png")).unwrap();
         assert_eq!(files.alpha, Path::new("a/alpha.png"));
     }
@@ -153,6 +162,12 @@ mod tests {
         fs::write(&files.record, r#"{"schema": "relit.session/1"}"#).unwrap();
         let result = check_replaceable(&files, true, false);
         assert!(matches!(result, Err(MaskingError::ForeignFile { .. })));
+        fs::rename(&files.record, &files.previous).unwrap();
+        let result = check_replaceable(&files, true, false);
+        assert!(matches!(
+            result,
+            Err(MaskingError::ForeignFile { path, .. }) if path == files.previous
+        ));
     }
 
     #[test]

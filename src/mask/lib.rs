@@ -2,7 +2,8 @@
 //!
 //! `NAME.png` is the mask, `NAME.json` its record, `NAME-preview.png` the image for checking it, and on
 //! request `NAME-alpha.png` (`alpha.png` beside `mask.png`) its soft form. An
-//! existing mask is replaced only if its record has its hash, because then it can be made again.
+//! existing mask is replaced only if its record has its hash, because then it can be made again. Strokes that were
+//! painted for it are applied again, and `NAME-previous.json` keeps its record.
 //!
 //! [`make_mask`] makes a mask from hints that are known; [`edit`] lets a person draw them in a browser;
 //! [`check_mask`] holds a mask against all frames.
@@ -38,6 +39,7 @@
 
 mod bench;
 mod checking;
+mod earlier;
 mod editor;
 mod engine;
 mod error;

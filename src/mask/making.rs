@@ -7,10 +7,11 @@ use relit_data::session::{MASK_FILE, Notice, Recording};
 use relit_grabcut::{Effort, Mask, Warning, alpha, grey_png, preview, rgb_png, segment_with};
 use relit_video::Video;
 
+use super::earlier::{keep_recipe, with_strokes};
 use super::engine::cut_by_opencv;
 use super::files::{check_replaceable, has_alpha, remove, write};
 use super::request::Recipe;
-use super::sampling::{SampledTurn, read_turn};
+use super::sampling::{SampledTurn, read_frame, read_turn, same_image};
 use super::{
     MASK_SCHEMA, MaskEngine, MaskFiles, MaskRecord, MaskRequest, MaskSoftware, MaskingError,
     RecordedHints, RecordedResult, SourceFrame,
@@ -44,11 +45,11 @@ pub fn make_mask(
 ) -> Result<MaskOutput, MaskingError> {
     let recording = Recording::open(input)?;
     match mask_recording(&recording, output, request) {
-        Ok((files, record)) => Ok(MaskOutput {
+        Ok((files, record, notice)) => Ok(MaskOutput {
             recording: recording.id,
             files,
             record,
-            notices: recording.notices,
+            notices: recording.notices.into_iter().chain(notice).collect(),
         }),
         Err(source) => Err(MaskingError::Recording {
             recording: recording.id,
@@ -61,20 +62,20 @@ fn mask_recording(
     recording: &Recording,
     output: Option<MaskFiles>,
     request: &MaskRequest,
-) -> Result<(MaskFiles, MaskRecord), MaskingError> {
+) -> Result<(MaskFiles, MaskRecord, Option<Notice>), MaskingError> {
     let files = files_of(recording, output)?;
     check_replaceable(&files, request.force, request.settings.alpha)?;
-    let record = segment_and_write(&recording.video, &files, request)?;
-    Ok((files, record))
+    let video = Video::open(&recording.video)?;
+    let (request, notice) = with_strokes(request, &files, &video)?;
+    let record = segment_and_write(&video, &files, &request)?;
+    Ok((files, record, notice))
 }
 
 fn segment_and_write(
-    video: &Path,
+    video: &Video,
     files: &MaskFiles,
     request: &MaskRequest,
 ) -> Result<MaskRecord, MaskingError> {
-    let video_path = video;
-    let video = &Video::open(video_path)?;
     let (frame, source) = read_frame(video, request.frame)?;
     if let Some(recipe) = &request.recipe
         && !request.force
@@ -82,7 +83,7 @@ fn segment_and_write(
     {
         return Err(MaskingError::OtherFrame {
             frame: request.frame,
-            video: video_path.to_owned(),
+            video: video.path().to_owned(),
             recipe: recipe.path.clone(),
         });
     }
@@ -110,7 +111,7 @@ pub(super) fn cut(
 }
 
 /// Writes a mask that was made by [`cut`] on `frame`, with its record and its preview: each file appears
-/// whole or not at all, the mask last.
+/// whole or not at all, the mask last. A record for which a person painted is kept.
 pub(super) fn write_files(
     frame: &RgbImage,
     source: SourceFrame,
@@ -131,6 +132,7 @@ pub(super) fn write_files(
     };
     // A soft mask of an earlier mask would be taken for this one's.
     let is_stale = soft.is_none() && has_alpha(files)?;
+    keep_recipe(files, &record)?;
     write(&files.preview, &preview_png)?;
     if let Some(soft) = soft {
         write(&files.alpha, &soft)?;
@@ -153,29 +155,6 @@ pub(super) fn files_of(
         Some(files) => Ok(files),
         None => MaskFiles::of(&recording.folder.clone().unwrap_or_default().join(MASK_FILE)),
     }
-}
-
-pub(super) fn read_frame(
-    video: &Video,
-    number: u64,
-) -> Result<(RgbImage, SourceFrame), MaskingError> {
-    let frame = video.frame(number)?;
-    let info = video.frames().iter().find(|info| info.number == number);
-    let name = video.path().file_name().unwrap_or_default();
-    let source = SourceFrame {
-        video: name.to_string_lossy().into_owned(),
-        frame: number,
-        t_us: info.map_or(0, |info| info.t_us),
-        width: frame.width(),
-        height: frame.height(),
-        exif_orientation: video.facts().exif_orientation,
-        frame_blake3: blake3::hash(frame.as_raw()).to_hex().to_string(),
-    };
-    Ok((frame, source))
-}
-
-fn same_image(a: &SourceFrame, b: &SourceFrame) -> bool {
-    (a.width, a.height, &a.frame_blake3) == (b.width, b.height, &b.frame_blake3)
 }
 
 fn record_of(

@@ -30,6 +30,16 @@ pub(super) enum TurnRequest {
     Frames(Vec<u64>),
 }
 
+impl TurnRequest {
+    /// The frames by which a recorded mask was made.
+    pub(super) fn of(record: &MaskRecord) -> Self {
+        match record.hints.turn_frames.as_slice() {
+            [] => Self::None,
+            frames => Self::Frames(frames.to_vec()),
+        }
+    }
+}
+
 /// A record whose mask has to be reproduced byte for byte.
 #[derive(Debug, Clone)]
 pub(super) struct Recipe {
@@ -83,10 +93,7 @@ impl MaskRequest {
         let request = Self {
             frame: record.source.frame,
             drawing,
-            turn: match record.hints.turn_frames.as_slice() {
-                [] => TurnRequest::None,
-                frames => TurnRequest::Frames(frames.to_vec()),
-            },
+            turn: TurnRequest::of(&record),
             engine: MaskEngine::default(),
             settings: record.settings,
             recipe: Some(Recipe { path, record }),

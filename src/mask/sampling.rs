@@ -1,10 +1,11 @@
-//! What a turn shows, by frames spread over its video.
+//! Frames of a video: the one on which a mask is made, and those spread over it that tell what the turn shows.
 
+use image::RgbImage;
 use relit_grabcut::{TURN_FRAMES, TurnFrames, TurnStatistics};
 use relit_video::Video;
 
-use super::MaskingError;
 use super::request::TurnRequest;
+use super::{MaskingError, SourceFrame};
 
 /// The numbers of some frames of a turn, and what they tell.
 #[derive(Debug)]
@@ -33,4 +34,29 @@ pub(super) fn read_turn(
     }
     let statistics = TurnStatistics::new(&turn);
     Ok(Some(SampledTurn { frames, statistics }))
+}
+
+/// Reads a frame, and says of which recording it is.
+pub(super) fn read_frame(
+    video: &Video,
+    number: u64,
+) -> Result<(RgbImage, SourceFrame), MaskingError> {
+    let frame = video.frame(number)?;
+    let info = video.frames().iter().find(|info| info.number == number);
+    let name = video.path().file_name().unwrap_or_default();
+    let source = SourceFrame {
+        video: name.to_string_lossy().into_owned(),
+        frame: number,
+        t_us: info.map_or(0, |info| info.t_us),
+        width: frame.width(),
+        height: frame.height(),
+        exif_orientation: video.facts().exif_orientation,
+        frame_blake3: blake3::hash(frame.as_raw()).to_hex().to_string(),
+    };
+    Ok((frame, source))
+}
+
+/// Whether two frames have the same pixels.
+pub(super) fn same_image(a: &SourceFrame, b: &SourceFrame) -> bool {
+    (a.width, a.height, &a.frame_blake3) == (b.width, b.height, &b.frame_blake3)
 }

@@ -99,6 +99,87 @@ fn a_mask_that_can_be_made_again_is_replaced_and_a_painted_one_is_kept() {
     assert_ne!(read(path, "mask.png"), painted);
 }
 
+/// Adds a stroke to the recipe in `folder` and makes its mask.
+fn painted_mask(folder: &Path) -> serde_json::Value {
+    assert_eq!(
+        code(&relit_mask(folder, &["clip.y4m", "--rect", AROUND])),
+        0
+    );
+    let mut record: serde_json::Value = serde_json::from_slice(&read(folder, "mask.json")).unwrap();
+    record["hints"]["strokes"] =
+        serde_json::json!([{ "brush": "background", "radius": 4.0, "points": [[48.5, 32.5]] }]);
+    fs::write(folder.join("drawn.json"), record.to_string()).unwrap();
+    let output = relit_mask(folder, &["clip.y4m", "--recipe", "drawn.json", "--force"]);
+    assert_eq!(code(&output), 0, "{}", said(&output));
+    serde_json::from_slice(&read(folder, "mask.json")).unwrap()
+}
+
+fn is_object(folder: &Path, x: u32, y: u32) -> bool {
+    let mask = image::load_from_memory(&read(folder, "mask.png")).unwrap();
+    mask.into_luma8().get_pixel(x, y).0[0] >= 128
+}
+
+#[test]
+fn strokes_are_applied_to_the_mask_that_replaces_theirs_and_the_old_recipe_is_kept() {
+    let folder = clip();
+    let path = folder.path();
+    let painted = painted_mask(path);
+    assert!(!is_object(path, 48, 32));
+    let old = read(path, "mask.json");
+    let output = relit_mask(path, &["clip.y4m", "--rect", "22,6,54,52"]);
+    assert_eq!(code(&output), 0, "{}", said(&output));
+    assert!(
+        said(&output).contains("1 stroke of the mask that was there"),
+        "{}",
+        said(&output)
+    );
+    assert!(!is_object(path, 48, 32), "the stroke is lost");
+    let record: serde_json::Value = serde_json::from_slice(&read(path, "mask.json")).unwrap();
+    assert_eq!(record["hints"]["strokes"], painted["hints"]["strokes"]);
+    assert_eq!(record["hints"]["rect"], serde_json::json!([22, 6, 54, 52]));
+    assert_eq!(read(path, "mask-previous.json"), old);
+
+    // Forced, they are left out, and their recipe makes the mask again.
+    let old = read(path, "mask.json");
+    let output = relit_mask(path, &["clip.y4m", "--rect", AROUND, "--force"]);
+    assert_eq!(code(&output), 0, "{}", said(&output));
+    assert!(
+        said(&output).contains("left out 1 stroke"),
+        "{}",
+        said(&output)
+    );
+    assert!(is_object(path, 48, 32));
+    assert_eq!(read(path, "mask-previous.json"), old);
+    let arguments = [
+        "clip.y4m",
+        "--recipe",
+        "mask-previous.json",
+        "-o",
+        "again.png",
+    ];
+    assert_eq!(code(&relit_mask(path, &arguments)), 0);
+}
+
+#[test]
+fn strokes_of_another_recording_are_neither_applied_nor_lost() {
+    let folder = clip();
+    let path = folder.path();
+    painted_mask(path);
+    let old = read(path, "mask.json");
+    let mut other = video();
+    let in_first_frame = other.len() / 6;
+    other[in_first_frame] = 255;
+    fs::write(path.join("other.y4m"), other).unwrap();
+    let output = relit_mask(path, &["other.y4m", "--rect", AROUND]);
+    assert_eq!(code(&output), 1);
+    assert!(
+        said(&output).contains("painted on another recording"),
+        "{}",
+        said(&output)
+    );
+    assert_eq!(read(path, "mask.json"), old);
+}
+
 #[test]
 fn another_file_is_never_overwritten_by_the_record() {
     let folder = clip();

@@ -156,7 +156,7 @@ pub(crate) struct MaskArguments {
     #[arg(short, long, value_name = "PNG", value_parser = output)]
     pub(crate) output: Option<MaskFiles>,
 
-    /// Replace a mask that was painted or changed by hand
+    /// Replace a mask that was painted or changed by hand; strokes of the mask that is there are left out
     #[arg(long)]
     force: bool,
 

@@ -14,9 +14,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use relit_data::session::Recording;
+use relit_video::Video;
 use relit_web::{AccessPolicy, Announcement, ConnectionLimits, Shutdown, Token};
 use tokio::sync::Semaphore;
 
+use super::earlier::with_strokes;
 use super::files::check_replaceable;
 use super::making::files_of;
 use super::{MaskFiles, MaskOutput, MaskRequest, MaskingError};
@@ -48,14 +50,18 @@ pub fn edit(
     };
     let files = files_of(&recording, output)?;
     check_replaceable(&files, request.force, request.settings.alpha).map_err(of_recording)?;
-    let session = EditorSession::new(&recording, files.clone(), request).map_err(of_recording)?;
+    let video = Video::open(&recording.video).map_err(|error| of_recording(error.into()))?;
+    let (request, notice) = with_strokes(&request, &files, &video).map_err(of_recording)?;
+    let request = request.into_owned();
+    let session = EditorSession::new(&recording, video, files.clone(), request);
+    let session = session.map_err(of_recording)?;
     let app = serve(session, address, announce)?;
     let record = app.accepted();
     Ok(record.map(|record| MaskOutput {
         recording: recording.id,
         files,
         record,
-        notices: recording.notices,
+        notices: recording.notices.into_iter().chain(notice).collect(),
     }))
 }
 

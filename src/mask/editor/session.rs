@@ -11,9 +11,9 @@ use relit_video::Video;
 use serde::{Deserialize, Serialize};
 
 use super::super::files::check_replaceable;
-use super::super::making::{cut, read_frame, write_files};
+use super::super::making::{cut, write_files};
 use super::super::request::TurnRequest;
-use super::super::sampling::{SampledTurn, read_turn};
+use super::super::sampling::{SampledTurn, read_frame, read_turn};
 use super::super::{MaskFiles, MaskRecord, MaskRequest, MaskingError, SourceFrame};
 
 /// JPEG quality of the frames that are shown, 1 to 100.
@@ -69,12 +69,13 @@ pub(super) struct EditorSession {
 impl EditorSession {
     pub(super) fn new(
         recording: &Recording,
+        video: Video,
         files: MaskFiles,
         request: MaskRequest,
     ) -> Result<Self, MaskingError> {
         let session = Self {
             recording: recording.id.clone(),
-            video: Video::open(&recording.video)?,
+            video,
             files,
             seeds: request.drawing.seeds.clone(),
             request,
