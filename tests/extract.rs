@@ -624,6 +624,93 @@ fn shifts_of_a_shaken_turn_are_measured_and_corrected() {
 }
 
 #[test]
+fn a_mask_of_another_session_lowers_the_verdict_and_exits_with_3() {
+    let bench = Bench::new();
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures");
+    let (session, other) = (
+        fixtures.join("20261120T102000Z-bust-short"),
+        fixtures.join("20261120T101500Z-cow-short"),
+    );
+    let line = |mask: &Path, out: &str| {
+        let (session, mask) = (session.display(), mask.join("mask_gt.png"));
+        let mask = mask.display();
+        format!("{session} --mask {mask} --frames 30 --size 40 -o {out}")
+    };
+    let quality = |out: &str| {
+        let bytes = fs::read(bench.path(&format!("{out}/dataset.json"))).unwrap();
+        let dataset: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
+        dataset["sessions"][0]["quality"].clone()
+    };
+    let errors = bench.errors(3, &line(&other, "wrong"));
+    assert!(errors.contains("background in the mask"), "{errors}");
+    assert_eq!(quality("wrong")["verdict"], "broken");
+    assert_eq!(quality("wrong")["mask_misfit"], "as-a-whole");
+    bench.verified(0, "wrong");
+    // Nor is it forgotten when nothing is done again.
+    bench.errors(3, &format!("{} --resume", line(&other, "wrong")));
+    // Nor when the pieces of tasks are merged.
+    bench.errors(
+        3,
+        &format!("{} --task-id 0 --task-count 1", line(&other, "pieces")),
+    );
+    bench.errors(3, "merge pieces");
+    bench.errors(0, &line(&session, "right"));
+    assert_eq!(quality("right")["mask_misfit"], serde_json::Value::Null);
+}
+
+#[test]
+fn frames_that_cannot_be_registered_are_placed_by_the_frames_around() {
+    let bench = Bench::new();
+    let session = Path::new(env!("CARGO_MANIFEST_DIR")).join(SHAKEN);
+    let from = session.join("video.mkv");
+    let black = "drawbox=t=fill:color=black:enable='between(n,40,41)+eq(n,90)'";
+    let options = [
+        "-i",
+        from.to_str().unwrap(),
+        "-vf",
+        black,
+        "-q:v",
+        "2",
+        "dark.avi",
+    ];
+    ffmpeg(bench.folder.path(), &options);
+    fs::copy(session.join("mask_gt.png"), bench.path("mask.png")).unwrap();
+    let line = "dark.avi --mask mask.png --frames 150 --size 40 --align correct -o out";
+    let errors = bench.errors(0, line);
+    assert!(
+        errors.contains("3 of 150 frames could not be registered and were placed"),
+        "{errors}"
+    );
+    let records = bench.records("out/dark.tar");
+    let truth = true_shifts();
+    for record in &records {
+        let [dx, dy] = record.shift_px.unwrap();
+        let [tx, ty] = truth[record.source_frame as usize];
+        let error = (dx - tx + truth[0][0]).hypot(dy - ty + truth[0][1]);
+        let is_dark = [40, 41, 90].contains(&record.source_frame);
+        assert_eq!(
+            record.shift_interpolated_sd_px.is_some(),
+            is_dark,
+            "{record:?}"
+        );
+        if let Some(sd) = record.shift_interpolated_sd_px {
+            assert!(
+                (0.05..=1.0).contains(&sd) && error < 3.0 * sd,
+                "{error}: {record:?}"
+            );
+        }
+    }
+    bench.verified(0, "out");
+    let bytes = fs::read(bench.path("out/dataset.json")).unwrap();
+    let dataset: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
+    let quality = &dataset["sessions"][0]["quality"];
+    assert_eq!(
+        (&quality["interpolated"], &quality["unregistered"]),
+        (&3.into(), &0.into())
+    );
+}
+
+#[test]
 fn a_shaken_object_that_the_border_cuts_off_gets_no_black_pixels_and_only_what_was_seen_counts() {
     let bench = Bench::new();
     let session = Path::new(env!("CARGO_MANIFEST_DIR")).join(SHAKEN);

@@ -1,5 +1,6 @@
 //! The extraction of one recording, from its files to its entry in the data set.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use rayon::ThreadPool;
@@ -10,16 +11,17 @@ use relit_data::image_stats::MaskSpans;
 use relit_data::report::{self, Page};
 use relit_data::session::{INDEX_FILE, Notice, Recording, Status};
 use relit_data::shard::{
-    Align, Dataset, Digest, FrameRecord, ImageSize, MaskInfo, OutputFolder, Sample, SessionEntry,
-    SessionQuality, ShardEntry, ShardWriter, SourceVideo,
+    Align, Dataset, Digest, FrameRecord, ImageSize, MaskInfo, MaskMisfit, OutputFolder, Sample,
+    SessionEntry, SessionQuality, ShardEntry, ShardWriter, SourceVideo,
 };
 use relit_video::Video;
 
 use super::collected::Collected;
+use super::interpolate::ShiftCourse;
 use super::mask_doubts::mask_doubts;
 use super::object::ObjectMask;
 use super::pipeline::{self, LostFrame, ProcessedFrame, Stage};
-use super::plan::{Assignment, Plan};
+use super::plan::{Assignment, Assignments, Plan};
 use super::quality;
 use super::select::{TURN_DEG, TURN_TOLERANCE_DEG};
 use super::steadiness::Steadiness;
@@ -76,16 +78,19 @@ impl Job {
         })
     }
 
-    /// What a few frames of the video say against the mask.
-    fn doubts_about_the_mask(&self) -> Vec<Notice> {
-        let looked = mask_doubts(&self.video, &self.mask.image, self.mask.frame);
-        let doubts = looked.unwrap_or_else(|error| {
-            vec![format!(
-                "the mask could not be checked: {}",
-                with_causes(&error)
-            )]
-        });
-        doubts.into_iter().map(Notice::Warning).collect()
+    /// What a few frames of the video say against the mask, and how much that is.
+    fn doubts_about_the_mask(&self) -> (Vec<Notice>, Option<MaskMisfit>) {
+        match mask_doubts(&self.video, &self.mask.image, self.mask.frame) {
+            Ok(doubts) => {
+                let misfit = doubts.misfit;
+                let reasons = doubts.reasons.into_iter();
+                (reasons.map(Notice::Warning).collect(), misfit)
+            }
+            Err(error) => {
+                let text = format!("the mask could not be checked: {}", with_causes(&error));
+                (vec![Notice::Warning(text)], None)
+            }
+        }
     }
 
     pub(super) fn id(&self) -> &str {
@@ -145,19 +150,30 @@ impl Job {
         let mut collected = Collected::new(samples);
         let mut assignments = plan.assignments();
         let mut lost = Vec::new();
-        let mut doubts = Vec::new();
+        let mut doubts = None;
+        let mut course = ShiftCourse::default();
+        let mut waiting = Assignments::new();
         pool.in_place_scope(|scope| {
             // The look at the mask takes one thread for a while, and the others go on.
-            scope.spawn(|_| doubts = self.doubts_about_the_mask());
+            scope.spawn(|_| doubts = Some(self.doubts_about_the_mask()));
             if options.align != Align::Off {
                 stage.align = self.align(&stage, &plan, options, pool)?;
             }
+            let mut all_known = false;
             while !assignments.is_empty() {
                 let newly_lost = stage.run(&assignments, pool, |frame| {
+                    let samples = assignments.get(&frame.number);
                     if let Some(alignment) = &frame.alignment {
-                        steadiness.add(frame.number, alignment);
+                        course.add(frame.number, alignment);
+                        if alignment.shift.is_none() && !all_known {
+                            // It waits until the frames around it are known.
+                            let samples = samples.into_iter().flatten().copied();
+                            waiting.entry(frame.number).or_default().extend(samples);
+                            return Ok(());
+                        }
+                        steadiness.add(frame.number, alignment, frame.interpolated);
                     }
-                    for &sample in assignments.get(&frame.number).into_iter().flatten() {
+                    for &sample in samples.into_iter().flatten() {
                         let record = self.record(&stage, &plan, &frame, sample, options);
                         collected.add(&record, &frame.image);
                         let (image, png) = (frame.image.clone(), frame.png.clone());
@@ -173,9 +189,17 @@ impl Job {
                     let first = notices_of_lost(&lost).swap_remove(0);
                     return Err(ExtractError::Strict(first.text().to_owned()));
                 }
+                if assignments.is_empty() && !all_known {
+                    all_known = true;
+                    assignments = std::mem::take(&mut waiting);
+                    if let Some(align) = &mut stage.align {
+                        align.interpolated = course.fill(assignments.keys().copied());
+                    }
+                }
             }
             Ok(())
         })?;
+        let (doubts, misfit) = doubts.unwrap_or_default();
         notices.extend(doubts);
         if options.align != Align::Off && stage.align.is_none() {
             notices.push(Notice::Warning(
@@ -198,6 +222,7 @@ impl Job {
         notices.extend(quality::notices(&findings));
         let lossy = notices.iter().any(Notice::is_loss);
         let quality = SessionQuality::of(&collected.records, lossy, part_of_turn(&plan));
+        let quality = quality.with_mask(misfit);
         // Whatever can fail is done before the shard of an earlier run is replaced.
         let page = self.page(options, &collected, &notices, &quality)?;
         let files = writer.finish()?;
@@ -308,6 +333,7 @@ impl Job {
                 above: options.align_tolerance,
                 most: options.max_shift,
             }),
+            interpolated: HashMap::new(),
         }))
     }
 
@@ -342,6 +368,7 @@ impl Job {
             frame.shift_applied,
             alignment.map(|alignment| thousandths(alignment.confidence)),
         )
+        .interpolated(frame.interpolated.map(thousandths))
     }
 
     /// What the plan shows: repeated frames, an incomplete turn, gaps.

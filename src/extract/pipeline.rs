@@ -2,6 +2,7 @@
 //! and passed to the writer as they are finished. Every queue is bounded.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
@@ -16,6 +17,7 @@ use relit_data::shard;
 use relit_video::{DecodeFault, Pending, Reader, Video};
 
 use super::crop::repeat_edge;
+use super::interpolate::InterpolatedShift;
 use super::plan::Assignments;
 use super::scale::APRON;
 use super::{
@@ -40,6 +42,8 @@ pub(super) struct Align {
     pub(super) aligner: Aligner,
     /// `None` if no shifts are corrected.
     pub(super) correction: Option<Correction>,
+    /// The shifts of frames that cannot be registered, as far as the frames around them tell.
+    pub(super) interpolated: HashMap<u64, InterpolatedShift>,
 }
 
 /// Which shifts are corrected, pixels.
@@ -57,6 +61,8 @@ pub(super) struct ProcessedFrame {
     pub(super) measures: Measures,
     /// `None` if it was not measured.
     pub(super) alignment: Option<Alignment>,
+    /// The uncertainty of the shift, pixels, if it was not measured but comes from the frames around.
+    pub(super) interpolated: Option<f64>,
     pub(super) shift_applied: bool,
 }
 
@@ -136,6 +142,7 @@ impl Stage<'_> {
         let crop = CropView::within(region, self.border());
         let alignment = self.align.as_ref();
         let alignment = alignment.map(|by| by.aligner.measure_crop(crop, align));
+        let (alignment, interpolated) = self.completed(number, alignment);
         let moved = alignment.and_then(|alignment| self.moved(crop, alignment));
         let spans = match moved {
             None => Cow::Borrowed(&self.spans),
@@ -154,8 +161,32 @@ impl Stage<'_> {
             image,
             measures: measuring.finish(),
             alignment,
+            interpolated,
             shift_applied: moved.is_some(),
         }))
+    }
+
+    /// A frame's alignment with the shift that the frames around it tell, if it has none, and its uncertainty then.
+    fn completed(
+        &self,
+        number: u64,
+        alignment: Option<Alignment>,
+    ) -> (Option<Alignment>, Option<f64>) {
+        let lacks = alignment.filter(|alignment| alignment.shift.is_none());
+        let around = self
+            .align
+            .as_ref()
+            .and_then(|by| by.interpolated.get(&number));
+        match (lacks, around) {
+            (Some(alignment), Some(found)) => {
+                let shift = Some(found.shift);
+                (
+                    Some(Alignment { shift, ..alignment }),
+                    Some(found.uncertainty),
+                )
+            }
+            _ => (alignment, None),
+        }
     }
 
     /// The crop where its object went; `None` if it is not corrected.

@@ -12,6 +12,8 @@ pub(super) struct Steadiness {
     max_shift: f64,
     frames: u64,
     unregistered: Vec<u64>,
+    /// Frames whose shift is that of the frames around them, and the largest uncertainty, pixels.
+    interpolated: (u64, f64),
     /// The first frame whose object lies too far away, and how far.
     beyond: Option<(u64, f64)>,
     /// The frame that is turned or grown most: degrees, factor minus 1.
@@ -28,8 +30,13 @@ impl Steadiness {
         }
     }
 
-    pub(super) fn add(&mut self, frame: u64, alignment: &Alignment) {
+    /// Notes a frame; `interpolated` is the uncertainty of a shift that was not measured, pixels.
+    pub(super) fn add(&mut self, frame: u64, alignment: &Alignment, interpolated: Option<f64>) {
         self.frames += 1;
+        if let Some(uncertainty) = interpolated {
+            let (frames, most) = self.interpolated;
+            self.interpolated = (frames + 1, uncertainty.max(most));
+        }
         let Some([dx, dy]) = alignment.shift else {
             return self.unregistered.push(frame);
         };
@@ -76,6 +83,13 @@ impl Steadiness {
                 ),
             }));
         }
+        if let (count @ 1.., most) = self.interpolated {
+            let all = count_of(self.frames, "frame");
+            notices.push(Notice::Warning(format!(
+                "{count} of {all} could not be registered and {} placed by the frames around, uncertain by at most {most:.2} pixels (shift_interpolated_sd_px says of each)",
+                if count == 1 { "was" } else { "were" },
+            )));
+        }
         if let Some((frame, (degrees, growth))) = self.turned {
             let (count, percent) = (count_of(self.turned_frames, "frame"), 100.0 * growth);
             notices.push(Notice::Warning(format!(
@@ -103,7 +117,7 @@ mod tests {
     fn the_first_frame_beyond_the_largest_shift_is_named_in_any_order() {
         let mut steadiness = Steadiness::new(8.0);
         for (frame, dx) in [(3, 1.0), (9, -8.5), (7, 9.0), (8, 2.0)] {
-            steadiness.add(frame, &moved_by(dx));
+            steadiness.add(frame, &moved_by(dx), None);
         }
         let error = steadiness.check().unwrap_err();
         assert!(
@@ -116,7 +130,7 @@ mod tests {
     #[test]
     fn frames_that_cannot_be_registered_are_counted() {
         let mut steadiness = Steadiness::new(8.0);
-        steadiness.add(1, &moved_by(0.2));
+        steadiness.add(1, &moved_by(0.2), None);
         assert!(steadiness.notices(0.3).is_empty());
         let lost = Alignment {
             shift: None,
@@ -124,16 +138,22 @@ mod tests {
             confidence: 0.1,
             turned: None,
         };
-        steadiness.add(6, &lost);
+        steadiness.add(6, &lost, None);
         let text = steadiness.notices(0.5).remove(0).text().to_owned();
         assert!(
             text.contains("1 of 2 frames") && text.contains("is as it was"),
             "{text}"
         );
-        steadiness.add(5, &lost);
+        steadiness.add(5, &lost, None);
         let text = steadiness.notices(0.5).remove(0).text().to_owned();
         assert!(
             text.contains("2 of 3") && text.contains("frame 5") && text.contains("below 0.50"),
+            "{text}"
+        );
+        steadiness.add(7, &moved_by(0.3), Some(0.14));
+        let text = steadiness.notices(0.5).remove(1).text().to_owned();
+        assert!(
+            text.contains("1 of 4 frames") && text.contains("0.14 pixels"),
             "{text}"
         );
     }

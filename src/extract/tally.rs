@@ -1,5 +1,7 @@
 //! What became of all recordings of an extraction, counted.
 
+use relit_data::shard::SessionEntry;
+
 use super::RecordingOutcome;
 
 /// The outcome of an extraction: numbers of recordings.
@@ -10,6 +12,8 @@ pub struct Tally {
     pub extracted: usize,
     /// Extracted or skipped recordings of which something is lost.
     pub lossy: usize,
+    /// Extracted or skipped recordings whose mask does not fit.
+    pub misfits: usize,
     /// Recordings that were in the data set already.
     pub skipped: usize,
     /// Recordings that hold too little of a turn, and were left out.
@@ -24,14 +28,19 @@ impl Tally {
         match outcome {
             RecordingOutcome::Extracted(entry) => {
                 self.extracted += 1;
-                self.lossy += usize::from(entry.lossy);
+                self.count_flaws(entry);
             }
             RecordingOutcome::Skipped(entry) => {
                 self.skipped += 1;
-                self.lossy += usize::from(entry.lossy);
+                self.count_flaws(entry);
             }
             RecordingOutcome::LeftOut(_) => self.left_out += 1,
             RecordingOutcome::Failed(_) => self.failed += 1,
         }
+    }
+
+    fn count_flaws(&mut self, entry: &SessionEntry) {
+        self.lossy += usize::from(entry.lossy);
+        self.misfits += usize::from(entry.has_misfit());
     }
 }

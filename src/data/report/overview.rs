@@ -219,6 +219,10 @@ fn found(overview: &Overview) -> String {
     let rows = [
         row("moved back", of_samples(totals.moved)),
         row("shift not measurable", of_samples(totals.unregistered)),
+        row(
+            "shift from the frames around",
+            of_samples(totals.interpolated),
+        ),
         row("exposure steps", of_samples(totals.exposure_steps)),
         row(
             "pictures repeated by the camera",

@@ -124,6 +124,15 @@ pub struct SessionEntry {
     pub report: Option<FileEntry>,
 }
 
+impl SessionEntry {
+    /// Whether its mask does not fit the recording, as far as that is known.
+    #[must_use]
+    pub fn has_misfit(&self) -> bool {
+        let quality = self.quality.as_ref();
+        quality.is_some_and(|quality| quality.mask_misfit.is_some())
+    }
+}
+
 /// An object with all its turns: it may have been put on the table in several poses.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ObjectTurns {

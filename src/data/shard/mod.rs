@@ -66,7 +66,7 @@ pub use overview::{
 };
 pub use parquet_table::{TableRow, read_table};
 pub use pieces::{Merged, TaskOutcome, TaskPiece, merge, merge_with};
-pub use quality::{QualityVerdict, SessionQuality};
+pub use quality::{MaskMisfit, QualityVerdict, SessionQuality};
 pub use reader::{ShardReader, ShardSample};
 pub use record::FrameRecord;
 pub use settings::{Align, ExtractionSettings, ImageSize, Layout, Native};

@@ -66,6 +66,8 @@ pub struct OverviewTotals {
     pub moved: u64,
     /// Samples whose frame could not be registered.
     pub unregistered: u64,
+    /// Samples whose shift comes from the frames around.
+    pub interpolated: u64,
     /// Samples with `exposure_step`.
     pub exposure_steps: u64,
     /// Samples with `identical_to`.
@@ -130,6 +132,7 @@ impl Overview {
             totals.duplicates += u64::from(entry.duplicates);
             totals.moved += u64::from(quality.moved);
             totals.unregistered += u64::from(quality.unregistered);
+            totals.interpolated += u64::from(quality.interpolated);
             totals.exposure_steps += u64::from(quality.exposure_steps);
             totals.identical += u64::from(quality.identical);
             totals.blurred += u64::from(quality.blurred);
@@ -181,8 +184,13 @@ impl SessionOverview {
                 .map(|r| r.saturated_fraction)
                 .fold(0.0, f64::max)
         };
+        let judged = entry.quality.as_ref();
         Self {
-            quality: SessionQuality::of(records, entry.lossy, entry.covered_deg),
+            quality: SessionQuality {
+                // The records do not tell it.
+                mask_misfit: judged.and_then(|quality| quality.mask_misfit),
+                ..SessionQuality::of(records, entry.lossy, entry.covered_deg)
+            },
             histogram,
             profile: parts.map(largest).collect(),
             entry,

@@ -89,7 +89,7 @@ macro_rules! column {
 }
 
 /// All columns, in the order of the file, for writing and for reading.
-const COLUMNS: [Column; 31] = [
+const COLUMNS: [Column; 32] = [
     column!(Text "session": record.session),
     column!(Text "object": record.object),
     column!(U32 "index": record.index),
@@ -130,6 +130,7 @@ const COLUMNS: [Column; 31] = [
     },
     column!(Flag "shift_applied": record.shift_applied),
     column!(MaybeReal? "align_confidence": record.align_confidence),
+    column!(MaybeReal? "shift_interpolated_sd_px": record.shift_interpolated_sd_px),
     column!(U64 "mask_px": record.mask_px),
     column!(U64 "saturated_px": record.saturated_px),
     column!(Real "saturated_fraction": record.saturated_fraction),
@@ -372,6 +373,7 @@ mod tests {
                         !even,
                         (!even).then_some(0.75),
                     )
+                    .interpolated((!even).then_some(0.3))
             },
             png_blake3: Digest::of(&index.to_le_bytes()),
             mask_blake3: Digest::of(b"mask"),
@@ -443,7 +445,7 @@ mod tests {
             .filter(|column| !column.read(None, &mut row(0)))
             .map(|column| column.name)
             .collect();
-        assert_eq!(needed.len(), COLUMNS.len() - 4);
+        assert_eq!(needed.len(), COLUMNS.len() - 5);
         assert!(needed.contains(&"angle_deg") && !needed.contains(&"blur"));
     }
 

@@ -28,7 +28,7 @@ pub enum QualityVerdict {
     Good,
     /// Something is missing or flagged, in few samples or without harm to the others.
     Usable,
-    /// The recording is at fault in so many samples that it should be made again.
+    /// The recording is at fault in so many samples that it should be made again, or the mask is another object's.
     Broken,
 }
 
@@ -56,6 +56,16 @@ impl fmt::Display for QualityVerdict {
     }
 }
 
+/// How much a mask does not fit its recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MaskMisfit {
+    /// A part of it is background, or a part of the object is not in it.
+    InPart,
+    /// It is that of another object or recording.
+    AsAWhole,
+}
+
 /// The quality figures of a session, summed over its samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SessionQuality {
@@ -75,6 +85,12 @@ pub struct SessionQuality {
     pub moved: u32,
     /// Samples whose frame could not be registered.
     pub unregistered: u32,
+    /// Samples whose shift comes from the frames around.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub interpolated: u32,
+    /// How much the mask does not fit the recording, by a look at a few frames; `None` if it fits or nothing is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mask_misfit: Option<MaskMisfit>,
     /// Samples with an `exposure_step`.
     pub exposure_steps: u32,
     /// Samples with `identical_to`: the camera delivered the picture twice.
@@ -107,12 +123,30 @@ impl SessionQuality {
             unregistered: count(records, |r| {
                 r.align_confidence.is_some() && r.shift_px.is_none()
             }),
+            interpolated: count(records, |r| r.shift_interpolated_sd_px.is_some()),
+            mask_misfit: None,
             exposure_steps: count(records, |r| r.exposure_step.is_some()),
             identical: count(records, |r| r.identical_to.is_some()),
             blurred: count(records, |r| r.blur.is_some()),
         };
         quality.judge(records, lossy, covered_deg);
         quality
+    }
+
+    /// With what is known of the mask, which lowers the verdict.
+    #[must_use]
+    pub fn with_mask(mut self, misfit: Option<MaskMisfit>) -> Self {
+        self.mask_misfit = misfit;
+        match misfit {
+            None => {}
+            Some(MaskMisfit::InPart) => {
+                self.add(QualityVerdict::Usable, "the mask does not fit everywhere");
+            }
+            Some(MaskMisfit::AsAWhole) => {
+                self.add(QualityVerdict::Broken, "the mask is not that of the object");
+            }
+        }
+        self
     }
 
     fn judge(&mut self, records: &[FrameRecord], lossy: bool, covered_deg: Option<f64>) {
@@ -147,6 +181,11 @@ impl SessionQuality {
                 "the shift could not be measured",
             ),
             (
+                self.interpolated,
+                f64::INFINITY,
+                "the shift comes from the frames around",
+            ),
+            (
                 count(records, |r| r.duplicate),
                 f64::INFINITY,
                 "a source frame is used again",
@@ -178,6 +217,14 @@ impl SessionQuality {
         self.verdict = self.verdict.max(verdict);
         self.reasons.push(reason.to_owned());
     }
+}
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_none(samples: &u32) -> bool {
+    *samples == 0
 }
 
 fn count(records: &[FrameRecord], is: impl Fn(&FrameRecord) -> bool) -> u32 {
@@ -219,6 +266,34 @@ mod tests {
         assert!(quality.reasons.is_empty());
         assert_eq!(quality.shift_max_px, Some(0.5));
         assert_eq!(quality.shift_rms_px, Some(0.5));
+    }
+
+    #[test]
+    fn a_mask_that_does_not_fit_lowers_the_verdict() {
+        let of = |misfit| SessionQuality::of(&turn(100), false, None).with_mask(misfit);
+        assert_eq!(of(None).verdict, QualityVerdict::Good);
+        let partly = of(Some(MaskMisfit::InPart));
+        assert_eq!(partly.verdict, QualityVerdict::Usable);
+        let other = of(Some(MaskMisfit::AsAWhole));
+        assert_eq!(other.verdict, QualityVerdict::Broken);
+        assert_eq!(other.reasons, ["the mask is not that of the object"]);
+    }
+
+    #[test]
+    fn interpolated_shifts_are_counted_and_leave_a_session_usable() {
+        let mut records = turn(100);
+        records[3].shift_px = Some([0.1, 0.2]);
+        records[3].shift_interpolated_sd_px = Some(0.3);
+        let quality = SessionQuality::of(&records, false, None);
+        assert_eq!(
+            (quality.verdict, quality.interpolated),
+            (QualityVerdict::Usable, 1)
+        );
+        let json = serde_json::to_string(&SessionQuality::of(&turn(3), false, None)).unwrap();
+        assert!(
+            !json.contains("interpolated") && !json.contains("misfit"),
+            "{json}"
+        );
     }
 
     #[test]

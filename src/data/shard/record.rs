@@ -41,6 +41,10 @@ pub struct FrameRecord {
     /// value and without `shift_px`, the frame could not be registered.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub align_confidence: Option<f64>,
+    /// Standard deviation of `shift_px`, source pixels, where the frame could not be registered and the frames around it
+    /// tell the shift; null where it was measured or is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shift_interpolated_sd_px: Option<f64>,
     /// Source pixels under the mask.
     pub mask_px: u64,
     /// Source pixels under the mask with all three channels at or above the saturation level.
@@ -99,6 +103,7 @@ impl FrameRecord {
             shift_px: None,
             shift_applied: false,
             align_confidence: None,
+            shift_interpolated_sd_px: None,
             mask_px: measures.mask_px,
             saturated_px: measures.saturated_px,
             saturated_fraction,
@@ -159,6 +164,15 @@ impl FrameRecord {
             ..self
         }
     }
+
+    /// How uncertain a shift is that comes from the frames around; `None` for one that was measured.
+    #[must_use]
+    pub fn interpolated(self, sd_px: Option<f64>) -> Self {
+        Self {
+            shift_interpolated_sd_px: sd_px,
+            ..self
+        }
+    }
 }
 
 #[cfg(test)]
@@ -193,5 +207,17 @@ pub(super) mod tests {
             serde_json::from_str::<FrameRecord>(text).unwrap(),
             record(3)
         );
+    }
+
+    #[test]
+    fn an_interpolated_shift_is_written_only_where_there_is_one() {
+        let measured = serde_json::to_string(&record(3)).unwrap();
+        assert!(!measured.contains("interpolated"), "{measured}");
+        let placed = record(3)
+            .aligned(Some([0.5, -0.25]), true, Some(0.1))
+            .interpolated(Some(0.3));
+        let text = serde_json::to_string(&placed).unwrap();
+        assert!(text.contains(r#""shift_interpolated_sd_px":0.3"#), "{text}");
+        assert_eq!(serde_json::from_str::<FrameRecord>(&text).unwrap(), placed);
     }
 }

@@ -338,6 +338,10 @@ fn first_not_finite(record: &FrameRecord) -> Option<&'static str> {
             "align_confidence",
             record.align_confidence.unwrap_or_default(),
         ),
+        (
+            "shift_interpolated_sd_px",
+            record.shift_interpolated_sd_px.unwrap_or_default(),
+        ),
         ("saturated_fraction", record.saturated_fraction),
         ("mean_rgb", r + g + b),
         ("sharpness", record.sharpness),

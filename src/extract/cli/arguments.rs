@@ -27,7 +27,8 @@ Examples:
   relit-extract sessions -o dataset --task-id 3 --task-count 10
       the fourth of ten parts; afterwards: relit-extract merge dataset
 
-Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost.";
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost, \
+or a mask does not fit.";
 
 /// The parsed command line.
 pub(crate) struct Arguments {

@@ -42,10 +42,14 @@ pub(crate) fn run(
     }
     console.say(
         &format!(
-            "{}: {} extracted ({} with losses), {} skipped, {} left out, {} failed",
+            "{}: {} extracted ({} with losses{}), {} skipped, {} left out, {} failed",
             out.display(),
             tally.extracted,
             tally.lossy,
+            match tally.misfits {
+                0 => String::new(),
+                misfits => format!(", {misfits} with a mask that does not fit"),
+            },
             tally.skipped,
             tally.left_out,
             tally.failed
@@ -55,17 +59,20 @@ pub(crate) fn run(
             "out": out.to_string_lossy(),
             "extracted": tally.extracted,
             "lossy": tally.lossy,
+            "misfits": tally.misfits,
             "skipped": tally.skipped,
             "left_out": tally.left_out,
             "failed": tally.failed,
         }),
     );
     let nothing_came_out = tally.extracted + tally.skipped == 0;
-    Ok(match (tally.failed, tally.lossy + tally.left_out) {
-        (0, 0) => Outcome::Whole,
-        (1.., _) if nothing_came_out => Outcome::Wrong,
-        _ => Outcome::Incomplete,
-    })
+    Ok(
+        match (tally.failed, tally.lossy + tally.misfits + tally.left_out) {
+            (0, 0) => Outcome::Whole,
+            (1.., _) if nothing_came_out => Outcome::Wrong,
+            _ => Outcome::Incomplete,
+        },
+    )
 }
 
 /// Prints the progress and the outcome of each recording.

@@ -39,8 +39,9 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
             "tasks": tasks,
         }),
     );
-    let lossy = merged.dataset.sessions.iter().any(|session| session.lossy);
-    Ok(match lossy || !merged.left_out.is_empty() {
+    let mut sessions = merged.dataset.sessions.iter();
+    let is_flawed = sessions.any(|session| session.lossy || session.has_misfit());
+    Ok(match is_flawed || !merged.left_out.is_empty() {
         true => Outcome::Incomplete,
         false => Outcome::Whole,
     })

@@ -173,6 +173,7 @@ fn totals(session: &SessionEntry, records: &[Option<&FrameRecord>]) -> Vec<Strin
         let found = SessionQuality {
             verdict: listed.verdict,
             reasons: listed.reasons.clone(),
+            mask_misfit: listed.mask_misfit,
             ..SessionQuality::of(&records, session.lossy, session.covered_deg)
         };
         if found != *listed {
