@@ -54,6 +54,7 @@ mod blur;
 mod check;
 mod cleanup;
 mod closed;
+mod cut_energy;
 mod drawing;
 mod encode;
 mod error;
@@ -90,11 +91,12 @@ pub use outline::outline;
 pub use preview::preview;
 pub use score::{BOUNDARY_TOLERANCE_PX, MaskScore, ScoreFault, score};
 pub use segment::{
-    Mask, MaskStatistics, check_hints, clean_cut, segment, segment_turn, segment_with,
+    Mask, MaskStatistics, check_hints, clean_cut, segment, segment_turn, segment_with, start_cuts,
 };
 pub use settings::{
     Effort, Feather, Iterations, MAX_PIXELS, MIN_SIDE, SegmentSettings, SettingsFault,
 };
+pub use starts::{StartCuts, StartRule};
 pub use strokes::{Brush, Stroke, Strokes};
 pub use turn::{MIN_TURN_FRAMES, TURN_FRAMES, TurnFrames, TurnStatistics};
 pub use warning::{Side, Warning};

@@ -5,11 +5,10 @@ use relit_data::geometry::Rect;
 
 use super::bitmap::Bitmap;
 use super::closed::enclosed;
-use super::grab_cut::Label;
 use super::initial::InitialLabels;
 use super::pyramid::FirstModels;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
-use super::starts::prefers_ranked;
+use super::starts::{StartCuts, StartRule};
 use super::turn::{self, TurnStatistics};
 use super::warning::OPENING;
 use super::{Effort, Hints, MaskError, SegmentSettings, Warning, cleanup, pyramid, warning};
@@ -231,47 +230,81 @@ fn by_hints(
     settings: &SegmentSettings,
     effort: Effort,
 ) -> Result<Mask, MaskError> {
-    let size = frame.dimensions();
-    check_size(size)?;
-    let InitialLabels {
-        labels,
-        first,
-        rect,
-    } = InitialLabels::new(hints, size)?;
-    // Marks of the background alone cut nothing out of a frame; a turn may do without those of the object.
-    if !labels.iter().any(|label| label.is_object()) {
-        return Err(MaskError::NothingMarked);
+    check_size(frame.dimensions())?;
+    let initial = InitialLabels::new(hints, frame.dimensions())?;
+    if initial.rect.is_none() {
+        let first = initial.first;
+        return cut_from(frame, hints, &initial, first, settings, effort);
     }
-    let begin = |labels: Vec<Label>, first: FirstModels| {
-        cut_from(frame, labels, first, settings, effort)
-            .and_then(|raw| finish(&raw, size, Some(hints), rect, settings, FILLED_OF_FRAME))
+    let rule = StartRule::default();
+    cuts_by_hints(frame, hints, &initial, settings, effort, rule.shares)?.into_mask(rule)
+}
+
+/// A rectangle's cuts from several starts, each named by the share of the rectangle that is background at first, 0 to
+/// 1; what [`segment`] chooses from. Seeds alone have one start, that of share 0.
+///
+/// # Errors
+/// As [`segment`].
+pub fn start_cuts(
+    frame: &RgbImage,
+    hints: &Hints,
+    settings: &SegmentSettings,
+    shares: &[f64],
+) -> Result<StartCuts, MaskError> {
+    check_size(frame.dimensions())?;
+    let initial = InitialLabels::new(hints, frame.dimensions())?;
+    cuts_by_hints(frame, hints, &initial, settings, Effort::Fine, shares)
+}
+
+fn cuts_by_hints(
+    frame: &RgbImage,
+    hints: &Hints,
+    initial: &InitialLabels,
+    settings: &SegmentSettings,
+    effort: Effort,
+    shares: &[f64],
+) -> Result<StartCuts, MaskError> {
+    let whole = Rect::new(0, 0, frame.width(), frame.height());
+    let rect = initial.rect.unwrap_or(whole);
+    let shares = if initial.rect.is_some() {
+        shares
+    } else {
+        &[0.0]
     };
-    let Some(rect) = rect else {
-        return begin(labels, first);
-    };
-    match (
-        begin(labels.clone(), FirstModels::All),
-        begin(labels, first),
-    ) {
-        (Ok(plain), Ok(ranked)) => {
-            let better = prefers_ranked(frame, rect, &plain.bitmap(), &ranked.bitmap());
-            Ok(if better { ranked } else { plain })
-        }
-        (Err(_), ranked) => ranked,
-        (plain, Err(_)) => plain,
-    }
+    StartCuts::make(frame, rect, shares, |share| {
+        let first = match initial.rect {
+            None => initial.first,
+            Some(_) if share > 0.0 => FirstModels::Ranked(share),
+            Some(_) => FirstModels::All,
+        };
+        cut_from(frame, hints, initial, first, settings, effort)
+    })
 }
 
 fn cut_from(
     frame: &RgbImage,
-    mut labels: Vec<Label>,
+    hints: &Hints,
+    initial: &InitialLabels,
     first: FirstModels,
     settings: &SegmentSettings,
     effort: Effort,
-) -> Result<Bitmap, MaskError> {
+) -> Result<Mask, MaskError> {
+    let mut labels = initial.labels.clone();
+    // Marks of the background alone cut nothing out of a frame; a turn may do without those of the object.
+    if !labels.iter().any(|label| label.is_object()) {
+        return Err(MaskError::NothingMarked);
+    }
     pyramid::segment(frame, &mut labels, first, settings.iterations, effort)?;
-    let object = labels.iter().map(|label| label.is_object());
-    Ok(Bitmap::new(frame.dimensions(), object))
+    let size = frame.dimensions();
+    let raw = Bitmap::new(size, labels.iter().map(|label| label.is_object()));
+    finish(
+        &raw,
+        size,
+        Some(hints),
+        initial.rect,
+        settings,
+        FILLED_OF_FRAME,
+    )
 }
 
 /// Why the turn's mask is worse than that of the hints alone; none if it is not.

@@ -1,49 +1,113 @@
-//! Which of two starts gave the better cut of a rectangle: the plain one of GrabCut, or the one that takes half of
-//! the rectangle for background at first.
+//! Where a cut of a rectangle starts: GrabCut's way, with all of it as object, or with the share of it as background
+//! that looks most like what is around it.
 //!
-//! The half is right for a rectangle with much background in it, and cuts a part off an object that fills its
-//! rectangle and is in places like what is around it. Both cuts are measured by the energy that GrabCut minimises,
-//! with histograms in place of its mixtures, because these fit any mask best in closed form (Vicente, Kolmogorov and
-//! Rother, "Joint optimization of segmentation and appearance models", 2009). Where a cut reaches all four sides of
-//! its rectangle, as the object of a tight one does, the plain start counts as good, and the other has to be better
-//! by a margin.
+//! A share is right for a rectangle with much background in it, and cuts a part off an object that fills its rectangle
+//! and is in places like what is around it. So a rectangle is cut from several starts, and the cut of the lowest energy
+//! counts. Where the cut of the plain start reaches all four sides of its rectangle, as the object of a tight one does,
+//! it counts as good, and another has to be better by a margin.
 
 use image::RgbImage;
 use relit_data::geometry::Rect;
 
-use super::bitmap::Bitmap;
-use super::grab_cut::{DIRECTIONS_AHEAD, SMOOTHNESS, neighbour};
-use super::max_flow::DIRECTIONS;
+use super::cut_energy::CutEnergy;
+use super::{Mask, MaskError};
 
-/// Bits of a channel that a histogram distinguishes.
-const BITS: usize = 4;
-/// Pixels this share of the rectangle's sides around it are looked at.
-const AROUND: f64 = 0.3;
 /// A cut reaches a side of the rectangle if it comes within this share of the way to the other.
 const REACHES: f64 = 0.04;
-/// In a tight rectangle the ranked cut has to be better by so much, in units of the log-likelihood of a pixel.
-const MARGIN: f64 = 0.2;
-/// The longer side of an image at which the margin was chosen, pixels: an outline's share of the pixels falls with
-/// the size.
-const SIDE: f64 = 600.0;
 
-/// Whether the cut that began with half the rectangle as background is the better one.
-pub(super) fn prefers_ranked(
-    frame: &RgbImage,
-    rect: Rect,
-    plain: &Bitmap,
-    ranked: &Bitmap,
-) -> bool {
-    if plain == ranked {
-        return false;
+/// From which starts a rectangle is cut, and which of the cuts counts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StartRule {
+    /// The share of the rectangle that is background at first, 0 to 1, of each start; 0 is GrabCut's own. At least one.
+    pub shares: &'static [f64],
+    /// By how much a cut has to be better than that of the plain start where that reaches all sides of the rectangle,
+    /// in units of the log-likelihood of a pixel.
+    pub margin: f64,
+}
+
+impl Default for StartRule {
+    fn default() -> Self {
+        Self {
+            shares: &[0.0, 0.5],
+            margin: 0.2,
+        }
     }
-    let measure = Measure::new(frame, rect);
-    let margin = if fills(plain.bounds(), rect) {
-        MARGIN
-    } else {
-        0.0
-    };
-    measure.energy(plain) - measure.energy(ranked) > margin
+}
+
+/// A rectangle's cuts from several starts, for choosing between rules without cutting again.
+#[derive(Debug)]
+pub struct StartCuts {
+    cuts: Vec<StartCut>,
+}
+
+#[derive(Debug)]
+struct StartCut {
+    share: f64,
+    energy: f64,
+    reaches_all_sides: bool,
+    mask: Mask,
+}
+
+impl StartCuts {
+    /// The cuts of `shares`, each made by `cut`, as far as there are any.
+    ///
+    /// # Errors
+    /// That of the last start if none gives a cut.
+    pub(super) fn make(
+        frame: &RgbImage,
+        rect: Rect,
+        shares: &[f64],
+        cut: impl Fn(f64) -> Result<Mask, MaskError>,
+    ) -> Result<Self, MaskError> {
+        let energy = CutEnergy::new(frame, rect);
+        let mut cuts = Vec::new();
+        let mut fault = MaskError::Empty;
+        for &share in shares {
+            match cut(share) {
+                Ok(mask) => {
+                    let found = mask.bitmap();
+                    cuts.push(StartCut {
+                        share,
+                        energy: energy.of(&found),
+                        reaches_all_sides: fills(found.bounds(), rect),
+                        mask,
+                    });
+                }
+                Err(error) => fault = error,
+            }
+        }
+        match cuts.is_empty() {
+            true => Err(fault),
+            false => Ok(Self { cuts }),
+        }
+    }
+
+    /// The mask that a rule chooses among the cuts of its shares; `None` if there is none of them.
+    #[must_use]
+    pub fn by(&self, rule: StartRule) -> Option<&Mask> {
+        let of_rule = self
+            .cuts
+            .iter()
+            .filter(|cut| rule.shares.contains(&cut.share));
+        let best = of_rule
+            .clone()
+            .min_by(|a, b| a.energy.total_cmp(&b.energy))?;
+        let plain = of_rule.clone().find(|cut| cut.share <= 0.0);
+        let margin = |cut: &StartCut| {
+            if cut.reaches_all_sides {
+                rule.margin
+            } else {
+                0.0
+            }
+        };
+        let chosen = plain.filter(|plain| plain.energy - best.energy <= margin(plain));
+        Some(&chosen.unwrap_or(best).mask)
+    }
+
+    /// As [`Self::by`], by the rule by which they were made.
+    pub(super) fn into_mask(self, rule: StartRule) -> Result<Mask, MaskError> {
+        self.by(rule).cloned().ok_or(MaskError::Empty)
+    }
 }
 
 /// Whether a cut reaches all four sides of its rectangle.
@@ -55,123 +119,10 @@ fn fills(found: Rect, rect: Rect) -> bool {
         && (rect.bottom() - found.bottom()) as f64 <= down
 }
 
-/// An image, as far as cuts in it are measured.
-struct Measure<'a> {
-    frame: &'a RgbImage,
-    size: (usize, usize),
-    /// The part in which colours count.
-    part: Rect,
-    scale: f64,
-}
-
-impl<'a> Measure<'a> {
-    fn new(frame: &'a RgbImage, rect: Rect) -> Self {
-        let (width, height) = frame.dimensions();
-        let grow = |side: u32| (f64::from(side) * AROUND) as u32;
-        let (dx, dy) = (grow(rect.w), grow(rect.h));
-        let part = Rect::new(
-            rect.x.saturating_sub_unsigned(dx),
-            rect.y.saturating_sub_unsigned(dy),
-            rect.w.saturating_add(2 * dx),
-            rect.h.saturating_add(2 * dy),
-        );
-        let mut measure = Self {
-            frame,
-            size: (width as usize, height as usize),
-            part: part.clipped_to(width, height).unwrap_or(rect),
-            scale: 0.0,
-        };
-        let (mut sum, mut count) = (0.0, 0.0);
-        measure.pairs(|at, next, _| {
-            sum += measure.contrast(at, next);
-            count += 1.0;
-        });
-        measure.scale = 0.5 * f64::max(count, 1.0) / f64::max(sum, 1e-6);
-        measure
-    }
-
-    /// The energy of a cut, a pixel of the part.
-    fn energy(&self, object: &Bitmap) -> f64 {
-        let mut histograms = [vec![0_u32; 1 << (3 * BITS)], vec![0_u32; 1 << (3 * BITS)]];
-        let (columns, rows) = (
-            i64::from(self.part.x)..self.part.right(),
-            i64::from(self.part.y)..self.part.bottom(),
-        );
-        for y in rows {
-            for x in columns.clone() {
-                let at = y as usize * self.size.0 + x as usize;
-                let side = usize::from(object.bits().get(at) == Some(&true));
-                histograms[side][self.colour(at)] += 1;
-            }
-        }
-        let colours: f64 = histograms
-            .iter()
-            .map(|histogram| code_length(histogram))
-            .sum();
-        let mut outline = 0.0;
-        self.pairs(|at, next, length| {
-            if object.bits()[at] != object.bits()[next] {
-                let alike = (-self.scale * self.contrast(at, next)).exp();
-                outline += f64::from(SMOOTHNESS) / length * alike;
-            }
-        });
-        let longer = self.size.0.max(self.size.1) as f64;
-        let pixels = f64::from(self.part.w) * f64::from(self.part.h);
-        (colours + outline * longer / SIDE) / pixels.max(1.0)
-    }
-
-    /// Calls `each` with all pairs of neighbours and their distance.
-    fn pairs(&self, mut each: impl FnMut(usize, usize, f64)) {
-        for at in 0..self.size.0 * self.size.1 {
-            for direction in DIRECTIONS_AHEAD {
-                if let Some(next) = neighbour(at, direction, self.size) {
-                    let (dx, dy) = DIRECTIONS[direction];
-                    let is_diagonal = dx != 0 && dy != 0;
-                    each(
-                        at,
-                        next,
-                        if is_diagonal {
-                            std::f64::consts::SQRT_2
-                        } else {
-                            1.0
-                        },
-                    );
-                }
-            }
-        }
-    }
-
-    fn pixel(&self, at: usize) -> &[u8] {
-        &self.frame.as_raw()[3 * at..3 * at + 3]
-    }
-
-    fn contrast(&self, at: usize, next: usize) -> f64 {
-        let pairs = self.pixel(at).iter().zip(self.pixel(next));
-        pairs
-            .map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2))
-            .sum()
-    }
-
-    fn colour(&self, at: usize) -> usize {
-        let bits = self.pixel(at).iter();
-        bits.fold(0, |colour, &level| {
-            colour << BITS | usize::from(level) >> (8 - BITS)
-        })
-    }
-}
-
-/// The negative log-likelihood of all samples under their own histogram.
-fn code_length(histogram: &[u32]) -> f64 {
-    let all: f64 = histogram.iter().map(|&count| f64::from(count)).sum();
-    let filled = histogram.iter().filter(|&&count| count > 0);
-    filled
-        .map(|&count| -f64::from(count) * (f64::from(count) / all).ln())
-        .sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Hints, SegmentSettings, start_cuts};
 
     #[test]
     fn a_cut_reaches_a_rectangle_or_not() {
@@ -181,31 +132,32 @@ mod tests {
         assert!(!fills(Rect::new(12, 11, 96, 40), rect));
     }
 
-    #[test]
-    fn the_cut_along_the_objects_outline_has_the_least_energy() {
-        let inside = |x: u32, y: u32| (20..60).contains(&x) && (16..48).contains(&y);
-        let frame = RgbImage::from_fn(80, 64, |x, y| {
+    /// An object whose upper part looks like what is around it.
+    fn two_toned() -> RgbImage {
+        RgbImage::from_fn(90, 70, |x, y| {
             let grain = ((x * 7 + y * 13) % 11) as u8;
-            image::Rgb(if inside(x, y) {
-                [200 + grain, 90, 40]
-            } else {
-                [40 + grain, 80, 90]
+            let inside = (20..70).contains(&x) && (14..58).contains(&y);
+            image::Rgb(match (inside, y < 34) {
+                (true, true) => [70 + grain, 95, 80],
+                (true, false) => [200 + grain, 90, 40],
+                (false, _) => [40 + grain, 80, 90],
             })
-        });
-        let cut = |from: u32, to: u32| {
-            Bitmap::new(
-                (80, 64),
-                (0..80 * 64).map(|at| {
-                    let (x, y) = (at % 80, at / 80);
-                    inside(x, y) && (from..to).contains(&x)
-                }),
-            )
+        })
+    }
+
+    #[test]
+    fn a_rule_chooses_the_cut_of_the_least_energy_and_needs_no_other() {
+        let rect = Rect::new(16, 10, 58, 52);
+        let shares = &[0.0, 0.25, 0.5];
+        let settings = SegmentSettings::default();
+        let cuts = start_cuts(&two_toned(), &Hints::Rect(rect), &settings, shares).unwrap();
+        let area = |shares, margin| {
+            let rule = StartRule { shares, margin };
+            cuts.by(rule).map(|mask| mask.statistics().area_px)
         };
-        let rect = Rect::new(18, 14, 44, 36);
-        let measure = Measure::new(&frame, rect);
-        let whole = measure.energy(&cut(20, 60));
-        assert!(whole < measure.energy(&cut(20, 40)));
-        assert!(!prefers_ranked(&frame, rect, &cut(20, 60), &cut(20, 40)));
-        assert!(prefers_ranked(&frame, rect, &cut(20, 40), &cut(20, 60)));
+        let alone = [area(&[0.0], 0.0), area(&[0.25], 0.0), area(&[0.5], 0.0)];
+        assert!(alone.contains(&area(shares, 0.0)), "{alone:?}");
+        assert_eq!(area(shares, f64::INFINITY), alone[0]);
+        assert_eq!(area(&[0.4], 0.0), None);
     }
 }

@@ -44,6 +44,7 @@ mod editor;
 mod engine;
 mod error;
 mod files;
+mod folds;
 mod making;
 #[cfg(feature = "opencv")]
 mod opencv_grab_cut;
@@ -52,12 +53,13 @@ mod request;
 mod sampling;
 mod seeds;
 
-pub use bench::{BenchImage, BenchRow, Prompt, bench_image, bench_images};
+pub use bench::{BenchImage, BenchOptions, BenchRow, BoxKind, Prompt, bench_image, bench_images};
 pub use checking::{CheckOutput, DriftCheck, FrameDrift, MaskReport, MaskVerdict, check_mask};
 pub use editor::edit;
 pub use engine::{MaskEngine, opencv_grab_cut};
 pub use error::MaskingError;
 pub use files::MaskFiles;
+pub use folds::{FoldFigures, FoldReport, cross_validate, start_rules};
 pub use making::{MaskOutput, make_mask};
 pub use record::{
     MASK_SCHEMA, MaskRecord, MaskSoftware, RecordFault, RecordedHints, RecordedResult, SourceFrame,

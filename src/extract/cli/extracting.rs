@@ -88,14 +88,19 @@ impl Reporter<'_> {
     }
 
     fn skipped(&self, entry: &SessionEntry) {
-        let lossy = if entry.lossy {
-            "; something of it is lost, see its report"
-        } else {
-            ""
+        let flaw = match (entry.lossy, entry.has_misfit()) {
+            (_, true) => "; its mask does not fit, see its report",
+            (true, false) => "; something of it is lost, see its report",
+            (false, false) => "",
         };
         self.console.say(
-            &format!("{}: already extracted, skipped{lossy}", entry.id),
-            &json!({ "event": "skipped", "id": entry.id, "lossy": entry.lossy }),
+            &format!("{}: already extracted, skipped{flaw}", entry.id),
+            &json!({
+                "event": "skipped",
+                "id": entry.id,
+                "lossy": entry.lossy,
+                "misfit": entry.has_misfit(),
+            }),
         );
     }
 

@@ -7,7 +7,7 @@ use clap::error::ErrorKind;
 use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use relit_data::geometry::Rect;
 use relit_grabcut::{Drawing, Feather, Iterations, SegmentSettings};
-use relit_mask::{MaskEngine, MaskFiles, MaskRequest, MaskingError, read_seeds};
+use relit_mask::{BoxKind, MaskEngine, MaskFiles, MaskRequest, MaskingError, read_seeds};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -65,6 +65,13 @@ pub(crate) enum Verb {
         /// A folder with NAME.jpg, NAME.gt.png, and NAME.box.txt or NAME.scribble.png for each image
         #[arg(value_name = "DIR")]
         folder: PathBuf,
+        /// Rectangles made from the ground truth in place of NAME.box.txt: 2 pixels around the object, 12 % around it,
+        /// or without its left tenth
+        #[arg(long, value_name = "KIND", value_delimiter = ',')]
+        boxes: Vec<BoxName>,
+        /// Choose where cuts of a rectangle start anew for each of N parts of the images, on the other parts
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..))]
+        folds: Option<u8>,
         /// Measure also our masks cut at each image's own size, which coarse to fine comes close to
         #[arg(long)]
         whole: bool,
@@ -72,6 +79,24 @@ pub(crate) enum Verb {
         #[arg(long)]
         json: bool,
     },
+}
+
+/// The names of rectangles that are made from the ground truth.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum BoxName {
+    Tight,
+    Loose,
+    Cut,
+}
+
+impl From<BoxName> for BoxKind {
+    fn from(name: BoxName) -> Self {
+        match name {
+            BoxName::Tight => Self::Tight,
+            BoxName::Loose => Self::Loose,
+            BoxName::Cut => Self::Cut,
+        }
+    }
 }
 
 /// The names of the engines.

@@ -4,28 +4,60 @@ use std::path::Path;
 
 use relit_console::{Console, Outcome};
 use relit_grabcut::MaskScore;
-use relit_mask::{BenchRow, MaskEngine, MaskingError, Prompt, bench_image, bench_images};
+use relit_mask::{
+    BenchOptions, BenchRow, BoxKind, FoldFigures, FoldReport, MaskEngine, MaskingError, Prompt,
+    bench_image, bench_images, cross_validate, start_rules,
+};
 use serde_json::{Value, json};
 
 /// An image counts as worse if its IoU is lower by more than this.
 const WORSE_BY: f64 = 0.02;
 
-/// Measures every image, and prints a line for each and one for the average.
-pub(crate) fn run(console: Console, folder: &Path, whole: bool) -> Result<Outcome, MaskingError> {
+/// Measures every image, and prints a line for each and one for the average; with `folds` also what cross-validation
+/// says of the starts.
+pub(crate) fn run(
+    console: Console,
+    folder: &Path,
+    boxes: Vec<BoxKind>,
+    folds: Option<u8>,
+    whole: bool,
+) -> Result<Outcome, MaskingError> {
     let images = bench_images(folder)?;
+    let options = BenchOptions {
+        boxes,
+        whole,
+        rules: folds.map(|_| start_rules()).unwrap_or_default(),
+    };
     let bar = console.progress(images.len() as u64, "images");
     bar.suspend(|| print_head(console));
     let mut rows = Vec::new();
     for image in &images {
-        for row in bench_image(image, whole)? {
+        for row in bench_image(image, &options)? {
             bar.suspend(|| print_row(console, &row));
             rows.push(row);
         }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    for prompt in [Prompt::Box, Prompt::Scribble] {
+    let mut prompts: Vec<Prompt> = Vec::new();
+    for row in &rows {
+        if !prompts.contains(&row.prompt) {
+            prompts.push(row.prompt);
+        }
+    }
+    for prompt in prompts {
         print_average(console, prompt, &rows);
+    }
+    if let Some(folds) = folds {
+        match cross_validate(&rows, &options.rules, folds.into()) {
+            Some(report) => print_folds(console, &report),
+            None => {
+                return Err(MaskingError::Bench {
+                    path: folder.to_owned(),
+                    why: "folds need rectangles on at least two images".to_owned(),
+                });
+            }
+        }
     }
     Ok(match rows.is_empty() {
         true => Outcome::Wrong,
@@ -102,6 +134,58 @@ fn print_average(console: Console, prompt: Prompt, rows: &[BenchRow]) {
         "whole": whole.as_ref().map(figures),
         "error_ratio": ratio,
         "worse": worse,
+    });
+    console.say(&text, &event);
+}
+
+fn print_folds(console: Console, report: &FoldReport) {
+    let rules: Vec<String> = report
+        .chosen
+        .iter()
+        .map(|rule| format!("{:?} margin {}", rule.shares, rule.margin))
+        .collect();
+    let text = format!(
+        "\n100 - IoU, points, where each part's rule of starts was chosen on the other parts\nchosen: {}\n{:<10}{:>7}{:>18}{:>10}{:>10}{:>10}",
+        rules.join("; "),
+        "hint",
+        "images",
+        "out of fold",
+        "plain",
+        "shipped",
+        "OpenCV"
+    );
+    console.say(&text, &json!({ "event": "folds", "chosen": rules }));
+    for figures in &report.figures {
+        print_fold(console, figures);
+    }
+}
+
+fn print_fold(console: Console, figures: &FoldFigures) {
+    let (mean, standard_error) = figures.out_of_fold;
+    let opencv = figures
+        .opencv
+        .map_or("-".to_owned(), |error| format!("{error:.2}"));
+    let mut text = format!(
+        "{:<10}{:>7}{mean:>10.2} +- {standard_error:>4.2}{:>10.2}{:>10.2}{opencv:>10}",
+        figures.prompt.name(),
+        figures.images,
+        figures.plain,
+        figures.shipped,
+    );
+    if !figures.worse.is_empty() {
+        let worse = figures.worse.join(", ");
+        text += &format!("  worse than OpenCV's by more than 2 points: {worse}");
+    }
+    let event = json!({
+        "event": "fold",
+        "hint": figures.prompt.name(),
+        "images": figures.images,
+        "out_of_fold": mean,
+        "standard_error": standard_error,
+        "plain": figures.plain,
+        "shipped": figures.shipped,
+        "opencv": figures.opencv,
+        "worse": figures.worse,
     });
     console.say(&text, &event);
 }

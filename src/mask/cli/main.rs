@@ -10,6 +10,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser};
 use relit_console::Console;
+use relit_mask::BoxKind;
 
 use arguments::{CommandLine, Verb};
 
@@ -34,13 +35,16 @@ fn main() -> ExitCode {
         (
             Some(Verb::Bench {
                 folder,
+                boxes,
+                folds,
                 whole,
                 json,
             }),
             _,
         ) => {
             let console = Console::new(json);
-            console.finish(benching::run(console, &folder, whole))
+            let boxes = boxes.into_iter().map(BoxKind::from).collect();
+            console.finish(benching::run(console, &folder, boxes, folds, whole))
         }
         (None, Some(arguments)) => making::run(&arguments),
         (None, None) => {

@@ -21,6 +21,7 @@ struct Line {
     /// Of `relit-extract`.
     session: Option<ExtractedSession>,
     lossy: bool,
+    misfit: bool,
     url: Option<String>,
     address: Option<String>,
 }
@@ -55,6 +56,13 @@ pub(super) struct EditorPlace {
     pub(super) url: String,
 }
 
+/// A session that was not extracted again.
+#[derive(Debug, Clone, Copy)]
+struct Skipped {
+    is_lossy: bool,
+    has_misfit: bool,
+}
+
 /// All that was heard of a program.
 #[derive(Debug, Default)]
 pub(super) struct Heard {
@@ -63,7 +71,7 @@ pub(super) struct Heard {
     warnings: Vec<String>,
     check: Option<CheckReport>,
     extracted: Option<ExtractedSession>,
-    is_skipped: Option<bool>,
+    skipped: Option<Skipped>,
     left_out: Option<String>,
     problems: Vec<String>,
     problem_count: u64,
@@ -85,7 +93,12 @@ impl Heard {
             "mask" => self.has_mask = true,
             "check" => self.check = line.report,
             "extracted" => self.extracted = line.session,
-            "skipped" => self.is_skipped = Some(line.lossy),
+            "skipped" => {
+                self.skipped = Some(Skipped {
+                    is_lossy: line.lossy,
+                    has_misfit: line.misfit,
+                });
+            }
             "left_out" => self.left_out = line.message,
             "problem" => {
                 self.problem_count += 1;
@@ -166,14 +179,16 @@ impl Heard {
     }
 
     fn extracted(&mut self, code: i32) -> Option<StepEnd> {
-        if let Some(is_lossy) = self.is_skipped {
-            return Some(match is_lossy {
-                false => good("it is in the data set already"),
-                true => doubtful(
-                    "it is in the data set already; something of it is lost: see its report",
-                    true,
-                ),
-            });
+        if let Some(skipped) = self.skipped {
+            let fault = match skipped {
+                Skipped {
+                    has_misfit: true, ..
+                } => "its mask does not fit",
+                Skipped { is_lossy: true, .. } => "something of it is lost",
+                _ => return Some(good("it is in the data set already")),
+            };
+            let what = format!("it is in the data set already; {fault}: see its report");
+            return Some(doubtful(&what, true));
         }
         let session = self.extracted.take()?;
         let quality = session.quality.unwrap_or_default();
@@ -309,6 +324,14 @@ mod tests {
                 r#"{"event":"skipped","id":"x","lossy":false}"#,
                 Good,
                 "already",
+                true,
+            ),
+            (
+                Extract,
+                3,
+                r#"{"event":"skipped","id":"x","lossy":false,"misfit":true}"#,
+                Doubtful,
+                "its mask does not fit",
                 true,
             ),
             (
