@@ -1,22 +1,30 @@
 //! Which rule of starts generalises: each fold's rule is chosen on the images of the other folds.
 
-use relit_grabcut::StartRule;
+use relit_grabcut::{Start, StartRule};
 
 use super::{BenchRow, Prompt};
 
-/// The rules among which is chosen: GrabCut's own start, each share alone, and the lower energy of several.
+/// GrabCut's own start.
+const PLAIN: &[Start] = &[Start::coarse(0.0)];
+/// It at a larger size.
+const FINE: &[Start] = &[Start {
+    share: 0.0,
+    fine: true,
+}];
+
+/// The rules among which is chosen: each start alone, and the lowest energy of several.
 #[must_use]
 pub fn start_rules() -> Vec<StartRule> {
-    const ALONE: [&[f64]; 3] = [&[0.0], &[0.25], &[0.5]];
-    const SEVERAL: [&[f64]; 3] = [&[0.0, 0.25], &[0.0, 0.5], &[0.0, 0.25, 0.5]];
+    const ALONE: [&[Start]; 3] = [PLAIN, &[Start::coarse(0.5)], FINE];
+    const SEVERAL: [&[Start]; 2] = [&Start::COARSE, &Start::BOTH_SIZES];
     const MARGINS: [f64; 6] = [0.0, 0.05, 0.1, 0.2, 0.3, 0.5];
-    let alone = ALONE.map(|shares| StartRule {
-        shares,
+    let alone = ALONE.map(|starts| StartRule {
+        starts,
         margin: 0.0,
     });
     let several = SEVERAL
         .iter()
-        .flat_map(|&shares| MARGINS.map(|margin| StartRule { shares, margin }));
+        .flat_map(|&starts| MARGINS.map(|margin| StartRule { starts, margin }));
     alone.into_iter().chain(several).collect()
 }
 
@@ -105,7 +113,7 @@ pub fn cross_validate(rows: &[BenchRow], rules: &[StartRule], folds: usize) -> O
 
 /// The place of GrabCut's own start among the rules.
 fn plain(rules: &[StartRule]) -> Option<usize> {
-    rules.iter().position(|rule| rule.shares == [0.0])
+    rules.iter().position(|rule| rule.starts == PLAIN)
 }
 
 fn figures(prompt: Prompt, rows: &[(&BenchRow, f64)], plain: Option<usize>) -> FoldFigures {
@@ -188,11 +196,11 @@ mod tests {
     fn a_rule_is_judged_on_images_that_did_not_choose_it() {
         let rules = [
             StartRule {
-                shares: &[0.0],
+                starts: PLAIN,
                 margin: 0.0,
             },
             StartRule {
-                shares: &[0.5],
+                starts: FINE,
                 margin: 0.0,
             },
         ];
@@ -204,8 +212,7 @@ mod tests {
             row("d", [0.6, 0.9], 0.95),
         ];
         let report = cross_validate(&rows, &rules, 4).unwrap();
-        let shares: Vec<f64> = report.chosen.iter().map(|rule| rule.shares[0]).collect();
-        assert_eq!(shares[0], 0.5);
+        assert_eq!(report.chosen[0].starts, FINE);
         let figures = &report.figures[0];
         assert_eq!((figures.images, figures.prompt.name()), (4, "tight"));
         assert!((figures.plain - 30.0).abs() < 1e-9);

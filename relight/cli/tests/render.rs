@@ -151,10 +151,7 @@ fn a_file_that_is_missing_or_wrong_is_named_in_one_line_and_the_code_is_1() {
             "--normals up.png --panorama up.png -o a.png",
             "up.png holds 8- or 16-bit integers",
         ),
-        (
-            "--normals up.png --light light.txt -o taken/a.png",
-            "taken",
-        ),
+        ("--normals up.png --light light.txt -o taken/a.png", "taken"),
         (
             "--normals up.png --light light.txt --turn 2 -o taken",
             "taken cannot be made",

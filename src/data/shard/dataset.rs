@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::digest::Digest;
 use super::file::FileEntry;
-use super::quality::SessionQuality;
+use super::quality::{MaskMisfit, SessionQuality};
 use super::settings::ExtractionSettings;
 use super::{ShardError, names, output};
 use crate::geometry::Rect;
@@ -125,11 +125,12 @@ pub struct SessionEntry {
 }
 
 impl SessionEntry {
-    /// Whether its mask does not fit the recording, as far as that is known.
+    /// Whether its mask is that of another object or recording, as far as that is known. A mask that does not fit in
+    /// part may be a false alarm of the look at a few frames: it only lowers the verdict.
     #[must_use]
     pub fn has_misfit(&self) -> bool {
-        let quality = self.quality.as_ref();
-        quality.is_some_and(|quality| quality.mask_misfit.is_some())
+        let misfit = self.quality.as_ref().and_then(|quality| quality.mask_misfit);
+        misfit == Some(MaskMisfit::AsAWhole)
     }
 }
 

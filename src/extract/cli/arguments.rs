@@ -28,7 +28,7 @@ Examples:
       the fourth of ten parts; afterwards: relit-extract merge dataset
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost, \
-or a mask does not fit.";
+or a mask is not that of its object.";
 
 /// The parsed command line.
 pub(crate) struct Arguments {

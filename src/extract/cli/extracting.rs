@@ -48,7 +48,7 @@ pub(crate) fn run(
             tally.lossy,
             match tally.misfits {
                 0 => String::new(),
-                misfits => format!(", {misfits} with a mask that does not fit"),
+                misfits => format!(", {misfits} with the mask of something else"),
             },
             tally.skipped,
             tally.left_out,
@@ -89,7 +89,7 @@ impl Reporter<'_> {
 
     fn skipped(&self, entry: &SessionEntry) {
         let flaw = match (entry.lossy, entry.has_misfit()) {
-            (_, true) => "; its mask does not fit, see its report",
+            (_, true) => "; its mask is not that of the object, see its report",
             (true, false) => "; something of it is lost, see its report",
             (false, false) => "",
         };

@@ -183,7 +183,7 @@ impl Heard {
             let fault = match skipped {
                 Skipped {
                     has_misfit: true, ..
-                } => "its mask does not fit",
+                } => "its mask is not that of the object",
                 Skipped { is_lossy: true, .. } => "something of it is lost",
                 _ => return Some(good("it is in the data set already")),
             };
@@ -331,7 +331,7 @@ mod tests {
                 3,
                 r#"{"event":"skipped","id":"x","lossy":false,"misfit":true}"#,
                 Doubtful,
-                "its mask does not fit",
+                "its mask is not that of the object",
                 true,
             ),
             (
