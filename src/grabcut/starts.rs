@@ -180,6 +180,7 @@ mod tests {
 
     #[test]
     fn a_rule_chooses_the_cut_of_the_least_energy_and_needs_no_other() {
+        const OTHER: &[Start] = &[Start::coarse(0.4)];
         let rect = Rect::new(16, 10, 58, 52);
         let starts = &Start::BOTH_SIZES;
         let settings = SegmentSettings::default();
@@ -195,6 +196,6 @@ mod tests {
         ];
         assert!(alone.contains(&area(starts, 0.0)), "{alone:?}");
         assert_eq!(area(starts, f64::INFINITY), alone[0]);
-        assert_eq!(area(&[Start::coarse(0.4)], 0.0), None);
+        assert_eq!(area(OTHER, 0.0), None);
     }
 }

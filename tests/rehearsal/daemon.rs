@@ -264,14 +264,12 @@ fn after_an_emergency_stop_one_command_brings_the_table_back() {
         state.table
     );
     // Nothing moves before a person has looked at the table.
-    let faults = once(&daemon, |state| state.phase == Phase::Idle)
-        .faults
-        .len();
-    daemon.command(start()).unwrap();
-    let state = once(&daemon, |state| state.faults.len() > faults);
-    let fault = &state.faults.back().unwrap().what;
-    assert!(fault.contains("reset and home"), "{fault}");
     once(&daemon, |state| state.phase == Phase::Idle);
+    let refused = daemon.command(start()).unwrap_err();
+    assert!(
+        matches!(&refused, Refused::Unavailable(why) if why.contains("reset and home")),
+        "{refused}"
+    );
     daemon.command(Command::Reset).unwrap();
     once(&daemon, |state| {
         state.table.homed && state.table.state == "Idle"

@@ -129,7 +129,10 @@ impl SessionEntry {
     /// part may be a false alarm of the look at a few frames: it only lowers the verdict.
     #[must_use]
     pub fn has_misfit(&self) -> bool {
-        let misfit = self.quality.as_ref().and_then(|quality| quality.mask_misfit);
+        let misfit = self
+            .quality
+            .as_ref()
+            .and_then(|quality| quality.mask_misfit);
         misfit == Some(MaskMisfit::AsAWhole)
     }
 }
