@@ -34,9 +34,8 @@
 //!
 //! # How it decides
 //!
-//! With a rectangle, pixels outside are background; seeds overrule that. Three cuts are
-//! made: in one the half of the pixels inside that looks most like the outside starts as background too, and one begins
-//! at a larger size. The one with the lowest energy counts. With seeds alone, the colours of the marked
+//! With a rectangle, pixels outside are background; seeds overrule that. Two cuts are made: in one the half of the
+//! pixels inside that looks most like the outside starts as background too. The one with the lower energy counts. With seeds alone, the colours of the marked
 //! pixels decide first; if no background is marked, unmarked pixels start as probable background. Colour
 //! models of both sides and minimum cuts then take turns at a small size, and at each larger size a band
 //! along the edge is decided again.
@@ -97,7 +96,7 @@ pub use segment::{
 pub use settings::{
     Effort, Feather, Iterations, MAX_PIXELS, MIN_SIDE, SegmentSettings, SettingsFault,
 };
-pub use starts::{Start, StartCuts, StartRule};
+pub use starts::{StartCuts, StartRule};
 pub use strokes::{Brush, Stroke, Strokes};
 pub use turn::{MIN_TURN_FRAMES, TURN_FRAMES, TurnFrames, TurnStatistics};
 pub use warning::{Side, Warning};

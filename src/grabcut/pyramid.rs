@@ -27,21 +27,19 @@ pub(super) enum FirstModels {
     All,
 }
 
-/// Cuts the object out of `image`, first at a size of at most `coarsest_px` pixels. `labels` holds what is known, row by
-/// row, and the result.
+/// Cuts the object out of `image`. `labels` holds what is known, row by row, and the result.
 pub(super) fn segment(
     image: &RgbImage,
     labels: &mut Vec<Label>,
     first: FirstModels,
     iterations: Iterations,
     effort: Effort,
-    coarsest_px: usize,
 ) -> Result<(), MaskError> {
     let table = LabTable::new();
     let mut levels: Vec<(RgbImage, Vec<Label>)> = Vec::new();
     loop {
         let (image, known) = levels.last().map_or((image, &*labels), |(i, l)| (i, l));
-        if pixels(image) <= coarsest_px {
+        if pixels(image) <= effort.coarsest_px() {
             break;
         }
         let half = (half_image(image), half_labels(known, size(image)));

@@ -8,7 +8,7 @@ use super::closed::enclosed;
 use super::initial::InitialLabels;
 use super::pyramid::FirstModels;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
-use super::starts::{Start, StartCuts, StartRule};
+use super::starts::{StartCuts, StartRule};
 use super::turn::{self, TurnStatistics};
 use super::warning::OPENING;
 use super::{Effort, Hints, MaskError, SegmentSettings, Warning, cleanup, pyramid, warning};
@@ -234,13 +234,14 @@ fn by_hints(
     let initial = InitialLabels::new(hints, frame.dimensions())?;
     if initial.rect.is_none() {
         let first = initial.first;
-        return cut_from(frame, hints, &initial, first, settings, effort, false);
+        return cut_from(frame, hints, &initial, first, settings, effort);
     }
     let rule = StartRule::default();
-    cuts_by_hints(frame, hints, &initial, settings, effort, rule.starts)?.into_mask(rule)
+    cuts_by_hints(frame, hints, &initial, settings, effort, rule.shares)?.into_mask(rule)
 }
 
-/// A rectangle's cuts from several starts; what [`segment`] chooses from. Seeds alone have one start, GrabCut's own.
+/// A rectangle's cuts from several starts, each named by the share of the rectangle that is background at first, 0 to
+/// 1; what [`segment`] chooses from. Seeds alone have one start, that of share 0.
 ///
 /// # Errors
 /// As [`segment`].
@@ -248,11 +249,11 @@ pub fn start_cuts(
     frame: &RgbImage,
     hints: &Hints,
     settings: &SegmentSettings,
-    starts: &[Start],
+    shares: &[f64],
 ) -> Result<StartCuts, MaskError> {
     check_size(frame.dimensions())?;
     let initial = InitialLabels::new(hints, frame.dimensions())?;
-    cuts_by_hints(frame, hints, &initial, settings, Effort::Fine, starts)
+    cuts_by_hints(frame, hints, &initial, settings, Effort::Fine, shares)
 }
 
 fn cuts_by_hints(
@@ -261,23 +262,22 @@ fn cuts_by_hints(
     initial: &InitialLabels,
     settings: &SegmentSettings,
     effort: Effort,
-    starts: &[Start],
+    shares: &[f64],
 ) -> Result<StartCuts, MaskError> {
     let whole = Rect::new(0, 0, frame.width(), frame.height());
     let rect = initial.rect.unwrap_or(whole);
-    let seeds_only = [Start::coarse(0.0)];
-    let starts = if initial.rect.is_some() {
-        starts
+    let shares = if initial.rect.is_some() {
+        shares
     } else {
-        &seeds_only
+        &[0.0]
     };
-    StartCuts::make(frame, rect, starts, |start| {
+    StartCuts::make(frame, rect, shares, |share| {
         let first = match initial.rect {
             None => initial.first,
-            Some(_) if start.share > 0.0 => FirstModels::Ranked(start.share),
+            Some(_) if share > 0.0 => FirstModels::Ranked(share),
             Some(_) => FirstModels::All,
         };
-        cut_from(frame, hints, initial, first, settings, effort, start.fine)
+        cut_from(frame, hints, initial, first, settings, effort)
     })
 }
 
@@ -288,22 +288,13 @@ fn cut_from(
     first: FirstModels,
     settings: &SegmentSettings,
     effort: Effort,
-    fine: bool,
 ) -> Result<Mask, MaskError> {
     let mut labels = initial.labels.clone();
     // Marks of the background alone cut nothing out of a frame; a turn may do without those of the object.
     if !labels.iter().any(|label| label.is_object()) {
         return Err(MaskError::NothingMarked);
     }
-    let coarsest = effort.coarsest_px(fine);
-    pyramid::segment(
-        frame,
-        &mut labels,
-        first,
-        settings.iterations,
-        effort,
-        coarsest,
-    )?;
+    pyramid::segment(frame, &mut labels, first, settings.iterations, effort)?;
     let size = frame.dimensions();
     let raw = Bitmap::new(size, labels.iter().map(|label| label.is_object()));
     finish(

@@ -113,12 +113,11 @@ pub enum Effort {
 }
 
 impl Effort {
-    /// The frame is halved until it has at most so many pixels; a `fine` start halves once less often.
-    pub(super) fn coarsest_px(self, fine: bool) -> usize {
-        match (self, fine) {
-            (Self::Draft | Self::Fine, false) => 200_000,
-            (Self::Draft | Self::Fine, true) => 800_000,
-            (Self::Whole, _) => usize::MAX,
+    /// The frame is halved until it has at most so many pixels.
+    pub(super) fn coarsest_px(self) -> usize {
+        match self {
+            Self::Draft | Self::Fine => 200_000,
+            Self::Whole => usize::MAX,
         }
     }
 

@@ -3,7 +3,7 @@
 //!
 //! A share is right for a rectangle with much background in it, and cuts a part off an object that fills its rectangle
 //! and is in places like what is around it. So a rectangle is cut from several starts, and the cut of the lowest energy
-//! counts. The first cut is made at a small size, and once more at a larger one. Where the cut of the plain start reaches all four sides of its rectangle, as the object of a tight one does,
+//! counts. Where the cut of the plain start reaches all four sides of its rectangle, as the object of a tight one does,
 //! it counts as good, and another has to be better by a margin.
 
 use image::RgbImage;
@@ -15,54 +15,21 @@ use super::{Mask, MaskError};
 /// A cut reaches a side of the rectangle if it comes within this share of the way to the other.
 const REACHES: f64 = 0.04;
 
-/// Where a cut of a rectangle starts.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Start {
-    /// The share of the rectangle that is background at first, 0 to 1; 0 is GrabCut's own.
-    pub share: f64,
-    /// Whether the first cut is made at up to twice the usual size, where thin and low-contrast parts count for more.
-    pub fine: bool,
-}
-
 /// From which starts a rectangle is cut, and which of the cuts counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StartRule {
-    /// The starts, at least one.
-    pub starts: &'static [Start],
-    /// By how much a cut has to be better than GrabCut's own where that reaches all sides of the rectangle, in units of
-    /// the log-likelihood of a pixel.
+    /// The share of the rectangle that is background at first, 0 to 1, of each start; 0 is GrabCut's own. At least one.
+    pub shares: &'static [f64],
+    /// By how much a cut has to be better than that of the plain start where that reaches all sides of the rectangle,
+    /// in units of the log-likelihood of a pixel.
     pub margin: f64,
-}
-
-impl Start {
-    /// GrabCut's own, and the one that takes a half for background.
-    pub const COARSE: [Self; 2] = [Self::coarse(0.0), Self::coarse(0.5)];
-    /// These, and GrabCut's own at a larger size.
-    pub const BOTH_SIZES: [Self; 3] = [
-        Self::coarse(0.0),
-        Self::coarse(0.5),
-        Self {
-            share: 0.0,
-            fine: true,
-        },
-    ];
-
-    /// A start at the usual size.
-    #[must_use]
-    pub const fn coarse(share: f64) -> Self {
-        Self { share, fine: false }
-    }
-
-    fn is_plain(self) -> bool {
-        self == Self::coarse(0.0)
-    }
 }
 
 impl Default for StartRule {
     fn default() -> Self {
         Self {
-            starts: &Start::BOTH_SIZES,
-            margin: 0.1,
+            shares: &[0.0, 0.5],
+            margin: 0.2,
         }
     }
 }
@@ -75,32 +42,32 @@ pub struct StartCuts {
 
 #[derive(Debug)]
 struct StartCut {
-    start: Start,
+    share: f64,
     energy: f64,
     reaches_all_sides: bool,
     mask: Mask,
 }
 
 impl StartCuts {
-    /// The cuts of `starts`, each made by `cut`, as far as there are any.
+    /// The cuts of `shares`, each made by `cut`, as far as there are any.
     ///
     /// # Errors
     /// That of the last start if none gives a cut.
     pub(super) fn make(
         frame: &RgbImage,
         rect: Rect,
-        starts: &[Start],
-        cut: impl Fn(Start) -> Result<Mask, MaskError>,
+        shares: &[f64],
+        cut: impl Fn(f64) -> Result<Mask, MaskError>,
     ) -> Result<Self, MaskError> {
         let energy = CutEnergy::new(frame, rect);
         let mut cuts = Vec::new();
         let mut fault = MaskError::Empty;
-        for &start in starts {
-            match cut(start) {
+        for &share in shares {
+            match cut(share) {
                 Ok(mask) => {
                     let found = mask.bitmap();
                     cuts.push(StartCut {
-                        start,
+                        share,
                         energy: energy.of(&found),
                         reaches_all_sides: fills(found.bounds(), rect),
                         mask,
@@ -115,17 +82,17 @@ impl StartCuts {
         }
     }
 
-    /// The mask that a rule chooses among the cuts of its starts; `None` if there is none of them.
+    /// The mask that a rule chooses among the cuts of its shares; `None` if there is none of them.
     #[must_use]
     pub fn by(&self, rule: StartRule) -> Option<&Mask> {
         let of_rule = self
             .cuts
             .iter()
-            .filter(|cut| rule.starts.contains(&cut.start));
+            .filter(|cut| rule.shares.contains(&cut.share));
         let best = of_rule
             .clone()
             .min_by(|a, b| a.energy.total_cmp(&b.energy))?;
-        let plain = of_rule.clone().find(|cut| cut.start.is_plain());
+        let plain = of_rule.clone().find(|cut| cut.share <= 0.0);
         let margin = |cut: &StartCut| {
             if cut.reaches_all_sides {
                 rule.margin
@@ -180,22 +147,17 @@ mod tests {
 
     #[test]
     fn a_rule_chooses_the_cut_of_the_least_energy_and_needs_no_other() {
-        const OTHER: &[Start] = &[Start::coarse(0.4)];
         let rect = Rect::new(16, 10, 58, 52);
-        let starts = &Start::BOTH_SIZES;
+        let shares = &[0.0, 0.25, 0.5];
         let settings = SegmentSettings::default();
-        let cuts = start_cuts(&two_toned(), &Hints::Rect(rect), &settings, starts).unwrap();
-        let area = |starts, margin| {
-            let rule = StartRule { starts, margin };
+        let cuts = start_cuts(&two_toned(), &Hints::Rect(rect), &settings, shares).unwrap();
+        let area = |shares, margin| {
+            let rule = StartRule { shares, margin };
             cuts.by(rule).map(|mask| mask.statistics().area_px)
         };
-        let alone = [
-            area(&starts[..1], 0.0),
-            area(&starts[1..2], 0.0),
-            area(&starts[2..], 0.0),
-        ];
-        assert!(alone.contains(&area(starts, 0.0)), "{alone:?}");
-        assert_eq!(area(starts, f64::INFINITY), alone[0]);
-        assert_eq!(area(OTHER, 0.0), None);
+        let alone = [area(&[0.0], 0.0), area(&[0.25], 0.0), area(&[0.5], 0.0)];
+        assert!(alone.contains(&area(shares, 0.0)), "{alone:?}");
+        assert_eq!(area(shares, f64::INFINITY), alone[0]);
+        assert_eq!(area(&[0.4], 0.0), None);
     }
 }

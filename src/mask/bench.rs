@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use image::{GrayImage, Luma, RgbImage};
 use relit_data::geometry::Rect;
 use relit_grabcut::{
-    Effort, Hints, Iterations, MaskError, MaskScore, Seeds, SegmentSettings, Start, StartRule,
-    score, segment_with, start_cuts,
+    Effort, Hints, Iterations, MaskError, MaskScore, Seeds, SegmentSettings, StartRule, score,
+    segment_with, start_cuts,
 };
 
 use super::{MaskEngine, MaskingError, opencv_grab_cut};
@@ -176,14 +176,14 @@ fn by_rules(
     hints: &Hints,
     rules: &[StartRule],
 ) -> Result<Vec<GrayImage>, MaskingError> {
-    let mut starts: Vec<Start> = Vec::new();
-    for start in rules.iter().flat_map(|rule| rule.starts) {
-        if !starts.contains(start) {
-            starts.push(*start);
+    let mut shares: Vec<f64> = Vec::new();
+    for share in rules.iter().flat_map(|rule| rule.shares) {
+        if !shares.contains(share) {
+            shares.push(*share);
         }
     }
     let nothing = || GrayImage::new(image.width(), image.height());
-    match start_cuts(image, hints, &SegmentSettings::default(), &starts) {
+    match start_cuts(image, hints, &SegmentSettings::default(), &shares) {
         Ok(cuts) => Ok(rules
             .iter()
             .map(|&rule| {

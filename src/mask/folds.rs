@@ -1,30 +1,22 @@
 //! Which rule of starts generalises: each fold's rule is chosen on the images of the other folds.
 
-use relit_grabcut::{Start, StartRule};
+use relit_grabcut::StartRule;
 
 use super::{BenchRow, Prompt};
 
-/// GrabCut's own start.
-const PLAIN: &[Start] = &[Start::coarse(0.0)];
-/// It at a larger size.
-const FINE: &[Start] = &[Start {
-    share: 0.0,
-    fine: true,
-}];
-
-/// The rules among which is chosen: each start alone, and the lowest energy of several.
+/// The rules among which is chosen: GrabCut's own start, each share alone, and the lower energy of several.
 #[must_use]
 pub fn start_rules() -> Vec<StartRule> {
-    const ALONE: [&[Start]; 3] = [PLAIN, &[Start::coarse(0.5)], FINE];
-    const SEVERAL: [&[Start]; 2] = [&Start::COARSE, &Start::BOTH_SIZES];
+    const ALONE: [&[f64]; 3] = [&[0.0], &[0.25], &[0.5]];
+    const SEVERAL: [&[f64]; 3] = [&[0.0, 0.25], &[0.0, 0.5], &[0.0, 0.25, 0.5]];
     const MARGINS: [f64; 6] = [0.0, 0.05, 0.1, 0.2, 0.3, 0.5];
-    let alone = ALONE.map(|starts| StartRule {
-        starts,
+    let alone = ALONE.map(|shares| StartRule {
+        shares,
         margin: 0.0,
     });
     let several = SEVERAL
         .iter()
-        .flat_map(|&starts| MARGINS.map(|margin| StartRule { starts, margin }));
+        .flat_map(|&shares| MARGINS.map(|margin| StartRule { shares, margin }));
     alone.into_iter().chain(several).collect()
 }
 
@@ -113,7 +105,7 @@ pub fn cross_validate(rows: &[BenchRow], rules: &[StartRule], folds: usize) -> O
 
 /// The place of GrabCut's own start among the rules.
 fn plain(rules: &[StartRule]) -> Option<usize> {
-    rules.iter().position(|rule| rule.starts == PLAIN)
+    rules.iter().position(|rule| rule.shares == [0.0])
 }
 
 fn figures(prompt: Prompt, rows: &[(&BenchRow, f64)], plain: Option<usize>) -> FoldFigures {
@@ -196,11 +188,11 @@ mod tests {
     fn a_rule_is_judged_on_images_that_did_not_choose_it() {
         let rules = [
             StartRule {
-                starts: PLAIN,
+                shares: &[0.0],
                 margin: 0.0,
             },
             StartRule {
-                starts: FINE,
+                shares: &[0.5],
                 margin: 0.0,
             },
         ];
@@ -212,7 +204,8 @@ mod tests {
             row("d", [0.6, 0.9], 0.95),
         ];
         let report = cross_validate(&rows, &rules, 4).unwrap();
-        assert_eq!(report.chosen[0].starts, FINE);
+        let shares: Vec<f64> = report.chosen.iter().map(|rule| rule.shares[0]).collect();
+        assert_eq!(shares[0], 0.5);
         let figures = &report.figures[0];
         assert_eq!((figures.images, figures.prompt.name()), (4, "tight"));
         assert!((figures.plain - 30.0).abs() < 1e-9);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use relit_console::{Console, Outcome};
-use relit_grabcut::{MaskScore, Start};
+use relit_grabcut::MaskScore;
 use relit_mask::{
     BenchOptions, BenchRow, BoxKind, FoldFigures, FoldReport, MaskEngine, MaskingError, Prompt,
     bench_image, bench_images, cross_validate, start_rules,
@@ -142,14 +142,7 @@ fn print_folds(console: Console, report: &FoldReport) {
     let rules: Vec<String> = report
         .chosen
         .iter()
-        .map(|rule| {
-            let name = |start: &Start| match start.fine {
-                true => format!("{} fine", start.share),
-                false => format!("{}", start.share),
-            };
-            let starts: Vec<String> = rule.starts.iter().map(name).collect();
-            format!("starts {} margin {}", starts.join(" + "), rule.margin)
-        })
+        .map(|rule| format!("{:?} margin {}", rule.shares, rule.margin))
         .collect();
     let text = format!(
         "\n100 - IoU, points, where each part's rule of starts was chosen on the other parts\nchosen: {}\n{:<10}{:>7}{:>18}{:>10}{:>10}{:>10}",
