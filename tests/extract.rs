@@ -82,9 +82,10 @@ impl Bench {
 
 #[test]
 fn the_shard_is_the_same_bytes_for_any_number_of_threads() {
-    for (name, encoding) in [
-        ("clip.mkv", "-pix_fmt yuvj422p -c:v mjpeg"),
-        ("film.mp4", "-pix_fmt yuv420p -c:v libx264"),
+    // The pattern holds no object, and the mask of one is seen to be that of something else in one of the two.
+    for (name, encoding, code) in [
+        ("clip.mkv", "-pix_fmt yuvj422p -c:v mjpeg", 0),
+        ("film.mp4", "-pix_fmt yuv420p -c:v libx264", 3),
     ] {
         let bench = Bench::new();
         bench.video(name, encoding);
@@ -92,7 +93,7 @@ fn the_shard_is_the_same_bytes_for_any_number_of_threads() {
         for threads in [1, 2, 5] {
             let out = format!("out{threads}");
             bench.errors(
-                0,
+                code,
                 &format!(
                     "{name} --mask mask.png --frames 30 --size 40 -o {out} --threads {threads}"
                 ),

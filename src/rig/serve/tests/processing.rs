@@ -117,7 +117,9 @@ fn steps(wanted: &[(&str, &str)]) -> Vec<(String, String)> {
 /// The state of a process as the kernel calls it: `T` is stopped.
 fn state_of(folder: &Path) -> Option<String> {
     let pid = fs::read_to_string(folder.join("pid")).ok()?;
-    let stat = fs::read_to_string(format!("/proc/{}/stat", pid.trim())).ok()?;
+    // The program makes the file before it writes its number there, and `/proc//stat` is another file.
+    let number: u32 = pid.trim().parse().ok()?;
+    let stat = fs::read_to_string(format!("/proc/{number}/stat")).ok()?;
     stat.rsplit(") ").next()?.chars().next().map(String::from)
 }
 
