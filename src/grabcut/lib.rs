@@ -62,6 +62,7 @@ mod grab_cut;
 mod hints;
 mod initial;
 mod lab;
+mod mask;
 mod max_flow;
 mod mixture;
 mod outline;
@@ -87,12 +88,11 @@ pub use drawing::Drawing;
 pub use encode::{grey_png, rgb_png};
 pub use error::{MaskError, SeedsFault, StrokesFault};
 pub use hints::{Hints, Mark, Seeds};
+pub use mask::{Mask, MaskStatistics};
 pub use outline::outline;
 pub use preview::preview;
 pub use score::{BOUNDARY_TOLERANCE_PX, MaskScore, ScoreFault, score};
-pub use segment::{
-    Mask, MaskStatistics, check_hints, clean_cut, segment, segment_turn, segment_with, start_cuts,
-};
+pub use segment::{check_hints, clean_cut, segment, segment_turn, segment_with, start_cuts};
 pub use settings::{
     Effort, Feather, Iterations, MAX_PIXELS, MIN_SIDE, SegmentSettings, SettingsFault,
 };

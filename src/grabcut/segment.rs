@@ -6,6 +6,7 @@ use relit_data::geometry::Rect;
 use super::bitmap::Bitmap;
 use super::closed::enclosed;
 use super::initial::InitialLabels;
+use super::mask::{Mask, MaskStatistics};
 use super::pyramid::FirstModels;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
 use super::starts::{StartCuts, StartRule};
@@ -19,61 +20,6 @@ const FILLED_OF_FRAME: f64 = 0.01;
 const LEAST_OF_HINTS: f32 = 0.85;
 /// Over a turn highlights move: only specks are filled.
 const FILLED_OF_TURN: f64 = 0.001;
-
-/// An object's mask on one frame.
-#[derive(Debug, Clone)]
-pub struct Mask {
-    image: GrayImage,
-    statistics: MaskStatistics,
-    warnings: Vec<Warning>,
-}
-
-/// Numbers about a mask.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MaskStatistics {
-    /// Pixels of the object (at or above 128), at least 1.
-    pub area_px: u64,
-    /// The smallest rectangle around them.
-    pub bounding_box: Rect,
-    /// Connected components before the clean-up, at least 1.
-    pub components: usize,
-    /// Connected components that were kept.
-    pub components_kept: usize,
-    /// Pixels of the holes that were filled.
-    pub holes_filled_px: u64,
-}
-
-impl Mask {
-    fn with_warning(mut self, warning: Option<Warning>) -> Self {
-        self.warnings.extend(warning);
-        self
-    }
-
-    /// The pixels of the object.
-    pub(super) fn bitmap(&self) -> Bitmap {
-        let levels = self.image.as_raw().iter();
-        Bitmap::new(self.image.dimensions(), levels.map(|&level| level >= 128))
-    }
-
-    /// The mask, in the size of the frame: 255 object, 0 background; with a feather also values
-    /// between.
-    #[must_use]
-    pub fn image(&self) -> &GrayImage {
-        &self.image
-    }
-
-    /// Area, bounding box and components.
-    #[must_use]
-    pub fn statistics(&self) -> MaskStatistics {
-        self.statistics
-    }
-
-    /// What its user should check.
-    #[must_use]
-    pub fn warnings(&self) -> &[Warning] {
-        &self.warnings
-    }
-}
 
 /// Finds the object in `frame`. The same input gives the same mask.
 ///

@@ -9,8 +9,9 @@
 use image::RgbImage;
 use relit_data::geometry::Rect;
 
+use super::MaskError;
 use super::cut_energy::CutEnergy;
-use super::{Mask, MaskError};
+use super::mask::Mask;
 
 /// A cut reaches a side of the rectangle if it comes within this share of the way to the other.
 const REACHES: f64 = 0.04;
