@@ -1,0 +1,136 @@
+// The page: starts the engine and brings its parts together.
+
+import { $, make } from "./dom.js";
+import { Backgrounds } from "./backgrounds.js";
+import { bindControls } from "./controls.js";
+import { Cutter } from "./cutter.js";
+import { Engine } from "./engine.js";
+import { opens, takeFiles } from "./fields.js";
+import { isZip } from "./files.js";
+import { Lamp } from "./lamp.js";
+import { Library } from "./library.js";
+import * as notices from "./notices.js";
+import { Objects } from "./objects.js";
+import { keepOffline } from "./offline.js";
+import { painterOn } from "./painter.js";
+import { Rendering } from "./rendering.js";
+import { Saving } from "./saving.js";
+import { emptyScene } from "./scene.js";
+import { Stage } from "./stage.js";
+import { bindTabs } from "./tabs.js";
+import { Video } from "./video.js";
+import { Work } from "./work.js";
+
+/** Longer questions are shown as going on, milliseconds. */
+const LONG = 300;
+
+notices.listen();
+bindTabs();
+begin().catch((error) => {
+  document.body.classList.add("dead");
+  notices.alert(error.message);
+  $("loading").textContent = error.message;
+});
+
+async function begin() {
+  const engine = await Engine.start((text) => ($("loading").textContent = text));
+  const library = new Library(engine);
+  const [first] = await library.bundled();
+  const work = new Work(emptyScene(first.key));
+  const rendering = new Rendering(engine, library, work, painterOn($("picture")), $("picture"));
+  const cutter = new Cutter(library);
+  const objects = new Objects(work, library, cutter, rendering);
+  new Backgrounds(work, library, rendering);
+  new Stage(work, rendering);
+  new Lamp(work, rendering);
+  new Video(work, engine, library);
+  const saving = new Saving(work, engine, library);
+  bindControls(work);
+  bindSteps(work, cutter);
+  bindBefore(rendering);
+  bindIncoming(objects, saving);
+  showState(engine, rendering);
+  rendering.refresh();
+  document.body.classList.remove("starting");
+  performance.mark("relight:usable");
+  await keepOffline();
+}
+
+/** Undo and redo: of the sketch while an object is cut out, else of the scene. */
+function bindSteps(work, cutter) {
+  const step = (by) => (by < 0 ? work.undo() : work.redo());
+  $("undo").addEventListener("click", () => step(-1));
+  $("redo").addEventListener("click", () => step(1));
+  const show = () => {
+    $("undo").disabled = !work.canUndo;
+    $("redo").disabled = !work.canRedo;
+  };
+  work.addEventListener("scene", show);
+  show();
+  document.addEventListener("keydown", (event) => {
+    const letter = event.key.toLowerCase();
+    if (!(event.ctrlKey || event.metaKey) || (letter !== "z" && letter !== "y")) return;
+    event.preventDefault();
+    const by = letter === "y" || event.shiftKey ? 1 : -1;
+    if (cutter.isOpen) cutter.step(by);
+    else step(by);
+  });
+}
+
+/** As long as it is pressed; by keys, pressed and pressed again. */
+function bindBefore(rendering) {
+  const button = $("before");
+  const show = (before) => {
+    button.setAttribute("aria-pressed", before);
+    rendering.showBefore(before);
+  };
+  button.addEventListener("pointerdown", (event) => {
+    button.setPointerCapture(event.pointerId);
+    show(true);
+  });
+  for (const end of ["pointerup", "pointercancel"]) button.addEventListener(end, () => show(false));
+  button.addEventListener("contextmenu", (event) => event.preventDefault());
+  button.addEventListener("click", (event) => {
+    if (event.detail === 0) show(button.getAttribute("aria-pressed") !== "true");
+  });
+}
+
+/** Files that come by a button, are dropped or pasted. */
+function bindIncoming(objects, saving) {
+  const take = async (file) => ((await isZip(file)) ? saving.reopen(file) : objects.add(file));
+  opens("photo-file", "choose", "welcome-choose");
+  opens("camera-file", "camera", "welcome-camera");
+  for (const field of ["photo-file", "camera-file"]) takeFiles(field, take);
+  document.addEventListener("dragover", (event) => event.preventDefault());
+  document.addEventListener("drop", (event) => {
+    event.preventDefault();
+    const [file] = event.dataTransfer.files;
+    if (file) notices.attempt(() => take(file));
+  });
+  document.addEventListener("paste", (event) => {
+    const [file] = event.clipboardData.files;
+    if (file) notices.attempt(() => take(file));
+  });
+}
+
+/** What the engine does, and what it says of the picture. */
+function showState(engine, rendering) {
+  let timer = 0;
+  engine.addEventListener("busy", ({ detail }) => {
+    clearTimeout(timer);
+    timer = setTimeout(() => document.body.classList.toggle("busy", detail > 0), detail > 0 ? LONG : 0);
+  });
+  engine.addEventListener("restart", ({ detail }) => {
+    notices.alert(detail);
+    rendering.refresh();
+  });
+  rendering.addEventListener("problem", ({ detail }) => notices.alert(detail));
+  rendering.addEventListener("state", () => (document.body.dataset.picture = rendering.rests ? "sharp" : "draft"));
+  rendering.addEventListener("picture", () => {
+    $("frame").style.setProperty("--ratio", rendering.width / rendering.height);
+    const notes = rendering.notes.join("\n");
+    if ($("notes").dataset.text === notes) return;
+    $("notes").dataset.text = notes;
+    $("notes").replaceChildren(...rendering.notes.map((text) => make("li", { text })));
+  });
+}

@@ -1,0 +1,163 @@
+// The engine as the page sees it: questions and answers. After a fault it is started anew and given again what it held.
+
+import { Held } from "./held.js";
+
+/** The smallest module that needs SIMD. */
+const SIMD = [0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11];
+const NO_WASM = "This browser cannot run relight: it needs WebAssembly with SIMD, which browsers have had since 2023.";
+
+/** The engine ended while it answered. */
+export class Fault extends Error {}
+
+/** Events: "restart" (detail: a sentence), "busy" (detail: how many questions are open). */
+export class Engine extends EventTarget {
+  /** Bytes of the engine's memory after its last answer. */
+  memory = 0;
+
+  #module;
+  #weights;
+  #worker;
+  #held = new Held();
+  #open = new Map();
+  #number = 0;
+  #restarting = null;
+
+  /** Loads the engine and its weights; tells `progress` a sentence now and then. */
+  static async start(progress) {
+    if (!canRun()) throw new Error(NO_WASM);
+    const [module, weights] = await Promise.all([compiled("relight.wasm"), download("weights.safetensors", progress)]);
+    const engine = new Engine();
+    engine.#module = module;
+    engine.#weights = weights;
+    await engine.#begin();
+    return engine;
+  }
+
+  /** Asks the engine. Its answer's parts are in `parts`; its refusals and faults are thrown as sentences. */
+  async ask(op, fields = {}, parts = []) {
+    if (this.#restarting) await this.#restarting;
+    const request = { fields: { op, ...fields }, parts };
+    const answer = await this.#send(request);
+    this.#held.note(request);
+    return answer;
+  }
+
+  async #begin() {
+    this.#worker = new Worker("worker.js", { type: "module" });
+    await new Promise((resolve, reject) => {
+      this.#worker.onmessage = ({ data }) => (data.ready ? resolve() : reject(new Error(`The engine does not start: ${data.broken}.`)));
+      this.#worker.onerror = () => reject(new Error("The engine's worker does not start."));
+      this.#worker.postMessage({ module: this.#module });
+    });
+    this.#worker.onmessage = ({ data }) => this.#answered(data);
+    this.#worker.onerror = (event) => this.#failed(event);
+    await this.#send({ fields: { op: "load" }, parts: [this.#weights] });
+  }
+
+  #send(request) {
+    const id = ++this.#number;
+    return new Promise((resolve, reject) => {
+      this.#open.set(id, { request, resolve, reject, began: performance.now() });
+      this.#worker.postMessage({ id, ...request });
+      this.#tellBusy();
+    });
+  }
+
+  #answered({ id, reply, parts, fault, memory }) {
+    const { request, resolve, reject, began } = this.#open.get(id);
+    this.#open.delete(id);
+    this.#tellBusy();
+    performance.measure(`relight:${request.fields.op}`, { start: began, end: performance.now() });
+    if (fault !== undefined) {
+      this.#restart(fault);
+      return reject(new Fault(`The engine gave up (${fault}).`));
+    }
+    this.memory = memory ?? this.memory;
+    if (reply.error) return reject(new Error(reply.error));
+    resolve({ ...reply, parts });
+  }
+
+  /** The worker itself broke: nothing that is open will be answered. */
+  #failed(event) {
+    event.preventDefault();
+    const open = [...this.#open.values()];
+    this.#open.clear();
+    this.#restart(event.message);
+    for (const { reject } of open) reject(new Fault("The engine gave up."));
+  }
+
+  #restart(fault) {
+    if (this.#restarting) return;
+    this.#restarting = this.#rebuild()
+      .then((lost) => {
+        const loss = lost.length > 0 ? ` These could not be opened again: ${lost.join(", ")}.` : "";
+        this.dispatchEvent(new CustomEvent("restart", { detail: `The engine gave up and was started again (${fault}).${loss}` }));
+      })
+      .catch((error) => this.dispatchEvent(new CustomEvent("restart", { detail: `The engine cannot be started again: ${error.message}` })))
+      .finally(() => (this.#restarting = null));
+  }
+
+  /** A new worker that holds what the old one held; the names of what it would not take. */
+  async #rebuild() {
+    const waiting = [...this.#open.values()];
+    const lost = [];
+    for (;;) {
+      this.#open.clear();
+      this.#worker.terminate();
+      await this.#begin();
+      const bad = await this.#giveAgain();
+      if (!bad) break;
+      lost.push(this.#held.drop(bad));
+    }
+    for (const { request, resolve, reject } of waiting) this.#send(request).then(resolve, reject);
+    return lost;
+  }
+
+  /** The first request that fails again, if any. */
+  async #giveAgain() {
+    for (const request of this.#held.requests()) {
+      try {
+        await this.#send(request);
+      } catch {
+        return request;
+      }
+    }
+    return null;
+  }
+
+  #tellBusy() {
+    this.dispatchEvent(new CustomEvent("busy", { detail: this.#open.size }));
+  }
+}
+
+function canRun() {
+  return typeof WebAssembly === "object" && WebAssembly.validate(new Uint8Array(SIMD)) && typeof Worker === "function";
+}
+
+async function compiled(name) {
+  const response = await get(name);
+  try {
+    return await WebAssembly.compile(await response.arrayBuffer());
+  } catch (error) {
+    throw new Error(`${NO_WASM} (${error.message})`);
+  }
+}
+
+/** A file; how much of it is here is told every now and then. */
+async function download(name, progress) {
+  const reader = (await get(name)).body.getReader();
+  const chunks = [];
+  let bytes = 0;
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    chunks.push(part.value);
+    bytes += part.value.length;
+    progress(`Loading the networks: ${(bytes / 1e6).toFixed(0)} MB`);
+  }
+  return new Blob(chunks);
+}
+
+async function get(name) {
+  const response = await fetch(name).catch(() => null);
+  if (!response?.ok) throw new Error(`The page is incomplete: ${name} cannot be loaded.`);
+  return response;
+}

@@ -1,0 +1,203 @@
+// What the page knows of the photographs and backgrounds that the engine holds: their names, pictures, masks and strokes.
+
+import { canvasOf } from "./dom.js";
+import { openable, asPixels } from "./files.js";
+
+/** The longer side of a small picture in a list, pixels. */
+const SMALL = 112;
+/** A new object's height, and the most of the picture's width that it takes. */
+const TALL = 0.5;
+const WIDE = 0.6;
+
+export class Library {
+  /** Photographs by the engine's number: { object, name, kind, width, height, picture, mask, sketch, small, layers }. */
+  photos = new Map();
+  /** Backgrounds by the page's key: { key, name, kind, fields, parts, width, height, small }. */
+  backgrounds = new Map();
+
+  #engine;
+  #number = 0;
+  #background = null;
+
+  constructor(engine) {
+    this.#engine = engine;
+  }
+
+  /** Opens a file as a photograph of an object. */
+  async open(file) {
+    const object = ++this.#number;
+    const answer = await this.#ask(file, (name, parts) => this.#engine.ask("open_photo", { object, name }, parts),
+      (fields, parts) => this.#engine.ask("open_pixels", { object, ...fields }, parts));
+    const photo = { ...answer, object, name: file.name, sketch: null, layers: null };
+    this.#take(photo, answer.parts);
+    return photo;
+  }
+
+  /** Cuts a photograph by a sketch: { rect, strokes }. */
+  async cut(photo, { rect, strokes }) {
+    const answer = await this.#engine.ask("mask", { object: photo.object, rect, strokes });
+    photo.mask = answer.parts[0];
+    return answer;
+  }
+
+  /** Takes a photograph apart, where that is not yet done. */
+  async decompose(photo) {
+    if (photo.layers) return photo.layers;
+    const { parts, width, height, ...answer } = await this.#engine.ask("decompose", { object: photo.object });
+    photo.layers = { ...answer, width, height, pictures: parts.map((part) => canvasOf(part, width, height)) };
+    return photo.layers;
+  }
+
+  /** What was made of an older mask is gone; the new one is shown in lists. */
+  cutAnew(photo, sketch) {
+    Object.assign(photo, { sketch, layers: null, masked: true, small: smallOf(photo) });
+  }
+
+  /** Gives photographs back to the engine that no scene has any more. */
+  async closeAllBut(reachable) {
+    for (const object of [...this.photos.keys()]) {
+      if (reachable.has(object)) continue;
+      this.photos.delete(object);
+      await this.#engine.ask("close", { object });
+    }
+  }
+
+  /** The backgrounds that the engine makes. */
+  async bundled() {
+    const { panoramas, parts } = await this.#engine.ask("backgrounds");
+    panoramas.forEach(({ id, name }, index) => {
+      const small = canvasOf(parts[index], 96, 48);
+      this.#addBackground({ key: id, name, kind: "panorama", fields: { kind: "panorama", id }, parts: [], small });
+    });
+    return panoramas.map(({ id }) => this.backgrounds.get(id));
+  }
+
+  /** Opens a file as a background: "photo" or "panorama_file". */
+  async openBackground(file, kind) {
+    let [fields, parts] = [{ kind, name: file.name }, [file]];
+    const answer = await this.#ask(file, (_, bytes) => this.#engine.ask("background", { kind, name: file.name }, (parts = bytes)),
+      (read, bytes) => this.#engine.ask("background", (fields = { kind: pixelKind(kind), ...read }), (parts = bytes)));
+    const background = { key: `own ${++this.#number}`, name: file.name, kind, fields, parts, width: answer.width, height: answer.height };
+    this.#background = background.key;
+    background.small = await smallOfFile(file);
+    this.#addBackground(background);
+    return background;
+  }
+
+  /** Sees to it that the engine has a background. */
+  async useBackground(key) {
+    if (this.#background === key) return;
+    const { fields, parts } = this.backgrounds.get(key);
+    await this.#engine.ask("background", fields, parts);
+    this.#background = key;
+  }
+
+  /** Takes what a kept scene brought, in place of everything. */
+  takeImport({ objects, background, parts }) {
+    const rest = [...parts];
+    this.photos.clear();
+    for (const { object, ...about } of objects) {
+      this.#number = Math.max(this.#number, object);
+      const photo = { ...about, object, sketch: null, layers: null };
+      this.#take(photo, rest.splice(0, about.masked ? 2 : 1));
+    }
+    return this.#takeBackground(background, rest[0]);
+  }
+
+  /** The background of a kept scene: one of the engine's, or the kept file's, which only the engine has. */
+  #takeBackground({ kind, name, id, width, height }, thumbnail) {
+    const known = id !== undefined && this.backgrounds.get(id);
+    const key = known ? id : `own ${++this.#number}`;
+    if (!known) this.#addBackground({ key, name, kind, width, height, small: canvasOf(thumbnail, ...sidesOf(thumbnail, width, height)) });
+    this.#background = key;
+    return key;
+  }
+
+  #addBackground(background) {
+    this.backgrounds.set(background.key, background);
+  }
+
+  #take(photo, [picture, mask]) {
+    photo.picture = canvasOf(picture, photo.width, photo.height);
+    photo.mask = mask ?? null;
+    photo.small = smallOf(photo);
+    this.photos.set(photo.object, photo);
+  }
+
+  /** Gives a file to the engine as it is; where it is of a kind that only the browser knows, as pixels. */
+  async #ask(file, asFile, asRead) {
+    const known = await openable(file);
+    if (known) return asFile(file.name, [file]);
+    const { fields, rgba } = await asPixels(file);
+    return asRead(fields, [rgba]);
+  }
+}
+
+/** Where a new object comes to stand: high, but not too wide, and beside what is there. */
+export function placeFor(photo, scene) {
+  const [, , w, h] = boundsOf(photo);
+  const [width, height] = scene.size;
+  const beside = [0.5, 0.28, 0.72, 0.4, 0.6][scene.objects.length % 5];
+  return { at: [beside, 0.9], height: Math.min(TALL, (WIDE * width * h) / (w * height)) };
+}
+
+/** The rectangle that a photograph's mask takes. */
+export function boundsOf({ mask, width, height }) {
+  if (!mask) return [0, 0, width, height];
+  let [left, top, right, bottom] = [width, height, -1, -1];
+  for (let y = 0, at = 0; y < height; y++) {
+    for (let x = 0; x < width; x++, at++) {
+      if (mask[at] < 128) continue;
+      left = Math.min(left, x);
+      right = Math.max(right, x);
+      top = Math.min(top, y);
+      bottom = y;
+    }
+  }
+  return right < 0 ? [0, 0, width, height] : [left, top, right - left + 1, bottom - top + 1];
+}
+
+/** A small picture of the object alone. */
+function smallOf(photo) {
+  const [x, y, w, h] = boundsOf(photo);
+  const scale = SMALL / Math.max(w, h);
+  const [width, height] = [w, h].map((side) => Math.max(1, Math.round(side * scale)));
+  const small = new OffscreenCanvas(width, height);
+  const context = small.getContext("2d");
+  context.drawImage(photo.picture, x, y, w, h, 0, 0, width, height);
+  if (photo.mask) {
+    context.globalCompositeOperation = "destination-in";
+    context.drawImage(maskCanvas(photo), x, y, w, h, 0, 0, width, height);
+  }
+  return small;
+}
+
+/** The mask as a canvas that is opaque on the object. */
+function maskCanvas({ mask, width, height }) {
+  const rgba = new Uint8ClampedArray(4 * mask.length);
+  mask.forEach((value, index) => (rgba[4 * index + 3] = value));
+  const canvas = new OffscreenCanvas(width, height);
+  canvas.getContext("2d").putImageData(new ImageData(rgba, width, height), 0, 0);
+  return canvas;
+}
+
+/** A small picture of a background's file; a grey one of what the browser cannot read. */
+async function smallOfFile(file) {
+  const small = new OffscreenCanvas(96, 48);
+  const context = small.getContext("2d");
+  context.fillStyle = "#888";
+  context.fillRect(0, 0, 96, 48);
+  const image = await createImageBitmap(file, { resizeWidth: 96, resizeHeight: 48 }).catch(() => null);
+  if (image) context.drawImage(image, 0, 0);
+  return small;
+}
+
+/** The sides of a thumbnail of which only the number of pixels is known. */
+function sidesOf(rgba, width, height) {
+  const pixels = rgba.length / 4;
+  if (pixels === 96 * 48) return [96, 48];
+  const across = Math.round(Math.sqrt((pixels * width) / height));
+  return [across, Math.floor(pixels / across)];
+}
+
+const pixelKind = (kind) => (kind === "photo" ? "photo_pixels" : kind);

@@ -1,0 +1,175 @@
+// The picture of the stage: asks the engine for layers, one question at a time and always for the newest scene. While something
+// changes the picture is small; when it rests, sharp. Where only placements change, the layers that are here are moved.
+
+import { clamp } from "./dom.js";
+import { forEngine, lookOf } from "./scene.js";
+
+/** The longer side of a picture while something changes, pixels. */
+const DRAFT = 512;
+const LEAST_DRAFT = 256;
+/** A draft may take so long before smaller ones are made, milliseconds. */
+const PATIENCE = 60;
+/** Rest before new layers are made for new placements, and before a picture is made sharp, milliseconds. */
+const PLACED = 150;
+const STILL = 300;
+const SHARPEST = 1280;
+
+/** Events: "picture" (a new one is shown), "state" (it rests or does not), "problem" (detail: a sentence). */
+export class Rendering extends EventTarget {
+  /** Where the objects stand in the picture that is shown: [{ key, box }], from back to front. */
+  boxes = [];
+  /** What the engine says of the picture. */
+  notes = [];
+  width = 4;
+  height = 3;
+
+  #engine;
+  #library;
+  #work;
+  #painter;
+  #canvas;
+  #draft = DRAFT;
+  #changed = 0;
+  #timer = 0;
+  #running = false;
+  /** What the layers show: { scene, look, sharp, layers }. */
+  #shown = null;
+  #before = null;
+  #wantsBefore = false;
+
+  constructor(engine, library, work, painter, canvas) {
+    super();
+    [this.#engine, this.#library, this.#work, this.#painter, this.#canvas] = [engine, library, work, painter, canvas];
+    work.addEventListener("scene", () => this.#sceneChanged());
+    canvas.addEventListener("empty", () => this.refresh());
+  }
+
+  /** Makes the picture anew, although the scene is the same. */
+  refresh() {
+    this.#shown = this.#before = null;
+    this.#sceneChanged();
+  }
+
+  /** Shows the objects as they were photographed, or in the scene's light. */
+  showBefore(before) {
+    this.#wantsBefore = before;
+    if (!before && this.#painter.layered && this.#shown) this.#paint();
+    else if (!before) this.refresh();
+    this.#plan();
+  }
+
+  #sceneChanged() {
+    this.#changed = performance.now();
+    if (!this.#wantsBefore) this.#paint();
+    this.#plan();
+  }
+
+  /** Whether the picture is the scene's, and as sharp as it becomes. */
+  get rests() {
+    return !this.#running && this.#next() === null;
+  }
+
+  #plan() {
+    clearTimeout(this.#timer);
+    this.dispatchEvent(new Event("state"));
+    if (this.#running) return;
+    const next = this.#next();
+    if (next) this.#timer = setTimeout(() => this.#make(next.sharp), Math.max(0, next.at - performance.now()));
+  }
+
+  /** What is to be made next, and when. */
+  #next() {
+    const { scene } = this.#work;
+    if (this.#wantsBefore) return this.#before === scene ? null : { sharp: true, at: 0 };
+    if (this.#shown?.scene === scene) return this.#shown.sharp ? null : { sharp: true, at: this.#changed + STILL };
+    const moved = this.#painter.layered && this.#shown?.look === lookOf(scene);
+    return moved ? { sharp: true, at: this.#changed + PLACED } : { sharp: false, at: 0 };
+  }
+
+  async #make(sharp) {
+    this.#running = true;
+    const { scene } = this.#work;
+    try {
+      await this.#library.useBackground(scene.background);
+      if (this.#wantsBefore) await this.#makeBefore(scene);
+      else await this.#makeLayers(scene, sharp);
+    } catch (error) {
+      this.#shown = { scene, look: lookOf(scene), sharp: true, layers: null };
+      this.#before = this.#wantsBefore ? scene : null;
+      this.dispatchEvent(new CustomEvent("problem", { detail: error.message }));
+    }
+    this.#running = false;
+    this.#plan();
+  }
+
+  async #makeBefore(scene) {
+    const picture = await this.#engine.ask("render", { scene: forEngine(scene), longest: this.#sharpest(), before: true });
+    this.#before = scene;
+    if (!this.#wantsBefore) return;
+    this.#painter.show(picture);
+    this.#shown = null;
+    this.#tell(picture, scene);
+  }
+
+  async #makeLayers(scene, sharp) {
+    const began = performance.now();
+    const longest = sharp ? this.#sharpest() : this.#draft;
+    const layers = await this.#engine.ask(this.#painter.layered ? "layers" : "render", { scene: forEngine(scene), longest, ...(this.#painter.layered ? {} : { before: false }) });
+    if (!sharp) this.#learn(performance.now() - began);
+    if (this.#wantsBefore) return;
+    this.#shown = { scene, look: lookOf(scene), sharp, layers };
+    this.#before = null;
+    if (this.#painter.layered) this.#painter.load(layers);
+    else this.#painter.show(layers);
+    this.#tell(layers, scene);
+    this.#paint();
+  }
+
+  /** Smaller drafts where they take long, larger ones where they do not. */
+  #learn(took) {
+    const factor = clamp(Math.sqrt(PATIENCE / took), 0.8, 1.1);
+    this.#draft = Math.round(clamp(this.#draft * factor, LEAST_DRAFT, DRAFT));
+  }
+
+  #sharpest() {
+    const { width, height } = this.#canvas.getBoundingClientRect();
+    return Math.round(clamp(Math.max(width, height) * devicePixelRatio, DRAFT, SHARPEST));
+  }
+
+  #tell({ width, height, objects, notes }, scene) {
+    [this.width, this.height, this.notes] = [width, height, notes ?? []];
+    this.boxes = scene.objects.map(({ key }, index) => ({ key, box: boxOf(objects[index]) }));
+    this.dispatchEvent(new Event("picture"));
+  }
+
+  /** Paints the layers that are here as the scene wants them to stand. */
+  #paint() {
+    if (!this.#painter.layered || !this.#shown?.layers) return;
+    const { scene, layers } = this.#shown;
+    const { width, height } = layers;
+    const moves = [];
+    this.boxes = [];
+    for (const object of this.#work.scene.objects) {
+      const layer = scene.objects.findIndex(({ key }) => key === object.key);
+      if (layer < 0) continue;
+      const move = moveOf(scene.objects[layer], object, width, height);
+      moves.push({ layer, ...move });
+      this.boxes.push({ key: object.key, box: movedBox(boxOf(layers.objects[layer]), move) });
+    }
+    this.#painter.paint(moves);
+    this.dispatchEvent(new Event("picture"));
+  }
+}
+
+const boxOf = ({ box, place, width, height }) => box ?? [...place, width, height];
+
+/** How an object's layer gets from where it was made to where it is to stand, pixels. */
+function moveOf(from, to, width, height) {
+  const foot = [from.at[0] * width, from.at[1] * height];
+  const [dx, dy] = [to.at[0] * width - foot[0], to.at[1] * height - foot[1]];
+  return { foot, dx, dy, scale: to.height / from.height, turn: to.rotation - from.rotation };
+}
+
+function movedBox([x, y, w, h], { foot, dx, dy, scale }) {
+  return [foot[0] + dx + (x - foot[0]) * scale, foot[1] + dy + (y - foot[1]) * scale, w * scale, h * scale];
+}

@@ -1,0 +1,95 @@
+// What leaves the page, by the browser's own ways: pictures and kept scenes as downloads or through its share sheet.
+
+import { $ } from "./dom.js";
+import { opens, takeFiles } from "./fields.js";
+import { copyOf, isZip } from "./files.js";
+import { attempt, calm, say } from "./notices.js";
+import { forEngine, fromEngine } from "./scene.js";
+
+const TYPES = { png: "image/png", jpeg: "image/jpeg" };
+const ENDS = { png: "png", jpeg: "jpg" };
+
+export class Saving {
+  #work;
+  #engine;
+  #library;
+
+  constructor(work, engine, library) {
+    [this.#work, this.#engine, this.#library] = [work, engine, library];
+    for (const format of ["png", "jpeg"]) $(`save-${format}`).addEventListener("click", () => attempt(() => this.#save(format)));
+    $("share").addEventListener("click", () => attempt(() => this.#share()));
+    $("keep").addEventListener("click", () => attempt(() => this.#keep()));
+    opens("reopen-file", "reopen");
+    takeFiles("reopen-file", (file) => this.reopen(file));
+    window.addEventListener("beforeunload", (event) => {
+      if (work.unsaved) event.preventDefault();
+    });
+  }
+
+  async #save(format) {
+    download(await this.#picture(format));
+    say("The picture is saved.");
+  }
+
+  /** Through the share sheet where the browser has one for files, else as a download. */
+  async #share() {
+    const file = await this.#picture("jpeg");
+    if (!navigator.canShare?.({ files: [file] })) {
+      download(file);
+      return say("This browser cannot share files: the picture is saved instead.");
+    }
+    try {
+      await navigator.share({ files: [file] });
+      return say("The picture is shared.");
+    } catch (error) {
+      if (error.name !== "AbortError") throw new Error("The browser did not share the picture: save it instead.");
+      return say("");
+    }
+  }
+
+  async #picture(format) {
+    const scene = await this.#ready();
+    say("Making the picture in full size …");
+    const { parts } = await this.#engine.ask("save", { scene: forEngine(scene), format });
+    return new File(parts, `relight.${ENDS[format]}`, { type: TYPES[format] });
+  }
+
+  async #keep() {
+    const scene = await this.#ready();
+    say("Packing the scene …");
+    const { parts } = await this.#engine.ask("export", { scene: forEngine(scene), name: "scene" });
+    download(new File(parts, "relight-scene.zip", { type: "application/zip" }));
+    this.#work.kept(scene);
+    say("The scene is kept, with its photographs.");
+  }
+
+  /** Opens a kept scene in place of this one. */
+  async reopen(file) {
+    calm();
+    if (!(await isZip(file))) throw new Error(`${file.name} is no kept scene: choose a zip file of this page.`);
+    if (this.#work.unsaved && !confirm("Open another scene? This one is not kept.")) return;
+    say(`Opening ${file.name} …`);
+    const answer = await this.#engine.ask("import", {}, [await copyOf(file)]);
+    const background = this.#library.takeImport(answer);
+    this.#work.begin(fromEngine(answer.scene, background));
+    say("The scene is open.");
+  }
+
+  /** The scene, whose background the engine has. */
+  async #ready() {
+    calm();
+    const { scene } = this.#work;
+    if (scene.objects.length === 0) throw new Error("There is no object in the scene yet: add one first.");
+    await this.#library.useBackground(scene.background);
+    return scene;
+  }
+}
+
+/** Hands a file to the browser's downloads. */
+export function download(file) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(file);
+  link.download = file.name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+}

@@ -1,0 +1,114 @@
+// A short film in which the light goes once around: all pictures are made first, then played into the browser's recorder.
+
+import { $, make, pixels } from "./dom.js";
+import { attempt, calm, say } from "./notices.js";
+import { download } from "./saving.js";
+import { forEngine } from "./scene.js";
+
+const RATE = 24;
+const LONGEST = 640;
+const KINDS = ["video/mp4;codecs=avc1.42E01F", "video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
+const NO_RECORDER = "This browser cannot make videos: save a picture instead.";
+
+export class Video {
+  #work;
+  #engine;
+  #library;
+  #making = false;
+
+  constructor(work, engine, library) {
+    [this.#work, this.#engine, this.#library] = [work, engine, library];
+    $("video").addEventListener("click", () => (this.#making ? (this.#making = false) : attempt(() => this.#make())));
+  }
+
+  async #make() {
+    calm();
+    const { scene } = this.#work;
+    if (scene.objects.length === 0) throw new Error("There is no object in the scene yet: add one first.");
+    const type = kindOfVideo();
+    this.#making = true;
+    $("video-label").textContent = "Cancel";
+    try {
+      await this.#library.useBackground(scene.background);
+      const frames = await this.#render(scene, RATE * Number($("video-seconds").value));
+      if (this.#making) await this.#record(frames, type);
+      else say("No video was made.");
+    } finally {
+      this.#making = false;
+      $("video-label").textContent = "Make a video";
+      $("video-progress").hidden = true;
+    }
+  }
+
+  /** All pictures of the turn, compressed: as many as a phone can hold. */
+  async #render(scene, count) {
+    say("Making the pictures of the video …");
+    Object.assign($("video-progress"), { hidden: false, max: count, value: 0 });
+    const frames = [];
+    for (let index = 0; index < count && this.#making; index++) {
+      const turn = scene.light.turn + (360 * index) / count;
+      const turned = { ...scene, light: { ...scene.light, turn: ((turn + 180) % 360) - 180 } };
+      const { width, height, parts } = await this.#engine.ask("render", { scene: forEngine(turned), longest: LONGEST, before: false });
+      frames.push(await compressed(parts[0], width, height));
+      $("video-progress").value = index + 1;
+    }
+    return frames;
+  }
+
+  async #record(frames, type) {
+    say("Recording the video …");
+    const file = await recorded(frames, type);
+    download(file);
+    say("The video is saved.");
+  }
+}
+
+function kindOfVideo() {
+  const canRecord = typeof MediaRecorder === "function" && typeof HTMLCanvasElement.prototype.captureStream === "function";
+  const type = canRecord && KINDS.find((kind) => MediaRecorder.isTypeSupported(kind));
+  if (!type) throw new Error(NO_RECORDER);
+  return type;
+}
+
+/** A picture of even sides, which every encoder of videos takes. */
+async function compressed(rgba, width, height) {
+  const canvas = new OffscreenCanvas(width - (width % 2), height - (height % 2));
+  canvas.getContext("2d").putImageData(pixels(rgba, width, height), 0, 0);
+  return canvas.convertToBlob({ type: "image/jpeg", quality: 0.95 });
+}
+
+/** Plays pictures into a recorder, each for as long as it is to be seen. */
+async function recorded(frames, type) {
+  const first = await createImageBitmap(frames[0]);
+  const canvas = make("canvas", { width: first.width, height: first.height });
+  const context = canvas.getContext("2d", { alpha: false });
+  const stream = canvas.captureStream(RATE);
+  const recorder = new MediaRecorder(stream, { mimeType: type, videoBitsPerSecond: 6e6 });
+  const chunks = [];
+  recorder.ondataavailable = ({ data }) => chunks.push(data);
+  const ended = new Promise((resolve, reject) => {
+    recorder.onstop = resolve;
+    recorder.onerror = () => reject(new Error(NO_RECORDER));
+  });
+  context.drawImage(first, 0, 0);
+  recorder.start();
+  await play(frames, context);
+  recorder.stop();
+  await ended;
+  stream.getTracks().forEach((track) => track.stop());
+  const ending = type.startsWith("video/mp4") ? "mp4" : "webm";
+  return new File(chunks, `relight.${ending}`, { type: type.split(";")[0] });
+}
+
+async function play(frames, context) {
+  const began = performance.now();
+  for (const [index, frame] of frames.entries()) {
+    const image = await createImageBitmap(frame);
+    await until(began + (1000 * index) / RATE);
+    context.drawImage(image, 0, 0);
+    image.close();
+  }
+  await until(began + (1000 * frames.length) / RATE);
+}
+
+const until = (time) => new Promise((resolve) => setTimeout(resolve, Math.max(0, time - performance.now())));

@@ -1,0 +1,72 @@
+// The engine in its worker. The page sends a compiled module first, then requests, which are answered one after another.
+
+import { lengthOf, pack, unpack } from "./message.js";
+
+const WORD = 4;
+let exports = null;
+let last = Promise.resolve();
+
+self.addEventListener("message", ({ data }) => {
+  last = last.then(() => (data.module ? begin(data.module) : answer(data)));
+});
+
+async function begin(module) {
+  try {
+    const imports = { env: { relight_now: () => performance.now() } };
+    exports = (await WebAssembly.instantiate(module, imports)).exports;
+    self.postMessage({ ready: true });
+  } catch (error) {
+    self.postMessage({ broken: error.message });
+  }
+}
+
+async function answer({ id, fields, parts }) {
+  let bytes;
+  try {
+    bytes = await Promise.all(parts.map(bytesOf));
+  } catch {
+    return self.postMessage({ id, reply: { error: "The file cannot be read any more: choose it again." }, parts: [] });
+  }
+  try {
+    const [text, ...rest] = ask([new TextEncoder().encode(JSON.stringify(fields)), ...bytes]);
+    const reply = JSON.parse(new TextDecoder().decode(text));
+    const memory = exports.memory.buffer.byteLength;
+    self.postMessage({ id, reply, parts: rest, memory }, rest.map((part) => part.buffer));
+  } catch (error) {
+    self.postMessage({ id, fault: faultOr(error.message) });
+  }
+}
+
+/** Files come as blobs, so that they are read where they are needed. */
+async function bytesOf(part) {
+  return part instanceof Blob ? new Uint8Array(await part.arrayBuffer()) : part;
+}
+
+function ask(parts) {
+  const length = lengthOf(parts);
+  const request = exports.relight_alloc(length) >>> 0;
+  pack(parts, new Uint8Array(exports.memory.buffer, request, length));
+  return take(exports.relight_answer(request, length) >>> 0);
+}
+
+/** The parts of a reply, which is given back. */
+function take(address) {
+  const bytes = replyAt(address);
+  const parts = unpack(bytes);
+  exports.relight_free(address, WORD + bytes.length);
+  return parts;
+}
+
+function replyAt(address) {
+  const { buffer } = exports.memory;
+  return new Uint8Array(buffer, address + WORD, new DataView(buffer).getUint32(address, true));
+}
+
+/** What the engine says of its end, or else what the browser says. */
+function faultOr(text) {
+  try {
+    return new TextDecoder().decode(replyAt(exports.relight_fault() >>> 0).slice()) || text;
+  } catch {
+    return text;
+  }
+}
