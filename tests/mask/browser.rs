@@ -6,7 +6,6 @@
     reason = "a test fails by a panic, in its helpers too"
 )]
 
-mod chromium;
 #[allow(dead_code, reason = "the tests without a browser ask it more")]
 mod editing;
 #[allow(dead_code, reason = "the tests without a browser show more of it")]
@@ -16,10 +15,11 @@ mod support;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use relit_test_support::chromium::{self, Chromium};
+use relit_test_support::editor_canvas::EditorCanvas;
 use relit_test_support::trials;
 use serde_json::Value;
 
-use chromium::Chromium;
 use editing::Editing;
 use scene::{disc_share, in_disc};
 use support::{clip, code, read, relit_mask, said};
@@ -28,41 +28,10 @@ const READY: &str = "document.getElementById('state')?.dataset.state === 'ready'
 const NONE: &str = "document.getElementById('state')?.dataset.state === 'none'";
 
 fn main() -> ExitCode {
-    trials::run(trials![with browser =>
+    trials::run(trials![with chromium::find =>
         drawn_undone_drawn_again_and_accepted_with_the_mouse,
         a_finger_draws_and_two_zoom_on_a_phone,
     ])
-}
-
-fn browser() -> Result<PathBuf, String> {
-    chromium::find().ok_or_else(|| "there is no Chromium or Chrome on the PATH".to_owned())
-}
-
-/// From places in the frame to places on the page.
-struct Screen {
-    scale: f64,
-    x: f64,
-    y: f64,
-}
-
-impl Screen {
-    fn of(page: &mut Chromium) -> Self {
-        page.wait_for("Boolean(document.getElementById('canvas').dataset.view)");
-        let expression = "(() => { const box = canvas.getBoundingClientRect(); \
-            const [scale, x, y] = canvas.dataset.view.split(' ').map(Number); \
-            return [scale, x + box.left, y + box.top]; })()";
-        let numbers = page.value(expression);
-        let number = |at: usize| numbers[at].as_f64().unwrap();
-        Self {
-            scale: number(0),
-            x: number(1),
-            y: number(2),
-        }
-    }
-
-    fn at(&self, x: f64, y: f64) -> [f64; 2] {
-        [self.x + x * self.scale, self.y + y * self.scale]
-    }
 }
 
 fn strokes(page: &mut Chromium) -> usize {
@@ -84,7 +53,7 @@ fn drawn_undone_drawn_again_and_accepted_with_the_mouse(program: PathBuf) {
         page.value("document.getElementById('accept').disabled"),
         true
     );
-    let screen = Screen::of(&mut page);
+    let screen = EditorCanvas::of(&mut page);
 
     // A box around the disc.
     page.drag(&[
@@ -150,13 +119,13 @@ fn a_finger_draws_and_two_zoom_on_a_phone(program: PathBuf) {
     );
 
     // Two fingers apart: twice as large, and nothing drawn.
-    let screen = Screen::of(&mut page);
+    let screen = EditorCanvas::of(&mut page);
     let apart = |way: f64| {
         let [x, y] = screen.at(48.0, 32.0);
         vec![[x - way, y], [x + way, y]]
     };
     page.touch(&[apart(40.0), apart(60.0), apart(80.0)]);
-    let zoomed = Screen::of(&mut page);
+    let zoomed = EditorCanvas::of(&mut page);
     assert!(
         zoomed.scale > 1.7 * screen.scale,
         "{} {}",

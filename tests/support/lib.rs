@@ -1,11 +1,14 @@
 //! What the tests of several crates share: making videos with the `ffmpeg` program, which `make setup`
-//! installs, and tests that say when they did not run.
+//! installs, a browser, and tests that say when they did not run.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
+    clippy::panic,
     reason = "a test fails by a panic, in its helpers too"
 )]
 
+pub mod chromium;
+pub mod editor_canvas;
 pub mod trials;
 
 use std::io::Write;
