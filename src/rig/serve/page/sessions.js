@@ -44,7 +44,7 @@ function entry(session) {
     make("b", { text: session.object }),
     make("small", { text: when(session) }),
     make("small", {}, make("span", { text: words, className }), make("span", { text: facts(session) && ` · ${facts(session)}` })),
-    make("small", { className: `stage ${stageClass}`, text: stage }),
+    make("small", { className: `standing ${stageClass}`, text: stage }),
   );
   const button = make("button", { type: "button", disabled: !ended }, image, text);
   button.addEventListener("click", () => play(session));
