@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-programs setup-train train-turn test test-rig test-slurm test-objects packages test-packages test-image test-python wheel bench-python image release lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-train train-turn test test-day test-rig test-slurm test-objects packages test-packages test-image test-python wheel bench-python image release lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -77,6 +77,13 @@ test: setup ## Run all tests
 
 test-rig: setup ## Capture with the kernel's camera drivers and a real tty, in a virtual machine
 	@tests/rig-vm/run
+
+# Pictures of each step are left in PICTURES.
+PICTURES ?= $(TARGET)/day
+
+test-day: setup ## Go through a day at the rig by taps in a browser, with whole turns; pictures in PICTURES
+	cargo build --locked $(PROGRAMS) --bins
+	RELIT_PICTURES="$(abspath $(PICTURES))" cargo test --locked -p relit-tests --test day -- --include-ignored
 
 test-slurm: setup ## Extract as an array job on a real Slurm, started on this machine for it
 	cargo build --locked -p relit-extract

@@ -1,0 +1,82 @@
+//! A day at the rig by taps on a phone: the real programs, a replayed camera, a simulated table and a headless browser.
+//!
+//! `make test-day PICTURES=DIR` goes through the long day, with a turn of 1500 frames, and leaves a picture of each step.
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test fails by a panic, in its helpers too"
+)]
+
+mod day;
+mod phone;
+mod rig;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use relit_test_support::chromium;
+use relit_test_support::trials;
+use relit_test_support::trials::trial;
+
+use day::Day;
+use phone::Phone;
+use rig::{LONG_TURN, Rig, SHORT_TURN};
+
+fn main() -> ExitCode {
+    let mut trials = trials![with chromium::find =>
+        a_day_goes_by_taps_from_an_empty_table_to_a_verified_data_set_and_the_next_object,
+        where_the_programs_are_missing_a_session_shows_its_commands,
+    ];
+    let long = trial("a_day_of_whole_turns", chromium::find, a_day_of_whole_turns);
+    trials.push(long.with_ignored_flag(true));
+    trials::run(trials)
+}
+
+fn a_day_goes_by_taps_from_an_empty_table_to_a_verified_data_set_and_the_next_object(
+    browser: PathBuf,
+) {
+    let rig = Rig::start(&SHORT_TURN);
+    Day::begin(&rig, Phone::open(&browser, &rig.url, "short")).go_through();
+}
+
+fn a_day_of_whole_turns(browser: PathBuf) {
+    let rig = Rig::start(&LONG_TURN);
+    Day::begin(&rig, Phone::open(&browser, &rig.url, "day")).go_through();
+}
+
+fn where_the_programs_are_missing_a_session_shows_its_commands(browser: PathBuf) {
+    let rig = Rig::start_without_programs(&SHORT_TURN);
+    let session = rig.hold_recorded();
+    let mut phone = Phone::open(&browser, &rig.url, "alone");
+    phone.wait_text("#missing", "relit-mask and relit-extract are not installed");
+    phone.wait_for("document.getElementById('when-done').disabled");
+    phone.tap("#sessions li button");
+    phone.wait_text("#mask-command", "relit-mask ");
+    let folder = rig.sessions().join(&session);
+    let shown = |phone: &mut Phone, id: &str| phone.text(id);
+    assert_eq!(
+        shown(&mut phone, "#mask-command"),
+        format!("relit-mask {} --auto", folder.display())
+    );
+    assert_eq!(
+        shown(&mut phone, "#extract-command"),
+        format!(
+            "relit-extract {} -o {}",
+            folder.display(),
+            rig.dataset().display()
+        )
+    );
+    for button in ["make-mask", "edit-mask", "make-check", "make-extract"] {
+        let expression = format!("document.getElementById('{button}').disabled");
+        assert_eq!(phone.value(&expression), true, "{button}");
+    }
+    for command in ["mask", "extract"] {
+        let button = format!("[data-copy={command}-command]");
+        phone.tap(&button);
+        phone.wait_for(&format!(
+            "['Copied', 'Selected'].includes(document.querySelector('{button}').textContent)"
+        ));
+    }
+    phone.see("commands");
+}

@@ -1,0 +1,140 @@
+//! The programs at the rig, with a bundled recording as the camera and a simulated table.
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+
+/// What stands on the table, and how it turns.
+#[derive(Debug)]
+pub(crate) struct Turn {
+    recording: &'static str,
+    degrees_per_second: f64,
+    /// Frames of a take.
+    pub(crate) frames: u32,
+    /// Longest wait for a step.
+    pub(crate) longest: Duration,
+}
+
+/// A turn as fast as the table can: each frame of the recording twice.
+pub(crate) const SHORT_TURN: Turn = Turn {
+    recording: "20261120T101500Z-cow-short",
+    degrees_per_second: 36.0,
+    frames: 300,
+    longest: Duration::from_secs(180),
+};
+
+/// The turn that the programs are made for.
+pub(crate) const LONG_TURN: Turn = Turn {
+    recording: "20261120T093015Z-cow",
+    degrees_per_second: 7.2,
+    frames: 1500,
+    longest: Duration::from_secs(900),
+};
+
+/// `relit-capture serve`, until the test ends.
+#[derive(Debug)]
+pub(crate) struct Rig {
+    child: Child,
+    pub(crate) url: String,
+    pub(crate) turn: &'static Turn,
+    folder: tempfile::TempDir,
+}
+
+impl Rig {
+    /// With `relit-mask` and `relit-extract` beside it.
+    pub(crate) fn start(turn: &'static Turn) -> Self {
+        for program in ["relit-mask", "relit-extract"] {
+            assert!(relit_tests::program(program).is_file());
+        }
+        let command = Command::new(relit_tests::program("relit-capture"));
+        Self::serve(command, turn, tempfile::tempdir().unwrap())
+    }
+
+    /// As on a machine that has the rig's program alone.
+    pub(crate) fn start_without_programs(turn: &'static Turn) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let alone = folder.path().join("bin");
+        fs::create_dir(&alone).unwrap();
+        let program = alone.join("relit-capture");
+        fs::copy(relit_tests::program("relit-capture"), &program).unwrap();
+        let mut command = Command::new(program);
+        command.env("PATH", &alone);
+        Self::serve(command, turn, folder)
+    }
+
+    fn serve(mut command: Command, turn: &'static Turn, folder: tempfile::TempDir) -> Self {
+        let camera = format!("replay:{}?loop=1", recording(turn).display());
+        command
+            .args(["serve", "--json", "--listen", "127.0.0.1:0"])
+            .args(["--turntable", "sim:", "--camera", &camera])
+            .args(["--degrees-per-second", &turn.degrees_per_second.to_string()])
+            .arg("--root")
+            .arg(folder.path().join("sessions"))
+            .stdout(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let mut line = String::new();
+        let output = child.stdout.take().unwrap();
+        BufReader::new(output).read_line(&mut line).unwrap();
+        let serving: Value = serde_json::from_str(&line).unwrap();
+        Self {
+            url: serving["url"].as_str().unwrap().to_owned(),
+            child,
+            turn,
+            folder,
+        }
+    }
+
+    /// Puts the recording itself among the sessions; returns its name.
+    pub(crate) fn hold_recorded(&self) -> String {
+        let (from, name) = (recording(self.turn), self.turn.recording);
+        let to = self.sessions().join(name);
+        fs::create_dir_all(&to).unwrap();
+        for file in ["frames.jsonl", "video.mkv", "session.json"] {
+            fs::copy(from.join(file), to.join(file)).unwrap();
+        }
+        name.to_owned()
+    }
+
+    /// The folder of the sessions, by the name that the programs are given.
+    pub(crate) fn sessions(&self) -> PathBuf {
+        let folder = self.folder.path().canonicalize().unwrap();
+        folder.join("sessions")
+    }
+
+    /// The folder of the data set.
+    pub(crate) fn dataset(&self) -> PathBuf {
+        self.sessions().with_file_name("dataset")
+    }
+
+    /// The true mask of what stands on the table.
+    pub(crate) fn true_mask(&self) -> image::GrayImage {
+        let file = recording(self.turn).join("mask_gt.png");
+        image::open(file).unwrap().into_luma8()
+    }
+
+    /// Reads the data set back.
+    pub(crate) fn verify(&self) -> Output {
+        let mut command = Command::new(relit_tests::program("relit-extract"));
+        command.arg("verify").arg(self.dataset());
+        command.output().unwrap()
+    }
+}
+
+fn recording(turn: &Turn) -> PathBuf {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures");
+    fixtures.join(turn.recording).canonicalize().unwrap()
+}
+
+impl Drop for Rig {
+    fn drop(&mut self) {
+        // It ends its programs when it is asked to end.
+        let _ = Command::new("kill")
+            .arg(self.child.id().to_string())
+            .status();
+        let _ = self.child.wait();
+    }
+}
