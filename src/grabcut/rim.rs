@@ -1,15 +1,15 @@
 //! The table's rim in a result: where the rig shakes, the rim between table and room is neither the one nor
 //! the other on average, and hangs on the object as a thin line.
 
-use super::bitmap::{Bitmap, Connectivity};
+use super::bitmap::{Bitmap, Component, Connectivity};
 use super::turntable::Turntable;
 
 /// A line is at most twice this share of the frame's width wide.
 const WIDTH: f64 = 0.005;
 /// The table begins at most this share of the frame's width below it, and the room as far above it.
 const REACH: f64 = 0.03;
-/// A line is at least so many times as long as wide.
-const LENGTH: usize = 4;
+/// A line is at least so many times as long as it is thick on average, and longer than the widest line is wide.
+const LENGTH: u64 = 4;
 /// This share of a line's pixels has the table below and the room above.
 const BETWEEN: f64 = 0.4;
 
@@ -32,11 +32,16 @@ pub(super) fn without_rim(object: &Bitmap, table: &Turntable, size: (usize, usiz
         .iter()
         .zip(of_rim)
         .map(|(component, count)| {
-            component.bounds.w as usize >= LENGTH * 2 * radius
-                && count as f64 >= BETWEEN * component.area as f64
+            is_line(component, radius) && count as f64 >= BETWEEN * component.area as f64
         })
         .collect();
     object.map(|at, bit| bit && !components.at(at).is_some_and(|component| is_rim[component]))
+}
+
+fn is_line(component: &Component, radius: usize) -> bool {
+    let length = u64::from(component.bounds.w);
+    // Its mean thickness is its area by its length.
+    length >= 2 * radius as u64 && length * length >= LENGTH * component.area
 }
 
 /// Whether there is a plain dark surface below a pixel, and something else than that and the object above.
@@ -80,6 +85,15 @@ mod tests {
         let body = |x: usize, y: usize| (30..50).contains(&x) && (10..50).contains(&y);
         let rim = |x: usize, y: usize| (5..75).contains(&x) && (39..41).contains(&y);
         let object = bitmap(|x, y| body(x, y) || rim(x, y));
+        let left = without_rim(&object, &table(), SIZE);
+        assert_eq!(left, bitmap(body));
+    }
+
+    #[test]
+    fn a_short_piece_of_the_rim_is_taken_away_too() {
+        let body = |x: usize, y: usize| (30..50).contains(&x) && (10..50).contains(&y);
+        let spike = |x: usize, y: usize| (50..56).contains(&x) && y == 41;
+        let object = bitmap(|x, y| body(x, y) || spike(x, y));
         let left = without_rim(&object, &table(), SIZE);
         assert_eq!(left, bitmap(body));
     }
