@@ -23,6 +23,8 @@ import { Work } from "./work.js";
 
 /** Longer questions are shown as going on, milliseconds. */
 const LONG = 300;
+/** The background to begin with. */
+const FIRST = "room";
 
 notices.listen();
 bindTabs();
@@ -35,8 +37,8 @@ begin().catch((error) => {
 async function begin() {
   const engine = await Engine.start((text) => ($("loading").textContent = text));
   const library = new Library(engine);
-  const [first] = await library.bundled();
-  const work = new Work(emptyScene(first.key));
+  const bundled = await library.bundled();
+  const work = new Work(emptyScene((bundled.find(({ key }) => key === FIRST) ?? bundled[0]).key));
   const rendering = new Rendering(engine, library, work, painterOn($("picture")), $("picture"));
   const cutter = new Cutter(library);
   const objects = new Objects(work, library, cutter, rendering);
@@ -127,7 +129,7 @@ function showState(engine, rendering) {
   rendering.addEventListener("problem", ({ detail }) => notices.alert(detail));
   rendering.addEventListener("state", () => (document.body.dataset.picture = rendering.rests ? "sharp" : "draft"));
   rendering.addEventListener("picture", () => {
-    $("frame").style.setProperty("--ratio", rendering.width / rendering.height);
+    $("work").style.setProperty("--ratio", rendering.width / rendering.height);
     const notes = rendering.notes.join("\n");
     if ($("notes").dataset.text === notes) return;
     $("notes").dataset.text = notes;

@@ -1,6 +1,7 @@
 // Sliders, switches and colours: each shows a value of the scene, its light or the selected object, and changes it.
 
 import { $ } from "./dom.js";
+import { lampAt, lampAzimuth } from "./scene.js";
 
 const degrees = (value) => `${Math.round(value)}°`;
 const percent = (value) => `${Math.round(100 * value)} %`;
@@ -24,7 +25,7 @@ const CONTROLS = {
   "balance": { of: "scene", read: ({ white_balance }) => white_balance === "auto", write: (auto) => ({ white_balance: auto ? "auto" : "light" }) },
   "shape": { of: "scene", read: ({ size }) => size.join("x"), write: (text) => ({ size: text.split("x").map(Number) }) },
   "turn": { of: "light", read: ({ turn }) => turn, write: (turn) => ({ turn }), text: degrees },
-  "azimuth": { of: "light", read: ({ azimuth }) => azimuth, write: (azimuth) => ({ azimuth }), text: degrees },
+  "azimuth": { of: "light", read: lampAzimuth, write: lampAt, text: degrees },
   "elevation": { of: "light", read: ({ elevation }) => elevation, write: (elevation) => ({ elevation }), text: degrees },
   "colour": { of: "light", read: ({ colour }) => colour, write: (colour) => ({ colour }) },
   "size": { of: "light", read: ({ size }) => size, write: (size) => ({ size }), text: degrees },

@@ -1,6 +1,7 @@
 // The lamp: dragged on a dial of the sky, which is seen from above, and on the picture, around the selected object.
 
 import { $, clamp } from "./dom.js";
+import { lampAt, lampAzimuth } from "./scene.js";
 
 /** The lamp's distance from the object on the picture, in parts of the picture's shorter side. */
 const REACH = 0.42;
@@ -38,12 +39,11 @@ export class Lamp {
   }
 
   #turn(azimuth, elevation) {
-    const around = Math.round(((azimuth % 360) + 360) % 360);
-    this.#work.changeLight({ kind: "lamp", azimuth: around % 360, elevation: Math.round(elevation) }, "lamp");
+    this.#work.changeLight({ kind: "lamp", ...lampAt(azimuth, this.#work.scene.light), elevation: Math.round(elevation) }, "lamp");
   }
 
   get #isBehind() {
-    return Math.cos(this.#work.scene.light.azimuth * RADIANS) < -1e-6;
+    return Math.cos(lampAzimuth(this.#work.scene.light) * RADIANS) < -1e-6;
   }
 
   /** Where a pointer is, from the object's middle: to the right and up, 1 at the lamp's distance. */
@@ -67,7 +67,9 @@ export class Lamp {
   }
 
   #show() {
-    const { kind, azimuth, elevation, colour } = this.#work.scene.light;
+    const { light } = this.#work.scene;
+    const { kind, elevation, colour } = light;
+    const azimuth = lampAzimuth(light);
     const [sin, cos] = [Math.sin(azimuth * RADIANS), Math.cos(azimuth * RADIANS)];
     const radius = 50 * (1 - clamp(elevation, 0, 90) / 90);
     place($("dial-lamp"), 50 + radius * sin, 50 + radius * cos, colour);

@@ -9,10 +9,13 @@ export function say(text) {
 
 /** Says what failed, until it is read. */
 export function alert(text) {
-  $("alert-text").textContent = text;
+  $("alert-text").textContent = sentence(text);
   $("alert").hidden = false;
   say("");
 }
+
+/** The engine's messages end without a full stop, as they do in a terminal. */
+const sentence = (text) => (/[.!?]$/.test(text) ? text : `${text}.`);
 
 /** Takes the alert away. */
 export function calm() {

@@ -1,4 +1,4 @@
-// The objects of the scene: added from files, listed, ordered, copied, removed; and what a photograph was taken apart into.
+// The objects of the scene: added from files, listed, ordered, copied, removed; and what a photograph was decomposed into.
 
 import { $, make } from "./dom.js";
 import { copyOf } from "./files.js";
@@ -50,9 +50,7 @@ export class Objects {
       return say("");
     }
     await this.#decompose(photo);
-    const object = newObject(photo.object, placeFor(photo, this.#work.scene));
-    this.#work.change(added(this.#work.scene, object));
-    this.#work.select(object.key);
+    this.#work.add(added(this.#work.scene, newObject(photo.object, placeFor(photo, this.#work.scene))));
     await this.#library.closeAllBut(this.#work.reachable);
     return say(`${photo.name} stands in the scene.`);
   }
@@ -79,7 +77,7 @@ export class Objects {
     const change = (how) => () => attempt(() => this.#work.change(how(this.#work.scene, this.#work.selected)));
     $("forward").addEventListener("click", change((scene, key) => reordered(scene, key, 1)));
     $("backward").addEventListener("click", change((scene, key) => reordered(scene, key, -1)));
-    $("duplicate").addEventListener("click", change(duplicated));
+    $("duplicate").addEventListener("click", () => attempt(() => this.#work.add(duplicated(this.#work.scene, this.#work.selected))));
     $("remove").addEventListener("click", change(removed));
     $("cut-again").addEventListener("click", () => attempt(() => this.#cutAgain()));
     $("large-close").addEventListener("click", () => this.#enlarge(null));

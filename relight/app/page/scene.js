@@ -59,6 +59,14 @@ export function reordered(scene, key, step) {
   return { ...scene, objects };
 }
 
+/** Where the lamp is seen: all light is turned, and it with all. */
+export const lampAzimuth = ({ azimuth, turn }) => around(azimuth + turn);
+
+/** A lamp that is seen at an azimuth. */
+export const lampAt = (azimuth, { turn }) => ({ azimuth: around(azimuth - turn) });
+
+const around = (degrees) => Math.round(((degrees % 360) + 360) % 360) % 360;
+
 export const find = (scene, key) => scene.objects.find((object) => object.key === key);
 
 /** The scene as text, without where its objects stand: two scenes with the same text differ in placement only. */

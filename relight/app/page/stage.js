@@ -2,6 +2,7 @@
 // object, a panorama is turned.
 
 import { $, clamp } from "./dom.js";
+import { attempt } from "./notices.js";
 import { duplicated, removed, reordered } from "./scene.js";
 
 /** So far beside an object's box it is still meant, pixels of the page. */
@@ -133,7 +134,7 @@ export class Stage {
     PageDown: ({ key }) => this.#work.change(reordered(this.#work.scene, key, -1)),
     Delete: ({ key }) => this.#work.change(removed(this.#work.scene, key)),
     Backspace: ({ key }) => this.#work.change(removed(this.#work.scene, key)),
-    d: ({ key }) => this.#work.change(duplicated(this.#work.scene, key)),
+    d: ({ key }) => attempt(() => this.#work.add(duplicated(this.#work.scene, key))),
     n: ({ key }) => this.#next(key),
   };
 

@@ -60,6 +60,12 @@ export class Work extends EventTarget {
     this.#tell();
   }
 
+  /** Goes on to a scene that has a new object, which is selected. */
+  add(scene) {
+    this.change(scene);
+    this.select(scene.objects.at(-1).key);
+  }
+
   changeScene(parts, join) {
     this.change({ ...this.scene, ...parts }, join);
   }

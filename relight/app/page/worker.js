@@ -12,12 +12,23 @@ self.addEventListener("message", ({ data }) => {
 
 async function begin(module) {
   try {
-    const imports = { env: { relight_now: () => performance.now() } };
-    exports = (await WebAssembly.instantiate(module, imports)).exports;
+    exports = (await WebAssembly.instantiate(module, importsOf(module))).exports;
     self.postMessage({ ready: true });
   } catch (error) {
     self.postMessage({ broken: error.message });
   }
+}
+
+/** The clock, and for every other import of the module, which nothing calls, a function that says so if it is called. */
+function importsOf(module) {
+  const imports = { env: { relight_now: () => performance.now() } };
+  for (const { module: from, name } of WebAssembly.Module.imports(module)) {
+    imports[from] ??= {};
+    imports[from][name] ??= () => {
+      throw new Error(`the engine asked for ${name}, which the page does not have`);
+    };
+  }
+  return imports;
 }
 
 async function answer({ id, fields, parts }) {
