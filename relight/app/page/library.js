@@ -44,7 +44,8 @@ export class Library {
   async decompose(photo) {
     if (photo.layers) return photo.layers;
     const { parts, width, height, ...answer } = await this.#engine.ask("decompose", { object: photo.object });
-    photo.layers = { ...answer, width, height, pictures: parts.map((part) => canvasOf(part, width, height)) };
+    const bounds = boundsOf(photo).map((part, side) => (side % 2 ? (part * height) / photo.height : (part * width) / photo.width));
+    photo.layers = { ...answer, pictures: parts.map((part) => cropped(canvasOf(part, width, height), bounds)) };
     return photo.layers;
   }
 
@@ -170,6 +171,13 @@ function smallOf(photo) {
     context.drawImage(maskCanvas(photo), x, y, w, h, 0, 0, width, height);
   }
   return small;
+}
+
+/** The part of a picture in a rectangle. */
+function cropped(picture, [x, y, w, h]) {
+  const part = new OffscreenCanvas(Math.max(1, Math.round(w)), Math.max(1, Math.round(h)));
+  part.getContext("2d").drawImage(picture, x, y, w, h, 0, 0, part.width, part.height);
+  return part;
 }
 
 /** The mask as a canvas that is opaque on the object. */
