@@ -32,8 +32,9 @@ export class Rendering extends EventTarget {
   #changed = 0;
   #timer = 0;
   #running = false;
-  /** What the layers show: { scene, look, sharp, layers }. */
+  /** The newest layers: { scene, look, sharp, layers }. */
   #shown = null;
+  /** The newest picture of the objects as they were photographed: { scene, picture }. */
   #before = null;
   #wantsBefore = false;
 
@@ -53,8 +54,7 @@ export class Rendering extends EventTarget {
   /** Shows the objects as they were photographed, or in the scene's light. */
   showBefore(before) {
     this.#wantsBefore = before;
-    if (!before && this.#painter.layered && this.#shown) this.#paint();
-    else if (!before) this.refresh();
+    this.#show();
     this.#plan();
   }
 
@@ -80,7 +80,7 @@ export class Rendering extends EventTarget {
   /** What is to be made next, and when. */
   #next() {
     const { scene } = this.#work;
-    if (this.#wantsBefore) return this.#before === scene ? null : { sharp: true, at: 0 };
+    if (this.#wantsBefore) return this.#before?.scene === scene ? null : { sharp: true, at: 0 };
     if (this.#shown?.scene === scene) return this.#shown.sharp ? null : { sharp: true, at: this.#changed + STILL };
     const moved = this.#painter.layered && this.#shown?.look === lookOf(scene);
     return moved ? { sharp: true, at: this.#changed + PLACED } : { sharp: false, at: 0 };
@@ -95,7 +95,7 @@ export class Rendering extends EventTarget {
       else await this.#makeLayers(scene, sharp);
     } catch (error) {
       this.#shown = { scene, look: lookOf(scene), sharp: true, layers: null };
-      this.#before = this.#wantsBefore ? scene : null;
+      this.#before = { scene, picture: null };
       this.dispatchEvent(new CustomEvent("problem", { detail: error.message }));
     }
     this.#running = false;
@@ -104,11 +104,8 @@ export class Rendering extends EventTarget {
 
   async #makeBefore(scene) {
     const picture = await this.#engine.ask("render", { scene: forEngine(scene), longest: this.#sharpest(), before: true });
-    this.#before = scene;
-    if (!this.#wantsBefore) return;
-    this.#painter.show(picture);
-    this.#shown = null;
-    this.#tell(picture, scene);
+    this.#before = { scene, picture };
+    if (this.#wantsBefore) this.#show();
   }
 
   async #makeLayers(scene, sharp) {
@@ -116,13 +113,18 @@ export class Rendering extends EventTarget {
     const longest = sharp ? this.#sharpest() : this.#draft;
     const layers = await this.#engine.ask(this.#painter.layered ? "layers" : "render", { scene: forEngine(scene), longest, ...(this.#painter.layered ? {} : { before: false }) });
     if (!sharp) this.#learn(performance.now() - began);
-    if (this.#wantsBefore) return;
     this.#shown = { scene, look: lookOf(scene), sharp, layers };
-    this.#before = null;
-    if (this.#painter.layered) this.#painter.load(layers);
-    else this.#painter.show(layers);
-    this.#tell(layers, scene);
-    this.#paint();
+    if (!this.#wantsBefore) this.#show();
+  }
+
+  /** Shows what is here: the layers, or the picture of before where it is the scene's. */
+  #show() {
+    const { scene, picture } = this.#wantsBefore ? this.#before ?? {} : { scene: this.#shown?.scene, picture: this.#shown?.layers };
+    if (!picture || (this.#wantsBefore && scene !== this.#work.scene)) return;
+    if (this.#wantsBefore || !this.#painter.layered) this.#painter.show(picture);
+    else this.#painter.load(picture);
+    this.#tell(picture, scene);
+    if (!this.#wantsBefore) this.#paint();
   }
 
   /** Smaller drafts where they take long, larger ones where they do not. */
