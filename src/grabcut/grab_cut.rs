@@ -152,9 +152,10 @@ pub(super) fn iterate<const D: usize, F: Field<D>>(
 ) -> Result<Models<D>, MaskError> {
     let active = open_pixels(labels);
     let scale = contrast_scale(field);
+    let mut open = OpenCut::new(field, scale, labels, &active);
     let mut models = match first {
         Some(models) => {
-            cut(field, &models, scale, labels, &active);
+            open.decide(field, &models, labels);
             check_sides(labels)?;
             models
         }
@@ -164,7 +165,7 @@ pub(super) fn iterate<const D: usize, F: Field<D>>(
         if round > 0 {
             models.refine(field, labels);
         }
-        let changed = cut(field, &models, scale, labels, &active);
+        let changed = open.decide(field, &models, labels);
         check_sides(labels)?;
         if changed == 0 && round > 0 {
             break;
@@ -208,49 +209,84 @@ pub(super) fn contrast_scale<const D: usize, F: Field<D>>(field: &F) -> f32 {
     (0.5 / mean.max(1e-6)) as f32
 }
 
-/// Decides the `active` pixels, which are in order, by one minimum cut. Returns how many changed.
-pub(super) fn cut<const D: usize, F: Field<D>>(
-    field: &F,
-    models: &Models<D>,
-    scale: f32,
-    labels: &mut [Label],
-    active: &[u32],
-) -> usize {
-    let size = field.size();
-    let mut node_of = vec![NONE; labels.len()];
-    for (node, &at) in active.iter().enumerate() {
-        node_of[at as usize] = node as u32;
-    }
-    let mut graph = PixelGraph::with_capacity(active.len());
-    for &at in active {
-        let at = at as usize;
-        let ratio = models.log_ratio(&field.feature(at)) + field.evidence(at);
-        let mut terminal = (ratio.clamp(-MOST_COST, MOST_COST) * UNIT) as i32;
-        let mut neighbours = [NONE; 8];
-        let mut capacity = [0; 8];
-        for direction in 0..8 {
-            let Some(next) = neighbour(at, direction, size) else {
-                continue;
-            };
-            let cost = separation(field, scale, at, next, direction);
-            match node_of[next] {
-                NONE if labels[next].is_object() => terminal += cost,
-                NONE => terminal -= cost,
-                node => {
-                    neighbours[direction] = node;
-                    capacity[direction] = cost;
+/// Minimum cuts of the same pixels by changing models.
+pub(super) struct OpenCut<'a> {
+    /// The pixels that are decided, in order.
+    active: &'a [u32],
+    graph: PixelGraph,
+    /// What neighbours that are not decided make each of them cost.
+    border: Vec<i32>,
+    /// The costs of the last cut.
+    terminals: Vec<i32>,
+}
+
+impl<'a> OpenCut<'a> {
+    /// The graph of the `active` pixels, which are in order. Labels of the others may not change between cuts.
+    pub(super) fn new<const D: usize, F: Field<D>>(
+        field: &F,
+        scale: f32,
+        labels: &[Label],
+        active: &'a [u32],
+    ) -> Self {
+        let size = field.size();
+        let mut node_of = vec![NONE; labels.len()];
+        for (node, &at) in active.iter().enumerate() {
+            node_of[at as usize] = node as u32;
+        }
+        let mut graph = PixelGraph::with_capacity(active.len());
+        let mut border = vec![0; active.len()];
+        for (&at, border) in active.iter().zip(&mut border) {
+            let at = at as usize;
+            let mut neighbours = [NONE; 8];
+            let mut capacity = [0; 8];
+            for direction in 0..8 {
+                let Some(next) = neighbour(at, direction, size) else {
+                    continue;
+                };
+                let cost = separation(field, scale, at, next, direction);
+                match node_of[next] {
+                    NONE if labels[next].is_object() => *border += cost,
+                    NONE => *border -= cost,
+                    node => {
+                        neighbours[direction] = node;
+                        capacity[direction] = cost;
+                    }
                 }
             }
+            graph.add(0, neighbours, capacity);
         }
-        graph.add(terminal, neighbours, capacity);
+        Self {
+            active,
+            graph,
+            terminals: vec![0; border.len()],
+            border,
+        }
     }
-    let mut changed = 0;
-    for (&at, object) in active.iter().zip(graph.cut()) {
-        let label = &mut labels[at as usize];
-        changed += usize::from(label.is_object() != object);
-        *label = Label::probably(object);
+
+    /// Decides the pixels by one minimum cut. Returns how many changed.
+    pub(super) fn decide<const D: usize, F: Field<D>>(
+        &mut self,
+        field: &F,
+        models: &Models<D>,
+        labels: &mut [Label],
+    ) -> usize {
+        for (node, &at) in self.active.iter().enumerate() {
+            let at = at as usize;
+            let ratio = models.log_ratio(&field.feature(at)) + field.evidence(at);
+            let own = (ratio.clamp(-MOST_COST, MOST_COST) * UNIT) as i32;
+            let terminal = own + self.border[node];
+            self.graph
+                .change(node as u32, terminal - self.terminals[node]);
+            self.terminals[node] = terminal;
+        }
+        let mut changed = 0;
+        for (&at, object) in self.active.iter().zip(self.graph.cut()) {
+            let label = &mut labels[at as usize];
+            changed += usize::from(label.is_object() != object);
+            *label = Label::probably(object);
+        }
+        changed
     }
-    changed
 }
 
 fn separation<const D: usize, F: Field<D>>(

@@ -82,8 +82,14 @@ impl PixelGraph {
         });
     }
 
-    /// Finds the minimum cut; true for the nodes on the source's side.
-    pub(super) fn cut(mut self) -> Vec<bool> {
+    /// Changes what it costs to put a node on the sink's side, minus what it costs to put it on the source's, by so much. What
+    /// flows already stays: the next cut has only the rest to find, and is that of the new costs all the same.
+    pub(super) fn change(&mut self, node: u32, by: i32) {
+        self.node_mut(node).terminal += by;
+    }
+
+    /// Finds the minimum cut; true for the nodes on the source's side: of several least cuts the one with the fewest of them.
+    pub(super) fn cut(&mut self) -> Vec<bool> {
         self.plant();
         let mut growing = None;
         while let Some(at) = growing.take().or_else(|| self.next_active()) {
@@ -109,19 +115,20 @@ impl PixelGraph {
         &mut self.nodes[at as usize]
     }
 
+    /// Both trees anew: their first nodes are those with residual capacity to a terminal.
     fn plant(&mut self) {
+        self.time = 0;
         for at in 0..self.nodes.len() as u32 {
             let node = self.node_mut(at);
-            if node.terminal == 0 {
-                continue;
-            }
-            node.tree = match node.terminal {
-                1.. => Tree::Source,
-                _ => Tree::Sink,
+            (node.tree, node.parent) = match node.terminal {
+                0 => (Tree::Free, ORPHAN),
+                1.. => (Tree::Source, TERMINAL),
+                _ => (Tree::Sink, TERMINAL),
             };
-            node.parent = TERMINAL;
-            node.distance = 1;
-            self.activate(at);
+            (node.queued, node.distance, node.stamp) = (false, 1, 0);
+            if node.terminal != 0 {
+                self.activate(at);
+            }
         }
     }
 
@@ -366,6 +373,10 @@ mod tests {
         }
 
         fn cut(&self) -> Vec<bool> {
+            self.graph().cut()
+        }
+
+        fn graph(&self) -> PixelGraph {
             let mut graph = PixelGraph::with_capacity(self.terminals.len());
             for (at, &terminal) in self.terminals.iter().enumerate() {
                 let next = |d| self.neighbour(at, d).map_or(NONE, |next| next as u32);
@@ -374,7 +385,7 @@ mod tests {
                     (std::array::from_fn(next), std::array::from_fn(capacity));
                 graph.add(terminal, neighbours, capacities);
             }
-            graph.cut()
+            graph
         }
 
         fn cost(&self, side: &[bool]) -> i64 {
@@ -427,6 +438,22 @@ mod tests {
                 .map(|bits| (0..count).map(|at| bits >> at & 1 == 1).collect::<Vec<_>>());
             let least = sides.map(|side| grid.cost(&side)).min();
             prop_assert_eq!(Some(found), least);
+        }
+
+        #[test]
+        fn a_cut_after_changes_is_that_of_a_new_graph(
+            mut grid in any_grid(),
+            changes in prop::collection::vec(prop::collection::vec(-9i32..10, 12), 1..4),
+        ) {
+            let mut graph = grid.graph();
+            prop_assert_eq!(graph.cut(), grid.cut());
+            for change in changes {
+                for (at, by) in change.into_iter().take(grid.terminals.len()).enumerate() {
+                    grid.terminals[at] += by;
+                    graph.change(at as u32, by);
+                }
+                prop_assert_eq!(graph.cut(), grid.cut());
+            }
         }
     }
 

@@ -6,7 +6,7 @@
 use image::RgbImage;
 
 use super::bitmap::Bitmap;
-use super::grab_cut::{self, Field, Label, Models};
+use super::grab_cut::{self, Field, Label, Models, OpenCut};
 use super::lab::LabTable;
 use super::{Effort, Iterations, MaskError};
 
@@ -126,7 +126,7 @@ pub(super) fn refine<const D: usize>(
     let band = band(labels, size, BAND);
     models.refine(field, labels);
     let scale = grab_cut::contrast_scale(field);
-    grab_cut::cut(field, models, scale, labels, &band);
+    OpenCut::new(field, scale, labels, &band).decide(field, models, labels);
 }
 
 /// Each pixel that is not sure takes the coarse result.
