@@ -1,6 +1,6 @@
 //! The shape of an object out of its normals, as far as its shadow needs it. Knows nothing of light.
 
-use relight_core::image::{Extent, Planes};
+use relight_core::image::{Extent, Planes, beside};
 use relight_core::light::{Normals, YUp};
 
 /// The longest side of the grid on which heights are found, cells.
@@ -66,6 +66,45 @@ impl Relief {
     }
 }
 
+/// A cell with its neighbours inside.
+struct Cell {
+    at: u32,
+    /// The four neighbours, left, right, above and below; itself where there is none.
+    around: [u32; 4],
+    /// How many there are not.
+    missing: f32,
+    /// One over the number of neighbours.
+    share: f32,
+    /// How much higher it is than they are in the mean, by the slopes.
+    step: f32,
+}
+
+impl Cell {
+    /// None where it has no neighbour.
+    fn of(at: usize, extent: Extent, inside: &[bool], slopes: &[[f32; 2]]) -> Option<Self> {
+        let (mut cell, mut count) = ([at as u32; 4], 0.0);
+        let mut sum = 0.0;
+        let sides = [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)];
+        for (side, other) in beside(extent, at).into_iter().enumerate() {
+            let Some(other) = other.filter(|&other| inside[other]) else {
+                continue;
+            };
+            // Rows go down, as slopes are told.
+            let (axis, sign) = sides[side];
+            sum -= sign * (slopes[at][axis] + slopes[other][axis]) / 2.0;
+            count += 1.0;
+            cell[side] = other as u32;
+        }
+        (count > 0.0).then(|| Self {
+            at: at as u32,
+            around: cell,
+            missing: 4.0 - count,
+            share: 1.0 / count,
+            step: sum / count,
+        })
+    }
+}
+
 /// Heights of the cells inside, up to a constant.
 fn integrated(normals: &Normals<YUp>, inside: &[bool]) -> Vec<f32> {
     let extent = normals.extent();
@@ -76,33 +115,18 @@ fn integrated(normals: &Normals<YUp>, inside: &[bool]) -> Vec<f32> {
         [-x[at] / facing, y[at] / facing]
     };
     let slopes: Vec<[f32; 2]> = (0..inside.len()).map(slope).collect();
+    let cells: Vec<Cell> = (0..inside.len())
+        .filter(|&at| inside[at])
+        .filter_map(|at| Cell::of(at, extent, inside, &slopes))
+        .collect();
     let mut heights = vec![0.0_f32; inside.len()];
     for _ in 0..ROUNDS {
-        for at in (0..inside.len()).filter(|&at| inside[at]) {
-            let (column, row) = (at % extent.width, at / extent.width);
-            let (mut sum, mut count) = (0.0, 0.0);
-            let mut add = |other: usize, axis: usize, sign: f32| {
-                if inside[other] {
-                    let step = (slopes[at][axis] + slopes[other][axis]) / 2.0;
-                    sum += heights[other] - sign * step;
-                    count += 1.0;
-                }
-            };
-            if column > 0 {
-                add(at - 1, 0, -1.0);
-            }
-            if column + 1 < extent.width {
-                add(at + 1, 0, 1.0);
-            }
-            if row > 0 {
-                add(at - extent.width, 1, -1.0);
-            }
-            if row + 1 < extent.height {
-                add(at + extent.width, 1, 1.0);
-            }
-            if count > 0.0 {
-                heights[at] += RELAXATION * (sum / count - heights[at]);
-            }
+        for cell in &cells {
+            let sum: f32 = cell.around.iter().map(|&at| heights[at as usize]).sum();
+            // A side without a neighbour counts the cell itself, which is taken out again.
+            let height = &mut heights[cell.at as usize];
+            let mean = (sum - cell.missing * *height) * cell.share + cell.step;
+            *height += RELAXATION * (mean - *height);
         }
     }
     heights

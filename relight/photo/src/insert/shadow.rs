@@ -2,6 +2,8 @@
 //! cast shadow and contact shadow are one.
 
 use std::f64::consts::{PI, TAU};
+use std::iter::StepBy;
+use std::ops::Range;
 
 use super::relief::Relief;
 use relight_core::image::{Extent, Planes};
@@ -17,6 +19,8 @@ const RAYS: usize = 24;
 const REACH: f64 = 1.5;
 /// The part of the object's lowest points that may lie below the ground: normals at the rim are rough.
 const BELOW_GROUND: f64 = 0.03;
+/// The least part of a direction along an axis.
+const LEAST_LEAN: f32 = 1e-6;
 /// Ground that is seen more edge-on than this is as if it were seen so, radians.
 const LEAST_TILT: f64 = 0.08;
 
@@ -30,10 +34,14 @@ pub(super) struct Shadow {
 }
 
 /// A direction with the light from there that falls on the ground.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Ray {
-    towards: [f64; 3],
+    towards: [f32; 3],
+    /// One over each part of the direction, so that the shape's box is found without a division.
+    over: [f32; 3],
     light: [f32; 3],
+    /// Columns and rows of the ground from which it may meet the shape, from the relief's first cell.
+    shaded: [Range<f32>; 2],
 }
 
 /// The ground: points p with p · up = level.
@@ -46,7 +54,7 @@ impl Shadow {
     /// The shadow of a shape on ground that the camera looks down on by `tilt` radians, in the light of a panorama.
     pub(super) fn cast(relief: &Relief, tilt: f64, light: &Panorama) -> Self {
         let ground = Ground::under(relief, tilt);
-        let patterns = rays(&ground, &light.resized(DRAWN));
+        let patterns = rays(&ground, relief.around(), &light.resized(DRAWN));
         let Extent { width, height } = relief.extent;
         let (beside, beyond) = (
             (width.max(height) as f64 * REACH) as usize,
@@ -55,12 +63,17 @@ impl Shadow {
         let extent = Extent::new(width + 2 * beside, height + beyond);
         // Ground that is higher in the picture than the object's top is far behind it.
         let from = [-(beside as i64), 0];
-        let mut arriving = Planes::filled(extent, [1.0; 3]);
-        arriving.fill_rows(|y, [red, green, blue]| {
-            for x in 0..extent.width {
-                let rays = &patterns[y % PATTERN * PATTERN + x % PATTERN];
-                let place = [x as f64 + 0.5 + from[0] as f64, -(y as f64 + 0.5)];
-                [red[x], green[x], blue[x]] = ground.arriving(relief, place, rays);
+        let mut arriving = Planes::zeros(extent);
+        arriving.fill_rows(|y, mut row| {
+            for column in 0..PATTERN {
+                let rays = &patterns[y % PATTERN * PATTERN + column];
+                let cells = (column..extent.width).step_by(PATTERN);
+                ground.shade(
+                    relief,
+                    rays,
+                    &mut row,
+                    (cells, y as f64 + 0.5, from[0] as f64),
+                );
             }
         });
         // Every square of the pattern holds all directions.
@@ -94,47 +107,103 @@ impl Ground {
         }
     }
 
-    /// The part of the light that arrives at the ground that is seen at a place.
-    fn arriving(&self, relief: &Relief, [x, y]: [f64; 2], rays: &[Ray]) -> [f32; 3] {
-        let z = (self.level - y * self.up[1]) / self.up[2];
-        let (mut all, mut open) = ([0.0_f32; 3], [0.0_f32; 3]);
-        for ray in rays {
-            let arrives = !relief.blocks([x, y, z], ray.towards);
-            for c in 0..3 {
-                all[c] += ray.light[c];
-                open[c] += if arrives { ray.light[c] } else { 0.0 };
+    /// Fills in the part of the light that arrives at some cells of a row of the ground, which is so far below the relief's
+    /// first row; the row begins at column `first` of the relief.
+    fn shade(
+        &self,
+        relief: &Relief,
+        rays: &[Ray],
+        row: &mut [&mut [f32]; 3],
+        (cells, below, first): (StepBy<Range<usize>>, f64, f64),
+    ) {
+        let z = (self.level + below * self.up[1]) / self.up[2];
+        let all = rays.iter().fold([0.0_f32; 3], |all, ray| {
+            [0, 1, 2].map(|c| all[c] + ray.light[c])
+        });
+        // First all that is kept from each cell, then what is left of the light.
+        for ray in rays
+            .iter()
+            .filter(|ray| ray.shaded[1].contains(&(below as f32)))
+        {
+            for x in cells.clone() {
+                let at = (x as f64 + 0.5 + first) as f32;
+                let may_meet = ray.shaded[0].contains(&at);
+                if may_meet && relief.blocks([at, -below as f32, z as f32], ray) {
+                    for c in 0..3 {
+                        row[c][x] += ray.light[c];
+                    }
+                }
             }
         }
-        [0, 1, 2].map(|c| if all[c] > 0.0 { open[c] / all[c] } else { 1.0 })
+        for c in 0..3 {
+            for x in cells.clone() {
+                let kept = if all[c] > 0.0 {
+                    row[c][x] / all[c]
+                } else {
+                    0.0
+                };
+                row[c][x] = (1.0 - kept).max(0.0);
+            }
+        }
+    }
+
+    /// Columns and rows of the ground, rows downwards, from which a direction leads into a box.
+    fn shaded(&self, [low, high]: [[f32; 3]; 2], towards: [f32; 3]) -> [Range<f32>; 2] {
+        let rises: f64 = (0..3)
+            .map(|axis| f64::from(towards[axis]) * self.up[axis])
+            .sum();
+        let mut ranges = [
+            f32::INFINITY..f32::NEG_INFINITY,
+            f32::INFINITY..f32::NEG_INFINITY,
+        ];
+        for corner in 0..8 {
+            let place = [0, 1, 2].map(|axis| match corner >> axis & 1 {
+                0 => f64::from(low[axis]),
+                _ => f64::from(high[axis]),
+            });
+            let above: f64 = (0..3).map(|axis| place[axis] * self.up[axis]).sum();
+            // A ray meets what is above the ground: the corner itself, or, of an edge that enters the ground, a place between
+            // its ends.
+            let back = ((above - self.level) / rises.max(1e-6)).max(0.0);
+            for back in [0.0, back] {
+                let seen = [0, 1].map(|axis| place[axis] - back * f64::from(towards[axis]));
+                for (range, at) in ranges.iter_mut().zip([seen[0], -seen[1]]) {
+                    range.start = range.start.min(at as f32 - 1.0);
+                    range.end = range.end.max(at as f32 + 1.0);
+                }
+            }
+        }
+        ranges
     }
 }
 
 impl Relief {
-    /// Whether the shape is in the way from a point in a direction. Its cells are 1 wide; rows lie below y = 0.
-    fn blocks(&self, from: [f64; 3], towards: [f64; 3]) -> bool {
+    /// The corners of the box around the shape.
+    fn around(&self) -> [[f32; 3]; 2] {
         let Extent { width, height } = self.extent;
-        let thickest = f64::from(self.thickest);
-        let low = [0.0, -(height as f64), -thickest];
-        let high = [width as f64, 0.0, thickest];
-        let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+        [
+            [0.0, -(height as f32), -self.thickest],
+            [width as f32, 0.0, self.thickest],
+        ]
+    }
+
+    /// Whether the shape is in the way from a point in a direction. Its cells are 1 wide; rows lie below y = 0.
+    fn blocks(&self, from: [f32; 3], ray: &Ray) -> bool {
+        let Extent { width, height } = self.extent;
+        let [low, high] = self.around();
+        let (mut enter, mut leave) = (0.0_f32, f32::INFINITY);
         for axis in 0..3 {
-            if towards[axis].abs() < 1e-9 {
-                if from[axis] < low[axis] || from[axis] > high[axis] {
-                    return false;
-                }
-                continue;
-            }
-            let ends = [low[axis], high[axis]].map(|end| (end - from[axis]) / towards[axis]);
+            let ends = [low[axis], high[axis]].map(|end| (end - from[axis]) * ray.over[axis]);
             enter = enter.max(ends[0].min(ends[1]));
             leave = leave.min(ends[0].max(ends[1]));
         }
         // Steps of less than a cell; the first is a little above the ground.
         let mut along = enter + 0.4;
         while along < leave {
-            let [x, y, z] = [0, 1, 2].map(|axis| from[axis] + along * towards[axis]);
+            let [x, y, z] = [0, 1, 2].map(|axis| from[axis] + along * ray.towards[axis]);
             let (column, row) = (x as usize, (-y) as usize);
             if x >= 0.0 && y <= 0.0 && column < width && row < height {
-                let half = f64::from(self.half[row * width + column]);
+                let half = self.half[row * width + column];
                 if half > 0.0 && z.abs() <= half {
                     return true;
                 }
@@ -147,7 +216,7 @@ impl Relief {
 
 /// Directions for each place of the pattern, half of them drawn by the light and half by the cosine to the ground, weighted by
 /// Veach's balance heuristic.
-fn rays(ground: &Ground, light: &Panorama) -> Vec<Vec<Ray>> {
+fn rays(ground: &Ground, around: [[f32; 3]; 2], light: &Panorama) -> Vec<Vec<Ray>> {
     let positive = light.image().planes().clone().map(|v| v.max(0.0));
     let light =
         Panorama::new(relight_core::image::Rgb::new(positive)).unwrap_or_else(|_| light.clone());
@@ -161,8 +230,19 @@ fn rays(ground: &Ground, light: &Panorama) -> Vec<Vec<Ray>> {
         }
         let density = sampler.density(direction) + cosine / PI;
         let light = sampler.panorama().radiance(direction);
+        // A ray along a side of the box leans a little: nothing is divided by 0.
+        let leaning = towards.map(|part| {
+            let part = part as f32;
+            if part.abs() < LEAST_LEAN {
+                LEAST_LEAN
+            } else {
+                part
+            }
+        });
         Some(Ray {
-            towards,
+            towards: leaning,
+            over: leaning.map(|part| 1.0 / part),
+            shaded: ground.shaded(around, leaning),
             light: light.map(|l| l * (cosine / density) as f32),
         })
     };
@@ -249,6 +329,25 @@ mod tests {
         assert!(below < 0.8 && beside > 0.95, "{below} {beside}");
         let [left, right] = sides(&shadow, &relief);
         assert!((left / right - 1.0).abs() < 0.15, "{left} {right}");
+    }
+
+    #[test]
+    fn rays_meet_the_shape_only_from_where_they_may() {
+        let relief = ball();
+        let ground = Ground::under(&relief, 0.4);
+        let patterns = rays(&ground, relief.around(), &lamp(60.0, 0.3));
+        let mut met = 0;
+        for (number, ray) in patterns.iter().flatten().enumerate() {
+            let x = (number * 37 % 200) as f32 - 70.0;
+            let below = (number * 53 % 110) as f32;
+            let z = ((ground.level + f64::from(below) * ground.up[1]) / ground.up[2]) as f32;
+            if relief.blocks([x, -below, z], ray) {
+                met += 1;
+                let [columns, rows] = &ray.shaded;
+                assert!(columns.contains(&x) && rows.contains(&below), "{x} {below}");
+            }
+        }
+        assert!(met > 30, "{met}");
     }
 
     #[test]
