@@ -380,6 +380,15 @@ fn wrong_usage_and_several_turns_are_refused() {
         );
     }
     let folder = tempfile::tempdir().unwrap();
+    let photo = folder.path().join("photo.jpg");
+    fs::write(&photo, [0xff; 2000]).unwrap();
+    let run = relight(&["turn", photo.to_str().unwrap(), "-o", "missing"]);
+    assert_eq!(run.status.code(), Some(1));
+    assert!(
+        text(&run.stderr).contains("it is a picture"),
+        "{}",
+        text(&run.stderr)
+    );
     let (shard, _) = turn(folder.path(), 12);
     fs::copy(&shard, folder.path().join("again.tar")).unwrap();
     fs::remove_file(folder.path().join("dataset.json")).unwrap();

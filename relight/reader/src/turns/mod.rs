@@ -49,6 +49,11 @@ impl Turns {
         let turns = if path.is_file() {
             let shard = ShardTurn::open(path, None)?;
             if let Some(why) = shard.whole_loss() {
+                let why = if is_picture(path) {
+                    "it is a picture"
+                } else {
+                    why
+                };
                 return Err(OpenError::NoShard {
                     path: path.to_owned(),
                     why: why.to_owned(),
@@ -87,6 +92,14 @@ impl Turns {
             Turn::Folder(folder) => folder.bytes(),
         })
     }
+}
+
+/// Whether a file is called as a picture.
+fn is_picture(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default();
+    ["png", "jpg", "jpeg", "webp", "exr", "hdr"]
+        .iter()
+        .any(|picture| ending.eq_ignore_ascii_case(picture))
 }
 
 impl Turn {
