@@ -175,7 +175,8 @@ pub fn exif_orientation(bytes: &[u8]) -> Option<u8> {
     (stated != Orientation::NoTransforms).then(|| stated.to_exif())
 }
 
-fn decode(path: &Path, bytes: &[u8]) -> Result<DynamicImage, ImageError> {
+/// The picture as it is displayed.
+pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<DynamicImage, ImageError> {
     let open = |source| ImageError::Open {
         path: path.to_owned(),
         source,

@@ -5,6 +5,7 @@ mod colour;
 mod error;
 mod extent;
 mod planes;
+mod reduced;
 mod resize;
 mod wholeness;
 
@@ -15,4 +16,5 @@ pub use colour::{ColourSpace, Gamma22, Linear, Rgb, Srgb, Transfer};
 pub use error::ImageError;
 pub use extent::Extent;
 pub use planes::Planes;
+pub use reduced::ReducedFile;
 pub use resize::{Part, area_shares, beside};

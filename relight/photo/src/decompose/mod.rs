@@ -33,4 +33,4 @@ pub use gloss::fit_gloss;
 pub use mask::{MaskSource, Rectangle};
 #[cfg(feature = "files")]
 pub(crate) use photo::stem;
-pub use photo::{Photo, PhotoHints};
+pub use photo::{Photo, PhotoHints, stated_extent, stated_transfer};

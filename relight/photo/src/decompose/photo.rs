@@ -154,7 +154,8 @@ pub(crate) fn stem(path: &Path) -> String {
 }
 
 /// The size that a file says it has; none where it cannot be read.
-fn stated_extent(bytes: &[u8]) -> Option<Extent> {
+#[must_use]
+pub fn stated_extent(bytes: &[u8]) -> Option<Extent> {
     let reader = ::image::ImageReader::new(Cursor::new(bytes));
     let sides = reader.with_guessed_format().ok()?.into_dimensions().ok()?;
     Some(Extent::new(sides.0 as usize, sides.1 as usize))
@@ -219,10 +220,13 @@ fn shown(planes: &Planes<3>, transfer: Option<Transfer>) -> Planes<3> {
     }
 }
 
-/// How a file of integers says that they are encoded; sRGB where it says nothing.
+/// How a file of integers says that they are encoded; sRGB where it says nothing. Errors name it as `path`.
 ///
 /// A PNG says it by the chunks cICP, sRGB or gAMA. 1 / 2.2 in gAMA is what programs write for sRGB.
-fn stated_transfer(path: &Path, bytes: &[u8]) -> Result<Transfer, DecomposeError> {
+///
+/// # Errors
+/// Where it says what is not read.
+pub fn stated_transfer(path: &Path, bytes: &[u8]) -> Result<Transfer, DecomposeError> {
     // What is no PNG says nothing.
     let Ok(reader) = png::Decoder::new(Cursor::new(bytes)).read_info() else {
         return Ok(Transfer::Srgb);

@@ -4,7 +4,7 @@ use std::iter;
 use std::path::{Path, PathBuf};
 
 use relight_core::image::{Extent, Transfer};
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{DiscLamp, LampFault, MaterialChange, ObjectGloss, Placement, WhiteBalance};
 
@@ -32,7 +32,7 @@ const MOST_OBJECTS: usize = 100;
 /// assert!(SceneDescription::parse("background = 1").is_err());
 /// # Ok::<(), relight_photo::insert::SceneFault>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneDescription {
     /// A photograph, a panorama or a video.
@@ -66,8 +66,8 @@ pub struct SceneDescription {
     pub objects: Vec<ObjectDescription>,
 }
 
-/// Where the light comes from: at most one of these.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+/// Where the light comes from, at most one of panorama, lamp, coefficients and object, and how far it has turned.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightDescription {
     /// A panorama.
@@ -80,10 +80,14 @@ pub struct LightDescription {
     pub coefficients: Option<PathBuf>,
     /// The mask of an object in the background, from which its light is estimated.
     pub object: Option<PathBuf>,
+    /// Degrees by which it is turned about the vertical, from the viewer to the right, and a panorama behind the objects with
+    /// it.
+    #[serde(default)]
+    pub turn: f64,
 }
 
 /// An object of a scene.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectDescription {
     /// Its photograph, or a captured object (`.relit`).
@@ -92,7 +96,12 @@ pub struct ObjectDescription {
     #[serde(default)]
     pub mask: Option<PathBuf>,
     /// How its integers are encoded, where the file is not to be asked.
-    #[serde(default, deserialize_with = "transfer")]
+    #[serde(
+        default,
+        deserialize_with = "transfer",
+        serialize_with = "transfer_name",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub transfer: Option<Transfer>,
     /// The middle of its lower edge in the picture, in parts of its width and height from the upper left corner.
     #[serde(default = "default_at")]
@@ -124,6 +133,9 @@ pub enum SceneFault {
     /// It is no TOML, or has fields that a scene has not.
     #[error("it is no scene: {}", .0.to_string().trim_end())]
     Text(#[from] toml::de::Error),
+    /// It has a path that a text cannot hold.
+    #[error("it cannot be written: {0}")]
+    Unwritten(#[from] toml::ser::Error),
     /// A number is out of its range.
     #[error("{what} is {value}, it has to be {allowed}")]
     Number {
@@ -156,6 +168,14 @@ impl SceneDescription {
         Ok(scene)
     }
 
+    /// The text of the scene, which [`SceneDescription::parse`] reads back as it was.
+    ///
+    /// # Errors
+    /// Where a path is no Unicode.
+    pub fn to_toml(&self) -> Result<String, SceneFault> {
+        Ok(toml::to_string(self)?)
+    }
+
     /// The files that it names: background, light, photographs and masks.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
         let light = &self.light;
@@ -178,11 +198,8 @@ impl SceneDescription {
     /// Whether all that is said can be.
     ///
     /// # Errors
-    /// [`SceneFault`] names the first number that is out of its range.
+    /// [`SceneFault`] names the first number that is out of its range; the number of objects comes last.
     pub fn check(&self) -> Result<(), SceneFault> {
-        if !(1..=MOST_OBJECTS).contains(&self.objects.len()) {
-            return Err(SceneFault::Objects(self.objects.len()));
-        }
         for side in self.size {
             within(
                 "size",
@@ -212,7 +229,10 @@ impl SceneDescription {
         for (number, object) in self.objects.iter().enumerate() {
             object.check(number + 1)?;
         }
-        Ok(())
+        match self.objects.len() {
+            1..=MOST_OBJECTS => Ok(()),
+            count => Err(SceneFault::Objects(count)),
+        }
     }
 }
 
@@ -243,6 +263,13 @@ impl LightDescription {
         if let [first, second, ..] = given.as_slice() {
             return Err(SceneFault::Lights(first, second));
         }
+        within(
+            "light.turn",
+            self.turn,
+            -3600.0,
+            3600.0,
+            "-3600 to 3600 degrees",
+        )?;
         within(
             "light.ambient",
             self.ambient.unwrap_or(0.0),
@@ -338,19 +365,29 @@ fn within(
 }
 
 /// How integers are encoded, as the command line names it.
+#[derive(Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum TransferName {
+    Srgb,
+    Gamma22,
+    Linear,
+}
+
 fn transfer<'de, D: Deserializer<'de>>(text: D) -> Result<Option<Transfer>, D::Error> {
-    #[derive(Deserialize)]
-    #[serde(rename_all = "lowercase")]
-    enum Name {
-        Srgb,
-        Gamma22,
-        Linear,
-    }
-    Ok(Some(match Name::deserialize(text)? {
-        Name::Srgb => Transfer::Srgb,
-        Name::Gamma22 => Transfer::Gamma22,
-        Name::Linear => Transfer::Linear,
+    Ok(Some(match TransferName::deserialize(text)? {
+        TransferName::Srgb => Transfer::Srgb,
+        TransferName::Gamma22 => Transfer::Gamma22,
+        TransferName::Linear => Transfer::Linear,
     }))
+}
+
+fn transfer_name<S: Serializer>(transfer: &Option<Transfer>, to: S) -> Result<S::Ok, S::Error> {
+    let name = transfer.map(|transfer| match transfer {
+        Transfer::Srgb => TransferName::Srgb,
+        Transfer::Gamma22 => TransferName::Gamma22,
+        Transfer::Linear => TransferName::Linear,
+    });
+    name.serialize(to)
 }
 
 fn default_size() -> [u32; 2] {
@@ -409,6 +446,26 @@ mod tests {
     }
 
     #[test]
+    fn a_scene_that_is_written_is_read_back() {
+        let text = r#"
+            background = "room.exr"
+            white_balance = "auto"
+            light = { lamp = "60,30,3200K", ambient = 0.2, turn = -40.5 }
+
+            [[object]]
+            photo = "cup.png"
+            mask = "cup-mask.png"
+            transfer = "gamma22"
+            at = [0.25, 0.75]
+            gloss = [0.3, 40.0]
+        "#;
+        let scene = SceneDescription::parse(text).unwrap();
+        assert_eq!(scene.light.turn, -40.5);
+        let written = scene.to_toml().unwrap();
+        assert_eq!(SceneDescription::parse(&written).unwrap(), scene);
+    }
+
+    #[test]
     fn what_cannot_be_is_named() {
         let object = "[[object]]\nphoto = \"b.jpg\"\n";
         assert!(fault("").contains("missing field `object`"));
@@ -422,6 +479,9 @@ mod tests {
         assert!(
             fault(&format!("light = {{ lamp = \"1\" }}\n{object}"))
                 .contains("light.lamp: give AZIMUTH")
+        );
+        assert!(
+            fault(&format!("light = {{ turn = inf }}\n{object}")).contains("light.turn is inf")
         );
         let both = "light = { lamp = \"1,2\", panorama = \"c.hdr\" }";
         assert!(fault(&format!("{both}\n{object}")).contains("both panorama and lamp"));

@@ -34,14 +34,26 @@ impl<'a> InsertScene<'a> {
         matching: Matching,
         objects: Vec<SceneObject<'a>>,
     ) -> Result<Self, InsertError> {
+        let light = (source.light()?, source.panorama());
+        Self::in_light(extent, light, tilt, matching, objects)
+    }
+
+    /// As [`InsertScene::new`], in a light whose coefficients and panorama are known.
+    pub(super) fn in_light(
+        extent: Extent,
+        (light, panorama): (ShLight, Panorama),
+        tilt: f64,
+        matching: Matching,
+        objects: Vec<SceneObject<'a>>,
+    ) -> Result<Self, InsertError> {
         for (number, object) in objects.iter().enumerate() {
             object.check(extent, number + 1)?;
         }
         let balance = matching.balance.map(|b| f64::from(b * matching.level));
         Ok(Self {
             extent,
-            light: source.light()?.tinted(balance),
-            panorama: source.panorama(),
+            light: light.tinted(balance),
+            panorama,
             tilt: tilt.to_radians(),
             matching,
             objects,

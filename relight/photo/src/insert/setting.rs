@@ -53,6 +53,10 @@ pub struct SceneSetting {
     pub sun: Option<SeenSun>,
     /// How a panorama is exposed.
     pub exposure: Option<PanoramaExposure>,
+    /// The light as coefficients.
+    projected: ShLight,
+    /// The same as a panorama, from which shadows are drawn.
+    around: Panorama,
     /// What a panorama's radiance is multiplied with to be shown.
     panorama_scale: [f32; 3],
 }
@@ -93,6 +97,12 @@ impl SceneSetting {
         let coefficients = light.light()?;
         let tint = scene.white_balance.tint(&coefficients);
         let light = scene.white_balance.shown(light)?;
+        let projected = if scene.white_balance == WhiteBalance::Light {
+            coefficients.clone()
+        } else {
+            light.light()?
+        };
+        let around = light.panorama();
         let base = exposure_for(&coefficients.clone().tinted(tint)) * WHITE * PI;
         let mut panorama_scale = tint.map(|t| t as f32 * base);
         let mut exposure = None;
@@ -109,12 +119,21 @@ impl SceneSetting {
         Ok(Self {
             extent,
             light,
-            tilt: scene.tilt.unwrap_or_else(|| tilt_of(scene, background)),
+            tilt: Self::ground_tilt(scene, background),
             matching,
             sun,
             exposure,
+            projected,
+            around,
             panorama_scale,
         })
+    }
+
+    /// How far the camera of a scene looks down on the ground of its objects, degrees: as far as it is given, or as the first
+    /// object's place says.
+    #[must_use]
+    pub fn ground_tilt(scene: &SceneDescription, background: SceneBackground<'_>) -> f64 {
+        scene.tilt.unwrap_or_else(|| tilt_of(scene, background))
     }
 
     /// The photograph of an object no larger than it has to be for its size in the scene.
@@ -132,7 +151,8 @@ impl SceneSetting {
     /// # Errors
     /// As [`InsertScene::new`].
     pub fn scene<'a>(&self, objects: Vec<SceneObject<'a>>) -> Result<InsertScene<'a>, InsertError> {
-        InsertScene::new(self.extent, &self.light, self.tilt, self.matching, objects)
+        let light = (self.projected.clone(), self.around.clone());
+        InsertScene::in_light(self.extent, light, self.tilt, self.matching, objects)
     }
 
     /// What is seen of a panorama that has turned by so many radians, as bright as it is shown.

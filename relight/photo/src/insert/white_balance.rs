@@ -2,7 +2,7 @@
 
 use relight_core::image::{Linear, Rgb};
 use relight_core::light::{Panorama, ShLight};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::{DiscLamp, InsertError, LightSource};
 
@@ -10,7 +10,7 @@ use super::{DiscLamp, InsertError, LightSource};
 const MOST: f64 = 8.0;
 
 /// How the colour of new light is shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum WhiteBalance {
     /// As the light has it.

@@ -1,0 +1,120 @@
+//! Pictures made smaller in their files, for those who have little memory.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::imageops::FilterType as Kernel;
+use image::{ColorType, DynamicImage, ImageFormat};
+
+use super::ImageError;
+use super::codec::decode;
+
+/// A picture that was made smaller.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReducedFile {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// How its name ends: `png`, or `exr` where values are floating point.
+    pub ending: &'static str,
+}
+
+impl ReducedFile {
+    /// The picture of a file with at most so many pixels, turned as its Exif orientation says; none where the file has no
+    /// more. Integers stay encoded as they are, and are averaged so. Errors name it as `path`.
+    ///
+    /// # Errors
+    /// Where it is no image of a known format, too large, or cut off.
+    pub fn of(path: &Path, bytes: &[u8], most: usize) -> Result<Option<Self>, ImageError> {
+        let image = decode(path, bytes)?;
+        let [width, height] = [image.width(), image.height()];
+        let pixels = f64::from(width) * f64::from(height);
+        if pixels <= most as f64 {
+            return Ok(None);
+        }
+        let scale = (most as f64 / pixels).sqrt();
+        let side = |pixels: u32| ((f64::from(pixels) * scale) as u32).max(1);
+        let smaller = image.resize_exact(side(width), side(height), Kernel::Triangle);
+        // Half of the memory is free again before the picture is encoded.
+        drop(image);
+        let is_float = matches!(smaller.color(), ColorType::Rgb32F | ColorType::Rgba32F);
+        let ending = if is_float { "exr" } else { "png" };
+        let mut file = Cursor::new(Vec::new());
+        let encoded = if is_float {
+            smaller.write_to(&mut file, ImageFormat::OpenExr)
+        } else {
+            // Of the kinds of PNG the one with the samples at hand.
+            let png = PngEncoder::new_with_quality(
+                &mut file,
+                CompressionType::Fast,
+                FilterType::Adaptive,
+            );
+            plain(smaller).write_with_encoder(png)
+        };
+        encoded.map_err(|source| ImageError::Encode {
+            path: path.to_owned(),
+            source,
+        })?;
+        Ok(Some(Self {
+            bytes: file.into_inner(),
+            ending,
+        }))
+    }
+}
+
+/// Colours with alpha where there is some.
+fn plain(image: DynamicImage) -> DynamicImage {
+    match image.color() {
+        ColorType::La8 => DynamicImage::ImageRgba8(image.into_rgba8()),
+        ColorType::La16 => DynamicImage::ImageRgba16(image.into_rgba16()),
+        _ => image,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{Extent, Planes, StoredImage, encode_exr, encode_jpeg};
+
+    fn ramp(extent: Extent) -> Planes<3> {
+        Planes::from_fn(extent, |x, y| {
+            [
+                x as f32 / extent.width as f32,
+                y as f32 / extent.height as f32,
+                0.5,
+            ]
+        })
+    }
+
+    #[test]
+    fn a_large_picture_is_made_as_small_as_it_has_to_be() {
+        let path = Path::new("a.jpg");
+        let file = encode_jpeg(path, &ramp(Extent::new(300, 200))).unwrap();
+        assert_eq!(ReducedFile::of(path, &file, 60_000).unwrap(), None);
+        let reduced = ReducedFile::of(path, &file, 15_000).unwrap().unwrap();
+        assert_eq!(reduced.ending, "png");
+        let image = StoredImage::from_bytes(path, &reduced.bytes).unwrap();
+        assert_eq!(image.planes.extent(), Extent::new(150, 100));
+        let [r, g, _] = image.planes.pixel(75, 20);
+        assert!(
+            (r - 0.503).abs() < 0.03 && (g - 0.205).abs() < 0.03,
+            "{r} {g}"
+        );
+    }
+
+    #[test]
+    fn values_in_floating_point_stay_so() {
+        let path = Path::new("a.exr");
+        let bright = ramp(Extent::new(40, 40)).map(|value| value * 7.0);
+        let file = encode_exr(path, &bright).unwrap();
+        let reduced = ReducedFile::of(path, &file, 400).unwrap().unwrap();
+        assert_eq!(reduced.ending, "exr");
+        let image = StoredImage::from_bytes(path, &reduced.bytes).unwrap();
+        assert!(image.planes.pixel(19, 0)[0] > 6.0);
+    }
+
+    #[test]
+    fn what_is_no_picture_is_refused() {
+        assert!(ReducedFile::of(Path::new("a.png"), b"no picture", 1).is_err());
+    }
+}
