@@ -253,16 +253,6 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
             2,
             "a part from 0 to 1",
         ),
-        (
-            format!("{one} --lamp 30,40 -o o.png --trust o.jpg"),
-            2,
-            "--trust o.jpg: give a .png",
-        ),
-        (
-            format!("{one} --lamp 30,40 -o o.png --trust o.png"),
-            2,
-            "that is not --output",
-        ),
     ] {
         let (found, errors) = folder.code_and_errors(&command);
         assert_eq!(found, code, "{command}: {errors}");
@@ -290,7 +280,6 @@ fn no_file_that_is_read_is_overwritten() {
         format!("{given} -o photos/one.png"),
         format!("{given} -o ./masks/one.png"),
         format!("{given} -o sky.exr"),
-        format!("{given} -o o.png --trust masks/one.png"),
         "relight photos --mask masks --weights w.safetensors --lamp 30,40 -o masks".to_owned(),
         format!("{inserted} photos/two.png -o photos/two.png"),
         format!("{inserted} sky.exr -o masks/one.png"),

@@ -8,7 +8,6 @@
 //! | [`evaluate_highlights`] | image, highlight | highlight | MSE, DSSIM of the highlight and of what it leaves |
 //! | [`evaluate_ordinal`] | what people judged of points | albedo | WHDR |
 //! | [`evaluate_insertion`] | an object rendered in another picture | nothing: it runs `insert` | MSE, DSSIM |
-//! | [`evaluate_trust`] | normals | nothing: it runs `decompose` | errors ordered by trust |
 //! | [`evaluate_turns`] | turns with normals, albedo, light | nothing: it runs `turn` | angles, albedo, what is expected beside what is |
 //! | [`evaluate_relighting`] | an object's maps, images under many lights | maps, or images | MSE, DSSIM |
 //!
@@ -29,7 +28,6 @@ mod relighting;
 mod retinex;
 mod run;
 mod scores;
-mod trust;
 mod turns;
 
 pub use error::EvalError;
@@ -47,7 +45,6 @@ pub use relighting::{
 pub use retinex::{IntrinsicImages, Retinex};
 pub use run::EvalProgress;
 pub use scores::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
-pub use trust::{TrustCurve, TrustTable, evaluate_trust};
 pub use turns::{
     AzimuthScore, TurnLine, TurnMethod, TurnNetworks, TurnScore, TurnSet, TurnTable, evaluate_turns,
 };

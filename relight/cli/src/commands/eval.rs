@@ -13,7 +13,7 @@ use relight_eval::{
     IntrinsicMethod, LightMethod, NormalMethod, OrdinalMethod, Predictions, RelightMethod,
     RelightingRecipe, RelightingSet, ScoreTable, TurnMethod, TurnNetworks, TurnSet,
     evaluate_highlights, evaluate_insertion, evaluate_intrinsic, evaluate_light, evaluate_normals,
-    evaluate_ordinal, evaluate_relighting, evaluate_trust, evaluate_turns, make_relighting,
+    evaluate_ordinal, evaluate_relighting, evaluate_turns, make_relighting,
 };
 use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
@@ -44,9 +44,7 @@ Examples:
       24 objects in other pictures, with and without shadow, edge colours and relighting
   relight synth --turn --light monte-carlo --count 24 --frames 60 --size 128 --seed 2611 -o turns
   relight eval turn --data turns
-      24 synthetic turns in rooms that no network was trained in
-  relight eval trust --data MIT-intrinsic
-      errors of the most trusted pixels";
+      24 synthetic turns in rooms that no network was trained in";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -86,14 +84,6 @@ enum Protocol {
     Relighting(RelightingArguments),
     /// Insertion: MSE and DSSIM of objects in other pictures, with and without each part of `relight insert`.
     Insertion(InsertionArguments),
-    /// Trust: whether what is said to be doubtful is wrong.
-    Trust {
-        #[command(flatten)]
-        set: SetArguments,
-        /// The network's weights [default: those that come with the program].
-        #[arg(long, value_name = "FILE")]
-        weights: Option<PathBuf>,
-    },
     /// Whole turns in unknown rooms: normals, albedo, and whether what is said to be sure is right.
     Turn(TurnArguments),
     /// Albedo as people judge it: WHDR on the folder of Intrinsic Images in the Wild.
@@ -277,7 +267,6 @@ impl Arguments {
             Protocol::Mit { set, .. }
             | Protocol::Normals { set }
             | Protocol::Light { set, .. }
-            | Protocol::Trust { set, .. }
             | Protocol::Highlight { set } => {
                 (set.count == Some(0)).then(|| "--count 0 leaves no image to compare".to_owned())
             }
@@ -296,7 +285,6 @@ impl Arguments {
             Protocol::Mit { set, .. }
             | Protocol::Normals { set }
             | Protocol::Light { set, .. }
-            | Protocol::Trust { set, .. }
             | Protocol::Highlight { set } => &set.common,
             Protocol::Relighting(arguments) => &arguments.common,
             Protocol::Whdr(common) => common,
@@ -347,7 +335,6 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         Protocol::Whdr(common) => ordinal(common, console),
         Protocol::Insertion(arguments) => insertion(arguments, console),
         Protocol::Turn(arguments) => return turns(arguments, console),
-        Protocol::Trust { set, weights } => return trust(set, weights.as_deref(), console),
     }?;
     report(&table, arguments.output(), console)
 }
@@ -473,18 +460,6 @@ fn insertion(arguments: &InsertionArguments, console: Console) -> Evaluated {
         console,
         |progress| evaluate_insertion(&recipe, &library, &network, &mut show, progress),
     )
-}
-
-fn trust(arguments: &SetArguments, weights: Option<&Path>, console: Console) -> CommandResult {
-    let (set, split) = arguments.open()?;
-    let network = network(weights)?;
-    let table = with_progress(set.names().len(), "looking again", console, |progress| {
-        evaluate_trust(&set, &split, &network, progress)
-    })?;
-    write_json(&table, arguments.common.output.as_deref())?;
-    let event = json!({ "event": "table", "table": table });
-    console.say(table.to_string().trim_end(), &event);
-    Ok(Outcome::Whole)
 }
 
 fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {

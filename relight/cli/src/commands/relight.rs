@@ -6,13 +6,12 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use relight_core::files::{MovieFormat, MovieWriter, OutputKind, write_picture, write_png};
-use relight_core::image::Depth;
+use relight_core::files::{MovieFormat, MovieWriter, OutputKind, write_picture};
 use relight_photo::decompose::Rectangle;
 use relight_photo::files::{InsertionError, PhotoInput, PhotoReading};
 use relight_photo::insert::{
     Backdrop, LightSource, MaterialChange, ObjectGloss, PanoramaView, Shot, ShotCompanions,
-    Subject, TrustMap, WhiteBalance, likeness,
+    Subject, WhiteBalance, likeness,
 };
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
@@ -105,9 +104,6 @@ pub(crate) struct Arguments {
     /// The longest side of the result, pixels [default: the photograph's; of a video at most 1080].
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=16_384))]
     size: Option<u32>,
-    /// Write how far the result can be trusted as a picture, beside what --json says: blue is good, red is not.
-    #[arg(long, value_name = "FILE.png")]
-    trust: Option<PathBuf>,
     /// Bits a channel of a PNG.
     #[arg(long, value_enum, default_value = "8")]
     bits: Bits,
@@ -145,15 +141,6 @@ impl Arguments {
             return Some(
                 "--background light: there is no panorama; give one by --light".to_owned(),
             );
-        }
-        if let Some(trust) = &self.trust {
-            if self.is_set() {
-                return Some("--trust: give one photograph".to_owned());
-            }
-            if *trust == self.output || OutputKind::of(trust) != Some(OutputKind::Png) {
-                let trust = trust.display();
-                return Some(format!("--trust {trust}: give a .png that is not --output"));
-            }
         }
         if self.is_set() {
             return None;
@@ -304,12 +291,6 @@ impl Run<'_> {
             backdrop,
             exposure,
         )?;
-        let trust = TrustMap::of(
-            &subject,
-            &network.decomposer,
-            &photo.options(&network.options),
-        )?;
-        let figures = trust.figures();
         let start = Instant::now();
         let frames = match OutputKind::of(&output) {
             Some(OutputKind::Movie(format)) => self.film(&shot, &output, format, console)?,
@@ -320,15 +301,10 @@ impl Run<'_> {
                 1
             }
         };
-        if let Some(path) = &arguments.trust {
-            write_png(path, &subject.in_photo(&trust.picture()), Depth::Eight)?;
-        }
         let seconds = start.elapsed().as_secs_f64();
         let text = format!(
-            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposing; trust {:.2}, {:.0} % of the object in doubt",
+            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposing",
             output.display(),
-            figures.mean,
-            100.0 * figures.doubtful
         );
         let event = json!({
             "event": "relit",
@@ -338,7 +314,6 @@ impl Run<'_> {
             "seconds": seconds,
             "decompose_seconds": decomposed,
             "likeness": likeness(subject.light(), &light),
-            "trust": figures,
         });
         console.say(&text, &event);
         Ok(())
@@ -354,16 +329,9 @@ impl Run<'_> {
         let mut inputs: Vec<PathBuf> = mask.into_iter().collect();
         inputs.extend(self.photos.iter().cloned());
         inputs.extend(arguments.light.light.clone());
-        let trust = arguments.trust.as_deref();
-        for output in [Some(output), trust].into_iter().flatten() {
-            not_an_input(output, &inputs)?;
-        }
+        not_an_input(output, &inputs)?;
         // What lies in the way of a folder is told before the work.
-        for folder in [Some(output), trust]
-            .into_iter()
-            .flatten()
-            .filter_map(Path::parent)
-        {
+        if let Some(folder) = output.parent() {
             if !folder.as_os_str().is_empty() {
                 make_folder(folder)?;
             }

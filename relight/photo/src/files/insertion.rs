@@ -10,7 +10,7 @@ use super::{BackgroundFile, InsertionError, PhotoInput, PhotoReading};
 use crate::decompose::{DecomposeOptions, Decomposer, Photo};
 use crate::insert::{
     InsertScene, LightSource, ObjectDescription, SceneBackground, SceneDescription, SceneSetting,
-    Subject, TrustFigures, TrustMap,
+    Subject,
 };
 
 /// The most frames of a video in which a panorama turns.
@@ -25,15 +25,6 @@ pub enum InsertSource {
     Captured(Box<CapturedObject>),
 }
 
-/// An object that is ready to be lit, and how far its decomposition can be trusted, where somebody asks.
-#[derive(Debug)]
-pub struct InsertSubject {
-    /// The object.
-    pub subject: Subject,
-    /// None for a captured object: it was measured, and not estimated.
-    pub trust: Option<TrustFigures>,
-}
-
 /// A background and the setting that follows from it, with the network that decomposes the objects.
 #[derive(Debug)]
 pub struct Insertion<'a> {
@@ -41,6 +32,8 @@ pub struct Insertion<'a> {
     /// The first frame of a video.
     first: Option<Rgb<Linear>>,
     setting: SceneSetting,
+    /// How far the light has turned, radians.
+    turned: f64,
     decomposer: &'a Decomposer,
     options: DecomposeOptions,
 }
@@ -112,6 +105,7 @@ impl<'a> Insertion<'a> {
             background,
             first,
             setting,
+            turned: scene.light.turn.to_radians(),
             decomposer,
             options,
         })
@@ -123,7 +117,7 @@ impl<'a> Insertion<'a> {
         &self.setting
     }
 
-    /// An object, decomposed no larger than it has to be. How far it can be trusted takes three more looks of the network.
+    /// An object, decomposed no larger than it has to be.
     ///
     /// # Errors
     /// Where it cannot be decomposed.
@@ -131,25 +125,13 @@ impl<'a> Insertion<'a> {
         &self,
         object: &ObjectDescription,
         source: InsertSource,
-        with_trust: bool,
-    ) -> Result<InsertSubject, InsertionError> {
-        let photo = match source {
-            InsertSource::Photo(photo) => self.setting.reduced(object, *photo),
-            InsertSource::Captured(object) => {
-                return Ok(InsertSubject {
-                    subject: Subject::of_captured(&object)?,
-                    trust: None,
-                });
+    ) -> Result<Subject, InsertionError> {
+        Ok(match source {
+            InsertSource::Photo(photo) => {
+                let photo = self.setting.reduced(object, *photo);
+                Subject::of_photo(&photo, self.decomposer, &self.options)?
             }
-        };
-        let subject = Subject::of_photo(&photo, self.decomposer, &self.options)?;
-        let options = photo.options(&self.options);
-        let trust = with_trust
-            .then(|| TrustMap::of(&subject, self.decomposer, &options))
-            .transpose()?;
-        Ok(InsertSubject {
-            subject,
-            trust: trust.map(|trust| trust.figures()),
+            InsertSource::Captured(object) => Subject::of_captured(&object)?,
         })
     }
 
@@ -179,7 +161,8 @@ impl<'a> Insertion<'a> {
                 _ => self.film_turn(scene, output, format, written),
             },
             _ => {
-                let picture = scene.compose(&self.still(0.0), &scene.layers(0.0)?, 0);
+                let picture =
+                    scene.compose(&self.still(self.turned), &scene.layers(self.turned)?, 0);
                 write_picture(output.path, &picture, output.depth)?;
                 Ok(1)
             }
@@ -206,7 +189,7 @@ impl<'a> Insertion<'a> {
         format: MovieFormat,
         mut written: impl FnMut(),
     ) -> Result<u32, InsertionError> {
-        let layers = scene.layers(0.0)?;
+        let layers = scene.layers(self.turned)?;
         let mut next = Some(self.still(0.0));
         let BackgroundFile::Movie(movie) = &mut self.background else {
             return Err(InsertionError::NoFrame);
@@ -237,7 +220,8 @@ impl<'a> Insertion<'a> {
         let (extent, rate) = (self.setting.extent, output.frames_per_second);
         let mut film = MovieWriter::create(output.path, format, extent, rate)?;
         for frame in 0..frames {
-            let turn = (output.turn * f64::from(frame) / f64::from(frames)).to_radians();
+            let part = f64::from(frame) / f64::from(frames);
+            let turn = self.turned + (output.turn * part).to_radians();
             let picture = scene.compose(&self.still(turn), &scene.layers(turn)?, u64::from(frame));
             film.push(&picture.encode())?;
             written();

@@ -12,6 +12,6 @@ mod results;
 
 pub use background::BackgroundFile;
 pub use input::{PhotoInput, PhotoReading};
-pub use insertion::{InsertSource, InsertSubject, Insertion, InsertionOutput};
+pub use insertion::{InsertSource, Insertion, InsertionOutput};
 pub use insertion_error::InsertionError;
 pub use results::{DecompositionFigures, DecompositionFiles, bright, write_light};

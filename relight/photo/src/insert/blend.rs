@@ -41,22 +41,6 @@ impl Subject {
         )
     }
 
-    /// A map of the size of [`Subject::extent`] at its place in the photograph; 0 elsewhere.
-    ///
-    /// # Panics
-    /// Where the map has another size.
-    #[must_use]
-    pub fn in_photo(&self, map: &Planes<3>) -> Planes<3> {
-        let Extent { width, height } = self.extent();
-        assert_eq!(map.extent(), self.extent(), "size of the map");
-        let [left, top] = self.place();
-        let mut photo = Planes::zeros(self.photo_extent());
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            photo.set_pixel(left + x, top + y, map.pixel(x, y));
-        }
-        photo
-    }
-
     /// A background with the photograph's pixels under the mask, as they are: naive insertion.
     ///
     /// # Panics

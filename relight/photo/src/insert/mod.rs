@@ -19,7 +19,6 @@
 //! | `description` | a scene as a text in TOML |
 //! | `exposure`, `white_balance` | how bright a panorama is shown, and in which colours its light |
 //! | `matching` | brightness, white balance and grain of a background |
-//! | `trust` | how far a decomposition can be trusted, pixel by pixel |
 //! | `smooth` | means over squares of pixels |
 
 mod blend;
@@ -47,7 +46,6 @@ mod sun;
 mod surroundings;
 #[cfg(test)]
 mod tests;
-mod trust;
 mod view;
 mod white_balance;
 
@@ -68,6 +66,5 @@ pub use shot::{Backdrop, Shot, ShotCompanions};
 pub use source::{LightSource, exposure_between, likeness};
 pub use subject::Subject;
 pub use sun::SeenSun;
-pub use trust::{TrustFigures, TrustMap};
 pub use view::PanoramaView;
 pub use white_balance::WhiteBalance;

@@ -78,6 +78,9 @@ pub(crate) struct Arguments {
     /// Brightness of a panorama and its light in stops, from that which is found.
     #[arg(long, value_name = "STOPS", value_parser = number, allow_hyphen_values = true, conflicts_with = "scene")]
     exposure: Option<f64>,
+    /// Turn the light about the vertical first, from the viewer to the right, and a panorama behind the objects with it.
+    #[arg(long, value_name = "DEGREES", value_parser = number, allow_hyphen_values = true, conflicts_with = "scene")]
+    turned: Option<f64>,
     /// Turn a panorama and its light by so many degrees about the vertical, in a video.
     #[arg(long, value_name = "DEGREES", value_parser = degrees, allow_hyphen_values = true)]
     pub(super) turn: Option<f64>,
@@ -238,6 +241,7 @@ impl Arguments {
                 ambient: None,
                 coefficients,
                 object: self.light.light_object.clone(),
+                turn: self.turned.unwrap_or(0.0),
             },
             matches: !self.no_match,
             white_balance: self.white_balance.map_or(WhiteBalance::Light, Into::into),

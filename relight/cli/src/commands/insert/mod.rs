@@ -8,7 +8,6 @@ use relight_core::files::OutputKind;
 use relight_photo::files::{BackgroundFile, InsertSource, Insertion};
 use relight_photo::insert::{
     LightDescription, PanoramaExposure, SceneDescription, SceneObject, SceneSetting, SeenSun,
-    TrustFigures,
 };
 use relit_console::{Console, Outcome, ProgressBar};
 use serde_json::json;
@@ -34,10 +33,10 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let mut insertion = Insertion::new(&scene, background, &folder, decomposer, options)?;
     let pairs = scene.objects.iter().zip(sources);
     let subjects = pairs
-        .map(|(object, source)| insertion.subject(object, source, console.is_json()))
+        .map(|(object, source)| insertion.subject(object, source))
         .collect::<Result<Vec<_>, _>>()?;
     let pairs = scene.objects.iter().zip(&subjects);
-    let objects = pairs.map(|(object, read)| SceneObject::described(object, &read.subject));
+    let objects = pairs.map(|(object, subject)| SceneObject::described(object, subject));
     let set = insertion.setting().scene(objects.collect())?;
     let output = arguments.written();
     let bar = match OutputKind::of(output.path) {
@@ -48,7 +47,6 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     };
     let frames = insertion.write(&set, &output, || bar.inc(1))?;
     bar.finish_and_clear();
-    let trust: Vec<Option<TrustFigures>> = subjects.iter().map(|read| read.trust).collect();
     let (setting, output) = (insertion.setting(), output.path);
     let matching = setting.matching;
     console.say(
@@ -65,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         ),
         &json!({
             "event": "inserted", "output": output, "objects": scene.objects.len(), "frames": frames,
-            "trust": trust, "tilt": setting.tilt, "level": matching.level, "balance": matching.balance, "grain": matching.grain,
+            "tilt": setting.tilt, "level": matching.level, "balance": matching.balance, "grain": matching.grain,
             "exposure": setting.exposure, "sun": setting.sun,
         }),
     );
