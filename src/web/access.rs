@@ -72,7 +72,7 @@ impl AccessPolicy {
     fn admit(&self, local: IpAddr, uri: &Uri, headers: &HeaderMap) -> Result<(), Failure> {
         let host = self.host(local, headers)?;
         check_origin(host, headers)?;
-        if self.open_paths.contains(&uri.path()) || self.has_token(headers) {
+        if self.open_paths.contains(&uri.path()) || self.lets_in(headers) {
             return Ok(());
         }
         let error = "this needs the token: open the address that was printed at the start, or send \
@@ -102,7 +102,8 @@ impl AccessPolicy {
     }
 
     /// True where no token is asked for, or the right one came.
-    fn has_token(&self, headers: &HeaderMap) -> bool {
+    #[must_use]
+    pub fn lets_in(&self, headers: &HeaderMap) -> bool {
         let Some(token) = &self.token else {
             return true;
         };

@@ -47,6 +47,14 @@ pub struct Entry {
     token: Option<String>,
 }
 
+impl Entry {
+    /// The token, where the URL has one.
+    #[must_use]
+    pub fn token(&self) -> Option<&str> {
+        self.token.as_deref()
+    }
+}
+
 /// The page itself.
 #[derive(Debug, Clone, Copy)]
 pub struct Index(pub &'static str);
