@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-programs setup-train train-turn test test-day test-rig test-slurm test-objects packages test-packages test-image test-python wheel bench-python image release lint wasm demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-train train-turn test test-day test-rig test-slurm test-objects packages test-packages test-image test-python wheel bench-python image release lint wasm app test-app demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -133,7 +133,7 @@ lint: setup ## Check formatting, lints and documentation
 	cargo clippy --locked -p relit-data --no-default-features -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps $(EXTRAS)
 	@if cargo tree --locked -p relight -e normal --prefix none \
-	    | grep -E '^(ffmpeg|opencv|axum|hyper|tokio|relit-(video|mask|rig))'; then \
+	    | grep -E '^(ffmpeg|opencv|relit-(video|mask|rig))'; then \
 	    echo "relight must not depend on these"; exit 1; fi
 	@if cargo tree --locked -p relit-extract -e normal --prefix none \
 	    | grep -E '^(opencv|v4l|axum|hyper|tokio|relit-(mask|rig|web))'; then \
@@ -145,6 +145,13 @@ lint: setup ## Check formatting, lints and documentation
 	@.ci/wasm --check
 	cargo fmt --manifest-path rig-firmware/uno/Cargo.toml --check
 	@if rig-firmware/build --can; then rig-firmware/build --clippy; fi
+
+app: ## Build the app's page into target/page: its engine for WebAssembly, its weights and its files
+	@.ci/app
+
+test-app: app ## Test the page in headless Chromium, and hold it against the programs
+	cargo build --locked --release -p relight -p relit-mask
+	relight/app/tests/run $(TARGET)/page $(TARGET)/release/relight $(TARGET)/release/relit-mask
 
 wasm: ## Build for WebAssembly the crates that a page in a browser is made of
 	@.ci/wasm

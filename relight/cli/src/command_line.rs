@@ -8,7 +8,9 @@ use relit_console::Console;
 
 #[cfg(feature = "train")]
 use crate::commands::train;
-use crate::commands::{decompose, eval, export, insert, relight, render, synth, turn, weights};
+use crate::commands::{
+    decompose, eval, export, insert, relight, render, serve, synth, turn, weights,
+};
 
 /// Single-view relighting: photographs decomposed and relit, rendering, synthetic data with ground truth, measures of the results.
 #[derive(Parser)]
@@ -55,6 +57,9 @@ enum Verb {
     /// Write objects and turns for other programs: GLB, layered EXR, a Blender script, frames with their mask.
     #[command(after_help = export::EXAMPLES)]
     Export(export::Arguments),
+    /// Hand out the app: a page that cuts objects out of photographs, relights them and puts them into scenes.
+    #[command(after_help = serve::EXAMPLES)]
+    Serve(serve::Arguments),
     /// Convert weights of networks.
     #[command(after_help = weights::EXAMPLES)]
     Weights(weights::Arguments),
@@ -72,7 +77,7 @@ impl Verb {
             Self::Synth(arguments) => arguments.fault(),
             #[cfg(feature = "train")]
             Self::Train(_) => None,
-            Self::Turn(_) => None,
+            Self::Turn(_) | Self::Serve(_) => None,
             Self::Export(arguments) => arguments.fault(),
             Self::Weights(arguments) => arguments.fault(),
         }
@@ -101,6 +106,7 @@ pub(crate) fn run() -> ExitCode {
         Verb::Train(arguments) => train::run(&arguments, console),
         Verb::Turn(arguments) => turn::run(&arguments, console),
         Verb::Export(arguments) => export::run(&arguments, console),
+        Verb::Serve(arguments) => serve::run(&arguments, console),
         Verb::Weights(arguments) => weights::run(&arguments, console),
     })
 }

@@ -10,6 +10,7 @@ pub(super) mod export;
 pub(super) mod insert;
 pub(super) mod relight;
 pub(super) mod render;
+pub(super) mod serve;
 pub(super) mod synth;
 #[cfg(feature = "train")]
 pub(super) mod train;

@@ -1,0 +1,31 @@
+//! The app of relight: its engine, which runs in a browser, and the server that hands the page out.
+//!
+//! | module | concern |
+//! | --- | --- |
+//! | `message` | requests and replies as bytes: several parts, the first of them JSON |
+//! | `studio` | the engine: photographs, masks, scenes and what is asked of them |
+//! | `scenery` | panoramas that are made, so that a scene needs no file |
+//! | `browser` | the engine's functions that the page's worker calls |
+#![cfg_attr(
+    feature = "server",
+    doc = "| [`server`] | the page handed out, or written to a folder |"
+)]
+//!
+//! It knows the libraries of photographs, light and masks, and no terminal.
+
+#[cfg(target_arch = "wasm32")]
+mod browser;
+mod clock;
+mod message;
+mod scenery;
+#[cfg(feature = "server")]
+pub mod server;
+mod studio;
+
+pub use message::{MessageFault, pack, unpack};
+pub use studio::{Studio, StudioError};
+
+/// The example of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

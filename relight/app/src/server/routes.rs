@@ -1,0 +1,107 @@
+//! The page's files as answers: to GET and HEAD alone, with the headers of a page that loads nothing from elsewhere.
+
+use std::sync::Arc;
+
+use axum::Router;
+use axum::extract::{FromRef, Path, State};
+use axum::http::StatusCode;
+use axum::http::header::{self, HeaderMap, HeaderName};
+use axum::middleware::from_fn_with_state;
+use axum::response::{IntoResponse, Redirect, Response};
+use axum::routing::get;
+use relit_web::{AccessPolicy, Entry, Failure, QueryParams, guard};
+
+use super::files::{POLICY, PageFile, PageFiles};
+
+/// The page itself.
+const INDEX: &str = "index.html";
+
+#[derive(Clone)]
+struct Served {
+    files: Arc<PageFiles>,
+    policy: Arc<AccessPolicy>,
+}
+
+impl FromRef<Served> for Arc<PageFiles> {
+    fn from_ref(served: &Served) -> Self {
+        Self::clone(&served.files)
+    }
+}
+
+impl FromRef<Served> for Arc<AccessPolicy> {
+    fn from_ref(served: &Served) -> Self {
+        Self::clone(&served.policy)
+    }
+}
+
+/// Paths that need no token: there the token in the URL becomes a cookie.
+pub(super) fn open_paths() -> Vec<&'static str> {
+    vec!["/"]
+}
+
+pub(super) fn router(files: Arc<PageFiles>, policy: Arc<AccessPolicy>) -> Router {
+    let served = Served {
+        files,
+        policy: Arc::clone(&policy),
+    };
+    Router::new()
+        .route("/", get(index))
+        .route("/{name}", get(file))
+        .fallback(|| async { Failure::not_found("there is no such file") })
+        .layer(from_fn_with_state(policy, guard))
+        .with_state(served)
+}
+
+/// The page. A token in the URL becomes a cookie, and the URL is opened again without it.
+async fn index(
+    State(files): State<Arc<PageFiles>>,
+    State(policy): State<Arc<AccessPolicy>>,
+    QueryParams(entry): QueryParams<Entry>,
+    headers: HeaderMap,
+) -> Response {
+    let home = || Redirect::to("./").into_response();
+    match entry.token() {
+        Some(given) => match policy.cookie_for(given) {
+            Some(cookie) => ([(header::SET_COOKIE, cookie)], home()).into_response(),
+            None if policy.is_open() => home(),
+            None => refused(),
+        },
+        None if policy.lets_in(&headers) => answer(&files, INDEX, &headers),
+        None => refused(),
+    }
+}
+
+async fn file(
+    State(files): State<Arc<PageFiles>>,
+    Path(name): Path<String>,
+    headers: HeaderMap,
+) -> Response {
+    answer(&files, &name, &headers)
+}
+
+fn refused() -> Response {
+    let error = "this needs the token: open the address that was printed at the start";
+    Failure::new(StatusCode::UNAUTHORIZED, error).into_response()
+}
+
+fn answer(files: &PageFiles, name: &str, headers: &HeaderMap) -> Response {
+    let Some(PageFile { content, kind, tag }) = files.get(name) else {
+        return Failure::not_found("there is no such file").into_response();
+    };
+    let about = [
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::ETAG, tag),
+        // Asked for again each time, and not sent again where it is the same.
+        (header::CACHE_CONTROL, "no-cache"),
+        (
+            HeaderName::from_static("cross-origin-embedder-policy"),
+            "require-corp",
+        ),
+    ];
+    let known = headers.get(header::IF_NONE_MATCH);
+    if known.is_some_and(|known| known.as_bytes() == tag.as_bytes()) {
+        return (StatusCode::NOT_MODIFIED, about).into_response();
+    }
+    let kind = [(header::CONTENT_TYPE, *kind)];
+    (about, kind, content.clone()).into_response()
+}

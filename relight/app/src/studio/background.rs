@@ -1,0 +1,319 @@
+//! What the objects are put into: a photograph, or a panorama of which a part is seen.
+
+use std::path::Path;
+
+use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Samples, Srgb, encode_exr};
+use relight_core::light::Panorama;
+use relight_photo::insert::{PanoramaView, SceneBackground, SceneDescription, SceneSetting};
+
+use super::StudioError;
+use super::object::{OpenedFile, png_of, stem};
+use super::pixels::rgba;
+use super::request::BackgroundRequest;
+use crate::scenery::Scenery;
+
+/// The most columns of a panorama.
+const MOST_COLUMNS: usize = 1024;
+/// The size of a panorama's little picture.
+const THUMBNAIL: Extent = Extent::new(96, 48);
+/// The mean brightness in which it is shown.
+const THUMBNAIL_MEAN: f32 = 0.22;
+
+/// A background.
+pub(super) struct StudioBackground {
+    /// The name of its file.
+    pub(super) name: String,
+    content: Content,
+}
+
+enum Content {
+    Photo(PhotoBackground),
+    Panorama(PanoramaBackground),
+}
+
+struct PhotoBackground {
+    file: Vec<u8>,
+    picture: Rgb<Linear>,
+    /// In the size in which it was shown last.
+    reduced: Option<(u32, Rgb<Linear>)>,
+}
+
+struct PanoramaBackground {
+    /// None where it is made.
+    file: Option<Vec<u8>>,
+    scenery: Option<Scenery>,
+    panorama: Panorama,
+    /// The camera that looked last, and what it depends on.
+    view: Option<(ViewKey, PanoramaView)>,
+}
+
+type ViewKey = ([u32; 2], [u64; 2]);
+
+impl StudioBackground {
+    /// The background that the page asks for, whose file or pixels are these.
+    ///
+    /// # Errors
+    /// Where it cannot be read, or is no panorama.
+    pub(super) fn open(asked: &BackgroundRequest, bytes: &[u8]) -> Result<Self, StudioError> {
+        match asked {
+            BackgroundRequest::Panorama { id } => {
+                let scenery = Scenery::of(id);
+                let scenery = scenery.ok_or_else(|| StudioError::NoPanorama(id.clone()))?;
+                Ok(Self::made(scenery)?)
+            }
+            BackgroundRequest::Photo { name } => Self::photo(name, bytes.to_vec()),
+            BackgroundRequest::PhotoPixels {
+                name,
+                width,
+                height,
+            } => {
+                let png = png_of(name, [*width, *height], bytes)?;
+                Self::photo(&format!("{}.png", stem(name)), png)
+            }
+            BackgroundRequest::PanoramaFile { name } => Self::panorama(name, bytes.to_vec()),
+        }
+    }
+
+    fn made(scenery: Scenery) -> Result<Self, relight_core::light::LightError> {
+        Ok(Self {
+            name: format!("{}.exr", scenery.id()),
+            content: Content::Panorama(PanoramaBackground {
+                file: None,
+                scenery: Some(scenery),
+                panorama: scenery.panorama()?,
+                view: None,
+            }),
+        })
+    }
+
+    /// A photograph.
+    ///
+    /// # Errors
+    /// Where it cannot be read, or has values that are no light.
+    pub(super) fn photo(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+        let mut opened = OpenedFile::read(name, bytes)?;
+        let (name, file) = (opened.name.clone(), std::mem::take(&mut opened.bytes));
+        // relight insert reads backgrounds of integers as sRGB.
+        opened.transfer = None;
+        let picture = opened.light();
+        let is_light = |plane: &[f32]| plane.iter().all(|v| v.is_finite() && *v >= 0.0);
+        if !picture.planes().planes().into_iter().all(is_light) {
+            return Err(StudioError::NotLight { name });
+        }
+        Ok(Self {
+            name,
+            content: Content::Photo(PhotoBackground {
+                file,
+                picture,
+                reduced: None,
+            }),
+        })
+    }
+
+    /// A panorama: linear light in HDR or EXR, or any picture that is twice as wide as high.
+    ///
+    /// # Errors
+    /// Where it cannot be read or has another shape.
+    pub(super) fn panorama(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+        let mut opened = OpenedFile::read(name, bytes)?;
+        let Extent { width, height } = opened.image.planes.extent();
+        // Making it smaller rounds its sides.
+        if width.abs_diff(2 * height) > 2 || height < 4 {
+            return Err(StudioError::PanoramaShape {
+                name: name.to_owned(),
+                width,
+                height,
+            });
+        }
+        let is_float = opened.image.samples == Samples::Float;
+        let own_file = std::mem::take(&mut opened.bytes);
+        let panorama = Panorama::new(opened.light())?;
+        let columns = width.min(MOST_COLUMNS) / 2 * 2;
+        let wanted = Extent::new(columns, columns / 2);
+        let is_as_kept = is_float && wanted == Extent::new(width, height);
+        let panorama = if is_as_kept || wanted == Extent::new(width, height) {
+            panorama
+        } else {
+            panorama.resized(wanted)
+        };
+        let file = if is_as_kept {
+            own_file
+        } else {
+            encode_exr(Path::new(name), panorama.image().planes())?
+        };
+        let name = if is_as_kept {
+            name.to_owned()
+        } else {
+            format!("{}.exr", stem(name))
+        };
+        Ok(Self {
+            name,
+            content: Content::Panorama(PanoramaBackground {
+                file: Some(file),
+                scenery: None,
+                panorama,
+                view: None,
+            }),
+        })
+    }
+
+    /// The panorama of this id that is made, or that of a file of a kept scene: one that is made is known by its name.
+    ///
+    /// # Errors
+    /// Where it cannot be read.
+    pub(super) fn kept(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+        let made = Scenery::ALL
+            .into_iter()
+            .find(|scenery| name == format!("{}.exr", scenery.id()));
+        if let Some(scenery) = made {
+            let background = Self::made(scenery)?;
+            if background.file()? == bytes {
+                return Ok(background);
+            }
+        }
+        let is_panorama = ["exr", "hdr"]
+            .iter()
+            .any(|ending| name.to_ascii_lowercase().ends_with(&format!(".{ending}")));
+        let is_wide = relight_photo::decompose::stated_extent(&bytes)
+            .is_some_and(|extent| extent.width == 2 * extent.height);
+        if is_panorama && is_wide {
+            Self::panorama(name, bytes)
+        } else {
+            Self::photo(name, bytes)
+        }
+    }
+
+    /// Whether it is a panorama, and the id of one that is made.
+    pub(super) fn panorama_id(&self) -> Option<Option<&'static str>> {
+        match &self.content {
+            Content::Photo(_) => None,
+            Content::Panorama(panorama) => Some(panorama.scenery.map(Scenery::id)),
+        }
+    }
+
+    /// The file that is kept with a scene.
+    ///
+    /// # Errors
+    /// Where a panorama that is made cannot be encoded.
+    pub(super) fn file(&self) -> Result<Vec<u8>, StudioError> {
+        match &self.content {
+            Content::Photo(photo) => Ok(photo.file.clone()),
+            Content::Panorama(PanoramaBackground {
+                file: Some(file), ..
+            }) => Ok(file.clone()),
+            Content::Panorama(panorama) => Ok(encode_exr(
+                Path::new(&self.name),
+                panorama.panorama.image().planes(),
+            )?),
+        }
+    }
+
+    /// The size of a scene's picture, where that of a panorama's is given.
+    pub(super) fn extent(&self, of_panorama: [u32; 2]) -> Extent {
+        match &self.content {
+            Content::Photo(photo) => photo.picture.planes().extent(),
+            Content::Panorama(_) => Extent::new(of_panorama[0] as usize, of_panorama[1] as usize),
+        }
+    }
+
+    /// Makes ready what a scene shows of it, `longest` pixels at most: the size of that picture.
+    pub(super) fn prepare(&mut self, scene: &SceneDescription, longest: Option<u32>) {
+        match &mut self.content {
+            Content::Photo(photo) => {
+                let Some(longest) = longest else {
+                    photo.reduced = None;
+                    return;
+                };
+                if photo
+                    .reduced
+                    .as_ref()
+                    .is_none_or(|(was, _)| *was != longest)
+                {
+                    let extent = reduced(photo.picture.planes().extent(), Some(longest));
+                    let planes = photo.picture.planes().resized(extent);
+                    photo.reduced = Some((longest, Rgb::new(planes)));
+                }
+            }
+            Content::Panorama(panorama) => {
+                let key = (scene.size, [scene.field, scene.down].map(f64::to_bits));
+                if panorama.view.as_ref().is_none_or(|(was, _)| *was != key) {
+                    let extent = scene.panorama_extent();
+                    let view = PanoramaView::new(extent, scene.field, scene.down);
+                    panorama.view = Some((key, view));
+                }
+            }
+        }
+    }
+
+    /// What a scene is told of it, after [`StudioBackground::prepare`].
+    pub(super) fn for_scene(&self) -> SceneBackground<'_> {
+        match &self.content {
+            Content::Photo(photo) => SceneBackground::Picture(photo.shown()),
+            Content::Panorama(panorama) => SceneBackground::Panorama(&panorama.panorama),
+        }
+    }
+
+    /// What is seen of it after light has turned by so many radians, after [`StudioBackground::prepare`].
+    pub(super) fn seen(&self, setting: &SceneSetting, turn: f64) -> Rgb<Linear> {
+        match &self.content {
+            Content::Photo(photo) => photo.shown().clone(),
+            Content::Panorama(panorama) => match &panorama.view {
+                Some((_, view)) => setting.seen(view, &panorama.panorama, turn),
+                None => Rgb::new(Planes::zeros(setting.extent)),
+            },
+        }
+    }
+
+    /// A little picture of it.
+    pub(super) fn thumbnail(&self) -> Vec<u8> {
+        match &self.content {
+            Content::Photo(photo) => {
+                let planes = photo.picture.planes().resized(THUMBNAIL);
+                rgba(&planes.map(Srgb::from_linear))
+            }
+            Content::Panorama(panorama) => thumbnail(&panorama.panorama),
+        }
+    }
+}
+
+impl PhotoBackground {
+    fn shown(&self) -> &Rgb<Linear> {
+        self.reduced
+            .as_ref()
+            .map_or(&self.picture, |(_, reduced)| reduced)
+    }
+}
+
+/// The panoramas that are made, each with a little picture.
+///
+/// # Errors
+/// None: their values are finite.
+pub(super) fn made_panoramas() -> Result<Vec<(Scenery, Vec<u8>)>, StudioError> {
+    let made = |scenery: Scenery| {
+        let panorama = scenery.panorama_of(THUMBNAIL)?;
+        Ok((scenery, thumbnail(&panorama)))
+    };
+    Scenery::ALL.into_iter().map(made).collect()
+}
+
+/// A panorama as bright as a screen can show it: by the median, so that a sun does not make all else black.
+fn thumbnail(panorama: &Panorama) -> Vec<u8> {
+    let planes = panorama.image().planes().resized(THUMBNAIL);
+    let mut values: Vec<f32> = planes.plane(1).to_vec();
+    values.sort_by(f32::total_cmp);
+    let middle = values.get(values.len() / 2).copied().unwrap_or(1.0);
+    let gain = THUMBNAIL_MEAN / middle.max(1e-6);
+    rgba(&planes.map(|value| Srgb::from_linear((value * gain).max(0.0))))
+}
+
+/// A size whose longer side is at most so many pixels.
+pub(super) fn reduced(extent: Extent, longest: Option<u32>) -> Extent {
+    let Extent { width, height } = extent;
+    let most = longest.map_or(usize::MAX, |longest| longest.max(16) as usize);
+    let own = width.max(height).max(1);
+    if own <= most {
+        return extent;
+    }
+    let side = |side: usize| ((side * most + own / 2) / own).max(1);
+    Extent::new(side(width), side(height))
+}

@@ -1,0 +1,261 @@
+//! Pictures of a scene: whole, in layers that the page can move, and in full size.
+
+use relight_core::image::{Extent, Linear, Planes, Rgb};
+use relight_photo::insert::{
+    InsertScene, SceneDescription, SceneLayer, SceneObject, SceneSetting, Subject,
+};
+use serde::Serialize;
+
+use super::StudioError;
+use super::background::{StudioBackground, reduced};
+use super::pixels::{rgba, shown, straight};
+
+/// How much of a pixel an object covers at least where it counts as seen.
+const SEEN: f32 = 0.5;
+/// A larger part of a picture that is clipped is told.
+const MUCH_CLIPPED: f32 = 0.25;
+
+/// The setting that was made last: while only objects and the light's angle change it stays.
+#[derive(Default)]
+pub(super) struct KeptSetting {
+    made: Option<(SettingKey, SceneSetting)>,
+}
+
+/// All that a setting depends on.
+#[derive(PartialEq)]
+struct SettingKey {
+    /// The scene without objects and without the light's angle.
+    scene: SceneDescription,
+    longest: Option<u32>,
+}
+
+impl KeptSetting {
+    /// Another background was chosen.
+    pub(super) fn forget(&mut self) {
+        self.made = None;
+    }
+
+    /// The setting of a scene, `longest` pixels at most; the background is made ready for it.
+    ///
+    /// # Errors
+    /// Where there is no light.
+    pub(super) fn of(
+        &mut self,
+        scene: &SceneDescription,
+        background: &mut StudioBackground,
+        longest: Option<u32>,
+    ) -> Result<&SceneSetting, StudioError> {
+        background.prepare(scene, longest);
+        let mut bare = scene.clone();
+        bare.objects.clear();
+        bare.light.turn = 0.0;
+        let key = SettingKey {
+            scene: bare,
+            longest,
+        };
+        let tilt = SceneSetting::ground_tilt(scene, background.for_scene());
+        let kept = self.made.take().filter(|(was, _)| *was == key);
+        let mut setting = match kept {
+            Some((_, setting)) => setting,
+            None => {
+                let lamp = scene
+                    .light
+                    .lamp()?
+                    .map(relight_photo::insert::LightSource::Lamp);
+                SceneSetting::new(scene, background.for_scene(), lamp)?
+            }
+        };
+        setting.tilt = tilt;
+        Ok(&self.made.insert((key, setting)).1)
+    }
+}
+
+/// A scene with a panorama's picture of another size.
+pub(super) fn of_size(
+    mut scene: SceneDescription,
+    background: &StudioBackground,
+    longest: u32,
+) -> SceneDescription {
+    let extent = reduced(background.extent(scene.size), Some(longest));
+    scene.size = [extent.width as u32, extent.height as u32];
+    scene
+}
+
+/// A picture of a scene.
+pub(super) struct Drawn {
+    pub(super) picture: Rgb<Linear>,
+    pub(super) boxes: Vec<ObjectBox>,
+}
+
+/// Where an object is seen.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct ObjectBox {
+    /// Column and row of the first pixel, width and height.
+    #[serde(rename = "box")]
+    pub(super) seen: [i64; 4],
+}
+
+/// A scene ready to be drawn: its objects in their setting before their background.
+pub(super) struct Drawing<'a> {
+    pub(super) setting: &'a SceneSetting,
+    pub(super) background: &'a StudioBackground,
+    scene: InsertScene<'a>,
+    turn: f64,
+}
+
+impl<'a> Drawing<'a> {
+    /// Objects as a scene describes them; `before`: as they were photographed, without shadows.
+    ///
+    /// # Errors
+    /// Where an object cannot stand where it should.
+    pub(super) fn new(
+        scene: &SceneDescription,
+        setting: &'a SceneSetting,
+        background: &'a StudioBackground,
+        subjects: &[&'a Subject],
+        before: bool,
+    ) -> Result<Self, StudioError> {
+        let pairs = scene.objects.iter().zip(subjects);
+        let objects = pairs.map(|(described, &subject)| {
+            let object = SceneObject::described(described, subject);
+            SceneObject {
+                relit: !before,
+                shadow: if before { 0.0 } else { object.shadow },
+                ..object
+            }
+        });
+        Ok(Self {
+            scene: setting.scene(objects.collect())?,
+            setting,
+            background,
+            turn: scene.light.turn.to_radians(),
+        })
+    }
+
+    /// Background, shadows and objects in one picture.
+    ///
+    /// # Errors
+    /// Those of the render layers.
+    pub(super) fn picture(&self) -> Result<Drawn, StudioError> {
+        let layers = self.scene.layers(self.turn)?;
+        let background = self.background.seen(self.setting, self.turn);
+        Ok(Drawn {
+            picture: self.scene.compose(&background, &layers, 0),
+            boxes: layers.iter().map(ObjectBox::of).collect(),
+        })
+    }
+
+    /// Background, shadows and objects apart.
+    ///
+    /// # Errors
+    /// Those of the render layers.
+    pub(super) fn layers(&self) -> Result<DrawnLayers, StudioError> {
+        let layers = self.scene.layers(self.turn)?;
+        let background = self.background.seen(self.setting, self.turn);
+        let mut drawn = DrawnLayers {
+            objects: Vec::with_capacity(layers.len()),
+            parts: vec![shown(&background)],
+        };
+        for layer in &layers {
+            drawn.add(layer);
+        }
+        Ok(drawn)
+    }
+
+    /// What the person at the page should know of the setting.
+    pub(super) fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let Some(sun) = &self.setting.sun {
+            let sure = 100.0 * sun.confidence;
+            notes.push(format!(
+                "light comes from the sun in the picture ({sure:.0} % sure)"
+            ));
+        }
+        if let Some(exposure) = &self.setting.exposure
+            && exposure.clipped > MUCH_CLIPPED
+        {
+            let part = 100.0 * exposure.clipped;
+            notes.push(format!(
+                "{part:.0} % of the background is too bright to be shown"
+            ));
+        }
+        notes
+    }
+}
+
+/// A scene in layers.
+pub(super) struct DrawnLayers {
+    pub(super) objects: Vec<LayerPlace>,
+    /// The background, then for each object its colours and its shadow.
+    pub(super) parts: Vec<Vec<u8>>,
+}
+
+/// Where a layer lies.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct LayerPlace {
+    place: [i64; 2],
+    width: usize,
+    height: usize,
+    #[serde(rename = "box")]
+    seen: [i64; 4],
+    shadow: Option<ShadowPlace>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct ShadowPlace {
+    place: [i64; 2],
+    width: usize,
+    height: usize,
+}
+
+impl DrawnLayers {
+    fn add(&mut self, layer: &SceneLayer) {
+        self.parts.push(straight(layer.colours(), layer.alpha()));
+        let shadow = layer.shadow().map(|(place, arriving)| {
+            self.parts.push(rgba(arriving));
+            let Extent { width, height } = arriving.extent();
+            ShadowPlace {
+                place,
+                width,
+                height,
+            }
+        });
+        let Extent { width, height } = layer.alpha().extent();
+        self.objects.push(LayerPlace {
+            place: layer.place(),
+            width,
+            height,
+            seen: ObjectBox::of(layer).seen,
+            shadow,
+        });
+    }
+}
+
+impl ObjectBox {
+    fn of(layer: &SceneLayer) -> Self {
+        let [x, y, width, height] = covered(layer.alpha());
+        let [left, top] = layer.place();
+        Self {
+            seen: [left + x, top + y, width, height],
+        }
+    }
+}
+
+/// The smallest rectangle around all that is covered: column, row, width and height.
+fn covered(alpha: &Planes<1>) -> [i64; 4] {
+    let width = alpha.extent().width.max(1);
+    let seen = || {
+        let values = alpha.plane(0).iter().enumerate();
+        values
+            .filter(|(_, value)| **value >= SEEN)
+            .map(|(at, _)| (at % width, at / width))
+    };
+    let Some(first) = seen().next() else {
+        return [0; 4];
+    };
+    let start = (first.0, first.0, first.1, first.1);
+    let (left, right, top, bottom) = seen().fold(start, |(left, right, top, bottom), (x, y)| {
+        (left.min(x), right.max(x), top.min(y), bottom.max(y))
+    });
+    [left, top, right - left + 1, bottom - top + 1].map(|side| side as i64)
+}

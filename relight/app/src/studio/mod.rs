@@ -1,0 +1,429 @@
+//! The engine: it keeps photographs, masks, a background and what was computed of them, and answers messages.
+//!
+//! | file | concern |
+//! | --- | --- |
+//! | `request` | what the page asks |
+//! | `page_scene` | the page's scene, to and from the scene of a file |
+//! | `object` | a photograph or captured object, cut out and decomposed |
+//! | `background` | what objects are put into |
+//! | `drawing` | pictures of a scene |
+//! | `archive` | a scene with its files in a ZIP archive |
+//! | `pixels` | pictures as a page takes them |
+//! | `error` | what can be wrong, as a sentence |
+
+mod archive;
+mod background;
+mod drawing;
+mod error;
+mod object;
+mod page_scene;
+mod pixels;
+mod request;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use relight_core::image::{ColourSpace, Depth, Extent, Planes, Srgb, encode_jpeg, encode_png};
+use relight_nets::Weights;
+use relight_photo::decompose::Decomposer;
+use relight_photo::insert::{SceneDescription, Subject};
+use relit_data::causes::with_causes;
+use serde_json::{Value, json};
+
+pub use error::StudioError;
+
+use crate::clock::Moment;
+use crate::message::{pack, unpack};
+use archive::SceneFiles;
+use background::{StudioBackground, made_panoramas};
+use drawing::{Drawing, KeptSetting, of_size};
+use object::StudioObject;
+use page_scene::{ObjectFiles, PageScene};
+use request::{FileFormat, Request};
+
+/// The most objects of a scene.
+const MOST_OBJECTS: usize = 12;
+/// The size of a panorama's picture where nothing is said.
+const PANORAMA_PICTURE: [u32; 2] = [1280, 960];
+
+/// The engine of the page: it answers messages, one after the other.
+///
+/// ```
+/// use relight_app::{Studio, pack, unpack};
+///
+/// let mut studio = Studio::new();
+/// let reply = studio.answer(&pack(&[br#"{"op": "decompose", "object": 1}"#]));
+/// let text = String::from_utf8(unpack(&reply)?[0].to_vec()).unwrap();
+/// assert_eq!(text, r#"{"error":"the networks are not loaded yet: wait a moment"}"#);
+/// # Ok::<(), relight_app::MessageFault>(())
+/// ```
+#[derive(Default)]
+pub struct Studio {
+    decomposer: Option<Decomposer>,
+    objects: BTreeMap<u32, StudioObject>,
+    background: Option<StudioBackground>,
+    setting: KeptSetting,
+}
+
+/// An answer: what is said, and the pictures and files with it.
+struct Answer {
+    says: Value,
+    parts: Vec<Vec<u8>>,
+}
+
+impl Answer {
+    fn new(says: Value, parts: Vec<Vec<u8>>) -> Self {
+        Self { says, parts }
+    }
+}
+
+impl Studio {
+    /// An engine without networks, objects and background.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Answers a message. What cannot be done is answered by `{"error": "a sentence"}`, and nothing has changed then.
+    #[must_use]
+    pub fn answer(&mut self, message: &[u8]) -> Vec<u8> {
+        let answered = self.answered(message).and_then(|answer| {
+            let says = serde_json::to_vec(&answer.says).map_err(StudioError::Answer)?;
+            Ok((says, answer.parts))
+        });
+        match answered {
+            Ok((says, parts)) => {
+                let others = parts.iter().map(Vec::as_slice);
+                let parts: Vec<&[u8]> = std::iter::once(&says[..]).chain(others).collect();
+                pack(&parts)
+            }
+            Err(fault) => {
+                let says = json!({ "error": with_causes(&fault) }).to_string();
+                pack(&[says.as_bytes()])
+            }
+        }
+    }
+
+    fn answered(&mut self, message: &[u8]) -> Result<Answer, StudioError> {
+        let parts = unpack(message)?;
+        let request: Request = serde_json::from_slice(parts[0]).map_err(StudioError::Request)?;
+        let part = |what| parts.get(1).copied().ok_or(StudioError::Part(what));
+        match request {
+            Request::Load => self.load(part("weights")?),
+            Request::OpenPhoto { object, name } => {
+                let opened = StudioObject::open(&name, part("file")?.to_vec())?;
+                self.opened(object, opened)
+            }
+            Request::OpenPixels {
+                object,
+                name,
+                width,
+                height,
+            } => {
+                let pixels = part("pixels")?;
+                let opened = StudioObject::of_pixels(&name, [width, height], pixels)?;
+                self.opened(object, opened)
+            }
+            Request::Mask {
+                object,
+                rect,
+                strokes,
+            } => {
+                let start = Moment::now();
+                let made = self.object(object)?.cut_out(rect, strokes)?;
+                let says = json!({
+                    "area": made.area,
+                    "seconds": start.seconds(),
+                    "warnings": made.warnings,
+                });
+                Ok(Answer::new(says, vec![made.levels]))
+            }
+            Request::Decompose { object } => self.decompose(object),
+            Request::Close { object } => {
+                self.objects.remove(&object);
+                Ok(Answer::new(json!({}), Vec::new()))
+            }
+            Request::Backgrounds => backgrounds(),
+            Request::Background(asked) => {
+                let bytes = parts.get(1).copied().unwrap_or_default();
+                self.choose(StudioBackground::open(&asked, bytes)?)
+            }
+            Request::Render {
+                scene,
+                longest,
+                before,
+            } => self.render(&scene, longest, before),
+            Request::Layers { scene, longest } => self.layers(&scene, longest),
+            Request::Save { scene, format } => self.save(&scene, format),
+            Request::Export { scene, name } => self.export(&scene, &name),
+            Request::Import => self.import(part("archive")?),
+        }
+    }
+
+    fn load(&mut self, weights: &[u8]) -> Result<Answer, StudioError> {
+        let weights = Weights::from_bytes(weights).map_err(StudioError::Weights)?;
+        self.decomposer = Some(Decomposer::new(&weights)?);
+        let says = json!({ "version": env!("CARGO_PKG_VERSION") });
+        Ok(Answer::new(says, Vec::new()))
+    }
+
+    fn object(&mut self, number: u32) -> Result<&mut StudioObject, StudioError> {
+        let object = self.objects.get_mut(&number);
+        object.ok_or(StudioError::NoObject(number))
+    }
+
+    fn opened(&mut self, number: u32, object: StudioObject) -> Result<Answer, StudioError> {
+        let others = self.objects.keys().filter(|&&key| key != number).count();
+        if others >= MOST_OBJECTS {
+            return Err(StudioError::ManyObjects(others));
+        }
+        let (says, parts) = told(&object);
+        self.objects.insert(number, object);
+        Ok(Answer::new(says, parts))
+    }
+
+    fn decompose(&mut self, number: u32) -> Result<Answer, StudioError> {
+        let decomposer = self.decomposer.as_ref().ok_or(StudioError::NoNetwork)?;
+        let object = self.objects.get_mut(&number);
+        let object = object.ok_or(StudioError::NoObject(number))?;
+        let start = Moment::now();
+        let found = object.decomposed(decomposer)?;
+        let seconds = start.seconds();
+        let Extent { width, height } = found.shading.extent();
+        let most = most_shading(&found.shading);
+        let grey = |plane: &Planes<1>, scale: f32| -> Result<Vec<u8>, StudioError> {
+            let values = plane.plane(0).iter();
+            let shown: Vec<f32> = values.map(|v| Srgb::from_linear(v * scale)).collect();
+            let planes = [shown.clone(), shown.clone(), shown];
+            Ok(pixels::rgba(&Planes::from_planes(plane.extent(), planes)?))
+        };
+        let parts = vec![
+            pixels::shown(&found.albedo),
+            grey(&found.shading, 1.0 / most)?,
+            pixels::rgba(&found.normals.to_colours()),
+            grey(&found.highlight, 1.0)?,
+        ];
+        let says = json!({
+            "seconds": seconds,
+            "glossy": found.is_glossy,
+            "saturated": found.saturated_fraction,
+            "width": width,
+            "height": height,
+        });
+        Ok(Answer::new(says, parts))
+    }
+
+    fn choose(&mut self, background: StudioBackground) -> Result<Answer, StudioError> {
+        let extent = background.extent(PANORAMA_PICTURE);
+        self.setting.forget();
+        self.background = Some(background);
+        let says = json!({ "width": extent.width, "height": extent.height });
+        Ok(Answer::new(says, Vec::new()))
+    }
+
+    /// A scene as it is drawn while it is worked on: smaller, of objects that are ready.
+    fn draw<T>(
+        &mut self,
+        scene: &PageScene,
+        longest: u32,
+        before: bool,
+        draw: impl FnOnce(&Drawing<'_>) -> Result<T, StudioError>,
+    ) -> Result<T, StudioError> {
+        let decomposer = self.decomposer.as_ref().ok_or(StudioError::NoNetwork)?;
+        let background = self.background.as_mut().ok_or(StudioError::NoBackground)?;
+        for placed in &scene.objects {
+            let object = self.objects.get_mut(&placed.object);
+            let object = object.ok_or(StudioError::NoObject(placed.object))?;
+            object.prepare(decomposer)?;
+        }
+        let described = in_engine(scene)?;
+        let described = of_size(described, background, longest);
+        let setting = self.setting.of(&described, background, Some(longest))?;
+        let ready = |placed: &page_scene::PageObject| {
+            let object = self.objects.get(&placed.object);
+            let subject = object.and_then(StudioObject::prepared);
+            subject.ok_or(StudioError::NoObject(placed.object))
+        };
+        let subjects: Vec<&Subject> = scene.objects.iter().map(ready).collect::<Result<_, _>>()?;
+        draw(&Drawing::new(
+            &described, setting, background, &subjects, before,
+        )?)
+    }
+
+    fn render(
+        &mut self,
+        scene: &PageScene,
+        longest: u32,
+        before: bool,
+    ) -> Result<Answer, StudioError> {
+        let start = Moment::now();
+        let (drawn, notes) = self.draw(scene, longest, before, |drawing| {
+            Ok((drawing.picture()?, drawing.notes()))
+        })?;
+        let Extent { width, height } = drawn.picture.planes().extent();
+        let picture = pixels::shown(&drawn.picture);
+        let says = json!({
+            "width": width,
+            "height": height,
+            "seconds": start.seconds(),
+            "objects": drawn.boxes,
+            "notes": notes,
+        });
+        Ok(Answer::new(says, vec![picture]))
+    }
+
+    fn layers(&mut self, scene: &PageScene, longest: u32) -> Result<Answer, StudioError> {
+        let start = Moment::now();
+        let (drawn, extent, notes) = self.draw(scene, longest, false, |drawing| {
+            Ok((drawing.layers()?, drawing.setting.extent, drawing.notes()))
+        })?;
+        let says = json!({
+            "width": extent.width,
+            "height": extent.height,
+            "seconds": start.seconds(),
+            "objects": drawn.objects,
+            "notes": notes,
+        });
+        Ok(Answer::new(says, drawn.parts))
+    }
+
+    fn save(&mut self, scene: &PageScene, format: FileFormat) -> Result<Answer, StudioError> {
+        let decomposer = self.decomposer.as_ref().ok_or(StudioError::NoNetwork)?;
+        let background = self.background.as_mut().ok_or(StudioError::NoBackground)?;
+        let described = in_engine(scene)?;
+        let setting = self.setting.of(&described, background, None)?;
+        let mut subjects = Vec::with_capacity(scene.objects.len());
+        for (placed, described) in scene.objects.iter().zip(&described.objects) {
+            let object = self.objects.get_mut(&placed.object);
+            let object = object.ok_or(StudioError::NoObject(placed.object))?;
+            subjects.push(object.subject(setting, described, decomposer)?);
+        }
+        let subjects: Vec<&Subject> = subjects.iter().collect();
+        let drawing = Drawing::new(&described, setting, background, &subjects, false)?;
+        let picture = drawing.picture()?.picture.encode::<Srgb>().into_planes();
+        let Extent { width, height } = picture.extent();
+        let path = Path::new("the picture");
+        let file = match format {
+            FileFormat::Png => encode_png(path, &picture, Depth::Eight)?,
+            FileFormat::Jpeg => encode_jpeg(path, &picture)?,
+        };
+        let says = json!({ "width": width, "height": height });
+        Ok(Answer::new(says, vec![file]))
+    }
+
+    fn export(&mut self, scene: &PageScene, name: &str) -> Result<Answer, StudioError> {
+        let background = self.background.as_ref().ok_or(StudioError::NoBackground)?;
+        if scene.objects.is_empty() {
+            return Err(StudioError::Empty);
+        }
+        let mut files = SceneFiles::default();
+        let mut named = Vec::with_capacity(scene.objects.len());
+        for placed in &scene.objects {
+            let object = self.objects.get(&placed.object);
+            let object = object.ok_or(StudioError::NoObject(placed.object))?;
+            named.push(files.add_object(object)?);
+        }
+        let described = scene.described(files.add_background(background)?, named)?;
+        let says = json!({ "name": name });
+        Ok(Answer::new(says, vec![files.packed(&described)?]))
+    }
+
+    fn import(&mut self, archive: &[u8]) -> Result<Answer, StudioError> {
+        let (described, files) = SceneFiles::unpacked(archive)?;
+        if described.objects.len() > MOST_OBJECTS {
+            return Err(StudioError::ManyObjects(MOST_OBJECTS));
+        }
+        let background_name = described.background.to_string_lossy();
+        let content = files.content(&described.background)?.clone();
+        let background = StudioBackground::kept(&background_name, content)?;
+        let numbers: Vec<u32> = (1..).take(described.objects.len()).collect();
+        let scene = PageScene::of(&described, &numbers)?;
+        let mut objects = BTreeMap::new();
+        for (described, &number) in described.objects.iter().zip(&numbers) {
+            objects.insert(number, kept_object(described, &files)?);
+        }
+        let mut parts = Vec::new();
+        let mut says_objects = Vec::new();
+        for (number, object) in &objects {
+            let (mut says, pictures) = told(object);
+            says["object"] = json!(number);
+            says["name"] = json!(object.name);
+            says_objects.push(says);
+            parts.extend(pictures);
+        }
+        parts.push(background.thumbnail());
+        let extent = background.extent(described.size);
+        let says = json!({
+            "scene": serde_json::to_value(&scene).map_err(StudioError::Answer)?,
+            "objects": says_objects,
+            "background": {
+                "kind": if background.panorama_id().is_some() { "panorama" } else { "photo" },
+                "id": background.panorama_id().flatten(),
+                "name": background.name,
+                "width": extent.width,
+                "height": extent.height,
+            },
+        });
+        self.objects = objects;
+        self.choose(background)?;
+        Ok(Answer::new(says, parts))
+    }
+}
+
+/// An object for the page, with its picture and its mask.
+fn told(object: &StudioObject) -> (Value, Vec<Vec<u8>>) {
+    let (extent, picture) = object.picture();
+    let mask = object.mask();
+    let says = json!({
+        "kind": object.kind(),
+        "width": extent.width,
+        "height": extent.height,
+        "reduced": object.reduced,
+        "masked": mask.is_some(),
+    });
+    (says, std::iter::once(picture).chain(mask).collect())
+}
+
+fn kept_object(
+    described: &relight_photo::insert::ObjectDescription,
+    files: &SceneFiles,
+) -> Result<StudioObject, StudioError> {
+    let name = described.photo.to_string_lossy();
+    let content = files.content(&described.photo)?.clone();
+    match &described.mask {
+        Some(mask) => {
+            let mask = files.content(mask)?;
+            StudioObject::open_masked(&name, content, mask, described.transfer)
+        }
+        None => StudioObject::open(&name, content),
+    }
+}
+
+/// A scene whose files are all in the engine.
+fn in_engine(scene: &PageScene) -> Result<SceneDescription, StudioError> {
+    let files = vec![ObjectFiles::default(); scene.objects.len()];
+    scene.described(PathBuf::new(), files)
+}
+
+fn backgrounds() -> Result<Answer, StudioError> {
+    let made = made_panoramas()?;
+    let panoramas: Vec<Value> = made
+        .iter()
+        .map(|(scenery, _)| json!({ "id": scenery.id(), "name": scenery.name() }))
+        .collect();
+    let thumbnails = made.into_iter().map(|(_, thumbnail)| thumbnail).collect();
+    Ok(Answer::new(json!({ "panoramas": panoramas }), thumbnails))
+}
+
+/// The brightest shading, but for one pixel in a hundred: what is shown as white.
+fn most_shading(shading: &Planes<1>) -> f32 {
+    let mut values: Vec<f32> = shading
+        .plane(0)
+        .iter()
+        .copied()
+        .filter(|v| *v > 0.0)
+        .collect();
+    values.sort_by(f32::total_cmp);
+    let most = values.get(values.len() * 99 / 100).copied().unwrap_or(1.0);
+    most.max(1e-6)
+}

@@ -1,0 +1,394 @@
+//! An object of the page: its file, its mask, and what was computed of it.
+
+use std::path::Path;
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, GrayImage, ImageEncoder, RgbImage};
+use relight_core::captured_object::CapturedObject;
+use relight_core::image::{
+    ColourSpace, Extent, Gamma22, ImageError, Linear, ReducedFile, Rgb, Samples, Srgb, StoredImage,
+    Transfer,
+};
+use relight_photo::decompose::{
+    DecomposeError, DecomposeOptions, Decomposer, Decomposition, Photo, PhotoHints, stated_extent,
+    stated_transfer,
+};
+use relight_photo::insert::{ObjectDescription, SceneSetting, Subject};
+use relit_data::geometry::Rect;
+use relit_grabcut::{Hints, SegmentSettings, Stroke, Strokes, segment};
+
+use super::StudioError;
+use super::pixels::{levels, on_screen, opaque, shown, stored, without_alpha};
+use super::request::ObjectKind;
+
+/// Larger photographs are made smaller: the page keeps several, on a phone.
+pub(super) const MOST_PIXELS: usize = 2_000_000;
+/// Photographs that would take too much memory while they are decoded.
+const MOST_READ: usize = 100_000_000;
+/// The height of an object of which the scene is shown while it is worked on, pixels.
+const PREVIEW_ROWS: usize = 320;
+/// The most that the longest side of its photograph has then.
+const PREVIEW_SIDE: usize = 1024;
+
+/// An object.
+pub(super) struct StudioObject {
+    /// The name of its file.
+    pub(super) name: String,
+    /// The file, as it is kept with a scene.
+    pub(super) file: Vec<u8>,
+    /// How integers are encoded, where the file is not to be asked.
+    pub(super) transfer: Option<Transfer>,
+    /// Whether the photograph was larger.
+    pub(super) reduced: bool,
+    content: Content,
+}
+
+enum Content {
+    Photo(Box<Cut>),
+    Captured(Box<(CapturedObject, Subject)>),
+}
+
+/// A photograph, as far as it is cut out.
+struct Cut {
+    /// As a screen shows it, and as GrabCut sees it.
+    shown: RgbImage,
+    /// A mask that a person made; without one the file's own counts, if it has any.
+    mask: Option<GrayImage>,
+    /// The photograph with its mask.
+    photo: Option<Photo>,
+    /// The object in the size in which the scene is worked on.
+    preview: Option<Subject>,
+}
+
+/// A mask that was made.
+pub(super) struct MadeMask {
+    pub(super) levels: Vec<u8>,
+    pub(super) area: u64,
+    pub(super) warnings: Vec<String>,
+}
+
+impl StudioObject {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// Where it is no photograph and no captured object, or too large.
+    pub(super) fn open(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+        if is_captured(name) {
+            let captured = CapturedObject::from_bytes(&bytes)?;
+            let subject = Subject::of_captured(&captured)?;
+            return Ok(Self {
+                name: name.to_owned(),
+                file: bytes,
+                transfer: None,
+                reduced: false,
+                content: Content::Captured(Box::new((captured, subject))),
+            });
+        }
+        let opened = OpenedFile::read(name, bytes)?;
+        Self::of_file(opened, None)
+    }
+
+    /// Opens a photograph with the mask that was kept with it.
+    ///
+    /// # Errors
+    /// Where it is no photograph, or the mask is none.
+    pub(super) fn open_masked(
+        name: &str,
+        bytes: Vec<u8>,
+        mask: &[u8],
+        transfer: Option<Transfer>,
+    ) -> Result<Self, StudioError> {
+        let mut opened = OpenedFile::read(name, bytes)?;
+        opened.transfer = transfer.or(opened.transfer);
+        let image = StoredImage::from_bytes(Path::new("the mask"), mask)?;
+        let extent = image.planes.extent();
+        let bytes = image.planes.to_bytes().into_iter().step_by(3).collect();
+        let mask = GrayImage::from_raw(extent.width as u32, extent.height as u32, bytes);
+        Self::of_file(opened, mask)
+    }
+
+    fn of_file(opened: OpenedFile, mask: Option<GrayImage>) -> Result<Self, StudioError> {
+        let mut object = Self {
+            name: opened.name,
+            file: opened.bytes,
+            transfer: opened.transfer,
+            reduced: opened.reduced,
+            content: Content::Photo(Box::new(Cut {
+                shown: opened.shown,
+                mask,
+                photo: None,
+                preview: None,
+            })),
+        };
+        // A photograph may show by itself where its object is.
+        match object.photo() {
+            Ok(_) | Err(StudioError::NoMask { .. }) => Ok(object),
+            Err(fault) => Err(fault),
+        }
+    }
+
+    /// A photograph that a browser has decoded.
+    ///
+    /// # Errors
+    /// Where the pixels are not as many as they should be.
+    pub(super) fn of_pixels(name: &str, size: [u32; 2], rgba: &[u8]) -> Result<Self, StudioError> {
+        Self::open(&format!("{}.png", stem(name)), png_of(name, size, rgba)?)
+    }
+
+    /// What it is made of.
+    pub(super) const fn kind(&self) -> ObjectKind {
+        match self.content {
+            Content::Photo(_) => ObjectKind::Photo,
+            Content::Captured(_) => ObjectKind::Captured,
+        }
+    }
+
+    /// Its picture for the page, with its size.
+    pub(super) fn picture(&self) -> (Extent, Vec<u8>) {
+        match &self.content {
+            Content::Photo(cut) => {
+                let (width, height) = cut.shown.dimensions();
+                let extent = Extent::new(width as usize, height as usize);
+                (extent, opaque(&cut.shown))
+            }
+            Content::Captured(object) => {
+                let albedo = object.0.surface().albedo();
+                (object.0.extent(), shown(albedo))
+            }
+        }
+    }
+
+    /// Its mask for the page; none where nobody and nothing has said where the object is.
+    pub(super) fn mask(&self) -> Option<Vec<u8>> {
+        match &self.content {
+            Content::Photo(cut) => {
+                let photo = cut.photo.as_ref()?;
+                Some(levels(&photo.mask))
+            }
+            Content::Captured(object) => Some(levels(object.0.alpha())),
+        }
+    }
+
+    /// The mask that a person made, as a file that is kept with the photograph.
+    pub(super) fn mask_file(&self) -> Option<&GrayImage> {
+        match &self.content {
+            Content::Photo(cut) => cut.mask.as_ref(),
+            Content::Captured(_) => None,
+        }
+    }
+
+    /// Cuts the object out by hints.
+    ///
+    /// # Errors
+    /// Where the hints do not fit, or nothing is left.
+    pub(super) fn cut_out(
+        &mut self,
+        rect: Option<[i32; 4]>,
+        strokes: Vec<Stroke>,
+    ) -> Result<MadeMask, StudioError> {
+        let Content::Photo(cut) = &mut self.content else {
+            let name = self.name.clone();
+            return Err(StudioError::Captured { name });
+        };
+        let seeds = Strokes::new(strokes)?.paint(cut.shown.dimensions(), None)?;
+        let rect = rect.map(|[x, y, width, height]| {
+            Rect::new(x, y, width.max(0) as u32, height.max(0) as u32)
+        });
+        let hints = Hints::from_parts(rect, seeds)?;
+        let mask = segment(&cut.shown, &hints, &SegmentSettings::default())?;
+        let made = MadeMask {
+            levels: mask.image().as_raw().clone(),
+            area: mask.statistics().area_px,
+            warnings: mask.warnings().iter().map(ToString::to_string).collect(),
+        };
+        cut.mask = Some(mask.image().clone());
+        (cut.photo, cut.preview) = (None, None);
+        Ok(made)
+    }
+
+    /// The photograph with its mask: the same that `relight` reads of its files.
+    fn photo(&mut self) -> Result<&Photo, StudioError> {
+        let Content::Photo(cut) = &mut self.content else {
+            let name = self.name.clone();
+            return Err(StudioError::Captured { name });
+        };
+        if cut.photo.is_none() {
+            let mask = cut.mask.as_ref().map(stored).transpose()?;
+            let hints = PhotoHints {
+                mask: mask.as_ref(),
+                transfer: self.transfer,
+                rectangle: None,
+            };
+            let read = Photo::from_bytes(Path::new(&self.name), &self.file, &hints);
+            cut.photo = Some(read.map_err(|fault| match fault {
+                DecomposeError::NoMask { .. } | DecomposeError::Black { .. } => {
+                    let name = self.name.clone();
+                    StudioError::NoMask { name }
+                }
+                fault => fault.into(),
+            })?);
+        }
+        cut.photo.as_ref().ok_or_else(|| StudioError::NoMask {
+            name: self.name.clone(),
+        })
+    }
+
+    /// The photograph decomposed as it is; none of a captured object.
+    ///
+    /// # Errors
+    /// Where it is not cut out yet, or cannot be decomposed.
+    pub(super) fn decomposed(
+        &mut self,
+        decomposer: &Decomposer,
+    ) -> Result<Decomposition, StudioError> {
+        let photo = self.photo()?.clone().at_most(PREVIEW_SIDE);
+        let options = photo.options(&DecomposeOptions::default());
+        Ok(decomposer.decompose(&photo.picture, &photo.mask, &options)?)
+    }
+
+    /// Makes the object ready to be shown while the scene is worked on.
+    ///
+    /// # Errors
+    /// Where it is not cut out yet, or cannot be decomposed.
+    pub(super) fn prepare(&mut self, decomposer: &Decomposer) -> Result<(), StudioError> {
+        if self.prepared().is_some() {
+            return Ok(());
+        }
+        let photo = self.photo()?;
+        let width = photo.mask.extent().width.max(1);
+        let lines = photo.mask.plane(0).chunks_exact(width);
+        let rows = lines.filter(|line| line.contains(&1.0)).count().max(1);
+        let longest = width.max(photo.mask.extent().height);
+        let longest = (longest * PREVIEW_ROWS / rows).min(PREVIEW_SIDE);
+        let photo = photo.clone().at_most(longest.max(PREVIEW_ROWS));
+        let subject = Subject::of_photo(&photo, decomposer, &DecomposeOptions::default())?;
+        if let Content::Photo(cut) = &mut self.content {
+            cut.preview = Some(subject);
+        }
+        Ok(())
+    }
+
+    /// The object as it is shown while the scene is worked on, after [`StudioObject::prepare`].
+    pub(super) fn prepared(&self) -> Option<&Subject> {
+        match &self.content {
+            Content::Photo(cut) => cut.preview.as_ref(),
+            Content::Captured(object) => Some(&object.1),
+        }
+    }
+
+    /// The object as `relight insert` puts it into a scene.
+    ///
+    /// # Errors
+    /// Where it is not cut out yet, or cannot be decomposed.
+    pub(super) fn subject(
+        &mut self,
+        setting: &SceneSetting,
+        described: &ObjectDescription,
+        decomposer: &Decomposer,
+    ) -> Result<Subject, StudioError> {
+        if let Content::Captured(object) = &self.content {
+            return Ok(object.1.clone());
+        }
+        let photo = setting.reduced(described, self.photo()?.clone());
+        let options = DecomposeOptions::default();
+        Ok(Subject::of_photo(&photo, decomposer, &options)?)
+    }
+}
+
+/// A photograph's file, no larger than the page works on.
+pub(super) struct OpenedFile {
+    pub(super) name: String,
+    pub(super) bytes: Vec<u8>,
+    pub(super) transfer: Option<Transfer>,
+    pub(super) shown: RgbImage,
+    pub(super) image: StoredImage,
+    pub(super) reduced: bool,
+}
+
+impl OpenedFile {
+    /// Decodes a file, after it was made smaller where it is too large.
+    ///
+    /// # Errors
+    /// Where it is no picture that can be read.
+    pub(super) fn read(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+        let path = Path::new(name);
+        if let Some(extent) = stated_extent(&bytes)
+            && extent.width.saturating_mul(extent.height) > MOST_READ
+        {
+            let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
+            return Err(StudioError::TooLarge {
+                name: name.to_owned(),
+                width: side(extent.width),
+                height: side(extent.height),
+                most: MOST_READ,
+            });
+        }
+        let stated = stated_transfer(path, &bytes)?;
+        let smaller = ReducedFile::of(path, &bytes, MOST_PIXELS)?;
+        let reduced = smaller.is_some();
+        let (name, bytes) = match smaller {
+            Some(smaller) => (format!("{}.{}", stem(name), smaller.ending), smaller.bytes),
+            None => (name.to_owned(), bytes),
+        };
+        let image = StoredImage::from_bytes(Path::new(&name), &bytes)?;
+        let transfer =
+            (image.samples == Samples::Integer && stated != Transfer::Srgb).then_some(stated);
+        Ok(Self {
+            shown: on_screen(&image, transfer),
+            transfer,
+            name,
+            bytes,
+            image,
+            reduced,
+        })
+    }
+
+    /// Its light.
+    pub(super) fn light(self) -> Rgb<Linear> {
+        let to_linear = match (self.image.samples, self.transfer) {
+            (Samples::Float, _) | (_, Some(Transfer::Linear)) => |value: f32| value,
+            (_, Some(Transfer::Gamma22)) => Gamma22::to_linear,
+            _ => Srgb::to_linear,
+        };
+        Rgb::new(self.image.planes.map(to_linear))
+    }
+}
+
+/// The pixels that a browser has decoded, in a PNG.
+///
+/// # Errors
+/// Where they are not as many as they should be.
+pub(super) fn png_of(
+    name: &str,
+    [width, height]: [u32; 2],
+    rgba: &[u8],
+) -> Result<Vec<u8>, StudioError> {
+    if rgba.len() as u64 != 4 * u64::from(width) * u64::from(height) || rgba.is_empty() {
+        return Err(StudioError::Part("pixels of its size"));
+    }
+    let (colours, has_alpha) = without_alpha(rgba);
+    let (pixels, kind) = if has_alpha {
+        (rgba, ExtendedColorType::Rgba8)
+    } else {
+        (&colours[..], ExtendedColorType::Rgb8)
+    };
+    let mut file = Vec::new();
+    PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(pixels, width, height, kind)
+        .map_err(|source| ImageError::Encode {
+            path: name.into(),
+            source,
+        })?;
+    Ok(file)
+}
+
+/// Whether a file is called as a captured object.
+fn is_captured(name: &str) -> bool {
+    name.rsplit_once('.')
+        .is_some_and(|(_, ending)| ending.eq_ignore_ascii_case("relit"))
+}
+
+/// A file's name without its ending.
+pub(super) fn stem(name: &str) -> &str {
+    name.rsplit_once('.').map_or(name, |(stem, _)| stem)
+}

@@ -1,0 +1,94 @@
+//! What the page asks, as JSON: docs/relight-serve.md has the whole of it.
+
+use relit_grabcut::Stroke;
+use serde::{Deserialize, Serialize};
+
+use super::page_scene::PageScene;
+
+/// A request; pictures and files come as further parts of its message.
+#[derive(Debug, Deserialize)]
+#[serde(tag = "op", rename_all = "snake_case", deny_unknown_fields)]
+pub(super) enum Request {
+    /// The weights of the networks.
+    Load,
+    /// A photograph or a captured object, as its file.
+    OpenPhoto { object: u32, name: String },
+    /// A photograph that the browser has decoded.
+    OpenPixels {
+        object: u32,
+        name: String,
+        width: u32,
+        height: u32,
+    },
+    /// The mask of a photograph by hints.
+    Mask {
+        object: u32,
+        rect: Option<[i32; 4]>,
+        #[serde(default)]
+        strokes: Vec<Stroke>,
+    },
+    /// What a photograph is decomposed into.
+    Decompose { object: u32 },
+    /// Forgets an object.
+    Close { object: u32 },
+    /// The panoramas that are made.
+    Backgrounds,
+    /// What the objects are put into.
+    Background(BackgroundRequest),
+    /// A picture of the scene.
+    Render {
+        scene: PageScene,
+        longest: u32,
+        #[serde(default)]
+        before: bool,
+    },
+    /// The same in parts that can be moved.
+    Layers { scene: PageScene, longest: u32 },
+    /// A picture of the scene in full size, as a file.
+    Save {
+        scene: PageScene,
+        format: FileFormat,
+    },
+    /// The scene and all it needs in an archive.
+    Export { scene: PageScene, name: String },
+    /// Such an archive in place of all that is there.
+    Import,
+}
+
+/// A background.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub(super) enum BackgroundRequest {
+    /// A panorama that is made.
+    Panorama { id: String },
+    /// A photograph, as its file.
+    Photo { name: String },
+    /// A photograph that the browser has decoded.
+    PhotoPixels {
+        name: String,
+        width: u32,
+        height: u32,
+    },
+    /// A panorama, as its file.
+    PanoramaFile { name: String },
+}
+
+/// How a picture is saved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum FileFormat {
+    /// Without loss.
+    Png,
+    /// Smaller.
+    Jpeg,
+}
+
+/// What an object is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum ObjectKind {
+    /// A photograph, which is decomposed.
+    Photo,
+    /// Maps that were measured.
+    Captured,
+}
