@@ -33,14 +33,14 @@ pub(super) struct Worker {
 }
 
 impl Worker {
-    /// Starts a program in a process group of its own, at the lowest priority.
-    pub(super) fn start(mut command: Command) -> io::Result<Self> {
+    /// Starts a program in a process group of its own; at a niceness of 19 it gives way to all others.
+    pub(super) fn start(mut command: Command, niceness: i32) -> io::Result<Self> {
         command
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .process_group(0);
-        let mut child = spawn_last(&mut command)?;
+        let mut child = spawn_nice(&mut command, niceness)?;
         let (sender, lines) = sync_channel(LINES);
         if let Some(output) = child.stdout.take() {
             spawn_reader("relit-heard", move || {
@@ -139,13 +139,13 @@ impl Drop for Worker {
     }
 }
 
-/// Starts a program that gives way to all others. Linux keeps a priority for each thread, and a program inherits that
-/// of the thread that starts it: one of its own, as whoever holds the program later must not wait.
-fn spawn_last(command: &mut Command) -> io::Result<Child> {
+/// Starts a program that gives way to others. Linux keeps a priority for each thread, and a program inherits that of the
+/// thread that starts it: one of its own, as whoever holds the program later must not wait.
+fn spawn_nice(command: &mut Command, niceness: i32) -> io::Result<Child> {
     thread::scope(|scope| {
         let starter = scope.spawn(|| {
             // Where the system refuses, it runs as others do.
-            let _ = rustix::process::setpriority_process(None, 19);
+            let _ = rustix::process::setpriority_process(None, niceness);
             command.spawn()
         });
         let failed = |_| Err(io::Error::other("the thread that starts it failed"));
