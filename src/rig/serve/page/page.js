@@ -55,7 +55,8 @@ function show(next) {
   showCamera();
   showDisk();
   const finished = before && JSON.stringify(before.last_take) !== JSON.stringify(state.last_take);
-  if (!before || finished || before.session !== state.session) refresh();
+  const folder = Boolean(before?.disk_fault) !== Boolean(state.disk_fault);
+  if (!before || finished || folder || before.session !== state.session) refresh();
   if (before && finished) signal(state.last_take.verdict === "clean");
   showSettings();
   showLog();
@@ -296,14 +297,26 @@ function warn(id, fault) {
   $(id).hidden = !fault;
 }
 
+let listFault = "";
+
+/** Says why there is no list, until there is one. */
+function sayOfList(sentence) {
+  const isShown = listFault && $("message").textContent === listFault;
+  listFault = sentence;
+  if (sentence || isShown) say(sentence);
+}
+
 /** Fetches what is on the disk: the list, and the names to suggest. */
 async function refresh() {
+  // Without a folder there is no list, and that is said already.
+  if (state?.disk_fault) return sayOfList("");
   try {
     await listSessions();
     const names = await ask("/api/v1/objects");
     $("objects").replaceChildren(...names.map((value) => make("option", { value })));
+    sayOfList("");
   } catch (problem) {
-    if (problem.status !== 0) say(problem.message);
+    if (problem.status !== 0) sayOfList(problem.message);
   }
 }
 
