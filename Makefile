@@ -82,8 +82,9 @@ test-rig: setup ## Capture with the kernel's camera drivers and a real tty, in a
 PICTURES ?= $(TARGET)/day
 
 test-day: setup ## Go through a day at the rig by taps in a browser, with whole turns; pictures in PICTURES
-	cargo build --locked $(PROGRAMS) --bins
-	RELIT_PICTURES="$(abspath $(PICTURES))" cargo test --locked -p relit-tests --test day -- --include-ignored
+	cargo build --locked --release $(PROGRAMS) --bins
+	RELIT_PICTURES="$(abspath $(PICTURES))" cargo test --locked --release -p relit-tests --test day -- \
+	    --include-ignored --test-threads 1
 
 test-slurm: setup ## Extract as an array job on a real Slurm, started on this machine for it
 	cargo build --locked -p relit-extract

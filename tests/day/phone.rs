@@ -7,8 +7,9 @@ use std::{env, fs};
 use relit_test_support::chromium::Chromium;
 use serde_json::Value;
 
-/// Pixels of the screen.
+/// Pixels of the screen, and the variable that gives others, as in 844x390.
 const SCREEN: (u32, u32) = (390, 844);
+const OTHER_SCREEN: &str = "RELIT_SCREEN";
 /// The folder of the pictures, where they are wanted.
 const PICTURES: &str = "RELIT_PICTURES";
 /// What hangs over a side of the screen, or has more text than place.
@@ -35,7 +36,7 @@ impl Phone {
         if let Some(folder) = &pictures {
             fs::create_dir_all(folder).unwrap();
         }
-        let mut page = Chromium::open(browser, url, SCREEN, true);
+        let mut page = Chromium::open(browser, url, screen(), true);
         page.wait_for("document.body?.className === '' && document.getElementById('phase').textContent !== ''");
         Self {
             page,
@@ -90,6 +91,14 @@ impl Phone {
         self.wait_so_long(&has(selector, words), longest);
     }
 
+    /// Whether the button at the bottom has this text, and does something.
+    pub(crate) fn wait_button(&mut self, text: &str, is_enabled: bool) {
+        self.wait_for(&format!(
+            "document.getElementById('go').textContent === {text:?} \
+                && document.getElementById('go').disabled !== {is_enabled}"
+        ));
+    }
+
     /// Looks at the screen: nothing is cut off, and a picture is taken where pictures are wanted.
     pub(crate) fn see(&mut self, what: &str) {
         let cut_off = self.value(CUT_OFF);
@@ -115,6 +124,15 @@ impl Phone {
             fs::write(folder.join(name), self.page.picture(whole)).unwrap();
         }
     }
+}
+
+fn screen() -> (u32, u32) {
+    let other = env::var(OTHER_SCREEN).ok();
+    let sides = other.as_deref().map(|sides| {
+        let (width, height) = sides.split_once('x').unwrap();
+        (width.parse().unwrap(), height.parse().unwrap())
+    });
+    sides.unwrap_or(SCREEN)
 }
 
 fn has(selector: &str, words: &str) -> String {

@@ -27,6 +27,13 @@ pub(crate) const SHORT_TURN: Turn = Turn {
     longest: Duration::from_secs(180),
 };
 
+/// Slow enough for something to happen meanwhile.
+pub(crate) const SLOW_TURN: Turn = Turn {
+    degrees_per_second: 7.2,
+    frames: 1500,
+    ..SHORT_TURN
+};
+
 /// The turn that the programs are made for.
 pub(crate) const LONG_TURN: Turn = Turn {
     recording: "20261120T093015Z-cow",
@@ -34,6 +41,13 @@ pub(crate) const LONG_TURN: Turn = Turn {
     frames: 1500,
     longest: Duration::from_secs(900),
 };
+
+impl Turn {
+    /// The address of the recording as a camera.
+    pub(crate) fn camera(&self) -> String {
+        format!("replay:{}?loop=1", recording(self).display())
+    }
+}
 
 /// `relit-capture serve`, until the test ends.
 #[derive(Debug)]
@@ -47,10 +61,16 @@ pub(crate) struct Rig {
 impl Rig {
     /// With `relit-mask` and `relit-extract` beside it.
     pub(crate) fn start(turn: &'static Turn) -> Self {
+        Self::start_at(turn, &turn.camera(), "sim:")
+    }
+
+    /// With another camera or table.
+    pub(crate) fn start_at(turn: &'static Turn, camera: &str, table: &str) -> Self {
         for program in ["relit-mask", "relit-extract"] {
             assert!(relit_tests::program(program).is_file());
         }
-        let command = Command::new(relit_tests::program("relit-capture"));
+        let mut command = Command::new(relit_tests::program("relit-capture"));
+        command.args(["serve", "--camera", camera, "--turntable", table]);
         Self::serve(command, turn, tempfile::tempdir().unwrap())
     }
 
@@ -63,14 +83,13 @@ impl Rig {
         fs::copy(relit_tests::program("relit-capture"), &program).unwrap();
         let mut command = Command::new(program);
         command.env("PATH", &alone);
+        command.args(["serve", "--camera", &turn.camera(), "--turntable", "sim:"]);
         Self::serve(command, turn, folder)
     }
 
     fn serve(mut command: Command, turn: &'static Turn, folder: tempfile::TempDir) -> Self {
-        let camera = format!("replay:{}?loop=1", recording(turn).display());
         command
-            .args(["serve", "--json", "--listen", "127.0.0.1:0"])
-            .args(["--turntable", "sim:", "--camera", &camera])
+            .args(["--json", "--listen", "127.0.0.1:0"])
             .args(["--degrees-per-second", &turn.degrees_per_second.to_string()])
             .arg("--root")
             .arg(folder.path().join("sessions"))

@@ -1,0 +1,73 @@
+//! What the page says where something is in the way. All states of the rig are in `src/rig/serve/tests/states`; here a
+//! browser shows those that were once hidden.
+
+use std::fs;
+use std::path::PathBuf;
+
+use crate::phone::Phone;
+use crate::rig::{Rig, SHORT_TURN, SLOW_TURN};
+
+pub(crate) fn what_is_not_there_is_named_by_headline_and_button(browser: PathBuf) {
+    let rig = Rig::start_at(&SHORT_TURN, "v4l2:/dev/no-camera", "sim:");
+    let mut phone = Phone::open(&browser, &rig.url, "no-camera");
+    phone.wait_text("#phase", "No camera");
+    phone.wait_text("#camera-fault", "/dev/no-camera");
+    phone.wait_button("No camera", false);
+    phone.see("no-camera");
+    drop((rig, phone));
+
+    let folder = tempfile::tempdir().unwrap();
+    let port = folder.path().join("port");
+    fs::write(&port, "").unwrap();
+    let table = format!("serial:{}", port.display());
+    let rig = Rig::start_at(&SHORT_TURN, &SHORT_TURN.camera(), &table);
+    let mut phone = Phone::open(&browser, &rig.url, "no-table");
+    phone.wait_text("#phase", "No turntable");
+    phone.wait_text("#table-fault", "could not be opened");
+    phone.wait_button("No turntable", false);
+    phone.write("#object", "cow");
+    phone.wait_button("No turntable", false);
+    phone.see("port-that-cannot-be-opened");
+    drop((rig, phone));
+
+    let rig = Rig::start(&SHORT_TURN);
+    let mut phone = Phone::open(&browser, &rig.url, "no-folder");
+    phone.wait_text("#phase", "Ready");
+    let away = rig.sessions().with_file_name("away");
+    fs::rename(rig.sessions(), &away).unwrap();
+    phone.wait_text("#phase", "No folder for sessions");
+    phone.wait_text("#disk", "put the folder back");
+    phone.wait_button("No folder for sessions", false);
+    phone.wait_for("document.getElementById('message').hidden");
+    phone.see("no-folder");
+    fs::rename(&away, rig.sessions()).unwrap();
+    phone.wait_text("#phase", "Ready");
+    phone.wait_for("document.getElementById('message').hidden");
+}
+
+pub(crate) fn the_emergency_stop_comes_before_the_queue_and_the_aborted_object_after_it(
+    browser: PathBuf,
+) {
+    let longest = SLOW_TURN.longest;
+    let table = "sim:?fault=estop@30s:10s";
+    let rig = Rig::start_at(&SLOW_TURN, &SLOW_TURN.camera(), table);
+    let mut phone = Phone::open(&browser, &rig.url, "emergency");
+    phone.write("#object", "calf");
+    phone.tap("#enqueue");
+    phone.wait_text("#queue-list", "calf");
+    phone.wait_button("Capture calf", true);
+    phone.tap("#go");
+    phone.wait_button("Stop", true);
+    phone.wait_text_so_long("#alarm", "release it", longest);
+    phone.wait_button("Release the emergency stop", false);
+    phone.wait_for("document.getElementById('next').checkVisibility() === false");
+    phone.value("scrollTo(0, 0)");
+    phone.see("pressed");
+    phone.wait_text_so_long("#phase", "The table is locked", longest);
+    phone.wait_button("Reset and home the table", true);
+    phone.see("released");
+    phone.tap("#go");
+    phone.wait_text_so_long("#phase", "The take of calf was aborted", longest);
+    phone.wait_button("Again: calf", true);
+    phone.see("again");
+}
