@@ -15,7 +15,7 @@ pub(crate) struct Turn {
     degrees_per_second: f64,
     /// Frames of a take.
     pub(crate) frames: u32,
-    /// Longest wait for a step.
+    /// Longest wait for a step: what is made of sessions gives way to whatever else the machine does.
     pub(crate) longest: Duration,
 }
 
@@ -24,7 +24,7 @@ pub(crate) const SHORT_TURN: Turn = Turn {
     recording: "20261120T101500Z-cow-short",
     degrees_per_second: 36.0,
     frames: 300,
-    longest: Duration::from_secs(180),
+    longest: Duration::from_secs(600),
 };
 
 /// Slow enough for something to happen meanwhile.
@@ -39,7 +39,7 @@ pub(crate) const LONG_TURN: Turn = Turn {
     recording: "20261120T093015Z-cow",
     degrees_per_second: 7.2,
     frames: 1500,
-    longest: Duration::from_secs(900),
+    longest: Duration::from_secs(1800),
 };
 
 impl Turn {
