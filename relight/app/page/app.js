@@ -35,7 +35,7 @@ begin().catch((error) => {
 });
 
 async function begin() {
-  const engine = await Engine.start((text) => ($("loading").textContent = text));
+  const engine = await Engine.start(notices.say);
   const library = new Library(engine);
   const bundled = await library.bundled();
   const work = new Work(emptyScene((bundled.find(({ key }) => key === FIRST) ?? bundled[0]).key));
@@ -55,7 +55,17 @@ async function begin() {
   rendering.refresh();
   document.body.classList.remove("starting");
   performance.mark("relight:usable");
+  await firstPicture(rendering);
+  await notices.attempt(() => engine.prepare());
+  notices.say("");
   await keepOffline();
+}
+
+/** The networks can wait until there is something to be seen. */
+function firstPicture(rendering) {
+  return new Promise((resolve) => {
+    for (const event of ["picture", "problem"]) rendering.addEventListener(event, resolve, { once: true });
+  });
 }
 
 /** Undo and redo: of the sketch while an object is cut out, else of the scene. */

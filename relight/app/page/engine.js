@@ -6,6 +6,9 @@ import { Held } from "./held.js";
 const SIMD = [0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11];
 const NO_WASM = "This browser cannot run relight: it needs WebAssembly with SIMD, which browsers have had since 2023.";
 
+/** Questions after which the networks will be needed. */
+const NEED_NETWORKS = new Set(["open_photo", "open_pixels", "import"]);
+
 /** The engine ended while it answered. */
 export class Fault extends Error {}
 
@@ -15,27 +18,41 @@ export class Engine extends EventTarget {
   memory = 0;
 
   #module;
-  #weights;
+  #progress;
+  /** The file of the networks and its way into the engine, as promises, from when they are first wanted. */
+  #weights = null;
+  #prepared = null;
   #worker;
   #held = new Held();
   #open = new Map();
   #number = 0;
   #restarting = null;
 
-  /** Loads the engine and its weights; tells `progress` a sentence now and then. */
+  /** Loads the engine, without its networks; `progress` is told a sentence now and then. */
   static async start(progress) {
     if (!canRun()) throw new Error(NO_WASM);
-    const [module, weights] = await Promise.all([compiled("relight.wasm"), download("weights.safetensors", progress)]);
     const engine = new Engine();
-    engine.#module = module;
-    engine.#weights = weights;
+    engine.#progress = progress;
+    engine.#module = await compiled("relight.wasm");
     await engine.#begin();
     return engine;
+  }
+
+  /** Loads the networks, once. */
+  async prepare() {
+    this.#prepared ??= this.#load();
+    try {
+      await this.#prepared;
+    } catch (error) {
+      this.#prepared = this.#weights = null;
+      throw error;
+    }
   }
 
   /** Asks the engine. Its answer's parts are in `parts`; its refusals and faults are thrown as sentences. */
   async ask(op, fields = {}, parts = []) {
     if (this.#restarting) await this.#restarting;
+    if (NEED_NETWORKS.has(op)) await this.prepare();
     const request = { fields: { op, ...fields }, parts };
     const answer = await this.#send(request);
     this.#held.note(request);
@@ -51,7 +68,11 @@ export class Engine extends EventTarget {
     });
     this.#worker.onmessage = ({ data }) => this.#answered(data);
     this.#worker.onerror = (event) => this.#failed(event);
-    await this.#send({ fields: { op: "load" }, parts: [this.#weights] });
+  }
+
+  async #load() {
+    this.#weights ??= download("weights.safetensors", this.#progress);
+    return this.#send({ fields: { op: "load" }, parts: [await this.#weights] });
   }
 
   #send(request) {
@@ -105,6 +126,7 @@ export class Engine extends EventTarget {
       this.#open.clear();
       this.#worker.terminate();
       await this.#begin();
+      if (this.#prepared) await (this.#prepared = this.#load());
       const bad = await this.#giveAgain();
       if (!bad) break;
       lost.push(this.#held.drop(bad));
