@@ -17,14 +17,14 @@ export async function openable(file) {
   if (file.size === 0) throw new Error(`${file.name} is empty.`);
   if (file.size > MOST_BYTES) throw new Error(`${file.name} has ${(file.size / 1e6).toFixed(0)} MB: at most ${MOST_BYTES / 1e6} MB are opened.`);
   const head = await headOf(file);
-  if (/\.relit$/i.test(file.name)) return true;
+  if (isCaptured(file)) return true;
   if (isSvg(file, head)) throw new Error(`${file.name} is a drawing (SVG): choose a photograph.`);
   return READ_BY_ENGINE.some(([at, text]) => head.startsWith(text, at));
 }
 
-/** Whether a file is a zip. */
+/** Whether a file is a zip that may be a kept scene: a captured object is a zip of another kind. */
 export async function isZip(file) {
-  return (await headOf(file)).startsWith("PK\x03\x04");
+  return !isCaptured(file) && (await headOf(file)).startsWith("PK\x03\x04");
 }
 
 /** A picture that the browser decodes, as it is to be looked at and not too large: { fields: { name, width, height }, rgba }. */
@@ -55,6 +55,8 @@ async function headOf(file) {
   const bytes = new Uint8Array(await file.slice(0, HEAD).arrayBuffer());
   return Array.from(bytes, (byte) => String.fromCharCode(byte)).join("");
 }
+
+const isCaptured = ({ name }) => /\.relit$/i.test(name);
 
 const isSvg = ({ name, type }, head) => type === "image/svg+xml" || /\.svgz?$/i.test(name) || /<svg[\s>]/i.test(head.slice(0, 4096));
 

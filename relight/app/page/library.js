@@ -8,6 +8,8 @@ const SMALL = 112;
 /** A new object's height, and the most of the picture's width that it takes. */
 const TALL = 0.5;
 const WIDE = 0.6;
+/** A new object is enlarged so many times at most. */
+const ENLARGED = 16;
 
 export class Library {
   /** Photographs by the engine's number: { object, name, kind, width, height, picture, mask, sketch, small, layers }. */
@@ -139,7 +141,7 @@ export function placeFor(photo, scene) {
   const [, , w, h] = boundsOf(photo);
   const [width, height] = scene.size;
   const beside = [0.5, 0.28, 0.72, 0.4, 0.6][scene.objects.length % 5];
-  return { at: [beside, 0.9], height: Math.min(TALL, (WIDE * width * h) / (w * height)) };
+  return { at: [beside, 0.9], height: Math.min(TALL, (WIDE * width * h) / (w * height), (ENLARGED * h) / height) };
 }
 
 /** The rectangle that a photograph's mask takes. */

@@ -64,6 +64,7 @@ export class Objects {
   }
 
   async #decompose(photo) {
+    if (photo.kind === "captured") return;
     say("Separating colour from light …");
     const { seconds } = await this.#library.decompose(photo);
     say(`Colour and light separated in ${seconds.toFixed(1)} s.`);
@@ -121,9 +122,9 @@ export class Objects {
     if (this.#layersOf === (photo?.layers ?? null) && photo?.layers) return;
     this.#enlarge(null);
     this.#layersOf = null;
-    const layers = photo && (await attempt(() => this.#library.decompose(photo)));
+    const layers = photo?.kind === "photo" && (await attempt(() => this.#library.decompose(photo)));
     if (photo !== this.#photo) return;
-    this.#layersOf = layers ?? null;
+    this.#layersOf = layers || null;
     $("layers").replaceChildren(...(layers ? LAYERS.map((name, index) => this.#tile(layers, name, index)) : []));
     $("layers-note").textContent = layers?.glossy ? "Much of it is overexposed: highlights were separated." : "";
   }
