@@ -1,19 +1,23 @@
 // The page from outside, in Chromium, at the size of a phone and of a desk. The server is stopped as soon as the page is kept.
 
 import assert from "node:assert/strict";
-import { mkdirSync } from "node:fs";
+import { mkdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 
 import { AxeBuilder } from "@axe-core/playwright";
 
 import { launch, offline, open, settled, SIZES } from "./browser.js";
-import { badFiles, ball, panorama } from "./photos.js";
+import { badFiles, ball, exifTurned, panorama } from "./photos.js";
 import { serve } from "./server.js";
 import * as steps from "./steps.js";
 
 const FOLDER = process.env.RELIGHT_PAGE ?? "../../../target/page";
 const SHOTS = process.env.SHOTS;
+/** So much of a picture are soft edges of objects brighter than white, where layers of 8 bits lose light. */
+const SOFT_EDGE = 1e-3;
+/** A captured object. */
+const CAPTURED = "../../../tests/fuzz/seeds/captured_object/glossy.relit";
 
 let browser, photo, second;
 
@@ -371,14 +375,18 @@ test("opened again without a network, the page is there", async () => {
 
 test("without WebGL the same picture is painted plainly", async () => {
   const server = await serve(FOLDER);
+  const [layered, plain] = [await ballOnStage(server), await ballOnStage(server, withoutWebGl)];
+  assert.deepEqual([layered.width, layered.height], [plain.width, plain.height]);
+  const far = layered.rgba.reduce((count, value, index) => count + (Math.abs(value - plain.rgba[index]) > 2), 0) / plain.rgba.length;
+  assert.ok(far <= SOFT_EDGE, `${far} of the layers' values differ from the picture's by more than 2 / 255`);
+  await server.stop();
+});
+
+/** The pixels of the stage with a ball that was moved by a key. */
+async function ballOnStage(server, script = () => {}) {
   const context = await browser.newContext({ viewport: SIZES.desk });
   const page = await context.newPage();
-  await page.addInitScript(() => {
-    const get = HTMLCanvasElement.prototype.getContext;
-    HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
-      return kind === "webgl2" ? null : get.call(this, kind, ...rest);
-    };
-  });
+  await page.addInitScript(script);
   await page.goto(server.address);
   await settled(page);
   await steps.addBall(page, photo);
@@ -386,9 +394,59 @@ test("without WebGL the same picture is painted plainly", async () => {
   await page.focus("#picture");
   await page.keyboard.press("Shift+ArrowLeft");
   assert.notEqual(await steps.stagePicture(page), before);
+  const url = await page.evaluate(() => document.getElementById("picture").toDataURL());
+  const pixels = await steps.decoded(page, Buffer.from(url.split(",")[1], "base64"));
   await context.close();
-  await server.stop();
+  return pixels;
+}
+
+/** Runs in the page. */
+function withoutWebGl() {
+  const get = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+    return kind === "webgl2" ? null : get.call(this, kind, ...rest);
+  };
+}
+
+test("photographs are opened as they are displayed, of every kind that cameras write", async () => {
+  const { page, close } = await keptPage("desk");
+  const upright = await ball(browser, { name: "upright.webp", width: 640, height: 480 });
+  const turned = exifTurned(await ball(browser, { name: "turned.jpg", width: 640, height: 480 }));
+  for (const [file, width, height] of [[upright, 640, 480], [turned, 480, 640]]) {
+    await steps.choose(page, file);
+    await page.waitForFunction((name) => document.getElementById("cut-name").textContent === name, file.name);
+    await page.waitForSelector("body.cutting #cut-canvas[data-view]");
+    await page.waitForTimeout(100);
+    const shape = await shapeOfCut(page);
+    assert.ok(Math.abs(shape - width / height) < 0.02, `${file.name} is ${shape} times as wide as high`);
+    await steps.cutBall(page, { width, height });
+    await page.click("#cut-done");
+    await page.waitForFunction((name) => document.querySelector("#objects .entry")?.textContent === name, file.name);
+  }
+  assert.equal(await page.isHidden("#alert"), true, await alertText(page));
+  await close();
 });
+
+test("a captured object stands in the scene without being cut out", async () => {
+  const { page, close } = await keptPage("phone");
+  const empty = await steps.stagePicture(page);
+  await steps.choose(page, { name: "glossy.relit", mimeType: "application/octet-stream", buffer: readFileSync(CAPTURED) });
+  await page.waitForSelector("#objects .entry");
+  await page.waitForSelector("#selection:not([hidden])");
+  assert.notEqual(await steps.stagePicture(page), empty);
+  assert.equal(await page.isHidden("#alert"), true, await alertText(page));
+  await close();
+});
+
+/** Width by height of the photograph that is being cut out, as it lies in the middle of its canvas. */
+function shapeOfCut(page) {
+  return page.evaluate(() => {
+    const canvas = document.getElementById("cut-canvas");
+    const [, left, top] = canvas.dataset.view.split(" ").map(Number);
+    const { width, height } = canvas.getBoundingClientRect();
+    return (width - 2 * left) / (height - 2 * top);
+  });
+}
 
 test("a browser without WebAssembly is told so in a sentence", async () => {
   const server = await serve(FOLDER);

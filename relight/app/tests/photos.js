@@ -1,5 +1,6 @@
 // Photographs that the tests make: a lit ball before a backdrop, drawn by the browser; and files that are none.
 
+import { extname } from "node:path";
 import { crc32, deflateSync } from "node:zlib";
 
 /** Where the ball is, in parts of the picture: its box. */
@@ -7,7 +8,7 @@ export const BALL = [0.28, 0.2, 0.44, 0.6];
 
 /** A ball that is lit from the upper left, as a file: { name, mimeType, buffer }. */
 export async function ball(browser, { name = "ball.png", width = 640, height = 480, hue = 28 } = {}) {
-  const mimeType = name.endsWith(".jpg") ? "image/jpeg" : "image/png";
+  const mimeType = `image/${extname(name).slice(1).replace("jpg", "jpeg")}`;
   const page = await browser.newPage();
   const bytes = await page.evaluate(drawBall, { width, height, hue, mimeType });
   await page.close();
@@ -33,6 +34,15 @@ async function drawBall({ width, height, hue, mimeType }) {
   context.arc(x, y, r, 0, 2 * Math.PI);
   context.fill();
   return canvas.toDataURL(mimeType, 0.93).split(",")[1];
+}
+
+/** A JPEG that is displayed turned by a quarter, as its Exif says. */
+export function exifTurned({ buffer, ...file }) {
+  const orientation = [0x01, 0x12, 0, 3, 0, 0, 0, 1, 0, 6, 0, 0];
+  const tiff = ["M".charCodeAt(0), "M".charCodeAt(0), 0, 42, 0, 0, 0, 8, 0, 1, ...orientation, 0, 0, 0, 0];
+  const content = Buffer.concat([Buffer.from("Exif\0\0", "latin1"), Buffer.from(tiff)]);
+  const marker = Buffer.from([0xff, 0xe1, 0, content.length + 2]);
+  return { ...file, buffer: Buffer.concat([buffer.subarray(0, 2), marker, content, buffer.subarray(2)]) };
 }
 
 /** A panorama, twice as wide as high, with a bright window. */
