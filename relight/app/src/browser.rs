@@ -14,16 +14,6 @@ use std::slice;
 
 use crate::Studio;
 
-#[link(wasm_import_module = "env")]
-unsafe extern "C" {
-    safe fn relight_now() -> f64;
-}
-
-/// The page's clock.
-pub(crate) fn milliseconds() -> f64 {
-    relight_now()
-}
-
 thread_local! {
     static STUDIO: RefCell<Studio> = RefCell::new(started());
     static FAULT: RefCell<String> = const { RefCell::new(String::new()) };

@@ -1,5 +1,16 @@
 //! How long something took: by the page's clock in a browser, where the library has none, and by the system's elsewhere.
 
+/// What the page's worker gives the engine.
+#[cfg(target_arch = "wasm32")]
+#[allow(unsafe_code, reason = "a function of the page")]
+mod page {
+    #[link(wasm_import_module = "env")]
+    unsafe extern "C" {
+        /// The page's clock, milliseconds.
+        pub(super) safe fn relight_now() -> f64;
+    }
+}
+
 /// A moment.
 pub(crate) struct Moment {
     #[cfg(not(target_arch = "wasm32"))]
@@ -26,12 +37,12 @@ impl Moment {
 impl Moment {
     pub(crate) fn now() -> Self {
         Self {
-            at: crate::browser::milliseconds(),
+            at: page::relight_now(),
         }
     }
 
     /// Seconds since then.
     pub(crate) fn seconds(&self) -> f64 {
-        (crate::browser::milliseconds() - self.at) / 1000.0
+        (page::relight_now() - self.at) / 1000.0
     }
 }
