@@ -331,10 +331,10 @@ impl Run<'_> {
         inputs.extend(arguments.light.light.clone());
         not_an_input(output, &inputs)?;
         // What lies in the way of a folder is told before the work.
-        if let Some(folder) = output.parent() {
-            if !folder.as_os_str().is_empty() {
-                make_folder(folder)?;
-            }
+        if let Some(folder) = output.parent()
+            && !folder.as_os_str().is_empty()
+        {
+            make_folder(folder)?;
         }
         Ok(())
     }

@@ -129,20 +129,16 @@ impl Ground {
                 let at = (x as f64 + 0.5 + first) as f32;
                 let may_meet = ray.shaded[0].contains(&at);
                 if may_meet && relief.blocks([at, -below as f32, z as f32], ray) {
-                    for c in 0..3 {
-                        row[c][x] += ray.light[c];
+                    for (line, light) in row.iter_mut().zip(ray.light) {
+                        line[x] += light;
                     }
                 }
             }
         }
-        for c in 0..3 {
+        for (line, all) in row.iter_mut().zip(all) {
             for x in cells.clone() {
-                let kept = if all[c] > 0.0 {
-                    row[c][x] / all[c]
-                } else {
-                    0.0
-                };
-                row[c][x] = (1.0 - kept).max(0.0);
+                let kept = if all > 0.0 { line[x] / all } else { 0.0 };
+                line[x] = (1.0 - kept).max(0.0);
             }
         }
     }
