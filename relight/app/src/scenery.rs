@@ -4,7 +4,7 @@ use relight_core::image::{Extent, Planes, Rgb};
 use relight_core::light::{Direction, LightError, Panorama};
 
 /// Their size.
-const EXTENT: Extent = Extent::new(512, 256);
+const EXTENT: Extent = Extent::new(1024, 512);
 
 /// A panorama that is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -18,6 +18,8 @@ use crate::decompose::Photo;
 /// The part of the brightest light that a white diffuse surface has in a picture of a panorama: bright places clip, as in
 /// photographs.
 const WHITE: f32 = 1.4;
+/// The size of a panorama from which shadows are drawn, at most.
+const MOST_AROUND: Extent = Extent::new(512, 256);
 /// The longer side of the picture of a panorama by which it is exposed, pixels.
 const LOOK: usize = 160;
 /// Photographs are brought to this much more than the size in which they are shown.
@@ -102,14 +104,22 @@ impl SceneSetting {
         } else {
             light.light()?
         };
-        let around = light.panorama();
+        let around = for_shadows(light.panorama());
         let base = exposure_for(&coefficients.clone().tinted(tint)) * WHITE * PI;
         let mut panorama_scale = tint.map(|t| t as f32 * base);
         let mut exposure = None;
         if let SceneBackground::Panorama(panorama) = background {
-            let found = exposed(scene, panorama, panorama_scale, &coefficients);
-            matching.level = found.stops.exp2();
-            panorama_scale = panorama_scale.map(|scale| scale * matching.level);
+            // A lamp's strength and a panorama's are told in other units: each is exposed by itself.
+            let is_one_light = matches!(light, LightSource::Panorama(_));
+            let bound = is_one_light.then_some(&coefficients);
+            let found = exposed(scene, panorama, panorama_scale, bound);
+            let gain = found.stops.exp2();
+            matching.level = if is_one_light {
+                gain
+            } else {
+                scene.exposure.exp2()
+            };
+            panorama_scale = panorama_scale.map(|scale| scale * gain);
             exposure = Some(found);
         }
         let extent = match background {
@@ -167,12 +177,22 @@ fn shown(view: &PanoramaView, panorama: &Panorama, turn: f64, scale: [f32; 3]) -
     tinted(Rgb::new(seen.map(|v| v.max(0.0))), scale)
 }
 
-/// The exposure of a panorama: by what is seen of it, where brightness is to be matched, and as it is given beyond that.
+/// A panorama no larger than shadows need it: it is turned and looked at again and again.
+fn for_shadows(panorama: Panorama) -> Panorama {
+    if panorama.extent().width > MOST_AROUND.width {
+        panorama.resized(MOST_AROUND)
+    } else {
+        panorama
+    }
+}
+
+/// The exposure of a panorama: by what is seen of it, where brightness is to be matched, and as it is given beyond that;
+/// `light` that is its own binds it to the objects.
 fn exposed(
     scene: &SceneDescription,
     panorama: &Panorama,
     scale: [f32; 3],
-    light: &ShLight,
+    light: Option<&ShLight>,
 ) -> PanoramaExposure {
     let Extent { width, height } = scene.panorama_extent();
     let side = |side: usize| (side * LOOK / width.max(height).max(1)).max(1);
@@ -247,6 +267,21 @@ mod tests {
         let brighter = SceneSetting::new(&brighter, background, None).unwrap();
         assert!((brighter.matching.level / plain.matching.level - 2.0).abs() < 1e-5);
         assert!((shown(&brighter) / shown(&plain) - 2.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_lamp_before_a_panorama_leaves_both_as_bright_as_they_are_wanted() {
+        let bright = ShLight::even(Order::TWO, [40.0; 3]);
+        let panorama = Panorama::of_light(&bright, Extent::new(32, 16));
+        let background = SceneBackground::Panorama(&panorama);
+        let lamp = LightSource::Lamp("170,30".parse().unwrap());
+        let scene = described("size = [200, 100]");
+        let set = SceneSetting::new(&scene, background, Some(lamp)).unwrap();
+        assert_eq!(set.matching.level, 1.0);
+        let view = PanoramaView::new(set.extent, scene.field, scene.down);
+        let shown = set.seen(&view, &panorama, 0.0).planes().pixel(100, 50)[1];
+        assert!((shown - 0.8).abs() < 0.01, "{shown}");
+        assert!(set.exposure.unwrap().clipped == 0.0);
     }
 
     #[test]
