@@ -316,7 +316,8 @@ async function refresh() {
     $("objects").replaceChildren(...names.map((value) => make("option", { value })));
     sayOfList("");
   } catch (problem) {
-    if (problem.status !== 0) sayOfList(problem.message);
+    // The folder may have gone while the list was on its way.
+    if (problem.status !== 0) sayOfList(state?.disk_fault ? "" : problem.message);
   }
 }
 
