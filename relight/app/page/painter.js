@@ -11,7 +11,7 @@ void main() {
   gl_Position = vec4(2.0 * pixel.x / picture.x - 1.0, 1.0 - 2.0 * pixel.y / picture.y, 0, 1);
 }`;
 
-/** A texel is weighted by its alpha before texels are mixed: what is not covered has no colour. */
+/** A texel of an object is its light times its alpha: what is not covered has no colour, and texels can be mixed. */
 const LAYER = `#version 300 es
 precision highp float;
 uniform sampler2D layer;
@@ -21,8 +21,7 @@ out vec4 colour;
 vec4 texel(ivec2 at, ivec2 size) {
   bool outside = any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size));
   if (outside) return shadow ? vec4(1) : vec4(0);
-  vec4 value = texelFetch(layer, at, 0);
-  return shadow ? value : vec4(value.rgb * value.a, value.a);
+  return texelFetch(layer, at, 0);
 }
 void main() {
   ivec2 size = textureSize(layer, 0);

@@ -267,12 +267,8 @@ fn the_layers_put_together_are_the_picture() {
                 value *= f64::from(shadow[c]) / 255.0;
             }
             if let Some(colour) = part(object, &parts[1], x, y) {
-                // Colours that are too bright for a layer's bytes are cut there, and in the picture only behind the edge.
-                if colour[c] == 255 {
-                    continue;
-                }
                 let alpha = f64::from(colour[3]) / 255.0;
-                value = value * (1.0 - alpha) + linear(colour[c]) * alpha;
+                value = value * (1.0 - alpha) + linear(colour[c]);
             }
             most = most.max((encoded(value) - f64::from(picture[0][at + c])).abs());
         }

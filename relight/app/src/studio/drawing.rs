@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::StudioError;
 use super::background::{StudioBackground, reduced};
-use super::pixels::{rgba, shown, straight};
+use super::pixels::{covering, rgba, shown};
 
 /// How much of a pixel an object covers at least where it counts as seen.
 const SEEN: f32 = 0.5;
@@ -210,7 +210,7 @@ struct ShadowPlace {
 
 impl DrawnLayers {
     fn add(&mut self, layer: &SceneLayer) {
-        self.parts.push(straight(layer.colours(), layer.alpha()));
+        self.parts.push(covering(layer.colours(), layer.alpha()));
         let shadow = layer.shadow().map(|(place, arriving)| {
             self.parts.push(rgba(arriving));
             let Extent { width, height } = arriving.extent();

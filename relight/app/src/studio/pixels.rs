@@ -30,14 +30,15 @@ fn painted(planes: &Planes<3>, byte: impl Fn(f32) -> u8) -> Vec<u8> {
     bytes
 }
 
-/// Light times alpha as straight colours.
-pub(super) fn straight(premultiplied: &Planes<3>, alpha: &Planes<1>) -> Vec<u8> {
+/// Light times alpha, encoded as sRGB, with alpha: what a page adds to the light behind. Divided by alpha, bright edges would be
+/// cut.
+pub(super) fn covering(premultiplied: &Planes<3>, alpha: &Planes<1>) -> Vec<u8> {
     let table = SrgbTable::get();
     let [red, green, blue] = premultiplied.planes();
     let mut bytes = vec![0; 4 * red.len()];
     for (at, (pixel, &alpha)) in bytes.chunks_exact_mut(4).zip(alpha.plane(0)).enumerate() {
         if alpha > 0.0 {
-            let colour = [red, green, blue].map(|plane| table.byte(plane[at] / alpha));
+            let colour = [red, green, blue].map(|plane| table.byte(plane[at]));
             pixel[..3].copy_from_slice(&colour);
             pixel[3] = byte(alpha);
         }
@@ -168,14 +169,12 @@ mod tests {
     }
 
     #[test]
-    fn straight_colours_are_those_before_alpha() {
+    fn what_covers_is_light_times_alpha() {
         let extent = Extent::new(2, 1);
         let light = Planes::filled(extent, [0.25, 0.0, 0.125]);
         let alpha = Planes::from_planes(extent, [vec![0.25, 0.0]]).unwrap();
-        let bytes = straight(&light, &alpha);
-        assert_eq!(
-            bytes,
-            [255, 0, byte(Srgb::from_linear(0.5)), 64, 0, 0, 0, 0]
-        );
+        let bytes = covering(&light, &alpha);
+        let [red, blue] = [0.25, 0.125].map(|value| SrgbTable::get().byte(value));
+        assert_eq!(bytes, [red, 0, blue, 64, 0, 0, 0, 0]);
     }
 }
