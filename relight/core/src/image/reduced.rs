@@ -1,14 +1,13 @@
 //! Pictures made smaller in their files, for those who have little memory.
 
-use std::io::Cursor;
 use std::path::Path;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::imageops::FilterType as Kernel;
-use image::{ColorType, DynamicImage, ImageFormat};
+use image::{ColorType, DynamicImage};
 
-use super::ImageError;
-use super::codec::decode;
+use super::codec::{decode, encode_exr};
+use super::{Extent, ImageError, StoredImage};
 
 /// A picture that was made smaller.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,7 +20,8 @@ pub struct ReducedFile {
 
 impl ReducedFile {
     /// The picture of a file with at most so many pixels, turned as its Exif orientation says; none where the file has no
-    /// more. Integers stay encoded as they are, and are averaged so. Errors name it as `path`.
+    /// more, or has floating point values with alpha. Integers stay encoded as they are, and are averaged so. Errors name it as
+    /// `path`.
     ///
     /// # Errors
     /// Where it is no image of a known format, too large, or cut off.
@@ -33,33 +33,41 @@ impl ReducedFile {
             return Ok(None);
         }
         let scale = (most as f64 / pixels).sqrt();
-        let side = |pixels: u32| ((f64::from(pixels) * scale) as u32).max(1);
-        let smaller = image.resize_exact(side(width), side(height), Kernel::Triangle);
-        // Half of the memory is free again before the picture is encoded.
-        drop(image);
-        let is_float = matches!(smaller.color(), ColorType::Rgb32F | ColorType::Rgba32F);
-        let ending = if is_float { "exr" } else { "png" };
-        let mut file = Cursor::new(Vec::new());
-        let encoded = if is_float {
-            smaller.write_to(&mut file, ImageFormat::OpenExr)
-        } else {
-            // Of the kinds of PNG the one with the samples at hand.
-            let png = PngEncoder::new_with_quality(
-                &mut file,
-                CompressionType::Fast,
-                FilterType::Adaptive,
-            );
-            plain(smaller).write_with_encoder(png)
-        };
-        encoded.map_err(|source| ImageError::Encode {
-            path: path.to_owned(),
-            source,
-        })?;
-        Ok(Some(Self {
-            bytes: file.into_inner(),
-            ending,
-        }))
+        let [width, height] = [width, height].map(|side| ((f64::from(side) * scale) as u32).max(1));
+        match image.color() {
+            ColorType::Rgba32F => Ok(None),
+            // What resizes integers clips values beyond 1.
+            ColorType::Rgb32F => {
+                let extent = Extent::new(width as usize, height as usize);
+                let planes = StoredImage::from_bytes(path, bytes)?.planes;
+                Ok(Some(Self {
+                    bytes: encode_exr(path, &planes.resized(extent))?,
+                    ending: "exr",
+                }))
+            }
+            _ => {
+                let smaller = image.resize_exact(width, height, Kernel::Triangle);
+                // Half of the memory is free again before the picture is encoded.
+                drop(image);
+                Ok(Some(Self {
+                    bytes: png(path, smaller)?,
+                    ending: "png",
+                }))
+            }
+        }
     }
+}
+
+fn png(path: &Path, image: DynamicImage) -> Result<Vec<u8>, ImageError> {
+    let mut file = Vec::new();
+    let encoder =
+        PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive);
+    let encoded = plain(image).write_with_encoder(encoder);
+    encoded.map_err(|source| ImageError::Encode {
+        path: path.to_owned(),
+        source,
+    })?;
+    Ok(file)
 }
 
 /// Colours with alpha where there is some.
@@ -74,7 +82,7 @@ fn plain(image: DynamicImage) -> DynamicImage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::{Extent, Planes, StoredImage, encode_exr, encode_jpeg};
+    use crate::image::{Planes, encode_jpeg};
 
     fn ramp(extent: Extent) -> Planes<3> {
         Planes::from_fn(extent, |x, y| {

@@ -19,6 +19,11 @@ const RAYS: usize = 24;
 const REACH: f64 = 1.5;
 /// The part of the object's lowest points that may lie below the ground: normals at the rim are rough.
 const BELOW_GROUND: f64 = 0.03;
+/// How far a ray goes at a time, cells: less than one.
+const STEP: f32 = 0.8;
+/// Bits behind the point of a place in fixed point; shapes and their grounds have a few hundred cells.
+const FIXED_BITS: u32 = 16;
+const FIXED: f32 = (1 << FIXED_BITS) as f32;
 /// The least part of a direction along an axis.
 const LEAST_LEAN: f32 = 1e-6;
 /// Ground that is seen more edge-on than this is as if it were seen so, radians.
@@ -193,18 +198,25 @@ impl Relief {
             enter = enter.max(ends[0].min(ends[1]));
             leave = leave.min(ends[0].max(ends[1]));
         }
-        // Steps of less than a cell; the first is a little above the ground.
-        let mut along = enter + 0.4;
-        while along < leave {
-            let [x, y, z] = [0, 1, 2].map(|axis| from[axis] + along * ray.towards[axis]);
-            let (column, row) = (x as usize, (-y) as usize);
-            if x >= 0.0 && y <= 0.0 && column < width && row < height {
-                let half = self.half[row * width + column];
+        // The first step is a little above the ground.
+        let along = enter + 0.4;
+        let steps = ((leave - along) / STEP).ceil().max(0.0) as usize;
+        let [x, y, mut z] = [0, 1, 2].map(|axis| from[axis] + along * ray.towards[axis]);
+        let [right, up, forward] = ray.towards.map(|part| STEP * part);
+        // Columns and rows in fixed point: floating point would be made whole at each step.
+        let fixed = |cells: f32| (cells * FIXED) as i32;
+        let [mut column, mut row] = [fixed(x), fixed(-y)];
+        let [right, down] = [fixed(right), fixed(-up)];
+        for _ in 0..steps {
+            let [at, line] = [column, row].map(|place| (place >> FIXED_BITS) as usize);
+            // What lies left or above is a very large number.
+            if at < width && line < height {
+                let half = self.half[line * width + at];
                 if half > 0.0 && z.abs() <= half {
                     return true;
                 }
             }
-            along += 0.8;
+            (column, row, z) = (column + right, row + down, z + forward);
         }
         false
     }
