@@ -302,7 +302,7 @@ test("what is no photograph is refused by a sentence, and the page stays in use"
   const { page, problems, close } = await keptPage("desk");
   for (const file of await badFiles(browser)) {
     await steps.choose(page, file);
-    await page.waitForSelector("#alert:not([hidden])");
+    await page.waitForFunction(() => document.getElementById("alert-text").textContent);
     const text = await alertText(page);
     assert.match(text, /^[^.]*\S.*\.$/s, `${file.name}: a sentence`);
     assert.ok(!/gave up|in the page failed/.test(text), `${file.name}: ${text}`);
