@@ -2,6 +2,7 @@
 
 use relight_core::image::{Extent, Planes, Rgb};
 use relight_core::light::{Direction, LightError, Panorama};
+use relight_photo::insert::DiscLamp;
 
 /// Their size.
 const EXTENT: Extent = Extent::new(1024, 512);
@@ -148,6 +149,17 @@ fn inside(at: [f64; 2], middle: [f64; 2], half: [f64; 2], soft: f64) -> f64 {
     line(0) * line(1)
 }
 
+/// How many degrees a direction is from that of a lamp or sun, whose azimuth and elevation are given as of lamps.
+fn degrees_from(towards: Direction, [azimuth, elevation]: [f64; 2]) -> f64 {
+    let lamp = DiscLamp {
+        azimuth,
+        elevation,
+        ..DiscLamp::default()
+    };
+    let cosine = towards.dot(lamp.direction());
+    cosine.clamp(-1.0, 1.0).acos().to_degrees()
+}
+
 fn studio(towards: Direction) -> Colour {
     let [x, y, z] = towards.components();
     // Wall and floor are one sheet of paper, lighter where the boxes light it.
@@ -270,14 +282,7 @@ const EVENING: Outside = Outside {
 
 fn outside(towards: Direction, scene: &Outside) -> Colour {
     let [x, y, z] = towards.components();
-    let [azimuth, elevation] = scene.sun.map(f64::to_radians);
-    let sun = [
-        azimuth.sin() * elevation.cos(),
-        elevation.sin(),
-        azimuth.cos() * elevation.cos(),
-    ];
-    let cosine = x * sun[0] + y * sun[1] + z * sun[2];
-    let from_sun = cosine.clamp(-1.0, 1.0).acos().to_degrees();
+    let from_sun = degrees_from(towards, scene.sun);
     let sky = mixed(scene.horizon, scene.zenith, y.max(0.0).powf(0.6));
     let level = (x / (y.abs() + 0.12), z / (y.abs() + 0.12));
     let cloud = step(
@@ -345,14 +350,7 @@ fn night(towards: Direction) -> Colour {
         step(-0.01, 0.01, y),
     );
     for ([azimuth, elevation, size], radiance) in LAMPS {
-        let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
-        let lamp = [
-            azimuth.sin() * elevation.cos(),
-            elevation.sin(),
-            azimuth.cos() * elevation.cos(),
-        ];
-        let cosine = x * lamp[0] + y * lamp[1] + z * lamp[2];
-        let from = cosine.clamp(-1.0, 1.0).acos().to_degrees();
+        let from = degrees_from(towards, [azimuth, elevation]);
         let disc = step(size / 2.0 * 1.1, size / 2.0 * 0.9, from);
         colour = add(colour, times(radiance, disc + 0.006 * (-from / 10.0).exp()));
     }

@@ -53,9 +53,9 @@ pub enum StudioError {
         /// The photograph's name.
         name: String,
         /// Its width.
-        width: u32,
+        width: usize,
         /// Its height.
-        height: u32,
+        height: usize,
         /// What is read.
         most: usize,
     },

@@ -229,9 +229,10 @@ impl Studio {
         before: bool,
         draw: impl FnOnce(&Drawing<'_>) -> Result<T, StudioError>,
     ) -> Result<T, StudioError> {
-        let decomposer = self.decomposer.as_ref().ok_or(StudioError::NoNetwork)?;
         let background = self.background.as_mut().ok_or(StudioError::NoBackground)?;
+        // A background alone needs no network.
         for placed in &scene.objects {
+            let decomposer = self.decomposer.as_ref().ok_or(StudioError::NoNetwork)?;
             let object = self.objects.get_mut(&placed.object);
             let object = object.ok_or(StudioError::NoObject(placed.object))?;
             object.prepare(decomposer)?;

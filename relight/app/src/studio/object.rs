@@ -312,19 +312,27 @@ impl OpenedFile {
     /// Where it is no picture that can be read.
     pub(super) fn read(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
         let path = Path::new(name);
-        if let Some(extent) = stated_extent(&bytes)
-            && extent.width.saturating_mul(extent.height) > MOST_READ
+        let extent = stated_extent(&bytes);
+        let has_at_most = |most: usize| {
+            extent.is_some_and(|Extent { width, height }| width.saturating_mul(height) <= most)
+        };
+        if let Some(Extent { width, height }) = extent
+            && !has_at_most(MOST_READ)
         {
-            let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
             return Err(StudioError::TooLarge {
                 name: name.to_owned(),
-                width: side(extent.width),
-                height: side(extent.height),
+                width,
+                height,
                 most: MOST_READ,
             });
         }
         let stated = stated_transfer(path, &bytes)?;
-        let smaller = ReducedFile::of(path, &bytes, MOST_PIXELS)?;
+        // What says that it is small is not decoded to see whether it is.
+        let smaller = if has_at_most(MOST_PIXELS) {
+            None
+        } else {
+            ReducedFile::of(path, &bytes, MOST_PIXELS)?
+        };
         let reduced = smaller.is_some();
         let (name, bytes) = match smaller {
             Some(smaller) => (format!("{}.{}", stem(name), smaller.ending), smaller.bytes),
