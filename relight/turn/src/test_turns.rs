@@ -197,6 +197,7 @@ pub(crate) fn metal_ball() -> (Surface, ShLight, TurnCurves) {
     let metal = ShadingModel {
         frame: table,
         light: TableLight::from_viewer(&light, &table),
+        diffuse_beyond: GlossLight::NONE,
         gloss: GlossLight::sum(&shown, &factors),
         material: MaterialKind::Metal,
     };

@@ -120,6 +120,7 @@ pub(crate) fn fit_lambertian(
         let model = ShadingModel {
             frame: *frame,
             light,
+            diffuse_beyond: GlossLight::NONE,
             gloss,
             material: MaterialKind::Diffuse,
         };
@@ -185,6 +186,7 @@ fn fit_reflection(
     Some(ShadingModel {
         frame: *frame,
         light: TableLight::of_mirror(&gloss).ok()?,
+        diffuse_beyond: GlossLight::NONE,
         gloss,
         material: MaterialKind::Metal,
     })

@@ -213,6 +213,7 @@ impl Setting {
         ShadingModel {
             frame: self.frame,
             light: known.diffuse,
+            diffuse_beyond: known.diffuse_beyond,
             gloss,
             material,
         }

@@ -90,9 +90,14 @@ impl Estimate {
             Unknowns::Reflection => TableLight::of_mirror(&gloss).unwrap_or(self.light),
             _ => self.light,
         };
+        let diffuse_beyond = match unknowns {
+            Unknowns::Gloss(known) => known.diffuse_beyond,
+            _ => GlossLight::NONE,
+        };
         ShadingModel {
             frame: *frame,
             light,
+            diffuse_beyond,
             gloss,
             material: unknowns.material(),
         }

@@ -4,13 +4,20 @@ use relight_core::light::ShLight;
 
 use crate::model::frame::TableFrame;
 use crate::model::gloss::GlossLight;
+use crate::model::harmonics::GLOSS_ORDER;
 use crate::model::lighting::TableLight;
 use crate::model::metal::MIRROR;
+
+/// The cosine lobe's coefficient of the even bands beyond the second, over π: that of band l is
+/// 2 (-1)^(l/2 - 1) / ((l + 2) (l - 1)) · l! / (2^l (l/2)!²) (Ramamoorthi and Hanrahan 2001, equation 8). Odd bands have 0.
+const COSINE_LOBE_BEYOND: [(usize, f64); 2] = [(4, -1.0 / 24.0), (6, 1.0 / 64.0)];
 
 /// A light that was measured.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct KnownLight {
     pub(crate) diffuse: TableLight,
+    /// The irradiance by its bands beyond the second, as a mirror would show it.
+    pub(crate) diffuse_beyond: GlossLight,
     bands: Vec<GlossLight>,
     mirror: Vec<GlossLight>,
 }
@@ -18,10 +25,15 @@ pub(crate) struct KnownLight {
 impl KnownLight {
     pub(crate) fn new(light: &ShLight, frame: &TableFrame) -> Self {
         let bands = GlossLight::bands(&light.rotated(&frame.rotation()));
-        let mirror = bands.iter().map(|band| band.times([MIRROR; 3]));
+        let mirror: Vec<GlossLight> = bands.iter().map(|band| band.times([MIRROR; 3])).collect();
+        let mut factors = [0.0; GLOSS_ORDER + 1];
+        for (band, factor) in COSINE_LOBE_BEYOND {
+            factors[band] = factor;
+        }
         Self {
             diffuse: TableLight::from_viewer(light, frame),
-            mirror: mirror.collect(),
+            diffuse_beyond: GlossLight::sum(&mirror, &factors),
+            mirror,
             bands,
         }
     }
@@ -55,6 +67,7 @@ mod tests {
         let model = |material| ShadingModel {
             frame,
             light: known.diffuse,
+            diffuse_beyond: GlossLight::NONE,
             gloss: GlossLight::sum(known.mirror(), &[1.0; 3]),
             material,
         };

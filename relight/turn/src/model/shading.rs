@@ -13,6 +13,9 @@ use crate::model::metal::mirror_terms;
 pub(crate) struct ShadingModel {
     pub(crate) frame: TableFrame,
     pub(crate) light: TableLight,
+    /// What a diffuse surface shows of the bands beyond the second, as a mirror would show it along the normal; of a light
+    /// that had to be found nothing is known of them.
+    pub(crate) diffuse_beyond: GlossLight,
     /// What gloss shows of it beside the diffuse part; of metal, what a white one shows.
     pub(crate) gloss: GlossLight,
     pub(crate) material: MaterialKind,
@@ -32,16 +35,34 @@ impl ShadingModel {
     pub(crate) fn harmonics(&self, normal: [f64; 3]) -> PixelHarmonics {
         let reflected = self.frame.to_table(reflected(normal));
         match self.material {
-            MaterialKind::Diffuse => PixelHarmonics {
-                base: self.light.harmonics(self.frame.to_table(normal)),
-                count: LAMBERTIAN_COEFFICIENTS,
-                gloss: self.gloss.harmonics(normal[2], reflected),
-            },
+            MaterialKind::Diffuse => {
+                let (base, count) = self.diffuse(self.frame.to_table(normal));
+                PixelHarmonics {
+                    base,
+                    count,
+                    gloss: self.gloss.harmonics(normal[2], reflected),
+                }
+            }
             MaterialKind::Metal => PixelHarmonics {
                 base: self.gloss.harmonics_of(&mirror_terms(reflected)),
                 count: COEFFICIENTS,
                 gloss: [[0.0; COEFFICIENTS]; 3],
             },
         }
+    }
+
+    /// The irradiance on a normal in the table's frame as harmonics, and how many of them there are.
+    fn diffuse(&self, normal: [f64; 3]) -> ([[f64; COEFFICIENTS]; 3], usize) {
+        let mut base = self.light.harmonics(normal);
+        if self.diffuse_beyond.is_none() {
+            return (base, LAMBERTIAN_COEFFICIENTS);
+        }
+        let beyond = self.diffuse_beyond.harmonics_of(&mirror_terms(normal));
+        let pairs = base
+            .as_flattened_mut()
+            .iter_mut()
+            .zip(beyond.as_flattened());
+        pairs.for_each(|(sum, part)| *sum += part);
+        (base, COEFFICIENTS)
     }
 }

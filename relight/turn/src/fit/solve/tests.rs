@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 use relight_core::image::{Extent, Planes};
-use relight_core::light::{Direction, Normals, Rotation, YUp};
+use relight_core::light::{Direction, Normals, Order, Rotation, ShLight, YUp};
 use relight_core::render::Surface;
 
 use crate::model::gloss::GlossLight;
@@ -156,6 +156,26 @@ fn a_turn_of_which_a_third_is_missing_gives_the_same() {
     assert!(albedo_off < 0.01, "{albedo_off}");
 }
 
+/// A lamp beside even light, to the order of gloss.
+fn lamp() -> ShLight {
+    let towards = Direction::new(0.8, 0.5, 0.3).unwrap();
+    let mut light = ShLight::even(Order::GLOSS, [0.4; 3]);
+    let lamp = relight_core::light::basis(Order::GLOSS, towards);
+    for (values, lamp) in light.coefficients_mut().iter_mut().zip(lamp) {
+        *values = values.map(|value| value + 2.0 * lamp);
+    }
+    light
+}
+
+#[test]
+fn a_known_lamp_s_fourth_band_bends_no_normals() {
+    let (surface, light) = (ball(), lamp());
+    let curves = film(&surface, &light, TAKE);
+    let found = solve_turn(&curves, &known(&light)).unwrap();
+    let off = off(&surface, &found.normals(&curves));
+    assert!(off < 0.2, "{off}");
+}
+
 #[test]
 fn gloss_beside_the_diffuse_part_is_found_in_known_light() {
     let (surface, light) = (ball(), environment());
@@ -164,6 +184,7 @@ fn gloss_beside_the_diffuse_part_is_found_in_known_light() {
     let glossy = ShadingModel {
         frame: table,
         light: TableLight::from_viewer(&light, &table),
+        diffuse_beyond: GlossLight::NONE,
         gloss: GlossLight::sum(&shown, &[0.5, 0.4, 0.3]),
         material: MaterialKind::Diffuse,
     };
