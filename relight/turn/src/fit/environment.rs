@@ -41,7 +41,7 @@ const PARAMETERS: EnvironmentParameters = EnvironmentParameters {
 
 /// The light that fits the curves of a known surface best: of a ball whose albedo is known, say, or of an object with
 /// its truth. Pixels without a normal do not count. It is in the viewer's frame at the table's angle 0. Bands beyond
-/// the second, which a Lambertian surface does not show, are those that gloss shows, where there is any: as if it
+/// the second, which a Lambertian surface hardly shows, are those that gloss shows, where there is any: as if it
 /// blurred them no more than band 2.
 ///
 /// # Errors
