@@ -10,6 +10,7 @@
 mod brightness;
 mod demand;
 mod fit;
+mod median;
 mod region;
 mod structure;
 mod template;

@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
+use super::median::{LANES, Medians};
 use super::structure::{Plane, add_scaled, cubic};
 
 /// Pixels of a template; those that say most about a shift are kept.
@@ -142,28 +143,29 @@ fn band(
             around.map(|y| moved_row(plane, shift, y)).collect()
         })
         .collect();
-    let mut across = Vec::with_capacity(planes.len());
-    let mut down = Vec::with_capacity(planes.len());
-    let mut scratch = Vec::with_capacity(planes.len());
+    let mut medians = Medians::new(planes.len());
+    let [mut across, mut down] = [0, 1].map(|_| vec![[0.0; LANES]; planes.len()]);
     for (at, (row, needed)) in found.iter_mut().zip(needed).enumerate() {
-        for x in needed {
-            across.clear();
-            down.clear();
-            for rows in &moved {
+        for columns in needed.chunks(LANES) {
+            for ((rows, across), down) in moved.iter().zip(&mut across).zip(&mut down) {
                 let [above, here, below] = [&rows[at], &rows[at + 1], &rows[at + 2]];
-                across.push(0.5 * (here[x + 1] - here[x - 1]));
-                down.push(0.5 * (below[x] - above[x]));
+                for ((&x, across), down) in columns.iter().zip(across).zip(down) {
+                    *across = 0.5 * (here[x + 1] - here[x - 1]);
+                    *down = 0.5 * (below[x] - above[x]);
+                }
             }
-            let (mid_x, mid_y) = (
-                middle_of(&across, &mut scratch),
-                middle_of(&down, &mut scratch),
-            );
-            for (a, d) in across.iter_mut().zip(&down) {
-                let (x, y) = (*a - mid_x, d - mid_y);
-                *a = (x * x + y * y).sqrt();
+            let (mid_x, mid_y) = (medians.of(&across), medians.of(&down));
+            for (across, down) in across.iter_mut().zip(&down) {
+                for (lane, (a, d)) in across.iter_mut().zip(down).enumerate() {
+                    let (x, y) = (*a - mid_x[lane], d - mid_y[lane]);
+                    *a = (x * x + y * y).sqrt();
+                }
             }
-            row.gradients[x] = [mid_x, mid_y];
-            row.deviations[x] = middle(&mut across);
+            let deviations = medians.of(&across);
+            for (lane, &x) in columns.iter().enumerate() {
+                row.gradients[x] = [mid_x[lane], mid_y[lane]];
+                row.deviations[x] = deviations[lane];
+            }
         }
     }
     found
@@ -207,22 +209,6 @@ fn moved_row(plane: &Plane, [dx, dy]: [f64; 2], y: isize) -> Vec<f32> {
         moved[to..].iter_mut().for_each(|to| *to += weight * last);
     }
     moved
-}
-
-/// The median of values that keep their order.
-fn middle_of(values: &[f32], scratch: &mut Vec<f32>) -> f32 {
-    scratch.clear();
-    scratch.extend_from_slice(values);
-    middle(scratch)
-}
-
-/// The median, for an even number the upper one; 0 of nothing.
-fn middle(values: &mut [f32]) -> f32 {
-    let at = values.len() / 2;
-    if at >= values.len() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(at, f32::total_cmp).1
 }
 
 #[cfg(test)]

@@ -27,6 +27,8 @@ pub(super) struct SourceMask {
     pub(super) image: GrayImage,
     /// For each row, the columns from the first under the mask to the last.
     hulls: Vec<Range<usize>>,
+    /// For each row, the runs of columns under the mask.
+    runs: Vec<Vec<Range<usize>>>,
 }
 
 impl SourceMask {
@@ -37,11 +39,26 @@ impl SourceMask {
             start..end.map_or(start, |last| last + 1)
         };
         let width = image.width().max(1) as usize;
+        let rows = || image.as_raw().chunks_exact(width);
         Self {
-            hulls: image.as_raw().chunks_exact(width).map(hull).collect(),
+            hulls: rows().map(hull).collect(),
+            runs: rows().map(runs).collect(),
             image,
         }
     }
+}
+
+/// The runs of a mask's row that are not 0.
+fn runs(row: &[u8]) -> Vec<Range<usize>> {
+    let mut runs = Vec::new();
+    let mut at = 0;
+    for run in row.chunk_by(|a, b| (*a != 0) == (*b != 0)) {
+        if run[0] != 0 {
+            runs.push(at..at + run.len());
+        }
+        at += run.len();
+    }
+    runs
 }
 
 /// What a thread needs to scale crops; it keeps its memory from frame to frame.
@@ -51,6 +68,9 @@ pub struct ScaleBuffers {
     light: [Vec<f32>; PLANES],
     /// Output rows before they are filtered across; each is used again for later ones.
     sums: Vec<[Vec<f32>; PLANES]>,
+    /// An output row's light, and its levels, channel by channel.
+    across: Vec<f32>,
+    levels: Vec<u16>,
 }
 
 /// The gathering of one crop's pixels.
@@ -91,15 +111,12 @@ impl Gather<'_> {
         }
     }
 
-    /// The columns of a row, with the apron, that hold light, and may hold 0.
+    /// The columns of a row, with the apron, that hold light of a moved crop, and may hold 0.
     fn columns(&self, row: i64) -> Range<usize> {
         let hull = |row: i64| {
             let at = usize::try_from(row).ok();
             let hull = at.and_then(|at| self.source.hulls.get(at)).cloned();
             hull.filter(|hull| !hull.is_empty())
-        };
-        let Some(_) = self.part else {
-            return hull(row).unwrap_or_default();
         };
         // A moved mask reaches one pixel further.
         let around = [row - 1, row, row + 1].into_iter().filter_map(hull);
@@ -127,7 +144,11 @@ impl WithSimd for Run<'_, '_> {
             None => PLANES,
         };
         let ring = gather.down.overlap().max(1);
-        buffers.reset(source + gather.across.taps(), ring);
+        buffers.reset(
+            source + gather.across.taps(),
+            ring,
+            3 * gather.mask.width() as usize,
+        );
         let mask = gather.mask;
         let mut scaled = RgbImage::new(mask.width(), mask.height());
         let (mut first, mut next) = (0, 0);
@@ -138,40 +159,29 @@ impl WithSimd for Run<'_, '_> {
                 measuring.add_row::<4>(gather.crop.row(y, 0));
             }
             while next < gather.down.outputs() && gather.down.window(next).0 <= at {
-                for plane in &mut buffers.sums[next % ring] {
+                for plane in buffers.sums[next % ring].iter_mut().take(planes) {
                     plane.fill(0.0);
                 }
                 next += 1;
             }
-            let columns = gather.columns(y);
-            if !columns.is_empty() {
-                light_of(
-                    &row[4 * columns.start..4 * columns.end],
-                    &columns,
-                    &mut buffers.light,
-                );
-                match gather.part {
-                    None => cut_out(
-                        gather.source.image.as_raw(),
-                        at * source,
-                        &columns,
-                        &mut buffers.light,
-                    ),
-                    Some(part) => {
-                        share(&gather.source.image, part, y, &columns, &mut buffers.light)
+            match gather.part {
+                None => {
+                    for columns in gather.source.runs.get(at).into_iter().flatten() {
+                        light_of(row, columns, &mut buffers.light);
+                        gather.add(first..next, at, columns, planes, buffers);
                     }
                 }
-                for output in first..next {
-                    let (start, weights) = gather.down.window(output);
-                    let weight = weights[at - start];
-                    let sums = &mut buffers.sums[output % ring];
-                    for (sum, light) in sums.iter_mut().zip(&buffers.light).take(planes) {
-                        add_scaled(&mut sum[columns.clone()], &light[columns.clone()], weight);
+                Some(part) => {
+                    let columns = gather.columns(y);
+                    if !columns.is_empty() {
+                        light_of(row, &columns, &mut buffers.light);
+                        share(&gather.source.image, part, y, &columns, &mut buffers.light);
+                        gather.add(first..next, at, &columns, planes, buffers);
                     }
                 }
             }
             while first < next && gather.down.end(first) <= at + 1 {
-                gather.finish(first, &buffers.sums[first % ring], &mut scaled);
+                gather.finish(first, buffers, &mut scaled);
                 first += 1;
             }
         }
@@ -180,37 +190,72 @@ impl WithSimd for Run<'_, '_> {
 }
 
 impl Gather<'_> {
+    /// Adds the light of row `at` to these output rows, in these columns.
+    #[inline(always)]
+    fn add(
+        &self,
+        outputs: Range<usize>,
+        at: usize,
+        columns: &Range<usize>,
+        planes: usize,
+        ScaleBuffers { light, sums, .. }: &mut ScaleBuffers,
+    ) {
+        let ring = sums.len();
+        for output in outputs {
+            let (start, weights) = self.down.window(output);
+            let weight = weights[at - start];
+            let sums = &mut sums[output % ring];
+            for (sum, light) in sums.iter_mut().zip(&*light).take(planes) {
+                add_scaled(&mut sum[columns.clone()], &light[columns.clone()], weight);
+            }
+        }
+    }
+
     /// Filters an output row across.
     #[inline(always)]
-    fn finish(&self, output: usize, sums: &[Vec<f32>; PLANES], scaled: &mut RgbImage) {
-        let mask = self.mask;
-        let width = mask.width() as usize;
+    fn finish(&self, output: usize, buffers: &mut ScaleBuffers, scaled: &mut RgbImage) {
+        let ScaleBuffers {
+            sums,
+            across,
+            levels,
+            ..
+        } = buffers;
+        let sums = &sums[output % sums.len()];
+        let width = self.mask.width() as usize;
         let row = output * width..(output + 1) * width;
-        let pixels = scaled
-            .get_mut(3 * row.start..3 * row.end)
-            .unwrap_or_default();
-        let mask = mask.as_raw().get(row.clone()).unwrap_or_default();
-        for ((x, pixel), mask) in pixels.chunks_exact_mut(3).enumerate().zip(mask) {
-            if *mask == 0 {
+        let mask = self.mask.as_raw().get(row.clone()).unwrap_or_default();
+        let [red, green, blue, shares] = sums;
+        for (x, pixel) in across.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            if mask[x] == 0 {
+                *pixel = [0.0; 3];
                 continue;
             }
             let (start, weights) = self.across.window(x);
-            let filtered = |plane: &Vec<f32>| dot(weights, &plane[start..start + weights.len()]);
-            let [red, green, blue, shares] = sums;
+            let filtered = |plane: &[f32]| dot(weights, &plane[start..start + weights.len()]);
             let gain = match self.gain {
                 Some(gain) => gain[row.start + x],
                 // Where nothing of the moved object is left, the pixel stays 0.
                 None => 1.0 / filtered(shares).max(1e-5),
             };
-            for (value, plane) in pixel.iter_mut().zip([red, green, blue]) {
-                *value = self.srgb.value(gain * filtered(plane));
+            for (light, channel) in pixel.iter_mut().zip([red, green, blue]) {
+                *light = gain * filtered(channel);
             }
+        }
+        // In loops of their own: the first of them becomes vector instructions, the second waits for the table only.
+        for (level, light) in levels.iter_mut().zip(&*across) {
+            *level = Srgb::level(*light);
+        }
+        let values = scaled.get_mut(3 * row.start..3 * row.end);
+        for (value, level) in values.unwrap_or_default().iter_mut().zip(&*levels) {
+            *value = self.srgb.value(*level);
         }
     }
 }
 
 impl ScaleBuffers {
-    fn reset(&mut self, length: usize, ring: usize) {
+    fn reset(&mut self, length: usize, ring: usize, values: usize) {
+        self.across.resize(values, 0.0);
+        self.levels.resize(values, 0);
         let all = self.sums.iter_mut().flatten().chain(&mut self.light);
         for plane in all.filter(|plane| plane.len() != length) {
             plane.clear();
@@ -221,27 +266,16 @@ impl ScaleBuffers {
     }
 }
 
-/// The light of a run of pixels, at their columns.
+/// The light of these columns of a row.
 #[inline(always)]
-fn light_of(pixels: &[u8], columns: &Range<usize>, light: &mut [Vec<f32>; PLANES]) {
+fn light_of(row: &[u8], columns: &Range<usize>, light: &mut [Vec<f32>; PLANES]) {
+    let pixels = &row[4 * columns.start..4 * columns.end];
     // One channel at a time: the processor has too few registers for three.
     for (channel, plane) in (0..3).zip(light) {
         let plane = &mut plane[columns.clone()];
         for (pixel, light) in pixels.chunks_exact(4).zip(plane) {
             let all = u32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
             *light = linear((all >> (8 * channel)) & 255);
-        }
-    }
-}
-
-/// Sets the light outside the mask to 0; the mask's row begins at `start`.
-#[inline(always)]
-fn cut_out(mask: &[u8], start: usize, columns: &Range<usize>, light: &mut [Vec<f32>; PLANES]) {
-    let mask = &mask[start + columns.start..start + columns.end];
-    let [red, green, blue, _] = light;
-    for plane in [red, green, blue] {
-        for (light, mask) in plane[columns.clone()].iter_mut().zip(mask) {
-            *light = if *mask != 0 { *light } else { 0.0 };
         }
     }
 }
@@ -309,4 +343,32 @@ fn dot(weights: &[f32], values: &[f32]) -> f32 {
         }
     }
     (lanes[0] + lanes[2]) + (lanes[1] + lanes[3])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_runs_of_a_row_are_what_lies_under_the_mask_and_nothing_else() {
+        for row in [
+            &[][..],
+            &[0, 0],
+            &[255, 255, 255],
+            &[0, 255, 0, 255, 128, 0],
+            &[1, 0, 0, 7],
+        ] {
+            let runs = runs(row);
+            let under = |at: usize| runs.iter().any(|run| run.contains(&at));
+            assert!(
+                row.iter().enumerate().all(|(at, &m)| under(at) == (m != 0)),
+                "{row:?}"
+            );
+            // No two of them touch.
+            assert!(
+                runs.windows(2).all(|pair| pair[0].end < pair[1].start),
+                "{row:?}"
+            );
+        }
+    }
 }

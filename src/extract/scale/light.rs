@@ -4,22 +4,28 @@ use relit_data::srgb::from_linear;
 
 /// From light to sRGB values.
 #[derive(Debug)]
-pub(super) struct Srgb(Vec<u8>);
+pub(super) struct Srgb(Box<[u8; 1 << 16]>);
 
 impl Srgb {
     pub(super) fn new() -> Self {
         let value = |light: u16| 255.0 * from_linear(f64::from(light) / 65535.0);
-        Self(
-            (0..=u16::MAX)
-                .map(|light| value(light).round() as u8)
-                .collect(),
-        )
+        let mut values = Box::new([0; 1 << 16]);
+        for (to, level) in values.iter_mut().zip(0..=u16::MAX) {
+            *to = value(level).round() as u8;
+        }
+        Self(values)
     }
 
-    /// The value of a light of 0..=1; brighter light has the brightest value, and negative the darkest.
+    /// The level of a light of 0..=1; brighter light has the highest, and negative the lowest.
     #[inline(always)]
-    pub(super) fn value(&self, light: f32) -> u8 {
-        self.0[usize::from((65535.0 * light + 0.5) as u16)]
+    pub(super) fn level(light: f32) -> u16 {
+        (65535.0 * light + 0.5) as u16
+    }
+
+    /// The value of a level.
+    #[inline(always)]
+    pub(super) fn value(&self, level: u16) -> u8 {
+        self.0[usize::from(level)]
     }
 }
 
@@ -60,8 +66,11 @@ mod tests {
             let exact = relit_data::srgb::to_linear(f64::from(value) / 255.0);
             let light = linear(value);
             assert!((f64::from(light) - exact).abs() < 6e-6, "{value}: {light}");
-            assert_eq!(u32::from(srgb.value(light)), value);
+            assert_eq!(u32::from(srgb.value(Srgb::level(light))), value);
         }
-        assert_eq!((srgb.value(2.0), srgb.value(-1.0)), (255, 0));
+        assert_eq!(
+            (srgb.value(Srgb::level(2.0)), srgb.value(Srgb::level(-1.0))),
+            (255, 0)
+        );
     }
 }
