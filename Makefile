@@ -107,14 +107,14 @@ test-image: image ## Run the container image without a daemon, as a cluster does
 
 wheel: $(PYTHON_VENV)/ready ## Make the Python package, one wheel for Python 3.9 and newer
 	$(PYTHON_VENV)/bin/maturin build --release --locked -m relight/python/Cargo.toml -i $(PYTHON_VENV)/bin/python \
-	    --out $(TARGET)/packages
+	    --out target/packages
 
 test-python: wheel $(DEMO)/mask.png ## Install the Python package and test it; tests of torch run where it is installed
-	$(PYTHON_VENV)/bin/pip install --quiet --force-reinstall --no-deps $(TARGET)/packages/relit-*.whl
+	$(PYTHON_VENV)/bin/pip install --quiet --force-reinstall --no-deps target/packages/relit-*.whl
 	cd relight/python/tests && RELIT_DATA=$(abspath $(DEMO))/out $(abspath $(PYTHON_VENV))/bin/python -m pytest -q -rs .
 
 bench-python: wheel $(DEMO)/mask.png ## Measure the reader through Python against webdataset
-	$(PYTHON_VENV)/bin/pip install --quiet --force-reinstall --no-deps $(TARGET)/packages/relit-*.whl
+	$(PYTHON_VENV)/bin/pip install --quiet --force-reinstall --no-deps target/packages/relit-*.whl
 	$(PYTHON_VENV)/bin/pip install --quiet -r tests/bench/requirements.txt
 	$(PYTHON_VENV)/bin/python tests/bench/python_reader.py --runs $(BENCH_RUNS) $(DEMO)/out
 
